@@ -1,0 +1,79 @@
+"""Rotations between the earth frame (NED) and the body frame (FRD), and geodetic to local positions.
+
+Quaternions are Hamilton, body to earth, `(w, x, y, z)`. Euler angles are Z-Y-X (yaw, pitch, roll), radians.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flownav.compile import equation
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+Rotation = tuple[float, float, float, float, float, float, float, float, float]
+
+
+@equation
+def rotation_from_quaternion(w: float, x: float, y: float, z: float) -> Rotation:
+    """R_EB (body to earth) row by row, nine scalars; the quaternion has unit length (paper eq. 1, corrected)."""
+    return (
+        1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
+        2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
+        2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
+    )  # fmt: skip
+
+
+@equation
+def to_earth(rotation: Rotation, x: float, y: float, z: float) -> Vector:
+    """R_EB [x y z]': a body FRD vector in earth NED."""
+    return (
+        rotation[0] * x + rotation[1] * y + rotation[2] * z,
+        rotation[3] * x + rotation[4] * y + rotation[5] * z,
+        rotation[6] * x + rotation[7] * y + rotation[8] * z,
+    )
+
+
+@equation
+def to_body(rotation: Rotation, x: float, y: float, z: float) -> Vector:
+    """R_EB' [x y z]': an earth NED vector in body FRD."""
+    return (
+        rotation[0] * x + rotation[3] * y + rotation[6] * z,
+        rotation[1] * x + rotation[4] * y + rotation[7] * z,
+        rotation[2] * x + rotation[5] * y + rotation[8] * z,
+    )
+
+
+@equation
+def quaternion_rate(w: float, x: float, y: float, z: float, p: float, q: float, r: float) -> Quaternion:
+    """dq/dt = q * (0, p, q, r) / 2, body rates [rad/s] (paper eqs. 8-10 without their singularity)."""
+    return (
+        0.5 * (-x * p - y * q - z * r),
+        0.5 * (w * p + y * r - z * q),
+        0.5 * (w * q - x * r + z * p),
+        0.5 * (w * r + x * q - y * p),
+    )
+
+
+@equation
+def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quaternion:
+    """Unit quaternion of Z-Y-X Euler angles [rad]."""
+    cr, sr = np.cos(0.5 * roll), np.sin(0.5 * roll)
+    cp, sp = np.cos(0.5 * pitch), np.sin(0.5 * pitch)
+    cy, sy = np.cos(0.5 * yaw), np.sin(0.5 * yaw)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+@equation
+def euler_from_quaternion(w: float, x: float, y: float, z: float) -> Vector:
+    """Roll, pitch, yaw [rad] of a unit quaternion; pitch is held to +-90 degrees."""
+    return (
+        np.arctan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+        np.arcsin(min(1.0, max(-1.0, 2.0 * (w * y - x * z)))),
+        np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)),
+    )

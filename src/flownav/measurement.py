@@ -1,0 +1,159 @@
+"""Measurements: timed readings of one sensor with their noise, delay and validity.
+
+Every source (simulation, a log, a live link) yields them and every filter takes them. One reading is a
+`Measurement`; a whole sensor's readings are a `Stream`, the same fields as columns, which is how logs are
+read, records are kept and kernels are fed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+class Sensor(IntEnum):
+    """What measured. The values are stable: they are written to records and read by kernels."""
+
+    GPS_POSITION = 1  # north, east, down of the local frame [m]
+    GPS_VELOCITY = 2  # north, east, down [m/s]
+    FLOW_RATE = 3  # flow_x, flow_y, gyro_x, gyro_y [rad/s], PX4 convention: flow_x = w_x - v_y/r, flow_y = w_y + v_x/r
+    FLOW_VELOCITY = 4  # forward, right, down of the body frame [m/s]; down is NaN where the sensor has none
+    RANGE = 5  # along the boresight [m]
+    IMU = 6  # gyro x, y, z [rad/s], specific force x, y, z [m/s2], body FRD
+    ATTITUDE = 7  # quaternion w, x, y, z, body FRD to earth NED
+    BARO = 8  # altitude, positive up [m]
+    MAG = 9  # field x, y, z, body FRD [gauss]
+    POSE = 10  # an external position: north, east, down [m]
+
+
+COLUMNS: dict[Sensor, tuple[str, ...]] = {
+    Sensor.GPS_POSITION: ("pos_n_m", "pos_e_m", "pos_d_m"),
+    Sensor.GPS_VELOCITY: ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s"),
+    Sensor.FLOW_RATE: ("flow_x_rad_s", "flow_y_rad_s", "gyro_x_rad_s", "gyro_y_rad_s"),
+    Sensor.FLOW_VELOCITY: ("vel_u_m_s", "vel_v_m_s", "vel_w_m_s"),
+    Sensor.RANGE: ("range_m",),
+    Sensor.IMU: (
+        "gyro_x_rad_s",
+        "gyro_y_rad_s",
+        "gyro_z_rad_s",
+        "accel_x_m_s2",
+        "accel_y_m_s2",
+        "accel_z_m_s2",
+    ),
+    Sensor.ATTITUDE: ("qw", "qx", "qy", "qz"),
+    Sensor.BARO: ("alt_m",),
+    Sensor.MAG: ("mag_x_gauss", "mag_y_gauss", "mag_z_gauss"),
+    Sensor.POSE: ("pos_n_m", "pos_e_m", "pos_d_m"),
+}
+MAX_VALUES = max(len(names) for names in COLUMNS.values())
+
+
+class Measurement(NamedTuple):
+    """One reading. `t_s` is when it arrived; it describes the vehicle at `t_s - delay_s`.
+
+    value: as COLUMNS[sensor] names it. variance: of each value; NaN where the sensor states none and the
+    filter's own model serves. quality: 0..255, 0 = no data (255 where the sensor has no such figure).
+    """
+
+    t_s: float
+    sensor: Sensor
+    value: tuple[float, ...]
+    variance: tuple[float, ...]
+    delay_s: float = 0.0
+    quality: float = 255.0
+
+
+@dataclass(frozen=True)
+class Stream:
+    """All readings of one sensor, in order of arrival.
+
+    t_s (n,), value (n, k) with k = len(COLUMNS[sensor]), variance (n, k) NaN where unstated, quality (n,)
+    0..255, delay_s one number. `rejected` counts what the reader threw away, by reason.
+    """
+
+    sensor: Sensor
+    t_s: Array
+    value: Array
+    variance: Array
+    quality: Array
+    delay_s: float = 0.0
+    rejected: dict[str, int] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        sensor: Sensor,
+        t_s: Array,
+        value: Array,
+        *,
+        variance: Array | None = None,
+        quality: Array | None = None,
+        delay_s: float = 0.0,
+        rejected: dict[str, int] | None = None,
+    ) -> Stream:
+        """A stream from arrays; unstated variances are NaN, unstated quality is 255. ValueError on a wrong shape."""
+        count, width = len(t_s), len(COLUMNS[sensor])
+        value = np.asarray(value, float).reshape(count, -1)
+        if value.shape != (count, width):
+            raise ValueError(f"{sensor.name} takes {width} values a reading, got {value.shape[1]}")
+        return cls(
+            sensor,
+            np.asarray(t_s, float),
+            value,
+            np.full((count, width), np.nan) if variance is None else np.asarray(variance, float),
+            np.full(count, 255.0) if quality is None else np.asarray(quality, float),
+            delay_s,
+            dict(rejected or {}),
+        )
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    def __iter__(self) -> Iterator[Measurement]:
+        for t, value, variance, quality in zip(self.t_s, self.value, self.variance, self.quality, strict=True):
+            yield Measurement(float(t), self.sensor, tuple(value), tuple(variance), self.delay_s, float(quality))
+
+
+class EventQueue(NamedTuple):
+    """Every stream's readings in one time order, as the kernels take them.
+
+    t_s (n,) the instant each reading describes (arrival less delay); sensor (n,) int64; value and variance
+    (n, MAX_VALUES), unused columns NaN; quality (n,); index (n,) the row in its own stream.
+    """
+
+    t_s: Array
+    sensor: NDArray[np.int64]
+    value: Array
+    variance: Array
+    quality: Array
+    index: NDArray[np.int64]
+
+
+def merge(streams: Iterable[Stream]) -> EventQueue:
+    """Readings of all streams ordered by the instant they describe; ties keep the order of the streams."""
+    streams = [s for s in streams if len(s)]
+
+    def padded(values: Array) -> Array:
+        return np.pad(values, ((0, 0), (0, MAX_VALUES - values.shape[1])), constant_values=np.nan)
+
+    if not streams:
+        empty = np.zeros((0, MAX_VALUES))
+        none = np.zeros(0)
+        return EventQueue(none, none.astype(np.int64), empty, empty, none, none.astype(np.int64))
+    t_s = np.concatenate([s.t_s - s.delay_s for s in streams])
+    order = np.argsort(t_s, kind="stable")
+    return EventQueue(
+        t_s[order],
+        np.concatenate([np.full(len(s), int(s.sensor)) for s in streams])[order],
+        np.concatenate([padded(s.value) for s in streams])[order],
+        np.concatenate([padded(s.variance) for s in streams])[order],
+        np.concatenate([s.quality for s in streams])[order],
+        np.concatenate([np.arange(len(s)) for s in streams])[order],
+    )

@@ -1,0 +1,101 @@
+"""TOML parameter files: units in the key names, provenance beside the values, one clear line on a mistake.
+
+A number may stand bare, `radius_m = 0.89`, or with its provenance,
+`radius_m = { value = 0.89, uncertainty = 0.03, source = "800 mm blade + grip" }`.
+A file's schema is a pydantic model of `Number` fields with their allowed ranges.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+
+from flownav.errors import InputError
+
+PROVENANCE_KEYS = {"value", "uncertainty", "source"}
+
+
+def _value_of(entry: Any) -> Any:
+    """The number of an entry that may carry its provenance."""
+    if isinstance(entry, dict):
+        if "value" not in entry or not set(entry) <= PROVENANCE_KEYS:
+            raise ValueError("an entry with provenance is { value = ..., uncertainty = ..., source = ... }")
+        return entry["value"]
+    if isinstance(entry, bool):
+        raise ValueError("a number is needed, not true or false")
+    return entry
+
+
+Number = Annotated[float, BeforeValidator(_value_of)]
+
+
+class ParameterModel(BaseModel):
+    """Base of every file schema: unknown keys, NaN and infinity are refused; loaded values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def shipped(name: str) -> Path:
+    """The path of a data file that ships with flownav, e.g. `maxi_joker_3.toml`."""
+    return Path(str(resources.files("flownav") / "data" / name))
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """A TOML file as nested dictionaries. InputError names the file and the line at fault."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read ({error})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not valid TOML: {error}") from None
+
+
+def load(path: Path, schema: type[Model]) -> Model:
+    """Read and check a parameter file. InputError names file, key and what is allowed, in one line."""
+    return check(read_toml(path), schema, str(path))
+
+
+def check(entries: dict[str, Any], schema: type[Model], where: str) -> Model:
+    """Check entries against a schema. InputError as `load`; `where` names the file."""
+    try:
+        return schema.model_validate(entries)
+    except ValidationError as error:
+        first, *others = error.errors()
+        key = ".".join(str(part) for part in first["loc"])
+        more = f" (and {len(others)} more)" if others else ""
+        raise InputError(f"{where}: {key}: {_sentence(first, schema)}{more}") from None
+
+
+def _sentence(error: Any, schema: type[BaseModel]) -> str:
+    """What is wrong with one key and what would be right."""
+    kind, given = error["type"], error["input"]
+    if kind == "extra_forbidden":
+        known = ", ".join(sorted(_keys_beside(error["loc"], schema)))
+        return f"unknown key; known here: {known}"
+    if kind == "missing":
+        return "missing; add it"
+    return f"{error['msg'].removeprefix('Value error, ')}, got {_number_of(given)!r}"
+
+
+def _number_of(given: Any) -> Any:
+    return given.get("value", given) if isinstance(given, dict) else given
+
+
+def _keys_beside(location: tuple[Any, ...], schema: type[BaseModel]) -> list[str]:
+    """The field names of the table in which an unknown key stands."""
+    model: Any = schema
+    for part in location[:-1]:
+        info = model.model_fields.get(part)
+        model = info.annotation if info is not None else None
+        if not (isinstance(model, type) and issubclass(model, BaseModel)):
+            return []
+    return list(model.model_fields)

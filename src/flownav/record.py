@@ -1,0 +1,121 @@
+"""Record: the one bundle that fly, replay and live write and that scoring, report and export read.
+
+On disk a record is a zip of Parquet tables and one `manifest.json`: it loads in any language without the
+code that wrote it. Table and column names carry frame and unit; `TABLES` is the vocabulary.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.errors import InputError
+
+SCHEMA_VERSION = 1
+
+POSITION_NED = ("pos_n_m", "pos_e_m", "pos_d_m")
+VELOCITY_BODY = ("vel_u_m_s", "vel_v_m_s", "vel_w_m_s")
+QUATERNION = ("qw", "qx", "qy", "qz")
+
+# The vocabulary: every table has `t_s` first; a writer may leave a table or a trailing column out.
+TABLES: dict[str, tuple[str, ...]] = {
+    # what was so (simulation, motion capture)
+    "truth": (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, "rate_p_rad_s", "rate_q_rad_s", "rate_r_rad_s",
+              "thrust_n", "on_ground"),  # fmt: skip
+    # what the filter says, with one standard deviation of each
+    "estimate": (*POSITION_NED, *VELOCITY_BODY, *QUATERNION,
+                 *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY))),  # fmt: skip
+    # what another estimator said (an autopilot's own)
+    "autopilot": (*POSITION_NED, *VELOCITY_BODY, *QUATERNION),
+    # what the vehicle was told: references and controls
+    "command": ("pos_n_ref_m", "pos_e_ref_m", "pos_d_ref_m", "lon_rad", "lat_rad", "col_rad", "ped_rad"),
+    # one row per measurement component offered to the filter (PX4's estimator_aid_src fields)
+    "innovation": ("sensor", "component", "observation", "observation_variance", "innovation",
+                   "innovation_variance", "test_ratio", "fused", "reason"),  # fmt: skip
+    # one row per happening: source, kind, detail (text), value
+    "events": ("source", "kind", "detail", "value"),
+    # measurement streams are tables "gps_position", "flow_velocity", ...: measurement.COLUMNS and "quality"
+}
+
+Column = NDArray[Any]
+Table = dict[str, Column]
+
+
+@dataclass
+class Record:
+    """A flight as data.
+
+    manifest: JSON-able facts: `schema`, `kind` ("fly", "replay", "live"), `scenario`, `filter`, `seed`,
+    `duration_s`, `parameters` (nested, units in key names), `provenance` (versions, inputs and their
+    SHA-256), `scores` (what scoring computed, see scoring/).
+    tables: name -> column name -> array of equal length; `t_s` [s] in each.
+    """
+
+    manifest: dict[str, Any] = field(default_factory=dict)
+    tables: dict[str, Table] = field(default_factory=dict)
+
+    def add(self, name: str, columns: Mapping[str, Any]) -> None:
+        """Put a table in. ValueError where columns differ in length or `t_s` is missing."""
+        table = {key: np.asarray(value) for key, value in columns.items()}
+        if "t_s" not in table:
+            raise ValueError(f"table {name!r} has no t_s column")
+        if len({len(column) for column in table.values()}) != 1:
+            raise ValueError(f"table {name!r} has columns of different lengths")
+        self.tables[name] = table
+
+    def matrix(self, table: str, columns: tuple[str, ...]) -> NDArray[np.float64]:
+        """Columns of a table side by side, shape (n, len(columns)). KeyError where one is missing."""
+        return np.column_stack([self.tables[table][name] for name in columns]).astype(float)
+
+    def save(self, path: Path) -> None:
+        """Write the record as one file, whole or not at all (temporary name, then rename)."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        path.parent.mkdir(parents=True, exist_ok=True)
+        temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+        try:
+            with zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as bundle:
+                manifest = {"schema": SCHEMA_VERSION, **self.manifest}
+                bundle.writestr("manifest.json", json.dumps(manifest, indent=1, default=str))
+                for name, table in self.tables.items():
+                    buffer = io.BytesIO()
+                    pq.write_table(pa.table(table), buffer, compression="zstd")
+                    bundle.writestr(f"{name}.parquet", buffer.getvalue())
+            os.replace(temporary, path)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+    @classmethod
+    def load(cls, path: Path) -> Record:
+        """Read a record. InputError where the file is missing, is no record, or is of a newer schema."""
+        import pyarrow.parquet as pq
+
+        if not path.is_file():
+            raise InputError(f"{path}: no such record; `flownav fly landing` writes one")
+        try:
+            with zipfile.ZipFile(path) as bundle:
+                manifest = json.loads(bundle.read("manifest.json"))
+                tables = {
+                    Path(name).stem: {
+                        column: data.to_numpy(zero_copy_only=False)
+                        for column, data in zip(table.column_names, table.columns, strict=True)
+                    }
+                    for name in bundle.namelist()
+                    if name.endswith(".parquet")
+                    for table in [pq.read_table(io.BytesIO(bundle.read(name)))]
+                }
+        except (zipfile.BadZipFile, KeyError, ValueError, OSError) as error:
+            raise InputError(f"{path}: not a flownav record ({error}); write it again with fly or replay") from error
+        if manifest.get("schema", 0) > SCHEMA_VERSION:
+            raise InputError(f"{path}: record schema {manifest['schema']} is newer than this flownav; update flownav")
+        return cls(manifest, tables)

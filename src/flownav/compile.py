@@ -23,6 +23,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FunctionType
 from typing import Any, TypeVar, cast
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -55,7 +56,7 @@ os.environ["NUMBA_CACHE_DIR"] = str(CACHE_FOLDER)
 
 import numba  # noqa: E402  (the cache folder is set first)
 
-numba.config.CACHE_DIR = str(CACHE_FOLDER)
+setattr(numba.config, "CACHE_DIR", str(CACHE_FOLDER))  # noqa: B010  (set at run time, unknown to type checkers)
 
 
 def equation(function: Function) -> Function:
@@ -123,3 +124,24 @@ def magnitude(a: float) -> float:
 def clamp(a: float, low: float, high: float) -> float:
     """a held between low and high."""
     return larger(low, smaller(a, high))
+
+
+def plain(function: Function) -> Function:
+    """An equation as ordinary Python, together with every equation that it reaches.
+
+    For tests and exact derivatives: the result takes complex numbers (complex step) and needs no compiler.
+    """
+    rebuilt: dict[int, Any] = {}
+
+    def rebuild(value: Any) -> Any:
+        source = getattr(value, "py_func", None)
+        if source is None:
+            return value
+        if id(value) not in rebuilt:
+            scope = dict(source.__globals__)
+            twin = FunctionType(source.__code__, scope, source.__name__, source.__defaults__, source.__closure__)
+            rebuilt[id(value)] = twin
+            scope.update({name: rebuild(scope[name]) for name in source.__code__.co_names if name in scope})
+        return rebuilt[id(value)]
+
+    return cast(Function, rebuild(function))

@@ -125,7 +125,7 @@ class EventQueue(NamedTuple):
     """Every stream's readings in one time order, as the kernels take them.
 
     t_s (n,) the instant each reading describes (arrival less delay); sensor (n,) int64; value and variance
-    (n, MAX_VALUES), unused columns NaN; quality (n,); index (n,) the row in its own stream.
+    (n, MAX_VALUES), unused columns NaN; quality (n,); row (n,) the row in its own stream.
     """
 
     t_s: Array
@@ -133,7 +133,7 @@ class EventQueue(NamedTuple):
     value: Array
     variance: Array
     quality: Array
-    index: NDArray[np.int64]
+    row: NDArray[np.int64]
 
 
 def merge(streams: Iterable[Stream]) -> EventQueue:

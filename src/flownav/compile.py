@@ -18,6 +18,7 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+import struct
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -55,8 +56,17 @@ CACHE_FOLDER = _cache_folder()
 os.environ["NUMBA_CACHE_DIR"] = str(CACHE_FOLDER)
 
 import numba  # noqa: E402  (the cache folder is set first)
+import numpy as np  # noqa: E402
+from llvmlite import binding as llvm  # noqa: E402
+from llvmlite import ir  # noqa: E402
+from numba import types  # noqa: E402
+from numba.extending import intrinsic, overload  # noqa: E402
 
 setattr(numba.config, "CACHE_DIR", str(CACHE_FOLDER))  # noqa: B010  (set at run time, unknown to type checkers)
+
+# A lane loop must reach the vectoriser as a loop. Left alone, LLVM fully unrolls one whose body is still a
+# call (equations are inlined later) and the lanes come out scalar; loops of 8 and fewer may unroll.
+llvm.set_option("flownav", f"--unroll-full-max-count={LANES_WIDE // 2}")
 
 
 def equation(function: Function) -> Function:
@@ -145,3 +155,40 @@ def plain(function: Function) -> Function:
         return rebuilt[id(value)]
 
     return cast(Function, rebuild(function))
+
+
+# -- the bits of a float, and back: for polynomial logarithms and exponentials ----------------------------
+def float_from_bits(bits: Any) -> float:
+    """The float64 that these 64 bits (uint64) spell."""
+    return float(struct.unpack("<d", struct.pack("<Q", int(bits)))[0])
+
+
+def bits_from_float(value: float) -> Any:
+    """The 64 bits (uint64) of a float64."""
+    return np.uint64(struct.unpack("<Q", struct.pack("<d", value))[0])
+
+
+@intrinsic
+def _bitcast_to_float(typing_context: Any, bits: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.bitcast(arguments[0], ir.DoubleType())
+
+    return types.float64(types.uint64), generate
+
+
+@intrinsic
+def _bitcast_to_bits(typing_context: Any, value: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.bitcast(arguments[0], ir.IntType(64))
+
+    return types.uint64(types.float64), generate
+
+
+@overload(float_from_bits, inline="always")
+def _compiled_float_from_bits(bits):  # type: ignore[no-untyped-def]
+    return lambda bits: _bitcast_to_float(bits)  # type: ignore[call-arg]
+
+
+@overload(bits_from_float, inline="always")
+def _compiled_bits_from_float(value):  # type: ignore[no-untyped-def]
+    return lambda value: _bitcast_to_bits(value)  # type: ignore[call-arg]

@@ -29,18 +29,39 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 # The vocabulary: every table has `t_s` first; a writer may leave a table or a trailing column out.
 TABLES: dict[str, tuple[str, ...]] = {
     # what was so (simulation, motion capture)
-    "truth": (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, "rate_p_rad_s", "rate_q_rad_s", "rate_r_rad_s",
-              "thrust_n", "on_ground"),  # fmt: skip
+    "truth": (
+        *POSITION_NED,
+        *VELOCITY_BODY,
+        *QUATERNION,
+        "rate_p_rad_s",
+        "rate_q_rad_s",
+        "rate_r_rad_s",
+        "thrust_n",
+        "on_ground",
+    ),
     # what the filter says, with one standard deviation of each
-    "estimate": (*POSITION_NED, *VELOCITY_BODY, *QUATERNION,
-                 *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY))),  # fmt: skip
+    "estimate": (
+        *POSITION_NED,
+        *VELOCITY_BODY,
+        *QUATERNION,
+        *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)),
+    ),
     # what another estimator said (an autopilot's own)
     "autopilot": (*POSITION_NED, *VELOCITY_BODY, *QUATERNION),
     # what the vehicle was told: references and controls
     "command": ("pos_n_ref_m", "pos_e_ref_m", "pos_d_ref_m", "lon_rad", "lat_rad", "col_rad", "ped_rad"),
     # one row per measurement component offered to the filter (PX4's estimator_aid_src fields)
-    "innovation": ("sensor", "component", "observation", "observation_variance", "innovation",
-                   "innovation_variance", "test_ratio", "fused", "reason"),  # fmt: skip
+    "innovation": (
+        "sensor",
+        "component",
+        "observation",
+        "observation_variance",
+        "innovation",
+        "innovation_variance",
+        "test_ratio",
+        "fused",
+        "reason",
+    ),
     # one row per happening: source, kind, detail (text), value
     "events": ("source", "kind", "detail", "value"),
     # measurement streams are tables "gps_position", "flow_velocity", ...: measurement.COLUMNS and "quality"

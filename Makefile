@@ -1,0 +1,45 @@
+# flownav: `make demo` flies the paper's landing, `make test` proves the package. Either works first.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
+
+.PHONY: demo test test-slow lint bench docs clean
+
+demo: $(VENV)/.ready
+	$(BIN)/flownav fly landing --out out/landing.fnr
+
+test: $(VENV)/.ready-test
+	$(BIN)/python -m pytest -m "not slow"
+
+test-slow: $(VENV)/.ready-test
+	$(BIN)/python -m pytest -m slow
+
+lint: $(VENV)/.ready-lint
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+bench: $(VENV)/.ready-test
+	$(BIN)/flownav bench
+	$(BIN)/python -m pytest benchmarks --benchmark-only --benchmark-disable-gc
+
+docs: $(VENV)/.ready-docs
+	$(BIN)/mkdocs build --strict --site-dir out/docs
+
+clean:
+	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+
+$(VENV)/.python:
+	@$(PYTHON) -c 'import sys; sys.exit("flownav needs Python 3.11 or newer: make PYTHON=python3.x") if sys.version_info < (3, 11) else None'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade --constraint constraints.txt pip
+	@touch $@
+
+$(VENV)/.ready: $(VENV)/.python pyproject.toml constraints.txt
+	$(INSTALL) --editable .
+	@touch $@
+
+$(VENV)/.ready-%: $(VENV)/.ready
+	$(INSTALL) --group $*
+	@touch $@

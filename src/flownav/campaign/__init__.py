@@ -1,0 +1,1 @@
+"""Many flights of one scenario: run, scored, summarised."""

@@ -1,0 +1,64 @@
+"""Flights on this machine, scored as they land."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.record import POSITION_NED, VELOCITY_BODY, Record
+from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, score_block, scores_of_flight
+from flownav.scoring.paper_tables import published
+from flownav.simulation.assemble import Setup
+from flownav.simulation.engine import fly_blocks, fly_one
+from flownav.simulation.flight import Flight
+from flownav.simulation.flight_record import record_of
+from flownav.simulation.history import column, columns
+from flownav.simulation.sensing import EPOCH_S
+
+Array = NDArray[np.float64]
+
+
+def score_history(flight: Flight, history: Array) -> Array:
+    """The scores of a block's flights, (lanes, len(SCORE_COLUMNS)); history (epochs, len(HISTORY), lanes)."""
+    estimate = history[:, columns("estimate", (*POSITION_NED, *VELOCITY_BODY))]
+    truth = history[:, columns("truth", (*POSITION_NED, *VELOCITY_BODY))]
+    sink_rate = history[:, column("truth", "sink_rate_m_s")]
+    on_ground = (history[:, column("truth", "contact_n")] > 0.0).astype(float)
+    t_s: Array = np.arange(len(history), dtype=np.float64) * EPOCH_S
+    return score_block(t_s, estimate, truth, sink_rate, on_ground, lands=flight.plan.may_land_after_s <= t_s[-1])
+
+
+def fly_many(
+    flight: Flight,
+    seed: int,
+    flights: int,
+    *,
+    first: int = 0,
+    threads: int | None = None,
+    on_progress: Callable[[int], None] = lambda flown: None,
+) -> Array:
+    """The scores of flights `first` to `first + flights - 1`, (flights, len(SCORE_COLUMNS))."""
+    scores = np.empty((flights, len(SCORE_COLUMNS)))
+    done = 0
+    for flown, block in fly_blocks(flight, seed, first, flights, lambda h: score_history(flight, h), threads):
+        scores[done : done + flown] = block[:flown]
+        done += flown
+        on_progress(flown)
+    return scores
+
+
+def fly_recorded(setup: Setup, seed: int, index: int = 0) -> Record:
+    """One flight as a scored Record."""
+    history = fly_one(setup.flight, seed, index)
+    record = record_of(setup, history, seed, index)
+    record.manifest["scores"] = scores_of_flight(score_history(setup.flight, history)[0])
+    record.manifest["paper"] = published(setup.scenario.name)
+    return record
+
+
+def median_flight(scores: Array) -> int:
+    """The index of the flight whose largest position error is the (lower) median."""
+    order = np.argsort(scores[:, MAX_POSITION_ERROR], kind="stable")
+    return int(order[(len(order) - 1) // 2])

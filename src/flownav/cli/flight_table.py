@@ -1,0 +1,70 @@
+"""The table that `flownav fly` prints for people."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+UNITS = {"x": "m", "y": "m", "z": "m", "u": "m/s", "v": "m/s", "w": "m/s"}
+
+
+def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> None:
+    """Errors per state beside the paper's table, largest position error, touchdown, files."""
+    many = facts["flights"] > 1
+    console = Console()
+    title = f"{facts['scenario']}: {facts['filter']} filter, {facts['gps']} GPS, seed {facts['seed']}"
+    table = Table(
+        title=title + (f", {facts['flights']} flights: median (5-95 %)" if many else ""), title_justify="left"
+    )
+    table.add_column("state")
+    for name in ("mean error", "std error", "rms error", "max error"):
+        table.add_column(name, justify="right")
+    if paper:
+        table.add_column(f"{paper['title']} mean", justify="right", style="dim")
+        table.add_column(f"{paper['title']} std", justify="right", style="dim")
+    for state, entry in facts["states"].items():
+        cells = [_cell(entry[key], 4) for key in ("mean_error", "std_error", "rms_error", "max_error")]
+        if paper:
+            cells += [f"{paper['states'][state][key]:.4f}" for key in ("mean_error", "std_error")]
+        table.add_row(f"{state} [{UNITS[state]}]", *cells)
+    console.print(table)
+    beside = f"   paper: {paper['max_position_error_m']:.4f} m" if paper else ""
+    console.print(f"largest position error  {_cell(facts['max_position_error_m'], 4)} m{beside}", highlight=False)
+    _show_touchdown(console, facts)
+    if "paper_percentile" in facts:
+        _show_percentiles(console, facts["paper_percentile"])
+    which = f" (flight {median}, the one with the median largest error)" if many else ""
+    console.print(f"record  {facts['record']}{which}", highlight=False)
+    if "report" in facts:
+        console.print(f"report  {facts['report']}", highlight=False)
+
+
+def _show_touchdown(console: Console, facts: dict[str, Any]) -> None:
+    landing = facts["touchdown"]
+    if landing is None:
+        return
+    landed = f"   {facts['landed']} of {facts['flights']} flights landed" if "landed" in facts else ""
+    console.print(
+        f"touchdown  {_cell(landing['horizontal_error_m'], 3)} m from the pad's centre, "
+        f"{_cell(landing['sink_rate_m_s'], 3)} m/s, at {_cell(landing['t_s'], 2)} s{landed}",
+        highlight=False,
+    )
+
+
+def _show_percentiles(console: Console, percentiles: dict[str, Any]) -> None:
+    """Where the paper's one flight lies among ours."""
+    std = ", ".join(f"{state} {entry['std_error']:.0f}" for state, entry in percentiles["states"].items())
+    mean = ", ".join(f"{state} {entry['mean_error']:.0f}" for state, entry in percentiles["states"].items())
+    console.print(
+        f"the paper's flight lies at our percentile: largest error {percentiles['max_position_error_m']:.0f}; "
+        f"std {std}; |mean| {mean}",
+        highlight=False,
+    )
+
+
+def _cell(number: Any, digits: int) -> str:
+    if isinstance(number, dict):
+        return f"{number['median']:.{digits}f} ({number['p05']:.{digits}f}..{number['p95']:.{digits}f})"
+    return f"{number:.{digits}f}"

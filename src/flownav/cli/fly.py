@@ -1,0 +1,98 @@
+"""`flownav fly`: a scenario flown in closed loop, scored beside the paper's tables."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from flownav.simulation.scenario import Scenario
+
+
+def command(
+    scenario: Annotated[str, typer.Argument(help="takeoff, landing, gusty, or a scenario file (TOML).")],
+    flights: Annotated[int, typer.Option(help="How many flights; more than one gives medians and 5-95 %.")] = 1,
+    seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
+    gps: Annotated[str | None, typer.Option(help="GPS error model: white or midg.")] = None,
+    filter_name: Annotated[str | None, typer.Option("--filter", help="Filter: paper or kinematic.")] = None,
+    feedback: Annotated[str | None, typer.Option(help="What the autopilot flies on: estimate or truth.")] = None,
+    truth: Annotated[str | None, typer.Option(help="The plant: nonlinear, or the paper's linear model.")] = None,
+    sensor: Annotated[str | None, typer.Option(help="A flow sensor file (TOML).")] = None,
+    out: Annotated[Path | None, typer.Option(help="The record to write; out/SCENARIO.fnr where unsaid.")] = None,
+    report: Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report beside it.")] = True,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
+    from flownav.campaign.local import fly_many, fly_recorded, median_flight
+    from flownav.cli.output import progress, require_between
+    from flownav.scoring.errors import scores_of_flights
+    from flownav.scoring.paper_tables import percentile_of_paper, published
+    from flownav.simulation.assemble import assemble
+    from flownav.simulation.scenario import load_scenario
+
+    require_between("--flights", flights, 1, 10_000_000)
+    require_between("--seed", seed, 0, 2**63 - 1)
+    chosen = _overridden(load_scenario(scenario), gps, filter_name, feedback, truth, sensor)
+    setup = assemble(chosen)
+    record_path = out or Path("out") / f"{chosen.name}.fnr"
+    facts: dict[str, Any] = {
+        "scenario": chosen.name,
+        "filter": chosen.filter.name,
+        "gps": chosen.gps.model,
+        "seed": seed,
+        "flights": flights,
+    }
+    index, percentiles = 0, None
+    if flights > 1:
+        with progress(f"Flying {chosen.name}", flights) as advance:
+            rows = fly_many(setup.flight, seed, flights, on_progress=advance)
+        index = median_flight(rows)
+        table = published(chosen.name)
+        percentiles = percentile_of_paper(rows, table) if table else None
+    record = fly_recorded(setup, seed, index)
+    scores = record.manifest["scores"] if flights == 1 else scores_of_flights(rows)
+    record.save(record_path)
+    facts |= scores | {"record": str(record_path)}
+    if percentiles:
+        facts["paper_percentile"] = percentiles
+    if report:
+        from flownav.report.html import write_report
+
+        page = record_path.with_suffix(".html")
+        write_report(record, page)
+        facts["report"] = str(page)
+    if as_json:
+        typer.echo(json.dumps(facts))
+    else:
+        from flownav.cli.flight_table import show
+
+        show(facts, record.manifest["paper"], index)
+
+
+def _overridden(
+    scenario: Scenario,
+    gps: str | None,
+    filter_name: str | None,
+    feedback: str | None,
+    truth: str | None,
+    sensor: str | None,
+) -> Scenario:
+    """The scenario with the command line's choices in place of its own, checked anew."""
+    from flownav.parameter_files import check
+    from flownav.simulation.scenario import Scenario
+
+    entries = scenario.model_dump(exclude_unset=True)
+    if gps is not None and gps != entries.get("gps", {}).get("model"):
+        entries["gps"] = {"model": gps}
+    if filter_name is not None:
+        entries.setdefault("filter", {})["name"] = filter_name
+    if feedback is not None:
+        entries.setdefault("autopilot", {})["feedback"] = feedback
+    if truth is not None:
+        entries["truth"] = truth
+    if sensor is not None:
+        entries["flow_sensor"] = sensor
+    return check(entries, Scenario, "command line")

@@ -1,0 +1,26 @@
+"""What every command says the same way: progress on standard error, numbers held to their range."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from flownav.errors import InputError
+
+
+@contextmanager
+def progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
+    """A progress bar on standard error; the value is called with how many more are done."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda done: bar.advance(task, done)
+
+
+def require_between(option: str, value: float, low: float, high: float) -> None:
+    """InputError where an option's number is out of range."""
+    if not low <= value <= high:
+        raise InputError(f"{option} {value:g}: must be from {low:g} to {high:g}")

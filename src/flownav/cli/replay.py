@@ -1,0 +1,156 @@
+"""`flownav replay`: a recorded flight through the filter."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from flownav.replay.session import Replay
+
+
+def command(
+    folder: Annotated[Path, typer.Argument(help="A folder of CSV files (docs/csv-folder.md).", show_default=False)],
+    gps_outage: Annotated[
+        list[str] | None,
+        typer.Option("--gps-outage", metavar="T0:T1", help="Withhold GPS in [T0, T1) s; may be repeated."),
+    ] = None,
+    no_flow: Annotated[bool, typer.Option("--no-flow", help="Withhold the optical flow.")] = False,
+    flow_scale: Annotated[
+        str, typer.Option("--flow-scale", metavar="X,Y", help="Factors on flow_x and flow_y (or on velocity u and v).")
+    ] = "1,1",
+    gps_delay: Annotated[
+        float, typer.Option("--gps-delay", metavar="S", help="How old a GPS reading is when it arrives.")
+    ] = 0.22,
+    outage_table: Annotated[
+        str | None,
+        typer.Option("--outage-table", metavar="T0:T1:LENGTH", help="One replay a window, each with GPS cut there."),
+    ] = None,
+    settings: Annotated[
+        Path | None, typer.Option("--settings", help="TOML of filter settings (docs/kinematic-filter.md).")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", help="The record; out/FOLDER.fnr where unsaid.", show_default=False)
+    ] = None,
+    no_report: Annotated[bool, typer.Option("--no-report", help="Write no HTML page beside the record.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Fuse a recorded flight: its trajectory, its errors against its own GPS, and the drift through GPS outages."""
+    from flownav.replay.prepare import ReplayOptions
+    from flownav.replay.session import replay, table_windows
+
+    windows = tuple(_numbers("--gps-outage", text, ":", 2, "T0:T1") for text in gps_outage or [])
+    scale = _numbers("--flow-scale", flow_scale, ",", 2, "X,Y")
+    table = table_windows(*_numbers("--outage-table", outage_table, ":", 3, "T0:T1:LENGTH")) if outage_table else []
+    options = ReplayOptions(gps_delay, tuple((t0, t1) for t0, t1 in windows), not no_flow, (scale[0], scale[1]))
+    log, numbers = _read(folder), _settings(settings)
+    flown = replay(log, options, numbers)
+    scores = flown.scores()
+    if table:
+        scores.update(_fly_table(flown, table, scores["outages"]))
+    record_path = out or Path("out") / f"{folder.resolve().name}.fnr"
+    report_path = None if no_report else record_path.with_suffix(".html")
+    _write(flown, scores, record_path, report_path)
+    scores["record"] = str(record_path)
+    if as_json:
+        typer.echo(json.dumps(scores))
+    else:
+        _print(flown, scores, report_path)
+
+
+def _numbers(option: str, text: str, separator: str, count: int, form: str) -> tuple[float, ...]:
+    from math import isfinite
+
+    from flownav.errors import InputError
+
+    try:
+        numbers = tuple(float(part) for part in text.split(separator))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != count or not all(map(isfinite, numbers)):
+        raise InputError(f"{option} {text}: {form} is needed, numbers")
+    return numbers
+
+
+def _read(folder: Path) -> Any:
+    from flownav.logs.csv_folder import read_csv_folder
+
+    return read_csv_folder(folder)
+
+
+def _settings(path: Path | None) -> Any:
+    from flownav.estimation.kinematic_settings import KinematicSettingsFile
+    from flownav.parameter_files import load
+
+    return (load(path, KinematicSettingsFile) if path else KinematicSettingsFile()).settings()
+
+
+def _fly_table(flown: Replay, table: list[tuple[float, float]], explicit: list[dict[str, Any]]) -> dict[str, Any]:
+    """The table's windows after the explicit ones, with their median and worst."""
+    from flownav.replay.session import outage_entry, outage_summary, outage_table
+
+    def progress(done: int) -> None:
+        if sys.stderr.isatty():
+            print(f"\rflownav: outage {done} of {len(table)}", end="\n" if done == len(table) else "", file=sys.stderr)
+
+    errors = outage_table(flown.log, flown.options, flown.settings, table, progress)
+    return {"outages": [*explicit, *map(outage_entry, errors)], **outage_summary(errors)}
+
+
+def _write(flown: Replay, scores: dict[str, Any], record_path: Path, report_path: Path | None) -> None:
+    from flownav.errors import InputError
+    from flownav.replay.bundle import to_record
+    from flownav.report.html import write_report
+
+    record = to_record(flown, scores, ["flownav", *sys.argv[1:]])
+    try:
+        record.save(record_path)
+        if report_path is not None:
+            write_report(record, report_path)
+    except OSError as error:
+        raise InputError(f"{record_path}: cannot be written ({error.strerror}); give another --out") from error
+
+
+def _print(flown: Replay, scores: dict[str, Any], report_path: Path | None) -> None:
+    """The same figures for people."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    console.print(f"[bold]{flown.log.path.name}[/]: {scores['duration_s']:.1f} s")
+    if scores["outages"]:
+        table = Table("GPS cut [s]", "rms [m]", "max [m]", title="Horizontal error through GPS outages")
+        for outage in scores["outages"]:
+            table.add_row(
+                f"{outage['t0']:g} to {outage['t1']:g}",
+                *map(_figure, (outage["horizontal_rms_m"], outage["horizontal_max_m"])),
+            )
+        console.print(table)
+    if "outage_median_rms_m" in scores:
+        median, worst = _figure(scores["outage_median_rms_m"]), _figure(scores["outage_worst_rms_m"])
+        console.print(f"Over the table's windows: median {median} m rms, worst {worst} m rms")
+    if scores["velocity_rms_m_s"] is not None:
+        console.print(f"Horizontal velocity against GPS: {scores['velocity_rms_m_s']:.3f} m/s rms")
+    if "truth" in scores:
+        truth = scores["truth"]
+        console.print(
+            f"Against truth (turned by {57.29578 * truth['yaw_rad']:.1f} deg): horizontal {truth['horizontal_rms_m']:.2f} m rms, "
+            f"{truth['horizontal_max_m']:.2f} m max; velocity {truth['velocity_rms_m_s']:.3f} m/s rms"
+        )
+    rejected = Table("sensor", "reason", "rejected", title="Not fused")
+    for sensor, counts in scores["rejected"].items():
+        for reason, count in counts.items():
+            rejected.add_row(sensor, reason, str(count))
+    if rejected.row_count:
+        console.print(rejected)
+    for note in flown.prepared.notes:
+        console.print(f"Note: {note}")
+    console.print(f"Record: {scores['record']}" + (f"\nReport: {report_path}" if report_path else ""))
+
+
+def _figure(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"

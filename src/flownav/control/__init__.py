@@ -1,0 +1,1 @@
+"""Guidance references and the autopilot, as equations."""

@@ -1,0 +1,230 @@
+"""The autopilot: cascaded PID loops from position to blade angles, with anti-windup.
+
+Position error commands a velocity, velocity error an acceleration (a tilt and a collective), tilt error a
+cyclic; heading is held with the tail rotor. Every integrator stops while its output is at a limit (conditional
+integration) and while the skids carry the weight. The outer loop runs on the filter's estimate (or on the
+truth), the inner loop on the INS attitude and the flybarless unit's gyros.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import clamp, equation, magnitude
+from flownav.control.guidance import Reference
+from flownav.frames import Rotation
+
+GRAVITY_M_S2 = 9.80665
+
+
+class AutopilotGains(NamedTuple):
+    """Gains and limits, SI; trims of the vehicle that is flown."""
+
+    position_gain: float = 0.5  # [1/s] velocity per position error
+    horizontal_speed_limit_m_s: float = 1.5
+    velocity_gain: float = 1.1  # [1/s] acceleration per velocity error
+    velocity_integral: float = 0.25  # [1/s2]
+    tilt_limit: float = 0.20  # sine of the tilt against trim
+    height_gain: float = 0.9  # [1/s]
+    climb_limit_m_s: float = 1.5
+    collective_gain: float = 0.010  # [rad/(m/s)]
+    collective_integral: float = 0.008  # [rad/m]
+    collective_limit_rad: float = 0.06  # about trim
+    attitude_gain: float = 0.14  # [rad cyclic / tilt error]
+    attitude_integral: float = 0.10  # [rad/s]
+    rate_damping: float = 0.012  # [rad/(rad/s)]
+    cyclic_limit_rad: float = 0.12
+    heading_gain: float = 1.5  # [1/s]
+    yaw_rate_gain: float = 0.05  # [rad/(rad/s)]
+    yaw_rate_integral: float = 0.10  # [rad/rad]
+    pedal_limit_rad: float = 0.20
+    collective_trim_rad: float = 0.0732
+    pedal_trim_rad: float = 0.16
+    lon_trim_rad: float = 0.0
+    lat_trim_rad: float = 0.0
+    pitch_trim_sine: float = 0.0
+    roll_trim_sine: float = 0.0
+    idle_collective_rad: float = 0.0
+    spool_rate_rad_s: float = 0.10  # how fast the collective goes down to idle after touchdown
+
+
+class AutopilotState(NamedTuple):
+    """Integrators (in the unit of what they add to), the outer loop's held commands and the mode."""
+
+    accel_forward: float  # [m/s2]
+    accel_right: float  # [m/s2]
+    collective: float  # [rad]
+    lon: float  # [rad]
+    lat: float  # [rad]
+    pedal: float  # [rad]
+    pitch_sine: float  # commanded sine of pitch
+    roll_sine: float  # commanded sine of roll
+    collective_command: float  # [rad]
+    flying: float  # 1.0 in flight, 0.0 on the skids
+    contact_time_s: float  # how long the skids have carried weight
+
+
+class Estimate(NamedTuple):
+    """What the outer loop flies on: position NED [m], velocity body FRD [m/s]."""
+
+    pos_n: float
+    pos_e: float
+    pos_d: float
+    u: float
+    v: float
+    w: float
+
+
+@equation
+def grounded(gains: AutopilotGains) -> AutopilotState:
+    """The state of an autopilot on the ground at idle."""
+    return AutopilotState(
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gains.pitch_trim_sine, gains.roll_trim_sine, gains.idle_collective_rad, 0.0, 0.0
+    )
+
+
+@equation
+def hovering(gains: AutopilotGains) -> AutopilotState:
+    """The state of an autopilot in trimmed hover."""
+    return AutopilotState(
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gains.pitch_trim_sine, gains.roll_trim_sine, gains.collective_trim_rad, 1.0, 0.0
+    )
+
+
+@equation
+def integrate(integral: float, error: float, gain: float, dt: float, output: float, limit: float) -> float:
+    """One step of an integrator that stops where its loop's output is at the limit and would go further."""
+    further = magnitude(output) >= limit and output * error * gain > 0.0
+    return integral if further else integral + gain * error * dt
+
+
+@equation
+def landing_logic(
+    state: AutopilotState,
+    contact_force_n: float,
+    contact_threshold_n: float,
+    may_fly: float,
+    may_land: float,
+    dt: float,
+) -> AutopilotState:
+    """On the skids until told to fly; in flight until the skids have carried weight for 0.1 s after `may_land`."""
+    touching = contact_force_n > contact_threshold_n
+    contact_time = state.contact_time_s + dt if (touching and may_land > 0.0) else 0.0
+    landed = contact_time > 0.1
+    grounded_for_good = may_land > 0.0 and state.flying == 0.0
+    flying = 0.0 if (landed or grounded_for_good) else may_fly
+    return AutopilotState(
+        accel_forward=state.accel_forward,
+        accel_right=state.accel_right,
+        collective=state.collective,
+        lon=state.lon,
+        lat=state.lat,
+        pedal=state.pedal,
+        pitch_sine=state.pitch_sine,
+        roll_sine=state.roll_sine,
+        collective_command=state.collective_command,
+        flying=flying,
+        contact_time_s=contact_time,
+    )
+
+
+@equation
+def outer_loop(
+    state: AutopilotState,
+    reference: Reference,
+    estimate: Estimate,
+    rotation: Rotation,
+    gains: AutopilotGains,
+    dt: float,
+) -> AutopilotState:
+    """Position and velocity errors to tilt and collective commands (50 Hz)."""
+    vel_n = gains.position_gain * (reference.pos_n - estimate.pos_n)
+    vel_e = gains.position_gain * (reference.pos_e - estimate.pos_e)
+    speed_limit = gains.horizontal_speed_limit_m_s
+    vel_n = reference.vel_n + clamp(vel_n, -speed_limit, speed_limit)
+    vel_e = reference.vel_e + clamp(vel_e, -speed_limit, speed_limit)
+    climb_limit = gains.climb_limit_m_s
+    vel_d = reference.vel_d + clamp(gains.height_gain * (reference.pos_d - estimate.pos_d), -climb_limit, climb_limit)
+
+    # errors along the heading and across it; the body velocity in the earth frame first
+    est_n = rotation[0] * estimate.u + rotation[1] * estimate.v + rotation[2] * estimate.w
+    est_e = rotation[3] * estimate.u + rotation[4] * estimate.v + rotation[5] * estimate.w
+    est_d = rotation[6] * estimate.u + rotation[7] * estimate.v + rotation[8] * estimate.w
+    level = 1.0 / np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
+    cos_heading, sin_heading = rotation[0] * level, rotation[3] * level
+    error_forward = cos_heading * (vel_n - est_n) + sin_heading * (vel_e - est_e)
+    error_right = cos_heading * (vel_e - est_e) - sin_heading * (vel_n - est_n)
+    error_down = vel_d - est_d
+
+    accel_forward = gains.velocity_gain * error_forward + state.accel_forward
+    accel_right = gains.velocity_gain * error_right + state.accel_right
+    tilt_accel = GRAVITY_M_S2 * gains.tilt_limit
+    collective = -gains.collective_gain * error_down + state.collective
+    flying = state.flying > 0.0
+
+    forward = integrate(state.accel_forward, error_forward, gains.velocity_integral, dt, accel_forward, tilt_accel)
+    right = integrate(state.accel_right, error_right, gains.velocity_integral, dt, accel_right, tilt_accel)
+    heave = integrate(
+        state.collective, error_down, -gains.collective_integral, dt, collective, gains.collective_limit_rad
+    )
+    in_flight = gains.collective_trim_rad + clamp(collective, -gains.collective_limit_rad, gains.collective_limit_rad)
+    settling = state.collective_command - gains.spool_rate_rad_s * dt
+    on_ground = settling if settling > gains.idle_collective_rad else gains.idle_collective_rad
+    limit = gains.tilt_limit
+    pitch = -clamp(accel_forward / GRAVITY_M_S2, -limit, limit) if flying else 0.0
+    roll = clamp(accel_right / GRAVITY_M_S2, -limit, limit) if flying else 0.0
+    return AutopilotState(
+        accel_forward=forward if flying else 0.0,
+        accel_right=right if flying else 0.0,
+        collective=heave if flying else 0.0,
+        lon=state.lon,
+        lat=state.lat,
+        pedal=state.pedal,
+        pitch_sine=gains.pitch_trim_sine + pitch,
+        roll_sine=gains.roll_trim_sine + roll,
+        collective_command=in_flight if flying else on_ground,
+        flying=state.flying,
+        contact_time_s=state.contact_time_s,
+    )
+
+
+@equation
+def inner_loop(
+    state: AutopilotState, rotation: Rotation, p: float, q: float, r: float, gains: AutopilotGains, dt: float
+) -> tuple[AutopilotState, float, float, float, float]:
+    """Tilt, rates and heading (held at north) to blade angles lon, lat, col, ped [rad] (250 Hz)."""
+    error_pitch = state.pitch_sine + rotation[6]  # sin(pitch) = -R_31
+    error_roll = state.roll_sine - rotation[7]  # sin(roll) cos(pitch) = R_32
+    level = 1.0 / np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
+    error_rate_yaw = -gains.heading_gain * rotation[3] * level - r  # sin(heading)
+    flying = state.flying > 0.0
+
+    lon = gains.attitude_gain * error_pitch - gains.rate_damping * q + state.lon
+    lat = gains.attitude_gain * error_roll - gains.rate_damping * p + state.lat
+    pedal = gains.yaw_rate_gain * error_rate_yaw + state.pedal
+    limit = gains.cyclic_limit_rad
+    next_lon = integrate(state.lon, error_pitch, gains.attitude_integral, dt, lon, limit)
+    next_lat = integrate(state.lat, error_roll, gains.attitude_integral, dt, lat, limit)
+    next_pedal = integrate(state.pedal, error_rate_yaw, gains.yaw_rate_integral, dt, pedal, gains.pedal_limit_rad)
+    after = AutopilotState(
+        accel_forward=state.accel_forward,
+        accel_right=state.accel_right,
+        collective=state.collective,
+        lon=next_lon if flying else 0.0,
+        lat=next_lat if flying else 0.0,
+        pedal=next_pedal if flying else 0.0,
+        pitch_sine=state.pitch_sine,
+        roll_sine=state.roll_sine,
+        collective_command=state.collective_command,
+        flying=state.flying,
+        contact_time_s=state.contact_time_s,
+    )
+    return (
+        after,
+        gains.lon_trim_rad + (clamp(lon, -limit, limit) if flying else 0.0),
+        gains.lat_trim_rad + (clamp(lat, -limit, limit) if flying else 0.0),
+        state.collective_command,
+        gains.pedal_trim_rad + (clamp(pedal, -gains.pedal_limit_rad, gains.pedal_limit_rad) if flying else 0.0),
+    )

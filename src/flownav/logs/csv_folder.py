@@ -1,0 +1,199 @@
+"""A folder of CSV files, one a sensor, as a Log. docs/csv-folder.md is the format.
+
+Units stand in the column names; time is seconds of one clock; body axes are forward-right-down, the flow is in
+PX4's sensor convention. Sensors a folder lacks are left out; `attitude.csv` and one of `gps.csv`, `flow.csv`,
+`px4flow.csv` must be there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from flownav.errors import InputError
+from flownav.frames import quaternion_from_euler
+from flownav.logs.csv_table import Column, CsvTable, read_csv_table
+from flownav.logs.log import Log
+from flownav.logs.plausible import check_plausible
+from flownav.measurement import Array, Sensor, Stream
+
+HALF_TURN = np.pi + 0.01
+GYRO_LIMIT_RAD_S = 70.0  # twice the range of a 2000 deg/s gyro
+RADIANS = "radians are needed (degrees?)"
+METRES = "metres are needed (millimetres? centimetres?)"
+DEGREES = "degrees are needed (degrees * 1e7?)"
+
+FILES: dict[str, tuple[Column, ...]] = {
+    "attitude": (
+        Column("roll_rad", -HALF_TURN, HALF_TURN, RADIANS),
+        Column("pitch_rad", -HALF_TURN / 2, HALF_TURN / 2, RADIANS),
+        Column("yaw_rad", -2 * HALF_TURN, 2 * HALF_TURN, RADIANS),
+    ),
+    "imu": (
+        *(Column(f"gyro_{axis}_rad_s", -GYRO_LIMIT_RAD_S, GYRO_LIMIT_RAD_S, "radians per second") for axis in "xyz"),
+        *(Column(f"accel_{axis}_m_s2", -400.0, 400.0, "metres per second squared (mg?)") for axis in "xyz"),
+    ),
+    "gps": (
+        Column("fix_type", 0, 8, "GPS fix types run from 0 to 8"),
+        Column("lat_deg", -90.0, 90.0, DEGREES),
+        Column("lon_deg", -180.0, 180.0, DEGREES),
+        Column("alt_m", -1000.0, 20000.0, METRES),
+        *(Column(f"vel_{axis}_m_s", -150.0, 150.0, "metres per second (centimetres?)") for axis in "ned"),
+    ),
+    "flow": (
+        *(Column(f"flow_{axis}_rad_s", -GYRO_LIMIT_RAD_S, GYRO_LIMIT_RAD_S, "radians per second") for axis in "xy"),
+        *(
+            Column(f"gyro_{axis}_rad_s", -GYRO_LIMIT_RAD_S, GYRO_LIMIT_RAD_S, "radians per second", False, True)
+            for axis in "xy"
+        ),
+        Column("quality", 0, 255, "quality runs from 0 (no data) to 255"),
+    ),
+    "px4flow": (
+        *(Column(f"flow_comp_m_{axis}_m_s", -150.0, 150.0, "metres per second") for axis in "xy"),
+        Column("ground_distance_m", -1.0, 200.0, METRES),
+        Column("quality", 0, 255, "quality runs from 0 (no data) to 255"),
+    ),
+    "range": (Column("range_m", -1.0, 200.0, METRES), Column("valid", 0, 1, "valid is 0 or 1")),
+    "baro": (Column("alt_m", -1000.0, 20000.0, "metres of altitude are needed (pascal?)"),),
+    "mag": tuple(Column(f"mag_{axis}_mgauss", -2e4, 2e4, "milligauss are needed (nanotesla?)") for axis in "xyz"),
+    "truth": tuple(Column(f"{axis}_m", -1e5, 1e5, METRES) for axis in "xyz"),
+}
+
+
+def read_csv_folder(folder: Path) -> Log:
+    """Read every known file of a folder.
+
+    InputError, one line, where the folder or a needed file is missing, a file cannot be read or lacks a
+    column, or its numbers cannot be in the units that the names state. Bad rows are counted in
+    `Stream.rejected`, by reason.
+    """
+    tables = _tables(folder)
+    streams: dict[Sensor, Stream] = {}
+    for name, convert in CONVERTERS.items():
+        if name in tables:
+            streams.update({stream.sensor: stream for stream in convert(tables[name])})
+    _check_overlap(folder, tables)
+    check_plausible(folder, streams)
+    origin = _origin(tables["gps"]) if "gps" in tables else None
+    return Log(
+        folder,
+        streams,
+        origin,
+        _truth(tables["truth"]) if "truth" in tables else None,
+        {f"{name}.csv": table.sha256 for name, table in tables.items()},
+        tuple(note for table in tables.values() for note in table.notes),
+    )
+
+
+def _tables(folder: Path) -> dict[str, CsvTable]:
+    if not folder.is_dir():
+        raise InputError(f"{folder}: no such folder; replay takes a folder of CSV files (docs/csv-folder.md)")
+    present = {name for name in FILES if (folder / f"{name}.csv").exists()}
+    if "attitude" not in present or not present & {"gps", "flow", "px4flow"}:
+        lacking = [*(["attitude.csv"] if "attitude" not in present else [])]
+        if not present & {"gps", "flow", "px4flow"}:
+            lacking.append("one of gps.csv, flow.csv, px4flow.csv")
+        raise InputError(
+            f"{folder}: {' and '.join(lacking)} missing; a replay needs attitude.csv and gps.csv or flow.csv (or "
+            "px4flow.csv); imu.csv, range.csv (flow's height), baro.csv, mag.csv and truth.csv are used where present"
+        )
+    if "flow" in present:
+        present -= {"px4flow"}  # the same sensor again, in its other message
+    return {name: read_csv_table(folder / f"{name}.csv", FILES[name]) for name in FILES if name in present}
+
+
+def _check_overlap(folder: Path, tables: dict[str, CsvTable]) -> None:
+    """Sensors of one flight share a clock: their times must meet the attitude's."""
+    attitude = tables["attitude"].t_s
+    for name, table in tables.items():
+        if table.t_s[-1] < attitude[0] or table.t_s[0] > attitude[-1]:
+            raise InputError(
+                f"{folder}: {name}.csv covers {table.t_s[0]:g} to {table.t_s[-1]:g} s and attitude.csv "
+                f"{attitude[0]:g} to {attitude[-1]:g} s; all files need one clock, in seconds"
+            )
+
+
+# -- a file's streams --------------------------------------------------------------------------------------
+def _attitude(table: CsvTable) -> list[Stream]:
+    angles = table.matrix("roll_rad", "pitch_rad", "yaw_rad")
+    quaternion = np.column_stack(quaternion_from_euler.py_func(*angles.T))  # type: ignore[attr-defined]
+    return [Stream.of(Sensor.ATTITUDE, table.t_s, quaternion, rejected=table.rejected)]
+
+
+def _imu(table: CsvTable) -> list[Stream]:
+    columns = [column.name for column in FILES["imu"]]
+    return [Stream.of(Sensor.IMU, table.t_s, table.matrix(*columns), rejected=table.rejected)]
+
+
+def _gps(table: CsvTable) -> list[Stream]:
+    """Velocity first: a filter that starts at a fix then knows how fast."""
+    table.keep(table.columns["fix_type"] >= 3, "no_fix")
+    if not len(table.t_s):
+        raise InputError(f"{table.path}: no row has a 3-D fix (fix_type 3 or more); remove the file to replay without")
+    velocity = table.matrix("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
+    return [
+        Stream.of(Sensor.GPS_VELOCITY, table.t_s, velocity, rejected=table.rejected),
+        Stream.of(Sensor.GPS_POSITION, table.t_s, _local_position(table), rejected=table.rejected),
+    ]
+
+
+def _origin(table: CsvTable) -> tuple[float, float, float]:
+    first = table.matrix("lat_deg", "lon_deg", "alt_m")[0]
+    return float(first[0]), float(first[1]), float(first[2])
+
+
+def _local_position(table: CsvTable) -> Array:
+    """North, east, down [m] about the first fix."""
+    import pymap3d
+
+    latitude, longitude, altitude = table.matrix("lat_deg", "lon_deg", "alt_m").T
+    north, east, down = pymap3d.geodetic2ned(latitude, longitude, altitude, *_origin(table))
+    return np.column_stack([north, east, down])
+
+
+def _flow(table: CsvTable) -> list[Stream]:
+    value = table.matrix("flow_x_rad_s", "flow_y_rad_s", "gyro_x_rad_s", "gyro_y_rad_s")
+    return [Stream.of(Sensor.FLOW_RATE, table.t_s, value, quality=table.columns["quality"], rejected=table.rejected)]
+
+
+def _px4flow(table: CsvTable) -> list[Stream]:
+    """MAVLink OPTICAL_FLOW: velocity compensated and scaled in the sensor, and the sonar's distance."""
+    velocity = table.matrix("flow_comp_m_x_m_s", "flow_comp_m_y_m_s", "flow_comp_m_z_m_s")
+    quality = table.columns["quality"]
+    return [
+        Stream.of(Sensor.FLOW_VELOCITY, table.t_s, velocity, quality=quality, rejected=table.rejected),
+        Stream.of(Sensor.RANGE, table.t_s, table.matrix("ground_distance_m")),
+    ]
+
+
+def _range(table: CsvTable) -> list[Stream]:
+    table.keep(table.columns["valid"] > 0, "invalid")
+    return [Stream.of(Sensor.RANGE, table.t_s, table.matrix("range_m"), rejected=table.rejected)]
+
+
+def _baro(table: CsvTable) -> list[Stream]:
+    return [Stream.of(Sensor.BARO, table.t_s, table.matrix("alt_m"), rejected=table.rejected)]
+
+
+def _mag(table: CsvTable) -> list[Stream]:
+    field = 1e-3 * table.matrix("mag_x_mgauss", "mag_y_mgauss", "mag_z_mgauss")
+    return [Stream.of(Sensor.MAG, table.t_s, field, rejected=table.rejected)]
+
+
+def _truth(table: CsvTable) -> dict[str, Array]:
+    names = {"pos_n_m": "x_m", "pos_e_m": "y_m", "pos_d_m": "z_m"}
+    return {"t_s": table.t_s, **{name: table.columns[column] for name, column in names.items()}}
+
+
+CONVERTERS: dict[str, Callable[[CsvTable], list[Stream]]] = {
+    "attitude": _attitude,
+    "imu": _imu,
+    "gps": _gps,
+    "px4flow": _px4flow,
+    "flow": _flow,
+    "range": _range,
+    "baro": _baro,
+    "mag": _mag,
+}

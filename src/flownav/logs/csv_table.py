@@ -1,0 +1,241 @@
+"""One CSV file of a log as columns of numbers, its rows checked: finite, inside limits, in time order.
+
+Bad rows are thrown away and counted by reason. Where so many are bad that the file cannot be what its column
+names say (a wrong unit, two logs in one file), that is an InputError of one line.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.errors import InputError
+from flownav.measurement import Array
+
+WRONG_UNIT_SHARE = 0.1  # more rows than this outside the limits: the column is in another unit
+LATE_SHARE = 0.05  # more rows than this out of time order: not a late row here and there
+LONGEST_MEDIAN_STEP_S = 10.0
+LONGEST_GAP_S = 600.0  # a few rows further away than this carry a wrong time
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column that a file must hold: its allowed values and what a value outside them suggests."""
+
+    name: str
+    low: float
+    high: float
+    hint: str = ""
+    required: bool = True
+    may_be_empty: bool = False  # NaN says that the sensor has no such figure
+
+
+@dataclass
+class CsvTable:
+    """A file's good rows in time order. t_s (n,), columns by name, counts of thrown-away rows by reason."""
+
+    path: Path
+    t_s: Array
+    columns: dict[str, Array]
+    rejected: dict[str, int] = field(default_factory=dict)
+    sha256: str = ""
+    notes: list[str] = field(default_factory=list)
+
+    def matrix(self, *names: str) -> Array:
+        """Columns side by side, shape (n, len(names)); a column that the file lacks is NaN."""
+        absent = np.full(len(self.t_s), np.nan)
+        return np.column_stack([self.columns.get(name, absent) for name in names])
+
+    def keep(self, good: NDArray[np.bool_], reason: str) -> None:
+        """Throw the other rows away and count them."""
+        bad = int(np.count_nonzero(~good))
+        if bad:
+            self.rejected[reason] = self.rejected.get(reason, 0) + bad
+            self.t_s = self.t_s[good]
+            self.columns = {name: values[good] for name, values in self.columns.items()}
+
+
+def read_csv_table(path: Path, columns: Sequence[Column]) -> CsvTable:
+    """Read and check one file. InputError where it cannot be read, lacks a column or cannot be in the units."""
+    content = _content(path)
+    malformed: list[int] = []
+    raw = _parse(path, content, [column.name for column in columns], malformed)
+    lacking = [c.name for c in columns if c.required and c.name not in raw] + ([] if "t_s" in raw else ["t_s"])
+    if lacking:
+        raise InputError(f"{path}: no column {', '.join(lacking)}; a {path.name} needs {_needs(columns)}")
+    table = CsvTable(path, raw.pop("t_s"), raw, sha256=hashlib.sha256(content).hexdigest())
+    if malformed:
+        table.rejected["malformed_row"] = len(malformed)
+    _check_finite(table, columns)
+    _check_limits(table, columns)
+    _check_clock(table)
+    if not len(table.t_s):
+        reasons = ", ".join(f"{count} {reason}" for reason, count in table.rejected.items()) or "it is empty"
+        raise InputError(f"{path}: no usable row ({reasons})")
+    return table
+
+
+def _needs(columns: Sequence[Column]) -> str:
+    return ", ".join(["t_s", *(c.name for c in columns if c.required)])
+
+
+def _content(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); give a folder of CSV files") from error
+
+
+def _parse(path: Path, content: bytes, wanted: list[str], malformed: list[int]) -> dict[str, Array]:
+    """The wanted columns as floats; text that is no number is NaN, rows of another length are left out."""
+    import pyarrow as pa
+    from pyarrow import csv
+
+    def skip(row: Any) -> str:
+        malformed.append(1)
+        return "skip"
+
+    def parse(kind: pa.DataType) -> pa.Table:
+        malformed.clear()
+        return csv.read_csv(
+            pa.BufferReader(content),
+            read_options=csv.ReadOptions(column_names=header, skip_rows=1, use_threads=False),
+            parse_options=csv.ParseOptions(invalid_row_handler=skip),
+            convert_options=csv.ConvertOptions(
+                column_types=dict.fromkeys(names, kind),
+                include_columns=names,
+                null_values=["", "nan", "NaN", "NAN", "null", "None"],
+                strings_can_be_null=True,
+            ),
+        )
+
+    header = _header(path, content)
+    names = [name for name in dict.fromkeys(["t_s", *wanted]) if name in header]
+    if not names:
+        return {}
+    try:
+        try:
+            table = parse(pa.float64())
+            return {name: np.array(table[name].to_numpy(), float) for name in names}
+        except pa.ArrowInvalid:
+            table = parse(pa.string())
+            return {name: np.array([_number(text) for text in table[name].to_pylist()]) for name in names}
+    except pa.ArrowInvalid as error:
+        if "Empty CSV" in str(error):
+            return {name: np.zeros(0) for name in names}
+        raise InputError(f"{path}: not a CSV table ({str(error).splitlines()[0]})") from None
+
+
+def _header(path: Path, content: bytes) -> list[str]:
+    """Column names of the first line."""
+    line = content.split(b"\n", 1)[0].decode("utf-8-sig", errors="replace")
+    header = [name.strip().strip('"') for name in line.split(",")]
+    twice = sorted({name for name in header if name and header.count(name) > 1})
+    if twice:
+        raise InputError(f"{path}: column {', '.join(twice)} stands twice in the first line; keep one")
+    return header
+
+
+def _number(text: str | None) -> float:
+    try:
+        return float(text) if text is not None else np.nan
+    except ValueError:
+        return np.nan
+
+
+def _check_finite(table: CsvTable, columns: Sequence[Column]) -> None:
+    must = [c.name for c in columns if c.name in table.columns and not c.may_be_empty]
+    finite = np.isfinite(table.t_s)
+    for name in must:
+        finite &= np.isfinite(table.columns[name])
+    table.keep(finite, "not_finite")
+
+
+def _check_limits(table: CsvTable, columns: Sequence[Column]) -> None:
+    inside = np.ones(len(table.t_s), bool)
+    for column in columns:
+        values = table.columns.get(column.name)
+        if values is None:
+            continue
+        outside = (values < column.low) | (values > column.high)
+        share = np.count_nonzero(outside) / max(1, np.count_nonzero(np.isfinite(values)))
+        if share > WRONG_UNIT_SHARE:
+            worst = float(values[outside][np.argmax(np.abs(values[outside]))])
+            raise InputError(
+                f"{table.path}: {column.name}: {share:.0%} of the rows lie outside {column.low:g} to {column.high:g} "
+                f"(one is {worst:g}){'; ' + column.hint if column.hint else ''}"
+            )
+        inside &= ~outside
+    table.keep(inside, "out_of_range")
+
+
+def _check_clock(table: CsvTable) -> None:
+    """Put the rows in time order: late rows are thrown away, a file without any order is sorted."""
+    t_s = table.t_s
+    back = np.flatnonzero(np.diff(t_s) < 0)
+    if len(back):
+        ordered = _longest_ordered(t_s)
+        late = len(t_s) - int(np.count_nonzero(ordered))
+        if late <= max(1, LATE_SHARE * len(t_s)):
+            table.keep(ordered, "out_of_order")
+        elif len(back) < LATE_SHARE * len(t_s):
+            row = back[np.argmin(np.diff(t_s)[back])]
+            raise InputError(
+                f"{table.path}: the clock runs back from {t_s[row]:g} s to {t_s[row + 1]:g} s at row {row + 3}; "
+                "split the log there, or sort it by t_s"
+            )
+        else:
+            table.notes.append(f"{table.path.name}: rows in no time order ({len(back)} steps back); sorted by t_s")
+            order = np.argsort(t_s, kind="stable")
+            table.t_s = t_s[order]
+            table.columns = {name: values[order] for name, values in table.columns.items()}
+    _drop_strays(table)
+    again = np.zeros(len(table.t_s), bool)
+    again[1:] = np.diff(table.t_s) == 0
+    for values in table.columns.values():
+        again[1:] &= (values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))
+    table.keep(~again, "duplicate")
+    if len(table.t_s) > 2 and np.median(np.diff(table.t_s)) > LONGEST_MEDIAN_STEP_S:
+        step = float(np.median(np.diff(table.t_s)))
+        raise InputError(f"{table.path}: t_s steps by {step:g} a row; seconds are needed (milliseconds? microseconds?)")
+
+
+def _drop_strays(table: CsvTable) -> None:
+    """Throw away the few rows at either end that a gap of many minutes parts from all others."""
+    gaps = np.flatnonzero(np.diff(table.t_s) > LONGEST_GAP_S) + 1
+    few = max(1, int(LATE_SHARE * len(table.t_s)))
+    near = np.ones(len(table.t_s), bool)
+    for gap in gaps:
+        if len(near) - gap <= few:
+            near[gap:] = False
+        elif gap <= few:
+            near[:gap] = False
+    table.keep(near, "clock_jump")
+
+
+def _longest_ordered(t_s: Array) -> NDArray[np.bool_]:
+    """The largest set of rows whose times never run back (patience sorting), as a mask."""
+    tails: list[float] = []
+    tail_rows: list[int] = []
+    before = np.full(len(t_s), -1)
+    for row, t in enumerate(t_s.tolist()):
+        place = bisect_right(tails, t)
+        before[row] = tail_rows[place - 1] if place else -1
+        if place == len(tails):
+            tails.append(t)
+            tail_rows.append(row)
+        else:
+            tails[place], tail_rows[place] = t, row
+    keep = np.zeros(len(t_s), bool)
+    row = tail_rows[-1]
+    while row >= 0:
+        keep[row] = True
+        row = int(before[row])
+    return keep

@@ -1,0 +1,33 @@
+"""Log: what every reader yields, and what replay takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from flownav.measurement import Sensor, Stream
+from flownav.record import Table
+
+
+@dataclass(frozen=True)
+class Log:
+    """A recorded flight as streams.
+
+    streams: by sensor, times in seconds of the log's own clock, in the units and frames of `measurement`.
+    origin_deg_m: latitude, longitude [deg] and altitude [m] of the local frame's origin; None without GPS.
+    truth: an external reference, columns as record.TABLES["truth"]; its frame may be turned in yaw.
+    inputs: SHA-256 of each file read, by name. notes: what a reader would tell the user, one line each.
+    """
+
+    path: Path
+    streams: dict[Sensor, Stream]
+    origin_deg_m: tuple[float, float, float] | None = None
+    truth: Table | None = None
+    inputs: dict[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @property
+    def span_s(self) -> tuple[float, float]:
+        """First and last reading."""
+        times = [stream.t_s for stream in self.streams.values() if len(stream)]
+        return float(min(t[0] for t in times)), float(max(t[-1] for t in times))

@@ -1,0 +1,116 @@
+"""Do a log's sensors agree with each other? A unit or a sign that cannot be shows here.
+
+Limits on single values miss degrees in a calm hover, or a position in radians. Two sensors that see the same
+motion do not: the accelerometer must see gravity where the attitude says down is, the gyros must turn as the
+attitude turns, the GPS velocity must integrate to the GPS position. The bounds are wide: only a wrong unit,
+axis or sign breaks them, never a bad sensor.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from flownav.errors import InputError
+from flownav.frames import rotation_from_quaternion
+from flownav.logs.rates import attitude_at, attitude_rates, mean_over
+from flownav.measurement import Array, Sensor, Stream
+
+GRAVITY_LIMITS_M_S2 = (4.0, 25.0)
+LARGEST_TILT_ERROR_RAD = 0.6
+WRONG_UNIT_FACTOR = 10.0
+LEAST_RATE_RAD_S = 0.03
+INTERVAL_S = 0.25
+LEAST_ROWS = 50
+GPS_INTERVAL_S = 5.0
+LEAST_GPS_TRAVEL_M = 5.0
+LEAST_FIELD_GAUSS = 0.05
+
+
+def check_plausible(where: Path, streams: dict[Sensor, Stream]) -> None:
+    """InputError where two sensors cannot be in the stated units, axes and signs at the same time."""
+    attitude = streams[Sensor.ATTITUDE]
+    if Sensor.IMU in streams:
+        _check_gravity(where, streams[Sensor.IMU], attitude)
+        _check_rates(where, "imu gyro", streams[Sensor.IMU], (0, 1, 2), attitude, signed=True)
+    if Sensor.FLOW_RATE in streams:
+        _check_rates(where, "flow gyro", streams[Sensor.FLOW_RATE], (2, 3), attitude, signed=True)
+        _check_rates(where, "flow", streams[Sensor.FLOW_RATE], (0, 1), attitude, signed=False)
+    if Sensor.GPS_POSITION in streams:
+        _check_gps(where, streams[Sensor.GPS_POSITION], streams[Sensor.GPS_VELOCITY])
+    if Sensor.MAG in streams:
+        field = float(np.median(np.linalg.norm(streams[Sensor.MAG].value, axis=1)))
+        if field < LEAST_FIELD_GAUSS:
+            raise InputError(f"{where}: mag: a field of {1e3 * field:.3g} mgauss; the earth's is 250 to 650 (gauss?)")
+
+
+def _check_gravity(where: Path, imu: Stream, attitude: Stream) -> None:
+    if len(imu) < LEAST_ROWS:
+        return
+    force = imu.value[:, 3:]
+    size = float(np.median(np.linalg.norm(force, axis=1)))
+    if not GRAVITY_LIMITS_M_S2[0] < size < GRAVITY_LIMITS_M_S2[1]:
+        raise InputError(f"{where}: imu accel: a median of {size:.3g} m/s2 is not gravity; m/s2 are needed (g? mg?)")
+    rotation = rotation_from_quaternion.py_func(*attitude_at(attitude, imu.t_s).T)  # type: ignore[attr-defined]
+    in_earth = np.column_stack([sum(rotation[3 * i + j] * force[:, j] for j in range(3)) for i in range(3)])
+    mean = np.median(in_earth, axis=0)
+    tilt = float(np.arccos(np.clip(-mean[2] / np.linalg.norm(mean), -1.0, 1.0)))
+    if tilt > LARGEST_TILT_ERROR_RAD:
+        raise InputError(
+            f"{where}: attitude and imu accel disagree about down by {np.degrees(tilt):.0f} degrees; angles in radians, "
+            "axes forward-right-down and a specific force of -9.8 m/s2 on z at rest are needed"
+        )
+
+
+def _check_rates(
+    where: Path, name: str, stream: Stream, columns: tuple[int, ...], attitude: Stream, signed: bool
+) -> None:
+    """The slope of the logged rates on the attitude's own, axis by axis."""
+    values = stream.value[:, columns]
+    known = np.isfinite(values).all(axis=1)
+    t_s, values = stream.t_s[known], values[known]
+    if len(t_s) < LEAST_ROWS:
+        return
+    edges = np.arange(max(t_s[0], attitude.t_s[0]), min(t_s[-1], attitude.t_s[-1]), INTERVAL_S)
+    if len(edges) < LEAST_ROWS:
+        return
+    logged = mean_over(t_s, values, edges[:-1], edges[1:])
+    turned = attitude_rates(attitude, edges[:-1], edges[1:])
+    for column, axis in enumerate(("x", "y", "z")[: len(columns)]):
+        reference = turned[:, column]
+        if np.sqrt(np.mean(reference**2)) < LEAST_RATE_RAD_S:
+            continue
+        slope = _slope(reference, logged[:, column])
+        likeness = float(np.corrcoef(reference, logged[:, column])[0, 1]) if np.ptp(logged[:, column]) > 0 else 0.0
+        if slope > WRONG_UNIT_FACTOR and likeness > 0.5:
+            raise InputError(
+                f"{where}: {name}_{axis} is {slope:.0f} times as fast as the attitude turns; rad/s are needed (deg/s?)"
+            )
+        if signed and likeness < -0.5:
+            raise InputError(
+                f"{where}: {name}_{axis} turns against the attitude (correlation {likeness:.2f}); axes "
+                "forward-right-down are needed"
+            )
+
+
+def _check_gps(where: Path, position: Stream, velocity: Stream) -> None:
+    """Displacements against integrated velocities, over some seconds each."""
+    t_s = position.t_s
+    if len(t_s) < LEAST_ROWS or t_s[-1] - t_s[0] < 2 * GPS_INTERVAL_S:
+        return
+    edges = np.arange(t_s[0], t_s[-1], GPS_INTERVAL_S)
+    flown = mean_over(velocity.t_s, velocity.value[:, :2], edges[:-1], edges[1:]) * GPS_INTERVAL_S
+    moved = np.diff(np.column_stack([np.interp(edges, t_s, column) for column in position.value[:, :2].T]), axis=0)
+    if np.sqrt(np.mean(flown**2)) < LEAST_GPS_TRAVEL_M:
+        return
+    slope = _slope(flown.ravel(), moved.ravel())
+    if not 0.2 < slope < 5.0:
+        raise InputError(
+            f"{where}: gps: positions move {slope:.2g} times as far as the velocities say; lat_deg and lon_deg in degrees "
+            "and vel_n, vel_e in m/s are needed"
+        )
+
+
+def _slope(reference: Array, logged: Array) -> float:
+    return float(np.sum(reference * logged) / np.sum(reference * reference)) if np.any(reference) else np.inf

@@ -1,0 +1,50 @@
+"""Where a result came from: versions, inputs and their hashes, and the command that made it."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+import shlex
+import sys
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import flownav
+
+LIBRARIES = ("numpy", "numba", "scipy", "pyarrow", "plotly")
+
+
+def provenance(inputs: Iterable[Path] = ()) -> dict[str, Any]:
+    """Versions, time and the SHA-256 of every input file (a folder counts file by file)."""
+    return {
+        "flownav": flownav.__version__,
+        "python": platform.python_version(),
+        "libraries": {name: _version(name) for name in LIBRARIES},
+        "written_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+        "inputs": {str(file): hash_of(file) for path in inputs for file in _files(path)},
+    }
+
+
+def command_line() -> str:
+    """The command as typed, for the report's 'how to reproduce'."""
+    return shlex.join(["flownav", *sys.argv[1:]])
+
+
+def hash_of(file: Path) -> str:
+    """SHA-256 of a file, hexadecimal."""
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _files(path: Path) -> list[Path]:
+    return sorted(f for f in path.iterdir() if f.is_file()) if path.is_dir() else [path]
+
+
+def _version(name: str) -> str | None:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return None

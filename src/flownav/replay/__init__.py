@@ -1,0 +1,1 @@
+"""Replay: a log's measurements through the filter into a Record."""

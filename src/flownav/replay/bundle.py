@@ -1,0 +1,154 @@
+"""A replay as a Record: estimates, measurements, innovations, events, scores and provenance."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from flownav.estimation.gating import Reason
+from flownav.measurement import COLUMNS, Array, Sensor
+from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.replay.engine import EVENT_NAMES
+from flownav.replay.session import Replay
+from flownav.scoring.alignment import velocity_of
+
+KEPT = (
+    Sensor.GPS_POSITION,
+    Sensor.GPS_VELOCITY,
+    Sensor.FLOW_RATE,
+    Sensor.FLOW_VELOCITY,
+    Sensor.RANGE,
+    Sensor.BARO,
+)
+LOST_AFTER_S = 1.0
+DOWN = "pos_d_m"
+
+
+def to_record(replay: Replay, scores: dict[str, Any], command: list[str]) -> Record:
+    """The record of a replay. `scores` go into its manifest; `command` is what the user typed."""
+    record = Record(_manifest(replay, scores, command))
+    estimate = replay.estimate
+    names = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)))
+    record.add("estimate", {"t_s": estimate[:, 0], **dict(zip(names, estimate[:, 1:17].T, strict=True))})
+    for sensor in KEPT:
+        if sensor in replay.log.streams:
+            stream = replay.log.streams[sensor]
+            columns = dict(zip(COLUMNS[sensor], stream.value.T, strict=True))
+            record.add(sensor.name.lower(), {"t_s": stream.t_s, **columns, "quality": stream.quality})
+    if replay.truth_alignment is not None:
+        record.add("truth", _truth(replay))
+    record.add("innovation", _innovation(replay))
+    record.add("events", _events(replay))
+    return record
+
+
+def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dict[str, Any]:
+    log = replay.log
+    versions = {name: version(name) for name in ("flownav", "numpy", "numba", "pyarrow")}
+    return {
+        "kind": "replay",
+        "log": log.path.name,
+        "filter": "kinematic",
+        "duration_s": scores["duration_s"],
+        "delays_s": {sensor.name.lower(): delay for sensor, delay in replay.prepared.delays_s.items() if delay},
+        "parameters": {
+            "filter": replay.settings._asdict(),
+            "gps_delay_s": replay.options.gps_delay_s,
+            "gps_outages_s": [list(window) for window in replay.options.gps_outages_s],
+            "use_flow": replay.options.use_flow,
+            "flow_scale": list(replay.options.flow_scale),
+            **({} if log.origin_deg_m is None else {"origin_lat_lon_deg_alt_m": list(log.origin_deg_m)}),
+        },
+        "provenance": {
+            "versions": {"python": platform.python_version(), **versions},
+            "inputs": {name: {"sha256": digest} for name, digest in log.inputs.items()},
+        },
+        "command": command,
+        "scores": scores,
+    }
+
+
+def _truth(replay: Replay) -> dict[str, Array]:
+    """The truth in the estimate's frame; body velocity by differences, in the axes of the estimate's attitude."""
+    placed, truth = replay.truth_alignment, replay.log.truth
+    assert placed is not None and truth is not None
+    position = placed.moved(replay.truth_position)
+    velocity = placed.turned(velocity_of(truth["t_s"], replay.truth_position))
+    quaternion = [np.interp(truth["t_s"], replay.estimate[:, 0], column) for column in replay.estimate[:, 7:11].T]
+    rotation = rotation_of_columns(np.column_stack(quaternion))
+    body = {
+        name: sum(rotation[3 * row + column] * velocity[:, row] for row in range(3))
+        for column, name in enumerate(VELOCITY_BODY)
+    }
+    return {"t_s": truth["t_s"], **dict(zip(POSITION_NED, position.T, strict=True)), **body}
+
+
+def rotation_of_columns(quaternion: Array) -> tuple[Array, ...]:
+    """R_EB of quaternions (n, 4), row by row: nine arrays (n,)."""
+    from flownav.frames import rotation_from_quaternion
+
+    unit = quaternion / np.linalg.norm(quaternion, axis=1)[:, None]
+    return tuple(rotation_from_quaternion.py_func(*unit.T))  # type: ignore[attr-defined]
+
+
+def _innovation(replay: Replay) -> dict[str, Array]:
+    """One row for each offered component; `t_s` is the instant that the reading describes."""
+    rows = replay.innovation
+    sensor, component, reason = rows[:, 1].astype(int), rows[:, 2].astype(int), rows[:, 8].astype(int)
+    sensor_names = np.array(["", *(s.name.lower() for s in Sensor)])
+    reasons = np.array([r.label for r in Reason])
+    return {
+        "t_s": rows[:, 0],
+        "sensor": sensor_names[sensor],
+        "component": _component_names()[sensor, component],
+        "observation": rows[:, 3],
+        "observation_variance": rows[:, 4],
+        "innovation": rows[:, 5],
+        "innovation_variance": rows[:, 6],
+        "test_ratio": rows[:, 7],
+        "fused": reason == Reason.FUSED,
+        "reason": reasons[reason],
+    }
+
+
+def _component_names() -> Array:
+    """What each component of a sensor observes, by sensor number and component."""
+    names = np.full((max(Sensor) + 1, 3), "", dtype="U16")
+    for sensor in (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_VELOCITY):
+        names[sensor] = COLUMNS[sensor]
+    names[Sensor.FLOW_RATE] = VELOCITY_BODY
+    names[Sensor.RANGE] = names[Sensor.BARO] = DOWN
+    return names
+
+
+def _events(replay: Replay) -> dict[str, Any]:
+    """What happened, in order of time."""
+    start, _ = replay.log.span_s
+    events = [(start, "replay", "note", note, np.nan) for note in replay.prepared.notes]
+    for sensor, counts in replay.rejected().items():
+        events += [(start, sensor, "rejected", reason, float(count)) for reason, count in counts.items()]
+    for t_s, kind, value in replay.tape.event[: replay.tape.used[2]].tolist():
+        source, name, detail = EVENT_NAMES[int(kind)]
+        events.append((t_s, source, name, detail, value))
+    for t0, t1 in replay.options.gps_outages_s:
+        events += [(t0, "gps", "outage_start", "withheld on request", t1 - t0), (t1, "gps", "outage_end", "", np.nan)]
+    for sensor in (Sensor.GPS_POSITION, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE):
+        events += _losses(replay, sensor)
+    events.sort(key=lambda event: event[0])
+    columns = zip(*events, strict=True)
+    return dict(zip(("t_s", "source", "kind", "detail", "value"), map(np.array, columns), strict=True))
+
+
+def _losses(replay: Replay, sensor: Sensor) -> list[tuple[float, str, str, str, float]]:
+    """When nothing of a sensor was fused for long: lost, with how long, and back."""
+    rows = replay.innovation
+    t_s = rows[(rows[:, 1] == sensor) & (rows[:, 8] == Reason.FUSED), 0]
+    events = []
+    for row in np.flatnonzero(np.diff(t_s) > LOST_AFTER_S):
+        length = float(t_s[row + 1] - t_s[row])
+        events.append((float(t_s[row]), sensor.name.lower(), "lost", "nothing fused for this long [s]", length))
+        events.append((float(t_s[row + 1]), sensor.name.lower(), "back", "", np.nan))
+    return events

@@ -1,0 +1,174 @@
+"""From a log's streams to the event queue that the filter is fed: delays, flow's gyro and scale, GPS cuts.
+
+Nothing here looks ahead of the instant a reading arrives, but for one decision a log: which gyro takes the
+rotation out of the flow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flownav.compile import kernel
+from flownav.errors import InputError
+from flownav.logs.log import Log
+from flownav.logs.rates import attitude_rates, mean_over
+from flownav.measurement import Array, EventQueue, Sensor, Stream, merge
+
+WITHHELD = -1.0  # the quality of a reading that the user takes away
+GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
+FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
+GYRO_BIAS_TIME_S = 30.0
+LONGEST_FLOW_INTERVAL = 1.5  # medians: a longer step is a gap, not an exposure
+CLEARLY_SMOOTHER = 0.9
+LEAST_FLOW_ROWS = 20
+
+
+@dataclass(frozen=True)
+class ReplayOptions:
+    """What a user may ask of a replay."""
+
+    gps_delay_s: float = 0.22  # ArduPilot's default lag of a u-blox
+    gps_outages_s: tuple[tuple[float, float], ...] = ()
+    use_flow: bool = True
+    flow_scale: tuple[float, float] = (1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """The queue with nothing cut, each stream's delay, and what was decided on the way (events of the record)."""
+
+    queue: EventQueue
+    delays_s: dict[Sensor, float]
+    notes: tuple[str, ...]
+
+
+def prepare(log: Log, options: ReplayOptions) -> Prepared:
+    """Delay, scale and complete the streams, and merge them. InputError where an option cannot be."""
+    _check(log, options)
+    streams, notes = dict(log.streams), list(log.notes)
+    for sensor in GPS:
+        if sensor in streams:
+            streams[sensor] = replace(streams[sensor], delay_s=options.gps_delay_s)
+    for sensor in FLOW:
+        if sensor in streams:
+            streams[sensor] = _exposed(_scaled(streams[sensor], options.flow_scale))
+    if Sensor.FLOW_RATE in streams:
+        streams[Sensor.FLOW_RATE], note = _with_gyro(streams[Sensor.FLOW_RATE], streams)
+        notes.append(note)
+    delays = {sensor: stream.delay_s for sensor, stream in streams.items()}
+    return Prepared(merge(streams.values()), delays, tuple(notes))
+
+
+def withhold(log: Log, queue: EventQueue, options: ReplayOptions) -> EventQueue:
+    """The queue without what the options take away: GPS that arrives in [t0, t1) of an outage, and flow."""
+    quality = queue.quality.copy()
+    for sensor in GPS:
+        if sensor in log.streams:
+            rows = np.flatnonzero(queue.sensor == sensor)
+            arrival = log.streams[sensor].t_s[queue.row[rows]]
+            for t0, t1 in options.gps_outages_s:
+                quality[rows[(arrival >= t0) & (arrival < t1)]] = WITHHELD
+    if not options.use_flow:
+        quality[np.isin(queue.sensor, [int(sensor) for sensor in FLOW])] = WITHHELD
+    return queue._replace(quality=quality)
+
+
+def _check(log: Log, options: ReplayOptions) -> None:
+    start, end = log.span_s
+    if not -1.0 <= options.gps_delay_s <= 5.0:
+        raise InputError(f"--gps-delay {options.gps_delay_s:g}: seconds from 0 to 5 are needed")
+    if not all(0.01 <= abs(scale) <= 100.0 for scale in options.flow_scale):
+        raise InputError(f"--flow-scale {options.flow_scale[0]:g},{options.flow_scale[1]:g}: factors near 1 are needed")
+    for t0, t1 in options.gps_outages_s:
+        if not t0 < t1:
+            raise InputError(f"--gps-outage {t0:g}:{t1:g}: the end must come after the start")
+        if t1 <= start or t0 >= end:
+            raise InputError(f"--gps-outage {t0:g}:{t1:g}: outside the log, which covers {start:.1f} to {end:.1f} s")
+    if options.gps_outages_s and Sensor.GPS_POSITION not in log.streams:
+        raise InputError(f"--gps-outage: {log.path} has no GPS to cut")
+
+
+# -- flow --------------------------------------------------------------------------------------------------
+def _exposed(stream: Stream) -> Stream:
+    """A flow reading is a mean since the last one: it describes the middle of that time."""
+    period = float(np.median(np.diff(stream.t_s))) if len(stream) > 1 else 0.0
+    return replace(stream, delay_s=0.5 * period)
+
+
+def _scaled(stream: Stream, scale: tuple[float, float]) -> Stream:
+    """Factors on the first two values: flow_x and flow_y before the gyro is taken off, or velocity u and v."""
+    value = stream.value.copy()
+    value[:, :2] *= scale
+    return replace(stream, value=value)
+
+
+def _with_gyro(flow: Stream, streams: dict[Sensor, Stream]) -> tuple[Stream, str]:
+    """The flow with the rates that serve best in its gyro columns, and what was chosen.
+
+    Candidates are the sensor's own gyro, the vehicle's IMU (its bias followed against the attitude), and the
+    attitude's own turning. A vehicle has mass, so its velocity is smooth: the gyro that leaves the least
+    sample-to-sample noise in the compensated flow has seen the same rotation as the flow did. The sensor's own
+    stays unless another is clearly better, or it is absent or dead.
+    """
+    candidates = _gyro_candidates(flow, streams)
+    noises = {name: _roughness(flow, rates) for name, rates in candidates.items()}
+    own = noises.pop("sensor gyro", np.inf)
+    best = min(noises, key=lambda name: noises[name])
+    chosen = best if noises[best] < CLEARLY_SMOOTHER * own else "sensor gyro"
+    if chosen not in candidates:
+        chosen = best
+    value = flow.value.copy()
+    value[:, 2:4] = candidates[chosen]
+    noises["sensor gyro"] = own
+    listed = ", ".join(f"{name} {noise:.4f}" for name, noise in sorted(noises.items()) if np.isfinite(noise))
+    return replace(flow, value=value), f"flow is compensated with the {chosen} (flow noise, rad/s: {listed})"
+
+
+def _gyro_candidates(flow: Stream, streams: dict[Sensor, Stream]) -> dict[str, Array]:
+    """Mean rates about x and y over each flow reading's exposure, by source."""
+    attitude, imu = streams[Sensor.ATTITUDE], streams.get(Sensor.IMU)
+    steps = np.diff(flow.t_s)
+    period = float(np.median(steps)) if len(steps) else 0.1
+    exposure = np.clip(np.concatenate([[period], steps]), 0.2 * period, LONGEST_FLOW_INTERVAL * period)
+    start = flow.t_s - exposure
+    turning = attitude_rates(attitude, start, flow.t_s)
+    candidates = {"attitude": turning[:, :2]}
+    if imu is not None and len(imu) > 1:
+        rates = mean_over(imu.t_s, imu.value[:, :3], start, flow.t_s)
+        candidates["imu gyro"] = (rates - _followed(flow.t_s, rates - turning))[:, :2]
+    own = flow.value[:, 2:4]
+    known = np.isfinite(own).all(axis=1)
+    if known.mean() > 0.5 and np.ptp(own[known], axis=0).all():
+        candidates["sensor gyro"] = np.where(known[:, None], own, candidates.get("imu gyro", candidates["attitude"]))
+    return candidates
+
+
+def _followed(t_s: Array, difference: Array) -> Array:
+    """A first-order low-pass of a gyro's difference from the attitude's rates: its bias, as known at each instant."""
+    gain = 1.0 - np.exp(-np.diff(t_s, prepend=t_s[0]) / GYRO_BIAS_TIME_S)
+    gain = np.maximum(gain, 1.0 / np.arange(1, len(t_s) + 1))
+    return np.asarray(_low_pass(difference, gain))
+
+
+@kernel
+def _low_pass(value: Array, gain: Array) -> Array:
+    """y += gain (value - y), column by column; value (n, k), gain (n,)."""
+    followed = np.empty_like(value)
+    for column in range(value.shape[1]):
+        state = 0.0
+        for row in range(value.shape[0]):
+            state += gain[row] * (value[row, column] - state)
+            followed[row, column] = state
+    return followed
+
+
+def _roughness(flow: Stream, rates: Array) -> float:
+    """Standard deviation of the compensated flow's noise [rad/s], from its second differences."""
+    good = (flow.quality > 0) & np.isfinite(rates).all(axis=1) & np.isfinite(flow.value[:, :2]).all(axis=1)
+    if np.count_nonzero(good) < LEAST_FLOW_ROWS:
+        return np.inf
+    compensated = flow.value[good, :2] - rates[good]
+    second = compensated[2:] - 2.0 * compensated[1:-1] + compensated[:-2]
+    return float(np.median(np.abs(second)) / (0.6745 * np.sqrt(6.0)))

@@ -1,0 +1,189 @@
+"""A replay: a log through the filter, its scores, and a table of GPS outages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from flownav.compile import announce_compilation
+from flownav.errors import InputError
+from flownav.estimation.gating import Reason
+from flownav.estimation.kinematic_settings import KinematicSettings
+from flownav.logs.log import Log
+from flownav.measurement import Array, Sensor
+from flownav.replay.engine import Tape, new_memory, new_tape, run
+from flownav.replay.prepare import Prepared, ReplayOptions, prepare, withhold
+from flownav.scoring.alignment import Alignment, align, velocity_of
+from flownav.scoring.outage import OutageError, difference_at, horizontal_rms, outage_error
+
+NO_REJECTION = (Reason.FUSED, Reason.DATUM)
+LONGEST_TABLE = 2000
+
+
+@dataclass(frozen=True)
+class Replay:
+    """One run of a log through the filter."""
+
+    log: Log
+    options: ReplayOptions
+    settings: KinematicSettings
+    prepared: Prepared
+    tape: Tape
+
+    @cached_property
+    def estimate(self) -> Array:
+        """Rows of the tape's estimate that were written (n, 23)."""
+        return self.tape.estimate[: self.tape.used[0]]
+
+    @cached_property
+    def innovation(self) -> Array:
+        """Rows of the tape's innovation that were written (m, 9)."""
+        return self.tape.innovation[: self.tape.used[1]]
+
+    @cached_property
+    def truth_alignment(self) -> Alignment | None:
+        """How the log's truth lies in the estimate's frame; None without a truth that overlaps."""
+        if self.log.truth is None:
+            return None
+        t_s, position = self.log.truth["t_s"], self.truth_position
+        covered = (t_s >= self.estimate[0, 0]) & (t_s <= self.estimate[-1, 0])
+        if np.count_nonzero(covered) < 2:
+            return None
+        return align(position[covered] + difference_at(*self._position, t_s, position), position[covered])
+
+    @cached_property
+    def truth_position(self) -> Array:
+        """The log's truth (n, 3) in its own frame."""
+        truth = self.log.truth or {}
+        return np.column_stack([truth[name] for name in ("pos_n_m", "pos_e_m", "pos_d_m")])
+
+    @property
+    def _position(self) -> tuple[Array, Array]:
+        return self.estimate[:, 0], self.estimate[:, 1:4]
+
+    def outage(self, t0: float, t1: float) -> OutageError:
+        """The outage error over a window."""
+        gps = self.log.streams[Sensor.GPS_POSITION]
+        delay_s = self.options.gps_delay_s
+        return outage_error(self.estimate[:, 0], self.estimate[:, 1:3], gps.t_s, gps.value[:, :2], delay_s, t0, t1)
+
+    def velocity_rms(self) -> float | None:
+        """Horizontal velocity against GPS velocity at the instant it describes [m/s]; None without GPS."""
+        gps = self.log.streams.get(Sensor.GPS_VELOCITY)
+        if gps is None:
+            return None
+        t_s = gps.t_s - self.options.gps_delay_s
+        return _number(horizontal_rms(self.estimate[:, 0], self.estimate[:, 17:19], t_s, gps.value[:, :2]))
+
+    def rejected(self) -> dict[str, dict[str, int]]:
+        """What was not fused, by sensor and reason: rows by the reader, components by the filter."""
+        counts = {s.name.lower(): dict(stream.rejected) for s, stream in self.log.streams.items() if stream.rejected}
+        sensors, reasons = self.innovation[:, 1].astype(int), self.innovation[:, 8].astype(int)
+        for sensor in self.log.streams:
+            numbers = np.bincount(reasons[sensors == sensor], minlength=len(Reason))
+            found = {r.label: int(numbers[r]) for r in Reason if numbers[r] and r not in NO_REJECTION}
+            if found:
+                counts.setdefault(sensor.name.lower(), {}).update(found)
+        return counts
+
+    def truth_scores(self) -> dict[str, float] | None:
+        """Errors against the log's truth, turned and shifted onto the estimate; None without one."""
+        placed = self.truth_alignment
+        if placed is None or self.log.truth is None:
+            return None
+        t_s, position = self.log.truth["t_s"], self.truth_position
+        error = difference_at(*self._position, t_s, placed.moved(position))
+        velocity = placed.turned(velocity_of(t_s, position))
+        squares = np.sum(error[:, :2] ** 2, axis=1)
+        return {
+            "yaw_rad": placed.yaw_rad,
+            "horizontal_rms_m": float(np.sqrt(squares.mean())),
+            "horizontal_max_m": float(np.sqrt(squares.max())),
+            "vertical_rms_m": float(np.sqrt(np.mean(error[:, 2] ** 2))),
+            "velocity_rms_m_s": horizontal_rms(self.estimate[:, 0], self.estimate[:, 17:19], t_s, velocity[:, :2]),
+        }
+
+    def scores(self) -> dict[str, Any]:
+        """What `--json` prints, but for the outage table and the record's path."""
+        start, end = self.log.span_s
+        scores: dict[str, Any] = {
+            "duration_s": end - start,
+            "outages": [outage_entry(self.outage(t0, t1)) for t0, t1 in self.options.gps_outages_s],
+            "velocity_rms_m_s": self.velocity_rms(),
+            "rejected": self.rejected(),
+        }
+        truth = self.truth_scores()
+        return scores if truth is None else {**scores, "truth": truth}
+
+
+def replay(log: Log, options: ReplayOptions, settings: KinematicSettings) -> Replay:
+    """Run a log through the filter. InputError where an option cannot be, or the filter never starts."""
+    with announce_compilation("replay"):
+        prepared = prepare(log, options)
+        return _run(log, options, settings, prepared)
+
+
+def outage_table(
+    log: Log,
+    options: ReplayOptions,
+    settings: KinematicSettings,
+    windows: list[tuple[float, float]],
+    progress: Callable[[int], None] = lambda done: None,
+) -> list[OutageError]:
+    """One replay a window, each with GPS cut in that window alone. `progress` is told how many are done."""
+
+    def error_of(window: tuple[float, float]) -> OutageError:
+        return _run(log, replace(options, gps_outages_s=(window,)), settings, prepared).outage(*window)
+
+    errors = []
+    with announce_compilation("replay"), ThreadPoolExecutor(2) as pool:
+        prepared = prepare(log, replace(options, gps_outages_s=tuple(windows)))
+        for done, error in enumerate(pool.map(error_of, windows), start=1):
+            errors.append(error)
+            progress(done)
+    return errors
+
+
+def table_windows(t0: float, t1: float, length_s: float) -> list[tuple[float, float]]:
+    """[t0, t0 + length), ... up to t1. InputError where that is no list of windows."""
+    if not (t0 < t1 and length_s > 0.0 and np.isfinite([t0, t1, length_s]).all()):
+        raise InputError(f"--outage-table {t0:g}:{t1:g}:{length_s:g}: START:END:LENGTH in seconds, START before END")
+    count = int(np.floor((t1 - t0) / length_s + 1e-9))
+    if not 1 <= count <= LONGEST_TABLE:
+        raise InputError(
+            f"--outage-table {t0:g}:{t1:g}:{length_s:g}: that is {count} windows; 1 to {LONGEST_TABLE} can be flown"
+        )
+    return [(t0 + k * length_s, t0 + (k + 1) * length_s) for k in range(count)]
+
+
+def outage_entry(error: OutageError) -> dict[str, float | None]:
+    """An outage as JSON has it; null where the window could not be scored."""
+    return {name: _number(value) for name, value in error._asdict().items()}
+
+
+def outage_summary(errors: list[OutageError]) -> dict[str, float | None]:
+    """Median and worst rms of the windows that could be scored; null without any."""
+    rms = np.array([error.horizontal_rms_m for error in errors])
+    rms = rms[np.isfinite(rms)]
+    if not len(rms):
+        return {"outage_median_rms_m": None, "outage_worst_rms_m": None}
+    return {"outage_median_rms_m": float(np.median(rms)), "outage_worst_rms_m": float(rms.max())}
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _run(log: Log, options: ReplayOptions, settings: KinematicSettings, prepared: Prepared) -> Replay:
+    queue = withhold(log, prepared.queue, options)
+    tape = new_tape(queue)
+    work, memory = new_memory(queue, settings.start_wait_s)
+    run(queue, settings, work, memory, tape)
+    if tape.used[0] < 2:
+        raise InputError(f"{log.path}: the filter never started; it needs an attitude before the log's end")
+    return Replay(log, options, settings, prepared, tape)

@@ -1,0 +1,248 @@
+"""The words and tables of the report: headline, scores, events, parameters. Scores are shown, never computed."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shlex
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+
+from flownav.measurement import Sensor
+from flownav.record import Record
+from flownav.report.figures_filter import SENSOR_TITLES
+from flownav.report.series import event_rows, flow_velocity, has, mapping, readings, scored_outages, start_end_s
+
+EVENTS_LISTED = 300
+NONE, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
+UNIT_AFTER_NUMBER = re.compile(r"(\d) (m/s|m|s)\b")
+STATES = {"x": ("north", "m"), "y": ("east", "m"), "z": ("down", "m"),
+          "u": ("forward", "m/s"), "v": ("right", "m/s"), "w": ("down", "m/s")}  # fmt: skip
+KINDS = {
+    "fly": "A closed-loop simulated flight of {}.",
+    "replay": "A recorded flight of {}, fused again.",
+    "live": "A live flight of {}.",
+}
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A large figure of the headline."""
+
+    label: str
+    value: str
+    unit: str = ""
+    note: str = ""
+
+
+def number(value: Any, digits: int = 4) -> str:
+    """A number with a true minus sign and fixed decimals; a dash where there is none."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        return NONE
+    return f"{value:.{digits}f}".replace("-", MINUS)
+
+
+def metres(value: Any) -> str:
+    """A length with as many decimals as it deserves."""
+    size = abs(value) if isinstance(value, (int, float)) else 0.0
+    return number(value, 3 if size < 1 else 2 if size < 100 else 0)
+
+
+def title(record: Record) -> str:
+    """What flew, as a heading: the scenario's (or the log's) name."""
+    name = record.manifest.get("scenario") or record.manifest.get("log") or record.manifest.get("kind") or "Flight"
+    words = PurePath(str(name)).name.removesuffix(".toml").replace("_", " ").replace("-", " ").strip() or "Flight"
+    return words[0].upper() + words[1:]
+
+
+def duration_s(record: Record) -> float:
+    """The flight's length [s]: as the manifest says, or else as its estimate lasts."""
+    stated = record.manifest.get("duration_s")
+    start, end = start_end_s(record)
+    return float(stated) if isinstance(stated, (int, float)) else end - start
+
+
+def facts(record: Record) -> list[tuple[str, str]]:
+    """The line under the heading: filter, GPS model, seed, length."""
+    manifest = record.manifest
+    stated = [("Filter", manifest.get("filter")), ("GPS model", manifest.get("gps")), ("Seed", manifest.get("seed"))]
+    shown = [(name, str(value)) for name, value in stated if value is not None]
+    return [*shown, ("Length", f"{duration_s(record):.1f} s")]
+
+
+def summary(record: Record) -> str:
+    """The verdict in sentences."""
+    manifest, scores = record.manifest, mapping(record.manifest.get("scores"))
+    said = [KINDS.get(str(manifest.get("kind")), "A flight of {}.").format(f"{duration_s(record):.1f} s")]
+    largest = scores.get("max_position_error_m")
+    if largest is not None:
+        published = mapping(manifest.get("paper")).get("max_position_error_m")
+        beside = f" (the paper: {metres(published)} m)" if published is not None else ""
+        said.append(f"The estimated position was never further than {metres(largest)} m from the truth{beside}.")
+    touchdown = mapping(scores.get("touchdown"))
+    if touchdown:
+        said.append(
+            f"It touched down after {number(touchdown.get('t_s'), 1)} s, "
+            f"{metres(touchdown.get('horizontal_error_m'))} m from its mark, "
+            f"sinking at {number(touchdown.get('sink_rate_m_s'), 2)} m/s."
+        )
+    outages = scored_outages(record)
+    if outages:
+        worst = max(outages, key=lambda outage: outage.get("horizontal_rms_m") or 0.0)
+        among = f", the worst of {len(outages)} outages," if len(outages) > 1 else ""
+        rms, largest = number(worst.get("horizontal_rms_m"), 2), number(worst.get("horizontal_max_m"), 2)
+        said.append(
+            f"With GPS withheld from {worst['t0']:g} to {worst['t1']:g} s{among} the position drifted "
+            f"{rms} m rms and {largest} m at most."
+        )
+    if not scores:
+        said.append("The record carries no scores.")
+    return UNIT_AFTER_NUMBER.sub("\\1\N{NO-BREAK SPACE}\\2", " ".join(said))
+
+
+def tiles(record: Record) -> list[Tile]:
+    """The headline figures that the record's scores and streams give."""
+    scores, paper = mapping(record.manifest.get("scores")), mapping(record.manifest.get("paper"))
+    found = []
+    if scores.get("max_position_error_m") is not None:
+        published = paper.get("max_position_error_m")
+        note = f"paper {metres(published)} m" if published is not None else "estimate against truth"
+        found.append(Tile("Largest position error", metres(scores["max_position_error_m"]), "m", note))
+    touchdown = mapping(scores.get("touchdown"))
+    if touchdown:
+        when = f"at {number(touchdown.get('t_s'), 1)} s"
+        found.append(Tile("Touchdown off its mark", metres(touchdown.get("horizontal_error_m")), "m", when))
+        found.append(Tile("Touchdown sink rate", number(touchdown.get("sink_rate_m_s"), 2), "m/s", when))
+    outages = scored_outages(record)
+    if outages:
+        worst = max(outages, key=lambda outage: outage.get("horizontal_rms_m") or 0.0)
+        when = f"rms, {worst['t0']:g} to {worst['t1']:g} s"
+        name = "Drift without GPS" if len(outages) == 1 else f"Worst drift of {len(outages)} outages"
+        found.append(Tile(name, number(worst.get("horizontal_rms_m"), 2), "m", when))
+    if scores.get("velocity_rms_m_s") is not None:
+        found.append(Tile("Velocity error", number(scores["velocity_rms_m_s"], 2), "m/s", "rms, against GPS"))
+    share = flow_share(record)
+    if share is None:
+        return [*found, Tile("Flow sensor engaged", NONE, "", "no valid readings")]
+    return [*found, Tile("Flow sensor engaged", f"{100 * share:.0f}", "%", "of the time")]
+
+
+def flow_share(record: Record) -> float | None:
+    """Share of the flight with valid flow readings, a gap not counted; None without readings."""
+    flow = flow_velocity(record)
+    start, end = start_end_s(record)
+    if flow is None or len(flow.t_s) < 2 or end <= start:
+        return None
+    interval = np.diff(flow.t_s)
+    return float(min(1.0, interval[interval <= 3.0 * np.median(interval)].sum() / (end - start)))
+
+
+def lacking(record: Record) -> list[str]:
+    """What the record does not hold, in words, and what the report can therefore not show."""
+    notes = []
+    if not has(record, "truth"):
+        notes.append("No truth: errors are shown against GPS, which has errors of its own.")
+    if not has(record, "estimate"):
+        notes.append("No estimate: nothing was fused.")
+    if flow_velocity(record) is None:
+        notes.append("No valid optical flow: position and velocity rest on the other sensors.")
+    if readings(record, Sensor.GPS_POSITION) is None:
+        notes.append("No GPS positions.")
+    if record.manifest.get("kind") != "fly" and not has(record, "autopilot"):
+        notes.append("No estimate of an autopilot's own to compare with.")
+    if not mapping(record.manifest.get("scores")):
+        notes.append("No scores.")
+    return notes
+
+
+@dataclass(frozen=True)
+class ScoreRow:
+    """A state's scores beside the paper's, as text."""
+
+    state: str
+    direction: str
+    unit: str
+    ours: tuple[str, str, str, str]  # mean, std, rms, max
+    paper: tuple[str, str]  # mean, std
+
+
+def score_rows(record: Record) -> list[ScoreRow]:
+    """One row for each scored state."""
+    states = mapping(mapping(record.manifest.get("scores")).get("states"))
+    published = mapping(mapping(record.manifest.get("paper")).get("states"))
+    rows = []
+    for key, (direction, unit) in STATES.items():
+        mine, theirs = mapping(states.get(key)), mapping(published.get(key))
+        if mine:
+            mean, std, rms, largest = (number(mine.get(f"{kind}_error")) for kind in ("mean", "std", "rms", "max"))
+            beside = (number(theirs.get("mean_error")), number(theirs.get("std_error")))
+            rows.append(ScoreRow(key, direction, unit, (mean, std, rms, largest), beside))
+    return rows
+
+
+def outage_rows(record: Record) -> list[tuple[str, str, str]]:
+    """GPS outages as (window, rms, max)."""
+    return [(f"{outage['t0']:g} to {outage['t1']:g} s", number(outage.get("horizontal_rms_m"), 2),
+             number(outage.get("horizontal_max_m"), 2)) for outage in scored_outages(record)]  # fmt: skip
+
+
+def rejected_rows(record: Record) -> list[tuple[str, str, str]]:
+    """Rejected readings as (sensor, reason, count), most first."""
+    counts = mapping(mapping(record.manifest.get("scores")).get("rejected"))
+    rows = [(sensor, reason, count) for sensor, reasons in counts.items() for reason, count in mapping(reasons).items()]
+    rows.sort(key=lambda row: -float(row[2]))
+    return [(SENSOR_TITLES.get(s, s.replace("_", " ")), r.replace("_", " "), f"{c:,}") for s, r, c in rows]
+
+
+@dataclass(frozen=True)
+class EventTables:
+    """Events counted by what they are, and one by one up to a limit."""
+
+    counted: list[tuple[str, str, int, str, str]]  # source, kind, count, first, last
+    listed: list[tuple[str, str, str, str, str]]  # t_s, source, kind, detail, value
+    total: int
+
+
+def events(record: Record) -> EventTables:
+    """The events table, counted and listed."""
+    rows = event_rows(record)
+    groups: dict[tuple[str, str], list[float]] = {}
+    for t_s, source, kind, _, _ in rows:
+        groups.setdefault((source, kind), []).append(t_s)
+    counted = [(*what, len(times), f"{min(times):.2f}", f"{max(times):.2f}") for what, times in groups.items()]
+    listed = [(f"{t_s:.2f}", source, kind, detail, value) for t_s, source, kind, detail, value in rows[:EVENTS_LISTED]]
+    return EventTables(counted, listed, len(rows))
+
+
+def groups(tree: Any) -> list[tuple[str, list[tuple[str, str]]]]:
+    """A nested mapping as (group, [(dotted key, value as text)]); its own plain values come first, as "General"."""
+    tree = mapping(tree)
+    plain = [(str(key), text(value)) for key, value in tree.items() if not isinstance(value, Mapping)]
+    nested = [(str(key), list(_flat(value))) for key, value in tree.items() if isinstance(value, Mapping)]
+    return ([("General", plain)] if plain else []) + nested
+
+
+def _flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
+    for key, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{prefix}{key}.")
+        else:
+            yield f"{prefix}{key}", text(value)
+
+
+def text(value: Any) -> str:
+    """A manifest value as text: strings as they are, everything else as JSON."""
+    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)
+
+
+def command(record: Record) -> str:
+    """The command line that made the record, "" where it does not say."""
+    stated = record.manifest.get("command")
+    if isinstance(stated, (list, tuple)):
+        return shlex.join(str(part) for part in stated)
+    return str(stated) if stated else ""

@@ -1,0 +1,182 @@
+"""The path over the ground: top view and 3-D view over the pad."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flownav.measurement import Sensor
+from flownav.record import POSITION_NED, Record
+from flownav.report.panels import Panel, drawn, listed
+from flownav.report.series import (
+    DOT_POINTS,
+    LINE_POINTS,
+    Array,
+    Track,
+    at,
+    mapping,
+    moments,
+    outages,
+    readings,
+    thin,
+    thin_dots,
+    track,
+)
+from flownav.report.style import COLOUR, LINES, axis, layout
+
+BOX_DIAGONAL, BOX_HEIGHT = (
+    1.75,
+    1.15,
+)  # of a 3-D view at most, in Plotly's units: the camera sees it whole
+
+
+class Pad(NamedTuple):
+    """The landing pad, a square on the ground: centre in NED [m] and length of a side [m]."""
+
+    n_m: float
+    e_m: float
+    d_m: float
+    size_m: float
+
+    def corners(self) -> Array:
+        """North, east, down of the closed outline, shape (5, 3)."""
+        half = 0.5 * self.size_m
+        north, east = half * np.array([-1, 1, 1, -1, -1]), half * np.array([-1, -1, 1, 1, -1])
+        return np.column_stack([self.n_m + north, self.e_m + east, np.full(5, self.d_m)])
+
+
+def pad(record: Record) -> Pad | None:
+    """The pad of manifest["pad"] {"size_m", "n_m", "e_m", "d_m"}; its centre is the origin where unstated."""
+    stated = mapping(record.manifest.get("pad"))
+    if not isinstance(stated.get("size_m"), (int, float)):
+        return None
+    return Pad(*(float(stated.get(name) or 0.0) for name in ("n_m", "e_m", "d_m", "size_m")))
+
+
+def _paths(record: Record) -> list[tuple[str, Track]]:
+    """Lines to draw by role, the truth last and so on top."""
+    sources = [(role, track(record, role, POSITION_NED)) for role in ("autopilot", "estimate", "truth")]
+    return [(role, source) for role, source in sources if source is not None]
+
+
+def _touchdown(record: Record, paths: list[tuple[str, Track]]) -> Array | None:
+    touch = next((m.t_s for m in moments(record) if m.name == "touchdown"), None)
+    if touch is None:
+        return None
+    point = at(np.array([touch]), paths[-1][1])[0]
+    return None if np.isnan(point).any() else point
+
+
+def ground_track(record: Record) -> Panel:
+    """Top view: north up the page, east to the right, GPS readings, paths, pad, outages."""
+    key, title = "ground-track", "Ground track"
+    paths, gps = _paths(record), readings(record, Sensor.GPS_POSITION)
+    if not paths:
+        return Panel(key, title, absent="The record holds no positions.")
+    from plotly.graph_objects import Figure
+
+    figure = Figure()
+    figure.update_layout(template="none", **{**layout(470), "hovermode": "closest"})
+    figure.update_xaxes({**axis("y, east (m)"), "zeroline": False})
+    figure.update_yaxes({**axis("x, north (m)"), "zeroline": False, "scaleanchor": "x", "scaleratio": 1})
+    where = pad(record)
+    if where is not None:
+        north, east, _ = where.corners().T
+        _flat(figure, "pad", north, east, mode="lines", line={"color": COLOUR["pad"], "width": 1.5}, fill="toself",
+              fillcolor=COLOUR["padfill"], hoverinfo="skip")  # fmt: skip
+    if gps is not None:
+        kept = thin_dots(DOT_POINTS, gps.value[:, 0], gps.value[:, 1])
+        marker = {"color": COLOUR["gps"], "size": 3.5, "opacity": 0.45}
+        _flat(figure, "GPS", gps.value[kept, 0], gps.value[kept, 1], mode="markers", marker=marker)
+    for role, path in paths:
+        kept = thin(LINE_POINTS, path.value[:, 0], path.value[:, 1])
+        _flat(
+            figure, role, path.value[kept, 0], path.value[kept, 1], mode="lines", line={**LINES[role], "dash": "solid"}
+        )
+    _outage_parts(figure, record)
+    touch = _touchdown(record, paths)
+    if touch is not None:
+        marker = {"symbol": "x-thin", "size": 12, "line": {"width": 2.5, "color": COLOUR["alert"]}}
+        _flat(figure, "touchdown", touch[:1], touch[1:2], mode="markers", marker=marker)
+    caption = "Seen from above, both axes to the same scale."
+    caption += f" The pad is {where.size_m:g} m square." if where is not None else ""
+    drawn_names = [str(trace.name) for trace in figure.data if trace.showlegend is not False]
+    return Panel(key, title, caption, f"Path over the ground from above: {listed(drawn_names)}.", figure)
+
+
+def _flat(figure: Any, name: str, north: Array, east: Array, **style: Any) -> None:
+    style.setdefault("hovertemplate", "north %{y:.2f} m, east %{x:.2f} m")
+    if style.get("hoverinfo"):
+        style.pop("hovertemplate")
+    figure.add_scatter(x=drawn(east), y=drawn(north), name=name, **style)
+
+
+def _outage_parts(figure: Any, record: Record) -> None:
+    """The estimate's path while GPS was withheld, in the colour of alarm."""
+    estimate = track(record, "estimate", POSITION_NED)
+    for number, window in enumerate(outages(record) if estimate is not None else ()):
+        part = estimate.within(window).value  # type: ignore[union-attr]
+        if len(part):
+            kept = thin(LINE_POINTS, part[:, 0], part[:, 1])
+            _flat(figure, "estimate in an outage", part[kept, 0], part[kept, 1], mode="lines", showlegend=number == 0,
+                  legendgroup="outage", line={"color": COLOUR["alert"], "width": 2.2})  # fmt: skip
+
+
+def path_over_pad(record: Record) -> Panel:
+    """3-D view of the path over the pad; height is drawn upwards."""
+    key, title = "path-3d", "Path over the pad" if pad(record) else "Path in space"
+    paths, gps, where = _paths(record), readings(record, Sensor.GPS_POSITION), pad(record)
+    if not paths:
+        return Panel(key, title, absent="The record holds no positions.")
+    from plotly.graph_objects import Figure
+
+    figure = Figure()
+    scene_axis = {"backgroundcolor": "rgba(0,0,0,0)", "gridcolor": COLOUR["rule"], "zerolinecolor": COLOUR["rule"],
+                  "tickfont": {"color": COLOUR["muted"], "size": 10}, "showspikes": False, "nticks": 5}  # fmt: skip
+    named = dict(zip(("xaxis", "yaxis", "zaxis"), ("east (m)", "north (m)", "height (m)"), strict=True))
+    titles = {name: {"text": text, "font": {"size": 11}} for name, text in named.items()}
+    scene: dict[str, Any] = {name: {**scene_axis, "title": title} for name, title in titles.items()}
+    look = {"eye": {"x": 1.15, "y": -1.35, "z": 0.6}, "center": {"x": 0, "y": 0, "z": -0.08}}
+    sides, to_scale = _proportions(paths, where)
+    scene |= {"aspectmode": "manual", "aspectratio": sides, "camera": look, "dragmode": "turntable"}
+    margin = {"l": 0, "r": 0, "t": 36, "b": 0}
+    figure.update_layout(template="none", scene=scene, **{**layout(470), "margin": margin})
+    if where is not None:
+        corners = where.corners()
+        figure.add_mesh3d(**_space(corners[:4]), i=[0, 0], j=[1, 2], k=[2, 3], color=COLOUR["pad"], opacity=0.35,
+                          hoverinfo="skip", showlegend=False)  # fmt: skip
+        figure.add_scatter3d(**_space(corners), mode="lines", name="pad", hoverinfo="skip",
+                             line={"color": COLOUR["pad"], "width": 4})  # fmt: skip
+    if gps is not None:
+        kept = thin_dots(DOT_POINTS, *gps.value.T)
+        figure.add_scatter3d(**_space(gps.value[kept]), mode="markers", name="GPS", visible="legendonly",
+                             marker={"color": COLOUR["gps"], "size": 2, "opacity": 0.5})  # fmt: skip
+    for role, path in paths:
+        kept = thin(LINE_POINTS, *path.value.T)
+        figure.add_scatter3d(**_space(path.value[kept]), mode="lines", name=role,
+                             line={"color": COLOUR[role], "width": 5 if role == "truth" else 3})  # fmt: skip
+    touch = _touchdown(record, paths)
+    if touch is not None:
+        figure.add_scatter3d(**_space(touch[None, :]), mode="markers", name="touchdown",
+                             marker={"symbol": "x", "size": 4, "color": COLOUR["alert"]})  # fmt: skip
+    caption = "Drag to turn. GPS readings wait in the legend."
+    caption += "" if to_scale else " Height is drawn to a scale of its own."
+    alt = f"Path in space: {listed([role for role, _ in paths])}{', over the pad' if where else ''}."
+    return Panel(key, title, caption, alt, figure, needs_webgl=True)
+
+
+def _proportions(paths: list[tuple[str, Track]], where: Pad | None) -> tuple[dict[str, float], bool]:
+    """Sides of the box of a 3-D view, and whether they are true to scale: a very flat or slender path is not."""
+    points = np.concatenate([paths[-1][1].value, *([where.corners()] if where is not None else [])])
+    north, east, height = np.maximum(np.nanmax(points, axis=0) - np.nanmin(points, axis=0), 1e-3)
+    across = max(north, east)
+    to_scale = bool(across / 6.0 < height < 6.0 * across)
+    sides = np.array([east, north, height if to_scale else 0.6 * across])
+    sides = np.maximum(sides * min(BOX_DIAGONAL / np.linalg.norm(sides), BOX_HEIGHT / sides[2]), 0.1)
+    return dict(zip("xyz", map(float, sides), strict=True)), to_scale
+
+
+def _space(ned: Array) -> dict[str, Any]:
+    return {"x": drawn(ned[:, 1]), "y": drawn(ned[:, 0]), "z": drawn(-ned[:, 2]),
+            "hovertemplate": "north %{y:.2f} m, east %{x:.2f} m, height %{z:.2f} m"}  # fmt: skip

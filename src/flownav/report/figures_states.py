@@ -1,0 +1,194 @@
+"""Position, velocity and their errors in time: the paper's figures 17 to 30."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.measurement import Sensor
+from flownav.record import POSITION_NED, VELOCITY_BODY, Record
+from flownav.report.panels import Panel, Stack, listed
+from flownav.report.series import (
+    Array,
+    Moment,
+    Track,
+    Window,
+    difference,
+    flow_velocity,
+    gps_velocity_body,
+    has,
+    moments,
+    outages,
+    readings,
+    start_end_s,
+    track,
+    worst_outage,
+)
+
+POSITION_TITLES = ("x, north (m)", "y, east (m)", "z, down (m)")
+VELOCITY_TITLES = ("u, forward (m/s)", "v, right (m/s)", "w, down (m/s)")
+REFERENCE = ("pos_n_ref_m", "pos_e_ref_m", "pos_d_ref_m")
+DOWN = "z is positive down (NED); its axis is drawn upside down, so that up on the page is up."
+
+
+class View(NamedTuple):
+    """A panel's key and title, the window of time [s] it shows (all where None), whether GPS is shown at once."""
+
+    key: str
+    title: str
+    window: Window | None = None
+    with_gps: bool = True
+
+
+class Source(NamedTuple):
+    """Something to draw: the role it is coloured by, its name in the legend, and its values."""
+
+    role: str
+    name: str
+    track: Track | None
+
+
+POSITION = View("position", "Position")
+VELOCITY = View("velocity", "Velocity")
+
+
+def position(record: Record, view: View = POSITION) -> Panel:
+    """Position x, y, z: GPS readings, estimate, truth (figures 17 and 22)."""
+    dots = [Source("gps", "GPS", readings(record, Sensor.GPS_POSITION))]
+    lines = [Source("command", "reference", track(record, "command", REFERENCE))]
+    lines += [Source(role, role, track(record, role, POSITION_NED)) for role in ("autopilot", "estimate", "truth")]
+    note = DOWN if view.with_gps else "GPS readings wait in the legend, so that centimetres show."
+    return _states(record, POSITION_TITLES, dots, lines, view, note)
+
+
+def velocity(record: Record, view: View = VELOCITY) -> Panel:
+    """Body velocity u, v, w: flow, estimate, truth (figures 18 to 25)."""
+    lines = [Source(role, role, track(record, role, VELOCITY_BODY)) for role in ("autopilot", "estimate", "truth")]
+    flow = flow_velocity(record)
+    name = "flow sensor" if has(record, "flow_velocity") else "flow \N{MULTIPLICATION SIGN} range"
+    dots = [Source("flow", name, flow)]
+    if lines[-1].track is None:
+        dots.insert(0, Source("gps", "GPS velocity", gps_velocity_body(record)))
+    note = "Body axes: forward, right, down."
+    if flow is None:
+        note += " The record holds no valid flow readings."
+    elif np.isnan(flow.value[:, 2]).all():
+        note += " The flow sensor does not measure w."
+    return _states(record, VELOCITY_TITLES, dots, lines, view, note)
+
+
+def _states(
+    record: Record, titles: tuple[str, ...], dots: list[Source], lines: list[Source], view: View, note: str
+) -> Panel:
+    if all(line.track is None for line in lines if line.role != "command"):
+        return Panel(view.key, view.title, absent="The record holds no estimate and no truth of these states.")
+    stack = Stack(titles)
+    for role, name, source in dots:
+        for row, t_s, values in _rows(source, view.window):
+            stack.dots(row, role, name, t_s, values, shown=view.with_gps)
+    for role, name, source in lines:
+        for row, t_s, values in _rows(source, view.window):
+            stack.line(row, role, name, t_s, values)
+    if titles is POSITION_TITLES:
+        stack.reverse(3)
+    span = view.window or start_end_s(record)
+    figure = stack.figure(span, moments(record), outages(record))
+    alt = f"{view.title} from {span[0]:.0f} to {span[1]:.0f} s: {', '.join(titles)}. "
+    return Panel(view.key, view.title, note, f"{alt}Drawn: {listed(stack.names)}.", figure)
+
+
+def _rows(source: Track | None, window: Window | None) -> Iterator[tuple[int, Array, Array]]:
+    """Each component of a track inside a window, as (row from 1, t_s, values)."""
+    if source is not None:
+        shown = source.within(window)
+        for row, values in enumerate(shown.value.T, 1):
+            yield row, shown.t_s, values
+
+
+def close_ups(record: Record) -> list[Panel]:
+    """Position and velocity around lift-off and touchdown (figures 19 to 21 and 23 to 25) and in the worst outage."""
+    panels = []
+    start, end = start_end_s(record)
+    for moment in moments(record):
+        window = close_up_window(moment, start, end)
+        name = moment.name.capitalize()
+        panels.append(position(record, View(f"{moment.name}-position", f"{name}: position", window, with_gps=False)))
+        panels.append(velocity(record, View(f"{moment.name}-velocity", f"{name}: velocity", window)))
+        if moment.name == "lift-off":
+            panels.append(lift_off_transient(record, moment))
+    outage = worst_outage(record)
+    if outage is not None:
+        window = (max(start, outage[0] - 5.0), min(end, outage[1] + 5.0))
+        panels.append(position(record, View("outage-position", "GPS outage: position", window)))
+        panels.append(velocity(record, View("outage-velocity", "GPS outage: velocity", window)))
+    if not panels:
+        why = "The record tells of no lift-off, no touchdown and no GPS outage."
+        panels.append(Panel("no-moments", "Take-off and landing", absent=why))
+    return panels
+
+
+def close_up_window(moment: Moment, start_s: float, end_s: float) -> Window:
+    """15 s around a moment: mostly what follows a lift-off, mostly what precedes a touchdown."""
+    before, after = (3.0, 12.0) if moment.name == "lift-off" else (12.0, 3.0)
+    return (max(start_s, moment.t_s - before), min(end_s, moment.t_s + after))
+
+
+def position_error(record: Record) -> Panel:
+    """Position error with its 3-sigma band (figures 26 and 29)."""
+    titles = ("x error (m)", "y error (m)", "z error (m)")
+    return _error(record, POSITION_NED, titles, "position-error", "Position error")
+
+
+def velocity_error(record: Record) -> Panel:
+    """Velocity error with its 3-sigma band (figures 27 and 30)."""
+    titles = ("u error (m/s)", "v error (m/s)", "w error (m/s)")
+    return _error(record, VELOCITY_BODY, titles, "velocity-error", "Velocity error")
+
+
+def _error(record: Record, columns: tuple[str, ...], titles: tuple[str, ...], key: str, title: str) -> Panel:
+    estimate, truth = track(record, "estimate", columns), track(record, "truth", columns)
+    if estimate is None or truth is None:
+        missing = "truth" if truth is None else "estimate"
+        return Panel(key, title, absent=f"The record holds no {missing} of these states, so there is no error to draw.")
+    stack = Stack(titles)
+    deviation = track(record, "estimate", tuple(f"std_{name}" for name in columns))
+    error = difference(estimate, truth)
+    for row in (1, 2, 3):
+        if deviation is not None:
+            stack.band(
+                row,
+                "±3\N{GREEK SMALL LETTER SIGMA}, as the filter states it",
+                deviation.t_s,
+                3.0 * deviation.value[:, row - 1],
+            )
+        stack.line(row, "estimate", "estimate \N{MINUS SIGN} truth", error.t_s, error.value[:, row - 1])
+    figure = stack.figure(start_end_s(record), moments(record))
+    caption = (
+        "A consistent filter stays inside its band about 99.7 % of the time."
+        if deviation is not None
+        else "The filter states no standard deviations, so there is no band."
+    )
+    alt = f"{title} over time: {', '.join(titles)}. Drawn: {listed(stack.names)}."
+    return Panel(key, title, caption, alt, figure)
+
+
+def lift_off_transient(record: Record, lift_off: Moment) -> Panel:
+    """Error in w around lift-off beside the rotor thrust that shakes the flow sensor (figure 28)."""
+    key, title = "lift-off-transient", "Lift-off transient"
+    estimate, truth = track(record, "estimate", VELOCITY_BODY), track(record, "truth", VELOCITY_BODY)
+    if estimate is None or truth is None:
+        return Panel(key, title, absent="Without truth the error at lift-off is not known.")
+    window = (lift_off.t_s - 3.0, lift_off.t_s + 6.0)
+    thrust = track(record, "truth", ("thrust_n",))
+    stack = Stack(("w error (m/s)", "thrust (N)") if thrust else ("w error (m/s)",), row_height_px=190)
+    error = difference(estimate, truth).within(window)
+    stack.line(1, "estimate", "estimate \N{MINUS SIGN} truth", error.t_s, error.value[:, 2])
+    if thrust:
+        shown = thrust.within(window)
+        stack.line(2, "truth", "rotor thrust", shown.t_s, shown.value[:, 0])
+    figure = stack.figure(window, [lift_off])
+    caption = "How the change of thrust at lift-off disturbs the estimate of w, as in the paper's figure 28."
+    alt = f"Error of w and rotor thrust around lift-off at {lift_off.t_s:.1f} s."
+    return Panel(key, title, caption, alt, figure, wide=True)

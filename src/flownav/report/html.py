@@ -1,0 +1,136 @@
+"""Write a record's report: one HTML file that needs nothing but a browser."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import os
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from flownav.record import Record
+from flownav.report import content, figures_filter, figures_path, figures_states, figures_vehicle
+from flownav.report.panels import Panel, Section
+from flownav.report.series import DOT_POINTS, LINE_POINTS, has, mapping
+from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
+
+HERE = Path(__file__).parent
+
+
+def write_report(record: Record, path: Path) -> None:
+    """Write the report of a record as one HTML file, whole or not at all (temporary name, then rename).
+
+    The page loads nothing: scripts, styles, figures and data are inside, and its content security policy
+    lets only its own scripts run. Text from the record is escaped. OSError where the file cannot be written.
+    """
+    page = render(record)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        temporary.write_text(page, encoding="utf-8", newline="\n")
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def sections(record: Record) -> list[Section]:
+    """The figures of a record, in the order of the page; one that would stand alone in its row is made wide."""
+    return [Section(key, title, tuple(_widened(panels))) for key, title, panels in _sections(record)]
+
+
+def _widened(panels: list[Panel]) -> Iterator[Panel]:
+    """Panels stand in pairs; a narrow one without a narrow neighbour takes the row."""
+    narrow = [not (panel.wide or panel.absent) for panel in panels]
+    paired = False  # the panel before this one awaits a neighbour
+    for here, following, panel in zip(narrow, [*narrow[1:], False], panels, strict=True):
+        if here and not paired and not following:
+            yield replace(panel, wide=True)
+        else:
+            yield panel
+        paired = here and not paired
+
+
+def _sections(record: Record) -> list[tuple[str, str, list[Panel]]]:
+    known = has(record, "truth")
+    errors = [figures_states.position_error(record), figures_states.velocity_error(record)] if known else []
+    against_gps = [] if known else [figures_filter.error_against_gps(record)]
+    uncertainty = [*errors, *against_gps, figures_filter.radius_of_uncertainty(record)]
+    return [
+        ("path", "Flight path", [figures_path.path_over_pad(record), figures_path.ground_track(record)]),
+        ("states", "Position and velocity", [figures_states.position(record), figures_states.velocity(record)]),
+        ("close-ups", "Close-ups", figures_states.close_ups(record)),
+        ("errors", "Errors and uncertainty", uncertainty),
+        ("filter", "Inside the filter", figures_filter.innovations(record)),
+        ("vehicle", "Vehicle", [figures_vehicle.attitude(record), figures_vehicle.controls(record)]),
+    ]
+
+
+def render(record: Record) -> str:
+    """The page as text."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
+
+    shown = sections(record)
+    scripts = [get_plotlyjs().replace("\r", ""), (HERE / "page.js").read_text(encoding="utf-8")]
+    environment = Environment(
+        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.get_template("page.html.j2").render(
+        title=content.title(record),
+        kind=str(record.manifest.get("kind") or "flight"),
+        facts=content.facts(record),
+        summary=content.summary(record),
+        tiles=content.tiles(record),
+        lacking=content.lacking(record),
+        paper=mapping(record.manifest.get("paper")),
+        scores=content.score_rows(record),
+        outages=content.outage_rows(record),
+        rejected=content.rejected_rows(record),
+        sections=shown,
+        thinned=_thinned(record),
+        line_points=LINE_POINTS,
+        dot_points=DOT_POINTS,
+        events=content.events(record),
+        parameters=content.groups(record.manifest.get("parameters")),
+        provenance=content.groups(record.manifest.get("provenance")),
+        command=content.command(record),
+        palette=PALETTE,
+        font=Markup(FONT),
+        data={panel.key: Markup(_figure_json(panel)) for section in shown for panel in section.panels if panel.figure},
+        dark=Markup(_inside_script(json.dumps(LIGHT_TO_DARK))),
+        style=Markup((HERE / "page.css").read_text(encoding="utf-8")),
+        scripts=[Markup(script) for script in scripts],
+        policy=_policy(scripts),
+    )
+
+
+def _thinned(record: Record) -> bool:
+    """Whether any table may be longer than what is drawn of it."""
+    return any(len(table["t_s"]) > DOT_POINTS for table in record.tables.values())
+
+
+def _figure_json(panel: Panel) -> str:
+    return _inside_script(panel.figure.to_json())
+
+
+def _inside_script(text: str) -> str:
+    """JSON that cannot end the script element that holds it."""
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def _policy(scripts: list[str]) -> str:
+    """A content security policy: nothing is loaded from anywhere, and only these scripts run."""
+    digests = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
+    rules: dict[str, Any] = {
+        "default-src": "'none'",
+        "script-src": " ".join(f"'sha256-{digest}'" for digest in digests),
+        "style-src": "'unsafe-inline'",
+        "img-src": "data: blob:",
+        "base-uri": "'none'",
+        "form-action": "'none'",
+    }
+    return "; ".join(f"{name} {value}" for name, value in rules.items())

@@ -1,0 +1,92 @@
+// Draws the page's figures, in the colours of the reader's system, and again on paper.
+"use strict";
+(() => {
+  const darkOf = JSON.parse(document.getElementById("dark-colours").textContent);
+  const prefersDark = matchMedia("(prefers-color-scheme: dark)");
+  const coarse = matchMedia("(pointer: coarse)").matches;
+  const plots = [...document.querySelectorAll("[data-figure]")];
+  const sources = new Map(plots.map((plot) => [plot, JSON.parse(document.getElementById(`figure-${plot.dataset.figure}`).textContent)]));
+  const config = { responsive: true, displaylogo: false, showSendToCloud: false, plotlyServerURL: "", modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+  const PAPER_WIDTH_PX = 660;
+
+  // A copy of a figure with each light colour replaced by its dark one.
+  function coloured(node, dark) {
+    if (typeof node === "string") return (dark && darkOf[node]) || node;
+    if (Array.isArray(node)) return node.map((item) => coloured(item, dark));
+    if (node === null || typeof node !== "object") return node;
+    return Object.fromEntries(Object.entries(node).map(([key, value]) => [key, key === "bdata" ? value : coloured(value, dark)]));
+  }
+
+  function hasWebGL() {
+    const canvas = document.createElement("canvas");
+    return Boolean(canvas.getContext("webgl2") || canvas.getContext("webgl"));
+  }
+
+  function say(plot, words) {
+    plot.classList.add("words");
+    plot.removeAttribute("role");
+    plot.replaceChildren(Object.assign(document.createElement("p"), { textContent: words }));
+    plot.dataset.drawn = "words";
+  }
+
+  // On a narrow page the legend stands below the axes, clear of the buttons above them; a 3-D view steps back.
+  function narrow(plot, data, layout) {
+    if (layout.scene) {
+      for (const side of ["x", "y", "z"]) layout.scene.camera.eye[side] *= 1.3;
+      Object.assign(layout.legend, { yref: "container", y: 0, yanchor: "bottom" });
+      return;
+    }
+    const names = data.filter((trace) => trace.showlegend !== false).map((trace) => trace.name);
+    const width_px = names.reduce((sum, name) => sum + 52 + 7 * name.length, 0);
+    const legend_px = 22 * Math.ceil((1.15 * width_px) / (plot.clientWidth - 60));
+    const axes_px = layout.height - layout.margin.t - layout.margin.b;
+    Object.assign(layout.margin, { l: 54, r: 6, t: 34, b: 46 + legend_px });
+    Object.assign(layout.legend, { y: -46 / axes_px, yanchor: "top" });
+    layout.height = axes_px + layout.margin.t + layout.margin.b;
+  }
+
+  async function draw(plot, dark, width) {
+    if (plot.dataset.drawn === "words") return;
+    if ("webgl" in plot.dataset && !hasWebGL()) {
+      say(plot, "This browser has no WebGL, which the 3-D view needs; the ground track and the height over time show the same flight.");
+      return;
+    }
+    const { data, layout } = coloured(sources.get(plot), dark);
+    if (width) Object.assign(layout, { width, autosize: false });
+    else if (plot.clientWidth < 480) narrow(plot, data, layout);
+    if (coarse && !("webgl" in plot.dataset)) layout.dragmode = false; // a finger scrolls the page
+    if (plot.dataset.drawn) await Plotly.react(plot, data, layout, config);
+    else {
+      plot.replaceChildren();
+      await Plotly.newPlot(plot, data, layout, config);
+    }
+    plot.dataset.drawn = "figure";
+  }
+
+  async function drawAll() {
+    delete document.documentElement.dataset.figures;
+    for (const plot of plots) {
+      try {
+        await draw(plot, prefersDark.matches);
+      } catch (error) {
+        console.error(error);
+        say(plot, `This figure could not be drawn: ${error.message}`);
+      }
+      await new Promise((resume) => setTimeout(resume)); // the page stays alive between figures
+    }
+    document.documentElement.dataset.figures = "drawn";
+  }
+
+  prefersDark.addEventListener("change", drawAll);
+  let closed = [];
+  addEventListener("beforeprint", () => {
+    closed = [...document.querySelectorAll("details:not([open])")];
+    for (const part of closed) part.open = true;
+    for (const plot of plots) draw(plot, false, PAPER_WIDTH_PX);
+  });
+  addEventListener("afterprint", () => {
+    for (const part of closed) part.open = false;
+    drawAll();
+  });
+  drawAll();
+})();

@@ -1,0 +1,170 @@
+"""A panel (one figure with its words) and the stack of axes that most figures are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.report.series import DOT_POINTS, LINE_POINTS, Array, Moment, Window, thin, thin_dots
+from flownav.report.style import COLOUR, LINES, axis, layout
+
+ROW_HEIGHT_PX = 138
+FRAME_HEIGHT_PX = 84
+GAP_PX = 22
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One figure of the page, or in `absent` the words that say why it is not there.
+
+    caption: what to look for (shown); alt: what is drawn (for screen readers); figure: a Plotly figure.
+    """
+
+    key: str
+    title: str
+    caption: str = ""
+    alt: str = ""
+    figure: Any = None
+    absent: str = ""
+    wide: bool = False
+    needs_webgl: bool = False
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and its panels."""
+
+    key: str
+    title: str
+    panels: tuple[Panel, ...]
+
+
+def drawn(values: Array) -> NDArray[np.float32]:
+    """Values as the page carries them: single precision halves its size."""
+    return np.asarray(values, np.float32)
+
+
+class Stack:
+    """Axes stacked over one time axis. Each `name` appears once in the legend and switches all its traces.
+
+    Rows count from 1. The figure is built, and checked by Plotly, once: by `figure`.
+    """
+
+    def __init__(self, titles: Sequence[str], row_height_px: int = ROW_HEIGHT_PX) -> None:
+        self.names: list[str] = []
+        self._count = len(titles)
+        self._data: list[dict[str, Any]] = []
+        self._layout = layout(FRAME_HEIGHT_PX + self._count * row_height_px)
+        self._layout |= {"shapes": [], "annotations": []}
+        self._reach = np.full((self._count, 2), np.nan)  # smallest and largest value drawn on each axis
+        gap = GAP_PX / (self._count * row_height_px)
+        height = (1.0 - gap * (self._count - 1)) / self._count
+        for row, title in enumerate(titles, 1):
+            top = 1.0 - (row - 1) * (height + gap)
+            last = row == self._count
+            across = {"anchor": f"y{row}", "showticklabels": last, "matches": None if row == 1 else "x"}
+            self._layout[f"xaxis{row}"] = axis("time (s)" if last else "") | across
+            domain = [max(0.0, top - height), min(1.0, top)]
+            self._layout[f"yaxis{row}"] = axis(title) | {"anchor": f"x{row}", "domain": domain, "nticks": 6}
+
+    def _add(self, row: int, name: str, trace: dict[str, Any], *, listed: bool = True) -> None:
+        self._reach[row - 1] = _reach(np.append(self._reach[row - 1], trace["y"]))
+        first = listed and name not in self.names
+        if first:
+            self.names.append(name)
+        place = {"xaxis": f"x{row}", "yaxis": f"y{row}"}
+        self._data.append({"type": "scatter", "name": name, "legendgroup": name, "showlegend": first, **place, **trace})
+
+    def line(self, row: int, role: str, name: str, t_s: Array, values: Array) -> None:
+        """A line in a role's style, thinned."""
+        kept = thin(LINE_POINTS, values)
+        points = {"x": drawn(t_s[kept]), "y": drawn(values[kept])}
+        self._add(row, name, {**points, "mode": "lines", "line": LINES[role], "hovertemplate": "%{y:.3f}"})
+
+    def dots(
+        self, row: int, colour: str, name: str, t_s: Array, values: Array, *, cross: bool = False, shown: bool = True
+    ) -> None:
+        """Readings as dots (or crosses), thinned; not shown, they wait in the legend."""
+        known = ~np.isnan(values)
+        if not known.any():
+            return
+        t_s, values = t_s[known], values[known]
+        kept = thin_dots(DOT_POINTS, values)
+        line = {"color": COLOUR[colour], "width": 1.5}
+        shape: dict[str, Any] = (
+            {"symbol": "x-thin", "size": 6, "line": line} if cross else {"size": 3.5, "opacity": 0.5}
+        )
+        points = {"x": drawn(t_s[kept]), "y": drawn(values[kept]), "mode": "markers", "hovertemplate": "%{y:.3f}"}
+        visible = True if shown else "legendonly"
+        self._add(row, name, {**points, "marker": {"color": COLOUR[colour], **shape}, "visible": visible})
+
+    def band(self, row: int, name: str, t_s: Array, half_width: Array) -> None:
+        """The area between -half_width and +half_width, thinned."""
+        kept = thin(LINE_POINTS, half_width)
+        x, y = drawn(t_s[kept]), drawn(half_width[kept])
+        edge = {"x": x, "mode": "lines", "line": {"color": COLOUR["band"], "width": 1}, "hoverinfo": "skip"}
+        self._add(row, name, {**edge, "y": -y}, listed=False)
+        self._add(row, name, {**edge, "y": y, "fill": "tonexty", "fillcolor": COLOUR["band"]})
+
+    def log_axis(self, row: int) -> None:
+        """Make an upright axis logarithmic."""
+        self._layout[f"yaxis{row}"] |= {"type": "log", "dtick": 1, "exponentformat": "none"}
+
+    def reverse(self, row: int) -> None:
+        """Draw an axis with its positive end down, as z of NED."""
+        self._layout[f"yaxis{row}"]["autorange"] = "reversed"
+
+    def from_zero(self) -> None:
+        """Let every upright axis start at zero."""
+        for row in range(1, self._count + 1):
+            self._layout[f"yaxis{row}"]["rangemode"] = "tozero"
+
+    def figure(self, window: Window, moments: Iterable[Moment] = (), outages: Iterable[Window] = ()) -> Any:
+        """The Plotly figure over a window of time, with the moments and GPS outages inside it marked.
+
+        An axis whose values hardly differ is kept from magnifying their rounding.
+        """
+        from plotly.graph_objects import Figure
+
+        for row, (smallest, largest) in enumerate(self._reach, 1):
+            self._layout[f"xaxis{row}"]["range"] = list(window)
+            if largest - smallest < 1e-6:
+                self._layout[f"yaxis{row}"] |= {"range": [smallest - 1.0, largest + 1.0], "autorange": False}
+        self._shade([outage for outage in outages if outage[0] < window[1] and outage[1] > window[0]])
+        for moment in moments:
+            if window[0] <= moment.t_s <= window[1]:
+                line = {"color": COLOUR["muted"], "width": 1, "dash": "2px,2px"}
+                self._upright("line", moment.t_s, moment.t_s, line=line)
+                self._note(moment.t_s, moment.name)
+        return Figure({"data": self._data, "layout": {"template": {}, **self._layout}})
+
+    def _shade(self, windows: Sequence[Window]) -> None:
+        for number, (t0, t1) in enumerate(windows):
+            self._upright("rect", t0, t1, layer="below", line={"width": 0}, fillcolor=COLOUR["window"])
+            if number == 0:
+                self._note(t0, "GPS outage")
+
+    def _upright(self, kind: str, t0_s: float, t1_s: float, **style: Any) -> None:
+        """A line or an area through all axes."""
+        place = {"type": kind, "x0": t0_s, "x1": t1_s, "y0": 0, "y1": 1, "xref": "x", "yref": "paper"}
+        self._layout["shapes"].append(place | style)
+
+    def _note(self, t_s: float, text: str) -> None:
+        place = {"x": t_s, "y": 1, "xref": "x", "yref": "paper", "xanchor": "left", "yanchor": "top", "xshift": 3}
+        font = {"size": 11, "color": COLOUR["muted"]}
+        self._layout["annotations"].append(place | {"text": text, "showarrow": False, "font": font})
+
+
+def _reach(values: Array) -> tuple[float, float]:
+    known = values[np.isfinite(values)]
+    return (float(known.min()), float(known.max())) if len(known) else (np.nan, np.nan)
+
+
+def listed(names: Iterable[str]) -> str:
+    """Names as a sentence has them: "a, b and c"."""
+    names = list(names)
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}" if names else "nothing"

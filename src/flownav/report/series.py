@@ -1,0 +1,230 @@
+"""What the figures draw, taken out of a record's tables: thinning, interpolation, rotation, moments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.measurement import COLUMNS, Sensor
+from flownav.record import QUATERNION, Record
+
+Array = NDArray[np.float64]
+Window = tuple[float, float]
+
+LINE_POINTS = 3000  # a drawn line has at most so many points
+DOT_POINTS = 900  # and a cloud of readings so many dots
+
+LIFT_OFF_KINDS = frozenset({"lift_off", "liftoff", "take_off", "takeoff"})
+TOUCHDOWN_KINDS = frozenset({"touchdown", "touch_down"})
+
+
+class Moment(NamedTuple):
+    """An instant that figures mark: `name` is "lift-off" or "touchdown"."""
+
+    t_s: float
+    name: str
+
+
+class Track(NamedTuple):
+    """A vector in time: t_s (n,), value (n, 3); frame and unit are the caller's."""
+
+    t_s: Array
+    value: Array
+
+    def within(self, window: Window | None) -> Track:
+        """The part inside a window of time [s], or all of it."""
+        if window is None:
+            return self
+        inside = (self.t_s >= window[0]) & (self.t_s <= window[1])
+        return Track(self.t_s[inside], self.value[inside])
+
+
+def thin(budget: int, *columns: Array) -> NDArray[np.int64]:
+    """Rows to draw, at most `budget`: of each stretch those with the smallest and largest value of every column."""
+    count = len(columns[0])
+    if count <= budget:
+        return np.arange(count)
+    stretches = (budget - 2) // (2 * len(columns))
+    edges = np.linspace(0, count, stretches + 1).astype(int)
+    width = int(np.diff(edges).max())
+    rows = np.minimum(edges[:-1, None] + np.arange(width), edges[1:, None] - 1)
+    kept = [np.array([0, count - 1])]
+    for column in columns:
+        values = np.asarray(column, float)[rows]
+        here = np.arange(stretches)
+        kept.append(rows[here, np.where(np.isnan(values), np.inf, values).argmin(axis=1)])
+        kept.append(rows[here, np.where(np.isnan(values), -np.inf, values).argmax(axis=1)])
+    return np.unique(np.concatenate(kept))
+
+
+def thin_dots(budget: int, *columns: Array) -> NDArray[np.int64]:
+    """Rows of a cloud of dots to draw, at most `budget`: an even sample, and the extremes of each stretch.
+
+    The extremes alone would hollow the cloud out: nine parts of the budget in ten are the sample.
+    """
+    count = len(columns[0])
+    if count <= budget:
+        return np.arange(count)
+    sample = np.linspace(0, count - 1, budget - budget // 10).astype(int)
+    return np.unique(np.concatenate([sample, thin(budget // 10, *columns)]))
+
+
+def has(record: Record, table: str, columns: tuple[str, ...] = ()) -> bool:
+    """Whether a table is there, holds a row, and has all the columns."""
+    there = record.tables.get(table, {})
+    return len(there.get("t_s", ())) > 0 and all(name in there for name in columns)
+
+
+def track(record: Record, table: str, columns: tuple[str, ...]) -> Track | None:
+    """Columns of a table in time; None where the table, a row or a column is missing."""
+    if not has(record, table, columns):
+        return None
+    return Track(np.asarray(record.tables[table]["t_s"], float), record.matrix(table, columns))
+
+
+def readings(record: Record, sensor: Sensor) -> Track | None:
+    """A sensor's valid readings (quality above 0) at the instants they describe: arrival less delay."""
+    name = sensor.name.lower()
+    all_readings = track(record, name, COLUMNS[sensor])
+    if all_readings is None:
+        return None
+    quality = np.asarray(record.tables[name].get("quality", np.full(len(all_readings.t_s), 255.0)), float)
+    valid = (quality > 0) & ~np.isnan(all_readings.value).all(axis=1)
+    if not valid.any():
+        return None
+    return Track(all_readings.t_s[valid] - delay_s(record, name), all_readings.value[valid])
+
+
+def delay_s(record: Record, sensor_name: str) -> float:
+    """The sensor's delay [s] that the record states in manifest["delays_s"]; 0 where it states none."""
+    return float(mapping(record.manifest.get("delays_s")).get(sensor_name) or 0.0)
+
+
+def mapping(value: Any) -> Mapping[str, Any]:
+    """The value where it is a mapping, an empty one elsewhere: manifests come from files."""
+    return value if isinstance(value, Mapping) else {}
+
+
+def at(t_s: Array, source: Track) -> Array:
+    """A track's columns at other instants by linear interpolation, shape (len(t_s), k); NaN outside its time."""
+    columns = [np.interp(t_s, source.t_s, column, left=np.nan, right=np.nan) for column in source.value.T]
+    return np.column_stack(columns).astype(float)
+
+
+def difference(source: Track, reference: Track) -> Track:
+    """source minus reference at the source's instants, those inside the reference's time."""
+    error = source.value - at(source.t_s, reference)
+    known = ~np.isnan(error).all(axis=1)
+    return Track(source.t_s[known], error[known])
+
+
+def flow_velocity(record: Record) -> Track | None:
+    """Body velocity [m/s] that the flow sensor gave; of a raw flow sensor, its flow less its gyro, times the range.
+
+    PX4 convention: flow_x = w_x - v_y/r, flow_y = w_y + v_x/r. The third column is NaN where there is none.
+    """
+    velocity = readings(record, Sensor.FLOW_VELOCITY)
+    if velocity is not None:
+        return velocity
+    flow, distance = readings(record, Sensor.FLOW_RATE), readings(record, Sensor.RANGE)
+    if flow is None or distance is None:
+        return None
+    range_m = at(flow.t_s, distance)[:, 0]
+    flow_x, flow_y, gyro_x, gyro_y = flow.value.T
+    body = np.column_stack([(flow_y - gyro_y) * range_m, -(flow_x - gyro_x) * range_m, np.full(len(range_m), np.nan)])
+    known = ~np.isnan(body[:, 0])
+    return Track(flow.t_s[known], body[known]) if known.any() else None
+
+
+def gps_velocity_body(record: Record) -> Track | None:
+    """GPS velocity [m/s] turned into the body frame by the estimated attitude."""
+    gps, attitude = readings(record, Sensor.GPS_VELOCITY), track(record, "estimate", QUATERNION)
+    if gps is None or attitude is None:
+        return None
+    from flownav.compile import plain
+    from flownav.frames import rotation_from_quaternion, to_body
+
+    nearest = np.clip(np.searchsorted(attitude.t_s, gps.t_s), 0, len(attitude.t_s) - 1)
+    rotation = plain(rotation_from_quaternion)(*attitude.value[nearest].T)
+    return Track(gps.t_s, np.column_stack(plain(to_body)(rotation, *gps.value.T)))
+
+
+def euler_deg(attitude: Track) -> Array:
+    """Roll, pitch, yaw [deg] of a track of quaternions, shape (n, 3), one row at a time: thin it first."""
+    from flownav.compile import plain
+    from flownav.frames import euler_from_quaternion
+
+    angles = plain(euler_from_quaternion)
+    return np.asarray(np.degrees([angles(*row) for row in attitude.value])).reshape(-1, 3)
+
+
+def sliding_rms(t_s: Array, squares: Array, width_s: float) -> Array:
+    """Root of the mean of squares over a window of time centred on each instant."""
+    total = np.concatenate([[0.0], np.cumsum(squares)])
+    first = np.searchsorted(t_s, t_s - width_s / 2, side="left")
+    last = np.searchsorted(t_s, t_s + width_s / 2, side="right")
+    return np.asarray(np.sqrt(np.maximum(total[last] - total[first], 0.0) / (last - first)))
+
+
+def moments(record: Record) -> list[Moment]:
+    """Lift-off and touchdown, as the truth, the scores or the events tell them, in order of time."""
+    found: dict[str, float] = {}
+    if has(record, "truth", ("on_ground",)):
+        truth = record.tables["truth"]
+        change = np.diff(np.asarray(truth["on_ground"], float) > 0.5, prepend=np.nan)  # +1 lands, -1 leaves
+        for name, sign in (("lift-off", -1.0), ("touchdown", 1.0)):
+            rows = np.flatnonzero(change[1:] == sign) + 1
+            if len(rows):
+                found[name] = float(truth["t_s"][rows[0 if sign < 0 else -1]])
+    for t_s, _, kind, _, _ in event_rows(record):
+        if kind.lower() in LIFT_OFF_KINDS:
+            found.setdefault("lift-off", t_s)
+        if kind.lower() in TOUCHDOWN_KINDS:
+            found.setdefault("touchdown", t_s)
+    scored = mapping(mapping(record.manifest.get("scores")).get("touchdown")).get("t_s")
+    if isinstance(scored, (int, float)):
+        found["touchdown"] = float(scored)
+    return sorted(Moment(t_s, name) for name, t_s in found.items())
+
+
+def event_rows(record: Record) -> list[tuple[float, str, str, str, str]]:
+    """Events as (t_s, source, kind, detail, value), each text as the record has it, missing ones empty."""
+    table = record.tables.get("events", {})
+    t_s = np.asarray(table.get("t_s", ()), float)
+    columns = [table.get(name, np.full(len(t_s), "")) for name in ("source", "kind", "detail", "value")]
+    return [(float(t), *(_text(cell) for cell in row)) for t, *row in zip(t_s, *columns, strict=True)]  # type: ignore[misc]
+
+
+def _text(cell: Any) -> str:
+    if cell is None or (isinstance(cell, (float, np.floating)) and np.isnan(cell)):
+        return ""
+    return f"{cell:.4g}" if isinstance(cell, (float, np.floating)) else str(cell)
+
+
+def start_end_s(record: Record) -> Window:
+    """First and last instant [s] of the estimate, or of whatever the record holds; (0, 0) of an empty one."""
+    tables = [record.tables["estimate"]] if has(record, "estimate") else list(record.tables.values())
+    times = [np.asarray(table["t_s"], float) for table in tables if len(table["t_s"])]
+    if not times:
+        return (0.0, 0.0)
+    return (float(min(t[0] for t in times)), float(max(t[-1] for t in times)))
+
+
+def scored_outages(record: Record) -> list[Mapping[str, Any]]:
+    """The GPS outages of the scores: {"t0", "t1" [s], "horizontal_rms_m", "horizontal_max_m"}."""
+    listed = mapping(record.manifest.get("scores")).get("outages") or []
+    return [outage for outage in listed if "t0" in mapping(outage) and "t1" in outage]
+
+
+def outages(record: Record) -> list[Window]:
+    """Windows [s] in which the scores say that GPS was withheld."""
+    return [(float(outage["t0"]), float(outage["t1"])) for outage in scored_outages(record)]
+
+
+def worst_outage(record: Record) -> Window | None:
+    """The outage with the largest rms drift."""
+    worst = max(scored_outages(record), key=lambda outage: outage.get("horizontal_rms_m") or 0.0, default=None)
+    return None if worst is None else (float(worst["t0"]), float(worst["t1"]))

@@ -1,0 +1,124 @@
+"""Errors of an estimate against the truth, and the touchdown: one flight or a block of flights alike.
+
+Histories are `(epochs, columns, lanes)`; a single flight is a block of one lane. The sums run over time in
+one order, so a flight scores the same bytes alone and in any block.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.compile import kernel
+
+STATES = ("x", "y", "z", "u", "v", "w")
+STATISTICS = ("mean_error", "std_error", "rms_error", "max_error")
+TOUCHDOWN = ("t_s", "horizontal_error_m", "sink_rate_m_s")
+
+# one flight's scores as a row: the statistics of each state, the largest position error, the touchdown
+SCORE_COLUMNS = (
+    *(f"{state}.{statistic}" for state in STATES for statistic in STATISTICS),
+    "max_position_error_m",
+    *(f"touchdown.{name}" for name in TOUCHDOWN),
+)
+MAX_POSITION_ERROR = len(STATES) * len(STATISTICS)
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def error_statistics(error: Array) -> Array:
+    """Mean, standard deviation, RMS and largest absolute error over time.
+
+    error (epochs, states, lanes) -> (lanes, states, 4), in the order of STATISTICS. The standard deviation is
+    that of the error about its mean (the paper's "difference in standard deviation", reading 13 of
+    docs/paper.md).
+    """
+    epochs, states, lanes = error.shape
+    result = np.zeros((lanes, states, 4))
+    for state in range(states):
+        for lane in range(lanes):
+            total, squares, largest = 0.0, 0.0, 0.0
+            for k in range(epochs):
+                value = error[k, state, lane]
+                total += value
+                squares += value * value
+                largest = max(largest, abs(value))
+            mean = total / epochs
+            deviation = 0.0
+            for k in range(epochs):
+                deviation += (error[k, state, lane] - mean) ** 2
+            result[lane, state, 0] = mean
+            result[lane, state, 1] = np.sqrt(deviation / epochs)
+            result[lane, state, 2] = np.sqrt(squares / epochs)
+            result[lane, state, 3] = largest
+    return result
+
+
+@kernel
+def touchdown(t_s: Array, position: Array, sink_rate: Array, on_ground: Array) -> Array:
+    """Time, distance from the pad's centre and sink rate of the first ground contact after being airborne.
+
+    t_s (epochs,), position (epochs, 3, lanes) NED [m], sink_rate (epochs, lanes) downward [m/s], on_ground
+    (epochs, lanes) 0/1 -> (lanes, 3); NaN where a flight never lands. The sink rate is that of the last
+    epoch before contact.
+    """
+    epochs, lanes = on_ground.shape
+    result = np.full((lanes, 3), np.nan)
+    for lane in range(lanes):
+        airborne = False
+        for k in range(epochs):
+            if on_ground[k, lane] > 0.0 and airborne:
+                result[lane, 0] = t_s[k]
+                result[lane, 1] = np.sqrt(position[k, 0, lane] ** 2 + position[k, 1, lane] ** 2)
+                result[lane, 2] = sink_rate[k - 1, lane]
+                break
+            airborne = airborne or on_ground[k, lane] == 0.0
+    return result
+
+
+def score_block(t_s: Array, estimate: Array, truth: Array, sink_rate: Array, on_ground: Array, *, lands: bool) -> Array:
+    """Scores of a block of flights, (lanes, len(SCORE_COLUMNS)).
+
+    estimate and truth (epochs, 6, lanes): position NED [m] and velocity body FRD [m/s]. `lands` says
+    whether the scenario ends on the ground; without it there is no touchdown to score.
+    """
+    statistics = error_statistics(estimate - truth)
+    lanes = statistics.shape[0]
+    landing = touchdown(t_s, truth[:, :3], sink_rate, on_ground) if lands else np.full((lanes, 3), np.nan)
+    largest = statistics[:, :3, 3].max(axis=1)
+    return np.column_stack([statistics.reshape(lanes, -1), largest, landing])
+
+
+def scores_of_flight(row: Array) -> dict[str, Any]:
+    """One flight's row of scores as the JSON of `flownav fly`; NaN touchdowns are null."""
+    return _nested(lambda column: float(row[column]))
+
+
+def scores_of_flights(rows: Array) -> dict[str, Any]:
+    """Many flights' scores as the same JSON, each number its median and 5th and 95th percentile."""
+
+    def spread(column: int) -> dict[str, float]:
+        values = rows[~np.isnan(rows[:, column]), column]
+        low, median, high = np.percentile(values, [5, 50, 95]) if len(values) else (np.nan,) * 3
+        return {"median": float(median), "p05": float(low), "p95": float(high)}
+
+    return _nested(spread) | {"landed": int(np.isfinite(rows[:, -1]).sum())}
+
+
+def _nested(number: Any) -> dict[str, Any]:
+    """The nested JSON layout, each leaf from its column in the score row."""
+    states = {
+        state: {name: number(i * len(STATISTICS) + j) for j, name in enumerate(STATISTICS)}
+        for i, state in enumerate(STATES)
+    }
+    landing = {name: number(MAX_POSITION_ERROR + 1 + j) for j, name in enumerate(TOUCHDOWN)}
+    first = landing["t_s"]
+    landed = first == first if isinstance(first, float) else first["median"] == first["median"]
+    return {
+        "states": states,
+        "max_position_error_m": number(MAX_POSITION_ERROR),
+        "touchdown": landing if landed else None,
+    }

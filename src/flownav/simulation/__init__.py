@@ -1,0 +1,1 @@
+"""The closed loop: scenario, noise by counter, wind, and the flight kernel."""

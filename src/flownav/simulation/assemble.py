@@ -1,0 +1,177 @@
+"""From a scenario to a flight: files read, helicopter trimmed, filters and gains built, all as plain numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flownav.control.autopilot import AutopilotGains
+from flownav.control.guidance import path_through
+from flownav.estimation.paper_filter import STATES, PaperModel
+from flownav.sensors.datasheet import FlowSensor, load_sensor
+from flownav.simulation.flight import ATTITUDE_S, PAPER_FILTER, Flight, FlightPlan
+from flownav.simulation.plant import LinearTruth
+from flownav.simulation.scenario import Scenario
+from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
+from flownav.vehicle.paper_model import PaperReducedModel, discretised, load_paper_model
+from flownav.vehicle.parameters import VehicleParameters, describe_vehicle, load_vehicle
+from flownav.vehicle.state import Controls, HelicopterState
+from flownav.vehicle.trim import Trim, parked, trim
+
+NEVER_S = 1e9
+# closed-loop bandwidths that the gains give, whatever the vehicle [rad/s]
+HEAVE_RAD_S = 2.9
+ATTITUDE_RAD_S = 5.4
+YAW_RATE_RAD_S = 14.0
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A scenario made ready: the numbers the kernel takes, and what reports say of them."""
+
+    scenario: Scenario
+    sensor: FlowSensor
+    flight: Flight
+    trim: Trim
+    inputs: tuple[Path, ...]
+    parameters: dict[str, Any]
+
+
+def assemble(scenario: Scenario) -> Setup:
+    """Read, check, trim and discretise everything a scenario names. InputError as the loaders say."""
+    vehicle_file = Path(scenario.vehicle.file) if scenario.vehicle.file else None
+    sensor_file = Path(scenario.flow_sensor) if scenario.flow_sensor else None
+    vehicle, sensor, paper = load_vehicle(vehicle_file), load_sensor(sensor_file), load_paper_model()
+    hover = trim(vehicle)
+    flight = Flight(
+        plan=_plan(scenario, vehicle, hover),
+        vehicle=vehicle,
+        sensors=_sensors(scenario, sensor, vehicle),
+        wind=scenario.wind.parameters(),
+        path=_path(scenario, vehicle),
+        gains=gains_for(vehicle, hover, math.radians(scenario.autopilot.idle_collective_deg)),
+        paper=_paper_filter(paper),
+        initial_variance=_initial_variance(scenario, paper),
+        linear=_linear_truth(paper, hover),
+    )
+    described = describe_vehicle(vehicle_file)
+    parameters = {
+        "scenario": scenario.model_dump(),
+        "flow_sensor": sensor.model_dump(exclude={"identified_models"}),
+        "vehicle": {
+            entry.key: {"value": entry.value, "uncertainty": entry.uncertainty, "source": entry.source}
+            for entry in described.entries
+        },
+        "autopilot_gains": flight.gains._asdict(),
+    }
+    inputs = tuple(path for path in (vehicle_file, sensor_file) if path)
+    return Setup(scenario, sensor, flight, hover, inputs, parameters)
+
+
+def gains_for(vehicle: VehicleParameters, hover: Trim, idle_collective_rad: float) -> AutopilotGains:
+    """Gains that give every vehicle the same bandwidths, from its control powers at frozen inflow."""
+    heave_per_collective = vehicle.main_thrust_slope_n_s_m * vehicle.main_tip_speed_m_s * (2.0 / 3.0) / vehicle.mass_kg
+    side_per_pedal = vehicle.tail_thrust_slope_n_s_m * vehicle.tail_tip_speed_m_s * (2.0 / 3.0)
+    yaw_per_pedal = side_per_pedal * vehicle.tail_behind_cg_m / vehicle.inertia_zz_kg_m2
+    collective_gain = HEAVE_RAD_S / heave_per_collective
+    attitude_gain = ATTITUDE_RAD_S / vehicle.flap_rate_1_s
+    yaw_gain = YAW_RATE_RAD_S / yaw_per_pedal
+    return AutopilotGains(
+        collective_gain=collective_gain,
+        collective_integral=0.8 * collective_gain,
+        attitude_gain=attitude_gain,
+        attitude_integral=0.7 * attitude_gain,
+        rate_damping=0.085 * attitude_gain,
+        yaw_rate_gain=yaw_gain,
+        yaw_rate_integral=2.0 * yaw_gain,
+        collective_trim_rad=hover.collective_rad,
+        pedal_trim_rad=hover.pedal_rad,
+        lon_trim_rad=hover.lon,
+        lat_trim_rad=hover.lat,
+        pitch_trim_sine=math.sin(hover.pitch_rad),
+        roll_trim_sine=math.sin(hover.roll_rad) * math.cos(hover.pitch_rad),
+        idle_collective_rad=idle_collective_rad,
+    )
+
+
+def _plan(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> FlightPlan:
+    """What the loop is asked to do."""
+    section = scenario.flight
+    linear = scenario.truth == "linear"
+    on_ground = section.start == "ground" and not linear
+    return FlightPlan(
+        epochs=round(section.duration_s / EPOCH_S) + 1,
+        start=_start(scenario, vehicle, hover, on_ground, linear),
+        starts_on_ground=on_ground,
+        takeoff_at_s=0.0 if linear else section.takeoff_at_s,
+        may_land_after_s=NEVER_S if linear or section.may_land_after_s is None else section.may_land_after_s,
+        linear_truth=linear,
+        fly_on_truth=scenario.autopilot.feedback == "truth",
+        start_known=start_of(scenario) == "known",
+        filter_kind=PAPER_FILTER,
+        draws=Draws(gps=True, wind=scenario.wind.speed_20ft_m_s > 0.0, imu=scenario.filter.name == "kinematic"),
+    )
+
+
+def start_of(scenario: Scenario) -> str:
+    """Where the filter starts: as the scenario says, else at the pad with white GPS noise and at the GPS with real."""
+    return scenario.filter.start or ("known" if scenario.gps.model == "white" else "gps")
+
+
+def _start(
+    scenario: Scenario, vehicle: VehicleParameters, hover: Trim, on_ground: bool, linear: bool
+) -> HelicopterState:
+    """The vehicle's first state: parked, in trimmed hover, or level for the linear truth."""
+    first = scenario.flight.path[0]
+    pos_d = -first.height_m - vehicle.cg_above_skid_m
+    if on_ground:
+        idle = math.radians(scenario.autopilot.idle_collective_deg)
+        state = parked(vehicle, Controls(hover.lon, hover.lat, idle, hover.pedal_rad))
+        return state._replace(pos_n=first.north_m, pos_e=first.east_m)
+    state = hover.state._replace(pos_n=first.north_m, pos_e=first.east_m, pos_d=pos_d)
+    return state._replace(qw=1.0, qx=0.0, qy=0.0, qz=0.0) if linear else state
+
+
+def _path(scenario: Scenario, vehicle: VehicleParameters) -> Any:
+    """The reference path of the centre of gravity. The linear truth has no ground: its path stops there."""
+    lowest = 0.0 if scenario.truth == "linear" else -np.inf
+    return path_through(
+        [
+            (knot.t_s, knot.north_m, knot.east_m, -max(knot.height_m, lowest) - vehicle.cg_above_skid_m)
+            for knot in scenario.flight.path
+        ]
+    )
+
+
+def _sensors(scenario: Scenario, sensor: FlowSensor, vehicle: VehicleParameters) -> SensorSuite:
+    """Every sensor's coefficients."""
+    return SensorSuite(
+        gps=scenario.gps.parameters(),
+        flow=scenario.flow.parameters(sensor),
+        rangefinder=scenario.rangefinder.parameters(),
+        imu=scenario.imu.parameters(),
+        lens_below_cg_m=vehicle.cg_above_skid_m - scenario.vehicle.lens_above_skid_m,
+        pad_half_size_m=0.5 * scenario.pad.size_m,
+    )
+
+
+def _paper_filter(paper: PaperReducedModel) -> PaperModel:
+    """The printed matrices, discretised with the inputs held over an epoch."""
+    transition, input_matrix = discretised(paper, EPOCH_S)
+    return PaperModel(transition, input_matrix, np.diag(paper.Q).copy(), np.diag(paper.R).copy())
+
+
+def _initial_variance(scenario: Scenario, paper: PaperReducedModel) -> Any:
+    """P at the start: one step's process noise about a known pad, one measurement's about a first GPS reading."""
+    return np.diag(paper.Q if start_of(scenario) == "known" else paper.R).copy()
+
+
+def _linear_truth(paper: PaperReducedModel, hover: Trim) -> LinearTruth:
+    """The paper's linear truth over one step of the attitude loop."""
+    transition, input_matrix = discretised(paper, ATTITUDE_S)
+    trims = np.array([hover.lon, hover.lat, hover.collective_rad, hover.pedal_rad])
+    return LinearTruth(transition, input_matrix, trims, float(paper.B[STATES - 2, 3]))

@@ -1,0 +1,116 @@
+"""From the history of one flight to its Record: tables, measurement streams, events."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.measurement import COLUMNS, Sensor
+from flownav.provenance import command_line, provenance
+from flownav.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY, Record, Table
+from flownav.simulation.assemble import Setup
+from flownav.simulation.history import HISTORY
+from flownav.simulation.sensing import EPOCH_S, RANGE_EPOCHS
+
+Array = NDArray[np.float64]
+GATE_SIGMA_SHOWN = 3.0  # the paper's filter has no gate: its test ratios are shown against 3 sigma
+
+
+def record_of(setup: Setup, history: Array, seed: int, index: int) -> Record:
+    """The record of flight `index`, not yet scored; history (epochs, len(HISTORY), 1)."""
+    scenario = setup.scenario
+    flown = {key: history[:, i, 0] for i, key in enumerate(HISTORY)}
+    t_s: Array = np.arange(len(history), dtype=np.float64) * EPOCH_S
+    record = Record(
+        {
+            "kind": "fly",
+            "scenario": scenario.name,
+            "description": scenario.description,
+            "filter": scenario.filter.name,
+            "gps": scenario.gps.model,
+            "truth": scenario.truth,
+            "feedback": scenario.autopilot.feedback,
+            "seed": seed,
+            "flight": index,
+            "duration_s": float(t_s[-1]),
+            "pad_size_m": scenario.pad.size_m,
+            "command": command_line(),
+            "parameters": setup.parameters,
+            "provenance": provenance(setup.inputs),
+        }
+    )
+
+    def table(name: str, source: str, columns: tuple[str, ...], rows: Any = slice(None), **more: Array) -> None:
+        record.add(name, {"t_s": t_s[rows], **{c: flown[source, c][rows] for c in columns}, **more})
+
+    truth = tuple(c for c in TABLES["truth"] if c != "on_ground")
+    table("truth", "truth", truth, on_ground=(flown["truth", "contact_n"] > 0.0).astype(float))
+    attitude = {name: flown["gps", name] for name in QUATERNION}
+    estimate = tuple(c for c in TABLES["estimate"] if c not in QUATERNION)
+    table("estimate", "estimate", estimate, **attitude)
+    table("command", "command", TABLES["command"])
+    every = np.full(len(t_s), 255.0)
+    table("gps_position", "gps", COLUMNS[Sensor.GPS_POSITION], quality=every)
+    if scenario.gps.model != "white":  # with white noise the unit's velocity is the truth and nobody's input
+        table("gps_velocity", "gps", COLUMNS[Sensor.GPS_VELOCITY], quality=every)
+    table("attitude", "gps", COLUMNS[Sensor.ATTITUDE], quality=every)
+    table("flow_velocity", "flow", (*VELOCITY_BODY, "sigma_m_s"), quality=255.0 * flown["flow", "engaged"])
+    pings = slice(0, None, RANGE_EPOCHS)
+    table("range", "range", COLUMNS[Sensor.RANGE], pings, quality=255.0 * flown["range", "valid"][pings])
+    if setup.flight.plan.draws.imu:
+        table("imu", "imu", COLUMNS[Sensor.IMU], quality=every)
+    record.add("innovation", _innovations(t_s, flown))
+    record.add("events", _events(t_s, flown))
+    return record
+
+
+def _innovations(t_s: Array, flown: dict[tuple[str, str], Array]) -> Table:
+    """One row per measurement component offered to the filter, in time order."""
+    names = (*POSITION_NED, *VELOCITY_BODY)
+    count = len(names)
+
+    def interleaved(column: Callable[[int], Array]) -> Array:
+        return np.stack([column(i) for i in range(count)], axis=1).ravel()
+
+    is_gps = interleaved(lambda i: np.full(len(t_s), float(i < 3))) > 0.0
+    engaged = np.repeat(flown["flow", "engaged"], count) > 0.0
+    kept = is_gps | engaged
+    innovation = interleaved(lambda i: flown["innovation", f"innovation_{i}"])[kept]
+    variance = interleaved(lambda i: flown["innovation", f"innovation_variance_{i}"])[kept]
+    return {
+        "t_s": np.repeat(t_s, count)[kept],
+        "sensor": np.where(is_gps, "gps_position", "flow_velocity")[kept],
+        "component": np.tile(np.arange(count) % 3, len(t_s))[kept],
+        "observation": interleaved(lambda i: flown["gps" if i < 3 else "flow", names[i]])[kept],
+        "innovation": innovation,
+        "innovation_variance": variance,
+        "test_ratio": innovation**2 / (GATE_SIGMA_SHOWN**2 * variance),
+        "fused": np.ones(int(kept.sum())),
+        "reason": np.full(int(kept.sum()), "fused"),
+    }
+
+
+def _events(t_s: Array, flown: dict[tuple[str, str], Array]) -> Table:
+    """Engagements of the flow sensor, lift-off and touchdown, in time order."""
+    height = -flown["truth", "pos_d_m"]
+    contact = flown["truth", "contact_n"] > 0.0
+    engaged = flown["flow", "engaged"] > 0.0
+    rows: list[tuple[float, str, str, str, float]] = []
+
+    def changes(signal: NDArray[np.bool_], source: str, begins: str, ends: str, detail: str, value: Array) -> None:
+        for k in np.flatnonzero(np.diff(signal.astype(int))) + 1:
+            rows.append((t_s[k], source, begins if signal[k] else ends, detail, float(value[k])))
+
+    if engaged[0]:
+        rows.append((t_s[0], "flow", "engaged", "centre of gravity above ground [m]", float(height[0])))
+    changes(engaged, "flow", "engaged", "disengaged", "centre of gravity above ground [m]", height)
+    sink = flown["truth", "sink_rate_m_s"]
+    changes(contact, "vehicle", "touchdown", "lift-off", "sink rate [m/s]", np.roll(sink, 1))
+    rows.sort(key=lambda row: row[0])
+    columns = list(zip(*rows, strict=True)) if rows else [()] * 5
+    names = ("t_s", "source", "kind", "detail", "value")
+    kinds = (float, str, str, str, float)
+    return {name: np.array(values, dtype=kind) for name, values, kind in zip(names, columns, kinds, strict=True)}

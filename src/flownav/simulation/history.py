@@ -1,0 +1,77 @@
+"""The history of a block of flights: one row of columns an epoch, from which scores and records are made."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.compile import equation
+from flownav.control.guidance import Reference
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.paper_filter import STATES
+from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY
+from flownav.simulation import layout
+from flownav.simulation.layout import load_autopilot, load_helicopter
+
+# columns and the rows of the lane buffer that they copy
+_COPIED: tuple[tuple[str, tuple[str, ...], int], ...] = (
+    ("truth", (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, *TABLES["truth"][10:13]), layout.HELICOPTER),
+    ("truth", ("thrust_n", "contact_n"), layout.THRUST),
+    ("estimate", (*POSITION_NED, *VELOCITY_BODY), layout.ESTIMATED),
+    ("gps", ("pos_n_m", "pos_e_m", "pos_d_m", "vel_n_m_s", "vel_e_m_s", "vel_d_m_s", *QUATERNION), layout.GPS),
+    ("flow", VELOCITY_BODY, layout.MEASURED + 3),
+    ("flow", ("engaged",), layout.ARRIVED + 3),
+    ("flow", ("sigma_m_s",), layout.FLOW_SIGMA),
+    ("range", ("range_m", "valid"), layout.RANGE),
+    ("imu", ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s", "accel_x_m_s2", "accel_y_m_s2", "accel_z_m_s2"),
+     layout.IMU_READING),
+    ("innovation", tuple(f"innovation_{i}" for i in range(STATES)), layout.INNOVATION),
+    ("innovation", tuple(f"innovation_variance_{i}" for i in range(STATES)), layout.INNOVATION + STATES),
+    ("command", ("lon_rad", "lat_rad", "col_rad", "ped_rad"), layout.CONTROLS),
+)  # fmt: skip
+_COMPUTED = (
+    *(("estimate", f"std_{name}") for name in (*POSITION_NED, *VELOCITY_BODY)),
+    ("command", "pos_n_ref_m"),
+    ("command", "pos_e_ref_m"),
+    ("command", "pos_d_ref_m"),
+    ("autopilot", "flying"),
+    ("truth", "sink_rate_m_s"),
+)
+HISTORY: tuple[tuple[str, str], ...] = (
+    *((table, name) for table, names, _ in _COPIED for name in names),
+    *_COMPUTED,
+)
+_SOURCE_ROWS = np.array([row + i for _, names, row in _COPIED for i in range(len(names))], np.int64)
+COPIED = len(_SOURCE_ROWS)
+
+
+def column(table: str, name: str) -> int:
+    """The index of a history column."""
+    return HISTORY.index((table, name))
+
+
+def columns(table: str, names: tuple[str, ...]) -> slice:
+    """The indices of consecutive history columns."""
+    first = column(table, names[0])
+    return slice(first, first + len(names))
+
+
+@equation
+def write_history(work: Work, lanes: Lanes, epoch: int, reference: Reference, history: NDArray[np.float64]) -> None:
+    """One epoch of every lane into history (epochs, len(HISTORY), lanes)."""
+    for k in range(COPIED):
+        row = _SOURCE_ROWS[k]
+        for lane in range(len(lanes)):
+            history[epoch, k, lane] = work[row * len(lanes) + lane]
+    for lane in range(len(lanes)):
+        for i in range(STATES):
+            variance = work[(layout.VARIANCE + i) * len(lanes) + lane]
+            history[epoch, COPIED + i, lane] = np.sqrt(max(variance, 0.0))
+        history[epoch, COPIED + 6, lane] = reference.pos_n
+        history[epoch, COPIED + 7, lane] = reference.pos_e
+        history[epoch, COPIED + 8, lane] = reference.pos_d
+        history[epoch, COPIED + 9, lane] = load_autopilot(work, lanes, lane).flying
+        state = load_helicopter(work, lanes, lane)
+        rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
+        history[epoch, COPIED + 10, lane] = to_earth(rotation, state.u, state.v, state.w)[2]

@@ -1,0 +1,104 @@
+"""Scenario files: what is flown, with which vehicle, sensors, wind, filter and autopilot.
+
+`takeoff`, `landing` and `gusty` ship; any TOML file of this schema flies. Positions are those of the skids
+relative to the pad's centre, in the local NED frame.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, field_validator
+
+from flownav.errors import InputError
+from flownav.parameter_files import Number, ParameterModel, load, shipped
+from flownav.sensors.datasheet import FlowSettings
+from flownav.sensors.settings import GpsInsSettings, ImuSettings, RangefinderSettings
+from flownav.simulation.wind import WindSettings
+
+SHIPPED = ("takeoff", "landing", "gusty")
+
+
+class Knot(ParameterModel):
+    """A point of the reference path; between knots the reference moves in a straight line at constant speed."""
+
+    t_s: Number = Field(ge=0.0, le=3600.0)
+    north_m: Number = Field(0.0, ge=-1000.0, le=1000.0)
+    east_m: Number = Field(0.0, ge=-1000.0, le=1000.0)
+    height_m: Number = Field(ge=-10.0, le=120.0)
+
+
+class FlightSection(ParameterModel):
+    """What is flown. `start` puts the vehicle on its skids or in trimmed hover at the first knot."""
+
+    duration_s: Number = Field(50.0, ge=0.1, le=3600.0)
+    start: Literal["ground", "hover"]
+    takeoff_at_s: Number = Field(0.0, ge=0.0, le=3600.0)
+    may_land_after_s: Number | None = Field(None, ge=0.0, le=3600.0)
+    path: tuple[Knot, ...] = Field(min_length=2)
+
+    @field_validator("path")
+    @classmethod
+    def _in_time_order(cls, path: tuple[Knot, ...]) -> tuple[Knot, ...]:
+        if any(later.t_s <= earlier.t_s for earlier, later in pairwise(path)):
+            raise ValueError("the knots' t_s must increase")
+        return path
+
+
+class PadSection(ParameterModel):
+    """The landing pattern: a square about the origin, its sides north and east."""
+
+    size_m: Number = Field(2.0, gt=0.05, le=100.0)
+
+
+class VehicleSection(ParameterModel):
+    """The vehicle file; the shipped Maxi Joker 3 unless named."""
+
+    file: str | None = None
+    lens_above_skid_m: Number = Field(0.10, ge=0.0, le=2.0)
+
+
+class FilterSection(ParameterModel):
+    """Which filter flies, and where it starts: at the known pad, or at the first GPS reading."""
+
+    name: Literal["paper", "kinematic"] = "paper"
+    start: Literal["known", "gps"] | None = None
+
+
+class AutopilotSection(ParameterModel):
+    """What the autopilot flies on, and the collective on the skids."""
+
+    feedback: Literal["estimate", "truth"] = "estimate"
+    idle_collective_deg: Number = Field(0.0, ge=-10.0, le=10.0)
+
+
+class Scenario(ParameterModel):
+    """A scenario file."""
+
+    schema_version: Literal[1]
+    name: str
+    description: str = ""
+    truth: Literal["nonlinear", "linear"] = "nonlinear"
+    flight: FlightSection
+    pad: PadSection = PadSection()
+    vehicle: VehicleSection = VehicleSection()
+    gps: GpsInsSettings = GpsInsSettings(model="white")
+    flow: FlowSettings = FlowSettings()
+    flow_sensor: str | None = None
+    rangefinder: RangefinderSettings = RangefinderSettings()
+    imu: ImuSettings = ImuSettings()
+    wind: WindSettings = WindSettings()
+    filter: FilterSection = FilterSection()
+    autopilot: AutopilotSection = AutopilotSection()
+
+
+def load_scenario(name: str) -> Scenario:
+    """A shipped scenario by name, or a file. InputError where neither exists or the file is wrong."""
+    if name in SHIPPED:
+        return load(shipped(f"{name}.toml"), Scenario)
+    path = Path(name)
+    if not path.suffix and not path.exists():
+        raise InputError(f"{name}: no such scenario; shipped: {', '.join(SHIPPED)}, or give a TOML file")
+    return load(path, Scenario)

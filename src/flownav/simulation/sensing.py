@@ -1,0 +1,221 @@
+"""The sensors on lanes: each epoch's normals, and every reading taken from the plant's state."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flownav.compile import equation
+from flownav.estimation.kalman import Lanes, Work
+from flownav.frames import rotation_from_quaternion, to_body, to_earth
+from flownav.sensors.flow import FlowParameters, engage_flow, read_flow, start_flow
+from flownav.sensors.gps_ins import GpsInsParameters, GpsInsState, NavSolution, start_gps_ins, step_gps_ins
+from flownav.sensors.imu import ImuParameters, ImuReading, start_imu, step_imu
+from flownav.sensors.rangefinder import RangefinderParameters, start_rangefinder, step_rangefinder
+from flownav.simulation import layout
+from flownav.simulation.layout import (
+    load_flow,
+    load_gps_errors,
+    load_gps_held,
+    load_gps_normals,
+    load_helicopter,
+    load_imu,
+    load_imu_normals,
+    load_rangefinder,
+    store_flow,
+    store_gps,
+    store_gps_errors,
+    store_gps_held,
+    store_imu,
+    store_imu_reading,
+    store_rangefinder,
+)
+from flownav.simulation.noise import normal_pair
+from flownav.vehicle.helicopter import HelicopterState
+
+EPOCH_S = 0.02  # the GPS/INS unit, the published flow and the filters: 50 Hz
+RANGE_EPOCHS = 5  # the rangefinder: 10 Hz
+
+
+class SensorSuite(NamedTuple):
+    """Every sensor's parameters and where they look from."""
+
+    gps: GpsInsParameters
+    flow: FlowParameters
+    rangefinder: RangefinderParameters
+    imu: ImuParameters
+    lens_below_cg_m: float
+    pad_half_size_m: float
+
+
+class Draws(NamedTuple):
+    """Which groups of normals a scenario needs (those of a silent sensor are not drawn)."""
+
+    gps: bool
+    wind: bool
+    imu: bool
+
+
+@equation
+def draw_normals(work: Work, lanes: Lanes, first_row: int, end_row: int, seed: int, flight: int, step: int) -> None:
+    """Fill the rows from first_row to end_row; the channel of a pair is its place among all normals."""
+    for pair in range((end_row - first_row) // 2):
+        row = first_row + 2 * pair
+        channel = (row - layout.GPS_NORMALS) // 2
+        for lane in range(len(lanes)):
+            first, second = normal_pair(seed, flight + lane, step, channel)
+            work[row * len(lanes) + lane] = first
+            work[(row + 1) * len(lanes) + lane] = second
+
+
+@equation
+def draw_epoch(work: Work, lanes: Lanes, seed: int, flight: int, step: int, draws: Draws) -> None:
+    """Every normal of one epoch; `flight` is the index of the first lane's flight."""
+    if draws.gps:
+        draw_normals(work, lanes, layout.GPS_NORMALS, layout.FLOW_NORMALS, seed, flight, step)
+    draw_normals(work, lanes, layout.FLOW_NORMALS, layout.WIND_NORMALS, seed, flight, step)
+    if draws.wind:
+        draw_normals(work, lanes, layout.WIND_NORMALS, layout.IMU_NORMALS, seed, flight, step)
+    if draws.imu:
+        draw_normals(work, lanes, layout.IMU_NORMALS, layout.NORMALS_END, seed, flight, step)
+
+
+@equation
+def true_solution(state: HelicopterState) -> NavSolution:
+    """What a perfect GPS/INS would report."""
+    rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
+    vel_n, vel_e, vel_d = to_earth(rotation, state.u, state.v, state.w)
+    return NavSolution(
+        state.pos_n, state.pos_e, state.pos_d, vel_n, vel_e, vel_d, state.qw, state.qx, state.qy, state.qz
+    )
+
+
+@equation
+def lens_height(state: HelicopterState, cosine: float, lens_below_cg_m: float) -> float:
+    """Height of the lens and the sonar above the ground [m]."""
+    return -state.pos_d - lens_below_cg_m * cosine
+
+
+@equation
+def true_imu(work: Work, lanes: Lanes, lane: int, gravity_m_s2: float) -> ImuReading:
+    """Body rates, and the specific force averaged over the last epoch: (delta v / dt - g) turned to the body."""
+    state = load_helicopter(work, lanes, lane)
+    rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
+    vel_n, vel_e, vel_d = to_earth(rotation, state.u, state.v, state.w)
+    row = layout.PREVIOUS_VELOCITY
+    accel_n = (vel_n - work[row * len(lanes) + lane]) / EPOCH_S
+    accel_e = (vel_e - work[(row + 1) * len(lanes) + lane]) / EPOCH_S
+    accel_d = (vel_d - work[(row + 2) * len(lanes) + lane]) / EPOCH_S
+    work[row * len(lanes) + lane] = vel_n
+    work[(row + 1) * len(lanes) + lane] = vel_e
+    work[(row + 2) * len(lanes) + lane] = vel_d
+    force_x, force_y, force_z = to_body(rotation, accel_n, accel_e, accel_d - gravity_m_s2)
+    return ImuReading(state.p, state.q, state.r, force_x, force_y, force_z)
+
+
+@equation
+def start_sensors(work: Work, lanes: Lanes, suite: SensorSuite, mass_kg: float, gravity_m_s2: float) -> None:
+    """Every sensor settled on the first state; error processes drawn from their stationary distributions."""
+    for lane in range(len(lanes)):
+        state = load_helicopter(work, lanes, lane)
+        truth = true_solution(state)
+        work[layout.PREVIOUS_VELOCITY * len(lanes) + lane] = truth.vel_n_m_s
+        work[(layout.PREVIOUS_VELOCITY + 1) * len(lanes) + lane] = truth.vel_e_m_s
+        work[(layout.PREVIOUS_VELOCITY + 2) * len(lanes) + lane] = truth.vel_d_m_s
+        gps = start_gps_ins(truth, load_gps_normals(work, lanes, lane), suite.gps)
+        store_gps_errors(work, lanes, lane, gps.errors)
+        store_gps_held(work, lanes, lane, gps.held)
+        cosine = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)[8]
+        height = lens_height(state, cosine, suite.lens_below_cg_m)
+        store_rangefinder(work, lanes, lane, start_rangefinder(height, cosine, suite.rangefinder))
+        thrust = work[layout.THRUST * len(lanes) + lane] / mass_kg
+        store_flow(work, lanes, lane, start_flow(state.u, state.v, state.w, thrust, suite.flow))
+        imu = start_imu(true_imu(work, lanes, lane, gravity_m_s2), load_imu_normals(work, lanes, lane), suite.imu)
+        store_imu(work, lanes, lane, imu)
+
+
+@equation
+def read_gps(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
+    """The GPS/INS reading of this epoch."""
+    for lane in range(len(lanes)):
+        state = GpsInsState(load_gps_errors(work, lanes, lane), load_gps_held(work, lanes, lane))
+        truth = true_solution(load_helicopter(work, lanes, lane))
+        after, reading = step_gps_ins(state, truth, load_gps_normals(work, lanes, lane), suite.gps)
+        store_gps_errors(work, lanes, lane, after.errors)
+        store_gps_held(work, lanes, lane, after.held)
+        store_gps(work, lanes, lane, reading)
+
+
+@equation
+def read_rangefinder(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
+    """The sonar's reading (10 Hz)."""
+    for lane in range(len(lanes)):
+        state = load_helicopter(work, lanes, lane)
+        cosine = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)[8]
+        height = lens_height(state, cosine, suite.lens_below_cg_m)
+        normal = work[(layout.FLOW_NORMALS + 3) * len(lanes) + lane]
+        after, reading = step_rangefinder(
+            load_rangefinder(work, lanes, lane), height, cosine, normal, suite.rangefinder
+        )
+        store_rangefinder(work, lanes, lane, after)
+        work[layout.RANGE * len(lanes) + lane] = reading.range_m
+        work[(layout.RANGE + 1) * len(lanes) + lane] = reading.valid
+
+
+@equation
+def read_flow_sensor(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
+    """Whether the flow sensor is engaged, and its reading, into the measured velocity rows (50 Hz)."""
+    for lane in range(len(lanes)):
+        state = load_helicopter(work, lanes, lane)
+        rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
+        height = lens_height(state, rotation[8], suite.lens_below_cg_m)
+        distance = height if height > 0.05 else 0.05
+        lens_n = state.pos_n + rotation[2] * suite.lens_below_cg_m
+        lens_e = state.pos_e + rotation[5] * suite.lens_below_cg_m
+        flow_x = state.p - state.v / distance
+        flow_y = state.q + state.u / distance
+        flow = engage_flow(
+            load_flow(work, lanes, lane), lens_n, lens_e, height, rotation, flow_x, flow_y,
+            suite.pad_half_size_m, suite.flow,
+        )  # fmt: skip
+        store_flow(work, lanes, lane, flow)
+        row = layout.FLOW_NORMALS
+        reading = read_flow(
+            flow,
+            height,
+            load_rangefinder(work, lanes, lane).rate_m_s,
+            work[row * len(lanes) + lane],
+            work[(row + 1) * len(lanes) + lane],
+            work[(row + 2) * len(lanes) + lane],
+            suite.flow,
+        )
+        work[(layout.MEASURED + 3) * len(lanes) + lane] = reading.vel_u_m_s
+        work[(layout.MEASURED + 4) * len(lanes) + lane] = reading.vel_v_m_s
+        work[(layout.MEASURED + 5) * len(lanes) + lane] = reading.vel_w_m_s
+        work[layout.FLOW_SIGMA * len(lanes) + lane] = reading.sigma_m_s
+        for component in range(3):
+            work[(layout.ARRIVED + 3 + component) * len(lanes) + lane] = reading.engaged
+
+
+@equation
+def read_imu(work: Work, lanes: Lanes, suite: SensorSuite, gravity_m_s2: float) -> None:
+    """The inertial reading of this epoch."""
+    for lane in range(len(lanes)):
+        truth = true_imu(work, lanes, lane, gravity_m_s2)
+        after, reading = step_imu(load_imu(work, lanes, lane), truth, load_imu_normals(work, lanes, lane), suite.imu)
+        store_imu(work, lanes, lane, after)
+        store_imu_reading(work, lanes, lane, reading)
+
+
+@equation
+def sense(work: Work, lanes: Lanes, epoch: int, suite: SensorSuite, gravity_m_s2: float) -> None:
+    """Every reading of one epoch, and which of them arrived."""
+    read_gps(work, lanes, suite)
+    if epoch % RANGE_EPOCHS == 0:
+        read_rangefinder(work, lanes, suite)
+    read_flow_sensor(work, lanes, suite)
+    read_imu(work, lanes, suite, gravity_m_s2)
+    for component in range(3):
+        for lane in range(len(lanes)):
+            position = work[(layout.GPS + component) * len(lanes) + lane]
+            work[(layout.MEASURED + component) * len(lanes) + lane] = position
+            work[(layout.ARRIVED + component) * len(lanes) + lane] = 1.0

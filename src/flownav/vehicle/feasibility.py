@@ -1,0 +1,99 @@
+"""Refuse a helicopter that cannot be: one line that says which numbers contradict each other.
+
+Closed forms only (hover by momentum theory and blade elements), so that a bad file is refused at once.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from flownav.errors import InputError
+
+if TYPE_CHECKING:
+    from flownav.vehicle.parameters import VehicleParameters
+
+HOVER_MARGIN = 1.05  # the thrust and power limits must leave this much above what hover takes
+
+
+def require_feasible(vehicle: VehicleParameters, where: str) -> None:
+    """InputError, naming file, keys and numbers, where the vehicle contradicts itself or cannot hover."""
+    _require_rigid_body(vehicle, where)
+    _require_geometry(vehicle, where)
+    _require_hover(vehicle, where)
+
+
+def _require_rigid_body(vehicle: VehicleParameters, where: str) -> None:
+    moments = sorted((vehicle.inertia_xx_kg_m2, vehicle.inertia_yy_kg_m2, vehicle.inertia_zz_kg_m2))
+    if moments[2] > moments[0] + moments[1]:
+        raise InputError(
+            f"{where}: body: no rigid body has these inertias, {moments[2]:g} kg m2 is more than "
+            f"{moments[0]:g} + {moments[1]:g}; correct inertia_xx, inertia_yy or inertia_zz"
+        )
+
+
+def _require_geometry(vehicle: VehicleParameters, where: str) -> None:
+    clear = vehicle.tail_behind_cg_m - vehicle.main_radius_m
+    tail_radius = vehicle.tail_tip_speed_m_s / vehicle.tail_speed_rad_s
+    if clear < tail_radius and vehicle.tail_above_cg_m > vehicle.hub_above_cg_m - tail_radius:
+        raise InputError(
+            f"{where}: tail_rotor.behind_cg_m: the rotors strike each other, {vehicle.tail_behind_cg_m:g} m is less "
+            f"than main radius + tail radius {vehicle.main_radius_m + tail_radius:g} m; correct radius_m or behind_cg_m"
+        )
+    if vehicle.cg_above_skid_m + vehicle.tail_above_cg_m < tail_radius:
+        raise InputError(
+            f"{where}: skids.cg_above_skid_m: the tail rotor strikes the ground when parked, its hub stands "
+            f"{vehicle.cg_above_skid_m + vehicle.tail_above_cg_m:g} m high and its radius is {tail_radius:g} m"
+        )
+
+
+def _require_hover(vehicle: VehicleParameters, where: str) -> None:
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    if weight * HOVER_MARGIN > vehicle.main_thrust_limit_n:
+        raise InputError(
+            f"{where}: main_rotor: cannot hover, the blades stall at {vehicle.main_thrust_limit_n:.1f} N and hover "
+            f"takes {weight:.1f} N; correct body.mass_kg, main_rotor.radius_m, chord_m or speed_rad_s"
+        )
+    inflow = hover_induced_velocity(weight, vehicle.main_thrust_slope_n_s_m, vehicle.main_inflow_speed_m_s)
+    collective = hover_pitch(weight, inflow, vehicle.main_thrust_slope_n_s_m, vehicle.main_tip_speed_m_s)
+    _require_travel(
+        "collective", collective, vehicle.collective_min_rad, vehicle.collective_max_rad, where, "body.mass_kg"
+    )
+    torque = vehicle.main_profile_torque_n_m + weight * inflow / vehicle.main_speed_rad_s
+    side_force = torque / vehicle.tail_behind_cg_m / vehicle.tail_fin_blockage
+    if side_force * HOVER_MARGIN > vehicle.tail_thrust_limit_n:
+        raise InputError(
+            f"{where}: tail_rotor: cannot hold the heading, its blades stall at {vehicle.tail_thrust_limit_n:.2f} N and "
+            f"hover takes {side_force:.2f} N; correct radius_m, chord_m or gear_ratio"
+        )
+    tail_inflow = hover_induced_velocity(side_force, vehicle.tail_thrust_slope_n_s_m, vehicle.tail_inflow_speed_m_s)
+    pedal = hover_pitch(side_force, tail_inflow, vehicle.tail_thrust_slope_n_s_m, vehicle.tail_tip_speed_m_s)
+    _require_travel("pedal", pedal, vehicle.pedal_min_rad, vehicle.pedal_max_rad, where, "tail_rotor")
+    power = (
+        torque * vehicle.main_speed_rad_s
+        + vehicle.tail_profile_torque_n_m * vehicle.tail_speed_rad_s
+        + side_force * tail_inflow
+    )
+    if power * HOVER_MARGIN > vehicle.shaft_power_limit_w:
+        raise InputError(
+            f"{where}: drive.shaft_power_limit_w: cannot hover, it takes {power:.0f} W and the drive gives "
+            f"{vehicle.shaft_power_limit_w:.0f} W"
+        )
+
+
+def _require_travel(control: str, needed: float, low: float, high: float, where: str, blame: str) -> None:
+    if not low < needed < high:
+        raise InputError(
+            f"{where}: {control}: cannot hover, it takes {math.degrees(needed):.2f} deg and the travel is "
+            f"{math.degrees(low):g}..{math.degrees(high):g} deg; correct {control}.maximum_deg or {blame}"
+        )
+
+
+def hover_induced_velocity(thrust_n: float, thrust_slope_n_s_m: float, inflow_speed_m_s: float) -> float:
+    """v_i [m/s] at which momentum theory gives the thrust in hover: T = 2ρA·η_w·v_i² = thrust_slope·v_i²/inflow_speed."""
+    return math.sqrt(max(thrust_n, 0.0) * inflow_speed_m_s / thrust_slope_n_s_m)
+
+
+def hover_pitch(thrust_n: float, induced_m_s: float, thrust_slope_n_s_m: float, tip_speed_m_s: float) -> float:
+    """Blade pitch [rad] that gives the thrust in hover: T = thrust_slope·(2/3·ΩR·θ - v_i)."""
+    return 1.5 * (thrust_n / thrust_slope_n_s_m + induced_m_s) / tip_speed_m_s

@@ -1,0 +1,28 @@
+"""Ground effect on the main rotor's thrust (paper equation 11, read as Cheeseman and Bennett printed it)."""
+
+from __future__ import annotations
+
+from flownav.compile import equation, larger, magnitude
+
+LOWEST_INDUCED_VELOCITY_M_S = 0.3
+
+
+@equation
+def multiplier_of_squares(hub_height_m: float, airspeed_sq: float, induced_m_s: float, radius_m: float) -> float:
+    """`multiplier` with the square of the horizontal airspeed [m2/s2], which the physics has at hand."""
+    height = larger(hub_height_m, 0.5 * radius_m)
+    induced = larger(magnitude(induced_m_s), LOWEST_INDUCED_VELOCITY_M_S)
+    image = radius_m * radius_m * induced * induced
+    free = 16.0 * height * height * (induced * induced + airspeed_sq)
+    return free / (free - image)
+
+
+@equation
+def multiplier(hub_height_m: float, airspeed_m_s: float, induced_m_s: float, radius_m: float) -> float:
+    """T_IGE/T_OGE = 1 / (1 - (R/4z)² / (1 + (V/v_i)²)) (equation 11), 1.333 at z = R/2 in hover.
+
+    z is the height of the rotor hub above ground, not of the vehicle; V the horizontal airspeed; v_i the induced
+    velocity, at least 0.3 m/s. The source image is valid for about 0.5 <= z/R <= 2: below R/2 the value there
+    serves; above 2R the formula runs on (1.0 % at 1.25 diameters, where the paper's text says zero).
+    """
+    return multiplier_of_squares(hub_height_m, airspeed_m_s * airspeed_m_s, induced_m_s, radius_m)

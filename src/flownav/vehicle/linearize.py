@@ -1,0 +1,78 @@
+"""The reduced linear model about hover, as the paper uses it: six states, four inputs, exact derivatives.
+
+States x, y, z (earth NED) and u, v, w (body); inputs lon, lat, col, ped, the blade angles. Everything else is held
+at its trim value: attitude and body rates (zero) are no states, the servos are taken as settled, and the flapping
+angles are frozen, which is why the columns of lon and lat are zero, as they are in the paper's B_red: tilting
+reaches the velocities through flapping and attitude only.
+
+With *frozen inflow* the induced velocities of both rotors keep their trim values (the paper's reading; right for
+times well under the inflow lag of 50 ms); with *quasi-steady inflow* they are re-solved with every change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.compile import plain
+from flownav.vehicle import helicopter
+from flownav.vehicle.complex_step import jacobian
+from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.state import Controls, HelicopterState, Inflow
+from flownav.vehicle.trim import Trim
+
+STATES = ("x", "y", "z", "u", "v", "w")
+INPUTS = ("lon", "lat", "col", "ped")
+
+Array = NDArray[np.float64]
+
+_attitude = plain(helicopter.attitude)
+_air_motion = plain(helicopter.air_motion)
+_blade_angles = plain(helicopter.blade_angles)
+_inflow = plain(helicopter.inflow)
+_derivative_at_inflow = plain(helicopter.derivative_at_inflow)
+
+
+class LinearModel(NamedTuple):
+    """ẋ = A·x + B·u about trim: A (6, 6) and B (6, 4) in STATES and INPUTS, SI, radians, 1/s."""
+
+    a: Array
+    b: Array
+
+
+def reduced_model(vehicle: VehicleParameters, about: Trim, *, freeze_inflow: bool) -> LinearModel:
+    """A and B of the reduced model about a trim, in still air (see the module)."""
+    held = _inflow_at(about.state, vehicle) if freeze_inflow else None
+
+    def rates(point: Sequence[complex]) -> Sequence[complex]:
+        state, controls = _displaced(about, point)
+        rotation = _attitude(state)
+        air = _air_motion(state, rotation, 0.0, 0.0, 0.0)
+        induced = held or _inflow(air, _blade_angles(state, vehicle), vehicle)
+        rate = _derivative_at_inflow(state, controls, air, rotation, induced, vehicle)
+        return (rate.pos_n, rate.pos_e, rate.pos_d, rate.u, rate.v, rate.w)
+
+    trim = about.state
+    point = np.array([trim.pos_n, trim.pos_e, trim.pos_d, trim.u, trim.v, trim.w, *about.controls])
+    both = jacobian(rates, point)
+    return LinearModel(both[:, : len(STATES)], both[:, len(STATES) :])
+
+
+def _displaced(about: Trim, point: Sequence[complex]) -> tuple[HelicopterState, Controls]:
+    """The trim with the reduced states and the settled inputs at a point; the rest as in trim."""
+    n, e, d, u, v, w, lon, lat, col, ped = point
+    moved = {"pos_n": n, "pos_e": e, "pos_d": d, "u": u, "v": v, "w": w, "lon": lon, "lat": lat, "col": col, "ped": ped}
+    return about.state._replace(**moved), Controls(lon, lat, col, ped)  # type: ignore[arg-type]
+
+
+def _inflow_at(state: HelicopterState, vehicle: VehicleParameters) -> Inflow:
+    air = _air_motion(state, _attitude(state), 0.0, 0.0, 0.0)
+    return _inflow(air, _blade_angles(state, vehicle), vehicle)
+
+
+def eigenvalues(a: Array) -> NDArray[np.complex128]:
+    """Eigenvalues of A [1/s], ordered by real then imaginary part, the slowest last."""
+    return np.sort_complex(np.linalg.eigvals(a))

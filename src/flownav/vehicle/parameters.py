@@ -1,0 +1,210 @@
+"""The vehicle's parameters: from a file with provenance to the flat bundle of floats that kernels take."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from flownav.parameter_files import check, read_toml, shipped
+from flownav.vehicle.feasibility import require_feasible
+from flownav.vehicle.schema import Actuator, VehicleFile
+
+SHIPPED_VEHICLE = "maxi_joker_3.toml"
+
+
+class VehicleParameters(NamedTuple):
+    """A helicopter, SI units and radians; what is derived from the file says how.
+
+    Of each rotor, with blade area b·c·R, solidity σ = b·c/(πR) and lift slope a:
+    `inflow_speed` = a·σ·ΩR/(8·η_w), the only constant of the inflow balance; `thrust_slope` = ρ·a·b·c·R·ΩR/4,
+    thrust per inflow that the blades see; `thrust_limit` = ρ·πR²·(ΩR)²·σ·(C_T/σ)_stall; `profile_torque` =
+    ρ·b·c·R²·(ΩR)²·C_D0/8, the blades' drag torque without lift.
+    """
+
+    gravity_m_s2: float
+    air_density_kg_m3: float
+    mass_kg: float
+    inertia_xx_kg_m2: float
+    inertia_yy_kg_m2: float
+    inertia_zz_kg_m2: float
+    # main rotor
+    main_radius_m: float
+    main_speed_rad_s: float
+    main_tip_speed_m_s: float
+    main_inflow_speed_m_s: float
+    main_thrust_slope_n_s_m: float
+    main_thrust_limit_n: float
+    main_profile_torque_n_m: float
+    main_inplane_drag_n_s_m: float  # H-force per in-plane airspeed, ρ·b·c·R·ΩR·C_D0/4
+    main_lift_solidity: float  # a·σ
+    hub_stiffness_n_m_rad: float
+    hub_above_cg_m: float
+    flap_rate_1_s: float  # 1/τ_f = γ·Ω/16, Lock number γ = ρ·a·c·R⁴/I_β
+    flap_response: float  # K_μ, flapping per in-plane airspeed against the ideal rotor
+    # tail rotor
+    tail_speed_rad_s: float
+    tail_tip_speed_m_s: float
+    tail_inflow_speed_m_s: float
+    tail_thrust_slope_n_s_m: float
+    tail_thrust_limit_n: float
+    tail_profile_torque_n_m: float
+    tail_fin_blockage: float  # share of the tail thrust that the fin leaves
+    tail_behind_cg_m: float
+    tail_above_cg_m: float
+    # airframe
+    fuselage_area_x_m2: float
+    fuselage_area_y_m2: float
+    fuselage_area_z_m2: float
+    vertical_fin_area_m2: float
+    vertical_fin_lift_slope_per_rad: float
+    vertical_fin_inflow_fraction: float
+    horizontal_fin_area_m2: float
+    horizontal_fin_lift_slope_per_rad: float
+    horizontal_fin_behind_cg_m: float
+    horizontal_fin_inflow_fraction: float
+    # skids
+    cg_above_skid_m: float
+    skid_half_length_m: float
+    skid_half_track_m: float
+    skid_stiffness_n_m: float
+    skid_damping_n_s_m: float
+    skid_friction_coefficient: float
+    # actuators, at the blade
+    cyclic_frequency_rad_s: float
+    cyclic_damping_ratio: float
+    cyclic_rate_limit_rad_s: float
+    cyclic_min_rad: float
+    cyclic_max_rad: float
+    collective_frequency_rad_s: float
+    collective_damping_ratio: float
+    collective_rate_limit_rad_s: float
+    collective_min_rad: float
+    collective_max_rad: float
+    pedal_frequency_rad_s: float
+    pedal_damping_ratio: float
+    pedal_rate_limit_rad_s: float
+    pedal_min_rad: float
+    pedal_max_rad: float
+    # drive
+    shaft_power_limit_w: float
+
+
+class Entry(NamedTuple):
+    """One number of a vehicle file: dotted key, value in the file's unit, and what the file says of it."""
+
+    key: str
+    value: float
+    uncertainty: str  # as written, e.g. "0.6" or "0.012..0.025"; "" where the file gives none
+    source: str  # "" where the file gives none
+
+
+class VehicleDescription(NamedTuple):
+    """A vehicle file as people read it."""
+
+    name: str
+    path: Path
+    entries: tuple[Entry, ...]
+
+
+def load_vehicle(path: Path | None = None) -> VehicleParameters:
+    """The parameters in a vehicle file, the shipped Maxi Joker 3 where `path` is None.
+
+    InputError names the file, the key and what is allowed: an unknown or missing key, a value out of range, a
+    helicopter that cannot be (inertia, skids) or that cannot hold a hover.
+    """
+    path = path or shipped(SHIPPED_VEHICLE)
+    vehicle = flatten(check(read_toml(path), VehicleFile, str(path)))
+    require_feasible(vehicle, str(path))
+    return vehicle
+
+
+def describe_vehicle(path: Path | None = None) -> VehicleDescription:
+    """Name, and every number with its uncertainty and provenance, for tables and reports. InputError as `load_vehicle`."""
+    path = path or shipped(SHIPPED_VEHICLE)
+    contents = read_toml(path)
+    file = check(contents, VehicleFile, str(path))
+    tables = {key: table for key, table in contents.items() if isinstance(table, dict)}
+    entries = [_entry(f"{table}.{key}", value) for table, rows in tables.items() for key, value in rows.items()]
+    return VehicleDescription(file.name, path, tuple(entries))
+
+
+def _entry(key: str, given: Any) -> Entry:
+    if not isinstance(given, dict):
+        return Entry(key, float(given), "", "")
+    return Entry(key, float(given["value"]), str(given.get("uncertainty", "")), str(given.get("source", "")))
+
+
+def flatten(file: VehicleFile) -> VehicleParameters:
+    """The checked file as the flat bundle, angles in radians, rotor constants derived."""
+    air, body, main, tail = file.environment, file.body, file.main_rotor, file.tail_rotor
+    rho = air.air_density_kg_m3
+    main_area = main.blade_count * main.chord_m * main.radius_m
+    tail_area = tail.blade_count * tail.chord_m * tail.radius_m
+    main_tip = main.speed_rad_s * main.radius_m
+    tail_speed = tail.gear_ratio * main.speed_rad_s
+    tail_tip = tail_speed * tail.radius_m
+    main_solidity = main_area / (math.pi * main.radius_m**2)
+    tail_solidity = tail_area / (math.pi * tail.radius_m**2)
+    lock_number = rho * main.lift_slope_per_rad * main.chord_m * main.radius_m**4 / main.blade_flap_inertia_kg_m2
+    return VehicleParameters(
+        gravity_m_s2=air.gravity_m_s2,
+        air_density_kg_m3=rho,
+        mass_kg=body.mass_kg,
+        inertia_xx_kg_m2=body.inertia_xx_kg_m2,
+        inertia_yy_kg_m2=body.inertia_yy_kg_m2,
+        inertia_zz_kg_m2=body.inertia_zz_kg_m2,
+        main_radius_m=main.radius_m,
+        main_speed_rad_s=main.speed_rad_s,
+        main_tip_speed_m_s=main_tip,
+        main_inflow_speed_m_s=main.lift_slope_per_rad * main_solidity * main_tip / (8.0 * main.wake_efficiency),
+        main_thrust_slope_n_s_m=rho * main.lift_slope_per_rad * main_area * main_tip / 4.0,
+        main_thrust_limit_n=rho * main_area * main_tip**2 * main.stall_blade_loading,
+        main_profile_torque_n_m=rho * main_area * main.radius_m * main_tip**2 * main.profile_drag_coefficient / 8.0,
+        main_inplane_drag_n_s_m=rho * main_area * main_tip * main.profile_drag_coefficient / 4.0,
+        main_lift_solidity=main.lift_slope_per_rad * main_solidity,
+        hub_stiffness_n_m_rad=main.hub_stiffness_n_m_rad,
+        hub_above_cg_m=main.hub_above_cg_m,
+        flap_rate_1_s=lock_number * main.speed_rad_s / 16.0,
+        flap_response=main.flap_response,
+        tail_speed_rad_s=tail_speed,
+        tail_tip_speed_m_s=tail_tip,
+        tail_inflow_speed_m_s=tail.lift_slope_per_rad * tail_solidity * tail_tip / (8.0 * tail.wake_efficiency),
+        tail_thrust_slope_n_s_m=rho * tail.lift_slope_per_rad * tail_area * tail_tip / 4.0,
+        tail_thrust_limit_n=rho * tail_area * tail_tip**2 * tail.stall_blade_loading,
+        tail_profile_torque_n_m=rho * tail_area * tail.radius_m * tail_tip**2 * tail.profile_drag_coefficient / 8.0,
+        tail_fin_blockage=tail.fin_blockage,
+        tail_behind_cg_m=tail.behind_cg_m,
+        tail_above_cg_m=tail.above_cg_m,
+        fuselage_area_x_m2=file.fuselage.area_x_m2,
+        fuselage_area_y_m2=file.fuselage.area_y_m2,
+        fuselage_area_z_m2=file.fuselage.area_z_m2,
+        vertical_fin_area_m2=file.vertical_fin.area_m2,
+        vertical_fin_lift_slope_per_rad=file.vertical_fin.lift_slope_per_rad,
+        vertical_fin_inflow_fraction=file.vertical_fin.tail_inflow_fraction,
+        horizontal_fin_area_m2=file.horizontal_fin.area_m2,
+        horizontal_fin_lift_slope_per_rad=file.horizontal_fin.lift_slope_per_rad,
+        horizontal_fin_behind_cg_m=file.horizontal_fin.behind_cg_m,
+        horizontal_fin_inflow_fraction=file.horizontal_fin.main_inflow_fraction,
+        cg_above_skid_m=file.skids.cg_above_skid_m,
+        skid_half_length_m=file.skids.half_length_m,
+        skid_half_track_m=file.skids.half_track_m,
+        skid_stiffness_n_m=file.skids.stiffness_n_m,
+        skid_damping_n_s_m=file.skids.damping_n_s_m,
+        skid_friction_coefficient=file.skids.friction_coefficient,
+        **_actuator("cyclic", file.cyclic),
+        **_actuator("collective", file.collective),
+        **_actuator("pedal", file.pedal),
+        shaft_power_limit_w=file.drive.shaft_power_limit_w,
+    )
+
+
+def _actuator(name: str, servo: Actuator) -> dict[str, float]:
+    """One servo's fields of VehicleParameters, degrees turned to radians."""
+    return {
+        f"{name}_frequency_rad_s": servo.frequency_rad_s,
+        f"{name}_damping_ratio": servo.damping_ratio,
+        f"{name}_rate_limit_rad_s": math.radians(servo.rate_limit_deg_s),
+        f"{name}_min_rad": math.radians(servo.minimum_deg),
+        f"{name}_max_rad": math.radians(servo.maximum_deg),
+    }

@@ -1,0 +1,102 @@
+"""Skid contact with flat ground at down = 0: four unilateral sprung feet, and dry friction that really sticks.
+
+The feet push and never pull. Their damping comes in over the first 2 mm, so the force has no jump at touch.
+
+Friction acts as one force at the skid plane below the centre of gravity and one torque about the vertical: what
+it takes to stop the sliding within `STICK_TIME_S`, other forces included, but no more than μ·N (Karnopp's reading
+of Coulomb's law). A parked helicopter therefore stays put against its tail rotor, without the creep of a
+viscous regularisation and without its stiffness, which a 2 ms Runge-Kutta step could not carry.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import clamp, equation, larger, smaller
+from flownav.frames import Vector
+from flownav.vehicle.airframe import Wrench
+from flownav.vehicle.parameters import VehicleParameters
+
+DAMPING_DEPTH_M = 0.002
+STICK_TIME_S = 0.010
+NEGLIGIBLE_FORCE_N = 1e-9  # keeps feet in the air from dividing zero by zero
+
+
+class Support(NamedTuple):
+    """What the feet carry: total normal force [N] and its moments of place Σ N·x, Σ N·y [N m], body axes."""
+
+    normal_n: float
+    forward_n_m: float
+    right_n_m: float
+
+
+@equation
+def foot_force(depth: float, sink: float, vehicle: VehicleParameters) -> float:
+    """Normal force of one foot [N], `depth` below the ground [m] and sinking at `sink` [m/s]; never negative."""
+    pressed = larger(depth, 0.0)
+    damping = vehicle.skid_damping_n_s_m * smaller(pressed * (1.0 / DAMPING_DEPTH_M), 1.0)
+    return larger(vehicle.skid_stiffness_n_m * pressed + damping * sink, 0.0)
+
+
+@equation
+def support(pos_d: float, down: Vector, velocity: Vector, rates: Vector, vehicle: VehicleParameters) -> Support:
+    """The normal forces of the four feet at (±half_length, ±half_track, cg_above_skid), body axes.
+
+    A foot at r is pos_d + down·r deep and sinks at down·(velocity + rates × r).
+    """
+    x, y, z = vehicle.skid_half_length_m, vehicle.skid_half_track_m, vehicle.cg_above_skid_m
+    p, q, r = rates
+    depth = pos_d + down[2] * z
+    depth_x, depth_y = down[0] * x, down[1] * y
+    turn_x, turn_y = (down[1] * r - down[2] * q) * x, (down[2] * p - down[0] * r) * y
+    sink = down[0] * velocity[0] + down[1] * velocity[1] + down[2] * velocity[2] + (down[0] * q - down[1] * p) * z
+    front_right = foot_force(depth + depth_x + depth_y, sink + turn_x + turn_y, vehicle)
+    front_left = foot_force(depth + depth_x - depth_y, sink + turn_x - turn_y, vehicle)
+    rear_right = foot_force(depth - depth_x + depth_y, sink - turn_x + turn_y, vehicle)
+    rear_left = foot_force(depth - depth_x - depth_y, sink - turn_x - turn_y, vehicle)
+    front, rear = front_right + front_left, rear_right + rear_left
+    right, left = front_right + rear_right, front_left + rear_left
+    return Support(front + rear, (front - rear) * x, (right - left) * y)
+
+
+@equation
+def support_wrench(feet: Support, down: Vector, vehicle: VehicleParameters) -> Wrench:
+    """The feet's normal forces, upwards: -N·down at the feet."""
+    z = feet.normal_n * vehicle.cg_above_skid_m
+    return Wrench(
+        -feet.normal_n * down[0],
+        -feet.normal_n * down[1],
+        -feet.normal_n * down[2],
+        z * down[1] - feet.right_n_m * down[2],
+        feet.forward_n_m * down[2] - z * down[0],
+        feet.right_n_m * down[0] - feet.forward_n_m * down[1],
+    )
+
+
+@equation
+def friction_wrench(
+    feet: Support, down: Vector, velocity: Vector, rates: Vector, others: Wrench, vehicle: VehicleParameters
+) -> Wrench:
+    """Dry friction under the skids; `others` is the sum of all other forces and moments."""
+    z = vehicle.cg_above_skid_m
+    p, q, r = rates
+    limit = vehicle.skid_friction_coefficient * feet.normal_n
+    # the acceleration of the skid plane's centre that friction has to undo, in the plane of the ground
+    per_mass, per_jx, per_jy = 1.0 / vehicle.mass_kg, 1.0 / vehicle.inertia_xx_kg_m2, 1.0 / vehicle.inertia_yy_kg_m2
+    undo_x = others.x * per_mass + others.m * per_jy * z + (velocity[0] + q * z) * (1.0 / STICK_TIME_S)
+    undo_y = others.y * per_mass - others.l * per_jx * z + (velocity[1] - p * z) * (1.0 / STICK_TIME_S)
+    undo_z = others.z * per_mass + velocity[2] * (1.0 / STICK_TIME_S)
+    upward = undo_x * down[0] + undo_y * down[1] + undo_z * down[2]
+    # times the mass that a force there has to move
+    mass_x, mass_y = 1.0 / (per_mass + z * z * per_jy), 1.0 / (per_mass + z * z * per_jx)
+    need_x = mass_x * (undo_x - upward * down[0])
+    need_y = mass_y * (undo_y - upward * down[1])
+    need_z = mass_y * (undo_z - upward * down[2])
+    need = np.sqrt(need_x * need_x + need_y * need_y + need_z * need_z)
+    share = -limit / larger(need, limit + NEGLIGIBLE_FORCE_N)
+    arm = np.sqrt(vehicle.skid_half_length_m**2 + vehicle.skid_half_track_m**2)
+    spin = others.n + vehicle.inertia_zz_kg_m2 * r * (1.0 / STICK_TIME_S)
+    x, y = share * need_x, share * need_y
+    return Wrench(x, y, share * need_z, -z * y, z * x, clamp(-spin, -limit * arm, limit * arm))

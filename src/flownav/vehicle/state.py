@@ -1,0 +1,129 @@
+"""The helicopter's state, its controls and what follows from them, as bundles of scalars."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import equation
+
+
+class HelicopterState(NamedTuple):
+    """The helicopter's state; of its rates where a function says so (then every unit is per second).
+
+    pos: centre of gravity, earth NED [m], the ground at pos_d = 0. u, v, w: velocity, body FRD [m/s]. qw..qz:
+    attitude, body to earth. p, q, r: body rates [rad/s]. a1, b1: flapping, back and right [rad]. lon, lat, col,
+    ped: servo positions, as blade angles [rad], and their rates [rad/s].
+    """
+
+    pos_n: float
+    pos_e: float
+    pos_d: float
+    u: float
+    v: float
+    w: float
+    qw: float
+    qx: float
+    qy: float
+    qz: float
+    p: float
+    q: float
+    r: float
+    a1: float
+    b1: float
+    lon: float
+    lat: float
+    col: float
+    ped: float
+    lon_rate: float
+    lat_rate: float
+    col_rate: float
+    ped_rate: float
+
+
+class Controls(NamedTuple):
+    """Commanded blade angles [rad]: lon > 0 pitches up, lat > 0 rolls right, col > 0 climbs, ped > 0 yaws right."""
+
+    lon: float
+    lat: float
+    col: float
+    ped: float
+
+
+class Inflow(NamedTuple):
+    """Induced velocities of the main and the tail rotor [m/s]."""
+
+    main: float
+    tail: float
+
+
+class Outputs(NamedTuple):
+    """What the state implies: main rotor thrust in ground effect, torque, shaft power, inflow; skid normal force."""
+
+    thrust_n: float
+    torque_n_m: float
+    power_w: float
+    induced_velocity_m_s: float
+    contact_force_n: float
+
+
+@equation
+def add_scaled(state: HelicopterState, rate: HelicopterState, dt: float) -> HelicopterState:
+    """state + rate·dt, component by component."""
+    return HelicopterState(
+        state.pos_n + rate.pos_n * dt,
+        state.pos_e + rate.pos_e * dt,
+        state.pos_d + rate.pos_d * dt,
+        state.u + rate.u * dt,
+        state.v + rate.v * dt,
+        state.w + rate.w * dt,
+        state.qw + rate.qw * dt,
+        state.qx + rate.qx * dt,
+        state.qy + rate.qy * dt,
+        state.qz + rate.qz * dt,
+        state.p + rate.p * dt,
+        state.q + rate.q * dt,
+        state.r + rate.r * dt,
+        state.a1 + rate.a1 * dt,
+        state.b1 + rate.b1 * dt,
+        state.lon + rate.lon * dt,
+        state.lat + rate.lat * dt,
+        state.col + rate.col * dt,
+        state.ped + rate.ped * dt,
+        state.lon_rate + rate.lon_rate * dt,
+        state.lat_rate + rate.lat_rate * dt,
+        state.col_rate + rate.col_rate * dt,
+        state.ped_rate + rate.ped_rate * dt,
+    )
+
+
+@equation
+def normalised(state: HelicopterState) -> HelicopterState:
+    """The state with its quaternion brought back to unit length."""
+    scale = 1.0 / np.sqrt(state.qw * state.qw + state.qx * state.qx + state.qy * state.qy + state.qz * state.qz)
+    return HelicopterState(
+        state.pos_n,
+        state.pos_e,
+        state.pos_d,
+        state.u,
+        state.v,
+        state.w,
+        state.qw * scale,
+        state.qx * scale,
+        state.qy * scale,
+        state.qz * scale,
+        state.p,
+        state.q,
+        state.r,
+        state.a1,
+        state.b1,
+        state.lon,
+        state.lat,
+        state.col,
+        state.ped,
+        state.lon_rate,
+        state.lat_rate,
+        state.col_rate,
+        state.ped_rate,
+    )

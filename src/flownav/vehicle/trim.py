@@ -1,0 +1,162 @@
+"""Trim: the controls and the attitude in which the helicopter keeps its motion, in the air or on its skids.
+
+Newton's method on the whole equations of motion, with the exact Jacobian of the complex step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.compile import plain
+from flownav.errors import InputError
+from flownav.frames import Vector, quaternion_from_euler
+from flownav.vehicle import helicopter
+from flownav.vehicle.complex_step import solve, value
+from flownav.vehicle.feasibility import hover_induced_velocity, hover_pitch
+from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.state import Controls, HelicopterState
+
+OUT_OF_GROUND_EFFECT_M = 1e6
+TOLERANCE = 1e-11  # [m/s2, rad/s2, rad/s]
+HOVER: Vector = (0.0, 0.0, 0.0)
+
+plain_derivative = plain(helicopter.derivative)
+_outputs = plain(helicopter.outputs)
+_tail_power = plain(helicopter.tail_power)
+_quaternion = plain(quaternion_from_euler)
+
+
+class Trim(NamedTuple):
+    """A trimmed flight: angles [rad], induced velocity [m/s], thrust [N], shaft power of either rotor [W].
+
+    `state` and `controls` are what the simulation starts from: heading north over the origin.
+    """
+
+    collective_rad: float
+    pedal_rad: float
+    roll_rad: float
+    pitch_rad: float
+    a1: float
+    b1: float
+    lon: float
+    lat: float
+    induced_velocity_m_s: float
+    power_w: float  # the main rotor's
+    tail_power_w: float
+    thrust_n: float
+    state: HelicopterState
+    controls: Controls
+
+
+def settled_state(
+    pos_d_m: float,
+    vel_body_m_s: Sequence[complex],
+    euler_rad: Sequence[complex],
+    flapping_rad: Sequence[complex],
+    controls: Controls,
+) -> HelicopterState:
+    """A state over the origin without rates, its servos where the controls ask them to be."""
+    return HelicopterState(
+        0.0, 0.0, pos_d_m,
+        *vel_body_m_s,  # type: ignore[arg-type]
+        *_quaternion(*euler_rad),  # type: ignore[arg-type]
+        0.0, 0.0, 0.0,
+        *flapping_rad,  # type: ignore[arg-type]
+        *controls,
+        0.0, 0.0, 0.0, 0.0,
+    )  # fmt: skip
+
+
+def accelerations(rate: HelicopterState) -> tuple[float, ...]:
+    """What a trim makes vanish: the six accelerations and the two flapping rates."""
+    return (rate.u, rate.v, rate.w, rate.p, rate.q, rate.r, rate.a1, rate.b1)
+
+
+def _flight(unknown: Sequence[complex], vel_body_m_s: Vector, pos_d_m: float) -> tuple[HelicopterState, Controls]:
+    """Unknowns collective, pedal, roll, pitch, a1, b1, lon, lat as state and controls."""
+    col, ped, roll, pitch, a1, b1, lon, lat = unknown
+    controls = Controls(lon, lat, col, ped)  # type: ignore[arg-type]
+    return settled_state(pos_d_m, vel_body_m_s, (roll, pitch, 0.0), (a1, b1), controls), controls
+
+
+def trim(
+    vehicle: VehicleParameters, vel_body_m_s: Vector = HOVER, height_m: float = OUT_OF_GROUND_EFFECT_M
+) -> Trim:
+    """Straight flight at a constant body velocity [m/s], the centre of gravity at a height [m], in still air.
+
+    Accelerations and flapping rates are below 1e-9. InputError where the controls cannot hold that flight.
+    """
+
+    def residual(unknown: Sequence[complex]) -> tuple[float, ...]:
+        state, controls = _flight(unknown, vel_body_m_s, -height_m)
+        return accelerations(plain_derivative(state, controls, 0.0, 0.0, 0.0, vehicle))
+
+    wanted = f"trim at u, v, w = {vel_body_m_s[0]:g}, {vel_body_m_s[1]:g}, {vel_body_m_s[2]:g} m/s"
+    failure = f"{wanted}: the controls' travel, the blades or the skids do not allow it; ask for a slower or higher flight"
+    solution = [float(x) for x in solve(residual, _first_guess(vehicle), TOLERANCE, failure)]
+    state, controls = _flight(solution, vel_body_m_s, -height_m)
+    out = _outputs(state, 0.0, 0.0, 0.0, vehicle)
+    col, ped, roll, pitch, a1, b1, lon, lat = solution
+    return Trim(
+        collective_rad=col,
+        pedal_rad=ped,
+        roll_rad=roll,
+        pitch_rad=pitch,
+        a1=a1,
+        b1=b1,
+        lon=lon,
+        lat=lat,
+        induced_velocity_m_s=float(out.induced_velocity_m_s),
+        power_w=float(out.power_w),
+        tail_power_w=float(_tail_power(state, 0.0, 0.0, 0.0, vehicle)),
+        thrust_n=float(out.thrust_n),
+        state=_as_floats(state),
+        controls=controls,
+    )
+
+
+def _first_guess(vehicle: VehicleParameters) -> NDArray[np.float64]:
+    """Hover by momentum theory: weight on the main rotor, its torque on the tail rotor, level but for the roll."""
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    inflow = hover_induced_velocity(weight, vehicle.main_thrust_slope_n_s_m, vehicle.main_inflow_speed_m_s)
+    torque = vehicle.main_profile_torque_n_m + weight * inflow / vehicle.main_speed_rad_s
+    side = torque / vehicle.tail_behind_cg_m / vehicle.tail_fin_blockage
+    tail_inflow = hover_induced_velocity(side, vehicle.tail_thrust_slope_n_s_m, vehicle.tail_inflow_speed_m_s)
+    collective = hover_pitch(weight, inflow, vehicle.main_thrust_slope_n_s_m, vehicle.main_tip_speed_m_s)
+    pedal = hover_pitch(side, tail_inflow, vehicle.tail_thrust_slope_n_s_m, vehicle.tail_tip_speed_m_s)
+    return np.array([collective, pedal, side / weight, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def parked(vehicle: VehicleParameters, controls: Controls) -> HelicopterState:
+    """The state at rest on the skids over the origin, rotors turning, with these controls held; still air.
+
+    InputError where it does not stay: too much lift, or more side force or torque than the skids' friction holds.
+    """
+
+    def state_of(unknown: Sequence[complex]) -> HelicopterState:
+        pos_d, roll, pitch, a1, b1 = unknown
+        return settled_state(pos_d, HOVER, (roll, pitch, 0.0), (a1, b1), controls)  # type: ignore[arg-type]
+
+    def rate_of(unknown: Sequence[complex]) -> HelicopterState:
+        return plain_derivative(state_of(unknown), controls, 0.0, 0.0, 0.0, vehicle)
+
+    def residual(unknown: Sequence[complex]) -> tuple[float, ...]:
+        rate = rate_of(unknown)
+        return (rate.w, rate.p, rate.q, rate.a1, rate.b1)
+
+    sag = vehicle.mass_kg * vehicle.gravity_m_s2 / (4.0 * vehicle.skid_stiffness_n_m)
+    start = np.array([sag - vehicle.cg_above_skid_m, 0.0, 0.0, 0.0, 0.0])
+    failure = "parked: the helicopter does not rest on its skids with these controls; lower the collective"
+    solution = solve(residual, start, TOLERANCE, failure)
+    state = _as_floats(state_of([float(x) for x in solution]))
+    if np.abs(value(lambda x: accelerations(rate_of(x)), solution)).max() > 0.05:
+        raise InputError("parked: the helicopter slides on its skids with these controls; lower collective or pedal")
+    return state
+
+
+def _as_floats(state: HelicopterState) -> HelicopterState:
+    return HelicopterState(*(float(complex(x).real) for x in state))

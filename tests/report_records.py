@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from flownav.record import Record
@@ -42,10 +44,7 @@ def flight(scenario: str = "landing", seed: int = 1, gps_sigma_m: float = 0.3) -
     """50 s at 50 Hz: 3 m down at 0.3 m/s from 10 s on (landing), or 3 m up at 1 m/s (takeoff)."""
     random, dt_s = np.random.default_rng(seed), 0.02
     t_s = np.arange(0.0, 50.0, dt_s)
-    if scenario == "landing":
-        height = np.clip(3.0 - 0.3 * (t_s - 10.0), 0.0, 3.0)
-    else:
-        height = np.clip(t_s - 10.0, 0.0, 3.0)
+    height = np.clip(3.0 - 0.3 * (t_s - 10.0) if scenario == "landing" else t_s - 10.0, 0.0, 3.0)
     smooth = np.ones(25) / 25
     height = np.convolve(np.pad(height, 12, mode="edge"), smooth, mode="valid")
     airborne = np.clip(height, 0.0, 0.3) / 0.3
@@ -87,13 +86,15 @@ def flight(scenario: str = "landing", seed: int = 1, gps_sigma_m: float = 0.3) -
     times = [*t_s[edges], *([float(t_s[np.flatnonzero(on_ground)[0]])] if touched else [])]
     kinds = [*("engaged" if engaged[row] else "disengaged" for row in edges), *(["touchdown"] if touched else [])]
     record.add("events", {"t_s": np.array(times), "source": np.array(["flow"] * len(edges) + ["vehicle"] * touched),
-                          "kind": np.array(kinds), "detail": np.array(["pattern in view"] * len(times)),
+                          "kind": np.array(kinds), "detail": np.array(["height above ground [m]"] * len(times)),
                           "value": np.full(len(times), np.nan)})  # fmt: skip
     record.manifest = _manifest(scenario, seed, estimate - position, speed - velocity, times[-1] if touched else None)
     return record
 
 
-def _innovations(t_s, gps, flow, engaged, gps_sigma_m):
+def _innovations(
+    t_s: np.ndarray, gps: np.ndarray, flow: np.ndarray, engaged: np.ndarray, gps_sigma_m: float
+) -> dict[str, np.ndarray]:
     rows = []
     for sensor, residual, names, sigma, when in (
         ("gps_position", gps, POSITION, np.hypot(gps_sigma_m, 0.07), np.full(len(t_s), True)),
@@ -112,11 +113,13 @@ def _innovations(t_s, gps, flow, engaged, gps_sigma_m):
     return table
 
 
-def _manifest(scenario, seed, position_error, velocity_error, touchdown_s):
+def _manifest(
+    scenario: str, seed: int, position_error: np.ndarray, velocity_error: np.ndarray, touchdown_s: float | None
+) -> dict[str, Any]:
     errors = np.column_stack([position_error, velocity_error]).T
     return {
         "kind": "fly", "scenario": scenario, "filter": "paper", "gps": "white", "seed": seed, "duration_s": 50.0,
-        "pad": {"size_m": 1.0, "n_m": 0.0, "e_m": 0.0, "d_m": 0.0},
+        "pad_size_m": 1.0,
         "command": ["flownav", "fly", scenario, "--seed", str(seed)],
         "paper": PAPER_LANDING,
         "parameters": {
@@ -127,7 +130,7 @@ def _manifest(scenario, seed, position_error, velocity_error, touchdown_s):
         },
         "provenance": {
             "versions": {"flownav": "0.1.0", "numpy": np.__version__},
-            "inputs": {"maxi_joker_3.toml": {"sha256": "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"}},
+            "inputs": {"maxi_joker_3.toml": "9f86d081884c7d659a2feaa0c55ad015a3bf4f1b2b0b822cd15d6c15b0f00a08"},
         },
         "scores": {
             "states": {name: {"mean_error": float(e.mean()), "std_error": float(e.std()),
@@ -155,7 +158,8 @@ def replay(duration_s: float = 849.0, seed: int = 2, autopilot: bool = True, flo
     drift = np.where((t_s > window[0]) & (t_s < window[1]), 1.2 * (t_s - window[0]) / (window[1] - window[0]), 0.0)
     estimate = path + _markov(random, len(t_s), 0.15, 5.0, dt_s) + drift[:, None] * np.array([1.0, 0.6, 0.0])
     record = Record()
-    std = {f"std_{name}": 0.2 + drift for name in POSITION} | {f"std_{name}": np.full(len(t_s), 0.1) for name in VELOCITY}
+    std = {f"std_{name}": 0.2 + drift for name in POSITION}
+    std |= {f"std_{name}": np.full(len(t_s), 0.1) for name in VELOCITY}
     noisy = body + random.normal(0, 0.05, body.shape)
     record.add("estimate", {"t_s": t_s, **dict(zip(POSITION, estimate.T, strict=True)),
                             **dict(zip(VELOCITY, noisy.T, strict=True)), **attitude, **std})  # fmt: skip
@@ -167,9 +171,10 @@ def replay(duration_s: float = 849.0, seed: int = 2, autopilot: bool = True, flo
     gps = path[slow] + random.normal(0, 0.4, path[slow].shape)
     speed = earth[slow] + random.normal(0, 0.1, path[slow].shape)
     arrival = t_s[slow] + 0.22
-    record.add("gps_position", {"t_s": arrival, **dict(zip(POSITION, gps.T, strict=True)), "quality": 255 + 0 * arrival})
+    good = 255.0 + 0.0 * arrival
+    record.add("gps_position", {"t_s": arrival, **dict(zip(POSITION, gps.T, strict=True)), "quality": good})
     names = ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
-    record.add("gps_velocity", {"t_s": arrival, **dict(zip(names, speed.T, strict=True)), "quality": 255 + 0 * arrival})
+    record.add("gps_velocity", {"t_s": arrival, **dict(zip(names, speed.T, strict=True)), "quality": good})
     record.add("range", {"t_s": t_s, "range_m": np.maximum(height, 0.13), "quality": 255 + 0 * t_s})
     record.add("attitude", {"t_s": t_s, **attitude, "quality": 255 + 0 * t_s})
     if flow:
@@ -184,14 +189,22 @@ def replay(duration_s: float = 849.0, seed: int = 2, autopilot: bool = True, flo
     residual = gps - estimate[slow]
     parts = {"t_s": np.tile(arrival, 3), "sensor": np.repeat("gps_position", 3 * len(arrival)),
              "component": np.repeat(POSITION, len(arrival)), "innovation": residual.T.ravel(),
-             "observation_variance": np.full(3 * len(arrival), 0.25), "innovation_variance": np.full(3 * len(arrival), 0.3),
+             "observation_variance": np.full(3 * len(arrival), 0.25),
+             "innovation_variance": np.full(3 * len(arrival), 0.3),
              "test_ratio": residual.T.ravel() ** 2 / 2.7, "fused": np.tile(fused, 3)}  # fmt: skip
     record.add("innovation", parts)
     record.manifest = {
         "kind": "replay", "log": "quad-px4flow-outdoor", "filter": "kinematic", "duration_s": duration_s,
         "delays_s": {"gps_position": 0.22, "gps_velocity": 0.22},
-        "scores": {"outages": [{"t0": window[0], "t1": window[1], "horizontal_rms_m": 0.87, "horizontal_max_m": 1.63}],
-                   "velocity_rms_m_s": 0.23,
-                   "rejected": {"flow_rate": {"quality_zero": 812, "outside_gate": 31}, "gps_position": {"outage": 300}}},
+        "parameters": {"gps_outages_s": [list(window)]},
+        "scores": {
+            "outages": [
+                {"t0": window[0], "t1": window[1], "horizontal_rms_m": 0.87, "horizontal_max_m": 1.63},
+                {"t0": 1.0, "t1": 3.0, "horizontal_rms_m": 0.41, "horizontal_max_m": 0.72},
+            ],
+            "outage_median_rms_m": 0.64,
+            "velocity_rms_m_s": 0.23,
+            "rejected": {"flow_rate": {"no_data": 812, "innovation_gate": 31}, "gps_position": {"outage": 300}},
+        },
     }  # fmt: skip
     return record

@@ -122,6 +122,26 @@ def test_midg_velocity_and_attitude_errors_have_their_size() -> None:
         assert np.std(angle) == pytest.approx(sigma, abs=four_sigma_of_std(sigma) + 1e-3 * sigma)
 
 
+@pytest.mark.parametrize("process", ["slow", "fast", "jitter", "velocity"])
+def test_each_process_stays_at_its_own_size_on_each_axis(process: str) -> None:
+    sizes = dict.fromkeys(
+        ("slow_sigma_m", "slow_sigma_down_m", "fast_sigma_m", "fast_sigma_down_m", "jitter_sigma_m"), 0.0
+    ) | {"velocity_sigma_m_s": 0.0, "velocity_white_m_s": 0.0}
+    unit = "m_s" if process == "velocity" else "m"
+    sizes[f"{process}_sigma_{unit}"] = 1.0
+    down = 1.0
+    if process in ("slow", "fast"):
+        sizes[f"{process}_sigma_down_m"] = down = 2.0
+    settings = GpsInsSettings.model_validate(sizes | {f"{process}_tau_s": 0.05})  # forgets its start in the test
+    p, draw = settings.parameters(), np.random.default_rng(15)
+    state = start(AT_PAD, normals(draw), p)
+    for _ in range(20):
+        state, reading = step(state, AT_PAD, normals(draw), p)
+    axes = reading[3:6] if process == "velocity" else reading[:3]
+    for axis, sigma in zip(axes, (1.0, 1.0, down), strict=True):
+        assert np.std(axis) == pytest.approx(sigma, abs=four_sigma_of_std(sigma))
+
+
 def test_midg_messages_come_in_whole_centimetres() -> None:
     p, draw = GpsInsSettings().parameters(), np.random.default_rng(6)
     state = start(AT_PAD, normals(draw, 100), p)

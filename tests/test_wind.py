@@ -61,6 +61,15 @@ def test_the_direction_is_where_it_blows_from(direction: float, north: float, ea
     np.testing.assert_allclose(velocity(CALM, 6.096, p), (4.0 * north, 4.0 * east, 0.0), atol=1e-12)
 
 
+def test_gusts_act_along_the_wind_to_its_right_and_down() -> None:
+    p = WindSettings(speed_20ft_m_s=4.0, from_direction_deg=270.0).parameters()  # blows east, its right is south
+    steady = np.array(velocity(CALM, 3.0, p))
+    np.testing.assert_allclose(velocity(CALM._replace(along=1.0), 3.0, p) - steady, (0, 1, 0), atol=1e-12)
+    np.testing.assert_allclose(velocity(CALM._replace(across1=1.0), 3.0, p) - steady, (-1, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(velocity(CALM._replace(across2=1.0), 3.0, p) - steady, (-SQRT3, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(velocity(CALM._replace(down1=1.0), 3.0, p) - steady, (0, 0, 1), atol=1e-12)
+
+
 @pytest.mark.parametrize("direction", [0.0, 90.0, 200.0, -90.0])
 def test_off_is_exactly_plus_zero(direction: float) -> None:
     p, draw = WindSettings(from_direction_deg=direction).parameters(), np.random.default_rng(11)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, TypeVar, get_args
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 
@@ -69,7 +69,8 @@ def check(entries: dict[str, Any], schema: type[Model], where: str) -> Model:
     try:
         return schema.model_validate(entries)
     except ValidationError as error:
-        first, *others = error.errors()
+        # a misspelt key is reported before the key that it should have been
+        first, *others = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
         key = ".".join(str(part) for part in first["loc"])
         more = f" (and {len(others)} more)" if others else ""
         raise InputError(f"{where}: {key}: {_sentence(first, schema)}{more}") from None
@@ -91,11 +92,20 @@ def _number_of(given: Any) -> Any:
 
 
 def _keys_beside(location: tuple[Any, ...], schema: type[BaseModel]) -> list[str]:
-    """The field names of the table in which an unknown key stands."""
+    """The field names of the table in which an unknown key stands; tables in lists count."""
     model: Any = schema
     for part in location[:-1]:
+        if isinstance(part, int):
+            continue
         info = model.model_fields.get(part)
-        model = info.annotation if info is not None else None
-        if not (isinstance(model, type) and issubclass(model, BaseModel)):
+        models = [m for m in _types_in(info.annotation) if issubclass(m, BaseModel)] if info is not None else []
+        if not models:
             return []
+        model = models[0]
     return list(model.model_fields)
+
+
+def _types_in(annotation: Any) -> list[type]:
+    """Every class that an annotation such as tuple[Knot, ...] names."""
+    inner = [found for argument in get_args(annotation) for found in _types_in(argument)]
+    return inner or ([annotation] if isinstance(annotation, type) else [])

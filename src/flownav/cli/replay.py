@@ -36,7 +36,7 @@ def command(
     out: Annotated[
         Path | None, typer.Option("--out", help="The record; out/FOLDER.fnr where unsaid.", show_default=False)
     ] = None,
-    no_report: Annotated[bool, typer.Option("--no-report", help="Write no HTML page beside the record.")] = False,
+    report: Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report beside it.")] = True,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Fuse a recorded flight: its trajectory, its errors against its own GPS, and the drift through GPS outages."""
@@ -53,13 +53,11 @@ def command(
     if table:
         scores.update(_fly_table(flown, table, scores["outages"]))
     record_path = out or Path("out") / f"{folder.resolve().name}.fnr"
-    report_path = None if no_report else record_path.with_suffix(".html")
-    _write(flown, scores, record_path, report_path)
-    scores["record"] = str(record_path)
+    scores |= _write(flown, scores, record_path, report)
     if as_json:
         typer.echo(json.dumps(scores))
     else:
-        _print(flown, scores, report_path)
+        _print(flown, scores)
 
 
 def _numbers(option: str, text: str, separator: str, count: int, form: str) -> tuple[float, ...]:
@@ -91,37 +89,41 @@ def _settings(path: Path | None) -> Any:
 
 def _fly_table(flown: Replay, table: list[tuple[float, float]], explicit: list[dict[str, Any]]) -> dict[str, Any]:
     """The table's windows after the explicit ones, with their median and worst."""
+    from flownav.cli.output import progress
     from flownav.replay.session import outage_entry, outage_summary, outage_table
 
-    def progress(done: int) -> None:
-        if sys.stderr.isatty():
-            print(f"\rflownav: outage {done} of {len(table)}", end="\n" if done == len(table) else "", file=sys.stderr)
-
-    errors = outage_table(flown.log, flown.options, flown.settings, table, progress)
+    with progress("GPS outages", len(table)) as advance:
+        errors = outage_table(flown.log, flown.options, flown.settings, table, advance)
     return {"outages": [*explicit, *map(outage_entry, errors)], **outage_summary(errors)}
 
 
-def _write(flown: Replay, scores: dict[str, Any], record_path: Path, report_path: Path | None) -> None:
+def _write(flown: Replay, scores: dict[str, Any], record_path: Path, report: bool) -> dict[str, str]:
+    """The record and its report; where they lie."""
     from flownav.errors import InputError
     from flownav.replay.bundle import to_record
-    from flownav.report.html import write_report
 
     record = to_record(flown, scores, ["flownav", *sys.argv[1:]])
+    page = record_path.with_suffix(".html")
+    if report and page == record_path:
+        raise InputError(f"--out {record_path}: the report would replace the record; name it .fnr")
     try:
         record.save(record_path)
-        if report_path is not None:
-            write_report(record, report_path)
+        if report:
+            from flownav.report.html import write_report
+
+            write_report(record, page)
     except OSError as error:
         raise InputError(f"{record_path}: cannot be written ({error.strerror}); give another --out") from error
+    return {"record": str(record_path), **({"report": str(page)} if report else {})}
 
 
-def _print(flown: Replay, scores: dict[str, Any], report_path: Path | None) -> None:
+def _print(flown: Replay, scores: dict[str, Any]) -> None:
     """The same figures for people."""
     from rich.console import Console
     from rich.table import Table
 
-    console = Console()
-    console.print(f"[bold]{flown.log.path.name}[/]: {scores['duration_s']:.1f} s")
+    console = Console(markup=False, highlight=False)
+    console.print(f"{flown.log.path.name}: {scores['duration_s']:.1f} s")
     if scores["outages"]:
         table = Table("GPS cut [s]", "rms [m]", "max [m]", title="Horizontal error through GPS outages")
         for outage in scores["outages"]:
@@ -138,8 +140,9 @@ def _print(flown: Replay, scores: dict[str, Any], report_path: Path | None) -> N
     if "truth" in scores:
         truth = scores["truth"]
         console.print(
-            f"Against truth (turned by {57.29578 * truth['yaw_rad']:.1f} deg): horizontal {truth['horizontal_rms_m']:.2f} m rms, "
-            f"{truth['horizontal_max_m']:.2f} m max; velocity {truth['velocity_rms_m_s']:.3f} m/s rms"
+            f"Against truth (turned by {57.29578 * truth['yaw_rad']:.1f} deg): horizontal "
+            f"{truth['horizontal_rms_m']:.2f} m rms, {truth['horizontal_max_m']:.2f} m max; "
+            f"velocity {truth['velocity_rms_m_s']:.3f} m/s rms"
         )
     rejected = Table("sensor", "reason", "rejected", title="Not fused")
     for sensor, counts in scores["rejected"].items():
@@ -149,7 +152,9 @@ def _print(flown: Replay, scores: dict[str, Any], report_path: Path | None) -> N
         console.print(rejected)
     for note in flown.prepared.notes:
         console.print(f"Note: {note}")
-    console.print(f"Record: {scores['record']}" + (f"\nReport: {report_path}" if report_path else ""))
+    for name in ("record", "report"):
+        if name in scores:
+            console.print(f"{name.capitalize()}: {scores[name]}", soft_wrap=True)
 
 
 def _figure(value: float | None) -> str:

@@ -97,7 +97,8 @@ def propagate_kinematic_covariance(
 @equation
 def path_noise_rate(vel_n_m_s: float, vel_e_m_s: float, path_noise_m_rt_m: float) -> float:
     """How fast odometry's position variance grows [m2/s]: a random walk over the distance flown."""
-    return path_noise_m_rt_m * path_noise_m_rt_m * np.sqrt(vel_n_m_s * vel_n_m_s + vel_e_m_s * vel_e_m_s)
+    speed: float = np.sqrt(vel_n_m_s * vel_n_m_s + vel_e_m_s * vel_e_m_s)
+    return path_noise_m_rt_m * path_noise_m_rt_m * speed
 
 
 @equation

@@ -28,6 +28,7 @@ class KinematicSettings(NamedTuple):
     flow_low_quality_sigma_rad_s: float
     flow_floor_m_s: float
     flow_limit_rad_s: float
+    flow_noise_time_s: float
     range_sigma_m: float
     range_relative_sigma: float
     range_min_m: float
@@ -57,7 +58,7 @@ class KinematicSettingsFile(ParameterModel):
     )
     path_noise_m_rt_m: Number = Field(
         0.1, ge=0, le=5,
-        description="odometry's own random walk: 1 m after 100 m, the 1 % that scale, mounting and heading errors leave",
+        description="odometry's own random walk: 1 m after 100 m, the 1 % that scale and heading errors leave",
     )  # fmt: skip
     trim_time_s: Number = Field(60.0, ge=5, le=1e9, description="time constant of the accelerometer trim")
     trim_limit_m_s2: Number = Field(0.5, ge=0, le=3, description="largest trim: 3 degrees of tilt or 50 mg of bias")
@@ -71,6 +72,9 @@ class KinematicSettingsFile(ParameterModel):
     flow_low_quality_sigma_rad_s: Number = Field(0.5, gt=0, le=10, description="flow as its quality goes to 0")
     flow_floor_m_s: Number = Field(0.03, gt=0, le=5, description="body velocity near the ground, whatever the range")
     flow_limit_rad_s: Number = Field(10.0, gt=0, le=50, description="no sensor of this kind measures faster flow")
+    flow_noise_time_s: Number = Field(
+        10.0, gt=0, le=1e9, description="flow noisier than modelled is followed at this pace; a surface lasts seconds"
+    )
     range_sigma_m: Number = Field(0.05, gt=0, le=5, description="rangefinder noise and grass")
     range_relative_sigma: Number = Field(0.02, ge=0, le=0.5, description="share of the range added to it")
     range_min_m: Number = Field(0.02, ge=0, le=5, description="shorter readings are no readings")

@@ -40,7 +40,10 @@ FILES: dict[str, tuple[Column, ...]] = {
         Column("lat_deg", -90.0, 90.0, DEGREES),
         Column("lon_deg", -180.0, 180.0, DEGREES),
         Column("alt_m", -1000.0, 20000.0, METRES),
-        *(Column(f"vel_{axis}_m_s", -150.0, 150.0, "metres per second (centimetres?)") for axis in "ned"),
+        *(
+            Column(f"vel_{axis}_m_s", -150.0, 150.0, "metres per second (centimetres?)", may_be_empty=True)
+            for axis in "ned"
+        ),
     ),
     "flow": (
         *(Column(f"flow_{axis}_rad_s", -GYRO_LIMIT_RAD_S, GYRO_LIMIT_RAD_S, "radians per second") for axis in "xy"),

@@ -165,7 +165,7 @@ def _check_limits(table: CsvTable, columns: Sequence[Column]) -> None:
         if values is None:
             continue
         outside = (values < column.low) | (values > column.high)
-        share = np.count_nonzero(outside) / max(1, np.count_nonzero(np.isfinite(values)))
+        share = int(np.count_nonzero(outside)) / max(1, int(np.count_nonzero(np.isfinite(values))))
         if share > WRONG_UNIT_SHARE:
             worst = float(values[outside][np.argmax(np.abs(values[outside]))])
             raise InputError(

@@ -58,7 +58,7 @@ def _check_gravity(where: Path, imu: Stream, attitude: Stream) -> None:
     tilt = float(np.arccos(np.clip(-mean[2] / np.linalg.norm(mean), -1.0, 1.0)))
     if tilt > LARGEST_TILT_ERROR_RAD:
         raise InputError(
-            f"{where}: attitude and imu accel disagree about down by {np.degrees(tilt):.0f} degrees; angles in radians, "
+            f"{where}: attitude and imu accel disagree about down by {np.degrees(tilt):.0f} degrees; radians, "
             "axes forward-right-down and a specific force of -9.8 m/s2 on z at rest are needed"
         )
 
@@ -99,16 +99,19 @@ def _check_gps(where: Path, position: Stream, velocity: Stream) -> None:
     t_s = position.t_s
     if len(t_s) < LEAST_ROWS or t_s[-1] - t_s[0] < 2 * GPS_INTERVAL_S:
         return
+    known = np.isfinite(velocity.value).all(axis=1)
+    if np.count_nonzero(known) < LEAST_ROWS:
+        return
     edges = np.arange(t_s[0], t_s[-1], GPS_INTERVAL_S)
-    flown = mean_over(velocity.t_s, velocity.value[:, :2], edges[:-1], edges[1:]) * GPS_INTERVAL_S
+    flown = mean_over(velocity.t_s[known], velocity.value[known, :2], edges[:-1], edges[1:]) * GPS_INTERVAL_S
     moved = np.diff(np.column_stack([np.interp(edges, t_s, column) for column in position.value[:, :2].T]), axis=0)
     if np.sqrt(np.mean(flown**2)) < LEAST_GPS_TRAVEL_M:
         return
     slope = _slope(flown.ravel(), moved.ravel())
     if not 0.2 < slope < 5.0:
         raise InputError(
-            f"{where}: gps: positions move {slope:.2g} times as far as the velocities say; lat_deg and lon_deg in degrees "
-            "and vel_n, vel_e in m/s are needed"
+            f"{where}: gps: positions move {slope:.2g} times as far as the velocities say; degrees (lat_deg, lon_deg) "
+            "and m/s (vel_n_m_s, vel_e_m_s) are needed"
         )
 
 

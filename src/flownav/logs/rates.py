@@ -18,7 +18,7 @@ def mean_over(t_s: Array, value: Array, start_s: Array, end_s: Array) -> Array:
     def at(instants: Array) -> Array:
         inside = [np.interp(instants, t_s, column) for column in integral.T]
         before, after = np.minimum(instants - t_s[0], 0.0), np.maximum(instants - t_s[-1], 0.0)
-        return np.column_stack(inside) + before[:, None] * value[0] + after[:, None] * value[-1]
+        return np.asarray(np.column_stack(inside) + before[:, None] * value[0] + after[:, None] * value[-1])
 
     return np.asarray((at(end_s) - at(start_s)) / (end_s - start_s)[:, None])
 

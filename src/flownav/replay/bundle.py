@@ -11,8 +11,8 @@ import numpy as np
 from flownav.estimation.gating import Reason
 from flownav.measurement import COLUMNS, Array, Sensor
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
-from flownav.replay.engine import EVENT_NAMES
 from flownav.replay.session import Replay
+from flownav.replay.state import EVENT_NAMES
 from flownav.scoring.alignment import velocity_of
 
 KEPT = (
@@ -74,7 +74,8 @@ def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dic
 def _truth(replay: Replay) -> dict[str, Array]:
     """The truth in the estimate's frame; body velocity by differences, in the axes of the estimate's attitude."""
     placed, truth = replay.truth_alignment, replay.log.truth
-    assert placed is not None and truth is not None
+    assert placed is not None
+    assert truth is not None
     position = placed.moved(replay.truth_position)
     velocity = placed.turned(velocity_of(truth["t_s"], replay.truth_position))
     quaternion = [np.interp(truth["t_s"], replay.estimate[:, 0], column) for column in replay.estimate[:, 7:11].T]
@@ -128,11 +129,10 @@ def _events(replay: Replay) -> dict[str, Any]:
     """What happened, in order of time."""
     start, _ = replay.log.span_s
     events = [(start, "replay", "note", note, np.nan) for note in replay.prepared.notes]
-    for sensor, counts in replay.rejected().items():
-        events += [(start, sensor, "rejected", reason, float(count)) for reason, count in counts.items()]
+    for name, counts in replay.rejected().items():
+        events += [(start, name, "rejected", reason, float(count)) for reason, count in counts.items()]
     for t_s, kind, value in replay.tape.event[: replay.tape.used[2]].tolist():
-        source, name, detail = EVENT_NAMES[int(kind)]
-        events.append((t_s, source, name, detail, value))
+        events.append((t_s, *EVENT_NAMES[int(kind)], value))
     for t0, t1 in replay.options.gps_outages_s:
         events += [(t0, "gps", "outage_start", "withheld on request", t1 - t0), (t1, "gps", "outage_end", "", np.nan)]
     for sensor in (Sensor.GPS_POSITION, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE):

@@ -19,10 +19,11 @@ from flownav.measurement import Array, EventQueue, Sensor, Stream, merge
 WITHHELD = -1.0  # the quality of a reading that the user takes away
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
 FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
-GYRO_BIAS_TIME_S = 30.0
+GYRO_BIAS_TIME_S = 10.0  # as PX4's EKF2 follows it at 10 Hz
 LONGEST_FLOW_INTERVAL = 1.5  # medians: a longer step is a gap, not an exposure
-CLEARLY_SMOOTHER = 0.9
-LEAST_FLOW_ROWS = 20
+OWN = "sensor gyro"
+SIGNIFICANT = 3.0  # standard errors
+LEAST_FLOW_ROWS = 50
 
 
 @dataclass(frozen=True)
@@ -107,23 +108,22 @@ def _scaled(stream: Stream, scale: tuple[float, float]) -> Stream:
 def _with_gyro(flow: Stream, streams: dict[Sensor, Stream]) -> tuple[Stream, str]:
     """The flow with the rates that serve best in its gyro columns, and what was chosen.
 
-    Candidates are the sensor's own gyro, the vehicle's IMU (its bias followed against the attitude), and the
-    attitude's own turning. A vehicle has mass, so its velocity is smooth: the gyro that leaves the least
+    Candidates are the sensor's own gyro, the vehicle's IMU (both with their bias followed against the attitude)
+    and the attitude's own turning. A vehicle has mass, so its velocity is smooth: the gyro that leaves the least
     sample-to-sample noise in the compensated flow has seen the same rotation as the flow did. The sensor's own
-    stays unless another is clearly better, or it is absent or dead.
+    stays unless another is significantly better, or it is absent or dead.
     """
     candidates = _gyro_candidates(flow, streams)
-    noises = {name: _roughness(flow, rates) for name, rates in candidates.items()}
-    own = noises.pop("sensor gyro", np.inf)
-    best = min(noises, key=lambda name: noises[name])
-    chosen = best if noises[best] < CLEARLY_SMOOTHER * own else "sensor gyro"
-    if chosen not in candidates:
-        chosen = best
+    roughness = {name: _roughness(flow, rates) for name, rates in candidates.items()}
+    limit = np.quantile(np.concatenate([*roughness.values(), [0.0]]), 0.95)  # spikes weigh no more than this
+    roughness = {name: np.minimum(squares, limit) for name, squares in roughness.items()}
+    noises = {name: float(np.sqrt(squares.mean())) for name, squares in roughness.items() if len(squares)}
+    best = min(noises, key=lambda name: noises[name], default=min(candidates))
+    chosen = best if _significant(roughness.get(OWN), roughness[best]) else OWN
     value = flow.value.copy()
     value[:, 2:4] = candidates[chosen]
-    noises["sensor gyro"] = own
-    listed = ", ".join(f"{name} {noise:.4f}" for name, noise in sorted(noises.items()) if np.isfinite(noise))
-    return replace(flow, value=value), f"flow is compensated with the {chosen} (flow noise, rad/s: {listed})"
+    listed = ", ".join(f"{name} {noise:.4f}" for name, noise in sorted(noises.items()))
+    return replace(flow, value=value), f"flow is compensated with the {chosen} (noise left, rad/s: {listed})"
 
 
 def _gyro_candidates(flow: Stream, streams: dict[Sensor, Stream]) -> dict[str, Array]:
@@ -139,9 +139,10 @@ def _gyro_candidates(flow: Stream, streams: dict[Sensor, Stream]) -> dict[str, A
         rates = mean_over(imu.t_s, imu.value[:, :3], start, flow.t_s)
         candidates["imu gyro"] = (rates - _followed(flow.t_s, rates - turning))[:, :2]
     own = flow.value[:, 2:4]
-    known = np.isfinite(own).all(axis=1)
-    if known.mean() > 0.5 and np.ptp(own[known], axis=0).all():
-        candidates["sensor gyro"] = np.where(known[:, None], own, candidates.get("imu gyro", candidates["attitude"]))
+    known = np.asarray(np.isfinite(own).all(axis=1))
+    if known.mean() > 0.5 and np.all(np.ptp(own[known], axis=0)):
+        filled = np.where(known[:, None], own, turning[:, :2])
+        candidates[OWN] = filled - _followed(flow.t_s, filled - turning[:, :2])
     return candidates
 
 
@@ -164,11 +165,19 @@ def _low_pass(value: Array, gain: Array) -> Array:
     return followed
 
 
-def _roughness(flow: Stream, rates: Array) -> float:
-    """Standard deviation of the compensated flow's noise [rad/s], from its second differences."""
-    good = (flow.quality > 0) & np.isfinite(rates).all(axis=1) & np.isfinite(flow.value[:, :2]).all(axis=1)
+def _roughness(flow: Stream, rates: Array) -> Array:
+    """Squared noise of the compensated flow [rad2/s2], reading by reading (second differences); may be empty."""
+    good = (flow.quality > 0) & np.isfinite(flow.value[:, :2]).all(axis=1)
     if np.count_nonzero(good) < LEAST_FLOW_ROWS:
-        return np.inf
+        return np.zeros(0)
     compensated = flow.value[good, :2] - rates[good]
     second = compensated[2:] - 2.0 * compensated[1:-1] + compensated[:-2]
-    return float(np.median(np.abs(second)) / (0.6745 * np.sqrt(6.0)))
+    return np.asarray(np.mean(second**2, axis=1) / 6.0)
+
+
+def _significant(own: Array | None, other: Array) -> bool:
+    """Whether another gyro leaves less noise than the sensor's own, beyond chance (neighbours share readings)."""
+    if own is None:
+        return True
+    gain = own - other
+    return len(gain) > 0 and bool(gain.mean() > SIGNIFICANT * gain.std() / np.sqrt(len(gain) / 3.0))

@@ -16,8 +16,9 @@ from flownav.estimation.gating import Reason
 from flownav.estimation.kinematic_settings import KinematicSettings
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
-from flownav.replay.engine import Tape, new_memory, new_tape, run
+from flownav.replay.engine import run
 from flownav.replay.prepare import Prepared, ReplayOptions, prepare, withhold
+from flownav.replay.state import Tape, new_filter
 from flownav.scoring.alignment import Alignment, align, velocity_of
 from flownav.scoring.outage import OutageError, difference_at, horizontal_rms, outage_error
 
@@ -77,8 +78,9 @@ class Replay:
         gps = self.log.streams.get(Sensor.GPS_VELOCITY)
         if gps is None:
             return None
-        t_s = gps.t_s - self.options.gps_delay_s
-        return _number(horizontal_rms(self.estimate[:, 0], self.estimate[:, 17:19], t_s, gps.value[:, :2]))
+        known = np.isfinite(gps.value[:, :2]).all(axis=1)
+        t_s = gps.t_s[known] - self.options.gps_delay_s
+        return _number(horizontal_rms(self.estimate[:, 0], self.estimate[:, 17:19], t_s, gps.value[known, :2]))
 
     def rejected(self) -> dict[str, dict[str, int]]:
         """What was not fused, by sensor and reason: rows by the reader, components by the filter."""
@@ -133,9 +135,9 @@ def outage_table(
     options: ReplayOptions,
     settings: KinematicSettings,
     windows: list[tuple[float, float]],
-    progress: Callable[[int], None] = lambda done: None,
+    on_progress: Callable[[int], None] = lambda done: None,
 ) -> list[OutageError]:
-    """One replay a window, each with GPS cut in that window alone. `progress` is told how many are done."""
+    """One replay a window, each with GPS cut in that window alone. `on_progress` is called with 1 for each."""
 
     def error_of(window: tuple[float, float]) -> OutageError:
         return _run(log, replace(options, gps_outages_s=(window,)), settings, prepared).outage(*window)
@@ -143,9 +145,9 @@ def outage_table(
     errors = []
     with announce_compilation("replay"), ThreadPoolExecutor(2) as pool:
         prepared = prepare(log, replace(options, gps_outages_s=tuple(windows)))
-        for done, error in enumerate(pool.map(error_of, windows), start=1):
+        for error in pool.map(error_of, windows):
             errors.append(error)
-            progress(done)
+            on_progress(1)
     return errors
 
 
@@ -181,9 +183,10 @@ def _number(value: float) -> float | None:
 
 def _run(log: Log, options: ReplayOptions, settings: KinematicSettings, prepared: Prepared) -> Replay:
     queue = withhold(log, prepared.queue, options)
-    tape = new_tape(queue)
-    work, memory = new_memory(queue, settings.start_wait_s)
-    run(queue, settings, work, memory, tape)
-    if tape.used[0] < 2:
-        raise InputError(f"{log.path}: the filter never started; it needs an attitude before the log's end")
-    return Replay(log, options, settings, prepared, tape)
+    running = new_filter(queue, settings)
+    run(queue, running)
+    if running.tape.used[0] < 2:
+        raise InputError(
+            f"{log.path}: the filter never started; it needs an attitude, then a GPS fix or flow of quality above 0"
+        )
+    return Replay(log, options, settings, prepared, running.tape)

@@ -16,7 +16,17 @@ import numpy as np
 from flownav.measurement import Sensor
 from flownav.record import Record
 from flownav.report.figures_filter import SENSOR_TITLES
-from flownav.report.series import event_rows, flow_velocity, has, mapping, readings, scored_outages, start_end_s
+from flownav.report.series import (
+    event_rows,
+    flow_velocity,
+    has,
+    mapping,
+    outages,
+    readings,
+    rms_m,
+    scored_outages,
+    start_end_s,
+)
 
 EVENTS_LISTED = 300
 NONE, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
@@ -68,10 +78,11 @@ def duration_s(record: Record) -> float:
 
 
 def facts(record: Record) -> list[tuple[str, str]]:
-    """The line under the heading: filter, GPS model, seed, length."""
+    """The line under the heading: filter, GPS model, plant, seed, length."""
     manifest = record.manifest
-    stated = [("Filter", manifest.get("filter")), ("GPS model", manifest.get("gps")), ("Seed", manifest.get("seed"))]
-    shown = [(name, str(value)) for name, value in stated if value is not None]
+    named = {"Filter": "filter", "GPS model": "gps", "Plant": "truth", "Feedback": "feedback", "Seed": "seed",
+             "Flight": "flight"}  # fmt: skip
+    shown = [(name, str(manifest[key])) for name, key in named.items() if manifest.get(key) is not None]
     return [*shown, ("Length", f"{duration_s(record):.1f} s")]
 
 
@@ -88,17 +99,23 @@ def summary(record: Record) -> str:
     if touchdown:
         said.append(
             f"It touched down after {number(touchdown.get('t_s'), 1)} s, "
-            f"{metres(touchdown.get('horizontal_error_m'))} m from its mark, "
+            f"{metres(touchdown.get('horizontal_error_m'))} m from the pad's centre, "
             f"sinking at {number(touchdown.get('sink_rate_m_s'), 2)} m/s."
         )
-    outages = scored_outages(record)
-    if outages:
-        worst = max(outages, key=lambda outage: outage.get("horizontal_rms_m") or 0.0)
-        among = f", the worst of {len(outages)} outages," if len(outages) > 1 else ""
+    cut = scored_outages(record)
+    if cut:
+        worst = max(cut, key=rms_m)
+        among = f", the worst of {len(cut)} outages," if len(cut) > 1 else ""
         rms, largest = number(worst.get("horizontal_rms_m"), 2), number(worst.get("horizontal_max_m"), 2)
         said.append(
             f"With GPS withheld from {worst['t0']:g} to {worst['t1']:g} s{among} the position drifted "
             f"{rms} m rms and {largest} m at most."
+        )
+    truth = mapping(scores.get("truth"))
+    if truth:
+        rms, largest = number(truth.get("horizontal_rms_m"), 2), number(truth.get("horizontal_max_m"), 2)
+        said.append(
+            f"Against the recorded truth its position is off by {rms} m rms, {largest} m at most, horizontally."
         )
     if not scores:
         said.append("The record carries no scores.")
@@ -116,14 +133,18 @@ def tiles(record: Record) -> list[Tile]:
     touchdown = mapping(scores.get("touchdown"))
     if touchdown:
         when = f"at {number(touchdown.get('t_s'), 1)} s"
-        found.append(Tile("Touchdown off its mark", metres(touchdown.get("horizontal_error_m")), "m", when))
+        found.append(Tile("Touchdown off centre", metres(touchdown.get("horizontal_error_m")), "m", when))
         found.append(Tile("Touchdown sink rate", number(touchdown.get("sink_rate_m_s"), 2), "m/s", when))
-    outages = scored_outages(record)
-    if outages:
-        worst = max(outages, key=lambda outage: outage.get("horizontal_rms_m") or 0.0)
+    cut = scored_outages(record)
+    if cut:
+        worst = max(cut, key=rms_m)
         when = f"rms, {worst['t0']:g} to {worst['t1']:g} s"
-        name = "Drift without GPS" if len(outages) == 1 else f"Worst drift of {len(outages)} outages"
+        name = "Drift without GPS" if len(cut) == 1 else f"Worst drift of {len(cut)} outages"
         found.append(Tile(name, number(worst.get("horizontal_rms_m"), 2), "m", when))
+    truth = mapping(scores.get("truth"))
+    if truth:
+        largest = f"at most {number(truth.get('horizontal_max_m'), 2)} m"
+        found.append(Tile("Horizontal error", number(truth.get("horizontal_rms_m"), 2), "m", f"rms, {largest}"))
     if scores.get("velocity_rms_m_s") is not None:
         found.append(Tile("Velocity error", number(scores["velocity_rms_m_s"], 2), "m/s", "rms, against GPS"))
     share = flow_share(record)
@@ -185,10 +206,19 @@ def score_rows(record: Record) -> list[ScoreRow]:
     return rows
 
 
-def outage_rows(record: Record) -> list[tuple[str, str, str]]:
-    """GPS outages as (window, rms, max)."""
-    return [(f"{outage['t0']:g} to {outage['t1']:g} s", number(outage.get("horizontal_rms_m"), 2),
-             number(outage.get("horizontal_max_m"), 2)) for outage in scored_outages(record)]  # fmt: skip
+def outage_rows(record: Record) -> list[tuple[str, str, str, str]]:
+    """Scored GPS outages as (window, rms, max, where GPS was cut); the median and the worst last, where scored."""
+    scores, here = mapping(record.manifest.get("scores")), outages(record)
+    rows = []
+    for outage in scored_outages(record):
+        window = (float(outage["t0"]), float(outage["t1"]))
+        figures = number(outage.get("horizontal_rms_m"), 2), number(outage.get("horizontal_max_m"), 2)
+        place = "this record" if window in here else "a replay of its own"
+        rows.append((f"{window[0]:g} to {window[1]:g} s", *figures, place))
+    for name, key in (("median", "outage_median_rms_m"), ("worst", "outage_worst_rms_m")):
+        if scores.get(key) is not None:
+            rows.append((name, number(scores[key], 2), "", ""))
+    return rows
 
 
 def rejected_rows(record: Record) -> list[tuple[str, str, str]]:
@@ -220,11 +250,11 @@ def events(record: Record) -> EventTables:
 
 
 def groups(tree: Any) -> list[tuple[str, list[tuple[str, str]]]]:
-    """A nested mapping as (group, [(dotted key, value as text)]); its own plain values come first, as "General"."""
+    """A nested mapping as (group, [(dotted key, value as text)]); its own plain values come first, as "general"."""
     tree = mapping(tree)
     plain = [(str(key), text(value)) for key, value in tree.items() if not isinstance(value, Mapping)]
     nested = [(str(key), list(_flat(value))) for key, value in tree.items() if isinstance(value, Mapping)]
-    return ([("General", plain)] if plain else []) + nested
+    return ([("general", plain)] if plain else []) + nested
 
 
 def _flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:

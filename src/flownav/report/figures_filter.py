@@ -17,7 +17,6 @@ from flownav.report.series import (
     moments,
     outages,
     readings,
-    scored_outages,
     sliding_rms,
     start_end_s,
     track,
@@ -25,6 +24,7 @@ from flownav.report.series import (
 
 STD_POSITION = tuple(f"std_{name}" for name in POSITION_NED)
 RADIUS_WINDOW_S = 5.0
+INNOVATION_NUMBERS = ("t_s", "observation_variance", "innovation", "innovation_variance", "test_ratio", "fused")
 SMALLEST_RATIO = 0.01  # test ratios below are not drawn: the axis is logarithmic
 AXIS_TITLES = {
     "pos_n_m": "x, north (m)",
@@ -76,7 +76,7 @@ def radius_of_uncertainty(record: Record) -> Panel:
         for role, name, radius in spread:
             if radius is not None and len(radius.t_s):
                 stack.line(row, role, name, radius.t_s, radius.value[:, 0])
-                medians.setdefault(name, float(np.nanmedian(radius.value)))
+                medians.setdefault(name, float(np.median(radius.value)))
     stack.from_zero()
     figure = stack.figure(start_end_s(record), moments(record), outages(record))
     caption = (
@@ -123,7 +123,7 @@ def _innovations(record: Record) -> dict[str, dict[str, dict[str, Array]]]:
         return {}
     count = len(table["t_s"])
     sensor_of, component_of = np.asarray(table["sensor"]), np.asarray(table.get("component", np.zeros(count)))
-    numeric = [name for name in table if name not in ("sensor", "component", "reason")]
+    numeric = [name for name in INNOVATION_NUMBERS if name in table]
     found: dict[str, dict[str, dict[str, Array]]] = {}
     for sensor in dict.fromkeys(sensor_of.tolist()):
         rows = np.flatnonzero(sensor_of == sensor)
@@ -168,18 +168,15 @@ def _innovation_panel(record: Record, sensor: str, components: dict[str, dict[st
         fused = part.get("fused", np.ones(len(t_s))) > 0.5
         offered, refused = offered + len(t_s), refused + int((~fused).sum())
         if "innovation_variance" in part:
-            stack.band(
-                row,
-                "±3\N{GREEK SMALL LETTER SIGMA} expected",
-                t_s,
-                3.0 * np.sqrt(np.maximum(part["innovation_variance"], 0.0)),
-            )
+            expected = 3.0 * np.sqrt(np.maximum(part["innovation_variance"], 0.0))
+            stack.band(row, "±3\N{GREEK SMALL LETTER SIGMA} expected", t_s, expected)
+            stack.within(row, _reach(part["innovation"], expected))
         stack.dots(row, colour, "fused", t_s[fused], part["innovation"][fused])
-        stack.dots(row, "alert", "not fused", t_s[~fused], part["innovation"][~fused], cross=True)
+        stack.crosses(row, "alert", "not fused", t_s[~fused], part["innovation"][~fused])
         if "test_ratio" in part:
             ratio = np.where(part["test_ratio"] < SMALLEST_RATIO, np.nan, part["test_ratio"])
             stack.dots(gate_row, colour, "fused", t_s[fused], ratio[fused])
-            stack.dots(gate_row, "alert", "not fused", t_s[~fused], ratio[~fused], cross=True)
+            stack.crosses(gate_row, "alert", "not fused", t_s[~fused], ratio[~fused])
     span = start_end_s(record)
     if tested:
         stack.line(gate_row, "gate", "gate", np.array(span), np.ones(2))
@@ -189,6 +186,13 @@ def _innovation_panel(record: Record, sensor: str, components: dict[str, dict[st
     if tested:
         caption += f" A test ratio above 1 is outside the gate; those below {SMALLEST_RATIO} are not drawn."
     return Panel(f"innovation-{sensor}", title, caption, f"{title}: {caption}", figure)
+
+
+def _reach(innovation: Array, expected: Array) -> float:
+    """Half the height of an axis that shows every innovation, and the band but for its rare spikes."""
+    known = expected[np.isfinite(expected)]
+    shown = [np.abs(innovation[np.isfinite(innovation)]), np.quantile(known, [0.98]) if len(known) else known]
+    return 1.1 * float(np.max(np.concatenate(shown), initial=1e-6))
 
 
 def error_against_gps(record: Record) -> Panel:
@@ -210,9 +214,5 @@ def error_against_gps(record: Record) -> Panel:
     caption = f"Against each GPS reading, {delay_s(record, 'gps_position'):.2f} s before it arrived (its delay). "
     caption += f"The lines are root mean squares over a sliding {RADIUS_WINDOW_S:.0f} s; GPS noise stays in them."
     if windows:
-        worst = max(float(outage.get("horizontal_rms_m") or 0.0) for outage in scored_outages(record))
-        caption += (
-            f" Shaded: {len(windows)} GPS outage{'s' * (len(windows) > 1)}, the worst {worst:.2f} m rms;"
-            " that score leaves out the distance at the start of the window, the figure does not."
-        )
+        caption += " Shaded: GPS was withheld; the scores leave out the distance at the start, the figure does not."
     return Panel(key, title, caption, f"{title} over time. {caption}", figure, wide=True)

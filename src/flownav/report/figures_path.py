@@ -15,7 +15,6 @@ from flownav.report.series import (
     Array,
     Track,
     at,
-    mapping,
     moments,
     outages,
     readings,
@@ -32,26 +31,21 @@ BOX_DIAGONAL, BOX_HEIGHT = (
 
 
 class Pad(NamedTuple):
-    """The landing pad, a square on the ground: centre in NED [m] and length of a side [m]."""
+    """The landing pad: a square on the ground about the origin, length of a side [m]."""
 
-    n_m: float
-    e_m: float
-    d_m: float
     size_m: float
 
     def corners(self) -> Array:
         """North, east, down of the closed outline, shape (5, 3)."""
         half = 0.5 * self.size_m
         north, east = half * np.array([-1, 1, 1, -1, -1]), half * np.array([-1, -1, 1, 1, -1])
-        return np.column_stack([self.n_m + north, self.e_m + east, np.full(5, self.d_m)])
+        return np.column_stack([north, east, np.zeros(5)])
 
 
 def pad(record: Record) -> Pad | None:
-    """The pad of manifest["pad"] {"size_m", "n_m", "e_m", "d_m"}; its centre is the origin where unstated."""
-    stated = mapping(record.manifest.get("pad"))
-    if not isinstance(stated.get("size_m"), (int, float)):
-        return None
-    return Pad(*(float(stated.get(name) or 0.0) for name in ("n_m", "e_m", "d_m", "size_m")))
+    """The pad of manifest["pad_size_m"], None where the record states none."""
+    size_m = record.manifest.get("pad_size_m")
+    return Pad(float(size_m)) if isinstance(size_m, (int, float)) else None
 
 
 def _paths(record: Record) -> list[tuple[str, Track]]:

@@ -82,6 +82,8 @@ def render(record: Record) -> str:
     return environment.get_template("page.html.j2").render(
         title=content.title(record),
         kind=str(record.manifest.get("kind") or "flight"),
+        description=str(record.manifest.get("description") or ""),
+        has_truth=has(record, "truth"),
         facts=content.facts(record),
         summary=content.summary(record),
         tiles=content.tiles(record),

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.report.series import DOT_POINTS, LINE_POINTS, Array, Moment, Window, thin, thin_dots
+from flownav.report.series import CROSS_POINTS, DOT_POINTS, LINE_POINTS, Array, Moment, Window, thin, thin_dots
 from flownav.report.style import COLOUR, LINES, axis, layout
 
 ROW_HEIGHT_PX = 138
@@ -85,22 +85,23 @@ class Stack:
         points = {"x": drawn(t_s[kept]), "y": drawn(values[kept])}
         self._add(row, name, {**points, "mode": "lines", "line": LINES[role], "hovertemplate": "%{y:.3f}"})
 
-    def dots(
-        self, row: int, colour: str, name: str, t_s: Array, values: Array, *, cross: bool = False, shown: bool = True
-    ) -> None:
-        """Readings as dots (or crosses), thinned; not shown, they wait in the legend."""
-        known = ~np.isnan(values)
-        if not known.any():
-            return
-        t_s, values = t_s[known], values[known]
-        kept = thin_dots(DOT_POINTS, values)
-        line = {"color": COLOUR[colour], "width": 1.5}
-        shape: dict[str, Any] = (
-            {"symbol": "x-thin", "size": 6, "line": line} if cross else {"size": 3.5, "opacity": 0.5}
-        )
-        points = {"x": drawn(t_s[kept]), "y": drawn(values[kept]), "mode": "markers", "hovertemplate": "%{y:.3f}"}
-        visible = True if shown else "legendonly"
-        self._add(row, name, {**points, "marker": {"color": COLOUR[colour], **shape}, "visible": visible})
+    def dots(self, row: int, colour: str, name: str, t_s: Array, values: Array, *, shown: bool = True) -> None:
+        """Readings as dots, thinned; not shown, they wait in the legend."""
+        marker = {"color": COLOUR[colour], "size": 3.5, "opacity": 0.5}
+        self._readings(row, name, t_s, values, DOT_POINTS, {"marker": marker, "visible": shown or "legendonly"})
+
+    def crosses(self, row: int, colour: str, name: str, t_s: Array, values: Array) -> None:
+        """Exceptional readings as crosses, thinned to fewer than dots."""
+        line = {"color": COLOUR[colour], "width": 1.2}
+        marker = {"color": COLOUR[colour], "size": 5.5, "symbol": "x-thin", "line": line}
+        self._readings(row, name, t_s, values, CROSS_POINTS, {"marker": marker})
+
+    def _readings(self, row: int, name: str, t_s: Array, values: Array, budget: int, style: dict[str, Any]) -> None:
+        known = np.flatnonzero(~np.isnan(values))
+        if len(known):
+            kept = known[thin_dots(budget, values[known])]
+            points = {"x": drawn(t_s[kept]), "y": drawn(values[kept])}
+            self._add(row, name, {**points, "mode": "markers", "hovertemplate": "%{y:.3f}", **style})
 
     def band(self, row: int, name: str, t_s: Array, half_width: Array) -> None:
         """The area between -half_width and +half_width, thinned."""
@@ -117,6 +118,10 @@ class Stack:
     def reverse(self, row: int) -> None:
         """Draw an axis with its positive end down, as z of NED."""
         self._layout[f"yaxis{row}"]["autorange"] = "reversed"
+
+    def within(self, row: int, half_height: float) -> None:
+        """Let an upright axis reach from -half_height to +half_height."""
+        self._layout[f"yaxis{row}"]["range"] = [-half_height, half_height]
 
     def from_zero(self) -> None:
         """Let every upright axis start at zero."""

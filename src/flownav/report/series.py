@@ -15,10 +15,11 @@ Array = NDArray[np.float64]
 Window = tuple[float, float]
 
 LINE_POINTS = 3000  # a drawn line has at most so many points
-DOT_POINTS = 900  # and a cloud of readings so many dots
+DOT_POINTS = 900  # a cloud of readings so many dots
+CROSS_POINTS = 250  # and the exceptional ones so many crosses
 
-LIFT_OFF_KINDS = frozenset({"lift_off", "liftoff", "take_off", "takeoff"})
-TOUCHDOWN_KINDS = frozenset({"touchdown", "touch_down"})
+LIFT_OFF_KINDS = ("lift-off", "lift_off", "takeoff")
+TOUCHDOWN_KINDS = ("touchdown",)
 
 
 class Moment(NamedTuple):
@@ -63,13 +64,14 @@ def thin(budget: int, *columns: Array) -> NDArray[np.int64]:
 def thin_dots(budget: int, *columns: Array) -> NDArray[np.int64]:
     """Rows of a cloud of dots to draw, at most `budget`: an even sample, and the extremes of each stretch.
 
-    The extremes alone would hollow the cloud out: nine parts of the budget in ten are the sample.
+    Extremes alone would hollow the cloud out and widen it: they get one part of the budget in twenty.
     """
     count = len(columns[0])
     if count <= budget:
         return np.arange(count)
-    sample = np.linspace(0, count - 1, budget - budget // 10).astype(int)
-    return np.unique(np.concatenate([sample, thin(budget // 10, *columns)]))
+    extremes = max(budget // 20, 2 + 2 * len(columns))
+    sample = np.linspace(0, count - 1, budget - extremes).astype(int)
+    return np.unique(np.concatenate([sample, thin(extremes, *columns)]))
 
 
 def has(record: Record, table: str, columns: tuple[str, ...] = ()) -> bool:
@@ -170,24 +172,41 @@ def sliding_rms(t_s: Array, squares: Array, width_s: float) -> Array:
 
 
 def moments(record: Record) -> list[Moment]:
-    """Lift-off and touchdown, as the truth, the scores or the events tell them, in order of time."""
+    """Lift-off and touchdown, in order of time.
+
+    Lift-off is the first time the truth (or else an event) leaves the ground; a bounce after touchdown is
+    none. Touchdown is the scored one; where there are no scores, the last one of truth or events.
+    """
+    scores = mapping(record.manifest.get("scores"))
+    found = _ground_contacts(record)
+    if "touchdown" in scores:
+        found.pop("touchdown", None)
+        t_s = mapping(scores["touchdown"]).get("t_s")
+        if isinstance(t_s, (int, float)):
+            found["touchdown"] = float(t_s)
+    if found.get("lift-off", 0.0) > found.get("touchdown", np.inf):
+        del found["lift-off"]
+    return sorted(Moment(t_s, name) for name, t_s in found.items())
+
+
+def _ground_contacts(record: Record) -> dict[str, float]:
+    """First lift-off and last touchdown [s] in truth and events."""
     found: dict[str, float] = {}
     if has(record, "truth", ("on_ground",)):
         truth = record.tables["truth"]
-        change = np.diff(np.asarray(truth["on_ground"], float) > 0.5, prepend=np.nan)  # +1 lands, -1 leaves
-        for name, sign in (("lift-off", -1.0), ("touchdown", 1.0)):
-            rows = np.flatnonzero(change[1:] == sign) + 1
-            if len(rows):
-                found[name] = float(truth["t_s"][rows[0 if sign < 0 else -1]])
+        change = np.diff(np.asarray(truth["on_ground"], float) > 0.5)
+        rows = np.flatnonzero(change) + 1  # the first row of each new state
+        on_ground = np.asarray(truth["on_ground"], float)[rows] > 0.5
+        if not on_ground.all():
+            found["lift-off"] = float(truth["t_s"][rows[~on_ground][0]])
+        if on_ground.any():
+            found["touchdown"] = float(truth["t_s"][rows[on_ground][-1]])
     for t_s, _, kind, _, _ in event_rows(record):
         if kind.lower() in LIFT_OFF_KINDS:
             found.setdefault("lift-off", t_s)
         if kind.lower() in TOUCHDOWN_KINDS:
             found.setdefault("touchdown", t_s)
-    scored = mapping(mapping(record.manifest.get("scores")).get("touchdown")).get("t_s")
-    if isinstance(scored, (int, float)):
-        found["touchdown"] = float(scored)
-    return sorted(Moment(t_s, name) for name, t_s in found.items())
+    return found
 
 
 def event_rows(record: Record) -> list[tuple[float, str, str, str, str]]:
@@ -219,12 +238,23 @@ def scored_outages(record: Record) -> list[Mapping[str, Any]]:
     return [outage for outage in listed if "t0" in mapping(outage) and "t1" in outage]
 
 
+def rms_m(outage: Mapping[str, Any]) -> float:
+    """An outage's rms drift [m]; 0 where it could not be scored."""
+    return float(outage.get("horizontal_rms_m") or 0.0)
+
+
 def outages(record: Record) -> list[Window]:
-    """Windows [s] in which the scores say that GPS was withheld."""
+    """Windows [s] in which this record had no GPS: those of its parameters, or else those of its scores.
+
+    The scores may list more: windows that were each cut in a replay of their own.
+    """
+    stated = mapping(record.manifest.get("parameters")).get("gps_outages_s")
+    if stated is not None:
+        return [(float(t0), float(t1)) for t0, t1 in stated]
     return [(float(outage["t0"]), float(outage["t1"])) for outage in scored_outages(record)]
 
 
 def worst_outage(record: Record) -> Window | None:
-    """The outage with the largest rms drift."""
-    worst = max(scored_outages(record), key=lambda outage: outage.get("horizontal_rms_m") or 0.0, default=None)
-    return None if worst is None else (float(worst["t0"]), float(worst["t1"]))
+    """Of the windows without GPS in this record, the one with the largest rms drift."""
+    drift = {(float(outage["t0"]), float(outage["t1"])): rms_m(outage) for outage in scored_outages(record)}
+    return max(outages(record), key=lambda window: drift.get(window, 0.0), default=None)

@@ -25,7 +25,7 @@ class Alignment(NamedTuple):
 
     def moved(self, positions_ned_m: Array) -> Array:
         """Positions (n, 3) in the estimate's frame."""
-        return self.turned(positions_ned_m) + np.array(self.shift_ned_m)
+        return np.asarray(self.turned(positions_ned_m) + np.array(self.shift_ned_m))
 
 
 def align(estimate_ned_m: Array, reference_ned_m: Array) -> Alignment:

@@ -29,31 +29,34 @@ Array = NDArray[np.float64]
 
 
 @kernel
-def error_statistics(error: Array) -> Array:
+def error_statistics(estimate: Array, truth: Array) -> Array:
     """Mean, standard deviation, RMS and largest absolute error over time.
 
-    error (epochs, states, lanes) -> (lanes, states, 4), in the order of STATISTICS. The standard deviation is
-    that of the error about its mean (the paper's "difference in standard deviation", reading 13 of
-    docs/paper.md).
+    estimate and truth (epochs, states, lanes) -> (lanes, states, 4), in the order of STATISTICS. The standard
+    deviation is that of the error about its mean (the paper's "difference in standard deviation").
     """
-    epochs, states, lanes = error.shape
-    result = np.zeros((lanes, states, 4))
+    epochs, states, lanes = estimate.shape
+    total, squares, largest = np.zeros((states, lanes)), np.zeros((states, lanes)), np.zeros((states, lanes))
+    for k in range(epochs):
+        for state in range(states):
+            for lane in range(lanes):
+                error = estimate[k, state, lane] - truth[k, state, lane]
+                total[state, lane] += error
+                squares[state, lane] += error * error
+                largest[state, lane] = max(largest[state, lane], abs(error))
+    spread = np.zeros((states, lanes))
+    for k in range(epochs):
+        for state in range(states):
+            for lane in range(lanes):
+                error = estimate[k, state, lane] - truth[k, state, lane]
+                spread[state, lane] += (error - total[state, lane] / epochs) ** 2
+    result = np.empty((lanes, states, 4))
     for state in range(states):
         for lane in range(lanes):
-            total, squares, largest = 0.0, 0.0, 0.0
-            for k in range(epochs):
-                value = error[k, state, lane]
-                total += value
-                squares += value * value
-                largest = max(largest, abs(value))
-            mean = total / epochs
-            deviation = 0.0
-            for k in range(epochs):
-                deviation += (error[k, state, lane] - mean) ** 2
-            result[lane, state, 0] = mean
-            result[lane, state, 1] = np.sqrt(deviation / epochs)
-            result[lane, state, 2] = np.sqrt(squares / epochs)
-            result[lane, state, 3] = largest
+            result[lane, state, 0] = total[state, lane] / epochs
+            result[lane, state, 1] = np.sqrt(spread[state, lane] / epochs)
+            result[lane, state, 2] = np.sqrt(squares[state, lane] / epochs)
+            result[lane, state, 3] = largest[state, lane]
     return result
 
 
@@ -85,7 +88,7 @@ def score_block(t_s: Array, estimate: Array, truth: Array, sink_rate: Array, on_
     estimate and truth (epochs, 6, lanes): position NED [m] and velocity body FRD [m/s]. `lands` says
     whether the scenario ends on the ground; without it there is no touchdown to score.
     """
-    statistics = error_statistics(estimate - truth)
+    statistics = error_statistics(estimate, truth)
     lanes = statistics.shape[0]
     landing = touchdown(t_s, truth[:, :3], sink_rate, on_ground) if lands else np.full((lanes, 3), np.nan)
     largest = statistics[:, :3, 3].max(axis=1)

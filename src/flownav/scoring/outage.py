@@ -53,4 +53,5 @@ def difference_at(estimate_t_s: Array, estimate: Array, reference_t_s: Array, re
         return np.zeros((0, reference.shape[1]))
     covered = (reference_t_s >= estimate_t_s[0]) & (reference_t_s <= estimate_t_s[-1])
     instants = reference_t_s[covered]
-    return np.column_stack([np.interp(instants, estimate_t_s, column) for column in estimate.T]) - reference[covered]
+    at_instants = np.column_stack([np.interp(instants, estimate_t_s, column) for column in estimate.T])
+    return np.asarray(at_instants - reference[covered])

@@ -146,7 +146,7 @@ def step_flow(
     """
     shake_m_s = state.mount_m_s
     overscale = sonar_overscale(range_m, p)
-    seen_u = (vel_u_m_s - p.shake_horizontal * shake_m_s) * overscale
+    seen_u = (vel_u_m_s + p.shake_horizontal * shake_m_s) * overscale
     seen_v = (vel_v_m_s + p.shake_horizontal * shake_m_s) * overscale
     seen_w = vel_w_m_s + p.shake_vertical * shake_m_s
     u1, u2 = _lag(state.u1, state.u2, seen_u, p)

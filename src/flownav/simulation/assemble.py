@@ -11,13 +11,14 @@ import numpy as np
 
 from flownav.control.autopilot import AutopilotGains
 from flownav.control.guidance import path_through
-from flownav.estimation.paper_filter import STATES, PaperModel
+from flownav.estimation.discretise import discretised
+from flownav.estimation.paper_filter import PaperModel
 from flownav.sensors.datasheet import FlowSensor, load_sensor
 from flownav.simulation.flight import ATTITUDE_S, PAPER_FILTER, Flight, FlightPlan
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
-from flownav.vehicle.paper_model import PaperReducedModel, discretised, load_paper_model
+from flownav.vehicle.paper_model import ReducedModel, load_paper_model
 from flownav.vehicle.parameters import VehicleParameters, describe_vehicle, load_vehicle
 from flownav.vehicle.state import Controls, HelicopterState
 from flownav.vehicle.trim import Trim, parked, trim
@@ -159,19 +160,19 @@ def _sensors(scenario: Scenario, sensor: FlowSensor, vehicle: VehicleParameters)
     )
 
 
-def _paper_filter(paper: PaperReducedModel) -> PaperModel:
+def _paper_filter(paper: ReducedModel) -> PaperModel:
     """The printed matrices, discretised with the inputs held over an epoch."""
-    transition, input_matrix = discretised(paper, EPOCH_S)
-    return PaperModel(transition, input_matrix, np.diag(paper.Q).copy(), np.diag(paper.R).copy())
+    transition, input_matrix = discretised(paper.a, paper.b, EPOCH_S)
+    return PaperModel(transition, input_matrix, np.diag(paper.q).copy(), np.diag(paper.r).copy())
 
 
-def _initial_variance(scenario: Scenario, paper: PaperReducedModel) -> Any:
+def _initial_variance(scenario: Scenario, paper: ReducedModel) -> Any:
     """P at the start: one step's process noise about a known pad, one measurement's about a first GPS reading."""
-    return np.diag(paper.Q if start_of(scenario) == "known" else paper.R).copy()
+    return np.diag(paper.q if start_of(scenario) == "known" else paper.r).copy()
 
 
-def _linear_truth(paper: PaperReducedModel, hover: Trim) -> LinearTruth:
+def _linear_truth(paper: ReducedModel, hover: Trim) -> LinearTruth:
     """The paper's linear truth over one step of the attitude loop."""
-    transition, input_matrix = discretised(paper, ATTITUDE_S)
+    transition, input_matrix = discretised(paper.a, paper.b, ATTITUDE_S)
     trims = np.array([hover.lon, hover.lat, hover.collective_rad, hover.pedal_rad])
-    return LinearTruth(transition, input_matrix, trims, float(paper.B[STATES - 2, 3]))
+    return LinearTruth(transition, input_matrix, trims, float(paper.b[4, 3]))

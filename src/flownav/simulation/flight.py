@@ -30,6 +30,7 @@ from flownav.estimation.paper_filter import PaperModel
 from flownav.frames import rotation_from_quaternion
 from flownav.sensors.flow import step_flow
 from flownav.sensors.gps_ins import attitude_with_error
+from flownav.sensors.rangefinder import slant_range
 from flownav.simulation import layout
 from flownav.simulation.history import write_history
 from flownav.simulation.layout import (
@@ -244,11 +245,11 @@ def follow_flow(work: Work, lanes: Lanes, flight: Flight) -> None:
     for lane in range(len(lanes)):
         state = load_helicopter(work, lanes, lane)
         cosine = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)[8]
-        height = lens_height(state, cosine, flight.sensors.lens_below_cg_m)
+        distance = slant_range(lens_height(state, cosine, flight.sensors.lens_below_cg_m), cosine)
         thrust = work[layout.THRUST * len(lanes) + lane] / flight.vehicle.mass_kg
         store_flow(
             work, lanes, lane,
-            step_flow(load_flow(work, lanes, lane), state.u, state.v, state.w, height, thrust, flight.sensors.flow),
+            step_flow(load_flow(work, lanes, lane), state.u, state.v, state.w, distance, thrust, flight.sensors.flow),
         )  # fmt: skip
 
 

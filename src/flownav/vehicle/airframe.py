@@ -39,12 +39,6 @@ class AirMotion(NamedTuple):
 
 
 @equation
-def add(a: Wrench, b: Wrench) -> Wrench:
-    """Two wrenches about the same point together."""
-    return Wrench(a.x + b.x, a.y + b.y, a.z + b.z, a.l + b.l, a.m + b.m, a.n + b.n)
-
-
-@equation
 def tail_sideslip(air: AirMotion, vehicle: VehicleParameters) -> float:
     """Sideways velocity of the tail rotor and the fin through the air [m/s]."""
     return air.v - vehicle.tail_behind_cg_m * air.r + vehicle.tail_above_cg_m * air.p
@@ -64,43 +58,50 @@ def main_rotor_wrench(
 
 
 @equation
-def tail_wrench(thrust: float, induced: float, air: AirMotion, vehicle: VehicleParameters) -> Wrench:
-    """The tail rotor's thrust to the left, and the vertical fin in its wake, at one place."""
+def tail_side_force(thrust: float, induced: float, air: AirMotion, vehicle: VehicleParameters) -> float:
+    """Side force of the tail rotor, to the left, and of the vertical fin in its wake, at one place [N]."""
     sideslip = tail_sideslip(air, vehicle) - vehicle.vertical_fin_inflow_fraction * induced
     lift = vehicle.vertical_fin_lift_slope_per_rad * magnitude(air.u) + magnitude(sideslip)
-    fin = -0.5 * vehicle.air_density_kg_m3 * vehicle.vertical_fin_area_m2 * lift * sideslip
-    y = fin - vehicle.tail_fin_blockage * thrust
-    return Wrench(0.0, y, 0.0, vehicle.tail_above_cg_m * y, 0.0, -vehicle.tail_behind_cg_m * y)
+    pressure = 0.5 * vehicle.air_density_kg_m3 * vehicle.vertical_fin_area_m2
+    return -pressure * lift * sideslip - vehicle.tail_fin_blockage * thrust
 
 
 @equation
-def fuselage_wrench(induced: float, air: AirMotion, vehicle: VehicleParameters) -> Wrench:
-    """Drag of the fuselage in the airspeed and the main rotor's wake; it acts at the centre of gravity."""
+def tail_plane_force(induced: float, air: AirMotion, vehicle: VehicleParameters) -> float:
+    """Downward force of the horizontal fin in the airspeed and a share of the main rotor's wake [N]."""
+    w = air.w + vehicle.horizontal_fin_behind_cg_m * air.q - vehicle.horizontal_fin_inflow_fraction * induced
+    lift = vehicle.horizontal_fin_lift_slope_per_rad * magnitude(air.u) + magnitude(w)
+    pressure = 0.5 * vehicle.air_density_kg_m3 * vehicle.horizontal_fin_area_m2
+    return -pressure * lift * w
+
+
+@equation
+def fuselage_drag(induced: float, air: AirMotion, vehicle: VehicleParameters) -> Vector:
+    """Drag of the fuselage in the airspeed and the main rotor's wake [N]; it acts at the centre of gravity."""
     w = air.w - induced
     speed = np.sqrt(air.u * air.u + air.v * air.v + w * w)
-    pressure = -0.5 * vehicle.air_density_kg_m3 * speed
-    return Wrench(
-        pressure * vehicle.fuselage_area_x_m2 * air.u,
-        pressure * vehicle.fuselage_area_y_m2 * air.v,
-        pressure * vehicle.fuselage_area_z_m2 * w,
-        0.0,
-        0.0,
-        0.0,
+    half_density = 0.5 * vehicle.air_density_kg_m3
+    return (
+        -(half_density * vehicle.fuselage_area_x_m2) * speed * air.u,
+        -(half_density * vehicle.fuselage_area_y_m2) * speed * air.v,
+        -(half_density * vehicle.fuselage_area_z_m2) * speed * w,
     )
 
 
 @equation
-def tail_plane_wrench(induced: float, air: AirMotion, vehicle: VehicleParameters) -> Wrench:
-    """The horizontal fin in the airspeed and a share of the main rotor's wake."""
-    arm = vehicle.horizontal_fin_behind_cg_m
-    w = air.w + arm * air.q - vehicle.horizontal_fin_inflow_fraction * induced
-    lift = vehicle.horizontal_fin_lift_slope_per_rad * magnitude(air.u) + magnitude(w)
-    z = -0.5 * vehicle.air_density_kg_m3 * vehicle.horizontal_fin_area_m2 * lift * w
-    return Wrench(0.0, 0.0, z, 0.0, arm * z, 0.0)
+def flight_wrench(
+    rotor: Wrench, tail: float, plane: float, fuselage: Vector, down: Vector, vehicle: VehicleParameters
+) -> Wrench:
+    """All but the ground: main rotor, tail (side force), tail plane (down force), fuselage and weight.
 
-
-@equation
-def gravity_wrench(down: Vector, vehicle: VehicleParameters) -> Wrench:
-    """Weight; `down` is the earth's down axis in body axes, (-sin θ, sin φ cos θ, cos φ cos θ)."""
+    `down` is the earth's down axis in body axes, (-sin θ, sin φ cos θ, cos φ cos θ).
+    """
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
-    return Wrench(weight * down[0], weight * down[1], weight * down[2], 0.0, 0.0, 0.0)
+    return Wrench(
+        rotor.x + fuselage[0] + weight * down[0],
+        rotor.y + fuselage[1] + weight * down[1] + tail,
+        rotor.z + fuselage[2] + weight * down[2] + plane,
+        rotor.l + vehicle.tail_above_cg_m * tail,
+        rotor.m + vehicle.horizontal_fin_behind_cg_m * plane,
+        rotor.n - vehicle.tail_behind_cg_m * tail,
+    )

@@ -7,6 +7,7 @@ rounding, without the cancellation of differences.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from flownav.errors import InputError
 
 Array = NDArray[np.float64]
-PlainEquation = Callable[[Sequence[complex]], Sequence[complex]]
+PlainEquation = Callable[[Sequence[Any]], Sequence[Any]]
 
 STEP = 1e-30
 ITERATIONS = 50

@@ -63,8 +63,8 @@ def _require_hover(vehicle: VehicleParameters, where: str) -> None:
     side_force = torque / vehicle.tail_behind_cg_m / vehicle.tail_fin_blockage
     if side_force * HOVER_MARGIN > vehicle.tail_thrust_limit_n:
         raise InputError(
-            f"{where}: tail_rotor: cannot hold the heading, its blades stall at {vehicle.tail_thrust_limit_n:.2f} N and "
-            f"hover takes {side_force:.2f} N; correct radius_m, chord_m or gear_ratio"
+            f"{where}: tail_rotor: cannot hold the heading, the blades stall at {vehicle.tail_thrust_limit_n:.2f} N "
+            f"and hover takes {side_force:.2f} N; correct radius_m, chord_m or gear_ratio"
         )
     tail_inflow = hover_induced_velocity(side_force, vehicle.tail_thrust_slope_n_s_m, vehicle.tail_inflow_speed_m_s)
     pedal = hover_pitch(side_force, tail_inflow, vehicle.tail_thrust_slope_n_s_m, vehicle.tail_tip_speed_m_s)
@@ -90,7 +90,7 @@ def _require_travel(control: str, needed: float, low: float, high: float, where:
 
 
 def hover_induced_velocity(thrust_n: float, thrust_slope_n_s_m: float, inflow_speed_m_s: float) -> float:
-    """v_i [m/s] at which momentum theory gives the thrust in hover: T = 2ρA·η_w·v_i² = thrust_slope·v_i²/inflow_speed."""
+    """v_i [m/s] of a thrust in hover by momentum theory: T = 2ρA·η_w·v_i² = thrust_slope·v_i²/inflow_speed."""
     return math.sqrt(max(thrust_n, 0.0) * inflow_speed_m_s / thrust_slope_n_s_m)
 
 

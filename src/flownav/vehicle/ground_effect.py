@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from flownav.compile import equation, larger, magnitude
+from flownav.compile import equation, larger
 
-LOWEST_INDUCED_VELOCITY_M_S = 0.3
+LOWEST_INDUCED_SQ = 0.3**2  # [m2/s2]
 
 
 @equation
 def multiplier_of_squares(hub_height_m: float, airspeed_sq: float, induced_m_s: float, radius_m: float) -> float:
     """`multiplier` with the square of the horizontal airspeed [m2/s2], which the physics has at hand."""
     height = larger(hub_height_m, 0.5 * radius_m)
-    induced = larger(magnitude(induced_m_s), LOWEST_INDUCED_VELOCITY_M_S)
-    image = radius_m * radius_m * induced * induced
-    free = 16.0 * height * height * (induced * induced + airspeed_sq)
+    induced_sq = larger(induced_m_s * induced_m_s, LOWEST_INDUCED_SQ)
+    image = radius_m * radius_m * induced_sq
+    free = 16.0 * (height * height) * (induced_sq + airspeed_sq)
     return free / (free - image)
 
 

@@ -11,19 +11,18 @@ from flownav.vehicle.actuators import Servo, acceleration, blade_angle
 from flownav.vehicle.airframe import (
     AirMotion,
     Wrench,
-    add,
-    fuselage_wrench,
-    gravity_wrench,
+    flight_wrench,
+    fuselage_drag,
     main_rotor_wrench,
-    tail_plane_wrench,
+    tail_plane_force,
+    tail_side_force,
     tail_sideslip,
-    tail_wrench,
 )
 from flownav.vehicle.ground_effect import multiplier_of_squares
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.rigid_body import angular_acceleration, linear_acceleration
 from flownav.vehicle.rotor import blowback, induced_velocity, main_rotor, tail_rotor, thrust, torque
-from flownav.vehicle.skids import friction_wrench, support, support_wrench
+from flownav.vehicle.skids import support, with_friction, with_support
 from flownav.vehicle.state import Controls, HelicopterState, Inflow, Outputs, add_scaled, normalised
 
 __all__ = [
@@ -115,9 +114,7 @@ def inflow(air: AirMotion, blades: Controls, vehicle: VehicleParameters) -> Infl
     """Both rotors' induced velocities, in balance with the present motion (quasi-steady)."""
     return Inflow(
         induced_velocity(blades.col, air.u * air.u + air.v * air.v, air.w, main_rotor(vehicle)),
-        induced_velocity(
-            blades.ped, tail_inplane_sq(air, vehicle), tail_sideslip(air, vehicle), tail_rotor(vehicle)
-        ),
+        induced_velocity(blades.ped, tail_inplane_sq(air, vehicle), tail_sideslip(air, vehicle), tail_rotor(vehicle)),
     )
 
 
@@ -145,7 +142,7 @@ def main_rotor_load(
 
 
 @equation
-def free_wrench(
+def forces_and_moments(
     state: HelicopterState,
     down: Vector,
     air: AirMotion,
@@ -153,17 +150,22 @@ def free_wrench(
     induced: Inflow,
     vehicle: VehicleParameters,
 ) -> Wrench:
-    """All forces and moments but the ground's (block 3)."""
+    """All forces and moments about the centre of gravity (block 3), the ground's last: friction answers the rest."""
     lift, drag_torque = main_rotor_load(state, down, air, blades, induced, vehicle)
     tail_thrust = thrust(
         blades.ped, tail_inplane_sq(air, vehicle), tail_sideslip(air, vehicle), induced.tail, tail_rotor(vehicle)
     )
-    rotors = add(
+    free = flight_wrench(
         main_rotor_wrench(lift, drag_torque, state.a1, state.b1, air, vehicle),
-        tail_wrench(tail_thrust, induced.tail, air, vehicle),
+        tail_side_force(tail_thrust, induced.tail, air, vehicle),
+        tail_plane_force(induced.main, air, vehicle),
+        fuselage_drag(induced.main, air, vehicle),
+        down,
+        vehicle,
     )
-    airframe = add(fuselage_wrench(induced.main, air, vehicle), tail_plane_wrench(induced.main, air, vehicle))
-    return add(add(rotors, airframe), gravity_wrench(down, vehicle))
+    velocity, rates = (state.u, state.v, state.w), (state.p, state.q, state.r)
+    feet = support(state.pos_d, down, velocity, rates, vehicle)
+    return with_friction(with_support(free, feet, down, vehicle), feet, velocity, rates, vehicle)
 
 
 @equation
@@ -179,10 +181,7 @@ def derivative_at_inflow(
     down = (rotation[6], rotation[7], rotation[8])
     velocity, rates = (state.u, state.v, state.w), (state.p, state.q, state.r)
     blades = blade_angles(state, vehicle)
-    free = free_wrench(state, down, air, blades, induced, vehicle)
-    feet = support(state.pos_d, down, velocity, rates, vehicle)
-    standing = add(free, support_wrench(feet, down, vehicle))
-    total = add(standing, friction_wrench(feet, down, velocity, rates, standing, vehicle))
+    total = forces_and_moments(state, down, air, blades, induced, vehicle)
     pos_rate = to_earth(rotation, state.u, state.v, state.w)
     accel = linear_acceleration(velocity, rates, (total.x, total.y, total.z), vehicle.mass_kg)
     spin = angular_acceleration(rates, (total.l, total.m, total.n), vehicle)
@@ -235,9 +234,7 @@ def derivative(
 
 
 @equation
-def outputs(
-    state: HelicopterState, wind_n: float, wind_e: float, wind_d: float, vehicle: VehicleParameters
-) -> Outputs:
+def outputs(state: HelicopterState, wind_n: float, wind_e: float, wind_d: float, vehicle: VehicleParameters) -> Outputs:
     """What the state implies (see Outputs); wind in earth NED [m/s]."""
     rotation = attitude(state)
     down = (rotation[6], rotation[7], rotation[8])

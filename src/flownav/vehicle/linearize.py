@@ -12,7 +12,7 @@ times well under the inflow lag of 50 ms); with *quasi-steady inflow* they are r
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,11 +47,11 @@ def reduced_model(vehicle: VehicleParameters, about: Trim, *, freeze_inflow: boo
     """A and B of the reduced model about a trim, in still air (see the module)."""
     held = _inflow_at(about.state, vehicle) if freeze_inflow else None
 
-    def rates(point: Sequence[complex]) -> Sequence[complex]:
+    def rates(point: Sequence[Any]) -> Sequence[Any]:
         state, controls = _displaced(about, point)
         rotation = _attitude(state)
         air = _air_motion(state, rotation, 0.0, 0.0, 0.0)
-        induced = held or _inflow(air, _blade_angles(state, vehicle), vehicle)
+        induced = _inflow(air, _blade_angles(state, vehicle), vehicle) if held is None else held
         rate = _derivative_at_inflow(state, controls, air, rotation, induced, vehicle)
         return (rate.pos_n, rate.pos_e, rate.pos_d, rate.u, rate.v, rate.w)
 
@@ -61,11 +61,11 @@ def reduced_model(vehicle: VehicleParameters, about: Trim, *, freeze_inflow: boo
     return LinearModel(both[:, : len(STATES)], both[:, len(STATES) :])
 
 
-def _displaced(about: Trim, point: Sequence[complex]) -> tuple[HelicopterState, Controls]:
+def _displaced(about: Trim, point: Sequence[Any]) -> tuple[HelicopterState, Controls]:
     """The trim with the reduced states and the settled inputs at a point; the rest as in trim."""
     n, e, d, u, v, w, lon, lat, col, ped = point
     moved = {"pos_n": n, "pos_e": e, "pos_d": d, "u": u, "v": v, "w": w, "lon": lon, "lat": lat, "col": col, "ped": ped}
-    return about.state._replace(**moved), Controls(lon, lat, col, ped)  # type: ignore[arg-type]
+    return about.state._replace(**moved), Controls(lon, lat, col, ped)
 
 
 def _inflow_at(state: HelicopterState, vehicle: VehicleParameters) -> Inflow:
@@ -75,4 +75,4 @@ def _inflow_at(state: HelicopterState, vehicle: VehicleParameters) -> Inflow:
 
 def eigenvalues(a: Array) -> NDArray[np.complex128]:
     """Eigenvalues of A [1/s], ordered by real then imaginary part, the slowest last."""
-    return np.sort_complex(np.linalg.eigvals(a))
+    return np.sort_complex(np.linalg.eigvals(a).astype(complex))

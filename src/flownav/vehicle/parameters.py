@@ -120,7 +120,10 @@ def load_vehicle(path: Path | None = None) -> VehicleParameters:
 
 
 def describe_vehicle(path: Path | None = None) -> VehicleDescription:
-    """Name, and every number with its uncertainty and provenance, for tables and reports. InputError as `load_vehicle`."""
+    """Name and every number with its uncertainty and provenance, for tables and reports.
+
+    InputError where the file does not fit its schema.
+    """
     path = path or shipped(SHIPPED_VEHICLE)
     contents = read_toml(path)
     file = check(contents, VehicleFile, str(path))

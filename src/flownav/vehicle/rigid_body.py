@@ -8,9 +8,7 @@ from flownav.vehicle.parameters import VehicleParameters
 
 
 @equation
-def linear_acceleration(
-    velocity: Vector, rates: Vector, force: Vector, mass_kg: float
-) -> Vector:
+def linear_acceleration(velocity: Vector, rates: Vector, force: Vector, mass_kg: float) -> Vector:
     """Rate of the body-frame velocity [m/s2] (equations 5-7); force [N] with gravity in it."""
     u, v, w = velocity
     p, q, r = rates

@@ -17,9 +17,9 @@ import numpy as np
 from flownav.compile import clamp, equation, larger, magnitude, smaller
 from flownav.vehicle.parameters import VehicleParameters
 
-HYPOTENUSE = 0.828
-SMALLEST_SLOPE_SQ = 1e-30
+HYPOTENUSE = 2.0 * (2.0**0.5 - 1.0)  # (a² + b² + this·a·b)/(a + b) is √(a² + b²), within 1 %
 STILL_AIR_SQ = 1e-12  # [m2/s2] keeps a rotor in dead air from dividing by zero
+SMALLEST_SLOPE_SQ = 1e-30
 
 
 class Rotor(NamedTuple):
@@ -69,19 +69,17 @@ def thrustless_inflow(pitch: float, inplane_sq: float, axial: float, rotor: Roto
 
 
 @equation
-def axial_induced_velocity(thrustless: float, axial: float, rotor: Rotor) -> float:
-    """Induced velocity without in-plane flow [m/s], exactly: v·|v - axial| = c·(thrustless - v), a quadratic."""
+def axial_flow_through(thrustless: float, axial: float, rotor: Rotor) -> float:
+    """|v_i - axial| without in-plane flow [m/s], exactly: v·|v - axial| = c·(thrustless - v) is a quadratic in it."""
     c = rotor.inflow_speed_m_s
     lift = thrustless - axial
-    sign = 1.0 if lift.real >= 0.0 else -1.0
-    half = 0.5 * (c + sign * axial)
-    return axial + sign * (np.sqrt(half * half + c * magnitude(lift)) - half)
+    half = 0.5 * (c + axial if lift.real >= 0.0 else c - axial)
+    root: float = np.sqrt(half * half + c * magnitude(lift))
+    return root - half
 
 
 @equation
-def refine_induced_velocity(
-    induced: float, thrustless: float, inplane_sq: float, axial: float, rotor: Rotor
-) -> float:
+def refine_induced_velocity(induced: float, thrustless: float, inplane_sq: float, axial: float, rotor: Rotor) -> float:
     """One Halley step on the squared balance f(v) = v²·D² - c²·(thrustless - v)², D² = V_inplane² + (v - axial)².
 
     Squared, equation 2.2 is a polynomial: the step takes one division and no root.
@@ -94,21 +92,27 @@ def refine_induced_velocity(
     half_slope = induced * resultant_sq + induced_sq * through + c_sq * carried
     half_curvature = resultant_sq + 4.0 * induced * through + induced_sq - c_sq
     slope_sq = half_slope * half_slope
-    return induced - balance * half_slope / larger(
-        2.0 * slope_sq - balance * half_curvature, slope_sq + SMALLEST_SLOPE_SQ
-    )
+    # 4·f'² - 2·f·f''; the floor binds far outside the model's validity only, and keeps every step finite
+    denominator = larger(2.0 * slope_sq - balance * half_curvature, slope_sq + SMALLEST_SLOPE_SQ)
+    return induced - balance * half_slope / denominator
 
 
 @equation
 def induced_velocity(pitch: float, inplane_sq: float, axial: float, rotor: Rotor) -> float:
-    """Induced velocity v_i [m/s] at which momentum theory and blade elements agree on the thrust (2.1, 2.2)."""
+    """Induced velocity v_i [m/s] at which momentum theory and blade elements agree on the thrust.
+
+    Equations 2.1 and 2.2 of the reference together: v·D = c·(thrustless - v), D = √(V_inplane² + (v - axial)²),
+    c = `inflow_speed`. D is first estimated from the exact solution in axial flow, then two Halley steps follow:
+    fixed work, no loop. Exact in axial flow; over 12 m/s in plane, -4..1.5 m/s axial and 0..12 degrees of pitch
+    the error of λ0 is below 1e-8 (tests/test_vehicle_rotor.py).
+    """
     c = rotor.inflow_speed_m_s
     thrustless = thrustless_inflow(pitch, inplane_sq, axial, rotor)
-    through = magnitude(axial_induced_velocity(thrustless, axial, rotor) - axial)
+    through = axial_flow_through(thrustless, axial, rotor)
     inplane = np.sqrt(inplane_sq + STILL_AIR_SQ)
     sides = inplane + through
-    hypotenuse = inplane_sq + through * through + HYPOTENUSE * inplane * through
-    start = c * thrustless * sides / (c * sides + hypotenuse)
+    squares = inplane_sq + through * through + HYPOTENUSE * inplane * through
+    start = c * thrustless * sides / (c * sides + squares)
     once = refine_induced_velocity(start, thrustless, inplane_sq, axial, rotor)
     twice = refine_induced_velocity(once, thrustless, inplane_sq, axial, rotor)
     # the thrust pushes the air its own way, so v_i lies between none and thrustless
@@ -141,20 +145,20 @@ def blowback(
     """
     per_tip = 1.0 / tip_speed_m_s
     mu_sq = inplane_sq * (per_tip * per_tip)
-    mu = np.sqrt(inplane_sq + STILL_AIR_SQ) * per_tip
+    mu: float = np.sqrt(inplane_sq + STILL_AIR_SQ) * per_tip
     through = 16.0 * mu * (axial * per_tip) / ((1.0 - 0.5 * mu_sq) * (8.0 * mu + lift_solidity))
     return 2.0 * (4.0 / 3.0 * pitch - induced * per_tip) + through
 
 
 @equation
 def sine_of_tilt(angle: float) -> float:
-    """The sine of a flapping angle [rad] by its series: error below 1.6e-8 to 0.35 rad (libm has no lanes)."""
+    """The sine of a flapping angle [rad] by its series (libm has no lanes): error below 3e-9 to 0.2 rad."""
     square = angle * angle
     return angle * (1.0 + square * (-1.0 / 6.0 + square * (1.0 / 120.0)))
 
 
 @equation
 def cosine_of_tilt(angle: float) -> float:
-    """The cosine of a flapping angle [rad] by its series: error below 6e-9 to 0.35 rad."""
+    """The cosine of a flapping angle [rad] by its series: error below 1e-7 to 0.2 rad."""
     square = angle * angle
-    return 1.0 + square * (-0.5 + square * (1.0 / 24.0 + square * (-1.0 / 720.0)))
+    return 1.0 + square * (-0.5 + square * (1.0 / 24.0))

@@ -2,10 +2,11 @@
 
 The feet push and never pull. Their damping comes in over the first 2 mm, so the force has no jump at touch.
 
-Friction acts as one force at the skid plane below the centre of gravity and one torque about the vertical: what
-it takes to stop the sliding within `STICK_TIME_S`, other forces included, but no more than μ·N (Karnopp's reading
-of Coulomb's law). A parked helicopter therefore stays put against its tail rotor, without the creep of a
-viscous regularisation and without its stiffness, which a 2 ms Runge-Kutta step could not carry.
+Friction acts in the plane of the skids, as one force below the centre of gravity and one torque. It is what it
+takes to stop the sliding within `STICK_TIME_S`, all other forces included, but no more than μ·N along the skids,
+μ·N across them (a friction pyramid) and μ·N times the feet's distance in torque: Karnopp's reading of Coulomb's
+law. A parked helicopter therefore stays put against its tail rotor, without the creep of a viscous
+regularisation and without its stiffness, which a 2 ms Runge-Kutta step could not carry.
 """
 
 from __future__ import annotations
@@ -21,7 +22,6 @@ from flownav.vehicle.parameters import VehicleParameters
 
 DAMPING_DEPTH_M = 0.002
 STICK_TIME_S = 0.010
-NEGLIGIBLE_FORCE_N = 1e-9  # keeps feet in the air from dividing zero by zero
 
 
 class Support(NamedTuple):
@@ -62,41 +62,33 @@ def support(pos_d: float, down: Vector, velocity: Vector, rates: Vector, vehicle
 
 
 @equation
-def support_wrench(feet: Support, down: Vector, vehicle: VehicleParameters) -> Wrench:
-    """The feet's normal forces, upwards: -N·down at the feet."""
+def with_support(free: Wrench, feet: Support, down: Vector, vehicle: VehicleParameters) -> Wrench:
+    """The free wrench and the feet's normal forces, which act upwards: -N·down at the feet."""
     z = feet.normal_n * vehicle.cg_above_skid_m
     return Wrench(
-        -feet.normal_n * down[0],
-        -feet.normal_n * down[1],
-        -feet.normal_n * down[2],
-        z * down[1] - feet.right_n_m * down[2],
-        feet.forward_n_m * down[2] - z * down[0],
-        feet.right_n_m * down[0] - feet.forward_n_m * down[1],
+        free.x - feet.normal_n * down[0],
+        free.y - feet.normal_n * down[1],
+        free.z - feet.normal_n * down[2],
+        free.l + (z * down[1] - feet.right_n_m * down[2]),
+        free.m + (feet.forward_n_m * down[2] - z * down[0]),
+        free.n + (feet.right_n_m * down[0] - feet.forward_n_m * down[1]),
     )
 
 
 @equation
-def friction_wrench(
-    feet: Support, down: Vector, velocity: Vector, rates: Vector, others: Wrench, vehicle: VehicleParameters
-) -> Wrench:
-    """Dry friction under the skids; `others` is the sum of all other forces and moments."""
+def with_friction(free: Wrench, feet: Support, velocity: Vector, rates: Vector, vehicle: VehicleParameters) -> Wrench:
+    """The free wrench, which holds all other forces, and the dry friction under the skids."""
     z = vehicle.cg_above_skid_m
-    p, q, r = rates
-    limit = vehicle.skid_friction_coefficient * feet.normal_n
-    # the acceleration of the skid plane's centre that friction has to undo, in the plane of the ground
     per_mass, per_jx, per_jy = 1.0 / vehicle.mass_kg, 1.0 / vehicle.inertia_xx_kg_m2, 1.0 / vehicle.inertia_yy_kg_m2
-    undo_x = others.x * per_mass + others.m * per_jy * z + (velocity[0] + q * z) * (1.0 / STICK_TIME_S)
-    undo_y = others.y * per_mass - others.l * per_jx * z + (velocity[1] - p * z) * (1.0 / STICK_TIME_S)
-    undo_z = others.z * per_mass + velocity[2] * (1.0 / STICK_TIME_S)
-    upward = undo_x * down[0] + undo_y * down[1] + undo_z * down[2]
-    # times the mass that a force there has to move
-    mass_x, mass_y = 1.0 / (per_mass + z * z * per_jy), 1.0 / (per_mass + z * z * per_jx)
-    need_x = mass_x * (undo_x - upward * down[0])
-    need_y = mass_y * (undo_y - upward * down[1])
-    need_z = mass_y * (undo_z - upward * down[2])
-    need = np.sqrt(need_x * need_x + need_y * need_y + need_z * need_z)
-    share = -limit / larger(need, limit + NEGLIGIBLE_FORCE_N)
+    per_time = 1.0 / STICK_TIME_S
+    p, q, r = rates
+    # the acceleration that friction has to give the point under the centre of gravity, and the mass it moves there
+    stop_x = free.x * per_mass + free.m * (per_jy * z) + (velocity[0] + q * z) * per_time
+    stop_y = free.y * per_mass - free.l * (per_jx * z) + (velocity[1] - p * z) * per_time
+    need_x = stop_x * (1.0 / (per_mass + z * z * per_jy))
+    need_y = stop_y * (1.0 / (per_mass + z * z * per_jx))
+    limit = vehicle.skid_friction_coefficient * feet.normal_n
     arm = np.sqrt(vehicle.skid_half_length_m**2 + vehicle.skid_half_track_m**2)
-    spin = others.n + vehicle.inertia_zz_kg_m2 * r * (1.0 / STICK_TIME_S)
-    x, y = share * need_x, share * need_y
-    return Wrench(x, y, share * need_z, -z * y, z * x, clamp(-spin, -limit * arm, limit * arm))
+    x, y = clamp(need_x, -limit, limit), clamp(need_y, -limit, limit)
+    torque = clamp(free.n + r * (vehicle.inertia_zz_kg_m2 * per_time), -limit * arm, limit * arm)
+    return Wrench(free.x - x, free.y - y, free.z, free.l + z * y, free.m - z * x, free.n - torque)

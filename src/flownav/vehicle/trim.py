@@ -6,7 +6,7 @@ Newton's method on the whole equations of motion, with the exact Jacobian of the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,22 +53,13 @@ class Trim(NamedTuple):
 
 
 def settled_state(
-    pos_d_m: float,
-    vel_body_m_s: Sequence[complex],
-    euler_rad: Sequence[complex],
-    flapping_rad: Sequence[complex],
-    controls: Controls,
+    pos_d_m: float, vel_body_m_s: Vector, roll: float, pitch: float, a1: float, b1: float, controls: Controls
 ) -> HelicopterState:
-    """A state over the origin without rates, its servos where the controls ask them to be."""
-    return HelicopterState(
-        0.0, 0.0, pos_d_m,
-        *vel_body_m_s,  # type: ignore[arg-type]
-        *_quaternion(*euler_rad),  # type: ignore[arg-type]
-        0.0, 0.0, 0.0,
-        *flapping_rad,  # type: ignore[arg-type]
-        *controls,
-        0.0, 0.0, 0.0, 0.0,
-    )  # fmt: skip
+    """A state over the origin, heading north, without rates, its servos where the controls ask them to be."""
+    u, v, w = vel_body_m_s
+    qw, qx, qy, qz = _quaternion(roll, pitch, 0.0)
+    still = (0.0, 0.0, 0.0)
+    return HelicopterState(0.0, 0.0, pos_d_m, u, v, w, qw, qx, qy, qz, *still, a1, b1, *controls, 0.0, *still)
 
 
 def accelerations(rate: HelicopterState) -> tuple[float, ...]:
@@ -76,27 +67,25 @@ def accelerations(rate: HelicopterState) -> tuple[float, ...]:
     return (rate.u, rate.v, rate.w, rate.p, rate.q, rate.r, rate.a1, rate.b1)
 
 
-def _flight(unknown: Sequence[complex], vel_body_m_s: Vector, pos_d_m: float) -> tuple[HelicopterState, Controls]:
+def _flight(unknown: Sequence[Any], vel_body_m_s: Vector, pos_d_m: float) -> tuple[HelicopterState, Controls]:
     """Unknowns collective, pedal, roll, pitch, a1, b1, lon, lat as state and controls."""
     col, ped, roll, pitch, a1, b1, lon, lat = unknown
-    controls = Controls(lon, lat, col, ped)  # type: ignore[arg-type]
-    return settled_state(pos_d_m, vel_body_m_s, (roll, pitch, 0.0), (a1, b1), controls), controls
+    controls = Controls(lon, lat, col, ped)
+    return settled_state(pos_d_m, vel_body_m_s, roll, pitch, a1, b1, controls), controls
 
 
-def trim(
-    vehicle: VehicleParameters, vel_body_m_s: Vector = HOVER, height_m: float = OUT_OF_GROUND_EFFECT_M
-) -> Trim:
+def trim(vehicle: VehicleParameters, vel_body_m_s: Vector = HOVER, height_m: float = OUT_OF_GROUND_EFFECT_M) -> Trim:
     """Straight flight at a constant body velocity [m/s], the centre of gravity at a height [m], in still air.
 
     Accelerations and flapping rates are below 1e-9. InputError where the controls cannot hold that flight.
     """
 
-    def residual(unknown: Sequence[complex]) -> tuple[float, ...]:
+    def residual(unknown: Sequence[Any]) -> tuple[float, ...]:
         state, controls = _flight(unknown, vel_body_m_s, -height_m)
         return accelerations(plain_derivative(state, controls, 0.0, 0.0, 0.0, vehicle))
 
     wanted = f"trim at u, v, w = {vel_body_m_s[0]:g}, {vel_body_m_s[1]:g}, {vel_body_m_s[2]:g} m/s"
-    failure = f"{wanted}: the controls' travel, the blades or the skids do not allow it; ask for a slower or higher flight"
+    failure = f"{wanted}: the controls' travel or the blades do not allow it; ask for a slower or higher flight"
     solution = [float(x) for x in solve(residual, _first_guess(vehicle), TOLERANCE, failure)]
     state, controls = _flight(solution, vel_body_m_s, -height_m)
     out = _outputs(state, 0.0, 0.0, 0.0, vehicle)
@@ -137,14 +126,14 @@ def parked(vehicle: VehicleParameters, controls: Controls) -> HelicopterState:
     InputError where it does not stay: too much lift, or more side force or torque than the skids' friction holds.
     """
 
-    def state_of(unknown: Sequence[complex]) -> HelicopterState:
+    def state_of(unknown: Sequence[Any]) -> HelicopterState:
         pos_d, roll, pitch, a1, b1 = unknown
-        return settled_state(pos_d, HOVER, (roll, pitch, 0.0), (a1, b1), controls)  # type: ignore[arg-type]
+        return settled_state(pos_d, HOVER, roll, pitch, a1, b1, controls)
 
-    def rate_of(unknown: Sequence[complex]) -> HelicopterState:
+    def rate_of(unknown: Sequence[Any]) -> HelicopterState:
         return plain_derivative(state_of(unknown), controls, 0.0, 0.0, 0.0, vehicle)
 
-    def residual(unknown: Sequence[complex]) -> tuple[float, ...]:
+    def residual(unknown: Sequence[Any]) -> tuple[float, ...]:
         rate = rate_of(unknown)
         return (rate.w, rate.p, rate.q, rate.a1, rate.b1)
 

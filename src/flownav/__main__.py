@@ -1,0 +1,5 @@
+"""`python -m flownav`."""
+
+from flownav.cli import main
+
+main()

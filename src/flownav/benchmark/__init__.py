@@ -1,0 +1,1 @@
+"""Speed, measured as a user would feel it: what `flownav bench` prints."""

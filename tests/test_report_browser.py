@@ -1,0 +1,153 @@
+"""The report in a real browser: every figure is drawn, nothing is loaded, narrow and dark pages work."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flownav.record import Record
+from flownav.report.html import write_report
+from report_records import flight, replay
+
+pytestmark = pytest.mark.browser
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+QUIET = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update",
+         "--disable-sync", "--no-first-run", "--disable-extensions", "--disable-dev-shm-usage"]  # fmt: skip
+SOFTWARE_GL = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+NO_GL = ["--disable-3d-apis", "--disable-webgl", "--disable-webgl2"]
+WORDS_OF_NO_WEBGL = "This browser has no WebGL"
+
+# For each figure: how many traces it has, and whether its drawing has a size and the traces are in it.
+FIGURES = """() => [...document.querySelectorAll("[data-figure]")].map((plot) => {
+  const drawing = plot.querySelector("svg.main-svg, canvas");
+  const box = drawing ? drawing.getBoundingClientRect() : { width: 0, height: 0 };
+  return { key: plot.dataset.figure, drawn: plot.dataset.drawn, plotly: plot.classList.contains("js-plotly-plot"),
+           traces: (plot.data || []).length, width: box.width, height: box.height, text: plot.innerText,
+           marks: plot.querySelectorAll(".scatterlayer .trace, canvas").length,
+           ink: plot.layout ? plot.layout.font.color : "", right: plot.getBoundingClientRect().right };
+})"""
+
+
+class Visit:
+    """A page that was opened, and what it complained of."""
+
+    def __init__(self, browser: Any, path: Path, width: int, **options: Any) -> None:
+        self.width = width
+        self.context = browser.new_context(viewport={"width": width, "height": 850}, **options)
+        self.page = self.context.new_page()
+        self.errors: list[str] = []
+        self.requests: list[str] = []
+        self.page.on("console", lambda message: self.errors.append(message.text) if message.type == "error" else None)
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("requestfailed", lambda request: self.errors.append(f"failed: {request.url[:100]}"))
+        self.page.on("request", lambda request: self.requests.append(request.url[:100]))
+        self.page.goto(path.as_uri())
+        self.wait()
+
+    def wait(self) -> None:
+        self.page.wait_for_selector("html[data-figures=drawn]", state="attached", timeout=120_000)
+
+    def until(self, condition: str) -> None:
+        """Wait for a condition; asked from here, since the page's policy lets nothing evaluate text inside it."""
+        give_up = time.monotonic() + 60.0
+        while not self.page.evaluate(condition):
+            assert time.monotonic() < give_up, condition
+            self.page.wait_for_timeout(50)
+
+    def figures(self) -> dict[str, dict[str, Any]]:
+        return {figure["key"]: figure for figure in self.page.evaluate(FIGURES)}
+
+    def check(self, count: int) -> None:
+        """All figures are drawn, nothing was complained of, nothing was loaded, nothing sticks out."""
+        figures = self.figures()
+        assert len(figures) == count
+        for figure in figures.values():
+            assert figure["plotly"], figure
+            assert figure["drawn"] == "figure", figure
+            assert figure["traces"] > 0, figure
+            assert figure["marks"] > 0, figure
+            assert figure["width"] > 200, figure
+            assert figure["height"] > 200, figure
+            assert figure["right"] <= self.width, figure
+        assert self.errors == []
+        assert [request for request in self.requests if not request.startswith(("file:", "data:", "blob:"))] == []
+        assert self.page.evaluate("document.documentElement.scrollWidth") <= self.width  # no scrolling sideways
+
+
+@pytest.fixture(scope="module")
+def playwright() -> Iterator[Any]:
+    if CHROMIUM is None:
+        pytest.skip("no Chromium here: install Debian's package `chromium` (apt-get install chromium)")
+    api = pytest.importorskip("playwright.sync_api", reason="install `playwright` (dependency group `test`)")
+    with api.sync_playwright() as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def browser(playwright: Any) -> Iterator[Any]:
+    opened = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET + SOFTWARE_GL)
+    yield opened
+    opened.close()
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("reports")
+    records: dict[str, Record] = {"landing": flight(), "takeoff": flight("takeoff"), "replay": replay(200.0)}
+    for name, record in records.items():
+        write_report(record, folder / f"{name}.html")
+    return {name: folder / f"{name}.html" for name in records}
+
+
+def test_every_figure_of_a_landing_is_drawn(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["landing"], width=1440)
+    visit.check(count=13)
+    buttons = visit.page.eval_on_selector_all(".modebar-btn", "all => all.map((b) => b.dataset.title || '')")
+    assert buttons
+    assert not [title for title in buttons if "hare" in title or "loud" in title]  # no "Share chart": it would upload
+    visit.context.close()
+
+
+def test_a_take_off_works_on_a_dark_phone(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["takeoff"], width=390, color_scheme="dark",
+                  has_touch=True, is_mobile=True)  # fmt: skip
+    visit.check(count=14)
+    assert visit.page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(20, 24, 29)"
+    assert {figure["ink"] for figure in visit.figures().values()} == {"#e7eaee"}
+    visit.context.close()
+
+
+def test_a_replay_follows_the_reader_from_light_to_dark(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["replay"], width=1100, color_scheme="light")
+    visit.check(count=10)
+    assert {figure["ink"] for figure in visit.figures().values()} == {"#1d232a"}
+    visit.page.emulate_media(color_scheme="dark")
+    visit.until("[...document.querySelectorAll('[data-figure]')].every((p) => p.layout.font.color === '#e7eaee')")
+    visit.wait()
+    visit.check(count=10)
+    visit.context.close()
+
+
+def test_without_webgl_the_3d_view_says_so_and_the_rest_is_drawn(playwright: Any, pages: dict[str, Path]) -> None:
+    opened = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET + NO_GL)
+    visit = Visit(opened, pages["takeoff"], width=1440)
+    figures = visit.figures()
+    assert WORDS_OF_NO_WEBGL in figures.pop("path-3d")["text"]
+    assert {figure["drawn"] for figure in figures.values()} == {"figure"}
+    assert visit.errors == []
+    opened.close()
+
+
+def test_paper_gets_light_figures_that_fit_and_all_details(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["landing"], width=1440, color_scheme="dark")
+    visit.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    visit.page.emulate_media(media="print")
+    visit.until("[...document.querySelectorAll('[data-figure]')].every((p) => p._fullLayout.width <= 680)")
+    assert {figure["ink"] for figure in visit.figures().values()} == {"#1d232a"}
+    assert visit.page.evaluate("[...document.querySelectorAll('details')].every((part) => part.open)")
+    visit.context.close()

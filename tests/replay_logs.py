@@ -56,7 +56,7 @@ def path(t_s: np.ndarray) -> np.ndarray:
 def log_of_flight(duration_s: float = 60.0, *, start_s: float = 0.0, yaw_rate: float = 0.05, imu_hz: float = 50.0,
                   attitude_hz: float = 50.0, flow_hz: float = 20.0, gps_hz: float = 5.0, range_hz: float = 20.0,
                   sensor_gyro: bool = True) -> SyntheticLog:  # fmt: skip
-    """A log without any error but its sampling. Thrust lies along the body's z axis, so attitude follows from the path."""
+    """A log without any error but its sampling. Thrust lies along body z, so the attitude follows from the path."""
     fine = 1000.0
     t = np.arange(-1.0, duration_s + 1.0, 1.0 / fine)
     position = path(t)
@@ -71,14 +71,11 @@ def log_of_flight(duration_s: float = 60.0, *, start_s: float = 0.0, yaw_rate: f
     flow = rates[:, :2] + np.column_stack([-body_velocity[:, 1], body_velocity[:, 0]]) / boresight[:, None]
 
     def at(instants: np.ndarray, values: np.ndarray) -> np.ndarray:
-        return np.column_stack([np.interp(instants, t, column) for column in np.atleast_2d(values.T)])
+        return np.column_stack([np.interp(instants, t, column) for column in values.T])
 
     def mean(instants: np.ndarray, values: np.ndarray, period: float) -> np.ndarray:
-        integral = np.vstack([np.zeros(values.shape[1]), np.cumsum(values, axis=0) / fine])
-        return (at2(instants, integral) - at2(instants - period, integral)) / period
-
-    def at2(instants: np.ndarray, integral: np.ndarray) -> np.ndarray:
-        return np.column_stack([np.interp(instants, t[0] + np.arange(len(integral)) / fine, c) for c in integral.T])
+        integral = np.cumsum(values, axis=0) / fine
+        return (at(instants, integral) - at(instants - period, integral)) / period
 
     def times(hz: float) -> np.ndarray:
         return np.arange(0.0, duration_s, 1.0 / hz)
@@ -93,8 +90,9 @@ def log_of_flight(duration_s: float = 60.0, *, start_s: float = 0.0, yaw_rate: f
     s = times(gps_hz)
     fix = at(s - GPS_DELAY_S, np.column_stack([position, velocity]))
     latitude, longitude, altitude = pymap3d.ned2geodetic(*fix[:, :3].T, *ORIGIN)
-    tables["gps"] = {"t_s": s + start_s, "fix_type": np.full(len(s), 3.0), "lat_deg": latitude, "lon_deg": longitude,
-                     "alt_m": altitude, **dict(zip(("vel_n_m_s", "vel_e_m_s", "vel_d_m_s"), fix[:, 3:].T, strict=True))}  # fmt: skip
+    tables["gps"] = _table(s, start_s, ("fix_type", "lat_deg", "lon_deg", "alt_m"),
+                           np.column_stack([np.full(len(s), 3.0), latitude, longitude, altitude]))  # fmt: skip
+    tables["gps"] |= dict(zip(("vel_n_m_s", "vel_e_m_s", "vel_d_m_s"), fix[:, 3:].T, strict=True))
     s = times(flow_hz)
     tables["flow"] = _table(s, start_s, ("flow_x_rad_s", "flow_y_rad_s"), mean(s, flow, 1.0 / flow_hz))
     if sensor_gyro:
@@ -105,7 +103,9 @@ def log_of_flight(duration_s: float = 60.0, *, start_s: float = 0.0, yaw_rate: f
     tables["range"] = _table(s, start_s, ("range_m",), at(s, boresight[:, None])) | {"valid": np.ones(len(s))}
     s = times(10.0)
     tables["baro"] = _table(s, start_s, ("alt_m",), 12.0 + at(s, -position[:, 2:]))
-    tables["mag"] = _table(s, start_s, ("mag_x_mgauss", "mag_y_mgauss", "mag_z_mgauss"), np.tile([210.0, 10.0, 430.0], (len(s), 1)))
+    tables["mag"] = _table(
+        s, start_s, ("mag_x_mgauss", "mag_y_mgauss", "mag_z_mgauss"), np.tile([210.0, 10.0, 430.0], (len(s), 1))
+    )
     return SyntheticLog(tables, t + start_s, position - path(np.array([-GPS_DELAY_S])), velocity)
 
 

@@ -74,7 +74,7 @@ def test_no_trace_of_a_long_replay_exceeds_its_budget() -> None:
     for section in sections(replay(400.0)):
         for panel in section.panels:
             for trace in panel.figure.data if panel.figure else ():
-                assert len(trace.x) <= (LINE_POINTS if trace.mode != "markers" else DOT_POINTS)
+                assert len(trace.x) <= (DOT_POINTS if trace.mode == "markers" else 2 * LINE_POINTS + 2)  # a band twice
 
 
 def test_moments_come_from_the_truth() -> None:
@@ -293,7 +293,18 @@ def test_velocity_says_that_the_flow_sensor_gives_no_w_or_that_there_is_no_flow(
 def test_errors_are_drawn_inside_the_filters_own_band() -> None:
     record = flight()
     traces = position_error(record).figure.data
-    band, error = traces[1], traces[2]
-    assert max(band.y) == pytest.approx(0.21, abs=1e-6)
+    band, error = traces[0], traces[1]
+    assert (np.nanmin(band.y), np.nanmax(band.y)) == pytest.approx((-0.21, 0.21), abs=1e-6)
     truth, estimate = record.tables["truth"]["pos_n_m"], record.tables["estimate"]["pos_n_m"]
     assert max(error.y) == pytest.approx(np.max(estimate - truth), abs=1e-6)
+
+
+def test_a_band_is_open_where_nothing_was_measured() -> None:
+    record = flight()
+    table = record.tables["innovation"]
+    paused = (table["t_s"] > 20.0) & (table["t_s"] < 30.0)
+    record.add("innovation", {name: column[~paused] for name, column in table.items()})
+    band = innovations(record)[0].figure.data[0]
+    assert band.fill == "toself"
+    assert np.isnan(band.y).sum() == 2  # two areas, each closed
+    assert not np.any((np.array(band.x) > 20.0) & (np.array(band.x) < 30.0))

@@ -1,8 +1,9 @@
 """The only place that knows Numba: scalar equations, the kernels built from them, and lanes.
 
-An `@equation` is a short pure function of scalars and named tuples. It is inlined into every kernel that
-uses it; its `.py_func` is plain Python, which tests call with floats and, for exact derivatives, with
-complex numbers. A `@kernel` is an entry point: it releases the interpreter lock and is cached on disk.
+An `@equation` is a short pure function of scalars and named tuples. Called from Python it is plain Python,
+which takes floats, complex numbers (for exact derivatives) and, where it has no branch, NumPy arrays; called
+from a kernel it is compiled and inlined. A `@kernel` is an entry point: it releases the interpreter lock and
+is cached on disk.
 
 *Lanes* are flights that a kernel advances side by side. A kernel takes a lane marker, `ONE_LANE` or
 `LANES`, whose length is part of its type and so a compile-time constant: the same source compiles to the
@@ -24,7 +25,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import FunctionType
 from typing import Any, TypeVar, cast
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -60,7 +60,7 @@ import numpy as np  # noqa: E402
 from llvmlite import binding as llvm  # noqa: E402
 from llvmlite import ir  # noqa: E402
 from numba import types  # noqa: E402
-from numba.extending import intrinsic, overload  # noqa: E402
+from numba.extending import intrinsic, overload, register_jitable  # noqa: E402
 
 setattr(numba.config, "CACHE_DIR", str(CACHE_FOLDER))  # noqa: B010  (set at run time, unknown to type checkers)
 
@@ -70,8 +70,8 @@ llvm.set_option("flownav", f"--unroll-full-max-count={LANES_WIDE // 2}")
 
 
 def equation(function: Function) -> Function:
-    """A scalar law: pure, inlined wherever a kernel uses it. `.py_func` is the plain Python function."""
-    return cast(Function, numba.njit(forceinline=True, error_model="numpy")(function))
+    """A scalar law: plain Python where Python calls it, compiled and inlined where a kernel does."""
+    return cast(Function, register_jitable(forceinline=True, error_model="numpy")(function))
 
 
 def kernel(function: Function) -> Function:
@@ -137,24 +137,8 @@ def clamp(a: float, low: float, high: float) -> float:
 
 
 def plain(function: Function) -> Function:
-    """An equation as ordinary Python, together with every equation that it reaches.
-
-    For tests and exact derivatives: the result takes complex numbers (complex step) and needs no compiler.
-    """
-    rebuilt: dict[int, Any] = {}
-
-    def rebuild(value: Any) -> Any:
-        source = getattr(value, "py_func", None)
-        if source is None:
-            return value
-        if id(value) not in rebuilt:
-            scope = dict(source.__globals__)
-            twin = FunctionType(source.__code__, scope, source.__name__, source.__defaults__, source.__closure__)
-            rebuilt[id(value)] = twin
-            scope.update({name: rebuild(scope[name]) for name in source.__code__.co_names if name in scope})
-        return rebuilt[id(value)]
-
-    return cast(Function, rebuild(function))
+    """An equation as ordinary Python: itself. (Equations compile only where a kernel calls them.)"""
+    return function
 
 
 # -- the bits of a float, and back: for polynomial logarithms and exponentials ----------------------------

@@ -113,7 +113,7 @@ def eigenvalue_table(sheet: VehicleSheet) -> Table:
 
 def ground_effect_table(sheet: VehicleSheet) -> Table:
     """Thrust in ground effect over thrust in free air against hub height."""
-    table = _table("Ground effect in hover (equation 11)", ("hub height z/R", "right"), ("T_IGE/T_OGE", "right"))
+    table = _table("Ground effect in hover", ("hub height z/R", "right"), ("T_IGE/T_OGE", "right"))
     for ratio, gain in sheet.ground_effect:
         table.add_row(f"{ratio:g}", f"{gain:.4f}")
     return table

@@ -31,6 +31,7 @@ from flownav.frames import Rotation, quaternion_rate, rotation_from_quaternion, 
 
 STATES = 6
 GRAVITY_M_S2 = 9.80665
+LARGEST_VARIANCE = 1e30
 
 
 class KinematicRows(NamedTuple):
@@ -219,8 +220,7 @@ def observe_state(
     for lane in range(len(lanes)):
         predicted = work[(kalman.state + index) * len(lanes) + lane]
         work[kalman.innovation * len(lanes) + lane] = work[measured * len(lanes) + lane] - predicted
-        work[kalman.noise * len(lanes) + lane] = work[variance * len(lanes) + lane]
-        work[kalman.offered * len(lanes) + lane] = work[offered * len(lanes) + lane]
+    take_noise(work, lanes, rows, variance, offered)
 
 
 @equation
@@ -237,8 +237,17 @@ def observe_body_velocity(
             work[(kalman.observation + 3 + i) * len(lanes) + lane] = rotation[3 * i + component]
             predicted += rotation[3 * i + component] * work[(kalman.state + 3 + i) * len(lanes) + lane]
         work[kalman.innovation * len(lanes) + lane] = work[measured * len(lanes) + lane] - predicted
-        work[kalman.noise * len(lanes) + lane] = work[variance * len(lanes) + lane]
-        work[kalman.offered * len(lanes) + lane] = work[offered * len(lanes) + lane]
+    take_noise(work, lanes, rows, variance, offered)
+
+
+@equation
+def take_noise(work: Work, lanes: Lanes, rows: KinematicRows, variance: int, offered: int) -> None:
+    """The component's variance; one that is no finite number of 0 or more is not offered, and leaves no NaN."""
+    for lane in range(len(lanes)):
+        noise = work[variance * len(lanes) + lane]
+        sound = noise >= 0.0 and noise < LARGEST_VARIANCE
+        work[rows.kalman.noise * len(lanes) + lane] = noise if sound else 1.0
+        work[rows.kalman.offered * len(lanes) + lane] = work[offered * len(lanes) + lane] if sound else 0.0
 
 
 @equation

@@ -121,7 +121,7 @@ def _check_overlap(folder: Path, tables: dict[str, CsvTable]) -> None:
 # -- a file's streams --------------------------------------------------------------------------------------
 def _attitude(table: CsvTable) -> list[Stream]:
     angles = table.matrix("roll_rad", "pitch_rad", "yaw_rad")
-    quaternion = np.column_stack(quaternion_from_euler.py_func(*angles.T))  # type: ignore[attr-defined]
+    quaternion = np.column_stack(quaternion_from_euler(*angles.T))
     return [Stream.of(Sensor.ATTITUDE, table.t_s, quaternion, rejected=table.rejected)]
 
 

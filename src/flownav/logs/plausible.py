@@ -52,7 +52,7 @@ def _check_gravity(where: Path, imu: Stream, attitude: Stream) -> None:
     size = float(np.median(np.linalg.norm(force, axis=1)))
     if not GRAVITY_LIMITS_M_S2[0] < size < GRAVITY_LIMITS_M_S2[1]:
         raise InputError(f"{where}: imu accel: a median of {size:.3g} m/s2 is not gravity; m/s2 are needed (g? mg?)")
-    rotation = rotation_from_quaternion.py_func(*attitude_at(attitude, imu.t_s).T)  # type: ignore[attr-defined]
+    rotation = rotation_from_quaternion(*attitude_at(attitude, imu.t_s).T)
     in_earth = np.column_stack([sum(rotation[3 * i + j] * force[:, j] for j in range(3)) for i in range(3)])
     mean = np.median(in_earth, axis=0)
     tilt = float(np.arccos(np.clip(-mean[2] / np.linalg.norm(mean), -1.0, 1.0)))

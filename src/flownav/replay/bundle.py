@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from flownav.estimation.gating import Reason
+from flownav.frames import rotation_from_quaternion
+from flownav.logs.rates import attitude_at
 from flownav.measurement import COLUMNS, Array, Sensor
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.replay.session import Replay
@@ -72,27 +74,18 @@ def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dic
 
 
 def _truth(replay: Replay) -> dict[str, Array]:
-    """The truth in the estimate's frame; body velocity by differences, in the axes of the estimate's attitude."""
+    """The truth in the estimate's frame; body velocity by differences, in the axes of the logged attitude."""
     placed, truth = replay.truth_alignment, replay.log.truth
     assert placed is not None
     assert truth is not None
     position = placed.moved(replay.truth_position)
     velocity = placed.turned(velocity_of(truth["t_s"], replay.truth_position))
-    quaternion = [np.interp(truth["t_s"], replay.estimate[:, 0], column) for column in replay.estimate[:, 7:11].T]
-    rotation = rotation_of_columns(np.column_stack(quaternion))
+    rotation = rotation_from_quaternion(*attitude_at(replay.log.streams[Sensor.ATTITUDE], truth["t_s"]).T)
     body = {
         name: sum(rotation[3 * row + column] * velocity[:, row] for row in range(3))
         for column, name in enumerate(VELOCITY_BODY)
     }
     return {"t_s": truth["t_s"], **dict(zip(POSITION_NED, position.T, strict=True)), **body}
-
-
-def rotation_of_columns(quaternion: Array) -> tuple[Array, ...]:
-    """R_EB of quaternions (n, 4), row by row: nine arrays (n,)."""
-    from flownav.frames import rotation_from_quaternion
-
-    unit = quaternion / np.linalg.norm(quaternion, axis=1)[:, None]
-    return tuple(rotation_from_quaternion.py_func(*unit.T))  # type: ignore[attr-defined]
 
 
 def _innovation(replay: Replay) -> dict[str, Array]:

@@ -24,10 +24,8 @@ from flownav.report.series import (
 )
 from flownav.report.style import COLOUR, LINES, axis, layout
 
-BOX_DIAGONAL, BOX_HEIGHT = (
-    1.75,
-    1.15,
-)  # of a 3-D view at most, in Plotly's units: the camera sees it whole
+# A 3-D view at most, in Plotly's units: the camera sees it whole.
+BOX_DIAGONAL, BOX_HEIGHT = 1.65, 1.1
 
 
 class Pad(NamedTuple):
@@ -154,7 +152,7 @@ def path_over_pad(record: Record) -> Panel:
     if touch is not None:
         figure.add_scatter3d(**_space(touch[None, :]), mode="markers", name="touchdown",
                              marker={"symbol": "x", "size": 4, "color": COLOUR["alert"]})  # fmt: skip
-    caption = "Drag to turn. GPS readings wait in the legend."
+    caption = "Drag to turn; the legend switches the GPS readings on."
     caption += "" if to_scale else " Height is drawn to a scale of its own."
     alt = f"Path in space: {listed([role for role, _ in paths])}{', over the pad' if where else ''}."
     return Panel(key, title, caption, alt, figure, needs_webgl=True)

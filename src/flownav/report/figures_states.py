@@ -59,7 +59,7 @@ def position(record: Record, view: View = POSITION) -> Panel:
     dots = [Source("gps", "GPS", readings(record, Sensor.GPS_POSITION))]
     lines = [Source("command", "reference", track(record, "command", REFERENCE))]
     lines += [Source(role, role, track(record, role, POSITION_NED)) for role in ("autopilot", "estimate", "truth")]
-    note = DOWN if view.with_gps else "GPS readings wait in the legend, so that centimetres show."
+    note = DOWN if view.with_gps else "The legend switches the GPS readings on."
     return _states(record, POSITION_TITLES, dots, lines, view, note)
 
 

@@ -71,9 +71,9 @@ class Stack:
             domain = [max(0.0, top - height), min(1.0, top)]
             self._layout[f"yaxis{row}"] = axis(title) | {"anchor": f"x{row}", "domain": domain, "nticks": 6}
 
-    def _add(self, row: int, name: str, trace: dict[str, Any], *, listed: bool = True) -> None:
+    def _add(self, row: int, name: str, trace: dict[str, Any]) -> None:
         self._reach[row - 1] = _reach(np.append(self._reach[row - 1], trace["y"]))
-        first = listed and name not in self.names
+        first = name not in self.names
         if first:
             self.names.append(name)
         place = {"xaxis": f"x{row}", "yaxis": f"y{row}"}
@@ -104,12 +104,17 @@ class Stack:
             self._add(row, name, {**points, "mode": "markers", "hovertemplate": "%{y:.3f}", **style})
 
     def band(self, row: int, name: str, t_s: Array, half_width: Array) -> None:
-        """The area between -half_width and +half_width, thinned."""
+        """The area between -half_width and +half_width, thinned, and open where nothing was measured for long."""
         kept = thin(LINE_POINTS, half_width)
-        x, y = drawn(t_s[kept]), drawn(half_width[kept])
-        edge = {"x": x, "mode": "lines", "line": {"color": COLOUR["band"], "width": 1}, "hoverinfo": "skip"}
-        self._add(row, name, {**edge, "y": -y}, listed=False)
-        self._add(row, name, {**edge, "y": y, "fill": "tonexty", "fillcolor": COLOUR["band"]})
+        x: list[Array] = []
+        y: list[Array] = []
+        end = np.array([np.nan])
+        for part in np.split(kept, np.flatnonzero(_gap_before(t_s, kept)[1:]) + 1):
+            x += [t_s[part], t_s[part[::-1]], end]
+            y += [half_width[part], -half_width[part[::-1]], end]
+        line = {"color": COLOUR["band"], "width": 1}
+        shape = {"x": drawn(np.concatenate(x)), "y": drawn(np.concatenate(y)), "mode": "lines", "line": line}
+        self._add(row, name, {**shape, "fill": "toself", "fillcolor": COLOUR["band"], "hoverinfo": "skip"})
 
     def log_axis(self, row: int) -> None:
         """Make an upright axis logarithmic."""
@@ -162,6 +167,16 @@ class Stack:
         place = {"x": t_s, "y": 1, "xref": "x", "yref": "paper", "xanchor": "left", "yanchor": "top", "xshift": 3}
         font = {"size": 11, "color": COLOUR["muted"]}
         self._layout["annotations"].append(place | {"text": text, "showarrow": False, "font": font})
+
+
+def _gap_before(t_s: Array, kept: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether a kept sample follows a pause since the one kept before: half a second, and twenty usual intervals.
+
+    A pause lies between two neighbours of the whole series, so thinning makes none.
+    """
+    interval = np.diff(t_s, prepend=t_s[:1])
+    pauses = np.cumsum(interval > max(0.5, 20.0 * float(np.median(interval)) if len(interval) else 0.0))
+    return np.asarray(np.diff(pauses[kept], prepend=pauses[kept[:1]]) > 0)
 
 
 def _reach(values: Array) -> tuple[float, float]:

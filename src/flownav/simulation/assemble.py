@@ -12,9 +12,11 @@ import numpy as np
 from flownav.control.autopilot import AutopilotGains
 from flownav.control.guidance import path_through
 from flownav.estimation.discretise import discretised
+from flownav.estimation.kinematic_settings import default_settings
 from flownav.estimation.paper_filter import PaperModel
 from flownav.sensors.datasheet import FlowSensor, load_sensor
-from flownav.simulation.flight import ATTITUDE_S, PAPER_FILTER, Flight, FlightPlan
+from flownav.simulation.filtering import KinematicSetup
+from flownav.simulation.flight import ATTITUDE_S, Flight, FlightPlan
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
@@ -55,9 +57,10 @@ def assemble(scenario: Scenario) -> Setup:
         wind=scenario.wind.parameters(),
         path=_path(scenario, vehicle),
         gains=gains_for(vehicle, hover, math.radians(scenario.autopilot.idle_collective_deg)),
-        paper=_paper_filter(paper),
+        paper=_paper_filter(paper) if scenario.filter.name == "paper" else None,
+        kinematic=_kinematic_filter(scenario, vehicle) if scenario.filter.name == "kinematic" else None,
         initial_variance=_initial_variance(scenario, paper),
-        linear=_linear_truth(paper, hover),
+        linear=_linear_truth(paper, hover) if scenario.truth == "linear" else None,
     )
     described = describe_vehicle(vehicle_file)
     parameters = {
@@ -110,10 +113,8 @@ def _plan(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> Flight
         starts_on_ground=on_ground,
         takeoff_at_s=0.0 if linear else section.takeoff_at_s,
         may_land_after_s=NEVER_S if linear or section.may_land_after_s is None else section.may_land_after_s,
-        linear_truth=linear,
         fly_on_truth=scenario.autopilot.feedback == "truth",
         start_known=start_of(scenario) == "known",
-        filter_kind=PAPER_FILTER,
         draws=Draws(gps=True, wind=scenario.wind.speed_20ft_m_s > 0.0, imu=scenario.filter.name == "kinematic"),
     )
 
@@ -164,6 +165,18 @@ def _paper_filter(paper: ReducedModel) -> PaperModel:
     """The printed matrices, discretised with the inputs held over an epoch."""
     transition, input_matrix = discretised(paper.a, paper.b, EPOCH_S)
     return PaperModel(transition, input_matrix, np.diag(paper.q).copy(), np.diag(paper.r).copy())
+
+
+def _kinematic_filter(scenario: Scenario, vehicle: VehicleParameters) -> KinematicSetup:
+    """Default settings, the accuracy that the GPS/INS states of itself, and where the sonar looks from."""
+    velocity = scenario.gps.velocity_sigma_total_m_s
+    return KinematicSetup(
+        settings=default_settings(),
+        gps_position_variance=np.square(scenario.gps.position_sigma_m),
+        gps_velocity_variance=np.full(3, velocity**2 if velocity > 0.0 else np.inf),
+        lens_below_cg_m=vehicle.cg_above_skid_m - scenario.vehicle.lens_above_skid_m,
+        sonar_floor_m=scenario.rangefinder.floor_m,
+    )
 
 
 def _initial_variance(scenario: Scenario, paper: ReducedModel) -> Any:

@@ -16,6 +16,7 @@ from flownav.compile import equation, kernel
 from flownav.control.autopilot import (
     GRAVITY_M_S2,
     AutopilotGains,
+    AutopilotState,
     Estimate,
     grounded,
     hovering,
@@ -24,14 +25,14 @@ from flownav.control.autopilot import (
     outer_loop,
 )
 from flownav.control.guidance import Path, Reference, reference_at
-from flownav.estimation import paper_filter
-from flownav.estimation.kalman import Lanes, Work, start
+from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.paper_filter import PaperModel
 from flownav.frames import rotation_from_quaternion
 from flownav.sensors.flow import step_flow
 from flownav.sensors.gps_ins import attitude_with_error
 from flownav.sensors.rangefinder import slant_range
 from flownav.simulation import layout
+from flownav.simulation.filtering import KinematicSetup, run_filter, start_filter
 from flownav.simulation.history import write_history
 from flownav.simulation.layout import (
     load_autopilot,
@@ -70,8 +71,6 @@ PHYSICS_S = ATTITUDE_S / PHYSICS_STEPS
 CONTACT_SHARE = 0.2  # of the weight on the skids counts as touching
 START_STEP = 1 << 40  # the noise counter's step for the draws before the first epoch
 
-PAPER_FILTER = 0
-
 
 class FlightPlan(NamedTuple):
     """What a scenario asks of the loop, as numbers the kernel takes."""
@@ -81,15 +80,13 @@ class FlightPlan(NamedTuple):
     starts_on_ground: bool
     takeoff_at_s: float
     may_land_after_s: float
-    linear_truth: bool
     fly_on_truth: bool
     start_known: bool  # the filter starts at the true position, else at the first GPS reading
-    filter_kind: int
     draws: Draws
 
 
 class Flight(NamedTuple):
-    """Everything constant over a flight."""
+    """Everything constant over a flight: one of `paper` and `kinematic`; `linear` only for that truth."""
 
     plan: FlightPlan
     vehicle: VehicleParameters
@@ -97,9 +94,10 @@ class Flight(NamedTuple):
     wind: WindParameters
     path: Path
     gains: AutopilotGains
-    paper: PaperModel
+    paper: PaperModel | None
+    kinematic: KinematicSetup | None
     initial_variance: NDArray[np.float64]
-    linear: LinearTruth
+    linear: LinearTruth | None
 
 
 # -- start ------------------------------------------------------------------------------------------------
@@ -114,18 +112,6 @@ def start_block(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight)
         store_autopilot(work, lanes, lane, autopilot)
     observe_plant(work, lanes, flight.vehicle)
     start_sensors(work, lanes, flight.sensors, flight.vehicle.mass_kg, flight.vehicle.gravity_m_s2)
-    start(work, lanes, layout.FILTER, paper_filter.STATES, flight.initial_variance)
-
-
-@equation
-def start_filter(work: Work, lanes: Lanes, flight: Flight) -> None:
-    """The filter's position: the known start, or the first GPS reading; its velocity zero."""
-    for component in range(3):
-        for lane in range(len(lanes)):
-            known = work[(layout.HELICOPTER + component) * len(lanes) + lane]
-            measured = work[(layout.MEASURED + component) * len(lanes) + lane]
-            position = known if flight.plan.start_known else measured
-            work[(layout.FILTER.state + component) * len(lanes) + lane] = position
 
 
 # -- one epoch --------------------------------------------------------------------------------------------
@@ -137,21 +123,6 @@ def blow(work: Work, lanes: Lanes, wind: WindParameters) -> None:
         after, air = step_wind(load_wind(work, lanes, lane), height, load_wind_normals(work, lanes, lane), wind)
         store_wind(work, lanes, lane, after)
         store_air(work, lanes, lane, air)
-
-
-@equation
-def estimate_states(work: Work, lanes: Lanes, epoch: int, flight: Flight) -> None:
-    """The filter's turn: predict over the last epoch, correct with this one's readings."""
-    if epoch == 0:
-        start_filter(work, lanes, flight)
-    else:
-        paper_filter.predict(work, lanes, layout.FILTER, layout.INPUT, flight.paper)
-    paper_filter.update(work, lanes, layout.FILTER, layout.MEASURED, layout.ARRIVED, layout.INNOVATION, flight.paper)
-    for i in range(paper_filter.STATES):
-        diagonal = layout.FILTER.covariance + i * (paper_filter.STATES + 1)
-        for lane in range(len(lanes)):
-            work[(layout.ESTIMATED + i) * len(lanes) + lane] = work[(layout.FILTER.state + i) * len(lanes) + lane]
-            work[(layout.VARIANCE + i) * len(lanes) + lane] = work[diagonal * len(lanes) + lane]
 
 
 @equation
@@ -219,9 +190,8 @@ def note_inputs(work: Work, lanes: Lanes, gains: AutopilotGains) -> None:
 
 
 @equation
-def steer(work: Work, lanes: Lanes, flight: Flight) -> None:
+def steer(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None) -> None:
     """The attitude loop: blade angles for the next 4 ms, on the INS attitude and the flybarless unit's gyros."""
-    gains = flight.gains
     for lane in range(len(lanes)):
         state = load_helicopter(work, lanes, lane)
         error = load_gps_errors(work, lanes, lane)
@@ -230,13 +200,19 @@ def steer(work: Work, lanes: Lanes, flight: Flight) -> None:
         )
         rotation = rotation_from_quaternion(qw, qx, qy, qz)
         after, lon, lat, col, ped = inner_loop(
-            load_autopilot(work, lanes, lane), rotation, state.p, state.q, state.r, gains, ATTITUDE_S
+            load_autopilot(work, lanes, lane), rotation, state.p, state.q, state.r, flight.gains, ATTITUDE_S
         )
         store_autopilot(work, lanes, lane, after)
-        if flight.plan.linear_truth:  # B_red answers to collective and pedal alone: the pedal carries the lateral loop
-            sideways = GRAVITY_M_S2 * (after.roll_sine - gains.roll_trim_sine)
-            ped = gains.pedal_trim_rad + sideways / flight.linear.lateral_per_pedal
-        store_controls(work, lanes, lane, Controls(lon, lat, col, ped))
+        if linear is None:
+            store_controls(work, lanes, lane, Controls(lon, lat, col, ped))
+        else:
+            store_controls(work, lanes, lane, Controls(lon, lat, col, pedal_sideways(after, flight.gains, linear)))
+
+
+@equation
+def pedal_sideways(state: AutopilotState, gains: AutopilotGains, linear: LinearTruth) -> float:
+    """B_red answers to collective and pedal alone, so the pedal carries the lateral loop of the linear truth."""
+    return gains.pedal_trim_rad + GRAVITY_M_S2 * (state.roll_sine - gains.roll_trim_sine) / linear.lateral_per_pedal
 
 
 @equation
@@ -247,24 +223,23 @@ def follow_flow(work: Work, lanes: Lanes, flight: Flight) -> None:
         cosine = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)[8]
         distance = slant_range(lens_height(state, cosine, flight.sensors.lens_below_cg_m), cosine)
         thrust = work[layout.THRUST * len(lanes) + lane] / flight.vehicle.mass_kg
-        store_flow(
-            work, lanes, lane,
-            step_flow(load_flow(work, lanes, lane), state.u, state.v, state.w, distance, thrust, flight.sensors.flow),
-        )  # fmt: skip
+        before = load_flow(work, lanes, lane)
+        after = step_flow(before, state.u, state.v, state.w, distance, thrust, flight.sensors.flow)
+        store_flow(work, lanes, lane, after)
 
 
 @equation
-def advance(work: Work, lanes: Lanes, flight: Flight) -> None:
+def advance(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None) -> None:
     """From one epoch to the next."""
     for _ in range(ATTITUDE_STEPS):
-        steer(work, lanes, flight)
+        steer(work, lanes, flight, linear)
         follow_flow(work, lanes, flight)
-        if flight.plan.linear_truth:
-            linear_step(work, lanes, flight.linear)
-        else:
+        if linear is None:
             for _ in range(PHYSICS_STEPS):
                 runge_kutta_step(work, lanes, flight.vehicle, PHYSICS_S)
             observe_plant(work, lanes, flight.vehicle)
+        else:
+            linear_step(work, lanes, linear)
 
 
 @kernel
@@ -281,10 +256,12 @@ def fly_block(flight: Flight, seed: int, first: int, lanes: Lanes, work: Work, h
         draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
         blow(work, lanes, flight.wind)
         sense(work, lanes, epoch, flight.sensors, flight.vehicle.gravity_m_s2)
-        estimate_states(work, lanes, epoch, flight)
+        if epoch == 0:
+            start_filter(work, lanes, flight.initial_variance, flight.plan.start_known)
+        run_filter(work, lanes, epoch, flight.paper, flight.kinematic)
         estimate_for_autopilot(work, lanes, flight)
         note_home(work, lanes, epoch, reference, flight)
         command(work, lanes, t_s, reference, flight)
         write_history(work, lanes, epoch, reference, history)
-        advance(work, lanes, flight)
+        advance(work, lanes, flight, flight.linear)
         note_inputs(work, lanes, flight.gains)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from flownav.compile import lane_access
 from flownav.control.autopilot import AutopilotState, Estimate
-from flownav.estimation.kalman import kalman_row_count, kalman_rows
+from flownav.estimation.kinematic_filter import KINEMATIC_ROW_COUNT, kinematic_rows
 from flownav.estimation.paper_filter import INPUTS, STATES
 from flownav.sensors.flow import FlowState
 from flownav.sensors.gps_ins import GpsInsErrors, GpsInsNormals, NavSolution
@@ -62,8 +62,10 @@ WIND_NORMALS = _rows.take(len(WindNormals._fields) + len(WindNormals._fields) % 
 IMU_NORMALS = _rows.take(len(ImuNormals._fields))
 NORMALS_END = _rows.next
 
-# the filters: the state and covariance of the one that flies, its inputs and its measurements
-FILTER = kalman_rows(_rows.take(kalman_row_count(STATES)), STATES)
+# the filter that flies: state and covariance, attitude and force for the kinematic one; inputs and measurements
+KINEMATIC = kinematic_rows(_rows.take(KINEMATIC_ROW_COUNT))
+FILTER = KINEMATIC.kalman
+OFFER = _rows.take(3)  # a reading, its variance, and whether it is here
 INPUT = _rows.take(INPUTS)
 MEASURED = _rows.take(STATES)
 ARRIVED = _rows.take(STATES)

@@ -27,6 +27,9 @@ from flownav.vehicle.trim import Trim
 STATES = ("x", "y", "z", "u", "v", "w")
 INPUTS = ("lon", "lat", "col", "ped")
 
+# The fins lift with |u|, which has a kink in hover: the derivatives are the mean of both sides.
+BESIDE_HOVER_M_S = 1e-9
+
 Array = NDArray[np.float64]
 
 _attitude = plain(helicopter.attitude)
@@ -56,8 +59,10 @@ def reduced_model(vehicle: VehicleParameters, about: Trim, *, freeze_inflow: boo
         return (rate.pos_n, rate.pos_e, rate.pos_d, rate.u, rate.v, rate.w)
 
     trim = about.state
-    point = np.array([trim.pos_n, trim.pos_e, trim.pos_d, trim.u, trim.v, trim.w, *about.controls])
-    both = jacobian(rates, point)
+    here = np.array([trim.pos_n, trim.pos_e, trim.pos_d, trim.u, trim.v, trim.w, *about.controls])
+    aside = np.zeros(len(here))
+    aside[STATES.index("u")] = BESIDE_HOVER_M_S
+    both = 0.5 * (jacobian(rates, here + aside) + jacobian(rates, here - aside))
     return LinearModel(both[:, : len(STATES)], both[:, len(STATES) :])
 
 

@@ -22,6 +22,7 @@ from flownav.vehicle.state import Controls, HelicopterState
 
 OUT_OF_GROUND_EFFECT_M = 1e6
 TOLERANCE = 1e-11  # [m/s2, rad/s2, rad/s]
+SLIDING = 0.01  # [m/s2, rad/s2] more than friction leaves of what it can hold
 HOVER: Vector = (0.0, 0.0, 0.0)
 
 plain_derivative = plain(helicopter.derivative)
@@ -139,11 +140,11 @@ def parked(vehicle: VehicleParameters, controls: Controls) -> HelicopterState:
 
     sag = vehicle.mass_kg * vehicle.gravity_m_s2 / (4.0 * vehicle.skid_stiffness_n_m)
     start = np.array([sag - vehicle.cg_above_skid_m, 0.0, 0.0, 0.0, 0.0])
-    failure = "parked: the helicopter does not rest on its skids with these controls; lower the collective"
+    failure = "parked: with these controls it lifts, tips or slides on its skids; lower the collective or the pedal"
     solution = solve(residual, start, TOLERANCE, failure)
     state = _as_floats(state_of([float(x) for x in solution]))
-    if np.abs(value(lambda x: accelerations(rate_of(x)), solution)).max() > 0.05:
-        raise InputError("parked: the helicopter slides on its skids with these controls; lower collective or pedal")
+    if np.abs(value(lambda x: accelerations(rate_of(x)), solution)).max() > SLIDING:
+        raise InputError(failure)
     return state
 
 

@@ -1,0 +1,53 @@
+"""Ground effect: the values of paper equation 11, its clamp and its fading with airspeed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flownav.compile import plain
+from flownav.vehicle import ground_effect
+from flownav.vehicle.helicopter import outputs
+from flownav.vehicle.parameters import load_vehicle
+from flownav.vehicle.trim import trim
+
+multiplier = plain(ground_effect.multiplier)
+R, V_I = 0.89, 3.57
+
+
+@pytest.mark.parametrize(("ratio", "expected"), [(0.5, 4 / 3), (1.0, 1.0667), (2.0, 1.0159), (2.5, 1.0101)])
+def test_equation_11_in_hover(ratio, expected):
+    assert multiplier(ratio * R, 0.0, V_I, R) == pytest.approx(expected, abs=5e-5)
+
+
+@pytest.mark.parametrize("ratio", [0.49, 0.3, 0.25, 0.1, 0.0, -1.0])
+def test_below_half_a_radius_the_value_there_serves(ratio):
+    assert multiplier(ratio * R, 0.0, V_I, R) == pytest.approx(4 / 3, abs=1e-12)
+
+
+def test_airspeed_of_the_induced_velocity_halves_the_correction():
+    def correction(speed):
+        return 1.0 - 1.0 / multiplier(R, speed, V_I, R)
+
+    assert correction(V_I) == pytest.approx(correction(0.0) / 2.0, rel=1e-12)
+
+
+def test_it_falls_steadily_with_height_and_never_jumps():
+    gains = np.array([multiplier(z, 0.0, V_I, R) for z in np.linspace(0.0, 8 * R, 2000)])
+    assert (np.diff(gains) <= 0.0).all()
+    assert np.abs(np.diff(gains)).max() < 0.01
+    assert gains[-1] > 1.0
+
+
+def test_an_unloaded_rotor_near_the_ground_stays_finite():
+    assert multiplier(0.5 * R, 5.0, 0.0, R) == pytest.approx(1.0 / (1.0 - 0.25 / (1.0 + (5.0 / 0.3) ** 2)))
+
+
+def test_the_height_that_counts_is_the_hubs():
+    vehicle = load_vehicle()
+    hover = trim(vehicle)
+    free = plain(outputs)(hover.state, 0.0, 0.0, 0.0, vehicle)
+    level = hover.state._replace(qw=1.0, qx=0.0, qy=0.0, qz=0.0)
+    near = plain(outputs)(level._replace(pos_d=-(R - vehicle.hub_above_cg_m)), 0.0, 0.0, 0.0, vehicle)
+    assert near.thrust_n / free.thrust_n == pytest.approx(1.0667, abs=5e-5)
+    assert near.torque_n_m == pytest.approx(free.torque_n_m)

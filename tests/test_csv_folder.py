@@ -261,6 +261,16 @@ BAD_CELLS = [
 ]
 
 
+def test_a_receiver_that_wakes_up_at_zero_zero_does_not_move_the_origin(folder):
+    header, *rows = rows_of(folder / "gps.csv")
+    for row in rows[:3]:
+        row[header.index("lat_deg")] = row[header.index("lon_deg")] = "0"
+    put(folder / "gps.csv", [header, *rows])
+    log = read_csv_folder(folder)
+    assert log.streams[Sensor.GPS_POSITION].rejected == {"out_of_range": 3}
+    assert log.origin_deg_m == pytest.approx(ORIGIN, abs=1e-6)
+
+
 @pytest.mark.parametrize(("name", "column", "cell", "sensor", "reason"), BAD_CELLS)
 def test_a_bad_cell_costs_its_row_and_is_counted(folder, name, column, cell, sensor, reason):
     header, *rows = rows_of(folder / f"{name}.csv")

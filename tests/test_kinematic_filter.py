@@ -266,6 +266,7 @@ def test_the_trim_keeps_to_its_limit():
 
 
 # -- measurement laws --------------------------------------------------------------------------------------
+@settings(deadline=None)
 @given(st.floats(-3, 3), st.floats(-3, 3), st.floats(-1, 1), st.floats(-1, 1), st.floats(0.1, 30))
 def test_flow_gives_back_the_velocity_that_made_it(u, v, p, q, r):
     """PX4: flow_x = p - v/r, flow_y = q + u/r."""
@@ -277,7 +278,7 @@ def test_pure_rotation_is_no_velocity():
     assert kf.flow_to_body_velocity(0.7, -0.4, 0.7, -0.4, 5.0) == (0.0, 0.0)
 
 
-@settings(max_examples=50)
+@settings(max_examples=50, deadline=None)
 @given(st.floats(0.1, 20), st.floats(0, 5), st.floats(1, 255))
 def test_flow_noise_grows_with_height_and_falls_with_quality(range_m, speed, quality):
     variance = kf.flow_velocity_variance

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flownav.scoring.alignment import align, velocity_of
@@ -24,10 +24,11 @@ def test_a_perfect_estimate_has_no_error():
     assert found.horizontal_rms_m == pytest.approx(0.0, abs=1e-9)
 
 
+@settings(deadline=None)
 @given(st.floats(-5, 5), st.floats(-5, 5))
 def test_a_constant_offset_does_not_count(north, east):
     gps_t = np.arange(0.0, 100.0, 0.2)
-    found = outage_error(T, PATH + [north, east], gps_t, gps_of(gps_t, 0.22), 0.22, 20.0, 40.0)
+    found = outage_error(T, np.add(PATH, [north, east]), gps_t, gps_of(gps_t, 0.22), 0.22, 20.0, 40.0)
     assert found.horizontal_max_m == pytest.approx(0.0, abs=1e-9)
 
 
@@ -59,10 +60,11 @@ def test_windows_that_cannot_be_scored_are_nan():
 
 
 def test_horizontal_rms_is_of_lengths():
-    assert horizontal_rms(T, PATH + [0.3, 0.4], T, PATH) == pytest.approx(0.5)
+    assert horizontal_rms(T, np.add(PATH, [0.3, 0.4]), T, PATH) == pytest.approx(0.5)
     assert np.isnan(horizontal_rms(T, PATH, T + 1000.0, PATH))
 
 
+@settings(deadline=None)
 @given(st.floats(-3.1, 3.1), st.floats(-50, 50), st.floats(-50, 50), st.floats(-5, 5))
 def test_alignment_undoes_a_turn_and_a_shift(yaw, north, east, down):
     reference = np.column_stack([np.cos(0.3 * T), np.sin(0.5 * T), 0.1 * np.sin(T)])

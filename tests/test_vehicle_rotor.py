@@ -36,7 +36,10 @@ def momentum_imbalance(induced, pitch, inplane, axial, rotor):
 def envelope(count, seed=1):
     rng = np.random.default_rng(seed)
     return zip(
-        np.radians(rng.uniform(0.0, 12.0, count)), rng.uniform(0.0, 12.0, count), rng.uniform(-4.0, 1.5, count), strict=True
+        np.radians(rng.uniform(0.0, 12.0, count)),
+        rng.uniform(0.0, 12.0, count),
+        rng.uniform(-4.0, 1.5, count),
+        strict=True,
     )
 
 
@@ -88,9 +91,7 @@ def test_inflow_is_odd_in_thrust_and_flow():
         assert induced_velocity(-pitch, inplane**2, -axial, MAIN) == pytest.approx(-forward, abs=1e-12)
 
 
-@given(
-    pitch=st.floats(-0.45, 0.45), inplane=st.floats(0.0, 60.0), axial=st.floats(-40.0, 40.0), main=st.booleans()
-)
+@given(pitch=st.floats(-0.45, 0.45), inplane=st.floats(0.0, 60.0), axial=st.floats(-40.0, 40.0), main=st.booleans())
 def test_inflow_stays_finite_and_between_none_and_thrustless_everywhere(pitch, inplane, axial, main):
     rotor = MAIN if main else TAIL
     induced = induced_velocity(pitch, inplane**2, axial, rotor)

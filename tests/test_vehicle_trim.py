@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from vehicle_files import X_CELL
 
 from flownav.compile import plain
 from flownav.errors import InputError
@@ -17,6 +16,7 @@ from flownav.vehicle import helicopter
 from flownav.vehicle.parameters import load_vehicle
 from flownav.vehicle.state import HelicopterState
 from flownav.vehicle.trim import accelerations, trim
+from vehicle_files import X_CELL
 
 VEHICLE = load_vehicle()
 HOVER = trim(VEHICLE)

@@ -27,7 +27,7 @@ from flownav.estimation.kalman import (
     test_innovation,
 )
 from flownav.estimation.kinematic_settings import KinematicSettings
-from flownav.frames import Rotation, quaternion_rate, rotation_from_quaternion, to_body, to_earth
+from flownav.frames import Rotation, Vector, quaternion_rate, rotation_from_quaternion, to_body, to_earth
 
 STATES = 6
 GRAVITY_M_S2 = 9.80665
@@ -230,12 +230,18 @@ def observe_body_velocity(
     """Set up a component (0 forward, 1 right, 2 down) of the body velocity R_BE v_ned [m/s]."""
     kalman = rows.kalman
     for lane in range(len(lanes)):
-        rotation = rotation_of(work, lanes, rows, lane)
-        predicted = 0.0
-        for i in range(3):
-            work[(kalman.observation + i) * len(lanes) + lane] = 0.0
-            work[(kalman.observation + 3 + i) * len(lanes) + lane] = rotation[3 * i + component]
-            predicted += rotation[3 * i + component] * work[(kalman.state + 3 + i) * len(lanes) + lane]
+        axis = body_axis(rotation_of(work, lanes, rows, lane), component)
+        work[(kalman.observation + 0) * len(lanes) + lane] = 0.0
+        work[(kalman.observation + 1) * len(lanes) + lane] = 0.0
+        work[(kalman.observation + 2) * len(lanes) + lane] = 0.0
+        work[(kalman.observation + 3) * len(lanes) + lane] = axis[0]
+        work[(kalman.observation + 4) * len(lanes) + lane] = axis[1]
+        work[(kalman.observation + 5) * len(lanes) + lane] = axis[2]
+        predicted = (
+            axis[0] * work[(kalman.state + 3) * len(lanes) + lane]
+            + axis[1] * work[(kalman.state + 4) * len(lanes) + lane]
+            + axis[2] * work[(kalman.state + 5) * len(lanes) + lane]
+        )
         work[kalman.innovation * len(lanes) + lane] = work[measured * len(lanes) + lane] - predicted
     take_noise(work, lanes, rows, variance, offered)
 
@@ -281,9 +287,22 @@ def learn_trim(work: Work, lanes: Lanes, rows: KinematicRows, rate_1_s: float, l
             step * work[(kalman.gain + 4) * len(lanes) + lane],
             step * work[(kalman.gain + 5) * len(lanes) + lane],
         )
-        for i in range(3):
-            trim = work[(rows.trim + i) * len(lanes) + lane] - error[i]
-            work[(rows.trim + i) * len(lanes) + lane] = clamp(trim, -limit, limit)
+        trim_x = work[(rows.trim + 0) * len(lanes) + lane] - error[0]
+        trim_y = work[(rows.trim + 1) * len(lanes) + lane] - error[1]
+        trim_z = work[(rows.trim + 2) * len(lanes) + lane] - error[2]
+        work[(rows.trim + 0) * len(lanes) + lane] = clamp(trim_x, -limit, limit)
+        work[(rows.trim + 1) * len(lanes) + lane] = clamp(trim_y, -limit, limit)
+        work[(rows.trim + 2) * len(lanes) + lane] = clamp(trim_z, -limit, limit)
+
+
+@equation
+def body_axis(rotation: Rotation, component: int) -> Vector:
+    """Column `component` of R_EB: the body's forward, right or down axis in earth NED."""
+    return (
+        rotation[0] if component == 0 else (rotation[1] if component == 1 else rotation[2]),
+        rotation[3] if component == 0 else (rotation[4] if component == 1 else rotation[5]),
+        rotation[6] if component == 0 else (rotation[7] if component == 1 else rotation[8]),
+    )
 
 
 @equation

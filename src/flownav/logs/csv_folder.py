@@ -11,6 +11,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.errors import InputError
 from flownav.frames import quaternion_from_euler
@@ -22,6 +23,7 @@ from flownav.measurement import Array, Sensor, Stream
 HALF_TURN = np.pi + 0.01
 GYRO_LIMIT_RAD_S = 70.0  # twice the range of a 2000 deg/s gyro
 RADIANS = "radians are needed (degrees?)"
+FARTHEST_FIX_DEG = 0.5
 METRES = "metres are needed (millimetres? centimetres?)"
 DEGREES = "degrees are needed (degrees * 1e7?)"
 
@@ -135,11 +137,20 @@ def _gps(table: CsvTable) -> list[Stream]:
     table.keep(table.columns["fix_type"] >= 3, "no_fix")
     if not len(table.t_s):
         raise InputError(f"{table.path}: no row has a 3-D fix (fix_type 3 or more); remove the file to replay without")
+    table.keep(_near_the_rest(table), "out_of_range")
     velocity = table.matrix("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
     return [
         Stream.of(Sensor.GPS_VELOCITY, table.t_s, velocity, rejected=table.rejected),
         Stream.of(Sensor.GPS_POSITION, table.t_s, _local_position(table), rejected=table.rejected),
     ]
+
+
+def _near_the_rest(table: CsvTable) -> NDArray[np.bool_]:
+    """Fixes within half a degree of the middle one: a receiver's first are at times 0, 0 or where it was last used."""
+    latitude, longitude = table.columns["lat_deg"], table.columns["lon_deg"]
+    north = latitude - np.sort(latitude)[len(latitude) // 2]
+    east = (longitude - np.sort(longitude)[len(longitude) // 2] + 180.0) % 360.0 - 180.0
+    return np.asarray(np.hypot(north, east) < FARTHEST_FIX_DEG)
 
 
 def _origin(table: CsvTable) -> tuple[float, float, float]:

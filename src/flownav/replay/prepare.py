@@ -6,6 +6,7 @@ rotation out of the flow.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -77,18 +78,25 @@ def withhold(log: Log, queue: EventQueue, options: ReplayOptions) -> EventQueue:
 
 
 def _check(log: Log, options: ReplayOptions) -> None:
-    start, end = log.span_s
-    if not -1.0 <= options.gps_delay_s <= 5.0:
+    if not 0.0 <= options.gps_delay_s <= 5.0:
         raise InputError(f"--gps-delay {options.gps_delay_s:g}: seconds from 0 to 5 are needed")
     if not all(0.01 <= abs(scale) <= 100.0 for scale in options.flow_scale):
         raise InputError(f"--flow-scale {options.flow_scale[0]:g},{options.flow_scale[1]:g}: factors near 1 are needed")
-    for t0, t1 in options.gps_outages_s:
+    check_windows(log, options.gps_outages_s, "--gps-outage")
+
+
+def check_windows(log: Log, windows: Iterable[tuple[float, float]], option: str) -> None:
+    """InputError where a GPS cut cannot be made in a log; `option` asked for it."""
+    start, end = log.span_s
+    for t0, t1 in windows:
+        if Sensor.GPS_POSITION not in log.streams:
+            raise InputError(f"{option}: {log.path} has no GPS to cut")
         if not t0 < t1:
-            raise InputError(f"--gps-outage {t0:g}:{t1:g}: the end must come after the start")
+            raise InputError(f"{option} {t0:g}:{t1:g}: the end must come after the start")
         if t1 <= start or t0 >= end:
-            raise InputError(f"--gps-outage {t0:g}:{t1:g}: outside the log, which covers {start:.1f} to {end:.1f} s")
-    if options.gps_outages_s and Sensor.GPS_POSITION not in log.streams:
-        raise InputError(f"--gps-outage: {log.path} has no GPS to cut")
+            raise InputError(
+                f"{option}: {t0:g} to {t1:g} s is outside the log, which covers {start:.1f} to {end:.1f} s"
+            )
 
 
 # -- flow --------------------------------------------------------------------------------------------------

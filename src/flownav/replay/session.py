@@ -17,7 +17,7 @@ from flownav.estimation.kinematic_settings import KinematicSettings
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
 from flownav.replay.engine import run
-from flownav.replay.prepare import Prepared, ReplayOptions, prepare, withhold
+from flownav.replay.prepare import Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replay.state import Tape, new_filter
 from flownav.scoring.alignment import Alignment, align, velocity_of
 from flownav.scoring.outage import OutageError, difference_at, horizontal_rms, outage_error
@@ -137,14 +137,18 @@ def outage_table(
     windows: list[tuple[float, float]],
     on_progress: Callable[[int], None] = lambda done: None,
 ) -> list[OutageError]:
-    """One replay a window, each with GPS cut in that window alone. `on_progress` is called with 1 for each."""
+    """One replay a window, each with GPS cut in that window alone. `on_progress` is called with 1 for each.
+
+    InputError where a window lies outside the log.
+    """
+    check_windows(log, windows, "--outage-table")
 
     def error_of(window: tuple[float, float]) -> OutageError:
         return _run(log, replace(options, gps_outages_s=(window,)), settings, prepared).outage(*window)
 
     errors = []
     with announce_compilation("replay"), ThreadPoolExecutor(2) as pool:
-        prepared = prepare(log, replace(options, gps_outages_s=tuple(windows)))
+        prepared = prepare(log, replace(options, gps_outages_s=()))
         for error in pool.map(error_of, windows):
             errors.append(error)
             on_progress(1)
@@ -154,7 +158,7 @@ def outage_table(
 def table_windows(t0: float, t1: float, length_s: float) -> list[tuple[float, float]]:
     """[t0, t0 + length), ... up to t1. InputError where that is no list of windows."""
     if not (t0 < t1 and length_s > 0.0 and np.isfinite([t0, t1, length_s]).all()):
-        raise InputError(f"--outage-table {t0:g}:{t1:g}:{length_s:g}: START:END:LENGTH in seconds, START before END")
+        raise InputError(f"--outage-table {t0:g}:{t1:g}:{length_s:g}: T0:T1:LENGTH is needed, seconds, T0 before T1")
     count = int(np.floor((t1 - t0) / length_s + 1e-9))
     if not 1 <= count <= LONGEST_TABLE:
         raise InputError(

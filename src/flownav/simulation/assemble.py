@@ -158,6 +158,7 @@ def _sensors(scenario: Scenario, sensor: FlowSensor, vehicle: VehicleParameters)
         imu=scenario.imu.parameters(),
         lens_below_cg_m=vehicle.cg_above_skid_m - scenario.vehicle.lens_above_skid_m,
         pad_half_size_m=0.5 * scenario.pad.size_m,
+        gps_offers_velocity=scenario.gps.velocity_sigma_total_m_s > 0.0,
     )
 
 

@@ -132,9 +132,9 @@ def offer_flow(work: Work, lanes: Lanes, axis: int) -> None:
     """A flow velocity with the variance that the sensor's own law gives at this height."""
     for lane in range(len(lanes)):
         sigma = work[layout.FLOW_SIGMA * len(lanes) + lane]
-        work[layout.OFFER * len(lanes) + lane] = work[(layout.MEASURED + 3 + axis) * len(lanes) + lane]
+        work[layout.OFFER * len(lanes) + lane] = work[(layout.FLOW_READING + axis) * len(lanes) + lane]
         work[VARIANCE * len(lanes) + lane] = sigma * sigma
-        work[OFFERED * len(lanes) + lane] = work[(layout.ARRIVED + 3) * len(lanes) + lane]
+        work[OFFERED * len(lanes) + lane] = work[(layout.FLOW_READING + 3) * len(lanes) + lane]
 
 
 @equation

@@ -16,7 +16,7 @@ from flownav.simulation.history import HISTORY
 from flownav.simulation.sensing import EPOCH_S, RANGE_EPOCHS
 
 Array = NDArray[np.float64]
-GATE_SIGMA_SHOWN = 3.0  # the paper's filter has no gate: its test ratios are shown against 3 sigma
+GATE_SIGMA_SHOWN = 3.0  # the paper's filter has no gate: its test ratios are shown against 3 sigma and all are fused
 
 
 def record_of(setup: Setup, history: Array, seed: int, index: int) -> Record:
@@ -62,34 +62,42 @@ def record_of(setup: Setup, history: Array, seed: int, index: int) -> Record:
     table("range", "range", COLUMNS[Sensor.RANGE], pings, quality=255.0 * flown["range", "valid"][pings])
     if setup.flight.plan.draws.imu:
         table("imu", "imu", COLUMNS[Sensor.IMU], quality=every)
-    record.add("innovation", _innovations(t_s, flown))
+    kinematic = setup.flight.kinematic
+    record.add("innovation", _innovations(t_s, flown, kinematic.settings.gate_sigma if kinematic else None))
     record.add("events", _events(t_s, flown))
     return record
 
 
-def _innovations(t_s: Array, flown: dict[tuple[str, str], Array]) -> Table:
-    """One row per measurement component offered to the filter, in time order."""
+def _innovations(t_s: Array, flown: dict[tuple[str, str], Array], gate_sigma: float | None) -> Table:
+    """One row per measurement component offered to the filter, in time order; gate_sigma None: no gate."""
     names = (*POSITION_NED, *VELOCITY_BODY)
     count = len(names)
 
     def interleaved(column: Callable[[int], Array]) -> Array:
         return np.stack([column(i) for i in range(count)], axis=1).ravel()
 
-    is_gps = interleaved(lambda i: np.full(len(t_s), float(i < 3))) > 0.0
+    is_position = interleaved(lambda i: np.full(len(t_s), float(i < 3))) > 0.0
     engaged = np.repeat(flown["flow", "engaged"], count) > 0.0
-    kept = is_gps | engaged
+    source = np.where(is_position, "gps_position", np.where(engaged, "flow_velocity", "gps_velocity"))
+    arrived = is_position | (np.repeat(flown["measured", "velocity_arrived"], count) > 0.0)
+    if gate_sigma is not None:  # the kinematic filter takes flow here; INS velocity is a measurement of its own
+        arrived = is_position | engaged
+    variances = interleaved(lambda i: flown["innovation", f"innovation_variance_{i}"])
+    kept = arrived & (variances > 0.0)  # no variance: the filter does not take that component
+    variance = variances[kept]
     innovation = interleaved(lambda i: flown["innovation", f"innovation_{i}"])[kept]
-    variance = interleaved(lambda i: flown["innovation", f"innovation_variance_{i}"])[kept]
+    ratio = innovation**2 / ((gate_sigma or GATE_SIGMA_SHOWN) ** 2 * variance)
+    fused = (ratio <= 1.0) | (gate_sigma is None)
     return {
         "t_s": np.repeat(t_s, count)[kept],
-        "sensor": np.where(is_gps, "gps_position", "flow_velocity")[kept],
+        "sensor": source[kept],
         "component": np.tile(np.arange(count) % 3, len(t_s))[kept],
-        "observation": interleaved(lambda i: flown["gps" if i < 3 else "flow", names[i]])[kept],
+        "observation": interleaved(lambda i: flown["measured", names[i]])[kept],
         "innovation": innovation,
         "innovation_variance": variance,
-        "test_ratio": innovation**2 / (GATE_SIGMA_SHOWN**2 * variance),
-        "fused": np.ones(int(kept.sum())),
-        "reason": np.full(int(kept.sum()), "fused"),
+        "test_ratio": ratio,
+        "fused": fused.astype(float),
+        "reason": np.where(fused, "fused", "innovation_gate"),
     }
 
 

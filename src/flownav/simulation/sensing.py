@@ -14,6 +14,7 @@ from flownav.sensors.rangefinder import RangefinderParameters, start_rangefinder
 from flownav.simulation import layout
 from flownav.simulation.layout import (
     load_flow,
+    load_gps,
     load_gps_errors,
     load_gps_held,
     load_gps_normals,
@@ -45,6 +46,7 @@ class SensorSuite(NamedTuple):
     imu: ImuParameters
     lens_below_cg_m: float
     pad_half_size_m: float
+    gps_offers_velocity: bool  # the unit's own velocity serves while the flow sensor is not engaged
 
 
 class Draws(NamedTuple):
@@ -163,7 +165,7 @@ def read_rangefinder(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
 
 @equation
 def read_flow_sensor(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
-    """Whether the flow sensor is engaged, and its reading, into the measured velocity rows (50 Hz)."""
+    """Whether the flow sensor is engaged, and its reading (50 Hz)."""
     for lane in range(len(lanes)):
         state = load_helicopter(work, lanes, lane)
         rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
@@ -188,12 +190,26 @@ def read_flow_sensor(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
             work[(row + 2) * len(lanes) + lane],
             suite.flow,
         )
-        work[(layout.MEASURED + 3) * len(lanes) + lane] = reading.vel_u_m_s
-        work[(layout.MEASURED + 4) * len(lanes) + lane] = reading.vel_v_m_s
-        work[(layout.MEASURED + 5) * len(lanes) + lane] = reading.vel_w_m_s
+        work[layout.FLOW_READING * len(lanes) + lane] = reading.vel_u_m_s
+        work[(layout.FLOW_READING + 1) * len(lanes) + lane] = reading.vel_v_m_s
+        work[(layout.FLOW_READING + 2) * len(lanes) + lane] = reading.vel_w_m_s
+        work[(layout.FLOW_READING + 3) * len(lanes) + lane] = reading.engaged
         work[layout.FLOW_SIGMA * len(lanes) + lane] = reading.sigma_m_s
-        for component in range(3):
-            work[(layout.ARRIVED + 3 + component) * len(lanes) + lane] = reading.engaged
+
+
+@equation
+def choose_velocity(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
+    """The velocity of the paper's measurement: flow where it is engaged, else the GPS/INS's own, turned to the body."""
+    for lane in range(len(lanes)):
+        gps = load_gps(work, lanes, lane)
+        rotation = rotation_from_quaternion(gps.qw, gps.qx, gps.qy, gps.qz)
+        ins = to_body(rotation, gps.vel_n_m_s, gps.vel_e_m_s, gps.vel_d_m_s)
+        engaged = work[(layout.FLOW_READING + 3) * len(lanes) + lane] > 0.0
+        for axis in range(3):
+            flow = work[(layout.FLOW_READING + axis) * len(lanes) + lane]
+            work[(layout.MEASURED + 3 + axis) * len(lanes) + lane] = flow if engaged else ins[axis]
+            arrived = engaged or suite.gps_offers_velocity
+            work[(layout.ARRIVED + 3 + axis) * len(lanes) + lane] = 1.0 if arrived else 0.0
 
 
 @equation
@@ -213,6 +229,7 @@ def sense(work: Work, lanes: Lanes, epoch: int, suite: SensorSuite, gravity_m_s2
     if epoch % RANGE_EPOCHS == 0:
         read_rangefinder(work, lanes, suite)
     read_flow_sensor(work, lanes, suite)
+    choose_velocity(work, lanes, suite)
     read_imu(work, lanes, suite, gravity_m_s2)
     for component in range(3):
         for lane in range(len(lanes)):

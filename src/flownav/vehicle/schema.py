@@ -105,7 +105,7 @@ class Actuator(ParameterModel):
     damping_ratio: Number = Field(gt=0.2, lt=2.0)
     rate_limit_deg_s: Number = Field(gt=5.0, lt=5000.0)
     minimum_deg: Number = Field(gt=-45.0, le=0.0)
-    maximum_deg: Number = Field(gt=0.0, lt=45.0)
+    maximum_deg: Number = Field(gt=1.0, lt=45.0)
 
 
 class Drive(ParameterModel):

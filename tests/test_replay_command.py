@@ -1,0 +1,123 @@
+"""`flownav replay` as a user meets it: JSON, tables, options, one-line errors, whole files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from flownav.cli.replay import command
+from flownav.errors import InputError
+from flownav.record import Record
+from replay_logs import log_of_flight
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    return log_of_flight(40.0).write(tmp_path_factory.mktemp("log") / "garden")
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def call(*arguments):
+    app = typer.Typer()
+    app.command()(command)
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+def answer(*arguments):
+    result = call(*arguments, "--no-report", "--json")
+    assert result.exception is None, result.exception
+    return json.loads(result.stdout)
+
+
+def complaint(*arguments) -> str:
+    result = call(*arguments, "--no-report")
+    assert isinstance(result.exception, InputError), result.exception
+    assert result.stdout == ""
+    assert not list(Path.cwd().rglob("*.fnr"))
+    text = str(result.exception)
+    assert "\n" not in text
+    return text
+
+
+def test_json_holds_the_promised_keys_and_nothing_else_is_printed(folder):
+    facts = answer(folder, "--gps-outage", "15:25", "--gps-outage", "30:38")
+    assert set(facts) == {"duration_s", "outages", "velocity_rms_m_s", "rejected", "record"}
+    assert facts["duration_s"] == pytest.approx(39.98)
+    assert [(o["t0"], o["t1"]) for o in facts["outages"]] == [(15.0, 25.0), (30.0, 38.0)]
+    assert all(0 <= o["horizontal_rms_m"] <= o["horizontal_max_m"] < 0.02 for o in facts["outages"])
+    assert facts["velocity_rms_m_s"] < 0.01
+    assert facts["rejected"]["gps_position"]["outage"] == 3 * (50 + 40)
+    assert facts["record"] == "out/garden.fnr"
+    assert Record.load(Path(facts["record"])).manifest["command"][0] == "flownav"
+
+
+def test_the_outage_table_adds_its_median_and_worst(folder):
+    facts = answer(folder, "--outage-table", "15:35:10")
+    assert [(o["t0"], o["t1"]) for o in facts["outages"]] == [(15.0, 25.0), (25.0, 35.0)]
+    rms = [o["horizontal_rms_m"] for o in facts["outages"]]
+    assert facts["outage_median_rms_m"] == pytest.approx(sum(rms) / 2)
+    assert facts["outage_worst_rms_m"] == max(rms)
+    assert "outage" not in facts["rejected"]["gps_position"]
+
+
+def test_options_reach_the_filter(folder):
+    cut = ("--gps-outage", "15:38")
+    good = answer(folder, *cut)["outages"][0]["horizontal_rms_m"]
+    assert answer(folder, *cut, "--flow-scale", "1.2,1.2")["outages"][0]["horizontal_rms_m"] > 10 * good
+    assert answer(folder, *cut, "--no-flow")["rejected"]["flow_rate"]["outage"] > 1000
+    assert answer(folder, "--gps-delay", "0.6")["velocity_rms_m_s"] > 0.1
+
+
+def test_settings_come_from_a_file(folder, tmp_path):
+    (tmp_path / "strict.toml").write_text("gate_sigma = 0.001\n")
+    assert answer(folder, "--settings", tmp_path / "strict.toml")["rejected"]["range"]["innovation_gate"] > 50
+
+
+def test_people_get_tables_and_files(folder):
+    result = call(folder, "--gps-outage", "15:25", "--out", "here/garden.fnr")
+    assert result.exception is None
+    assert "15 to 25" in result.stdout
+    assert "Horizontal velocity against GPS" in result.stdout
+    assert Path("here/garden.fnr").is_file()
+    assert "</html>" in Path("here/garden.html").read_text()
+
+
+@pytest.mark.parametrize(("arguments", "said"), [
+    (("--gps-outage", "15"), "--gps-outage 15: T0:T1 is needed"),
+    (("--gps-outage", "a:b"), "--gps-outage a:b"),
+    (("--gps-outage", "nan:20"), "--gps-outage nan:20"),
+    (("--gps-outage", "30:20"), "the end must come after the start"),
+    (("--gps-outage", "500:600"), "outside the log"),
+    (("--flow-scale", "1"), "--flow-scale 1: X,Y is needed"),
+    (("--flow-scale", "0,1"), "--flow-scale 0,1"),
+    (("--gps-delay", "-3"), "--gps-delay -3"),
+    (("--gps-delay", "inf"), "--gps-delay inf"),
+    (("--outage-table", "0:10"), "T0:T1:LENGTH"),
+    (("--outage-table", "0:10:50"), "0 windows"),
+    (("--outage-table", "100:400:60"), "--outage-table: 100 to 160 s is outside the log"),
+    (("--settings", "absent.toml"), "absent.toml: no such file"),
+    (("--out", "there.html", "--report"), "name it .fnr"),
+])  # fmt: skip
+def test_a_wrong_option_is_one_line_and_leaves_no_file(folder, arguments, said):
+    result = call(folder, *arguments)
+    assert isinstance(result.exception, InputError), result.exception
+    assert said in str(result.exception)
+    assert "\n" not in str(result.exception)
+    assert list(Path.cwd().iterdir()) == []
+
+
+def test_a_folder_that_is_not_there(tmp_path):
+    assert "no such folder" in complaint(tmp_path / "absent")
+
+
+def test_a_record_that_cannot_be_written(folder, tmp_path):
+    (tmp_path / "taken").write_text("")
+    assert "cannot be written" in complaint(folder, "--out", tmp_path / "taken" / "garden.fnr")

@@ -1,0 +1,64 @@
+"""`flownav vehicle`: the promised JSON, tables that people can read, and one line on a bad file."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from flownav.cli.vehicle import command
+from flownav.errors import InputError
+from flownav.vehicle.paper_model import load_paper_model
+from vehicle_files import X_CELL
+
+APP = typer.Typer()
+APP.command()(command)
+
+
+def run(*arguments):
+    return CliRunner().invoke(APP, list(arguments))
+
+
+def test_json_is_one_object_with_the_promised_keys():
+    result = run("--json")
+    assert result.exit_code == 0
+    sheet = json.loads(result.stdout)
+    promised = {"collective_rad", "pedal_rad", "roll_rad", "pitch_rad", "induced_velocity_m_s", "power_w"}
+    assert promised <= set(sheet["trim"])
+    assert sheet["states"] == ["x", "y", "z", "u", "v", "w"]
+    assert sheet["inputs"] == ["lon", "lat", "col", "ped"]
+    for model in ("frozen_inflow", "quasi_steady_inflow", "paper"):
+        assert [len(row) for row in sheet[model]["A"]] == [6] * 6
+        assert [len(row) for row in sheet[model]["B"]] == [4] * 6
+    assert sheet["paper"]["A"] == load_paper_model().a.tolist()
+    gains = {point["z_over_R"]: point["multiplier"] for point in sheet["ground_effect"]}
+    assert list(gains) == [0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0]
+    assert (gains[0.5], gains[1.0], gains[2.0]) == pytest.approx((1.333, 1.0667, 1.0159), abs=5e-4)
+    assert math.degrees(sheet["trim"]["collective_rad"]) == pytest.approx(4.2, abs=0.1)
+
+
+def test_tables_show_trim_power_and_every_entry_beside_the_papers():
+    result = run()
+    assert result.exit_code == 0
+    text = result.stdout
+    for part in ("Maxi Joker 3", "Trim", "shaft power", "A(w,w)", "-3.2826", "B(w,col)", "-294.6074", "1.3333"):
+        assert part in text
+    for title in ("A, inflow frozen", "B, inflow re-solved", "Eigenvalues", "Ground effect"):
+        assert title in text
+    assert text.count("A(") == 18
+    assert text.count("B(") == 4
+
+
+def test_another_vehicle_is_shown_from_its_file(tmp_path):
+    path = tmp_path / "x_cell.toml"
+    path.write_text(X_CELL)
+    assert json.loads(run(str(path), "--json").stdout)["vehicle"] == "X-Cell .60"
+
+
+def test_a_bad_file_is_an_input_error_and_prints_nothing(tmp_path):
+    result = run(str(tmp_path / "none.toml"), "--json")
+    assert isinstance(result.exception, InputError)
+    assert result.stdout == ""

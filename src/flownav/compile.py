@@ -71,7 +71,7 @@ llvm.set_option("flownav", f"--unroll-full-max-count={LANES_WIDE // 2}")
 
 def equation(function: Function) -> Function:
     """A scalar law: plain Python where Python calls it, compiled and inlined where a kernel does."""
-    return cast(Function, register_jitable(forceinline=True, error_model="numpy")(function))
+    return register_jitable(forceinline=True, error_model="numpy")(function)
 
 
 def kernel(function: Function) -> Function:

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from flownav.compile import LANES, ONE_LANE
+from flownav.estimation.paper_filter import PaperModel
 from flownav.simulation.engine import fly_blocks, fly_one
 from flownav.simulation.flight import Flight
 
@@ -69,6 +70,14 @@ def _landing() -> Flight:
     return assemble(load_scenario("landing")).flight
 
 
+def _papers_model() -> PaperModel:
+    """The matrices of the paper's filter, discretised."""
+    model = _landing().paper
+    if model is None:
+        raise RuntimeError("the landing scenario flies the paper's filter")
+    return model
+
+
 def single_flight(flight: Flight) -> Figure:
     """One 50 s flight with its whole history, kernels warm."""
     return Figure("one warm 50 s flight", 1e3 * best_of(lambda: fly_one(flight, 1)), "ms", 25.0, False)
@@ -95,7 +104,7 @@ def _filter_runner() -> Callable[[int], float]:
     """Seconds for n predict+update steps of the paper's filter on one lane."""
     from flownav.benchmark.filter_loop import ROWS, run_paper_filter
 
-    model = _landing().paper
+    model = _papers_model()
     work = np.zeros(ROWS)
 
     def run(steps: int) -> float:
@@ -125,7 +134,7 @@ def filter_against_filterpy() -> Iterator[Figure]:
     run = _filter_runner()
     run(10)
     ours = min(run(20_000) for _ in range(REPEATS)) / 20_000
-    model = _landing().paper
+    model = _papers_model()
     other = KalmanFilter(dim_x=6, dim_z=6, dim_u=4)
     other.F, other.B, other.H = model.transition, model.input_matrix, np.eye(6)
     other.Q, other.R = np.diag(model.process_noise), np.diag(model.measurement_noise)

@@ -6,7 +6,11 @@ import sys
 
 import typer
 
-from flownav.cli import bench, fly, replay, report, vehicle
+from flownav.cli import bench as bench
+from flownav.cli import fly as fly
+from flownav.cli import replay as replay
+from flownav.cli import report as report
+from flownav.cli import vehicle as vehicle
 from flownav.errors import FlownavError, InputError
 
 app = typer.Typer(

@@ -7,6 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+WIDEST = 132  # columns that the medians and percentiles of many flights take
 UNITS = {"x": "m", "y": "m", "z": "m", "u": "m/s", "v": "m/s", "w": "m/s"}
 
 
@@ -14,6 +15,7 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
     """Errors per state beside the paper's table, largest position error, touchdown, files."""
     many = facts["flights"] > 1
     console = Console()
+    console.width = max(console.width, WIDEST if many else 0)
     title = f"{facts['scenario']}: {facts['filter']} filter, {facts['gps']} GPS, seed {facts['seed']}"
     table = Table(
         title=title + (f", {facts['flights']} flights: median (5-95 %)" if many else ""), title_justify="left"
@@ -25,13 +27,14 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
         table.add_column(f"{paper['title']} mean", justify="right", style="dim")
         table.add_column(f"{paper['title']} std", justify="right", style="dim")
     for state, entry in facts["states"].items():
-        cells = [_cell(entry[key], 4) for key in ("mean_error", "std_error", "rms_error", "max_error")]
+        cells = [_cell(entry[key], 3 if many else 4) for key in ("mean_error", "std_error", "rms_error", "max_error")]
         if paper:
             cells += [f"{paper['states'][state][key]:.4f}" for key in ("mean_error", "std_error")]
         table.add_row(f"{state} [{UNITS[state]}]", *cells)
     console.print(table)
     beside = f"   paper: {paper['max_position_error_m']:.4f} m" if paper else ""
-    console.print(f"largest position error  {_cell(facts['max_position_error_m'], 4)} m{beside}", highlight=False)
+    largest = _cell(facts["max_position_error_m"], 3 if many else 4)
+    console.print(f"largest position error  {largest} m{beside}", highlight=False)
     _show_touchdown(console, facts)
     if "paper_percentile" in facts:
         _show_percentiles(console, facts["paper_percentile"])

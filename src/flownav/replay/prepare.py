@@ -102,8 +102,13 @@ def check_windows(log: Log, windows: Iterable[tuple[float, float]], option: str)
 # -- flow --------------------------------------------------------------------------------------------------
 def _exposed(stream: Stream) -> Stream:
     """A flow reading is a mean since the last one: it describes the middle of that time."""
-    period = float(np.median(np.diff(stream.t_s))) if len(stream) > 1 else 0.0
-    return replace(stream, delay_s=0.5 * period)
+    return replace(stream, delay_s=0.5 * _period(stream.t_s))
+
+
+def _period(t_s: Array) -> float:
+    """The usual time between readings [s]; that of a 10 Hz sensor where there are not two."""
+    steps = np.diff(t_s)
+    return float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.1
 
 
 def _scaled(stream: Stream, scale: tuple[float, float]) -> Stream:
@@ -137,9 +142,8 @@ def _with_gyro(flow: Stream, streams: dict[Sensor, Stream]) -> tuple[Stream, str
 def _gyro_candidates(flow: Stream, streams: dict[Sensor, Stream]) -> dict[str, Array]:
     """Mean rates about x and y over each flow reading's exposure, by source."""
     attitude, imu = streams[Sensor.ATTITUDE], streams.get(Sensor.IMU)
-    steps = np.diff(flow.t_s)
-    period = float(np.median(steps)) if len(steps) else 0.1
-    exposure = np.clip(np.concatenate([[period], steps]), 0.2 * period, LONGEST_FLOW_INTERVAL * period)
+    period = _period(flow.t_s)
+    exposure = np.clip(np.concatenate([[period], np.diff(flow.t_s)]), 0.2 * period, LONGEST_FLOW_INTERVAL * period)
     start = flow.t_s - exposure
     turning = attitude_rates(attitude, start, flow.t_s)
     candidates = {"attitude": turning[:, :2]}

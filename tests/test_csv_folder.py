@@ -375,6 +375,14 @@ def test_mutilated_rows_are_counted_or_refused_in_one_line(folder, data):
     assert "\n" not in said
 
 
+def test_the_documentation_names_every_file_and_column():
+    page = (Path(__file__).parents[1] / "docs" / "csv-folder.md").read_text(encoding="utf-8")
+    for name, columns in FILES.items():
+        assert f"`{name}.csv`" in page
+        for column in columns:
+            assert f"`{column.name}`" in page or column.name.replace("_y_", "_x_") in page, column.name
+
+
 # -- real logs ---------------------------------------------------------------------------------------------
 def test_the_outdoor_log_reads_whole(data_folder):
     log = read_csv_folder(data_folder / "quad-px4flow-outdoor")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
@@ -304,3 +306,9 @@ def test_every_setting_says_why():
     for name, field in KinematicSettingsFile.model_fields.items():
         assert field.description, name
         assert len(field.description) > 10, name
+
+
+def test_the_documentation_states_the_shipped_defaults():
+    page = (Path(__file__).parents[1] / "docs" / "kinematic-filter.md").read_text(encoding="utf-8")
+    for name, field in KinematicSettingsFile.model_fields.items():
+        assert f"| `{name}` | {field.default:g} | {field.description} |" in page, name

@@ -100,7 +100,7 @@ class Stream:
     ) -> Stream:
         """A stream from arrays; unstated variances are NaN, unstated quality is 255. ValueError on a wrong shape."""
         count, width = len(t_s), len(COLUMNS[sensor])
-        value = np.asarray(value, float).reshape(count, -1)
+        value = np.asarray(value, float).reshape(count, -1 if count else width)
         if value.shape != (count, width):
             raise ValueError(f"{sensor.name} takes {width} values a reading, got {value.shape[1]}")
         return cls(

@@ -108,15 +108,39 @@ def test_innovation(work: Work, lanes: Lanes, rows: KalmanRows, n: int, gate_sig
         variance = work[rows.noise * len(lanes) + lane]
         for k in range(n):
             variance += work[(rows.observation + k) * len(lanes) + lane] * work[(rows.cross + k) * len(lanes) + lane]
-        innovation = work[rows.innovation * len(lanes) + lane]
-        ratio = innovation * innovation / (gate_sigma * gate_sigma * variance)
         work[rows.innovation_variance * len(lanes) + lane] = variance
-        work[rows.test_ratio * len(lanes) + lane] = ratio
-        offered = work[rows.offered * len(lanes) + lane] > 0.0
-        work[rows.accepted * len(lanes) + lane] = 1.0 if (offered and ratio <= 1.0) else 0.0
+    judge(work, lanes, rows, n, gate_sigma)
+
+
+@equation
+def test_component(work: Work, lanes: Lanes, rows: KalmanRows, n: int, component: int, gate_sigma: float) -> None:
+    """`test_innovation` for a reading of one state itself: h is a unit vector, so P h' is a column of P."""
     for i in range(n):
         for lane in range(len(lanes)):
-            gain = work[(rows.cross + i) * len(lanes) + lane] / work[rows.innovation_variance * len(lanes) + lane]
+            entry = work[(rows.covariance + i * n + component) * len(lanes) + lane]
+            work[(rows.cross + i) * len(lanes) + lane] = entry
+    for lane in range(len(lanes)):
+        variance = work[rows.noise * len(lanes) + lane] + work[(rows.cross + component) * len(lanes) + lane]
+        work[rows.innovation_variance * len(lanes) + lane] = variance
+    judge(work, lanes, rows, n, gate_sigma)
+
+
+@equation
+def judge(work: Work, lanes: Lanes, rows: KalmanRows, n: int, gate_sigma: float) -> None:
+    """The test ratio, the verdict and the gain, from P h' and S."""
+    per_gate = 1.0 / (gate_sigma * gate_sigma)
+    precision = rows.scratch
+    for lane in range(len(lanes)):
+        per_variance = 1.0 / work[rows.innovation_variance * len(lanes) + lane]
+        innovation = work[rows.innovation * len(lanes) + lane]
+        ratio = innovation * innovation * per_variance * per_gate
+        fused = work[rows.offered * len(lanes) + lane] > 0.0 and ratio <= 1.0
+        work[rows.test_ratio * len(lanes) + lane] = ratio
+        work[rows.accepted * len(lanes) + lane] = 1.0 if fused else 0.0
+        work[precision * len(lanes) + lane] = per_variance
+    for i in range(n):
+        for lane in range(len(lanes)):
+            gain = work[(rows.cross + i) * len(lanes) + lane] * work[precision * len(lanes) + lane]
             fused = work[rows.accepted * len(lanes) + lane] > 0.0
             work[(rows.gain + i) * len(lanes) + lane] = gain if fused else 0.0
 

@@ -22,7 +22,7 @@ from flownav.estimation.kalman import (
     correct_covariance_short,
     correct_state,
     propagate_covariance,
-    test_innovation,
+    test_component,
 )
 
 STATES = 6
@@ -65,15 +65,12 @@ def update(
     Leaves each component's innovation in the rows from `seen` on and its variance S in the six rows after.
     """
     for component in range(STATES):
-        for i in range(STATES):
-            for lane in range(len(lanes)):
-                work[(rows.observation + i) * len(lanes) + lane] = 1.0 if i == component else 0.0
         for lane in range(len(lanes)):
             state = work[(rows.state + component) * len(lanes) + lane]
             work[rows.innovation * len(lanes) + lane] = work[(measured + component) * len(lanes) + lane] - state
             work[rows.noise * len(lanes) + lane] = model.measurement_noise[component]
             work[rows.offered * len(lanes) + lane] = work[(arrived + component) * len(lanes) + lane]
-        test_innovation(work, lanes, rows, STATES, OPEN_GATE_SIGMA)
+        test_component(work, lanes, rows, STATES, component, OPEN_GATE_SIGMA)
         for lane in range(len(lanes)):
             work[(seen + component) * len(lanes) + lane] = work[rows.innovation * len(lanes) + lane]
             variance = work[rows.innovation_variance * len(lanes) + lane]

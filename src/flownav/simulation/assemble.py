@@ -115,7 +115,11 @@ def _plan(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> Flight
         may_land_after_s=NEVER_S if linear or section.may_land_after_s is None else section.may_land_after_s,
         fly_on_truth=scenario.autopilot.feedback == "truth",
         start_known=start_of(scenario) == "known",
-        draws=Draws(gps=True, wind=scenario.wind.speed_20ft_m_s > 0.0, imu=scenario.filter.name == "kinematic"),
+        draws=Draws(
+            gps_drift=scenario.gps.model != "white",
+            wind=scenario.wind.speed_20ft_m_s > 0.0,
+            imu=scenario.filter.name == "kinematic",
+        ),
     )
 
 

@@ -58,6 +58,7 @@ IMU_READING = _rows.take(len(ImuReading._fields))
 
 # standard normals of the epoch: pairs in the order of drawing
 GPS_NORMALS = _rows.take(len(GpsInsNormals._fields))
+GPS_JITTER = GPS_NORMALS + GpsInsNormals._fields.index("jitter_n")
 FLOW_NORMALS = _rows.take(4)  # u, v, w, range
 WIND_NORMALS = _rows.take(len(WindNormals._fields) + len(WindNormals._fields) % 2)
 IMU_NORMALS = _rows.take(len(ImuNormals._fields))

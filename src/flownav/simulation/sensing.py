@@ -52,7 +52,7 @@ class SensorSuite(NamedTuple):
 class Draws(NamedTuple):
     """Which groups of normals a scenario needs (those of a silent sensor are not drawn)."""
 
-    gps: bool
+    gps_drift: bool  # everything of the GPS/INS but the position's jitter, which is always drawn
     wind: bool
     imu: bool
 
@@ -72,8 +72,10 @@ def draw_normals(work: Work, lanes: Lanes, first_row: int, end_row: int, seed: i
 @equation
 def draw_epoch(work: Work, lanes: Lanes, seed: int, flight: int, step: int, draws: Draws) -> None:
     """Every normal of one epoch; `flight` is the index of the first lane's flight."""
-    if draws.gps:
-        draw_normals(work, lanes, layout.GPS_NORMALS, layout.FLOW_NORMALS, seed, flight, step)
+    draw_normals(work, lanes, layout.GPS_JITTER, layout.GPS_JITTER + 4, seed, flight, step)
+    if draws.gps_drift:
+        draw_normals(work, lanes, layout.GPS_NORMALS, layout.GPS_JITTER, seed, flight, step)
+        draw_normals(work, lanes, layout.GPS_JITTER + 4, layout.FLOW_NORMALS, seed, flight, step)
     draw_normals(work, lanes, layout.FLOW_NORMALS, layout.WIND_NORMALS, seed, flight, step)
     if draws.wind:
         draw_normals(work, lanes, layout.WIND_NORMALS, layout.IMU_NORMALS, seed, flight, step)

@@ -1,0 +1,286 @@
+"""The response of an all-pole model to a logged input, and its exact derivatives, at the log's own times.
+
+    y(t) = x(t - T) + y0,    x^(n) + a_1 x^(n-1) + ... + a_n x = K a_n u(t)
+
+K is the gain at rest, T a pure delay. The input is linear between its samples (first-order hold) or kept until
+the next one (zero-order hold). State, sensitivities and input form one linear system without input,
+
+    z = (x, x', .., q, q', .., u, u'),   q^(n) + a_1 q^(n-1) + .. + a_n q = -x,   q(0) = 0
+
+so one step is z <- exp(M h) z, exact whatever h is. The exponential is computed once for each distinct step of
+a log (logs keep few), or summed as a series at each step of a log that has many. Readings between input samples,
+which is what a delay makes of all of them, are reached by a step of their own.
+
+Derivatives (Goodwin and Payne 1977, section 5.3): x by a_{n-j} is q^(j) less its free response, since q's
+derivatives solve the same equation driven by -x^(j); x by the initial state is the free response; y by T is
+-dy/dt. No finite difference is taken anywhere.
+
+Inside, time is scaled by the model's own rate a_n^(1/n), which makes a_n one and M well balanced.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.compile import kernel
+from flownav.measurement import Array
+
+MOST_STEPS = 64  # distinct steps that are worth a matrix each
+STEP_GRAIN_S = 1e-10  # steps nearer to each other than this are the same
+LARGEST_SERIES = 0.7  # |M h| of one series; a longer step is done in parts
+SERIES_TERMS = 15  # 0.7^15/15! = 4e-15
+
+
+class Steps(NamedTuple):
+    """Time steps: each one's length and its place among the distinct ones (`distinct` empty: too many)."""
+
+    length_s: Array
+    distinct_s: Array
+    kind: NDArray[np.int64]
+
+
+class Grid(NamedTuple):
+    """Where readings lie among input samples for one delay.
+
+    sample (m,): the input sample at or before each reading's instant; past: the step from there to it;
+    between: the steps from each input sample to the next.
+    """
+
+    sample: NDArray[np.int64]
+    past: Steps
+    between: Steps
+
+
+@kernel
+def distinct_steps(length_s: Array) -> Steps:
+    """The distinct values among step lengths, where there are at most MOST_STEPS of them."""
+    distinct = np.empty(MOST_STEPS)
+    kind = np.zeros(len(length_s), np.int64)
+    count, last = 0, 0
+    for i in range(len(length_s)):
+        if count == 0 or abs(length_s[i] - distinct[last]) > STEP_GRAIN_S:
+            last = 0
+            while last < count and abs(length_s[i] - distinct[last]) > STEP_GRAIN_S:
+                last += 1
+            if last == MOST_STEPS:
+                return Steps(length_s, distinct[:0].copy(), kind)
+            if last == count:
+                distinct[count] = length_s[i]
+                count += 1
+        kind[i] = last
+    return Steps(length_s, distinct[:count].copy(), kind)
+
+
+@kernel
+def lay_grid(t_u: Array, t_y: Array, delay_s: float, between: Steps) -> Grid:
+    """The grid of readings at t_y (m,), ordered, on input samples at t_u (n,), ordered, for a delay."""
+    sample = np.zeros(len(t_y), np.int64)
+    past = np.zeros(len(t_y))
+    at = 0
+    for row in range(len(t_y)):
+        instant = t_y[row] - delay_s
+        while at + 1 < len(t_u) and t_u[at + 1] <= instant + STEP_GRAIN_S:
+            at += 1
+        sample[row] = at
+        past[row] = instant - t_u[at]
+        if abs(past[row]) <= STEP_GRAIN_S:
+            past[row] = 0.0
+    return Grid(sample, distinct_steps(past), between)
+
+
+@kernel
+def _apply(z: Array, model: Model, a: Array, held: bool, out: Array) -> None:
+    """out = M z in scaled time; a (n,): a_1 .. a_n, scaled."""
+    q, u = order, 2 * order
+    drive_x, drive_q = z[u], -z[0]
+    for i in range(order):
+        drive_x -= a[order - 1 - i] * z[i]
+        drive_q -= a[order - 1 - i] * z[q + i]
+    for i in range(order - 1):
+        out[i] = z[i + 1]
+        out[q + i] = z[q + i + 1]
+    out[order - 1] = drive_x
+    out[q + order - 1] = drive_q
+    out[u] = 0.0 if held else z[u + 1]
+    out[u + 1] = 0.0
+
+
+@kernel
+def _apply_free(row: Array, model: Model, a: Array, out: Array) -> None:
+    """out = row A: the free response's first row, advanced from the right."""
+    for i in range(order):
+        out[i] = (row[i - 1] if i > 0 else 0.0) - a[order - 1 - i] * row[order - 1]
+
+
+@kernel
+def _advance(z: Array, h: float, model: Model, a: Array, held: bool, work: Array) -> None:
+    """z <- exp(M h) z by its series, in as many parts as keep |M h| small."""
+    size = 1.0 + np.sum(a)
+    parts = max(1, int(np.ceil(size * abs(h) / LARGEST_SERIES)))
+    term, following = work[0], work[1]
+    for _ in range(parts):
+        term[:] = z
+        for k in range(1, SERIES_TERMS):
+            _apply(term, model, a, held, following)
+            for i in range(len(z)):
+                term[i] = following[i] * (h / (parts * k))
+                z[i] += term[i]
+
+
+@kernel
+def _advance_free(row: Array, h: float, model: Model, a: Array, work: Array) -> None:
+    """row <- row exp(A h), as `_advance`."""
+    size = 1.0 + np.sum(a)
+    parts = max(1, int(np.ceil(size * abs(h) / LARGEST_SERIES)))
+    term, following = work[0], work[1]
+    for _ in range(parts):
+        for i in range(order):
+            term[i] = row[i]
+        for k in range(1, SERIES_TERMS):
+            _apply_free(term, model, a, following)
+            for i in range(order):
+                term[i] = following[i] * (h / (parts * k))
+                row[i] += term[i]
+
+
+@kernel
+def _matrices(steps: Steps, rate: float, model: Model, a: Array, held: bool, work: Array) -> Array:
+    """exp(M h) of each distinct step, (s, k, k)."""
+    width = 2 * order + 2
+    matrices = np.zeros((len(steps.distinct_s), width, width))
+    column = np.zeros(width)
+    for s in range(len(matrices)):
+        for j in range(width):
+            column[:] = 0.0
+            column[j] = 1.0
+            _advance(column, steps.distinct_s[s] * rate, model, a, held, work)
+            matrices[s, :, j] = column
+    return matrices
+
+
+@kernel
+def _step(z: Array, row: Array, steps: Steps, at: int, matrices: Array, rate: float, model: Model, a: Array, held: bool,
+          work: Array) -> None:  # fmt: skip
+    """State and free response over one step, by its matrix or its series."""
+    h = steps.length_s[at]
+    if h == 0.0:
+        return
+    if len(matrices) == 0:
+        _advance(z, h * rate, model, a, held, work)
+        _advance_free(row, h * rate, model, a, work)
+        return
+    matrix = matrices[steps.kind[at]]
+    width = 2 * order + 2
+    moved = work[0]
+    for i in range(2 * order + 1):  # the last two rows are the input's own
+        total = 0.0
+        for j in range(width):
+            total += matrix[i, j] * z[j]
+        moved[i] = total
+    for i in range(2 * order + 1):
+        z[i] = moved[i]
+    for j in range(order):
+        total = 0.0
+        for i in range(order):
+            total += row[i] * matrix[i, j]
+        moved[j] = total
+    for j in range(order):
+        row[j] = moved[j]
+
+
+@kernel
+def _feed(z: Array, t_u: Array, u: Array, at: int, order: int, rate: float, gain: float, held: bool) -> None:
+    """The input and its slope from an input sample on."""
+    z[2 * order] = gain * u[at]
+    z[2 * order + 1] = 0.0
+    if not held and at + 1 < len(u):
+        z[2 * order + 1] = gain * (u[at + 1] - u[at]) / ((t_u[at + 1] - t_u[at]) * rate)
+
+
+@kernel
+def _free_parts(model: Model, a: Array, z: Array) -> Array:
+    """(n, n): row j the initial state of q^(j), which its free response has to be taken off for."""
+    high = np.zeros(2 * order)  # q^(m) at the start
+    for m in range(order - 1):
+        value = -z[m]
+        for i in range(1, m + 1):
+            value -= a[i - 1] * high[order + m - i]
+        high[order + m] = value
+    parts = np.zeros((order, order))
+    for j in range(order):
+        parts[j] = high[j : j + order]
+    return parts
+
+
+@kernel
+def response(
+    t_u: Array, u: Array, held: bool, grid: Grid, coefficients: Array, gain: float, start: Array, jacobian: Array
+) -> Array:
+    """Model output (m,) at the readings of a grid, without its offset; its derivatives go into `jacobian`.
+
+    t_u [s], u (n,): input samples; coefficients (n,): log a_1 .. log a_n; start (n,): x, x', .. at the first
+    input sample, in the output's unit and its rates. jacobian (m, 2n + 2), columns: log a_1 .. log a_n, gain,
+    delay [s], start.
+    """
+    order = len(coefficients)
+    rate = np.exp(coefficients[order - 1] / order)
+    a, unit = np.empty(order), np.empty(order)
+    for i in range(order):
+        a[i] = np.exp(coefficients[i]) * rate ** -(i + 1.0)
+        unit[i] = rate ** -float(i)
+    width = 2 * order + 2
+    work = np.zeros((2, width))
+    between = _matrices(grid.between, rate, model, a, held, work)
+    past = _matrices(grid.past, rate, model, a, held, work)
+    z, now = np.zeros(width), np.zeros(width)
+    free, free_now = np.zeros(order), np.zeros(order)
+    free[0] = 1.0
+    for i in range(order):
+        z[i] = start[i] * unit[i]
+    first = z[:order].copy()
+    parts = _free_parts(order, a, first)
+    output = np.empty(len(grid.sample))
+    at = 0
+    _feed(z, t_u, u, at, order, rate, gain, held)
+    for row in range(len(output)):
+        while at < grid.sample[row]:
+            _step(z, free, grid.between, at, between, rate, model, a, held, work)
+            at += 1
+            _feed(z, t_u, u, at, order, rate, gain, held)
+        now[:] = z
+        free_now[:] = free
+        _step(now, free_now, grid.past, row, past, rate, model, a, held, work)
+        output[row] = now[0]
+        forced = now[0]
+        for i in range(order):
+            forced -= free_now[i] * first[i]
+            jacobian[row, order + 2 + i] = free_now[i] * unit[i]
+        for j in range(order):
+            sensitivity = now[order + j]
+            for i in range(order):
+                sensitivity -= free_now[i] * parts[j, i]
+            jacobian[row, order - 1 - j] = a[order - 1 - j] * sensitivity
+        jacobian[row, order - 1] += forced
+        jacobian[row, order] = forced / gain
+        slope = now[1] if order > 1 else now[2 * order] - a[0] * now[0]
+        jacobian[row, order + 1] = -rate * slope
+    return output
+
+
+@kernel
+def delayed(t_u: Array, u: Array, held: bool, grid: Grid, gain: float, jacobian: Array) -> Array:
+    """As `response` for a model without dynamics, y(t) = K u(t - T); jacobian (m, 2): gain, delay."""
+    output = np.empty(len(grid.sample))
+    for row in range(len(output)):
+        at = grid.sample[row]
+        slope = 0.0
+        if not held and at + 1 < len(u):
+            slope = (u[at + 1] - u[at]) / (t_u[at + 1] - t_u[at])
+        value = u[at] + slope * grid.past.length_s[row]
+        output[row] = gain * value
+        jacobian[row, 0] = value
+        jacobian[row, 1] = -gain * slope
+    return output

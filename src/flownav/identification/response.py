@@ -25,13 +25,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import kernel
+from flownav.compile import equation, kernel
 from flownav.measurement import Array
 
 MOST_STEPS = 64  # distinct steps that are worth a matrix each
 STEP_GRAIN_S = 1e-10  # steps nearer to each other than this are the same
 LARGEST_SERIES = 0.7  # |M h| of one series; a longer step is done in parts
+SMALLEST_FREE = 1e-14  # below this the start is forgotten
 SERIES_TERMS = 15  # 0.7^15/15! = 4e-15
+
+
+Order = tuple[int, ...]  # (0,) * n: an order whose length is part of its type, so that kernels are built for it
 
 
 class Steps(NamedTuple):
@@ -91,9 +95,10 @@ def lay_grid(t_u: Array, t_y: Array, delay_s: float, between: Steps) -> Grid:
     return Grid(sample, distinct_steps(past), between)
 
 
-@kernel
-def _apply(z: Array, model: Model, a: Array, held: bool, out: Array) -> None:
+@equation
+def _apply(z: Array, of: Order, a: Array, held: bool, out: Array) -> None:
     """out = M z in scaled time; a (n,): a_1 .. a_n, scaled."""
+    order = len(of)
     q, u = order, 2 * order
     drive_x, drive_q = z[u], -z[0]
     for i in range(order):
@@ -108,31 +113,34 @@ def _apply(z: Array, model: Model, a: Array, held: bool, out: Array) -> None:
     out[u + 1] = 0.0
 
 
-@kernel
-def _apply_free(row: Array, model: Model, a: Array, out: Array) -> None:
+@equation
+def _apply_free(row: Array, of: Order, a: Array, out: Array) -> None:
     """out = row A: the free response's first row, advanced from the right."""
+    order = len(of)
     for i in range(order):
         out[i] = (row[i - 1] if i > 0 else 0.0) - a[order - 1 - i] * row[order - 1]
 
 
 @kernel
-def _advance(z: Array, h: float, model: Model, a: Array, held: bool, work: Array) -> None:
+def _advance(z: Array, h: float, of: Order, a: Array, held: bool, work: Array) -> None:
     """z <- exp(M h) z by its series, in as many parts as keep |M h| small."""
     size = 1.0 + np.sum(a)
     parts = max(1, int(np.ceil(size * abs(h) / LARGEST_SERIES)))
     term, following = work[0], work[1]
     for _ in range(parts):
-        term[:] = z
+        for i in range(len(z)):
+            term[i] = z[i]
         for k in range(1, SERIES_TERMS):
-            _apply(term, model, a, held, following)
+            _apply(term, of, a, held, following)
             for i in range(len(z)):
                 term[i] = following[i] * (h / (parts * k))
                 z[i] += term[i]
 
 
 @kernel
-def _advance_free(row: Array, h: float, model: Model, a: Array, work: Array) -> None:
+def _advance_free(row: Array, h: float, of: Order, a: Array, work: Array) -> None:
     """row <- row exp(A h), as `_advance`."""
+    order = len(of)
     size = 1.0 + np.sum(a)
     parts = max(1, int(np.ceil(size * abs(h) / LARGEST_SERIES)))
     term, following = work[0], work[1]
@@ -140,58 +148,58 @@ def _advance_free(row: Array, h: float, model: Model, a: Array, work: Array) -> 
         for i in range(order):
             term[i] = row[i]
         for k in range(1, SERIES_TERMS):
-            _apply_free(term, model, a, following)
+            _apply_free(term, of, a, following)
             for i in range(order):
                 term[i] = following[i] * (h / (parts * k))
                 row[i] += term[i]
 
 
 @kernel
-def _matrices(steps: Steps, rate: float, model: Model, a: Array, held: bool, work: Array) -> Array:
+def _matrices(steps: Steps, rate: float, of: Order, a: Array, held: bool, work: Array) -> Array:
     """exp(M h) of each distinct step, (s, k, k)."""
-    width = 2 * order + 2
+    width = 2 * len(of) + 2
     matrices = np.zeros((len(steps.distinct_s), width, width))
     column = np.zeros(width)
     for s in range(len(matrices)):
         for j in range(width):
             column[:] = 0.0
             column[j] = 1.0
-            _advance(column, steps.distinct_s[s] * rate, model, a, held, work)
+            _advance(column, steps.distinct_s[s] * rate, of, a, held, work)
             matrices[s, :, j] = column
     return matrices
 
 
-@kernel
-def _step(z: Array, row: Array, steps: Steps, at: int, matrices: Array, rate: float, model: Model, a: Array, held: bool,
-          work: Array) -> None:  # fmt: skip
-    """State and free response over one step, by its matrix or its series."""
-    h = steps.length_s[at]
-    if h == 0.0:
-        return
-    if len(matrices) == 0:
-        _advance(z, h * rate, model, a, held, work)
-        _advance_free(row, h * rate, model, a, work)
-        return
-    matrix = matrices[steps.kind[at]]
-    width = 2 * order + 2
-    moved = work[0]
-    for i in range(2 * order + 1):  # the last two rows are the input's own
-        total = 0.0
-        for j in range(width):
-            total += matrix[i, j] * z[j]
+@equation
+def _move(z: Array, matrices: Array, kind: int, of: Order, moved: Array) -> None:
+    """z <- exp(M h) z by its matrix; x does not depend on q."""
+    order = len(of)
+    for i in range(order):
+        total = matrices[kind, i, 2 * order] * z[2 * order] + matrices[kind, i, 2 * order + 1] * z[2 * order + 1]
+        for j in range(order):
+            total += matrices[kind, i, j] * z[j]
         moved[i] = total
-    for i in range(2 * order + 1):
+    for i in range(order, 2 * order):
+        total = matrices[kind, i, 2 * order] * z[2 * order] + matrices[kind, i, 2 * order + 1] * z[2 * order + 1]
+        for j in range(2 * order):
+            total += matrices[kind, i, j] * z[j]
+        moved[i] = total
+    for i in range(2 * order):
         z[i] = moved[i]
-    for j in range(order):
-        total = 0.0
-        for i in range(order):
-            total += row[i] * matrix[i, j]
-        moved[j] = total
-    for j in range(order):
+    z[2 * order] += matrices[kind, 2 * order, 2 * order + 1] * z[2 * order + 1]
+
+
+@equation
+def _move_free(row: Array, matrices: Array, kind: int, of: Order, moved: Array) -> None:
+    """row <- row exp(A h) by the same matrix."""
+    for j in range(len(of)):
+        moved[j] = 0.0
+        for i in range(len(of)):
+            moved[j] += row[i] * matrices[kind, i, j]
+    for j in range(len(of)):
         row[j] = moved[j]
 
 
-@kernel
+@equation
 def _feed(z: Array, t_u: Array, u: Array, at: int, order: int, rate: float, gain: float, held: bool) -> None:
     """The input and its slope from an input sample on."""
     z[2 * order] = gain * u[at]
@@ -201,7 +209,7 @@ def _feed(z: Array, t_u: Array, u: Array, at: int, order: int, rate: float, gain
 
 
 @kernel
-def _free_parts(model: Model, a: Array, z: Array) -> Array:
+def _free_parts(order: int, a: Array, z: Array) -> Array:
     """(n, n): row j the initial state of q^(j), which its free response has to be taken off for."""
     high = np.zeros(2 * order)  # q^(m) at the start
     for m in range(order - 1):
@@ -217,7 +225,8 @@ def _free_parts(model: Model, a: Array, z: Array) -> Array:
 
 @kernel
 def response(
-    t_u: Array, u: Array, held: bool, grid: Grid, coefficients: Array, gain: float, start: Array, jacobian: Array
+    of: Order, t_u: Array, u: Array, held: bool, grid: Grid, coefficients: Array, gain: float, start: Array,
+    jacobian: Array,
 ) -> Array:
     """Model output (m,) at the readings of a grid, without its offset; its derivatives go into `jacobian`.
 
@@ -225,7 +234,7 @@ def response(
     input sample, in the output's unit and its rates. jacobian (m, 2n + 2), columns: log a_1 .. log a_n, gain,
     delay [s], start.
     """
-    order = len(coefficients)
+    order = len(of)
     rate = np.exp(coefficients[order - 1] / order)
     a, unit = np.empty(order), np.empty(order)
     for i in range(order):
@@ -233,8 +242,8 @@ def response(
         unit[i] = rate ** -float(i)
     width = 2 * order + 2
     work = np.zeros((2, width))
-    between = _matrices(grid.between, rate, model, a, held, work)
-    past = _matrices(grid.past, rate, model, a, held, work)
+    between = _matrices(grid.between, rate, of, a, held, work)
+    past = _matrices(grid.past, rate, of, a, held, work)
     z, now = np.zeros(width), np.zeros(width)
     free, free_now = np.zeros(order), np.zeros(order)
     free[0] = 1.0
@@ -242,27 +251,52 @@ def response(
         z[i] = start[i] * unit[i]
     first = z[:order].copy()
     parts = _free_parts(order, a, first)
-    output = np.empty(len(grid.sample))
-    at = 0
+    sample, between_s, between_kind = grid.sample, grid.between.length_s, grid.between.kind
+    past_s, past_kind = grid.past.length_s, grid.past.kind
+    between_tabled, past_tabled = len(between) > 0, len(past) > 0
+    moved = np.zeros(width)
+    output = np.empty(len(sample))
+    at, alive = 0, True
     _feed(z, t_u, u, at, order, rate, gain, held)
     for row in range(len(output)):
-        while at < grid.sample[row]:
-            _step(z, free, grid.between, at, between, rate, model, a, held, work)
+        while at < sample[row]:
+            h = between_s[at] * rate
+            if between_tabled:
+                _move(z, between, between_kind[at], of, moved)
+                if alive:
+                    _move_free(free, between, between_kind[at], of, moved)
+            else:
+                _advance(z, h, of, a, held, work)
+                if alive:
+                    _advance_free(free, h, of, a, work)
+            alive = alive and np.abs(free).max() > SMALLEST_FREE
             at += 1
             _feed(z, t_u, u, at, order, rate, gain, held)
-        now[:] = z
-        free_now[:] = free
-        _step(now, free_now, grid.past, row, past, rate, model, a, held, work)
+        for i in range(width):
+            now[i] = z[i]
+        for i in range(order):
+            free_now[i] = free[i] if alive else 0.0
+        if past_s[row] != 0.0:
+            h = past_s[row] * rate
+            if past_tabled:
+                _move(now, past, past_kind[row], of, moved)
+                if alive:
+                    _move_free(free_now, past, past_kind[row], of, moved)
+            else:
+                _advance(now, h, of, a, held, work)
+                if alive:
+                    _advance_free(free_now, h, of, a, work)
         output[row] = now[0]
         forced = now[0]
-        for i in range(order):
-            forced -= free_now[i] * first[i]
-            jacobian[row, order + 2 + i] = free_now[i] * unit[i]
         for j in range(order):
-            sensitivity = now[order + j]
+            jacobian[row, order - 1 - j] = a[order - 1 - j] * now[order + j]
+            jacobian[row, order + 2 + j] = 0.0
+        if alive:
             for i in range(order):
-                sensitivity -= free_now[i] * parts[j, i]
-            jacobian[row, order - 1 - j] = a[order - 1 - j] * sensitivity
+                forced -= free_now[i] * first[i]
+                jacobian[row, order + 2 + i] = free_now[i] * unit[i]
+                for j in range(order):
+                    jacobian[row, order - 1 - j] -= a[order - 1 - j] * free_now[i] * parts[j, i]
         jacobian[row, order - 1] += forced
         jacobian[row, order] = forced / gain
         slope = now[1] if order > 1 else now[2 * order] - a[0] * now[0]
@@ -284,3 +318,18 @@ def delayed(t_u: Array, u: Array, held: bool, grid: Grid, gain: float, jacobian:
         jacobian[row, 0] = value
         jacobian[row, 1] = -gain * slope
     return output
+
+
+@kernel
+def products(columns: Array) -> Array:
+    """columns' columns (k, k) of (m, k), in one pass and one thread: small matrices lose by BLAS's threads."""
+    width = columns.shape[1]
+    total = np.zeros((width, width))
+    for row in range(len(columns)):
+        for i in range(width):
+            for j in range(i + 1):
+                total[i, j] += columns[row, i] * columns[row, j]
+    for i in range(width):
+        for j in range(i):
+            total[j, i] = total[i, j]
+    return total

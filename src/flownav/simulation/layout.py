@@ -15,7 +15,7 @@ from flownav.sensors.gps_ins import GpsInsErrors, GpsInsNormals, NavSolution
 from flownav.sensors.imu import ImuNormals, ImuReading, ImuState
 from flownav.sensors.rangefinder import RangefinderState
 from flownav.simulation.wind import WindNormals, WindState, WindVelocity
-from flownav.vehicle.state import Controls, HelicopterState
+from flownav.vehicle.state import Controls, HelicopterState, Inflow
 
 
 class _Rows:
@@ -37,6 +37,7 @@ _rows = _Rows()
 HELICOPTER = _rows.take(len(HelicopterState._fields))
 STAGE = _rows.take(len(HelicopterState._fields))  # the state of a Runge-Kutta stage
 SUM = _rows.take(len(HelicopterState._fields))  # the weighted sum of stage rates
+INFLOW = _rows.take(len(Inflow._fields))
 CONTROLS = _rows.take(len(Controls._fields))
 WIND = _rows.take(len(WindState._fields))
 AIR = _rows.take(len(WindVelocity._fields))
@@ -87,6 +88,7 @@ ROWS = _rows.next
 load_helicopter, store_helicopter = lane_access(HelicopterState, HELICOPTER)
 load_stage, store_stage = lane_access(HelicopterState, STAGE)
 load_sum, store_sum = lane_access(HelicopterState, SUM)
+load_inflow, store_inflow = lane_access(Inflow, INFLOW)
 load_controls, store_controls = lane_access(Controls, CONTROLS)
 load_wind, store_wind = lane_access(WindState, WIND)
 load_air, store_air = lane_access(WindVelocity, AIR)

@@ -14,15 +14,27 @@ from flownav.simulation.layout import (
     load_air,
     load_controls,
     load_helicopter,
+    load_inflow,
     load_stage,
     load_sum,
     store_helicopter,
+    store_inflow,
     store_stage,
     store_sum,
 )
-from flownav.vehicle.helicopter import derivative, outputs
+from flownav.vehicle.airframe import AirMotion, tail_sideslip
+from flownav.vehicle.helicopter import (
+    air_motion,
+    attitude,
+    blade_angles,
+    derivative_at_inflow,
+    inflow,
+    outputs,
+    tail_inplane_sq,
+)
 from flownav.vehicle.parameters import VehicleParameters
-from flownav.vehicle.state import add_scaled, normalised
+from flownav.vehicle.rotor import main_rotor, refine_induced_velocity, tail_rotor, thrustless_inflow
+from flownav.vehicle.state import Controls, HelicopterState, Inflow, add_scaled, normalised
 
 
 class LinearTruth(NamedTuple):
@@ -39,28 +51,70 @@ class LinearTruth(NamedTuple):
 
 @equation
 def runge_kutta_step(work: Work, lanes: Lanes, vehicle: VehicleParameters, dt: float) -> None:
-    """One classical fourth-order step of every lane's helicopter; controls and wind held over the step."""
+    """One classical fourth-order step of every lane's helicopter; controls and wind held over the step.
+
+    The inflow is solved in full at the first stage; the other stages, half a step away, refine it with one
+    Halley step each, which leaves less than 1e-9 of it (tests/test_plant.py holds this against `helicopter.step`).
+    """
     for lane in range(len(lanes)):
         state = load_helicopter(work, lanes, lane)
-        store_stage(work, lanes, lane, state)
         store_sum(work, lanes, lane, state)
-    for stage in range(4):
-        weight = dt / 6.0 if stage == 0 or stage == 3 else dt / 3.0
-        reach = 0.5 * dt if stage < 2 else dt
+        air = moving_air(work, lanes, lane, state)
+        induced = inflow(air, blade_angles(state, vehicle), vehicle)
+        store_inflow(work, lanes, lane, induced)
+        add_stage(work, lanes, lane, state, air, induced, dt / 6.0, 0.5 * dt, vehicle)
+    for stage in range(3):
+        weight = dt / 3.0 if stage < 2 else dt / 6.0
+        reach = 0.5 * dt if stage < 1 else dt
         for lane in range(len(lanes)):
-            wind = load_air(work, lanes, lane)
-            rate = derivative(
-                load_stage(work, lanes, lane),
-                load_controls(work, lanes, lane),
-                wind.wind_n_m_s,
-                wind.wind_e_m_s,
-                wind.wind_d_m_s,
-                vehicle,
-            )
-            store_sum(work, lanes, lane, add_scaled(load_sum(work, lanes, lane), rate, weight))
-            store_stage(work, lanes, lane, add_scaled(load_helicopter(work, lanes, lane), rate, reach))
+            state = load_stage(work, lanes, lane)
+            air = moving_air(work, lanes, lane, state)
+            guess = load_inflow(work, lanes, lane)
+            induced = refined_inflow(guess, air, blade_angles(state, vehicle), vehicle)
+            store_inflow(work, lanes, lane, induced)
+            add_stage(work, lanes, lane, state, air, induced, weight, reach, vehicle)
     for lane in range(len(lanes)):
         store_helicopter(work, lanes, lane, normalised(load_sum(work, lanes, lane)))
+
+
+@equation
+def moving_air(work: Work, lanes: Lanes, lane: int, state: HelicopterState) -> AirMotion:
+    """Motion of a state through this lane's air."""
+    wind = load_air(work, lanes, lane)
+    return air_motion(state, attitude(state), wind.wind_n_m_s, wind.wind_e_m_s, wind.wind_d_m_s)
+
+
+@equation
+def add_stage(
+    work: Work,
+    lanes: Lanes,
+    lane: int,
+    state: HelicopterState,
+    air: AirMotion,
+    induced: Inflow,
+    weight: float,
+    reach: float,
+    vehicle: VehicleParameters,
+) -> None:
+    """A stage's rate into the weighted sum, and the next stage's state `reach` from the step's start."""
+    controls = load_controls(work, lanes, lane)
+    rate = derivative_at_inflow(state, controls, air, attitude(state), induced, vehicle)
+    store_sum(work, lanes, lane, add_scaled(load_sum(work, lanes, lane), rate, weight))
+    store_stage(work, lanes, lane, add_scaled(load_helicopter(work, lanes, lane), rate, reach))
+
+
+@equation
+def refined_inflow(guess: Inflow, air: AirMotion, blades: Controls, vehicle: VehicleParameters) -> Inflow:
+    """Both rotors' induced velocities, one Halley step on from those of a neighbouring state."""
+    main, tail = main_rotor(vehicle), tail_rotor(vehicle)
+    main_inplane, tail_inplane = air.u * air.u + air.v * air.v, tail_inplane_sq(air, vehicle)
+    sideslip = tail_sideslip(air, vehicle)
+    main_free = thrustless_inflow(blades.col, main_inplane, air.w, main)
+    tail_free = thrustless_inflow(blades.ped, tail_inplane, sideslip, tail)
+    return Inflow(
+        refine_induced_velocity(guess.main, main_free, main_inplane, air.w, main),
+        refine_induced_velocity(guess.tail, tail_free, tail_inplane, sideslip, tail),
+    )
 
 
 @equation

@@ -1,0 +1,302 @@
+"""Output-error identification: least squares on the simulated output, one or several runs jointly.
+
+Gauss-Newton with Levenberg's damping on exact derivatives (`response.py`). What the runs share are the log
+coefficients, the gain and the delay; each run has its own start and offset, which are eliminated run by run
+(Schur complement), so the work grows linearly with the runs. Many starts are tried on block means of the log
+and the best is finished on the log itself.
+
+For white residuals this is the maximum-likelihood estimate, and its covariance sigma^2 (J'J)^-1 the Cramer-Rao
+bound. Residuals that are not white get the sandwich with their own autocovariance in place of J'J.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.errors import InputError
+from flownav.identification import starting_points
+from flownav.identification.experiment import Experiment
+from flownav.identification.response import delayed, lay_grid, products, response
+from flownav.identification.statistics import (
+    Whiteness,
+    coloured_information,
+    fit_percent,
+    information_criteria,
+    whiteness,
+)
+from flownav.measurement import Array
+
+HIGHEST_ORDER = 6
+DELAY_RANGE_S = (-0.1, 0.6)
+THIN_READINGS = 1200  # of one run, where starts are tried
+MOST_ITERATIONS = 60
+CONVERGED = 1e-4  # predicted fall of the cost, in residual variances
+MOST_DAMPING = 1e8
+SMALLEST_EIGENVALUE = 1e-14
+
+
+class Structure(NamedTuple):
+    """Which model: order 0 is gain and delay alone; `delay` adds a pure delay to dynamics."""
+
+    order: int
+    delay: bool = False
+    held: bool = False  # input by zero-order hold instead of straight lines between its samples
+
+    @property
+    def has_delay(self) -> bool:
+        """Whether the delay is a parameter: always without dynamics."""
+        return self.delay or self.order == 0
+
+    @property
+    def parameters(self) -> int:
+        """Coefficients, gain and delay."""
+        return self.order + 1 + (1 if self.has_delay else 0)
+
+    @property
+    def label(self) -> str:
+        """As the command line names it."""
+        return "delay" if self.order == 0 else f"{self.order}{'+delay' if self.delay else ''}"
+
+
+class Point(NamedTuple):
+    """Shared parameters. log_a (n,): log a_1 .. log a_n; delay_s is 0 where it is not a parameter."""
+
+    log_a: Array
+    gain: float
+    delay_s: float
+
+    def moved(self, step: Array, structure: Structure) -> Point:
+        """The point after a step in (log a, gain, delay)."""
+        n = structure.order
+        delay = min(max(self.delay_s + float(step[n + 1]), DELAY_RANGE_S[0]), DELAY_RANGE_S[1]) if (
+            structure.has_delay
+        ) else 0.0
+        return Point(self.log_a + np.clip(step[:n], -1.5, 1.5), self.gain + float(step[n]), delay)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A fitted model.
+
+    covariance (p, p) of (log a_1 .. log a_n, gain, delay if it is a parameter), p = structure.parameters, and
+    white_covariance the same if the residuals were white (the Cramer-Rao bound at the estimate); sigma the
+    residuals' standard deviation; fits one per run, fit_percent over all runs; residuals and predictions by run.
+    """
+
+    structure: Structure
+    point: Point
+    covariance: Array
+    white_covariance: Array
+    sigma: float
+    fit_percent: float
+    fits: tuple[float, ...]
+    aic: float
+    bic: float
+    whiteness: Whiteness
+    readings: int
+    converged: bool
+    residuals: tuple[Array, ...]
+    predictions: tuple[Array, ...]
+
+
+def fit(experiments: Sequence[Experiment], structure: Structure, starts: Sequence[Point] | None = None) -> Fit:
+    """The least-squares model of one or several runs.
+
+    starts: where to begin; from the runs' own gain and delay where None. InputError where a run is too short for
+    the delays considered, or no start leads to a stable model.
+    """
+    if not experiments:
+        raise InputError("no experiment to identify from; give a log")
+    if not 0 <= structure.order <= HIGHEST_ORDER:
+        raise InputError(f"order {structure.order}: 0 (gain and delay) to {HIGHEST_ORDER} are possible")
+    runs = [run.within(DELAY_RANGE_S) for run in experiments]
+    thin = [run.thinned(THIN_READINGS) if len(run.t_y) >= 2 * THIN_READINGS else run for run in runs]
+    if starts is None:
+        starts = starting_points.points(thin, structure, DELAY_RANGE_S)
+    tried = [_descend(thin, structure, start) for start in starts]
+    best = min(tried, key=lambda state: state.cost)
+    thinned = any(short is not run for short, run in zip(thin, runs, strict=True))
+    state = _descend(runs, structure, best.point) if thinned else best
+    if not np.isfinite(state.cost):
+        raise InputError(f"{runs[0].name}: no stable model of order {structure.label} fits; try a lower order")
+    return _finish(runs, structure, state)
+
+
+class _State(NamedTuple):
+    point: Point
+    nuisance: list[Array]  # by run: start and offset
+    cost: float
+    converged: bool
+
+
+class _Linearised(NamedTuple):
+    columns: Array  # (m, p + n + 2): derivatives by the shared parameters, by start and offset; the residual
+    products: Array  # columns' columns
+    prediction: Array
+
+
+def _linearise(run: Experiment, structure: Structure, point: Point, nuisance: Array) -> _Linearised:
+    n = structure.order
+    grid = lay_grid(run.t_u, run.t_y, point.delay_s, run.between)
+    columns = np.empty((len(run.t_y), 2 * n + 4))
+    columns[:, 2 * n + 2] = 1.0
+    if n:
+        prediction = response(
+            (0,) * n, run.t_u, run.u, structure.held, grid, point.log_a, point.gain, nuisance[:n], columns
+        )
+    else:
+        prediction = delayed(run.t_u, run.u, structure.held, grid, point.gain, columns)
+    prediction += nuisance[n]
+    columns[:, -1] = run.y - prediction
+    if not structure.has_delay:
+        columns = np.delete(columns, n + 1, axis=1)
+    return _Linearised(columns, products(columns), prediction)
+
+
+def _linearise_all(
+    runs: Sequence[Experiment], structure: Structure, point: Point, nuisance: list[Array]
+) -> list[_Linearised]:
+    return [_linearise(run, structure, point, own) for run, own in zip(runs, nuisance, strict=True)]
+
+
+def _cost(parts: Sequence[_Linearised]) -> float:
+    cost = sum(float(part.products[-1, -1]) for part in parts)
+    return cost if all(np.isfinite(part.products).all() for part in parts) else np.inf
+
+
+class _Normal(NamedTuple):
+    """The normal equations with each run's own unknowns eliminated."""
+
+    matrix: Array
+    gradient: Array
+    inverse: list[Array]  # of each run's own block
+    coupling: list[Array]
+    own_gradient: list[Array]
+
+
+def _normal(parts: Sequence[_Linearised], count: int) -> _Normal:
+    """`count` parameters are shared."""
+    matrix, gradient = np.zeros((count, count)), np.zeros(count)
+    inverse, coupling, own_gradient = [], [], []
+    own = slice(count, -1)
+    for part in parts:
+        block, across, own_part = part.products[own, own], part.products[:count, own], part.products[own, -1]
+        inner = _inverse(block)
+        matrix += part.products[:count, :count] - across @ inner @ across.T
+        gradient += part.products[:count, -1] - across @ inner @ own_part
+        inverse.append(inner)
+        coupling.append(across)
+        own_gradient.append(own_part)
+    return _Normal(0.5 * (matrix + matrix.T), gradient, inverse, coupling, own_gradient)
+
+
+def _solve(matrix: Array, gradient: Array, damping: float) -> Array:
+    """The damped step in columns scaled to one."""
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
+    values = np.maximum(values, SMALLEST_EIGENVALUE * max(values[-1], 1e-300)) + damping
+    return np.asarray(vectors @ ((vectors.T @ (gradient / scale)) / values) / scale)
+
+
+def _own_steps(normal: _Normal, step: Array) -> list[Array]:
+    return [
+        inner @ (gradient - across.T @ step)
+        for inner, across, gradient in zip(normal.inverse, normal.coupling, normal.own_gradient, strict=True)
+    ]
+
+
+def _predicted_fall(normal: _Normal, step: Array) -> float:
+    """By how much the linearised cost falls over a full step."""
+    own = zip(_own_steps(normal, step), normal.own_gradient, strict=True)
+    return float(step @ normal.gradient) + sum(float(change @ gradient) for change, gradient in own)
+
+
+def _descend(runs: Sequence[Experiment], structure: Structure, start: Point) -> _State:
+    """Levenberg-Marquardt from one start."""
+    readings = sum(len(run.t_y) for run in runs)
+    nuisance = [np.zeros(structure.order + 1) for _ in runs]
+    point, damping = start, 1e-3
+    parts = _linearise_all(runs, structure, point, nuisance)
+    cost = _cost(parts)
+    if not np.isfinite(cost):
+        return _State(point, nuisance, np.inf, False)
+    for _ in range(MOST_ITERATIONS):
+        normal = _normal(parts, structure.parameters)
+        full = _solve(normal.matrix, normal.gradient, 0.0)
+        if _predicted_fall(normal, full) <= CONVERGED * cost / readings:
+            return _State(point, nuisance, cost, True)
+        while damping < MOST_DAMPING:
+            step = _solve(normal.matrix, normal.gradient, damping)
+            following = point.moved(step, structure)
+            moved = [own + change for own, change in zip(nuisance, _own_steps(normal, step), strict=True)]
+            trial = _linearise_all(runs, structure, following, moved)
+            if _cost(trial) < cost:
+                break
+            damping *= 10.0
+        else:
+            break
+        point, nuisance, parts, cost = following, moved, trial, _cost(trial)
+        damping = max(0.1 * damping, 1e-12)
+    return _State(point, nuisance, cost, False)
+
+
+def _finish(runs: Sequence[Experiment], structure: Structure, state: _State) -> Fit:
+    parts = _linearise_all(runs, structure, state.point, state.nuisance)
+    normal = _normal(parts, structure.parameters)
+    residuals = [part.columns[:, -1].copy() for part in parts]
+    readings = sum(map(len, residuals))
+    free = structure.parameters + len(runs) * (structure.order + 1)
+    variance = state.cost / max(1, readings - free)
+    inverse = _inverse(normal.matrix)
+    tested = whiteness(residuals)
+    covariance = white = variance * inverse
+    if not tested.white:
+        meat = np.zeros_like(inverse)
+        for part, inner, across in zip(parts, normal.inverse, normal.coupling, strict=True):
+            shared, own, residual = np.split(part.columns, [structure.parameters, -1], axis=1)
+            projected = shared - own @ (inner @ across.T)
+            meat += coloured_information(projected, residual[:, 0]) * float(residual.var())
+        sandwich = inverse @ meat @ inverse
+        keep = np.sqrt(np.maximum(1.0, np.diag(white) / np.maximum(np.diag(sandwich), 1e-300)))
+        covariance = sandwich * np.outer(keep, keep)
+    pairs = list(zip(runs, parts, strict=True))
+    fits = tuple(fit_percent(run.y, part.prediction) for run, part in pairs)
+    spread = sum(float(np.sum((run.y - run.y.mean()) ** 2)) for run in runs)
+    aic, bic = information_criteria(state.cost, readings, free, readings / tested.readings_per_independent)
+    return Fit(
+        structure,
+        state.point,
+        covariance,
+        white,
+        float(np.sqrt(variance)),
+        100.0 * (1.0 - float(np.sqrt(state.cost / spread))),
+        fits,
+        aic,
+        bic,
+        tested,
+        readings,
+        state.converged,
+        tuple(residuals),
+        tuple(part.prediction for part in parts),
+    )
+
+
+def _inverse(matrix: Array) -> Array:
+    """The inverse of an information matrix; what it does not hold is very uncertain, not an error."""
+    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
+    values = np.maximum(values, SMALLEST_EIGENVALUE * max(values[-1], 1e-300))
+    return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))
+
+
+def simulate(run: Experiment, structure: Structure, point: Point) -> Array:
+    """Model output at a run's readings, with the start and offset that suit this run best (as `compare` does)."""
+    own = np.zeros(structure.order + 1)
+    part = _linearise(run, structure, point, own)
+    normal = _normal([part], structure.parameters)
+    own = normal.inverse[0] @ normal.own_gradient[0]
+    return np.asarray(part.prediction + part.columns[:, structure.parameters : -1] @ own)

@@ -1,0 +1,60 @@
+"""Where the fits start: gain and delay from the runs themselves, dynamics of several shapes with that delay."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flownav.identification.experiment import Experiment
+from flownav.measurement import Array
+
+if TYPE_CHECKING:
+    from flownav.identification.output_error import Point, Structure
+
+DELAY_STEPS = 71
+SHORTEST_LAG_S = 2e-3
+
+
+def points(runs: Sequence[Experiment], structure: Structure, delay_range_s: tuple[float, float]) -> list[Point]:
+    """Starts for a structure: the best delays on a grid alone, or split between dynamics and a pure delay."""
+    from flownav.identification.output_error import Point
+
+    gain, delay_s = gain_and_delay(runs, delay_range_s)
+    if structure.order == 0:
+        return [Point(np.zeros(0), gain, delay_s)]
+    lag_s = max(delay_s, SHORTEST_LAG_S)
+    if not structure.delay:
+        lags = [(shape, lag_s * factor, 0.0) for shape in (critical, butterworth) for factor in (1.0, 0.4)]
+    else:
+        lags = [(shape, max(lag_s * share, SHORTEST_LAG_S), lag_s * (1.0 - share))
+                for shape in (critical, butterworth) for share in (0.8, 0.3)]  # fmt: skip
+    return [Point(np.log(shape(structure.order, lag)), gain, rest) for shape, lag, rest in lags]
+
+
+def gain_and_delay(runs: Sequence[Experiment], delay_range_s: tuple[float, float]) -> tuple[float, float]:
+    """The gain and the delay on a grid that explain most, by regression of each run on its shifted input."""
+    best = (0.0, 1.0, 0.0)
+    for delay_s in np.linspace(*delay_range_s, DELAY_STEPS):
+        across, along = 0.0, 1e-300
+        for run in runs:
+            shifted = np.interp(run.t_y - delay_s, run.t_u, run.u)
+            shifted -= shifted.mean()
+            across += float(shifted @ run.y)
+            along += float(shifted @ shifted)
+        best = max(best, (across * across / along, across / along, float(delay_s)))
+    return best[1] or 1e-3, best[2]
+
+
+def critical(order: int, lag_s: float) -> Array:
+    """a_1 .. a_n of (s + n/lag)^n: equal real poles."""
+    return np.asarray(np.poly(np.full(order, -order / lag_s))[1:])
+
+
+def butterworth(order: int, lag_s: float) -> Array:
+    """a_1 .. a_n of the Butterworth polynomial whose slow delay a_{n-1}/a_n is the lag."""
+    angles = np.pi * (2.0 * np.arange(1, order + 1) + order - 1.0) / (2.0 * order)
+    unit = np.poly(np.exp(1j * angles)).real
+    rate = unit[-2] / lag_s
+    return np.asarray(unit[1:] * rate ** np.arange(1.0, order + 1.0))

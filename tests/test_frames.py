@@ -8,11 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flownav import frames
-from flownav.compile import plain
 
-to_quaternion, to_euler = plain(frames.quaternion_from_euler), plain(frames.euler_from_quaternion)
-to_rotation, quaternion_rate = plain(frames.rotation_from_quaternion), plain(frames.quaternion_rate)
-to_earth, to_body = plain(frames.to_earth), plain(frames.to_body)
+to_quaternion, to_euler = frames.quaternion_from_euler, frames.euler_from_quaternion
+to_rotation, quaternion_rate = frames.rotation_from_quaternion, frames.quaternion_rate
+to_earth, to_body = frames.to_earth, frames.to_body
 
 angle = st.floats(-3.1, 3.1)
 pitch = st.floats(-1.5, 1.5)

@@ -75,7 +75,7 @@ def text(**replacements: str) -> str:
     ("old", "new", "message"),
     [
         ("value = 191.9", "value = -191.9", "dynamics.c_1_s2: Input should be greater than 0, got -191.9"),
-        ("b_1_s =", "b_rad_s =", "dynamics.b_1_s: missing; add it (and 1 more)"),
+        ("b_1_s =", "b_rad_s =", "dynamics.b_rad_s: unknown key; known here: a_1_s2, b_1_s, c_1_s2 (and 1 more)"),
         ("schema_version = 1", "schema_version = 2", "schema_version: Input should be 1, got 2"),
         ('law = "power"', 'law = "cubic"', "noise.law: Input should be 'constant', 'power' or 'accuracy', got 'cubic'"),
         ("value = 3.5", "value = 0.01", "limits.max_height_m: at least min_height_m = 0.05 is needed, got 0.01"),

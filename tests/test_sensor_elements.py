@@ -13,7 +13,6 @@ import scipy.signal
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.compile import plain
 from flownav.parameter_files import shipped
 from flownav.sensors.gauss_markov import gauss_markov, gauss_markov_coefficients
 from flownav.sensors.quantisation import quantised, steps_per_unit
@@ -36,7 +35,7 @@ def test_variance_and_autocorrelation_of_many_processes_follow_the_exponential()
     count, sigma, tau, period, lag = 40_000, 1.7, 0.3, 0.02, 15
     decay, drive = gauss_markov_coefficients(tau, period)
     draw = np.random.default_rng(1)
-    step = plain(gauss_markov)
+    step = gauss_markov
     first = value = sigma * draw.standard_normal(count)
     for _ in range(lag):
         value = step(value, decay, drive * sigma, draw.standard_normal(count))
@@ -63,7 +62,7 @@ def test_step_response_of_every_identified_model_is_exact(a: float, b: float, c:
     period, steps = 0.004, 250
     hold = second_order_hold(b, c, period)
     _, continuous = control.step_response(control.tf([a], [1.0, b, c]), np.arange(steps) * period)
-    advance = plain(hold_step)
+    advance = hold_step
     x1 = x2 = 0.0
     for k in range(steps):
         assert a * x1 == pytest.approx(continuous[k], abs=1e-12)
@@ -107,10 +106,10 @@ def test_the_selected_model_has_the_published_gain_delay_and_peak() -> None:
 # -- quantisation ----------------------------------------------------------------------------------------
 @given(value=st.floats(-1e4, 1e4), quantum=st.sampled_from([0.001, 0.01, 0.25]))
 def test_a_quantised_value_is_the_nearest_whole_step(value: float, quantum: float) -> None:
-    got = plain(quantised)(value, quantum, steps_per_unit(quantum))
+    got = quantised(value, quantum, steps_per_unit(quantum))
     assert abs(got - value) <= 0.5 * quantum * (1.0 + 1e-9)
     assert got / quantum == pytest.approx(round(got / quantum), abs=1e-6)
 
 
 def test_no_quantum_leaves_every_bit() -> None:
-    assert plain(quantised)(1.0 / 3.0, 0.0, steps_per_unit(0.0)) == 1.0 / 3.0
+    assert quantised(1.0 / 3.0, 0.0, steps_per_unit(0.0)) == 1.0 / 3.0

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.compile import plain
 from flownav.sensors.angular_flow import angular_flow, metric_flow
 from flownav.sensors.datasheet import FlowSettings, load_sensor
 from flownav.sensors.flow import (
@@ -26,8 +25,8 @@ from flownav.sensors.noise_law import WORST_FIT, accuracy_law, fit_noise_law, po
 
 SENSOR = load_sensor()
 G = 9.81
-start, step, read = plain(start_flow), plain(step_flow), plain(read_flow)
-sigma_at, overscale = plain(flow_noise_sigma), plain(sonar_overscale)
+start, step, read = start_flow, step_flow, read_flow
+sigma_at, overscale = flow_noise_sigma, sonar_overscale
 
 
 def parameters(**settings: object) -> FlowParameters:
@@ -215,11 +214,11 @@ velocity, rate, distance = st.floats(-5.0, 5.0), st.floats(-3.0, 3.0), st.floats
 
 @given(u=velocity, v=velocity, p=rate, q=rate, r=distance)
 def test_metric_and_angular_flow_are_each_others_inverse(u: float, v: float, p: float, q: float, r: float) -> None:
-    flow = plain(angular_flow)(u, v, p, q, r)
-    np.testing.assert_allclose(plain(metric_flow)(*flow, p, q, r), (u, v), atol=1e-12)
+    flow = angular_flow(u, v, p, q, r)
+    np.testing.assert_allclose(metric_flow(*flow, p, q, r), (u, v), atol=1e-12)
 
 
 def test_angular_flow_has_px4s_signs() -> None:
-    assert plain(angular_flow)(1.0, 0.0, 0.0, 0.0, 2.0) == (0.0, 0.5)  # forward: positive about y
-    assert plain(angular_flow)(0.0, 1.0, 0.0, 0.0, 2.0) == (-0.5, 0.0)  # right: negative about x
-    assert plain(angular_flow)(0.0, 0.0, 0.3, -0.2, 2.0) == (0.3, -0.2)  # turning: the body rates themselves
+    assert angular_flow(1.0, 0.0, 0.0, 0.0, 2.0) == (0.0, 0.5)  # forward: positive about y
+    assert angular_flow(0.0, 1.0, 0.0, 0.0, 2.0) == (-0.5, 0.0)  # right: negative about x
+    assert angular_flow(0.0, 0.0, 0.3, -0.2, 2.0) == (0.3, -0.2)  # turning: the body rates themselves

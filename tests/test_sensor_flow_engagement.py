@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from flownav.compile import plain
 from flownav.frames import quaternion_from_euler, rotation_from_quaternion
 from flownav.sensors.datasheet import FlowSettings, load_sensor
 from flownav.sensors.flow import engage_flow, engagement, pattern_reach, start_flow
@@ -20,14 +19,14 @@ P = FlowSettings().parameters(SENSOR)
 LIMITS = SENSOR.limits
 T = SENSOR.optics.half_fov_tangent
 LEVEL = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-reach, engaged, engage = plain(pattern_reach), plain(engagement), plain(engage_flow)
+reach, engaged, engage = pattern_reach, engagement, engage_flow
 
 position, height = st.floats(-1.0, 1.0), st.floats(0.1, 3.4)
 tilt, heading = st.floats(-0.4, 0.4), st.floats(-math.pi, math.pi)
 
 
 def attitude(roll: float, pitch: float, yaw: float) -> tuple[float, ...]:
-    return plain(rotation_from_quaternion)(*plain(quaternion_from_euler)(roll, pitch, yaw))
+    return rotation_from_quaternion(*quaternion_from_euler(roll, pitch, yaw))
 
 
 def test_the_image_is_5_5_degrees_wide_and_covers_29_cm_at_3_m() -> None:
@@ -121,7 +120,7 @@ def test_a_larger_pad_and_having_been_engaged_never_hurt(
 
 
 def test_a_descent_engages_once_and_keeps_the_lag_untouched() -> None:
-    state = plain(start_flow)(0.1, 0.2, 0.3, 9.81, P)
+    state = start_flow(0.1, 0.2, 0.3, 9.81, P)
     history = []
     for lens_height_m in np.arange(6.0, 0.2, -0.01):
         after = engage(state, 0.1, 0.0, float(lens_height_m), LEVEL, 0.0, 0.0, 0.5, P)

@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from flownav.compile import plain
 from flownav.errors import InputError
 from flownav.frames import euler_from_quaternion, quaternion_from_euler
 from flownav.parameter_files import check
@@ -26,7 +25,7 @@ from flownav.sensors.settings import SIGMA_PER_CEP, GpsInsSettings
 
 FLIGHTS = 20_000
 AT_PAD = NavSolution(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-start, step = plain(start_gps_ins), plain(step_gps_ins)
+start, step = start_gps_ins, step_gps_ins
 
 
 def normals(draw: np.random.Generator, flights: int = FLIGHTS) -> GpsInsNormals:
@@ -82,7 +81,7 @@ def test_midg_position_error_is_smooth_while_white_error_is_not() -> None:
 
 def test_white_errors_are_independent_between_readings_and_spare_velocity_and_attitude() -> None:
     p, draw = GpsInsSettings(model="white", white_sigma_m=0.3).parameters(), np.random.default_rng(4)
-    truth = NavSolution(1.0, -2.0, -3.0, 0.1, 0.2, -0.3, *plain(quaternion_from_euler)(0.1, -0.05, 2.0))
+    truth = NavSolution(1.0, -2.0, -3.0, 0.1, 0.2, -0.3, *quaternion_from_euler(0.1, -0.05, 2.0))
     state = start(truth, normals(draw), p)
     state, first = step(state, truth, normals(draw), p)
     state, second = step(state, truth, normals(draw), p)
@@ -157,8 +156,8 @@ def test_midg_messages_come_in_whole_centimetres() -> None:
 def test_attitude_errors_are_small_rotations_about_body_x_y_and_earth_down(
     roll: float, pitch: float, yaw: float, errors: tuple[float, float, float]
 ) -> None:
-    true = plain(quaternion_from_euler)(roll, pitch, yaw)
-    got = plain(attitude_with_error)(true, *errors)
+    true = quaternion_from_euler(roll, pitch, yaw)
+    got = attitude_with_error(true, *errors)
 
     def rotation(w: float, x: float, y: float, z: float) -> Rotation:
         return Rotation.from_quat([x, y, z, w])
@@ -168,7 +167,7 @@ def test_attitude_errors_are_small_rotations_about_body_x_y_and_earth_down(
     )
     assert (expected.inv() * rotation(*got)).magnitude() < 1e-5
     if roll == pitch == 0.0:  # level: the errors are those of the Euler angles
-        euler = plain(euler_from_quaternion)(*got)
+        euler = euler_from_quaternion(*got)
         np.testing.assert_allclose(euler, (errors[0], errors[1], yaw + errors[2]), atol=5e-4)
 
 

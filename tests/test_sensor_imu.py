@@ -7,11 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from flownav.compile import plain
 from flownav.sensors.imu import PERIOD_S, ImuNormals, ImuReading, start_imu, step_imu
 from flownav.sensors.settings import STANDARD_GRAVITY_M_S2, ImuSettings
 
-start, step = plain(start_imu), plain(step_imu)
+start, step = start_imu, step_imu
 SILENT = ImuNormals(*(0.0,) * len(ImuNormals._fields))
 HOVER = ImuReading(0.0, 0.0, 0.0, 0.0, 0.0, -STANDARD_GRAVITY_M_S2)
 

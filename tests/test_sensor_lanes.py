@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flownav.compile import LANES, ONE_LANE, equation, kernel, lane_access, plain
+from flownav.compile import LANES, ONE_LANE, equation, kernel, lane_access
 from flownav.frames import rotation_from_quaternion
 from flownav.sensors.datasheet import FlowSettings, load_sensor
 from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, engage_flow, read_flow, start_flow, step_flow
@@ -175,8 +175,8 @@ def fill(work: NDArray[np.float64], width: int, first: int, epoch: int) -> None:
             work[r * width + lane] = drawn[r]
         solution, forces = truth(first + lane, epoch)
         lanes = (0,) * width
-        plain(store_truth)(work, lanes, lane, solution)
-        plain(store_forces)(work, lanes, lane, forces)
+        store_truth(work, lanes, lane, solution)
+        store_forces(work, lanes, lane, forces)
 
 
 def fly(lanes: tuple[int, ...], first: int, suite: Suite, compiled: bool = True) -> NDArray[np.float64]:
@@ -187,14 +187,14 @@ def fly(lanes: tuple[int, ...], first: int, suite: Suite, compiled: bool = True)
     if compiled:
         start_all(work, lanes, suite)
     else:
-        plain(start_lane)(work, lanes, 0, suite)
+        start_lane(work, lanes, 0, suite)
     out = []
     for epoch in range(EPOCHS):
         fill(work, width, first, epoch)
         if compiled:
             step_all(work, lanes, suite)
         else:
-            plain(step_lane)(work, lanes, 0, suite)
+            step_lane(work, lanes, 0, suite)
         out.append(work.reshape(ROWS, width)[READING_ROWS].copy())
     return np.array(out)
 

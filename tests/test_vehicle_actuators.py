@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from flownav.compile import plain
 from flownav.vehicle import actuators
 from flownav.vehicle.actuators import Servo
 
-acceleration = plain(actuators.acceleration)
+acceleration = actuators.acceleration
 SERVO = Servo(50.0, 0.7, 1.2, -0.14, 0.14)
 
 
@@ -50,6 +49,6 @@ def test_a_command_beyond_the_travel_ends_at_the_stop():
 
 
 def test_the_blade_never_passes_the_stop():
-    assert plain(actuators.blade_angle)(0.15, SERVO) == 0.14
-    assert plain(actuators.blade_angle)(-0.15, SERVO) == -0.14
-    assert plain(actuators.blade_angle)(0.05, SERVO) == 0.05
+    assert actuators.blade_angle(0.15, SERVO) == 0.14
+    assert actuators.blade_angle(-0.15, SERVO) == -0.14
+    assert actuators.blade_angle(0.05, SERVO) == 0.05

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.compile import plain
 from flownav.vehicle import airframe
 from flownav.vehicle.airframe import AirMotion, Wrench
 from flownav.vehicle.parameters import load_vehicle
@@ -17,7 +16,7 @@ ARM, ABOVE = VEHICLE.tail_behind_cg_m, VEHICLE.tail_above_cg_m
 
 
 def test_fuselage_drag_opposes_the_motion_through_air_and_wake():
-    force = plain(airframe.fuselage_drag)(3.5, AIR, VEHICLE)
+    force = airframe.fuselage_drag(3.5, AIR, VEHICLE)
     relative = np.array([AIR.u, AIR.v, AIR.w - 3.5])
     areas = [VEHICLE.fuselage_area_x_m2, VEHICLE.fuselage_area_y_m2, VEHICLE.fuselage_area_z_m2]
     assert force == pytest.approx(-RHO / 2 * np.array(areas) * relative * np.linalg.norm(relative))
@@ -28,14 +27,14 @@ def test_the_tail_pushes_left_and_the_fin_in_its_wake_takes_some_back():
     sideslip = AIR.v - ARM * AIR.r + ABOVE * AIR.p - VEHICLE.vertical_fin_inflow_fraction * induced
     lift = VEHICLE.vertical_fin_lift_slope_per_rad * abs(AIR.u) + abs(sideslip)
     expected = -RHO / 2 * VEHICLE.vertical_fin_area_m2 * lift * sideslip - VEHICLE.tail_fin_blockage * thrust
-    side = plain(airframe.tail_side_force)
+    side = airframe.tail_side_force
     assert side(thrust, induced, AIR, VEHICLE) == pytest.approx(expected)
     still = AirMotion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     assert -thrust < side(thrust, induced, still, VEHICLE) < -0.95 * thrust
 
 
 def test_the_tail_plane_is_pushed_down_by_the_wake_and_lifts_with_speed():
-    plane = plain(airframe.tail_plane_force)
+    plane = airframe.tail_plane_force
     w = AIR.w + VEHICLE.horizontal_fin_behind_cg_m * AIR.q - VEHICLE.horizontal_fin_inflow_fraction * 3.5
     lift = VEHICLE.horizontal_fin_lift_slope_per_rad * abs(AIR.u) + abs(w)
     assert plane(3.5, AIR, VEHICLE) == pytest.approx(-RHO / 2 * VEHICLE.horizontal_fin_area_m2 * lift * w)
@@ -44,7 +43,7 @@ def test_the_tail_plane_is_pushed_down_by_the_wake_and_lifts_with_speed():
 
 def test_the_main_rotor_tilts_its_thrust_drags_its_blades_and_bends_its_hub():
     thrust, torque, a1, b1 = 77.0, 8.5, 0.03, -0.02
-    wrench = plain(airframe.main_rotor_wrench)(thrust, torque, a1, b1, AIR, VEHICLE)
+    wrench = airframe.main_rotor_wrench(thrust, torque, a1, b1, AIR, VEHICLE)
     drag = VEHICLE.main_inplane_drag_n_s_m
     x, y = -thrust * np.sin(a1) - drag * AIR.u, thrust * np.sin(b1) - drag * AIR.v
     assert wrench.x == pytest.approx(x)
@@ -60,7 +59,7 @@ def test_forces_turn_about_the_centre_of_gravity_where_they_act():
     rotor = Wrench(1.0, 2.0, -70.0, 3.0, -4.0, -8.0)
     down = (-0.1, 0.2, 0.97)
     tail, plane, fuselage = -7.5, 0.4, (-1.0, 2.0, 0.5)
-    total = plain(airframe.flight_wrench)(rotor, tail, plane, fuselage, down, VEHICLE)
+    total = airframe.flight_wrench(rotor, tail, plane, fuselage, down, VEHICLE)
     weight = VEHICLE.mass_kg * VEHICLE.gravity_m_s2 * np.array(down)
     force = np.array(rotor[:3]) + fuselage + weight + [0.0, tail, plane]
     moment = (

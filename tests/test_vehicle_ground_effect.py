@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.compile import plain
 from flownav.vehicle import ground_effect
 from flownav.vehicle.helicopter import outputs
 from flownav.vehicle.parameters import load_vehicle
 from flownav.vehicle.trim import trim
 
-multiplier = plain(ground_effect.multiplier)
+multiplier = ground_effect.multiplier
 R, V_I = 0.89, 3.57
 
 
@@ -46,8 +45,8 @@ def test_an_unloaded_rotor_near_the_ground_stays_finite():
 def test_the_height_that_counts_is_the_hubs():
     vehicle = load_vehicle()
     hover = trim(vehicle)
-    free = plain(outputs)(hover.state, 0.0, 0.0, 0.0, vehicle)
+    free = outputs(hover.state, 0.0, 0.0, 0.0, vehicle)
     level = hover.state._replace(qw=1.0, qx=0.0, qy=0.0, qz=0.0)
-    near = plain(outputs)(level._replace(pos_d=-(R - vehicle.hub_above_cg_m)), 0.0, 0.0, 0.0, vehicle)
+    near = outputs(level._replace(pos_d=-(R - vehicle.hub_above_cg_m)), 0.0, 0.0, 0.0, vehicle)
     assert near.thrust_n / free.thrust_n == pytest.approx(1.0667, abs=5e-5)
     assert near.torque_n_m == pytest.approx(free.torque_n_m)

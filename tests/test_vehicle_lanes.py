@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from flownav.compile import LANES, ONE_LANE, lane_access, plain
+from flownav.compile import LANES, ONE_LANE, lane_access
 from flownav.vehicle import helicopter
 from flownav.vehicle.helicopter import add_scaled, derivative, normalised
 from flownav.vehicle.parameters import load_vehicle
@@ -61,6 +61,6 @@ def test_the_compiled_helicopter_is_the_plain_one():
     compiled = flown(ONE_LANE, [(state, controls)], 100)[0]
     now = HelicopterState(*state)
     for _ in range(100):
-        rate = plain(helicopter.derivative)(now, Controls(*controls), 1.0, -2.0, 0.2, VEHICLE)
-        now = plain(normalised)(plain(add_scaled)(now, rate, 1e-3))
+        rate = helicopter.derivative(now, Controls(*controls), 1.0, -2.0, 0.2, VEHICLE)
+        now = normalised(add_scaled(now, rate, 1e-3))
     assert np.allclose(compiled, now, rtol=1e-12, atol=1e-14)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.compile import plain
 from flownav.frames import quaternion_from_euler, rotation_from_quaternion
 from flownav.vehicle import helicopter
 from flownav.vehicle.parameters import load_vehicle
@@ -14,7 +13,7 @@ from flownav.vehicle.trim import trim
 
 VEHICLE = load_vehicle()
 INERTIA = np.diag([VEHICLE.inertia_xx_kg_m2, VEHICLE.inertia_yy_kg_m2, VEHICLE.inertia_zz_kg_m2])
-step = plain(helicopter.step)
+step = helicopter.step
 NO_CONTROLS = Controls(0.0, 0.0, 0.0, 0.0)
 
 
@@ -52,7 +51,7 @@ def march(state, vehicle, dt, count, controls=NO_CONTROLS, wind=(0.0, 0.0, 0.0))
 
 
 def rotation(state):
-    return np.reshape(plain(rotation_from_quaternion)(state.qw, state.qx, state.qy, state.qz), (3, 3))
+    return np.reshape(rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz), (3, 3))
 
 
 def angular_momentum_earth(state):
@@ -109,7 +108,7 @@ def test_runge_kutta_converges_at_fourth_order_on_the_whole_helicopter():
 
 def test_wind_acts_as_the_opposite_motion():
     hover = trim(VEHICLE, (4.0, 0.0, 0.0))
-    rate = plain(helicopter.derivative)
+    rate = helicopter.derivative
     moving = rate(hover.state, hover.controls, 0.0, 0.0, 0.0, VEHICLE)
     wind = rotation(hover.state) @ [-4.0, 0.0, 0.0]
     held = rate(hover.state._replace(u=0.0), hover.controls, *wind, VEHICLE)

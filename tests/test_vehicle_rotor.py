@@ -10,18 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from flownav.compile import plain
 from flownav.vehicle import rotor as equations
 from flownav.vehicle.parameters import load_vehicle
 
 VEHICLE = load_vehicle()
-MAIN = plain(equations.main_rotor)(VEHICLE)
-TAIL = plain(equations.tail_rotor)(VEHICLE)
-induced_velocity = plain(equations.induced_velocity)
-thrust = plain(equations.thrust)
-torque = plain(equations.torque)
-blowback = plain(equations.blowback)
-thrustless_inflow = plain(equations.thrustless_inflow)
+MAIN = equations.main_rotor(VEHICLE)
+TAIL = equations.tail_rotor(VEHICLE)
+induced_velocity = equations.induced_velocity
+thrust = equations.thrust
+torque = equations.torque
+blowback = equations.blowback
+thrustless_inflow = equations.thrustless_inflow
 
 
 def momentum_imbalance(induced, pitch, inplane, axial, rotor):
@@ -143,6 +142,6 @@ def test_blowback_is_the_references_derivative():
 
 def test_series_replace_sine_and_cosine_of_flapping_angles():
     angles = np.linspace(-0.2, 0.2, 4001)
-    sine, cosine = plain(equations.sine_of_tilt), plain(equations.cosine_of_tilt)
+    sine, cosine = equations.sine_of_tilt, equations.cosine_of_tilt
     assert np.abs(sine(angles) - np.sin(angles)).max() < 3e-9
     assert np.abs(cosine(angles) - np.cos(angles)).max() < 1e-7

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.compile import plain
 from flownav.errors import InputError
 from flownav.frames import quaternion_from_euler
 from flownav.vehicle import helicopter, skids
@@ -17,8 +16,8 @@ VEHICLE = load_vehicle()
 HOVER = trim(VEHICLE)
 WEIGHT = VEHICLE.mass_kg * VEHICLE.gravity_m_s2
 IDLE = Controls(0.0, 0.0, 0.0, HOVER.pedal_rad)
-step = plain(helicopter.step)
-outputs = plain(helicopter.outputs)
+step = helicopter.step
+outputs = helicopter.outputs
 
 
 def march(state, controls, seconds, dt=0.002, wind=(0.0, 0.0, 0.0)):
@@ -80,7 +79,7 @@ def test_a_landing_at_the_papers_sink_rate_is_the_same_at_half_the_step():
 
 
 def test_the_contact_force_begins_without_a_jump_and_never_pulls():
-    foot = plain(skids.foot_force)
+    foot = skids.foot_force
     depths = np.linspace(-0.001, 0.02, 2101)
     for sink in (-1.0, -0.1, 0.0, 0.3, 1.0):
         forces = np.array([foot(depth, sink, VEHICLE) for depth in depths])
@@ -92,7 +91,7 @@ def test_the_contact_force_begins_without_a_jump_and_never_pulls():
 
 def test_sliding_is_braked_by_mu_g_and_then_stops():
     start = parked(VEHICLE, IDLE)._replace(u=1.0)
-    rate = plain(helicopter.derivative)(start, IDLE, 0.0, 0.0, 0.0, VEHICLE)
+    rate = helicopter.derivative(start, IDLE, 0.0, 0.0, 0.0, VEHICLE)
     assert rate.u == pytest.approx(-VEHICLE.skid_friction_coefficient * VEHICLE.gravity_m_s2, rel=0.05)
     end, _ = march(start, IDLE, 1.5)
     assert np.hypot(end.u, end.v) < 1e-3
@@ -103,7 +102,7 @@ def test_off_the_ground_nothing_touches():
     state = above_ground(0.001)
     assert outputs(state, 0.0, 0.0, 0.0, VEHICLE).contact_force_n == 0.0
     stiff = VEHICLE._replace(skid_stiffness_n_m=3e5, skid_friction_coefficient=1.0)
-    rate = plain(helicopter.derivative)
+    rate = helicopter.derivative
     assert rate(state, IDLE, 0.0, 0.0, 0.0, stiff) == rate(state, IDLE, 0.0, 0.0, 0.0, VEHICLE)
 
 

@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flownav.compile import plain
 from flownav.errors import InputError
 from flownav.frames import euler_from_quaternion, quaternion_from_euler
 from flownav.vehicle import helicopter
@@ -20,7 +19,7 @@ from vehicle_files import X_CELL
 
 VEHICLE = load_vehicle()
 HOVER = trim(VEHICLE)
-derivative = plain(helicopter.derivative)
+derivative = helicopter.derivative
 
 
 def rates(state, controls, vehicle=VEHICLE):

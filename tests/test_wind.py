@@ -10,7 +10,6 @@ import scipy.linalg
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.compile import plain
 from flownav.errors import InputError
 from flownav.parameter_files import check
 from flownav.simulation.wind import (
@@ -25,7 +24,7 @@ from flownav.simulation.wind import (
     wind_velocity,
 )
 
-start, step, velocity = plain(start_wind), plain(step_wind), plain(wind_velocity)
+start, step, velocity = start_wind, step_wind, wind_velocity
 CALM = WindState(0.0, 0.0, 0.0, 0.0, 0.0)
 
 

@@ -141,11 +141,6 @@ def clamp(a: float, low: float, high: float) -> float:
     return larger(low, smaller(a, high))
 
 
-def plain(function: Function) -> Function:
-    """An equation as ordinary Python: itself. (Equations compile only where a kernel calls them.)"""
-    return function
-
-
 # -- the bits of a float, and back: for polynomial logarithms and exponentials ----------------------------
 def float_from_bits(bits: Any) -> float:
     """The float64 that these 64 bits (uint64) spell."""

@@ -2,8 +2,8 @@
 
 Gauss-Newton with Levenberg's damping on exact derivatives (`response.py`). What the runs share are the log
 coefficients, the gain and the delay; each run has its own start and offset, which are eliminated run by run
-(Schur complement), so the work grows linearly with the runs. Many starts are tried on block means of the log
-and the best is finished on the log itself.
+(Schur complement), so the work grows linearly with the runs. All of several starts get a
+few iterations, the best are finished.
 
 For white residuals this is the maximum-likelihood estimate, and its covariance sigma^2 (J'J)^-1 the Cramer-Rao
 bound. Residuals that are not white get the sandwich with their own autocovariance in place of J'J.
@@ -32,11 +32,16 @@ from flownav.measurement import Array
 
 HIGHEST_ORDER = 6
 DELAY_RANGE_S = (-0.1, 0.6)
-THIN_READINGS = 1200  # of one run, where starts are tried
+HEAT_ITERATIONS = 2  # that every start gets
+FINALISTS = 2  # starts that are finished
+FINALIST_COST = 2.0  # times the best one's, at most
 MOST_ITERATIONS = 60
 CONVERGED = 1e-4  # predicted fall of the cost, in residual variances
 MOST_DAMPING = 1e8
+START_WEIGHT = 1e-4  # of the belief that a run starts at rest, against one reading's of 1
+START_TIME_S = 0.1  # unit of a start's rates
 SMALLEST_EIGENVALUE = 1e-14
+LARGEST_PRODUCT = 1e60  # of an unstable model: it has no cost
 
 
 class Structure(NamedTuple):
@@ -114,29 +119,29 @@ def fit(experiments: Sequence[Experiment], structure: Structure, starts: Sequenc
     if not 0 <= structure.order <= HIGHEST_ORDER:
         raise InputError(f"order {structure.order}: 0 (gain and delay) to {HIGHEST_ORDER} are possible")
     runs = [run.within(DELAY_RANGE_S) for run in experiments]
-    thin = [run.thinned(THIN_READINGS) if len(run.t_y) >= 2 * THIN_READINGS else run for run in runs]
     if starts is None:
-        starts = starting_points.points(thin, structure, DELAY_RANGE_S)
-    tried = [_descend(thin, structure, start) for start in starts]
-    best = min(tried, key=lambda state: state.cost)
-    thinned = any(short is not run for short, run in zip(thin, runs, strict=True))
-    state = _descend(runs, structure, best.point) if thinned else best
+        starts = starting_points.points(runs, structure, DELAY_RANGE_S)
+    begun = [_descend(runs, structure, _begin(runs, structure, start), HEAT_ITERATIONS) for start in starts]
+    begun.sort(key=lambda state: state.cost)
+    finalists = [state for state in begun[:FINALISTS] if state.cost < begun[0].cost * FINALIST_COST] or begun[:1]
+    state = min((_descend(runs, structure, state, MOST_ITERATIONS) for state in finalists), key=lambda s: s.cost)
     if not np.isfinite(state.cost):
         raise InputError(f"{runs[0].name}: no stable model of order {structure.label} fits; try a lower order")
     return _finish(runs, structure, state)
-
-
-class _State(NamedTuple):
-    point: Point
-    nuisance: list[Array]  # by run: start and offset
-    cost: float
-    converged: bool
 
 
 class _Linearised(NamedTuple):
     columns: Array  # (m, p + n + 2): derivatives by the shared parameters, by start and offset; the residual
     products: Array  # columns' columns
     prediction: Array
+
+
+class _State(NamedTuple):
+    point: Point
+    nuisance: list[Array]  # by run: start and offset
+    parts: list[_Linearised]
+    cost: float
+    converged: bool
 
 
 def _linearise(run: Experiment, structure: Structure, point: Point, nuisance: Array) -> _Linearised:
@@ -154,7 +159,19 @@ def _linearise(run: Experiment, structure: Structure, point: Point, nuisance: Ar
     columns[:, -1] = run.y - prediction
     if not structure.has_delay:
         columns = np.delete(columns, n + 1, axis=1)
-    return _Linearised(columns, products(columns), prediction)
+    return _Linearised(columns, _with_prior(products(columns), structure, nuisance), prediction)
+
+
+def _with_prior(sums: Array, structure: Structure, nuisance: Array) -> Array:
+    """The sums with a very weak belief that a run starts near rest: most runs forget their start unread."""
+    n, first = structure.order, structure.parameters
+    weight = START_WEIGHT * START_TIME_S ** (2.0 * np.arange(n))
+    start = np.arange(first, first + n)
+    sums[start, start] += weight
+    sums[start, -1] -= weight * nuisance[:n]
+    sums[-1, start] -= weight * nuisance[:n]
+    sums[-1, -1] += float(weight @ nuisance[:n] ** 2)
+    return sums
 
 
 def _linearise_all(
@@ -165,7 +182,7 @@ def _linearise_all(
 
 def _cost(parts: Sequence[_Linearised]) -> float:
     cost = sum(float(part.products[-1, -1]) for part in parts)
-    return cost if all(np.isfinite(part.products).all() for part in parts) else np.inf
+    return cost if all(np.abs(part.products).max() < LARGEST_PRODUCT for part in parts) else np.inf
 
 
 class _Normal(NamedTuple):
@@ -215,37 +232,40 @@ def _predicted_fall(normal: _Normal, step: Array) -> float:
     return float(step @ normal.gradient) + sum(float(change @ gradient) for change, gradient in own)
 
 
-def _descend(runs: Sequence[Experiment], structure: Structure, start: Point) -> _State:
-    """Levenberg-Marquardt from one start."""
-    readings = sum(len(run.t_y) for run in runs)
+def _begin(runs: Sequence[Experiment], structure: Structure, start: Point) -> _State:
+    """A start with each run at rest."""
     nuisance = [np.zeros(structure.order + 1) for _ in runs]
-    point, damping = start, 1e-3
-    parts = _linearise_all(runs, structure, point, nuisance)
-    cost = _cost(parts)
-    if not np.isfinite(cost):
-        return _State(point, nuisance, np.inf, False)
-    for _ in range(MOST_ITERATIONS):
-        normal = _normal(parts, structure.parameters)
+    parts = _linearise_all(runs, structure, start, nuisance)
+    return _State(start, nuisance, parts, _cost(parts), False)
+
+
+def _descend(runs: Sequence[Experiment], structure: Structure, state: _State, iterations: int) -> _State:
+    """Levenberg-Marquardt from a state, for so many iterations at most."""
+    readings, damping = sum(len(run.t_y) for run in runs), 1e-3
+    for _ in range(iterations):
+        if state.converged or not np.isfinite(state.cost):
+            break
+        normal = _normal(state.parts, structure.parameters)
         full = _solve(normal.matrix, normal.gradient, 0.0)
-        if _predicted_fall(normal, full) <= CONVERGED * cost / readings:
-            return _State(point, nuisance, cost, True)
+        if _predicted_fall(normal, full) <= CONVERGED * state.cost / readings:
+            return state._replace(converged=True)
         while damping < MOST_DAMPING:
             step = _solve(normal.matrix, normal.gradient, damping)
-            following = point.moved(step, structure)
-            moved = [own + change for own, change in zip(nuisance, _own_steps(normal, step), strict=True)]
-            trial = _linearise_all(runs, structure, following, moved)
-            if _cost(trial) < cost:
+            point = state.point.moved(step, structure)
+            moved = [own + change for own, change in zip(state.nuisance, _own_steps(normal, step), strict=True)]
+            parts = _linearise_all(runs, structure, point, moved)
+            if _cost(parts) < state.cost:
                 break
             damping *= 10.0
         else:
             break
-        point, nuisance, parts, cost = following, moved, trial, _cost(trial)
+        state = _State(point, moved, parts, _cost(parts), False)
         damping = max(0.1 * damping, 1e-12)
-    return _State(point, nuisance, cost, False)
+    return state
 
 
 def _finish(runs: Sequence[Experiment], structure: Structure, state: _State) -> Fit:
-    parts = _linearise_all(runs, structure, state.point, state.nuisance)
+    parts = state.parts
     normal = _normal(parts, structure.parameters)
     residuals = [part.columns[:, -1].copy() for part in parts]
     readings = sum(map(len, residuals))

@@ -146,21 +146,18 @@ def gps_velocity_body(record: Record) -> Track | None:
     gps, attitude = readings(record, Sensor.GPS_VELOCITY), track(record, "estimate", QUATERNION)
     if gps is None or attitude is None:
         return None
-    from flownav.compile import plain
     from flownav.frames import rotation_from_quaternion, to_body
 
     nearest = np.clip(np.searchsorted(attitude.t_s, gps.t_s), 0, len(attitude.t_s) - 1)
-    rotation = plain(rotation_from_quaternion)(*attitude.value[nearest].T)
-    return Track(gps.t_s, np.column_stack(plain(to_body)(rotation, *gps.value.T)))
+    rotation = rotation_from_quaternion(*attitude.value[nearest].T)
+    return Track(gps.t_s, np.column_stack(to_body(rotation, *gps.value.T)))
 
 
 def euler_deg(attitude: Track) -> Array:
     """Roll, pitch, yaw [deg] of a track of quaternions, shape (n, 3), one row at a time: thin it first."""
-    from flownav.compile import plain
     from flownav.frames import euler_from_quaternion
 
-    angles = plain(euler_from_quaternion)
-    return np.asarray(np.degrees([angles(*row) for row in attitude.value])).reshape(-1, 3)
+    return np.asarray(np.degrees([euler_from_quaternion(*row) for row in attitude.value])).reshape(-1, 3)
 
 
 def sliding_rms(t_s: Array, squares: Array, width_s: float) -> Array:

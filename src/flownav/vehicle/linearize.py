@@ -17,7 +17,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import plain
 from flownav.vehicle import helicopter
 from flownav.vehicle.complex_step import jacobian
 from flownav.vehicle.parameters import VehicleParameters
@@ -31,12 +30,6 @@ INPUTS = ("lon", "lat", "col", "ped")
 BESIDE_HOVER_M_S = 1e-9
 
 Array = NDArray[np.float64]
-
-_attitude = plain(helicopter.attitude)
-_air_motion = plain(helicopter.air_motion)
-_blade_angles = plain(helicopter.blade_angles)
-_inflow = plain(helicopter.inflow)
-_derivative_at_inflow = plain(helicopter.derivative_at_inflow)
 
 
 class LinearModel(NamedTuple):
@@ -52,10 +45,10 @@ def reduced_model(vehicle: VehicleParameters, about: Trim, *, freeze_inflow: boo
 
     def rates(point: Sequence[Any]) -> Sequence[Any]:
         state, controls = _displaced(about, point)
-        rotation = _attitude(state)
-        air = _air_motion(state, rotation, 0.0, 0.0, 0.0)
-        induced = _inflow(air, _blade_angles(state, vehicle), vehicle) if held is None else held
-        rate = _derivative_at_inflow(state, controls, air, rotation, induced, vehicle)
+        rotation = helicopter.attitude(state)
+        air = helicopter.air_motion(state, rotation, 0.0, 0.0, 0.0)
+        induced = helicopter.inflow(air, helicopter.blade_angles(state, vehicle), vehicle) if held is None else held
+        rate = helicopter.derivative_at_inflow(state, controls, air, rotation, induced, vehicle)
         return (rate.pos_n, rate.pos_e, rate.pos_d, rate.u, rate.v, rate.w)
 
     trim = about.state
@@ -74,8 +67,8 @@ def _displaced(about: Trim, point: Sequence[Any]) -> tuple[HelicopterState, Cont
 
 
 def _inflow_at(state: HelicopterState, vehicle: VehicleParameters) -> Inflow:
-    air = _air_motion(state, _attitude(state), 0.0, 0.0, 0.0)
-    return _inflow(air, _blade_angles(state, vehicle), vehicle)
+    air = helicopter.air_motion(state, helicopter.attitude(state), 0.0, 0.0, 0.0)
+    return helicopter.inflow(air, helicopter.blade_angles(state, vehicle), vehicle)
 
 
 def eigenvalues(a: Array) -> NDArray[np.complex128]:

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import plain
 from flownav.vehicle import ground_effect
 from flownav.vehicle.linearize import INPUTS, STATES, LinearModel, eigenvalues, reduced_model
 from flownav.vehicle.paper_model import ReducedModel, load_paper_model
@@ -17,7 +16,7 @@ from flownav.vehicle.trim import Trim, trim
 
 HEIGHTS_OVER_R = (0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0)
 
-_multiplier = plain(ground_effect.multiplier)
+_multiplier = ground_effect.multiplier
 
 
 class VehicleSheet(NamedTuple):

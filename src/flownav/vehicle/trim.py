@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import plain
 from flownav.errors import InputError
 from flownav.frames import Vector, quaternion_from_euler
 from flownav.vehicle import helicopter
@@ -24,11 +23,6 @@ OUT_OF_GROUND_EFFECT_M = 1e6
 TOLERANCE = 1e-11  # [m/s2, rad/s2, rad/s]
 SLIDING = 0.01  # [m/s2, rad/s2] more than friction leaves of what it can hold
 HOVER: Vector = (0.0, 0.0, 0.0)
-
-plain_derivative = plain(helicopter.derivative)
-_outputs = plain(helicopter.outputs)
-_tail_power = plain(helicopter.tail_power)
-_quaternion = plain(quaternion_from_euler)
 
 
 class Trim(NamedTuple):
@@ -58,7 +52,7 @@ def settled_state(
 ) -> HelicopterState:
     """A state over the origin, heading north, without rates, its servos where the controls ask them to be."""
     u, v, w = vel_body_m_s
-    qw, qx, qy, qz = _quaternion(roll, pitch, 0.0)
+    qw, qx, qy, qz = quaternion_from_euler(roll, pitch, 0.0)
     still = (0.0, 0.0, 0.0)
     return HelicopterState(0.0, 0.0, pos_d_m, u, v, w, qw, qx, qy, qz, *still, a1, b1, *controls, 0.0, *still)
 
@@ -83,13 +77,13 @@ def trim(vehicle: VehicleParameters, vel_body_m_s: Vector = HOVER, height_m: flo
 
     def residual(unknown: Sequence[Any]) -> tuple[float, ...]:
         state, controls = _flight(unknown, vel_body_m_s, -height_m)
-        return accelerations(plain_derivative(state, controls, 0.0, 0.0, 0.0, vehicle))
+        return accelerations(helicopter.derivative(state, controls, 0.0, 0.0, 0.0, vehicle))
 
     wanted = f"trim at u, v, w = {vel_body_m_s[0]:g}, {vel_body_m_s[1]:g}, {vel_body_m_s[2]:g} m/s"
     failure = f"{wanted}: the controls' travel or the blades do not allow it; ask for a slower or higher flight"
     solution = [float(x) for x in solve(residual, _first_guess(vehicle), TOLERANCE, failure)]
     state, controls = _flight(solution, vel_body_m_s, -height_m)
-    out = _outputs(state, 0.0, 0.0, 0.0, vehicle)
+    out = helicopter.outputs(state, 0.0, 0.0, 0.0, vehicle)
     col, ped, roll, pitch, a1, b1, lon, lat = solution
     return Trim(
         collective_rad=col,
@@ -102,7 +96,7 @@ def trim(vehicle: VehicleParameters, vel_body_m_s: Vector = HOVER, height_m: flo
         lat=lat,
         induced_velocity_m_s=float(out.induced_velocity_m_s),
         power_w=float(out.power_w),
-        tail_power_w=float(_tail_power(state, 0.0, 0.0, 0.0, vehicle)),
+        tail_power_w=float(helicopter.tail_power(state, 0.0, 0.0, 0.0, vehicle)),
         thrust_n=float(out.thrust_n),
         state=_as_floats(state),
         controls=controls,
@@ -132,7 +126,7 @@ def parked(vehicle: VehicleParameters, controls: Controls) -> HelicopterState:
         return settled_state(pos_d, HOVER, roll, pitch, a1, b1, controls)
 
     def rate_of(unknown: Sequence[Any]) -> HelicopterState:
-        return plain_derivative(state_of(unknown), controls, 0.0, 0.0, 0.0, vehicle)
+        return helicopter.derivative(state_of(unknown), controls, 0.0, 0.0, 0.0, vehicle)
 
     def residual(unknown: Sequence[Any]) -> tuple[float, ...]:
         rate = rate_of(unknown)

@@ -1,0 +1,93 @@
+"""The camera on the rod: every frame rendered and matched against the one before, nothing kept but the flow."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.compile import kernel
+from flownav.optics.block_matching import fits, match, matching_of, workspace
+from flownav.optics.camera import Camera, Exposure, effective_focal_px
+from flownav.optics.firmware import Firmware
+from flownav.optics.pad import Pad
+from flownav.optics.projection import pose_looking_down
+from flownav.optics.render import digitise, noise_bank, seen, stripe_harmonics, stripe_row, take_raster_frame
+from flownav.rig.pendulum import sensor_pose
+
+Array = NDArray[np.float64]
+
+
+class Rod(NamedTuple):
+    """Where the camera hangs: rod length, height at rest, the axis along the swing, and its place on the pad."""
+
+    length_m: float
+    height_m: float
+    along_x: bool
+    x0_m: float
+
+
+@kernel
+def film_of_stripes(  # type: ignore[no-untyped-def]
+    opened_rad, closed_rad, rod, focal_px, pitch_m, harmonics, exposure, bank, settings, work, frames, flow_px, quality
+):
+    """Flow (n-1, 2) and quality (n-1) of frames exposed from angle `opened_rad[k]` to `closed_rad[k]`."""
+    size = frames.shape[1]
+    row, image = np.empty(size), np.empty((size, size), np.float32)
+    for k in range(len(opened_rad)):
+        first = sensor_pose(opened_rad[k], rod.length_m, rod.height_m, rod.along_x, rod.x0_m)
+        last = sensor_pose(closed_rad[k], rod.length_m, rod.height_m, rod.along_x, rod.x0_m)
+        middle = sensor_pose(0.5 * (opened_rad[k] + closed_rad[k]), rod.length_m, rod.height_m, rod.along_x, rod.x0_m)
+        travel_m = last.x_m - first.x_m + middle.height_m * (last.r13 / last.r33 - first.r13 / first.r33)
+        stripe_row(middle, rod.along_x, focal_px, pitch_m, harmonics, abs(travel_m) * focal_px / middle.height_m, row)
+        for i in range(size):
+            for j in range(size):
+                image[i, j] = np.float32(row[j] if rod.along_x else row[i])
+        digitise(image, exposure, bank, k, frames[k % 2])
+        if k > 0:
+            x, y, good = match(frames[(k - 1) % 2].ravel(), frames[k % 2].ravel(), size, settings, work)
+            flow_px[k - 1, 0], flow_px[k - 1, 1], quality[k - 1] = x, y, good
+
+
+@kernel
+def film_of_raster(  # type: ignore[no-untyped-def]
+    opened_rad, closed_rad, rod, focal_px, raster, texel_m, exposure, bank, settings, work, frames, flow_px, quality
+):
+    """The same over a pad that is a raster, blurred beforehand as it is seen from the height at rest."""
+    size = frames.shape[1]
+    image = np.empty((size, size), np.float32)
+    for k in range(len(opened_rad)):
+        first = sensor_pose(opened_rad[k], rod.length_m, rod.height_m, rod.along_x, rod.x0_m)
+        last = sensor_pose(closed_rad[k], rod.length_m, rod.height_m, rod.along_x, rod.x0_m)
+        take_raster_frame(raster, texel_m, first, last, focal_px, exposure, bank, k, image, frames[k % 2])
+        if k > 0:
+            x, y, good = match(frames[(k - 1) % 2].ravel(), frames[k % 2].ravel(), size, settings, work)
+            flow_px[k - 1, 0], flow_px[k - 1, 1], quality[k - 1] = x, y, good
+
+
+def film_swing(
+    opened_rad: Array,
+    closed_rad: Array,
+    rod: Rod,
+    pad: Pad,
+    camera: Camera,
+    exposure: Exposure,
+    firmware: Firmware,
+    seed: int,
+) -> tuple[Array, NDArray[np.int64]]:
+    """Flow [px] (n-1, 2) and quality (n-1) between frames exposed from `opened_rad[k]` to `closed_rad[k]` (n)."""
+    size = camera.width_px
+    if camera.height_px != size or not fits(size, size, firmware):
+        raise ValueError(f"a square frame that firmware {firmware.name} can search is needed, not {size} px")
+    frames = np.zeros((2, size, size), np.uint8)
+    flow, quality = np.zeros((len(opened_rad) - 1, 2)), np.zeros(len(opened_rad) - 1, np.int64)
+    rest = (exposure, noise_bank(seed, size), matching_of(firmware), workspace(size, size, firmware))
+    ways = (opened_rad, closed_rad, rod, effective_focal_px(camera))
+    if pad.stripe_pitch_m > 0.0:
+        harmonics = stripe_harmonics(pad.stripe_pitch_m, camera, rod.height_m)
+        film_of_stripes(*ways, pad.stripe_pitch_m, harmonics, *rest, frames, flow, quality)
+    else:
+        view = pose_looking_down(height_m=rod.height_m, yaw_rad=0.0 if rod.along_x else -0.5 * np.pi)
+        film_of_raster(*ways, seen(pad, camera, view), pad.texel_m, *rest, frames, flow, quality)
+    return flow, quality

@@ -25,7 +25,7 @@ bench: $(VENV)/.ready-test
 	$(BIN)/python -m pytest benchmarks --benchmark-only --benchmark-disable-gc
 
 docs: $(VENV)/.ready-docs
-	$(BIN)/mkdocs build --strict --site-dir out/docs
+	$(BIN)/zensical build --strict --config-file mkdocs.yml
 
 clean:
 	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks

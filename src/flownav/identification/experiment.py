@@ -44,12 +44,18 @@ class Experiment:
         inside = (self.t_y >= start_s) & (self.t_y < end_s)
         return Experiment(self.name, self.t_u, self.u, self.t_y[inside], self.y[inside], self.between, self.height_m)
 
-    def thinned(self, readings: int) -> Experiment:
-        """Block means of input and readings, about `readings` of each: means obey the same linear model."""
-        t_u, u = _block_means(max(1, len(self.t_u) // readings), self.t_u, self.u)
-        t_y, y = _block_means(max(1, len(self.t_y) // readings), self.t_y, self.y)
-        inside = (t_y >= t_u[0]) & (t_y <= t_u[-1])
-        return Experiment(self.name, t_u, u, t_y[inside], y[inside], distinct_steps(np.diff(t_u)), self.height_m)
+    def from_input(self, first: int) -> Experiment:
+        """The run with its input from a sample on; not checked for length."""
+        t_u = self.t_u[first:]
+        return Experiment(
+            self.name, t_u, self.u[first:], self.t_y, self.y, distinct_steps(np.diff(t_u)), self.height_m
+        )
+
+    @property
+    def longest_step_s(self) -> float:
+        """Between two input samples."""
+        steps = self.between.distinct_s if len(self.between.distinct_s) else self.between.length_s
+        return float(steps.max())
 
 
 def experiment(name: str, t_u: Array, u: Array, t_y: Array, y: Array, height_m: float = float("nan")) -> Experiment:
@@ -69,7 +75,3 @@ def experiment(name: str, t_u: Array, u: Array, t_y: Array, y: Array, height_m: 
             raise InputError(f"{name}: the {what}'s velocity is constant ({value[0]:g} m/s); a run that moves is needed")
     return Experiment(name, t_u, u, t_y, y, distinct_steps(np.diff(t_u)), height_m)
 
-
-def _block_means(block: int, *columns: Array) -> list[Array]:
-    count = len(columns[0]) // block
-    return [column[: count * block].reshape(count, block).mean(axis=1) for column in columns]

@@ -2,8 +2,8 @@
 
 Gauss-Newton with Levenberg's damping on exact derivatives (`response.py`). What the runs share are the log
 coefficients, the gain and the delay; each run has its own start and offset, which are eliminated run by run
-(Schur complement), so the work grows linearly with the runs. All of several starts get a
-few iterations, the best are finished.
+(Schur complement), so the work grows linearly with the runs. Several starts are compared, the better
+ones get some iterations, the best is finished.
 
 For white residuals this is the maximum-likelihood estimate, and its covariance sigma^2 (J'J)^-1 the Cramer-Rao
 bound. Residuals that are not white get the sandwich with their own autocovariance in place of J'J.
@@ -20,7 +20,7 @@ import numpy as np
 from flownav.errors import InputError
 from flownav.identification import starting_points
 from flownav.identification.experiment import Experiment
-from flownav.identification.response import delayed, lay_grid, products, response
+from flownav.identification.response import delayed, lay_grid, response
 from flownav.identification.statistics import (
     Whiteness,
     coloured_information,
@@ -32,15 +32,15 @@ from flownav.measurement import Array
 
 HIGHEST_ORDER = 6
 DELAY_RANGE_S = (-0.1, 0.6)
-HEAT_ITERATIONS = 2  # that every start gets
-FINALISTS = 2  # starts that are finished
-FINALIST_COST = 2.0  # times the best one's, at most
+FINALISTS = 2  # starts that get
+HEAT_ITERATIONS = 2  # iterations each, before the best is finished
 MOST_ITERATIONS = 60
-CONVERGED = 1e-4  # predicted fall of the cost, in residual variances
+CONVERGED = 1e-2  # predicted fall of the cost in residual variances: the step that makes it is the last
 MOST_DAMPING = 1e8
 START_WEIGHT = 1e-4  # of the belief that a run starts at rest, against one reading's of 1
 START_TIME_S = 0.1  # unit of a start's rates
 SMALLEST_EIGENVALUE = 1e-14
+STIFFEST = 100.0  # rate x step of a model that is tried: faster ones cannot be told from none
 LARGEST_PRODUCT = 1e60  # of an unstable model: it has no cost
 
 
@@ -121,19 +121,22 @@ def fit(experiments: Sequence[Experiment], structure: Structure, starts: Sequenc
     runs = [run.within(DELAY_RANGE_S) for run in experiments]
     if starts is None:
         starts = starting_points.points(runs, structure, DELAY_RANGE_S)
-    begun = [_descend(runs, structure, _begin(runs, structure, start), HEAT_ITERATIONS) for start in starts]
-    begun.sort(key=lambda state: state.cost)
-    finalists = [state for state in begun[:FINALISTS] if state.cost < begun[0].cost * FINALIST_COST] or begun[:1]
-    state = min((_descend(runs, structure, state, MOST_ITERATIONS) for state in finalists), key=lambda s: s.cost)
+        if structure.order > 2:
+            lower = fit(experiments, structure._replace(order=structure.order - 1)).point
+            starts = [*starts, lower._replace(log_a=starting_points.with_fast_pole(lower.log_a))]
+    states = sorted((_begin(runs, structure, start) for start in starts), key=_by_cost)
+    hopeful = [_descend(runs, structure, state, HEAT_ITERATIONS) for state in states[:FINALISTS]]
+    state = _descend(runs, structure, min(hopeful, key=_by_cost), MOST_ITERATIONS)
     if not np.isfinite(state.cost):
         raise InputError(f"{runs[0].name}: no stable model of order {structure.label} fits; try a lower order")
     return _finish(runs, structure, state)
 
 
 class _Linearised(NamedTuple):
-    columns: Array  # (m, p + n + 2): derivatives by the shared parameters, by start and offset; the residual
+    """Derivatives by the shared parameters, by start and offset, then the residual."""
+
+    columns: Array  # (m, k), or (1, k) where only their products are needed
     products: Array  # columns' columns
-    prediction: Array
 
 
 class _State(NamedTuple):
@@ -144,22 +147,29 @@ class _State(NamedTuple):
     converged: bool
 
 
-def _linearise(run: Experiment, structure: Structure, point: Point, nuisance: Array) -> _Linearised:
+def _linearise(
+    run: Experiment, structure: Structure, point: Point, nuisance: Array, whole: bool = False
+) -> _Linearised:
     n = structure.order
+    width = structure.parameters + n + 2
+    if n and _stiffness(point) * run.longest_step_s > STIFFEST:
+        return _Linearised(np.zeros((0, width)), np.full((width, width), np.inf))
     grid = lay_grid(run.t_u, run.t_y, point.delay_s, run.between)
-    columns = np.empty((len(run.t_y), 2 * n + 4))
-    columns[:, 2 * n + 2] = 1.0
+    columns, sums = np.empty((len(run.t_y) if whole else 1, width)), np.zeros((width, width))
     if n:
-        prediction = response(
-            (0,) * n, run.t_u, run.u, structure.held, grid, point.log_a, point.gain, nuisance[:n], columns
-        )
+        response(
+            (0,) * n, run.t_u, run.u, structure.held, grid, point.log_a, point.gain, structure.delay,
+            nuisance, run.y, columns, sums,
+        )  # fmt: skip
     else:
-        prediction = delayed(run.t_u, run.u, structure.held, grid, point.gain, columns)
-    prediction += nuisance[n]
-    columns[:, -1] = run.y - prediction
-    if not structure.has_delay:
-        columns = np.delete(columns, n + 1, axis=1)
-    return _Linearised(columns, _with_prior(products(columns), structure, nuisance), prediction)
+        delayed(run.t_u, run.u, structure.held, grid, point.gain, float(nuisance[0]), run.y, columns, sums)
+    return _Linearised(columns, _with_prior(sums, structure, nuisance))
+
+
+def _stiffness(point: Point) -> float:
+    """A bound on the model's fastest rate [1/s]."""
+    n = len(point.log_a)
+    return float(np.max(np.exp(point.log_a / np.arange(1.0, n + 1.0)))) * n
 
 
 def _with_prior(sums: Array, structure: Structure, nuisance: Array) -> Array:
@@ -175,9 +185,9 @@ def _with_prior(sums: Array, structure: Structure, nuisance: Array) -> Array:
 
 
 def _linearise_all(
-    runs: Sequence[Experiment], structure: Structure, point: Point, nuisance: list[Array]
+    runs: Sequence[Experiment], structure: Structure, point: Point, nuisance: list[Array], whole: bool = False
 ) -> list[_Linearised]:
-    return [_linearise(run, structure, point, own) for run, own in zip(runs, nuisance, strict=True)]
+    return [_linearise(run, structure, point, own, whole) for run, own in zip(runs, nuisance, strict=True)]
 
 
 def _cost(parts: Sequence[_Linearised]) -> float:
@@ -232,6 +242,10 @@ def _predicted_fall(normal: _Normal, step: Array) -> float:
     return float(step @ normal.gradient) + sum(float(change @ gradient) for change, gradient in own)
 
 
+def _by_cost(state: _State) -> float:
+    return state.cost
+
+
 def _begin(runs: Sequence[Experiment], structure: Structure, start: Point) -> _State:
     """A start with each run at rest."""
     nuisance = [np.zeros(structure.order + 1) for _ in runs]
@@ -247,8 +261,7 @@ def _descend(runs: Sequence[Experiment], structure: Structure, state: _State, it
             break
         normal = _normal(state.parts, structure.parameters)
         full = _solve(normal.matrix, normal.gradient, 0.0)
-        if _predicted_fall(normal, full) <= CONVERGED * state.cost / readings:
-            return state._replace(converged=True)
+        converged = _predicted_fall(normal, full) <= CONVERGED * state.cost / readings
         while damping < MOST_DAMPING:
             step = _solve(normal.matrix, normal.gradient, damping)
             point = state.point.moved(step, structure)
@@ -256,16 +269,18 @@ def _descend(runs: Sequence[Experiment], structure: Structure, state: _State, it
             parts = _linearise_all(runs, structure, point, moved)
             if _cost(parts) < state.cost:
                 break
+            if converged:
+                return state._replace(converged=True)
             damping *= 10.0
         else:
             break
-        state = _State(point, moved, parts, _cost(parts), False)
+        state = _State(point, moved, parts, _cost(parts), converged)
         damping = max(0.1 * damping, 1e-12)
     return state
 
 
 def _finish(runs: Sequence[Experiment], structure: Structure, state: _State) -> Fit:
-    parts = state.parts
+    parts = _linearise_all(runs, structure, state.point, state.nuisance, whole=True)
     normal = _normal(parts, structure.parameters)
     residuals = [part.columns[:, -1].copy() for part in parts]
     readings = sum(map(len, residuals))
@@ -283,8 +298,8 @@ def _finish(runs: Sequence[Experiment], structure: Structure, state: _State) -> 
         sandwich = inverse @ meat @ inverse
         keep = np.sqrt(np.maximum(1.0, np.diag(white) / np.maximum(np.diag(sandwich), 1e-300)))
         covariance = sandwich * np.outer(keep, keep)
-    pairs = list(zip(runs, parts, strict=True))
-    fits = tuple(fit_percent(run.y, part.prediction) for run, part in pairs)
+    predictions = tuple(run.y - residual for run, residual in zip(runs, residuals, strict=True))
+    fits = tuple(fit_percent(run.y, predicted) for run, predicted in zip(runs, predictions, strict=True))
     spread = sum(float(np.sum((run.y - run.y.mean()) ** 2)) for run in runs)
     aic, bic = information_criteria(state.cost, readings, free, readings / tested.readings_per_independent)
     return Fit(
@@ -301,7 +316,7 @@ def _finish(runs: Sequence[Experiment], structure: Structure, state: _State) -> 
         readings,
         state.converged,
         tuple(residuals),
-        tuple(part.prediction for part in parts),
+        predictions,
     )
 
 
@@ -315,8 +330,8 @@ def _inverse(matrix: Array) -> Array:
 
 def simulate(run: Experiment, structure: Structure, point: Point) -> Array:
     """Model output at a run's readings, with the start and offset that suit this run best (as `compare` does)."""
-    own = np.zeros(structure.order + 1)
-    part = _linearise(run, structure, point, own)
+    part = _linearise(run, structure, point, np.zeros(structure.order + 1), whole=True)
     normal = _normal([part], structure.parameters)
     own = normal.inverse[0] @ normal.own_gradient[0]
-    return np.asarray(part.prediction + part.columns[:, structure.parameters : -1] @ own)
+    shared = structure.parameters
+    return np.asarray(run.y - part.columns[:, -1] + part.columns[:, shared:-1] @ own)

@@ -223,16 +223,32 @@ def _free_parts(order: int, a: Array, z: Array) -> Array:
     return parts
 
 
+@equation
+def _account(columns: Array, row: int, sums: Array) -> None:
+    """Add a row's products to the lower triangle of the sums."""
+    for i in range(sums.shape[0]):
+        for j in range(i + 1):
+            sums[i, j] += columns[row, i] * columns[row, j]
+
+
+@kernel
+def _mirror(sums: Array) -> None:
+    for i in range(len(sums)):
+        for j in range(i):
+            sums[j, i] = sums[i, j]
+
+
 @kernel
 def response(
-    of: Order, t_u: Array, u: Array, held: bool, grid: Grid, coefficients: Array, gain: float, start: Array,
-    jacobian: Array,
-) -> Array:
-    """Model output (m,) at the readings of a grid, without its offset; its derivatives go into `jacobian`.
+    of: Order, t_u: Array, u: Array, held: bool, grid: Grid, coefficients: Array, gain: float, with_delay: bool,
+    own: Array, y: Array, columns: Array, sums: Array,
+) -> None:  # fmt: skip
+    """Derivatives of the model's output at the readings of a grid, its error, and all their products.
 
-    t_u [s], u (n,): input samples; coefficients (n,): log a_1 .. log a_n; start (n,): x, x', .. at the first
-    input sample, in the output's unit and its rates. jacobian (m, 2n + 2), columns: log a_1 .. log a_n, gain,
-    delay [s], start.
+    t_u [s], u (n,): input samples; coefficients (n,): log a_1 .. log a_n; own (n + 1,): x, x', .. at the first
+    input sample, in the output's unit and its rates, then the offset; y (m,): the readings. Columns: by log a_1 ..
+    log a_n, gain, delay [s] (where with_delay), start and offset; then y less the output. columns: (m, k) takes
+    them all, (1, k) only the last. sums (k, k), zero on entry: columns' columns.
     """
     order = len(of)
     rate = np.exp(coefficients[order - 1] / order)
@@ -248,17 +264,19 @@ def response(
     free, free_now = np.zeros(order), np.zeros(order)
     free[0] = 1.0
     for i in range(order):
-        z[i] = start[i] * unit[i]
+        z[i] = own[i] * unit[i]
     first = z[:order].copy()
     parts = _free_parts(order, a, first)
     sample, between_s, between_kind = grid.sample, grid.between.length_s, grid.between.kind
     past_s, past_kind = grid.past.length_s, grid.past.kind
     between_tabled, past_tabled = len(between) > 0, len(past) > 0
     moved = np.zeros(width)
-    output = np.empty(len(sample))
+    whole, last = len(columns) > 1, columns.shape[1] - 1
+    begin = order + 2 if with_delay else order + 1
     at, alive = 0, True
     _feed(z, t_u, u, at, order, rate, gain, held)
-    for row in range(len(output)):
+    for row in range(len(y)):
+        at_row = row if whole else 0
         while at < sample[row]:
             h = between_s[at] * rate
             if between_tabled:
@@ -286,50 +304,41 @@ def response(
                 _advance(now, h, of, a, held, work)
                 if alive:
                     _advance_free(free_now, h, of, a, work)
-        output[row] = now[0]
         forced = now[0]
         for j in range(order):
-            jacobian[row, order - 1 - j] = a[order - 1 - j] * now[order + j]
-            jacobian[row, order + 2 + j] = 0.0
+            columns[at_row, order - 1 - j] = a[order - 1 - j] * now[order + j]
+            columns[at_row, begin + j] = 0.0
         if alive:
             for i in range(order):
                 forced -= free_now[i] * first[i]
-                jacobian[row, order + 2 + i] = free_now[i] * unit[i]
+                columns[at_row, begin + i] = free_now[i] * unit[i]
                 for j in range(order):
-                    jacobian[row, order - 1 - j] -= a[order - 1 - j] * free_now[i] * parts[j, i]
-        jacobian[row, order - 1] += forced
-        jacobian[row, order] = forced / gain
-        slope = now[1] if order > 1 else now[2 * order] - a[0] * now[0]
-        jacobian[row, order + 1] = -rate * slope
-    return output
+                    columns[at_row, order - 1 - j] -= a[order - 1 - j] * free_now[i] * parts[j, i]
+        columns[at_row, order - 1] += forced
+        columns[at_row, order] = forced / gain
+        if with_delay:
+            slope = now[1] if order > 1 else now[2 * order] - a[0] * now[0]
+            columns[at_row, order + 1] = -rate * slope
+        columns[at_row, last - 1] = 1.0
+        columns[at_row, last] = y[row] - now[0] - own[order]
+        _account(columns, at_row, sums)
+    _mirror(sums)
 
 
 @kernel
-def delayed(t_u: Array, u: Array, held: bool, grid: Grid, gain: float, jacobian: Array) -> Array:
-    """As `response` for a model without dynamics, y(t) = K u(t - T); jacobian (m, 2): gain, delay."""
-    output = np.empty(len(grid.sample))
-    for row in range(len(output)):
-        at = grid.sample[row]
+def delayed(
+    t_u: Array, u: Array, held: bool, grid: Grid, gain: float, offset: float, y: Array, columns: Array, sums: Array
+) -> None:
+    """As `response` for a model without dynamics, y(t) = K u(t - T) + y0; columns: gain, delay, offset, error."""
+    for row in range(len(y)):
+        at, at_row = grid.sample[row], row if len(columns) > 1 else 0
         slope = 0.0
         if not held and at + 1 < len(u):
             slope = (u[at + 1] - u[at]) / (t_u[at + 1] - t_u[at])
         value = u[at] + slope * grid.past.length_s[row]
-        output[row] = gain * value
-        jacobian[row, 0] = value
-        jacobian[row, 1] = -gain * slope
-    return output
-
-
-@kernel
-def products(columns: Array) -> Array:
-    """columns' columns (k, k) of (m, k), in one pass and one thread: small matrices lose by BLAS's threads."""
-    width = columns.shape[1]
-    total = np.zeros((width, width))
-    for row in range(len(columns)):
-        for i in range(width):
-            for j in range(i + 1):
-                total[i, j] += columns[row, i] * columns[row, j]
-    for i in range(width):
-        for j in range(i):
-            total[j, i] = total[i, j]
-    return total
+        columns[at_row, 0] = value
+        columns[at_row, 1] = -gain * slope
+        columns[at_row, 2] = 1.0
+        columns[at_row, 3] = y[row] - gain * value - offset
+        _account(columns, at_row, sums)
+    _mirror(sums)

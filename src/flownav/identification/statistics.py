@@ -25,8 +25,8 @@ class Whiteness(NamedTuple):
 
 def fit_percent(measured: Array, predicted: Array) -> float:
     """100 (1 - |y - yhat| / |y - mean(y)|): the normalised root-mean-square fit of MATLAB's `compare`."""
-    spread = float(np.linalg.norm(measured - measured.mean()))
-    return 100.0 * (1.0 - float(np.linalg.norm(measured - predicted)) / spread) if spread > 0.0 else -math.inf
+    spread = float(measured.std())
+    return 100.0 * (1.0 - math.sqrt(float(np.mean((measured - predicted) ** 2))) / spread) if spread else -math.inf
 
 
 def information_criteria(cost: float, readings: int, parameters: int, independent: float) -> tuple[float, float]:

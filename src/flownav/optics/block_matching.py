@@ -52,8 +52,6 @@ class Workspace(NamedTuple):
     best: NDArray[np.uint16]
     shift_x: NDArray[np.int64]
     shift_y: NDArray[np.int64]
-    found_x: NDArray[np.int64]
-    found_y: NDArray[np.int64]
     direction: NDArray[np.int64]
     histogram_x: NDArray[np.int64]
     histogram_y: NDArray[np.int64]
@@ -111,14 +109,17 @@ def workspace(height_px: int, width_px: int, firmware: Firmware) -> Workspace:
     return Workspace(
         grid_x,
         grid_y,
-        np.zeros(-(-span // VECTOR) * VECTOR, np.uint16),
-        *(np.zeros(plane, np.uint8) for _ in range(3)),
-        np.zeros(across, np.uint8),
-        np.zeros(across, np.uint16),
-        *(np.zeros(across, np.int64) for _ in range(2)),
-        *(np.zeros(patches, np.int64) for _ in range(2)),
-        np.full(max(patches, width_px), NO_DIRECTION, np.int64),
-        *(np.zeros(bins, np.int64) for _ in range(2)),
+        columns=np.zeros(-(-span // VECTOR) * VECTOR, np.uint16),
+        right=np.zeros(plane, np.uint8),
+        down=np.zeros(plane, np.uint8),
+        diagonal=np.zeros(plane, np.uint8),
+        usable=np.zeros(across, np.uint8),
+        best=np.zeros(across, np.uint16),
+        shift_x=np.zeros(across, np.int64),
+        shift_y=np.zeros(across, np.int64),
+        direction=np.full(max(patches, width_px), NO_DIRECTION, np.int64),
+        histogram_x=np.zeros(bins, np.int64),
+        histogram_y=np.zeros(bins, np.int64),
     )
 
 
@@ -127,7 +128,7 @@ def workspace(height_px: int, width_px: int, firmware: Firmware) -> Workspace:
 def gradient_sum(image, first, width, rows_twice):  # type: ignore[no-untyped-def]
     """The feature test: absolute steps between neighbours in the middle 4x4 of the patch at flat index `first`."""
     corner = first + 2 * width + 2
-    down, across = 0, 0
+    down, across = np.int64(0), np.int64(0)
     for row in range(4):
         for column in range(4):
             here = corner + row * width + column
@@ -204,7 +205,8 @@ def search_row(previous, current, width, corner_y, settings, work):  # type: ign
 @kernel
 def half_pixel_direction(previous, first, second, width, sad, work):  # type: ignore[no-untyped-def]
     """Which of the eight half-pixel neighbours of the best match is better still, 8 for none."""
-    direction, least = NO_DIRECTION, sad
+    direction: int = NO_DIRECTION
+    least = sad
     for k in range(8):
         if k == 0 or k == 4:
             candidate = patch_sad(previous, first, work.right, second - (1 if k == 4 else 0), width)

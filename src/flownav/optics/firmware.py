@@ -7,7 +7,7 @@ set of plain numbers and switches, so that a defect can be switched alone:
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from flownav.errors import InputError
 
@@ -76,13 +76,9 @@ _2013_09 = _2013_06._replace(name="2013-09", first_px=0, step_px=0)
 _2014_01 = _2013_09._replace(name="2014-01", over_zero_defect=False)
 _2014_07 = _2014_01._replace(name="2014-07", frame_rate_hz=400.0, patches=5)
 _2014_08 = _2014_07._replace(name="2014-08", clock_s=1e-5, frames_per_message=1, transmit_latency_s=0.356)
-_2014_10 = _2014_08._replace(
-    name="2014-10", frames_per_message=10, transmit_latency_s=0.003, gyro_compensation=False
-)
+_2014_10 = _2014_08._replace(name="2014-10", frames_per_message=10, transmit_latency_s=0.003, gyro_compensation=False)
 _2014_11 = _2014_10._replace(name="2014-11", gyro_scale=1.0)
-_2014_12 = _2014_11._replace(
-    name="2014-12", rows_twice_defect=False, half_pixel_y_defect=False, sonar_median=True
-)
+_2014_12 = _2014_11._replace(name="2014-12", rows_twice_defect=False, half_pixel_y_defect=False, sonar_median=True)
 _2015_12 = _2014_12._replace(name="2015-12", sonar_median=False)
 _2016 = _2015_12._replace(name="2016", search_px=8, frames_per_message=40)
 _2017 = _2016._replace(name="2017", feature_threshold=40)
@@ -106,14 +102,14 @@ VERSIONS: dict[str, Firmware] = {
     )
 }
 
-DEFECTS: dict[str, dict[str, object]] = {
+DEFECTS: dict[str, dict[str, Any]] = {
     "rows-twice": {"rows_twice_defect": True},
     "half-pixel-y": {"half_pixel_y_defect": True},
     "gyro-scale": {"gyro_scale": EARLY_GYRO_SCALE},
     "over-zero": {"over_zero_defect": True},
     "histogram-index": {"histogram_index_defect": True},
 }
-REPAIRS: dict[str, dict[str, object]] = {
+REPAIRS: dict[str, dict[str, Any]] = {
     "rows-twice": {"rows_twice_defect": False},
     "half-pixel-y": {"half_pixel_y_defect": False},
     "gyro-scale": {"gyro_scale": 1.0},
@@ -137,7 +133,7 @@ def firmware_named(text: str) -> Firmware:
     return version._replace(name=text)
 
 
-def _changes(switch: str) -> dict[str, object]:
+def _changes(switch: str) -> dict[str, Any]:
     sign, name = switch[:1], switch[1:]
     parameters = {"histogram": "histogram_filter", "low-pass": "low_pass", "gyro": "gyro_compensation"}
     if sign in ("+", "-") and name in parameters:

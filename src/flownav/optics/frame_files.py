@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -69,7 +70,7 @@ def _pillow() -> Any:
 
 def _video(path: Path) -> NDArray[np.uint8]:
     try:
-        import av
+        av: Any = import_module("av")
     except ImportError:
         raise InputError(
             f"{path}: reading video needs PyAV: pip install av; "

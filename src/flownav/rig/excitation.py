@@ -23,6 +23,7 @@ REST_S = 1.0
 CHIRP_HZ = (0.3, 4.0)
 SERVO_RAD_S = 2.0 * np.pi * 8.0
 STEP_HOLD_S = (0.3, 1.2)
+LARGEST_ANGLE_RAD = 0.2
 SHORTEST_ROD_M = 0.25
 
 
@@ -35,7 +36,7 @@ class Motion(NamedTuple):
 
 
 def rod_length(excitation: str, pivot_height_m: float, height_m: float, run: int, runs: int) -> float:
-    """Length of the rod in a run [m]: l0 - h, or for `lengths` from there down to SHORTEST_ROD_M, tones evenly apart."""
+    """Length of the rod in a run [m]: l0 - h; for `lengths` from there to SHORTEST_ROD_M, their tones evenly apart."""
     longest = pivot_height_m - height_m
     if excitation != "lengths" or runs < 2:
         return longest
@@ -61,7 +62,7 @@ def move(
         driven(_steps(count, speed_m_s / length_m, rng), SERVO_RAD_S, angle, rate)
     else:
         raise InputError(f"excitation {excitation!r}: unknown; known are {', '.join(EXCITATIONS)}")
-    return Motion(np.arange(count) * STEP_S, angle, rate)
+    return Motion(np.linspace(0.0, (count - 1) * STEP_S, count), angle, rate)
 
 
 def _chirp(count: int, rate_rad_s: float) -> Array:
@@ -75,15 +76,14 @@ def _chirp(count: int, rate_rad_s: float) -> Array:
 
 def _steps(count: int, rate_rad_s: float, rng: np.random.Generator) -> Array:
     """Angle at constant rates, forth and back: each held for a random time, turned where the angle grows large."""
-    farthest = rate_rad_s * STEP_HOLD_S[1]
     wanted = np.zeros(count)
     k, angle, sign = round(REST_S / STEP_S), 0.0, 1.0
     while k < count:
-        hold = max(round(rng.uniform(*STEP_HOLD_S) / STEP_S), 1)
         level = rate_rad_s * rng.choice([0.0, 0.5, 1.0])
+        room_s = (LARGEST_ANGLE_RAD - sign * angle) / level if level > 0.0 else STEP_HOLD_S[1]
+        hold = max(round(min(rng.uniform(*STEP_HOLD_S), room_s) / STEP_S), 1)
         steps = np.arange(1, min(hold, count - k) + 1)
         wanted[k : k + len(steps)] = angle + sign * level * STEP_S * steps
-        angle = wanted[k + len(steps) - 1]
-        k += len(steps)
-        sign = -np.sign(angle) if abs(angle) > 0.5 * farthest else rng.choice([-1.0, 1.0])
+        k, angle = k + len(steps), wanted[k + len(steps) - 1]
+        sign = -np.sign(angle) if abs(angle) > 0.5 * LARGEST_ANGLE_RAD else rng.choice([-1.0, 1.0])
     return wanted

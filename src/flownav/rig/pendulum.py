@@ -31,7 +31,8 @@ def sensor_velocity(angle_rad: float, rate_rad_s: float, length_m: float) -> tup
 @equation
 def largest_speed(start_angle_rad: float, pivot_height_m: float, height_m: float) -> float:
     """Equation 16, small swings: v_max = sqrt(g l0 (1 - h/l0)) theta0 [m/s], at the lowest place."""
-    return np.sqrt(GRAVITY_M_S2 * pivot_height_m * (1.0 - height_m / pivot_height_m)) * start_angle_rad
+    speed_m_s: float = np.sqrt(GRAVITY_M_S2 * pivot_height_m * (1.0 - height_m / pivot_height_m)) * start_angle_rad
+    return speed_m_s
 
 
 @equation
@@ -39,7 +40,8 @@ def swing_acceleration(
     angle_rad: float, rate_rad_s: float, push_rad_s2: float, length_m: float, damping_1_s: float
 ) -> float:
     """theta'' = -(g/l) sin(theta) - 2 sigma theta' + push: amplitude falls as exp(-sigma t) [rad/s²]."""
-    return -GRAVITY_M_S2 / length_m * np.sin(angle_rad) - 2.0 * damping_1_s * rate_rad_s + push_rad_s2
+    gravity_rad_s2: float = GRAVITY_M_S2 / length_m * np.sin(angle_rad)
+    return push_rad_s2 - gravity_rad_s2 - 2.0 * damping_1_s * rate_rad_s
 
 
 @equation

@@ -1,0 +1,141 @@
+"""`flownav flow`: a user's own pictures through the PX4FLOW's block matching."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from flownav.optics.flow import FlowSeries
+
+
+def command(
+    frames: Annotated[
+        list[Path], typer.Argument(help="A folder of pictures, pictures in order, or one video.", show_default=False)
+    ],
+    fps: Annotated[float, typer.Option(help="Frames a second.", show_default=False)],
+    focal: Annotated[float, typer.Option(help="Focal length [px]; the PX4FLOW's is 666.67.")] = 666.67,
+    distance: Annotated[
+        float | None, typer.Option("--range", help="Distance to the ground [m]; adds velocities.", show_default=False)
+    ] = None,
+    rates: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV with columns rate_x_rad_s, rate_y_rad_s, rate_z_rad_s, a row a frame: compensates rotation.",
+            show_default=False,
+        ),
+    ] = None,
+    firmware: Annotated[str, typer.Option(help="A version and its switches (docs/optics.md).")] = "2014-12",
+    window: Annotated[
+        int | None, typer.Option(help="Use the middle WINDOW x WINDOW pixels only.", show_default=False)
+    ] = None,
+    bin_by: Annotated[int, typer.Option("--bin", help="Average BIN x BIN pixels into one first.")] = 1,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Flow and quality from each frame to the next, with the historical firmware of your choice."""
+    from flownav.cli.output import require_between
+    from flownav.compile import announce_compilation
+    from flownav.optics.flow import flow_of_frames
+    from flownav.optics.frame_files import read_frames
+    from flownav.optics.frame_window import binned, middle
+
+    require_between("--fps", fps, 1e-3, 1e6)
+    require_between("--focal", focal, 1.0, 1e6)
+    require_between("--bin", bin_by, 1, 64)
+    if distance is not None:
+        require_between("--range", distance, 0.01, 10_000.0)
+    grey = binned(read_frames(frames), bin_by)
+    if window is not None:
+        grey = middle(grey, window)
+    with announce_compilation("flow"):
+        series = flow_of_frames(
+            grey,
+            fps,
+            focal_px=focal / bin_by,
+            rates_rad_s=_rates(rates) if rates else None,
+            range_m=distance,
+            firmware=firmware,
+        )
+    facts = _facts(series, len(grey), grey.shape[2], grey.shape[1], fps, focal / bin_by, firmware)
+    if as_json:
+        typer.echo(json.dumps(facts))
+    else:
+        _print(facts)
+
+
+def _rates(path: Path) -> Any:
+    """The rates of a CSV file, one row a frame."""
+    import csv
+
+    import numpy as np
+
+    from flownav.errors import InputError
+
+    names = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
+    try:
+        with path.open(newline="", encoding="utf-8") as stream:
+            rows = list(csv.DictReader(stream))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read ({error})") from None
+    try:
+        return np.array([[float(row[name]) for name in names] for row in rows]).reshape(-1, 3)
+    except (KeyError, TypeError, ValueError):
+        raise InputError(f"{path}: columns {', '.join(names)} of numbers are needed, one row a frame") from None
+
+
+def _facts(
+    series: FlowSeries, count: int, width: int, height: int, fps: float, focal_px: float, firmware: str
+) -> dict[str, Any]:
+    import numpy as np
+
+    good = series.quality > 0
+    moving = np.isfinite(series.velocity_m_s).all()
+    per_frame = []
+    for k in range(count - 1):
+        row = {
+            "t_s": float(series.time_s[k]),
+            "flow_x_px": float(series.flow_px[k, 0]),
+            "flow_y_px": float(series.flow_px[k, 1]),
+            "quality": int(series.quality[k]),
+        }
+        if moving:
+            row |= {f"velocity_{a}_m_s": float(v) for a, v in zip("xy", series.velocity_m_s[k], strict=True)}
+        per_frame.append(row)
+    mean = lambda values: values[good].mean(axis=0).tolist() if good.any() else None  # noqa: E731
+    summary = {
+        "valid": int(good.sum()),
+        "mean_quality": float(series.quality.mean()),
+        "mean_flow_px": mean(series.flow_px),
+        "std_flow_px": series.flow_px[good].std(axis=0).tolist() if good.any() else None,
+        "mean_flow_rad_s": mean(series.flow_rad_s),
+        "mean_velocity_m_s": mean(series.velocity_m_s) if moving else None,
+    }
+    return {
+        "frames": count,
+        "size_px": [width, height],
+        "fps": fps,
+        "focal_px": focal_px,
+        "firmware": firmware,
+        "summary": summary,
+        "per_frame": per_frame,
+    }
+
+
+def _print(facts: dict[str, Any]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    summary = facts["summary"]
+    console = Console(markup=False, highlight=False)
+    width, height = facts["size_px"]
+    console.print(f"{facts['frames']} frames of {width}x{height} px, firmware {facts['firmware']}")
+    console.print(f"{summary['valid']} of {facts['frames'] - 1} pairs valid, quality {summary['mean_quality']:.0f}/255")
+    table = Table("", "x", "y")
+    rows = (("flow [px]", "mean_flow_px"), ("spread [px]", "std_flow_px"), ("flow [rad/s]", "mean_flow_rad_s"))
+    for label, key in (*rows, ("velocity [m/s]", "mean_velocity_m_s")):
+        if summary[key] is not None:
+            table.add_row(label, *(f"{value:.4f}" for value in summary[key]))
+    console.print(table)

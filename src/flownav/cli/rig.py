@@ -1,0 +1,108 @@
+"""`flownav rig`: the paper's pendulum experiment, simulated from pixels, logged as a real rig would."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from flownav.rig.experiment import RigLog
+
+
+def command(
+    out: Annotated[Path, typer.Option("--out", help="The folder to write (docs/rig.md).", show_default=False)],
+    height: Annotated[
+        list[float] | None, typer.Option(help="Sensor's height above the pad at rest [m]; may be repeated.")
+    ] = None,
+    runs: Annotated[int, typer.Option(help="Runs at each height.")] = 1,
+    duration: Annotated[float, typer.Option(help="Length of a run [s].")] = 25.0,
+    excitation: Annotated[str, typer.Option(help="swing (the paper's), lengths, chirp or steps.")] = "swing",
+    pad: Annotated[str, typer.Option(help="stripes, stripes-MM, texture, checker, or a picture FILE:WIDTH_M.")] = (
+        "stripes"
+    ),
+    light: Annotated[str, typer.Option(help="low, normal or intense.")] = "normal",
+    firmware: Annotated[str, typer.Option(help="A version and its switches, 2013-09,-gyro-scale (docs/optics.md).")] = (
+        "2013-09"
+    ),
+    along: Annotated[str, typer.Option(help="The camera's axis along the swing, x or y.")] = "x",
+    pivot_height: Annotated[float, typer.Option(help="Pivot above the pad [m].")] = 2.1,
+    start_angle: Annotated[float, typer.Option(help="Amplitude of the swing [rad].")] = 0.0912,
+    refocus: Annotated[float, typer.Option(help="1: lens focused at each height; 0: left at 0.6 m.")] = 1.0,
+    chain_delay: Annotated[float, typer.Option(help="Serial and logging chain [s].")] = 0.07,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same logs.")] = 1,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Swing a PX4FLOW over a pad beside an encoder and log both: rig.csv and rig.toml, a folder a run."""
+    from flownav.cli.output import progress, require_between
+    from flownav.compile import announce_compilation
+    from flownav.provenance import command_line
+    from flownav.rig.campaign import run_campaign
+    from flownav.rig.experiment import RigSettings
+    from flownav.rig.log_folder import run_folders, write_rig_folder
+
+    require_between("--seed", seed, 0, 2**31 - 1)
+    heights = height or [0.6]
+    settings = RigSettings(
+        height_m=heights[0],
+        pivot_height_m=pivot_height,
+        start_angle_rad=start_angle,
+        duration_s=duration,
+        pad=pad,
+        light=light,
+        firmware=firmware,
+        excitation=excitation,
+        along=along,
+        refocus=refocus,
+        chain_delay_s=chain_delay,
+        runs=runs,
+        seed=seed,
+    )
+    rows = []
+    with announce_compilation("rig"), progress("Swinging", len(heights) * runs) as advance:
+        folders = run_folders(out, len(heights) * runs)
+        for log, folder in zip(run_campaign(settings, heights, advance), folders, strict=True):
+            write_rig_folder(log, folder, command_line())
+            rows.append(_facts(log, folder))
+    if as_json:
+        typer.echo(json.dumps({"seed": seed, "firmware": firmware, "pad": pad, "excitation": excitation, "runs": rows}))
+    else:
+        _print(rows)
+
+
+def _facts(log: RigLog, folder: Path) -> dict[str, Any]:
+    """What a run was and what it looks like."""
+    import numpy as np
+
+    return {
+        "folder": str(folder),
+        "height_m": log.settings.height_m,
+        "rod_length_m": round(log.rod_length_m, 4),
+        "rows": len(log.time_s),
+        "peak_reference_m_s": float(np.abs(log.reference_velocity_m_s).max()),
+        "rms_reference_m_s": float(np.sqrt(np.mean(log.reference_velocity_m_s**2))),
+        "rms_flow_m_s": float(np.sqrt(np.mean(log.flow_velocity_m_s**2))),
+        "mean_quality": float(log.quality.mean()),
+    }
+
+
+def _print(rows: list[dict[str, Any]]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title="Logs written", title_justify="left")
+    for heading in ("folder", "height [m]", "rod [m]", "peak [m/s]", "encoder rms [m/s]", "flow rms [m/s]", "quality"):
+        table.add_column(heading, justify="left" if heading == "folder" else "right")
+    for row in rows:
+        table.add_row(
+            row["folder"],
+            f"{row['height_m']:g}",
+            f"{row['rod_length_m']:.3f}",
+            f"{row['peak_reference_m_s']:.3f}",
+            f"{row['rms_reference_m_s']:.3f}",
+            f"{row['rms_flow_m_s']:.3f}",
+            f"{row['mean_quality']:.0f}",
+        )
+    Console().print(table)

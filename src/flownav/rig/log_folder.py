@@ -1,0 +1,105 @@
+"""The folder that a rig writes: rig.csv, one row a logged moment, and rig.toml, what was set up.
+
+Several runs or heights stand side by side as FOLDER/run-001, run-002, ...
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flownav.errors import InputError
+from flownav.provenance import provenance
+from flownav.rig.encoder import COUNTS_PER_REVOLUTION
+from flownav.rig.experiment import RigLog
+
+SCHEMA_VERSION = 1
+COLUMNS = {
+    "t_s": "%.3f",
+    "encoder_counts": "%d",
+    "reference_velocity_m_s": "%.6f",
+    "flow_velocity_m_s": "%.6f",
+    "flow_x_dpx": "%d",
+    "flow_y_dpx": "%d",
+    "ground_distance_m": "%.4f",
+    "quality": "%d",
+}
+
+
+def write_rig_folder(log: RigLog, folder: Path, command: str = "") -> None:
+    """Write rig.csv and rig.toml, each whole or not at all. InputError where the folder cannot be written."""
+    table = np.column_stack(
+        [
+            log.time_s,
+            log.encoder_counts,
+            log.reference_velocity_m_s,
+            log.flow_velocity_m_s,
+            log.flow_x_dpx,
+            log.flow_y_dpx,
+            log.ground_distance_m,
+            log.quality,
+        ]
+    )
+    line = ",".join(COLUMNS.values())
+    text = "\n".join([",".join(COLUMNS), *(line % tuple(row) for row in table.tolist())]) + "\n"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        _write_whole(folder / "rig.csv", text)
+        _write_whole(folder / "rig.toml", _set_up(log, command))
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); give another --out") from error
+
+
+def run_folders(folder: Path, count: int) -> Iterator[Path]:
+    """Where the logs of `count` runs go: the folder itself for one, run-001 ... in it for more."""
+    if count == 1:
+        yield folder
+        return
+    for number in range(1, count + 1):
+        yield folder / f"run-{number:03d}"
+
+
+def _set_up(log: RigLog, command: str) -> str:
+    s, made = log.settings, provenance()
+    entries: dict[str, Any] = {
+        "schema_version": SCHEMA_VERSION,
+        "pivot_height_m": log.rod_length_m + s.height_m,
+        "rod_length_m": log.rod_length_m,
+        "height_m": s.height_m,
+        "encoder_counts_per_revolution": COUNTS_PER_REVOLUTION,
+        "pad": s.pad,
+        "firmware": s.firmware,
+        "excitation": s.excitation,
+        "seed": s.seed,
+        "chain_delay_s": s.chain_delay_s,
+    }
+    origin = {
+        "source": "flownav rig, simulated from pixels",
+        "command": command,
+        "run": log.run,
+        "light": s.light,
+        "axis_along_swing": s.along,
+        "start_angle_rad": s.start_angle_rad,
+        "duration_s": s.duration_s,
+        "refocus": s.refocus,
+        "flownav": made["flownav"],
+        "written_utc": made["written_utc"],
+    }
+    lines = [f"{key} = {_toml(value)}" for key, value in entries.items()]
+    return "\n".join([*lines, "", "[provenance]", *(f"{key} = {_toml(value)}" for key, value in origin.items())]) + "\n"
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return repr(round(value, 9)) if isinstance(value, float) else str(value)
+
+
+def _write_whole(path: Path, text: str) -> None:
+    temporary = path.with_name(f".{path.name}.{os.getpid()}")
+    temporary.write_text(text, encoding="utf-8")
+    temporary.replace(path)

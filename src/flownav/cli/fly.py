@@ -27,7 +27,7 @@ def command(
 ) -> None:
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
     from flownav.campaign.local import fly_many, fly_recorded, median_flight
-    from flownav.cli.output import progress, require_between
+    from flownav.cli.output import progress, require_between, save
     from flownav.scoring.errors import scores_of_flights
     from flownav.scoring.paper_tables import percentile_of_paper, published
     from flownav.simulation.assemble import assemble
@@ -54,16 +54,9 @@ def command(
         percentiles = percentile_of_paper(rows, table) if table else None
     record = fly_recorded(setup, seed, index)
     scores = record.manifest["scores"] if flights == 1 else scores_of_flights(rows)
-    record.save(record_path)
-    facts |= scores | {"record": str(record_path)}
+    facts |= scores | save(record, record_path, report=report)
     if percentiles:
         facts["paper_percentile"] = percentiles
-    if report:
-        from flownav.report.html import write_report
-
-        page = record_path.with_suffix(".html")
-        write_report(record, page)
-        facts["report"] = str(page)
     if as_json:
         typer.echo(json.dumps(facts))
     else:

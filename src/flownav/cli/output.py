@@ -4,8 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from flownav.errors import InputError
+
+if TYPE_CHECKING:
+    from flownav.record import Record
 
 
 @contextmanager
@@ -24,3 +29,19 @@ def require_between(option: str, value: float, low: float, high: float) -> None:
     """InputError where an option's number is out of range."""
     if not low <= value <= high:
         raise InputError(f"{option} {value:g}: must be from {low:g} to {high:g}")
+
+
+def save(record: Record, path: Path, *, report: bool) -> dict[str, str]:
+    """Write a record and, if asked, its report beside it; where they lie. InputError where that cannot be."""
+    page = path.with_suffix(".html")
+    if report and page == path:
+        raise InputError(f"--out {path}: the report would replace the record; name it .fnr")
+    try:
+        record.save(path)
+        if report:
+            from flownav.report.html import write_report
+
+            write_report(record, page)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
+    return {"record": str(path), **({"report": str(page)} if report else {})}

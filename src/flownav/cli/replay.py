@@ -40,6 +40,8 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Fuse a recorded flight: its trajectory, its errors against its own GPS, and the drift through GPS outages."""
+    from flownav.cli.output import save
+    from flownav.replay.bundle import to_record
     from flownav.replay.prepare import ReplayOptions
     from flownav.replay.session import replay, table_windows
 
@@ -53,7 +55,7 @@ def command(
     if table:
         scores.update(_fly_table(flown, table, scores["outages"]))
     record_path = out or Path("out") / f"{folder.resolve().name}.fnr"
-    scores |= _write(flown, scores, record_path, report)
+    scores |= save(to_record(flown, scores, ["flownav", *sys.argv[1:]]), record_path, report=report)
     if as_json:
         typer.echo(json.dumps(scores))
     else:
@@ -95,26 +97,6 @@ def _fly_table(flown: Replay, table: list[tuple[float, float]], explicit: list[d
     with progress("GPS outages", len(table)) as advance:
         errors = outage_table(flown.log, flown.options, flown.settings, table, advance)
     return {"outages": [*explicit, *map(outage_entry, errors)], **outage_summary(errors)}
-
-
-def _write(flown: Replay, scores: dict[str, Any], record_path: Path, report: bool) -> dict[str, str]:
-    """The record and its report; where they lie."""
-    from flownav.errors import InputError
-    from flownav.replay.bundle import to_record
-
-    record = to_record(flown, scores, ["flownav", *sys.argv[1:]])
-    page = record_path.with_suffix(".html")
-    if report and page == record_path:
-        raise InputError(f"--out {record_path}: the report would replace the record; name it .fnr")
-    try:
-        record.save(record_path)
-        if report:
-            from flownav.report.html import write_report
-
-            write_report(record, page)
-    except OSError as error:
-        raise InputError(f"{record_path}: cannot be written ({error.strerror}); give another --out") from error
-    return {"record": str(record_path), **({"report": str(page)} if report else {})}
 
 
 def _print(flown: Replay, scores: dict[str, Any]) -> None:

@@ -1,0 +1,51 @@
+"""The engine's hot paths, timed side by side with peers in one run: `make bench`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from filterpy.kalman import KalmanFilter
+
+from flownav.benchmark.filter_loop import ROWS, run_paper_filter
+from flownav.compile import LANES, ONE_LANE
+from flownav.simulation import layout
+from flownav.simulation.assemble import assemble
+from flownav.simulation.flight import fly_block
+from flownav.simulation.history import HISTORY
+from flownav.simulation.scenario import load_scenario
+
+STEPS = 1000
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return assemble(load_scenario("landing")).flight
+
+
+@pytest.mark.benchmark(group="one 50 s landing (divide the lanes' time by 16)")
+@pytest.mark.parametrize("lanes", [ONE_LANE, LANES], ids=["scalar", "16 lanes"])
+def test_flight(benchmark, flight, lanes):
+    work = np.zeros(layout.ROWS * len(lanes))
+    history = np.empty((flight.plan.epochs, len(HISTORY), len(lanes)))
+    benchmark(fly_block, flight, 1, 0, lanes, work, history)
+
+
+@pytest.mark.benchmark(group=f"{STEPS} predict+update of six states")
+def test_paper_filter(benchmark, flight):
+    benchmark(run_paper_filter, np.zeros(ROWS), ONE_LANE, STEPS, flight.paper)
+
+
+@pytest.mark.benchmark(group=f"{STEPS} predict+update of six states")
+def test_filterpy(benchmark, flight):
+    model = flight.paper
+    other = KalmanFilter(dim_x=6, dim_z=6, dim_u=4)
+    other.F, other.B, other.H = model.transition, model.input_matrix, np.eye(6)
+    other.Q, other.R = np.diag(model.process_noise), np.diag(model.measurement_noise)
+    inputs, measured = np.zeros((4, 1)), np.zeros((6, 1))
+
+    def steps():
+        for _ in range(STEPS):
+            other.predict(u=inputs)
+            other.update(measured)
+
+    benchmark(steps)

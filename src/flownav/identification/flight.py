@@ -1,0 +1,123 @@
+"""A flight log for identification: the flow's velocity, a reference track, and the vehicle's own motion between.
+
+The sensor's velocity along body x and y comes from angular rates times range (`prepare` takes the rotation out),
+or as the sensor says it. The reference is motion capture where the log has it, GPS otherwise. The IMU's earth
+acceleration ties both to the vehicle's clock: it gives the flow's latency as an autopilot needs it, and shows
+swapped or inverted axes even where the reference's heading is unknown.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.errors import InputError
+from flownav.frames import rotation_from_quaternion
+from flownav.logs.log import Log
+from flownav.logs.rates import attitude_at
+from flownav.measurement import Array, Sensor, Stream
+from flownav.replay.prepare import ReplayOptions, prepare
+
+GRAVITY_M_S2 = 9.80665
+FLOOR_SHARE = 0.01  # of the readings at the lowest range: a rangefinder stuck at its floor
+FLOOR_MARGIN = 1.03
+LEAST_FLOW = 200
+LONGEST_GAP_S = 0.5
+REFERENCES = ("truth", "gps")
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What identification needs of a flight.
+
+    t_s (n,) arrival of each flow reading, velocity_m_s (n, 2) along body x and y, age_s what the log says of how
+    old a reading is when it arrives (half its exposure), quality (n,), range_m (n,), good (n,) usable readings;
+    reference_t_s (m,), reference_m (m, 3) north, east, down of a frame that may be turned, reference ("truth" or
+    "gps"); imu None without one; climb_m_s: downward velocity at arrival, zero where the reference has no height.
+    """
+
+    name: str
+    t_s: Array
+    velocity_m_s: Array
+    age_s: float
+    quality: Array
+    range_m: Array
+    good: NDArray[np.bool_]
+    attitude: Stream
+    imu: Stream | None
+    reference: str
+    reference_t_s: Array
+    reference_m: Array
+    flow_limit_rad_s: float
+    notes: tuple[str, ...]
+
+    def rotation(self, instants_s: Array) -> Array:
+        """Body to earth, (n, 3, 3)."""
+        rows = rotation_from_quaternion(*attitude_at(self.attitude, instants_s).T)
+        return np.stack(rows, axis=1).reshape(-1, 3, 3)
+
+    def segments(self) -> list[slice]:
+        """Stretches of readings without a gap; readings that are not good are left out before."""
+        t_s = self.t_s[self.good]
+        cuts = np.flatnonzero(np.diff(t_s) > max(LONGEST_GAP_S, 5.0 * float(np.median(np.diff(t_s))))) + 1
+        edges = [0, *cuts.tolist(), len(t_s)]
+        return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+
+
+def flight(log: Log, reference: str = "auto") -> Flight:
+    """A flight out of a log. InputError names what is missing: flow, range, attitude or a reference."""
+    sensor = next((s for s in (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY) if s in log.streams), None)
+    if sensor is None:
+        raise InputError(f"{log.path}: no flow readings; flow.csv or px4flow.csv is needed to identify a flow sensor")
+    if Sensor.RANGE not in log.streams:
+        raise InputError(f"{log.path}: no range readings; range.csv is needed for the flow's scale and height")
+    chosen, reference_t_s, reference_m = _reference(log, reference)
+    prepared = prepare(log, ReplayOptions(gps_delay_s=0.0))
+    mine = prepared.queue.sensor == sensor
+    value, quality = prepared.queue.value[mine], prepared.queue.quality[mine]
+    age_s = prepared.delays_s[sensor]
+    t_s = prepared.queue.t_s[mine] + age_s
+    distance = log.streams[Sensor.RANGE]
+    range_m = np.interp(t_s - age_s, distance.t_s, distance.value[:, 0])
+    rate = value[:, :2]
+    if sensor == Sensor.FLOW_RATE:
+        velocity = np.column_stack([(value[:, 1] - value[:, 3]) * range_m, (value[:, 2] - value[:, 0]) * range_m])
+    else:
+        velocity, rate = value[:, :2], value[:, :2] / np.maximum(range_m, 0.1)[:, None]
+    good = (quality > 0) & np.isfinite(velocity).all(axis=1) & (range_m > _floor(distance.value[:, 0]))
+    good &= np.any(velocity != 0.0, axis=1)
+    good &= np.concatenate([[True], np.diff(t_s) > 0.0])
+    if np.count_nonzero(good) < LEAST_FLOW:
+        raise InputError(
+            f"{log.path}: {np.count_nonzero(good)} of {len(good)} flow readings are usable (quality above 0, range "
+            f"above its floor, not exactly zero); at least {LEAST_FLOW} are needed"
+        )
+    if not np.all(np.ptp(velocity[good], axis=0) > 0.0):
+        raise InputError(f"{log.path}: the flow is constant; a flight that moves is needed")
+    return Flight(
+        str(log.path), t_s, velocity, age_s, quality, range_m, good, log.streams[Sensor.ATTITUDE],
+        log.streams.get(Sensor.IMU), chosen, reference_t_s, reference_m,
+        float(np.quantile(np.abs(rate[good]), 0.999)), prepared.notes,
+    )  # fmt: skip
+
+
+def _reference(log: Log, wanted: str) -> tuple[str, Array, Array]:
+    if wanted not in ("auto", *REFERENCES):
+        raise InputError(f"--reference {wanted}: auto, truth (truth.csv) or gps (gps.csv) are possible for a flight")
+    if wanted in ("auto", "truth") and log.truth is not None:
+        columns = [np.asarray(log.truth[name], float) for name in ("pos_n_m", "pos_e_m", "pos_d_m")]
+        return "truth", np.asarray(log.truth["t_s"], float), np.column_stack(columns)
+    if wanted in ("auto", "gps") and Sensor.GPS_POSITION in log.streams:
+        stream = log.streams[Sensor.GPS_POSITION]
+        return "gps", stream.t_s, stream.value
+    missing = {"truth": "truth.csv", "gps": "gps.csv"}.get(wanted, "truth.csv (motion capture) or gps.csv")
+    raise InputError(f"{log.path}: no reference to identify against; {missing} is needed")
+
+
+def _floor(range_m: Array) -> float:
+    """The range that counts as too near: just above the lowest one, where many readings stick to it."""
+    lowest = float(np.min(range_m))
+    stuck = np.mean(range_m <= lowest + 0.005) > FLOOR_SHARE
+    return lowest * FLOOR_MARGIN + 0.005 if stuck else 0.0

@@ -1,0 +1,98 @@
+"""Tests that read the package: documented, layered, and honest about its data."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import pkgutil
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import flownav
+
+PACKAGE = Path(flownav.__file__).parent
+PROJECT = PACKAGE.parents[1]
+MODULES = sorted(m.name for m in pkgutil.walk_packages([str(PACKAGE)], "flownav.") if m.name != "flownav.__main__")
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+LONGEST_FILE = 330
+
+# rooms from the ground up; a room imports its own floor's neighbours named here and what lies below
+GROUND = {"errors", "compile", "frames", "measurement", "record", "parameter_files", "provenance"}
+EQUATIONS = {"vehicle", "sensors", "control", "estimation", "optics"}
+ALLOWED = {
+    "vehicle": GROUND,
+    "sensors": GROUND,
+    "control": GROUND,
+    "estimation": GROUND,
+    "optics": GROUND,
+    "scoring": GROUND,
+    "logs": GROUND,
+    "rig": GROUND | {"optics", "sensors"},
+    "identification": GROUND | EQUATIONS | {"logs", "rig"},
+    "simulation": GROUND | EQUATIONS,
+    "replay": GROUND | EQUATIONS | {"logs", "scoring"},
+    "campaign": GROUND | EQUATIONS | {"simulation", "scoring"},
+    "report": GROUND | {"scoring"},
+}
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_every_module_imports_and_says_what_it_is(name):
+    assert importlib.import_module(name).__doc__, f"{name} has no docstring"
+
+
+def _rooms_imported(source: Path) -> set[str]:
+    tree = ast.parse(source.read_text(encoding="utf-8"))
+    modules = [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    modules += [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
+    return {module.split(".")[1] for module in modules if module.startswith("flownav.") and module.count(".")}
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_imports_run_one_way(source):
+    room = source.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    if room in ALLOWED:
+        assert _rooms_imported(source) - {room} <= ALLOWED[room]
+    elif room in GROUND:
+        assert _rooms_imported(source) <= GROUND
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_only_compile_knows_numba(source):
+    if source.name != "compile.py":
+        imported = re.findall(r"^\s*(?:import|from)\s+(numba|llvmlite)", source.read_text(encoding="utf-8"), re.M)
+        assert not imported
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_files_can_be_read_in_one_sitting(source):
+    assert len(source.read_text(encoding="utf-8").splitlines()) <= LONGEST_FILE
+
+
+def test_constraints_pin_every_dependency_and_name_no_address():
+    lines = (PROJECT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    assert all(re.fullmatch(r"[A-Za-z0-9._-]+==[A-Za-z0-9.+_-]+", line) for line in lines)
+    pinned = {re.sub(r"[-_.]+", "-", line.split("==")[0]).lower() for line in lines}
+    project = tomllib.loads((PROJECT / "pyproject.toml").read_text(encoding="utf-8"))
+    groups = project["dependency-groups"].values()
+    wanted = [*project["project"]["dependencies"], *(name for group in groups for name in group)]
+    names = {re.sub(r"[-_.]+", "-", re.split(r"[<>=\[; ]", name)[0]).lower() for name in wanted}
+    assert names <= pinned
+
+
+def test_docs_have_a_place_in_the_navigation():
+    navigation = (PROJECT / "mkdocs.yml").read_text(encoding="utf-8")
+    for page in (PROJECT / "docs").glob("*.md"):
+        assert page.name in navigation, f"docs/{page.name} is not in mkdocs.yml"
+
+
+@pytest.mark.parametrize(
+    "page", ["README.md", "ARCHITECTURE.md", *sorted(f"docs/{p.name}" for p in (PROJECT / "docs").glob("*.md"))]
+)
+def test_links_between_pages_lead_somewhere(page):
+    text = (PROJECT / page).read_text(encoding="utf-8")
+    for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", text):
+        assert ((PROJECT / page).parent / target).exists(), f"{page}: {target}"

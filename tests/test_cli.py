@@ -1,0 +1,153 @@
+"""The command line as a user meets it: JSON alone on stdout, one-line errors, exit status, nothing half-written."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from flownav.parameter_files import shipped
+from flownav.record import Record
+
+
+def run(*arguments, cwd):
+    return subprocess.run(
+        [sys.executable, "-m", "flownav", *map(str, arguments)], cwd=cwd, capture_output=True, text=True, check=False
+    )
+
+
+def one_line_error(done):
+    """The only line of a refused command, after the status and the silence of stdout are checked."""
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    lines = done.stderr.strip().splitlines()
+    assert len(lines) == 1, done.stderr
+    return lines[0]
+
+
+def short(tmp_path, text="", name="landing", duration="2.0"):
+    """A short copy of a shipped scenario, with lines added to its end."""
+    path = tmp_path / "short.toml"
+    original = shipped(f"{name}.toml").read_text(encoding="utf-8")
+    path.write_text(original.replace("duration_s = 50.0", f"duration_s = {duration}") + text, encoding="utf-8")
+    return path
+
+
+NUMBER_KEYS = {"mean_error", "std_error", "rms_error", "max_error"}
+
+
+def test_fly_json_has_every_key_and_its_record_is_there(tmp_path):
+    done = run("fly", short(tmp_path), "--json", "--seed", 3, "--out", tmp_path / "f.fnr", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert {
+        "scenario",
+        "filter",
+        "gps",
+        "seed",
+        "flights",
+        "states",
+        "max_position_error_m",
+        "touchdown",
+        "record",
+    } <= set(facts)
+    assert (facts["filter"], facts["gps"], facts["seed"], facts["flights"]) == ("paper", "white", 3, 1)
+    assert list(facts["states"]) == list("xyzuvw")
+    assert all(set(entry) == NUMBER_KEYS for entry in facts["states"].values())
+    assert facts["touchdown"] is None
+    record = Record.load(tmp_path / "f.fnr")
+    error = record.matrix("estimate", ("pos_n_m",)) - record.matrix("truth", ("pos_n_m",))
+    assert facts["states"]["x"]["rms_error"] == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
+    assert (tmp_path / "f.html").stat().st_size > 1e6
+
+
+def test_many_flights_turn_every_number_into_median_and_percentiles(tmp_path):
+    done = run("fly", short(tmp_path), "--json", "--flights", 20, "--no-report", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    for entry in (*facts["states"].values(), {"largest": facts["max_position_error_m"]}):
+        for number in entry.values():
+            assert number["p05"] <= number["median"] <= number["p95"]
+    assert 0 <= facts["paper_percentile"]["max_position_error_m"] <= 100
+    record = Record.load(tmp_path / facts["record"])
+    assert record.manifest["scores"]["max_position_error_m"] == pytest.approx(
+        facts["max_position_error_m"]["median"], rel=0.2
+    )
+
+
+def test_a_seed_gives_the_same_flight_again(tmp_path):
+    first, again = (run("fly", short(tmp_path), "--json", "--no-report", cwd=tmp_path).stdout for _ in range(2))
+    assert first == again
+
+
+@pytest.mark.parametrize(
+    "choice", [("--filter", "kinematic"), ("--truth", "linear"), ("--feedback", "truth"), ("--gps", "midg")]
+)
+def test_choices_replace_the_files_own(tmp_path, choice):
+    done = run("fly", short(tmp_path), "--json", "--no-report", *choice, "--out", tmp_path / "c.fnr", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    manifest = Record.load(tmp_path / "c.fnr").manifest
+    assert manifest[choice[0].removeprefix("--")] == choice[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("fly", "nowhere"), "nowhere: no such scenario; shipped: takeoff, landing, gusty, or give a TOML file"),
+        (("fly", "nowhere.toml"), "nowhere.toml: no such file"),
+        (("fly", "landing", "--flights", "0"), "--flights 0: must be from 1 to"),
+        (("fly", "landing", "--seed", "-1"), "--seed -1: must be from 0 to"),
+        (("fly", "landing", "--gps", "rtk"), "command line: gps.model: Input should be 'white' or 'midg', got 'rtk'"),
+        (
+            ("fly", "landing", "--filter", "ukf"),
+            "command line: filter.name: Input should be 'paper' or 'kinematic', got 'ukf'",
+        ),
+        (
+            ("fly", "landing", "--truth", "real"),
+            "command line: truth: Input should be 'nonlinear' or 'linear', got 'real'",
+        ),
+        (("fly", "landing", "--sensor", "none.toml"), "none.toml: no such file"),
+        (("report", "none.fnr"), "none.fnr: no such record"),
+        (("vehicle", "none.toml"), "none.toml: no such file"),
+        (("replay", "nowhere"), "nowhere"),
+        (("bench", "--flights", "1"), "--flights 1: must be from 16 to"),
+    ],
+)
+def test_a_mistake_is_one_line_and_status_2(tmp_path, arguments, message):
+    assert message in one_line_error(run(*arguments, cwd=tmp_path))
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("size_m = 2.0", "size_m = -2.0"), "pad.size_m: Input should be greater than 0.05, got -2.0"),
+        (('start = "hover"', 'start = "fly"'), "flight.start: Input should be 'ground' or 'hover', got 'fly'"),
+        (("t_s = 10.0", "t_s = 0.0"), "flight.path: the knots' t_s must increase"),
+        (("may_land_after_s", "may_land_after_ms"), "flight.may_land_after_ms: unknown key; known here: "),
+        (("duration_s = 2.0", "duration_s = nan"), "flight.duration_s: Input should be a finite number, got nan"),
+        (("schema_version = 1", "schema_version = 2"), "schema_version: Input should be 1, got 2"),
+        (("[flight]", "[flight"), "not valid TOML"),
+    ],
+)
+def test_a_wrong_scenario_file_names_file_key_and_range(tmp_path, change, message):
+    path = short(tmp_path, "\n[pad]\nsize_m = 2.0\n")
+    path.write_text(path.read_text(encoding="utf-8").replace(*change), encoding="utf-8")
+    line = one_line_error(run("fly", path, cwd=tmp_path))
+    assert "short.toml" in line
+    assert message in line
+
+
+def test_a_record_that_cannot_be_written_is_said_in_one_line(tmp_path):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    line = one_line_error(run("fly", short(tmp_path), "--out", tmp_path / "file" / "x.fnr", cwd=tmp_path))
+    assert "cannot be written" in line
+
+
+def test_help_lists_every_command(tmp_path):
+    done = run("--help", cwd=tmp_path)
+    assert done.returncode == 0
+    assert all(command in done.stdout for command in ("fly", "replay", "vehicle", "report", "bench"))

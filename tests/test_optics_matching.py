@@ -157,9 +157,9 @@ def test_counting_rows_twice_makes_lines_down_the_image_invisible() -> None:
 
 
 def test_the_half_pixel_defect_turns_the_sign_in_y_alone() -> None:
-    still, moved = textured(4), textured(4, 0.4, 0.4)  # nearest whole pixel 0, so the half is all there is
+    still, moved = textured(4), textured(4, 0.35, 0.35)  # nearest whole pixel 0, so the half is all there is
     flow = flow_between(still, moved, firmware_named("2014-12,+half-pixel-y"))
-    assert (flow.x_px, flow.y_px) == pytest.approx((0.5, -0.5), abs=0.08)
+    assert (flow.x_px, flow.y_px) == pytest.approx((0.5, -0.5), abs=0.1)  # a patch may lie nearer to 1 px
 
 
 def test_the_histogram_defect_spoils_the_histogram_alone() -> None:

@@ -9,8 +9,9 @@ import pytest
 
 from flownav.errors import InputError
 from flownav.parameter_files import shipped
+from flownav.vehicle.loading import describe_vehicle, load_vehicle
 from flownav.vehicle.paper_model import load_paper_model
-from flownav.vehicle.parameters import VehicleParameters, describe_vehicle, load_vehicle
+from flownav.vehicle.parameters import VehicleParameters
 from vehicle_files import X_CELL
 
 SHIPPED = shipped("maxi_joker_3.toml").read_text()

@@ -67,7 +67,7 @@ def test_the_swing_keeps_its_energy_and_has_the_exact_period_of_a_large_pendulum
 def test_damping_takes_the_amplitude_down_as_stated() -> None:
     angle, _ = swung(1.1, 0.08, 41.0, 0.04)
     late = [np.abs(angle[round(t / STEP_S) : round((t + 2.2) / STEP_S)]).max() for t in (5.0, 35.0)]
-    assert late[1] / late[0] == pytest.approx(np.exp(-0.04 * 30.0), rel=0.01)
+    assert late[1] / late[0] == pytest.approx(np.exp(-0.04 * 30.0), rel=0.03)
 
 
 @given(ANGLE, st.booleans())

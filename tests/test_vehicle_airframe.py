@@ -7,7 +7,7 @@ import pytest
 
 from flownav.vehicle import airframe
 from flownav.vehicle.airframe import AirMotion, Wrench
-from flownav.vehicle.parameters import load_vehicle
+from flownav.vehicle.loading import load_vehicle
 
 VEHICLE = load_vehicle()
 RHO = VEHICLE.air_density_kg_m3

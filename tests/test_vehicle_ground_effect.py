@@ -7,7 +7,7 @@ import pytest
 
 from flownav.vehicle import ground_effect
 from flownav.vehicle.helicopter import outputs
-from flownav.vehicle.parameters import load_vehicle
+from flownav.vehicle.loading import load_vehicle
 from flownav.vehicle.trim import trim
 
 multiplier = ground_effect.multiplier

@@ -8,7 +8,7 @@ import numpy as np
 from flownav.compile import LANES, ONE_LANE, lane_access
 from flownav.vehicle import helicopter
 from flownav.vehicle.helicopter import add_scaled, derivative, normalised
-from flownav.vehicle.parameters import load_vehicle
+from flownav.vehicle.loading import load_vehicle
 from flownav.vehicle.state import Controls, HelicopterState
 from flownav.vehicle.trim import parked, trim
 

@@ -8,8 +8,8 @@ import pytest
 from flownav.vehicle import helicopter
 from flownav.vehicle.complex_step import jacobian, solve
 from flownav.vehicle.linearize import INPUTS, STATES, eigenvalues, reduced_model
+from flownav.vehicle.loading import load_vehicle
 from flownav.vehicle.paper_model import load_paper_model
-from flownav.vehicle.parameters import load_vehicle
 from flownav.vehicle.state import Controls, HelicopterState
 from flownav.vehicle.trim import trim
 

@@ -7,7 +7,7 @@ import pytest
 
 from flownav.frames import quaternion_from_euler, rotation_from_quaternion
 from flownav.vehicle import helicopter
-from flownav.vehicle.parameters import load_vehicle
+from flownav.vehicle.loading import load_vehicle
 from flownav.vehicle.state import Controls, HelicopterState
 from flownav.vehicle.trim import trim
 

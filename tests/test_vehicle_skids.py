@@ -8,7 +8,7 @@ import pytest
 from flownav.errors import InputError
 from flownav.frames import quaternion_from_euler
 from flownav.vehicle import helicopter, skids
-from flownav.vehicle.parameters import load_vehicle
+from flownav.vehicle.loading import load_vehicle
 from flownav.vehicle.state import Controls
 from flownav.vehicle.trim import parked, trim
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from flownav.errors import InputError
 from flownav.frames import euler_from_quaternion, quaternion_from_euler
 from flownav.vehicle import helicopter
-from flownav.vehicle.parameters import load_vehicle
+from flownav.vehicle.loading import load_vehicle
 from flownav.vehicle.state import HelicopterState
 from flownav.vehicle.trim import accelerations, trim
 from vehicle_files import X_CELL

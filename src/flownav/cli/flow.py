@@ -104,14 +104,13 @@ def _facts(
         if moving:
             row |= {f"velocity_{a}_m_s": float(v) for a, v in zip("xy", series.velocity_m_s[k], strict=True)}
         per_frame.append(row)
-    mean = lambda values: values[good].mean(axis=0).tolist() if good.any() else None  # noqa: E731
     summary = {
         "valid": int(good.sum()),
         "mean_quality": float(series.quality.mean()),
-        "mean_flow_px": mean(series.flow_px),
+        "mean_flow_px": _mean(series.flow_px, good),
         "std_flow_px": series.flow_px[good].std(axis=0).tolist() if good.any() else None,
-        "mean_flow_rad_s": mean(series.flow_rad_s),
-        "mean_velocity_m_s": mean(series.velocity_m_s) if moving else None,
+        "mean_flow_rad_s": _mean(series.flow_rad_s, good),
+        "mean_velocity_m_s": _mean(series.velocity_m_s, good) if moving else None,
     }
     return {
         "frames": count,
@@ -122,6 +121,11 @@ def _facts(
         "summary": summary,
         "per_frame": per_frame,
     }
+
+
+def _mean(values: Any, good: Any) -> list[float] | None:
+    """The mean of the valid rows, None where there are none."""
+    return values[good].mean(axis=0).tolist() if good.any() else None
 
 
 def _print(facts: dict[str, Any]) -> None:

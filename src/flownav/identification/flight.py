@@ -35,7 +35,7 @@ class Flight:
     t_s (n,) arrival of each flow reading, velocity_m_s (n, 2) along body x and y, age_s what the log says of how
     old a reading is when it arrives (half its exposure), quality (n,), range_m (n,), good (n,) usable readings;
     reference_t_s (m,), reference_m (m, 3) north, east, down of a frame that may be turned, reference ("truth" or
-    "gps"); imu None without one; climb_m_s: downward velocity at arrival, zero where the reference has no height.
+    "gps") and its own velocity where it has one; imu None without one.
     """
 
     name: str
@@ -50,6 +50,7 @@ class Flight:
     reference: str
     reference_t_s: Array
     reference_m: Array
+    reference_velocity: Stream | None
     flow_limit_rad_s: float
     notes: tuple[str, ...]
 
@@ -98,7 +99,7 @@ def flight(log: Log, reference: str = "auto") -> Flight:
         raise InputError(f"{log.path}: the flow is constant; a flight that moves is needed")
     return Flight(
         str(log.path), t_s, velocity, age_s, quality, range_m, good, log.streams[Sensor.ATTITUDE],
-        log.streams.get(Sensor.IMU), chosen, reference_t_s, reference_m,
+        log.streams.get(Sensor.IMU), chosen, reference_t_s, reference_m, _velocity(log) if chosen == "gps" else None,
         float(np.quantile(np.abs(rate[good]), 0.999)), prepared.notes,
     )  # fmt: skip
 
@@ -114,6 +115,15 @@ def _reference(log: Log, wanted: str) -> tuple[str, Array, Array]:
         return "gps", stream.t_s, stream.value
     missing = {"truth": "truth.csv", "gps": "gps.csv"}.get(wanted, "truth.csv (motion capture) or gps.csv")
     raise InputError(f"{log.path}: no reference to identify against; {missing} is needed")
+
+
+def _velocity(log: Log) -> Stream | None:
+    """GPS velocity, where most of its readings have one."""
+    stream = log.streams.get(Sensor.GPS_VELOCITY)
+    if stream is None:
+        return None
+    known = np.isfinite(stream.value).all(axis=1)
+    return Stream.of(stream.sensor, stream.t_s[known], stream.value[known]) if known.mean() > 0.5 else None
 
 
 def _floor(range_m: Array) -> float:

@@ -17,7 +17,6 @@ from flownav.compile import equation, kernel
 from flownav.errors import InputError
 from flownav.optics.camera import (
     Camera,
-    Exposure,
     box_transfer,
     effective_focal_px,
     exposed,
@@ -216,6 +215,3 @@ def film(
 def _require_looking_down(pose: Pose, k: int) -> None:
     if not (pose.height_m > 0.0 and pose.r33 > 0.2):
         raise InputError(f"pose {k}: the camera must be above the pad and look down, at most 78 degrees from it")
-
-
-__all__ = ["Exposure", "film", "footprint", "seen", "stripe_harmonics"]

@@ -20,8 +20,9 @@ from flownav.simulation.flight import ATTITUDE_S, Flight, FlightPlan
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
+from flownav.vehicle.loading import describe_vehicle, load_vehicle
 from flownav.vehicle.paper_model import ReducedModel, load_paper_model
-from flownav.vehicle.parameters import VehicleParameters, describe_vehicle, load_vehicle
+from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.state import Controls, HelicopterState
 from flownav.vehicle.trim import Trim, parked, trim
 

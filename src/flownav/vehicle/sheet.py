@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from flownav.vehicle import ground_effect
 from flownav.vehicle.linearize import INPUTS, STATES, LinearModel, eigenvalues, reduced_model
+from flownav.vehicle.loading import describe_vehicle, load_vehicle
 from flownav.vehicle.paper_model import ReducedModel, load_paper_model
-from flownav.vehicle.parameters import VehicleParameters, describe_vehicle, load_vehicle
+from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.trim import Trim, trim
 
 HEIGHTS_OVER_R = (0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0)

@@ -7,9 +7,11 @@ import sys
 import typer
 
 from flownav.cli import bench as bench
+from flownav.cli import flow as flow
 from flownav.cli import fly as fly
 from flownav.cli import replay as replay
 from flownav.cli import report as report
+from flownav.cli import rig as rig
 from flownav.cli import vehicle as vehicle
 from flownav.errors import FlownavError, InputError
 
@@ -23,6 +25,8 @@ app = typer.Typer(
 )
 app.command("fly")(fly.command)
 app.command("replay")(replay.command)
+app.command("rig")(rig.command)
+app.command("flow")(flow.command)
 app.command("vehicle")(vehicle.command)
 app.command("report")(report.command)
 app.command("bench")(bench.command)

@@ -23,13 +23,16 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-app.command("fly")(fly.command)
-app.command("replay")(replay.command)
-app.command("rig")(rig.command)
-app.command("flow")(flow.command)
-app.command("vehicle")(vehicle.command)
-app.command("report")(report.command)
-app.command("bench")(bench.command)
+for name, command, what in (
+    ("fly", fly.command, "Fly a take-off or landing in closed loop, scored beside the paper."),
+    ("replay", replay.command, "Fuse a recorded flight; measure the drift without GPS."),
+    ("rig", rig.command, "Swing a flow sensor over a pad beside an encoder, from pixels."),
+    ("flow", flow.command, "Optical flow of your own frames, as the PX4FLOW computes it."),
+    ("vehicle", vehicle.command, "Trim, power, linear models and ground effect of a helicopter."),
+    ("report", report.command, "Write a record's report as one HTML page."),
+    ("bench", bench.command, "Measure how fast all of this is on your machine."),
+):
+    app.command(name, short_help=what)(command)
 
 
 def main() -> None:

@@ -40,7 +40,8 @@ def choose(experiments: Sequence[Experiment], candidates: Sequence[Structure] = 
         model = fit(experiments, structure)
         tried.append((model, excitation(model)))
     shown = [pair for pair in tried if pair[1].complete] or tried[:1]
-    best, verdict = min(shown, key=lambda pair: pair[0].bic)
+    colour = min(tried, key=lambda pair: pair[0].cost)[0].whiteness.readings_per_independent
+    best, verdict = min(shown, key=lambda pair: pair[0].criteria(colour)[1])
     return Choice(best, verdict, tuple(tried))
 
 

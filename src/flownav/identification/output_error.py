@@ -106,6 +106,14 @@ class Fit:
     converged: bool
     residuals: tuple[Array, ...]
     predictions: tuple[Array, ...]
+    cost: float
+    unknowns: int
+
+    def criteria(self, readings_per_independent: float) -> tuple[float, float]:
+        """(AIC, BIC); models are compared with the same readings per independent one."""
+        return information_criteria(
+            self.cost, self.readings, self.unknowns, self.readings / readings_per_independent
+        )
 
 
 def fit(experiments: Sequence[Experiment], structure: Structure, starts: Sequence[Point] | None = None) -> Fit:
@@ -317,6 +325,8 @@ def _finish(runs: Sequence[Experiment], structure: Structure, state: _State) -> 
         state.converged,
         tuple(residuals),
         predictions,
+        state.cost,
+        free,
     )
 
 

@@ -1,0 +1,242 @@
+"""Identification from a flight log: axes and scale from the track, latency and dynamics from motion, noise, quality.
+
+Scale. Against GPS, whose noise is the greater, the flow's track is matched to the reference's (`displacement`);
+against motion capture, which is much cleaner than the flow, the flow's velocity is regressed on the reference's.
+Either way the noisy side stands on the left; the bias that the other side's noise leaves is computed and reported.
+
+Latency. The age of a reading when it arrives, on the vehicle's clock: from the IMU where the flow is good enough
+to be compared with it, else from the reference, whose own delay the IMU gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.errors import InputError
+from flownav.identification import displacement
+from flownav.identification.experiment import Experiment, experiment
+from flownav.identification.findings import Findings, Noise, Response
+from flownav.identification.flight import Flight, flight
+from flownav.identification.height_law import (
+    compare_schedules,
+    fit_power_law,
+    noise_by_height,
+    variance_by_quality,
+)
+from flownav.identification.orders import choose, cross_validation
+from flownav.identification.output_error import Structure
+from flownav.identification.quantities import Interval, latency
+from flownav.identification.reference_motion import ALIKE, Motion, difference, motion
+from flownav.identification.sentinel import Axes, judge
+from flownav.identification.statistics import Z_95
+from flownav.logs.csv_folder import read_csv_folder
+from flownav.measurement import Array
+
+CLUSTER_S = 3.0
+FLIGHT_ORDERS = (Structure(0), Structure(1), Structure(2))
+WORST_BIAS = 0.02
+
+
+class Scale(NamedTuple):
+    """The sensor's response (2, 2) to body velocity, with its axes put right: gains on the diagonal.
+
+    bias: share by which noise in the regressor pulls each gain, at most; method says which side that was.
+    """
+
+    response: Array
+    gains: tuple[Interval, Interval]
+    bias: tuple[float, float]
+    method: str
+
+
+def identify_flight(path: Path, candidates: Sequence[Structure], reference: str = "auto") -> Findings:
+    """Findings of one flight folder. InputError names what is missing."""
+    log = read_csv_folder(path)
+    flown = flight(log, reference)
+    moved = motion(flown)
+    age_s = _age(flown, moved)
+    raw = _velocity_response(flown, moved, age_s)
+    axes = judge(raw, moved.yaw_known)
+    put_right = flown.velocity_m_s @ axes.assignment  # assignment is orthogonal: its transpose undoes it
+    scale, track = _scale(flown, moved, age_s, put_right)
+    experiments = [_axis_run(flown, moved, put_right, axis) for axis in (0, 1)]
+    structures = candidates if len(candidates) == 1 else FLIGHT_ORDERS
+    responses = []
+    for axis, run in enumerate(experiments):
+        choice = choose([run], structures)
+        lag = _latency(moved, latency(choice.best))
+        held_out = cross_validation([run], choice.best.structure)
+        height = float(np.median(flown.range_m[flown.good]))
+        responses.append(Response("xy"[axis], height, scale.gains[axis], lag, choice, 1, held_out))
+    ranges = flown.range_m[flown.good]
+    return Findings(
+        "flight",
+        {"truth": "motion capture", "gps": "GPS"}[flown.reference],
+        tuple(responses),
+        axes,
+        _noise(flown, moved, put_right, responses),
+        (),
+        (float(np.quantile(ranges, 0.01)), float(np.quantile(ranges, 0.99))),
+        flown.flow_limit_rad_s,
+        int(flown.quality[flown.good].min()),
+        tuple(path / name for name in log.inputs),
+        (*log.notes, *flown.notes, *_notes(flown, moved, scale, axes)),
+        _details(flown, moved, scale, axes, raw, track),
+    )
+
+
+def _age(flown: Flight, moved: Motion) -> float:
+    """How old a flow reading is when it arrives, to turn it by the right attitude; what the log says where unsure."""
+    tie = moved.flow_tie
+    return tie.delay_s.value if tie is not None and tie.likeness >= ALIKE else flown.age_s
+
+
+def _latency(moved: Motion, against_reference: Interval) -> Interval:
+    """On the vehicle's clock: the IMU's word, else the reference's corrected for its own delay (already taken out)."""
+    if moved.flow_tie is not None and moved.flow_tie.likeness >= ALIKE:
+        return moved.flow_tie.delay_s
+    if moved.reference_tie is not None and moved.reference_tie.likeness >= ALIKE:
+        own = moved.reference_tie.delay_s
+        return difference(against_reference, Interval(0.0, own.low - own.value, own.high - own.value))
+    return against_reference
+
+
+def _body_input(flown: Flight, moved: Motion, age_s: float) -> Array:
+    return moved.in_body(flown, flown.t_s[flown.good] - age_s)[:, :2]
+
+
+def _velocity_response(flown: Flight, moved: Motion, age_s: float) -> Array:
+    """(2, 2) regression of flow on the reference's body velocity: enough for signs and axes."""
+    if not moved.yaw_known:
+        age_s = flown.age_s
+    design = np.column_stack([_body_input(flown, moved, age_s), np.ones(int(flown.good.sum()))])
+    return np.asarray(np.linalg.lstsq(design, flown.velocity_m_s[flown.good], rcond=None)[0][:2].T)
+
+
+def _scale(flown: Flight, moved: Motion, age_s: float, velocity: Array) -> tuple[Scale, displacement.Match | None]:
+    if flown.reference == "gps":
+        track = displacement.match(flown, age_s, velocity)
+        return _scale_of_track(track), track
+    return _scale_of_velocity(flown, moved, velocity), None
+
+
+def _scale_of_track(track: displacement.Match) -> Scale:
+    """The response is the inverse of the mixing; its covariance by the inverse's derivative, dB = -B dM B."""
+    response = np.linalg.inv(track.mixing)
+    covariance = track.covariance[:4, :4]  # of m11, m21, m12, m22
+    gains = []
+    for axis in (0, 1):
+        slope = np.array([-response[axis, i] * response[j, axis] for i, j in ((0, 0), (1, 0), (0, 1), (1, 1))])
+        gains.append(Interval.of(float(response[axis, axis]), float(np.sqrt(slope @ covariance @ slope))))
+    return Scale(response, (gains[0], gains[1]), track.attenuation, "displacement")
+
+
+def _scale_of_velocity(flown: Flight, moved: Motion, velocity: Array) -> Scale:
+    """Flow on reference velocity at the delay that fits best, with intervals by clusters of CLUSTER_S."""
+    t_s, y = flown.t_s[flown.good], velocity[flown.good]
+    fits = []
+    for delay in np.arange(0.0, 0.3, 0.01):
+        design = np.column_stack([_body_input(flown, moved, float(delay)), np.ones(len(t_s))])
+        solution = np.linalg.lstsq(design, y, rcond=None)[0]
+        fits.append((float(np.sum((y - design @ solution) ** 2)), design, solution))
+    _, design, solution = min(fits, key=lambda entry: entry[0])
+    inverse = np.linalg.inv(design.T @ design)
+    labels = np.floor(t_s / CLUSTER_S).astype(int)
+    gains = []
+    for axis in (0, 1):
+        residual = y[:, axis] - design @ solution[:, axis]
+        scores = np.array([design[labels == k].T @ residual[labels == k] for k in np.unique(labels)])
+        few = len(scores) / max(1, len(scores) - 3)
+        covariance = few * inverse @ (scores.T @ scores) @ inverse
+        gains.append(Interval.of(float(solution[axis, axis]), float(np.sqrt(covariance[axis, axis]))))
+    return Scale(np.asarray(solution[:2].T), (gains[0], gains[1]), _reference_noise_share(flown, design), "velocity")
+
+
+def _reference_noise_share(flown: Flight, design: Array) -> tuple[float, float]:
+    """Share of the reference velocity's power that is its own noise, from second differences of its positions."""
+    position = flown.reference_m[:, :2]
+    second = position[2:] - 2.0 * position[1:-1] + position[:-2]
+    sigma_m = float(np.sqrt(np.median(second**2) / 0.455 / 6.0))  # 0.455: median of a squared normal
+    step = float(np.median(np.diff(flown.reference_t_s)))
+    noise = 2.0 * sigma_m**2 / (2.0 * max(0.1, step)) ** 2
+    return noise / float(design[:, 0].var()), noise / float(design[:, 1].var())
+
+
+def _axis_run(flown: Flight, moved: Motion, velocity: Array, axis: int) -> Experiment:
+    """One body axis as an experiment: the reference's velocity on the vehicle's clock in, the flow's at arrival out."""
+    body = moved.in_body(flown, moved.t_s)[:, axis]
+    t_s, y = flown.t_s[flown.good], velocity[flown.good, axis]
+    return experiment(f"{flown.name} {'xy'[axis]}", moved.t_s, body, t_s, y, float(np.median(flown.range_m[flown.good])))
+
+
+def _noise(flown: Flight, moved: Motion, velocity: Array, responses: Sequence[Response]) -> Noise:
+    """Errors of both axes together, against each axis's model."""
+    ranges, quality = flown.range_m[flown.good], flown.quality[flown.good]
+    count = len(ranges)
+    error = np.concatenate([_last(response.model.residuals[0], count) for response in responses])
+    height, grade = np.concatenate([ranges, ranges]), np.concatenate([quality, quality])
+    points = noise_by_height(error, height)
+    signal = float(velocity[flown.good].std())
+    return Noise(
+        tuple(points),
+        fit_power_law(points),
+        tuple(variance_by_quality(error, grade)),
+        tuple(compare_schedules(error, height, grade, signal)),
+        signal,
+    )
+
+
+def _last(residual: Array, count: int) -> Array:
+    """The reference reaches 2 s beyond the flow on either side, so every reading has a residual."""
+    if len(residual) != count:
+        raise InputError(f"{count - len(residual)} flow readings lie outside the reference's time; trim the log")
+    return residual
+
+
+def _notes(flown: Flight, moved: Motion, scale: Scale, axes: Axes) -> list[str]:
+    notes = []
+    if not axes.right:
+        notes.append(f"axes: {axes.verdict}; gains are of the axes put right")
+    if max(scale.bias) > WORST_BIAS:
+        notes.append(
+            f"scale: noise in the regressor may pull the gains by up to {max(scale.bias):.0%}; a longer or livelier "
+            "flight is needed"
+        )
+    if moved.flow_tie is None:
+        notes.append("latency is against the reference and holds the reference's own delay: the log has no IMU")
+    elif moved.flow_tie.likeness < ALIKE and (moved.reference_tie is None or moved.reference_tie.likeness < ALIKE):
+        notes.append("latency is against the reference and holds its delay: the IMU agrees with neither of them")
+    if not moved.yaw_known:
+        notes.append("the reference's heading is unknown (no IMU): a sensor turned about its boresight does not show")
+    return notes
+
+
+def _details(
+    flown: Flight, moved: Motion, scale: Scale, axes: Axes, raw: Array, track: displacement.Match | None
+) -> dict[str, object]:
+    details: dict[str, object] = {
+        "scale_method": scale.method,
+        "scale_bias": {"x": scale.bias[0], "y": scale.bias[1]},
+        "cross_coupling": {"x_from_y": float(scale.response[0, 1]), "y_from_x": float(scale.response[1, 0])},
+        "naive_velocity_response": raw.tolist(),
+        "turned_deg": axes.turned_deg,
+        "reference_yaw_deg": float(np.degrees(moved.yaw_rad)),
+        "reference_delay_s": moved.reference_delay_s,
+        "usable_share": float(flown.good.mean()),
+    }
+    if track is not None:
+        sigma = float(np.sqrt(track.covariance[4, 4]))
+        details["reference_behind_flow_s"] = {
+            "value": track.lag_s, "low": track.lag_s - Z_95 * sigma, "high": track.lag_s + Z_95 * sigma
+        }  # fmt: skip
+        details["track_innovation_m"] = track.innovation_m
+    for name, tie in (("flow", moved.flow_tie), ("reference", moved.reference_tie)):
+        if tie is not None:
+            details[f"{name}_against_imu"] = {
+                "delay_s": tie.delay_s.as_dict(), "turn_deg": float(np.degrees(tie.turn_rad)), "likeness": tie.likeness
+            }  # fmt: skip
+    return details

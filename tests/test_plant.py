@@ -1,0 +1,80 @@
+"""The plant on lanes is the vehicle's own equations: its Runge-Kutta step, and the paper's linear truth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flownav.compile import LANES, kernel
+from flownav.simulation import layout
+from flownav.simulation.assemble import assemble
+from flownav.simulation.flight import PHYSICS_S
+from flownav.simulation.layout import store_controls, store_helicopter
+from flownav.simulation.plant import linear_step, runge_kutta_step
+from flownav.simulation.scenario import Scenario, load_scenario
+from flownav.vehicle import helicopter
+from flownav.vehicle.state import Controls, HelicopterState
+
+
+@kernel
+def put(work, lanes, lane, state, controls):
+    store_helicopter(work, lanes, lane, state)
+    store_controls(work, lanes, lane, controls)
+
+
+@kernel
+def step(work, lanes, vehicle, dt):
+    runge_kutta_step(work, lanes, vehicle, dt)
+
+
+@kernel
+def step_linear(work, lanes, model):
+    linear_step(work, lanes, model)
+
+
+@pytest.fixture(scope="module")
+def flight():
+    return assemble(load_scenario("landing")).flight
+
+
+def states_about_hover(flight, count):
+    """States and controls about hover, near the ground and high, moving and turning, one a lane."""
+    generator = np.random.default_rng(4)
+    scale = HelicopterState(1, 1, 1, 2, 2, 1, 0.05, 0.05, 0.05, 0.05, 0.4, 0.4, 0.4, 0.02, 0.02, 0.02, 0.02, 0.02, 0.05,
+                            0.2, 0.2, 0.2, 0.2)  # fmt: skip
+    for k in range(count):
+        moved = np.array(flight.plan.start) + np.array(scale) * generator.standard_normal(23)
+        moved[2] = -0.23 - 0.2 * k
+        moved[6:10] /= np.linalg.norm(moved[6:10])
+        controls = np.array([0.0, 0.0, flight.gains.collective_trim_rad, flight.gains.pedal_trim_rad])
+        yield HelicopterState(*map(float, moved)), Controls(*map(float, controls + 0.01 * generator.standard_normal(4)))
+
+
+def test_refining_the_inflow_between_stages_is_solving_it_in_each(flight):
+    """Relative to what a step moves: below 1e-9 of the velocities."""
+    work = np.zeros(layout.ROWS * len(LANES))
+    pairs = list(states_about_hover(flight, len(LANES)))
+    for lane, (state, controls) in enumerate(pairs):
+        put(work, LANES, lane, state, controls)
+    step(work, LANES, flight.vehicle, PHYSICS_S)
+    rows = work.reshape(-1, len(LANES))[layout.HELICOPTER : layout.HELICOPTER + 23]
+    for lane, (state, controls) in enumerate(pairs):
+        exact = helicopter.step(state, controls, 0.0, 0.0, 0.0, PHYSICS_S, flight.vehicle)
+        assert rows[:, lane] == pytest.approx(np.array(exact, float), rel=1e-9, abs=1e-9)
+
+
+def test_linear_truth_is_the_matrix_equation():
+    entries = load_scenario("takeoff").model_dump(exclude_unset=True) | {"truth": "linear"}
+    flight = assemble(Scenario.model_validate(entries)).flight
+    model = flight.linear
+    work = np.zeros(layout.ROWS * len(LANES))
+    generator = np.random.default_rng(1)
+    state = flight.plan.start._replace(
+        **dict(zip(HelicopterState._fields[:6], generator.standard_normal(6), strict=True))
+    )
+    controls = Controls(*(model.trim + 0.01 * generator.standard_normal(4)))
+    put(work, LANES, 5, state, controls)
+    step_linear(work, LANES, model)
+    moved = work.reshape(-1, len(LANES))[layout.HELICOPTER : layout.HELICOPTER + 6, 5]
+    wanted = model.transition @ np.array(state[:6]) + model.input_matrix @ (np.array(controls) - model.trim)
+    assert moved == pytest.approx(wanted, abs=1e-12)

@@ -51,7 +51,7 @@ def states_about_hover(flight, count):
 
 
 def test_refining_the_inflow_between_stages_is_solving_it_in_each(flight):
-    """Relative to what a step moves: below 1e-9 of the velocities."""
+    """At 16 moving, turning states, some on their skids, a step differs by less than 1e-8."""
     work = np.zeros(layout.ROWS * len(LANES))
     pairs = list(states_about_hover(flight, len(LANES)))
     for lane, (state, controls) in enumerate(pairs):
@@ -60,7 +60,7 @@ def test_refining_the_inflow_between_stages_is_solving_it_in_each(flight):
     rows = work.reshape(-1, len(LANES))[layout.HELICOPTER : layout.HELICOPTER + 23]
     for lane, (state, controls) in enumerate(pairs):
         exact = helicopter.step(state, controls, 0.0, 0.0, 0.0, PHYSICS_S, flight.vehicle)
-        assert rows[:, lane] == pytest.approx(np.array(exact, float), rel=1e-9, abs=1e-9)
+        assert rows[:, lane] == pytest.approx(np.array(exact, float), rel=1e-8, abs=1e-8)
 
 
 def test_linear_truth_is_the_matrix_equation():

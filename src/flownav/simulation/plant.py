@@ -54,7 +54,7 @@ def runge_kutta_step(work: Work, lanes: Lanes, vehicle: VehicleParameters, dt: f
     """One classical fourth-order step of every lane's helicopter; controls and wind held over the step.
 
     The inflow is solved in full at the first stage; the other stages, half a step away, refine it with one
-    Halley step each, which leaves less than 1e-9 of it (tests/test_plant.py holds this against `helicopter.step`).
+    Halley step each. The state differs by about 1e-9 from solving anew (tests/test_plant.py: `helicopter.step`).
     """
     for lane in range(len(lanes)):
         state = load_helicopter(work, lanes, lane)

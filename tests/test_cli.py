@@ -99,6 +99,8 @@ def test_choices_replace_the_files_own(tmp_path, choice):
         (("fly", "nowhere"), "nowhere: no such scenario; shipped: takeoff, landing, gusty, or give a TOML file"),
         (("fly", "nowhere.toml"), "nowhere.toml: no such file"),
         (("fly", "landing", "--flights", "0"), "--flights 0: must be from 1 to"),
+        (("fly", "landing", "--flights", "3", "--flight", "1"), "--flight names one flight, --flights many"),
+        (("fly", "gusty", "--truth", "linear"), 'truth = "linear" has no air to move'),
         (("fly", "landing", "--seed", "-1"), "--seed -1: must be from 0 to"),
         (("fly", "landing", "--gps", "rtk"), "command line: gps.model: Input should be 'white' or 'midg', got 'rtk'"),
         (
@@ -128,6 +130,13 @@ def test_a_mistake_is_one_line_and_status_2(tmp_path, arguments, message):
         (('start = "hover"', 'start = "fly"'), "flight.start: Input should be 'ground' or 'hover', got 'fly'"),
         (("t_s = 10.0", "t_s = 0.0"), "flight.path: the knots' t_s must increase"),
         (("may_land_after_s", "may_land_after_ms"), "flight.may_land_after_ms: unknown key; known here: "),
+        (
+            ("duration_s = 2.0", 'duration_s = "2"'),
+            "flight.duration_s: a number is needed, not true, false or text, got '2'",
+        ),
+        (("height_m = 3.0 }", "height_m = -3.0 }"), "flight.path: a hover starts at a height_m of 0 or more"),
+        (('name = "landing"', 'name = "../landing"'), "name: String should match pattern"),
+        (('start = "hover"', 'start = "ground"\ntakeoff_at_s = 20.0'), "more than takeoff_at_s = 20 is needed"),
         (("duration_s = 2.0", "duration_s = nan"), "flight.duration_s: Input should be a finite number, got nan"),
         (("schema_version = 1", "schema_version = 2"), "schema_version: Input should be 1, got 2"),
         (("[flight]", "[flight"), "not valid TOML"),
@@ -145,6 +154,30 @@ def test_a_record_that_cannot_be_written_is_said_in_one_line(tmp_path):
     (tmp_path / "file").write_text("", encoding="utf-8")
     line = one_line_error(run("fly", short(tmp_path), "--out", tmp_path / "file" / "x.fnr", cwd=tmp_path))
     assert "cannot be written" in line
+
+
+def test_a_crash_is_status_1_with_the_record_written(tmp_path):
+    storm = short(tmp_path, "\n[wind]\nspeed_20ft_m_s = 30.0\n", duration="20.0")
+    done = run("fly", storm, "--json", "--no-report", "--out", tmp_path / "storm.fnr", cwd=tmp_path)
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["crashed"] is True
+    assert "1 of 1 flights crashed" in done.stderr
+    assert Record.load(tmp_path / "storm.fnr").manifest["scores"]["crashed"] is True
+
+
+def test_one_flight_of_a_seed_can_be_flown_again(tmp_path):
+    many = json.loads(run("fly", short(tmp_path), "--json", "--flights", 3, "--no-report", cwd=tmp_path).stdout)
+    index = Record.load(tmp_path / many["record"]).manifest["flight"]
+    again = run("fly", short(tmp_path), "--json", "--flight", index, "--no-report", cwd=tmp_path)
+    assert json.loads(again.stdout)["max_position_error_m"] == many["max_position_error_m"]["median"]
+
+
+def test_files_that_a_scenario_names_lie_beside_it(tmp_path):
+    folder = tmp_path / "scenarios"
+    folder.mkdir()
+    (folder / "mine.toml").write_text(shipped("maxi_joker_3.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    path = short(folder, '\n[vehicle]\nfile = "mine.toml"\n')
+    assert run("fly", path, "--json", "--no-report", cwd=tmp_path).returncode == 0
 
 
 def test_help_lists_every_command(tmp_path):

@@ -77,9 +77,16 @@ def test_takeoff_waits_climbs_at_one_metre_a_second_and_holds():
 
 def test_white_gps_gives_the_papers_largest_error_and_real_gps_gives_metres(landing, landings):
     largest = np.median(landings[:, MAX_POSITION_ERROR])
-    assert largest == pytest.approx(published("landing")["max_position_error_m"], abs=0.06)
+    assert largest == pytest.approx(published(6)["max_position_error_m"], abs=0.06)
     honest = fly_many(setup("landing", gps={"model": "midg"}, pad={"size_m": 20.0}).flight, 11, 32)
     assert np.median(honest[:, MAX_POSITION_ERROR]) > 1.5
+
+
+def test_a_storm_is_a_crash_and_not_a_landing():
+    storm = setup("landing", wind={"speed_20ft_m_s": 30.0}).flight
+    scores = fly_many(storm, 1, 16)
+    assert scores[:, SCORE_COLUMNS.index("crashed")].all()
+    assert np.isnan(scores[:, SCORE_COLUMNS.index("touchdown.t_s")]).any()
 
 
 def test_flying_on_truth_tracks_better_than_flying_on_the_estimate():

@@ -10,10 +10,10 @@ import pytest
 from flownav.scoring.errors import (
     SCORE_COLUMNS,
     error_statistics,
+    first_contact,
     score_block,
     scores_of_flight,
     scores_of_flights,
-    touchdown,
 )
 from flownav.scoring.paper_tables import percentile_of_paper, published
 
@@ -25,33 +25,57 @@ def test_statistics_of_a_known_error():
     assert std == pytest.approx(np.std(error))
 
 
-def test_touchdown_is_the_first_contact_after_flight_with_the_sink_rate_just_before():
-    on_ground = np.array([1, 1, 0, 0, 1, 0, 1.0]).reshape(-1, 1)
-    t_s, sink = np.arange(7.0), np.arange(7.0).reshape(-1, 1) / 10
-    position = np.zeros((7, 3, 1))
-    position[4, :2, 0] = 3.0, 4.0
-    assert touchdown(t_s, position, sink, on_ground)[0] == pytest.approx([4.0, 5.0, 0.3])
+def contacts(pattern):
+    """on_ground (epochs, 1) from runs of (value, epochs)."""
+    return np.concatenate([np.full(count, float(value)) for value, count in pattern])[:, None]
+
+
+def test_touchdown_is_the_first_contact_after_half_a_second_of_flight_with_the_sink_rate_just_before():
+    on_ground = contacts([(1, 5), (0, 3), (1, 2), (0, 30), (1, 4), (0, 40), (1, 4)])  # flutter, flight, bounce
+    epochs = len(on_ground)
+    t_s, sink = np.arange(float(epochs)), np.arange(float(epochs))[:, None] / 100
+    position = np.zeros((epochs, 3, 1))
+    position[40, :2, 0] = 3.0, 4.0
+    assert first_contact(t_s, position, sink, on_ground)[0] == pytest.approx([40.0, 5.0, 0.39])
+
+
+def scored(on_ground, sink_m_s=0.1, may_land_after_s=0.0):
+    epochs = len(on_ground)
+    zeros = np.zeros((epochs, 6, 1))
+    sink = np.full((epochs, 1), sink_m_s)
+    row = score_block(np.arange(epochs) * 0.02, zeros, zeros, sink, on_ground, may_land_after_s=may_land_after_s)[0]
+    return scores_of_flight(row)
 
 
 def test_a_flight_that_never_lands_has_no_touchdown():
-    zeros = np.zeros((5, 6, 1))
-    row = score_block(np.arange(5.0), zeros, zeros, zeros[:, 0], np.zeros((5, 1)), lands=True)[0]
-    assert scores_of_flight(row)["touchdown"] is None
+    assert (scored(contacts([(0, 50)]))["touchdown"], scored(contacts([(0, 50)]))["crashed"]) == (None, False)
+
+
+def test_a_soft_contact_when_landing_is_allowed_is_a_touchdown():
+    scores = scored(contacts([(0, 50), (1, 10)]))
+    assert scores["touchdown"]["t_s"] == pytest.approx(1.0)
+    assert not scores["crashed"]
+
+
+def test_a_contact_before_landing_is_allowed_or_a_hard_one_is_a_crash():
+    early = scored(contacts([(0, 50), (1, 10)]), may_land_after_s=5.0)
+    assert (early["touchdown"], early["crashed"]) == (None, True)
+    assert scored(contacts([(0, 50), (1, 10)]), sink_m_s=3.0)["crashed"]
 
 
 def test_many_flights_give_median_and_percentiles_in_the_same_layout():
     rows = np.tile(np.arange(101.0)[:, None], (1, len(SCORE_COLUMNS)))
     scores = scores_of_flights(rows)
     assert scores["states"]["x"]["rms_error"] == {"median": 50.0, "p05": 5.0, "p95": 95.0}
-    assert scores["landed"] == 101
+    assert (scores["landed"], scores["crashed"]) == (1, 5050)  # the row numbers stand for every column
     assert scores["touchdown"]["sink_rate_m_s"]["median"] == 50.0
 
 
-@pytest.mark.parametrize(("scenario", "name"), [("takeoff", "table5_takeoff.csv"), ("landing", "table6_landing.csv")])
-def test_published_tables_are_the_papers(paper_folder, scenario, name):
+@pytest.mark.parametrize(("number", "name"), [(5, "table5_takeoff.csv"), (6, "table6_landing.csv")])
+def test_published_tables_are_the_papers(paper_folder, number, name):
     with (paper_folder / name).open(encoding="utf-8") as file:
         rows = {row["state"]: row for row in csv.DictReader(file)}
-    table = published(scenario)
+    table = published(number)
     assert table["max_position_error_m"] == float(rows["max_position_difference_m"]["mean_error"])
     for state, unit in zip("xyzuvw", ["m"] * 3 + ["m_s"] * 3, strict=True):
         for statistic in ("mean_error", "std_error"):
@@ -59,7 +83,7 @@ def test_published_tables_are_the_papers(paper_folder, scenario, name):
 
 
 def test_the_papers_percentile_counts_flights_below_it():
-    table = published("landing")
+    table = published(6)
     rows = np.zeros((4, len(SCORE_COLUMNS)))
     rows[:, SCORE_COLUMNS.index("max_position_error_m")] = [0.1, 0.2, 0.3, 0.4]
     assert percentile_of_paper(rows, table)["max_position_error_m"] == 50.0

@@ -24,9 +24,14 @@ def _value_of(entry: Any) -> Any:
     if isinstance(entry, dict):
         if "value" not in entry or not set(entry) <= PROVENANCE_KEYS:
             raise ValueError("an entry with provenance is { value = ..., uncertainty = ..., source = ... }")
-        return entry["value"]
-    if isinstance(entry, bool):
-        raise ValueError("a number is needed, not true or false")
+        return _number(entry["value"])
+    return _number(entry)
+
+
+def _number(entry: Any) -> Any:
+    """Refuse what pydantic would turn into a number."""
+    if isinstance(entry, bool | str):
+        raise ValueError("a number is needed, not true, false or text")
     return entry
 
 

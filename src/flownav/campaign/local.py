@@ -27,7 +27,8 @@ def score_history(flight: Flight, history: Array) -> Array:
     sink_rate = history[:, column("truth", "sink_rate_m_s")]
     on_ground = (history[:, column("truth", "contact_n")] > 0.0).astype(float)
     t_s: Array = np.arange(len(history), dtype=np.float64) * EPOCH_S
-    return score_block(t_s, estimate, truth, sink_rate, on_ground, lands=flight.plan.may_land_after_s <= t_s[-1])
+    may_land_after_s = flight.plan.may_land_after_s
+    return score_block(t_s, estimate, truth, sink_rate, on_ground, may_land_after_s=may_land_after_s)
 
 
 def fly_many(
@@ -54,7 +55,7 @@ def fly_recorded(setup: Setup, seed: int, index: int = 0) -> Record:
     history = fly_one(setup.flight, seed, index)
     record = record_of(setup, history, seed, index)
     record.manifest["scores"] = scores_of_flight(score_history(setup.flight, history)[0])
-    record.manifest["paper"] = published(setup.scenario.name)
+    record.manifest["paper"] = published(setup.scenario.paper_table)
     return record
 
 

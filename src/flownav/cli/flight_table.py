@@ -7,6 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+WIDE = 92  # columns that one flight beside a published table takes
 WIDEST = 132  # columns that the medians and percentiles of many flights take
 UNITS = {"x": "m", "y": "m", "z": "m", "u": "m/s", "v": "m/s", "w": "m/s"}
 
@@ -15,8 +16,10 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
     """Errors per state beside the paper's table, largest position error, touchdown, files."""
     many = facts["flights"] > 1
     console = Console()
-    console.width = max(console.width, WIDEST if many else 0)
-    title = f"{facts['scenario']}: {facts['filter']} filter, {facts['gps']} GPS, seed {facts['seed']}"
+    console.width = max(console.width, WIDEST if many else WIDE)
+    plant = "" if facts["truth"] == "nonlinear" else ", linear truth"
+    flown_on = "" if facts["feedback"] == "estimate" else ", flown on the truth"
+    title = f"{facts['scenario']}: {facts['filter']} filter, {facts['gps']} GPS{plant}{flown_on}, seed {facts['seed']}"
     table = Table(
         title=title + (f", {facts['flights']} flights: median (5-95 %)" if many else ""), title_justify="left"
     )
@@ -34,7 +37,7 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
     console.print(table)
     beside = f"   paper: {paper['max_position_error_m']:.4f} m" if paper else ""
     largest = _cell(facts["max_position_error_m"], 3 if many else 4)
-    console.print(f"largest position error  {largest} m{beside}", highlight=False)
+    console.print(f"largest error of one position axis  {largest} m{beside}", highlight=False)
     _show_touchdown(console, facts)
     if "paper_percentile" in facts:
         _show_percentiles(console, facts["paper_percentile"])
@@ -49,6 +52,8 @@ def _show_touchdown(console: Console, facts: dict[str, Any]) -> None:
     if landing is None:
         return
     landed = f"   {facts['landed']} of {facts['flights']} flights landed" if "landed" in facts else ""
+    if facts["crashed"] is not False and facts["crashed"]:
+        landed += f"   crashed: {int(facts['crashed'])}"
     console.print(
         f"touchdown  {_cell(landing['horizontal_error_m'], 3)} m from the pad's centre, "
         f"{_cell(landing['sink_rate_m_s'], 3)} m/s, at {_cell(landing['t_s'], 2)} s{landed}",

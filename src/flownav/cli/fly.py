@@ -8,13 +8,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flownav.errors import InputError, VerdictError
+
 if TYPE_CHECKING:
     from flownav.simulation.scenario import Scenario
+
+
+CRASHES_ALLOWED = 0.05  # of the flights, before the exit status says that the verdict is bad
 
 
 def command(
     scenario: Annotated[str, typer.Argument(help="takeoff, landing, gusty, or a scenario file (TOML).")],
     flights: Annotated[int, typer.Option(help="How many flights; more than one gives medians and 5-95 %.")] = 1,
+    flight: Annotated[int | None, typer.Option(help="Fly this one flight of the seed again, counted from 0.")] = None,
     seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
     gps: Annotated[str | None, typer.Option(help="GPS error model: white or midg.")] = None,
     filter_name: Annotated[str | None, typer.Option("--filter", help="Filter: paper or kinematic.")] = None,
@@ -27,7 +33,7 @@ def command(
 ) -> None:
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
     from flownav.campaign.local import fly_many, fly_recorded, median_flight
-    from flownav.cli.output import progress, require_between, save
+    from flownav.cli.output import progress, require_between, require_writable, save
     from flownav.scoring.errors import scores_of_flights
     from flownav.scoring.paper_tables import percentile_of_paper, published
     from flownav.simulation.assemble import assemble
@@ -35,22 +41,28 @@ def command(
 
     require_between("--flights", flights, 1, 10_000_000)
     require_between("--seed", seed, 0, 2**63 - 1)
+    require_between("--flight", flight or 0, 0, 10_000_000)
+    if flight is not None and flights > 1:
+        raise InputError("--flight names one flight, --flights many; give one of the two")
     chosen = _overridden(load_scenario(scenario), gps, filter_name, feedback, truth, sensor)
     setup = assemble(chosen)
     record_path = out or Path("out") / f"{chosen.name}.fnr"
+    require_writable(record_path)
     facts: dict[str, Any] = {
         "scenario": chosen.name,
         "filter": chosen.filter.name,
         "gps": chosen.gps.model,
+        "truth": chosen.truth,
+        "feedback": chosen.autopilot.feedback,
         "seed": seed,
         "flights": flights,
     }
-    index, percentiles = 0, None
+    index, percentiles = flight or 0, None
     if flights > 1:
         with progress(f"Flying {chosen.name}", flights) as advance:
             rows = fly_many(setup.flight, seed, flights, on_progress=advance)
         index = median_flight(rows)
-        table = published(chosen.name)
+        table = published(chosen.paper_table)
         percentiles = percentile_of_paper(rows, table) if table else None
     record = fly_recorded(setup, seed, index)
     scores = record.manifest["scores"] if flights == 1 else scores_of_flights(rows)
@@ -63,6 +75,8 @@ def command(
         from flownav.cli.flight_table import show
 
         show(facts, record.manifest["paper"], index)
+    if int(facts["crashed"]) > CRASHES_ALLOWED * flights:
+        raise VerdictError(f"{int(facts['crashed'])} of {flights} flights crashed (see `crashed` in docs/scenarios.md)")
 
 
 def _overridden(

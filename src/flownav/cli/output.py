@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -28,7 +29,17 @@ def progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
 def require_between(option: str, value: float, low: float, high: float) -> None:
     """InputError where an option's number is out of range."""
     if not low <= value <= high:
-        raise InputError(f"{option} {value:g}: must be from {low:g} to {high:g}")
+        raise InputError(f"{option} {value}: must be from {low} to {high}")
+
+
+def require_writable(path: Path) -> None:
+    """InputError where a file cannot be put there; asked before the work is done, not after."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
+    if path.is_dir() or not os.access(path.parent, os.W_OK):
+        raise InputError(f"{path}: cannot be written; give another --out")
 
 
 def save(record: Record, path: Path, *, report: bool) -> dict[str, str]:

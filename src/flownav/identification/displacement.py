@@ -159,7 +159,7 @@ def _solve(tracks: list[_Track], lag_s: float, gain: float) -> tuple[Array, floa
     """M's four entries at a lag, and the mean square of the innovations."""
     design, value, _ = _stacked(tracks, lag_s, gain)
     mixing = np.linalg.lstsq(design[:, :4], value, rcond=None)[0]
-    return mixing, float(np.mean((value - design[:, :4] @ mixing) ** 2))
+    return np.asarray(mixing), float(np.mean((value - design[:, :4] @ mixing) ** 2))
 
 
 def _refined(tracks: list[_Track], lags: Array, gain: float) -> float:

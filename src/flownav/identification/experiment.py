@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flownav.errors import InputError
-from flownav.identification.response import Steps, distinct_steps
+from flownav.identification.grid import Steps, distinct_steps
 from flownav.measurement import Array
 
 LEAST_READINGS = 50
@@ -47,9 +47,7 @@ class Experiment:
     def from_input(self, first: int) -> Experiment:
         """The run with its input from a sample on; not checked for length."""
         t_u = self.t_u[first:]
-        return Experiment(
-            self.name, t_u, self.u[first:], self.t_y, self.y, distinct_steps(np.diff(t_u)), self.height_m
-        )
+        return Experiment(self.name, t_u, self.u[first:], self.t_y, self.y, distinct_steps(np.diff(t_u)), self.height_m)
 
     @property
     def longest_step_s(self) -> float:
@@ -72,6 +70,7 @@ def experiment(name: str, t_u: Array, u: Array, t_y: Array, y: Array, height_m: 
             row = int(np.argmax(np.diff(t_s) <= 0.0))
             raise InputError(f"{name}: {what}: time does not increase after {t_s[row]:g} s; sort and remove repeats")
         if np.ptp(value) < LEAST_MOTION:
-            raise InputError(f"{name}: the {what}'s velocity is constant ({value[0]:g} m/s); a run that moves is needed")
+            raise InputError(
+                f"{name}: the {what}'s velocity is constant ({value[0]:g} m/s); a run that moves is needed"
+            )
     return Experiment(name, t_u, u, t_y, y, distinct_steps(np.diff(t_u)), height_m)
-

@@ -51,13 +51,17 @@ class RunModel:
 
 @dataclass(frozen=True)
 class Noise:
-    """The readings' error: by height, its law, by quality, and what schedules of it are worth."""
+    """The readings' error: by height, its law, by quality, and what schedules of it are worth.
+
+    tail: how many of the law's standard deviations hold 99.7 % of the readings.
+    """
 
     points: tuple[NoisePoint, ...]
     law: PowerLaw
     quality: tuple[QualityPoint, ...]
     schedules: tuple[ScheduleScore, ...]
     signal_sigma_m_s: float
+    tail: float
 
 
 @dataclass(frozen=True)
@@ -84,12 +88,12 @@ class Findings:
     @property
     def gain(self) -> Interval:
         """Over axes and heights; what they differ by widens it."""
-        return combined([response.gain for response in self.responses])
+        return combined(list(dict.fromkeys(response.gain for response in self.responses)))
 
     @property
     def latency_s(self) -> Interval:
         """Over axes and heights; what they differ by widens it."""
-        return combined([response.latency_s for response in self.responses])
+        return combined(list(dict.fromkeys(response.latency_s for response in self.responses)))
 
     @property
     def best(self) -> Response:

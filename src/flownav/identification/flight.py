@@ -9,6 +9,7 @@ swapped or inverted axes even where the reference's heading is unknown.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from flownav.replay.prepare import ReplayOptions, prepare
 GRAVITY_M_S2 = 9.80665
 FLOOR_SHARE = 0.01  # of the readings at the lowest range: a rangefinder stuck at its floor
 FLOOR_MARGIN = 1.03
+SPIKE_WINDOW, SPIKE_SHARE, SPIKE_M = 51, 0.3, 0.1
 LEAST_FLOW = 200
 LONGEST_GAP_S = 0.5
 REFERENCES = ("truth", "gps")
@@ -64,7 +66,7 @@ class Flight:
         t_s = self.t_s[self.good]
         cuts = np.flatnonzero(np.diff(t_s) > max(LONGEST_GAP_S, 5.0 * float(np.median(np.diff(t_s))))) + 1
         edges = [0, *cuts.tolist(), len(t_s)]
-        return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+        return [slice(a, b) for a, b in pairwise(edges)]
 
 
 def flight(log: Log, reference: str = "auto") -> Flight:
@@ -88,7 +90,7 @@ def flight(log: Log, reference: str = "auto") -> Flight:
     else:
         velocity, rate = value[:, :2], value[:, :2] / np.maximum(range_m, 0.1)[:, None]
     good = (quality > 0) & np.isfinite(velocity).all(axis=1) & (range_m > _floor(distance.value[:, 0]))
-    good &= np.any(velocity != 0.0, axis=1)
+    good &= np.any(velocity != 0.0, axis=1) & ~_spikes(range_m)
     good &= np.concatenate([[True], np.diff(t_s) > 0.0])
     if np.count_nonzero(good) < LEAST_FLOW:
         raise InputError(
@@ -124,6 +126,14 @@ def _velocity(log: Log) -> Stream | None:
         return None
     known = np.isfinite(stream.value).all(axis=1)
     return Stream.of(stream.sensor, stream.t_s[known], stream.value[known]) if known.mean() > 0.5 else None
+
+
+def _spikes(range_m: Array) -> NDArray[np.bool_]:
+    """Readings whose range is far from the median of those around: a sonar's echo of something else."""
+    width = min(SPIKE_WINDOW, len(range_m) - 1 + len(range_m) % 2)
+    padded = np.pad(range_m, width // 2, mode="edge")
+    median = np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1)
+    return np.asarray(np.abs(range_m - median) > SPIKE_SHARE * median + SPIKE_M)
 
 
 def _floor(range_m: Array) -> float:

@@ -18,6 +18,7 @@ import numpy as np
 
 from flownav.errors import InputError
 from flownav.identification import displacement
+from flownav.identification.descent import Structure
 from flownav.identification.experiment import Experiment, experiment
 from flownav.identification.findings import Findings, Noise, Response
 from flownav.identification.flight import Flight, flight
@@ -25,12 +26,20 @@ from flownav.identification.height_law import (
     compare_schedules,
     fit_power_law,
     noise_by_height,
+    tail,
     variance_by_quality,
 )
 from flownav.identification.orders import choose, cross_validation
-from flownav.identification.output_error import Structure
+from flownav.identification.output_error import fit
 from flownav.identification.quantities import Interval, latency
-from flownav.identification.reference_motion import ALIKE, Motion, difference, motion
+from flownav.identification.reference_motion import (
+    ALIKE,
+    Motion,
+    difference,
+    fast_experiments,
+    fast_flow,
+    motion,
+)
 from flownav.identification.sentinel import Axes, judge
 from flownav.identification.statistics import Z_95
 from flownav.logs.csv_folder import read_csv_folder
@@ -63,22 +72,21 @@ def identify_flight(path: Path, candidates: Sequence[Structure], reference: str 
     axes = judge(raw, moved.yaw_known)
     put_right = flown.velocity_m_s @ axes.assignment  # assignment is orthogonal: its transpose undoes it
     scale, track = _scale(flown, moved, age_s, put_right)
-    experiments = [_axis_run(flown, moved, put_right, axis) for axis in (0, 1)]
+    runs = [_axis_run(flown, moved, put_right, axis) for axis in (0, 1)]
     structures = candidates if len(candidates) == 1 else FLIGHT_ORDERS
     responses = []
-    for axis, run in enumerate(experiments):
-        choice = choose([run], structures)
+    for axis, members in enumerate(_dynamic_runs(flown, moved, put_right, runs)):
+        choice = choose(members, structures)
         lag = _latency(moved, latency(choice.best))
-        held_out = cross_validation([run], choice.best.structure)
-        height = float(np.median(flown.range_m[flown.good]))
-        responses.append(Response("xy"[axis], height, scale.gains[axis], lag, choice, 1, held_out))
+        held_out = cross_validation(members, choice.best)
+        responses.append(Response("xy"[axis], runs[0].height_m, scale.gains[axis], lag, choice, 1, held_out))
     ranges = flown.range_m[flown.good]
     return Findings(
         "flight",
         {"truth": "motion capture", "gps": "GPS"}[flown.reference],
         tuple(responses),
         axes,
-        _noise(flown, moved, put_right, responses),
+        _noise(flown, put_right, [fit([run], Structure(0)).residuals[0] for run in runs]),
         (),
         (float(np.quantile(ranges, 0.01)), float(np.quantile(ranges, 0.99))),
         flown.flow_limit_rad_s,
@@ -132,7 +140,7 @@ def _scale_of_track(track: displacement.Match) -> Scale:
     for axis in (0, 1):
         slope = np.array([-response[axis, i] * response[j, axis] for i, j in ((0, 0), (1, 0), (0, 1), (1, 1))])
         gains.append(Interval.of(float(response[axis, axis]), float(np.sqrt(slope @ covariance @ slope))))
-    return Scale(response, (gains[0], gains[1]), track.attenuation, "displacement")
+    return Scale(np.asarray(response), (gains[0], gains[1]), track.attenuation, "displacement")
 
 
 def _scale_of_velocity(flown: Flight, moved: Motion, velocity: Array) -> Scale:
@@ -170,27 +178,41 @@ def _axis_run(flown: Flight, moved: Motion, velocity: Array, axis: int) -> Exper
     """One body axis as an experiment: the reference's velocity on the vehicle's clock in, the flow's at arrival out."""
     body = moved.in_body(flown, moved.t_s)[:, axis]
     t_s, y = flown.t_s[flown.good], velocity[flown.good, axis]
-    return experiment(f"{flown.name} {'xy'[axis]}", moved.t_s, body, t_s, y, float(np.median(flown.range_m[flown.good])))
-
-
-def _noise(flown: Flight, moved: Motion, velocity: Array, responses: Sequence[Response]) -> Noise:
-    """Errors of both axes together, against each axis's model."""
-    ranges, quality = flown.range_m[flown.good], flown.quality[flown.good]
-    count = len(ranges)
-    error = np.concatenate([_last(response.model.residuals[0], count) for response in responses])
-    height, grade = np.concatenate([ranges, ranges]), np.concatenate([quality, quality])
-    points = noise_by_height(error, height)
-    signal = float(velocity[flown.good].std())
-    return Noise(
-        tuple(points),
-        fit_power_law(points),
-        tuple(variance_by_quality(error, grade)),
-        tuple(compare_schedules(error, height, grade, signal)),
-        signal,
+    return experiment(
+        f"{flown.name} {'xy'[axis]}", moved.t_s, body, t_s, y, float(np.median(flown.range_m[flown.good]))
     )
 
 
-def _last(residual: Array, count: int) -> Array:
+def _dynamic_runs(
+    flown: Flight, moved: Motion, velocity: Array, runs: Sequence[Experiment]
+) -> Sequence[Sequence[Experiment]]:
+    """What shows the dynamics of x and of y: above 1/SPLIT_S the IMU where it serves, else the reference."""
+    if moved.fast_m_s is None or moved.flow_tie is None or moved.flow_tie.likeness < ALIKE:
+        return [[run] for run in runs]
+    other = fast_flow(flown, moved.t_s, velocity)
+    both = fast_experiments(flown.name, moved.t_s, moved.fast_m_s, flown.t_s[flown.good], other)
+    return [both, both]
+
+
+def _noise(flown: Flight, velocity: Array, residuals: Sequence[Array]) -> Noise:
+    """Errors of both axes together, against gain and delay."""
+    ranges, quality = flown.range_m[flown.good], flown.quality[flown.good]
+    error = np.concatenate([_complete(residual, len(ranges)) for residual in residuals])
+    height, grade = np.concatenate([ranges, ranges]), np.concatenate([quality, quality])
+    points = noise_by_height(error, height)
+    signal = float(velocity[flown.good].std())
+    law = fit_power_law(points)
+    return Noise(
+        tuple(points),
+        law,
+        tuple(variance_by_quality(error, grade)),
+        tuple(compare_schedules(error, height, grade, signal)),
+        signal,
+        tail(error, law.at(height)),
+    )
+
+
+def _complete(residual: Array, count: int) -> Array:
     """The reference reaches 2 s beyond the flow on either side, so every reading has a residual."""
     if len(residual) != count:
         raise InputError(f"{count - len(residual)} flow readings lie outside the reference's time; trim the log")
@@ -206,6 +228,8 @@ def _notes(flown: Flight, moved: Motion, scale: Scale, axes: Axes) -> list[str]:
             f"scale: noise in the regressor may pull the gains by up to {max(scale.bias):.0%}; a longer or livelier "
             "flight is needed"
         )
+    if flown.reference == "gps":
+        notes.append("error: what is left of the GPS and attitude errors counts as the flow's; it is an upper bound")
     if moved.flow_tie is None:
         notes.append("latency is against the reference and holds the reference's own delay: the log has no IMU")
     elif moved.flow_tie.likeness < ALIKE and (moved.reference_tie is None or moved.reference_tie.likeness < ALIKE):

@@ -14,6 +14,7 @@ scored on the blocks between by the mean of log sigma + e^2/(2 sigma^2): the low
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -131,7 +132,7 @@ def noise_by_height(error: Array, height_m: Array) -> list[NoisePoint]:
 def variance_by_quality(error: Array, quality: Array) -> list[QualityPoint]:
     """Error variance in classes of quality; classes with few readings are left out."""
     points = []
-    for low, high in zip(QUALITY_EDGES[:-1], QUALITY_EDGES[1:], strict=True):
+    for low, high in pairwise(QUALITY_EDGES):
         mine = (quality >= low) & (quality < high)
         if np.count_nonzero(mine) >= LEAST_IN_BIN:
             points.append(QualityPoint(int(low), int(high - 1), spread(error[mine]) ** 2, int(mine.sum())))
@@ -144,6 +145,11 @@ def spread(error: Array) -> float:
     robust = 1.4826 * float(np.median(np.abs(centred)))
     kept = centred[np.abs(centred) <= 5.0 * robust] if robust > 0.0 else centred
     return max(float(kept.std()), SMALLEST_SIGMA_M_S)
+
+
+def tail(error: Array, sigma: Array) -> float:
+    """How many standard deviations hold 99.7 % of the readings: 3 for normal errors."""
+    return float(np.quantile(np.abs(error - np.median(error)) / sigma, 0.9973))
 
 
 def compare_schedules(error: Array, height_m: Array, quality: Array, signal_sigma_m_s: float) -> list[ScheduleScore]:

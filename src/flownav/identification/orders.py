@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from flownav.errors import InputError
+from flownav.identification.descent import DELAY_RANGE_S, Structure
 from flownav.identification.experiment import LEAST_READINGS, Experiment
-from flownav.identification.output_error import DELAY_RANGE_S, Fit, Structure, fit, simulate
+from flownav.identification.output_error import Fit, fit, simulate
 from flownav.identification.quantities import Excitation, excitation
+from flownav.identification.starting_points import gain_and_delay
 from flownav.identification.statistics import fit_percent
-from flownav.measurement import Array
 
 CANDIDATES = tuple(Structure(order, delay) for order, delay in ((0, False), (1, False), (1, True), (2, False),
                                                                 (2, True), (3, False)))  # fmt: skip
@@ -36,8 +37,9 @@ class Choice:
 def choose(experiments: Sequence[Experiment], candidates: Sequence[Structure] = CANDIDATES) -> Choice:
     """The model of least BIC among those whose every parameter the input shows; gain and delay where none is."""
     tried = []
+    guess = gain_and_delay([run.within(DELAY_RANGE_S) for run in experiments], DELAY_RANGE_S)
     for structure in candidates:
-        model = fit(experiments, structure)
+        model = fit(experiments, structure, guess=guess)
         tried.append((model, excitation(model)))
     shown = [pair for pair in tried if pair[1].complete] or tried[:1]
     colour = min(tried, key=lambda pair: pair[0].cost)[0].whiteness.readings_per_independent
@@ -57,20 +59,22 @@ def parse_order(text: str) -> tuple[Structure, ...]:
     return (Structure(int(order), bool(plus)),)
 
 
-def cross_validation(experiments: Sequence[Experiment], structure: Structure) -> tuple[float, ...]:
+def cross_validation(experiments: Sequence[Experiment], model: Fit) -> tuple[float, ...]:
     """Fit per cent on what the model has not seen: each run in turn, or the last third of a single one.
 
-    The start of the unseen run is estimated, as `compare` does; nothing else is. NaN where too little is left.
+    The start of the unseen run is estimated, as `compare` does; nothing else is. model: the fit to all runs, where the
+    others start from. NaN where too little is left.
     """
+    structure, starts = model.structure, [model.point]
     if len(experiments) == 1:
         run = experiments[0].within(DELAY_RANGE_S)
         cut = run.t_y[int(len(run.t_y) * (1.0 - HELD_OUT_SHARE))]
         seen, unseen = run.between_times(-np.inf, cut), run.between_times(cut, np.inf)
         if len(seen.t_y) < LEAST_READINGS or len(unseen.t_y) < LEAST_READINGS or np.ptp(seen.y) == 0.0:
             return (float("nan"),)
-        return (_unseen_fit(fit([seen], structure), _from(unseen, cut)),)
+        return (_unseen_fit(fit([seen], structure, starts), _from(unseen, cut)),)
     return tuple(
-        _unseen_fit(fit([*experiments[:i], *experiments[i + 1 :]], structure), run.within(DELAY_RANGE_S))
+        _unseen_fit(fit([*experiments[:i], *experiments[i + 1 :]], structure, starts), run.within(DELAY_RANGE_S))
         for i, run in enumerate(experiments)
     )
 
@@ -83,5 +87,3 @@ def _from(run: Experiment, start_s: float) -> Experiment:
     """The run with input from one delay range before `start_s` on, so that its start can be estimated."""
     first = max(0, int(np.searchsorted(run.t_u, start_s - DELAY_RANGE_S[1])) - 1)
     return run.from_input(first)
-
-

@@ -18,7 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.identification.output_error import Fit, Point
+from flownav.identification.descent import Point
+from flownav.identification.output_error import Fit
 from flownav.identification.statistics import Z_95
 from flownav.measurement import Array
 
@@ -152,7 +153,7 @@ def _sentence(names: list[str], count: int) -> str:
     if count == len(names):
         return f"the input excites all {count} parameters: {_listed(names)}"
     if count == 0:
-        return f"the input excites none of {len(names)} parameters: nothing is identifiable from this log"
+        return f"the log fixes none of {len(names)} parameters to 5 %: take {_listed(names[:2])} with their intervals"
     verb = "is" if count == 1 else "are"
     lacking = names[count:]
     plural = len(lacking) > 1 or " and " in lacking[0]
@@ -174,7 +175,8 @@ def _by_derivative(fit: Fit, quantity: Callable[[Point], float]) -> Interval:
         step = np.zeros(n + 2)
         step[i] = 1e-6
         gradient[i] = (quantity(_shifted(fit.point, step)) - quantity(_shifted(fit.point, -step))) / 2e-6
-    return Interval.of(quantity(fit.point), float(np.sqrt(max(gradient @ fit.covariance @ gradient, 0.0))))
+    variance = float(gradient @ fit.covariance @ gradient)
+    return Interval.of(quantity(fit.point), float(np.sqrt(max(variance, 0.0))))
 
 
 def _shifted(point: Point, step: Array) -> Point:

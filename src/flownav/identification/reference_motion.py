@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flownav.identification.descent import DELAY_RANGE_S, Structure
 from flownav.identification.experiment import Experiment, experiment
 from flownav.identification.flight import GRAVITY_M_S2, Flight
-from flownav.identification.output_error import DELAY_RANGE_S, Structure, fit
+from flownav.identification.output_error import fit
 from flownav.identification.quantities import Interval, latency
 from flownav.identification.statistics import Z_95
 from flownav.measurement import Array
@@ -46,6 +47,7 @@ class Motion:
     reference_delay_s: float
     reference_tie: Tie | None
     flow_tie: Tie | None
+    fast_m_s: Array | None  # the IMU's part above 1/SPLIT_S, (n, 3)
 
     def in_body(self, flown: Flight, instants_s: Array) -> Array:
         """Velocity in body axes (n, 3) at given instants."""
@@ -85,7 +87,7 @@ def motion(flown: Flight) -> Motion:
     grid = np.arange(t_s[0] - 2.0, t_s[-1] + 2.0, GRID_S)
     reference = reference_velocity(flown, grid)
     if flown.imu is None:
-        return Motion(grid, reference, 0.0, flown.reference == "gps", 0.0, None, None)
+        return Motion(grid, reference, 0.0, flown.reference == "gps", 0.0, None, None, None)
     inertial = _inertial_velocity(flown, grid)
     fast = inertial - smoothed(inertial)
     tie = _tie(grid, fast, grid, (reference - smoothed(reference))[:, :2])
@@ -95,8 +97,8 @@ def motion(flown: Flight) -> Motion:
     earth = _turned(on_grid(grid, reference, grid + delay), -yaw)
     if flown.reference == "gps" and alike:
         earth = smoothed(earth) + fast  # positions of a GPS receiver say nothing within a second
-    flow_tie = _flow_tie(flown, grid, fast)
-    return Motion(grid, earth, yaw, alike or flown.reference == "gps", delay, tie, flow_tie)
+    flow_tie = _tie(grid, fast, flown.t_s[flown.good], fast_flow(flown, grid, flown.velocity_m_s))
+    return Motion(grid, earth, yaw, alike or flown.reference == "gps", delay, tie, flow_tie, fast)
 
 
 def _inertial_velocity(flown: Flight, grid: Array) -> Array:
@@ -115,22 +117,12 @@ def _turned(velocity: Array, angle_rad: float) -> Array:
     return np.column_stack([cosine * north - sine * east, sine * north + cosine * east, down])
 
 
-def flow_in_earth(flown: Flight, age_s: float) -> Array:
-    """Level flow velocity (n, 2) of the good readings, turned by the attitude `age_s` before they arrived."""
-    t_s = flown.t_s[flown.good] - age_s
-    level = flown.rotation(t_s)[:, :2, :2]
-    return np.asarray(np.einsum("nij,nj->ni", level, flown.velocity_m_s[flown.good]))
-
-
-def fast_flow(flown: Flight, grid: Array) -> Array:
-    """The flow's earth velocity (n, 2) at arrival, less its Gaussian mean."""
+def fast_flow(flown: Flight, grid: Array, velocity: Array) -> Array:
+    """The flow's earth velocity (n, 2) at the good readings' arrival, less its Gaussian mean; velocity (m, 2)."""
     t_s = flown.t_s[flown.good]
-    earth = flow_in_earth(flown, flown.age_s)
+    level = flown.rotation(t_s - flown.age_s)[:, :2, :2]
+    earth = np.einsum("nij,nj->ni", level, velocity[flown.good])
     return np.asarray(earth - on_grid(grid, smoothed(on_grid(t_s, earth, grid)), t_s))
-
-
-def _flow_tie(flown: Flight, grid: Array, fast: Array) -> Tie:
-    return _tie(grid, fast, flown.t_s[flown.good], fast_flow(flown, grid))
 
 
 def _tie(grid: Array, fast: Array, t_s: Array, other: Array) -> Tie:
@@ -154,7 +146,9 @@ def _tie(grid: Array, fast: Array, t_s: Array, other: Array) -> Tie:
 
 def fast_experiments(name: str, grid: Array, fast: Array, t_s: Array, other: Array) -> list[Experiment]:
     """North and east as two runs of one system: the IMU's fast velocity in, the other one out."""
-    return [experiment(f"{name} {axis}", grid, fast[:, i], t_s, other[:, i]) for i, axis in enumerate(("north", "east"))]
+    return [
+        experiment(f"{name} {axis}", grid, fast[:, i], t_s, other[:, i]) for i, axis in enumerate(("north", "east"))
+    ]
 
 
 def difference(first: Interval, second: Interval) -> Interval:

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from flownav.errors import InputError
+from flownav.identification.descent import DELAY_RANGE_S, Structure
 from flownav.identification.findings import Findings, Noise, Response, RunModel
 from flownav.identification.height_law import (
     NoisePoint,
@@ -14,10 +15,11 @@ from flownav.identification.height_law import (
     fit_power_law,
     noise_by_height,
     spread,
+    tail,
     variance_by_quality,
 )
 from flownav.identification.orders import choose, cross_validation
-from flownav.identification.output_error import DELAY_RANGE_S, Structure, fit
+from flownav.identification.output_error import fit
 from flownav.identification.quantities import gain, latency
 from flownav.identification.rig_log import Run
 from flownav.identification.sentinel import one_axis
@@ -33,11 +35,12 @@ def identify_rig(runs: Sequence[Run], candidates: Sequence[Structure], validate:
         if not np.isfinite(run.experiment.height_m):
             raise InputError(f"{run.files[0]}: {UNKNOWN_HEIGHT}")
     groups = _by_height(runs)
-    responses, models, errors = [], [], []
+    responses, models = [], []
+    errors: list[tuple[Run, Array]] = []
     for height_m, members in groups.items():
         experiments = [run.experiment for run in members]
         choice = choose(experiments, candidates)
-        held_out = cross_validation(experiments, choice.best.structure) if validate else ()
+        held_out = cross_validation(experiments, choice.best) if validate else ()
         best = choice.best
         responses.append(Response("x", height_m, gain(best), latency(best), choice, len(members), held_out))
         errors.extend(zip(members, best.residuals, strict=True))
@@ -97,12 +100,14 @@ def _noise(errors: Sequence[tuple[Run, Array]]) -> Noise:
     errors_all, heights_all = np.concatenate(error), np.concatenate(height)
     quality_all, signal_sigma = np.concatenate(quality), float(np.concatenate(signal).std())
     points = by_height if len(by_height) > 1 else noise_by_height(errors_all, heights_all)
+    law = fit_power_law(points)
     return Noise(
         tuple(points),
-        fit_power_law(points),
+        law,
         tuple(variance_by_quality(errors_all, quality_all)),
         tuple(compare_schedules(errors_all, heights_all, quality_all, signal_sigma)),
         signal_sigma,
+        tail(errors_all, law.at(heights_all)),
     )
 
 

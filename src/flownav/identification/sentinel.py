@@ -57,7 +57,9 @@ def _sentence(assignment: Array) -> str:
     inverted = [axis for axis, row in zip("xy", assignment, strict=True) if row.sum() < 0.0]
     parts = ["axes are swapped"] if swapped else []
     if len(inverted) == 2:
-        parts.append("signs of x and y are inverted (sensor turned by 180 deg)" if not swapped else "both signs inverted")
+        parts.append(
+            "signs of x and y are inverted (sensor turned by 180 deg)" if not swapped else "both signs inverted"
+        )
     elif inverted:
         parts.append(f"sign of {inverted[0]} is inverted")
     return ", ".join(parts) if parts else "axes and signs are right"

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flownav.identification.descent import Point, Structure
 from flownav.identification.experiment import Experiment
 from flownav.measurement import Array
-
-if TYPE_CHECKING:
-    from flownav.identification.output_error import Point, Structure
 
 DELAY_STEPS = 71
 READINGS = 1000  # of a run, that the delays are compared on
@@ -19,11 +16,9 @@ SHORTEST_LAG_S = 2e-3
 FAST_POLE = 4.0
 
 
-def points(runs: Sequence[Experiment], structure: Structure, delay_range_s: tuple[float, float]) -> list[Point]:
-    """Starts for a structure: the best delays on a grid alone, or split between dynamics and a pure delay."""
-    from flownav.identification.output_error import Point
-
-    gain, delay_s = gain_and_delay(runs, delay_range_s)
+def points(guess: tuple[float, float], structure: Structure) -> list[Point]:
+    """Starts for a structure from a gain and a delay, the delay split between dynamics and a pure one."""
+    gain, delay_s = guess
     if structure.order == 0:
         return [Point(np.zeros(0), gain, delay_s)]
     lag_s = max(delay_s, SHORTEST_LAG_S)
@@ -63,8 +58,10 @@ def butterworth(order: int, lag_s: float) -> Array:
     return np.asarray(unit[1:] * rate ** np.arange(1.0, order + 1.0))
 
 
-def with_fast_pole(log_a: Array) -> Array:
-    """The same dynamics with one more real pole, FAST_POLE times as fast as the model's own rate."""
+def with_fast_poles(log_a: Array, order: int) -> Array:
+    """The same dynamics with more real poles, FAST_POLE times as fast as the model's own rate and up."""
     rate = float(np.exp(log_a[-1] / len(log_a)))
-    whole = np.convolve(np.concatenate([[1.0], np.exp(log_a)]), [1.0, FAST_POLE * rate])
+    whole = np.concatenate([[1.0], np.exp(log_a)])
+    for extra in range(order - len(log_a)):
+        whole = np.convolve(whole, [1.0, (FAST_POLE + extra) * rate])
     return np.asarray(np.log(whole[1:]))

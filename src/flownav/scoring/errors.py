@@ -16,14 +16,18 @@ from flownav.compile import kernel
 STATES = ("x", "y", "z", "u", "v", "w")
 STATISTICS = ("mean_error", "std_error", "rms_error", "max_error")
 TOUCHDOWN = ("t_s", "horizontal_error_m", "sink_rate_m_s")
+CRASH_SINK_RATE_M_S = 2.0
+AIRBORNE_EPOCHS = 25  # half a second without contact: skids flutter at lift-off
 
-# one flight's scores as a row: the statistics of each state, the largest position error, the touchdown
+# one flight's scores as a row: each state's statistics, largest error of one position axis, touchdown, crashed 0/1
 SCORE_COLUMNS = (
     *(f"{state}.{statistic}" for state in STATES for statistic in STATISTICS),
     "max_position_error_m",
     *(f"touchdown.{name}" for name in TOUCHDOWN),
+    "crashed",
 )
 MAX_POSITION_ERROR = len(STATES) * len(STATISTICS)
+CRASHED = len(SCORE_COLUMNS) - 1
 
 Array = NDArray[np.float64]
 
@@ -61,43 +65,49 @@ def error_statistics(estimate: Array, truth: Array) -> Array:
 
 
 @kernel
-def touchdown(t_s: Array, position: Array, sink_rate: Array, on_ground: Array) -> Array:
+def first_contact(t_s: Array, position: Array, sink_rate: Array, on_ground: Array) -> Array:
     """Time, distance from the pad's centre and sink rate of the first ground contact after being airborne.
 
     t_s (epochs,), position (epochs, 3, lanes) NED [m], sink_rate (epochs, lanes) downward [m/s], on_ground
-    (epochs, lanes) 0/1 -> (lanes, 3); NaN where a flight never lands. The sink rate is that of the last
+    (epochs, lanes) 0/1 -> (lanes, 3); NaN where a flight never touches. The sink rate is that of the last
     epoch before contact.
     """
     epochs, lanes = on_ground.shape
     result = np.full((lanes, 3), np.nan)
     for lane in range(lanes):
-        airborne = False
+        without_contact = 0
         for k in range(epochs):
-            if on_ground[k, lane] > 0.0 and airborne:
+            touching = on_ground[k, lane] > 0.0
+            if touching and without_contact >= AIRBORNE_EPOCHS:
                 result[lane, 0] = t_s[k]
                 result[lane, 1] = np.sqrt(position[k, 0, lane] ** 2 + position[k, 1, lane] ** 2)
                 result[lane, 2] = sink_rate[k - 1, lane]
                 break
-            airborne = airborne or on_ground[k, lane] == 0.0
+            without_contact = 0 if touching else without_contact + 1
     return result
 
 
-def score_block(t_s: Array, estimate: Array, truth: Array, sink_rate: Array, on_ground: Array, *, lands: bool) -> Array:
+def score_block(
+    t_s: Array, estimate: Array, truth: Array, sink_rate: Array, on_ground: Array, *, may_land_after_s: float
+) -> Array:
     """Scores of a block of flights, (lanes, len(SCORE_COLUMNS)).
 
-    estimate and truth (epochs, 6, lanes): position NED [m] and velocity body FRD [m/s]. `lands` says
-    whether the scenario ends on the ground; without it there is no touchdown to score.
+    estimate and truth (epochs, 6, lanes): position NED [m] and velocity body FRD [m/s]. A first contact
+    before `may_land_after_s`, or harder than CRASH_SINK_RATE_M_S, is a crash; an earlier one is no touchdown.
     """
     statistics = error_statistics(estimate, truth)
     lanes = statistics.shape[0]
-    landing = touchdown(t_s, truth[:, :3], sink_rate, on_ground) if lands else np.full((lanes, 3), np.nan)
+    contact = first_contact(t_s, truth[:, :3], sink_rate, on_ground)
+    too_early = contact[:, 0] < may_land_after_s
+    crashed = too_early | (contact[:, 2] > CRASH_SINK_RATE_M_S)
+    landing = np.where(too_early[:, None], np.nan, contact)
     largest = statistics[:, :3, 3].max(axis=1)
-    return np.column_stack([statistics.reshape(lanes, -1), largest, landing])
+    return np.column_stack([statistics.reshape(lanes, -1), largest, landing, crashed])
 
 
 def scores_of_flight(row: Array) -> dict[str, Any]:
     """One flight's row of scores as the JSON of `flownav fly`; NaN touchdowns are null."""
-    return _nested(lambda column: float(row[column]))
+    return _nested(lambda column: float(row[column])) | {"crashed": bool(row[CRASHED])}
 
 
 def scores_of_flights(rows: Array) -> dict[str, Any]:
@@ -108,7 +118,8 @@ def scores_of_flights(rows: Array) -> dict[str, Any]:
         low, median, high = np.percentile(values, [5, 50, 95]) if len(values) else (np.nan,) * 3
         return {"median": float(median), "p05": float(low), "p95": float(high)}
 
-    return _nested(spread) | {"landed": int(np.isfinite(rows[:, -1]).sum())}
+    landed = np.isfinite(rows[:, MAX_POSITION_ERROR + 1]) & (rows[:, CRASHED] == 0.0)
+    return _nested(spread) | {"landed": int(landed.sum()), "crashed": int(rows[:, CRASHED].sum())}
 
 
 def _nested(number: Any) -> dict[str, Any]:

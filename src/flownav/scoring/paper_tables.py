@@ -11,15 +11,14 @@ from numpy.typing import NDArray
 from flownav.parameter_files import shipped
 from flownav.scoring.errors import SCORE_COLUMNS, STATES
 
-TABLES = {"takeoff": (5, "paper_table5_takeoff.csv"), "landing": (6, "paper_table6_landing.csv")}
+TABLES = {5: "paper_table5_takeoff.csv", 6: "paper_table6_landing.csv"}
 
 
-def published(scenario: str) -> dict[str, Any] | None:
-    """The published table of a scenario ("takeoff" or "landing"), or None where the paper has none."""
-    if scenario not in TABLES:
+def published(number: int | None) -> dict[str, Any] | None:
+    """The published Table 5 (take-off) or 6 (landing), or None where there is none to compare with."""
+    if number is None:
         return None
-    number, name = TABLES[scenario]
-    with shipped(name).open(encoding="utf-8") as file:
+    with shipped(TABLES[number]).open(encoding="utf-8") as file:
         rows = {row["state"]: row for row in csv.DictReader(file)}
     states = {
         state: {statistic: float(rows[key][statistic]) for statistic in ("mean_error", "std_error")}

@@ -129,8 +129,97 @@ class Optics(ParameterModel):
         return 0.5 * self.image_side_px / self.focal_length_px
 
 
+class LogSource(ParameterModel):
+    """A file that the sensor was identified from."""
+
+    path: str
+    sha256: str
+
+
+class IdentifiedResponse(ParameterModel):
+    """Gain and latency of one axis at one height with their 95 % intervals, and how good the model is.
+
+    validation_percent: fit on runs that the model has not seen, their mean.
+    """
+
+    axis: Literal["x", "y"]
+    height_m: Number = Field(gt=0.0, le=1000.0)
+    gain: Number
+    gain_low: Number
+    gain_high: Number
+    latency_s: Number
+    latency_low_s: Number
+    latency_high_s: Number
+    order: str
+    fit_percent: Number = Field(le=100.0)
+    validation_percent: Number | None = Field(None, le=100.0)
+    residual_sigma_m_s: Number = Field(ge=0.0)
+    residuals_white: bool
+    runs: int = Field(ge=1)
+    readings: int = Field(ge=1)
+
+
+class NoiseAtHeight(ParameterModel):
+    """Standard deviation of the error about one height."""
+
+    height_m: Number = Field(gt=0.0, le=1000.0)
+    sigma_m_s: Number = Field(ge=0.0)
+    readings: int = Field(ge=1)
+
+
+class QualityVariance(ParameterModel):
+    """Error variance of readings whose quality lies from quality_low to quality_high."""
+
+    quality_low: int = Field(ge=0, le=255)
+    quality_high: int = Field(ge=0, le=255)
+    variance_m2_s2: Number = Field(ge=0.0)
+    readings: int = Field(ge=1)
+
+
+class DynamicsInterval(ParameterModel):
+    """95 % intervals of the dynamics. `validity`: "identified", or "assumed" where only gain and latency are."""
+
+    validity: Literal["identified", "assumed"]
+    note: str
+    a_low_1_s2: Number | None = None
+    a_high_1_s2: Number | None = None
+    b_low_1_s: Number | None = None
+    b_high_1_s: Number | None = None
+    c_low_1_s2: Number | None = None
+    c_high_1_s2: Number | None = None
+
+
+class Identification(ParameterModel):
+    """Where an identified sensor's figures come from; nothing that simulation needs, everything that judges it."""
+
+    kind: Literal["rig", "flight"]
+    reference: str
+    axes: str
+    verdict: str
+    parameters: int = Field(ge=1)
+    identifiable: int = Field(ge=0)
+    gain: Number
+    gain_low: Number
+    gain_high: Number
+    latency_s: Number
+    latency_low_s: Number
+    latency_high_s: Number
+    lowest_height_m: Number = Field(ge=0.0)
+    highest_height_m: Number = Field(gt=0.0)
+    fastest_flow_rad_s: Number = Field(ge=0.0)
+    least_quality: int = Field(ge=0, le=255)
+    noise_exponent_low: Number
+    noise_exponent_high: Number
+    dynamics: DynamicsInterval
+    responses: tuple[IdentifiedResponse, ...]
+    noise: tuple[NoiseAtHeight, ...]
+    quality: tuple[QualityVariance, ...] = ()
+    notes: tuple[str, ...] = ()
+    sources: tuple[LogSource, ...] = ()
+
+
 class FlowSensor(ParameterModel):
-    """A flow sensor's file."""
+    """A flow sensor's file. `identification` stands in those that `flownav identify` wrote."""
 
     schema_version: Literal[1]
     name: str
@@ -141,6 +230,7 @@ class FlowSensor(ParameterModel):
     limits: Limits
     optics: Optics
     identified_models: tuple[IdentifiedModel, ...] = ()
+    identification: Identification | None = None
 
     def with_model(self, height_m: float, model: int) -> FlowSensor:
         """The sensor with the dynamics of one of its identified models. InputError where there is none."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from flownav.control.autopilot import AutopilotGains
 from flownav.control.guidance import path_through
+from flownav.errors import InputError
 from flownav.estimation.discretise import discretised
 from flownav.estimation.kinematic_settings import default_settings
 from flownav.estimation.paper_filter import PaperModel
@@ -47,6 +48,8 @@ class Setup:
 
 def assemble(scenario: Scenario) -> Setup:
     """Read, check, trim and discretise everything a scenario names. InputError as the loaders say."""
+    if scenario.truth == "linear" and scenario.wind.speed_20ft_m_s > 0.0:
+        raise InputError(f'{scenario.name}: truth = "linear" has no air to move; remove [wind], or fly "nonlinear"')
     vehicle_file = Path(scenario.vehicle.file) if scenario.vehicle.file else None
     sensor_file = Path(scenario.flow_sensor) if scenario.flow_sensor else None
     vehicle, sensor, paper = load_vehicle(vehicle_file), load_sensor(sensor_file), load_paper_model()

@@ -68,7 +68,7 @@ ATTITUDE_STEPS = 5  # 250 Hz within an epoch
 PHYSICS_STEPS = 2  # 500 Hz within an attitude step
 ATTITUDE_S = EPOCH_S / ATTITUDE_STEPS
 PHYSICS_S = ATTITUDE_S / PHYSICS_STEPS
-CONTACT_SHARE = 0.2  # of the weight on the skids counts as touching
+CONTACT_SHARE = 0.05  # of the weight on the skids counts as touching (a skid switch)
 START_STEP = 1 << 40  # the noise counter's step for the draws before the first epoch
 
 
@@ -178,15 +178,16 @@ def command(work: Work, lanes: Lanes, t_s: float, reference: Reference, flight: 
 
 @equation
 def note_inputs(work: Work, lanes: Lanes, gains: AutopilotGains) -> None:
-    """U of the paper's filter: collective and pedal as perturbations from trim; zero on the ground."""
+    """U of the paper's filter: collective and pedal as perturbations from trim; zero where the skids touch."""
     for lane in range(len(lanes)):
-        flying = load_autopilot(work, lanes, lane).flying
+        autopilot = load_autopilot(work, lanes, lane)
+        flying = autopilot.flying > 0.0 and autopilot.contact_time_s == 0.0
         col = work[(layout.CONTROLS + 2) * len(lanes) + lane] - gains.collective_trim_rad
         ped = work[(layout.CONTROLS + 3) * len(lanes) + lane] - gains.pedal_trim_rad
         work[layout.INPUT * len(lanes) + lane] = 0.0
         work[(layout.INPUT + 1) * len(lanes) + lane] = 0.0
-        work[(layout.INPUT + 2) * len(lanes) + lane] = col if flying > 0.0 else 0.0
-        work[(layout.INPUT + 3) * len(lanes) + lane] = ped if flying > 0.0 else 0.0
+        work[(layout.INPUT + 2) * len(lanes) + lane] = col if flying else 0.0
+        work[(layout.INPUT + 3) * len(lanes) + lane] = ped if flying else 0.0
 
 
 @equation

@@ -51,6 +51,8 @@ def record_of(setup: Setup, history: Array, seed: int, index: int) -> Record:
     attitude = {name: flown["gps", name] for name in QUATERNION}
     estimate = tuple(c for c in TABLES["estimate"] if c not in QUATERNION)
     table("estimate", "estimate", estimate, **attitude)
+    ground = -setup.flight.vehicle.cg_above_skid_m  # the reference of a landing runs on below the ground
+    flown["command", "pos_d_ref_m"] = np.minimum(flown["command", "pos_d_ref_m"], ground)
     table("command", "command", TABLES["command"])
     every = np.full(len(t_s), 255.0)
     table("gps_position", "gps", COLUMNS[Sensor.GPS_POSITION], quality=every)

@@ -10,7 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from flownav.errors import InputError
 from flownav.parameter_files import Number, ParameterModel, load, shipped
@@ -36,7 +36,7 @@ class FlightSection(ParameterModel):
     duration_s: Number = Field(50.0, ge=0.1, le=3600.0)
     start: Literal["ground", "hover"]
     takeoff_at_s: Number = Field(0.0, ge=0.0, le=3600.0)
-    may_land_after_s: Number | None = Field(None, ge=0.0, le=3600.0)
+    may_land_after_s: Number | None = Field(None, ge=0.0, le=3600.0, validate_default=True)
     path: tuple[Knot, ...] = Field(min_length=2)
 
     @field_validator("path")
@@ -45,6 +45,21 @@ class FlightSection(ParameterModel):
         if any(later.t_s <= earlier.t_s for earlier, later in pairwise(path)):
             raise ValueError("the knots' t_s must increase")
         return path
+
+    @field_validator("path")
+    @classmethod
+    def _starts_above_the_ground(cls, path: tuple[Knot, ...], info: ValidationInfo) -> tuple[Knot, ...]:
+        if info.data.get("start") == "hover" and path[0].height_m < 0.0:
+            raise ValueError("a hover starts at a height_m of 0 or more")
+        return path
+
+    @field_validator("may_land_after_s")
+    @classmethod
+    def _lands_after_takeoff(cls, value: float | None, info: ValidationInfo) -> float | None:
+        takeoff = info.data.get("takeoff_at_s", 0.0)
+        if value is not None and info.data.get("start") == "ground" and value <= takeoff:
+            raise ValueError(f"more than takeoff_at_s = {takeoff:g} is needed, or it never takes off")
+        return value
 
 
 class PadSection(ParameterModel):
@@ -78,8 +93,9 @@ class Scenario(ParameterModel):
     """A scenario file."""
 
     schema_version: Literal[1]
-    name: str
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
     description: str = ""
+    paper_table: Literal[5, 6] | None = None  # the published table that the flight's errors are set beside
     truth: Literal["nonlinear", "linear"] = "nonlinear"
     flight: FlightSection
     pad: PadSection = PadSection()
@@ -101,4 +117,15 @@ def load_scenario(name: str) -> Scenario:
     path = Path(name)
     if not path.suffix and not path.exists():
         raise InputError(f"{name}: no such scenario; shipped: {', '.join(SHIPPED)}, or give a TOML file")
-    return load(path, Scenario)
+    scenario = load(path, Scenario)
+    return scenario.model_copy(
+        update={
+            "vehicle": scenario.vehicle.model_copy(update={"file": _beside(path, scenario.vehicle.file)}),
+            "flow_sensor": _beside(path, scenario.flow_sensor),
+        }
+    )
+
+
+def _beside(scenario: Path, file: str | None) -> str | None:
+    """A file that a scenario names is looked for beside the scenario."""
+    return None if file is None else str(scenario.parent / file)

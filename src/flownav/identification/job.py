@@ -1,0 +1,76 @@
+"""The job: logs in, findings out; rig logs together, or one flight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from flownav.errors import InputError
+from flownav.identification.descent import Structure
+from flownav.identification.findings import Findings
+from flownav.identification.flight_identification import identify_flight
+from flownav.identification.orders import CANDIDATES
+from flownav.identification.rig_identification import identify_rig
+from flownav.identification.rig_log import assign_heights, is_rig, read_runs
+
+
+def identify(
+    logs: Sequence[Path],
+    structures: Sequence[Structure] = CANDIDATES,
+    heights_m: Sequence[float] = (),
+    reference: str = "auto",
+) -> Findings:
+    """Findings of rig logs (all together, by height) or of one flight folder.
+
+    structures: models to choose from. InputError, one line, where a log is missing, mixed or cannot serve.
+    """
+    if not logs:
+        raise InputError("no log given; identify takes rig folders, rig CSV files or one flight folder")
+    for path in logs:
+        if not path.exists():
+            raise InputError(f"{path}: no such file or folder; identify takes rig logs and flight folders")
+    flights = [path for path in logs if path.is_dir() and (path / "attitude.csv").exists()]
+    if flights and len(logs) > 1:
+        raise InputError(f"{flights[0]}: a flight is identified alone; give rig logs together, flights one by one")
+    if flights:
+        if heights_m:
+            raise InputError("--heights: a flight's heights come from its range readings; leave the option out")
+        return identify_flight(flights[0], structures, reference)
+    for path in logs:
+        if not is_rig(path):
+            raise InputError(
+                f"{path}: neither a rig log (rig.csv, run-001/rig.csv, a CSV file) nor a flight folder (attitude.csv)"
+            )
+    runs = [
+        run
+        for path, height_m in zip(logs, assign_heights(logs, heights_m), strict=True)
+        for run in read_runs(path, height_m, reference)
+    ]
+    return identify_rig(runs, structures)
+
+
+def parse_heights(text: str | None) -> list[float]:
+    """Metres of `--heights 0.6,0.8`. InputError where one is no number."""
+    try:
+        return [float(part) for part in text.split(",")] if text else []
+    except ValueError:
+        raise InputError(f"--heights {text}: numbers in metres, parted by commas, are needed") from None
+
+
+def name_of(logs: Sequence[Path]) -> str:
+    """A name for what comes of the logs: the first one's."""
+    first = logs[0].resolve()
+    return first.stem if first.is_file() else first.name
+
+
+def finite(value: Any) -> Any:
+    """The same with None for what is not a number: JSON has no NaN."""
+    if isinstance(value, dict):
+        return {key: finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,37 @@
+"""Figures 17 to 31: the report's own panels of the median take-off and landing, under the paper's numbers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from flownav.paper.flights import Flights
+from flownav.report import figures_filter, figures_states
+from flownav.report.figures_states import View
+from flownav.report.panels import Panel
+from flownav.report.series import moments
+
+ZOOM_S = (10.0, 20.0)
+# of each table: figures of position, velocity, velocity zoomed, position error, velocity error
+FIGURES = {5: ("17", "18", "19 to 21", "26", "27"), 6: ("22", "22, its velocity", "23 to 25", "29", "30")}
+
+
+def panels(flights: Flights) -> list[Panel]:
+    """Everything the paper draws of a flight."""
+    record, name = flights.record, flights.scenario
+    what = {"takeoff": "take-off"}.get(name, name)
+    position, velocity, zoomed, position_error, velocity_error = FIGURES[flights.table]
+    found = [
+        figures_states.position(record, View(f"{name}-position", f"Figure {position}: position, {what}")),
+        figures_states.velocity(record, View(f"{name}-velocity", f"Figure {velocity}: velocity, {what}")),
+        figures_states.velocity(record, View(f"{name}-zoom", f"Figures {zoomed}: velocity from 10 to 20 s", ZOOM_S)),
+        replace(figures_states.position_error(record), key=f"{name}-position-error", title=f"Figure {position_error}: position error, {what}"),
+        replace(figures_states.velocity_error(record), key=f"{name}-velocity-error", title=f"Figure {velocity_error}: velocity error, {what}"),
+    ]  # fmt: skip
+    lift_off = next((moment for moment in moments(record) if moment.name == "lift-off"), None)
+    if flights.table == 5 and lift_off is not None:
+        transient = figures_states.lift_off_transient(record, lift_off)
+        found.append(replace(transient, key="figure-28", title="Figure 28: thrust and vertical velocity at lift-off"))
+    if flights.table == 6:
+        radius = figures_filter.radius_of_uncertainty(record)
+        found.append(replace(radius, key="figure-31", title="Figure 31: reduction of the radius of uncertainty"))
+    return found

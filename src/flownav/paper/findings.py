@@ -1,0 +1,198 @@
+"""What the reproduction says of the paper's claims, each sentence and verdict computed from the numbers.
+
+A claim is borne out, not borne out, or open. The first ones decide the command's exit status (`verdict`).
+"""
+
+from __future__ import annotations
+
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from flownav.paper import published
+from flownav.paper.flights import Flights
+from flownav.paper.laboratory import Laboratory, delay_s
+from flownav.paper.published import HEIGHTS_M, RELATION_FITS, ErrorRow
+from flownav.report.panels import listed
+
+FIT_TOLERANCE = 6.0
+LARGEST_TOLERANCE = 0.20
+SAME_FIT = 0.5  # points of fit that do not tell two orders apart
+SAME_SPREAD = 1.5  # factor between standard deviations that count as alike
+
+Verdict = Literal["agrees", "differs"]
+
+
+class Finding(NamedTuple):
+    """A claim of the paper, what came out here, and whether the two agree. decides: counts for the exit status."""
+
+    topic: str
+    paper: str
+    here: str
+    agrees: bool
+    decides: bool = False
+
+    def as_json(self) -> dict[str, object]:
+        """As the command prints it."""
+        return {"topic": self.topic, "paper": self.paper, "here": self.here, "agrees": self.agrees}
+
+
+def of_laboratory(laboratory: Laboratory) -> list[Finding]:
+    """About Table 1."""
+    return [
+        *_fits(laboratory),
+        _law(laboratory),
+        *_gain_and_delay(laboratory),
+        _dynamics(laboratory),
+        *_orders(laboratory),
+    ]
+
+
+def _fits(laboratory: Laboratory) -> list[Finding]:
+    found = []
+    for height_m, target in RELATION_FITS.items():
+        ours, (low, high) = laboratory.mean_fit(height_m), laboratory.spread(height_m)
+        words = f"{ours:.1f} % ({low:.1f} to {high:.1f} over seven runs), {ours - target:+.1f} points"
+        near = abs(ours - target) <= FIT_TOLERANCE
+        found.append(Finding(f"Fit at {height_m:g} m", f"{target:.0f} %", words, near, decides=True))
+    rows = published.table_1()
+    means = [float(np.mean([m.fit_percent for m in rows if m.height_m == height])) for height in HEIGHTS_M]
+    ours = [laboratory.mean_fit(height) for height in HEIGHTS_M]
+    falls = bool((np.diff(ours) < 0.0).all())
+    return [
+        *found,
+        Finding(
+            "Fit falls with height", f"mean of seven: {_series(means)} %", f"mean of seven: {_series(ours)} %", falls
+        ),
+    ]
+
+
+def _law(laboratory: Laboratory) -> Finding:
+    off = {height: laboratory.mean_fit(height) - published.accuracy_law(height) for height in HEIGHTS_M}
+    worst = max(off, key=lambda height: abs(off[height]))
+    words = f"within {abs(off[worst]):.1f} points of it; farthest at {worst:g} m ({off[worst]:+.1f})"
+    return Finding("Accuracy rule", "fit = 90 % √(0.6/h)", words, abs(off[worst]) <= FIT_TOLERANCE)
+
+
+def _gain_and_delay(laboratory: Laboratory) -> list[Finding]:
+    found = []
+    for what, unit, digits, scale, of_model, of_run in (
+        ("Gain a/c", "", 2, 1.0, lambda m: m.gain, lambda r: r.fits[2].point.gain),
+        ("Delay b/c", " ms", 0, 1e3, lambda m: m.delay_s, delay_s),
+    ):
+        outside, theirs, ours = [], [], []
+        for height in HEIGHTS_M:
+            printed = [scale * of_model(m) for m in published.table_1() if m.height_m == height]
+            here = float(np.median([scale * of_run(run) for run in laboratory.at(height)]))
+            theirs.append(f"{min(printed):.{digits}f} to {max(printed):.{digits}f}")
+            ours.append(f"{here:.{digits}f}")
+            if not min(printed) <= here <= max(printed):
+                outside.append(f"{height:g} m")
+        words = f"{', '.join(ours)}{unit}: " + (
+            f"outside the paper's range at {listed(outside)}" if outside else "inside the paper's range at every height"
+        )
+        found.append(Finding(f"{what} by height", f"{', '.join(theirs)}{unit}", words, not outside))
+    return found
+
+
+def _dynamics(laboratory: Laboratory) -> Finding:
+    rows = published.table_1()
+    rates = [m.natural_frequency_rad_s for m in rows]
+    ours = [run.dynamics.natural_frequency_rad_s for run in laboratory.runs]
+    whole = sum(run.excitation.complete for run in laboratory.runs)
+    bound = sum(0.985 <= m.damping_ratio <= 1.005 for m in rows)
+    return Finding(
+        "A second-order dynamics is identified",
+        f"natural frequencies of {min(rates):.0f} to {max(rates):.0f} rad/s; {bound} of {len(rows)} dampings at 0.99 to 1.00",
+        f"{min(ours):.0f} to {max(ours):.0f} rad/s from one and the same sensor: in {whole} of {len(laboratory.runs)} runs does a "
+        "swing show all three parameters; it shows gain and delay",
+        whole > len(laboratory.runs) // 2,
+    )
+
+
+def _orders(laboratory: Laboratory) -> list[Finding]:
+    found = []
+    for kind in ("swing", "chirp"):
+        tests = [test for test in laboratory.orders if test.kind == kind]
+        if not tests:
+            continue
+        means = {order: float(np.mean([test.fits[order] for test in tests])) for order in tests[0].fits}
+        rivals = {order: fit for order, fit in means.items() if order != 2}
+        as_good = [order for order, fit in rivals.items() if fit > means[2] - SAME_FIT]
+        better = [order for order in as_good if rivals[order] > means[2] + SAME_FIT]
+        words = ", ".join(f"{_order_name(order)} {fit:.1f} %" for order, fit in means.items())
+        if better:
+            words += f". Better than second order: {listed(_order_name(order) for order in better)}"
+        elif as_good:
+            words += f". As good as second order: {listed(_order_name(order) for order in as_good)}"
+        claim = "first, third and higher order models \u201cwere not as fit as the second order models\u201d"
+        found.append(Finding(f"Order of the model ({kind})", claim, words, not any(order > 0 for order in as_good)))
+    return found
+
+
+def _order_name(order: int) -> str:
+    return "gain and delay" if order == 0 else f"order {order}"
+
+
+def of_table_2(ours: list[ErrorRow]) -> list[Finding]:
+    """Validation errors by height."""
+    return _errors("Validation error (Table 2)", published.table_2(), ours)
+
+
+def of_table_3(ours: list[ErrorRow]) -> list[Finding]:
+    """The selected model's errors by height, and whether one model covers all heights."""
+    largest = max(ours, key=lambda row: row.std_error)
+    smallest = min(ours, key=lambda row: row.std_error)
+    printed = published.table_3()
+    ratio = printed[-1].std_error / printed[0].std_error
+    words = f"{smallest.std_error:.3f} m/s at {smallest.height_m:g} m, {largest.std_error:.3f} m/s at {largest.height_m:g} m: {largest.std_error / smallest.std_error:.1f} times as much"
+    return [
+        *_errors("Selected model (Table 3)", printed, ours),
+        Finding("One model serves every height", f"\u201csmall SD errors at various heights\u201d, yet {ratio:.0f} times as large at 1.5 m as at 0.6 m", words, largest.std_error < SAME_SPREAD * smallest.std_error),
+    ]  # fmt: skip
+
+
+def _errors(topic: str, printed: list[ErrorRow], ours: list[ErrorRow]) -> list[Finding]:
+    found = []
+    for height_m in HEIGHTS_M:
+        theirs, here = ([row.std_error for row in table if row.height_m == height_m] for table in (printed, ours))
+        a, b = float(np.median(theirs)), float(np.median(here))
+        alike = max(a, b) <= SAME_SPREAD * min(a, b)
+        found.append(
+            Finding(f"{topic}, {height_m:g} m", f"{a:.3f} m/s", f"{b:.3f} m/s, {b / a:.2f} times the paper's", alike)
+        )
+    return found
+
+
+def of_flights(flights: Flights) -> list[Finding]:
+    """Largest error, the states' spreads, and the receiver of Table 4."""
+    printed, ours = flights.published["max_position_error_m"], flights.scores["max_position_error_m"]
+    title, name = flights.published["title"], {"takeoff": "take-off"}.get(flights.scenario, flights.scenario)
+    near = abs(ours["median"] / printed - 1.0) <= LARGEST_TOLERANCE
+    words = f"{_spread(ours)} m; the paper's flight at percentile {flights.percentile['max_position_error_m']:.0f}"
+    honest = flights.honest["max_position_error_m"]
+    outside = [state for state, entry in flights.percentile["states"].items() if not 5.0 <= entry["std_error"] <= 95.0]
+    spreads = f"{len(outside)} of 6 outside our 5 to 95 %" + (f": {listed(outside)}" if outside else "")
+    return [
+        Finding(f"Largest position error, {name}", f"{printed:.4f} m", words, near, decides=True),
+        Finding(f"Errors by state, {name}", f"{title}, standard deviations", spreads, not outside),
+        Finding(
+            f"Largest position error with the GPS of Table 4 (2 m CEP), {name}",
+            f"{published.LARGEST_CLAIM_M:g} m",
+            f"{_spread(honest)} m",
+            abs(honest["median"] / printed - 1.0) <= LARGEST_TOLERANCE,
+        ),
+    ]
+
+
+def _spread(entry: dict[str, float]) -> str:
+    return f"{entry['median']:.3f} ({entry['p05']:.3f} to {entry['p95']:.3f})"
+
+
+def _series(values: list[float]) -> str:
+    return ", ".join(f"{value:.1f}" for value in values)
+
+
+def broken(findings: list[Finding]) -> list[Finding]:
+    """Those that decide and do not agree."""
+    return [finding for finding in findings if finding.decides and not finding.agrees]

@@ -1,0 +1,100 @@
+"""Section V of the paper: many take-offs and landings, scored as Tables 5 and 6 are, and one of each to draw."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from flownav.campaign.local import fly_many, median_flight, score_history
+from flownav.measurement import Array
+from flownav.parameter_files import check
+from flownav.record import Record
+from flownav.scoring.errors import STATES, scores_of_flight, scores_of_flights
+from flownav.scoring.paper_tables import percentile_of_paper, published
+from flownav.simulation.assemble import Setup, assemble
+from flownav.simulation.engine import fly_blocks
+from flownav.simulation.flight_record import record_of
+from flownav.simulation.scenario import Scenario, load_scenario
+
+SCENARIOS = {5: "takeoff", 6: "landing"}
+HONEST_GPS = "midg"
+
+
+@dataclass(frozen=True)
+class Flights:
+    """Flights of one scenario beside its table. honest: the scores with a receiver of 2 m CEP."""
+
+    table: int
+    scenario: str
+    flights: int
+    published: dict[str, Any]
+    scores: dict[str, Any]
+    percentile: dict[str, Any]
+    honest: dict[str, Any]
+    record: Record
+
+    def as_json(self) -> dict[str, Any]:
+        """The table's rows: published and reproduced, each state, and where the paper lies among our flights."""
+        states = {
+            state: {
+                f"{statistic}_{source}": table[state][statistic]
+                for statistic in ("mean_error", "std_error")
+                for source, table in (("published", self.published["states"]), ("reproduced", self.scores["states"]),
+                                      ("percentile", self.percentile["states"]))
+            }
+            | {"max_error_reproduced": self.scores["states"][state]["max_error"]}
+            for state in STATES
+        }  # fmt: skip
+        return {
+            "flights": self.flights,
+            "states": states,
+            "max_position_error_published_m": self.published["max_position_error_m"],
+            "max_position_error_reproduced_m": self.scores["max_position_error_m"],
+            "max_position_error_percentile": self.percentile["max_position_error_m"],
+            "max_position_error_with_2_m_cep_m": self.honest["max_position_error_m"],
+            "touchdown_reproduced": self.scores["touchdown"],
+            "touchdown_with_2_m_cep": self.honest["touchdown"],
+        }
+
+
+def fly_table(
+    table: int, seed: int, flights: int, on_progress: Callable[[int], object] = lambda flown: None
+) -> Flights:
+    """Table 5 or 6: `flights` flights with the paper's GPS noise, as many with 2 m CEP, and the median one recorded."""
+    name = SCENARIOS[table]
+    scenario = load_scenario(name)
+    setup = assemble(scenario)
+    rows = _flown(setup.flight, seed, flights, on_progress)
+    honest = assemble(_with_gps(scenario, HONEST_GPS))
+    record = _recorded(setup, seed, median_flight(rows), table)
+    printed = published(table)
+    assert printed is not None
+    return Flights(
+        table,
+        name,
+        flights,
+        printed,
+        scores_of_flights(rows),
+        percentile_of_paper(rows, printed),
+        scores_of_flights(_flown(honest.flight, seed, flights, on_progress)),
+        record,
+    )
+
+
+def _flown(flight: Any, seed: int, flights: int, on_progress: Callable[[int], object]) -> Array:
+    return fly_many(flight, seed, flights, on_progress=lambda flown: (on_progress(flown), None)[1])
+
+
+def _recorded(setup: Setup, seed: int, index: int, table: int) -> Record:
+    """One flight as a scored Record, by the kernel that flew them all: that of a single flight compiles for 10 s."""
+    _, history = next(fly_blocks(setup.flight, seed, index, 1, lambda block: block[:, :, :1].copy(), threads=1))
+    record = record_of(setup, history, seed, index)
+    record.manifest["scores"] = scores_of_flight(score_history(setup.flight, history)[0])
+    record.manifest["paper"] = published(table)
+    return record
+
+
+def _with_gps(scenario: Scenario, model: str) -> Scenario:
+    entries = scenario.model_dump(exclude_unset=True) | {"gps": {"model": model}}
+    return check(entries, Scenario, f"{scenario.name} with {model} GPS")

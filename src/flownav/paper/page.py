@@ -1,0 +1,91 @@
+"""The reproduction as one self-contained HTML page, in the report's looks."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+from flownav.paper import figures_flight, figures_rig, figures_tables, published, words
+from flownav.paper.reproduction import Reproduction
+from flownav.provenance import command_line, provenance
+from flownav.report import content
+from flownav.report import html as report
+from flownav.report.panels import Panel, Section
+from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
+
+HERE = Path(__file__).parent
+
+
+def write_page(reproduction: Reproduction, path: Path) -> None:
+    """Write the page, whole or not at all. OSError where it cannot be written."""
+    text = render(reproduction)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def figures(of: Reproduction) -> dict[str, Section]:
+    """The page's figures, section by section."""
+    found: dict[str, list[Panel]] = {}
+    laboratory = of.laboratory
+    if laboratory is not None and 1 in of.tables:
+        found["models"] = [figures_tables.fit_by_height(laboratory), figures_tables.gain_and_delay(laboratory)]
+        found["orders"] = figures_tables.orders(laboratory)
+        found["sensor"] = [
+            *figures_rig.depth(),
+            *figures_rig.rotation(),
+            figures_rig.light(laboratory.lights),
+            *figures_rig.heights(laboratory),
+        ]
+    if laboratory is not None and 2 in of.tables:
+        found["validation"] = [figures_tables.error_by_height(of.table_2), figures_rig.validation(laboratory)]
+    for flown in of.flights:
+        found[flown.scenario] = figures_flight.panels(flown)
+    return {key: Section(key, "", tuple(report._widened(panels))) for key, panels in found.items()}
+
+
+def render(of: Reproduction) -> str:
+    """The page as text."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
+
+    drawn = figures(of)
+    scripts = [get_plotlyjs().replace("\r", ""), (report.HERE / "page.js").read_text(encoding="utf-8")]
+    environment = Environment(
+        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    panels = [panel for section in drawn.values() for panel in section.panels if panel.figure]
+    return environment.get_template("page.html.j2").render(
+        facts=words.facts(of),
+        summary=words.summary(of),
+        tiles=words.tiles(of),
+        findings=of.findings,
+        model_groups=words.model_groups(of),
+        identifiable=words.identifiable(of.laboratory) if of.laboratory else "",
+        configurations=words.configurations(of),
+        set_up=words.set_up(of),
+        order_rows=words.order_rows(of),
+        error_groups=words.error_groups(of),
+        selected_rows=words.selected_rows(of),
+        flight_tables=words.flight_tables(of),
+        systems=published.landing_systems() if of.flights else [],
+        own_systems=words.own_systems(of),
+        inconsistencies=published.inconsistencies() if len(of.tables) > 1 else [],
+        figures=drawn,
+        provenance=content.groups(provenance()),
+        command=command_line(),
+        palette=PALETTE,
+        font=Markup(FONT),
+        data={panel.key: Markup(report._figure_json(panel)) for panel in panels},
+        dark=Markup(report._inside_script(json.dumps(LIGHT_TO_DARK))),
+        style=Markup(
+            (report.HERE / "page.css").read_text(encoding="utf-8") + (HERE / "page.css").read_text(encoding="utf-8")
+        ),
+        scripts=[Markup(script) for script in scripts],
+        policy=report._policy(scripts),
+    )

@@ -1,0 +1,139 @@
+"""The whole reproduction, or one table of it: what is computed, as JSON, and what it says of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from flownav.paper import findings, laboratory, published
+from flownav.paper.findings import Finding
+from flownav.paper.flights import Flights, fly_table
+from flownav.paper.laboratory import Laboratory
+from flownav.paper.published import ErrorRow
+
+TABLES = (1, 2, 3, 5, 6)
+RIG_TABLES = (1, 2, 3)
+FLIGHT_TABLES = (5, 6)
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """What was reproduced; what was not asked for is None or empty."""
+
+    tables: tuple[int, ...]
+    seed: int
+    laboratory: Laboratory | None = None
+    table_2: list[ErrorRow] = field(default_factory=list)
+    table_2_published_models: list[ErrorRow] = field(default_factory=list)
+    table_3: list[ErrorRow] = field(default_factory=list)
+    table_3_published_model: list[ErrorRow] = field(default_factory=list)
+    flights: tuple[Flights, ...] = ()
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def broken(self) -> list[Finding]:
+        """The findings for which the command exits with status 1."""
+        return findings.broken(list(self.findings))
+
+    def with_flights(self, other: Reproduction) -> Reproduction:
+        """This one with the flights of another."""
+        tables, said = (*self.tables, *other.tables), (*self.findings, *other.findings)
+        return replace(self, tables=tables, flights=other.flights, findings=said)
+
+    def as_json(self) -> dict[str, Any]:
+        """The command's JSON: table1 to table6 as far as asked for, and more beside them."""
+        facts: dict[str, Any] = {}
+        if self.laboratory is not None and 1 in self.tables:
+            facts["table1"] = _table_1_rows(self.laboratory)
+        if 2 in self.tables:
+            facts["table2"] = [
+                _error_row(*rows) | {"model": rows[0].model, "mean_error_of_published_model": rows[2].mean_error,
+                                     "std_error_of_published_model": rows[2].std_error}
+                for rows in zip(published.table_2(), self.table_2, self.table_2_published_models, strict=True)
+            ]  # fmt: skip
+        if 3 in self.tables:
+            facts["table3"] = [
+                _error_row(*rows) | {"mean_error_of_published_model": rows[2].mean_error,
+                                     "std_error_of_published_model": rows[2].std_error}
+                for rows in zip(published.table_3(), self.table_3, self.table_3_published_model, strict=True)
+            ]  # fmt: skip
+        facts |= {f"table{flown.table}": flown.as_json() for flown in self.flights}
+        if self.laboratory is not None and self.laboratory.orders:
+            facts["orders"] = [
+                {"excitation": test.kind, "height_m": test.height_m, "fit_by_order": {str(n): fit for n, fit in test.fits.items()}}
+                for test in self.laboratory.orders
+            ]  # fmt: skip
+            facts["configurations"] = [
+                {"name": other.name, "description": other.words, "fit_by_height": {f"{h:g}": fit for h, fit in fits.items()}}
+                for other, fits in [(self.laboratory.fixed, _fixed_fits(self.laboratory)), *self.laboratory.others]
+            ]  # fmt: skip
+        facts["findings"] = [finding.as_json() for finding in self.findings]
+        facts["seed"] = self.seed
+        return facts
+
+
+def _fixed_fits(of: Laboratory) -> dict[float, float]:
+    return {height: of.mean_fit(height) for height in published.HEIGHTS_M}
+
+
+def _table_1_rows(of: Laboratory) -> list[dict[str, Any]]:
+    rows = []
+    for model in published.table_1():
+        run = of.at(model.height_m)[model.model - 1]
+        shown = run.excitation
+        rows.append(
+            {
+                "height_m": model.height_m,
+                "model": model.model,
+                "fit_published": model.fit_percent,
+                "fit_reproduced": run.fits[2].fit_percent,
+                "gain": model.gain,
+                "delay_s": model.delay_s,
+                "gain_reproduced": run.fits[2].point.gain,
+                "delay_reproduced_s": laboratory.delay_s(run),
+                "identifiable_reproduced": shown.identifiable,
+                "excitation_reproduced": shown.verdict,
+            }
+            | {f"{name}_published": float(getattr(model, name)) for name in ("a_1_s2", "b_1_s", "c_1_s2")}
+            | {f"{name}_reproduced": float(getattr(run.dynamics, name)) for name in ("a_1_s2", "b_1_s", "c_1_s2")}
+        )
+    return rows
+
+
+def _error_row(printed: ErrorRow, ours: ErrorRow, _: ErrorRow) -> dict[str, Any]:
+    return {
+        "height_m": printed.height_m,
+        "mean_error_published": printed.mean_error,
+        "mean_error_reproduced": ours.mean_error,
+        "std_error_published": printed.std_error,
+        "std_error_reproduced": ours.std_error,
+    }
+
+
+def reproduce(
+    tables: tuple[int, ...],
+    seed: int,
+    flights: int,
+    on_run: Callable[[int], object] = lambda done: None,
+    on_flight: Callable[[int], object] = lambda flown: None,
+) -> Reproduction:
+    """Run the rig, identify, fly and judge, as far as these tables need it."""
+    of, said = None, []
+    more: dict[str, list[ErrorRow]] = {}
+    if set(tables) & set(RIG_TABLES):
+        of = laboratory.swing(seed, 1 in tables, on_run)
+        said += findings.of_laboratory(of) if 1 in tables else []
+        if 2 in tables:
+            printed = {(row.height_m, row.model): row for row in published.table_1()}
+            more["table_2"] = laboratory.table_2(of, lambda run, _: run.dynamics)
+            more["table_2_published_models"] = laboratory.table_2(of, lambda run, model: printed[run.height_m, model])
+            said += findings.of_table_2(more["table_2"])
+        if 3 in tables:
+            more["table_3"] = laboratory.table_3(of)
+            more["table_3_published_model"] = laboratory.table_3(of, published.selected_model())
+            said += findings.of_table_3(more["table_3"])
+    flown = tuple(fly_table(table, seed, flights, on_flight) for table in FLIGHT_TABLES if table in tables)
+    for of_table in flown:
+        said += findings.of_flights(of_table)
+    return Reproduction(tables, seed, of, flights=flown, findings=tuple(said), **more)

@@ -213,6 +213,24 @@ def test_a_unit_that_cannot_be_is_refused(folder, name, columns, factor, said):
     assert said in complaint(folder)
 
 
+@pytest.mark.parametrize("duration_s", [30.0, 60.0, 90.0, 120.0])
+def test_smooth_flight_whose_flow_runs_in_step_with_its_rotation_is_read(tmp_path, duration_s):
+    assert read_csv_folder(log_of_flight(duration_s).write(tmp_path / "log")).streams
+
+
+def test_flow_in_degrees_is_found(data_folder, tmp_path):
+    for name in ("attitude", "range", "gps"):
+        lines = (data_folder / "quad-px4flow-outdoor" / f"{name}.csv").read_text().splitlines()
+        (tmp_path / f"{name}.csv").write_text("\n".join(lines[:3000]))
+    lines = (data_folder / "quad-px4flow-outdoor" / "flow.csv").read_text().splitlines()[:1001]
+    rows = np.array([[float(cell) for cell in line.split(",")] for line in lines[1:]])
+    rows[:, 1:3] = np.clip(rows[:, 1:3] * 180.0 / np.pi, -69.0, 69.0)  # past the limits on single values
+    text = [lines[0], *(",".join(f"{cell:.9g}" for cell in row) for row in rows)]
+    (tmp_path / "flow.csv").write_text("\n".join(text))
+    with pytest.raises(InputError, match=r"flow_. is \d+ times as fast"):
+        read_csv_folder(tmp_path)
+
+
 def test_degrees_in_a_calm_hover_are_found_by_the_accelerometer(tmp_path):
     log = log_of_flight(4.0)  # on the ground and level
     for name in ("roll_rad", "pitch_rad"):

@@ -288,6 +288,7 @@ def test_a_biased_flow_gyro_is_followed(log, flight):
     ({"gps_delay_s": 50.0}, "--gps-delay 50"),
     ({"flow_scale": (0.0, 1.0)}, "--flow-scale 0,1"),
     ({"flow_scale": (float("nan"), 1.0)}, "--flow-scale nan,1"),
+    ({"flow_scale": (-1.0, 1.0)}, "--flow-scale -1,1"),
 ])  # fmt: skip
 def test_options_that_cannot_be(log, options, said):
     with pytest.raises(InputError, match="--"):
@@ -312,6 +313,12 @@ def test_a_cut_withholds_position_and_velocity_and_nothing_else(log):
     withheld = run.innovation[run.innovation[:, 8] == Reason.OUTAGE]
     assert withheld[:, 0].min() == pytest.approx(20.0 - 0.22)
     assert withheld[:, 0].max() < 30.0 - 0.22
+
+
+def test_the_tables_last_window_is_shorter_where_the_length_does_not_fit():
+    assert table_windows(60.0, 780.0, 50.0)[-2:] == [(710.0, 760.0), (760.0, 780.0)]
+    assert table_windows(0.0, 0.3, 0.1)[-1][1] == pytest.approx(0.3)
+    assert len(table_windows(0.0, 0.3, 0.1)) == 3
 
 
 def test_the_table_is_each_window_alone(log):

@@ -49,7 +49,8 @@ def complaint(*arguments) -> str:
 
 def test_json_holds_the_promised_keys_and_nothing_else_is_printed(folder):
     facts = answer(folder, "--gps-outage", "15:25", "--gps-outage", "30:38")
-    assert set(facts) == {"duration_s", "outages", "velocity_rms_m_s", "rejected", "record"}
+    assert set(facts) == {"duration_s", "outages", "velocity_rms_m_s", "rejected", "warnings", "record"}
+    assert facts["warnings"] == []
     assert facts["duration_s"] == pytest.approx(39.98)
     assert [(o["t0"], o["t1"]) for o in facts["outages"]] == [(15.0, 25.0), (30.0, 38.0)]
     assert all(0 <= o["horizontal_rms_m"] <= o["horizontal_max_m"] < 0.02 for o in facts["outages"])
@@ -98,6 +99,8 @@ def test_people_get_tables_and_files(folder):
     (("--gps-outage", "500:600"), "outside the log"),
     (("--flow-scale", "1"), "--flow-scale 1: X,Y is needed"),
     (("--flow-scale", "0,1"), "--flow-scale 0,1"),
+    (("--flow-scale", "-1,1"), "--flow-scale -1,1: factors from 0.1 to 10"),
+    (("--flow-scale", "1,100"), "--flow-scale 1,100"),
     (("--gps-delay", "-3"), "--gps-delay -3"),
     (("--gps-delay", "inf"), "--gps-delay inf"),
     (("--outage-table", "0:10"), "T0:T1:LENGTH"),

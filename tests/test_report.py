@@ -82,10 +82,17 @@ def outdoor() -> Page:
 def test_the_headline_says_what_flew_and_how_well(landing: Page) -> None:
     for words in ("Landing", "Filter paper", "GPS model white", "Seed 1", "Length 50.0 s"):
         assert words in landing.text
-    assert "Largest position error" in landing.text
+    assert "Largest error of one axis" in landing.text
     assert "paper 0.272 m" in landing.text
+    assert re.search(r"No axis of the estimated position was ever off by more than 0\.\d+\sm", landing.text)
+    assert "never further" not in landing.text
     assert "0.083 m from the pad's centre, sinking at 0.29 m/s" in landing.text
     assert re.search(r"Flow sensor engaged 1\d %", landing.text)  # from 2.2 m down to 0.02 m at 0.3 m/s, of 50 s
+
+
+def test_a_replays_flow_is_valid_readings_not_an_engaged_sensor(outdoor: Page) -> None:
+    assert re.search(r"Valid flow readings \d+ %", outdoor.text)
+    assert "engaged" not in outdoor.text
 
 
 def test_scores_are_shown_as_the_record_carries_them_beside_the_papers() -> None:

@@ -9,6 +9,8 @@ import typer
 from flownav.cli import bench as bench
 from flownav.cli import flow as flow
 from flownav.cli import fly as fly
+from flownav.cli import identify as identify
+from flownav.cli import paper as paper
 from flownav.cli import replay as replay
 from flownav.cli import report as report
 from flownav.cli import rig as rig
@@ -26,8 +28,10 @@ app = typer.Typer(
 for name, command, what in (
     ("fly", fly.command, "Fly a take-off or landing in closed loop, scored beside the paper."),
     ("replay", replay.command, "Fuse a recorded flight; measure the drift without GPS."),
+    ("identify", identify.command, "Identify a flow sensor from rig or flight logs; write its file."),
     ("rig", rig.command, "Swing a flow sensor over a pad beside an encoder, from pixels."),
     ("flow", flow.command, "Optical flow of your own frames, as the PX4FLOW computes it."),
+    ("paper", paper.command, "Every table of the paper, published and reproduced side by side."),
     ("vehicle", vehicle.command, "Trim, power, linear models and ground effect of a helicopter."),
     ("report", report.command, "Write a record's report as one HTML page."),
     ("bench", bench.command, "Measure how fast all of this is on your machine."),

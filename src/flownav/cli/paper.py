@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,7 +20,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Reproduce the paper: Tables 1 to 3 from the synthetic rig, 5 and 6 from flights, on one HTML page."""
-    from flownav.cli.output import require_between
+    from flownav.cli.output import require_between, require_writable
     from flownav.errors import InputError, VerdictError
     from flownav.paper.reproduction import TABLES
 
@@ -31,7 +30,8 @@ def command(
         raise InputError(
             f"--table {table}: Tables 1, 2, 3, 5 and 6 hold results (4 is the receiver's data sheet); give one of them"
         )
-    page = _writable(out or Path("out") / ("paper.html" if table is None else f"paper-table{table}.html"))
+    page = out or Path("out") / ("paper.html" if table is None else f"paper-table{table}.html")
+    require_writable(page)
     made = _reproduced((table,) if table else TABLES, seed, flights)
     from flownav.paper.page import write_page
 
@@ -47,21 +47,6 @@ def command(
         show(made, str(page))
     if made.broken:
         raise VerdictError("; ".join(f"{f.topic}: {f.here}, the paper has {f.paper}" for f in made.broken))
-
-
-def _writable(page: Path) -> Path:
-    """The page's path, its folder made. InputError, before the work begins, where it cannot be written."""
-    from flownav.errors import InputError
-
-    if page.is_dir():
-        raise InputError(f"--out {page}: is a folder; give the page's file name")
-    try:
-        page.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{page}: cannot be written ({error.strerror}); give another --out") from error
-    if not os.access(page.parent, os.W_OK):
-        raise InputError(f"{page}: cannot be written (its folder is read-only); give another --out")
-    return page
 
 
 def _reproduced(tables: tuple[int, ...], seed: int, flights: int) -> Reproduction:

@@ -41,6 +41,7 @@ def command(
 ) -> None:
     """Fuse a recorded flight: its trajectory, its errors against its own GPS, and the drift through GPS outages."""
     from flownav.cli.output import save
+    from flownav.errors import VerdictError
     from flownav.replay.bundle import to_record
     from flownav.replay.prepare import ReplayOptions
     from flownav.replay.session import replay, table_windows
@@ -60,6 +61,9 @@ def command(
         typer.echo(json.dumps(scores))
     else:
         _print(flown, scores)
+    wrong = [finding.text for finding in flown.findings if finding.flow_is_wrong]
+    if wrong:
+        raise VerdictError(f"{folder}: {wrong[0]}")
 
 
 def _numbers(option: str, text: str, separator: str, count: int, form: str) -> tuple[float, ...]:
@@ -134,6 +138,8 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
         console.print(rejected)
     for note in flown.prepared.notes:
         console.print(f"Note: {note}")
+    for finding in flown.findings:
+        console.print(f"{finding.label}: {finding.text}")
     for name in ("record", "report"):
         if name in scores:
             console.print(f"{name.capitalize()}: {scores[name]}", soft_wrap=True)

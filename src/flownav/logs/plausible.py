@@ -20,6 +20,8 @@ from flownav.measurement import Array, Sensor, Stream
 GRAVITY_LIMITS_M_S2 = (4.0, 25.0)
 LARGEST_TILT_ERROR_RAD = 0.6
 WRONG_UNIT_FACTOR = 10.0
+WRONG_FLOW_FACTOR = 40.0  # flow moves with translation too; degrees are 57 times as fast at least
+LEAST_QUICK_RATE_RAD_S = 0.01  # sample-to-sample rotation that a check may rest on
 LEAST_RATE_RAD_S = 0.03
 INTERVAL_S = 0.25
 LEAST_ROWS = 50
@@ -83,7 +85,8 @@ def _check_rates(
             continue
         slope = _slope(reference, logged[:, column])
         likeness = float(np.corrcoef(reference, logged[:, column])[0, 1]) if np.ptp(logged[:, column]) > 0 else 0.0
-        if slope > WRONG_UNIT_FACTOR and likeness > 0.5:
+        factor = WRONG_UNIT_FACTOR if signed else WRONG_FLOW_FACTOR
+        if slope > factor and likeness > 0.5 and (signed or not _turns_along(t_s, values[:, column], attitude, column)):
             raise InputError(
                 f"{where}: {name}_{axis} is {slope:.0f} times as fast as the attitude turns; rad/s are needed (deg/s?)"
             )
@@ -92,6 +95,19 @@ def _check_rates(
                 f"{where}: {name}_{axis} turns against the attitude (correlation {likeness:.2f}); axes "
                 "forward-right-down are needed"
             )
+
+
+def _turns_along(t_s: Array, flow: Array, attitude: Stream, axis: int) -> bool:
+    """Whether the flow's quick changes are as large as the attitude's: no translation is as quick.
+
+    Slow flight low over the ground moves the flow many times as much as its rotation does, and in step with it.
+    """
+    later = np.diff(t_s) > 0
+    turned = attitude_rates(attitude, t_s[:-1][later], t_s[1:][later])[:, axis]
+    quick = np.diff(turned, 2)
+    if len(quick) < LEAST_ROWS or np.sqrt(np.mean(quick**2)) < LEAST_QUICK_RATE_RAD_S:
+        return False
+    return _slope(quick, np.diff(flow[1:][later], 2)) < WRONG_UNIT_FACTOR
 
 
 def _check_gps(where: Path, position: Stream, velocity: Stream) -> None:

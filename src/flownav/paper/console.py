@@ -5,8 +5,10 @@ from __future__ import annotations
 from rich.console import Console
 from rich.table import Table
 
-from flownav.paper import words
+from flownav.paper import rows, words
+from flownav.paper.published import HEIGHTS_M, RELATION_FITS
 from flownav.paper.reproduction import Reproduction
+from flownav.paper.words import Spread
 
 WIDEST = 118
 MINUS = "\N{MINUS SIGN}"
@@ -30,45 +32,51 @@ def show(of: Reproduction, page: str) -> None:
 
 def _tables(of: Reproduction) -> list[Table]:
     found = []
-    groups = words.model_groups(of)
+    groups = rows.model_groups(of)
     if groups:
-        names = ("fit %", "gain", "delay ms", "√c rad/s", "damping")
-        found.append(_grouped("Table 1: paper, here", "model", [n for name in names for n in (name, "here")], [
-            (group.title, [(row.head, [text for pair in row.cells for text in pair]) for row in group.rows])
-            for group in groups
-        ]))  # fmt: skip
-        table = Table(title="Configurations of the rig: fit %", title_justify="left")
-        for heading in ("configuration", "0.6 m", "0.8 m", "1.0 m", "1.5 m"):
-            table.add_column(heading, justify="left" if heading == "configuration" else "right")
-        table.add_row("the paper's relations", "87", "78", "72", "57")
-        for name, what, fits in words.configurations(of):
-            table.add_row(f"{name}: {what}", *(fit if within else f"{fit} !" for fit, within in fits))
-        found.append(table)
-        found.append(_grouped("Order of the model: fit %", "runs", ["gain, delay", "1", "2", "3", "4"],
-                              [("", [(row.head, row.cells) for row in words.order_rows(of)])]))  # fmt: skip
+        names = [name for what in ("fit %", "gain", "delay ms", "√c rad/s", "damping") for name in (what, "here")]
+        side_by_side = [
+            rows.Group(g.title, [row._replace(cells=[text for pair in row.cells for text in pair]) for row in g.rows])
+            for g in groups
+        ]
+        found.append(_grouped("Table 1: paper, here", "model", names, side_by_side))
+        paper = rows.TableRow("the paper's relations", [f"{fit:.0f}" for fit in RELATION_FITS.values()])
+        set_ups = [
+            rows.TableRow(f"{name}: {what}", [fit if within else f"{fit} !" for fit, within in fits])
+            for name, what, fits in rows.configurations(of)
+        ]
+        at = [f"{height:.1f} m" for height in HEIGHTS_M]
+        found.append(_grouped("Rig set up otherwise: fit %", "configuration", at, [rows.Group("", [paper, *set_ups])]))
+        orders = ["gain, delay", "1", "2", "3", "4"]
+        found.append(_grouped("Order of the model: fit %", "runs", orders, [rows.Group("", rows.order_rows(of))]))
     six = ["mean m/s", "here", "paper's here", "std m/s", "here", "paper's here"]
-    errors = words.error_groups(of)
+    errors, selected = rows.error_groups(of), rows.selected_rows(of)
     if errors:
-        found.append(_grouped("Table 2: paper, here, the paper's model here", "model", six,
-                              [(group.title, list(group.rows)) for group in errors]))  # fmt: skip
-    selected = words.selected_rows(of)
+        found.append(_grouped("Table 2: paper, here, the paper's model here", "model", six, errors))
     if selected:
-        found.append(_grouped("Table 3: paper, here, the paper's model here", "height", six, [("", selected)]))
+        one = [rows.Group("", selected)]
+        found.append(_grouped("Table 3: paper, here, the paper's model here", "height", six, one))
     for flown in words.flight_tables(of):
         names = ["mean", "here", "percentile", "std", "here", "percentile", "largest, here"]
-        found.append(_grouped(f"{flown.title}, {flown.flights} flights", "state", names, [("", flown.rows)]))
+        title = f"{flown.title}, {flown.flights} flights: median over 5 to 95 %"
+        found.append(_grouped(title, "state", names, [rows.Group("", flown.rows)]))
     return found
 
 
-def _grouped(title: str, head: str, names: list[str], groups: list) -> Table:  # type: ignore[type-arg]
+def _grouped(title: str, head: str, names: list[str], groups: list[rows.Group]) -> Table:
     """A table with a line between groups."""
     table = Table(title=title, title_justify="left")
     table.add_column(head)
     for name in names:
         table.add_column(name, justify="right")
-    for group, rows in groups:
-        for row in rows:
-            name, cells = row[0], row[1]
-            table.add_row(f"{group} {name}".strip(), *(cell.replace(MINUS, "-") for cell in cells))
+    for group in groups:
+        for row in group.rows:
+            table.add_row(f"{group.title} {row.head}".strip(), *(_text(cell) for cell in row.cells))
         table.add_section()
     return table
+
+
+def _text(cell: str | Spread) -> str:
+    """A cell; of a spread the median above its range."""
+    text = cell if isinstance(cell, str) else f"{cell.median}\n{cell.between}"
+    return text.replace(MINUS, "-")

@@ -12,7 +12,7 @@ from flownav.report.series import moments
 
 ZOOM_S = (10.0, 20.0)
 # of each table: figures of position, velocity, velocity zoomed, position error, velocity error
-FIGURES = {5: ("17", "18", "19 to 21", "26", "27"), 6: ("22", "22, its velocity", "23 to 25", "29", "30")}
+FIGURES = {5: ("17", "Figure 18: velocity", "19 to 21", "26", "27"), 6: ("22", "Velocity", "23 to 25", "29", "30")}
 
 
 def panels(flights: Flights) -> list[Panel]:
@@ -20,13 +20,19 @@ def panels(flights: Flights) -> list[Panel]:
     record, name = flights.record, flights.scenario
     what = {"takeoff": "take-off"}.get(name, name)
     position, velocity, zoomed, position_error, velocity_error = FIGURES[flights.table]
+    errors = (
+        ("position", position_error, figures_states.position_error(record)),
+        ("velocity", velocity_error, figures_states.velocity_error(record)),
+    )
     found = [
         figures_states.position(record, View(f"{name}-position", f"Figure {position}: position, {what}")),
-        figures_states.velocity(record, View(f"{name}-velocity", f"Figure {velocity}: velocity, {what}")),
+        figures_states.velocity(record, View(f"{name}-velocity", f"{velocity}, {what}")),
         figures_states.velocity(record, View(f"{name}-zoom", f"Figures {zoomed}: velocity from 10 to 20 s", ZOOM_S)),
-        replace(figures_states.position_error(record), key=f"{name}-position-error", title=f"Figure {position_error}: position error, {what}"),
-        replace(figures_states.velocity_error(record), key=f"{name}-velocity-error", title=f"Figure {velocity_error}: velocity error, {what}"),
-    ]  # fmt: skip
+        *(
+            replace(panel, key=f"{name}-{quantity}-error", title=f"Figure {number}: {quantity} error, {what}")
+            for quantity, number, panel in errors
+        ),
+    ]
     lift_off = next((moment for moment in moments(record) if moment.name == "lift-off"), None)
     if flights.table == 5 and lift_off is not None:
         transient = figures_states.lift_off_transient(record, lift_off)

@@ -6,7 +6,7 @@ import numpy as np
 
 from flownav.measurement import Array
 from flownav.optics.camera import FIRMWARE_FOCAL_PX, Camera, effective_focal_px, refocused
-from flownav.optics.firmware import firmware_named
+from flownav.optics.firmware import EARLY_GYRO_SCALE, firmware_named
 from flownav.optics.flow import flow_of_frames, raw_flow
 from flownav.optics.pad import BLACK, WHITE, Pad, stripes, texture
 from flownav.optics.projection import pose_looking_down
@@ -21,14 +21,14 @@ FRAME_RATE_HZ = 250.0
 SPEED_M_S = 0.35
 NUMBERS = dict(zip(HEIGHTS_M, (10, 11, 12, 13), strict=True))
 TILT_HEIGHT_M, PAD_M, TILT_RAD = 3.0, 1.0, np.radians(9.5)
-ROCK_S, ROCK_RAD, ROCK_HEIGHT_M = 2.0, np.radians(4.0), 1.0
+ROCK_S, ROCK_HZ, ROCK_RAD, ROCK_HEIGHT_M = 2.0, 1.0, np.radians(8.0), 1.0
 
 
 def depth() -> list[Panel]:
     """Figure 2: the pad from two heights, and the flow of one velocity against height."""
     images = [
         (
-            f"{height:g} m: {1000 * 64 * height / FIRMWARE_FOCAL_PX:.0f} mm in view",
+            f"{height:.1f} m: {1000 * 64 * height / FIRMWARE_FOCAL_PX:.0f} mm in view",
             film(stripes(), [pose_looking_down(height_m=height)], camera=_focused(height))[0],
         )
         for height in (HEIGHTS_M[0], HEIGHTS_M[-1])
@@ -40,12 +40,14 @@ def depth() -> list[Panel]:
         plots.line("f v/(fps h)", "truth", heights, ideal, dash="5px,3px"),
         plots.dots("block matching", "flow", heights, flows),
     ]
+    frames = "One frame of 64 by 64 pixels from each height: the nearer camera sees fewer, wider lines."
+    curve = f"The same {SPEED_M_S} m/s moves the image less the farther the pad is; the firmware's matching, in steps "
+    curve += "of half a pixel, against the motion field."
+    plot = plots.figure(traces, "height (m)", "flow (px a frame)", yaxis={"rangemode": "tozero"})
     return [
-        Panel("figure-2-frames", "Figure 2: the pad from near and from far", "One frame of 64 by 64 pixels from each height: the nearer camera sees fewer, wider lines.",
-              "Two camera frames of the striped pad.", plots.pictures(images)),
-        Panel("figure-2-flow", "Figure 2: flow against depth", f"The same {SPEED_M_S} m/s moves the image less the farther the pad is; the firmware's matching against the motion field.",
-              "Flow in pixels a frame against height.", plots.figure(traces, "height (m)", "flow (px a frame)", yaxis={"rangemode": "tozero"})),
-    ]  # fmt: skip
+        Panel("figure-2-frames", "Figure 2: the pad from near and from far", frames, frames, plots.pictures(images)),
+        Panel("figure-2-flow", "Figure 2: flow against depth", curve, "Flow against height. " + curve, plot),
+    ]
 
 
 def _focused(height_m: float) -> Camera:
@@ -67,7 +69,7 @@ def rotation() -> list[Panel]:
         for title, angle in (("(a) level", 0.0), (f"(b) rolled by {np.degrees(TILT_RAD):.1f}°", TILT_RAD))
     ]
     t_s = np.arange(0.0, ROCK_S, 1.0 / FRAME_RATE_HZ)
-    angle = ROCK_RAD * np.sin(np.pi * t_s)
+    angle = ROCK_RAD * np.sin(2.0 * np.pi * ROCK_HZ * t_s)
     rates = np.zeros((len(t_s), 3))
     rates[:, 1] = np.gradient(angle, t_s)
     poses = [pose_looking_down(height_m=ROCK_HEIGHT_M, pitch_rad=float(a)) for a in angle]
@@ -79,14 +81,16 @@ def rotation() -> list[Panel]:
         ("estimate", "exact gyro scale", "2014-12", rates),
     ):
         series = flow_of_frames(frames, FRAME_RATE_HZ, rates_rad_s=given, range_m=ROCK_HEIGHT_M, firmware=firmware)
-        stack.line(1, role, name, series.time_s, _smoothed(series.velocity_m_s[:, 0]))
+        stack.line(1, role, name, _smoothed(series.time_s), _smoothed(series.velocity_m_s[:, 0]))
     figure = stack.figure((0.0, ROCK_S))
-    caption = f"The camera rocks by ±{np.degrees(ROCK_RAD):.0f}° at {ROCK_HEIGHT_M:g} m and does not move: what is not compensated reads as velocity."
+    view = f"A pad of {PAD_M:g} m from {TILT_HEIGHT_M:g} m; {np.degrees(TILT_RAD):.1f}° of roll move the view by "
+    view += f"{TILT_HEIGHT_M * np.tan(TILT_RAD):.2f} m."
+    flow = f"The camera rocks by ±{np.degrees(ROCK_RAD):.0f}° at {ROCK_HEIGHT_M:g} m and does not move: what is not "
+    flow += f"compensated reads as velocity. The firmware of 2013 takes out {100.0 * EARLY_GYRO_SCALE:.0f} % of it."
     return [
-        Panel("figure-3-frames", "Figure 3: a roll takes the pad out of view", f"A pad of {PAD_M:g} m from {TILT_HEIGHT_M:g} m; {np.degrees(TILT_RAD):.1f}° of roll move the view by half a metre.",
-              "Two camera frames, level and rolled.", plots.pictures(views)),
-        Panel("figure-3-flow", "Figure 3: flow of a rotation", caption + " The firmware of 2013 takes out 87 % of it.", "Reported velocity over time. " + caption, figure),
-    ]  # fmt: skip
+        Panel("figure-3-frames", "Figure 3: a roll takes the pad out of view", view, view, plots.pictures(views)),
+        Panel("figure-3-flow", "Figure 3: flow of a rotation", flow, "Reported velocity over time. " + flow, figure),
+    ]
 
 
 def _pad_on_ground(texel_m: float = 0.00175) -> Pad:
@@ -98,8 +102,8 @@ def _pad_on_ground(texel_m: float = 0.00175) -> Pad:
     return Pad("a pad on the ground", np.roll(ground, (-2 * half, -2 * half), (0, 1)), texel_m)
 
 
-def _smoothed(values: Array, frames: int = 25) -> Array:
-    return np.convolve(values, np.full(frames, 1.0 / frames), "same")
+def _smoothed(values: Array, frames: int = 11) -> Array:
+    return np.convolve(values, np.full(frames, 1.0 / frames), "valid")
 
 
 def light(lights: tuple[RigLog, ...]) -> Panel:
@@ -129,8 +133,12 @@ def heights(laboratory: Laboratory) -> list[Panel]:
         stack = Stack(("velocity (m/s)",), row_height_px=220)
         _beside_encoder(stack, 1, log)
         slow = np.abs(log.reference_velocity_m_s) < 0.5 * np.abs(log.reference_velocity_m_s).max()
-        caption = f"Rod of {log.rod_length_m:.1f} m, 25 s. Below half its top speed the sensor is off by {float((log.flow_velocity_m_s - log.reference_velocity_m_s)[slow].std()):.3f} m/s rms."
-        title = f"Figure {number}: sensor and encoder at {height_m:g} m"
+        off = float((log.flow_velocity_m_s - log.reference_velocity_m_s)[slow].std())
+        caption = (
+            f"Rod of {log.rod_length_m:.1f} m. Below half the top speed the sensor is off by {off:.3f} m/s rms, its "
+        )
+        caption += "delay included."
+        title = f"Figure {number}: sensor and encoder at {height_m:.1f} m"
         panels.append(Panel(f"figure-{number}", title, caption, caption, stack.figure((0.0, 25.0))))
     return panels
 

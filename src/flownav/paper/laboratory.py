@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flownav.identification.experiment import experiment
+from flownav.identification.experiment import Experiment, experiment
 from flownav.identification.output_error import Fit, Structure, fit, simulate
 from flownav.identification.quantities import Excitation, excitation, latency_s
 from flownav.identification.statistics import fit_percent
@@ -137,8 +137,8 @@ def swing(seed: int, whole: bool = True, on_run: Callable[[int], object] = lambd
     return Laboratory(fixed, runs, others, tuple(tests), tuple(lights))
 
 
-def _experiment(log: RigLog):  # type: ignore[no-untyped-def]
-    name = f"{log.settings.height_m:g} m, run {log.run}"
+def _experiment(log: RigLog) -> Experiment:
+    name = f"{log.settings.height_m:.1f} m, run {log.run}"
     return experiment(
         name, log.time_s, log.reference_velocity_m_s, log.time_s, log.flow_velocity_m_s, log.settings.height_m
     )

@@ -6,7 +6,8 @@ import json
 import os
 from pathlib import Path
 
-from flownav.paper import figures_flight, figures_rig, figures_tables, published, words
+from flownav.paper import figures_flight, figures_rig, figures_tables, published, rows, words
+from flownav.paper.findings import FIT_TOLERANCE, LARGEST_TOLERANCE, SAME_SPREAD, Finding
 from flownav.paper.reproduction import Reproduction
 from flownav.provenance import command_line, provenance
 from flownav.report import content
@@ -64,14 +65,20 @@ def render(of: Reproduction) -> str:
         facts=words.facts(of),
         summary=words.summary(of),
         tiles=words.tiles(of),
-        findings=of.findings,
-        model_groups=words.model_groups(of),
-        identifiable=words.identifiable(of.laboratory) if of.laboratory else "",
-        configurations=words.configurations(of),
-        set_up=words.set_up(of),
-        order_rows=words.order_rows(of),
-        error_groups=words.error_groups(of),
-        selected_rows=words.selected_rows(of),
+        findings=[_worded(finding) for finding in of.findings],
+        limits={
+            "fit": f"{FIT_TOLERANCE:g}",
+            "spread": f"{SAME_SPREAD:g}",
+            "largest": f"{100 * LARGEST_TOLERANCE:g}",
+        },
+        signal=words.signal(of),
+        model_groups=rows.model_groups(of),
+        identifiable=rows.identifiable(of.laboratory) if of.laboratory else "",
+        configurations=rows.configurations(of),
+        set_up=rows.set_up(of),
+        order_rows=rows.order_rows(of),
+        error_groups=rows.error_groups(of),
+        selected_rows=rows.selected_rows(of),
         flight_tables=words.flight_tables(of),
         systems=published.landing_systems() if of.flights else [],
         own_systems=words.own_systems(of),
@@ -89,3 +96,7 @@ def render(of: Reproduction) -> str:
         scripts=[Markup(script) for script in scripts],
         policy=report._policy(scripts),
     )
+
+
+def _worded(finding: Finding) -> Finding:
+    return finding._replace(paper=words.kept_together(finding.paper), here=words.kept_together(finding.here))

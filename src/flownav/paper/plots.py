@@ -47,7 +47,7 @@ def figure(
     return Figure({"data": traces, "layout": {"template": {}, **looks}})
 
 
-def pictures(images: list[tuple[str, ArrayLike]], height_px: int = 330) -> Any:
+def pictures(images: list[tuple[str, ArrayLike]], height_px: int = 300) -> Any:
     """Grey pictures 0 to 255 side by side, each with its title; rows run downwards."""
     from plotly.graph_objects import Figure
 
@@ -58,27 +58,27 @@ def pictures(images: list[tuple[str, ArrayLike]], height_px: int = 330) -> Any:
         left = (k - 1) * (width + gap)
         number = "" if k == 1 else str(k)
         data.append(
-            {"type": "heatmap", "z": np.asarray(image, np.uint8), "zmin": 0, "zmax": 255, "showscale": False, "name": title,
-             "colorscale": [[0, "rgb(0,0,0)"], [1, "rgb(255,255,255)"]], "xaxis": f"x{number}", "yaxis": f"y{number}",
-             "hovertemplate": "%{x}, %{y}: grey %{z}"}
-        )  # fmt: skip
-        looks[f"xaxis{number}"] = axis("pixels") | {
-            "domain": [left, left + width],
-            "anchor": f"y{number}",
-            "showgrid": False,
-            "constrain": "domain",
-        }
-        looks[f"yaxis{number}"] = axis() | {
-            "anchor": f"x{number}",
-            "autorange": "reversed",
-            "scaleanchor": f"x{number}",
-            "showgrid": False,
-            "constrain": "domain",
-        }
-        looks["annotations"].append(
-            {"text": title, "x": left + 0.5 * width, "y": 1.0, "xref": "paper", "yref": "paper", "xanchor": "center", "yanchor": "bottom",
-             "showarrow": False, "font": {"size": 12, "color": COLOUR["ink"]}}
-        )  # fmt: skip
+            {
+                "type": "heatmap",
+                "name": title,
+                "z": np.asarray(image, np.uint8),
+                "zmin": 0,
+                "zmax": 255,
+                "colorscale": [[0, "rgb(0,0,0)"], [1, "rgb(255,255,255)"]],
+                "showscale": False,
+                "xaxis": f"x{number}",
+                "yaxis": f"y{number}",
+                "hovertemplate": "%{x}, %{y}: grey %{z}",
+            }
+        )
+        square = {"showgrid": False, "zeroline": False, "constrain": "domain"}
+        across = {"domain": [left, left + width], "anchor": f"y{number}"}
+        down = {"anchor": f"x{number}", "scaleanchor": f"x{number}", "autorange": "reversed", "constraintoward": "top"}
+        looks[f"xaxis{number}"] = axis("pixels") | square | across
+        looks[f"yaxis{number}"] = axis() | square | down
+        place = {"x": left + 0.5 * width, "y": 1.0, "xref": "paper", "yref": "paper"}
+        middle = {"xanchor": "center", "yanchor": "bottom", "showarrow": False}
+        looks["annotations"].append({"text": title, "font": {"size": 12, "color": COLOUR["ink"]}, **place, **middle})
     return Figure({"data": data, "layout": {"template": {}, **looks}})
 
 

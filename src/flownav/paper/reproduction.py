@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -60,17 +60,22 @@ class Reproduction:
             ]  # fmt: skip
         facts |= {f"table{flown.table}": flown.as_json() for flown in self.flights}
         if self.laboratory is not None and self.laboratory.orders:
+            every = [(self.laboratory.fixed, _fixed_fits(self.laboratory)), *self.laboratory.others]
             facts["orders"] = [
-                {"excitation": test.kind, "height_m": test.height_m, "fit_by_order": {str(n): fit for n, fit in test.fits.items()}}
+                {"excitation": test.kind, "height_m": test.height_m, "fit_by_order": _keyed(test.fits)}
                 for test in self.laboratory.orders
-            ]  # fmt: skip
+            ]
             facts["configurations"] = [
-                {"name": other.name, "description": other.words, "fit_by_height": {f"{h:g}": fit for h, fit in fits.items()}}
-                for other, fits in [(self.laboratory.fixed, _fixed_fits(self.laboratory)), *self.laboratory.others]
-            ]  # fmt: skip
+                {"name": other.name, "description": other.words, "fit_by_height": _keyed(fits)} for other, fits in every
+            ]
         facts["findings"] = [finding.as_json() for finding in self.findings]
         facts["seed"] = self.seed
         return facts
+
+
+def _keyed(fits: Mapping[int, float] | Mapping[float, float]) -> dict[str, float]:
+    """With keys that JSON takes."""
+    return {f"{key:g}": fit for key, fit in fits.items()}
 
 
 def _fixed_fits(of: Laboratory) -> dict[float, float]:
@@ -124,15 +129,16 @@ def reproduce(
     if set(tables) & set(RIG_TABLES):
         of = laboratory.swing(seed, 1 in tables, on_run)
         said += findings.of_laboratory(of) if 1 in tables else []
+        validation = laboratory.table_2(of, lambda run, _: run.dynamics)
         if 2 in tables:
             printed = {(row.height_m, row.model): row for row in published.table_1()}
-            more["table_2"] = laboratory.table_2(of, lambda run, _: run.dynamics)
+            more["table_2"] = validation
             more["table_2_published_models"] = laboratory.table_2(of, lambda run, model: printed[run.height_m, model])
-            said += findings.of_table_2(more["table_2"])
+            said += findings.of_table_2(validation)
         if 3 in tables:
             more["table_3"] = laboratory.table_3(of)
             more["table_3_published_model"] = laboratory.table_3(of, published.selected_model())
-            said += findings.of_table_3(more["table_3"])
+            said += findings.of_table_3(more["table_3"], validation)
     flown = tuple(fly_table(table, seed, flights, on_flight) for table in FLIGHT_TABLES if table in tables)
     for of_table in flown:
         said += findings.of_flights(of_table)

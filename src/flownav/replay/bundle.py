@@ -122,6 +122,7 @@ def _events(replay: Replay) -> dict[str, Any]:
     """What happened, in order of time."""
     start, _ = replay.log.span_s
     events = [(start, "replay", "note", note, np.nan) for note in replay.prepared.notes]
+    events += [(start, "replay", "warning", finding.text, np.nan) for finding in replay.findings]
     for name, counts in replay.rejected().items():
         events += [(start, name, "rejected", reason, float(count)) for reason, count in counts.items()]
     for t_s, kind, value in replay.tape.event[: replay.tape.used[2]].tolist():

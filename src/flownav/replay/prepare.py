@@ -25,6 +25,7 @@ LONGEST_FLOW_INTERVAL = 1.5  # medians: a longer step is a gap, not an exposure
 OWN = "sensor gyro"
 SIGNIFICANT = 3.0  # standard errors
 LEAST_FLOW_ROWS = 50
+SCALE_LIMITS = (0.1, 10.0)
 
 
 @dataclass(frozen=True)
@@ -39,11 +40,16 @@ class ReplayOptions:
 
 @dataclass(frozen=True)
 class Prepared:
-    """The queue with nothing cut, each stream's delay, and what was decided on the way (events of the record)."""
+    """The streams as they are fed, their queue with nothing cut, and what was decided on the way (notes)."""
 
+    streams: dict[Sensor, Stream]
     queue: EventQueue
-    delays_s: dict[Sensor, float]
     notes: tuple[str, ...]
+
+    @property
+    def delays_s(self) -> dict[Sensor, float]:
+        """Each stream's delay."""
+        return {sensor: stream.delay_s for sensor, stream in self.streams.items()}
 
 
 def prepare(log: Log, options: ReplayOptions) -> Prepared:
@@ -59,8 +65,7 @@ def prepare(log: Log, options: ReplayOptions) -> Prepared:
     if Sensor.FLOW_RATE in streams:
         streams[Sensor.FLOW_RATE], note = _with_gyro(streams[Sensor.FLOW_RATE], streams)
         notes.append(note)
-    delays = {sensor: stream.delay_s for sensor, stream in streams.items()}
-    return Prepared(merge(streams.values()), delays, tuple(notes))
+    return Prepared(streams, merge(streams.values()), tuple(notes))
 
 
 def withhold(log: Log, queue: EventQueue, options: ReplayOptions) -> EventQueue:
@@ -80,8 +85,11 @@ def withhold(log: Log, queue: EventQueue, options: ReplayOptions) -> EventQueue:
 def _check(log: Log, options: ReplayOptions) -> None:
     if not 0.0 <= options.gps_delay_s <= 5.0:
         raise InputError(f"--gps-delay {options.gps_delay_s:g}: seconds from 0 to 5 are needed")
-    if not all(0.01 <= abs(scale) <= 100.0 for scale in options.flow_scale):
-        raise InputError(f"--flow-scale {options.flow_scale[0]:g},{options.flow_scale[1]:g}: factors near 1 are needed")
+    if not all(SCALE_LIMITS[0] <= scale <= SCALE_LIMITS[1] for scale in options.flow_scale):
+        raise InputError(
+            f"--flow-scale {options.flow_scale[0]:g},{options.flow_scale[1]:g}: factors from {SCALE_LIMITS[0]:g} to "
+            f"{SCALE_LIMITS[1]:g} are needed; a wrong sign belongs mended in the log"
+        )
     check_windows(log, options.gps_outages_s, "--gps-outage")
 
 

@@ -17,13 +17,16 @@ from flownav.estimation.kinematic_settings import KinematicSettings
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
 from flownav.replay.engine import run
-from flownav.replay.prepare import Prepared, ReplayOptions, check_windows, prepare, withhold
+from flownav.replay.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
+from flownav.replay.sentinel import Finding, findings
 from flownav.replay.state import Tape, new_filter
 from flownav.scoring.alignment import Alignment, align, velocity_of
 from flownav.scoring.outage import OutageError, difference_at, horizontal_rms, outage_error
 
 NO_REJECTION = (Reason.FUSED, Reason.DATUM)
+HORIZONTAL = (*GPS, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 LONGEST_TABLE = 2000
+LEAST_WINDOW_S = 1e-6
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,17 @@ class Replay:
     def innovation(self) -> Array:
         """Rows of the tape's innovation that were written (m, 9)."""
         return self.tape.innovation[: self.tape.used[1]]
+
+    @cached_property
+    def findings(self) -> list[Finding]:
+        """What is wrong with the log, as far as its sensors show, and whether anything was fused at all."""
+        fused = self.innovation[self.innovation[:, 8] == Reason.FUSED, 1]
+        found = findings(self.prepared.streams, self.options.gps_outages_s)
+        if not np.isin(fused, HORIZONTAL).any():
+            what = "horizontal was fused" if len(fused) else "was fused"
+            text = f"nothing {what}: the path is dead reckoning on attitude and accelerometer alone"
+            found.append(Finding(text, label="Note"))
+        return found
 
     @cached_property
     def truth_alignment(self) -> Alignment | None:
@@ -118,6 +132,7 @@ class Replay:
             "outages": [outage_entry(self.outage(t0, t1)) for t0, t1 in self.options.gps_outages_s],
             "velocity_rms_m_s": self.velocity_rms(),
             "rejected": self.rejected(),
+            "warnings": [finding.text for finding in self.findings],
         }
         truth = self.truth_scores()
         return scores if truth is None else {**scores, "truth": truth}
@@ -156,7 +171,10 @@ def outage_table(
 
 
 def table_windows(t0: float, t1: float, length_s: float) -> list[tuple[float, float]]:
-    """[t0, t0 + length), ... up to t1. InputError where that is no list of windows."""
+    """[t0, t0 + length), ... up to t1, the last one shorter where t1 asks for it.
+
+    InputError where that is no list of windows.
+    """
     if not (t0 < t1 and length_s > 0.0 and np.isfinite([t0, t1, length_s]).all()):
         raise InputError(f"--outage-table {t0:g}:{t1:g}:{length_s:g}: T0:T1:LENGTH is needed, seconds, T0 before T1")
     count = int(np.floor((t1 - t0) / length_s + 1e-9))
@@ -164,7 +182,8 @@ def table_windows(t0: float, t1: float, length_s: float) -> list[tuple[float, fl
         raise InputError(
             f"--outage-table {t0:g}:{t1:g}:{length_s:g}: that is {count} windows; 1 to {LONGEST_TABLE} can be flown"
         )
-    return [(t0 + k * length_s, t0 + (k + 1) * length_s) for k in range(count)]
+    whole = [(t0 + k * length_s, t0 + (k + 1) * length_s) for k in range(count)]
+    return whole if t1 - whole[-1][1] < LEAST_WINDOW_S else [*whole, (whole[-1][1], t1)]
 
 
 def outage_entry(error: OutageError) -> dict[str, float | None]:

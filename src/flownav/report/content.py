@@ -94,7 +94,7 @@ def summary(record: Record) -> str:
     if largest is not None:
         published = mapping(manifest.get("paper")).get("max_position_error_m")
         beside = f" (the paper: {metres(published)} m)" if published is not None else ""
-        said.append(f"The estimated position was never further than {metres(largest)} m from the truth{beside}.")
+        said.append(f"No axis of the estimated position was ever off by more than {metres(largest)} m{beside}.")
     touchdown = mapping(scores.get("touchdown"))
     if touchdown:
         said.append(
@@ -129,7 +129,7 @@ def tiles(record: Record) -> list[Tile]:
     if scores.get("max_position_error_m") is not None:
         published = paper.get("max_position_error_m")
         note = f"paper {metres(published)} m" if published is not None else "estimate against truth"
-        found.append(Tile("Largest position error", metres(scores["max_position_error_m"]), "m", note))
+        found.append(Tile("Largest error of one axis", metres(scores["max_position_error_m"]), "m", note))
     touchdown = mapping(scores.get("touchdown"))
     if touchdown:
         when = f"at {number(touchdown.get('t_s'), 1)} s"
@@ -148,9 +148,11 @@ def tiles(record: Record) -> list[Tile]:
     if scores.get("velocity_rms_m_s") is not None:
         found.append(Tile("Velocity error", number(scores["velocity_rms_m_s"], 2), "m/s", "rms, against GPS"))
     share = flow_share(record)
+    simulated = record.manifest.get("kind") == "fly"  # only there a flow reading means that the sensor saw the pad
+    name = "Flow sensor engaged" if simulated else "Valid flow readings"
     if share is None:
-        return [*found, Tile("Flow sensor engaged", NONE, "", "no valid readings")]
-    return [*found, Tile("Flow sensor engaged", f"{100 * share:.0f}", "%", "of the time")]
+        return [*found, Tile(name, NONE, "", "no valid readings")]
+    return [*found, Tile(name, f"{100 * share:.0f}", "%", "of the time")]
 
 
 def flow_share(record: Record) -> float | None:

@@ -31,11 +31,12 @@ ALLOWED = {
     "scoring": GROUND,
     "logs": GROUND,
     "rig": GROUND | {"optics", "sensors"},
-    "identification": GROUND | EQUATIONS | {"logs", "rig"},
+    "identification": GROUND | EQUATIONS | {"logs", "rig", "replay", "scoring"},
     "simulation": GROUND | EQUATIONS,
     "replay": GROUND | EQUATIONS | {"logs", "scoring"},
     "campaign": GROUND | EQUATIONS | {"simulation", "scoring"},
     "report": GROUND | {"scoring"},
+    "paper": GROUND | EQUATIONS | {"simulation", "campaign", "scoring", "rig", "identification", "report"},
 }
 
 

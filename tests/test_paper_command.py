@@ -298,3 +298,11 @@ def test_verdicts_on_flights_follow_the_numbers() -> None:
 
 def test_the_selected_model_is_the_one_whose_frequency_the_text_gives() -> None:
     assert published.selected_model().natural_frequency_rad_s == pytest.approx(13.8528, abs=5e-5)
+
+
+def test_what_stands_in_quotation_marks_stands_in_the_paper(paper_folder: Path) -> None:
+    text = " ".join((paper_folder / "paper.txt").read_text(encoding="utf-8").split()).lower()
+    quoted = [part for row in published.inconsistencies() for part in row.printed.split('"')[1::2]]
+    assert len(quoted) > 15
+    for words in [*quoted, *(system.printed for system in published.landing_systems())]:
+        assert words.lower() in text, words

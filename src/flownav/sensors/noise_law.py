@@ -57,7 +57,7 @@ def fit_noise_law(law: Law, low_m: float, high_m: float) -> NoiseFit:
 
     ValueError where the law is not positive there, or is too steep to be followed within 0.1 %.
     """
-    if low_m == high_m:
+    if high_m <= low_m * (1.0 + 1e-6):  # one height
         return constant_noise(float(law(np.array([low_m]))[0]), low_m, high_m)
     height = np.geomspace(low_m, high_m, 400)
     sigma = law(height)

@@ -46,7 +46,7 @@ def figures(of: Reproduction) -> dict[str, Section]:
         found["validation"] = [figures_tables.error_by_height(of.table_2), figures_rig.validation(laboratory)]
     for flown in of.flights:
         found[flown.scenario] = figures_flight.panels(flown)
-    return {key: Section(key, "", tuple(report._widened(panels))) for key, panels in found.items()}
+    return {key: Section(key, "", tuple(report.widened(panels))) for key, panels in found.items()}
 
 
 def render(of: Reproduction) -> str:
@@ -88,13 +88,13 @@ def render(of: Reproduction) -> str:
         command=command_line(),
         palette=PALETTE,
         font=Markup(FONT),
-        data={panel.key: Markup(report._figure_json(panel)) for panel in panels},
-        dark=Markup(report._inside_script(json.dumps(LIGHT_TO_DARK))),
+        data={panel.key: Markup(report.figure_json(panel)) for panel in panels},
+        dark=Markup(report.inside_script(json.dumps(LIGHT_TO_DARK))),
         style=Markup(
             (report.HERE / "page.css").read_text(encoding="utf-8") + (HERE / "page.css").read_text(encoding="utf-8")
         ),
         scripts=[Markup(script) for script in scripts],
-        policy=report._policy(scripts),
+        policy=report.content_policy(scripts),
     )
 
 

@@ -38,10 +38,10 @@ def write_report(record: Record, path: Path) -> None:
 
 def sections(record: Record) -> list[Section]:
     """The figures of a record, in the order of the page; one that would stand alone in its row is made wide."""
-    return [Section(key, title, tuple(_widened(panels))) for key, title, panels in _sections(record)]
+    return [Section(key, title, tuple(widened(panels))) for key, title, panels in _sections(record)]
 
 
-def _widened(panels: list[Panel]) -> Iterator[Panel]:
+def widened(panels: list[Panel]) -> Iterator[Panel]:
     """Panels stand in pairs; a narrow one without a narrow neighbour takes the row."""
     narrow = [not (panel.wide or panel.absent) for panel in panels]
     paired = False  # the panel before this one awaits a neighbour
@@ -102,11 +102,11 @@ def render(record: Record) -> str:
         command=content.command(record),
         palette=PALETTE,
         font=Markup(FONT),
-        data={panel.key: Markup(_figure_json(panel)) for section in shown for panel in section.panels if panel.figure},
-        dark=Markup(_inside_script(json.dumps(LIGHT_TO_DARK))),
+        data={panel.key: Markup(figure_json(panel)) for section in shown for panel in section.panels if panel.figure},
+        dark=Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
         style=Markup((HERE / "page.css").read_text(encoding="utf-8")),
         scripts=[Markup(script) for script in scripts],
-        policy=_policy(scripts),
+        policy=content_policy(scripts),
     )
 
 
@@ -115,16 +115,17 @@ def _thinned(record: Record) -> bool:
     return any(len(table["t_s"]) > DOT_POINTS for table in record.tables.values())
 
 
-def _figure_json(panel: Panel) -> str:
-    return _inside_script(panel.figure.to_json())
+def figure_json(panel: Panel) -> str:
+    """A panel's figure as JSON for the page's script."""
+    return inside_script(panel.figure.to_json())
 
 
-def _inside_script(text: str) -> str:
+def inside_script(text: str) -> str:
     """JSON that cannot end the script element that holds it."""
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
 
 
-def _policy(scripts: list[str]) -> str:
+def content_policy(scripts: list[str]) -> str:
     """A content security policy: nothing is loaded from anywhere, and only these scripts run."""
     digests = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
     rules: dict[str, Any] = {

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+WIDE = 120  # columns of the table
+
 
 def command(
     flights: Annotated[int, typer.Option(help="Size of the batch that is timed.")] = 1024,
@@ -37,4 +39,6 @@ def command(
         verdict = "reached" if figure.reached else "missed"
         measured, asked = f"{figure.value:.3g} {figure.unit}", f"{sign} {figure.asked:g} {figure.unit}"
         table.add_row(figure.name, measured, asked, verdict, figure.note)
-    Console().print(table)
+    console = Console()
+    console.width = max(console.width, WIDE)
+    console.print(table)

@@ -26,6 +26,9 @@ def command(
     gps_delay: Annotated[
         float, typer.Option("--gps-delay", metavar="S", help="How old a GPS reading is when it arrives.")
     ] = 0.22,
+    sensor: Annotated[
+        Path | None, typer.Option("--sensor", help="A flow sensor file: its gains and latency correct the flow.")
+    ] = None,
     outage_table: Annotated[
         str | None,
         typer.Option("--outage-table", metavar="T0:T1:LENGTH", help="One replay a window, each with GPS cut there."),
@@ -43,13 +46,16 @@ def command(
     from flownav.cli.output import save
     from flownav.errors import VerdictError
     from flownav.replay.bundle import to_record
-    from flownav.replay.prepare import ReplayOptions
+    from flownav.replay.prepare import ReplayOptions, identified_flow
     from flownav.replay.session import replay, table_windows
+    from flownav.sensors.datasheet import load_sensor
 
     windows = tuple(_numbers("--gps-outage", text, ":", 2, "T0:T1") for text in gps_outage or [])
     scale = _numbers("--flow-scale", flow_scale, ",", 2, "X,Y")
     table = table_windows(*_numbers("--outage-table", outage_table, ":", 3, "T0:T1:LENGTH")) if outage_table else []
-    options = ReplayOptions(gps_delay, tuple((t0, t1) for t0, t1 in windows), not no_flow, (scale[0], scale[1]))
+    identified = identified_flow(load_sensor(sensor)) if sensor else None
+    outages = tuple((t0, t1) for t0, t1 in windows)
+    options = ReplayOptions(gps_delay, outages, not no_flow, (scale[0], scale[1]), identified)
     log, numbers = _read(folder), _settings(settings)
     flown = replay(log, options, numbers)
     scores = flown.scores()

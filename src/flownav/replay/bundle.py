@@ -62,6 +62,7 @@ def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dic
             "gps_outages_s": [list(window) for window in replay.options.gps_outages_s],
             "use_flow": replay.options.use_flow,
             "flow_scale": list(replay.options.flow_scale),
+            "flow_sensor": replay.options.identified._asdict() if replay.options.identified else None,
             **({} if log.origin_deg_m is None else {"origin_lat_lon_deg_alt_m": list(log.origin_deg_m)}),
         },
         "provenance": {

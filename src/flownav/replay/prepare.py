@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from flownav.errors import InputError
 from flownav.logs.log import Log
 from flownav.logs.rates import attitude_rates, mean_over
 from flownav.measurement import Array, EventQueue, Sensor, Stream, merge
+from flownav.sensors.datasheet import FlowSensor
 
 WITHHELD = -1.0  # the quality of a reading that the user takes away
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
@@ -28,6 +30,14 @@ LEAST_FLOW_ROWS = 50
 SCALE_LIMITS = (0.1, 10.0)
 
 
+class IdentifiedFlow(NamedTuple):
+    """What a sensor file says of the flow: reported over true velocity of each body axis, and the age of a reading."""
+
+    gain_u: float
+    gain_v: float
+    latency_s: float
+
+
 @dataclass(frozen=True)
 class ReplayOptions:
     """What a user may ask of a replay."""
@@ -36,6 +46,7 @@ class ReplayOptions:
     gps_outages_s: tuple[tuple[float, float], ...] = ()
     use_flow: bool = True
     flow_scale: tuple[float, float] = (1.0, 1.0)
+    identified: IdentifiedFlow | None = None  # from a sensor file
 
 
 @dataclass(frozen=True)
@@ -65,6 +76,10 @@ def prepare(log: Log, options: ReplayOptions) -> Prepared:
     if Sensor.FLOW_RATE in streams:
         streams[Sensor.FLOW_RATE], note = _with_gyro(streams[Sensor.FLOW_RATE], streams)
         notes.append(note)
+    if options.identified is not None:
+        for sensor in FLOW:
+            if sensor in streams:
+                streams[sensor] = corrected(streams[sensor], options.identified)
     return Prepared(streams, merge(streams.values()), tuple(notes))
 
 
@@ -124,6 +139,39 @@ def _scaled(stream: Stream, scale: tuple[float, float]) -> Stream:
     value = stream.value.copy()
     value[:, :2] *= scale
     return replace(stream, value=value)
+
+
+def corrected(stream: Stream, identified: IdentifiedFlow) -> Stream:
+    """The stream as a sensor without gain error would have given it, with its identified age on arrival.
+
+    The gain is that of velocity: of angular flow, what is left when the rotation is taken off,
+    flow_x = p - g_v v/r and flow_y = q + g_u u/r.
+    """
+    value = stream.value.copy()
+    if stream.sensor == Sensor.FLOW_RATE:
+        value[:, 0] = value[:, 2] + (value[:, 0] - value[:, 2]) / identified.gain_v
+        value[:, 1] = value[:, 3] + (value[:, 1] - value[:, 3]) / identified.gain_u
+    else:
+        value[:, 0] /= identified.gain_u
+        value[:, 1] /= identified.gain_v
+    return replace(stream, value=value, delay_s=identified.latency_s)
+
+
+def identified_flow(sensor: FlowSensor) -> IdentifiedFlow:
+    """A sensor file's gains and latency; those of its dynamics where no log was identified."""
+    found = sensor.identification
+    if found is None:
+        return IdentifiedFlow(sensor.dynamics.gain, sensor.dynamics.gain, sensor.dynamics.delay_s)
+    if "swapped" in found.axes or "inverted" in found.axes:
+        raise InputError(f"{sensor.name}: {found.axes}; mend the log's axes, then identify again")
+
+    def gain_of(axis: str) -> float:
+        """The axis' gain, 1 where no height's interval excludes it: an uncertain gain would do more harm than good."""
+        rows = [r for r in found.responses if r.axis == axis] or list(found.responses)
+        sure = any(not r.gain_low <= 1.0 <= r.gain_high for r in rows)
+        return float(np.mean([r.gain for r in rows])) if sure else 1.0
+
+    return IdentifiedFlow(gain_of("x"), gain_of("y"), found.latency_s)
 
 
 def _with_gyro(flow: Stream, streams: dict[Sensor, Stream]) -> tuple[Stream, str]:

@@ -164,10 +164,12 @@ def _free_parts(order: int, a: Array, z: Array) -> Array:
 
 @equation
 def _account(columns: Array, row: int, sums: Array) -> None:
-    """Add a row's products to the lower triangle of the sums."""
+    """Add a row's products to the lower triangle of the sums; a start that is forgotten has only zeros."""
     for i in range(sums.shape[0]):
-        for j in range(i + 1):
-            sums[i, j] += columns[row, i] * columns[row, j]
+        value = columns[row, i]
+        if value != 0.0:
+            for j in range(i + 1):
+                sums[i, j] += value * columns[row, j]
 
 
 @kernel

@@ -94,7 +94,7 @@ def coloured_information(jacobian: Array, residual: Array) -> Array:
 
 
 def chi_square_tail(statistic: float, degrees: int) -> float:
-    """P(chi-square > statistic) by Wilson and Hilferty's cube root, good to 1e-3 from 3 degrees on."""
+    """P(chi-square > statistic), Wilson and Hilferty: good to 6e-3 from 3 degrees on, to 1e-3 below 0.05."""
     if degrees <= 0:
         return 1.0
     spread = 2.0 / (9.0 * degrees)

@@ -97,6 +97,12 @@ def flight(log: Log, reference: str = "auto") -> Flight:
             f"{log.path}: {np.count_nonzero(good)} of {len(good)} flow readings are usable (quality above 0, range "
             f"above its floor, not exactly zero); at least {LEAST_FLOW} are needed"
         )
+    good &= (t_s >= reference_t_s[0]) & (t_s <= reference_t_s[-1])
+    if np.count_nonzero(good) < LEAST_FLOW:
+        raise InputError(
+            f"{log.path}: the reference ({chosen}) covers {reference_t_s[0]:.1f} to {reference_t_s[-1]:.1f} s, where "
+            f"{np.count_nonzero(good)} flow readings are usable; at least {LEAST_FLOW} are needed, on one clock"
+        )
     if not np.all(np.ptp(velocity[good], axis=0) > 0.0):
         raise InputError(f"{log.path}: the flow is constant; a flight that moves is needed")
     return Flight(

@@ -4,8 +4,8 @@ Scale. Against GPS, whose noise is the greater, the flow's track is matched to t
 against motion capture, which is much cleaner than the flow, the flow's velocity is regressed on the reference's.
 Either way the noisy side stands on the left; the bias that the other side's noise leaves is computed and reported.
 
-Latency. The age of a reading when it arrives, on the vehicle's clock: from the IMU where the flow is good enough
-to be compared with it, else from the reference, whose own delay the IMU gives.
+Latency. The age of a reading when it arrives, on the vehicle's clock: from the flow against the IMU, or against the
+reference, whose own delay the IMU gives; the better-known of the two.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from flownav.identification.orders import choose, cross_validation
 from flownav.identification.output_error import fit
 from flownav.identification.quantities import Interval, latency
 from flownav.identification.reference_motion import (
-    ALIKE,
     Motion,
     difference,
     fast_experiments,
     fast_flow,
     motion,
+    with_flow,
 )
 from flownav.identification.sentinel import Axes, judge
 from flownav.identification.statistics import Z_95
@@ -48,6 +48,7 @@ from flownav.measurement import Array
 CLUSTER_S = 3.0
 FLIGHT_ORDERS = (Structure(0), Structure(1), Structure(2))
 WORST_BIAS = 0.02
+CLEAR = 0.8  # likeness to the IMU from which it, and not the reference, shows the dynamics
 
 
 class Scale(NamedTuple):
@@ -71,6 +72,9 @@ def identify_flight(path: Path, candidates: Sequence[Structure], reference: str 
     raw = _velocity_response(flown, moved, age_s)
     axes = judge(raw, moved.yaw_known)
     put_right = flown.velocity_m_s @ axes.assignment  # assignment is orthogonal: its transpose undoes it
+    if not axes.right:
+        moved = with_flow(moved, flown, put_right)
+        age_s = _age(flown, moved)
     scale, track = _scale(flown, moved, age_s, put_right)
     runs = [_axis_run(flown, moved, put_right, axis) for axis in (0, 1)]
     structures = candidates if len(candidates) == 1 else FLIGHT_ORDERS
@@ -100,17 +104,16 @@ def identify_flight(path: Path, candidates: Sequence[Structure], reference: str 
 def _age(flown: Flight, moved: Motion) -> float:
     """How old a flow reading is when it arrives, to turn it by the right attitude; what the log says where unsure."""
     tie = moved.flow_tie
-    return tie.delay_s.value if tie is not None and tie.likeness >= ALIKE else flown.age_s
+    return tie.delay_s.value if tie is not None and tie.holds else flown.age_s
 
 
 def _latency(moved: Motion, against_reference: Interval) -> Interval:
-    """On the vehicle's clock: the IMU's word, else the reference's corrected for its own delay (already taken out)."""
-    if moved.flow_tie is not None and moved.flow_tie.likeness >= ALIKE:
-        return moved.flow_tie.delay_s
-    if moved.reference_tie is not None and moved.reference_tie.likeness >= ALIKE:
+    """On the vehicle's clock: the better-known of the IMU's word and the reference's, whose delay is taken out."""
+    words = [tie.delay_s for tie in (moved.flow_tie,) if tie is not None and tie.holds]
+    if moved.reference_tie is not None and moved.reference_tie.holds:
         own = moved.reference_tie.delay_s
-        return difference(against_reference, Interval(0.0, own.low - own.value, own.high - own.value))
-    return against_reference
+        words.append(difference(against_reference, Interval(0.0, own.low - own.value, own.high - own.value)))
+    return min(words, key=lambda word: word.high - word.low, default=against_reference)
 
 
 def _body_input(flown: Flight, moved: Motion, age_s: float) -> Array:
@@ -187,7 +190,7 @@ def _dynamic_runs(
     flown: Flight, moved: Motion, velocity: Array, runs: Sequence[Experiment]
 ) -> Sequence[Sequence[Experiment]]:
     """What shows the dynamics of x and of y: above 1/SPLIT_S the IMU where it serves, else the reference."""
-    if moved.fast_m_s is None or moved.flow_tie is None or moved.flow_tie.likeness < ALIKE:
+    if moved.fast_m_s is None or moved.flow_tie is None or moved.flow_tie.likeness < CLEAR:
         return [[run] for run in runs]
     other = fast_flow(flown, moved.t_s, velocity)
     both = fast_experiments(flown.name, moved.t_s, moved.fast_m_s, flown.t_s[flown.good], other)
@@ -232,7 +235,7 @@ def _notes(flown: Flight, moved: Motion, scale: Scale, axes: Axes) -> list[str]:
         notes.append("error: what is left of the GPS and attitude errors counts as the flow's; it is an upper bound")
     if moved.flow_tie is None:
         notes.append("latency is against the reference and holds the reference's own delay: the log has no IMU")
-    elif moved.flow_tie.likeness < ALIKE and (moved.reference_tie is None or moved.reference_tie.likeness < ALIKE):
+    elif not moved.flow_tie.holds and (moved.reference_tie is None or not moved.reference_tie.holds):
         notes.append("latency is against the reference and holds its delay: the IMU agrees with neither of them")
     if not moved.yaw_known:
         notes.append("the reference's heading is unknown (no IMU): a sensor turned about its boresight does not show")
@@ -246,7 +249,7 @@ def _details(
         "scale_method": scale.method,
         "scale_bias": {"x": scale.bias[0], "y": scale.bias[1]},
         "cross_coupling": {"x_from_y": float(scale.response[0, 1]), "y_from_x": float(scale.response[1, 0])},
-        "naive_velocity_response": raw.tolist(),
+        "velocity_response": raw.tolist(),
         "turned_deg": axes.turned_deg,
         "reference_yaw_deg": float(np.degrees(moved.yaw_rad)),
         "reference_delay_s": moved.reference_delay_s,

@@ -8,7 +8,7 @@ the angle by which a reference's north is turned. The rest comes from the refere
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -23,17 +23,28 @@ from flownav.measurement import Array
 
 GRID_S = 0.02
 SPLIT_S = 1.0
+EDGE = 5.0  # of those are left out at either end
 HALF_SPAN_S = 0.1  # of the differences that make a reference's velocity
-ALIKE = 0.6  # correlation from which the IMU counts as seeing the same motion
+SIGNIFICANT = 4.0  # standard errors of a correlation of nothing
+WIDEST_DELAY_S = 0.3  # an interval wider than this says nothing
 
 
 class Tie(NamedTuple):
-    """A velocity compared with the IMU's above 1/SPLIT_S: its delay, the angle it is turned by, and likeness."""
+    """A velocity compared with the IMU's above 1/SPLIT_S: its delay, the angle it is turned by, and likeness.
+
+    likeness: correlation; independent: how many independent values it is of.
+    """
 
     delay_s: Interval
     turn_rad: float
-    turn_sigma_rad: float
     likeness: float
+    independent: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether the two saw the same motion, beyond chance, and the delay is known."""
+        known = self.delay_s.high - self.delay_s.low <= WIDEST_DELAY_S
+        return known and self.likeness >= SIGNIFICANT / np.sqrt(self.independent)
 
 
 @dataclass(frozen=True)
@@ -91,14 +102,21 @@ def motion(flown: Flight) -> Motion:
     inertial = _inertial_velocity(flown, grid)
     fast = inertial - smoothed(inertial)
     tie = _tie(grid, fast, grid, (reference - smoothed(reference))[:, :2])
-    alike = tie.likeness >= ALIKE
-    yaw = tie.turn_rad if alike and flown.reference == "truth" else 0.0
-    delay = tie.delay_s.value if alike else 0.0
+    yaw = tie.turn_rad if tie.holds and flown.reference == "truth" else 0.0
+    delay = tie.delay_s.value if tie.holds else 0.0
     earth = _turned(on_grid(grid, reference, grid + delay), -yaw)
-    if flown.reference == "gps" and alike:
+    if flown.reference == "gps" and tie.holds:
         earth = smoothed(earth) + fast  # positions of a GPS receiver say nothing within a second
-    flow_tie = _tie(grid, fast, flown.t_s[flown.good], fast_flow(flown, grid, flown.velocity_m_s))
-    return Motion(grid, earth, yaw, alike or flown.reference == "gps", delay, tie, flow_tie, fast)
+    moved = Motion(grid, earth, yaw, tie.holds or flown.reference == "gps", delay, tie, None, fast)
+    return with_flow(moved, flown, flown.velocity_m_s)
+
+
+def with_flow(moved: Motion, flown: Flight, velocity: Array) -> Motion:
+    """The motion with the flow's tie to the IMU, for flow velocities (n, 2) that may have been put right."""
+    if moved.fast_m_s is None:
+        return moved
+    t_s, other = flown.t_s[flown.good], fast_flow(flown, moved.t_s, velocity)
+    return replace(moved, flow_tie=_tie(moved.t_s, moved.fast_m_s, t_s, other))
 
 
 def _inertial_velocity(flown: Flight, grid: Array) -> Array:
@@ -126,7 +144,13 @@ def fast_flow(flown: Flight, grid: Array, velocity: Array) -> Array:
 
 
 def _tie(grid: Array, fast: Array, t_s: Array, other: Array) -> Tie:
-    """Compare a fast velocity (n, 2) at t_s with the IMU's on the grid: best shift, then angle and likeness."""
+    """Compare a fast velocity (n, 2) at t_s with the IMU's on the grid: best shift, then angle and likeness.
+
+    Not near the ends, where the Gaussian mean is of what the log no longer holds.
+    """
+    edge = min(EDGE * SPLIT_S, 0.1 * (grid[-1] - grid[0]))
+    inner = (t_s >= grid[0] + edge) & (t_s <= grid[-1] - edge)
+    t_s, other = t_s[inner], other[inner]
     signal = other[:, 0] + 1j * other[:, 1]
     products = []
     shifts = np.arange(DELAY_RANGE_S[0], DELAY_RANGE_S[1], GRID_S)
@@ -139,9 +163,7 @@ def _tie(grid: Array, fast: Array, t_s: Array, other: Array) -> Tie:
     turned = _turned(np.column_stack([fast[:, :2], np.zeros(len(fast))]), turn)
     runs = fast_experiments("IMU", grid, turned[:, :2], t_s, other)
     delay = latency(fit(runs, Structure(0)))
-    independent = max(4.0, (t_s[-1] - t_s[0]) / SPLIT_S)
-    sigma = float(np.sqrt(max(1.0 / max(likeness, 1e-3) ** 2 - 1.0, 0.0) / (2.0 * independent)))
-    return Tie(delay, turn, sigma, likeness)
+    return Tie(delay, turn, likeness, max(4.0, float(t_s[-1] - t_s[0]) / SPLIT_S))
 
 
 def fast_experiments(name: str, grid: Array, fast: Array, t_s: Array, other: Array) -> list[Experiment]:

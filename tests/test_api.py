@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 import flownav
+from flownav.compile import WITHOUT_KERNELS
 
 PACKAGE = Path(flownav.__file__).parent
 PROJECT = PACKAGE.parents[1]
@@ -20,7 +21,7 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 LONGEST_FILE = 330
 
 # rooms from the ground up; a room imports its own floor's neighbours named here and what lies below
-GROUND = {"errors", "compile", "frames", "measurement", "record", "parameter_files", "provenance"}
+GROUND = {"errors", "files", "compile", "frames", "measurement", "record", "parameter_files", "provenance"}
 EQUATIONS = {"vehicle", "sensors", "control", "estimation", "optics"}
 ALLOWED = {
     "vehicle": GROUND,
@@ -66,6 +67,12 @@ def test_only_compile_knows_numba(source):
     if source.name != "compile.py":
         imported = re.findall(r"^\s*(?:import|from)\s+(numba|llvmlite)", source.read_text(encoding="utf-8"), re.M)
         assert not imported
+
+
+def test_rooms_that_compilation_ignores_hold_no_compiled_code():
+    for room in WITHOUT_KERNELS:
+        for source in (PACKAGE / room).rglob("*.py"):
+            assert not re.search(r"^@(kernel|equation)", source.read_text(encoding="utf-8"), re.M), source
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))

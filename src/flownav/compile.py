@@ -30,16 +30,22 @@ from typing import Any, TypeVar, cast
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 LANES_WIDE = 16
+WITHOUT_KERNELS = ("cli", "export", "live", "logs", "paper", "report")
 ONE_LANE: tuple[int, ...] = (0,)
 LANES: tuple[int, ...] = (0,) * LANES_WIDE
 
 
 def _cache_folder() -> Path:
-    """A folder per version of the source: Numba's own cache does not see a change in an inlined function."""
+    """A folder per version of the source: Numba's own cache does not see a change in an inlined function.
+
+    Rooms that hold no compiled code are left out, so that a change in a table or a page compiles nothing anew.
+    """
     root = Path(os.environ.get("FLOWNAV_CACHE") or Path.home() / ".cache" / "flownav")
     digest = hashlib.sha256()
     package = Path(__file__).parent
     for source in sorted(package.rglob("*.py")):
+        if source.relative_to(package).parts[0] in WITHOUT_KERNELS:
+            continue
         digest.update(str(source.relative_to(package)).encode())
         digest.update(source.read_bytes())
     return root / f"kernels-{digest.hexdigest()[:16]}"

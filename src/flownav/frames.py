@@ -9,6 +9,8 @@ import numpy as np
 
 from flownav.compile import equation
 
+GRAVITY_M_S2 = 9.80665  # standard gravity
+
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 Rotation = tuple[float, float, float, float, float, float, float, float, float]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import io
 import json
-import os
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.errors import InputError
+from flownav.files import written_whole
 
 SCHEMA_VERSION = 1
 
@@ -102,19 +102,13 @@ class Record:
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-        try:
-            with zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as bundle:
-                manifest = {"schema": SCHEMA_VERSION, **self.manifest}
-                bundle.writestr("manifest.json", json.dumps(manifest, indent=1, default=str))
-                for name, table in self.tables.items():
-                    buffer = io.BytesIO()
-                    pq.write_table(pa.table(table), buffer, compression="zstd")
-                    bundle.writestr(f"{name}.parquet", buffer.getvalue())
-            os.replace(temporary, path)
-        finally:
-            temporary.unlink(missing_ok=True)
+        with written_whole(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as bundle:
+            manifest = {"schema": SCHEMA_VERSION, **self.manifest}
+            bundle.writestr("manifest.json", json.dumps(manifest, indent=1, default=str))
+            for name, table in self.tables.items():
+                buffer = io.BytesIO()
+                pq.write_table(pa.table(table), buffer, compression="zstd")
+                bundle.writestr(f"{name}.parquet", buffer.getvalue())
 
     @classmethod
     def load(cls, path: Path) -> Record:

@@ -14,9 +14,7 @@ import numpy as np
 
 from flownav.compile import clamp, equation, magnitude
 from flownav.control.guidance import Reference
-from flownav.frames import Rotation
-
-GRAVITY_M_S2 = 9.80665
+from flownav.frames import GRAVITY_M_S2, Rotation
 
 
 class AutopilotGains(NamedTuple):

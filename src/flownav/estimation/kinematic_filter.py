@@ -27,10 +27,17 @@ from flownav.estimation.kalman import (
     test_innovation,
 )
 from flownav.estimation.kinematic_settings import KinematicSettings
-from flownav.frames import Rotation, Vector, quaternion_rate, rotation_from_quaternion, to_body, to_earth
+from flownav.frames import (
+    GRAVITY_M_S2,
+    Rotation,
+    Vector,
+    quaternion_rate,
+    rotation_from_quaternion,
+    to_body,
+    to_earth,
+)
 
 STATES = 6
-GRAVITY_M_S2 = 9.80665
 LARGEST_VARIANCE = 1e30
 
 
@@ -170,18 +177,6 @@ def turn_attitude(work: Work, lanes: Lanes, rows: KinematicRows, gyro: int, dt_s
 
 
 # -- measurement laws --------------------------------------------------------------------------------------
-@equation
-def flow_to_body_velocity(
-    flow_x_rad_s: float, flow_y_rad_s: float, rate_p_rad_s: float, rate_q_rad_s: float, range_m: float
-) -> tuple[float, float]:
-    """Body velocity (u, v) [m/s] of a flow reading, less the rotation that the gyro saw.
-
-    PX4's convention: flow_x = p - v/r, flow_y = q + u/r, with r along the boresight (body down), so tilt over
-    flat ground is in r already.
-    """
-    return (flow_y_rad_s - rate_q_rad_s) * range_m, (rate_p_rad_s - flow_x_rad_s) * range_m
-
-
 @equation
 def flow_velocity_variance(
     range_m: float, range_variance: float, speed_m_s: float, quality: float, settings: KinematicSettings

@@ -15,13 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.errors import InputError
+from flownav.frames import GRAVITY_M_S2 as GRAVITY_M_S2
 from flownav.frames import rotation_from_quaternion
 from flownav.logs.log import Log
 from flownav.logs.rates import attitude_at
 from flownav.measurement import Array, Sensor, Stream
 from flownav.replay.prepare import ReplayOptions, prepare
 
-GRAVITY_M_S2 = 9.80665
 FLOOR_SHARE = 0.01  # of the readings at the lowest range: a rangefinder stuck at its floor
 FLOOR_MARGIN = 1.03
 SPIKE_WINDOW, SPIKE_SHARE, SPIKE_M = 51, 0.3, 0.1

@@ -7,16 +7,15 @@ the input did not show are those of a second-order Bessel lag with the identifie
 from __future__ import annotations
 
 import math
-import os
 import tomllib
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from flownav.errors import InputError
+from flownav.files import written_whole
 from flownav.identification.descent import Structure
 from flownav.identification.findings import Findings, Response
 from flownav.identification.quantities import Interval, coefficients, numerator
@@ -57,16 +56,11 @@ def write_sensor(path: Path, entries: Mapping[str, Any]) -> FlowSensor:
 
 def write_whole(path: Path, text: str) -> None:
     """A text file under a temporary name, then renamed. InputError where it cannot be written."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
+        with written_whole(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
 # -- the tables ----------------------------------------------------------------------------------------------

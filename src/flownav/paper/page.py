@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 
+from flownav.files import written_whole
 from flownav.paper import figures_flight, figures_rig, figures_tables, published, rows, words
 from flownav.paper.findings import FIT_TOLERANCE, LARGEST_TOLERANCE, SAME_SPREAD, Finding
 from flownav.paper.reproduction import Reproduction
@@ -21,12 +21,8 @@ HERE = Path(__file__).parent
 def write_page(reproduction: Reproduction, path: Path) -> None:
     """Write the page, whole or not at all. OSError where it cannot be written."""
     text = render(reproduction)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
+    with written_whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def figures(of: Reproduction) -> dict[str, Section]:

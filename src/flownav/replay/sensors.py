@@ -10,7 +10,6 @@ from flownav.compile import ONE_LANE, kernel
 from flownav.estimation.gating import Reason
 from flownav.estimation.kinematic_filter import (
     correct,
-    flow_to_body_velocity,
     flow_velocity_variance,
     observe_body_velocity,
     observe_state,
@@ -43,6 +42,7 @@ from flownav.replay.state import (
     write_event,
     write_offer,
 )
+from flownav.sensors.angular_flow import metric_flow
 
 (FUSED, INNOVATION_GATE, NO_DATA, NOT_FINITE, OUT_OF_RANGE, NO_HEIGHT, TILTED, BEFORE_START, DATUM, OUTAGE) = map(
     int, Reason
@@ -114,7 +114,7 @@ def take_flow(reading: Reading, on: Running) -> None:
     forward, right = value[0], value[1]
     reason = usable(reading.quality, forward + right, 0.0, on)
     if reading.sensor == Sensor.FLOW_RATE:
-        forward, right = flow_to_body_velocity(value[0], value[1], value[2], value[3], range_m)
+        forward, right = metric_flow(value[0], value[1], value[2], value[3], range_m)
         if reason == FUSED and not np.isfinite(forward + right):
             reason = NOT_FINITE
         elif reason == FUSED and not known:

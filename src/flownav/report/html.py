@@ -5,12 +5,12 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-import os
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from flownav.files import written_whole
 from flownav.record import Record
 from flownav.report import content, figures_filter, figures_path, figures_states, figures_vehicle
 from flownav.report.panels import Panel, Section
@@ -27,13 +27,8 @@ def write_report(record: Record, path: Path) -> None:
     lets only its own scripts run. Text from the record is escaped. OSError where the file cannot be written.
     """
     page = render(record)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
+    with written_whole(path) as temporary:
         temporary.write_text(page, encoding="utf-8", newline="\n")
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
 
 
 def sections(record: Record) -> list[Section]:

@@ -11,6 +11,7 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
+from flownav.frames import GRAVITY_M_S2 as STANDARD_GRAVITY_M_S2
 from flownav.parameter_files import Number, ParameterModel
 from flownav.sensors import gps_ins, imu
 from flownav.sensors.gauss_markov import gauss_markov_coefficients
@@ -19,7 +20,6 @@ from flownav.sensors.imu import ImuParameters
 from flownav.sensors.quantisation import steps_per_unit
 from flownav.sensors.rangefinder import RangefinderParameters
 
-STANDARD_GRAVITY_M_S2 = 9.80665
 SIGMA_PER_CEP = 1.0 / math.sqrt(2.0 * math.log(2.0))  # one axis of two equal normal ones: 1/1.1774
 
 

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from flownav.compile import equation, kernel
 from flownav.control.autopilot import (
-    GRAVITY_M_S2,
     AutopilotGains,
     AutopilotState,
     Estimate,
@@ -27,7 +26,7 @@ from flownav.control.autopilot import (
 from flownav.control.guidance import Path, Reference, reference_at
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.paper_filter import PaperModel
-from flownav.frames import rotation_from_quaternion
+from flownav.frames import GRAVITY_M_S2, rotation_from_quaternion
 from flownav.sensors.flow import step_flow
 from flownav.sensors.gps_ins import attitude_with_error
 from flownav.sensors.rangefinder import slant_range

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from flownav.compile import equation
 from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import rotation_from_quaternion, to_body, to_earth
+from flownav.sensors.angular_flow import angular_flow
 from flownav.sensors.flow import FlowParameters, engage_flow, read_flow, start_flow
 from flownav.sensors.gps_ins import GpsInsParameters, GpsInsState, NavSolution, start_gps_ins, step_gps_ins
 from flownav.sensors.imu import ImuParameters, ImuReading, start_imu, step_imu
@@ -175,8 +176,7 @@ def read_flow_sensor(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
         distance = height if height > 0.05 else 0.05
         lens_n = state.pos_n + rotation[2] * suite.lens_below_cg_m
         lens_e = state.pos_e + rotation[5] * suite.lens_below_cg_m
-        flow_x = state.p - state.v / distance
-        flow_y = state.q + state.u / distance
+        flow_x, flow_y = angular_flow(state.u, state.v, state.p, state.q, distance)
         flow = engage_flow(
             load_flow(work, lanes, lane), lens_n, lens_e, height, rotation, flow_x, flow_y,
             suite.pad_half_size_m, suite.flow,

@@ -31,6 +31,9 @@ class Sensor(IntEnum):
     BARO = 8  # altitude, positive up [m]
     MAG = 9  # field x, y, z, body FRD [gauss]
     POSE = 10  # an external position: north, east, down [m]
+    YAW = 11  # an external heading, from true north, clockwise from above [rad]
+    PAD = 12  # the pad from the lens: tangents of the angles towards body forward and right, and the distance [m]
+    LANDED = 13  # 1 on the ground, 0 in flight
 
 
 COLUMNS: dict[Sensor, tuple[str, ...]] = {
@@ -51,6 +54,9 @@ COLUMNS: dict[Sensor, tuple[str, ...]] = {
     Sensor.BARO: ("alt_m",),
     Sensor.MAG: ("mag_x_gauss", "mag_y_gauss", "mag_z_gauss"),
     Sensor.POSE: ("pos_n_m", "pos_e_m", "pos_d_m"),
+    Sensor.YAW: ("yaw_rad",),
+    Sensor.PAD: ("tan_forward", "tan_right", "distance_m"),
+    Sensor.LANDED: ("landed",),
 }
 MAX_VALUES = max(len(names) for names in COLUMNS.values())
 

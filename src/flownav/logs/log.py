@@ -4,9 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from flownav.measurement import Sensor, Stream
 from flownav.record import Table
+
+
+class Absence(NamedTuple):
+    """Something that a log lacks, and what the filter does instead: one line each."""
+
+    what: str
+    instead: str
 
 
 @dataclass(frozen=True)
@@ -17,6 +25,9 @@ class Log:
     origin_deg_m: latitude, longitude [deg] and altitude [m] of the local frame's origin; None without GPS.
     truth: an external reference, columns as record.TABLES["truth"]; its frame may be turned in yaw.
     inputs: SHA-256 of each file read, by name. notes: what a reader would tell the user, one line each.
+    autopilot: what the vehicle's own estimator said, columns as record.TABLES["autopilot"], and its name.
+    limits: what a sensor states of itself, lowest and highest, by name with unit ("range_m", "flow_height_m",
+    "flow_rad_s"). absences: what the log lacks.
     """
 
     path: Path
@@ -25,6 +36,10 @@ class Log:
     truth: Table | None = None
     inputs: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    autopilot: Table | None = None
+    autopilot_name: str = ""
+    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
+    absences: tuple[Absence, ...] = ()
 
     @property
     def span_s(self) -> tuple[float, float]:

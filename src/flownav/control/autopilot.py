@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import clamp, equation, magnitude
+from flownav.compile import clamp, equation, magnitude, smaller
 from flownav.control.guidance import Reference
 from flownav.frames import GRAVITY_M_S2, Rotation
 
@@ -46,6 +46,13 @@ class AutopilotGains(NamedTuple):
     roll_trim_sine: float = 0.0
     idle_collective_rad: float = 0.0
     spool_rate_rad_s: float = 0.10  # how fast the collective goes down to idle after touchdown
+    # the last metres of a precision landing: nothing of it where the limits are as here
+    pad_pos_d_m: float = 0.0  # of the reference point when the skids touch
+    land_height_m: float = 0.0  # below it the descent is held to land_speed_m_s
+    land_speed_m_s: float = 1e9
+    align_height_m: float = 0.0  # below it, down to commit_height_m, no descent while farther than align_radius_m
+    align_radius_m: float = 1e9
+    commit_height_m: float = 0.0
 
 
 class AutopilotState(NamedTuple):
@@ -129,6 +136,17 @@ def landing_logic(
 
 
 @equation
+def descent_limit(reference: Reference, estimate: Estimate, gains: AutopilotGains) -> float:
+    """How fast the vehicle may descend [m/s]: slowly near the pad, and at first only when it is above its middle."""
+    height = gains.pad_pos_d_m - estimate.pos_d
+    off_n, off_e = reference.pos_n - estimate.pos_n, reference.pos_e - estimate.pos_e
+    far = off_n * off_n + off_e * off_e > gains.align_radius_m * gains.align_radius_m
+    aligning = far and height < gains.align_height_m and height > gains.commit_height_m
+    slow = gains.land_speed_m_s if height < gains.land_height_m else gains.climb_limit_m_s + reference.vel_d
+    return 0.0 if aligning else slow
+
+
+@equation
 def outer_loop(
     state: AutopilotState,
     reference: Reference,
@@ -145,6 +163,8 @@ def outer_loop(
     vel_e = reference.vel_e + clamp(vel_e, -speed_limit, speed_limit)
     climb_limit = gains.climb_limit_m_s
     vel_d = reference.vel_d + clamp(gains.height_gain * (reference.pos_d - estimate.pos_d), -climb_limit, climb_limit)
+
+    vel_d = smaller(vel_d, descent_limit(reference, estimate, gains))
 
     # errors along the heading and across it; the body velocity in the earth frame first
     est_n = rotation[0] * estimate.u + rotation[1] * estimate.v + rotation[2] * estimate.w

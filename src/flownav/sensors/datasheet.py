@@ -266,6 +266,7 @@ class FlowSettings(ParameterModel):
     shake_frequency_hz: Number = Field(4.0, gt=0.0, le=100.0)
     shake_damping_ratio: Number = Field(0.1, gt=0.0, le=2.0)
     shake_horizontal_fraction: Number = Field(0.2, ge=-1.0, le=1.0)
+    gain_sigma: Number = Field(0.0, ge=0.0, le=0.5)
     constant_noise_m_s: Number | None = Field(None, ge=0.0, le=100.0)
     identified_height_m: Number | None = Field(None, gt=0.0, le=1000.0)
     identified_model: int | None = Field(None, ge=1, validate_default=True)

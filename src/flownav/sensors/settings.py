@@ -17,6 +17,7 @@ from flownav.sensors import gps_ins, imu
 from flownav.sensors.gauss_markov import gauss_markov_coefficients
 from flownav.sensors.gps_ins import GpsInsParameters
 from flownav.sensors.imu import ImuParameters
+from flownav.sensors.pad_fix import PadFixParameters
 from flownav.sensors.quantisation import steps_per_unit
 from flownav.sensors.rangefinder import RangefinderParameters
 
@@ -180,3 +181,23 @@ class ImuSettings(ParameterModel):
             accel_walk_m_s2=mg_m_s2 * self.accel_walk_mg_rts * rt_period,
             accel_range_m_s2=STANDARD_GRAVITY_M_S2 * self.accel_range_g,
         )
+
+
+class PadFixSettings(ParameterModel):
+    """A camera that finds the pad: noise of its angles and distance, and where it works."""
+
+    angle_sigma_rad: Number = Field(0.005, gt=0.0, le=1.0)
+    distance_sigma: Number = Field(0.02, gt=0.0, le=1.0)
+    min_height_m: Number = Field(0.3, ge=0.0, le=100.0)
+    max_height_m: Number = Field(3.0, gt=0.0, le=100.0)
+    half_view_deg: Number = Field(30.0, gt=0.0, lt=80.0)
+
+    def parameters(self) -> PadFixParameters:
+        """Coefficients of one reading."""
+        return PadFixParameters(
+            1.0, self.angle_sigma_rad, self.distance_sigma, self.min_height_m, self.max_height_m,
+            math.tan(math.radians(self.half_view_deg)),
+        )  # fmt: skip
+
+
+NO_PAD_FIX = PadFixParameters(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

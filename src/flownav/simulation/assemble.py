@@ -16,8 +16,11 @@ from flownav.estimation.discretise import discretised
 from flownav.estimation.kinematic_settings import default_settings
 from flownav.estimation.paper_filter import PaperModel
 from flownav.sensors.datasheet import FlowSensor, load_sensor
+from flownav.sensors.settings import NO_PAD_FIX
 from flownav.simulation.filtering import KinematicSetup
 from flownav.simulation.flight import ATTITUDE_S, Flight, FlightPlan
+from flownav.simulation.landing_filtering import LandingSetup
+from flownav.simulation.landing_setup import landing_setup
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
@@ -60,9 +63,10 @@ def assemble(scenario: Scenario) -> Setup:
         sensors=_sensors(scenario, sensor, vehicle),
         wind=scenario.wind.parameters(),
         path=_path(scenario, vehicle),
-        gains=gains_for(vehicle, hover, math.radians(scenario.autopilot.idle_collective_deg)),
+        gains=_gains(scenario, vehicle, hover),
         paper=_paper_filter(paper) if scenario.filter.name == "paper" else None,
         kinematic=_kinematic_filter(scenario, vehicle) if scenario.filter.name == "kinematic" else None,
+        landing=_landing_filter(scenario, sensor, vehicle) if scenario.filter.name == "landing" else None,
         initial_variance=_initial_variance(scenario, paper),
         linear=_linear_truth(paper, hover) if scenario.truth == "linear" else None,
     )
@@ -78,6 +82,19 @@ def assemble(scenario: Scenario) -> Setup:
     }
     inputs = tuple(path for path in (vehicle_file, sensor_file) if path)
     return Setup(scenario, sensor, flight, hover, inputs, parameters)
+
+
+def _gains(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> AutopilotGains:
+    """The vehicle's gains with what the scenario says of position, velocity and the last metres."""
+    section = scenario.autopilot
+    precision = {} if section.precision is None else section.precision.model_dump()
+    return gains_for(vehicle, hover, math.radians(section.idle_collective_deg))._replace(
+        position_gain=section.position_gain_1_s,
+        velocity_gain=section.velocity_gain_1_s,
+        velocity_integral=section.velocity_integral_1_s2,
+        pad_pos_d_m=-vehicle.cg_above_skid_m,
+        **precision,
+    )
 
 
 def gains_for(vehicle: VehicleParameters, hover: Trim, idle_collective_rad: float) -> AutopilotGains:
@@ -118,11 +135,13 @@ def _plan(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> Flight
         takeoff_at_s=0.0 if linear else section.takeoff_at_s,
         may_land_after_s=NEVER_S if linear or section.may_land_after_s is None else section.may_land_after_s,
         fly_on_truth=scenario.autopilot.feedback == "truth",
+        home_at_start=scenario.autopilot.home == "start",
         start_known=start_of(scenario) == "known",
         draws=Draws(
             gps_drift=scenario.gps.model != "white",
             wind=scenario.wind.speed_20ft_m_s > 0.0,
-            imu=scenario.filter.name == "kinematic",
+            imu=scenario.filter.name != "paper",
+            pad_fix=scenario.pad_fix is not None,
         ),
     )
 
@@ -164,6 +183,7 @@ def _sensors(scenario: Scenario, sensor: FlowSensor, vehicle: VehicleParameters)
         flow=scenario.flow.parameters(sensor),
         rangefinder=scenario.rangefinder.parameters(),
         imu=scenario.imu.parameters(),
+        pad_fix=scenario.pad_fix.parameters() if scenario.pad_fix else NO_PAD_FIX,
         lens_below_cg_m=vehicle.cg_above_skid_m - scenario.vehicle.lens_above_skid_m,
         pad_half_size_m=0.5 * scenario.pad.size_m,
         gps_offers_velocity=scenario.gps.velocity_sigma_total_m_s > 0.0,
@@ -186,6 +206,12 @@ def _kinematic_filter(scenario: Scenario, vehicle: VehicleParameters) -> Kinemat
         lens_below_cg_m=vehicle.cg_above_skid_m - scenario.vehicle.lens_above_skid_m,
         sonar_floor_m=scenario.rangefinder.floor_m,
     )
+
+
+def _landing_filter(scenario: Scenario, sensor: FlowSensor, vehicle: VehicleParameters) -> LandingSetup:
+    """The landing filter for these sensors."""
+    lens_below_cg_m = vehicle.cg_above_skid_m - scenario.vehicle.lens_above_skid_m
+    return landing_setup(scenario, sensor, scenario.flow.parameters(sensor), scenario.imu.parameters(), lens_below_cg_m)
 
 
 def _initial_variance(scenario: Scenario, paper: ReducedModel) -> Any:

@@ -18,6 +18,7 @@ from flownav.estimation.kinematic_settings import KinematicSettings
 from flownav.estimation.paper_filter import STATES, PaperModel
 from flownav.frames import rotation_from_quaternion, to_body
 from flownav.simulation import layout
+from flownav.simulation.landing_filtering import LandingSetup, run_landing_filter, start_landing_filter
 from flownav.simulation.layout import load_gps, load_imu_reading
 from flownav.simulation.sensing import EPOCH_S, RANGE_EPOCHS
 
@@ -36,30 +37,52 @@ class KinematicSetup(NamedTuple):
 
 
 @equation
-def start_filter(work: Work, lanes: Lanes, variance: NDArray[np.float64], start_known: bool) -> None:
-    """x: the known start, or the first GPS position; velocity zero. P = diag(variance)."""
-    start(work, lanes, layout.FILTER, STATES, variance)
-    for component in range(3):
-        for lane in range(len(lanes)):
-            known = work[(layout.HELICOPTER + component) * len(lanes) + lane]
-            measured = work[(layout.MEASURED + component) * len(lanes) + lane]
-            position = known if start_known else measured
-            work[(layout.FILTER.state + component) * len(lanes) + lane] = position
+def start_filter(
+    work: Work, lanes: Lanes, variance: NDArray[np.float64], start_known: bool, landing: LandingSetup | None
+) -> None:
+    """x: the known start, or the first GPS position; velocity zero. P = diag(variance), or the landing filter's own."""
+    if landing is None:
+        start(work, lanes, layout.FILTER, STATES, variance)
+        for component in range(3):
+            for lane in range(len(lanes)):
+                known = work[(layout.HELICOPTER + component) * len(lanes) + lane]
+                measured = work[(layout.MEASURED + component) * len(lanes) + lane]
+                position = known if start_known else measured
+                work[(layout.FILTER.state + component) * len(lanes) + lane] = position
+    else:
+        start_landing_filter(work, lanes, landing, start_known)
 
 
 @equation
 def run_filter(
-    work: Work, lanes: Lanes, epoch: int, paper: PaperModel | None, kinematic: KinematicSetup | None
+    work: Work,
+    lanes: Lanes,
+    epoch: int,
+    paper: PaperModel | None,
+    kinematic: KinematicSetup | None,
+    landing: LandingSetup | None,
 ) -> None:
     """Predict over the last epoch, correct with this one's readings, and say what is estimated.
 
     The compiler drops a branch whose filter is None, for which the tests must stand nested as they do.
     """
-    if paper is None:
-        if kinematic is not None:
-            run_kinematic_filter(work, lanes, epoch, kinematic)
+    if landing is None:
+        if paper is None:
+            if kinematic is not None:
+                run_kinematic_filter(work, lanes, epoch, kinematic)
+        else:
+            run_paper_filter(work, lanes, epoch, paper)
+        say_ins_attitude(work, lanes)
     else:
-        run_paper_filter(work, lanes, epoch, paper)
+        run_landing_filter(work, lanes, epoch, landing)
+
+
+@equation
+def say_ins_attitude(work: Work, lanes: Lanes) -> None:
+    """A filter without an attitude of its own says the INS's."""
+    for i in range(4):
+        for lane in range(len(lanes)):
+            work[(layout.ESTIMATED_ATTITUDE + i) * len(lanes) + lane] = work[(layout.GPS + 6 + i) * len(lanes) + lane]
 
 
 # -- the paper's ------------------------------------------------------------------------------------------

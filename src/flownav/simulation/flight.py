@@ -33,6 +33,7 @@ from flownav.sensors.rangefinder import slant_range
 from flownav.simulation import layout
 from flownav.simulation.filtering import KinematicSetup, run_filter, start_filter
 from flownav.simulation.history import write_history
+from flownav.simulation.landing_filtering import LandingSetup
 from flownav.simulation.layout import (
     load_autopilot,
     load_estimate,
@@ -80,12 +81,13 @@ class FlightPlan(NamedTuple):
     takeoff_at_s: float
     may_land_after_s: float
     fly_on_truth: bool
+    home_at_start: bool  # the pad is where the estimate first puts the start, else at the filter's origin
     start_known: bool  # the filter starts at the true position, else at the first GPS reading
     draws: Draws
 
 
 class Flight(NamedTuple):
-    """Everything constant over a flight: one of `paper` and `kinematic`; `linear` only for that truth."""
+    """Everything constant over a flight: one of `paper`, `kinematic` and `landing`; `linear` only for that truth."""
 
     plan: FlightPlan
     vehicle: VehicleParameters
@@ -95,6 +97,7 @@ class Flight(NamedTuple):
     gains: AutopilotGains
     paper: PaperModel | None
     kinematic: KinematicSetup | None
+    landing: LandingSetup | None
     initial_variance: NDArray[np.float64]
     linear: LinearTruth | None
 
@@ -103,7 +106,12 @@ class Flight(NamedTuple):
 @equation
 def start_block(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight) -> None:
     """Vehicle, wind, sensors, autopilot and filter before the first epoch."""
-    draw_epoch(work, lanes, seed, first, START_STEP, flight.plan.draws)
+    for group in range(3):
+        draw_epoch(work, lanes, seed, first, START_STEP + 2 - group, flight.plan.draws)
+        for i in range(3):
+            for lane in range(len(lanes)):
+                normal = work[(layout.FLOW_NORMALS + i) * len(lanes) + lane]
+                work[(layout.START_NORMALS + 3 * group + i) * len(lanes) + lane] = normal
     for lane in range(len(lanes)):
         store_helicopter(work, lanes, lane, flight.plan.start)
         store_wind(work, lanes, lane, start_wind(load_wind_normals(work, lanes, lane), flight.wind))
@@ -138,7 +146,8 @@ def estimate_for_autopilot(work: Work, lanes: Lanes, flight: Flight) -> None:
 def note_home(work: Work, lanes: Lanes, epoch: int, reference: Reference, flight: Flight) -> None:
     """Where the estimate puts the pad: noted at the start and for as long as the skids stay on it before take-off."""
     for lane in range(len(lanes)):
-        waiting = epoch == 0 or (epoch * EPOCH_S < flight.plan.takeoff_at_s and flight.plan.starts_on_ground)
+        parked = epoch * EPOCH_S < flight.plan.takeoff_at_s and flight.plan.starts_on_ground
+        waiting = flight.plan.home_at_start and (epoch == 0 or parked)
         estimate = load_estimate(work, lanes, lane)
         home_n, home_e, home_d = (
             estimate.pos_n - reference.pos_n,
@@ -257,8 +266,8 @@ def fly_block(flight: Flight, seed: int, first: int, lanes: Lanes, work: Work, h
         blow(work, lanes, flight.wind)
         sense(work, lanes, epoch, flight.sensors, flight.vehicle.gravity_m_s2)
         if epoch == 0:
-            start_filter(work, lanes, flight.initial_variance, flight.plan.start_known)
-        run_filter(work, lanes, epoch, flight.paper, flight.kinematic)
+            start_filter(work, lanes, flight.initial_variance, flight.plan.start_known, flight.landing)
+        run_filter(work, lanes, epoch, flight.paper, flight.kinematic, flight.landing)
         estimate_for_autopilot(work, lanes, flight)
         note_home(work, lanes, epoch, reference, flight)
         command(work, lanes, t_s, reference, flight)

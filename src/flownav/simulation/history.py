@@ -18,7 +18,8 @@ from flownav.simulation.layout import load_autopilot, load_helicopter
 _COPIED: tuple[tuple[str, tuple[str, ...], int], ...] = (
     ("truth", (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, *TABLES["truth"][10:13]), layout.HELICOPTER),
     ("truth", ("thrust_n", "contact_n"), layout.THRUST),
-    ("estimate", (*POSITION_NED, *VELOCITY_BODY), layout.ESTIMATED),
+    ("estimate", (*POSITION_NED, *VELOCITY_BODY, *QUATERNION), layout.ESTIMATED),
+    ("estimate", ("nees",), layout.NEES),
     ("gps", ("pos_n_m", "pos_e_m", "pos_d_m", "vel_n_m_s", "vel_e_m_s", "vel_d_m_s", *QUATERNION), layout.GPS),
     ("flow", (*VELOCITY_BODY, "engaged"), layout.FLOW_READING),
     ("flow", ("sigma_m_s",), layout.FLOW_SIGMA),
@@ -27,6 +28,7 @@ _COPIED: tuple[tuple[str, tuple[str, ...], int], ...] = (
     ("range", ("range_m", "valid"), layout.RANGE),
     ("imu", ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s", "accel_x_m_s2", "accel_y_m_s2", "accel_z_m_s2"),
      layout.IMU_READING),
+    ("pad", ("tan_forward", "tan_right", "distance_m", "valid"), layout.PAD_READING),
     ("innovation", tuple(f"innovation_{i}" for i in range(STATES)), layout.INNOVATION),
     ("innovation", tuple(f"innovation_variance_{i}" for i in range(STATES)), layout.INNOVATION + STATES),
     ("command", ("lon_rad", "lat_rad", "col_rad", "ped_rad"), layout.CONTROLS),

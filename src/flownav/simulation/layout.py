@@ -9,10 +9,12 @@ from __future__ import annotations
 from flownav.compile import lane_access
 from flownav.control.autopilot import AutopilotState, Estimate
 from flownav.estimation.kinematic_filter import KINEMATIC_ROW_COUNT, kinematic_rows
+from flownav.estimation.landing.states import LANDING_ROW_COUNT, landing_rows
 from flownav.estimation.paper_filter import INPUTS, STATES
 from flownav.sensors.flow import FlowState
 from flownav.sensors.gps_ins import GpsInsErrors, GpsInsNormals, NavSolution
 from flownav.sensors.imu import ImuNormals, ImuReading, ImuState
+from flownav.sensors.pad_fix import PadFixNormals, PadFixReading
 from flownav.sensors.rangefinder import RangefinderState
 from flownav.simulation.wind import WindNormals, WindState, WindVelocity
 from flownav.vehicle.state import Controls, HelicopterState, Inflow
@@ -44,6 +46,7 @@ AIR = _rows.take(len(WindVelocity._fields))
 THRUST = _rows.take(1)  # main rotor thrust [N]
 CONTACT = _rows.take(1)  # total skid load [N]
 PREVIOUS_VELOCITY = _rows.take(3)  # NED velocity one epoch ago [m/s]
+PREVIOUS_ATTITUDE = _rows.take(4)  # attitude one epoch ago
 
 # the sensors
 GPS_ERRORS = _rows.take(len(GpsInsErrors._fields))
@@ -55,7 +58,9 @@ FLOW_READING = _rows.take(4)  # u, v, w [m/s], and whether the sensor is engaged
 FLOW_SIGMA = _rows.take(1)  # of the published flow velocity [m/s]
 RANGE = _rows.take(2)  # the latest reading [m] and whether it is valid
 IMU = _rows.take(len(ImuState._fields))
+IMU_BIAS = IMU + ImuState._fields.index("accel_bias_x")
 IMU_READING = _rows.take(len(ImuReading._fields))
+PAD_READING = _rows.take(len(PadFixReading._fields))
 
 # standard normals of the epoch: pairs in the order of drawing
 GPS_NORMALS = _rows.take(len(GpsInsNormals._fields))
@@ -63,6 +68,7 @@ GPS_JITTER = GPS_NORMALS + GpsInsNormals._fields.index("jitter_n")
 FLOW_NORMALS = _rows.take(4)  # u, v, w, range
 WIND_NORMALS = _rows.take(len(WindNormals._fields) + len(WindNormals._fields) % 2)
 IMU_NORMALS = _rows.take(len(ImuNormals._fields))
+PAD_NORMALS = _rows.take(len(PadFixNormals._fields))
 NORMALS_END = _rows.next
 
 # the filter that flies: state and covariance, attitude and force for the kinematic one; inputs and measurements
@@ -72,11 +78,20 @@ OFFER = _rows.take(3)  # a reading, its variance, and whether it is here
 INPUT = _rows.take(INPUTS)
 MEASURED = _rows.take(STATES)
 ARRIVED = _rows.take(STATES)
+SCORED = STATES
 INNOVATION = _rows.take(2 * STATES)  # of each component, then their variances
+
+LANDING = landing_rows(_rows.take(LANDING_ROW_COUNT))
+START_NORMALS = _rows.take(9)  # of this flight's start: position, velocity, accelerometer bias
+STILL = _rows.take(1)  # 1.0 where the vehicle stands on its skids
+ALWAYS = _rows.take(1)  # 1.0
+NOTHING = _rows.take(1)  # 0.0
 
 # what the filter says, whichever flies: position NED and body velocity, and their variances
 ESTIMATED = _rows.take(STATES)
+ESTIMATED_ATTITUDE = _rows.take(4)
 VARIANCE = _rows.take(STATES)
+NEES = _rows.take(1)  # of position and velocity NED; 0 where the filter does not say
 
 # the autopilot
 ESTIMATE = _rows.take(len(Estimate._fields))  # what it flies on
@@ -102,5 +117,7 @@ load_imu_reading, store_imu_reading = lane_access(ImuReading, IMU_READING)
 load_gps_normals, _ = lane_access(GpsInsNormals, GPS_NORMALS)
 load_wind_normals, _ = lane_access(WindNormals, WIND_NORMALS)
 load_imu_normals, _ = lane_access(ImuNormals, IMU_NORMALS)
+load_pad_normals, _ = lane_access(PadFixNormals, PAD_NORMALS)
+load_pad_reading, store_pad_reading = lane_access(PadFixReading, PAD_READING)
 load_estimate, store_estimate = lane_access(Estimate, ESTIMATE)
 load_autopilot, store_autopilot = lane_access(AutopilotState, AUTOPILOT)

@@ -15,10 +15,10 @@ from pydantic import Field, ValidationInfo, field_validator
 from flownav.errors import InputError
 from flownav.parameter_files import Number, ParameterModel, load, shipped
 from flownav.sensors.datasheet import FlowSettings
-from flownav.sensors.settings import GpsInsSettings, ImuSettings, RangefinderSettings
+from flownav.sensors.settings import GpsInsSettings, ImuSettings, PadFixSettings, RangefinderSettings
 from flownav.simulation.wind import WindSettings
 
-SHIPPED = ("takeoff", "landing", "gusty")
+SHIPPED = ("takeoff", "landing", "gusty", "pad_return", "approach")
 
 
 class Knot(ParameterModel):
@@ -78,14 +78,34 @@ class VehicleSection(ParameterModel):
 class FilterSection(ParameterModel):
     """Which filter flies, and where it starts: at the known pad, or at the first GPS reading."""
 
-    name: Literal["paper", "kinematic"] = "paper"
+    name: Literal["paper", "kinematic", "landing"] = "landing"
+    flow_min_height_m: Number = Field(0.3, ge=0.0, le=100.0)
     start: Literal["known", "gps"] | None = None
 
 
+class PrecisionSection(ParameterModel):
+    """The last metres of a precision landing (as PX4's): descend slowly, align above the pad's middle, then commit."""
+
+    land_height_m: Number = Field(3.0, gt=0.0, le=100.0)
+    land_speed_m_s: Number = Field(0.3, gt=0.0, le=5.0)
+    align_height_m: Number = Field(0.6, gt=0.0, le=100.0)
+    align_radius_m: Number = Field(0.03, gt=0.0, le=100.0)
+    commit_height_m: Number = Field(0.3, ge=0.0, le=100.0)
+
+
 class AutopilotSection(ParameterModel):
-    """What the autopilot flies on, and the collective on the skids."""
+    """What the autopilot flies on, where it takes the pad to be, and the collective on the skids.
+
+    home: "start" puts the pad where the estimate first puts the start of the path (a vehicle that returns to where
+    it was), "origin" at the filter's origin (a vehicle that comes from elsewhere).
+    """
 
     feedback: Literal["estimate", "truth"] = "estimate"
+    home: Literal["start", "origin"] = "start"
+    position_gain_1_s: Number = Field(0.5, gt=0.0, le=5.0)
+    velocity_gain_1_s: Number = Field(1.1, gt=0.0, le=10.0)
+    velocity_integral_1_s2: Number = Field(0.25, ge=0.0, le=10.0)
+    precision: PrecisionSection | None = None
     idle_collective_deg: Number = Field(0.0, ge=-10.0, le=10.0)
 
 
@@ -105,6 +125,7 @@ class Scenario(ParameterModel):
     flow_sensor: str | None = None
     rangefinder: RangefinderSettings = RangefinderSettings()
     imu: ImuSettings = ImuSettings()
+    pad_fix: PadFixSettings | None = None
     wind: WindSettings = WindSettings()
     filter: FilterSection = FilterSection()
     autopilot: AutopilotSection = AutopilotSection()

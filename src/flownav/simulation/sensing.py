@@ -4,13 +4,23 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from flownav.compile import equation
 from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import rotation_from_quaternion, to_body, to_earth
 from flownav.sensors.angular_flow import angular_flow
 from flownav.sensors.flow import FlowParameters, engage_flow, read_flow, start_flow
-from flownav.sensors.gps_ins import GpsInsParameters, GpsInsState, NavSolution, start_gps_ins, step_gps_ins
+from flownav.sensors.gps_ins import (
+    GpsInsParameters,
+    GpsInsState,
+    NavSolution,
+    quaternion_product,
+    start_gps_ins,
+    step_gps_ins,
+)
 from flownav.sensors.imu import ImuParameters, ImuReading, start_imu, step_imu
+from flownav.sensors.pad_fix import PadFixParameters, read_pad
 from flownav.sensors.rangefinder import RangefinderParameters, start_rangefinder, step_rangefinder
 from flownav.simulation import layout
 from flownav.simulation.layout import (
@@ -22,6 +32,7 @@ from flownav.simulation.layout import (
     load_helicopter,
     load_imu,
     load_imu_normals,
+    load_pad_normals,
     load_rangefinder,
     store_flow,
     store_gps,
@@ -29,6 +40,7 @@ from flownav.simulation.layout import (
     store_gps_held,
     store_imu,
     store_imu_reading,
+    store_pad_reading,
     store_rangefinder,
 )
 from flownav.simulation.noise import normal_pair
@@ -36,6 +48,7 @@ from flownav.vehicle.helicopter import HelicopterState
 
 EPOCH_S = 0.02  # the GPS/INS unit, the published flow and the filters: 50 Hz
 RANGE_EPOCHS = 5  # the rangefinder: 10 Hz
+PAD_EPOCHS = 5  # the pad-relative fix: 10 Hz
 
 
 class SensorSuite(NamedTuple):
@@ -45,6 +58,7 @@ class SensorSuite(NamedTuple):
     flow: FlowParameters
     rangefinder: RangefinderParameters
     imu: ImuParameters
+    pad_fix: PadFixParameters
     lens_below_cg_m: float
     pad_half_size_m: float
     gps_offers_velocity: bool  # the unit's own velocity serves while the flow sensor is not engaged
@@ -56,6 +70,7 @@ class Draws(NamedTuple):
     gps_drift: bool  # everything of the GPS/INS but the position's jitter, which is always drawn
     wind: bool
     imu: bool
+    pad_fix: bool
 
 
 @equation
@@ -81,7 +96,9 @@ def draw_epoch(work: Work, lanes: Lanes, seed: int, flight: int, step: int, draw
     if draws.wind:
         draw_normals(work, lanes, layout.WIND_NORMALS, layout.IMU_NORMALS, seed, flight, step)
     if draws.imu:
-        draw_normals(work, lanes, layout.IMU_NORMALS, layout.NORMALS_END, seed, flight, step)
+        draw_normals(work, lanes, layout.IMU_NORMALS, layout.PAD_NORMALS, seed, flight, step)
+    if draws.pad_fix:
+        draw_normals(work, lanes, layout.PAD_NORMALS, layout.NORMALS_END, seed, flight, step)
 
 
 @equation
@@ -102,7 +119,10 @@ def lens_height(state: HelicopterState, cosine: float, lens_below_cg_m: float) -
 
 @equation
 def true_imu(work: Work, lanes: Lanes, lane: int, gravity_m_s2: float) -> ImuReading:
-    """Body rates, and the specific force averaged over the last epoch: (delta v / dt - g) turned to the body."""
+    """Means over the last epoch in body axes, as an integrating IMU has them.
+
+    Rate: the turn q0* q1 as a vector, over dt. Specific force: delta v / dt - g in the attitude of the middle.
+    """
     state = load_helicopter(work, lanes, lane)
     rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
     vel_n, vel_e, vel_d = to_earth(rotation, state.u, state.v, state.w)
@@ -113,8 +133,21 @@ def true_imu(work: Work, lanes: Lanes, lane: int, gravity_m_s2: float) -> ImuRea
     work[row * len(lanes) + lane] = vel_n
     work[(row + 1) * len(lanes) + lane] = vel_e
     work[(row + 2) * len(lanes) + lane] = vel_d
-    force_x, force_y, force_z = to_body(rotation, accel_n, accel_e, accel_d - gravity_m_s2)
-    return ImuReading(state.p, state.q, state.r, force_x, force_y, force_z)
+    row = layout.PREVIOUS_ATTITUDE
+    w, x = work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane]
+    y, z = work[(row + 2) * len(lanes) + lane], work[(row + 3) * len(lanes) + lane]
+    turn = quaternion_product((w, -x, -y, -z), (state.qw, state.qx, state.qy, state.qz))
+    half_square = turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3]
+    per_s = 2.0 * (1.0 + half_square / 6.0) / EPOCH_S
+    w, x, y, z = w + state.qw, x + state.qx, y + state.qy, z + state.qz
+    shrink = 1.0 / np.sqrt(w * w + x * x + y * y + z * z)
+    middle = rotation_from_quaternion(w * shrink, x * shrink, y * shrink, z * shrink)
+    work[row * len(lanes) + lane] = state.qw
+    work[(row + 1) * len(lanes) + lane] = state.qx
+    work[(row + 2) * len(lanes) + lane] = state.qy
+    work[(row + 3) * len(lanes) + lane] = state.qz
+    force_x, force_y, force_z = to_body(middle, accel_n, accel_e, accel_d - gravity_m_s2)
+    return ImuReading(per_s * turn[1], per_s * turn[2], per_s * turn[3], force_x, force_y, force_z)
 
 
 @equation
@@ -126,6 +159,10 @@ def start_sensors(work: Work, lanes: Lanes, suite: SensorSuite, mass_kg: float, 
         work[layout.PREVIOUS_VELOCITY * len(lanes) + lane] = truth.vel_n_m_s
         work[(layout.PREVIOUS_VELOCITY + 1) * len(lanes) + lane] = truth.vel_e_m_s
         work[(layout.PREVIOUS_VELOCITY + 2) * len(lanes) + lane] = truth.vel_d_m_s
+        work[layout.PREVIOUS_ATTITUDE * len(lanes) + lane] = state.qw
+        work[(layout.PREVIOUS_ATTITUDE + 1) * len(lanes) + lane] = state.qx
+        work[(layout.PREVIOUS_ATTITUDE + 2) * len(lanes) + lane] = state.qy
+        work[(layout.PREVIOUS_ATTITUDE + 3) * len(lanes) + lane] = state.qz
         gps = start_gps_ins(truth, load_gps_normals(work, lanes, lane), suite.gps)
         store_gps_errors(work, lanes, lane, gps.errors)
         store_gps_held(work, lanes, lane, gps.held)
@@ -200,6 +237,20 @@ def read_flow_sensor(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
 
 
 @equation
+def read_pad_fix(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
+    """Where the camera sees the pad (10 Hz)."""
+    for lane in range(len(lanes)):
+        state = load_helicopter(work, lanes, lane)
+        rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
+        lens = suite.lens_below_cg_m
+        reading = read_pad(
+            state.pos_n + rotation[2] * lens, state.pos_e + rotation[5] * lens, state.pos_d + rotation[8] * lens,
+            rotation, load_pad_normals(work, lanes, lane), suite.pad_fix,
+        )  # fmt: skip
+        store_pad_reading(work, lanes, lane, reading)
+
+
+@equation
 def choose_velocity(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
     """The velocity of the paper's measurement: flow where it is engaged, else the GPS/INS's own, turned to the body."""
     for lane in range(len(lanes)):
@@ -233,6 +284,8 @@ def sense(work: Work, lanes: Lanes, epoch: int, suite: SensorSuite, gravity_m_s2
     read_flow_sensor(work, lanes, suite)
     choose_velocity(work, lanes, suite)
     read_imu(work, lanes, suite, gravity_m_s2)
+    if epoch % PAD_EPOCHS == 0:
+        read_pad_fix(work, lanes, suite)
     for component in range(3):
         for lane in range(len(lanes)):
             position = work[(layout.GPS + component) * len(lanes) + lane]

@@ -17,7 +17,6 @@ from flownav.estimation.landing.observe import (
     GPS_POSITION_STATES,
     GPS_VELOCITY_STATES,
     LAGGED_FLOW_STATES,
-    PAD_STATES,
     RANGE_STATES,
     STATE_ITSELF,
     observe_attitude,
@@ -25,12 +24,12 @@ from flownav.estimation.landing.observe import (
     observe_gps_position,
     observe_gps_velocity,
     observe_lagged_flow,
-    observe_pad,
     observe_range,
     observe_state,
     offer,
     rotation_of,
 )
+from flownav.estimation.landing.observe_pad import PAD_STATES, observe_pad
 from flownav.estimation.landing.predict import predict
 from flownav.estimation.landing.settings import FlowLag, LandingSettings
 from flownav.estimation.landing.states import ACCEL_BIAS, GROUND, POSITION, STATES, VELOCITY

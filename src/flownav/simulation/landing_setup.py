@@ -154,10 +154,11 @@ def flow_lag(sensor: FlowSensor, flow: FlowParameters, lens_below_cg_m: float) -
     step, inlet = np.array([[f11, f12], [f21, f22]]), np.array([g1, g2])
     steps = round(EPOCH_S / PERIOD_S)
     powers = [np.linalg.matrix_power(step, steps - 1 - i) for i in range(steps)]
-    start = sum(power @ inlet * (1.0 - i / steps) for i, power in enumerate(powers))
-    end = sum(power @ inlet * (i / steps) for i, power in enumerate(powers))
+    start = np.sum([power @ inlet * (1.0 - i / steps) for i, power in enumerate(powers)], axis=0)
+    end = np.sum([power @ inlet * (i / steps) for i, power in enumerate(powers)], axis=0)
     whole = np.linalg.matrix_power(step, steps)
     return FlowLag(
-        *map(float, whole.ravel()), *map(float, start), *map(float, end),
-        gain=sensor.dynamics.a_1_s2, sonar_floor_m=flow.sonar_floor_m, lens_below_m=lens_below_cg_m,
+        float(whole[0, 0]), float(whole[0, 1]), float(whole[1, 0]), float(whole[1, 1]),
+        float(start[0]), float(start[1]), float(end[0]), float(end[1]),
+        sensor.dynamics.a_1_s2, flow.sonar_floor_m, lens_below_cg_m,
     )  # fmt: skip

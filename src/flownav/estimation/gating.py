@@ -21,6 +21,11 @@ class Reason(IntEnum):
     BEFORE_START = 7
     DATUM = 8
     OUTAGE = 9
+    DUPLICATE = 10
+    LATE = 11
+    STUCK = 12
+    NEAR_GROUND = 13
+    NOT_NEEDED = 14
 
     @property
     def label(self) -> str:
@@ -44,4 +49,9 @@ MESSAGES: dict[Reason, str] = {
     Reason.BEFORE_START: "The filter had not started: it waits for an attitude and a first position.",
     Reason.DATUM: "The reading set the sensor's datum (ground level, pressure offset) and holds no more news.",
     Reason.OUTAGE: "The user withheld the reading (a GPS cut, or no flow); its innovation is still shown.",
+    Reason.DUPLICATE: "The same reading came before, or one of this sensor that is not older.",
+    Reason.LATE: "The reading describes a time that the filter has left behind.",
+    Reason.STUCK: "The sensor repeats one value while the vehicle moves.",
+    Reason.NEAR_GROUND: "The vehicle is nearer to the ground than the sensor can be trusted.",
+    Reason.NOT_NEEDED: "Another source of the same kind serves; this one is only watched.",
 }

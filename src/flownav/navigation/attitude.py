@@ -1,0 +1,101 @@
+"""Attitude and heading readings: an external attitude where there is no IMU, a magnetometer, an external heading."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flownav.compile import ONE_LANE, kernel
+from flownav.estimation.landing.observe import (
+    ATTITUDE_STATES,
+    HEADING_STATES,
+    observe_attitude,
+    observe_heading,
+    rotation_of,
+)
+from flownav.frames import to_earth
+from flownav.navigation.offers import FUSED, NOT_FINITE, conclude, put, usable
+from flownav.navigation.state import (
+    FROM_ATTITUDE,
+    FROM_MAG,
+    MAG_HEADING,
+    ROWS,
+    STARTED,
+    USE_ATTITUDE,
+    USE_HEADING,
+    VALUE,
+    Reading,
+    Running,
+)
+
+LEAST_FIELD_GAUSS = 1e-3
+
+
+@kernel
+def take_attitude(reading: Reading, on: Running) -> None:
+    """An autopilot's or INS's attitude: all of it where no IMU serves, its heading where nothing else gives one."""
+    value, memory, work = reading.value, on.memory, on.work
+    if memory[STARTED] == 0.0 or (memory[USE_ATTITUDE] == 0.0 and memory[USE_HEADING] != FROM_ATTITUDE):
+        return
+    size = np.sqrt(value[0] ** 2 + value[1] ** 2 + value[2] ** 2 + value[3] ** 2)
+    reason = usable(reading.quality, size, 0.0, on)
+    if reason == FUSED and not 0.5 < size < 2.0:
+        reason = NOT_FINITE
+    if reason != FUSED:
+        return
+    for i in range(4):
+        work[VALUE + i] = value[i] / size
+    if memory[USE_ATTITUDE] > 0.0:
+        for axis in range(3):
+            sigma = on.settings.heading_white_rad if axis == 2 else on.settings.ins_tilt_white_rad
+            observe_attitude(work, ONE_LANE, ROWS, axis, VALUE, 0.0)
+            observation = work[ROWS.innovation]
+            put(sigma * sigma, reason, on)
+            conclude(reading, axis, observation, ATTITUDE_STATES[axis], reason, on)
+    else:
+        w, x, y, z = work[VALUE], work[VALUE + 1], work[VALUE + 2], work[VALUE + 3]
+        heading = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+        offer_heading(reading, heading, on.settings.heading_white_rad**2, reason, on)
+
+
+@kernel
+def magnetic_heading(on: Running) -> float:
+    """The heading that the latest magnetometer reading and the filter's tilt give, from magnetic north [rad]."""
+    rotation = rotation_of(on.work, ONE_LANE, ROWS, 0)
+    return np.arctan2(rotation[3], rotation[0]) - on.memory[MAG_HEADING]
+
+
+@kernel
+def take_mag(reading: Reading, on: Running) -> None:
+    """A magnetometer: the level field points to magnetic north; the declination is part of the heading error state."""
+    value, memory = reading.value, on.memory
+    if memory[USE_HEADING] != FROM_MAG:
+        return
+    rotation = rotation_of(on.work, ONE_LANE, ROWS, 0)
+    north, east, _ = to_earth(rotation, value[0], value[1], value[2])
+    field = np.sqrt(north * north + east * east)
+    reason = usable(reading.quality, field, 0.0, on)
+    if not field > LEAST_FIELD_GAUSS:
+        return
+    memory[MAG_HEADING] = np.arctan2(east, north)
+    if memory[STARTED] > 0.0:
+        offer_heading(reading, magnetic_heading(on), on.settings.heading_white_rad**2, reason, on)
+
+
+@kernel
+def take_yaw(reading: Reading, on: Running) -> None:
+    """An external heading."""
+    variance = reading.variance[0]
+    if np.isnan(variance):
+        variance = on.settings.heading_white_rad**2
+    reason = usable(reading.quality, reading.value[0], variance, on)
+    if on.memory[STARTED] > 0.0:
+        offer_heading(reading, reading.value[0], variance, reason, on)
+
+
+@kernel
+def offer_heading(reading: Reading, heading_rad: float, variance: float, reason: int, on: Running) -> None:
+    """A heading, with its slow error as a state."""
+    on.work[VALUE] = heading_rad
+    observe_heading(on.work, ONE_LANE, ROWS, VALUE)
+    put(variance, reason, on)
+    conclude(reading, 0, heading_rad, HEADING_STATES, reason, on)

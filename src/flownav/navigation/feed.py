@@ -1,0 +1,60 @@
+"""From streams to a navigator that is ready for them: which sensors serve, and the queue they are fed in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flownav.measurement import Array, Sensor, Stream
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.state import (
+    DEADLINE,
+    FLOW_GYRO_IS_IMU,
+    FROM_ATTITUDE,
+    FROM_MAG,
+    NO_HEADING,
+    USE_ATTITUDE,
+    USE_HEADING,
+    USE_IMU,
+    WORK_ROWS,
+    Running,
+    Tape,
+    new_memory,
+)
+
+SLOWEST_IMU_HZ = 20.0
+
+
+def rate_hz(t_s: Array) -> float:
+    """The usual rate of readings; 0 where there are not two."""
+    steps = np.diff(t_s)
+    steps = steps[steps > 0.0]
+    return 1.0 / float(np.median(steps)) if len(steps) else 0.0
+
+
+def imu_serves(streams: dict[Sensor, Stream]) -> bool:
+    """Whether the IMU is fast enough to move a filter."""
+    return Sensor.IMU in streams and rate_hz(streams[Sensor.IMU].t_s) >= SLOWEST_IMU_HZ
+
+
+def heading_source(streams: dict[Sensor, Stream]) -> float:
+    """Where headings come from; none where there is no earth frame to refer them to."""
+    if Sensor.GPS_POSITION not in streams and Sensor.GPS_VELOCITY not in streams:
+        return NO_HEADING
+    if Sensor.MAG in streams and len(streams[Sensor.MAG]):
+        return FROM_MAG
+    return FROM_ATTITUDE if Sensor.ATTITUDE in streams else NO_HEADING
+
+
+def new_navigator(
+    streams: dict[Sensor, Stream], first_s: float, flow_gyro_is_imu: bool, settings: NavigatorSettingsFile, tape: Tape
+) -> Running:
+    """A navigator that has heard nothing; `first_s` is the instant from which it waits for a fix."""
+    memory = new_memory()
+    memory[USE_IMU] = float(imu_serves(streams))
+    memory[USE_ATTITUDE] = float(not imu_serves(streams) and Sensor.ATTITUDE in streams)
+    memory[USE_HEADING] = heading_source(streams)
+    memory[FLOW_GYRO_IS_IMU] = float(flow_gyro_is_imu)
+    fixes = Sensor.GPS_POSITION in streams and bool(np.any(streams[Sensor.GPS_POSITION].quality > 0.0))
+    memory[DEADLINE] = first_s + float(settings.start_wait_s) if fixes else -np.inf
+    headed = memory[USE_HEADING] != NO_HEADING or memory[USE_ATTITUDE] > 0.0
+    return Running(settings.settings(), settings.start_sigma(has_heading=headed), np.zeros(WORK_ROWS), memory, tape)

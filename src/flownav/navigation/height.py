@@ -1,0 +1,130 @@
+"""Height readings: the rangefinder over ground whose level is a state, and the barometer with its offset."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flownav.compile import ONE_LANE, kernel
+from flownav.estimation.landing.algebra import forget
+from flownav.estimation.landing.observe import BARO_STATES, RANGE_STATES, observe_baro, observe_range, rotation_of
+from flownav.estimation.landing.states import BARO, GROUND, POSITION
+from flownav.navigation.offers import (
+    DATUM,
+    FUSED,
+    INNOVATION_GATE,
+    OUT_OF_RANGE,
+    STUCK,
+    TILTED,
+    conclude,
+    put,
+    usable,
+)
+from flownav.navigation.state import (
+    BARO_FOUND,
+    BARO_KNOWN,
+    GROUND_FOUND,
+    GROUND_RESET,
+    GROUND_SET,
+    RANGE_CLOCK,
+    RANGE_LAST,
+    RANGE_SAME_SINCE,
+    RANGE_SINCE,
+    RANGE_STUCK,
+    RANGE_TRAVEL,
+    ROWS,
+    STARTED,
+    VALUE,
+    Reading,
+    Running,
+    write_event,
+)
+
+UNKNOWN_M = 100.0
+
+
+@kernel
+def range_variance(range_m: float, on: Running) -> float:
+    """Variance of a range reading [m2]: a floor and a share of the range."""
+    share = on.settings.range_relative_sigma * range_m
+    return on.settings.range_sigma_m * on.settings.range_sigma_m + share * share
+
+
+@kernel
+def stuck(reading: Reading, on: Running) -> bool:
+    """Whether the range repeats one value to the last digit while the filter's height travels."""
+    memory, settings, range_m = on.memory, on.settings, reading.value[0]
+    if range_m != memory[RANGE_LAST]:
+        memory[RANGE_LAST], memory[RANGE_SAME_SINCE], memory[RANGE_TRAVEL] = range_m, reading.t_s, 0.0
+        return False
+    lasting = reading.t_s - memory[RANGE_SAME_SINCE] >= settings.range_stuck_s
+    return lasting and abs(memory[RANGE_TRAVEL]) >= settings.range_stuck_travel_m
+
+
+@kernel
+def take_range(reading: Reading, on: Running) -> None:
+    """Height over the ground below. Where range is rejected for long, the ground has a step."""
+    t_s, memory, settings, work = reading.t_s, on.memory, on.settings, on.work
+    range_m, noise = reading.value[0], reading.variance[0]
+    if np.isnan(noise):
+        noise = range_variance(range_m, on)
+    reason = usable(reading.quality, range_m, noise, on)
+    if memory[STARTED] == 0.0:
+        return
+    upright = rotation_of(work, ONE_LANE, ROWS, 0)[8]
+    if reason == FUSED and not settings.range_min_m <= range_m <= settings.range_max_m:
+        reason = OUT_OF_RANGE
+    if reason == FUSED and upright < np.cos(settings.tilt_limit_rad):
+        reason = TILTED
+    if reason == FUSED and stuck(reading, on):
+        reason = STUCK
+        if t_s - memory[RANGE_CLOCK] < settings.range_stuck_s:
+            write_event(t_s, RANGE_STUCK, range_m, on.tape)
+            memory[RANGE_CLOCK] -= settings.range_stuck_s
+    below = work[ROWS.state + POSITION + 2] + (range_m + settings.range_below_m) * upright
+    if reason == FUSED and memory[GROUND_SET] == 0.0:
+        set_ground(below, on)
+        memory[GROUND_SET] = 1.0
+        write_event(t_s, GROUND_FOUND, below, on.tape)
+    work[VALUE] = range_m
+    observe_range(work, ONE_LANE, ROWS, VALUE, settings.range_below_m)
+    put(noise, reason, on)
+    reason = conclude(reading, 0, range_m, RANGE_STATES, reason, on)
+    if reason == FUSED or reason == DATUM:  # noqa: SIM109
+        memory[RANGE_CLOCK], memory[RANGE_SINCE] = t_s, np.nan
+    elif reason == INNOVATION_GATE:
+        if np.isnan(memory[RANGE_SINCE]):
+            memory[RANGE_SINCE] = t_s
+        if t_s - memory[RANGE_SINCE] >= settings.ground_reset_s:
+            set_ground(below, on)
+            memory[RANGE_SINCE] = np.nan
+            write_event(t_s, GROUND_RESET, below, on.tape)
+
+
+@kernel
+def set_ground(below_m: float, on: Running) -> None:
+    """The ground is unknown but for this reading, which is about to be fused."""
+    on.work[ROWS.state + GROUND] = below_m
+    on.work[VALUE] = 1.0
+    forget(on.work, ONE_LANE, ROWS, GROUND, UNKNOWN_M * UNKNOWN_M, VALUE)
+
+
+@kernel
+def take_baro(reading: Reading, on: Running) -> None:
+    """Height from pressure; the first reading finds the offset."""
+    work, memory = on.work, on.memory
+    altitude_m, noise = reading.value[0], reading.variance[0]
+    if np.isnan(noise):
+        noise = on.settings.baro_sigma_m * on.settings.baro_sigma_m
+    reason = usable(reading.quality, altitude_m, noise, on)
+    if memory[STARTED] == 0.0:
+        return
+    if reason == FUSED and memory[BARO_KNOWN] == 0.0:
+        work[ROWS.state + BARO] = altitude_m + work[ROWS.state + POSITION + 2]
+        work[VALUE] = 1.0
+        forget(work, ONE_LANE, ROWS, BARO, UNKNOWN_M * UNKNOWN_M, VALUE)
+        memory[BARO_KNOWN] = 1.0
+        write_event(reading.t_s, BARO_FOUND, work[ROWS.state + BARO], on.tape)
+    work[VALUE] = altitude_m
+    observe_baro(work, ONE_LANE, ROWS, VALUE)
+    put(noise, reason, on)
+    conclude(reading, 0, altitude_m, BARO_STATES, reason, on)

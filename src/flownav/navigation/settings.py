@@ -1,0 +1,165 @@
+"""What the navigator assumes of a vehicle's sensors where nothing better is known: keys, limits, defaults, reasons.
+
+The defaults are for any small VTOL with consumer sensors. None is fitted to a log.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from pydantic import Field
+
+from flownav.estimation.landing.settings import LandingSettings
+from flownav.parameter_files import Number, ParameterModel
+
+
+class NavigatorSettings(NamedTuple):
+    """The settings as the kernels take them; `NavigatorSettingsFile` documents each. `coasting`: without an IMU."""
+
+    filter: LandingSettings
+    coasting: LandingSettings
+    gps_white_share: float
+    gps_white_sigma_m: float
+    gps_white_sigma_down_m: float
+    gps_velocity_white_m_s: float
+    gps_velocity_white_down_m_s: float
+    ins_tilt_white_rad: float
+    heading_white_rad: float
+    flow_sigma_rad_s: float
+    flow_low_quality_sigma_rad_s: float
+    flow_floor_m_s: float
+    flow_min_height_m: float
+    flow_limit_rad_s: float
+    flow_noise_time_s: float
+    flow_gyro_time_s: float
+    flow_forward_m: float
+    flow_right_m: float
+    flow_below_m: float
+    range_below_m: float
+    range_sigma_m: float
+    range_relative_sigma: float
+    range_min_m: float
+    range_max_m: float
+    range_stuck_s: float
+    range_stuck_travel_m: float
+    baro_sigma_m: float
+    pad_angle_sigma_rad: float
+    pad_distance_sigma: float
+    pose_sigma_m: float
+    still_sigma_m_s: float
+    tilt_limit_rad: float
+    imu_stale_s: float
+    height_hold_s: float
+    ground_reset_s: float
+    gps_reset_s: float
+    dead_reckoning_s: float
+    invalid_s: float
+    start_wait_s: float
+    levelling_s: float
+
+
+class NavigatorSettingsFile(ParameterModel):
+    """The settings as a TOML file states them; every key may be left out."""
+
+    accel_noise_m_s2_rt_hz: Number = Field(
+        0.05,
+        gt=0,
+        le=50,
+        description="white accelerometer noise with a rotor's vibration; PX4's 0.35 m/s2 at 8 ms is 0.03",
+    )
+    gyro_noise_rad_s_rt_hz: Number = Field(
+        0.002, gt=0, le=5, description="white gyro noise with vibration; PX4's 0.015 rad/s at 8 ms is 0.0013"
+    )
+    accel_walk_m_s2_rt_s: Number = Field(0.003, ge=0, le=1, description="accelerometer bias, PX4's 0.003")
+    gyro_walk_rad_s_rt_s: Number = Field(1e-4, ge=0, le=0.1, description="gyro bias over minutes of warming")
+    accel_bias_sigma_m_s2: Number = Field(0.2, gt=0, le=5, description="accelerometer bias at the start: 20 mg")
+    gyro_bias_sigma_rad_s: Number = Field(0.02, gt=0, le=0.5, description="gyro bias at the start: 1 deg/s")
+    coasting_accel_m_s2_rt_hz: Number = Field(
+        3.0, gt=0, le=100, description="without an IMU: manoeuvres of 0.3 g that last 0.5 s"
+    )
+    coasting_rate_rad_s_rt_hz: Number = Field(1.0, gt=0, le=100, description="without an IMU: turning")
+    position_walk_m_rt_s: Number = Field(0.01, ge=0, le=5, description="what the models leave out, per root second")
+    gps_slow_sigma_m: Number = Field(1.5, ge=0, le=100, description="GPS: ionosphere and orbits, open sky")
+    gps_slow_sigma_down_m: Number = Field(2.5, ge=0, le=200, description="and of height")
+    gps_slow_tau_s: Number = Field(300.0, gt=0, le=1e6, description="they change over minutes")
+    gps_fast_sigma_m: Number = Field(0.5, ge=0, le=100, description="GPS: multipath")
+    gps_fast_sigma_down_m: Number = Field(1.0, ge=0, le=200, description="and of height")
+    gps_fast_tau_s: Number = Field(20.0, gt=0, le=1e6, description="it changes as the vehicle moves")
+    gps_white_sigma_m: Number = Field(0.4, gt=0, le=100, description="GPS position: noise of one fix, quantisation")
+    gps_white_sigma_down_m: Number = Field(0.8, gt=0, le=100, description="and of height")
+    gps_white_share: Number = Field(
+        0.3, gt=0, le=1, description="of the accuracy that a receiver states, the part that changes from fix to fix"
+    )
+    gps_velocity_sigma_m_s: Number = Field(0.1, ge=0, le=20, description="GPS velocity: the part that lasts")
+    gps_velocity_tau_s: Number = Field(5.0, gt=0, le=1e6, description="for some seconds")
+    gps_velocity_white_m_s: Number = Field(0.3, gt=0, le=20, description="GPS velocity: noise, and lag in manoeuvres")
+    gps_velocity_white_down_m_s: Number = Field(0.5, gt=0, le=20, description="and vertically")
+    ins_tilt_sigma_rad: Number = Field(0.01, ge=0, le=1, description="an autopilot's tilt error, 0.6 deg")
+    ins_tilt_tau_s: Number = Field(30.0, gt=0, le=1e6, description="follows the manoeuvres")
+    ins_tilt_white_rad: Number = Field(0.01, gt=0, le=1, description="time alignment of such an attitude")
+    ins_heading_sigma_rad: Number = Field(0.15, ge=0, le=3.2, description="a compass with its declination: 9 deg")
+    ins_heading_tau_s: Number = Field(300.0, gt=0, le=1e6, description="changes with place")
+    heading_white_rad: Number = Field(0.2, gt=0, le=3.2, description="hard iron, as it turns with the vehicle")
+    ground_walk_m_rt_s: Number = Field(0.05, ge=0, le=5, description="the ground is not level: 0.4 m in a minute")
+    baro_walk_m_rt_s: Number = Field(0.1, ge=0, le=5, description="pressure drifts 0.8 m in a minute")
+    baro_sigma_m: Number = Field(1.0, gt=0, le=100, description="pressure height in the rotor's own wash")
+    flow_scale_sigma: Number = Field(0.03, ge=0, le=0.5, description="optics and their mounting, without a sensor file")
+    flow_sigma_rad_s: Number = Field(
+        0.05, gt=0, le=5, description="flow at full quality; pixel quantisation and gyro mismatch of a 10-50 Hz sensor"
+    )
+    flow_low_quality_sigma_rad_s: Number = Field(0.5, gt=0, le=10, description="flow as its quality goes to 0")
+    flow_floor_m_s: Number = Field(0.03, gt=0, le=5, description="body velocity near the ground, whatever the range")
+    flow_min_height_m: Number = Field(
+        0.3, ge=0, le=100, description="no flow nearer to the ground, where a range's floor makes any scale (ArduPilot)"
+    )
+    flow_limit_rad_s: Number = Field(10.0, gt=0, le=50, description="no sensor of this kind measures faster flow")
+    flow_noise_time_s: Number = Field(
+        10.0, gt=0, le=1e9, description="flow noisier than modelled is followed at this pace; a surface lasts seconds"
+    )
+    flow_gyro_time_s: Number = Field(
+        10.0, gt=0, le=1e6, description="a flow sensor's gyro bias is followed at this pace"
+    )
+    flow_forward_m: Number = Field(0.0, ge=-10, le=10, description="the lens from the IMU, body forward")
+    flow_right_m: Number = Field(0.0, ge=-10, le=10, description="body right")
+    flow_below_m: Number = Field(0.0, ge=-10, le=10, description="body down")
+    range_below_m: Number = Field(0.0, ge=-10, le=10, description="the rangefinder below the IMU")
+    range_sigma_m: Number = Field(0.05, gt=0, le=5, description="rangefinder noise and grass")
+    range_relative_sigma: Number = Field(0.02, ge=0, le=0.5, description="share of the range added to it")
+    range_min_m: Number = Field(0.02, ge=0, le=5, description="shorter readings are no readings")
+    range_max_m: Number = Field(100.0, gt=0, le=1000, description="longer readings are no readings")
+    range_stuck_s: Number = Field(0.5, gt=0, le=60, description="a range that repeats itself this long")
+    range_stuck_travel_m: Number = Field(0.1, gt=0, le=10, description="while the height changes so much, is stuck")
+    pad_angle_sigma_rad: Number = Field(0.01, gt=0, le=1, description="a pad detector's line of sight")
+    pad_distance_sigma: Number = Field(0.05, gt=0, le=1, description="share of the distance")
+    pose_sigma_m: Number = Field(0.05, gt=0, le=10, description="an external position that states no accuracy")
+    still_sigma_m_s: Number = Field(0.02, gt=0, le=1, description="a vehicle on the ground, its rotor turning")
+    gate_sigma: Number = Field(5.0, gt=0, le=100, description="innovation gate, standard deviations (ArduPilot's 5)")
+    accel_bias_limit_m_s2: Number = Field(0.6, gt=0, le=10, description="60 mg")
+    gyro_bias_limit_rad_s: Number = Field(0.15, gt=0, le=1, description="9 deg/s")
+    tilt_limit_rad: Number = Field(0.8, gt=0, le=1.4, description="46 degrees: the ground ahead is no longer below")
+    imu_stale_s: Number = Field(0.25, gt=0, le=10, description="an older IMU reading no longer moves the state")
+    height_hold_s: Number = Field(5.0, ge=0, le=600, description="flow is used this long after the last good range")
+    ground_reset_s: Number = Field(1.0, gt=0, le=60, description="range rejected this long: the ground has a step")
+    gps_reset_s: Number = Field(7.0, gt=0, le=600, description="GPS rejected this long: the filter is wrong (PX4's 7)")
+    dead_reckoning_s: Number = Field(1.0, gt=0, le=60, description="no horizontal aid this long: flagged (PX4's 1)")
+    invalid_s: Number = Field(5.0, gt=0, le=600, description="and this long: position flagged invalid (PX4's 5)")
+    start_wait_s: Number = Field(10.0, ge=0, le=600, description="wait this long for a fix, then start without")
+    levelling_s: Number = Field(0.5, gt=0, le=60, description="accelerometer mean that levels the first attitude")
+
+    def settings(self) -> NavigatorSettings:
+        """The numbers alone, for the kernels."""
+        common = {
+            name: float(getattr(self, name)) for name in NavigatorSettings._fields if name in type(self).model_fields
+        }
+        own = {name: float(getattr(self, name)) for name in LandingSettings._fields if name in type(self).model_fields}
+        flying = LandingSettings(imu_lag=0.0, **own)
+        coasting = flying._replace(
+            accel_noise_m_s2_rt_hz=float(self.coasting_accel_m_s2_rt_hz),
+            gyro_noise_rad_s_rt_hz=float(self.coasting_rate_rad_s_rt_hz),
+        )
+        return NavigatorSettings(filter=flying, coasting=coasting, **common)
+
+
+def default_settings() -> NavigatorSettings:
+    """The shipped defaults."""
+    return NavigatorSettingsFile().settings()

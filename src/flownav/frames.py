@@ -47,6 +47,19 @@ def to_body(rotation: Rotation, x: float, y: float, z: float) -> Vector:
 
 
 @equation
+def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
+    """Hamilton product a b of quaternions `(w, x, y, z)`."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    return (
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    )
+
+
+@equation
 def quaternion_rate(w: float, x: float, y: float, z: float, p: float, q: float, r: float) -> Quaternion:
     """dq/dt = q * (0, p, q, r) / 2, body rates [rad/s] (paper eqs. 8-10 without their singularity)."""
     return (

@@ -57,4 +57,10 @@ def new_navigator(
     fixes = Sensor.GPS_POSITION in streams and bool(np.any(streams[Sensor.GPS_POSITION].quality > 0.0))
     memory[DEADLINE] = first_s + float(settings.start_wait_s) if fixes else -np.inf
     headed = memory[USE_HEADING] != NO_HEADING or memory[USE_ATTITUDE] > 0.0
-    return Running(settings.settings(), settings.start_sigma(has_heading=headed), np.zeros(WORK_ROWS), memory, tape)
+    return Running(
+        settings.settings(),
+        settings.start_sigma(has_heading=headed, compass=memory[USE_HEADING] == FROM_MAG),
+        np.zeros(WORK_ROWS),
+        memory,
+        tape,
+    )

@@ -163,7 +163,7 @@ def learn_flow_noise(t_s: float, on: Running) -> None:
     """Follow how many times noisier than its model the flow is: the mean of (nu^2 - h P h')/R, at least 1.
 
     A poor lens or floor shows in the innovations; the model alone would take its noise for motion and gate the
-    rest away.
+    rest away. Flow smoother than modelled is not trusted more: what is left of its error lasts.
     """
     memory, work = on.memory, on.work
     noise, total = work[ROWS.noise], work[ROWS.innovation_variance]

@@ -19,6 +19,7 @@ from flownav.navigation.start import gather, try_start
 from flownav.navigation.state import (
     CLOCK,
     ESTIMATE_PERIOD_S,
+    GAP,
     IMU_CLOCK,
     IMU_LOST,
     LATEST_IMU,
@@ -123,6 +124,7 @@ def advance(t_s: float, on: Running) -> None:
         if moved:
             predict(work, ONE_LANE, ROWS, dt_s, on.settings.filter, None)
         else:
+            memory[GAP] = 1.0
             hold_still(on)
             predict(work, ONE_LANE, ROWS, dt_s, on.settings.coasting, None)
         memory[RANGE_TRAVEL] += dt_s * work[ROWS.state + VELOCITY + 2]

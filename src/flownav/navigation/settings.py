@@ -7,9 +7,24 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
 from pydantic import Field
 
 from flownav.estimation.landing.settings import LandingSettings
+from flownav.estimation.landing.states import (
+    ACCEL_BIAS,
+    COMPASS,
+    FLOW_SCALE,
+    GPS_FAST,
+    GPS_SLOW,
+    GPS_VELOCITY,
+    GYRO_BIAS,
+    INS_ERROR,
+    STATES,
+    VELOCITY,
+    VELOCITY_LAG,
+)
+from flownav.measurement import Array
 from flownav.parameter_files import Number, ParameterModel
 
 
@@ -24,7 +39,8 @@ class NavigatorSettings(NamedTuple):
     gps_velocity_white_m_s: float
     gps_velocity_white_down_m_s: float
     ins_tilt_white_rad: float
-    heading_white_rad: float
+    heading_noise_rad: float
+    heading_time_s: float
     flow_sigma_rad_s: float
     flow_low_quality_sigma_rad_s: float
     flow_floor_m_s: float
@@ -55,7 +71,6 @@ class NavigatorSettings(NamedTuple):
     dead_reckoning_s: float
     invalid_s: float
     start_wait_s: float
-    levelling_s: float
 
 
 class NavigatorSettingsFile(ParameterModel):
@@ -65,10 +80,10 @@ class NavigatorSettingsFile(ParameterModel):
         0.05,
         gt=0,
         le=50,
-        description="white accelerometer noise with a rotor's vibration; PX4's 0.35 m/s2 at 8 ms is 0.03",
+        description="accelerometer noise with vibration; PX4's 0.35 m/s2 at 8 ms is 0.03",
     )
     gyro_noise_rad_s_rt_hz: Number = Field(
-        0.002, gt=0, le=5, description="white gyro noise with vibration; PX4's 0.015 rad/s at 8 ms is 0.0013"
+        0.004, gt=0, le=5, description="gyro noise with vibration and sampling; PX4's 0.015 rad/s at 8 ms is 0.0013"
     )
     accel_walk_m_s2_rt_s: Number = Field(0.003, ge=0, le=1, description="accelerometer bias, PX4's 0.003")
     gyro_walk_rad_s_rt_s: Number = Field(1e-4, ge=0, le=0.1, description="gyro bias over minutes of warming")
@@ -94,12 +109,17 @@ class NavigatorSettingsFile(ParameterModel):
     gps_velocity_tau_s: Number = Field(5.0, gt=0, le=1e6, description="for some seconds")
     gps_velocity_white_m_s: Number = Field(0.3, gt=0, le=20, description="GPS velocity: noise, and lag in manoeuvres")
     gps_velocity_white_down_m_s: Number = Field(0.5, gt=0, le=20, description="and vertically")
+    gps_velocity_lag_sigma_s: Number = Field(0.15, ge=0, le=2, description="receivers smooth their velocity, and lag")
     ins_tilt_sigma_rad: Number = Field(0.01, ge=0, le=1, description="an autopilot's tilt error, 0.6 deg")
     ins_tilt_tau_s: Number = Field(30.0, gt=0, le=1e6, description="follows the manoeuvres")
     ins_tilt_white_rad: Number = Field(0.01, gt=0, le=1, description="time alignment of such an attitude")
     ins_heading_sigma_rad: Number = Field(0.15, ge=0, le=3.2, description="a compass with its declination: 9 deg")
-    ins_heading_tau_s: Number = Field(300.0, gt=0, le=1e6, description="changes with place")
-    heading_white_rad: Number = Field(0.2, gt=0, le=3.2, description="hard iron, as it turns with the vehicle")
+    ins_heading_tau_s: Number = Field(3e4, gt=0, le=1e6, description="constant over a flight")
+    compass_sigma_rad: Number = Field(
+        0.15, ge=0, le=3.2, description="hard iron: deviation that turns with the vehicle"
+    )
+    heading_noise_rad: Number = Field(0.04, gt=0, le=3.2, description="what is left: soft iron, currents, tilt, 3 deg")
+    heading_time_s: Number = Field(5.0, gt=0, le=1e4, description="and lasts this long, however often it is read")
     ground_walk_m_rt_s: Number = Field(0.05, ge=0, le=5, description="the ground is not level: 0.4 m in a minute")
     baro_walk_m_rt_s: Number = Field(0.1, ge=0, le=5, description="pressure drifts 0.8 m in a minute")
     baro_sigma_m: Number = Field(1.0, gt=0, le=100, description="pressure height in the rotor's own wash")
@@ -116,9 +136,7 @@ class NavigatorSettingsFile(ParameterModel):
     flow_noise_time_s: Number = Field(
         10.0, gt=0, le=1e9, description="flow noisier than modelled is followed at this pace; a surface lasts seconds"
     )
-    flow_gyro_time_s: Number = Field(
-        10.0, gt=0, le=1e6, description="a flow sensor's gyro bias is followed at this pace"
-    )
+    flow_gyro_time_s: Number = Field(10.0, gt=0, le=1e6, description="a flow sensor's gyro bias is followed so")
     flow_forward_m: Number = Field(0.0, ge=-10, le=10, description="the lens from the IMU, body forward")
     flow_right_m: Number = Field(0.0, ge=-10, le=10, description="body right")
     flow_below_m: Number = Field(0.0, ge=-10, le=10, description="body down")
@@ -144,14 +162,13 @@ class NavigatorSettingsFile(ParameterModel):
     dead_reckoning_s: Number = Field(1.0, gt=0, le=60, description="no horizontal aid this long: flagged (PX4's 1)")
     invalid_s: Number = Field(5.0, gt=0, le=600, description="and this long: position flagged invalid (PX4's 5)")
     start_wait_s: Number = Field(10.0, ge=0, le=600, description="wait this long for a fix, then start without")
-    levelling_s: Number = Field(0.5, gt=0, le=60, description="accelerometer mean that levels the first attitude")
+    start_velocity_sigma_m_s: Number = Field(2.0, gt=0, le=100, description="velocity before the first reading of it")
 
     def settings(self) -> NavigatorSettings:
         """The numbers alone, for the kernels."""
-        common = {
-            name: float(getattr(self, name)) for name in NavigatorSettings._fields if name in type(self).model_fields
-        }
-        own = {name: float(getattr(self, name)) for name in LandingSettings._fields if name in type(self).model_fields}
+        stated = {name: float(value) for name, value in self.model_dump().items()}
+        common = {name: stated[name] for name in NavigatorSettings._fields if name in stated}
+        own = {name: stated[name] for name in LandingSettings._fields if name in stated}
         flying = LandingSettings(imu_lag=0.0, **own)
         coasting = flying._replace(
             accel_noise_m_s2_rt_hz=float(self.coasting_accel_m_s2_rt_hz),
@@ -159,7 +176,21 @@ class NavigatorSettingsFile(ParameterModel):
         )
         return NavigatorSettings(filter=flying, coasting=coasting, **common)
 
+    def start_sigma(self, *, has_heading: bool, compass: bool) -> Array:
+        """Standard deviations of the error states before the first reading, (STATES,).
 
-def default_settings() -> NavigatorSettings:
-    """The shipped defaults."""
-    return NavigatorSettingsFile().settings()
+        Those of position and attitude are set at the start, those of the ground and the barometer when first read.
+        """
+        sigma = np.zeros(STATES)
+        sigma[VELOCITY : VELOCITY + 3] = self.start_velocity_sigma_m_s
+        sigma[GYRO_BIAS : GYRO_BIAS + 3] = self.gyro_bias_sigma_rad_s
+        sigma[ACCEL_BIAS : ACCEL_BIAS + 3] = self.accel_bias_sigma_m_s2
+        sigma[GPS_SLOW : GPS_SLOW + 3] = self.gps_slow_sigma_m, self.gps_slow_sigma_m, self.gps_slow_sigma_down_m
+        sigma[GPS_FAST : GPS_FAST + 3] = self.gps_fast_sigma_m, self.gps_fast_sigma_m, self.gps_fast_sigma_down_m
+        sigma[GPS_VELOCITY : GPS_VELOCITY + 3] = self.gps_velocity_sigma_m_s
+        heading = self.ins_heading_sigma_rad if has_heading else 0.0
+        sigma[INS_ERROR : INS_ERROR + 3] = self.ins_tilt_sigma_rad, self.ins_tilt_sigma_rad, heading
+        sigma[COMPASS : COMPASS + 2] = self.compass_sigma_rad if compass else 0.0
+        sigma[VELOCITY_LAG] = self.gps_velocity_lag_sigma_s
+        sigma[FLOW_SCALE] = self.flow_scale_sigma
+        return sigma

@@ -34,7 +34,8 @@ ORIGIN_SIGMA_M = 0.1  # the local origin, where the navigator's start defines it
 LOST_SIGMA_M = 10.0  # the same where the log's fixes define it and came too late, and about a first fix
 READ_TILT_RAD = 0.03  # an attitude that was read
 LEVELLED_TILT_RAD = 0.1  # one from the accelerometer
-HEADING_SIGMA_RAD = 0.3
+READ_HEADING_RAD = 0.1  # an autopilot's, whose compass is calibrated
+COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's
 LEAST_LEVELLING = 5
 
 
@@ -86,7 +87,7 @@ def try_start(reading: Reading, on: Running) -> None:
         tilt = READ_TILT_RAD if read else LEVELLED_TILT_RAD
         work[ROWS.covariance + (ATTITUDE + i) * (STATES + 1)] = tilt * tilt
     known = memory[USE_HEADING] == NO_HEADING and not lost  # the start defines the frame
-    heading = 1e-3 if known else HEADING_SIGMA_RAD
+    heading = 1e-3 if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
     work[ROWS.covariance + (ATTITUDE + 2) * (STATES + 1)] = heading * heading
     for i in range(3):
         sigma = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M

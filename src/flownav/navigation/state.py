@@ -57,13 +57,18 @@ WORK_ROWS = LEVER + 1
     FLAG,
     LANDED,
     LEVEL_COUNT,
-) = range(27)
-SINCE = 27
+    HEADING_CLOCK,
+    GAP,
+) = range(29)
+SINCE = 29
 COUNT = SINCE + 6
 LAST = COUNT + 6
 LEVEL = LAST + max(Sensor) + 1
 PAD = LEVEL + 3  # where the first pad fix puts the pad, NED [m]
-MEMORY_SIZE = PAD + 3
+OWN_BEFORE = PAD + 3  # the filter's attitude at the last attitude reading with a fresh IMU
+READ_BEFORE = OWN_BEFORE + 4  # that reading
+SPREAD_BEFORE = READ_BEFORE + 4  # and the filter's variances [rad2]
+MEMORY_SIZE = SPREAD_BEFORE + 3
 
 # headings: none, a magnetometer's, an external attitude's or YAW's
 NO_HEADING, FROM_MAG, FROM_ATTITUDE = 0.0, 1.0, 2.0
@@ -147,11 +152,11 @@ def empty_tape(estimates: int, components: int, events: int) -> Tape:
 def new_memory() -> Array:
     """Nothing has been heard."""
     memory = np.full(MEMORY_SIZE, np.nan)
-    zeros = [STARTED, USE_IMU, USE_ATTITUDE, USE_HEADING, GROUND_SET, BARO_KNOWN, FLAG, LANDED, LEVEL_COUNT,
+    zeros = [GAP, STARTED, USE_IMU, USE_ATTITUDE, USE_HEADING, GROUND_SET, BARO_KNOWN, FLAG, LANDED, LEVEL_COUNT,
              FLOW_BIAS_X, FLOW_BIAS_Y, FLOW_BIAS_COUNT, FLOW_GYRO_IS_IMU, RANGE_TRAVEL]  # fmt: skip
     memory[zeros] = 0.0
     memory[FLOW_EXCESS] = 1.0
-    memory[[IMU_CLOCK, ATTITUDE_CLOCK, FLOW_CLOCK, WRITTEN, RANGE_CLOCK]] = -np.inf
+    memory[[HEADING_CLOCK, IMU_CLOCK, ATTITUDE_CLOCK, FLOW_CLOCK, WRITTEN, RANGE_CLOCK]] = -np.inf
     memory[COUNT : COUNT + 6] = 0.0
     memory[LAST:LEVEL] = -np.inf
     memory[LEVEL : LEVEL + 3] = 0.0

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import equation
-from flownav.frames import Quaternion
+from flownav.frames import Quaternion, quaternion_product
 from flownav.sensors.gauss_markov import gauss_markov
 from flownav.sensors.quantisation import quantised
 
@@ -119,19 +119,6 @@ class GpsInsState(NamedTuple):
 
     errors: GpsInsErrors
     held: NavSolution
-
-
-@equation
-def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Hamilton product a b of quaternions `(w, x, y, z)`."""
-    aw, ax, ay, az = a
-    bw, bx, by, bz = b
-    return (
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    )
 
 
 @equation

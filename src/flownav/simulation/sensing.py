@@ -8,14 +8,13 @@ import numpy as np
 
 from flownav.compile import equation
 from flownav.estimation.kalman import Lanes, Work
-from flownav.frames import rotation_from_quaternion, to_body, to_earth
+from flownav.frames import quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.sensors.angular_flow import angular_flow
 from flownav.sensors.flow import FlowParameters, engage_flow, read_flow, start_flow
 from flownav.sensors.gps_ins import (
     GpsInsParameters,
     GpsInsState,
     NavSolution,
-    quaternion_product,
     start_gps_ins,
     step_gps_ins,
 )

@@ -15,6 +15,7 @@ from flownav.estimation.landing.predict import attitude_of
 from flownav.estimation.landing.states import (
     ATTITUDE,
     BARO,
+    COMPASS,
     FLOW_LAG,
     FLOW_SCALE,
     GPS_FAST,
@@ -24,9 +25,10 @@ from flownav.estimation.landing.states import (
     INS_ERROR,
     POSITION,
     VELOCITY,
+    VELOCITY_LAG,
     LandingRows,
 )
-from flownav.frames import Rotation, Vector, rotation_from_quaternion
+from flownav.frames import GRAVITY_M_S2, Rotation, Vector, rotation_from_quaternion
 
 LEAST_RANGE_M = 0.05
 LEAST_UPRIGHT = 0.1
@@ -38,16 +40,16 @@ GPS_POSITION_STATES = (
     (POSITION + 2, VELOCITY + 2, GPS_SLOW + 2, GPS_FAST + 2),
 )
 GPS_VELOCITY_STATES = (
-    (VELOCITY, GPS_VELOCITY),
-    (VELOCITY + 1, GPS_VELOCITY + 1),
-    (VELOCITY + 2, GPS_VELOCITY + 2),
+    (VELOCITY, GPS_VELOCITY, VELOCITY_LAG),
+    (VELOCITY + 1, GPS_VELOCITY + 1, VELOCITY_LAG),
+    (VELOCITY + 2, GPS_VELOCITY + 2, VELOCITY_LAG),
 )
 ATTITUDE_STATES = (
     (ATTITUDE, INS_ERROR, INS_ERROR + 1, INS_ERROR + 2),
     (ATTITUDE + 1, INS_ERROR, INS_ERROR + 1, INS_ERROR + 2),
     (ATTITUDE + 2, INS_ERROR, INS_ERROR + 1, INS_ERROR + 2),
 )
-HEADING_STATES = (ATTITUDE, ATTITUDE + 1, ATTITUDE + 2, INS_ERROR + 2)
+HEADING_STATES = (ATTITUDE, ATTITUDE + 1, ATTITUDE + 2, INS_ERROR + 2, COMPASS, COMPASS + 1)
 RANGE_STATES = (POSITION + 2, GROUND, ATTITUDE, ATTITUDE + 1)
 BARO_STATES = (POSITION + 2, BARO)
 LAGGED_FLOW_STATES = ((FLOW_LAG, FLOW_SCALE), (FLOW_LAG + 2, FLOW_SCALE))
@@ -103,13 +105,20 @@ def observe_gps_position(work: Work, lanes: Lanes, rows: LandingRows, axis: int,
 
 @equation
 def observe_gps_velocity(work: Work, lanes: Lanes, rows: LandingRows, axis: int, measured: int, age_s: float) -> None:
-    """z = v + Gauss-Markov error, of now or of one prediction ago."""
+    """z = v - lag a + Gauss-Markov error, of now or of one prediction ago; a is the acceleration of that prediction."""
     source = rows.before + 3 + axis if age_s > 0.0 else rows.state + VELOCITY + axis
+    gravity = GRAVITY_M_S2 if axis == 2 else 0.0
     for lane in range(len(lanes)):
-        predicted = work[source * len(lanes) + lane] + work[(rows.state + GPS_VELOCITY + axis) * len(lanes) + lane]
+        accel = work[(rows.force + axis) * len(lanes) + lane] + gravity
+        predicted = (
+            work[source * len(lanes) + lane]
+            + work[(rows.state + GPS_VELOCITY + axis) * len(lanes) + lane]
+            - work[(rows.state + VELOCITY_LAG) * len(lanes) + lane] * accel
+        )
         work[rows.innovation * len(lanes) + lane] = work[measured * len(lanes) + lane] - predicted
         work[rows.coefficient * len(lanes) + lane] = 1.0
         work[(rows.coefficient + 1) * len(lanes) + lane] = 1.0
+        work[(rows.coefficient + 2) * len(lanes) + lane] = -accel
 
 
 @equation
@@ -158,18 +167,29 @@ def observe_attitude(work: Work, lanes: Lanes, rows: LandingRows, axis: int, mea
 
 @equation
 def observe_heading(work: Work, lanes: Lanes, rows: LandingRows, measured: int) -> None:
-    """z = heading + its slow error: a magnetometer's or an external heading [rad], wrapped to half a turn."""
+    """z = psi + A + B sin psi + C cos psi [rad], wrapped to half a turn: a compass, or an external heading (B = C = 0).
+
+    A is the slow error of the heading (declination, mounting); B and C are the deviation that hard iron makes, which
+    turns with the vehicle.
+    """
     for lane in range(len(lanes)):
         rotation = rotation_of(work, lanes, rows, lane)
         forward_n, forward_e, forward_d = rotation[0], rotation[3], rotation[6]
         level = larger(forward_n * forward_n + forward_e * forward_e, LEAST_UPRIGHT * LEAST_UPRIGHT)
-        heading = np.arctan2(forward_e, forward_n) + work[(rows.state + INS_ERROR + 2) * len(lanes) + lane]
+        cosine, sine = forward_n / np.sqrt(level), forward_e / np.sqrt(level)
+        by_sine = work[(rows.state + COMPASS) * len(lanes) + lane]
+        by_cosine = work[(rows.state + COMPASS + 1) * len(lanes) + lane]
+        constant = work[(rows.state + INS_ERROR + 2) * len(lanes) + lane]
+        heading = np.arctan2(forward_e, forward_n) + constant + by_sine * sine + by_cosine * cosine
         difference = work[measured * len(lanes) + lane] - heading
+        by_heading = 1.0 + by_sine * cosine - by_cosine * sine
         work[rows.innovation * len(lanes) + lane] = np.arctan2(np.sin(difference), np.cos(difference))
-        work[rows.coefficient * len(lanes) + lane] = -forward_d * forward_n / level
-        work[(rows.coefficient + 1) * len(lanes) + lane] = -forward_d * forward_e / level
-        work[(rows.coefficient + 2) * len(lanes) + lane] = 1.0
+        work[rows.coefficient * len(lanes) + lane] = -by_heading * forward_d * forward_n / level
+        work[(rows.coefficient + 1) * len(lanes) + lane] = -by_heading * forward_d * forward_e / level
+        work[(rows.coefficient + 2) * len(lanes) + lane] = by_heading
         work[(rows.coefficient + 3) * len(lanes) + lane] = 1.0
+        work[(rows.coefficient + 4) * len(lanes) + lane] = sine
+        work[(rows.coefficient + 5) * len(lanes) + lane] = cosine
 
 
 # -- height -------------------------------------------------------------------------------------------------

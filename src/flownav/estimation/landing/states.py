@@ -26,7 +26,9 @@ GROUND = 27  # 1, down coordinate of the ground below [m]
 BARO = 28  # 1, pressure altitude less true altitude [m]
 FLOW_SCALE = 29  # 1, flow reported over flow by its datasheet, less 1
 FLOW_LAG = 30  # 4, the flow sensor's identified dynamics: x1, x2 forward, x1, x2 right
-STATES = 34
+COMPASS = 34  # 2, deviation of a compass: coefficients of sin and cos of the heading (hard iron) [rad]
+VELOCITY_LAG = 36  # 1, how much older GPS velocity is than its time says (receivers smooth it) [s]
+STATES = 37
 
 STATE_NAMES = (
     "pos_n_m", "pos_e_m", "pos_d_m", "vel_n_m_s", "vel_e_m_s", "vel_d_m_s",
@@ -37,6 +39,7 @@ STATE_NAMES = (
     "gps_velocity_n_m_s", "gps_velocity_e_m_s", "gps_velocity_d_m_s",
     "ins_roll_rad", "ins_pitch_rad", "ins_heading_rad",
     "ground_d_m", "baro_m", "flow_scale", "lag_u1", "lag_u2", "lag_v1", "lag_v2",
+    "compass_sin_rad", "compass_cos_rad", "velocity_lag_s",
 )  # fmt: skip
 
 LARGEST_TRANSFORM = 27  # coefficients: three states from nine

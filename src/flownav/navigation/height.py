@@ -7,7 +7,7 @@ import numpy as np
 from flownav.compile import ONE_LANE, kernel
 from flownav.estimation.landing.algebra import forget
 from flownav.estimation.landing.observe import BARO_STATES, RANGE_STATES, observe_baro, observe_range, rotation_of
-from flownav.estimation.landing.states import BARO, GROUND, POSITION
+from flownav.estimation.landing.states import BARO, GROUND, POSITION, STATES, VELOCITY
 from flownav.navigation.offers import (
     DATUM,
     FUSED,
@@ -25,6 +25,7 @@ from flownav.navigation.state import (
     GROUND_FOUND,
     GROUND_RESET,
     GROUND_SET,
+    HEIGHT_CLOCK,
     RANGE_CLOCK,
     RANGE_LAST,
     RANGE_SAME_SINCE,
@@ -38,8 +39,11 @@ from flownav.navigation.state import (
     Running,
     write_event,
 )
+from flownav.navigation.vibration import doubt
 
 UNKNOWN_M = 100.0
+DOUBTING_S = 0.05  # a range that alone tells the height and is rejected so long is believed, not the accelerometer
+ALONE = 5.0  # times the travel, where nothing else tells the height
 
 
 @kernel
@@ -51,13 +55,19 @@ def range_variance(range_m: float, on: Running) -> float:
 
 @kernel
 def stuck(reading: Reading, on: Running) -> bool:
-    """Whether the range repeats one value to the last digit while the filter's height travels."""
+    """Whether the range repeats one value to the last digit while the filter's height travels.
+
+    Where no barometer, GPS or pad has told the height lately, the filter's own drift must be told from a travel.
+    """
     memory, settings, range_m = on.memory, on.settings, reading.value[0]
     if range_m != memory[RANGE_LAST]:
         memory[RANGE_LAST], memory[RANGE_SAME_SINCE], memory[RANGE_TRAVEL] = range_m, reading.t_s, 0.0
         return False
-    lasting = reading.t_s - memory[RANGE_SAME_SINCE] >= settings.range_stuck_s
-    return lasting and abs(memory[RANGE_TRAVEL]) >= settings.range_stuck_travel_m
+    lasting_s = reading.t_s - memory[RANGE_SAME_SINCE]
+    drift = 3.0 * np.sqrt(on.work[ROWS.covariance + (VELOCITY + 2) * (STATES + 1)]) * lasting_s
+    alone = reading.t_s - memory[HEIGHT_CLOCK] > settings.height_hold_s
+    least = settings.range_stuck_travel_m + (ALONE * settings.range_stuck_travel_m + drift if alone else 0.0)
+    return lasting_s >= settings.range_stuck_s and abs(memory[RANGE_TRAVEL]) >= least
 
 
 @kernel
@@ -94,6 +104,9 @@ def take_range(reading: Reading, on: Running) -> None:
     elif reason == INNOVATION_GATE:
         if np.isnan(memory[RANGE_SINCE]):
             memory[RANGE_SINCE] = t_s
+        alone = t_s - memory[HEIGHT_CLOCK] > settings.height_hold_s
+        if alone and t_s - memory[RANGE_SINCE] >= DOUBTING_S:
+            doubt(t_s, work[ROWS.innovation], on)
         if t_s - memory[RANGE_SINCE] >= settings.ground_reset_s:
             set_ground(below, on)
             memory[RANGE_SINCE] = np.nan
@@ -127,4 +140,5 @@ def take_baro(reading: Reading, on: Running) -> None:
     work[VALUE] = altitude_m
     observe_baro(work, ONE_LANE, ROWS, VALUE)
     put(noise, reason, on)
-    conclude(reading, 0, altitude_m, BARO_STATES, reason, on)
+    if conclude(reading, 0, altitude_m, BARO_STATES, reason, on) == FUSED:
+        memory[HEIGHT_CLOCK] = reading.t_s

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import ONE_LANE, kernel
-from flownav.estimation.landing.bias_limits import limit_biases
 from flownav.estimation.landing.predict import predict
 from flownav.estimation.landing.states import ACCEL_BIAS, GYRO_BIAS, VELOCITY
 from flownav.frames import GRAVITY_M_S2
@@ -33,6 +32,7 @@ from flownav.navigation.state import (
     write_estimate,
     write_event,
 )
+from flownav.navigation.vibration import add_vibration_noise, follow_vibration, limit_biases
 
 LONGEST_STEP_S = 0.1
 
@@ -81,7 +81,7 @@ def take(reading: Reading, on: Running) -> None:
     if memory[STARTED] > 0.0:
         note_aid_age(t_s, on)
         if t_s - memory[WRITTEN] >= ESTIMATE_PERIOD_S:
-            limit_biases(on.work, ONE_LANE, ROWS, on.settings.filter)
+            limit_biases(on)
             write_estimate(t_s, on)
 
 
@@ -100,6 +100,8 @@ def take_imu_reading(reading: Reading, on: Running) -> None:
     fresh = reading.t_s - memory[IMU_CLOCK] <= on.settings.imu_stale_s
     if not fresh and np.isfinite(memory[IMU_CLOCK]):
         write_event(reading.t_s, IMU_LOST, reading.t_s - memory[IMU_CLOCK], on.tape)
+    if fresh:
+        follow_vibration(value, reading.t_s - memory[IMU_CLOCK], on)
     for i in range(6):
         on.work[LATEST_IMU + i] = 0.5 * (value[i] + on.work[LATEST_IMU + i]) if fresh else value[i]
     memory[IMU_CLOCK] = reading.t_s
@@ -123,6 +125,7 @@ def advance(t_s: float, on: Running) -> None:
             work[ROWS.imu + i] = work[LATEST_IMU + i]
         if moved:
             predict(work, ONE_LANE, ROWS, dt_s, on.settings.filter, None)
+            add_vibration_noise(dt_s, on)
         else:
             memory[GAP] = 1.0
             hold_still(on)

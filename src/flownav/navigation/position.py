@@ -35,6 +35,7 @@ from flownav.navigation.offers import (
 from flownav.navigation.state import (
     COUNT,
     GPS_RESET,
+    HEIGHT_CLOCK,
     LANDED,
     PAD,
     PAD_FOUND,
@@ -76,6 +77,8 @@ def take_gps(reading: Reading, on: Running) -> None:
             put(noise, reason, on)
             reason = conclude(reading, axis, reading.value[axis], GPS_VELOCITY_STATES[axis], reason, on)
         fused = fused or (reason == FUSED and axis < 2)
+        if reason == FUSED and position and axis == 2:
+            on.memory[HEIGHT_CLOCK] = reading.t_s
         mind_rejections(reading, axis, reason, noise, on)
     if fused:
         note_aid(reading.t_s, on)
@@ -129,6 +132,8 @@ def take_pose(reading: Reading, on: Running) -> None:
         reason = conclude(reading, axis, reading.value[axis], STATE_ITSELF[POSITION + axis], reason, on)
         if reason == FUSED and axis < 2:
             note_aid(reading.t_s, on)
+        elif reason == FUSED:
+            on.memory[HEIGHT_CLOCK] = reading.t_s
 
 
 @kernel
@@ -156,6 +161,7 @@ def take_pad(reading: Reading, on: Running) -> None:
         put(spread * spread if np.isnan(stated) else stated, reason, on)
         outcome = conclude(reading, component, value[component], PAD_STATES, reason, on)
         if outcome == FUSED:
+            memory[HEIGHT_CLOCK] = reading.t_s
             note_aid(reading.t_s, on)
     shift(on, 1.0)
 

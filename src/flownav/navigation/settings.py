@@ -33,6 +33,9 @@ class NavigatorSettings(NamedTuple):
 
     filter: LandingSettings
     coasting: LandingSettings
+    vibration_free_m_s2: float
+    vibration_walk_per_rt_s: float
+    vibration_bias_share: float
     gps_white_share: float
     gps_white_sigma_m: float
     gps_white_sigma_down_m: float
@@ -87,6 +90,13 @@ class NavigatorSettingsFile(ParameterModel):
     )
     accel_walk_m_s2_rt_s: Number = Field(0.003, ge=0, le=1, description="accelerometer bias, PX4's 0.003")
     gyro_walk_rad_s_rt_s: Number = Field(1e-4, ge=0, le=0.1, description="gyro bias over minutes of warming")
+    vibration_free_m_s2: Number = Field(
+        1.0, ge=0, le=100, description="sample-to-sample accelerometer noise, rms, that harms nothing"
+    )
+    vibration_walk_per_rt_s: Number = Field(
+        0.5, ge=0, le=10, description="what exceeds it lets the bias walk by this share: vibration is rectified"
+    )
+    vibration_bias_share: Number = Field(3.0, ge=0, le=20, description="and widens its limit by this share")
     accel_bias_sigma_m_s2: Number = Field(0.2, gt=0, le=5, description="accelerometer bias at the start: 20 mg")
     gyro_bias_sigma_rad_s: Number = Field(0.02, gt=0, le=0.5, description="gyro bias at the start: 1 deg/s")
     coasting_accel_m_s2_rt_hz: Number = Field(
@@ -107,7 +117,7 @@ class NavigatorSettingsFile(ParameterModel):
     )
     gps_velocity_sigma_m_s: Number = Field(0.1, ge=0, le=20, description="GPS velocity: the part that lasts")
     gps_velocity_tau_s: Number = Field(5.0, gt=0, le=1e6, description="for some seconds")
-    gps_velocity_white_m_s: Number = Field(0.3, gt=0, le=20, description="GPS velocity: noise, and lag in manoeuvres")
+    gps_velocity_white_m_s: Number = Field(0.4, gt=0, le=20, description="GPS velocity: noise, and lag in manoeuvres")
     gps_velocity_white_down_m_s: Number = Field(0.5, gt=0, le=20, description="and vertically")
     gps_velocity_lag_sigma_s: Number = Field(0.15, ge=0, le=2, description="receivers smooth their velocity, and lag")
     ins_tilt_sigma_rad: Number = Field(0.01, ge=0, le=1, description="an autopilot's tilt error, 0.6 deg")

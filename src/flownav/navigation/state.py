@@ -59,8 +59,11 @@ WORK_ROWS = LEVER + 1
     LEVEL_COUNT,
     HEADING_CLOCK,
     GAP,
-) = range(29)
-SINCE = 29
+    HEIGHT_CLOCK,
+    VIBRATION,
+    DOUBT,
+) = range(32)
+SINCE = 32
 COUNT = SINCE + 6
 LAST = COUNT + 6
 LEVEL = LAST + max(Sensor) + 1
@@ -87,7 +90,7 @@ COMPONENTS = {Sensor.GPS_POSITION: 3, Sensor.GPS_VELOCITY: 3, Sensor.FLOW_RATE: 
 # Kinds of event: source, kind, what the value is. NumPy numbers them, because Numba compiles a function anew
 # for each Python integer that it is called with.
 (START, GROUND_FOUND, GROUND_RESET, BARO_FOUND, GPS_RESET, DEAD_RECKONING, POSITION_INVALID, AIDED_AGAIN,
- RANGE_STUCK, PAD_FOUND, IMU_LOST) = np.arange(11)  # fmt: skip
+ RANGE_STUCK, PAD_FOUND, IMU_LOST, IMU_DOUBTED) = np.arange(12)  # fmt: skip
 EVENT_NAMES = (
     ("filter", "start", "at a GPS fix (1) or at the local origin (0)"),
     ("range", "datum", "ground level below the first range, down in the local frame [m]"),
@@ -100,6 +103,7 @@ EVENT_NAMES = (
     ("range", "stuck", "it repeats this value while the vehicle moves [m]"),
     ("pad", "datum", "the pad's distance from the local origin [m]"),
     ("imu", "lost", "no reading for this long [s]; attitude and velocity coast"),
+    ("imu", "doubted", "range contradicts it by this much [m]; the accelerometer's bias is set free"),
 )
 
 
@@ -152,11 +156,12 @@ def empty_tape(estimates: int, components: int, events: int) -> Tape:
 def new_memory() -> Array:
     """Nothing has been heard."""
     memory = np.full(MEMORY_SIZE, np.nan)
-    zeros = [GAP, STARTED, USE_IMU, USE_ATTITUDE, USE_HEADING, GROUND_SET, BARO_KNOWN, FLAG, LANDED, LEVEL_COUNT,
+    zeros = [DOUBT, VIBRATION, GAP, STARTED, USE_IMU, USE_ATTITUDE, USE_HEADING, GROUND_SET, BARO_KNOWN, FLAG,
+             LANDED, LEVEL_COUNT,
              FLOW_BIAS_X, FLOW_BIAS_Y, FLOW_BIAS_COUNT, FLOW_GYRO_IS_IMU, RANGE_TRAVEL]  # fmt: skip
     memory[zeros] = 0.0
     memory[FLOW_EXCESS] = 1.0
-    memory[[HEADING_CLOCK, IMU_CLOCK, ATTITUDE_CLOCK, FLOW_CLOCK, WRITTEN, RANGE_CLOCK]] = -np.inf
+    memory[[HEIGHT_CLOCK, HEADING_CLOCK, IMU_CLOCK, ATTITUDE_CLOCK, FLOW_CLOCK, WRITTEN, RANGE_CLOCK]] = -np.inf
     memory[COUNT : COUNT + 6] = 0.0
     memory[LAST:LEVEL] = -np.inf
     memory[LEVEL : LEVEL + 3] = 0.0

@@ -183,4 +183,3 @@ def _check_clock(table: CsvTable) -> None:
     if len(table.t_s) > 2 and np.median(np.diff(table.t_s)) > LONGEST_MEDIAN_STEP_S:
         step = float(np.median(np.diff(table.t_s)))
         raise InputError(f"{table.path}: t_s steps by {step:g} a row; seconds are needed (milliseconds? microseconds?)")
-

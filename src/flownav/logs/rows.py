@@ -30,7 +30,7 @@ class Rows:
         absent = np.full(len(self.t_s), np.nan)
         return np.column_stack([self.columns.get(name, absent) for name in names])
 
-    def keep(self, good: NDArray[np.bool_], reason: str) -> None:
+    def keep(self, good: NDArray[np.bool_] | np.bool_, reason: str) -> None:
         """Throw the other rows away and count them."""
         bad = int(np.count_nonzero(~good))
         if bad:

@@ -106,7 +106,9 @@ def read_ulog(path: Path, *, flow_instance: int | None = None) -> Log:
     said |= {"imu": slow_imu} if slow_imu else {}
     absences = [*absences_of(streams, **said)]
     if source == "vehicle_visual_odometry":
-        absences.append(Absence("no vehicle_attitude", "attitude is the visual odometry's, its heading from its own start"))
+        absences.append(
+            Absence("no vehicle_attitude", "attitude is the visual odometry's, its heading from its own start")
+        )
     return Log(
         path,
         streams,

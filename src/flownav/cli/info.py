@@ -56,10 +56,9 @@ def _print(facts: dict[str, Any]) -> None:
     for line in facts["clock"] or ["nothing found"]:
         console.print(f"Clock: {line}")
     for name, limit in facts["limits"].items():
-        outside = (
-            "" if limit["outside_share"] is None else f"; {100 * limit['outside_share']:.1f} % of readings outside"
-        )
-        console.print(f"Stated limits of {name}: {limit['low']:g} to {limit['high']:g}{outside}")
+        said = f"Stated limits of {name}: {limit['low']:g} to {limit['high']:g}"
+        share = limit["outside_share"]
+        console.print(said if share is None else f"{said}; {100 * share:.1f} % of readings outside")
     console.print(f"Compared: {facts['checked']}")
     for text in facts["warnings"]:
         console.print(f"Warning: {text}")

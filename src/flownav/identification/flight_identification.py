@@ -98,7 +98,7 @@ def identify_flight(
         flown.flow_limit_rad_s,
         int(flown.quality[flown.good].min()),
         tuple((path if path.is_dir() else path.parent) / name for name in log.inputs),
-        (*log.notes, *flown.notes, *_notes(flown, moved, scale, axes)),
+        (*flown.notes, *_notes(flown, moved, scale, axes)),
         _details(flown, moved, scale, axes, raw, track),
     )
 

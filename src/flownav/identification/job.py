@@ -26,10 +26,11 @@ def identify(
 ) -> Findings:
     """Findings of rig logs (all together, by height) or of one flight log.
 
-    structures: models to choose from. flow_instance: which of a flight's several flow sensors. InputError, one line, where a log is missing, mixed or cannot serve.
+    structures: models to choose from. flow_instance: which of a flight's several flow sensors.
+    InputError, one line, where a log is missing, mixed or cannot serve.
     """
     if not logs:
-        raise InputError("no log given; identify takes rig folders, rig CSV files or one flight folder")
+        raise InputError("no log given; identify takes rig folders, rig CSV files or one flight log")
     for path in logs:
         if not path.exists():
             raise InputError(f"{path}: no such file or folder; identify takes rig logs and flight logs")
@@ -45,7 +46,8 @@ def identify(
     for path in logs:
         if not is_rig(path):
             raise InputError(
-                f"{path}: neither a rig log (rig.csv, run-001/rig.csv, a CSV file) nor a flight log (attitude.csv, .ulg)"
+                f"{path}: neither a rig log (rig.csv, run-001/rig.csv, a CSV file) nor a flight log (a folder with "
+                "attitude.csv, .ulg, .bin, .tlog)"
             )
     runs = [
         run

@@ -12,7 +12,7 @@ from flownav.inspection.autopilot import autopilot_errors
 from flownav.logs.log import Log
 from flownav.logs.plausible import check_plausible
 from flownav.measurement import Array, Sensor, Stream
-from flownav.replay.prepare import ReplayOptions, prepare
+from flownav.replay.prepare import GPS, ReplayOptions, prepare
 from flownav.replay.sentinel import Finding, findings
 
 CLOCK_REASONS = {
@@ -129,12 +129,7 @@ def _findings(log: Log) -> tuple[str, list[Finding]]:
 def _autopilot(log: Log) -> dict[str, Any] | None:
     if log.autopilot is None:
         return None
-    gps = ReplayOptions().gps_delay_s
-    streams = {
-        s: replace(log.streams[s], delay_s=gps) for s in (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY) if s in log.streams
-    }
-    return {
-        "name": log.autopilot_name,
-        **_track(log.autopilot["t_s"]),
-        **autopilot_errors(log.autopilot, log.truth, streams),
-    }
+    delay_s = ReplayOptions().gps_delay_s
+    gps = {sensor: replace(log.streams[sensor], delay_s=delay_s) for sensor in GPS if sensor in log.streams}
+    errors = autopilot_errors(log.autopilot, log.truth, gps)
+    return {"name": log.autopilot_name, **_track(log.autopilot["t_s"]), **errors}

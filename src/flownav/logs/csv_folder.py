@@ -14,6 +14,7 @@ import numpy as np
 
 from flownav.errors import InputError
 from flownav.frames import quaternion_from_euler
+from flownav.logs.absences import absences_of
 from flownav.logs.csv_table import Column, CsvTable, read_csv_table
 from flownav.logs.fixes import local_position, near_the_rest, origin_of
 from flownav.logs.log import Log
@@ -88,6 +89,7 @@ def read_csv_folder(folder: Path) -> Log:
         _truth(tables["truth"]) if "truth" in tables else None,
         {f"{name}.csv": table.sha256 for name, table in tables.items()},
         tuple(note for table in tables.values() for note in table.notes),
+        absences=tuple(absences_of(streams)),
     )
 
 

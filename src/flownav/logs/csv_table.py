@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.errors import InputError
 from flownav.logs.rows import LATE_SHARE, Rows, drop_duplicates, drop_strays, longest_ordered

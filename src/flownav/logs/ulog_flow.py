@@ -38,7 +38,7 @@ def flow_topic(path: Path, topics: Topics, instance: int | None) -> Topic | None
         listed = ", ".join(topic.label for topic in present) or "no optical flow at all"
         raise InputError(f"{path}: --flow-instance {instance} is not in the log; it has {listed}")
     most = max(map(_seen_s, asked))
-    preferred = [topic for topic in asked if _seen_s(topic) >= ENOUGH * most][0].name
+    preferred = next(topic for topic in asked if _seen_s(topic) >= ENOUGH * most).name
     return max((topic for topic in asked if topic.name == preferred), key=_seen_s)
 
 

@@ -167,8 +167,8 @@ def _notes(framed: Framed) -> list[str]:
     notes = []
     if framed.dropouts_s:
         notes.append(
-            f"the logger states {len(framed.dropouts_s)} dropouts, {sum(framed.dropouts_s):.2f} s together, the longest "
-            f"{max(framed.dropouts_s):.2f} s"
+            f"the logger states {len(framed.dropouts_s)} dropouts, {sum(framed.dropouts_s):.2f} s together, "
+            f"the longest {max(framed.dropouts_s):.2f} s"
         )
     if framed.damaged_stretches:
         notes.append(

@@ -48,10 +48,8 @@ def _print(facts: dict[str, Any]) -> None:
     for s in facts["streams"]:
         rejected = ", ".join(f"{count} {reason}" for reason, count in s["rejected"].items())
         no_data = f"{100 * s['no_data_share']:.0f} %" if s["no_data_share"] else ""
-        streams.add_row(
-            s["sensor"], str(s["count"]), _figure(s["rate_hz"], 1), f"{s['start_s']:.1f}", f"{s['end_s']:.1f}",
-            _figure(s["largest_gap_s"], 2), no_data, rejected,
-        )  # fmt: skip
+        span, gap = f"{s['start_s']:.1f}, {s['end_s']:.1f}", _figure(s["largest_gap_s"], 2)
+        streams.add_row(s["sensor"], str(s["count"]), _figure(s["rate_hz"], 1), span, gap, no_data, rejected)
     console.print(streams)
     for line in facts["clock"] or ["nothing found"]:
         console.print(f"Clock: {line}")

@@ -29,6 +29,7 @@ A_HEADER = re.compile(rb"(?s)..[FIMPQARDLCSO]")  # where a message may begin aga
 FIELD = re.compile(rb"([A-Za-z0-9_/]{1,128})(?:\[(\d{1,5})\])? ([A-Za-z0-9_]{1,128})")
 NAME = re.compile(rb"[A-Za-z0-9_/-]{1,128}")
 LARGEST_MESSAGE = 0xFFFF
+LARGEST_TOPIC = 8192  # bytes; uORB's largest have a quarter of that
 DEEPEST_NESTING = 8
 MOST_BAD_FORMATS = 1000
 APPENDED = 1  # the one incompatible flag that is known: data appended at stated offsets
@@ -68,9 +69,11 @@ class Formats:
 
     def take(self, text: bytes) -> str:
         """Read a definition; its name, "" where it is none. A second one of the same name is not taken."""
-        name, colon, rest = text.partition(b":")
+        if self.bad > MOST_BAD_FORMATS:
+            return ""
+        name, _, rest = text.partition(b":")
         parts = [FIELD.fullmatch(part) for part in rest.rstrip(b"\0").split(b";") if part]
-        if self.bad > MOST_BAD_FORMATS or not colon or not NAME.fullmatch(name) or not parts or None in parts:
+        if not NAME.fullmatch(name) or not parts or None in parts:
             self.bad += 1
             return ""
         fields = [(m[1].decode() + ("[]" if m[2] else ""), int(m[2] or 1), m[3].decode()) for m in parts if m]
@@ -86,7 +89,7 @@ class Formats:
             names = [field_name for _, _, field_name in fields]
             sound = ("uint64_t", 1, "timestamp") in fields and len(set(names)) == len(names)
             size = self._sum(fields, 0) if sound else 0
-            self._sizes[name] = size if size <= LARGEST_MESSAGE - 2 else 0
+            self._sizes[name] = size if size <= LARGEST_TOPIC else 0
         return self._sizes[name]
 
     def full_size(self, name: str) -> int:
@@ -102,7 +105,7 @@ class Formats:
             if not each and depth < DEEPEST_NESTING and kind in self.fields:
                 each = self._sum(self.fields[kind], depth + 1)
             total += each * count
-            if not each or not count or total > LARGEST_MESSAGE:
+            if not each or not count or total > LARGEST_TOPIC:
                 return 0
         return total
 
@@ -192,7 +195,8 @@ class Framing:
         elif kind == 65:  # A
             sound = 3 < size <= 131 and NAME.fullmatch(self.content[pos + 6 : stop]) is not None
         elif kind == 70:  # F
-            sound = self._may_begin(stop, limit) and bool(self.formats.take(self.content[pos + 3 : stop]))
+            known = self.formats.bad <= MOST_BAD_FORMATS and self._may_begin(stop, limit)
+            sound = known and bool(self.formats.take(self.content[pos + 3 : stop]))
         else:
             sound = self._may_begin(stop, limit)
         return stop if sound else 0

@@ -18,7 +18,7 @@ UNIT_LENGTH_WITHIN = 0.1
 SEA_LEVEL_PA = 101325.0
 SCALE_HEIGHT_M, ALTITUDE_EXPONENT = 44330.77, 0.1902632  # the standard atmosphere's troposphere
 LARGEST_HECTOPASCAL = 2000.0
-NO_RELATIVE_TIME_US = 0x7FFFFFFF  # RELATIVE_TIMESTAMP_INVALID
+LARGEST_RELATIVE_US = 1e6  # RELATIVE_TIMESTAMP_INVALID is far above
 YAW_90 = 2.0  # PX4's rotation of an IR-LOCK where no parameter says another
 
 
@@ -176,10 +176,11 @@ def _at_relative(topic: Topic, what: str) -> Topic:
     if not topic.has(column):
         return topic
     relative_us = topic.columns[column]
-    fresh = (relative_us != NO_RELATIVE_TIME_US) & (abs(relative_us) < 1e6)
-    fresh[1:] &= np.diff(topic.t_s + 1e-6 * relative_us) > 1e-6
-    columns = {name: values[fresh] for name, values in topic.columns.items()}
-    return Topic(np.maximum(topic.t_s + 1e-6 * relative_us, 0.0)[fresh], columns, {}, topic.name, topic.instance)
+    stated = abs(relative_us) < LARGEST_RELATIVE_US
+    t_s = np.maximum(topic.t_s + 1e-6 * relative_us, 0.0)[stated]
+    fresh = np.diff(t_s, prepend=-1.0) > 1e-6
+    columns = {name: values[stated][fresh] for name, values in topic.columns.items()}
+    return Topic(t_s[fresh], columns, {}, topic.name, topic.instance)
 
 
 def pad_stream(topics: Topics, attitude: Stream | None) -> Stream | None:

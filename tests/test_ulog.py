@@ -130,8 +130,13 @@ def test_of_several_flow_sensors_the_one_that_saw_most_is_read_unless_asked(tmp_
     for instance, rate in flow.items():
         log = read(writer, tmp_path, flow_instance=instance)
         assert log.streams[Sensor.FLOW_RATE].value[0, 0] == pytest.approx(rate)
-    assert "flow is vehicle_optical_flow[1]; not used: vehicle_optical_flow[0] (200 readings)" in read(writer, tmp_path).notes
-    with pytest.raises(InputError, match=r"--flow-instance 7 is not in the log; it has vehicle_optical_flow\[0\], vehi"):
+    assert (
+        "flow is vehicle_optical_flow[1]; not used: vehicle_optical_flow[0] (200 readings)"
+        in read(writer, tmp_path).notes
+    )
+    with pytest.raises(
+        InputError, match=r"--flow-instance 7 is not in the log; it has vehicle_optical_flow\[0\], vehi"
+    ):
         read(writer, tmp_path, flow_instance=7)
     with pytest.raises(InputError, match="--flow-instance 0 is not in the log; it has no optical flow at all"):
         read(with_attitude(), tmp_path, flow_instance=0)
@@ -177,7 +182,8 @@ def test_what_the_flow_sensor_states_of_itself(tmp_path):
     t_s = times(50)
     stated = {"max_flow_rate": 7.4, "min_ground_distance": 0.08, "max_ground_distance": 30.0}
     log = read(
-        new_flow(with_attitude(), t_s, (0.0, 0.01), **{f"float__{k}": alike(t_s, v) for k, v in stated.items()}), tmp_path
+        new_flow(with_attitude(), t_s, (0.0, 0.01), **{f"float__{k}": alike(t_s, v) for k, v in stated.items()}),
+        tmp_path,
     )
     assert log.limits == {"flow_rad_s": (0.0, pytest.approx(7.4)), "flow_height_m": pytest.approx((0.08, 30.0))}
 

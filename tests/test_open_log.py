@@ -21,7 +21,7 @@ def test_a_folder_and_a_ulog_open_as_the_same_streams(tmp_path):
     folder, file = flown.write(tmp_path / "csv"), ulog_of_flight(flown.tables).write(tmp_path / "flight.ulg")
     assert set(open_log(folder).streams) == set(open_log(file).streams)
     assert open_flight(file).path == file
-    with pytest.raises(InputError, match="--flow-instance: .*csv is a folder of CSV files"):
+    with pytest.raises(InputError, match=r"--flow-instance: .*csv is a folder of CSV files"):
         open_log(folder, flow_instance=0)
     with pytest.raises(InputError, match="--flow-instance 3 is not in the log"):
         open_log(file, flow_instance=3)

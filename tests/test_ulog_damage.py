@@ -68,8 +68,8 @@ def test_any_damage_is_one_line_or_a_part_of_the_log(sound, tmp_path, data):
             content[at : at + length] = noise
     try:
         log = read(bytes(content), tmp_path)
-    except InputError as error:
-        assert "\n" not in str(error)
+    except InputError:
+        complaint(bytes(content), tmp_path)
         return
     for stream in log.streams.values():
         assert len(stream) > 0
@@ -168,7 +168,8 @@ def test_definitions_that_cannot_be_are_not_believed(tmp_path, definitions):
     (HEAD + message("B", bytes(8) + b"\x02" + bytes(31)) + bytes(50), "features that are not known here"),
     (HEAD + message("F", b"esc_status:uint64_t timestamp;") + announced(3, "esc_status"), "it holds esc_status"),
     (HEAD + message("F", ATTITUDE.encode()) + announced(0, "vehicle_attitude")
-     + b"".join(message("D", struct.pack("<HQ4f", 0, 10**6 + k, 0, 0, 0, 0)) for k in range(9)), "every row is invalid"),
+     + b"".join(message("D", struct.pack("<HQ4f", 0, 10**6 + k, 0, 0, 0, 0)) for k in range(9)),
+     "every row is invalid"),
 ])  # fmt: skip
 def test_files_without_a_usable_reading_are_one_line(tmp_path, content, said):
     assert said in complaint(content, tmp_path)

@@ -111,7 +111,8 @@ def ulog_of_flight(tables: dict[str, dict[str, np.ndarray]], *, old: bool = Fals
     if old:
         writer.add("sensor_combined", imu["t_s"], float__gyro_rad=rates, float__accelerometer_m_s2=force)
         writer.add("vehicle_gps_position", gps["t_s"], int32_t__lat=1e7 * gps["lat_deg"],
-                   int32_t__lon=1e7 * gps["lon_deg"], int32_t__alt=1e3 * gps["alt_m"], **velocity, **accuracy)  # fmt: skip
+                   int32_t__lon=1e7 * gps["lon_deg"], int32_t__alt=1e3 * gps["alt_m"], **velocity,
+                   **accuracy)  # fmt: skip
         writer.add("optical_flow", flow["t_s"], float__pixel_flow_x_integral=seen[:, 0],
                    float__pixel_flow_y_integral=seen[:, 1], float__gyro_x_rate_integral=turned[:, 0],
                    float__gyro_y_rate_integral=turned[:, 1], float__gyro_z_rate_integral=turned[:, 2],

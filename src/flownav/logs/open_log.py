@@ -62,12 +62,17 @@ def open_flight(path: Path, *, flow_instance: int | None = None) -> Log:
 
 
 def log_kind(path: Path) -> str:
-    """ "ulog", "dataflash" or "tlog" by a file's first bytes and its suffix; "" for anything else."""
+    """ "ulog", "dataflash" or "tlog" by a file's first bytes and its suffix; "" for anything else.
+
+    InputError where a file cannot be read.
+    """
+    if not path.is_file():
+        return ""
     try:
         with path.open("rb") as file:
             head = file.read(16)
-    except OSError:
-        return ""
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); see who may read it") from error
     if head.startswith(ULOG_MAGIC) or path.suffix.lower() == ".ulg":
         return "ulog"
     if head.startswith(DATAFLASH_MAGIC):

@@ -100,9 +100,8 @@ def read_ulog(path: Path, *, flow_instance: int | None = None) -> Log:
         streams[Sensor.POSE] = pose
     autopilot, autopilot_note = autopilot_estimate(topics, attitude, source)
     if not streams:
-        raise InputError(
-            f"{path}: no usable reading of any sensor; {'; '.join(_unusable(topics)) or 'every row is invalid'}"
-        )
+        why = "; ".join(_unusable(topics)) or "every row is invalid"
+        raise InputError(f"{path}: no usable reading of any sensor ({why}); give another log")
     flow_note = f"flow is {flow.label}; not used: {', '.join(flows)}" if flow is not None and flows else ""
     said = {"attitude": "no attitude (vehicle_attitude, or vehicle_visual_odometry with one)"}
     said |= {"imu": slow_imu} if slow_imu else {}

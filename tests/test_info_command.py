@@ -51,7 +51,7 @@ def call(command, *arguments):
 def facts_of(path: Path, *options) -> dict:
     result = call(info.command, path, *options, "--json")
     assert result.exception is None, result.exception
-    return json.loads(result.stdout)
+    return json.loads(result.stdout, parse_constant=pytest.fail)  # no NaN, no Infinity
 
 
 def test_json_holds_every_stream_with_its_figures(ulog):

@@ -72,6 +72,23 @@ def test_a_flight_says_the_same_in_topics_of_every_age_as_in_csv(flown, tmp_path
     assert len(ours.inputs["log.ulg"]) == 64
 
 
+def test_an_attitude_that_says_nothing_gives_way_to_the_odometrys(tmp_path):
+    t_s = times(30)
+    columns = odometry(t_s, old=False, heading=0.2, velocity=(2.0, 0.0, 0.0), frame="NED")
+    log = read(with_attitude(q=(0.0, 0.0, 0.0, 0.0)).add("vehicle_visual_odometry", t_s, **columns), tmp_path)
+    assert len(log.streams[Sensor.ATTITUDE]) == len(t_s)
+    assert "no vehicle_attitude" in lacks(log)
+    poor = with_attitude()
+    poor.topics[0].fields["float q"][:4] = [[2, 0, 0, 0], [np.nan, 0, 0, 0], [0, 0, 0, 0], [1, 0, 0, 0]]
+    assert read(poor, tmp_path).streams[Sensor.ATTITUDE].rejected == {"not_finite": 1, "out_of_range": 2}
+
+
+def test_a_parameter_that_is_no_number_is_not_believed(tmp_path):
+    writer = local_position(with_attitude(), times(10))
+    writer.parameters["SYS_MC_EST_GROUP"] = float("nan")
+    assert read(writer, tmp_path).autopilot_name == "PX4 EKF2"
+
+
 # -- flow --------------------------------------------------------------------------------------------------
 def test_flow_is_what_was_accumulated_over_the_time_it_took(tmp_path):
     """2 m/s forward and 1 m/s to the right at 4 m, rolling by 0.3 rad/s: flow_x = 0.3 - 1/4, flow_y = 2/4."""

@@ -131,7 +131,9 @@ class Framing:
             return []
         flags = self.content[HEADER_SIZE + 11 : HEADER_SIZE + 19]
         if flags[0] & ~APPENDED or any(flags[1:]):
-            raise InputError(f"{path}: a ULog with features that are not known here (flags {flags.hex()})")
+            raise InputError(
+                f"{path}: a ULog with features that are not known here (flags {flags.hex()}); update flownav"
+            )
         if not flags[0] & APPENDED:
             return []
         offsets = struct.unpack_from("<3Q", self.content, HEADER_SIZE + 19)

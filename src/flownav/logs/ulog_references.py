@@ -23,6 +23,8 @@ NEW_FRAMES = {1: NED, 2: FRD, 3: BODY}
 def truth_of(topics: Topics, odometry_serves: bool) -> tuple[Table | None, str]:
     """A simulator's ground truth; else, if it may serve, the visual odometry, with the note that says so."""
     place = topics.fullest("vehicle_local_position_groundtruth", needs=("x", "y", "z"))
+    if place is not None:
+        place.keep(np.isfinite(place.matrix("x", "y", "z")).all(axis=1), "not_finite")
     if place is not None and len(place) >= LEAST_ROWS:
         turned = topics.fullest("vehicle_attitude_groundtruth", needs=("q[0]", "q[3]"))
         attitude = Stream.of(Sensor.ATTITUDE, turned.t_s, turned.vector("q", 4)) if turned is not None else None

@@ -15,6 +15,7 @@ FASTEST_M_S = 150.0
 FASTEST_TURN_RAD_S = 70.0
 HARDEST_M_S2 = 400.0
 UNIT_LENGTH_WITHIN = 0.1
+QUATERNION_FIELDS = tuple(f"q[{k}]" for k in range(4))
 SEA_LEVEL_PA = 101325.0
 SCALE_HEIGHT_M, ALTITUDE_EXPONENT = 44330.77, 0.1902632  # the standard atmosphere's troposphere
 LARGEST_HECTOPASCAL = 2000.0
@@ -24,18 +25,20 @@ YAW_90 = 2.0  # PX4's rotation of an IR-LOCK where no parameter says another
 
 def attitude_stream(topics: Topics) -> tuple[Stream | None, str]:
     """Body FRD to NED, and the topic: the autopilot's, or where it is not logged that of the visual odometry."""
-    topic = topics.fullest("vehicle_attitude", "vehicle_visual_odometry", needs=("q[0]", "q[3]"))
-    if topic is None:
-        return None, ""
-    rejected = dict(topic.rejected) if topic.name == "vehicle_attitude" else {}
-    rotation = Topic(topic.t_s, {f"q[{k}]": topic.columns[f"q[{k}]"] for k in range(4)}, rejected)
-    rotation.keep(np.isfinite(rotation.vector("q", 4)).all(axis=1), "not_finite")
-    length = np.linalg.norm(rotation.vector("q", 4), axis=1)
-    rotation.keep(abs(length - 1.0) < UNIT_LENGTH_WITHIN, "out_of_range")
-    stream = Stream.of(
-        Sensor.ATTITUDE, rotation.t_s, rotation.vector("q", 4), delay_s=topic.delay_s, rejected=rotation.rejected
-    )
-    return (stream, topic.name) if len(stream) else (None, "")
+    for name in ("vehicle_attitude", "vehicle_visual_odometry"):
+        topic = topics.fullest(name, needs=QUATERNION_FIELDS)
+        stream = _rotations(topic, dict(topic.rejected) if name == "vehicle_attitude" else {}) if topic else None
+        if stream is not None and len(stream):
+            return stream, name
+    return None, ""
+
+
+def _rotations(topic: Topic, rejected: dict[str, int]) -> Stream:
+    """Quaternions of unit length."""
+    rows = Topic(topic.t_s, {name: topic.columns[name] for name in QUATERNION_FIELDS}, rejected)
+    rows.keep(np.isfinite(rows.vector("q", 4)).all(axis=1), "not_finite")
+    rows.keep(abs(np.linalg.norm(rows.vector("q", 4), axis=1) - 1.0) < UNIT_LENGTH_WITHIN, "out_of_range")
+    return Stream.of(Sensor.ATTITUDE, rows.t_s, rows.vector("q", 4), delay_s=topic.delay_s, rejected=rows.rejected)
 
 
 # -- inertial ----------------------------------------------------------------------------------------------
@@ -154,7 +157,7 @@ def mag_stream(topics: Topics) -> Stream | None:
     topic = topics.fullest("vehicle_magnetometer", "sensor_combined", needs=names)
     if topic is not None:
         return _column(Sensor.MAG, _at_relative(topic, "magnetometer"), names)
-    topic = topics.fullest("sensor_mag", needs="xyz")
+    topic = topics.fullest("sensor_mag", needs=("x", "y", "z"))
     return None if topic is None else _column(Sensor.MAG, topic, ("x", "y", "z"))
 
 

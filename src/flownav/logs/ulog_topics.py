@@ -75,7 +75,6 @@ class Topics:
     parameters: dict[str, float]
     sha256: str
     notes: list[str] = field(default_factory=list)
-    others: set[str] = field(default_factory=set)
 
     def of(self, *names: str) -> list[Topic]:
         """Every instance of the named topics that has rows, in the order of the names."""
@@ -115,8 +114,9 @@ def read_topics(path: Path, wanted: Collection[str], fields: Collection[str], st
             f"{path}: no reading of any sensor that is known here{others}; log vehicle_attitude, sensor_combined, "
             "vehicle_gps_position, vehicle_optical_flow and distance_sensor (SDLOG_PROFILE)"
         )
-    parameters = {str(name): float(value) for name, value in log.initial_parameters.items()}
-    return Topics(found, parameters, sha256, _notes(framed), framed.topics - set(wanted))
+    stated = {str(name): float(value) for name, value in log.initial_parameters.items()}
+    parameters = {name: value for name, value in stated.items() if np.isfinite(value)}
+    return Topics(found, parameters, sha256, _notes(framed))
 
 
 def _framed(path: Path, wanted: Collection[str]) -> tuple[Framed, str]:

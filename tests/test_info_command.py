@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +11,12 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from flownav.cli import identify, info, replay
+from flownav.cli import identify, info
+from flownav.cli import replay as replay_command
 from flownav.errors import InputError
+from flownav.frames import quaternion_from_euler
 from flownav.inspection.autopilot import autopilot_errors
+from flownav.inspection.summary import summarise
 from flownav.logs.open_log import open_log
 from flownav.measurement import Sensor
 from replay_logs import log_of_flight
@@ -127,6 +131,29 @@ def test_what_is_wrong_and_missing_is_said(flown, tmp_path):
     assert "no inertial readings" in shown
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_without_gps_the_reference_tells_the_flows_sign(flown, tmp_path, sign):
+    writer = ulog_of_flight(flown.tables)
+    writer.topics = [topic for topic in writer.topics if topic.name != "sensor_gps"]
+    fields = next(topic for topic in writer.topics if topic.name == "vehicle_optical_flow").fields
+    fields["float pixel_flow"] = sign * fields["float pixel_flow"]
+    t_s = np.arange(0.0, 39.0, 1 / 30)
+    at = [np.interp(t_s, flown.t_s, column) for column in (*flown.position.T, *flown.velocity.T)]
+    angles = [np.interp(t_s, flown.tables["attitude"]["t_s"], flown.tables["attitude"][f"{name}_rad"])
+              for name in ("roll", "pitch")]  # fmt: skip
+    yaw = np.interp(t_s, flown.tables["attitude"]["t_s"], np.unwrap(flown.tables["attitude"]["yaw_rad"]))
+    writer.add(
+        "vehicle_visual_odometry", t_s, float__position=np.column_stack(at[:3]),
+        float__velocity=np.column_stack(at[3:]), float__q=np.column_stack(quaternion_from_euler(*angles, yaw)),
+        uint8_t__pose_frame=0 * t_s + 1, uint8_t__velocity_frame=0 * t_s + 1,
+    )  # fmt: skip
+    facts = facts_of(writer.write(tmp_path / "indoors.ulg"))
+    assert facts["checked"].endswith("flow with the reference's velocity")
+    assert facts["flow_is_wrong"] is (sign < 0)
+    text = "flow sign is inverted (both axes) against the reference; mend the log's flow columns"
+    assert facts["warnings"] == ([text] if sign < 0 else [])
+
+
 def test_a_log_that_cannot_be_replayed_is_shown_all_the_same(flown, tmp_path):
     writer = ulog_of_flight(flown.tables)
     writer.topics = [topic for topic in writer.topics if topic.name in ("vehicle_imu", "vehicle_optical_flow")]
@@ -135,7 +162,7 @@ def test_a_log_that_cannot_be_replayed_is_shown_all_the_same(flown, tmp_path):
     assert [stream["sensor"] for stream in facts["streams"]] == ["imu", "flow_rate"]
     assert facts["checked"].startswith("nothing: the log has no attitude")
     assert {"no GPS fix", "no range"} <= {absence["what"] for absence in facts["absences"]}
-    result = call(replay.command, path)
+    result = call(replay_command.command, path)
     assert isinstance(result.exception, InputError)
     assert "the log lacks an attitude" in str(result.exception)
     assert not list(Path.cwd().rglob("*.fnr"))
@@ -151,11 +178,15 @@ def test_csv_folders_are_shown_too(flown, tmp_path):
 
 def test_a_replayed_ulog_drifts_as_its_csv_does(flown, ulog, tmp_path):
     cut = ("--gps-outage", "15:35", "--json", "--no-report")
-    both = [json.loads(call(replay.command, path, *cut).stdout) for path in (ulog, flown.write(tmp_path / "csv"))]
+    both = [
+        json.loads(call(replay_command.command, path, *cut).stdout) for path in (ulog, flown.write(tmp_path / "csv"))
+    ]
     ours, theirs = (facts["outages"][0]["horizontal_rms_m"] for facts in both)
     assert ours == pytest.approx(theirs, abs=0.01)
     assert both[0]["record"] == "out/garden.ulg.fnr"
-    assert "flow-instance 4 is not in the log" in str(call(replay.command, ulog, "--flow-instance", "4").exception)
+    assert "flow-instance 4 is not in the log" in str(
+        call(replay_command.command, ulog, "--flow-instance", "4").exception
+    )
 
 
 def test_identify_takes_a_ulog_and_says_what_a_rig_cannot_have(ulog, tmp_path):
@@ -178,8 +209,14 @@ def test_a_real_log_of_two_flow_sensors(data_folder):
     streams = {stream["sensor"]: stream for stream in facts["streams"]}
     assert streams["flow_rate"]["rate_hz"] == pytest.approx(58.8, abs=0.1)
     assert facts["limits"]["range_m"]["outside_share"] > 0.5  # on the ground it reads below what it states
+    assert facts["checked"].endswith("flow with the reference's velocity")
+    assert facts["warnings"] == []
     assert facts["autopilot"]["against"] == "truth"
     assert 0.1 < facts["autopilot"]["horizontal_rms_m"] < 2.0
+    log = open_log(path)
+    flow = log.streams[Sensor.FLOW_RATE]
+    swapped = replace(log, streams={**log.streams, Sensor.FLOW_RATE: replace(flow, value=flow.value[:, [1, 0, 2, 3]])})
+    assert any("flow axes are swapped" in text for text in summarise(swapped)["warnings"])
     second = facts_of(path, "--flow-instance", "1")
     assert next(s for s in second["streams"] if s["sensor"] == "flow_rate")["count"] == 14438
     assert Sensor.IMU.name.lower() not in streams

@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 
 from flownav.errors import InputError
+from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.inspection.autopilot import autopilot_errors
 from flownav.logs.log import Log
 from flownav.logs.plausible import check_plausible
+from flownav.logs.rates import attitude_at
 from flownav.measurement import Array, Sensor, Stream
+from flownav.record import VELOCITY_BODY
 from flownav.replay.prepare import GPS, ReplayOptions, prepare
 from flownav.replay.sentinel import Finding, findings
 
@@ -115,15 +118,29 @@ def _findings(log: Log) -> tuple[str, list[Finding]]:
         found.append(Finding(str(error).removeprefix(f"{log.path}: "), label="Error"))
     compared = "gravity, rates and GPS with the attitude and each other"
     try:
-        found += findings(prepare(log, ReplayOptions()).streams, ())
+        streams = dict(prepare(log, ReplayOptions()).streams)
     except InputError as error:
         return compared, [*found, Finding(str(error), label="Note")]
-    flow = log.streams.keys() & {Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY}
-    if not flow:
-        return compared, found
-    if Sensor.GPS_VELOCITY not in log.streams:
-        return f"{compared}; the flow's signs and axes are not told without GPS velocity", found
-    return f"{compared}; flow with GPS velocity", found
+    if not streams.keys() & {Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY}:
+        return compared, found + findings(streams, ())
+    if Sensor.GPS_VELOCITY in streams:
+        return f"{compared}; flow with GPS velocity", found + findings(streams, ())
+    witness = _witness(log)
+    if witness is None:
+        return f"{compared}; the flow's signs and axes are not told without a velocity to compare with", found
+    said = findings({**streams, Sensor.GPS_VELOCITY: witness}, ())
+    found += [finding._replace(text=finding.text.replace("GPS", "the reference")) for finding in said]
+    return f"{compared}; flow with the reference's velocity", found
+
+
+def _witness(log: Log) -> Stream | None:
+    """The reference's body velocity in the axes of the log's attitude, for want of GPS velocity; None without one."""
+    if log.truth is None or not set(VELOCITY_BODY) <= log.truth.keys():
+        return None
+    t_s = np.asarray(log.truth["t_s"], float)
+    body = np.column_stack([np.asarray(log.truth[name], float) for name in VELOCITY_BODY])
+    rotation = rotation_from_quaternion(*attitude_at(log.streams[Sensor.ATTITUDE], t_s).T)
+    return Stream.of(Sensor.GPS_VELOCITY, t_s, np.column_stack(to_earth(rotation, *body.T)))
 
 
 def _autopilot(log: Log) -> dict[str, Any] | None:

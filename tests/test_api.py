@@ -32,6 +32,7 @@ ALLOWED = {
     "scoring": GROUND,
     "logs": GROUND,
     "rig": GROUND | {"optics", "sensors"},
+    "inspection": GROUND | EQUATIONS | {"logs", "replay", "scoring"},
     "identification": GROUND | EQUATIONS | {"logs", "rig", "replay", "scoring"},
     "simulation": GROUND | EQUATIONS,
     "replay": GROUND | EQUATIONS | {"logs", "scoring"},

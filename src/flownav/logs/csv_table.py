@@ -73,9 +73,9 @@ def read_csv_table(path: Path, columns: Sequence[Column]) -> CsvTable:
     table = CsvTable(path, raw.pop("t_s"), raw, sha256=hashlib.sha256(content).hexdigest())
     if malformed:
         table.rejected["malformed_row"] = len(malformed)
-    _check_finite(table, columns)
+    check_finite(table, columns)
     _check_limits(table, columns)
-    _check_clock(table)
+    check_clock(table)
     if not len(table.t_s):
         reasons = ", ".join(f"{count} {reason}" for reason, count in table.rejected.items()) or "it is empty"
         raise InputError(f"{path}: no usable row ({reasons})")
@@ -150,7 +150,8 @@ def _number(text: str | None) -> float:
         return np.nan
 
 
-def _check_finite(table: CsvTable, columns: Sequence[Column]) -> None:
+def check_finite(table: CsvTable, columns: Sequence[Column]) -> None:
+    """Throw away the rows without a number where one must be."""
     must = [c.name for c in columns if c.name in table.columns and not c.may_be_empty]
     finite = np.isfinite(table.t_s)
     for name in must:
@@ -176,7 +177,7 @@ def _check_limits(table: CsvTable, columns: Sequence[Column]) -> None:
     table.keep(inside, "out_of_range")
 
 
-def _check_clock(table: CsvTable) -> None:
+def check_clock(table: CsvTable) -> None:
     """Put the rows in time order: late rows are thrown away, a file without any order is sorted."""
     t_s = table.t_s
     back = np.flatnonzero(np.diff(t_s) < 0)

@@ -76,6 +76,7 @@ def read_csv_table(path: Path, columns: Sequence[Column]) -> CsvTable:
     check_finite(table, columns)
     _check_limits(table, columns)
     check_clock(table)
+    _check_step(table)
     if not len(table.t_s):
         reasons = ", ".join(f"{count} {reason}" for reason, count in table.rejected.items()) or "it is empty"
         raise InputError(f"{path}: no usable row ({reasons})")
@@ -203,6 +204,9 @@ def check_clock(table: CsvTable) -> None:
     for values in table.columns.values():
         again[1:] &= (values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))
     table.keep(~again, "duplicate")
+
+
+def _check_step(table: CsvTable) -> None:
     if len(table.t_s) > 2 and np.median(np.diff(table.t_s)) > LONGEST_MEDIAN_STEP_S:
         step = float(np.median(np.diff(table.t_s)))
         raise InputError(f"{table.path}: t_s steps by {step:g} a row; seconds are needed (milliseconds? microseconds?)")

@@ -6,7 +6,7 @@ Format characters and their factors are ArduPilot's (libraries/AP_Logger/LogStru
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ DIVISORS = {"c": 100.0, "C": 100.0, "e": 100.0, "E": 100.0, "L": 1e7}  # these c
 FMT_TYPE = 0x80
 NO_UNIT, NO_MULTIPLIER = "", 0.0
 INSTANCE_UNIT = "#"
+INSTANCE_LABELS = ("I", "C", "Instance")  # of logs older than FMTU
 
 _SIZES = np.full(256, -1000)
 _SIZES[0] = 0
@@ -116,7 +117,9 @@ def with_units(formats: dict[str, Format], tables: dict[str, NDArray[np.void]]) 
     factors = {chr(key & 0x7F): _rounded(factor) for key, factor in _pairs(tables, "MULT", "Mult")}
     stated = tables.get("FMTU")
     described = dict(formats)
-    if stated is None or not {"FmtType", "UnitIds", "MultIds"} <= set(stated.dtype.names or ()):
+    if stated is None:
+        return {name: _guessed(known) for name, known in formats.items()}
+    if not {"FmtType", "UnitIds", "MultIds"} <= set(stated.dtype.names or ()):
         return described
     by_type = {known.type: known for known in formats.values()}
     for row in stated:
@@ -137,6 +140,12 @@ def _described(
     }
     marked = [label for label, key in zip(known.labels, unit_ids, strict=False) if key == INSTANCE_UNIT]
     return Format(known.type, known.name, known.codes, known.labels, named, multipliers, marked[0] if marked else None)
+
+
+def _guessed(known: Format) -> Format:
+    """The instance field by its customary name, for a file without FMTU."""
+    customary = [label for label in known.labels if label in INSTANCE_LABELS]
+    return replace(known, instance=customary[0] if customary else None)
 
 
 def _pairs(tables: dict[str, NDArray[np.void]], name: str, value: str) -> list[tuple[int, np.generic]]:

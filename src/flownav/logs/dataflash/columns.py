@@ -73,18 +73,22 @@ class DataFlash:
         Numbers are as ArduPilot's own tools give them: the factors of the characters c, C, e, E and L are applied
         (float64), those of MULT are not (`Format.multipliers`). Text is bytes, see `text`. instance: only one
         sensor's. t0_s, t1_s: only t0 <= TimeUS * 1e-6 < t1, seconds since the vehicle started.
-        KeyError where the kind, the label, TimeUS or the instance field is unknown.
+        KeyError where the kind, a label, TimeUS or the instance field is unknown.
         """
         known = self.formats[name]
+        wanted = known.labels if labels is None else tuple(labels)
+        sliced = t0_s is not None or t1_s is not None
+        unknown = {*wanted, *(("TimeUS",) if sliced else ())} - set(known.labels)
+        if unknown or (sliced and "TimeUS" not in known.numbers):
+            raise KeyError(f"{name} has no {', '.join(sorted(unknown or {'TimeUS in numbers'}))}")
         at = self._offsets(known)
         if instance is not None:
             if known.instance is None:
                 raise KeyError(f"{name} has no instance field")
             at = at[self._field(known, known.instance, at) == instance]
-        if t0_s is not None or t1_s is not None:
+        if sliced:
             t_s = self._field(known, "TimeUS", at) * 1e-6
             at = at[(t_s >= (-np.inf if t0_s is None else t0_s)) & (t_s < (np.inf if t1_s is None else t1_s))]
-        wanted = known.labels if labels is None else tuple(labels)
         rows = records(self._content, known.dtype)[at]
         return {label: _converted(rows[label], known.code(label)) for label in wanted}
 
@@ -120,7 +124,7 @@ def read_columns(
     return {
         name: log.table(name, t0_s=t0_s, t1_s=t1_s)
         for name in log.names()
-        if (messages is None or name in messages) and not (sliced and "TimeUS" not in log.formats[name].labels)
+        if (messages is None or name in messages) and not (sliced and "TimeUS" not in log.formats[name].numbers)
     }
 
 

@@ -19,6 +19,7 @@ CODES: dict[str, str] = {
     "c": "<i2", "C": "<u2", "e": "<i4", "E": "<u4", "L": "<i4",
 }  # fmt: skip
 DIVISORS = {"c": 100.0, "C": 100.0, "e": 100.0, "E": 100.0, "L": 1e7}  # these characters imply a factor
+NOT_NUMBERS = "anNZ"
 FMT_TYPE = 0x80
 NO_UNIT, NO_MULTIPLIER = "", 0.0
 INSTANCE_UNIT = "#"
@@ -57,6 +58,11 @@ class Format:
         ]
         return np.dtype(fields)
 
+    @property
+    def numbers(self) -> frozenset[str]:
+        """Labels of the fields that are one number each."""
+        return frozenset(label for label, c in zip(self.labels, self.codes, strict=True) if c not in NOT_NUMBERS)
+
     def code(self, label: str) -> str:
         """A field's format character."""
         return self.codes[self.labels.index(label)]
@@ -93,7 +99,7 @@ def _sound(content: Bytes, headers: Indices) -> NDArray[np.void]:
     for text in ("Name", "Format", "Columns"):  # letters or nothing: most chance headers end here
         at = at[content[at + int(FMT.dtype.fields[text][1])] < 128]  # type: ignore[index]
     rows = np.ascontiguousarray(records(content, FMT.dtype)[at])
-    codes = np.ascontiguousarray(rows["Format"]).view(np.uint8).reshape(len(rows), -1)
+    codes = np.ascontiguousarray(rows["Format"]).view(np.uint8).reshape(len(rows), FMT.dtype["Format"].itemsize)
     ended = np.logical_or.accumulate(codes == 0, axis=1)
     size = np.where(ended, 0, _SIZES[codes]).sum(axis=1) + HEADER_BYTES
     rows = rows[size == rows["Length"]]

@@ -31,9 +31,9 @@ def message_rows(log: DataFlash, name: str, fields: Sequence[Field], instance: i
 
     None where the kind does not occur, or lacks TimeUS or a required field as a number.
     """
-    numeric = _numeric_labels(log, name)
+    numeric = log.formats[name].numbers if log.count(name) else frozenset()
     lacking = [field.label for field in fields if field.required and field.label not in numeric]
-    if not log.count(name) or "TimeUS" not in numeric or lacking:
+    if "TimeUS" not in numeric or lacking:
         return None
     present = [field for field in fields if field.label in numeric]
     columns = log.table(name, ["TimeUS", *(field.label for field in present)], instance=instance)
@@ -60,11 +60,3 @@ def check_rows(table: CsvTable, fields: Sequence[Field]) -> None:
 def held_at(instants_s: Array, t_s: Array, values: Array) -> Array:
     """The latest value at each instant, the first one before there is any; values (n, ...), n at least 1."""
     return np.asarray(values[np.maximum(np.searchsorted(t_s, instants_s, side="right") - 1, 0)])
-
-
-def _numeric_labels(log: DataFlash, name: str) -> set[str]:
-    """Labels of a kind's fields that are one number each."""
-    known = log.formats.get(name)
-    return (
-        {label for label, code in zip(known.labels, known.codes, strict=True) if code not in "anNZ"} if known else set()
-    )

@@ -55,6 +55,11 @@ class DataFlashWriter:
         )
         return at
 
+    @staticmethod
+    def blank(codes: str) -> bytes:
+        """A body of zeros."""
+        return bytes(struct.calcsize("<" + "".join(STRUCT[c] for c in codes)))
+
     def content(self) -> bytes:
         return b"".join(self.parts)
 

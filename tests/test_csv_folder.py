@@ -308,6 +308,13 @@ def test_rows_of_another_length_are_counted(folder):
     assert stream.rejected == {"malformed_row": 2}
 
 
+def test_rows_of_another_length_that_are_no_text_are_counted(folder):
+    with (folder / "range.csv").open("ab") as file:
+        file.write(b"29.97,\xff\xfe,1,9\n29.98,\xff,1\n")
+    stream = read_csv_folder(folder).streams[Sensor.RANGE]
+    assert stream.rejected == {"malformed_row": 1, "not_finite": 1}
+
+
 def test_a_row_cut_off_at_the_end_is_counted(folder):
     text = (folder / "range.csv").read_text().rstrip("\n")
     (folder / "range.csv").write_text(text[: text.rindex(",")])

@@ -106,7 +106,7 @@ def _parse(path: Path, content: bytes, wanted: list[str], malformed: list[int]) 
     def parse(kind: pa.DataType) -> pa.Table:
         malformed.clear()
         return csv.read_csv(
-            pa.BufferReader(content),
+            pa.BufferReader(readable),
             read_options=csv.ReadOptions(column_names=header, skip_rows=1, use_threads=False),
             parse_options=csv.ParseOptions(invalid_row_handler=skip),
             convert_options=csv.ConvertOptions(
@@ -118,6 +118,7 @@ def _parse(path: Path, content: bytes, wanted: list[str], malformed: list[int]) 
         )
 
     header = _header(path, content)
+    readable = content if content.isascii() else content.decode("utf-8", errors="replace").encode()
     names = [name for name in dict.fromkeys(["t_s", *wanted]) if name in header]
     if not names:
         return {}

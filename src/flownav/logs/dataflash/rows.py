@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.logs.csv_table import Column, CsvTable, check_clock, check_finite
 from flownav.logs.dataflash.columns import DataFlash
@@ -38,10 +39,14 @@ def message_rows(log: DataFlash, name: str, fields: Sequence[Field], instance: i
     present = [field for field in fields if field.label in numeric]
     columns = log.table(name, ["TimeUS", *(field.label for field in present)], instance=instance)
     stated = log.formats[name].multipliers
-    scaled = {
-        field.label: columns[field.label].astype(float) * stated.get(field.label, field.factor) for field in present
-    }
-    return CsvTable(Path(f"{log.path}: {name}"), columns["TimeUS"].astype(float) * MICROSECOND_S, scaled)
+    scaled = {field.label: _floats(columns[field.label]) * stated.get(field.label, field.factor) for field in present}
+    return CsvTable(Path(f"{log.path}: {name}"), _floats(columns["TimeUS"]) * MICROSECOND_S, scaled)
+
+
+def _floats(values: NDArray[Any]) -> Array:
+    """As float64; a damaged file's signalling NaN is a NaN and no warning."""
+    with np.errstate(invalid="ignore"):
+        return values.astype(float)
 
 
 def check_rows(table: CsvTable, fields: Sequence[Field]) -> None:

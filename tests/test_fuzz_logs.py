@@ -33,7 +33,7 @@ from replay_logs import SyntheticLog, log_of_flight
 MUTANTS = int(os.environ.get("FLOWNAV_FUZZ", "500"))
 FIRST_SEED = int(os.environ.get("FLOWNAV_FUZZ_FIRST", "0"))
 SECONDS_PER_MB, FLOOR_S = 1.0, 3.0
-BYTES_PER_BYTE, FLOOR_BYTES = 60, 48 << 20
+BYTES_PER_BYTE, FLOOR_BYTES = 60, 128 << 20
 
 
 @dataclass(frozen=True)

@@ -39,14 +39,14 @@ def message_rows(log: DataFlash, name: str, fields: Sequence[Field], instance: i
     present = [field for field in fields if field.label in numeric]
     columns = log.table(name, ["TimeUS", *(field.label for field in present)], instance=instance)
     stated = log.formats[name].multipliers
-    scaled = {field.label: _floats(columns[field.label]) * stated.get(field.label, field.factor) for field in present}
-    return CsvTable(Path(f"{log.path}: {name}"), _floats(columns["TimeUS"]) * MICROSECOND_S, scaled)
+    scaled = {field.label: _scaled(columns[field.label], stated.get(field.label, field.factor)) for field in present}
+    return CsvTable(Path(f"{log.path}: {name}"), _scaled(columns["TimeUS"], MICROSECOND_S), scaled)
 
 
-def _floats(values: NDArray[Any]) -> Array:
-    """As float64; a damaged file's signalling NaN is a NaN and no warning."""
-    with np.errstate(invalid="ignore"):
-        return values.astype(float)
+def _scaled(values: NDArray[Any], factor: float) -> Array:
+    """In float64, times a factor; a damaged file's signalling NaN or huge number is no warning, the checks see it."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(values.astype(float) * factor)
 
 
 def check_rows(table: CsvTable, fields: Sequence[Field]) -> None:

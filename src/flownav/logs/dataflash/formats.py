@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.logs.dataflash.scan import HEADER_BYTES, Bytes, Indices
+from flownav.logs.dataflash.scan import HEADER_BYTES, Bytes, Headers
 
 CODES: dict[str, str] = {
     "a": "(32,)<i2", "b": "i1", "B": "u1", "h": "<i2", "H": "<u2", "i": "<i4", "I": "<u4", "q": "<i8", "Q": "<u8",
@@ -71,7 +71,7 @@ class Format:
 FMT = Format(FMT_TYPE, "FMT", "BBnNZ", ("Type", "Length", "Name", "Format", "Columns"))
 
 
-def read_formats(content: Bytes, headers: Indices) -> tuple[dict[str, Format], int]:
+def read_formats(content: Bytes, headers: Headers) -> tuple[dict[str, Format], int]:
     """Formats by name from every FMT message that is sound, and the number of those that contradict an earlier one.
 
     Sound: known characters, one label a character, a length that is their sum. The first definition of a type and
@@ -93,9 +93,10 @@ def read_formats(content: Bytes, headers: Indices) -> tuple[dict[str, Format], i
     return formats, contradictions
 
 
-def _sound(content: Bytes, headers: Indices) -> NDArray[np.void]:
+def _sound(content: Bytes, headers: Headers) -> NDArray[np.void]:
     """The distinct FMT rows whose characters add up to their length, in file order."""
-    at = headers[(content[headers + 2] == FMT_TYPE) & (headers + FMT.dtype.itemsize <= len(content))]
+    at = headers.offset[headers.type == FMT_TYPE]
+    at = at[at + FMT.dtype.itemsize <= len(content)]
     for text in ("Name", "Format", "Columns"):  # letters or nothing: most chance headers end here
         at = at[content[at + int(FMT.dtype.fields[text][1])] < 128]  # type: ignore[index]
     rows = np.ascontiguousarray(records(content, FMT.dtype)[at])

@@ -14,8 +14,9 @@ import numpy as np
 
 from flownav.errors import InputError
 from flownav.frames import quaternion_from_euler
+from flownav.logs.absences import absences_of
 from flownav.logs.csv_table import Column, CsvTable, read_csv_table
-from flownav.logs.fixes import local_ned, near_the_rest
+from flownav.logs.fixes import local_position, near_the_rest, origin_of
 from flownav.logs.log import Log
 from flownav.logs.plausible import check_plausible
 from flownav.measurement import Array, Sensor, Stream
@@ -80,7 +81,7 @@ def read_csv_folder(folder: Path) -> Log:
             streams.update({stream.sensor: stream for stream in convert(tables[name])})
     _check_overlap(folder, tables)
     check_plausible(folder, streams)
-    origin = _origin(tables["gps"]) if "gps" in tables else None
+    origin = origin_of(tables["gps"]) if "gps" in tables else None
     return Log(
         folder,
         streams,
@@ -88,6 +89,7 @@ def read_csv_folder(folder: Path) -> Log:
         _truth(tables["truth"]) if "truth" in tables else None,
         {f"{name}.csv": table.sha256 for name, table in tables.items()},
         tuple(note for table in tables.values() for note in table.notes),
+        absences=tuple(absences_of(streams)),
     )
 
 
@@ -136,22 +138,12 @@ def _gps(table: CsvTable) -> list[Stream]:
     table.keep(table.columns["fix_type"] >= 3, "no_fix")
     if not len(table.t_s):
         raise InputError(f"{table.path}: no row has a 3-D fix (fix_type 3 or more); remove the file to replay without")
-    table.keep(near_the_rest(table.columns["lat_deg"], table.columns["lon_deg"]), "out_of_range")
+    table.keep(near_the_rest(table), "out_of_range")
     velocity = table.matrix("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
     return [
         Stream.of(Sensor.GPS_VELOCITY, table.t_s, velocity, rejected=table.rejected),
-        Stream.of(Sensor.GPS_POSITION, table.t_s, _local_position(table), rejected=table.rejected),
+        Stream.of(Sensor.GPS_POSITION, table.t_s, local_position(table), rejected=table.rejected),
     ]
-
-
-def _origin(table: CsvTable) -> tuple[float, float, float]:
-    first = table.matrix("lat_deg", "lon_deg", "alt_m")[0]
-    return float(first[0]), float(first[1]), float(first[2])
-
-
-def _local_position(table: CsvTable) -> Array:
-    """North, east, down [m] about the first fix."""
-    return local_ned(table.matrix("lat_deg", "lon_deg", "alt_m"), _origin(table))
 
 
 def _flow(table: CsvTable) -> list[Stream]:

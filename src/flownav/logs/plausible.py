@@ -32,8 +32,13 @@ LEAST_FIELD_GAUSS = 0.05
 
 
 def check_plausible(where: Path, streams: dict[Sensor, Stream]) -> None:
-    """InputError where two sensors cannot be in the stated units, axes and signs at the same time."""
+    """InputError where two sensors cannot be in the stated units, axes and signs at the same time.
+
+    Nothing is compared without an attitude.
+    """
     _check_span(where, streams)
+    if Sensor.ATTITUDE not in streams:
+        return
     attitude = streams[Sensor.ATTITUDE]
     if Sensor.IMU in streams:
         _check_gravity(where, streams[Sensor.IMU], attitude)

@@ -6,32 +6,25 @@ import hashlib
 from pathlib import Path
 
 from flownav.errors import InputError
+from flownav.logs.absences import absences_of
 from flownav.logs.csv_table import CsvTable
 from flownav.logs.dataflash import reference, sensors
 from flownav.logs.dataflash.columns import DataFlash
-from flownav.logs.fixes import Origin
-from flownav.logs.log import Absence, Log
+from flownav.logs.dataflash.reference import Origin
+from flownav.logs.log import Log
 from flownav.logs.plausible import check_plausible
 from flownav.measurement import Sensor, Stream
 from flownav.record import Table
 
-ABSENCES = {
-    "GPS": Absence("GPS", "position starts at 0 and drifts with the flow"),
-    "OF": Absence("optical flow (OF)", "nothing but GPS holds the horizontal position"),
-    "RFND": Absence("a downward rangefinder (RFND)", "flow has no height to become a velocity"),
-    "IMU": Absence("IMU", "the attitude's turning takes the rotation out of the flow"),
-    "BARO": Absence("barometer (BARO)", "height comes from GPS and range"),
-    "MAG": Absence("magnetometer (MAG)", "heading is the attitude's, as always"),
-}
 LONGEST_DELAY_S = 1.0
 
 
 def read_dataflash(path: Path, *, flow_instance: int | None = None) -> Log:
     """Read a log; times are seconds since the first reading used.
 
-    flow_instance: which flow sensor, where the log has several; the first by default. InputError, one line, where
-    the file cannot be read, has no attitude, or has neither GPS nor flow; where its clock restarts; where two
-    sensors cannot be right together. Bad rows are counted in `Stream.rejected`, unreadable bytes told in a note.
+    flow_instance: which flow sensor, where the log has several; the one with most data by default. InputError where
+    the file cannot be read or holds no sensor's message; where its clock restarts; where two sensors cannot be
+    right together. Bad rows are counted in `Stream.rejected`, unreadable bytes told in a note.
     """
     log = DataFlash(path)
     notes = _file_notes(log)
@@ -62,7 +55,7 @@ def read_dataflash(path: Path, *, flow_instance: int | None = None) -> Log:
         reference.estimate(estimated[1], origins, about) if estimated else None,
         estimated[0] if estimated else "",
         reference.stated_limits(settings, sensors.rangefinder_instance(log)) if "RFND" in tables else {},
-        tuple(absence for name, absence in ABSENCES.items() if name not in tables),
+        tuple(absences_of(streams, flow_rate="no optical flow (OF)", range="no downward rangefinder (RFND)")),
     )
 
 
@@ -79,18 +72,15 @@ def _file_notes(log: DataFlash) -> list[str]:
 
 
 def _check_needed(log: DataFlash, tables: dict[str, CsvTable]) -> None:
-    lacking = [] if "ATT" in tables else ["ATT (attitude)"]
-    if not tables.keys() & {"GPS", "OF"}:
-        lacking.append("one of GPS, OF (optical flow)")
-    if lacking:
-        raise InputError(
-            f"{log.path}: no usable {' and no '.join(lacking)} in the log; a replay needs ATT and GPS or OF "
-            "(LOG_BITMASK decides what the vehicle writes)"
-        )
+    if not tables.keys() & {"GPS", *sensors.STREAMS}:
+        wanted = ", ".join(["GPS", *sensors.STREAMS])
+        raise InputError(f"{log.path}: no usable {wanted} in the log; LOG_BITMASK decides what the vehicle writes")
 
 
 def _check_overlap(path: Path, tables: dict[str, CsvTable]) -> None:
     """Messages of one flight share a clock: their times must meet the attitude's."""
+    if "ATT" not in tables:
+        return
     attitude = tables["ATT"].t_s
     for name, table in tables.items():
         if name in sensors.STREAMS and (table.t_s[-1] < attitude[0] or table.t_s[0] > attitude[-1]):
@@ -108,7 +98,7 @@ def _streams(tables: dict[str, CsvTable], origin: Origin | None, settings: dict[
     if "EV" in tables:
         found.append(sensors.landed(tables["EV"], 0.0))
     streams = {stream.sensor: stream for stream in found}
-    if "PL" in tables:
+    if "PL" in tables and Sensor.ATTITUDE in streams:
         delay_s = _delay_s(settings, ("PLND_LAG",), 1.0)
         streams[Sensor.PAD] = sensors.pad(tables["PL"], streams[Sensor.ATTITUDE], delay_s)
     return streams

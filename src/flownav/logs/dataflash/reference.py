@@ -8,13 +8,14 @@ from flownav.frames import quaternion_from_euler, rotation_from_quaternion, to_b
 from flownav.logs.csv_table import CsvTable
 from flownav.logs.dataflash.columns import DataFlash, text
 from flownav.logs.dataflash.rows import Field, check_rows, held_at, message_rows
-from flownav.logs.fixes import Origin, local_ned
 from flownav.measurement import Array
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
 
 FARTHEST_M, FASTEST_M_S = 1e5, 300.0
 EKF_ORIGIN = 0  # ORGN's Type: the filter's origin; 1 is home
 FILTERS = {3: ("EKF3", "XKF"), 2: ("EKF2", "NKF")}  # by AHRS_EKF_TYPE
+
+Origin = tuple[float, float, float]  # latitude, longitude [deg], altitude [m]
 
 GEODETIC = (Field("Lat", -90, 90), Field("Lng", -180, 180), Field("Alt", -1000, 20000))
 POSITION_VELOCITY = (
@@ -27,6 +28,13 @@ ESTIMATE = (
     Field("C", 0, 255, required=False),
 )
 TRUE_STATE = (*GEODETIC, *(Field(f"Q{i}", -1.01, 1.01) for i in (1, 2, 3, 4)))
+
+
+def local_ned(geodetic_deg_m: Array, origin: Origin) -> Array:
+    """North, east, down [m] about an origin; latitude, longitude [deg] and altitude [m] in, shape (n, 3) both."""
+    import pymap3d
+
+    return np.column_stack(pymap3d.geodetic2ned(*geodetic_deg_m.T, *origin))
 
 
 def parameters(log: DataFlash) -> dict[str, float]:

@@ -40,7 +40,7 @@ def message_rows(log: DataFlash, name: str, fields: Sequence[Field], instance: i
     columns = log.table(name, ["TimeUS", *(field.label for field in present)], instance=instance)
     stated = log.formats[name].multipliers
     scaled = {field.label: _scaled(columns[field.label], stated.get(field.label, field.factor)) for field in present}
-    return CsvTable(Path(f"{log.path}: {name}"), _scaled(columns["TimeUS"], MICROSECOND_S), scaled)
+    return CsvTable(_scaled(columns["TimeUS"], MICROSECOND_S), scaled, path=Path(f"{log.path}: {name}"))
 
 
 def _scaled(values: NDArray[Any], factor: float) -> Array:

@@ -8,16 +8,20 @@ flow_x = w_x - v_y / r, flow_y = w_y + v_x / r, bodyX and bodyY the gyro's rates
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.errors import InputError
 from flownav.frames import quaternion_from_euler, rotation_from_quaternion, to_body
 from flownav.logs.csv_table import CsvTable
 from flownav.logs.dataflash.columns import DataFlash
+from flownav.logs.dataflash.reference import Origin, local_ned
 from flownav.logs.dataflash.rows import Field, check_rows, message_rows
-from flownav.logs.fixes import Origin, local_ned, near_the_rest
+from flownav.logs.fixes import near_the_rest
 from flownav.logs.rates import attitude_at
+from flownav.logs.rows import Rows
 from flownav.measurement import Array, Sensor, Stream
 
 GYRO_LIMIT_RAD_S = 70.0  # twice the range of a 2000 deg/s gyro
@@ -25,6 +29,13 @@ RANGE_GOOD, FACING_DOWN = 4, 25  # RangeFinder::Status::Good, ROTATION_PITCH_270
 LEAST_FIX = 3  # GPS_OK_FIX_3D
 LANDED_BY_EVENT = {11: 1.0, 18: 1.0, 28: 0.0}  # disarmed, land complete, not landed (AP_Logger's LogEvent)
 MILLIGAUSS = 1e-3
+
+# of several sensors the one with the most rows of this kind: a GPS in use, flow with data, range downward
+PREFERRED: dict[str, tuple[str, Callable[[NDArray[Any]], NDArray[np.bool_]]]] = {
+    "GPS": ("U", lambda used: used == 1),
+    "OF": ("Qual", lambda quality: quality > 0),
+    "RFND": ("Orient", lambda orientation: orientation == FACING_DOWN),
+}
 
 FIELDS: dict[str, tuple[Field, ...]] = {
     "ATT": (Field("Roll", -181, 181), Field("Pitch", -91, 91), Field("Yaw", -361, 361)),
@@ -90,7 +101,7 @@ def sensor_rows(log: DataFlash, flow_instance: int | None, notes: list[str]) -> 
 
 
 def _chosen(log: DataFlash, name: str, flow_instance: int | None) -> int | None:
-    """The instance to read: the flow sensor asked for, the GPS in use, the rangefinder that looks down; else the first.
+    """The instance to read: the flow sensor asked for, or by what PREFERRED counts; else the first.
 
     InputError where the flow sensor asked for is not there.
     """
@@ -102,13 +113,13 @@ def _chosen(log: DataFlash, name: str, flow_instance: int | None) -> int | None:
         return flow_instance if there else None
     if len(there) < 2:
         return there[0] if there else None
-    label, wanted = {"GPS": ("U", 1), "RFND": ("Orient", FACING_DOWN)}.get(name, ("", 0))
     if name == "GPA" and log.count("GPS"):
         return _chosen(log, "GPS", None)
-    if label not in log.formats[name].labels:
+    label, wanted = PREFERRED.get(name, ("", np.isfinite))
+    if label not in log.formats[name].numbers:
         return there[0]
-    uses = {each: np.count_nonzero(log.table(name, [label], instance=each)[label] == wanted) for each in there}
-    return max(there, key=lambda each: (uses[each] if name == "GPS" else uses[each] > 0, -each))
+    says = {each: np.count_nonzero(wanted(log.table(name, [label], instance=each)[label])) for each in there}
+    return max(there, key=lambda each: (says[each], -each))
 
 
 def _keep_healthy(name: str, table: CsvTable) -> None:
@@ -123,7 +134,8 @@ def _keep_healthy(name: str, table: CsvTable) -> None:
     if name == "GPS":
         table.keep(table.columns["Status"] >= LEAST_FIX, "no_fix")
         if len(table.t_s):
-            table.keep(near_the_rest(table.columns["Lat"], table.columns["Lng"]), "out_of_range")
+            fixes = Rows(table.t_s, {"lat_deg": table.columns["Lat"], "lon_deg": table.columns["Lng"]})
+            table.keep(near_the_rest(fixes), "out_of_range")
     if name == "EV":
         table.keep(np.isin(table.columns["Id"], list(LANDED_BY_EVENT)), "another_event")
     if name == "PL":

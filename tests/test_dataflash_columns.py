@@ -231,7 +231,15 @@ def test_a_format_that_contradicts_an_earlier_one_is_counted_and_passed_over(tmp
 
 
 @pytest.mark.parametrize(
-    "content", [b"\0" * 5000, b"name,value\n1,2\n" * 50, HEAD * 1000, b"\xa3", DataFlashWriter().parts[0]]
+    "content",
+    [
+        b"\0" * 5000,
+        b"name,value\n1,2\n" * 50,
+        HEAD * 1000,
+        b"\xa3",
+        DataFlashWriter().parts[0],
+        DataFlashWriter().parts[0] + b"#",
+    ],
 )
 def test_what_is_no_dataflash_log_is_refused_in_one_line(tmp_path, content):
     with pytest.raises(InputError, match=r"log\.bin: no ArduPilot DataFlash message in it; a \.bin log"):

@@ -54,9 +54,10 @@ def chain_messages(content: Bytes, headers: Headers, length: Indices) -> Scan:
     near_end = int(np.searchsorted(start, len(content) - int(length.max())))
     possible[near_end:] &= start[near_end:] + length[kind[near_end:]] <= len(content)
     start, kind = _only(possible, start, kind)
+    if len(start):
+        start, kind = _only(_walk(content, start, start + length[kind]), start, kind)
     if not len(start):
         return Scan(start, kind, len(content), int(len(content) > 0))
-    start, kind = _only(_walk(content, start, start + length[kind]), start, kind)
     end = start + length[kind]
     gaps = int(start[0] > 0) + int(np.count_nonzero(end[:-1] != start[1:])) + int(end[-1] < len(content))
     return Scan(start, kind, len(content) - int(length[kind].sum()), gaps)

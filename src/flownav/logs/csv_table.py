@@ -54,9 +54,10 @@ def read_csv_table(path: Path, columns: Sequence[Column]) -> CsvTable:
     table = CsvTable(raw.pop("t_s"), raw, path=path, sha256=hashlib.sha256(content).hexdigest())
     if malformed:
         table.rejected["malformed_row"] = len(malformed)
-    _check_finite(table, columns)
+    check_finite(table, columns)
     _check_limits(table, columns)
-    _check_clock(table)
+    check_clock(table)
+    _check_step(table)
     if not len(table.t_s):
         reasons = ", ".join(f"{count} {reason}" for reason, count in table.rejected.items()) or "it is empty"
         raise InputError(f"{path}: no usable row ({reasons})")
@@ -86,7 +87,7 @@ def _parse(path: Path, content: bytes, wanted: list[str], malformed: list[int]) 
     def parse(kind: pa.DataType) -> pa.Table:
         malformed.clear()
         return csv.read_csv(
-            pa.BufferReader(content),
+            pa.BufferReader(readable),
             read_options=csv.ReadOptions(column_names=header, skip_rows=1, use_threads=False),
             parse_options=csv.ParseOptions(invalid_row_handler=skip),
             convert_options=csv.ConvertOptions(
@@ -98,6 +99,7 @@ def _parse(path: Path, content: bytes, wanted: list[str], malformed: list[int]) 
         )
 
     header = _header(path, content)
+    readable = content if content.isascii() else content.decode("utf-8", errors="replace").encode()
     names = [name for name in dict.fromkeys(["t_s", *wanted]) if name in header]
     if not names:
         return {}
@@ -131,7 +133,8 @@ def _number(text: str | None) -> float:
         return np.nan
 
 
-def _check_finite(table: CsvTable, columns: Sequence[Column]) -> None:
+def check_finite(table: CsvTable, columns: Sequence[Column]) -> None:
+    """Throw away the rows without a number where one must be."""
     must = [c.name for c in columns if c.name in table.columns and not c.may_be_empty]
     finite = np.isfinite(table.t_s)
     for name in must:
@@ -157,7 +160,7 @@ def _check_limits(table: CsvTable, columns: Sequence[Column]) -> None:
     table.keep(inside, "out_of_range")
 
 
-def _check_clock(table: CsvTable) -> None:
+def check_clock(table: CsvTable) -> None:
     """Put the rows in time order: late rows are thrown away, a file without any order is sorted."""
     t_s = table.t_s
     back = np.flatnonzero(np.diff(t_s) < 0)
@@ -179,6 +182,9 @@ def _check_clock(table: CsvTable) -> None:
             table.columns = {name: values[order] for name, values in table.columns.items()}
     drop_strays(table)
     drop_duplicates(table)
+
+
+def _check_step(table: CsvTable) -> None:
     if len(table.t_s) > 2 and np.median(np.diff(table.t_s)) > LONGEST_MEDIAN_STEP_S:
         step = float(np.median(np.diff(table.t_s)))
         raise InputError(f"{table.path}: t_s steps by {step:g} a row; seconds are needed (milliseconds? microseconds?)")

@@ -6,8 +6,8 @@ clock is the autopilot's time since boot: a stamp of that clock is taken as it i
 by the least difference seen between a stamp and the log's time on arrival: waiting on the link only ever adds to it.
 A message without a stamp was sent after the last stamped one that arrived before it.
 
-A step that cannot be is believed when three stamps in a row agree on it with none against (a reboot, a clock that
-was set); the log clock then goes on by the time that passed between the arrivals. Until then, and for a stamp that
+A step that cannot be is believed when three rising stamps agree on it with none against (a reboot, a clock that was
+set); the log clock then goes on by the time that passed between the arrivals. Until then, and for a stamp that
 stands still (a GPS without a fix repeats its last), a reading has no time and is left out, with the reason. An
 arrival clock that jumps or stands still does no harm while stamps advance.
 """
@@ -178,10 +178,11 @@ def _doubted(
     elapsed = arrival_s - state.arrival_s
     now = state.log_s + (elapsed if 0.0 <= elapsed <= LONGEST_PAUSE_S else 0.0)
     offset = now - stamp.stamp_s
-    agrees = abs(offset - clock.doubted_offset_s) < AGREEMENT_S and stamp.stamp_s > clock.doubted_stamp_s
-    doubts = clock.doubts + 1 if clock.doubts and agrees else 1
+    agrees = clock.doubts > 0 and abs(offset - clock.doubted_offset_s) < AGREEMENT_S
+    doubts = clock.doubts + (stamp.stamp_s > clock.doubted_stamp_s) if agrees else 1
     if doubts >= CONFIRMATIONS:
         return _heard(state, stamp.clock, _Clock(offset, stamp.stamp_s), arrival_s, rules, "clock_jump")
-    doubted = clock._replace(doubted_offset_s=offset, doubted_stamp_s=stamp.stamp_s, doubts=doubts)
+    newest = max(stamp.stamp_s, clock.doubted_stamp_s) if agrees else stamp.stamp_s
+    doubted = clock._replace(doubted_offset_s=offset, doubted_stamp_s=newest, doubts=doubts)
     state = state._replace(clocks={**state.clocks, stamp.clock: doubted})
     return state, Aligned(float("nan"), "stale_time")

@@ -99,3 +99,8 @@ def unstated(sensor: Sensor) -> tuple[float, ...]:
 def reading(sensor: Sensor, t_s: float, *value: float, quality: float = 255.0, delay_s: float = 0.0) -> Measurement:
     """A measurement without a stated variance."""
     return Measurement(t_s, sensor, value, unstated(sensor), delay_s, quality)
+
+
+def quality_of(percent: int) -> float:
+    """0..255 of MAVLink's 1..100 percent; 0, which is not stated, and more than 100 are 255."""
+    return min(percent, 100) * 255 / 100 if percent else 255.0

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from flownav.mavlink.converted import NAN, Context, Dropped, Outcome, reading
+from flownav.mavlink.converted import NAN, Context, Dropped, Outcome, quality_of, reading
 from flownav.mavlink.dialect import Message
 from flownav.measurement import Measurement, Sensor
 
@@ -74,7 +74,7 @@ def distance_sensor(message: Message, t_s: float, context: Context) -> Iterator[
     else:
         stated = 0 < message.covariance < UNKNOWN_COVARIANCE
         variance = message.covariance * 1e-4 if stated else NAN
-        quality = 2.55 * message.signal_quality if message.signal_quality else 255.0
+        quality = quality_of(message.signal_quality)
         yield Measurement(t_s, Sensor.RANGE, (distance * 1e-2,), (variance,), 0.0, quality)
 
 

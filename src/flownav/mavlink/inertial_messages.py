@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from flownav.frames import GRAVITY_M_S2, Quaternion, quaternion_from_euler
+from flownav.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.mavlink.converted import Context, Dropped, Outcome, reading
 from flownav.mavlink.dialect import Message
 from flownav.measurement import Sensor
@@ -14,6 +14,7 @@ ACCEL, GYRO, MAG, PRESSURE = 0x007, 0x038, 0x1C0, 0x200  # HIGHRES_IMU.fields_up
 SEA_LEVEL_HPA = 1013.25
 ATMOSPHERE_M, EXPONENT = 44330.77, 0.1902632  # ISO 2533: T0 / L and R L / g
 MILLI = 1e-3
+LARGEST_ANGLE_RAD = 2.1 * math.pi
 
 
 def highres_imu(message: Message, t_s: float, context: Context) -> Iterator[Outcome]:
@@ -56,7 +57,11 @@ def raw_imu(message: Message, t_s: float, context: Context) -> Iterator[Outcome]
 
 def attitude(message: Message, t_s: float, context: Context) -> Iterator[Outcome]:
     """ATTITUDE (#30): roll, pitch, yaw [rad], Z-Y-X, yaw from true north."""
-    yield reading(Sensor.ATTITUDE, t_s, *_quaternion(message.roll, message.pitch, message.yaw))
+    angles = message.roll, message.pitch, message.yaw
+    if all(abs(angle) <= LARGEST_ANGLE_RAD for angle in angles):
+        yield reading(Sensor.ATTITUDE, t_s, *(float(value) for value in quaternion_from_euler(*angles)))
+    else:
+        yield Dropped(Sensor.ATTITUDE, "out_of_range" if all(map(math.isfinite, angles)) else "not_finite")
 
 
 def attitude_quaternion(message: Message, t_s: float, context: Context) -> Iterator[Outcome]:
@@ -84,8 +89,3 @@ def _altitude(pressure: float, t_s: float) -> Iterator[Outcome]:
         yield Dropped(Sensor.BARO, "not_finite" if pressure != pressure else "out_of_range")
     else:
         yield reading(Sensor.BARO, t_s, pressure_altitude_m(pressure))
-
-
-def _quaternion(roll: float, pitch: float, yaw: float) -> Quaternion:
-    w, x, y, z = quaternion_from_euler(roll, pitch, yaw)
-    return float(w), float(x), float(y), float(z)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from flownav.frames import euler_from_quaternion, rotation_from_quaternion, to_body
-from flownav.mavlink.converted import NAN, Context, Dropped, Outcome, reading
+from flownav.mavlink.converted import LARGEST_UNIT_ERROR, NAN, Context, Dropped, Outcome, quality_of, reading
 from flownav.mavlink.dialect import Message
 from flownav.measurement import Measurement, Sensor
 
@@ -14,7 +14,7 @@ UNKNOWN_16 = 65535
 LEAST_FIX = 3  # 3-D
 FULL_TURN_CDEG = 36000
 RANGE_ERROR_M = 2.1  # per axis at DOP 1: the 2.5 m CEP that receivers of 1 m class state (u-blox M8 data sheet)
-LOCAL_NED, LOCAL_ENU, BODY_NED, BODY_FRD, LOCAL_FRD, LOCAL_FLU = 1, 4, 8, 12, 20, 21
+LOCAL_NED, BODY_NED, BODY_FRD, LOCAL_FRD = 1, 8, 12, 20  # MAV_FRAME
 ON_GROUND = 1
 # the diagonal of a 6x6 matrix in its upper triangle, row by row
 DIAGONAL = (0, 6, 11, 15, 18, 20)
@@ -77,10 +77,10 @@ def odometry(message: Message, t_s: float, context: Context) -> Iterator[Outcome
         yield Dropped(Sensor.POSE, "unknown_frame")
         return
     variance = _diagonal(message.pose_covariance)
-    quality = 2.55 * message.quality if message.quality else 255.0
+    quality = quality_of(message.quality)
     yield Measurement(t_s, Sensor.POSE, (message.x, message.y, message.z), variance[:3], 0.0, quality)
     w, x, y, z = message.q
-    if message.frame_id == LOCAL_NED and math.isfinite(w * w + x * x + y * y + z * z) and (w or x or y or z):
+    if message.frame_id == LOCAL_NED and abs(w * w + x * x + y * y + z * z - 1.0) <= LARGEST_UNIT_ERROR:
         yaw = float(euler_from_quaternion(w, x, y, z)[2])
         yield Measurement(t_s, Sensor.YAW, (yaw,), (variance[5],), 0.0, quality)
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from hypothesis import strategies as st
+
 from flownav.mavlink.dialect import coder, dialect
 
 START_US = 1_795_211_000_000_000
@@ -75,3 +77,28 @@ def flight_log(
             log.add(arrival, made("GPS_RAW_INT", time_usec=boot_ms * 1000, h_acc=500, v_acc=800, vel_acc=100, **fix))
             log.add(arrival, made("EXTENDED_SYS_STATE", landed_state=2))
     return log
+
+
+def arbitrary_payload(name: str) -> st.SearchStrategy[bytes]:
+    """Any bytes that fill a message, the floats among them often NaN, infinite, huge or tiny."""
+    kind = getattr(dialect(), f"MAVLink_{name.lower()}_message")
+    special = st.sampled_from([math.nan, math.inf, -math.inf, 3e38, 0.0, -0.0, 1e-40])
+    number = st.one_of(special, st.floats(width=32))
+
+    def payload(draw: Any) -> bytes:
+        size = kind.unpacker.size
+        raw = bytearray(draw(st.binary(min_size=size, max_size=size)))
+        for offset in range(0, size - 3, 4):
+            if draw(st.booleans()):
+                raw[offset : offset + 4] = struct.pack("<f", draw(number))
+        return bytes(raw)
+
+    return st.composite(payload)()
+
+
+def packed_payload(name: str, payload: bytes) -> bytes:
+    """A frame of system 1, component 1 with this payload and a right checksum."""
+    kind = getattr(dialect(), f"MAVLink_{name.lower()}_message")
+    header = struct.pack("<BBBBBBBHB", 0xFD, len(payload), 0, 0, 0, 1, 1, kind.id & 0xFFFF, kind.id >> 16)
+    crc = dialect().x25crc(header[1:] + payload + bytes([kind.crc_extra])).crc
+    return header + payload + struct.pack("<H", crc)

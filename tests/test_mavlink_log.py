@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from flownav.errors import InputError
 from flownav.estimation.kinematic_settings import default_settings
+from flownav.logs.mavlink_flight import WANTED
 from flownav.logs.mavlink_log import read_tlog
 from flownav.logs.plausible import check_plausible
 from flownav.logs.rates import attitude_rates
@@ -22,7 +23,7 @@ from flownav.mavlink.signing import sign_outgoing
 from flownav.measurement import Sensor
 from flownav.replay.prepare import ReplayOptions
 from flownav.replay.session import replay
-from mavlink_logs import PX4, START_US, Tlog, flight_log, made
+from mavlink_logs import PX4, START_US, Tlog, arbitrary_payload, flight_log, made, packed_payload
 
 STEPS = 80
 
@@ -362,6 +363,36 @@ def test_any_damage_is_counted_or_refused_in_one_line(path, data):
         assert table is None or all(np.isfinite(column).all() for column in table.values())
 
 
+@settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_any_payload_with_a_right_checksum_is_read_or_refused(path, data):
+    log = flight_log(0.5)
+    for _ in range(data.draw(st.integers(1, 12))):
+        name = data.draw(st.sampled_from(sorted({*WANTED, "HEARTBEAT", "GPS_GLOBAL_ORIGIN"})))
+        frame = packed_payload(name, data.draw(arbitrary_payload(name)))
+        log.frames.insert(data.draw(st.integers(0, len(log.frames))), (START_US, frame))
+    log.write(path)
+    said, found = "", None
+    try:
+        found = read_tlog(path)
+    except InputError as error:
+        said = str(error)
+    assert "\n" not in said
+    if found:
+        assert all(np.isfinite(stream.t_s).all() for stream in found.streams.values())
+        for table in (found.truth, found.autopilot):
+            assert table is None or all(np.isfinite(column).all() for column in table.values())
+
+
+def test_a_pad_in_the_earth_is_seen_from_where_the_vehicle_was(path):
+    log = flight_log()
+    pad = made("LANDING_TARGET", time_usec=24_000_000, position_valid=1, frame=1, x=3.0, y=4.0)
+    log.add(4.0, pad, component=191)
+    found = read_tlog(log.write(path)).streams[Sensor.PAD]
+    roll = 0.05 * math.sin(3.95)
+    assert found.value[0] == pytest.approx((0.0, math.tan(roll), 2.0), abs=1e-6)
+
+
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.lists(st.sampled_from(PIECES), max_size=200))
 def test_any_bytes_are_read_or_refused(path, parts):
@@ -398,6 +429,25 @@ def test_the_helicopters_autopilot_knew_where_it_was(helicopter):
         for name in names:
             error = auto[name][flying] - np.interp(t_s, truth["t_s"], truth[name])
             assert np.sqrt(np.mean(error**2)) < bound, name
+
+
+def test_the_helicopters_truth_is_that_of_its_dataflash_log(helicopter, data_folder):
+    """The same flight as the autopilot logged it: position within a beat of the truth's 0.05 s at 2 m/s."""
+    import pymap3d
+    from pymavlink.DFReader import DFReader_binary
+
+    log = DFReader_binary(str(data_folder / "dataflash" / "heli_sitl_takeoff_square_land.bin"))
+    rows = []
+    while (row := log.recv_match(type="SIM")) is not None:
+        rows.append((row.TimeUS * 1e-6, row.Lat, row.Lng, row.Alt))
+    log.data_map.close()
+    log.filehandle.close()
+    t_s, *position = np.array(rows).T
+    logged = pymap3d.geodetic2ned(*position, *helicopter.origin_deg_m)
+    truth = helicopter.truth
+    flying = (truth["t_s"] > 60.0) & (truth["t_s"] < 110.0)
+    for name, values in zip(("pos_n_m", "pos_e_m", "pos_d_m"), logged, strict=True):
+        assert np.interp(truth["t_s"][flying], t_s, values) == pytest.approx(truth[name][flying], abs=0.05), name
 
 
 def test_the_helicopters_flow_is_truths_flow(helicopter):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import struct
 
 import numpy as np
 import pytest
@@ -12,12 +11,12 @@ from hypothesis import strategies as st
 
 from flownav.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
 from flownav.mavlink.converted import OPTIONAL, Context, Dropped, Pose
-from flownav.mavlink.dialect import coder, dialect
+from flownav.mavlink.dialect import coder
 from flownav.mavlink.inertial_messages import pressure_altitude_m, pressure_hpa
 from flownav.mavlink.messages import CONVERTERS, instance_of, measurements
 from flownav.mavlink.state_messages import global_position_int, hil_state_quaternion, local_position_ned, sim_state
 from flownav.measurement import Measurement, Sensor
-from mavlink_logs import made
+from mavlink_logs import arbitrary_payload, made, packed_payload
 
 ORIGIN = (47.0, 8.5, 400.0)
 ARDUPILOT = Context(ardupilot=True, origin_deg_m=ORIGIN)
@@ -235,6 +234,11 @@ def test_a_fix_needs_an_origin():
     assert drops(made("GPS_RAW_INT", **FIX), Context()) == [(Sensor.GPS_POSITION, "no_origin")]
 
 
+@pytest.mark.parametrize("place", [{"lat": 910000000}, {"lon": -1810000000}])
+def test_a_fix_beyond_the_pole_or_the_date_line_is_out_of_range(place):
+    assert drops(made("GPS_RAW_INT", **(FIX | place))) == [(Sensor.GPS_POSITION, "out_of_range")]
+
+
 def test_a_fix_at_zero_zero_is_out_of_range():
     assert drops(made("GPS_RAW_INT", **(FIX | {"lat": 0, "lon": 0}))) == [(Sensor.GPS_POSITION, "out_of_range")]
 
@@ -351,7 +355,10 @@ def test_states_that_cannot_be_are_none():
     assert sim_state(made("SIM_STATE", q1=0.2, lat_int=1)) is None
     assert sim_state(made("SIM_STATE", q1=1.0, alt=math.nan)) is None
     assert local_position_ned(made("LOCAL_POSITION_NED", x=math.inf)) is None
+    assert local_position_ned(made("LOCAL_POSITION_NED", vx=3e38)) is None
     assert global_position_int(made("GLOBAL_POSITION_INT", alt=180)) is None
+    assert global_position_int(made("GLOBAL_POSITION_INT", lat=910000000)) is None
+    assert sim_state(made("SIM_STATE", q1=1.0, lat_int=910000000)) is None
 
 
 def test_units_of_the_other_states():
@@ -365,35 +372,15 @@ def test_units_of_the_other_states():
     assert (true.vel_ned_m_s[0], true.rate_frd_rad_s[0]) == (1.0, 0.25)
 
 
+def decoded(name, payload):
+    return coder().decode(bytearray(packed_payload(name, payload)))
+
+
 # -- anything at all ---------------------------------------------------------------------------------------
-def _arbitrary(name: str) -> st.SearchStrategy:
-    kind = getattr(dialect(), f"MAVLink_{name.lower()}_message")
-    special = st.sampled_from([math.nan, math.inf, -math.inf, 3e38, 0.0, -0.0, 1e-40])
-    number = st.one_of(special, st.floats(width=32))
-
-    def payload(draw):
-        size = struct.calcsize(kind.unpacker.format)
-        raw = bytearray(draw(st.binary(min_size=size, max_size=size)))
-        for offset in range(0, size - 3, 4):
-            if draw(st.booleans()):
-                raw[offset : offset + 4] = struct.pack("<f", draw(number))
-        return bytes(raw)
-
-    return st.composite(payload)()
-
-
-def _decoded(name: str, payload: bytes):
-    module = dialect()
-    kind = getattr(module, f"MAVLink_{name.lower()}_message")
-    header = struct.pack("<BBBBBBBHB", 0xFD, len(payload), 0, 0, 0, 1, 1, kind.id & 0xFFFF, kind.id >> 16)
-    crc = module.x25crc(header[1:] + payload + bytes([kind.crc_extra])).crc
-    return coder().decode(bytearray(header + payload + struct.pack("<H", crc)))
-
-
 @settings(max_examples=400, deadline=None)
 @given(data=st.data(), name=st.sampled_from(sorted(CONVERTERS)))
 def test_no_payload_yields_a_value_that_cannot_be(data, name):
-    message = _decoded(name, data.draw(_arbitrary(name)))
+    message = decoded(name, data.draw(arbitrary_payload(name)))
     context = data.draw(st.sampled_from([PX4, ARDUPILOT, COMPANION]))
     assert instance_of(message) >= 0
     for outcome in measurements(message, 1.0, context):
@@ -417,5 +404,5 @@ def test_attitude_angles_that_cannot_be(bad):
 def test_no_payload_yields_a_state_that_cannot_be(data, name):
     convert = {"SIM_STATE": sim_state, "HIL_STATE_QUATERNION": hil_state_quaternion,
                "LOCAL_POSITION_NED": local_position_ned}[name]  # fmt: skip
-    state = convert(_decoded(name, data.draw(_arbitrary(name))))
+    state = convert(decoded(name, data.draw(arbitrary_payload(name))))
     assert state is None or np.isfinite(np.concatenate([np.ravel(values) for values in state])).all()

@@ -17,7 +17,7 @@ from flownav.mavlink.dialect import Message, coder, dialect
 from flownav.mavlink.flow_messages import range_limits_m
 from flownav.mavlink.framing import Frame
 from flownav.mavlink.messages import CONVERTERS, instance_of, measurements
-from flownav.mavlink.position_messages import LEAST_FIX
+from flownav.mavlink.position_messages import LEAST_FIX, fix_deg_m
 from flownav.mavlink.state_messages import (
     GlobalState,
     LocalState,
@@ -157,7 +157,7 @@ class Flight:
 
     def _flow_limits(self) -> None:
         """PX4's parameters of the flow sensor, where the ground station asked for them."""
-        known = self._parameters
+        known = {name: value for name, value in self._parameters.items() if np.isfinite(value)}
         if known.get("SENS_FLOW_MAXR", 0.0) > 0.0:
             self.limits["flow_rad_s"] = (0.0, known["SENS_FLOW_MAXR"])
         if known.get("SENS_FLOW_MAXHGT", 0.0) > known.get("SENS_FLOW_MINHGT", 0.0) >= 0.0:
@@ -216,12 +216,14 @@ def find_vehicle(decoder: Decoder, frames: list[Frame]) -> tuple[Vehicle, list[s
 def _origin(decoder: Decoder, frames: list[Frame]) -> tuple[tuple[float, float, float] | None, bool]:
     """The autopilot's own origin, which its local positions are about (True); else the first fix near the others."""
     for _, message in decoder.all_of(frames, "GPS_GLOBAL_ORIGIN"):
-        if message.latitude or message.longitude:
+        if (message.latitude or message.longitude) and abs(message.latitude) <= 90e7:
             return (message.latitude * 1e-7, message.longitude * 1e-7, message.altitude * 1e-3), True
-    received = [message for _, message in decoder.all_of(frames, "GPS_RAW_INT") if message.fix_type >= LEAST_FIX]
-    if not received:
+    received = [
+        fix_deg_m(message) for _, message in decoder.all_of(frames, "GPS_RAW_INT") if message.fix_type >= LEAST_FIX
+    ]
+    fixes = np.array([fix for fix in received if fix is not None])
+    if not len(fixes):
         return None, False
-    fixes = np.array([[m.lat * 1e-7, m.lon * 1e-7, m.alt * 1e-3] for m in received])
     away = fixes[:, :2] - np.sort(fixes[:, :2], axis=0)[len(fixes) // 2]
     away[:, 1] = (away[:, 1] + 180.0) % 360.0 - 180.0
     latitude, longitude, altitude = fixes[np.argmax(np.hypot(*away.T) < FARTHEST_FIX_DEG)]

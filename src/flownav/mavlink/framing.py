@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 from flownav.mavlink.dialect import dialect
@@ -75,7 +75,7 @@ class _Check:
 
     def __init__(self) -> None:
         module = dialect()
-        self._crc = module.x25crc
+        self._crc: Callable[[bytes], int] = module.mcrf4xx or (lambda content: module.x25crc(content).crc)
         self._seeds = {number: bytes([kind.crc_extra]) for number, kind in module.mavlink_map.items()}
         self._sizes = {number: kind.unpacker.size for number, kind in module.mavlink_map.items()}
 
@@ -105,19 +105,12 @@ class _Check:
         end = checksum + CHECKSUM_BYTES + (SIGNATURE_BYTES if signed else 0)
         if end > size:
             return "truncated"
-        frame = Frame(
-            start,
-            end,
-            int.from_bytes(content[timestamp : timestamp + TIMESTAMP_BYTES], "big"),
-            message_id,
-            system,
-            component,
-            signed,
-        )
-        if message_id not in self._seeds:  # its checksum needs its definition: believe it if another frame follows
+        seed = self._seeds.get(message_id)
+        if seed is None:  # its checksum needs its definition: believe it if another frame follows
             following = end + TIMESTAMP_BYTES
-            follows = end == size or (following < size and content[following] in (MAVLINK_1, MAVLINK_2))
-            return frame if follows else "bad_checksum"
-        stated = content[checksum] | content[checksum + 1] << 8
-        computed = self._crc(content[start + 1 : checksum] + self._seeds[message_id]).crc
-        return frame if stated == computed else "bad_checksum"
+            if end != size and not (following < size and content[following] in (MAVLINK_1, MAVLINK_2)):
+                return "bad_checksum"
+        elif self._crc(content[start + 1 : checksum] + seed) != content[checksum] | content[checksum + 1] << 8:
+            return "bad_checksum"
+        arrival_us = int.from_bytes(content[timestamp : timestamp + TIMESTAMP_BYTES], "big")
+        return Frame(start, end, arrival_us, message_id, system, component, signed)

@@ -38,10 +38,12 @@ def gps_raw_int(message: Message, t_s: float, context: Context) -> Iterator[Outc
         velocity = (speed * math.cos(course), speed * math.sin(course), NAN)
         variance = _square(message.vel_acc * 1e-3)
         yield Measurement(t_s, Sensor.GPS_VELOCITY, velocity, (variance, variance, NAN))
+    fix = fix_deg_m(message)
     if context.origin_deg_m is None:
         yield Dropped(Sensor.GPS_POSITION, "no_origin")
+    elif fix is None:
+        yield Dropped(Sensor.GPS_POSITION, "out_of_range")
     else:
-        fix = (message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3)
         across = _square(_accuracy_m(message.h_acc, message.eph))
         along = _square(_accuracy_m(message.v_acc, message.epv))
         position = local_position_m(fix, context.origin_deg_m)
@@ -51,13 +53,19 @@ def gps_raw_int(message: Message, t_s: float, context: Context) -> Iterator[Outc
         yield Measurement(t_s, Sensor.YAW, (heading,), (_square(math.radians(message.hdg_acc * 1e-5)),))
 
 
+def fix_deg_m(message: Message) -> tuple[float, float, float] | None:
+    """Latitude, longitude [deg] and altitude [m] of a GPS_RAW_INT; None beyond the poles or the date line."""
+    latitude, longitude = message.lat * 1e-7, message.lon * 1e-7
+    return (latitude, longitude, message.alt * 1e-3) if abs(latitude) <= 90.0 and abs(longitude) <= 180.0 else None
+
+
 def local_position_m(
-    fix_deg_m: tuple[float, float, float], origin_deg_m: tuple[float, float, float]
+    position_deg_m: tuple[float, float, float], origin_deg_m: tuple[float, float, float]
 ) -> tuple[float, float, float]:
     """North, east, down [m] of a latitude, longitude [deg] and altitude [m] about an origin."""
     import pymap3d
 
-    north, east, down = pymap3d.geodetic2ned(*fix_deg_m, *origin_deg_m)
+    north, east, down = pymap3d.geodetic2ned(*position_deg_m, *origin_deg_m)
     return float(north), float(east), float(down)
 
 

@@ -13,6 +13,7 @@ from flownav.mavlink.converted import LARGEST_UNIT_ERROR
 from flownav.mavlink.dialect import Message
 
 LARGEST_DEG = 90.0
+FARTHEST_M, FASTEST_M_S, QUICKEST_RAD_S = 1e6, 1e3, 70.0  # beyond is no vehicle
 
 
 class LocalState(NamedTuple):
@@ -39,14 +40,14 @@ class TrueState(NamedTuple):
 
 
 def local_position_ned(message: Message) -> LocalState | None:
-    """LOCAL_POSITION_NED (#32): m and m/s. None where a value is not finite."""
+    """LOCAL_POSITION_NED (#32): m and m/s. None where a value is not finite or not possible."""
     position, velocity = (message.x, message.y, message.z), (message.vx, message.vy, message.vz)
-    return LocalState(position, velocity) if _finite(*position, *velocity) else None
+    return LocalState(position, velocity) if _possible(position, velocity) else None
 
 
 def global_position_int(message: Message) -> GlobalState | None:
     """GLOBAL_POSITION_INT (#33): 1e-7 deg, mm, cm/s; the filter's output, not the receiver's. None at 0, 0."""
-    if not message.lat and not message.lon:
+    if not (message.lat or message.lon) or abs(message.lat) > LARGEST_DEG * 1e7:
         return None
     velocity = (message.vx * 1e-2, message.vy * 1e-2, message.vz * 1e-2)
     return GlobalState((message.lat * 1e-7, message.lon * 1e-7, message.alt * 1e-3), velocity)
@@ -82,14 +83,19 @@ def hil_state_quaternion(message: Message) -> TrueState | None:
 
 
 def _true_state(position: Vector, velocity: Vector, quaternion: Quaternion, rate: Vector) -> TrueState | None:
-    if not _finite(*position, *velocity, *quaternion, *rate) or abs(position[0]) > LARGEST_DEG:
-        return None
     length = math.sqrt(sum(value * value for value in quaternion))
-    if abs(length - 1.0) > LARGEST_UNIT_ERROR:
+    if not abs(length - 1.0) <= LARGEST_UNIT_ERROR or not _possible(position, velocity, rate):
+        return None
+    if abs(position[0]) > LARGEST_DEG:
         return None
     w, x, y, z = (value / length for value in quaternion)
     return TrueState(position, velocity, (w, x, y, z), rate)
 
 
-def _finite(*values: float) -> bool:
-    return all(map(math.isfinite, values))
+def _possible(position: Vector, velocity: Vector, rate: Vector = (0.0, 0.0, 0.0)) -> bool:
+    """Whether all is finite and within what a vehicle can do; NaN compares as false."""
+    return (
+        all(abs(value) <= FARTHEST_M for value in position)
+        and all(abs(value) <= FASTEST_M_S for value in velocity)
+        and all(abs(value) <= QUICKEST_RAD_S for value in rate)
+    )

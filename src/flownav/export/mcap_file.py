@@ -57,7 +57,7 @@ def write_mcap(record: Record, path: Path) -> tuple[list[Path], list[str]]:
     for name, table in record.tables.items():
         rows = finite_rows(np.asarray(table["t_s"], float))
         if len(rows) < len(table["t_s"]):
-            notes.append(f"{name}: {len(table['t_s']) - len(rows)} rows without a time left out")
+            notes.append(f"{name}: rows without a time left out: {len(table['t_s']) - len(rows)}")
         kept = {column: np.asarray(values)[rows] for column, values in table.items()}
         time_ns = stamps(kept["t_s"], NS, shift_s)
         channels.append(Channel(f"/{name}", table_schema(name, kept), time_ns, _rows(kept)))

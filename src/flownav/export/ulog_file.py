@@ -40,16 +40,16 @@ class Contents(NamedTuple):
 def write_ulog(record: Record, path: Path, original: Path | None = None) -> tuple[list[Path], list[str]]:
     """Write a ULog file, whole or not at all; the file and notes.
 
-    With `original`, the log that the record was replayed from, a copy of that log with flownav's topics
-    among its own, on its clock. InputError where the original is missing, is no ULog, is not the log that
-    was replayed or does not overlap in time, or where the record holds no path.
+    With `original`, the log that the record was replayed from, a copy of that log with flownav's topics among
+    its own; a replayed record is on its log's clock. InputError where the original is missing, is no ULog, is not
+    the log that was replayed or does not overlap in time, or where the record holds no path.
     """
     if original is None:
         contents = _all_of(record)
         whole = _log(contents)
     else:
         log = _read_original(record, original)
-        contents = _from_zero_on(_ours(record, float(record.manifest.get("clock_zero_s", 0.0))))
+        contents = _from_zero_on(_ours(record, 0.0))
         whole = merged(log, str(original), contents.topics, contents.strings, contents.texts)
     with written_whole(path) as temporary:
         temporary.write_bytes(whole)
@@ -84,7 +84,7 @@ def _ours(record: Record, shift_s: float) -> Contents:
     for name, table in record.tables.items():
         lost = len(table["t_s"]) - len(finite_rows(table["t_s"]))
         if lost and name not in [path.name for path in paths]:
-            notes.append(f"{name}: {lost} rows without a time left out")
+            notes.append(f"{name}: rows without a time left out: {lost}")
     topics = [our_topic(record, path, shift_s) for path in paths]
     texts = {"flownav_record": str(record.manifest.get("scenario") or record.manifest.get("log") or "")}
     if "innovation" in record.tables:
@@ -104,7 +104,7 @@ def _from_zero_on(contents: Contents) -> Contents:
     strings = [string for string in contents.strings if string.time_us >= 0]
     lost = sum(len(before.time_us) - len(after.time_us) for before, after in zip(contents.topics, topics, strict=True))
     lost += len(contents.strings) - len(strings)
-    notes = [*contents.notes, *([f"{lost} rows before time 0 of the log's clock left out"] if lost else [])]
+    notes = [*contents.notes, *([f"rows before time 0 of the log's clock left out: {lost}"] if lost else [])]
     return contents._replace(topics=topics, strings=strings, notes=notes)
 
 

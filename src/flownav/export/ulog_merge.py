@@ -9,6 +9,7 @@ To append our data in that way too would be simpler, but PlotJuggler and PX4's r
 from __future__ import annotations
 
 import struct
+from itertools import pairwise
 from typing import NamedTuple
 
 from flownav.errors import InputError
@@ -62,7 +63,7 @@ def merged(log: bytes, name: str, topics: list[Topic], strings: list[Stamped], t
     if not log.startswith(MAGIC) or len(log) < HEADER_SIZE:
         raise InputError(f"{name}: not a ULog file; give the .ulg that was replayed")
     flags = _flags(log, name)
-    layout = _layout(log, min((offset for offset in flags.offsets if offset), default=len(log)))
+    layout = _layout(log, sorted({*(offset for offset in flags.offsets if offset), len(log)}))
     _check(layout, name, topics)
     first = layout.next_number
     numbered = list(enumerate(topics, first))
@@ -91,13 +92,13 @@ def _flags(log: bytes, name: str) -> Flags:
     return Flags(at, OFFSETS.unpack_from(log, at)) if incompatible[0] & 1 else Flags(None, ())
 
 
-def _layout(log: bytes, data_end: int) -> Layout:
-    """One walk over what was written while flying, up to `data_end`."""
+def _layout(log: bytes, ends: list[int]) -> Layout:
+    """One walk over what was written while flying, up to the first of `ends`, and the numbers taken after it."""
     data_at, whole_to, next_number = -1, HEADER_SIZE, 0
     formats: dict[bytes, bool] = {}
     clocked: set[int] = set()
     clock: list[tuple[int, int]] = []
-    for found in walk(log, HEADER_SIZE, data_end):
+    for found in walk(log, HEADER_SIZE, ends[0]):
         whole_to = found.end
         if data_at < 0 and found.kind not in DEFINITIONS:
             data_at = found.begin
@@ -111,6 +112,10 @@ def _layout(log: bytes, data_end: int) -> Layout:
                 clocked.add(number)
         elif found.kind == ord("D") and found.end - found.begin >= 13 and _number(log, found, 3) in clocked:
             clock.append((int.from_bytes(log[found.begin + 5 : found.begin + 13], "little"), found.begin))
+    for begin, end in pairwise(ends):
+        for found in walk(log, begin, end):
+            if found.kind == ord("A"):
+                next_number = max(next_number, _number(log, found, 4) + 1)
     return Layout(data_at, whole_to, clock, {topic.decode("utf-8", "replace") for topic in formats}, next_number)
 
 

@@ -103,7 +103,7 @@ def data(topic: Topic, number: int) -> list[Stamped]:
 
 def logged(time_us: int, text: str, level: str = "6") -> Stamped:
     """A logged string; level as the Linux kernel's, "4" a warning, "6" information."""
-    return Stamped(time_us, message("L", level.encode() + struct.pack("<Q", time_us) + text.encode()))
+    return Stamped(time_us, message("L", level.encode() + struct.pack("<q", time_us) + text.encode()))
 
 
 def walk(log: bytes, begin: int, end: int) -> Iterator[Found]:

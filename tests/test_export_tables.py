@@ -110,3 +110,12 @@ def test_a_written_folder_takes_its_name_at_the_end_only(tmp_path):
         assert not (tmp_path / "f").exists()
     assert [file.name for file in (tmp_path / "f").iterdir()] == ["a"]
     assert list(tmp_path.iterdir()) == [tmp_path / "f"]
+
+
+def test_a_text_that_is_not_there_is_null_or_an_empty_cell(tmp_path):
+    record = Record()
+    record.add("t", {"t_s": np.arange(2.0), "words": np.array(["None", None], object)})
+    export(record, "parquet", tmp_path / "p")
+    export(record, "csv", tmp_path / "c")
+    assert pq.read_table(tmp_path / "p" / "t.parquet")["words"].to_pylist() == ["None", None]
+    assert read_csv(tmp_path / "c" / "t.csv")[1] == [["0.0", "None"], ["1.0", ""]]

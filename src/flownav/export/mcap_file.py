@@ -19,7 +19,7 @@ from flownav import __version__
 from flownav.errors import InputError
 from flownav.export.mcap_schemas import FRAME_TRANSFORM, POSE_IN_FRAME, Schema, table_schema
 from flownav.export.stamps import Stamps, finite_rows, shift_needed_s, stamps
-from flownav.export.tables import is_text, manifest_json
+from flownav.export.tables import is_text, manifest_json, texts
 from flownav.export.trajectory import ENU_FROM_NED, Trajectory, trajectories
 from flownav.files import written_whole
 from flownav.record import Record, Table
@@ -134,8 +134,11 @@ def _time(time_ns: int) -> Row:
 
 
 def _rows(table: Table) -> Iterator[Row]:
-    """A table's rows as JSON objects without the values that are not finite."""
-    columns = [[str(v) for v in values] if is_text(values) else values.tolist() for values in table.values()]
+    """A table's rows as JSON objects without the values that JSON cannot say: those not finite, and texts not there."""
+    columns = [texts(values) if is_text(values) else values.tolist() for values in table.values()]
     for row in zip(*columns, strict=True):
-        named = zip(table, row, strict=True)
-        yield {name: value for name, value in named if not isinstance(value, float) or math.isfinite(value)}
+        yield {name: value for name, value in zip(table, row, strict=True) if _can_be_said(value)}
+
+
+def _can_be_said(value: Any) -> bool:
+    return value is not None and not (isinstance(value, float) and not math.isfinite(value))

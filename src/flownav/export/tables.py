@@ -21,7 +21,7 @@ def write_parquet(record: Record, folder: Path) -> tuple[list[Path], list[str]]:
 
     def write(table: Table, file: Path) -> None:
         columns = {
-            name: pa.array([str(value) for value in column], pa.string()) if is_text(column) else pa.array(column)
+            name: pa.array(texts(column), pa.string()) if is_text(column) else pa.array(column)
             for name, column in table.items()
         }
         pq.write_table(pa.table(columns), file, compression="zstd")
@@ -48,6 +48,11 @@ def write_csv(record: Record, folder: Path) -> tuple[list[Path], list[str]]:
 def is_text(column: Column) -> bool:
     """Whether a column holds strings."""
     return column.dtype.kind in "OUS"
+
+
+def texts(column: Column) -> list[str | None]:
+    """A column of strings as such; None where a row has none."""
+    return [None if value is None else str(value) for value in column]
 
 
 def manifest_json(record: Record) -> str:

@@ -89,6 +89,10 @@ def test_flow_and_range_are_what_px4_would_log(tmp_path):
     distance = log.get_dataset("distance_sensor")
     assert np.allclose(distance.data["current_distance"], record.tables["range"]["range_m"], rtol=1e-6)
     assert set(distance.data["signal_quality"]) == {100}
+    record.tables["range"]["quality"] = np.linspace(0.0, 255.0, len(record.tables["range"]["t_s"]))
+    export(record, "ulog", tmp_path / "r.ulg")
+    percent = read(tmp_path / "r.ulg").get_dataset("distance_sensor").data["signal_quality"]
+    assert np.allclose(percent, np.linspace(0.0, 100.0, len(percent)), atol=0.5)
     assert set(distance.data["orientation"]) == {25}
 
 

@@ -33,6 +33,7 @@ FLAGS_AT, OFFSETS_AT = 16 + 3, 16 + 3 + 16
 def ours(log: bytes, t0: float = 1.0, t1: float = 9.0, rate_hz: float = 7.0) -> Record:
     """A record that says it was replayed from `log`."""
     record = Record({"kind": "replay", "log": "x.ulg", "provenance": {"inputs": {"x.ulg": _digest(log)}}})
+    record.manifest["clock_start_s"] = 0.0
     t_s = np.arange(t0, t1, 1.0 / rate_hz)
     poses = {name: np.sin(t_s + k) for k, name in enumerate((*POSITION_NED, *VELOCITY_BODY))}
     record.add("estimate", {"t_s": t_s, **poses, **dict.fromkeys(QUATERNION, np.full(len(t_s), 0.5))})
@@ -127,6 +128,23 @@ def test_all_of_the_log_is_kept_byte_for_byte_and_ours_are_there(tmp_path):
     assert np.array_equal(found["flownav_estimate"].data["timestamp"], np.rint(estimate["t_s"] * 1e6))
     assert not read(merged).file_corruption
     assert written.notes == []
+
+
+def test_times_are_put_on_the_log_s_clock(tmp_path):
+    log = small_log()
+    record = ours(log, -1.0, 5.0)
+    record.manifest["clock_start_s"] = 3.25
+    merged, written = merge(tmp_path, log, record)
+    stamps = read(merged).get_dataset("flownav_estimate").data["timestamp"]
+    assert np.array_equal(stamps, np.rint((record.tables["estimate"]["t_s"] + 3.25) * 1e6))
+    assert written.notes == []
+
+
+def test_a_record_that_does_not_know_the_log_s_clock_is_refused(tmp_path):
+    record = ours(small_log())
+    del record.manifest["clock_start_s"]
+    with pytest.raises(InputError, match="does not say when its time began there; replay the log again"):
+        merge(tmp_path, small_log(), record)
 
 
 def test_ours_stand_where_their_time_is(tmp_path):

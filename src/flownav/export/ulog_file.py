@@ -41,15 +41,16 @@ def write_ulog(record: Record, path: Path, original: Path | None = None) -> tupl
     """Write a ULog file, whole or not at all; the file and notes.
 
     With `original`, the log that the record was replayed from, a copy of that log with flownav's topics among
-    its own; a replayed record is on its log's clock. InputError where the original is missing, is no ULog, is not
-    the log that was replayed or does not overlap in time, or where the record holds no path.
+    its own, on its clock: the manifest's `clock_start_s` says what that showed at time 0 of the record. InputError
+    where the original is missing, is no ULog, is not the log that was replayed or does not overlap in time, or
+    where the record holds no path or does not say how its times lie on that clock.
     """
     if original is None:
         contents = _all_of(record)
         whole = _log(contents)
     else:
         log = _read_original(record, original)
-        contents = _from_zero_on(_ours(record, 0.0))
+        contents = _from_zero_on(_ours(record, _clock_start_s(record, original)))
         whole = merged(log, str(original), contents.topics, contents.strings, contents.texts)
     with written_whole(path) as temporary:
         temporary.write_bytes(whole)
@@ -93,6 +94,14 @@ def _ours(record: Record, shift_s: float) -> Contents:
         texts["flownav_reasons"] = ", ".join(f"{code} {reason}" for code, reason in enumerate(reasons))
     strings = event_strings(record.tables["events"], shift_s) if "events" in record.tables else []
     return Contents(topics, strings, texts, notes)
+
+
+def _clock_start_s(record: Record, original: Path) -> float:
+    """What the original's clock showed at time 0 of the record."""
+    start_s = record.manifest.get("clock_start_s")
+    if start_s is None:
+        raise InputError(f"--merge {original}: the record does not say when its time began there; replay the log again")
+    return float(start_s)
 
 
 def _from_zero_on(contents: Contents) -> Contents:

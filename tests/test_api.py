@@ -39,6 +39,7 @@ ALLOWED = {
     "replay": GROUND | EQUATIONS | {"logs", "scoring"},
     "campaign": GROUND | EQUATIONS | {"simulation", "scoring"},
     "report": GROUND | {"scoring"},
+    "export": GROUND,
     "paper": GROUND | EQUATIONS | {"simulation", "campaign", "scoring", "rig", "identification", "report"},
 }
 

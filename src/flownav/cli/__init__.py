@@ -7,6 +7,7 @@ import sys
 import typer
 
 from flownav.cli import bench as bench
+from flownav.cli import export as export
 from flownav.cli import flow as flow
 from flownav.cli import fly as fly
 from flownav.cli import identify as identify
@@ -36,6 +37,7 @@ for name, command, what in (
     ("paper", paper.command, "Every table of the paper, published and reproduced side by side."),
     ("vehicle", vehicle.command, "Trim, power, linear models and ground effect of a helicopter."),
     ("report", report.command, "Write a record's report as one HTML page."),
+    ("export", export.command, "Write a record as MCAP, TUM, EuRoC, Parquet, CSV or ULog."),
     ("bench", bench.command, "Measure how fast all of this is on your machine."),
 ):
     app.command(name, short_help=what)(command)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.optics.pad_target import BOARD_CELLS, TAG_CELLS, PadTarget, checked, code_cells, corners_m
+from flownav.optics.pad_target import BOARD_CELLS, TAG_CELLS, PadTarget, checked, corners_m, picture_cells
 from flownav.optics.plane_pose import PlanePose, homography, mapped, plane_pose
 from flownav.optics.squares import (
     DARK,
@@ -39,8 +39,8 @@ BLURRED = "edges blurred, bent or broken"
 OTHER = "a square, but not this target"
 REASONS = (NO_FRAME, TOO_DARK, NO_SQUARE, CUT, TOO_FAR, BLURRED, OTHER)
 
-WRONG_CELLS_ALLOWED = 2  # of 36 cells of code; any two codes differ in 11 or more
-WRONG_RING_ALLOWED = 2  # of 28 cells of the black ring
+# of the 28 cells of a tag's ring and the 36 of its code (two codes differ in 11 or more); of a plain pad's 36 and 64
+WRONG_CELLS_ALLOWED = {True: (2, 2), False: (3, 6)}
 CUT_PART = 0.25  # of the frame's height and width: a region this large at the edge may be the target
 STRAIGHT_PX = 0.6
 WEAKEST_PART = {True: 0.25, False: 0.35}  # of the median contrast, along the sides of a tag and of a plain pad
@@ -53,7 +53,7 @@ class PadFix(NamedTuple):
 
     `tan_forward`, `tan_right`: tangents of the angles from body down. `distance_m`: from lens to centre.
     `heading_rad`: of the top of the pad's picture from body forward, clockwise from above, -pi to pi; a plain pad
-    looks alike after a quarter turn, so its heading is from -pi/4 to pi/4. `corners_px` (4, 2): column and row,
+    looks alike after half a turn, so its heading is from -pi/2 to pi/2. `corners_px` (4, 2): column and row,
     from the picture's top left clockwise. `coded`: the identity was read, not only an outline.
     """
 
@@ -133,41 +133,40 @@ def _corners_of(region: Region, levels: Array, target: PadTarget) -> tuple[Array
         return None, CUT
     if square.rms_px > STRAIGHT_PX or square.weakest < WEAKEST_PART[target.coded]:
         return None, BLURRED
-    return (_decoded(levels, square, target.code) if target.coded else square.corners), OTHER
+    return _in_order(levels, square, target), OTHER
 
 
-def _decoded(levels: Array, square: Square, code: int) -> Array | None:
-    """The corners turned so that the first is the picture's top left; None where the cells are not this code's."""
-    cells = read_cells(levels, square)
+def _in_order(levels: Array, square: Square, target: PadTarget) -> Array | None:
+    """The corners turned so that the first is the picture's top left; None where the cells are not the target's."""
+    wanted = picture_cells(target)[1:-1, 1:-1] if target.coded else picture_cells(target)
+    cells = read_cells(levels, square, len(wanted))
     if cells is None:
         return None
-    ring = np.ones_like(cells)
-    ring[1:-1, 1:-1] = False
-    if cells[ring].sum() > WRONG_RING_ALLOWED:
-        return None
-    inner, wanted = cells[1:-1, 1:-1], code_cells(code)
-    wrong = [int((np.rot90(inner, turn) != wanted).sum()) for turn in range(4)]
-    best = int(np.argmin(wrong))
-    return np.roll(square.corners, -best, 0) if wrong[best] <= WRONG_CELLS_ALLOWED else None
+    turned = [np.rot90(cells, turn) != wanted for turn in range(4)]
+    best = int(np.argmin([wrong.sum() for wrong in turned]))
+    ring = int(turned[best].sum() - turned[best][1:-1, 1:-1].sum())
+    code = int(turned[best][1:-1, 1:-1].sum())
+    ring_allowed, code_allowed = WRONG_CELLS_ALLOWED[target.coded]
+    return np.roll(square.corners, -best, 0) if ring <= ring_allowed and code <= code_allowed else None
 
 
-def read_cells(levels: Array, square: Square) -> NDArray[np.bool_] | None:
-    """The 8x8 cells of a square as they stand from its first corner, True where white; None for a flat quadrilateral.
+def read_cells(levels: Array, square: Square, count: int) -> NDArray[np.bool_] | None:
+    """The count x count cells of a square as they stand from its first corner, True where white.
 
-    Grey levels are compared with the middle of those within and without the square's edge.
+    Grey levels are compared with the middle of those within and without the square's edge. None where the corners
+    are not those of a square in perspective.
     """
-    outline = TAG_CELLS * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    outline = count * np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     transform = homography(outline, square.corners)
     if transform is None:
         return None
-    place = (np.arange(TAG_CELLS)[:, None] + 0.5 + CELL_SAMPLES).ravel()
+    place = (np.arange(count)[:, None] + 0.5 + CELL_SAMPLES).ravel()
     column, row = np.meshgrid(place, place)
     points = mapped(transform, np.column_stack([column.ravel(), row.ravel()]))
     if not np.isfinite(points).all():
         return None
     samples = bilinear(levels, points[:, 0], points[:, 1])
-    count = len(CELL_SAMPLES)
-    means = samples.reshape(TAG_CELLS, count, TAG_CELLS, count).mean((1, 3))
+    means = samples.reshape(count, len(CELL_SAMPLES), count, len(CELL_SAMPLES)).mean((1, 3))
     return np.asarray(means > 0.5 * (square.inner_grey + square.outer_grey))
 
 
@@ -189,8 +188,6 @@ def _fix(pose: PlanePose, corners: Array, axes: Array, coded: bool) -> PadFix | 
     top = axes @ pose.rotation[:, 0]
     heading = float(np.arctan2(top[1], top[0]))
     if not coded:
-        heading = (heading + 0.25 * np.pi) % (0.5 * np.pi) - 0.25 * np.pi
+        heading = (heading + 0.5 * np.pi) % np.pi - 0.5 * np.pi
     distance_m = float(np.linalg.norm(pose.place_m))
     return PadFix(float(forward / down), float(right / down), distance_m, heading, corners, coded)
-
-

@@ -129,7 +129,7 @@ def regions(frame: NDArray[np.uint8], wanted: tuple[int, ...]) -> Iterator[Regio
             corners = None
             if not cut:
                 inside = labels[top : bottom + 1, left : right + 1] == k + 1
-                corners = four_corners(convex_hull(_row_ends(inside))) 
+                corners = four_corners(convex_hull(_row_ends(inside)))
             yield Region(shade, (bottom - top + 1, right - left + 1), cut, _moved(corners, left, top))
 
 
@@ -222,7 +222,9 @@ def refined(frame: Array, corners: Array, shade: int, cells: int) -> Square | No
     return Square(corners, rms, float(contrast.min()) / middle, inner, outer)
 
 
-def _edge_places(frame: Array, corners: Array, shade: int, reach: float) -> tuple[Array, Array, Array, tuple[Array, Array]]:
+def _edge_places(
+    frame: Array, corners: Array, shade: int, reach: float
+) -> tuple[Array, Array, Array, tuple[Array, Array]]:
     """Along each side (4, blocks): the place 0..1, the edge's offset outwards [px], its contrast, levels in and out."""
     along = np.roll(corners, -1, 0) - corners
     outward = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]

@@ -22,7 +22,7 @@ LEAST_SIDE_PX = 12.0
 LEAST_FILL = 0.85  # of a region's convex hull by the four corners
 BLOCKS, SAMPLES_A_BLOCK = 10, 6
 CORNER_MARGIN = 0.08  # part of a side at each end that the neighbouring edge disturbs
-WIDEST_REACH_PX = 4.0
+WIDEST_REACH_PX = 3.0
 STEP_PX = 0.25
 PASSES = 4
 
@@ -201,6 +201,7 @@ def refined(frame: Array, corners: Array, shade: int, cells: int) -> Square | No
 
     Every side is looked across at places along it, as far as half a cell (`cells` make a side), four times over: the
     edge is at the centroid of the gradient, a straight line is fitted to ten such places, neighbouring lines meet.
+    The centroid is linear in the grey levels: any threshold on the gradient would draw edges towards pixels.
     """
     for turn in range(PASSES):
         side = np.linalg.norm(np.roll(corners, -1, 0) - corners, axis=1)
@@ -239,10 +240,9 @@ def _edge_places(
     profile = bilinear(frame, points[..., 0], points[..., 1])
     profile = profile.reshape(4, BLOCKS, SAMPLES_A_BLOCK, len(across)).mean(2)
     rise = np.diff(profile, axis=-1) * (1.0 if shade == DARK else -1.0)
-    weight = np.maximum(rise - 0.2 * rise.max(-1, keepdims=True), 0.0)
-    total = weight.sum(-1)
-    offset = (weight @ (0.5 * (across[1:] + across[:-1]))) / np.where(total > 0.0, total, 1.0)
-    contrast = np.where(total > 0.0, rise.sum(-1), 0.0)
+    contrast = rise.sum(-1)
+    centroid = (rise @ (0.5 * (across[1:] + across[:-1]))) / np.where(contrast > 1.0, contrast, np.inf)
+    offset = np.clip(centroid, -reach, reach)
     places = np.broadcast_to(place.reshape(BLOCKS, SAMPLES_A_BLOCK).mean(1), offset.shape)
     return places, offset, contrast, (profile[..., 0], profile[..., -1])
 

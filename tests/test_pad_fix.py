@@ -365,7 +365,7 @@ def test_the_command_measures_and_prints_a_table(tmp_path: Path) -> None:
     assert [r["height_m"] for r in facts["heights"]] == [4.0, 5.0]
     assert all(r["wrong"] == 0 and r["frames"] == 12 for r in facts["heights"])
     printed = CliRunner().invoke(app, list(arguments), catch_exceptions=False)
-    assert "tag of 0.2 m, camera px4flow" in printed.stdout
+    assert "camera px4flow: 669.3 px" in printed.stdout
     assert run("--print", tmp_path / "pad.png")["picture"].endswith("pad.png")
     assert (tmp_path / "pad.png").is_file()
 

@@ -169,18 +169,20 @@ def _heights(text: str) -> list[float]:
 
 
 def _print_measured(facts: dict[str, Any]) -> None:
+    from rich import box
     from rich.console import Console
     from rich.table import Table
 
     console = Console(markup=False, highlight=False)
     target, camera = facts["target"], facts["camera"]
     console.print(
-        f"{target['pattern']} of {target['side_m']:g} m, camera {camera['name']}: {camera['focal_px']:.1f} px, "
-        f"focused at {camera['focus_m']:g} m, tilt to {facts['tilt_deg']:g} deg, {facts['light']} light"
+        f"{target['pattern']} of {target['side_m']:g} m, tilt to {facts['tilt_deg']:g} deg, {facts['light']} light"
     )
-    table = Table(
-        "height [m]", "in view", "found", "wrong", "angle [mrad]", "bias", "distance [%]", "bias", "head [deg]"
-    )
+    console.print(f"camera {camera['name']}: {camera['focal_px']:.1f} px, focused at {camera['focus_m']:g} m")
+    table = Table(box=box.SIMPLE_HEAD)
+    for name in ("height", "in view", "found", "wrong", "angle", "bias", "distance", "bias", "heading"):
+        table.add_column(name, justify="right")
+    table.add_row("m", "", "", "", "urad", "urad", "ppm", "ppm", "mrad", style="dim")
     for row in facts["heights"]:
         table.add_row(
             f"{row['height_m']:g}",
@@ -190,11 +192,11 @@ def _print_measured(facts: dict[str, Any]) -> None:
             *(
                 _figure(row[key], scale)
                 for key, scale in (
-                    ("angle_sigma_rad", 1e3),
-                    ("angle_bias_rad", 1e3),
-                    ("distance_sigma", 1e2),
-                    ("distance_bias", 1e2),
-                    ("heading_sigma_rad", 57.29577951308232),
+                    ("angle_sigma_rad", 1e6),
+                    ("angle_bias_rad", 1e6),
+                    ("distance_sigma", 1e6),
+                    ("distance_bias", 1e6),
+                    ("heading_sigma_rad", 1e3),
                 )
             ),
         )
@@ -205,11 +207,11 @@ def _print_measured(facts: dict[str, Any]) -> None:
         return
     console.print(
         f"from {law['least_height_m']:g} to {law['greatest_height_m']:g} m: "
-        f"angle {law['angle_sigma_rad'] * 1e3:.3f} mrad, "
-        f"distance {law['distance_relative_sigma'] * 1e2:.4f} % x (d/1 m)^{law['distance_exponent']:.2f}, "
+        f"angle {law['angle_sigma_rad'] * 1e6:.1f} urad, "
+        f"distance {law['distance_relative_sigma'] * 1e6:.0f} ppm x (d/1 m)^{law['distance_exponent']:.2f}, "
         f"missed {law['outage_probability'] * 100:.1f} %"
     )
 
 
 def _figure(value: float | None, scale: float) -> str:
-    return "-" if value is None else f"{value * scale:.3g}"
+    return "-" if value is None else f"{value * scale:.1f}"

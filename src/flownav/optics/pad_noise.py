@@ -49,10 +49,10 @@ class PadFixNoise(NamedTuple):
     pad is found whenever it is whole in view, but for one frame in 1/outage_probability.
     """
 
-    angle_sigma_rad: float = 3.2e-5
-    distance_relative_sigma: float = 1.0e-4
-    distance_exponent: float = 1.5
-    least_height_m: float = 0.5
+    angle_sigma_rad: float = 1.3e-05
+    distance_relative_sigma: float = 1.13e-04
+    distance_exponent: float = 1.45
+    least_height_m: float = 0.3
     greatest_height_m: float = 5.0
     outage_probability: float = 0.0
 

@@ -113,7 +113,8 @@ def ground(size: int, seed: int = 1) -> NDArray[np.float32]:
     frequency = np.hypot(np.fft.fftfreq(size)[:, None], np.fft.rfftfreq(size)[None, :])
     frequency[0, 0] = np.inf
     field = np.fft.irfft2(np.fft.rfft2(white) / frequency, white.shape)
-    return np.clip(GROUND_REFLECTANCE + GROUND_SPREAD * field / field.std(), 0.02, 0.98).astype(np.float32)
+    level = np.clip(GROUND_REFLECTANCE + GROUND_SPREAD * field / field.std(), 0.02, 0.98)
+    return np.asarray(level, np.float32)
 
 
 def print_target(target: PadTarget, path: Path, dots_per_inch: int = 300) -> None:

@@ -80,9 +80,9 @@ def _tilted_back(rotation: Array, place_m: Array) -> Array:
     sight = place_m / np.linalg.norm(place_m)
     normal = rotation[:, 2]
     axis = np.cross(normal, sight)
-    angle = 2.0 * np.arctan2(np.linalg.norm(axis), normal @ sight)
-    size = np.linalg.norm(axis)
-    return rotation if size < 1e-12 else _turn(axis / size * angle) @ rotation
+    size = float(np.linalg.norm(axis))
+    angle = 2.0 * float(np.arctan2(size, normal @ sight))
+    return rotation if size < 1e-12 else _turn(np.asarray(axis * (angle / size), float)) @ rotation
 
 
 def _turn(vector: Array) -> Array:

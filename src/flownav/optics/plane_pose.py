@@ -82,7 +82,7 @@ def _tilted_back(rotation: Array, place_m: Array) -> Array:
     axis = np.cross(normal, sight)
     size = float(np.linalg.norm(axis))
     angle = 2.0 * float(np.arctan2(size, normal @ sight))
-    return rotation if size < 1e-12 else _turn(np.asarray(axis * (angle / size), float)) @ rotation
+    return rotation if size < 1e-12 else _turn(axis * (angle / size)) @ rotation
 
 
 def _turn(vector: Array) -> Array:
@@ -100,7 +100,7 @@ def _refined(rotation: Array, place_m: Array, figure_m: Array, tangents: Array) 
     for _ in range(STEPS):
         normal = slope.T @ slope
         step = np.linalg.lstsq(normal + damping * np.diag(np.diag(normal) + 1e-15), -slope.T @ error, rcond=None)[0]
-        turned, moved = _turn(step[:3]) @ rotation, place_m + step[3:]
+        turned, moved = _turn(np.asarray(step[:3], float)) @ rotation, place_m + step[3:]
         new_error, new_slope = _error(turned, moved, figure_m, tangents)
         if not new_error @ new_error < error @ error:
             damping *= 10.0

@@ -20,6 +20,7 @@ TILES_ALONG_SHORT_SIDE = (3, 8, 24)  # a pixel is judged against 3x3 tiles of ea
 LEAST_CONTRAST_GREY = 12.0
 LEAST_SIDE_PX = 12.0
 LEAST_FILL = 0.85  # of a region's convex hull by the four corners
+LEAST_CUT_FILL = 0.93  # of the convex hull of a region at the frame's edge, where it is part of a square
 BLOCKS, SAMPLES_A_BLOCK = 10, 6
 CORNER_MARGIN = 0.08  # part of a side at each end that the neighbouring edge disturbs
 WIDEST_REACH_PX = 3.0
@@ -42,7 +43,7 @@ class Square(NamedTuple):
 
 
 class Region(NamedTuple):
-    """A connected region: its convex hull's corners, and whether it touches the frame's edge."""
+    """A connected region: its convex hull's four corners, and whether it is a straight-sided one cut by the frame."""
 
     shade: int
     box_px: tuple[int, int]  # rows, columns
@@ -126,11 +127,22 @@ def regions(frame: NDArray[np.uint8], wanted: tuple[int, ...]) -> Iterator[Regio
         for k in np.flatnonzero(large):
             shade, top, bottom, left, right = (int(v) for v in table[k])
             cut = top == 0 or left == 0 or bottom == height - 1 or right == width - 1
-            corners = None
-            if not cut:
-                inside = labels[top : bottom + 1, left : right + 1] == k + 1
-                corners = four_corners(convex_hull(_row_ends(inside)))
-            yield Region(shade, (bottom - top + 1, right - left + 1), cut, _moved(corners, left, top))
+            inside = labels[top : bottom + 1, left : right + 1] == k + 1
+            hull = convex_hull(_row_ends(inside))
+            corners = None if cut else four_corners(hull)
+            even = cut and _filled(inside) >= LEAST_CUT_FILL * area(hull)
+            yield Region(shade, (bottom - top + 1, right - left + 1), even, _moved(corners, left, top))
+
+
+def _filled(inside: NDArray[np.bool_]) -> float:
+    """Area [px²] of a region with its gaps filled along rows or along columns, whichever is more."""
+    return max(float((_spans(side) - 1).clip(0).sum()) for side in (inside, inside.T))
+
+
+def _spans(inside: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Pixels from the first to the last of every row, 0 where a row is empty."""
+    width = inside.shape[1] - inside[:, ::-1].argmax(1) - inside.argmax(1)
+    return np.asarray(np.where(inside.any(1), width, 0))
 
 
 def _moved(corners: Array | None, column: int, row: int) -> Array | None:

@@ -12,6 +12,7 @@ from flownav.cli import flow as flow
 from flownav.cli import fly as fly
 from flownav.cli import identify as identify
 from flownav.cli import info as info
+from flownav.cli import pad as pad
 from flownav.cli import paper as paper
 from flownav.cli import replay as replay
 from flownav.cli import report as report
@@ -34,6 +35,7 @@ for name, command, what in (
     ("identify", identify.command, "Identify a flow sensor from rig or flight logs; write its file."),
     ("rig", rig.command, "Swing a flow sensor over a pad beside an encoder, from pixels."),
     ("flow", flow.command, "Optical flow of your own frames, as the PX4FLOW computes it."),
+    ("pad", pad.command, "Find the landing pad in a frame; measure how well, by height."),
     ("paper", paper.command, "Every table of the paper, published and reproduced side by side."),
     ("vehicle", vehicle.command, "Trim, power, linear models and ground effect of a helicopter."),
     ("report", report.command, "Write a record's report as one HTML page."),

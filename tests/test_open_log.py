@@ -7,24 +7,40 @@ import struct
 import numpy as np
 import pytest
 
+from dataflash_files import dataflash_of
 from flownav.errors import InputError
 from flownav.logs.open_log import log_kind, open_flight, open_log
 from flownav.measurement import Sensor
+from mavlink_logs import flight_log
 from replay_logs import log_of_flight
 from ulog_files import UlogWriter, ulog_of_flight
 
 IN_2024_US = 1_717_000_000_000_000
 
 
-def test_a_folder_and_a_ulog_open_as_the_same_streams(tmp_path):
+def test_a_folder_a_ulog_and_a_dataflash_log_open_as_the_same_streams(tmp_path):
     flown = log_of_flight(5.0)
     folder, file = flown.write(tmp_path / "csv"), ulog_of_flight(flown.tables).write(tmp_path / "flight.ulg")
-    assert set(open_log(folder).streams) == set(open_log(file).streams)
+    flash = tmp_path / "flight.bin"
+    flash.write_bytes(dataflash_of(flown, boot_s=40.0).content())
+    logs = [open_log(path) for path in (folder, file, flash)]
+    assert set(logs[0].streams) == set(logs[1].streams) == set(logs[2].streams)
     assert open_flight(file).path == file
+    starts = [min(float(stream.t_s[0]) for stream in log.streams.values()) for log in logs]
+    assert starts[1:] == [0.0, 0.0]
+    assert [log.clock_start_s for log in logs] == [None, pytest.approx(5.0 + starts[0]), pytest.approx(40.0 + starts[0])]
     with pytest.raises(InputError, match=r"--flow-instance: .*csv is a folder of CSV files"):
         open_log(folder, flow_instance=0)
     with pytest.raises(InputError, match="--flow-instance 3 is not in the log"):
         open_log(file, flow_instance=3)
+
+
+def test_a_telemetry_log_opens_on_the_vehicles_clock(tmp_path):
+    log = open_flight(flight_log(boot_s=20.0).write(tmp_path / "flight.tlog"), flow_instance=0)
+    assert log.clock_start_s == 0.0
+    assert log.streams[Sensor.ATTITUDE].t_s[0] == pytest.approx(20.0)
+    with pytest.raises(InputError, match="flow instance 3: the log has no such flow sensor"):
+        open_log(log.path, flow_instance=3)
 
 
 @pytest.mark.parametrize(("name", "head", "kind"), [
@@ -36,6 +52,7 @@ def test_a_folder_and_a_ulog_open_as_the_same_streams(tmp_path):
     ("flight.raw", struct.pack(">QB", IN_2024_US, 0xFE), "tlog"),
     ("flight.raw", struct.pack(">QB", 12, 0xFE), ""),
     ("flight.bin", b"\x00\x01\x02\x03", ""),
+    ("flight.bin", b"\x00\x01\x02\x03" + b"\xa3\x95\x80\x80", "dataflash"),
     ("flight.txt", b"hello", ""),
     ("flight.csv", b"", ""),
 ])  # fmt: skip

@@ -138,7 +138,7 @@ def _gps(table: CsvTable) -> list[Stream]:
     table.keep(table.columns["fix_type"] >= 3, "no_fix")
     if not len(table.t_s):
         raise InputError(f"{table.path}: no row has a 3-D fix (fix_type 3 or more); remove the file to replay without")
-    table.keep(near_the_rest(table), "out_of_range")
+    table.keep(near_the_rest(table.columns["lat_deg"], table.columns["lon_deg"]), "out_of_range")
     velocity = table.matrix("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
     return [
         Stream.of(Sensor.GPS_VELOCITY, table.t_s, velocity, rejected=table.rejected),

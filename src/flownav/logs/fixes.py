@@ -1,4 +1,4 @@
-"""GPS fixes as positions in the log's local frame. Rows have columns lat_deg, lon_deg, alt_m."""
+"""Geodetic positions: which fixes belong together, and where they lie in the log's local frame."""
 
 from __future__ import annotations
 
@@ -10,25 +10,29 @@ from flownav.measurement import Array
 
 FARTHEST_FIX_DEG = 0.5
 
+Origin = tuple[float, float, float]  # latitude, longitude [deg], altitude [m]
 
-def near_the_rest(fixes: Rows) -> NDArray[np.bool_]:
+
+def near_the_rest(latitude_deg: Array, longitude_deg: Array) -> NDArray[np.bool_]:
     """Fixes within half a degree of the middle one: a receiver's first are at times 0, 0 or where it was last used."""
-    latitude, longitude = fixes.columns["lat_deg"], fixes.columns["lon_deg"]
-    north = latitude - np.sort(latitude)[len(latitude) // 2]
-    east = (longitude - np.sort(longitude)[len(longitude) // 2] + 180.0) % 360.0 - 180.0
+    north = latitude_deg - np.sort(latitude_deg)[len(latitude_deg) // 2]
+    east = (longitude_deg - np.sort(longitude_deg)[len(longitude_deg) // 2] + 180.0) % 360.0 - 180.0
     return np.asarray(np.hypot(north, east) < FARTHEST_FIX_DEG)
 
 
-def origin_of(fixes: Rows) -> tuple[float, float, float]:
-    """Latitude, longitude [deg] and altitude [m] of the first fix."""
+def origin_of(fixes: Rows) -> Origin:
+    """The first fix. Rows have columns lat_deg, lon_deg, alt_m."""
     first = fixes.matrix("lat_deg", "lon_deg", "alt_m")[0]
     return float(first[0]), float(first[1]), float(first[2])
 
 
 def local_position(fixes: Rows) -> Array:
-    """North, east, down [m] about the first fix (n, 3)."""
+    """North, east, down [m] about the first fix (n, 3). Rows have columns lat_deg, lon_deg, alt_m."""
+    return local_ned(fixes.matrix("lat_deg", "lon_deg", "alt_m"), origin_of(fixes))
+
+
+def local_ned(geodetic_deg_m: Array, origin: Origin) -> Array:
+    """North, east, down [m] about an origin; latitude, longitude [deg] and altitude [m] in, shape (n, 3) both."""
     import pymap3d
 
-    latitude, longitude, altitude = fixes.matrix("lat_deg", "lon_deg", "alt_m").T
-    north, east, down = pymap3d.geodetic2ned(latitude, longitude, altitude, *origin_of(fixes))
-    return np.column_stack([north, east, down])
+    return np.column_stack(pymap3d.geodetic2ned(*geodetic_deg_m.T, *origin))

@@ -22,7 +22,8 @@ class Log:
     """A recorded flight as streams.
 
     streams: by sensor, times in seconds of the log's own clock, in the units and frames of `measurement`.
-    clock_start_s: what the clock of the file's timestamps shows at time 0 of the streams [s]; None where it is unknown.
+    clock_start_s: what the vehicle's clock, by which its log is stamped, showed at time 0 of the streams [s]; None
+    where the log does not say.
     origin_deg_m: latitude, longitude [deg] and altitude [m] of the local frame's origin; None without GPS.
     truth: an external reference, columns as record.TABLES["truth"]; its frame may be turned in yaw.
     inputs: SHA-256 of each file read, by name. notes: what a reader would tell the user, one line each.

@@ -8,9 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.frames import Quaternion, rotation_from_quaternion, to_body
+from flownav.frames import Quaternion
+from flownav.logs.fixes import Origin, local_ned, near_the_rest
 from flownav.logs.mavlink_streams import Gathered, Source
 from flownav.logs.rates import attitude_at
+from flownav.logs.states import in_order, state_table
 from flownav.mavlink.clock import Aligned, ClockState, align, stamp_of, told_unix_time
 from flownav.mavlink.converted import Context, Dropped, Pose
 from flownav.mavlink.dialect import Message, coder, dialect
@@ -28,7 +30,7 @@ from flownav.mavlink.state_messages import (
     sim_state,
 )
 from flownav.measurement import Array, Sensor, Stream
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
+from flownav.record import Table
 
 INVALID_AUTOPILOT, ARDUPILOT = 8, 3
 AUTOPILOTS = {ARDUPILOT: "ArduPilot", 12: "PX4"}
@@ -39,7 +41,6 @@ STATES: dict[str, Callable[[Message], LocalState | GlobalState | TrueState | Non
     "HIL_STATE_QUATERNION": hil_state_quaternion,
 }
 WANTED = {*CONVERTERS, *STATES, "SYSTEM_TIME", "PARAM_VALUE"}
-FARTHEST_FIX_DEG = 0.5
 RATES = ("rate_p_rad_s", "rate_q_rad_s", "rate_r_rad_s")
 
 
@@ -171,7 +172,8 @@ class Flight:
         t_s, states = np.array([t for t, _ in found]), [state for _, state in found]
         local = isinstance(states[0], LocalState)
         position = np.array([state.pos_ned_m for state in states]) if local else self._local(states)
-        return _table(t_s, position, np.array([state.vel_ned_m_s for state in states]), attitude_at(attitude, t_s))
+        velocity = np.array([state.vel_ned_m_s for state in states])
+        return in_order(state_table(t_s, position, velocity, attitude_at(attitude, t_s)))
 
     def truth(self) -> Table | None:
         """The simulator's truth about the log's origin (about its own first position without one)."""
@@ -184,14 +186,11 @@ class Flight:
         velocity = np.array([state.vel_ned_m_s for state in states])
         quaternion = np.array([state.quaternion for state in states])
         rates = np.array([state.rate_frd_rad_s for state in states])
-        more = dict(zip(RATES, rates.T, strict=True))
-        return _table(t_s, self._local(states), velocity, quaternion, more)
+        table = state_table(t_s, self._local(states), velocity, quaternion)
+        return in_order(table | dict(zip(RATES, rates.T, strict=True)))
 
     def _local(self, states: list[Any]) -> Array:
-        import pymap3d
-
-        latitude, longitude, altitude = np.array([state.position_deg_m for state in states]).T
-        return np.column_stack(pymap3d.geodetic2ned(latitude, longitude, altitude, *(self.origin_deg_m or (0, 0, 0))))
+        return local_ned(np.array([state.position_deg_m for state in states]), self.origin_deg_m or (0.0, 0.0, 0.0))
 
 
 def find_vehicle(decoder: Decoder, frames: list[Frame]) -> tuple[Vehicle, list[str]]:
@@ -213,7 +212,7 @@ def find_vehicle(decoder: Decoder, frames: list[Frame]) -> tuple[Vehicle, list[s
     return vehicle, []
 
 
-def _origin(decoder: Decoder, frames: list[Frame]) -> tuple[tuple[float, float, float] | None, bool]:
+def _origin(decoder: Decoder, frames: list[Frame]) -> tuple[Origin | None, bool]:
     """The autopilot's own origin, which its local positions are about (True); else the first fix near the others."""
     for _, message in decoder.all_of(frames, "GPS_GLOBAL_ORIGIN"):
         if (message.latitude or message.longitude) and abs(message.latitude) <= 90e7:
@@ -224,18 +223,5 @@ def _origin(decoder: Decoder, frames: list[Frame]) -> tuple[tuple[float, float, 
     fixes = np.array([fix for fix in received if fix is not None])
     if not len(fixes):
         return None, False
-    away = fixes[:, :2] - np.sort(fixes[:, :2], axis=0)[len(fixes) // 2]
-    away[:, 1] = (away[:, 1] + 180.0) % 360.0 - 180.0
-    latitude, longitude, altitude = fixes[np.argmax(np.hypot(*away.T) < FARTHEST_FIX_DEG)]
+    latitude, longitude, altitude = fixes[np.argmax(near_the_rest(fixes[:, 0], fixes[:, 1]))]
     return (float(latitude), float(longitude), float(altitude)), False
-
-
-def _table(t_s: Array, position: Array, velocity_ned: Array, quaternion: Array, more: Table | None = None) -> Table:
-    """Position, body velocity and attitude in the order of their times, as the Record names them."""
-    velocity = np.column_stack(to_body(rotation_from_quaternion(*quaternion.T), *velocity_ned.T))
-    table: Table = {"t_s": t_s}
-    for names, values in ((POSITION_NED, position), (VELOCITY_BODY, velocity), (QUATERNION, quaternion)):
-        table.update(zip(names, values.T, strict=True))
-    table.update(more or {})
-    order = np.argsort(t_s, kind="stable")
-    return {name: column[order] for name, column in table.items()}

@@ -6,18 +6,19 @@ import hashlib
 from collections import Counter
 from pathlib import Path
 
-import numpy as np
-
 from flownav.errors import InputError
-from flownav.logs.log import Absence, Log
+from flownav.logs.absences import absences_of
+from flownav.logs.log import Log
 from flownav.logs.mavlink_flight import STATES, Decoder, Flight, find_vehicle
 from flownav.mavlink.framing import Frame, tlog_frames
 from flownav.measurement import Sensor, Stream
 
-WITHOUT: dict[Sensor, tuple[str, str]] = {
-    Sensor.IMU: ("IMU (HIGHRES_IMU, SCALED_IMU; RAW_IMU of ArduPilot)", "constant velocity between readings"),
-    Sensor.RANGE: ("a range downwards (DISTANCE_SENSOR, RANGEFINDER)", "flow has no height and is not fused"),
-    Sensor.GPS_POSITION: ("a GPS fix (GPS_RAW_INT)", "dead reckoning on flow from where the log begins"),
+LACKING = {
+    "imu": "no IMU (HIGHRES_IMU, SCALED_IMU; RAW_IMU of ArduPilot)",
+    "range": "no range downwards (DISTANCE_SENSOR, RANGEFINDER)",
+    "gps_position": "no GPS fix (GPS_RAW_INT)",
+    "baro": "no barometer (SCALED_PRESSURE, HIGHRES_IMU)",
+    "flow_rate": "no optical flow (OPTICAL_FLOW, OPTICAL_FLOW_RAD)",
 }
 
 
@@ -54,7 +55,8 @@ def read_tlog(path: Path, *, flow_instance: int | None = None) -> Log:
         flight.autopilot(streams[Sensor.ATTITUDE]),
         vehicle.name,
         flight.limits,
-        _absences(streams),
+        tuple(absences_of(streams, **LACKING)),
+        clock_start_s=0.0,
     )
 
 
@@ -104,12 +106,3 @@ def _check_needed(path: Path, streams: dict[Sensor, Stream]) -> None:
         raise InputError(
             f"{path}: neither a GPS fix (GPS_RAW_INT) nor flow (OPTICAL_FLOW, OPTICAL_FLOW_RAD); have one of them sent"
         )
-
-
-def _absences(streams: dict[Sensor, Stream]) -> tuple[Absence, ...]:
-    found = [Absence(*WITHOUT[sensor]) for sensor in WITHOUT if sensor not in streams]
-    if not {Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY} & set(streams):
-        found.append(Absence("flow (OPTICAL_FLOW, OPTICAL_FLOW_RAD)", "GPS alone"))
-    elif Sensor.FLOW_RATE in streams and not np.isfinite(streams[Sensor.FLOW_RATE].value[:, 2:4]).any():
-        found.append(Absence("the flow sensor's gyro", "the vehicle's rates take the rotation out of the flow"))
-    return tuple(found)

@@ -2,31 +2,20 @@
 
 from __future__ import annotations
 
-from importlib import import_module
+from collections.abc import Callable
 from pathlib import Path
-from typing import Protocol, cast
 
 from flownav.errors import InputError
 from flownav.logs.log import Log
 from flownav.measurement import Sensor
 
 KNOWN = "a folder of CSV files, a PX4 ULog (.ulg), an ArduPilot DataFlash log (.bin) or a MAVLink telemetry log (.tlog)"
-READERS = {
-    "ulog": ("flownav.logs.ulog", "read_ulog"),
-    "dataflash": ("flownav.logs.dataflash", "read_dataflash"),
-    "tlog": ("flownav.logs.mavlink_log", "read_tlog"),
-}
 ULOG_MAGIC = b"\x55\x4c\x6f\x67\x01\x12\x35"
 DATAFLASH_MAGIC = b"\xa3\x95"
+DATAFLASH_FORMAT = b"\xa3\x95\x80"  # the message that describes others: a log that has lost its start still has many
 MAVLINK_MAGIC = b"\xfd\xfe"
+LOOKED_AT_BYTES = 4096
 YEARS_US = (1.0e15, 4.2e15)  # microseconds of the years 2001 to 2103
-
-
-class Reader(Protocol):
-    """What reads one format."""
-
-    def __call__(self, path: Path, *, flow_instance: int | None = None) -> Log:
-        """The log. InputError where there is none."""
 
 
 def open_log(path: Path, *, flow_instance: int | None = None) -> Log:
@@ -44,8 +33,7 @@ def open_log(path: Path, *, flow_instance: int | None = None) -> Log:
     kind = log_kind(path)
     if not kind:
         raise InputError(f"{path}: {'not a log that is known' if path.exists() else 'no such log'}; give {KNOWN}")
-    module, name = READERS[kind]
-    return cast(Reader, getattr(import_module(module), name))(path, flow_instance=flow_instance)
+    return _reader(kind)(path, flow_instance=flow_instance)
 
 
 def open_flight(path: Path, *, flow_instance: int | None = None) -> Log:
@@ -61,6 +49,20 @@ def open_flight(path: Path, *, flow_instance: int | None = None) -> Log:
     return log
 
 
+def _reader(kind: str) -> Callable[..., Log]:
+    if kind == "ulog":
+        from flownav.logs.ulog import read_ulog
+
+        return read_ulog
+    if kind == "dataflash":
+        from flownav.logs.dataflash import read_dataflash
+
+        return read_dataflash
+    from flownav.logs.mavlink_log import read_tlog
+
+    return read_tlog
+
+
 def log_kind(path: Path) -> str:
     """ "ulog", "dataflash" or "tlog" by a file's first bytes and its suffix; "" for anything else.
 
@@ -70,12 +72,12 @@ def log_kind(path: Path) -> str:
         return ""
     try:
         with path.open("rb") as file:
-            head = file.read(16)
+            head = file.read(LOOKED_AT_BYTES)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); see who may read it") from error
     if head.startswith(ULOG_MAGIC) or path.suffix.lower() == ".ulg":
         return "ulog"
-    if head.startswith(DATAFLASH_MAGIC):
+    if head.startswith(DATAFLASH_MAGIC) or (path.suffix.lower() == ".bin" and DATAFLASH_FORMAT in head):
         return "dataflash"
     dated = YEARS_US[0] < int.from_bytes(head[:8], "big") < YEARS_US[1]
     if path.suffix.lower() == ".tlog" or (dated and len(head) > 8 and head[8] in MAVLINK_MAGIC):

@@ -122,6 +122,7 @@ def read_ulog(path: Path, *, flow_instance: int | None = None) -> Log:
         _estimator(topics) if autopilot is not None else "",
         reading_limits(topics, flow),
         tuple(absences),
+        clock_start_s=topics.start_s,
     )
 
 

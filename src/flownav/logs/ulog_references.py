@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from flownav.frames import rotation_from_quaternion, to_body
 from flownav.logs.rates import attitude_at
+from flownav.logs.states import state_table
 from flownav.logs.ulog_topics import Topic, Topics
 from flownav.measurement import Array, Sensor, Stream
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
@@ -89,16 +90,7 @@ def autopilot_estimate(topics: Topics, attitude: Stream | None, source: str) -> 
 
 def _table(t_s: Array, position: Array, velocity_ned: Array, attitude: Stream | None) -> Table:
     """Position NED, and where the attitude is known velocity in body axes and the attitude."""
-    table: Table = {"t_s": t_s, **dict(zip(POSITION_NED, position.T, strict=True))}
-    if attitude is None:
-        return table
-    quaternion = _instants(attitude, t_s)
-    body = to_body(rotation_from_quaternion(*quaternion.T), *velocity_ned.T)
-    return {
-        **table,
-        **dict(zip(VELOCITY_BODY, map(np.asarray, body), strict=True)),
-        **dict(zip(QUATERNION, quaternion.T, strict=True)),
-    }
+    return state_table(t_s, position, velocity_ned, None if attitude is None else _instants(attitude, t_s))
 
 
 def _instants(attitude: Stream, t_s: Array) -> Array:

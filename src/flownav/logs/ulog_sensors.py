@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.frames import rotation_from_quaternion, to_body
-from flownav.logs.fixes import local_position, near_the_rest, origin_of
+from flownav.logs.fixes import Origin, local_position, near_the_rest, origin_of
 from flownav.logs.rates import attitude_at
 from flownav.logs.ulog_topics import Topic, Topics
 from flownav.measurement import Array, Sensor, Stream
@@ -94,7 +94,7 @@ def _joined(rates: Topic, force: Topic) -> Topic:
 
 
 # -- GPS ---------------------------------------------------------------------------------------------------
-def gps_streams(topics: Topics) -> tuple[list[Stream], tuple[float, float, float] | None]:
+def gps_streams(topics: Topics) -> tuple[list[Stream], Origin | None]:
     """Velocity, then position, and the origin of the local frame; nothing where no fix is 3-D."""
     candidates = topics.of("vehicle_gps_position", "sensor_gps")
     if not candidates:
@@ -133,7 +133,7 @@ def _fixes(topic: Topic) -> Topic:
     inside = (abs(topic.columns["lat_deg"]) <= 90) & (abs(topic.columns["lon_deg"]) <= 180)
     topic.keep(inside & (abs(topic.columns["alt_m"]) < 1e5), "out_of_range")
     if len(topic):
-        topic.keep(near_the_rest(topic), "out_of_range")
+        topic.keep(near_the_rest(topic.columns["lat_deg"], topic.columns["lon_deg"]), "out_of_range")
     return topic
 
 

@@ -69,11 +69,15 @@ class Topic(Rows):
 
 @dataclass
 class Topics:
-    """The wanted topics of a file, parameters, and what was wrong with the file."""
+    """The wanted topics of a file, parameters, and what was wrong with the file.
+
+    start_s: what the file's clock shows at time 0 of the topics.
+    """
 
     found: list[Topic]
     parameters: dict[str, float]
     sha256: str
+    start_s: float
     notes: list[str] = field(default_factory=list)
 
     def of(self, *names: str) -> list[Topic]:
@@ -116,7 +120,7 @@ def read_topics(path: Path, wanted: Collection[str], fields: Collection[str], st
         )
     stated = {str(name): float(value) for name, value in log.initial_parameters.items()}
     parameters = {name: value for name, value in stated.items() if np.isfinite(value)}
-    return Topics(found, parameters, sha256, _notes(framed))
+    return Topics(found, parameters, sha256, start_s, _notes(framed))
 
 
 def _framed(path: Path, wanted: Collection[str]) -> tuple[Framed, str]:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.frames import quaternion_from_euler, rotation_from_quaternion, to_body
+from flownav.frames import quaternion_from_euler
 from flownav.logs.csv_table import CsvTable
 from flownav.logs.dataflash.columns import DataFlash, text
 from flownav.logs.dataflash.rows import Field, check_rows, held_at, message_rows
+from flownav.logs.fixes import Origin, local_ned
+from flownav.logs.states import state_table
 from flownav.measurement import Array
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
+from flownav.record import Table
 
 FARTHEST_M, FASTEST_M_S = 1e5, 300.0
 EKF_ORIGIN = 0  # ORGN's Type: the filter's origin; 1 is home
 FILTERS = {3: ("EKF3", "XKF"), 2: ("EKF2", "NKF")}  # by AHRS_EKF_TYPE
-
-Origin = tuple[float, float, float]  # latitude, longitude [deg], altitude [m]
 
 GEODETIC = (Field("Lat", -90, 90), Field("Lng", -180, 180), Field("Alt", -1000, 20000))
 POSITION_VELOCITY = (
@@ -28,13 +28,6 @@ ESTIMATE = (
     Field("C", 0, 255, required=False),
 )
 TRUE_STATE = (*GEODETIC, *(Field(f"Q{i}", -1.01, 1.01) for i in (1, 2, 3, 4)))
-
-
-def local_ned(geodetic_deg_m: Array, origin: Origin) -> Array:
-    """North, east, down [m] about an origin; latitude, longitude [deg] and altitude [m] in, shape (n, 3) both."""
-    import pymap3d
-
-    return np.column_stack(pymap3d.geodetic2ned(*geodetic_deg_m.T, *origin))
 
 
 def parameters(log: DataFlash) -> dict[str, float]:
@@ -93,7 +86,7 @@ def estimate(table: CsvTable, origins: CsvTable | None, origin: Origin | None) -
         position = position + held_at(table.t_s, origins.t_s, shift)
     angles = np.radians(table.matrix("Roll", "Pitch", "Yaw"))
     quaternion = np.column_stack(quaternion_from_euler(*angles.T))
-    return _states(table.t_s, position, table.matrix("VN", "VE", "VD"), quaternion)
+    return state_table(table.t_s, position, table.matrix("VN", "VE", "VD"), quaternion)
 
 
 def true_rows(log: DataFlash) -> tuple[CsvTable, CsvTable | None] | None:
@@ -125,15 +118,7 @@ def truth(state: CsvTable, motion: CsvTable | None, origin: Origin) -> Table:
             position[inside] = moved[inside, :3] + shift
     quaternion = state.matrix("Q1", "Q2", "Q3", "Q4")
     size = np.linalg.norm(quaternion, axis=1)
-    return _states(state.t_s, position, velocity, quaternion / np.where(size > 0, size, np.nan)[:, None])
-
-
-def _states(t_s: Array, position_ned_m: Array, velocity_ned_m_s: Array, quaternion: Array) -> Table:
-    rotation = rotation_from_quaternion(*quaternion.T)
-    body = np.column_stack(to_body(rotation, *velocity_ned_m_s.T))
-    names = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION)
-    values = np.column_stack([position_ned_m, body, quaternion])
-    return {"t_s": t_s, **dict(zip(names, values.T, strict=True))}
+    return state_table(state.t_s, position, velocity, quaternion / np.where(size > 0, size, np.nan)[:, None])
 
 
 def stated_limits(settings: dict[str, float], rangefinder: int) -> dict[str, tuple[float, float]]:

@@ -17,11 +17,9 @@ from flownav.errors import InputError
 from flownav.frames import quaternion_from_euler, rotation_from_quaternion, to_body
 from flownav.logs.csv_table import CsvTable
 from flownav.logs.dataflash.columns import DataFlash
-from flownav.logs.dataflash.reference import Origin, local_ned
 from flownav.logs.dataflash.rows import Field, check_rows, message_rows
-from flownav.logs.fixes import near_the_rest
+from flownav.logs.fixes import Origin, local_ned, near_the_rest
 from flownav.logs.rates import attitude_at
-from flownav.logs.rows import Rows
 from flownav.measurement import Array, Sensor, Stream
 
 GYRO_LIMIT_RAD_S = 70.0  # twice the range of a 2000 deg/s gyro
@@ -134,8 +132,7 @@ def _keep_healthy(name: str, table: CsvTable) -> None:
     if name == "GPS":
         table.keep(table.columns["Status"] >= LEAST_FIX, "no_fix")
         if len(table.t_s):
-            fixes = Rows(table.t_s, {"lat_deg": table.columns["Lat"], "lon_deg": table.columns["Lng"]})
-            table.keep(near_the_rest(fixes), "out_of_range")
+            table.keep(near_the_rest(table.columns["Lat"], table.columns["Lng"]), "out_of_range")
     if name == "EV":
         table.keep(np.isin(table.columns["Id"], list(LANDED_BY_EVENT)), "another_event")
     if name == "PL":

@@ -28,7 +28,11 @@ def test_a_folder_a_ulog_and_a_dataflash_log_open_as_the_same_streams(tmp_path):
     assert open_flight(file).path == file
     starts = [min(float(stream.t_s[0]) for stream in log.streams.values()) for log in logs]
     assert starts[1:] == [0.0, 0.0]
-    assert [log.clock_start_s for log in logs] == [None, pytest.approx(5.0 + starts[0]), pytest.approx(40.0 + starts[0])]
+    assert [log.clock_start_s for log in logs] == [
+        None,
+        pytest.approx(5.0 + starts[0]),
+        pytest.approx(40.0 + starts[0]),
+    ]
     with pytest.raises(InputError, match=r"--flow-instance: .*csv is a folder of CSV files"):
         open_log(folder, flow_instance=0)
     with pytest.raises(InputError, match="--flow-instance 3 is not in the log"):

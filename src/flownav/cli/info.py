@@ -74,16 +74,13 @@ def _print(facts: dict[str, Any]) -> None:
 
 
 def _print_autopilot(console: Console, own: dict[str, Any]) -> None:
+    from flownav.cli.output import autopilot_errors
+
     console.print(
         f"The autopilot's own estimate: {own['name']}, {own['count']} rows at {_figure(own['rate_hz'], 1)} Hz"
     )
     if own["against"]:
-        against = {"truth": "the reference, turned and shifted onto it", "gps": "GPS, mean difference taken out"}
-        velocity = "" if own["velocity_rms_m_s"] is None else f"; velocity {own['velocity_rms_m_s']:.3f} m/s rms"
-        console.print(
-            f"  against {against[own['against']]}: horizontal {own['horizontal_rms_m']:.2f} m rms, "
-            f"{own['horizontal_max_m']:.2f} m max; vertical {own['vertical_rms_m']:.2f} m rms{velocity}"
-        )
+        console.print(f"  {autopilot_errors(own)}")
 
 
 def _figure(value: float | None, digits: int) -> str:

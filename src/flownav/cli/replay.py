@@ -119,6 +119,8 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from flownav.cli.output import autopilot_errors
+
     console = Console(markup=False, highlight=False)
     console.print(f"{flown.log.path.name}: {scores['duration_s']:.1f} s")
     if scores["outages"]:
@@ -141,6 +143,9 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
             f"{truth['horizontal_rms_m']:.2f} m rms, {truth['horizontal_max_m']:.2f} m max; "
             f"velocity {truth['velocity_rms_m_s']:.3f} m/s rms"
         )
+    if scores.get("autopilot", {}).get("against"):
+        own = scores["autopilot"]
+        console.print(f"The autopilot's own estimate ({own['name']}) {autopilot_errors(own)}")
     rejected = Table("sensor", "reason", "rejected", title="Not fused")
     for sensor, counts in scores["rejected"].items():
         for reason, count in counts.items():

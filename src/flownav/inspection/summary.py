@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from flownav.errors import InputError
 from flownav.frames import rotation_from_quaternion, to_earth
-from flownav.inspection.autopilot import autopilot_errors
 from flownav.logs.log import Log
 from flownav.logs.plausible import check_plausible
 from flownav.logs.rates import attitude_at
 from flownav.measurement import Array, Sensor, Stream
 from flownav.record import VELOCITY_BODY
-from flownav.replay.prepare import GPS, ReplayOptions, prepare
+from flownav.replay.autopilot import autopilot_scores
+from flownav.replay.prepare import ReplayOptions, prepare
 from flownav.replay.sentinel import Finding, findings
 
 CLOCK_REASONS = {
@@ -146,7 +145,4 @@ def _witness(log: Log) -> Stream | None:
 def _autopilot(log: Log) -> dict[str, Any] | None:
     if log.autopilot is None:
         return None
-    delay_s = ReplayOptions().gps_delay_s
-    gps = {sensor: replace(log.streams[sensor], delay_s=delay_s) for sensor in GPS if sensor in log.streams}
-    errors = autopilot_errors(log.autopilot, log.truth, gps)
-    return {"name": log.autopilot_name, **_track(log.autopilot["t_s"]), **errors}
+    return {**_track(log.autopilot["t_s"]), **(autopilot_scores(log, ReplayOptions().gps_delay_s) or {})}

@@ -10,6 +10,11 @@ import pytest
 SHARED = Path(__file__).resolve().parents[2] / "shared"
 
 
+def data_root() -> Path:
+    """Where the recorded logs would be."""
+    return Path(os.environ.get("FLOWNAV_DATA") or SHARED / "data")
+
+
 def _folder(variable: str, name: str) -> Path:
     folder = Path(os.environ.get(variable) or SHARED / name)
     if not folder.is_dir():

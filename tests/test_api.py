@@ -30,13 +30,16 @@ ALLOWED = {
     "estimation": GROUND,
     "optics": GROUND,
     "scoring": GROUND,
-    "logs": GROUND,
+    "mavlink": GROUND,
+    "logs": GROUND | {"mavlink"},
     "rig": GROUND | {"optics", "sensors"},
+    "inspection": GROUND | EQUATIONS | {"logs", "replay", "scoring"},
     "identification": GROUND | EQUATIONS | {"logs", "rig", "replay", "scoring"},
     "simulation": GROUND | EQUATIONS,
     "replay": GROUND | EQUATIONS | {"logs", "scoring"},
     "campaign": GROUND | EQUATIONS | {"simulation", "scoring"},
     "report": GROUND | {"scoring"},
+    "export": GROUND,
     "paper": GROUND | EQUATIONS | {"simulation", "campaign", "scoring", "rig", "identification", "report"},
 }
 

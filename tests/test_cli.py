@@ -183,4 +183,4 @@ def test_files_that_a_scenario_names_lie_beside_it(tmp_path):
 def test_help_lists_every_command(tmp_path):
     done = run("--help", cwd=tmp_path)
     assert done.returncode == 0
-    assert all(command in done.stdout for command in ("fly", "replay", "vehicle", "report", "bench"))
+    assert all(command in done.stdout for command in ("fly", "replay", "info", "vehicle", "report", "bench"))

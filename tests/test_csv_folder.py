@@ -257,6 +257,15 @@ def test_no_fix_at_all(folder):
     assert "no row has a 3-D fix" in complaint(folder)
 
 
+def test_a_clock_that_leaps_by_years_in_the_middle_is_refused(folder):
+    for file in folder.iterdir():
+        header, *rows = rows_of(file)
+        for row in rows[len(rows) // 2 :]:
+            row[header.index("t_s")] = repr(float(row[header.index("t_s")]) + 1e9)
+        put(file, [header, *rows])
+    assert "covers 0 to 1e+09 s, more than two days; the clock has leapt" in complaint(folder)
+
+
 # -- what is thrown away and counted -----------------------------------------------------------------------
 BAD_CELLS = [
     ("range", "range_m", "nan", Sensor.RANGE, "not_finite"),
@@ -306,6 +315,13 @@ def test_rows_of_another_length_are_counted(folder):
     put(folder / "range.csv", [header, *rows])
     stream = read_csv_folder(folder).streams[Sensor.RANGE]
     assert stream.rejected == {"malformed_row": 2}
+
+
+def test_rows_of_another_length_that_are_no_text_are_counted(folder):
+    with (folder / "range.csv").open("ab") as file:
+        file.write(b"29.97,\xff\xfe,1,9\n29.98,\xff,1\n")
+    stream = read_csv_folder(folder).streams[Sensor.RANGE]
+    assert stream.rejected == {"malformed_row": 1, "not_finite": 1}
 
 
 def test_a_row_cut_off_at_the_end_is_counted(folder):

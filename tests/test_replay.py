@@ -350,6 +350,9 @@ def test_the_record_holds_the_whole_replay_and_loads_again(log, tmp_path):
     assert manifest["delays_s"]["gps_position"] == 0.22
     assert manifest["scores"] == scores
     assert manifest["provenance"]["inputs"]["flow.csv"]["sha256"] == log.inputs["flow.csv"]
+    assert "clock_start_s" not in manifest  # a folder of CSV files does not say
+    told = Replay(altered(log, clock_start_s=81.5), run.options, run.settings, run.prepared, run.tape)
+    assert to_record(told, scores, []).manifest["clock_start_s"] == 81.5
     table = record.tables["innovation"]
     assert set(table["sensor"]) == {"gps_position", "gps_velocity", "flow_rate", "range", "baro"}
     fused = table["fused"]

@@ -118,7 +118,7 @@ def test_a_wrong_option_is_one_line_and_leaves_no_file(folder, arguments, said):
 
 
 def test_a_folder_that_is_not_there(tmp_path):
-    assert "no such folder" in complaint(tmp_path / "absent")
+    assert "no such log; give a folder of CSV files, a PX4 ULog" in complaint(tmp_path / "absent")
 
 
 def test_a_record_that_cannot_be_written(folder, tmp_path):

@@ -7,9 +7,12 @@ import sys
 import typer
 
 from flownav.cli import bench as bench
+from flownav.cli import export as export
 from flownav.cli import flow as flow
 from flownav.cli import fly as fly
 from flownav.cli import identify as identify
+from flownav.cli import info as info
+from flownav.cli import pad as pad
 from flownav.cli import paper as paper
 from flownav.cli import replay as replay
 from flownav.cli import report as report
@@ -28,12 +31,15 @@ app = typer.Typer(
 for name, command, what in (
     ("fly", fly.command, "Fly a take-off or landing in closed loop, scored beside the paper."),
     ("replay", replay.command, "Fuse a recorded flight; measure the drift without GPS."),
+    ("info", info.command, "What a log holds: sensors, rates, gaps, signs, what it lacks."),
     ("identify", identify.command, "Identify a flow sensor from rig or flight logs; write its file."),
     ("rig", rig.command, "Swing a flow sensor over a pad beside an encoder, from pixels."),
     ("flow", flow.command, "Optical flow of your own frames, as the PX4FLOW computes it."),
+    ("pad", pad.command, "Find the landing pad in a frame; measure how well, by height."),
     ("paper", paper.command, "Every table of the paper, published and reproduced side by side."),
     ("vehicle", vehicle.command, "Trim, power, linear models and ground effect of a helicopter."),
     ("report", report.command, "Write a record's report as one HTML page."),
+    ("export", export.command, "Write a record as MCAP, TUM, EuRoC, Parquet, CSV or ULog."),
     ("bench", bench.command, "Measure how fast all of this is on your machine."),
 ):
     app.command(name, short_help=what)(command)

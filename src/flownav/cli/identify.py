@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 def command(
     logs: Annotated[
-        list[Path], typer.Argument(help="Rig folders or CSV files, or one flight folder (docs/identification.md).")
+        list[Path], typer.Argument(help="Rig folders or CSV files, or one flight log (docs/identification.md).")
     ],
     order: Annotated[str, typer.Option(help="auto, delay (gain and latency), 1 to 6, or e.g. 2+delay.")] = "auto",
     heights: Annotated[
@@ -23,6 +23,9 @@ def command(
     reference: Annotated[
         str, typer.Option(help="auto; rig: velocity or encoder; flight: truth (motion capture) or gps.")
     ] = "auto",
+    flow_instance: Annotated[
+        int | None, typer.Option("--flow-instance", metavar="N", help="Which of a flight's several flow sensors.")
+    ] = None,
     autopilot: Annotated[
         str | None, typer.Option("--for", help="Also write this autopilot's parameters: px4 or ardupilot.")
     ] = None,
@@ -47,7 +50,7 @@ def command(
     base_sensor = load_sensor(base)
     parameter_path = _parameter_path(path, autopilot)
     with announce_compilation("identification"):
-        findings = identify(logs, structures, heights_m, reference)
+        findings = identify(logs, structures, heights_m, reference, flow_instance)
     entries = sensor_entries(findings, base_sensor, f"identified from {name_of(logs)}", command_line())
     sensor = write_sensor(path, entries)
     facts = _facts(findings) | {"sensor": str(path)}

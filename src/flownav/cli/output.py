@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from flownav.errors import InputError
 
@@ -56,3 +56,13 @@ def save(record: Record, path: Path, *, report: bool) -> dict[str, str]:
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
     return {"record": str(path), **({"report": str(page)} if report else {})}
+
+
+def autopilot_errors(scores: dict[str, Any]) -> str:
+    """The errors of an autopilot's own estimate (scoring/autopilot) in words, where it was compared with anything."""
+    against = {"truth": "the reference, turned and shifted onto it", "gps": "GPS, mean difference taken out"}
+    velocity = "" if scores["velocity_rms_m_s"] is None else f"; velocity {scores['velocity_rms_m_s']:.3f} m/s rms"
+    return (
+        f"against {against[scores['against']]}: horizontal {scores['horizontal_rms_m']:.2f} m rms, "
+        f"{scores['horizontal_max_m']:.2f} m max; vertical {scores['vertical_rms_m']:.2f} m rms{velocity}"
+    )

@@ -14,7 +14,9 @@ if TYPE_CHECKING:
 
 
 def command(
-    folder: Annotated[Path, typer.Argument(help="A folder of CSV files (docs/csv-folder.md).", show_default=False)],
+    folder: Annotated[
+        Path, typer.Argument(help="A log: CSV folder, .ulg, .bin or .tlog (docs/logs.md).", show_default=False)
+    ],
     gps_outage: Annotated[
         list[str] | None,
         typer.Option("--gps-outage", metavar="T0:T1", help="Withhold GPS in [T0, T1) s; may be repeated."),
@@ -32,6 +34,9 @@ def command(
     outage_table: Annotated[
         str | None,
         typer.Option("--outage-table", metavar="T0:T1:LENGTH", help="One replay a window, each with GPS cut there."),
+    ] = None,
+    flow_instance: Annotated[
+        int | None, typer.Option("--flow-instance", metavar="N", help="Which of several flow sensors.")
     ] = None,
     settings: Annotated[
         Path | None, typer.Option("--settings", help="TOML of filter settings (docs/kinematic-filter.md).")
@@ -56,7 +61,7 @@ def command(
     identified = identified_flow(load_sensor(sensor)) if sensor else None
     outages = tuple((t0, t1) for t0, t1 in windows)
     options = ReplayOptions(gps_delay, outages, not no_flow, (scale[0], scale[1]), identified)
-    log, numbers = _read(folder), _settings(settings)
+    log, numbers = _read(folder, flow_instance), _settings(settings)
     flown = replay(log, options, numbers)
     scores = flown.scores()
     if table:
@@ -86,10 +91,10 @@ def _numbers(option: str, text: str, separator: str, count: int, form: str) -> t
     return numbers
 
 
-def _read(folder: Path) -> Any:
-    from flownav.logs.csv_folder import read_csv_folder
+def _read(path: Path, flow_instance: int | None) -> Any:
+    from flownav.logs.open_log import open_flight
 
-    return read_csv_folder(folder)
+    return open_flight(path, flow_instance=flow_instance)
 
 
 def _settings(path: Path | None) -> Any:
@@ -114,6 +119,8 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from flownav.cli.output import autopilot_errors
+
     console = Console(markup=False, highlight=False)
     console.print(f"{flown.log.path.name}: {scores['duration_s']:.1f} s")
     if scores["outages"]:
@@ -136,6 +143,9 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
             f"{truth['horizontal_rms_m']:.2f} m rms, {truth['horizontal_max_m']:.2f} m max; "
             f"velocity {truth['velocity_rms_m_s']:.3f} m/s rms"
         )
+    if scores.get("autopilot", {}).get("against"):
+        own = scores["autopilot"]
+        console.print(f"The autopilot's own estimate ({own['name']}) {autopilot_errors(own)}")
     rejected = Table("sensor", "reason", "rejected", title="Not fused")
     for sensor, counts in scores["rejected"].items():
         for reason, count in counts.items():

@@ -42,7 +42,7 @@ from flownav.identification.reference_motion import (
 )
 from flownav.identification.sentinel import Axes, judge
 from flownav.identification.statistics import Z_95
-from flownav.logs.csv_folder import read_csv_folder
+from flownav.logs.open_log import open_flight
 from flownav.measurement import Array
 
 CLUSTER_S = 3.0
@@ -63,9 +63,11 @@ class Scale(NamedTuple):
     method: str
 
 
-def identify_flight(path: Path, candidates: Sequence[Structure], reference: str = "auto") -> Findings:
-    """Findings of one flight folder. InputError names what is missing."""
-    log = read_csv_folder(path)
+def identify_flight(
+    path: Path, candidates: Sequence[Structure], reference: str = "auto", flow_instance: int | None = None
+) -> Findings:
+    """Findings of one flight log. InputError names what is missing."""
+    log = open_flight(path, flow_instance=flow_instance)
     flown = flight(log, reference)
     moved = motion(flown)
     age_s = _age(flown, moved)
@@ -95,8 +97,8 @@ def identify_flight(path: Path, candidates: Sequence[Structure], reference: str 
         (float(np.quantile(ranges, 0.01)), float(np.quantile(ranges, 0.99))),
         flown.flow_limit_rad_s,
         int(flown.quality[flown.good].min()),
-        tuple(path / name for name in log.inputs),
-        (*log.notes, *flown.notes, *_notes(flown, moved, scale, axes)),
+        tuple((path if path.is_dir() else path.parent) / name for name in log.inputs),
+        (*flown.notes, *_notes(flown, moved, scale, axes)),
         _details(flown, moved, scale, axes, raw, track),
     )
 

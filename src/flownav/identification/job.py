@@ -14,6 +14,7 @@ from flownav.identification.flight_identification import identify_flight
 from flownav.identification.orders import CANDIDATES
 from flownav.identification.rig_identification import identify_rig
 from flownav.identification.rig_log import assign_heights, is_rig, read_runs
+from flownav.logs.open_log import log_kind
 
 
 def identify(
@@ -21,27 +22,32 @@ def identify(
     structures: Sequence[Structure] = CANDIDATES,
     heights_m: Sequence[float] = (),
     reference: str = "auto",
+    flow_instance: int | None = None,
 ) -> Findings:
-    """Findings of rig logs (all together, by height) or of one flight folder.
+    """Findings of rig logs (all together, by height) or of one flight log.
 
-    structures: models to choose from. InputError, one line, where a log is missing, mixed or cannot serve.
+    structures: models to choose from. flow_instance: which of a flight's several flow sensors.
+    InputError, one line, where a log is missing, mixed or cannot serve.
     """
     if not logs:
-        raise InputError("no log given; identify takes rig folders, rig CSV files or one flight folder")
+        raise InputError("no log given; identify takes rig folders, rig CSV files or one flight log")
     for path in logs:
         if not path.exists():
-            raise InputError(f"{path}: no such file or folder; identify takes rig logs and flight folders")
-    flights = [path for path in logs if path.is_dir() and (path / "attitude.csv").exists()]
+            raise InputError(f"{path}: no such file or folder; identify takes rig logs and flight logs")
+    flights = [path for path in logs if (path / "attitude.csv").exists() or log_kind(path)]
     if flights and len(logs) > 1:
         raise InputError(f"{flights[0]}: a flight is identified alone; give rig logs together, flights one by one")
     if flights:
         if heights_m:
             raise InputError("--heights: a flight's heights come from its range readings; leave the option out")
-        return identify_flight(flights[0], structures, reference)
+        return identify_flight(flights[0], structures, reference, flow_instance)
+    if flow_instance is not None:
+        raise InputError("--flow-instance: a rig log holds one flow sensor; leave the option out")
     for path in logs:
         if not is_rig(path):
             raise InputError(
-                f"{path}: neither a rig log (rig.csv, run-001/rig.csv, a CSV file) nor a flight folder (attitude.csv)"
+                f"{path}: neither a rig log (rig.csv, run-001/rig.csv, a CSV file) nor a flight log (a folder with "
+                "attitude.csv, .ulg, .bin, .tlog)"
             )
     runs = [
         run

@@ -11,11 +11,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.errors import InputError
 from flownav.frames import quaternion_from_euler
+from flownav.logs.absences import absences_of
 from flownav.logs.csv_table import Column, CsvTable, read_csv_table
+from flownav.logs.fixes import local_position, near_the_rest, origin_of
 from flownav.logs.log import Log
 from flownav.logs.plausible import check_plausible
 from flownav.measurement import Array, Sensor, Stream
@@ -23,7 +24,6 @@ from flownav.measurement import Array, Sensor, Stream
 HALF_TURN = np.pi + 0.01
 GYRO_LIMIT_RAD_S = 70.0  # twice the range of a 2000 deg/s gyro
 RADIANS = "radians are needed (degrees?)"
-FARTHEST_FIX_DEG = 0.5
 METRES = "metres are needed (millimetres? centimetres?)"
 DEGREES = "degrees are needed (degrees * 1e7?)"
 
@@ -81,7 +81,7 @@ def read_csv_folder(folder: Path) -> Log:
             streams.update({stream.sensor: stream for stream in convert(tables[name])})
     _check_overlap(folder, tables)
     check_plausible(folder, streams)
-    origin = _origin(tables["gps"]) if "gps" in tables else None
+    origin = origin_of(tables["gps"]) if "gps" in tables else None
     return Log(
         folder,
         streams,
@@ -89,6 +89,7 @@ def read_csv_folder(folder: Path) -> Log:
         _truth(tables["truth"]) if "truth" in tables else None,
         {f"{name}.csv": table.sha256 for name, table in tables.items()},
         tuple(note for table in tables.values() for note in table.notes),
+        absences=tuple(absences_of(streams)),
     )
 
 
@@ -137,34 +138,12 @@ def _gps(table: CsvTable) -> list[Stream]:
     table.keep(table.columns["fix_type"] >= 3, "no_fix")
     if not len(table.t_s):
         raise InputError(f"{table.path}: no row has a 3-D fix (fix_type 3 or more); remove the file to replay without")
-    table.keep(_near_the_rest(table), "out_of_range")
+    table.keep(near_the_rest(table.columns["lat_deg"], table.columns["lon_deg"]), "out_of_range")
     velocity = table.matrix("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
     return [
         Stream.of(Sensor.GPS_VELOCITY, table.t_s, velocity, rejected=table.rejected),
-        Stream.of(Sensor.GPS_POSITION, table.t_s, _local_position(table), rejected=table.rejected),
+        Stream.of(Sensor.GPS_POSITION, table.t_s, local_position(table), rejected=table.rejected),
     ]
-
-
-def _near_the_rest(table: CsvTable) -> NDArray[np.bool_]:
-    """Fixes within half a degree of the middle one: a receiver's first are at times 0, 0 or where it was last used."""
-    latitude, longitude = table.columns["lat_deg"], table.columns["lon_deg"]
-    north = latitude - np.sort(latitude)[len(latitude) // 2]
-    east = (longitude - np.sort(longitude)[len(longitude) // 2] + 180.0) % 360.0 - 180.0
-    return np.asarray(np.hypot(north, east) < FARTHEST_FIX_DEG)
-
-
-def _origin(table: CsvTable) -> tuple[float, float, float]:
-    first = table.matrix("lat_deg", "lon_deg", "alt_m")[0]
-    return float(first[0]), float(first[1]), float(first[2])
-
-
-def _local_position(table: CsvTable) -> Array:
-    """North, east, down [m] about the first fix."""
-    import pymap3d
-
-    latitude, longitude, altitude = table.matrix("lat_deg", "lon_deg", "alt_m").T
-    north, east, down = pymap3d.geodetic2ned(latitude, longitude, altitude, *_origin(table))
-    return np.column_stack([north, east, down])
 
 
 def _flow(table: CsvTable) -> list[Stream]:

@@ -7,22 +7,19 @@ names say (a wrong unit, two logs in one file), that is an InputError of one lin
 from __future__ import annotations
 
 import hashlib
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.errors import InputError
+from flownav.logs.rows import LATE_SHARE, Rows, drop_duplicates, drop_strays, longest_ordered
 from flownav.measurement import Array
 
 WRONG_UNIT_SHARE = 0.1  # more rows than this outside the limits: the column is in another unit
-LATE_SHARE = 0.05  # more rows than this out of time order: not a late row here and there
 LONGEST_MEDIAN_STEP_S = 10.0
-LONGEST_GAP_S = 600.0  # a few rows further away than this carry a wrong time
 
 
 @dataclass(frozen=True)
@@ -38,28 +35,12 @@ class Column:
 
 
 @dataclass
-class CsvTable:
-    """A file's good rows in time order. t_s (n,), columns by name, counts of thrown-away rows by reason."""
+class CsvTable(Rows):
+    """A file's good rows in time order."""
 
-    path: Path
-    t_s: Array
-    columns: dict[str, Array]
-    rejected: dict[str, int] = field(default_factory=dict)
+    path: Path = Path()
     sha256: str = ""
     notes: list[str] = field(default_factory=list)
-
-    def matrix(self, *names: str) -> Array:
-        """Columns side by side, shape (n, len(names)); a column that the file lacks is NaN."""
-        absent = np.full(len(self.t_s), np.nan)
-        return np.column_stack([self.columns.get(name, absent) for name in names])
-
-    def keep(self, good: NDArray[np.bool_], reason: str) -> None:
-        """Throw the other rows away and count them."""
-        bad = int(np.count_nonzero(~good))
-        if bad:
-            self.rejected[reason] = self.rejected.get(reason, 0) + bad
-            self.t_s = self.t_s[good]
-            self.columns = {name: values[good] for name, values in self.columns.items()}
 
 
 def read_csv_table(path: Path, columns: Sequence[Column]) -> CsvTable:
@@ -70,12 +51,13 @@ def read_csv_table(path: Path, columns: Sequence[Column]) -> CsvTable:
     lacking = [c.name for c in columns if c.required and c.name not in raw] + ([] if "t_s" in raw else ["t_s"])
     if lacking:
         raise InputError(f"{path}: no column {', '.join(lacking)}; a {path.name} needs {_needs(columns)}")
-    table = CsvTable(path, raw.pop("t_s"), raw, sha256=hashlib.sha256(content).hexdigest())
+    table = CsvTable(raw.pop("t_s"), raw, path=path, sha256=hashlib.sha256(content).hexdigest())
     if malformed:
         table.rejected["malformed_row"] = len(malformed)
-    _check_finite(table, columns)
+    check_finite(table, columns)
     _check_limits(table, columns)
-    _check_clock(table)
+    check_clock(table)
+    _check_step(table)
     if not len(table.t_s):
         reasons = ", ".join(f"{count} {reason}" for reason, count in table.rejected.items()) or "it is empty"
         raise InputError(f"{path}: no usable row ({reasons})")
@@ -105,7 +87,7 @@ def _parse(path: Path, content: bytes, wanted: list[str], malformed: list[int]) 
     def parse(kind: pa.DataType) -> pa.Table:
         malformed.clear()
         return csv.read_csv(
-            pa.BufferReader(content),
+            pa.BufferReader(readable),
             read_options=csv.ReadOptions(column_names=header, skip_rows=1, use_threads=False),
             parse_options=csv.ParseOptions(invalid_row_handler=skip),
             convert_options=csv.ConvertOptions(
@@ -117,6 +99,7 @@ def _parse(path: Path, content: bytes, wanted: list[str], malformed: list[int]) 
         )
 
     header = _header(path, content)
+    readable = content if content.isascii() else content.decode("utf-8", errors="replace").encode()
     names = [name for name in dict.fromkeys(["t_s", *wanted]) if name in header]
     if not names:
         return {}
@@ -150,7 +133,8 @@ def _number(text: str | None) -> float:
         return np.nan
 
 
-def _check_finite(table: CsvTable, columns: Sequence[Column]) -> None:
+def check_finite(table: CsvTable, columns: Sequence[Column]) -> None:
+    """Throw away the rows without a number where one must be."""
     must = [c.name for c in columns if c.name in table.columns and not c.may_be_empty]
     finite = np.isfinite(table.t_s)
     for name in must:
@@ -176,12 +160,12 @@ def _check_limits(table: CsvTable, columns: Sequence[Column]) -> None:
     table.keep(inside, "out_of_range")
 
 
-def _check_clock(table: CsvTable) -> None:
+def check_clock(table: CsvTable) -> None:
     """Put the rows in time order: late rows are thrown away, a file without any order is sorted."""
     t_s = table.t_s
     back = np.flatnonzero(np.diff(t_s) < 0)
     if len(back):
-        ordered = _longest_ordered(t_s)
+        ordered = longest_ordered(t_s)
         late = len(t_s) - int(np.count_nonzero(ordered))
         if late <= max(1, LATE_SHARE * len(t_s)):
             table.keep(ordered, "out_of_order")
@@ -196,46 +180,11 @@ def _check_clock(table: CsvTable) -> None:
             order = np.argsort(t_s, kind="stable")
             table.t_s = t_s[order]
             table.columns = {name: values[order] for name, values in table.columns.items()}
-    _drop_strays(table)
-    again = np.zeros(len(table.t_s), bool)
-    again[1:] = np.diff(table.t_s) == 0
-    for values in table.columns.values():
-        again[1:] &= (values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))
-    table.keep(~again, "duplicate")
+    drop_strays(table)
+    drop_duplicates(table)
+
+
+def _check_step(table: CsvTable) -> None:
     if len(table.t_s) > 2 and np.median(np.diff(table.t_s)) > LONGEST_MEDIAN_STEP_S:
         step = float(np.median(np.diff(table.t_s)))
         raise InputError(f"{table.path}: t_s steps by {step:g} a row; seconds are needed (milliseconds? microseconds?)")
-
-
-def _drop_strays(table: CsvTable) -> None:
-    """Throw away the few rows at either end that a gap of many minutes parts from all others."""
-    gaps = np.flatnonzero(np.diff(table.t_s) > LONGEST_GAP_S) + 1
-    few = max(1, int(LATE_SHARE * len(table.t_s)))
-    near = np.ones(len(table.t_s), bool)
-    for gap in gaps:
-        if len(near) - gap <= few:
-            near[gap:] = False
-        elif gap <= few:
-            near[:gap] = False
-    table.keep(near, "clock_jump")
-
-
-def _longest_ordered(t_s: Array) -> NDArray[np.bool_]:
-    """The largest set of rows whose times never run back (patience sorting), as a mask."""
-    tails: list[float] = []
-    tail_rows: list[int] = []
-    before = np.full(len(t_s), -1)
-    for row, t in enumerate(t_s.tolist()):
-        place = bisect_right(tails, t)
-        before[row] = tail_rows[place - 1] if place else -1
-        if place == len(tails):
-            tails.append(t)
-            tail_rows.append(row)
-        else:
-            tails[place], tail_rows[place] = t, row
-    keep = np.zeros(len(t_s), bool)
-    row = tail_rows[-1]
-    while row >= 0:
-        keep[row] = True
-        row = int(before[row])
-    return keep

@@ -22,6 +22,8 @@ class Log:
     """A recorded flight as streams.
 
     streams: by sensor, times in seconds of the log's own clock, in the units and frames of `measurement`.
+    clock_start_s: what the vehicle's clock, by which its log is stamped, showed at time 0 of the streams [s]; None
+    where the log does not say.
     origin_deg_m: latitude, longitude [deg] and altitude [m] of the local frame's origin; None without GPS.
     truth: an external reference, columns as record.TABLES["truth"]; its frame may be turned in yaw.
     inputs: SHA-256 of each file read, by name. notes: what a reader would tell the user, one line each.
@@ -40,6 +42,7 @@ class Log:
     autopilot_name: str = ""
     limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     absences: tuple[Absence, ...] = ()
+    clock_start_s: float | None = None
 
     @property
     def span_s(self) -> tuple[float, float]:

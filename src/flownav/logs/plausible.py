@@ -17,6 +17,7 @@ from flownav.frames import rotation_from_quaternion
 from flownav.logs.rates import attitude_at, attitude_rates, mean_over
 from flownav.measurement import Array, Sensor, Stream
 
+LONGEST_LOG_S = 172_800.0
 GRAVITY_LIMITS_M_S2 = (4.0, 25.0)
 LARGEST_TILT_ERROR_RAD = 0.6
 WRONG_UNIT_FACTOR = 10.0
@@ -31,7 +32,13 @@ LEAST_FIELD_GAUSS = 0.05
 
 
 def check_plausible(where: Path, streams: dict[Sensor, Stream]) -> None:
-    """InputError where two sensors cannot be in the stated units, axes and signs at the same time."""
+    """InputError where two sensors cannot be in the stated units, axes and signs at the same time.
+
+    Nothing is compared without an attitude.
+    """
+    _check_span(where, streams)
+    if Sensor.ATTITUDE not in streams:
+        return
     attitude = streams[Sensor.ATTITUDE]
     if Sensor.IMU in streams:
         _check_gravity(where, streams[Sensor.IMU], attitude)
@@ -45,6 +52,16 @@ def check_plausible(where: Path, streams: dict[Sensor, Stream]) -> None:
         field = float(np.median(np.linalg.norm(streams[Sensor.MAG].value, axis=1)))
         if field < LEAST_FIELD_GAUSS:
             raise InputError(f"{where}: mag: a field of {1e3 * field:.3g} mgauss; the earth's is 250 to 650 (gauss?)")
+
+
+def _check_span(where: Path, streams: dict[Sensor, Stream]) -> None:
+    """A clock that has leapt makes a log of years, and everything on a grid of its times fills the memory."""
+    for sensor, stream in streams.items():
+        if len(stream) and stream.t_s[-1] - stream.t_s[0] > LONGEST_LOG_S:
+            raise InputError(
+                f"{where}: {sensor.name.lower()} covers {stream.t_s[0]:g} to {stream.t_s[-1]:g} s, more than two days; "
+                "the clock has leapt: cut the log there"
+            )
 
 
 def _check_gravity(where: Path, imu: Stream, attitude: Stream) -> None:

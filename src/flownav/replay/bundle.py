@@ -13,6 +13,7 @@ from flownav.frames import rotation_from_quaternion
 from flownav.logs.rates import attitude_at
 from flownav.measurement import COLUMNS, Array, Sensor
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.replay.autopilot import autopilot_path
 from flownav.replay.session import Replay
 from flownav.replay.state import EVENT_NAMES
 from flownav.scoring.alignment import velocity_of
@@ -42,6 +43,9 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str]) -> Rec
             record.add(sensor.name.lower(), {"t_s": stream.t_s, **columns, "quality": stream.quality})
     if replay.truth_alignment is not None:
         record.add("truth", _truth(replay))
+    own = autopilot_path(replay.log, replay.options.gps_delay_s, estimate[:, 0], estimate[:, 1:4])
+    if own is not None:
+        record.add("autopilot", own)
     record.add("innovation", _innovation(replay))
     record.add("events", _events(replay))
     return record
@@ -53,6 +57,7 @@ def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dic
     return {
         "kind": "replay",
         "log": log.path.name,
+        **({} if log.clock_start_s is None else {"clock_start_s": log.clock_start_s}),
         "filter": "kinematic",
         "duration_s": scores["duration_s"],
         "delays_s": {sensor.name.lower(): delay for sensor, delay in replay.prepared.delays_s.items() if delay},

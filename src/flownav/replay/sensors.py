@@ -45,7 +45,7 @@ from flownav.replay.state import (
 from flownav.sensors.angular_flow import metric_flow
 
 (FUSED, INNOVATION_GATE, NO_DATA, NOT_FINITE, OUT_OF_RANGE, NO_HEIGHT, TILTED, BEFORE_START, DATUM, OUTAGE) = map(
-    int, Reason
+    int, tuple(Reason)[:10]
 )
 ONLY, DOWN = np.arange(2) * 2  # the one component of range and baro, and the state that it reads
 LEAST_REJECTIONS = 5

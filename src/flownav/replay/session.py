@@ -16,6 +16,7 @@ from flownav.estimation.gating import Reason
 from flownav.estimation.kinematic_settings import KinematicSettings
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
+from flownav.replay.autopilot import autopilot_scores
 from flownav.replay.engine import run
 from flownav.replay.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replay.sentinel import Finding, findings
@@ -134,8 +135,11 @@ class Replay:
             "rejected": self.rejected(),
             "warnings": [finding.text for finding in self.findings],
         }
-        truth = self.truth_scores()
-        return scores if truth is None else {**scores, "truth": truth}
+        beside = {
+            "truth": self.truth_scores(),
+            "autopilot": autopilot_scores(self.log, self.options.gps_delay_s),
+        }
+        return scores | {name: found for name, found in beside.items() if found is not None}
 
 
 def replay(log: Log, options: ReplayOptions, settings: KinematicSettings) -> Replay:

@@ -117,6 +117,14 @@ def summary(record: Record) -> str:
         said.append(
             f"Against the recorded truth its position is off by {rms} m rms, {largest} m at most, horizontally."
         )
+    own = mapping(scores.get("autopilot"))
+    if own.get("against"):
+        rms, largest = number(own.get("horizontal_rms_m"), 2), number(own.get("horizontal_max_m"), 2)
+        against = "that truth" if truth else "GPS, their mean difference taken out"
+        said.append(
+            f"The autopilot's own estimate ({own.get('name')}) is off by {rms} m rms, "
+            f"{largest} m at most, horizontally, against {against}."
+        )
     if not scores:
         said.append("The record carries no scores.")
     return UNIT_AFTER_NUMBER.sub("\\1\N{NO-BREAK SPACE}\\2", " ".join(said))

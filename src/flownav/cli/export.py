@@ -1,0 +1,49 @@
+"""`flownav export`: a record in the formats that other tools read."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def command(
+    record: Annotated[Path, typer.Argument(help="The record that fly or replay wrote.", show_default=False)],
+    to: Annotated[str, typer.Option("--to", help="mcap, tum, euroc, parquet, csv or ulog.", show_default=False)],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="The file, or folder for parquet and csv; beside the record where unsaid."),
+    ] = None,
+    frame: Annotated[
+        str | None, typer.Option("--frame", help="tum, euroc: ned (body FRD; where unsaid) or enu (body FLU).")
+    ] = None,
+    merge: Annotated[
+        Path | None,
+        typer.Option("--merge", metavar="ORIGINAL.ulg", help="ulog: into a copy of the log that was replayed."),
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Write a record for other tools: Foxglove, evo, spreadsheets, data frames, PlotJuggler, Flight Review."""
+    from flownav.errors import InputError
+    from flownav.export.formats import destination, export
+    from flownav.record import Record
+
+    path = destination(record, to, out)
+    sources = [source.resolve() for source in (record, merge) if source is not None]
+    if path.resolve() in sources:
+        raise InputError(f"{path}: the export would replace what it is made from; give another --out")
+    flown = Record.load(record)
+    try:
+        written = export(flown, to, path, frame, merge)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
+    if as_json:
+        files = [str(file) for file in written.files]
+        typer.echo(json.dumps({"record": str(record), "format": to, "files": files, "notes": written.notes}))
+        return
+    for file in written.files:
+        typer.echo(f"Written: {file}")
+    for note in written.notes:
+        typer.echo(f"Note: {note}")

@@ -1,0 +1,70 @@
+"""Every format by name: where its file or folder goes, and who writes it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+from flownav.errors import InputError
+from flownav.export.trajectory import FRAMES
+from flownav.record import Record
+
+SUFFIXES = {"mcap": ".mcap", "tum": ".tum", "euroc": ".csv", "ulog": ".ulg"}
+FOLDERS = {"parquet": "_parquet", "csv": "_csv"}
+FORMATS = ("mcap", "tum", "euroc", "parquet", "csv", "ulog")
+FRAMED = ("tum", "euroc")
+
+
+class Written(NamedTuple):
+    """What an export wrote: its files, and what the user should know of them, one line each."""
+
+    files: list[Path]
+    notes: list[str]
+
+
+def destination(record: Path, to: str, out: Path | None) -> Path:
+    """The file or folder that an export goes to: `out`, or beside the record where unsaid.
+
+    For TUM and EuRoC, NAME.tum stands for NAME_estimate.tum and so on. An `out` that is a folder takes a file
+    under the record's name. InputError where `to` is no format.
+    """
+    if to not in FORMATS:
+        raise InputError(f"--to {to}: one of {', '.join(FORMATS)} is needed")
+    if to in FOLDERS:
+        return out or record.with_name(record.stem + FOLDERS[to])
+    suffix = SUFFIXES[to]
+    if out is None:
+        return record.with_suffix(suffix)
+    if out.is_dir():
+        return out / f"{record.stem}{suffix}"
+    return out if out.suffix == suffix else out.with_name(out.name + suffix)
+
+
+def export(record: Record, to: str, path: Path, frame: str | None = None, original: Path | None = None) -> Written:
+    """Write a record to `path` in a format of FORMATS, whole or not at all.
+
+    frame: "ned" (and FRD; where None) or "enu" (and FLU), of TUM and EuRoC. original: the ULog to merge into.
+    InputError where an option does not belong to the format or the record lacks what it needs; OSError where
+    nothing can be written there.
+    """
+    if frame is not None and frame not in FRAMES:
+        raise InputError(f"--frame {frame}: ned or enu is needed")
+    if frame is not None and to not in FRAMED:
+        raise InputError(f"--frame is for {' and '.join(FRAMED)}; mcap carries both frames, the others are NED")
+    if original is not None and to != "ulog":
+        raise InputError("--merge is for --to ulog")
+    if to in FRAMED:
+        from flownav.export.poses import write_poses
+
+        return Written(*write_poses(record, path, frame or "ned"))
+    if to in FOLDERS:
+        from flownav.export.tables import write_csv, write_parquet
+
+        return Written(*(write_csv if to == "csv" else write_parquet)(record, path))
+    if to == "mcap":
+        from flownav.export.mcap_file import write_mcap
+
+        return Written(*write_mcap(record, path))
+    from flownav.export.ulog_file import write_ulog
+
+    return Written(*write_ulog(record, path, original))

@@ -1,0 +1,1 @@
+"""Inspection: what a log holds, and whether it can be trusted."""

@@ -1,0 +1,162 @@
+"""A DataFlash file as columns: every kind of message a table, one array a field, straight from the file's bytes."""
+
+from __future__ import annotations
+
+import mmap
+from collections.abc import Collection, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.errors import InputError
+from flownav.logs.dataflash.formats import DIVISORS, Format, read_formats, records, with_units
+from flownav.logs.dataflash.scan import Bytes, Indices, chain_messages, find_headers
+
+Columns = dict[str, NDArray[Any]]
+DESCRIBING: tuple[str, ...] = ("UNIT", "MULT", "FMTU")
+
+
+class DataFlash:
+    """An open DataFlash file.
+
+    formats: by name, of the kinds that the file describes. skipped_bytes, gaps: what belongs to no message.
+    contradictions: FMT messages that contradict an earlier one and were passed over.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Find every message. InputError where the file cannot be read or holds none."""
+        self.path = path
+        self._content = _content(path)
+        headers = find_headers(self._content)
+        self.formats, self.contradictions = read_formats(self._content, headers)
+        length = np.zeros(256, np.int64)
+        for known in self.formats.values():
+            length[known.type] = known.dtype.itemsize
+        self._scan = chain_messages(self._content, headers, length)
+        self.skipped_bytes, self.gaps = self._scan.skipped_bytes, self._scan.gaps
+        describing: dict[str, NDArray[np.void]] = {
+            name: self._rows(name) for name in DESCRIBING if name in self.formats
+        }
+        self.formats = with_units(self.formats, describing)
+        self._counts = np.bincount(self._scan.type, minlength=256)
+        if self._counts.sum() <= self.count("FMT"):
+            raise InputError(
+                f"{path}: no ArduPilot DataFlash message in it; a .bin log as the vehicle wrote it is needed"
+            )
+
+    @property
+    def size_bytes(self) -> int:
+        """The file's size."""
+        return len(self._content)
+
+    def count(self, name: str) -> int:
+        """How many messages of a kind there are; 0 of one that the file does not describe."""
+        return int(self._counts[self.formats[name].type]) if name in self.formats else 0
+
+    def names(self) -> list[str]:
+        """The kinds of message that occur."""
+        return sorted(name for name in self.formats if self.count(name))
+
+    def table(
+        self,
+        name: str,
+        labels: Iterable[str] | None = None,
+        *,
+        instance: int | None = None,
+        t0_s: float | None = None,
+        t1_s: float | None = None,
+    ) -> Columns:
+        """Fields of all messages of a kind, in file order; shape (n,), (n, 32) for arrays.
+
+        Numbers are as ArduPilot's own tools give them: the factors of the characters c, C, e, E and L are applied
+        (float64), those of MULT are not (`Format.multipliers`). Text is bytes, see `text`. instance: only one
+        sensor's. t0_s, t1_s: only t0 <= TimeUS * 1e-6 < t1, seconds since the vehicle started.
+        KeyError where the kind, a label, TimeUS or the instance field is unknown.
+        """
+        known = self.formats[name]
+        wanted = known.labels if labels is None else tuple(labels)
+        sliced = t0_s is not None or t1_s is not None
+        unknown = {*wanted, *(("TimeUS",) if sliced else ())} - set(known.labels)
+        if unknown or (sliced and "TimeUS" not in known.numbers):
+            raise KeyError(f"{name} has no {', '.join(sorted(unknown or {'TimeUS in numbers'}))}")
+        at = self._offsets(known)
+        if instance is not None:
+            if known.instance is None:
+                raise KeyError(f"{name} has no instance field")
+            at = at[self._field(known, known.instance, at) == instance]
+        if sliced:
+            t_s = self._field(known, "TimeUS", at) * 1e-6
+            at = at[(t_s >= (-np.inf if t0_s is None else t0_s)) & (t_s < (np.inf if t1_s is None else t1_s))]
+        rows = records(self._content, known.dtype)[at]
+        return {label: _converted(rows[label], known.code(label)) for label in wanted}
+
+    def instances(self, name: str) -> list[int]:
+        """Which sensors of a kind there are; empty where its messages carry no instance."""
+        known = self.formats.get(name)
+        if known is None or known.instance is None:
+            return []
+        found = np.unique(self._field(known, known.instance, self._offsets(known)))
+        return [int(value) for value in found] if found.dtype.kind in "iu" else []
+
+    def _offsets(self, known: Format) -> Indices:
+        return np.asarray(self._scan.offset[self._scan.type == known.type])
+
+    def _rows(self, name: str) -> NDArray[np.void]:
+        known = self.formats[name]
+        return np.asarray(records(self._content, known.dtype)[self._offsets(known)])
+
+    def _field(self, known: Format, label: str, at: Indices) -> NDArray[Any]:
+        kind, place = known.dtype.fields[label][:2]  # type: ignore[index]
+        return _converted(_gathered(self._content, np.dtype(kind), at + int(place)), known.code(label))
+
+
+def read_columns(
+    path: Path, messages: Collection[str] | None = None, *, t0_s: float | None = None, t1_s: float | None = None
+) -> dict[str, Columns]:
+    """The tables of some kinds of message (all that occur where None); kinds that do not occur are left out.
+
+    A time slice leaves out the kinds that carry no TimeUS. InputError where the file is no DataFlash log.
+    """
+    log = DataFlash(path)
+    sliced = t0_s is not None or t1_s is not None
+    return {
+        name: log.table(name, t0_s=t0_s, t1_s=t1_s)
+        for name in log.names()
+        if (messages is None or name in messages) and not (sliced and "TimeUS" not in log.formats[name].numbers)
+    }
+
+
+def text(column: NDArray[Any]) -> list[str]:
+    """A text column as strings: up to the first zero byte, UTF-8, else Latin-1."""
+    return [_decoded(bytes(value).split(b"\0", 1)[0]) for value in column.tolist()]
+
+
+def _decoded(raw: bytes) -> str:
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
+
+
+def _gathered(content: Bytes, dtype: np.dtype[Any], at: Indices) -> NDArray[Any]:
+    count = max(0, len(content) - dtype.itemsize + 1)
+    seen: NDArray[Any] = np.ndarray((count,), dtype, buffer=content.data, strides=(1,))
+    return np.asarray(seen[at])
+
+
+def _converted(values: NDArray[Any], code: str) -> NDArray[Any]:
+    if code in DIVISORS:
+        return np.asarray(values / DIVISORS[code])
+    return np.ascontiguousarray(values)
+
+
+def _content(path: Path) -> Bytes:
+    try:
+        with path.open("rb") as file:
+            return np.frombuffer(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), np.uint8)
+    except ValueError:
+        raise InputError(f"{path}: the file is empty; a .bin log as the vehicle wrote it is needed") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); give an ArduPilot .bin log") from error

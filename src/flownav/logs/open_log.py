@@ -1,0 +1,85 @@
+"""Any recorded flight as a Log: what a path holds is told from its first bytes, its reader is imported then."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from flownav.errors import InputError
+from flownav.logs.log import Log
+from flownav.measurement import Sensor
+
+KNOWN = "a folder of CSV files, a PX4 ULog (.ulg), an ArduPilot DataFlash log (.bin) or a MAVLink telemetry log (.tlog)"
+ULOG_MAGIC = b"\x55\x4c\x6f\x67\x01\x12\x35"
+DATAFLASH_MAGIC = b"\xa3\x95"
+DATAFLASH_FORMAT = b"\xa3\x95\x80"  # the message that describes others: a log that has lost its start still has many
+MAVLINK_MAGIC = b"\xfd\xfe"
+LOOKED_AT_BYTES = 4096
+YEARS_US = (1.0e15, 4.2e15)  # microseconds of the years 2001 to 2103
+
+
+def open_log(path: Path, *, flow_instance: int | None = None) -> Log:
+    """Read a recorded flight of any known format.
+
+    flow_instance: which of several flow sensors; None takes the one with most to say. InputError where the path is
+    missing or no known format, or the log cannot be read.
+    """
+    if path.is_dir():
+        if flow_instance is not None:
+            raise InputError(f"--flow-instance: {path} is a folder of CSV files, with one flow sensor; leave it out")
+        from flownav.logs.csv_folder import read_csv_folder
+
+        return read_csv_folder(path)
+    kind = log_kind(path)
+    if not kind:
+        raise InputError(f"{path}: {'not a log that is known' if path.exists() else 'no such log'}; give {KNOWN}")
+    return _reader(kind)(path, flow_instance=flow_instance)
+
+
+def open_flight(path: Path, *, flow_instance: int | None = None) -> Log:
+    """A log that can be replayed. InputError, besides open_log's, where it lacks what a replay cannot do without."""
+    log = open_log(path, flow_instance=flow_instance)
+    lacking = [] if Sensor.ATTITUDE in log.streams else ["an attitude"]
+    if not log.streams.keys() & {Sensor.GPS_POSITION, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY}:
+        lacking.append("GPS or optical flow")
+    if lacking:
+        raise InputError(
+            f"{path}: the log lacks {' and '.join(lacking)}, which a replay needs; `flownav info` shows what it holds"
+        )
+    return log
+
+
+def _reader(kind: str) -> Callable[..., Log]:
+    if kind == "ulog":
+        from flownav.logs.ulog import read_ulog
+
+        return read_ulog
+    if kind == "dataflash":
+        from flownav.logs.dataflash import read_dataflash
+
+        return read_dataflash
+    from flownav.logs.mavlink_log import read_tlog
+
+    return read_tlog
+
+
+def log_kind(path: Path) -> str:
+    """ "ulog", "dataflash" or "tlog" by a file's first bytes and its suffix; "" for anything else.
+
+    InputError where a file cannot be read.
+    """
+    if not path.is_file():
+        return ""
+    try:
+        with path.open("rb") as file:
+            head = file.read(LOOKED_AT_BYTES)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); see who may read it") from error
+    if head.startswith(ULOG_MAGIC) or path.suffix.lower() == ".ulg":
+        return "ulog"
+    if head.startswith(DATAFLASH_MAGIC) or (path.suffix.lower() == ".bin" and DATAFLASH_FORMAT in head):
+        return "dataflash"
+    dated = YEARS_US[0] < int.from_bytes(head[:8], "big") < YEARS_US[1]
+    if path.suffix.lower() == ".tlog" or (dated and len(head) > 8 and head[8] in MAVLINK_MAGIC):
+        return "tlog"
+    return ""

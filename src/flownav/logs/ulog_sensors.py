@@ -1,0 +1,217 @@
+"""GPS, inertial, attitude, air, magnetic and landing topics of a ULog as streams."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flownav.frames import rotation_from_quaternion, to_body
+from flownav.logs.fixes import Origin, local_position, near_the_rest, origin_of
+from flownav.logs.rates import attitude_at
+from flownav.logs.ulog_topics import Topic, Topics
+from flownav.measurement import Array, Sensor, Stream
+
+LEAST_IMU_HZ = 20.0  # slower, an inertial reading says nothing of the motion between two
+FASTEST_M_S = 150.0
+FASTEST_TURN_RAD_S = 70.0
+HARDEST_M_S2 = 400.0
+UNIT_LENGTH_WITHIN = 0.1
+QUATERNION_FIELDS = tuple(f"q[{k}]" for k in range(4))
+SEA_LEVEL_PA = 101325.0
+SCALE_HEIGHT_M, ALTITUDE_EXPONENT = 44330.77, 0.1902632  # the standard atmosphere's troposphere
+LARGEST_HECTOPASCAL = 2000.0
+LARGEST_RELATIVE_US = 1e6  # RELATIVE_TIMESTAMP_INVALID is far above
+YAW_90 = 2.0  # PX4's rotation of an IR-LOCK where no parameter says another
+
+
+def attitude_stream(topics: Topics) -> tuple[Stream | None, str]:
+    """Body FRD to NED, and the topic: the autopilot's, or where it is not logged that of the visual odometry."""
+    for name in ("vehicle_attitude", "vehicle_visual_odometry"):
+        topic = topics.fullest(name, needs=QUATERNION_FIELDS)
+        stream = _rotations(topic, dict(topic.rejected) if name == "vehicle_attitude" else {}) if topic else None
+        if stream is not None and len(stream):
+            return stream, name
+    return None, ""
+
+
+def _rotations(topic: Topic, rejected: dict[str, int]) -> Stream:
+    """Quaternions of unit length."""
+    rows = Topic(topic.t_s, {name: topic.columns[name] for name in QUATERNION_FIELDS}, rejected)
+    rows.keep(np.isfinite(rows.vector("q", 4)).all(axis=1), "not_finite")
+    rows.keep(abs(np.linalg.norm(rows.vector("q", 4), axis=1) - 1.0) < UNIT_LENGTH_WITHIN, "out_of_range")
+    return Stream.of(Sensor.ATTITUDE, rows.t_s, rows.vector("q", 4), delay_s=topic.delay_s, rejected=rows.rejected)
+
+
+# -- inertial ----------------------------------------------------------------------------------------------
+def imu_stream(topics: Topics) -> Stream | None:
+    """Rates and specific force from the fastest source; None where none is fast enough to integrate."""
+    sources = [*map(_combined, topics.of("sensor_combined")), *map(_delta, topics.of("vehicle_imu"))]
+    rates = topics.fullest("vehicle_angular_velocity", needs=("xyz[0]",))
+    force = topics.fullest("vehicle_acceleration", needs=("xyz[0]",))
+    if rates is not None and force is not None and force.rate_hz >= LEAST_IMU_HZ:
+        sources.append(_joined(rates, force))
+    for source in sources:
+        source.keep(np.isfinite(source.vector("imu", 6)).all(axis=1), "not_finite")
+        size = abs(source.vector("imu", 6))
+        inside = (size[:, :3] <= FASTEST_TURN_RAD_S).all(axis=1) & (size[:, 3:] <= HARDEST_M_S2).all(axis=1)
+        source.keep(inside, "out_of_range")
+    fast = [source for source in sources if source.rate_hz >= LEAST_IMU_HZ]
+    if not fast:
+        return None
+    best = max(fast, key=lambda source: source.rate_hz)
+    return Stream.of(Sensor.IMU, best.t_s, best.vector("imu", 6), delay_s=best.delay_s, rejected=best.rejected)
+
+
+def fastest_imu(topics: Topics) -> tuple[str, float, int]:
+    """Label, rate [Hz] and readings of the fastest inertial topic, fast enough or not; "", 0, 0 without."""
+    present = topics.of("sensor_combined", "vehicle_imu", "vehicle_angular_velocity")
+    best = max(present, key=lambda topic: topic.rate_hz, default=None)
+    return (best.label, best.rate_hz, len(best)) if best is not None else ("", 0.0, 0)
+
+
+def _inertial(topic: Topic, values: Array) -> Topic:
+    columns = {f"imu[{k}]": values[:, k] for k in range(6)}
+    if "sample_s" in topic.columns:
+        columns["sample_s"] = topic.columns["sample_s"]
+    return Topic(topic.t_s, columns, dict(topic.rejected), topic.name, topic.instance)
+
+
+def _combined(topic: Topic) -> Topic:
+    return _inertial(topic, np.column_stack([topic.vector("gyro_rad", 3), topic.vector("accelerometer_m_s2", 3)]))
+
+
+def _delta(topic: Topic) -> Topic:
+    """vehicle_imu: turn and velocity accumulated over times in microseconds."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        rates = topic.vector("delta_angle", 3) / (1e-6 * topic.matrix("delta_angle_dt"))
+        force = topic.vector("delta_velocity", 3) / (1e-6 * topic.matrix("delta_velocity_dt"))
+    return _inertial(topic, np.column_stack([rates, force]))
+
+
+def _joined(rates: Topic, force: Topic) -> Topic:
+    """Rates with the specific force between its two nearest readings."""
+    between = [np.interp(rates.t_s, force.t_s, column) for column in force.vector("xyz", 3).T]
+    return _inertial(rates, np.column_stack([rates.vector("xyz", 3), *between]))
+
+
+# -- GPS ---------------------------------------------------------------------------------------------------
+def gps_streams(topics: Topics) -> tuple[list[Stream], Origin | None]:
+    """Velocity, then position, and the origin of the local frame; nothing where no fix is 3-D."""
+    candidates = topics.of("vehicle_gps_position", "sensor_gps")
+    if not candidates:
+        return [], None
+    most = max(candidates, key=lambda topic: int(np.count_nonzero(topic.columns.get("fix_type", np.zeros(1)) >= 3)))
+    fixes = _fixes(most)
+    if not len(fixes):
+        return [], None
+    sigma = fixes.matrix("s_variance_m_s", "eph", "epv")  # accuracies [m/s, m], whatever the first one's name says
+    sigma[~(sigma > 0)] = np.nan
+    velocity = fixes.matrix("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
+    values = {
+        Sensor.GPS_VELOCITY: (velocity, sigma[:, [0, 0, 0]] ** 2),
+        Sensor.GPS_POSITION: (local_position(fixes), sigma[:, [1, 1, 2]] ** 2),
+    }
+    return [
+        Stream.of(sensor, fixes.t_s, value, variance=variance, delay_s=fixes.delay_s, rejected=fixes.rejected)
+        for sensor, (value, variance) in values.items()
+    ], origin_of(fixes)
+
+
+def _fixes(topic: Topic) -> Topic:
+    """3-D fixes in degrees and metres; velocity NaN where the receiver has none."""
+    if topic.has("latitude_deg", "longitude_deg", "altitude_msl_m"):
+        place = topic.matrix("latitude_deg", "longitude_deg", "altitude_msl_m")
+    else:
+        place = topic.matrix("lat", "lon", "alt") * (1e-7, 1e-7, 1e-3)
+    topic.columns |= dict(zip(("lat_deg", "lon_deg", "alt_m"), place.T, strict=True))
+    names = ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
+    velocity = topic.matrix(*names)
+    known = (abs(velocity) < FASTEST_M_S).all(axis=1) & (topic.columns.get("vel_ned_valid", np.ones(len(topic))) > 0)
+    velocity[~known] = np.nan
+    topic.columns |= dict(zip(names, velocity.T, strict=True))
+    topic.keep(topic.columns.get("fix_type", np.zeros(len(topic))) >= 3, "no_fix")
+    topic.keep(np.isfinite(topic.matrix("lat_deg", "lon_deg", "alt_m")).all(axis=1), "not_finite")
+    inside = (abs(topic.columns["lat_deg"]) <= 90) & (abs(topic.columns["lon_deg"]) <= 180)
+    topic.keep(inside & (abs(topic.columns["alt_m"]) < 1e5), "out_of_range")
+    if len(topic):
+        topic.keep(near_the_rest(topic.columns["lat_deg"], topic.columns["lon_deg"]), "out_of_range")
+    return topic
+
+
+# -- air, field, landing -----------------------------------------------------------------------------------
+def baro_stream(topics: Topics) -> Stream | None:
+    """Pressure altitude [m]."""
+    topic = topics.fullest("vehicle_air_data", "sensor_combined", needs=("baro_alt_meter",))
+    if topic is not None:
+        return _column(Sensor.BARO, _at_relative(topic, "baro"), ("baro_alt_meter",))
+    topic = topics.fullest("sensor_baro", needs=("altitude",)) or topics.fullest("sensor_baro", needs=("pressure",))
+    if topic is not None and not topic.has("altitude"):
+        pressure = topic.columns["pressure"]
+        pressure_pa = np.where(pressure < LARGEST_HECTOPASCAL, 100.0, 1.0) * np.maximum(pressure, 0.0)
+        topic.columns["altitude"] = SCALE_HEIGHT_M * (1.0 - (pressure_pa / SEA_LEVEL_PA) ** ALTITUDE_EXPONENT)
+    return None if topic is None else _column(Sensor.BARO, topic, ("altitude",))
+
+
+def mag_stream(topics: Topics) -> Stream | None:
+    """Field in body axes [gauss]."""
+    names = tuple(f"magnetometer_ga[{k}]" for k in range(3))
+    topic = topics.fullest("vehicle_magnetometer", "sensor_combined", needs=names)
+    if topic is not None:
+        return _column(Sensor.MAG, _at_relative(topic, "magnetometer"), names)
+    topic = topics.fullest("sensor_mag", needs=("x", "y", "z"))
+    return None if topic is None else _column(Sensor.MAG, topic, ("x", "y", "z"))
+
+
+def landed_stream(topics: Topics) -> Stream | None:
+    """1 on the ground, 0 in flight."""
+    topic = topics.fullest("vehicle_land_detected", needs=("landed",))
+    return None if topic is None else _column(Sensor.LANDED, topic, ("landed",))
+
+
+def _column(sensor: Sensor, topic: Topic, names: tuple[str, ...]) -> Stream:
+    rows = Topic(topic.t_s, {name: topic.columns[name] for name in names}, dict(topic.rejected))
+    rows.keep(np.isfinite(rows.matrix(*names)).all(axis=1), "not_finite")
+    return Stream.of(sensor, rows.t_s, rows.matrix(*names), delay_s=topic.delay_s, rejected=rows.rejected)
+
+
+def _at_relative(topic: Topic, what: str) -> Topic:
+    """The slower sensor inside an old sensor_combined: its own times, each of its readings once."""
+    column = f"{what}_timestamp_relative"
+    if not topic.has(column):
+        return topic
+    relative_us = topic.columns[column]
+    stated = abs(relative_us) < LARGEST_RELATIVE_US
+    t_s = np.maximum(topic.t_s + 1e-6 * relative_us, 0.0)[stated]
+    fresh = np.diff(t_s, prepend=-1.0) > 1e-6
+    columns = {name: values[stated][fresh] for name, values in topic.columns.items()}
+    return Topic(t_s[fresh], columns, {}, topic.name, topic.instance)
+
+
+def pad_stream(topics: Topics, attitude: Stream | None) -> Stream | None:
+    """The landing pad: an IR-LOCK's own reading, without distance, or else the precision landing's estimate."""
+    topic = topics.fullest("irlock_report", needs=("pos_x", "pos_y"))
+    if topic is not None:
+        scale = [topics.parameters.get(f"LTEST_SCALE_{axis}", 1.0) for axis in "XY"]
+        angle = 0.25 * np.pi * topics.parameters.get("LTEST_SENS_ROT", YAW_90)
+        x, y = (topic.matrix("pos_x", "pos_y") * scale).T
+        forward, right = np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y
+        value = np.column_stack([forward, right, np.full(len(topic), np.nan)])
+        return _pad(topic, value)
+    topic = topics.fullest("landing_target_pose", needs=("x_rel", "y_rel", "z_rel"))
+    if topic is None or attitude is None:
+        return None
+    topic.keep(topic.columns.get("rel_pos_valid", np.ones(len(topic))) > 0, "invalid")
+    away = topic.matrix("x_rel", "y_rel", "z_rel")
+    rotation = rotation_from_quaternion(*attitude_at(attitude, topic.t_s).T)
+    forward, right, down = np.asarray(to_body(rotation, *away.T))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        value = np.column_stack([forward / down, right / down, np.linalg.norm(away, axis=1)])
+    value[down <= 0] = np.nan
+    return _pad(topic, value)
+
+
+def _pad(topic: Topic, value: Array) -> Stream:
+    rows = Topic(topic.t_s, dict(zip(("forward", "right", "distance"), value.T, strict=True)), dict(topic.rejected))
+    rows.keep(np.isfinite(value[:, :2]).all(axis=1), "not_finite")
+    return Stream.of(
+        Sensor.PAD, rows.t_s, rows.matrix("forward", "right", "distance"), delay_s=topic.delay_s, rejected=rows.rejected
+    )

@@ -1,0 +1,1 @@
+"""MAVLink, once for logs and links: messages to measurements and back, the vehicle's clock, frames, signing."""

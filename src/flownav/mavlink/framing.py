@@ -1,0 +1,116 @@
+"""Frames in the bytes of a tlog: 8 bytes of arrival time (big-endian UNIX microseconds), then a MAVLink frame.
+
+Only a frame whose checksum holds is believed. After damage the search goes on at the next byte that could begin a
+frame, so that nothing but the damaged frames is lost; what is lost is counted. A frame is 280 bytes at most, so no
+length in a file can claim more.
+
+MAVLink 1: FE, length, sequence, system, component, id, payload, checksum.
+MAVLink 2: FD, length, incompatibility flags, compatibility flags, sequence, system, component, id (3 bytes),
+payload, checksum, and a signature of 13 bytes where flag 1 is set.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+from flownav.mavlink.dialect import dialect
+
+MAVLINK_1, MAVLINK_2 = 0xFE, 0xFD
+HEADER_1, HEADER_2 = 6, 10
+CHECKSUM_BYTES, SIGNATURE_BYTES = 2, 13
+SIGNED = 0x01
+TIMESTAMP_BYTES = 8
+BEGINNING = re.compile(rb"\xfd.[\x00\x01].{6}\x00|\xfe", re.DOTALL)  # ids of known messages fit in two bytes
+
+
+class Frame(NamedTuple):
+    """Where a frame lies in the bytes (start, end), when it arrived [us], and what its header says."""
+
+    start: int
+    end: int
+    arrival_us: int
+    message_id: int
+    system: int
+    component: int
+    signed: bool
+
+
+def tlog_frames(content: bytes, damage: Counter[str]) -> Iterator[Frame]:
+    """The frames of known messages, in order. `damage` counts by reason what is not among them.
+
+    `bad_checksum`, `truncated` and `unknown_message` count frames, `skipped_bytes` bytes that belong to no frame.
+    """
+    check = _Check()
+    place, size = 0, len(content)
+    while place < size:
+        frame = check.frame(content, place + TIMESTAMP_BYTES, place)
+        if isinstance(frame, str):
+            damage[frame] += frame != "no_header"
+            found = _resume(content, check, place)
+            damage["skipped_bytes"] += (size if found is None else found.start - TIMESTAMP_BYTES) - place
+            if found is None:
+                return
+            frame = found
+        if check.known(frame.message_id):
+            yield frame
+        else:
+            damage["unknown_message"] += 1
+        place = frame.end
+
+
+def _resume(content: bytes, check: _Check, place: int) -> Frame | None:
+    """The next frame whose checksum holds, with its timestamp in front, from just after `place`."""
+    for match in BEGINNING.finditer(content, place + TIMESTAMP_BYTES + 1):
+        frame = check.frame(content, match.start(), match.start() - TIMESTAMP_BYTES)
+        if not isinstance(frame, str) and check.known(frame.message_id):
+            return frame
+    return None
+
+
+class _Check:
+    """The dialect's checksum seeds and lengths, by message id."""
+
+    def __init__(self) -> None:
+        module = dialect()
+        self._crc: Callable[[bytes], int] = module.mcrf4xx or (lambda content: module.x25crc(content).crc)
+        self._seeds = {number: bytes([kind.crc_extra]) for number, kind in module.mavlink_map.items()}
+        self._sizes = {number: kind.unpacker.size for number, kind in module.mavlink_map.items()}
+
+    def known(self, message_id: int) -> bool:
+        return message_id in self._seeds
+
+    def frame(self, content: bytes, start: int, timestamp: int) -> Frame | str:
+        """The frame at `start`, or why there is none."""
+        size = len(content)
+        if start >= size or content[start] not in (MAVLINK_1, MAVLINK_2):
+            return "truncated" if start >= size else "no_header"
+        header = HEADER_2 if content[start] == MAVLINK_2 else HEADER_1
+        if start + header + CHECKSUM_BYTES > size:
+            return "truncated"
+        length, signed = content[start + 1], False
+        if header == HEADER_2:
+            if content[start + 2] & ~SIGNED:
+                return "no_header"
+            signed = bool(content[start + 2])
+            system, component = content[start + 5], content[start + 6]
+            message_id = int.from_bytes(content[start + 7 : start + 10], "little")
+        else:
+            system, component, message_id = content[start + 3], content[start + 4], content[start + 5]
+            if length > self._sizes.get(message_id, 255):
+                return "no_header"
+        checksum = start + header + length
+        end = checksum + CHECKSUM_BYTES + (SIGNATURE_BYTES if signed else 0)
+        if end > size:
+            return "truncated"
+        seed = self._seeds.get(message_id)
+        if seed is None:  # its checksum needs its definition: believe it if another frame follows
+            following = end + TIMESTAMP_BYTES
+            if end != size and not (following < size and content[following] in (MAVLINK_1, MAVLINK_2)):
+                return "bad_checksum"
+        elif self._crc(content[start + 1 : checksum] + seed) != content[checksum] | content[checksum + 1] << 8:
+            return "bad_checksum"
+        arrival_us = int.from_bytes(content[timestamp : timestamp + TIMESTAMP_BYTES], "big")
+        return Frame(start, end, arrival_us, message_id, system, component, signed)

@@ -1,0 +1,256 @@
+"""Damaged logs: a reader gives an InputError of one line or a sound Log, soon, in bounded memory, and nothing else.
+
+`make fuzz` runs 20 000 of them; FLOWNAV_FUZZ sets another number, FLOWNAV_FUZZ_FIRST the first seed. A failure names
+its seed: `damaged(sample, seed)` is the same bytes again.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from conftest import data_root
+from dataflash_files import HEAD, DataFlashWriter, dataflash_of
+from flownav.errors import InputError
+from flownav.logs.csv_folder import read_csv_folder
+from flownav.logs.dataflash import read_dataflash
+from flownav.logs.dataflash.formats import CODES
+from flownav.logs.dataflash.sensors import FIELDS
+from flownav.logs.log import Log
+from flownav.measurement import COLUMNS
+from log_mutations import mutate
+from replay_logs import SyntheticLog, log_of_flight
+
+MUTANTS = int(os.environ.get("FLOWNAV_FUZZ", "500"))
+FIRST_SEED = int(os.environ.get("FLOWNAV_FUZZ_FIRST", "0"))
+SECONDS_PER_MB, FLOOR_S = 1.0, 3.0
+BYTES_PER_BYTE, FLOOR_BYTES = 60, 128 << 20
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A small sound log: its files by name, and what reads it (a file's path, or the folder's)."""
+
+    name: str
+    suffix: str
+    files: dict[str, bytes]
+    read: Callable[[Path], Log]
+
+    def put(self, folder: Path, changed: str, content: bytes) -> Path:
+        """Write the files, one of them changed; what the reader takes."""
+        if not self.suffix:
+            for name, kept in self.files.items():
+                (folder / name).write_bytes(content if name == changed else kept)
+            return folder
+        path = folder / f"log{self.suffix}"
+        path.write_bytes(content)
+        return path
+
+
+def synthetic_flight() -> SyntheticLog:
+    return log_of_flight(6.0, imu_hz=25.0, attitude_hz=25.0)
+
+
+def synthetic_dataflash() -> bytes:
+    writer = dataflash_of(synthetic_flight())
+    for at, event in ((42.0, 28), (45.0, 18)):
+        writer.put("EV", at * 1e6, event)
+    return writer.content()
+
+
+def real_slice(name: str, head_bytes: int, from_byte: int, body_bytes: int) -> bytes | None:
+    """The start of a real log, where it describes itself, and a piece of its flight."""
+    path = data_root() / name
+    if not path.is_file():
+        return None
+    with path.open("rb") as file:
+        head = file.read(head_bytes)
+        file.seek(from_byte)
+        return head + file.read(body_bytes)
+
+
+def reader_of(module: str, function: str) -> Callable[[Path], Log] | None:
+    """A reader by its place; None where this flownav has none."""
+    try:
+        return getattr(importlib.import_module(module), function)  # type: ignore[no-any-return]
+    except ImportError:
+        return None
+
+
+def samples(folder: Path) -> list[Sample]:
+    """Every reader's samples: synthetic ones, and slices of the real logs that are at hand."""
+    csv = synthetic_flight().write(folder / "csv")
+    found = [
+        Sample("csv", "", {file.name: file.read_bytes() for file in sorted(csv.iterdir())}, read_csv_folder),
+        Sample("dataflash", ".bin", {"": synthetic_dataflash()}, read_dataflash),
+    ]
+    slices = (
+        (
+            "real dataflash",
+            ".bin",
+            read_dataflash,
+            ("dataflash/heli_sitl_takeoff_square_land.bin", 90_000, 3_000_000, 90_000),
+        ),
+        (
+            "real ulog",
+            ".ulg",
+            reader_of("flownav.logs.ulog", "read_ulog"),
+            ("ulog/sample_log_small.ulg", 120_000, 200_000, 60_000),
+        ),
+        (
+            "real tlog",
+            ".tlog",
+            reader_of("flownav.logs.mavlink_log", "read_tlog"),
+            ("mavlink/heli_sitl.tlog", 0, 600_000, 60_000),
+        ),
+    )
+    for name, suffix, read, where in slices:
+        content = real_slice(*where)
+        if read is not None and content is not None:
+            found.append(Sample(name, suffix, {"": content}, read))
+    return found
+
+
+NAMES = ("csv", "dataflash", "real dataflash", "real ulog", "real tlog")
+
+
+@pytest.fixture(scope="module")
+def at_hand(tmp_path_factory) -> dict[str, Sample]:
+    return {sample.name: sample for sample in samples(tmp_path_factory.mktemp("samples"))}
+
+
+def damaged(sample: Sample, seed: int) -> tuple[str, bytes]:
+    """The file that a seed damages, and what becomes of it."""
+    names = sorted(sample.files)
+    changed = names[seed % len(names)]
+    return changed, mutate(sample.files[changed], sample.files[names[(seed // 7) % len(names)]], seed)
+
+
+def assert_sound(log: Log) -> None:
+    """What every Log promises, however little of the file was left."""
+    assert log.streams
+    assert all("\n" not in note for note in log.notes)
+    for sensor, stream in log.streams.items():
+        count, width = len(stream.t_s), len(COLUMNS[sensor])
+        assert stream.value.shape == stream.variance.shape == (count, width)
+        assert stream.quality.shape == (count,)
+        assert np.all(np.isfinite(stream.t_s))
+        assert np.all(np.diff(stream.t_s) >= 0)
+        assert all(kept > 0 for kept in stream.rejected.values())
+    for table in (log.truth, log.autopilot):
+        assert table is None or len({len(column) for column in table.values()}) == 1
+
+
+def peak_bytes(anew: bool = False) -> int:
+    """The most memory held since it was last asked anew; 0 where the system does not tell (Linux does)."""
+    try:
+        if anew:
+            Path("/proc/self/clear_refs").write_text("5")
+        status = Path("/proc/self/status").read_text()
+    except OSError:
+        return 0
+    return 1024 * int(status.split("VmHWM:")[1].split()[0])
+
+
+def assert_promise(sample: Sample, path: Path, size: int, what: str) -> None:
+    """An InputError of one line, or a sound Log; within time and memory that follow the size."""
+    before = peak_bytes(anew=True)
+    begun = time.process_time()
+    said = ""
+    try:
+        assert_sound(sample.read(path))
+    except InputError as error:
+        said = str(error)
+    except Exception as error:
+        raise AssertionError(f"{what}: {type(error).__name__}: {error}") from error
+    assert "\n" not in said, what
+    assert time.process_time() - begun < FLOOR_S + SECONDS_PER_MB * size / 1e6, what
+    assert peak_bytes() - before < FLOOR_BYTES + BYTES_PER_BYTE * size, what
+
+
+@pytest.mark.fuzz
+@pytest.mark.parametrize("name", NAMES)
+def test_a_damaged_log_is_read_or_refused(at_hand, tmp_path, name):
+    if name not in at_hand:
+        pytest.skip(f"no sample or no reader for {name}")
+    sample = at_hand[name]
+    for seed in range(FIRST_SEED, FIRST_SEED + -(-MUTANTS // len(at_hand))):
+        changed, content = damaged(sample, seed)
+        path = sample.put(tmp_path, changed, content)
+        size = sum(map(len, sample.files.values())) + len(content)
+        assert_promise(sample, path, size, f"{name}, seed {seed}")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_samples_themselves_are_read(at_hand, tmp_path, name):
+    """Without this, a reader that refused everything would pass."""
+    if name not in at_hand:
+        pytest.skip(f"no sample or no reader for {name}")
+    sample = at_hand[name]
+    first = sorted(sample.files)[0]
+    assert_sound(sample.read(sample.put(tmp_path, first, sample.files[first])))
+
+
+@pytest.mark.fuzz
+@pytest.mark.parametrize("pattern", [HEAD, HEAD + b"\x80", HEAD + b"\x80" + b"A" * 7, HEAD + b"\x84", b"\0", b"\xff"])
+def test_a_megabyte_of_one_pattern_after_the_formats_is_soon_done(tmp_path, pattern):
+    content = synthetic_dataflash() + pattern * (1_000_000 // len(pattern))
+    sample = Sample("pattern", ".bin", {"": content}, read_dataflash)
+    assert_promise(sample, sample.put(tmp_path, "", content), len(content), repr(pattern))
+
+
+KINDS = sorted({*FIELDS, "PARM", "ORGN", "XKF1", "XKF4", "SIM", "SIM2", "UNIT", "MULT", "FMTU"})
+LABELS = sorted(
+    {"TimeUS", "I", "C", "Id", "Mult", "Label", "FmtType", "UnitIds", "MultIds", "Name", "Value", "PI", "Type"}
+    | {field.label for fields in FIELDS.values() for field in fields}
+)
+FORMATS = st.lists(st.tuples(st.sampled_from(sorted(CODES)), st.sampled_from(LABELS)), max_size=6).filter(
+    lambda fields: len(DataFlashWriter.blank("".join(code for code, _ in fields))) < 250
+)
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    kinds=st.lists(st.tuples(st.sampled_from(KINDS), FORMATS, st.binary(max_size=200)), max_size=8), flies=st.booleans()
+)
+def test_messages_that_are_not_what_their_names_say_are_no_other_error(tmp_path, kinds, flies):
+    """Kinds with known names and any fields: text where numbers belong, arrays, instances of the wrong type."""
+    writer = DataFlashWriter(units=False)
+    for name, fields, noise in kinds:
+        codes, labels = "".join(code for code, _ in fields), ",".join(label for _, label in fields)
+        writer.define(name, codes, labels)
+        kind = writer.types[name][0]
+        size = len(DataFlashWriter.blank(codes))
+        for i in range(3):
+            body = (noise[i:] + DataFlashWriter.blank(codes))[:size]
+            writer.parts.append(HEAD + bytes([kind]) + body)
+    content = writer.content()
+    if flies:
+        content += dataflash_of(log_of_flight(2.0), DataFlashWriter()).content()
+    path = tmp_path / "log.bin"
+    path.write_bytes(content)
+    try:
+        assert_sound(read_dataflash(path))
+    except InputError as error:
+        said = str(error)
+    else:
+        said = ""
+    assert "\n" not in said
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(content=st.binary(max_size=2000))
+def test_arbitrary_bytes_are_refused(tmp_path, content):
+    path = tmp_path / "log.bin"
+    path.write_bytes(content)
+    with pytest.raises(InputError):
+        read_dataflash(path)

@@ -17,11 +17,11 @@ def recorded_flight() -> Path | None:
 
 def replay_once(folder: Path) -> object:
     """Read the log, replay it, and bundle the record."""
-    from flownav.estimation.kinematic_settings import KinematicSettingsFile
     from flownav.logs.csv_folder import read_csv_folder
+    from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.replay.bundle import to_record
     from flownav.replay.prepare import ReplayOptions
     from flownav.replay.session import replay
 
-    flown = replay(read_csv_folder(folder), ReplayOptions(), KinematicSettingsFile().settings())
+    flown = replay(read_csv_folder(folder), ReplayOptions(), NavigatorSettingsFile())
     return to_record(flown, flown.scores(), ["flownav", "bench"])

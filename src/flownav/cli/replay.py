@@ -39,7 +39,7 @@ def command(
         int | None, typer.Option("--flow-instance", metavar="N", help="Which of several flow sensors.")
     ] = None,
     settings: Annotated[
-        Path | None, typer.Option("--settings", help="TOML of filter settings (docs/kinematic-filter.md).")
+        Path | None, typer.Option("--settings", help="TOML of filter settings (docs/landing-filter.md).")
     ] = None,
     out: Annotated[
         Path | None, typer.Option("--out", help="The record; out/FOLDER.fnr where unsaid.", show_default=False)
@@ -98,10 +98,10 @@ def _read(path: Path, flow_instance: int | None) -> Any:
 
 
 def _settings(path: Path | None) -> Any:
-    from flownav.estimation.kinematic_settings import KinematicSettingsFile
+    from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.parameter_files import load
 
-    return (load(path, KinematicSettingsFile) if path else KinematicSettingsFile()).settings()
+    return load(path, NavigatorSettingsFile) if path else NavigatorSettingsFile()
 
 
 def _fly_table(flown: Replay, table: list[tuple[float, float]], explicit: list[dict[str, Any]]) -> dict[str, Any]:

@@ -39,7 +39,7 @@ def open_log(path: Path, *, flow_instance: int | None = None) -> Log:
 def open_flight(path: Path, *, flow_instance: int | None = None) -> Log:
     """A log that can be replayed. InputError, besides open_log's, where it lacks what a replay cannot do without."""
     log = open_log(path, flow_instance=flow_instance)
-    lacking = [] if Sensor.ATTITUDE in log.streams else ["an attitude"]
+    lacking = [] if log.streams.keys() & {Sensor.ATTITUDE, Sensor.IMU} else ["an attitude or an IMU"]
     if not log.streams.keys() & {Sensor.GPS_POSITION, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY}:
         lacking.append("GPS or optical flow")
     if lacking:

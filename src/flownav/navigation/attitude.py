@@ -107,7 +107,8 @@ def bridge(reading: Reading, on: Running) -> None:
 def magnetic_heading(on: Running) -> float:
     """The heading that the latest magnetometer reading and the filter's tilt give, from magnetic north [rad]."""
     rotation = rotation_of(on.work, ONE_LANE, ROWS, 0)
-    return np.arctan2(rotation[3], rotation[0]) - on.memory[MAG_HEADING]
+    heading: float = np.arctan2(rotation[3], rotation[0]) - on.memory[MAG_HEADING]
+    return heading
 
 
 @kernel
@@ -116,7 +117,8 @@ def heading_variance(t_s: float, on: Running) -> float:
     settings, memory = on.settings, on.memory
     step_s = max(t_s - memory[HEADING_CLOCK], 1e-3)
     memory[HEADING_CLOCK] = t_s
-    return settings.heading_noise_rad**2 * max(1.0, 2.0 * settings.heading_time_s / step_s)
+    variance: float = settings.heading_noise_rad**2 * max(1.0, 2.0 * settings.heading_time_s / step_s)
+    return variance
 
 
 @kernel

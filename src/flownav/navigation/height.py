@@ -67,7 +67,8 @@ def stuck(reading: Reading, on: Running) -> bool:
     drift = 3.0 * np.sqrt(on.work[ROWS.covariance + (VELOCITY + 2) * (STATES + 1)]) * lasting_s
     alone = reading.t_s - memory[HEIGHT_CLOCK] > settings.height_hold_s
     least = settings.range_stuck_travel_m + (ALONE * settings.range_stuck_travel_m + drift if alone else 0.0)
-    return lasting_s >= settings.range_stuck_s and abs(memory[RANGE_TRAVEL]) >= least
+    repeating: bool = lasting_s >= settings.range_stuck_s and abs(memory[RANGE_TRAVEL]) >= least
+    return repeating
 
 
 @kernel

@@ -34,7 +34,8 @@ def follow_vibration(value: Array, dt_s: float, on: Running) -> None:
 @kernel
 def excess(on: Running) -> float:
     """The vibration beyond the harmless [m/s2]."""
-    return max(np.sqrt(on.memory[VIBRATION]) - on.settings.vibration_free_m_s2, 0.0)
+    level: float = np.sqrt(on.memory[VIBRATION])
+    return max(level - on.settings.vibration_free_m_s2, 0.0)
 
 
 @kernel

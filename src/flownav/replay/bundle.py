@@ -11,11 +11,11 @@ import numpy as np
 from flownav.estimation.gating import Reason
 from flownav.frames import rotation_from_quaternion
 from flownav.logs.rates import attitude_at
-from flownav.measurement import COLUMNS, Array, Sensor
+from flownav.measurement import COLUMNS, Array, Sensor, Stream
+from flownav.navigation.state import EVENT_NAMES
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.replay.autopilot import autopilot_path
 from flownav.replay.session import Replay
-from flownav.replay.state import EVENT_NAMES
 from flownav.scoring.alignment import velocity_of
 
 KEPT = (
@@ -25,6 +25,7 @@ KEPT = (
     Sensor.FLOW_VELOCITY,
     Sensor.RANGE,
     Sensor.BARO,
+    Sensor.PAD,
 )
 LOST_AFTER_S = 1.0
 DOWN = "pos_d_m"
@@ -58,11 +59,11 @@ def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dic
         "kind": "replay",
         "log": log.path.name,
         **({} if log.clock_start_s is None else {"clock_start_s": log.clock_start_s}),
-        "filter": "kinematic",
+        "filter": "landing",
         "duration_s": scores["duration_s"],
         "delays_s": {sensor.name.lower(): delay for sensor, delay in replay.prepared.delays_s.items() if delay},
         "parameters": {
-            "filter": replay.settings._asdict(),
+            "filter": replay.settings.model_dump(),
             "gps_delay_s": replay.options.gps_delay_s,
             "gps_outages_s": [list(window) for window in replay.options.gps_outages_s],
             "use_flow": replay.options.use_flow,
@@ -80,13 +81,14 @@ def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dic
 
 
 def _truth(replay: Replay) -> dict[str, Array]:
-    """The truth in the estimate's frame; body velocity by differences, in the axes of the logged attitude."""
+    """The truth in the estimate's frame; body velocity by differences, in the axes of the estimated attitude."""
     placed, truth = replay.truth_alignment, replay.log.truth
     assert placed is not None
     assert truth is not None
     position = placed.moved(replay.truth_position)
     velocity = placed.turned(velocity_of(truth["t_s"], replay.truth_position))
-    rotation = rotation_from_quaternion(*attitude_at(replay.log.streams[Sensor.ATTITUDE], truth["t_s"]).T)
+    own = Stream.of(Sensor.ATTITUDE, replay.estimate[:, 0], replay.estimate[:, 7:11])
+    rotation = rotation_from_quaternion(*attitude_at(own, truth["t_s"]).T)
     body = {
         name: sum(rotation[3 * row + column] * velocity[:, row] for row in range(3))
         for column, name in enumerate(VELOCITY_BODY)
@@ -117,10 +119,14 @@ def _innovation(replay: Replay) -> dict[str, Array]:
 def _component_names() -> Array:
     """What each component of a sensor observes, by sensor number and component."""
     names = np.full((max(Sensor) + 1, 3), "", dtype="U16")
-    for sensor in (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_VELOCITY):
+    for sensor in (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_VELOCITY, Sensor.POSE, Sensor.PAD):
         names[sensor] = COLUMNS[sensor]
-    names[Sensor.FLOW_RATE] = VELOCITY_BODY
-    names[Sensor.RANGE] = names[Sensor.BARO] = DOWN
+    names[Sensor.LANDED] = COLUMNS[Sensor.GPS_VELOCITY]
+    names[Sensor.ATTITUDE] = ("tilt_n_rad", "tilt_e_rad", "heading_rad")
+    names[Sensor.MAG] = names[Sensor.YAW] = "heading_rad"
+    names[Sensor.FLOW_RATE, :2] = COLUMNS[Sensor.FLOW_RATE][:2]
+    names[Sensor.RANGE] = COLUMNS[Sensor.RANGE]
+    names[Sensor.BARO] = COLUMNS[Sensor.BARO]
     return names
 
 

@@ -17,6 +17,7 @@ from flownav.errors import InputError
 from flownav.logs.log import Log
 from flownav.logs.rates import attitude_rates, mean_over
 from flownav.measurement import Array, EventQueue, Sensor, Stream, merge
+from flownav.navigation.feed import imu_serves
 from flownav.sensors.datasheet import FlowSensor
 
 WITHHELD = -1.0  # the quality of a reading that the user takes away
@@ -24,7 +25,7 @@ GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
 FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 GYRO_BIAS_TIME_S = 10.0  # as PX4's EKF2 follows it at 10 Hz
 LONGEST_FLOW_INTERVAL = 1.5  # medians: a longer step is a gap, not an exposure
-OWN = "sensor gyro"
+OWN, IMU, TURNING = "sensor gyro", "imu gyro", "attitude"
 SIGNIFICANT = 3.0  # standard errors
 LEAST_FLOW_ROWS = 50
 SCALE_LIMITS = (0.1, 10.0)
@@ -51,11 +52,15 @@ class ReplayOptions:
 
 @dataclass(frozen=True)
 class Prepared:
-    """The streams as they are fed, their queue with nothing cut, and what was decided on the way (notes)."""
+    """The streams as they are fed, their queue with nothing cut, and what was decided on the way (notes).
+
+    FLOW_RATE has two columns more, the vehicle's IMU over each exposure; `flow_gyro_is_imu`: they serve best.
+    """
 
     streams: dict[Sensor, Stream]
     queue: EventQueue
     notes: tuple[str, ...]
+    flow_gyro_is_imu: bool = False
 
     @property
     def delays_s(self) -> dict[Sensor, float]:
@@ -66,7 +71,7 @@ class Prepared:
 def prepare(log: Log, options: ReplayOptions) -> Prepared:
     """Delay, scale and complete the streams, and merge them. InputError where an option cannot be."""
     _check(log, options)
-    streams, notes = dict(log.streams), list(log.notes)
+    streams, notes, chosen = dict(log.streams), list(log.notes), Chosen(OWN, "")
     for sensor in GPS:
         if sensor in streams:
             streams[sensor] = replace(streams[sensor], delay_s=options.gps_delay_s)
@@ -74,13 +79,13 @@ def prepare(log: Log, options: ReplayOptions) -> Prepared:
         if sensor in streams:
             streams[sensor] = _exposed(_scaled(streams[sensor], options.flow_scale))
     if Sensor.FLOW_RATE in streams:
-        streams[Sensor.FLOW_RATE], note = _with_gyro(streams[Sensor.FLOW_RATE], streams)
-        notes.append(note)
+        streams[Sensor.FLOW_RATE], chosen = _with_gyro(streams[Sensor.FLOW_RATE], streams)
+        notes.append(chosen.note)
     if options.identified is not None:
         for sensor in FLOW:
             if sensor in streams:
                 streams[sensor] = corrected(streams[sensor], options.identified)
-    return Prepared(streams, merge(streams.values()), tuple(notes))
+    return Prepared(streams, merge(streams.values()), tuple(notes), chosen.name == IMU)
 
 
 def withhold(log: Log, queue: EventQueue, options: ReplayOptions) -> EventQueue:
@@ -174,8 +179,15 @@ def identified_flow(sensor: FlowSensor) -> IdentifiedFlow:
     return IdentifiedFlow(gain_of("x"), gain_of("y"), found.latency_s)
 
 
-def _with_gyro(flow: Stream, streams: dict[Sensor, Stream]) -> tuple[Stream, str]:
-    """The flow with the rates that serve best in its gyro columns, and what was chosen.
+class Chosen(NamedTuple):
+    """The gyro that takes the rotation out of the flow, and a note of why."""
+
+    name: str
+    note: str
+
+
+def _with_gyro(flow: Stream, streams: dict[Sensor, Stream]) -> tuple[Stream, Chosen]:
+    """The flow with the rates that serve best in its gyro columns and the IMU's after them, and what was chosen.
 
     Candidates are the sensor's own gyro, the vehicle's IMU (both with their bias followed against the attitude)
     and the attitude's own turning. A vehicle has mass, so its velocity is smooth: the gyro that leaves the least
@@ -189,28 +201,43 @@ def _with_gyro(flow: Stream, streams: dict[Sensor, Stream]) -> tuple[Stream, str
     noises = {name: float(np.sqrt(squares.mean())) for name, squares in roughness.items() if len(squares)}
     best = min(noises, key=lambda name: noises[name], default=min(candidates))
     chosen = best if _significant(roughness.get(OWN), roughness[best]) else OWN
-    value = flow.value.copy()
-    value[:, 2:4] = candidates[chosen]
+    imu = _imu_over(flow, streams, _exposure(flow)) if imu_serves(streams) else np.full((len(flow), 2), np.nan)
+    value = np.column_stack([flow.value[:, :2], candidates[chosen], imu])
     listed = ", ".join(f"{name} {noise:.4f}" for name, noise in sorted(noises.items()))
-    return replace(flow, value=value), f"flow is compensated with the {chosen} (noise left, rad/s: {listed})"
+    note = f"flow is compensated with the {chosen} (noise left, rad/s: {listed})"
+    return replace(flow, value=value), Chosen(chosen, note)
+
+
+def _exposure(flow: Stream) -> Array:
+    """How long each reading looked [s]."""
+    period = _period(flow.t_s)
+    steps = np.concatenate([[period], np.diff(flow.t_s)])
+    return np.asarray(np.clip(steps, 0.2 * period, LONGEST_FLOW_INTERVAL * period))
+
+
+def _imu_over(flow: Stream, streams: dict[Sensor, Stream], exposure_s: Array) -> Array:
+    """Mean rates of the vehicle's IMU about x and y over each exposure, (n, 2) [rad/s]."""
+    imu = streams[Sensor.IMU]
+    return mean_over(imu.t_s, imu.value[:, :3], flow.t_s - exposure_s, flow.t_s)[:, :2]
 
 
 def _gyro_candidates(flow: Stream, streams: dict[Sensor, Stream]) -> dict[str, Array]:
-    """Mean rates about x and y over each flow reading's exposure, by source."""
-    attitude, imu = streams[Sensor.ATTITUDE], streams.get(Sensor.IMU)
-    period = _period(flow.t_s)
-    exposure = np.clip(np.concatenate([[period], np.diff(flow.t_s)]), 0.2 * period, LONGEST_FLOW_INTERVAL * period)
-    start = flow.t_s - exposure
-    turning = attitude_rates(attitude, start, flow.t_s)
-    candidates = {"attitude": turning[:, :2]}
-    if imu is not None and len(imu) > 1:
-        rates = mean_over(imu.t_s, imu.value[:, :3], start, flow.t_s)
-        candidates["imu gyro"] = (rates - _followed(flow.t_s, rates - turning))[:, :2]
+    """Mean rates about x and y over each flow reading's exposure, by source; never none at all."""
+    exposure_s = _exposure(flow)
+    candidates: dict[str, Array] = {}
+    turning = None
+    if Sensor.ATTITUDE in streams:
+        turning = attitude_rates(streams[Sensor.ATTITUDE], flow.t_s - exposure_s, flow.t_s)[:, :2]
+        candidates[TURNING] = turning
+    if imu_serves(streams):
+        rates = _imu_over(flow, streams, exposure_s)
+        candidates[IMU] = rates if turning is None else rates - _followed(flow.t_s, rates - turning)
     own = flow.value[:, 2:4]
     known = np.asarray(np.isfinite(own).all(axis=1))
-    if known.mean() > 0.5 and np.all(np.ptp(own[known], axis=0)):
-        filled = np.where(known[:, None], own, turning[:, :2])
-        candidates[OWN] = filled - _followed(flow.t_s, filled - turning[:, :2])
+    if not candidates or (known.mean() > 0.5 and np.all(np.ptp(own[known], axis=0))):
+        spare = candidates.get(TURNING, candidates.get(IMU, np.zeros_like(own)))
+        filled = np.where(known[:, None], own, spare)
+        candidates[OWN] = filled if turning is None else filled - _followed(flow.t_s, filled - turning)
     return candidates
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from flownav.frames import rotation_from_quaternion
 from flownav.logs.rates import attitude_at, mean_over
-from flownav.measurement import Array, Sensor, Stream
+from flownav.measurement import COLUMNS, Array, Sensor, Stream
 
 MOVING_M_S = 1.0
 LEAST_MOVING_S = 10.0
@@ -212,7 +212,8 @@ def _usable(flow: Stream, streams: dict[Sensor, Stream]) -> Stream:
         good &= np.isfinite(flow.value).all(axis=1)
         ranges = _ranges(streams)
         good &= _near(ranges[0], t_s) if len(ranges[0]) > 1 else False
-    return Stream.of(flow.sensor, flow.t_s[good], flow.value[good], quality=flow.quality[good], delay_s=flow.delay_s)
+    value = flow.value[good, : len(COLUMNS[flow.sensor])]
+    return Stream.of(flow.sensor, flow.t_s[good], value, quality=flow.quality[good], delay_s=flow.delay_s)
 
 
 def _ranges(streams: dict[Sensor, Stream]) -> tuple[Array, Array]:

@@ -13,14 +13,15 @@ import numpy as np
 from flownav.compile import announce_compilation
 from flownav.errors import InputError
 from flownav.estimation.gating import Reason
-from flownav.estimation.kinematic_settings import KinematicSettings
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
+from flownav.navigation.feed import SLOWEST_IMU_HZ, new_navigator
+from flownav.navigation.loop import run
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.state import Tape, new_tape
 from flownav.replay.autopilot import autopilot_scores
-from flownav.replay.engine import run
 from flownav.replay.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replay.sentinel import Finding, findings
-from flownav.replay.state import Tape, new_filter
 from flownav.scoring.alignment import Alignment, align, velocity_of
 from flownav.scoring.outage import OutageError, difference_at, horizontal_rms, outage_error
 
@@ -36,13 +37,13 @@ class Replay:
 
     log: Log
     options: ReplayOptions
-    settings: KinematicSettings
+    settings: NavigatorSettingsFile
     prepared: Prepared
     tape: Tape
 
     @cached_property
     def estimate(self) -> Array:
-        """Rows of the tape's estimate that were written (n, 23)."""
+        """Rows of the tape's estimate that were written (n, ESTIMATE_COLUMNS)."""
         return self.tape.estimate[: self.tape.used[0]]
 
     @cached_property
@@ -142,7 +143,7 @@ class Replay:
         return scores | {name: found for name, found in beside.items() if found is not None}
 
 
-def replay(log: Log, options: ReplayOptions, settings: KinematicSettings) -> Replay:
+def replay(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile) -> Replay:
     """Run a log through the filter. InputError where an option cannot be, or the filter never starts."""
     with announce_compilation("replay"):
         prepared = prepare(log, options)
@@ -152,7 +153,7 @@ def replay(log: Log, options: ReplayOptions, settings: KinematicSettings) -> Rep
 def outage_table(
     log: Log,
     options: ReplayOptions,
-    settings: KinematicSettings,
+    settings: NavigatorSettingsFile,
     windows: list[tuple[float, float]],
     on_progress: Callable[[int], None] = lambda done: None,
 ) -> list[OutageError]:
@@ -208,12 +209,14 @@ def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _run(log: Log, options: ReplayOptions, settings: KinematicSettings, prepared: Prepared) -> Replay:
+def _run(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, prepared: Prepared) -> Replay:
     queue = withhold(log, prepared.queue, options)
-    running = new_filter(queue, settings)
+    gyro_is_imu = prepared.flow_gyro_is_imu
+    running = new_navigator(prepared.streams, float(queue.t_s[0]), gyro_is_imu, settings, new_tape(queue))
     run(queue, running)
     if running.tape.used[0] < 2:
         raise InputError(
-            f"{log.path}: the filter never started; it needs an attitude, then a GPS fix or flow of quality above 0"
+            f"{log.path}: the filter never started; it needs an attitude or an IMU of {SLOWEST_IMU_HZ:g} Hz, then a "
+            "GPS fix or flow of quality above 0"
         )
     return Replay(log, options, settings, prepared, running.tape)

@@ -24,7 +24,7 @@ def symmetric(p: np.ndarray) -> bool:
 
 
 def filter_with_covariance(random: np.random.Generator) -> Landing:
-    filter_ = landing(int(random.integers(2**32)), 0.2, -0.1, 1.0, 3.0)
+    filter_ = landing(int(random.integers(2**32)), *random.uniform(-0.5, 0.5, 2), random.uniform(-3.0, 3.0), 3.0)
     filter_.p[:] = random_covariance(random)
     return filter_
 
@@ -197,7 +197,7 @@ def touched(ours: Landing, before: Work) -> list[int]:
 @pytest.mark.parametrize("case", REFUSED)
 def test_a_refused_reading_changes_no_bit(case):
     random = np.random.default_rng(7)
-    for _ in range(5):
+    for _ in range(10):
         ours = filter_with_covariance(random)
         before = ours.work.copy()
         ours.set_coefficients(random.normal(size=4))

@@ -1,4 +1,4 @@
-"""The landing filter called as plain Python: one lane of rows, its error parametrisation, derivatives, dense algebra."""
+"""The landing filter called as plain Python: one lane of rows, its error parametrisation, derivatives."""
 
 from __future__ import annotations
 
@@ -217,7 +217,7 @@ SPREAD[VELOCITY : VELOCITY + 3] = 3.0
 SPREAD[ATTITUDE : ATTITUDE + 3] = 0.0  # the nominal error of attitude is zero between corrections
 SPREAD[GYRO_BIAS : GYRO_BIAS + 3] = 0.01
 SPREAD[ACCEL_BIAS : ACCEL_BIAS + 3] = 0.1
-SPREAD[GPS_FAST : INS_ERROR] = 0.5
+SPREAD[GPS_FAST:INS_ERROR] = 0.5
 SPREAD[INS_ERROR : INS_ERROR + 3] = 0.02
 SPREAD[GROUND] = SPREAD[BARO] = 0.5
 SPREAD[FLOW_SCALE] = 0.05
@@ -242,6 +242,4 @@ def landing(seed: int, roll: float, pitch: float, yaw: float, height_m: float) -
 def filters(least_m: float = 0.6, most_m: float = 40.0) -> st.SearchStrategy[Landing]:
     """Filters at random states: any heading, tilts up to 34 degrees."""
     tilt = st.floats(-0.6, 0.6)
-    return st.builds(
-        landing, st.integers(0, 2**32 - 1), tilt, tilt, st.floats(-3.14, 3.14), st.floats(least_m, most_m)
-    )
+    return st.builds(landing, st.integers(0, 2**32 - 1), tilt, tilt, st.floats(-3.14, 3.14), st.floats(least_m, most_m))

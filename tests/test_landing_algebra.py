@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from landing_filter import READING, ROWS, STATES, Landing, cross_matrix, landing, random_covariance
 
 from flownav.compile import ONE_LANE
+from flownav.estimation.gating import Reason
 from flownav.estimation.kalman import Work
 from flownav.estimation.landing.algebra import add_noise, correct, decay, forget, observe_cross, transform
 from flownav.estimation.landing.observe_pad import PAD_STATES, observe_pad
+from flownav.estimation.landing.settings import FlowLag, LandingSettings
 from flownav.estimation.landing.states import ATTITUDE, LARGEST_TRANSFORM, STATE_NAMES
+from landing_filter import READING, ROWS, STATES, Landing, cross_matrix, landing, random_covariance
 
 SEEDS = st.integers(0, 2**32 - 1)
 OTHERS = [i for i in range(STATES) if not ATTITUDE <= i < ATTITUDE + 3]
@@ -269,3 +273,10 @@ def test_every_state_has_a_name_and_every_row_a_place():
     assert len(STATE_NAMES) == len(set(STATE_NAMES)) == STATES
     assert list(ROWS) == sorted(ROWS)
     assert ROWS.innovation - ROWS.coefficient == LARGEST_TRANSFORM
+
+
+# -- what is written about it --------------------------------------------------------------------------------------
+def test_the_documentation_names_every_setting_and_every_reason():
+    page = (Path(__file__).parents[1] / "docs" / "landing-filter.md").read_text(encoding="utf-8")
+    for name in (*LandingSettings._fields, *FlowLag._fields, *(reason.label for reason in Reason)):
+        assert f"`{name}`" in page or name in {"f12", "f21"}, name

@@ -13,22 +13,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from landing_filter import (
-    ROWS,
-    SETTINGS,
-    SILENT,
-    STATES,
-    Landing,
-    cross_matrix,
-    filters,
-    landing,
-    paper_lag,
-    product,
-    random_covariance,
-    rotation_of,
-    step_jacobian,
-    transition_of,
-)
 from scipy import signal
 from scipy.linalg import expm
 
@@ -57,6 +41,22 @@ from flownav.estimation.landing.states import (
 from flownav.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.sensors.datasheet import FlowSettings, load_sensor
 from flownav.simulation.landing_setup import flow_lag
+from landing_filter import (
+    ROWS,
+    SETTINGS,
+    SILENT,
+    STATES,
+    Landing,
+    cross_matrix,
+    filters,
+    landing,
+    paper_lag,
+    product,
+    random_covariance,
+    rotation_of,
+    step_jacobian,
+    transition_of,
+)
 
 GRAVITY = np.array([0.0, 0.0, GRAVITY_M_S2])
 EPOCH_S = 0.02
@@ -238,7 +238,7 @@ def test_gauss_markov_errors_stay_at_their_stated_size_and_forget_at_their_state
 
 
 def test_process_noise_is_right_to_first_order_of_the_step():
-    """One second at rest from P = 0 against Van Loan's exact covariance of the continuous model: half step, half error."""
+    """A second at rest from P = 0 against Van Loan's covariance of the continuous model: half step, half error."""
     n = SETTINGS._replace(gyro_noise_rad_s_rt_hz=0.02)
     a, q = np.zeros((15, 15)), np.zeros((15, 15))
     a[0:3, 3:6], a[6:9, 9:12], a[3:6, 12:15] = np.eye(3), -np.eye(3), -np.eye(3)
@@ -401,7 +401,7 @@ A, B, C = 196.9, 14.8, 191.9
 
 
 def flight_with_steps_of_acceleration(lag: FlowLag, epochs: int = 60) -> tuple[np.ndarray, np.ndarray]:
-    """Level, with a new horizontal acceleration every epoch: velocity in straight lines. Velocity and flow (epochs, 2)."""
+    """Velocity and flow (epochs, 2) in level flight with a new horizontal acceleration every epoch."""
     random = np.random.default_rng(4)
     filter_ = Landing()
     filter_.x[POSITION + 2] = -50.0

@@ -28,7 +28,6 @@ from flownav.estimation.landing.states import (
 )
 from flownav.frames import Rotation, Vector, rotation_from_quaternion
 
-
 # the states that each law reads, in the order of its coefficients
 GPS_POSITION_STATES = (
     (POSITION, VELOCITY, GPS_SLOW, GPS_FAST),

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
+from flownav.inspection.autopilot import autopilot_errors
 from typer.testing import CliRunner
 
 from flownav.cli import identify, info
 from flownav.cli import replay as replay_command
 from flownav.errors import InputError
 from flownav.frames import quaternion_from_euler
-from flownav.inspection.autopilot import autopilot_errors
 from flownav.inspection.summary import summarise
 from flownav.logs.open_log import open_log
 from flownav.measurement import Sensor

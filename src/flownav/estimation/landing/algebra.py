@@ -120,7 +120,7 @@ def fuse(work: Work, lanes: Lanes, rows: LandingRows, index: tuple[int, ...], ga
         variance = work[rows.innovation_variance * len(lanes) + lane]
         innovation = work[rows.innovation * len(lanes) + lane]
         ratio = innovation * innovation / (gate_sigma * gate_sigma * variance)
-        fused = work[rows.accepted * len(lanes) + lane] > 0.0 and ratio <= 1.0
+        fused = work[rows.accepted * len(lanes) + lane] > 0.0 and variance > 0.0 and ratio <= 1.0
         work[rows.test_ratio * len(lanes) + lane] = ratio
         work[rows.accepted * len(lanes) + lane] = 1.0 if fused else 0.0
     correct(work, lanes, rows)
@@ -151,8 +151,10 @@ def correct(work: Work, lanes: Lanes, rows: LandingRows) -> None:
         for lane in range(len(lanes)):
             fused = work[rows.accepted * len(lanes) + lane] > 0.0
             variance = work[rows.innovation_variance * len(lanes) + lane] if fused else 1.0
-            gain = work[(rows.cross + i) * len(lanes) + lane] / variance if fused else 0.0
+            cross = work[(rows.cross + i) * len(lanes) + lane] if fused else 0.0
+            gain = cross / variance
             innovation = work[rows.innovation * len(lanes) + lane] if fused else 0.0
+            work[(rows.cross + i) * len(lanes) + lane] = cross
             work[(rows.gain + i) * len(lanes) + lane] = gain
             work[(rows.root + i) * len(lanes) + lane] = gain * np.sqrt(variance)
             work[(rows.state + i) * len(lanes) + lane] += gain * innovation
@@ -173,7 +175,10 @@ def correct(work: Work, lanes: Lanes, rows: LandingRows) -> None:
 
 @equation
 def fold_attitude(work: Work, lanes: Lanes, rows: LandingRows) -> None:
-    """The correction of the attitude error into the quaternion: q <- (1, theta/2) q, of unit length; theta <- 0."""
+    """The correction of the attitude error into the quaternion: q <- (1, theta/2) q, of unit length; theta <- 0.
+
+    Without a correction the quaternion keeps its last bit.
+    """
     for lane in range(len(lanes)):
         x = 0.5 * work[(rows.state + ATTITUDE) * len(lanes) + lane]
         y = 0.5 * work[(rows.state + ATTITUDE + 1) * len(lanes) + lane]
@@ -186,7 +191,8 @@ def fold_attitude(work: Work, lanes: Lanes, rows: LandingRows) -> None:
         a = qx + x * qw + y * qz - z * qy
         b = qy - x * qz + y * qw + z * qx
         c = qz + x * qy - y * qx + z * qw
-        shrink = 1.0 / np.sqrt(w * w + a * a + b * b + c * c)
+        corrected = x != 0.0 or y != 0.0 or z != 0.0
+        shrink = 1.0 / np.sqrt(w * w + a * a + b * b + c * c) if corrected else 1.0
         work[rows.attitude * len(lanes) + lane] = w * shrink
         work[(rows.attitude + 1) * len(lanes) + lane] = a * shrink
         work[(rows.attitude + 2) * len(lanes) + lane] = b * shrink

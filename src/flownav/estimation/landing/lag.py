@@ -12,9 +12,10 @@ from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.landing.algebra import set_coefficient, transform
 from flownav.estimation.landing.settings import FlowLag
 from flownav.estimation.landing.states import ATTITUDE, FLOW_LAG, GROUND, POSITION, VELOCITY, LandingRows
-from flownav.frames import Vector, rotation_from_quaternion
+from flownav.frames import Rotation, Vector, rotation_from_quaternion
 
 LEAST_RANGE_M = 0.05
+LEAST_UPRIGHT = 0.1
 SEEN = (
     VELOCITY, VELOCITY + 1, VELOCITY + 2, ATTITUDE, ATTITUDE + 1, ATTITUDE + 2, POSITION + 2, GROUND,
 )  # fmt: skip
@@ -31,6 +32,20 @@ def body_velocity_jacobian(axis: Vector, vel_n: float, vel_e: float, vel_d: floa
         axis[2] * vel_n - axis[0] * vel_d,
         axis[0] * vel_e - axis[1] * vel_n,
     )
+
+
+@equation
+def lens_range(rotation: Rotation, height_m: float, lens_below_m: float) -> tuple[float, float, float, float]:
+    """r = height/R_33 - lens [m], and its slopes on height and on the attitude error about north and east.
+
+    The distance from lens to level ground along body down; theta turns R_33 by theta_n R_23 - theta_e R_13. At
+    least LEAST_RANGE_M, where the slopes are 0.
+    """
+    upright = larger(rotation[8], LEAST_UPRIGHT)
+    free = height_m / upright - lens_below_m
+    slope = 1.0 / upright if free.real > LEAST_RANGE_M else 0.0
+    by_tilt = slope * height_m / upright
+    return larger(free, LEAST_RANGE_M), slope, -by_tilt * rotation[5], by_tilt * rotation[2]
 
 
 @equation
@@ -54,19 +69,19 @@ def see(work: Work, lanes: Lanes, rows: LandingRows, channel: int, lag: FlowLag,
         along = axis[0] * vel_n + axis[1] * vel_e + axis[2] * vel_d
         turn = body_velocity_jacobian(axis, vel_n, vel_e, vel_d)
         below = work[(rows.state + GROUND) * len(lanes) + lane] - work[(rows.state + POSITION + 2) * len(lanes) + lane]
-        range_m = larger(below / rotation[8] - lag.lens_below_m, LEAST_RANGE_M)
-        low = range_m < lag.sonar_floor_m
+        range_m, by_height, by_north, by_east = lens_range(rotation, below, lag.lens_below_m)
+        low = range_m.real < lag.sonar_floor_m
         over = lag.sonar_floor_m / range_m if low else 1.0
-        by_height = along * over / (range_m * rotation[8]) if low else 0.0
+        by_range = -over * along / range_m if low else 0.0
         work[(rows.seen + channel) * len(lanes) + lane] = over * along
         work[(rows.coefficient + first) * len(lanes) + lane] = over * axis[0]
         work[(rows.coefficient + first + 1) * len(lanes) + lane] = over * axis[1]
         work[(rows.coefficient + first + 2) * len(lanes) + lane] = over * axis[2]
-        work[(rows.coefficient + first + 3) * len(lanes) + lane] = over * turn[0]
-        work[(rows.coefficient + first + 4) * len(lanes) + lane] = over * turn[1]
+        work[(rows.coefficient + first + 3) * len(lanes) + lane] = over * turn[0] + by_range * by_north
+        work[(rows.coefficient + first + 4) * len(lanes) + lane] = over * turn[1] + by_range * by_east
         work[(rows.coefficient + first + 5) * len(lanes) + lane] = over * turn[2]
-        work[(rows.coefficient + first + 6) * len(lanes) + lane] = by_height
-        work[(rows.coefficient + first + 7) * len(lanes) + lane] = -by_height
+        work[(rows.coefficient + first + 6) * len(lanes) + lane] = -by_range * by_height
+        work[(rows.coefficient + first + 7) * len(lanes) + lane] = by_range * by_height
 
 
 @equation

@@ -10,8 +10,8 @@ import numpy as np
 
 from flownav.compile import equation, larger
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.landing.lag import body_velocity_jacobian
-from flownav.estimation.landing.predict import attitude_of
+from flownav.estimation.landing.lag import LEAST_UPRIGHT, body_velocity_jacobian, lens_range
+from flownav.estimation.landing.predict import attitude_before, attitude_of
 from flownav.estimation.landing.states import (
     ATTITUDE,
     BARO,
@@ -29,9 +29,6 @@ from flownav.estimation.landing.states import (
     LandingRows,
 )
 from flownav.frames import GRAVITY_M_S2, Rotation, Vector, rotation_from_quaternion
-
-LEAST_RANGE_M = 0.05
-LEAST_UPRIGHT = 0.1
 
 # the states that each law reads, in the order of its coefficients
 GPS_POSITION_STATES = (
@@ -88,11 +85,13 @@ def column(rotation: Rotation, axis: int) -> Vector:
 # -- position and velocity ----------------------------------------------------------------------------------
 @equation
 def observe_gps_position(work: Work, lanes: Lanes, rows: LandingRows, axis: int, measured: int, age_s: float) -> None:
-    """z = p + slow + fast error, of now (age 0) or of one prediction ago, where p was p - v age."""
-    source = rows.before + axis if age_s > 0.0 else rows.state + POSITION + axis
+    """z = p + slow + fast error, of now (age 0) or of one prediction ago, where p was p - v age less its change."""
     for lane in range(len(lanes)):
+        late = age_s * work[(rows.state + VELOCITY + axis) * len(lanes) + lane]
+        late += work[(rows.change + axis) * len(lanes) + lane] if age_s > 0.0 else 0.0
         predicted = (
-            work[source * len(lanes) + lane]
+            work[(rows.state + POSITION + axis) * len(lanes) + lane]
+            - late
             + work[(rows.state + GPS_SLOW + axis) * len(lanes) + lane]
             + work[(rows.state + GPS_FAST + axis) * len(lanes) + lane]
         )
@@ -106,15 +105,13 @@ def observe_gps_position(work: Work, lanes: Lanes, rows: LandingRows, axis: int,
 @equation
 def observe_gps_velocity(work: Work, lanes: Lanes, rows: LandingRows, axis: int, measured: int, age_s: float) -> None:
     """z = v - lag a + Gauss-Markov error, of now or of one prediction ago; a is the acceleration of that prediction."""
-    source = rows.before + 3 + axis if age_s > 0.0 else rows.state + VELOCITY + axis
     gravity = GRAVITY_M_S2 if axis == 2 else 0.0
     for lane in range(len(lanes)):
+        late = work[(rows.change + 3 + axis) * len(lanes) + lane] if age_s > 0.0 else 0.0
+        vel = work[(rows.state + VELOCITY + axis) * len(lanes) + lane] - late
         accel = work[(rows.force + axis) * len(lanes) + lane] + gravity
-        predicted = (
-            work[source * len(lanes) + lane]
-            + work[(rows.state + GPS_VELOCITY + axis) * len(lanes) + lane]
-            - work[(rows.state + VELOCITY_LAG) * len(lanes) + lane] * accel
-        )
+        lagging = work[(rows.state + VELOCITY_LAG) * len(lanes) + lane] * accel
+        predicted = vel + work[(rows.state + GPS_VELOCITY + axis) * len(lanes) + lane] - lagging
         work[rows.innovation * len(lanes) + lane] = work[measured * len(lanes) + lane] - predicted
         work[rows.coefficient * len(lanes) + lane] = 1.0
         work[(rows.coefficient + 1) * len(lanes) + lane] = 1.0
@@ -138,12 +135,11 @@ def observe_attitude(work: Work, lanes: Lanes, rows: LandingRows, axis: int, mea
     q_read q^-1 = theta + e_heading down + R (e_roll, e_pitch, 0), small angles; the quaternion lies in four rows
     `measured`.
     """
-    source = rows.before + 6 if age_s > 0.0 else rows.attitude
     for lane in range(len(lanes)):
         rw, rx = work[measured * len(lanes) + lane], work[(measured + 1) * len(lanes) + lane]
         ry, rz = work[(measured + 2) * len(lanes) + lane], work[(measured + 3) * len(lanes) + lane]
-        qw, qx = work[source * len(lanes) + lane], work[(source + 1) * len(lanes) + lane]
-        qy, qz = work[(source + 2) * len(lanes) + lane], work[(source + 3) * len(lanes) + lane]
+        late = age_s > 0.0
+        qw, qx, qy, qz = attitude_before(work, lanes, rows, lane) if late else attitude_of(work, lanes, rows, lane)
         w = rw * qw + rx * qx + ry * qy + rz * qz
         x = -rw * qx + rx * qw - ry * qz + rz * qy
         y = -rw * qy + rx * qz + ry * qw - rz * qx
@@ -225,9 +221,8 @@ def observe_baro(work: Work, lanes: Lanes, rows: LandingRows, measured: int) -> 
 @equation
 def height_range(work: Work, lanes: Lanes, rows: LandingRows, lane: int, lens_below_m: float) -> float:
     """The range that the state implies [m], at least LEAST_RANGE_M."""
-    upright = larger(rotation_of(work, lanes, rows, lane)[8], LEAST_UPRIGHT)
     height = work[(rows.state + GROUND) * len(lanes) + lane] - work[(rows.state + POSITION + 2) * len(lanes) + lane]
-    return larger(height / upright - lens_below_m, LEAST_RANGE_M)
+    return lens_range(rotation_of(work, lanes, rows, lane), height, lens_below_m)[0]
 
 
 # -- optical flow -------------------------------------------------------------------------------------------
@@ -281,8 +276,9 @@ def observe_flow_rate(
         component = 1 if channel == 0 else 0
         along, axis, turn = body_speed(work, lanes, rows, lane, component)
         along += work[lever_m_s * len(lanes) + lane]
-        range_m = height_range(work, lanes, rows, lane, lens_below_m)
-        upright = larger(rotation_of(work, lanes, rows, lane)[8], LEAST_UPRIGHT)
+        height = work[(rows.state + GROUND) * len(lanes) + lane] - work[(rows.state + POSITION + 2) * len(lanes) + lane]
+        rotation = rotation_of(work, lanes, rows, lane)
+        range_m, by_height, by_north, by_east = lens_range(rotation, height, lens_below_m)
         sign = -1.0 if channel == 0 else 1.0
         scale = 1.0 + work[(rows.state + FLOW_SCALE) * len(lanes) + lane]
         per_speed = sign * scale / range_m
@@ -290,7 +286,9 @@ def observe_flow_rate(
         for i in range(3):
             work[(rows.coefficient + i) * len(lanes) + lane] = per_speed * axis[i]
             work[(rows.coefficient + 3 + i) * len(lanes) + lane] = per_speed * turn[i]
-        by_range = per_speed * along / (range_m * upright)
+        by_range = -per_speed * along / range_m
+        work[(rows.coefficient + 3) * len(lanes) + lane] += by_range * by_north
+        work[(rows.coefficient + 4) * len(lanes) + lane] += by_range * by_east
         work[(rows.coefficient + 6) * len(lanes) + lane] = sign * along / range_m
-        work[(rows.coefficient + 7) * len(lanes) + lane] = by_range
-        work[(rows.coefficient + 8) * len(lanes) + lane] = -by_range
+        work[(rows.coefficient + 7) * len(lanes) + lane] = -by_range * by_height
+        work[(rows.coefficient + 8) * len(lanes) + lane] = by_range * by_height

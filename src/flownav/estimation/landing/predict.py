@@ -69,25 +69,65 @@ def predict(
     work: Work, lanes: Lanes, rows: LandingRows, dt_s: float, settings: LandingSettings, lag: FlowLag | None
 ) -> None:
     """The filter moved on by dt with the IMU reading in its rows, which stands for that time."""
-    keep_before(work, lanes, rows)
+    keep_start(work, lanes, rows)
     if lag is not None:
         lag_starts(work, lanes, rows, lag)
     move(work, lanes, rows, dt_s, settings)
     propagate_motion(work, lanes, rows, dt_s)
     propagate_errors(work, lanes, rows, dt_s, settings)
+    note_change(work, lanes, rows, dt_s)
     if lag is not None:
         lag_ends(work, lanes, rows, lag)
 
 
 @equation
-def keep_before(work: Work, lanes: Lanes, rows: LandingRows) -> None:
-    """Position, velocity and attitude, for readings that describe them one prediction later."""
+def keep_start(work: Work, lanes: Lanes, rows: LandingRows) -> None:
+    """Position, velocity and attitude before the prediction, in the rows of `change`."""
     for i in range(6):
         for lane in range(len(lanes)):
-            work[(rows.before + i) * len(lanes) + lane] = work[(rows.state + i) * len(lanes) + lane]
+            work[(rows.change + i) * len(lanes) + lane] = work[(rows.state + i) * len(lanes) + lane]
     for i in range(4):
         for lane in range(len(lanes)):
-            work[(rows.before + 6 + i) * len(lanes) + lane] = work[(rows.attitude + i) * len(lanes) + lane]
+            work[(rows.change + 6 + i) * len(lanes) + lane] = work[(rows.attitude + i) * len(lanes) + lane]
+
+
+@equation
+def note_change(work: Work, lanes: Lanes, rows: LandingRows, dt_s: float) -> None:
+    """What the prediction changed: position beyond its last velocity times dt, velocity, and the turn q0^-1 q.
+
+    A reading of one prediction ago is of p - v dt - change, v - change and q turn^-1. Kept as changes, they move
+    with every correction since, so that components fused one after the other are fused as if together.
+    """
+    for i in range(3):
+        for lane in range(len(lanes)):
+            vel = work[(rows.state + VELOCITY + i) * len(lanes) + lane]
+            moved = work[(rows.state + POSITION + i) * len(lanes) + lane] - work[(rows.change + i) * len(lanes) + lane]
+            work[(rows.change + i) * len(lanes) + lane] = moved - dt_s * vel
+            work[(rows.change + 3 + i) * len(lanes) + lane] = vel - work[(rows.change + 3 + i) * len(lanes) + lane]
+    for lane in range(len(lanes)):
+        w, x, y, z = attitude_of(work, lanes, rows, lane)
+        first = rows.change + 6
+        sw, sx = work[first * len(lanes) + lane], work[(first + 1) * len(lanes) + lane]
+        sy, sz = work[(first + 2) * len(lanes) + lane], work[(first + 3) * len(lanes) + lane]
+        work[first * len(lanes) + lane] = sw * w + sx * x + sy * y + sz * z
+        work[(first + 1) * len(lanes) + lane] = sw * x - sx * w - sy * z + sz * y
+        work[(first + 2) * len(lanes) + lane] = sw * y + sx * z - sy * w - sz * x
+        work[(first + 3) * len(lanes) + lane] = sw * z - sx * y + sy * x - sz * w
+
+
+@equation
+def attitude_before(work: Work, lanes: Lanes, rows: LandingRows, lane: int) -> Quaternion:
+    """A lane's attitude one prediction ago, with what was learnt since: q turn^-1."""
+    w, x, y, z = attitude_of(work, lanes, rows, lane)
+    first = rows.change + 6
+    tw, tx = work[first * len(lanes) + lane], work[(first + 1) * len(lanes) + lane]
+    ty, tz = work[(first + 2) * len(lanes) + lane], work[(first + 3) * len(lanes) + lane]
+    return (
+        w * tw + x * tx + y * ty + z * tz,
+        x * tw - w * tx - y * tz + z * ty,
+        y * tw - w * ty - z * tx + x * tz,
+        z * tw - w * tz - x * ty + y * tx,
+    )
 
 
 @equation

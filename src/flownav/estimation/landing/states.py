@@ -51,7 +51,7 @@ class LandingRows(NamedTuple):
     state: int  # STATES, nominal; the three of ATTITUDE stay 0 but within a correction
     covariance: int  # STATES * STATES, row by row
     attitude: int  # quaternion body to earth
-    before: int  # position, velocity, attitude one prediction ago: what a late reading describes
+    change: int  # 10: what the last prediction changed; a late reading describes the state without it
     imu: int  # gyro [rad/s] and specific force [m/s2], body FRD, as read
     imu_before: int  # the reading before
     rate: int  # body rate: gyro without its lag and bias

@@ -15,10 +15,10 @@ from flownav.cli import identify, info
 from flownav.cli import replay as replay_command
 from flownav.errors import InputError
 from flownav.frames import quaternion_from_euler
-from flownav.inspection.autopilot import autopilot_errors
 from flownav.inspection.summary import summarise
 from flownav.logs.open_log import open_log
 from flownav.measurement import Sensor
+from flownav.scoring.autopilot import autopilot_errors
 from replay_logs import log_of_flight
 from ulog_files import ulog_of_flight
 

@@ -120,7 +120,9 @@ def test_figures_that_are_no_numbers_show_as_a_dash() -> None:
     assert f"x , north (m) {dash} 0.0133 {dash} 0.0750 {dash} {dash}" in Page(render(record)).text
 
 
-@pytest.mark.parametrize(("against", "said"), [("gps", "against GPS, their mean"), ("truth", "against the recorded truth.")])
+@pytest.mark.parametrize(
+    ("against", "said"), [("gps", "against GPS, their mean"), ("truth", "against the recorded truth.")]
+)
 def test_the_autopilots_own_errors_stand_beside_ours(against: str, said: str) -> None:
     record = replay(60.0)
     errors = {"horizontal_rms_m": 0.41, "horizontal_max_m": 1.25}

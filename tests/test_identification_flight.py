@@ -187,8 +187,8 @@ def test_ranges_that_spike_or_stick_to_their_floor_are_left_out(tmp_path):
 @pytest.mark.parametrize(
     ("without", "message"),
     [
-        (("flow",), "no flow readings; flow.csv or px4flow.csv is needed to identify a flow sensor"),
-        (("range",), "no range readings; range.csv is needed for the flow's scale and height"),
+        (("flow",), "no flow readings; a log with a flow sensor's is needed to identify it"),
+        (("range",), "no range readings; a range is needed for the flow's scale and height"),
         (("gps",), "no reference to identify against; truth.csv (motion capture) or gps.csv is needed"),
     ],
 )

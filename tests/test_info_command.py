@@ -19,6 +19,7 @@ from flownav.frames import quaternion_from_euler
 from flownav.inspection.summary import summarise
 from flownav.logs.open_log import open_log
 from flownav.measurement import Sensor
+from flownav.scoring.autopilot import autopilot_errors
 from replay_logs import log_of_flight
 from ulog_files import ulog_of_flight
 

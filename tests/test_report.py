@@ -14,10 +14,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from flownav import files
 from flownav.cli import report as report_command
 from flownav.errors import InputError
 from flownav.record import Record
-from flownav.report import html
 from flownav.report.html import render, write_report
 from report_records import flight, replay
 
@@ -118,6 +118,21 @@ def test_figures_that_are_no_numbers_show_as_a_dash() -> None:
     record.manifest["scores"]["states"]["x"] = {"mean_error": None, "std_error": float("nan")}
     dash = "\N{EN DASH}"
     assert f"x , north (m) {dash} 0.0133 {dash} 0.0750 {dash} {dash}" in Page(render(record)).text
+
+
+@pytest.mark.parametrize(
+    ("against", "said"), [("gps", "against GPS, their mean"), ("truth", "against the recorded truth.")]
+)
+def test_the_autopilots_own_errors_stand_beside_ours(against: str, said: str) -> None:
+    record = replay(60.0)
+    errors = {"horizontal_rms_m": 0.41, "horizontal_max_m": 1.25}
+    record.manifest["scores"]["autopilot"] = {"name": "PX4 EKF2", "against": against, **errors}
+    if against == "truth":
+        record.manifest["scores"]["truth"] = errors
+    text = Page(render(record)).text.replace("\N{NO-BREAK SPACE}", " ")
+    assert f"The autopilot's own estimate (PX4 EKF2) is off by 0.41 m rms, 1.25 m at most, horizontally, {said}" in text
+    record.manifest["scores"]["autopilot"] = {"name": "PX4 EKF2", "against": None}
+    assert "The autopilot's own estimate (" not in Page(render(record)).text
 
 
 @pytest.mark.parametrize(
@@ -261,7 +276,7 @@ def test_the_report_appears_whole_or_not_at_all(tmp_path: Path, monkeypatch: pyt
     def fail(*_: object) -> None:
         raise OSError("disk full")
 
-    monkeypatch.setattr(html.os, "replace", fail)
+    monkeypatch.setattr(files.os, "replace", fail)
     with pytest.raises(OSError, match="disk full"):
         write_report(flight(), page)
     assert page.read_text(encoding="utf-8") == before

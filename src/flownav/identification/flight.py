@@ -73,9 +73,9 @@ def flight(log: Log, reference: str = "auto") -> Flight:
     """A flight out of a log. InputError names what is missing: flow, range, attitude or a reference."""
     sensor = next((s for s in (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY) if s in log.streams), None)
     if sensor is None:
-        raise InputError(f"{log.path}: no flow readings; flow.csv or px4flow.csv is needed to identify a flow sensor")
+        raise InputError(f"{log.path}: no flow readings; a log with a flow sensor's is needed to identify it")
     if Sensor.RANGE not in log.streams:
-        raise InputError(f"{log.path}: no range readings; range.csv is needed for the flow's scale and height")
+        raise InputError(f"{log.path}: no range readings; a range is needed for the flow's scale and height")
     chosen, reference_t_s, reference_m = _reference(log, reference)
     prepared = prepare(log, ReplayOptions(gps_delay_s=0.0))
     mine = prepared.queue.sensor == sensor

@@ -120,7 +120,7 @@ def summary(record: Record) -> str:
     own = mapping(scores.get("autopilot"))
     if own.get("against"):
         rms, largest = number(own.get("horizontal_rms_m"), 2), number(own.get("horizontal_max_m"), 2)
-        against = "that truth" if truth else "GPS, their mean difference taken out"
+        against = "the recorded truth" if own["against"] == "truth" else "GPS, their mean difference taken out"
         said.append(
             f"The autopilot's own estimate ({own.get('name')}) is off by {rms} m rms, "
             f"{largest} m at most, horizontally, against {against}."

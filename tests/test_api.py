@@ -36,6 +36,7 @@ ALLOWED = {
     "simulation": GROUND | EQUATIONS,
     "replay": GROUND | EQUATIONS | {"logs", "scoring"},
     "campaign": GROUND | EQUATIONS | {"simulation", "scoring"},
+    "faults": GROUND | EQUATIONS | {"logs", "simulation", "campaign", "scoring"},
     "report": GROUND | {"scoring"},
     "paper": GROUND | EQUATIONS | {"simulation", "campaign", "scoring", "rig", "identification", "report"},
 }

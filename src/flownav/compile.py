@@ -30,7 +30,7 @@ from typing import Any, TypeVar, cast
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 LANES_WIDE = 16
-WITHOUT_KERNELS = ("cli", "export", "live", "logs", "paper", "report")
+WITHOUT_KERNELS = ("cli", "export", "faults", "live", "logs", "paper", "report")
 ONE_LANE: tuple[int, ...] = (0,)
 LANES: tuple[int, ...] = (0,) * LANES_WIDE
 

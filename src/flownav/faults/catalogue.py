@@ -48,8 +48,18 @@ class Fault(NamedTuple):
 
 _CATALOGUE = (
     Fault("gps_loss", "GPS falls silent.", GPS, inject.lost),
-    Fault("gps_jump", "GPS position jumps 20 m sideways; its velocity stays right.", GPS[:1], inject.displaced(20.0, 0.0)),
-    Fault("gps_drift", "GPS position drifts off at 0.5 m/s; its velocity stays right.", GPS[:1], inject.displaced(0.0, 0.5)),
+    Fault(
+        "gps_jump",
+        "GPS position jumps 20 m sideways; its velocity stays right.",
+        (Sensor.GPS_POSITION,),
+        inject.displaced(20.0, 0.0),
+    ),
+    Fault(
+        "gps_drift",
+        "GPS position drifts off at 0.5 m/s; its velocity stays right.",
+        (Sensor.GPS_POSITION,),
+        inject.displaced(0.0, 0.5),
+    ),
     Fault("gps_clock", "The time stamps of GPS jump ahead by 1 s.", GPS, inject.restamped(1.0)),
     Fault("flow_loss", "The flow sensor falls silent.", FLOW, inject.lost),
     Fault("flow_garbage", "Flow is random, up to 2 rad/s or m/s, at full quality.", FLOW, inject.garbage(2.0)),
@@ -94,7 +104,7 @@ _CATALOGUE = (
     Fault("duplicates", "Every reading arrives twice.", MEASURED, inject.doubled),
     Fault("out_of_order", "Readings arrive in fives, last first.", MEASURED, inject.reversed_in_blocks(5)),
     Fault("silence", "No sensor says anything for 5 s.", EVERYTHING, inject.lost, lasts_s=5.0),
-)  # fmt: skip
+)
 FAULTS: dict[str, Fault] = {fault.name: fault for fault in _CATALOGUE}
 
 

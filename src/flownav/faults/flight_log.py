@@ -100,7 +100,7 @@ def _flow_velocity(record: Record) -> Stream:
 
 
 def _flow_rate(record: Record, setup: Setup) -> Stream:
-    """flow_x = w_x - v/r, flow_y = w_y + u/r with the range that the sensor scaled by: its sonar's, not below its floor."""
+    """flow_x = w_x - v/r, flow_y = w_y + u/r; r as the sensor scaled by it: its sonar's, not below its floor."""
     velocity = _flow_velocity(record)
     gyro = record.matrix("imu", ("gyro_x_rad_s", "gyro_y_rad_s"))
     seen_m = np.maximum(_lens_range(record, setup), max(setup.flight.sensors.flow.sonar_floor_m, SMALLEST_RANGE_M))
@@ -116,7 +116,7 @@ def _flow_rate(record: Record, setup: Setup) -> Stream:
 def _lens_range(record: Record, setup: Setup) -> Array:
     """True distance from the lens to the ground along the boresight [m]."""
     truth = record.tables["truth"]
-    cosine = rotation_from_quaternion(*(truth[name] for name in QUATERNION))[8]
+    cosine = np.asarray(rotation_from_quaternion(*record.matrix("truth", QUATERNION).T)[8])
     height_m = -truth["pos_d_m"] - setup.flight.sensors.lens_below_cg_m * cosine
     return np.asarray(height_m / np.maximum(cosine, SMALLEST_COSINE))
 

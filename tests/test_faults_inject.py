@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -271,6 +274,12 @@ def test_pixels_agree_with_what_low_texture_is_taken_to_be():
 def test_faults_are_found_by_name_in_the_order_asked_for():
     assert [fault.name for fault in faults_named(["silence", "gps_jump"])] == ["silence", "gps_jump"]
     assert all(fault.what.endswith(".") and fault.name == name for name, fault in FAULTS.items())
+
+
+def test_the_page_names_every_fault_and_no_other():
+    page = (Path(__file__).parents[1] / "docs" / "faults.md").read_text(encoding="utf-8")
+    table = page.split("## The faults")[1].split("## The figures")[0]
+    assert re.findall(r"^\| `(\w+)` \|", table, re.M) == list(FAULTS)
 
 
 def test_an_unknown_fault_is_refused_with_the_names_there_are():

@@ -45,7 +45,7 @@ def navigated(error_ned_m=None, sigma_m: float = 0.1, rows=(), events=(), flags=
 
 
 def pulse(t0: float, t1: float, height: float) -> np.ndarray:
-    return np.where((T_S >= t0 - 1e-9) & (T_S < t1 - 1e-9), height, 0.0)
+    return np.where((t0 - 1e-9 <= T_S) & (t1 - 1e-9 > T_S), height, 0.0)
 
 
 def scored(run: Navigated, without: Navigated | None = None, sensors=GPS, window=WINDOW, ground=None):

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 HEIGHTS_M = (0.3, 20.0)
 DURATIONS_S = (0.1, 60.0)
+WIDE = 116  # columns that the table takes
 
 
 def command(
@@ -76,7 +77,7 @@ def _show(rows: list[Row], seed: int) -> None:
     from rich.table import Table
 
     table = Table(title=f"Failing sensors on a landing, seed {seed}", title_justify="left")
-    table.add_column("fault")
+    table.add_column("fault", no_wrap=True)
     columns = ("height m", "lasts s", "noticed s", "largest m", "back s", "wrongly fused", "touchdown m", "unsaid s")
     for name in columns:
         table.add_column(name, justify="right")
@@ -89,7 +90,7 @@ def _show(rows: list[Row], seed: int) -> None:
             str(fused) if faulty else "", _cell(touchdown), _cell(unsaid),
         )  # fmt: skip
     console = Console()
-    console.width = max(console.width, 104)
+    console.width = max(console.width, WIDE)
     console.print(table)
     console.print(
         "noticed: first rejection, event or flag. back: as good as without the fault, after its end. "

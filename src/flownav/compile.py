@@ -30,7 +30,7 @@ from typing import Any, TypeVar, cast
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 LANES_WIDE = 16
-WITHOUT_KERNELS = ("cli", "export", "inspection", "live", "logs", "mavlink", "paper", "report")
+WITHOUT_KERNELS = ("cli", "export", "faults", "inspection", "live", "logs", "mavlink", "paper", "report")
 ONE_LANE: tuple[int, ...] = (0,)
 LANES: tuple[int, ...] = (0,) * LANES_WIDE
 

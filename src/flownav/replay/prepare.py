@@ -228,6 +228,7 @@ def _gyro_candidates(flow: Stream, streams: dict[Sensor, Stream]) -> dict[str, A
     turning = None
     if Sensor.ATTITUDE in streams:
         turning = attitude_rates(streams[Sensor.ATTITUDE], flow.t_s - exposure_s, flow.t_s)[:, :2]
+    if turning is not None and not imu_serves(streams):
         candidates[TURNING] = turning
     if imu_serves(streams):
         rates = _imu_over(flow, streams, exposure_s)
@@ -235,7 +236,7 @@ def _gyro_candidates(flow: Stream, streams: dict[Sensor, Stream]) -> dict[str, A
     own = flow.value[:, 2:4]
     known = np.asarray(np.isfinite(own).all(axis=1))
     if not candidates or (known.mean() > 0.5 and np.all(np.ptp(own[known], axis=0))):
-        spare = candidates.get(TURNING, candidates.get(IMU, np.zeros_like(own)))
+        spare = next(iter(candidates.values()), np.zeros_like(own))
         filled = np.where(known[:, None], own, spare)
         candidates[OWN] = filled if turning is None else filled - _followed(flow.t_s, filled - turning)
     return candidates

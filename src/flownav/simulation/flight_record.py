@@ -13,7 +13,7 @@ from flownav.provenance import command_line, provenance
 from flownav.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY, Record, Table
 from flownav.simulation.assemble import Setup
 from flownav.simulation.history import HISTORY
-from flownav.simulation.sensing import EPOCH_S, RANGE_EPOCHS
+from flownav.simulation.sensing import EPOCH_S, PAD_EPOCHS, RANGE_EPOCHS
 
 Array = NDArray[np.float64]
 GATE_SIGMA_SHOWN = 3.0  # the paper's filter has no gate: its test ratios are shown against 3 sigma and all are fused
@@ -62,6 +62,9 @@ def record_of(setup: Setup, history: Array, seed: int, index: int) -> Record:
     table("flow_velocity", "flow", (*VELOCITY_BODY, "sigma_m_s"), quality=255.0 * flown["flow", "engaged"])
     pings = slice(0, None, RANGE_EPOCHS)
     table("range", "range", COLUMNS[Sensor.RANGE], pings, quality=255.0 * flown["range", "valid"][pings])
+    if setup.flight.plan.draws.pad_fix:
+        fixes = slice(0, None, PAD_EPOCHS)
+        table("pad", "pad", COLUMNS[Sensor.PAD], fixes, quality=255.0 * flown["pad", "valid"][fixes])
     if setup.flight.plan.draws.imu:
         table("imu", "imu", COLUMNS[Sensor.IMU], quality=every)
     kinematic = setup.flight.kinematic

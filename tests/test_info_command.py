@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
-from flownav.inspection.autopilot import autopilot_errors
 from typer.testing import CliRunner
 
 from flownav.cli import identify, info

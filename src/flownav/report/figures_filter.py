@@ -48,6 +48,8 @@ SENSOR_TITLES = {
     "baro": "Barometer",
     "mag": "Magnetometer",
     "pose": "External position",
+    "yaw": "External heading",
+    "pad": "Pad fix",
 }
 
 

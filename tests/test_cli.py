@@ -84,7 +84,14 @@ def test_a_seed_gives_the_same_flight_again(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "choice", [("--filter", "kinematic"), ("--filter", "paper"), ("--truth", "linear"), ("--feedback", "truth"), ("--gps", "midg")]
+    "choice",
+    [
+        ("--filter", "kinematic"),
+        ("--filter", "paper"),
+        ("--truth", "linear"),
+        ("--feedback", "truth"),
+        ("--gps", "midg"),
+    ],
 )
 def test_choices_replace_the_files_own(tmp_path, choice):
     done = run("fly", short(tmp_path), "--json", "--no-report", *choice, "--out", tmp_path / "c.fnr", cwd=tmp_path)
@@ -96,7 +103,10 @@ def test_choices_replace_the_files_own(tmp_path, choice):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("fly", "nowhere"), "nowhere: no such scenario; shipped: takeoff, landing, gusty, pad_return, approach, or give a TOML file"),
+        (
+            ("fly", "nowhere"),
+            "nowhere: no such scenario; shipped: takeoff, landing, gusty, pad_return, approach, or give a TOML file",
+        ),
         (("fly", "nowhere.toml"), "nowhere.toml: no such file"),
         (("fly", "landing", "--flights", "0"), "--flights 0: must be from 1 to"),
         (("fly", "landing", "--flights", "3", "--flight", "1"), "--flight names one flight, --flights many"),
@@ -158,7 +168,9 @@ def test_a_record_that_cannot_be_written_is_said_in_one_line(tmp_path):
 
 def test_a_crash_is_status_1_with_the_record_written(tmp_path):
     storm = short(tmp_path, "\n[wind]\nspeed_20ft_m_s = 30.0\n", duration="20.0")
-    done = run("fly", storm, "--filter", "paper", "--json", "--no-report", "--out", tmp_path / "storm.fnr", cwd=tmp_path)
+    done = run(
+        "fly", storm, "--filter", "paper", "--json", "--no-report", "--out", tmp_path / "storm.fnr", cwd=tmp_path
+    )
     assert done.returncode == 1
     assert json.loads(done.stdout)["crashed"] is True
     assert "1 of 1 flights crashed" in done.stderr

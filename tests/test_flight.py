@@ -157,7 +157,7 @@ def test_a_fitted_pad_fix_is_a_stream_of_the_record_valid_only_where_the_pad_is_
     assert height[seen].max() < 3.5
     assert not seen[height > 3.5].any()
     offset = np.column_stack([np.interp(pad["t_s"], truth["t_s"], truth[name]) for name in POSITION_NED])
-    slant = np.linalg.norm(offset + [0.0, 0.0, approach.flight.sensors.lens_below_cg_m], axis=1)
+    slant = np.linalg.norm(offset + np.array([0.0, 0.0, approach.flight.sensors.lens_below_cg_m]), axis=1)
     assert pad["distance_m"][seen] == pytest.approx(slant[seen], rel=0.1)
 
 

@@ -6,6 +6,7 @@ import sys
 
 import typer
 
+from flownav.cli import accuracy as accuracy
 from flownav.cli import bench as bench
 from flownav.cli import flow as flow
 from flownav.cli import fly as fly
@@ -32,6 +33,7 @@ for name, command, what in (
     ("rig", rig.command, "Swing a flow sensor over a pad beside an encoder, from pixels."),
     ("flow", flow.command, "Optical flow of your own frames, as the PX4FLOW computes it."),
     ("paper", paper.command, "Every table of the paper, published and reproduced side by side."),
+    ("accuracy", accuracy.command, "The landing filter against its targets, and what its pieces are worth."),
     ("vehicle", vehicle.command, "Trim, power, linear models and ground effect of a helicopter."),
     ("report", report.command, "Write a record's report as one HTML page."),
     ("bench", bench.command, "Measure how fast all of this is on your machine."),

@@ -18,7 +18,9 @@ CRASHES_ALLOWED = 0.05  # of the flights, before the exit status says that the v
 
 
 def command(
-    scenario: Annotated[str, typer.Argument(help="takeoff, landing, gusty, pad_return, approach, or a scenario file (TOML).")],
+    scenario: Annotated[
+        str, typer.Argument(help="takeoff, landing, gusty, pad_return, approach, or a scenario file (TOML).")
+    ],
     flights: Annotated[int, typer.Option(help="How many flights; more than one gives medians and 5-95 %.")] = 1,
     flight: Annotated[int | None, typer.Option(help="Fly this one flight of the seed again, counted from 0.")] = None,
     seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,

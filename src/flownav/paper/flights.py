@@ -61,7 +61,7 @@ class Flights:
 def fly_table(
     table: int, seed: int, flights: int, on_progress: Callable[[int], object] = lambda flown: None
 ) -> Flights:
-    """Table 5 or 6 with the paper's filter: `flights` flights with its GPS noise, as many with 2 m CEP, one recorded."""
+    """Table 5 or 6, the paper's filter: `flights` flights with its GPS noise, as many with 2 m CEP, one recorded."""
     name = SCENARIOS[table]
     scenario = with_filter(load_scenario(name), "paper")
     setup = assemble(scenario)

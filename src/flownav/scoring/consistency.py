@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 SCORED = 6  # position and velocity, the degrees of freedom of a normalised error squared
 BAND = 0.95  # probability of the chi-square band
 AIRBORNE_SHARE = 0.9  # of the flights without contact: the step is one in flight
+LEAST_SHARE = 0.01  # of the steps in flight: a height band with fewer says nothing
 HEIGHTS_M = (0.0, 0.3, 1.0, 3.5, np.inf)  # of the skids: between them lie the height bands
 
 
@@ -121,12 +122,13 @@ def efficiency(errors: ErrorSums, bound: ErrorSums) -> dict[str, float]:
 
 
 def efficiency_by_height(errors: ErrorSums, bound: ErrorSums) -> dict[str, dict[str, float]]:
-    """The same in each height band that both were in, keyed "0.3-1 m"."""
+    """The same in each height band, keyed "0.3-1 m", that holds LEAST_SHARE of the steps of both."""
     ratios = errors.root_mean_square_by_height() / bound.root_mean_square_by_height()
+    share = np.minimum(errors.steps / errors.steps.sum(), bound.steps / bound.steps.sum())
     return {
         band_name(b): dict(zip(STATES, map(float, row), strict=True))
         for b, row in enumerate(ratios)
-        if np.isfinite(row).all()
+        if share[b] >= LEAST_SHARE
     }
 
 
@@ -162,7 +164,9 @@ def percentile_with_interval(values: Array, share: float, confidence: float = 0.
         raise ValueError("no values")
     ordered = np.append(np.sort(values), np.inf)
     tail = 0.5 * (1.0 - confidence)
-    below = bdtr(np.arange(count, dtype=float), count, share)  # probability that at most k values lie below the quantile
+    below = bdtr(
+        np.arange(count, dtype=float), count, share
+    )  # probability that at most k values lie below the quantile
     low = int(np.searchsorted(below, tail, side="left"))  # binomial quantiles
     high = int(np.searchsorted(below, 1.0 - tail, side="left"))
     place = max(int(np.ceil(share * count - 1e-9)) - 1, 0)

@@ -1,7 +1,7 @@
 """Scenario files: what is flown, with which vehicle, sensors, wind, filter and autopilot.
 
-`takeoff`, `landing`, `gusty`, `pad_return` and `approach` ship; any TOML file of this schema flies. Positions are those of the skids
-relative to the pad's centre, in the local NED frame.
+`takeoff`, `landing`, `gusty`, `pad_return` and `approach` ship; any TOML file of this schema flies. Positions are
+those of the skids relative to the pad's centre, in the local NED frame.
 """
 
 from __future__ import annotations

@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from flownav.campaign.local import score_history
 from flownav.record import POSITION_NED, VELOCITY_BODY
 from flownav.scoring.consistency import (
+    GROUP_FLIGHTS,
     ConsistencySums,
     ErrorSums,
     consistency_of_block,
     efficiency,
     error_sums,
     inside_fraction,
+    inside_steps,
     largest_horizontal_error,
     percentile_with_interval,
 )
@@ -41,13 +43,15 @@ class Judged:
     """What a batch of flights leaves: a row of scores and a largest horizontal error a flight, and sums.
 
     scores (flights, len(SCORE_COLUMNS)); largest_horizontal_m (flights,), relative to where the vehicle noted its
-    pad; sums: None for a filter that states no consistency.
+    pad; groups: steps inside the band, and steps, of each GROUP_FLIGHTS flights one after the other (of all where
+    there are fewer; a remainder is left out). Both are None for a filter that states no consistency.
     """
 
     scores: Array
     largest_horizontal_m: Array
-    sums: ConsistencySums | None
     errors: ErrorSums
+    sums: ConsistencySums | None
+    groups: tuple[tuple[int, int], ...] | None
 
 
 @dataclass(frozen=True)
@@ -76,15 +80,22 @@ def fly_judged(
         sums = consistency_of_block(estimate, truth, nees, _skid_height(flight, history), _on_ground(history))
         return score_history(flight, history), largest_horizontal_error(estimate, truth, home), sums
 
-    rows, largest, total = [], [], None
+    rows, largest, groups = [], [], []
+    total = group = None
     for flown, (scores, horizontal, sums) in fly_blocks(flight, seed, 0, flights, judge, threads):
         rows.append(scores)
         largest.append(horizontal)
         total = sums if total is None else total + sums
+        group = sums if group is None else group + sums
+        if group.flights >= GROUP_FLIGHTS:
+            groups.append(inside_steps(group))
+            group = None
         on_progress(flown)
     assert total is not None
-    stated = total if flight.landing is not None else None
-    return Judged(np.concatenate(rows), np.concatenate(largest), stated, total.errors)
+    found = np.concatenate(rows), np.concatenate(largest), total.errors
+    if flight.landing is None:
+        return Judged(*found, None, None)
+    return Judged(*found, total, tuple(groups) or (inside_steps(total),))
 
 
 def bound_of(setup: Setup, seed: int, flights: int, *, threads: int | None = None) -> Bound:
@@ -122,8 +133,8 @@ def home_epoch(flight: Flight) -> int | None:
 
 def consistency_facts(judged: Judged, bound: Bound) -> dict[str, Any]:
     """What `flownav fly` says of many flights of the landing filter; null where no flight landed or flew."""
-    assert judged.sums is not None
-    inside = inside_fraction(judged.sums)
+    assert judged.groups is not None
+    inside = inside_fraction(judged.groups)
     low, high = touchdown_radius(judged)[1:]
     return {
         "efficiency": {state: _finite(ratio) for state, ratio in efficiency(judged.errors, bound.sums).items()},

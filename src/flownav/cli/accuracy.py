@@ -76,14 +76,15 @@ def _targets(made: list[Case]) -> str:
 def _efficiency(made: list[Case]) -> str:
     rows = [
         (case.name, *(f"{case.facts['efficiency'][state]:.3f}" for state in EFFICIENCY_STATES),
-         f"{case.facts['anees']:.3f}", _interval(case.facts, "p95_largest_horizontal"), _interval(case.facts, "r95"),
-         str(case.facts["crashed"]))
+         f"{case.facts['anees']:.3f}", f"{case.facts['anees_inside_fraction_of_all_flights']:.3f}",
+         _interval(case.facts, "p95_largest_horizontal"), _interval(case.facts, "r95"), str(case.facts["crashed"]))
         for case in made
     ]  # fmt: skip
     heading = (
         "RMSE over bound",
         *EFFICIENCY_STATES,
         "ANEES",
+        "steps with the ANEES of all flights in its band",
         "p95 of largest horizontal error [m] (95 % interval)",
         "touchdown R95 [m] (95 % interval)",
         "crashed",

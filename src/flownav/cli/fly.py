@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from flownav.simulation.scenario import Scenario
 
 
+OF_MANY_FLIGHTS = ("efficiency", "anees_inside_fraction", "r95_m", "r95_interval_m")
 CRASHES_ALLOWED = 0.05  # of the flights, before the exit status says that the verdict is bad
 
 
@@ -34,7 +35,8 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
-    from flownav.campaign.local import fly_many, fly_recorded, median_flight
+    from flownav.campaign.judged import BOUND_FLIGHTS, bound_of, consistency_facts, fly_judged
+    from flownav.campaign.local import fly_recorded, median_flight
     from flownav.cli.output import progress, require_between, require_writable, save
     from flownav.scoring.errors import scores_of_flights
     from flownav.scoring.paper_tables import percentile_of_paper, published
@@ -62,12 +64,17 @@ def command(
     index, percentiles = flight or 0, None
     if flights > 1:
         with progress(f"Flying {chosen.name}", flights) as advance:
-            rows = fly_many(setup.flight, seed, flights, on_progress=advance)
+            judged = fly_judged(setup.flight, seed, flights, on_progress=advance)
+        rows = judged.scores
         index = median_flight(rows)
+        if setup.flight.landing is not None:
+            facts |= consistency_facts(judged, bound_of(setup, seed, min(flights, BOUND_FLIGHTS)))
         table = published(chosen.paper_table)
         percentiles = percentile_of_paper(rows, table) if table else None
     record = fly_recorded(setup, seed, index)
     scores = record.manifest["scores"] if flights == 1 else scores_of_flights(rows)
+    if flights == 1 and setup.flight.landing is not None:
+        facts |= dict.fromkeys(OF_MANY_FLIGHTS)
     facts |= scores | save(record, record_path, report=report)
     if percentiles:
         facts["paper_percentile"] = percentiles

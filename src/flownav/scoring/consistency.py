@@ -9,6 +9,7 @@ Sums, not flights, are kept: memory does not grow with the number of flights.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,6 +20,7 @@ from flownav.scoring.errors import STATES
 Array = NDArray[np.float64]
 
 SCORED = 6  # position and velocity, the degrees of freedom of a normalised error squared
+GROUP_FLIGHTS = 96  # flights whose mean is held against the band: the test is as sharp however many are flown
 BAND = 0.95  # probability of the chi-square band
 AIRBORNE_SHARE = 0.9  # of the flights without contact: the step is one in flight
 LEAST_SHARE = 0.01  # of the steps in flight: a height band with fewer says nothing
@@ -107,11 +109,17 @@ def anees(sums: ConsistencySums) -> float:
     return float(np.mean(sums.nees[inside])) / (SCORED * sums.flights) if inside.any() else float("nan")
 
 
-def inside_fraction(sums: ConsistencySums) -> float:
-    """Share of the steps in flight whose mean over flights lies inside its 95 % band; NaN without such a step."""
+def inside_steps(sums: ConsistencySums) -> tuple[int, int]:
+    """How many steps in flight have their mean over flights inside its 95 % band, and of how many."""
     mean = sums.nees[steps_in_flight(sums)] / sums.flights
     low, high = chi_square_band(sums.flights)
-    return float(np.mean((mean >= low) & (mean <= high))) if len(mean) else float("nan")
+    return int(np.count_nonzero((mean >= low) & (mean <= high))), len(mean)
+
+
+def inside_fraction(groups: Sequence[tuple[int, int]]) -> float:
+    """Share of the steps in flight inside the band, over groups as `inside_steps` has them; NaN without a step."""
+    inside, steps = (sum(column) for column in zip(*groups, strict=True))
+    return inside / steps if steps else float("nan")
 
 
 # -- efficiency -------------------------------------------------------------------------------------------

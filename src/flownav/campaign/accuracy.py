@@ -140,8 +140,8 @@ def _facts(judged: Judged) -> dict[str, Any]:
 def _targets(name: str, facts: dict[str, Any]) -> tuple[Target, ...]:
     """The promises of a case."""
     worst = max(facts["efficiency"].values())
-    inside = Target(f"steps with the ANEES of {GROUP_FLIGHTS} flights in its {100 * BAND:.0f} % band", facts["anees_inside_fraction"],
-                    LEAST_INSIDE, at_least=True)  # fmt: skip
+    what = f"steps with the ANEES of {GROUP_FLIGHTS} flights in its {100 * BAND:.0f} % band"
+    inside = Target(what, facts["anees_inside_fraction"], LEAST_INSIDE, at_least=True)
     if name in PAPERS_CONDITIONS:
         largest = Target("95th percentile of the largest error of one axis [m]", facts["p95_largest_axis_m"], 0.10)
         return largest, Target("RMSE over bound, worst state", worst, 1.10), inside

@@ -48,8 +48,9 @@ def command(
         with written_whole(out) as temporary:
             temporary.write_text(text, encoding="utf-8", newline="\n")
     if as_json:
-        facts: dict[str, Any] = {"flights": flights, "seed": seed, "cases": [case.as_json() for case in made]}
-        typer.echo(json.dumps(facts | ({"out": str(out)} if out else {})))
+        facts: dict[str, Any] = {"flights": flights, "ablation_flights": ablations, "seed": seed}
+        facts |= {"cases": [case.as_json() for case in made]} | ({"out": str(out)} if out else {})
+        typer.echo(json.dumps(facts))
     else:
         typer.echo(text)
     missed = [f"{case.name}: {target.sentence()}" for case in made for target in case.targets if not target.kept]

@@ -58,6 +58,7 @@ def test_fly_json_has_every_key_and_its_record_is_there(tmp_path):
     assert list(facts["states"]) == list("xyzuvw")
     assert all(set(entry) == NUMBER_KEYS for entry in facts["states"].values())
     assert facts["touchdown"] is None
+    assert [facts[key] for key in ("efficiency", "anees_inside_fraction", "r95_m")] == [None, None, None]
     record = Record.load(tmp_path / "f.fnr")
     error = record.matrix("estimate", ("pos_n_m",)) - record.matrix("truth", ("pos_n_m",))
     assert facts["states"]["x"]["rms_error"] == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
@@ -72,6 +73,9 @@ def test_many_flights_turn_every_number_into_median_and_percentiles(tmp_path):
         for number in entry.values():
             assert number["p05"] <= number["median"] <= number["p95"]
     assert 0 <= facts["paper_percentile"]["max_position_error_m"] <= 100
+    assert all(0.3 < facts["efficiency"][state] < 3.0 for state in "xyzuvw")
+    assert 0.0 <= facts["anees_inside_fraction"] <= 1.0
+    assert (facts["r95_m"], facts["r95_interval_m"]) == (None, [None, None])  # 2 s: none lands
     record = Record.load(tmp_path / facts["record"])
     assert record.manifest["scores"]["max_position_error_m"] == pytest.approx(
         facts["max_position_error_m"]["median"], rel=0.2
@@ -97,6 +101,7 @@ def test_choices_replace_the_files_own(tmp_path, choice):
     done = run("fly", short(tmp_path), "--json", "--no-report", *choice, "--out", tmp_path / "c.fnr", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     manifest = Record.load(tmp_path / "c.fnr").manifest
+    assert ("efficiency" in json.loads(done.stdout)) == (manifest["filter"] == "landing")
     assert manifest[choice[0].removeprefix("--")] == choice[1]
 
 

@@ -20,7 +20,7 @@ def command(
     cases: Annotated[
         str, typer.Option(help="Cases, with commas: takeoff, landing, pad_return, approach; or all.")
     ] = "all",
-    ablations: Annotated[int, typer.Option(help="Flights of each variant that lacks a piece; 0 for none.")] = 250,
+    ablations: Annotated[int, typer.Option(help="Flights of each variant that lacks a piece; 0 for none.")] = 100,
     seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
     out: Annotated[Path | None, typer.Option(help="Write the tables as Markdown, too.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,

@@ -14,10 +14,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from flownav import files
 from flownav.cli import report as report_command
 from flownav.errors import InputError
 from flownav.record import Record
-from flownav.report import html
 from flownav.report.html import render, write_report
 from report_records import flight, replay
 
@@ -261,7 +261,7 @@ def test_the_report_appears_whole_or_not_at_all(tmp_path: Path, monkeypatch: pyt
     def fail(*_: object) -> None:
         raise OSError("disk full")
 
-    monkeypatch.setattr(html.os, "replace", fail)
+    monkeypatch.setattr(files.os, "replace", fail)
     with pytest.raises(OSError, match="disk full"):
         write_report(flight(), page)
     assert page.read_text(encoding="utf-8") == before

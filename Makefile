@@ -1,4 +1,4 @@
-# flownav: `make demo` flies the paper's landing, `make test` proves the package. Either works first.
+# flownav: `make demo` flies the paper's landing on the landing filter, `make test` proves the package. Either works first.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin

@@ -54,10 +54,11 @@ def test_fly_json_has_every_key_and_its_record_is_there(tmp_path):
         "touchdown",
         "record",
     } <= set(facts)
-    assert (facts["filter"], facts["gps"], facts["seed"], facts["flights"]) == ("paper", "white", 3, 1)
+    assert (facts["filter"], facts["gps"], facts["seed"], facts["flights"]) == ("landing", "white", 3, 1)
     assert list(facts["states"]) == list("xyzuvw")
     assert all(set(entry) == NUMBER_KEYS for entry in facts["states"].values())
     assert facts["touchdown"] is None
+    assert [facts[key] for key in ("efficiency", "anees_inside_fraction", "r95_m")] == [None, None, None]
     record = Record.load(tmp_path / "f.fnr")
     error = record.matrix("estimate", ("pos_n_m",)) - record.matrix("truth", ("pos_n_m",))
     assert facts["states"]["x"]["rms_error"] == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
@@ -72,6 +73,9 @@ def test_many_flights_turn_every_number_into_median_and_percentiles(tmp_path):
         for number in entry.values():
             assert number["p05"] <= number["median"] <= number["p95"]
     assert 0 <= facts["paper_percentile"]["max_position_error_m"] <= 100
+    assert all(0.3 < facts["efficiency"][state] < 3.0 for state in "xyzuvw")
+    assert 0.0 <= facts["anees_inside_fraction"] <= 1.0
+    assert (facts["r95_m"], facts["r95_interval_m"]) == (None, [None, None])  # 2 s: none lands
     record = Record.load(tmp_path / facts["record"])
     assert record.manifest["scores"]["max_position_error_m"] == pytest.approx(
         facts["max_position_error_m"]["median"], rel=0.2
@@ -84,19 +88,30 @@ def test_a_seed_gives_the_same_flight_again(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "choice", [("--filter", "kinematic"), ("--truth", "linear"), ("--feedback", "truth"), ("--gps", "midg")]
+    "choice",
+    [
+        ("--filter", "kinematic"),
+        ("--filter", "paper"),
+        ("--truth", "linear"),
+        ("--feedback", "truth"),
+        ("--gps", "midg"),
+    ],
 )
 def test_choices_replace_the_files_own(tmp_path, choice):
     done = run("fly", short(tmp_path), "--json", "--no-report", *choice, "--out", tmp_path / "c.fnr", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     manifest = Record.load(tmp_path / "c.fnr").manifest
+    assert ("efficiency" in json.loads(done.stdout)) == (manifest["filter"] == "landing")
     assert manifest[choice[0].removeprefix("--")] == choice[1]
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("fly", "nowhere"), "nowhere: no such scenario; shipped: takeoff, landing, gusty, or give a TOML file"),
+        (
+            ("fly", "nowhere"),
+            "nowhere: no such scenario; shipped: takeoff, landing, gusty, pad_return, approach, or give a TOML file",
+        ),
         (("fly", "nowhere.toml"), "nowhere.toml: no such file"),
         (("fly", "landing", "--flights", "0"), "--flights 0: must be from 1 to"),
         (("fly", "landing", "--flights", "3", "--flight", "1"), "--flight names one flight, --flights many"),
@@ -105,7 +120,7 @@ def test_choices_replace_the_files_own(tmp_path, choice):
         (("fly", "landing", "--gps", "rtk"), "command line: gps.model: Input should be 'white' or 'midg', got 'rtk'"),
         (
             ("fly", "landing", "--filter", "ukf"),
-            "command line: filter.name: Input should be 'paper' or 'kinematic', got 'ukf'",
+            "command line: filter.name: Input should be 'paper', 'kinematic' or 'landing', got 'ukf'",
         ),
         (
             ("fly", "landing", "--truth", "real"),
@@ -158,7 +173,9 @@ def test_a_record_that_cannot_be_written_is_said_in_one_line(tmp_path):
 
 def test_a_crash_is_status_1_with_the_record_written(tmp_path):
     storm = short(tmp_path, "\n[wind]\nspeed_20ft_m_s = 30.0\n", duration="20.0")
-    done = run("fly", storm, "--json", "--no-report", "--out", tmp_path / "storm.fnr", cwd=tmp_path)
+    done = run(
+        "fly", storm, "--filter", "paper", "--json", "--no-report", "--out", tmp_path / "storm.fnr", cwd=tmp_path
+    )
     assert done.returncode == 1
     assert json.loads(done.stdout)["crashed"] is True
     assert "1 of 1 flights crashed" in done.stderr

@@ -7,6 +7,7 @@ import pytest
 
 from flownav.campaign.local import fly_many, fly_recorded, score_history
 from flownav.parameter_files import check
+from flownav.record import POSITION_NED, QUATERNION
 from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS
 from flownav.scoring.paper_tables import published
 from flownav.simulation.assemble import assemble
@@ -50,6 +51,9 @@ def landings(landing):
     return fly_many(landing.flight, 11, 32)
 
 
+PAPERS = {"name": "paper"}
+
+
 def test_every_landing_touches_down_on_the_pad_softly(landings):
     assert np.isfinite(landings[:, SCORE_COLUMNS.index("touchdown.t_s")]).all()
     assert landings[:, SCORE_COLUMNS.index("touchdown.horizontal_error_m")].max() < 1.0
@@ -75,15 +79,17 @@ def test_takeoff_waits_climbs_at_one_metre_a_second_and_holds():
     assert np.abs(height[900:] - 3.0).max() < 0.3
 
 
-def test_white_gps_gives_the_papers_largest_error_and_real_gps_gives_metres(landing, landings):
-    largest = np.median(landings[:, MAX_POSITION_ERROR])
+def test_the_papers_filter_has_its_largest_error_with_white_gps_and_metres_with_real_gps(landings):
+    papers = fly_many(setup("landing", filter=PAPERS).flight, 11, 32)
+    largest = np.median(papers[:, MAX_POSITION_ERROR])
     assert largest == pytest.approx(published(6)["max_position_error_m"], abs=0.06)
-    honest = fly_many(setup("landing", gps={"model": "midg"}, pad={"size_m": 20.0}).flight, 11, 32)
-    assert np.median(honest[:, MAX_POSITION_ERROR]) > 1.5
+    assert np.median(landings[:, MAX_POSITION_ERROR]) < 0.5 * largest
+    honest = setup("landing", filter=PAPERS, gps={"model": "midg"}, pad={"size_m": 20.0})
+    assert np.median(fly_many(honest.flight, 11, 32)[:, MAX_POSITION_ERROR]) > 1.5
 
 
 def test_a_storm_is_a_crash_and_not_a_landing():
-    storm = setup("landing", wind={"speed_20ft_m_s": 30.0}).flight
+    storm = setup("landing", filter=PAPERS, wind={"speed_20ft_m_s": 30.0}).flight
     scores = fly_many(storm, 1, 16)
     assert scores[:, SCORE_COLUMNS.index("crashed")].all()
     assert np.isnan(scores[:, SCORE_COLUMNS.index("touchdown.t_s")]).any()
@@ -98,7 +104,7 @@ def test_flying_on_truth_tracks_better_than_flying_on_the_estimate():
 
 
 def test_linear_truth_reproduces_the_papers_own_experiment():
-    history = fly_one(setup("takeoff", truth="linear").flight, 1)[:, :, 0]
+    history = fly_one(setup("takeoff", filter=PAPERS, truth="linear").flight, 1)[:, :, 0]
     down = history[:, column("truth", "pos_d_m")]
     assert down[0] - down[-1] == pytest.approx(3.0, abs=0.3)
     error = down - history[:, column("estimate", "pos_d_m")]
@@ -119,6 +125,40 @@ def test_record_holds_the_flight_and_survives_the_disk(landing, tmp_path):
     kinds = list(again.tables["events"]["kind"])
     assert "touchdown" in kinds
     assert "engaged" in kinds
+
+
+def test_the_landing_filters_record_has_its_own_attitude_its_consistency_and_its_gate(landing):
+    record = fly_recorded(landing, 11, 4)
+    estimate = record.tables["estimate"]
+    assert not np.array_equal(estimate["qw"], record.tables["attitude"]["qw"])
+    assert np.allclose(sum(estimate[name] ** 2 for name in QUATERNION), 1.0)
+    assert 3.0 < np.mean(estimate["nees"]) < 12.0
+    rows = record.tables["innovation"]
+    gate = landing.flight.landing.settings.gate_sigma
+    assert set(rows["sensor"]) == {"gps_position", "flow_velocity"}
+    assert set(rows["component"][rows["sensor"] == "flow_velocity"]) == {0, 1}
+    assert rows["test_ratio"] == pytest.approx(rows["innovation"] ** 2 / (gate**2 * rows["innovation_variance"]))
+    assert "pad" not in record.tables
+
+
+def test_other_filters_have_the_ins_attitude_and_no_consistency():
+    record = fly_recorded(setup("landing", filter=PAPERS, flight=SHORT), 11)
+    assert np.array_equal(record.tables["estimate"]["qx"], record.tables["attitude"]["qx"])
+    assert "nees" not in record.tables["estimate"]
+
+
+def test_a_fitted_pad_fix_is_a_stream_of_the_record_valid_only_where_the_pad_is_seen():
+    approach = setup("approach", flight={"duration_s": 30.0})
+    record = fly_recorded(approach, 3)
+    pad, truth = record.tables["pad"], record.tables["truth"]
+    seen = pad["quality"] > 0.0
+    assert seen.any()
+    height = -np.interp(pad["t_s"], truth["t_s"], truth["pos_d_m"])
+    assert height[seen].max() < 3.5
+    assert not seen[height > 3.5].any()
+    offset = np.column_stack([np.interp(pad["t_s"], truth["t_s"], truth[name]) for name in POSITION_NED])
+    slant = np.linalg.norm(offset + np.array([0.0, 0.0, approach.flight.sensors.lens_below_cg_m]), axis=1)
+    assert pad["distance_m"][seen] == pytest.approx(slant[seen], rel=0.1)
 
 
 def test_flow_disengages_where_the_pad_is_too_small_for_its_view():

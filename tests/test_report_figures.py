@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from flownav.measurement import Sensor
 from flownav.record import Record
-from flownav.report.figures_filter import error_against_gps, innovations, radius_of_uncertainty
+from flownav.report.figures_filter import consistency, error_against_gps, innovations, radius_of_uncertainty
 from flownav.report.figures_path import ground_track, path_over_pad
 from flownav.report.figures_states import close_ups, position, position_error, velocity
 from flownav.report.figures_vehicle import attitude
@@ -308,3 +308,18 @@ def test_a_band_is_open_where_nothing_was_measured() -> None:
     assert band.fill == "toself"
     assert np.isnan(band.y).sum() == 2  # two areas, each closed
     assert not np.any((np.array(band.x) > 20.0) & (np.array(band.x) < 30.0))
+
+
+def test_consistency_is_drawn_in_the_band_of_one_flight_where_the_record_has_it() -> None:
+    record = flight()
+    assert consistency(record) == []
+    estimate = record.tables["estimate"]
+    estimate["nees"] = np.full(len(estimate["t_s"]), 6.0)
+    estimate["nees"][: len(estimate["nees"]) // 4] = 20.0
+    (panel,) = consistency(record)
+    lines = {trace.name: np.asarray(trace.y) for trace in panel.figure.data}
+    assert lines["filter"].max() == 20.0
+    limits = sorted({float(trace.y[0]) for trace in panel.figure.data if "lie between" in trace.name})
+    assert limits == pytest.approx([1.237, 14.449], abs=1e-3)  # chi-square of 6 degrees of freedom
+    assert "here 75 % do" in panel.caption
+    assert panel in next(section for section in sections(record) if section.key == "filter").panels

@@ -45,6 +45,7 @@ TABLES: dict[str, tuple[str, ...]] = {
         *VELOCITY_BODY,
         *QUATERNION,
         *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)),
+        "nees",  # normalised estimation error squared of position and velocity, where the truth is known
     ),
     # what another estimator said (an autopilot's own)
     "autopilot": (*POSITION_NED, *VELOCITY_BODY, *QUATERNION),

@@ -63,11 +63,11 @@ def best_of(work: Callable[[], object], repeats: int = REPEATS) -> float:
 
 
 def _landing() -> Flight:
-    """The paper's landing."""
+    """The paper's landing with the paper's filter."""
     from flownav.simulation.assemble import assemble
-    from flownav.simulation.scenario import load_scenario
+    from flownav.simulation.scenario import load_scenario, with_filter
 
-    return assemble(load_scenario("landing")).flight
+    return assemble(with_filter(load_scenario("landing"), "paper")).flight
 
 
 def _papers_model() -> PaperModel:

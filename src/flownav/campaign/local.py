@@ -44,7 +44,7 @@ def fly_many(
     scores = np.empty((flights, len(SCORE_COLUMNS)))
     done = 0
     for flown, block in fly_blocks(flight, seed, first, flights, lambda h: score_history(flight, h), threads):
-        scores[done : done + flown] = block[:flown]
+        scores[done : done + flown] = block
         done += flown
         on_progress(flown)
     return scores

@@ -6,6 +6,7 @@ import sys
 
 import typer
 
+from flownav.cli import accuracy as accuracy
 from flownav.cli import bench as bench
 from flownav.cli import export as export
 from flownav.cli import flow as flow
@@ -37,6 +38,7 @@ for name, command, what in (
     ("flow", flow.command, "Optical flow of your own frames, as the PX4FLOW computes it."),
     ("pad", pad.command, "Find the landing pad in a frame; measure how well, by height."),
     ("paper", paper.command, "Every table of the paper, published and reproduced side by side."),
+    ("accuracy", accuracy.command, "The landing filter against its targets, and what its pieces are worth."),
     ("vehicle", vehicle.command, "Trim, power, linear models and ground effect of a helicopter."),
     ("report", report.command, "Write a record's report as one HTML page."),
     ("export", export.command, "Write a record as MCAP, TUM, EuRoC, Parquet, CSV or ULog."),

@@ -27,8 +27,8 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
     for name in ("mean error", "std error", "rms error", "max error"):
         table.add_column(name, justify="right")
     if paper:
-        table.add_column(f"{paper['title']} mean", justify="right", style="dim")
-        table.add_column(f"{paper['title']} std", justify="right", style="dim")
+        for statistic in ("mean", "std"):
+            table.add_column(f"{paper['title']} {statistic}\n(paper's filter)", justify="right", style="dim")
     for state, entry in facts["states"].items():
         cells = [_cell(entry[key], 3 if many else 4) for key in ("mean_error", "std_error", "rms_error", "max_error")]
         if paper:
@@ -39,6 +39,8 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
     largest = _cell(facts["max_position_error_m"], 3 if many else 4)
     console.print(f"largest error of one position axis  {largest} m{beside}", highlight=False)
     _show_touchdown(console, facts)
+    if facts.get("efficiency"):
+        _show_consistency(console, facts)
     if "paper_percentile" in facts:
         _show_percentiles(console, facts["paper_percentile"])
     which = f" (flight {median}, the one with the median largest error)" if many else ""
@@ -59,6 +61,22 @@ def _show_touchdown(console: Console, facts: dict[str, Any]) -> None:
         f"{_cell(landing['sink_rate_m_s'], 3)} m/s, at {_cell(landing['t_s'], 2)} s{landed}",
         highlight=False,
     )
+
+
+def _show_consistency(console: Console, facts: dict[str, Any]) -> None:
+    """Efficiency, consistency and touchdown radius of many flights of the landing filter."""
+    ratios = ", ".join(f"{state} {_or_dash(ratio)}" for state, ratio in facts["efficiency"].items())
+    console.print(f"RMSE over the Cramér-Rao bound, in flight  {ratios}", highlight=False)
+    inside = facts["anees_inside_fraction"]
+    if inside is not None:
+        console.print(f"ANEES inside its 95 % band  on {100.0 * inside:.1f} % of the steps in flight", highlight=False)
+    if facts["r95_m"] is not None:
+        low, high = (_or_dash(end, 3) for end in facts["r95_interval_m"])
+        console.print(f"touchdown R95  {facts['r95_m']:.3f} m (95 % interval {low}..{high})", highlight=False)
+
+
+def _or_dash(number: float | None, digits: int = 2) -> str:
+    return "-" if number is None else f"{number:.{digits}f}"
 
 
 def _show_percentiles(console: Console, percentiles: dict[str, Any]) -> None:

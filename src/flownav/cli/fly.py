@@ -14,16 +14,19 @@ if TYPE_CHECKING:
     from flownav.simulation.scenario import Scenario
 
 
+OF_MANY_FLIGHTS = ("efficiency", "anees_inside_fraction", "r95_m", "r95_interval_m")
 CRASHES_ALLOWED = 0.05  # of the flights, before the exit status says that the verdict is bad
 
 
 def command(
-    scenario: Annotated[str, typer.Argument(help="takeoff, landing, gusty, or a scenario file (TOML).")],
+    scenario: Annotated[
+        str, typer.Argument(help="takeoff, landing, gusty, pad_return, approach, or a scenario file (TOML).")
+    ],
     flights: Annotated[int, typer.Option(help="How many flights; more than one gives medians and 5-95 %.")] = 1,
     flight: Annotated[int | None, typer.Option(help="Fly this one flight of the seed again, counted from 0.")] = None,
     seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
     gps: Annotated[str | None, typer.Option(help="GPS error model: white or midg.")] = None,
-    filter_name: Annotated[str | None, typer.Option("--filter", help="Filter: paper or kinematic.")] = None,
+    filter_name: Annotated[str | None, typer.Option("--filter", help="Filter: landing, paper or kinematic.")] = None,
     feedback: Annotated[str | None, typer.Option(help="What the autopilot flies on: estimate or truth.")] = None,
     truth: Annotated[str | None, typer.Option(help="The plant: nonlinear, or the paper's linear model.")] = None,
     sensor: Annotated[str | None, typer.Option(help="A flow sensor file (TOML).")] = None,
@@ -32,7 +35,8 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
-    from flownav.campaign.local import fly_many, fly_recorded, median_flight
+    from flownav.campaign.judged import BOUND_FLIGHTS, bound_of, consistency_facts, fly_judged
+    from flownav.campaign.local import fly_recorded, median_flight
     from flownav.cli.output import progress, require_between, require_writable, save
     from flownav.scoring.errors import scores_of_flights
     from flownav.scoring.paper_tables import percentile_of_paper, published
@@ -60,12 +64,17 @@ def command(
     index, percentiles = flight or 0, None
     if flights > 1:
         with progress(f"Flying {chosen.name}", flights) as advance:
-            rows = fly_many(setup.flight, seed, flights, on_progress=advance)
+            judged = fly_judged(setup.flight, seed, flights, on_progress=advance)
+        rows = judged.scores
         index = median_flight(rows)
+        if setup.flight.landing is not None:
+            facts |= consistency_facts(judged, bound_of(setup, seed, min(flights, BOUND_FLIGHTS)))
         table = published(chosen.paper_table)
         percentiles = percentile_of_paper(rows, table) if table else None
     record = fly_recorded(setup, seed, index)
     scores = record.manifest["scores"] if flights == 1 else scores_of_flights(rows)
+    if flights == 1 and setup.flight.landing is not None:
+        facts |= dict.fromkeys(OF_MANY_FLIGHTS)
     facts |= scores | save(record, record_path, report=report)
     if percentiles:
         facts["paper_percentile"] = percentiles

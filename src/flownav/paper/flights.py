@@ -15,7 +15,7 @@ from flownav.scoring.paper_tables import percentile_of_paper, published
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.engine import fly_blocks
 from flownav.simulation.flight_record import record_of
-from flownav.simulation.scenario import Scenario, load_scenario
+from flownav.simulation.scenario import Scenario, load_scenario, with_filter
 
 SCENARIOS = {5: "takeoff", 6: "landing"}
 HONEST_GPS = "midg"
@@ -61,9 +61,9 @@ class Flights:
 def fly_table(
     table: int, seed: int, flights: int, on_progress: Callable[[int], object] = lambda flown: None
 ) -> Flights:
-    """Table 5 or 6: `flights` flights with the paper's GPS noise, as many with 2 m CEP, and the median one recorded."""
+    """Table 5 or 6, the paper's filter: `flights` flights with its GPS noise, as many with 2 m CEP, one recorded."""
     name = SCENARIOS[table]
-    scenario = load_scenario(name)
+    scenario = with_filter(load_scenario(name), "paper")
     setup = assemble(scenario)
     rows = _flown(setup.flight, seed, flights, on_progress)
     honest = assemble(_with_gps(scenario, HONEST_GPS))

@@ -25,6 +25,7 @@ from flownav.report.series import (
 STD_POSITION = tuple(f"std_{name}" for name in POSITION_NED)
 RADIUS_WINDOW_S = 5.0
 INNOVATION_NUMBERS = ("t_s", "observation_variance", "innovation", "innovation_variance", "test_ratio", "fused")
+SMALLEST_NEES = 0.01  # values below are not drawn: the axis is logarithmic
 SMALLEST_RATIO = 0.01  # test ratios below are not drawn: the axis is logarithmic
 AXIS_TITLES = {
     "pos_n_m": "x, north (m)",
@@ -48,6 +49,8 @@ SENSOR_TITLES = {
     "baro": "Barometer",
     "mag": "Magnetometer",
     "pose": "External position",
+    "yaw": "External heading",
+    "pad": "Pad fix",
 }
 
 
@@ -193,6 +196,32 @@ def _reach(innovation: Array, expected: Array) -> float:
     known = expected[np.isfinite(expected)]
     shown = [np.abs(innovation[np.isfinite(innovation)]), np.quantile(known, [0.98]) if len(known) else known]
     return 1.1 * float(np.max(np.concatenate(shown), initial=1e-6))
+
+
+def consistency(record: Record) -> list[Panel]:
+    """Normalised estimation error squared of position and velocity over time; no panel where none was recorded."""
+    nees = track(record, "estimate", ("nees",))
+    if nees is None:
+        return []
+    from flownav.scoring.consistency import SCORED, chi_square_band
+
+    span, (low, high) = start_end_s(record), chi_square_band(1)
+    stack = Stack(("NEES",), row_height_px=250)
+    shown = np.where(nees.value[:, 0] < SMALLEST_NEES, np.nan, nees.value[:, 0])
+    stack.line(1, "estimate", "filter", nees.t_s, shown)
+    for name, limit in (("95 % of a flight's steps lie between", low), ("95 % of a flight's steps lie between", high)):
+        stack.line(1, "gate", name, np.array(span), np.full(2, limit))
+    stack.line(1, "command", "expected", np.array(span), np.full(2, float(SCORED)))
+    stack.log_axis(1)
+    inside = 100.0 * float(np.mean((nees.value >= low) & (nees.value <= high)))
+    caption = (
+        f"Squared error of position and velocity in units of what the filter states, {SCORED} expected. Of a "
+        f"consistent filter 95 % of the values lie between {low:.2f} and {high:.2f} over many flights; "
+        f"here {inside:.0f} % do. Errors last, so one flight strays; on the ground, told that it rests, a filter "
+        "looks too modest."
+    )
+    title = "Consistency with the truth"
+    return [Panel("nees", title, caption, f"{title}: NEES over time. {caption}", stack.figure(span, moments(record)))]
 
 
 def error_against_gps(record: Record) -> Panel:

@@ -58,7 +58,7 @@ def _sections(record: Record) -> list[tuple[str, str, list[Panel]]]:
         ("states", "Position and velocity", [figures_states.position(record), figures_states.velocity(record)]),
         ("close-ups", "Close-ups", figures_states.close_ups(record)),
         ("errors", "Errors and uncertainty", uncertainty),
-        ("filter", "Inside the filter", figures_filter.innovations(record)),
+        ("filter", "Inside the filter", [*figures_filter.consistency(record), *figures_filter.innovations(record)]),
         ("vehicle", "Vehicle", [figures_vehicle.attitude(record), figures_vehicle.controls(record)]),
     ]
 

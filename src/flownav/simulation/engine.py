@@ -33,8 +33,8 @@ def fly_blocks(
 ) -> Iterator[tuple[int, Result]]:
     """Fly `flights` flights from number `first` on; yields (flights in the block, judge(its history)) in order.
 
-    `judge` takes a block's history (epochs, len(HISTORY), lanes), which is overwritten afterwards: memory does not
-    grow with the number of flights. The last block may hold more lanes than flights are left.
+    `judge` takes a block's history (epochs, len(HISTORY), flights in the block), which is overwritten afterwards:
+    memory does not grow with the number of flights.
     """
     own = threading.local()
 
@@ -43,7 +43,8 @@ def fly_blocks(
             own.work = np.empty(layout.ROWS * len(LANES))
             own.history = np.empty((flight.plan.epochs, len(HISTORY), len(LANES)))
         fly_block(flight, seed, first + start, LANES, own.work, own.history)
-        return min(len(LANES), flights - start), judge(own.history)
+        left = min(len(LANES), flights - start)
+        return left, judge(own.history[:, :, :left])
 
     with announce_compilation("batch"):
         nothing = flight._replace(plan=flight.plan._replace(epochs=0))

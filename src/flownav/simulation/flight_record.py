@@ -48,9 +48,12 @@ def record_of(setup: Setup, history: Array, seed: int, index: int) -> Record:
 
     truth = tuple(c for c in TABLES["truth"] if c != "on_ground")
     table("truth", "truth", truth, on_ground=(flown["truth", "contact_n"] > 0.0).astype(float))
-    attitude = {name: flown["gps", name] for name in QUATERNION}
-    estimate = tuple(c for c in TABLES["estimate"] if c not in QUATERNION)
-    table("estimate", "estimate", estimate, **attitude)
+    if setup.flight.landing is not None:
+        table("estimate", "estimate", TABLES["estimate"])
+    else:  # the others take the INS attitude as it comes, and say nothing of their consistency
+        attitude = {name: flown["gps", name] for name in QUATERNION}
+        own = tuple(c for c in TABLES["estimate"] if c not in (*QUATERNION, "nees"))
+        table("estimate", "estimate", own, **attitude)
     ground = -setup.flight.vehicle.cg_above_skid_m  # the reference of a landing runs on below the ground
     flown["command", "pos_d_ref_m"] = np.minimum(flown["command", "pos_d_ref_m"], ground)
     table("command", "command", TABLES["command"])
@@ -67,10 +70,18 @@ def record_of(setup: Setup, history: Array, seed: int, index: int) -> Record:
         table("pad", "pad", COLUMNS[Sensor.PAD], fixes, quality=255.0 * flown["pad", "valid"][fixes])
     if setup.flight.plan.draws.imu:
         table("imu", "imu", COLUMNS[Sensor.IMU], quality=every)
-    kinematic = setup.flight.kinematic
-    record.add("innovation", _innovations(t_s, flown, kinematic.settings.gate_sigma if kinematic else None))
+    if scenario.pad_fix is not None:
+        looks = slice(None, None, PAD_EPOCHS)
+        table("pad", "pad", COLUMNS[Sensor.PAD], looks, quality=255.0 * flown["pad", "valid"][looks])
+    record.add("innovation", _innovations(t_s, flown, _gate_sigma(setup)))
     record.add("events", _events(t_s, flown))
     return record
+
+
+def _gate_sigma(setup: Setup) -> float | None:
+    """The gate of the filter that flew; None for the paper's, which has none."""
+    gated = setup.flight.landing or setup.flight.kinematic
+    return gated.settings.gate_sigma if gated else None
 
 
 def _innovations(t_s: Array, flown: dict[tuple[str, str], Array], gate_sigma: float | None) -> Table:
@@ -85,7 +96,7 @@ def _innovations(t_s: Array, flown: dict[tuple[str, str], Array], gate_sigma: fl
     engaged = np.repeat(flown["flow", "engaged"], count) > 0.0
     source = np.where(is_position, "gps_position", np.where(engaged, "flow_velocity", "gps_velocity"))
     arrived = is_position | (np.repeat(flown["measured", "velocity_arrived"], count) > 0.0)
-    if gate_sigma is not None:  # the kinematic filter takes flow here; INS velocity is a measurement of its own
+    if gate_sigma is not None:  # flow alone stands here; INS velocity is a measurement of its own
         arrived = is_position | engaged
     variances = interleaved(lambda i: flown["innovation", f"innovation_variance_{i}"])
     kept = arrived & (variances > 0.0)  # no variance: the filter does not take that component

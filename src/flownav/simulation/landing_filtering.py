@@ -120,7 +120,7 @@ def run_landing_filter(work: Work, lanes: Lanes, epoch: int, setup: LandingSetup
     fuse_solution(work, lanes, age_s, setup)
     fuse_rest(work, lanes, settings)
     if setup.fuse_flow > 0.0:
-        fuse_flow(work, lanes, setup)
+        fuse_flow(work, lanes, setup, setup.lag)
     if epoch % RANGE_EPOCHS == 0:
         fuse_range(work, lanes, setup)
     if epoch % PAD_EPOCHS == 0:
@@ -167,7 +167,7 @@ def fuse_rest(work: Work, lanes: Lanes, settings: LandingSettings) -> None:
 
 
 @equation
-def fuse_flow(work: Work, lanes: Lanes, setup: LandingSetup) -> None:
+def fuse_flow(work: Work, lanes: Lanes, setup: LandingSetup, lag: FlowLag | None) -> None:
     """Both flow channels, with the datasheet's noise at the height that the filter believes."""
     for channel in range(2):
         for lane in range(len(lanes)):
@@ -177,11 +177,11 @@ def fuse_flow(work: Work, lanes: Lanes, setup: LandingSetup) -> None:
             work[ROWS.noise * len(lanes) + lane] = sigma * sigma
             engaged = work[(layout.FLOW_READING + 3) * len(lanes) + lane] > 0.0
             work[ROWS.offered * len(lanes) + lane] = 1.0 if engaged and height > setup.flow_min_height_m else 0.0
-        if setup.lag is None:
+        if lag is None:
             observe_body_velocity(work, lanes, ROWS, channel, layout.FLOW_READING + channel, layout.NOTHING)
             fuse(work, lanes, ROWS, BODY_VELOCITY_STATES, setup.settings.gate_sigma)
         else:
-            observe_lagged_flow(work, lanes, ROWS, channel, layout.FLOW_READING + channel, setup.lag.gain)
+            observe_lagged_flow(work, lanes, ROWS, channel, layout.FLOW_READING + channel, lag.gain)
             fuse(work, lanes, ROWS, LAGGED_FLOW_STATES[channel], setup.settings.gate_sigma)
         note_landing_innovation(work, lanes, 3 + channel)
 

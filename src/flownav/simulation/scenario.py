@@ -1,7 +1,7 @@
 """Scenario files: what is flown, with which vehicle, sensors, wind, filter and autopilot.
 
-`takeoff`, `landing` and `gusty` ship; any TOML file of this schema flies. Positions are those of the skids
-relative to the pad's centre, in the local NED frame.
+`takeoff`, `landing`, `gusty`, `pad_return` and `approach` ship; any TOML file of this schema flies. Positions are
+those of the skids relative to the pad's centre, in the local NED frame.
 """
 
 from __future__ import annotations
@@ -145,6 +145,11 @@ def load_scenario(name: str) -> Scenario:
             "flow_sensor": _beside(path, scenario.flow_sensor),
         }
     )
+
+
+def with_filter(scenario: Scenario, name: Literal["paper", "kinematic", "landing"]) -> Scenario:
+    """The scenario flown with another filter."""
+    return scenario.model_copy(update={"filter": scenario.filter.model_copy(update={"name": name})})
 
 
 def _beside(scenario: Path, file: str | None) -> str | None:

@@ -1,0 +1,173 @@
+"""What the landing filter promises, case by case, and whether it keeps it (docs/accuracy.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flownav.campaign.ablations import ablations
+from flownav.campaign.judged import BOUND_FLIGHTS, Judged, bound_of, fly_judged, touchdown_radius
+from flownav.parameter_files import check
+from flownav.scoring.consistency import (
+    BAND,
+    GROUP_FLIGHTS,
+    anees,
+    efficiency,
+    efficiency_by_height,
+    inside_fraction,
+    inside_steps,
+    percentile_with_interval,
+)
+from flownav.scoring.errors import CRASHED, MAX_POSITION_ERROR
+from flownav.simulation.assemble import assemble
+from flownav.simulation.flight import Flight
+from flownav.simulation.scenario import Scenario, load_scenario, with_filter
+
+CASES = ("takeoff", "landing", "pad_return", "approach")
+PAPERS_CONDITIONS = ("takeoff", "landing")  # flown in the air that the paper had none of
+WIND = {"speed_20ft_m_s": 4.0, "from_direction_deg": 30.0, "gusts": True}
+LEAST_INSIDE = 0.93  # of the steps in flight
+SHARE = 0.95
+
+
+@dataclass(frozen=True)
+class Target:
+    """A promise: `value` and the limit that it must not exceed (or, at_least, fall below)."""
+
+    what: str
+    value: float
+    limit: float
+    at_least: bool = False
+
+    @property
+    def kept(self) -> bool:
+        """Whether the figure is on the right side; NaN is not."""
+        return self.value >= self.limit if self.at_least else self.value <= self.limit
+
+    def sentence(self) -> str:
+        """The figure and its limit."""
+        return f"{self.what} {self.value:.3f}, {'at least' if self.at_least else 'at most'} {self.limit:g}"
+
+
+@dataclass(frozen=True)
+class Case:
+    """One case's figures: `facts` as JSON has them, the targets, and a row for each ablation."""
+
+    name: str
+    facts: dict[str, Any]
+    targets: tuple[Target, ...]
+    ablations: dict[str, dict[str, Any]]
+
+    def as_json(self) -> dict[str, Any]:
+        """All of it."""
+        targets = [
+            {"what": t.what, "value": _finite(t.value), "limit": t.limit, "at_least": t.at_least, "kept": t.kept}
+            for t in self.targets
+        ]
+        return {"case": self.name, **self.facts, "targets": targets, "ablations": self.ablations}
+
+
+def flights_of(cases: Sequence[str], flights: int, ablation_flights: int) -> int:
+    """How many flights `run_case` will fly for these cases."""
+    total = 0
+    for name in cases:
+        variants = len(ablations(assemble(scenario_of(name)))) + 1 if ablation_flights else 0
+        total += flights * (2 if name == "pad_return" else 1) + variants * ablation_flights
+    return total
+
+
+def scenario_of(name: str) -> Scenario:
+    """A case's scenario."""
+    scenario = with_filter(load_scenario(name), "landing")
+    if name not in PAPERS_CONDITIONS:
+        return scenario
+    return check(scenario.model_dump(exclude_unset=True) | {"wind": WIND}, Scenario, f"{name} in wind")
+
+
+def run_case(
+    name: str, seed: int, flights: int, ablation_flights: int, on_progress: Callable[[int], object] = lambda flown: None
+) -> Case:
+    """Fly a case, hold it against its bound and its targets, and take the filter apart."""
+    scenario = scenario_of(name)
+    setup = assemble(scenario)
+
+    def fly(flight: Flight, count: int) -> Judged:
+        return fly_judged(flight, seed, count, on_progress=on_progress)
+
+    judged = fly(setup.flight, flights)
+    bound = bound_of(setup, seed, min(flights, BOUND_FLIGHTS)).sums
+    facts = _facts(judged) | {
+        "flights": flights,
+        "efficiency": efficiency(judged.errors, bound),
+        "efficiency_by_height": efficiency_by_height(judged.errors, bound),
+    }
+    if name == "pad_return":
+        papers = fly(assemble(with_filter(scenario, "paper")).flight, flights)
+        facts["papers_p95_largest_horizontal_m"] = percentile_with_interval(papers.largest_horizontal_m, SHARE)[0]
+    taken_apart = {}
+    if ablation_flights:
+        whole = fly(setup.flight, ablation_flights)
+        taken_apart["nothing"] = _cost(whole, whole)
+        for lacking, flight in ablations(setup).items():
+            taken_apart[lacking] = _cost(fly(flight, ablation_flights), whole)
+    return Case(name, facts, _targets(name, facts), taken_apart)
+
+
+def _facts(judged: Judged) -> dict[str, Any]:
+    """Accuracy and consistency of a batch; null for a figure without a finite value."""
+    assert judged.sums is not None
+    assert judged.groups is not None
+    axis = percentile_with_interval(judged.scores[:, MAX_POSITION_ERROR], SHARE)
+    horizontal = percentile_with_interval(judged.largest_horizontal_m, SHARE)
+    touchdown = touchdown_radius(judged)
+    return {
+        "crashed": int(judged.scores[:, CRASHED].sum()),
+        "p95_largest_axis_m": axis[0],
+        "p95_largest_horizontal_m": horizontal[0],
+        "p95_largest_horizontal_interval_m": [_finite(x) for x in horizontal[1:]],
+        "r95_m": _finite(touchdown[0]),
+        "r95_interval_m": [_finite(x) for x in touchdown[1:]],
+        "rms_error": [float(x) for x in judged.errors.root_mean_square()],
+        "anees": anees(judged.sums),
+        "anees_inside_fraction": inside_fraction(judged.groups),
+        "anees_inside_fraction_of_all_flights": inside_fraction([inside_steps(judged.sums)]),
+    }
+
+
+def _targets(name: str, facts: dict[str, Any]) -> tuple[Target, ...]:
+    """The promises of a case."""
+    worst = max(facts["efficiency"].values())
+    what = f"steps with the ANEES of {GROUP_FLIGHTS} flights in its {100 * BAND:.0f} % band"
+    inside = Target(what, facts["anees_inside_fraction"], LEAST_INSIDE, at_least=True)
+    if name in PAPERS_CONDITIONS:
+        largest = Target("95th percentile of the largest error of one axis [m]", facts["p95_largest_axis_m"], 0.10)
+        return largest, Target("RMSE over bound, worst state", worst, 1.10), inside
+    if name == "pad_return":
+        gain = facts["papers_p95_largest_horizontal_m"] / facts["p95_largest_horizontal_m"]
+        better = Target("largest pad-relative error, the paper's filter over ours", gain, 4.0, at_least=True)
+        return Target("RMSE over bound, worst state", worst, 1.15), better, inside
+    radius = np.inf if facts["r95_m"] is None else facts["r95_m"]
+    return Target("touchdown R95 [m]", radius, 0.05), inside
+
+
+def _cost(judged: Judged, whole: Judged) -> dict[str, Any]:
+    """A variant's figures, and its errors over the whole filter's."""
+    ratio = judged.errors.root_mean_square() / whole.errors.root_mean_square()
+    squares, wholes = judged.errors.root_mean_square() ** 2, whole.errors.root_mean_square() ** 2
+    assert judged.sums is not None
+    return {
+        "p95_largest_horizontal_m": percentile_with_interval(judged.largest_horizontal_m, SHARE)[0],
+        "horizontal_rms_ratio": float(np.sqrt(squares[:2].sum() / wholes[:2].sum())),
+        "vertical_rms_ratio": float(ratio[2]),
+        "horizontal_speed_rms_ratio": float(np.sqrt(squares[3:5].sum() / wholes[3:5].sum())),
+        "anees": anees(judged.sums),
+        "r95_m": _finite(touchdown_radius(judged)[0]),
+        "crashed": int(judged.scores[:, CRASHED].sum()),
+    }
+
+
+def _finite(number: float) -> float | None:
+    return float(number) if np.isfinite(number) else None

@@ -1,0 +1,141 @@
+"""`flownav accuracy`: what the landing filter promises, case by case, and what each piece of it is worth."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from flownav.campaign.accuracy import Case
+
+EFFICIENCY_STATES = ("x", "y", "z", "u", "v", "w")
+
+
+def command(
+    flights: Annotated[int, typer.Option(help="Flights of each case.")] = 1000,
+    cases: Annotated[
+        str, typer.Option(help="Cases, with commas: takeoff, landing, pad_return, approach; or all.")
+    ] = "all",
+    ablations: Annotated[int, typer.Option(help="Flights of each variant that lacks a piece; 0 for none.")] = 100,
+    seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
+    out: Annotated[Path | None, typer.Option(help="Write the tables as Markdown, too.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Hold the landing filter against its targets: accuracy, consistency, efficiency, and what its pieces are worth."""
+    from flownav.campaign.accuracy import CASES, flights_of, run_case
+    from flownav.cli.output import progress, require_between, require_writable
+    from flownav.errors import InputError, VerdictError
+
+    require_between("--flights", flights, 1, 1_000_000)
+    require_between("--ablations", ablations, 0, 1_000_000)
+    require_between("--seed", seed, 0, 2**63 - 1)
+    chosen = CASES if cases == "all" else tuple(dict.fromkeys(name.strip() for name in cases.split(",")))
+    for name in chosen:
+        if name not in CASES:
+            raise InputError(f"--cases {name or '(empty)'}: no such case; known: {', '.join(CASES)}, or all")
+    if out:
+        require_writable(out)
+    with progress("Flying", flights_of(chosen, flights, ablations)) as advance:
+        made = [run_case(name, seed, flights, ablations, advance) for name in chosen]
+    text = markdown(made)
+    if out:
+        from flownav.files import written_whole
+
+        with written_whole(out) as temporary:
+            temporary.write_text(text, encoding="utf-8", newline="\n")
+    if as_json:
+        facts: dict[str, Any] = {"flights": flights, "ablation_flights": ablations, "seed": seed}
+        facts |= {"cases": [case.as_json() for case in made]} | ({"out": str(out)} if out else {})
+        typer.echo(json.dumps(facts))
+    else:
+        typer.echo(text)
+    missed = [f"{case.name}: {target.sentence()}" for case in made for target in case.targets if not target.kept]
+    if missed:
+        raise VerdictError("; ".join(missed))
+
+
+def markdown(made: list[Case]) -> str:
+    """The tables as they are printed and as docs/accuracy.md has them."""
+    parts = [_targets(made), _efficiency(made), _by_height(made)]
+    parts += [_ablations(case) for case in made if case.ablations]
+    return "\n\n".join(parts) + "\n"
+
+
+def _targets(made: list[Case]) -> str:
+    rows = [
+        (case.name, target.what, f"{target.value:.3f}", f"{'>=' if target.at_least else '<='} {target.limit:g}",
+         "kept" if target.kept else "MISSED")
+        for case in made for target in case.targets
+    ]  # fmt: skip
+    return _table(("case", "figure", "measured", "target", ""), rows)
+
+
+def _efficiency(made: list[Case]) -> str:
+    rows = [
+        (case.name, *(f"{case.facts['efficiency'][state]:.3f}" for state in EFFICIENCY_STATES),
+         f"{case.facts['anees']:.3f}", f"{case.facts['anees_inside_fraction_of_all_flights']:.3f}",
+         _interval(case.facts, "p95_largest_horizontal"), _interval(case.facts, "r95"), str(case.facts["crashed"]))
+        for case in made
+    ]  # fmt: skip
+    heading = (
+        "RMSE over bound",
+        *EFFICIENCY_STATES,
+        "ANEES",
+        "steps with the ANEES of all flights in its band",
+        "p95 of largest horizontal error [m] (95 % interval)",
+        "touchdown R95 [m] (95 % interval)",
+        "crashed",
+    )
+    return _table(heading, rows)
+
+
+def _by_height(made: list[Case]) -> str:
+    rows = [
+        (case.name, band, *(f"{ratios[state]:.3f}" for state in EFFICIENCY_STATES))
+        for case in made for band, ratios in case.facts["efficiency_by_height"].items()
+    ]  # fmt: skip
+    return _table(("RMSE over bound", "height of the skids", *EFFICIENCY_STATES), rows)
+
+
+def _ablations(case: Case) -> str:
+    def cells(row: dict[str, Any]) -> tuple[str, ...]:
+        radius = "-" if row["r95_m"] is None else f"{row['r95_m']:.3f}"
+        ratios = (row["horizontal_rms_ratio"], row["vertical_rms_ratio"], row["horizontal_speed_rms_ratio"])
+        return (
+            f"{row['p95_largest_horizontal_m']:.3f}", *(f"{ratio:.2f}" for ratio in ratios), f"{row['anees']:.3g}",
+            radius, str(row["crashed"]),
+        )  # fmt: skip
+
+    rows = [(lacking, *cells(row)) for lacking, row in case.ablations.items()]
+    heading = (
+        f"{case.name} without",
+        "p95 of largest horizontal error [m]",
+        "horizontal RMSE ratio",
+        "vertical RMSE ratio",
+        "horizontal speed RMSE ratio",
+        "ANEES",
+        "touchdown R95 [m]",
+        "crashed",
+    )
+    return _table(heading, rows)
+
+
+def _interval(facts: dict[str, Any], name: str) -> str:
+    value, ends = facts[f"{name}_m"], facts[f"{name}_interval_m"]
+    if value is None:
+        return "-"
+    return f"{value:.3f} ({'-'.join('?' if end is None else f'{end:.3f}' for end in ends)})"
+
+
+def _table(heading: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    """A Markdown table whose columns stand under each other."""
+    widths = [max(len(row[i]) for row in (heading, *rows)) for i in range(len(heading))]
+    rule = tuple("-" * width for width in widths)
+    lines = (heading, rule, *rows)
+    return "\n".join(
+        "| " + " | ".join(cell.ljust(w) for cell, w in zip(line, widths, strict=True)) + " |" for line in lines
+    )

@@ -1,0 +1,186 @@
+"""Consistency and efficiency of a filter over many flights: does it know how wrong it is, and how close to the bound.
+
+Everything is over steps in flight, those without skid contact. At rest on the ground a filter is told that it does
+not move, a pseudo-measurement with no noise of its own whose stated sigma is a guess on the safe side: any filter
+then looks too modest, and its errors are none of a flying vehicle's.
+
+Sums, not flights, are kept: memory does not grow with the number of flights.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.scoring.errors import STATES
+
+Array = NDArray[np.float64]
+
+SCORED = 6  # position and velocity, the degrees of freedom of a normalised error squared
+GROUP_FLIGHTS = 96  # flights whose mean is held against the band: the test is as sharp however many are flown
+BAND = 0.95  # probability of the chi-square band
+AIRBORNE_SHARE = 0.9  # of the flights without contact: the step is one in flight
+LEAST_SHARE = 0.01  # of the steps in flight: a height band with fewer says nothing
+HEIGHTS_M = (0.0, 0.3, 1.0, 3.5, np.inf)  # of the skids: between them lie the height bands
+
+
+@dataclass(frozen=True)
+class ErrorSums:
+    """Sums over the steps in flight of each height band: squares (bands, 6), and how many steps (bands,)."""
+
+    squares: Array
+    steps: Array
+
+    def __add__(self, other: ErrorSums) -> ErrorSums:
+        return ErrorSums(self.squares + other.squares, self.steps + other.steps)
+
+    def root_mean_square(self) -> Array:
+        """Of each state over all steps, (6,); NaN without a step."""
+        return _root(self.squares.sum(axis=0), self.steps.sum())
+
+    def root_mean_square_by_height(self) -> Array:
+        """Of each state in each height band, (bands, 6); NaN where no step was in the band."""
+        return _root(self.squares, self.steps[:, None])
+
+
+@dataclass(frozen=True)
+class ConsistencySums:
+    """Sums over flights at each step, (epochs,): normalised errors squared, and flights without skid contact."""
+
+    flights: int
+    nees: Array
+    airborne: Array
+    errors: ErrorSums
+
+    def __add__(self, other: ConsistencySums) -> ConsistencySums:
+        return ConsistencySums(
+            self.flights + other.flights,
+            self.nees + other.nees,
+            self.airborne + other.airborne,
+            self.errors + other.errors,
+        )
+
+
+def error_sums(squares: Array, height_m: Array, airborne: Array) -> ErrorSums:
+    """Sums of one block: squares (epochs, 6, lanes), height of the skids and airborne 0/1 (epochs, lanes)."""
+    sums = np.zeros((len(HEIGHTS_M) - 1, SCORED))
+    steps = np.zeros(len(HEIGHTS_M) - 1)
+    band = np.clip(np.searchsorted(HEIGHTS_M, height_m, side="right") - 1, 0, len(steps) - 1)
+    for b in range(len(steps)):
+        inside = airborne * (band == b)
+        sums[b] = np.einsum("esl,el->s", squares, inside)
+        steps[b] = inside.sum()
+    return ErrorSums(sums, steps)
+
+
+def consistency_of_block(
+    estimate: Array, truth: Array, nees: Array, height_m: Array, on_ground: Array
+) -> ConsistencySums:
+    """Sums of one block: estimate and truth (epochs, 6, lanes), the others (epochs, lanes)."""
+    airborne = 1.0 - on_ground
+    errors = error_sums((estimate - truth) ** 2, height_m, airborne)
+    return ConsistencySums(nees.shape[1], nees.sum(axis=1), airborne.sum(axis=1), errors)
+
+
+# -- consistency ------------------------------------------------------------------------------------------
+def chi_square_band(flights: int, probability: float = BAND) -> tuple[float, float]:
+    """Where the mean normalised error squared of `flights` independent flights lies with this probability.
+
+    Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001, section 5.4.2.
+    """
+    from scipy.special import chdtri
+
+    tail = 0.5 * (1.0 - probability)
+    low, high = chdtri(SCORED * flights, 1.0 - tail), chdtri(SCORED * flights, tail)
+    return float(low) / flights, float(high) / flights
+
+
+def steps_in_flight(sums: ConsistencySums) -> NDArray[np.bool_]:
+    """The steps at which nearly all flights have no skid contact, (epochs,)."""
+    return np.asarray(sums.airborne >= AIRBORNE_SHARE * sums.flights)
+
+
+def anees(sums: ConsistencySums) -> float:
+    """Mean normalised error squared per degree of freedom over the steps in flight: 1 is modest enough, no more."""
+    inside = steps_in_flight(sums)
+    return float(np.mean(sums.nees[inside])) / (SCORED * sums.flights) if inside.any() else float("nan")
+
+
+def inside_steps(sums: ConsistencySums) -> tuple[int, int]:
+    """How many steps in flight have their mean over flights inside its 95 % band, and of how many."""
+    mean = sums.nees[steps_in_flight(sums)] / sums.flights
+    low, high = chi_square_band(sums.flights)
+    return int(np.count_nonzero((mean >= low) & (mean <= high))), len(mean)
+
+
+def inside_fraction(groups: Sequence[tuple[int, int]]) -> float:
+    """Share of the steps in flight inside the band, over groups as `inside_steps` has them; NaN without a step."""
+    inside, steps = (sum(column) for column in zip(*groups, strict=True))
+    return inside / steps if steps else float("nan")
+
+
+# -- efficiency -------------------------------------------------------------------------------------------
+def efficiency(errors: ErrorSums, bound: ErrorSums) -> dict[str, float]:
+    """RMS error over the root of the mean bound, of each state: 1 is the best that any filter could do."""
+    ratio = errors.root_mean_square() / bound.root_mean_square()
+    return dict(zip(STATES, map(float, ratio), strict=True))
+
+
+def efficiency_by_height(errors: ErrorSums, bound: ErrorSums) -> dict[str, dict[str, float]]:
+    """The same in each height band, keyed "0.3-1 m", that holds LEAST_SHARE of the steps of both."""
+    ratios = errors.root_mean_square_by_height() / bound.root_mean_square_by_height()
+    share = np.minimum(errors.steps / errors.steps.sum(), bound.steps / bound.steps.sum())
+    return {
+        band_name(b): dict(zip(STATES, map(float, row), strict=True))
+        for b, row in enumerate(ratios)
+        if share[b] >= LEAST_SHARE
+    }
+
+
+def band_name(band: int) -> str:
+    """A height band's name."""
+    low, high = HEIGHTS_M[band], HEIGHTS_M[band + 1]
+    return f"above {low:g} m" if high == np.inf else f"{low:g}-{high:g} m"
+
+
+# -- largest errors and touchdown -------------------------------------------------------------------------
+def largest_horizontal_error(estimate: Array, truth: Array, home: int | None) -> Array:
+    """Largest horizontal position error of each flight [m], (lanes,); estimate and truth (epochs, >= 2, lanes).
+
+    home: the step at which the vehicle noted where its pad is; the error is then relative to that step's, and taken
+    from it on. None: the pad is where the filter's origin is.
+    """
+    error = (estimate - truth)[:, :2]
+    relative = error if home is None else error[home:] - error[home]
+    return np.asarray(np.sqrt((relative**2).sum(axis=1)).max(axis=0))
+
+
+def percentile_with_interval(values: Array, share: float, confidence: float = 0.95) -> tuple[float, float, float]:
+    """The smallest value that this share of the values does not exceed, and its confidence interval.
+
+    The interval is between order statistics, whatever the distribution (David and Nagaraja, Order Statistics, 2003,
+    section 7.1); infinite where there are too few values for an upper end. Infinite values count as large ones.
+    ValueError without a value.
+    """
+    from scipy.special import bdtr
+
+    count = len(values)
+    if count == 0:
+        raise ValueError("no values")
+    ordered = np.append(np.sort(values), np.inf)
+    tail = 0.5 * (1.0 - confidence)
+    below = bdtr(
+        np.arange(count, dtype=float), count, share
+    )  # probability that at most k values lie below the quantile
+    low = int(np.searchsorted(below, tail, side="left"))  # binomial quantiles
+    high = int(np.searchsorted(below, 1.0 - tail, side="left"))
+    place = max(int(np.ceil(share * count - 1e-9)) - 1, 0)
+    return float(ordered[place]), float(ordered[max(low - 1, 0)]), float(ordered[min(high, count)])
+
+
+def _root(squares: Array, steps: Array) -> Array:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.asarray(np.sqrt(squares / steps))

@@ -1,0 +1,144 @@
+"""Consistency and efficiency scores: chi-square bands, sums, bands of height, order statistics."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from flownav.scoring.consistency import (
+    HEIGHTS_M,
+    ConsistencySums,
+    ErrorSums,
+    anees,
+    band_name,
+    chi_square_band,
+    consistency_of_block,
+    efficiency,
+    efficiency_by_height,
+    error_sums,
+    inside_fraction,
+    inside_steps,
+    largest_horizontal_error,
+    percentile_with_interval,
+    steps_in_flight,
+)
+
+
+@pytest.mark.parametrize("flights", [1, 10, 1000])
+def test_the_band_is_scipys_chi_square_quantile(flights):
+    wanted = stats.chi2.ppf([0.025, 0.975], 6 * flights) / flights
+    assert chi_square_band(flights) == pytest.approx(tuple(wanted), rel=1e-9)
+
+
+def drawn(flights, epochs, scale=1.0, seed=1):
+    """A block of independent errors whose filter states a unit covariance; `scale` makes it over-confident."""
+    error = scale * np.random.default_rng(seed).standard_normal((epochs, 6, flights))
+    zeros = np.zeros((epochs, flights))
+    return consistency_of_block(error, np.zeros_like(error), (error**2).sum(axis=1), zeros + 2.0, zeros)
+
+
+def test_a_consistent_filter_is_inside_the_band_on_95_percent_of_the_steps():
+    sums = drawn(50, 4000)
+    assert inside_fraction([inside_steps(sums)]) == pytest.approx(0.95, abs=4.0 * np.sqrt(0.95 * 0.05 / 4000))
+    assert anees(sums) == pytest.approx(1.0, abs=0.01)
+
+
+@pytest.mark.parametrize("scale", [0.8, 1.25])
+def test_a_modest_and_an_overconfident_filter_are_outside(scale):
+    sums = drawn(50, 400, scale)
+    assert inside_fraction([inside_steps(sums)]) < 0.05
+    assert anees(sums) == pytest.approx(scale**2, rel=0.02)
+
+
+def test_steps_on_the_ground_are_left_out():
+    error = np.full((4, 6, 10), 100.0)
+    nees = np.array([[600.0], [6.0], [6.0], [600.0]]) * np.ones((4, 10))
+    on_ground = np.zeros((4, 10))
+    on_ground[0], on_ground[2, 0], on_ground[3, :2] = 1.0, 1.0, 1.0  # all, one and two of ten flights
+    sums = consistency_of_block(error, error, nees, np.ones((4, 10)), on_ground)
+    assert list(steps_in_flight(sums)) == [False, True, True, False]
+    assert inside_steps(sums) == (2, 2)
+    assert sums.errors.steps.sum() == 10 + 9 + 8
+    grounded = ConsistencySums(10, sums.nees, np.zeros(4), sums.errors)
+    assert np.isnan(inside_fraction([inside_steps(grounded)]))
+    assert inside_fraction([(1, 2), (2, 4), (3, 3), (0, 0)]) == pytest.approx(6 / 9)
+    assert np.isnan(anees(grounded))
+
+
+@given(st.integers(0, 10**6), st.integers(1, 8), st.integers(1, 8))
+@settings(max_examples=30, deadline=None)
+def test_sums_of_blocks_are_the_sums_of_all(seed, left, right):
+    draw = np.random.default_rng(seed)
+    count = left + right
+    estimate, truth = draw.standard_normal((2, 9, 6, count))
+    nees, height = draw.uniform(0.0, 12.0, (2, 9, count))
+    on_ground = draw.integers(0, 2, (9, count)).astype(float)
+    parts = [
+        consistency_of_block(estimate[..., s], truth[..., s], nees[:, s], height[:, s], on_ground[:, s])
+        for s in (slice(0, left), slice(left, None))
+    ]
+    whole, both = consistency_of_block(estimate, truth, nees, height, on_ground), parts[0] + parts[1]
+    assert both.flights == whole.flights == count
+    for name in ("nees", "airborne"):
+        assert getattr(both, name) == pytest.approx(getattr(whole, name))
+    assert both.errors.squares == pytest.approx(whole.errors.squares)
+    assert both.errors.steps == pytest.approx(whole.errors.steps)
+
+
+def test_errors_fall_into_their_height_bands():
+    heights = np.array([[-0.01], [0.29], [0.3], [0.99], [3.4], [3.5], [80.0]])
+    squares = np.arange(1.0, 8.0)[:, None, None] * np.ones((7, 6, 1))
+    sums = error_sums(squares, heights, np.ones((7, 1)))
+    assert list(sums.steps) == [2, 2, 1, 2]
+    assert list(sums.squares[:, 0]) == [1 + 2, 3 + 4, 5, 6 + 7]
+    assert sums.root_mean_square() == pytest.approx(np.full(6, 2.0))
+    assert [band_name(b) for b in range(len(HEIGHTS_M) - 1)] == ["0-0.3 m", "0.3-1 m", "1-3.5 m", "above 3.5 m"]
+
+
+def test_efficiency_is_rmse_over_the_root_of_the_bound_and_skips_bands_that_hold_nearly_nothing():
+    squares = np.array([[4.0] * 6, [90.0] * 6, [0.0] * 6, [0.9] * 6])
+    errors = ErrorSums(squares, np.array([10.0, 1000.0, 0.0, 1.0]))
+    bound = ErrorSums(squares / 4.0, np.array([10.0, 1000.0, 0.0, 1.0]))
+    assert efficiency(errors, bound) == pytest.approx(dict.fromkeys("xyzuvw", 2.0))
+    assert set(efficiency_by_height(errors, bound)) == {"0.3-1 m"}
+    assert efficiency_by_height(errors, bound)["0.3-1 m"]["w"] == pytest.approx(2.0)
+
+
+def test_the_largest_horizontal_error_is_relative_to_where_the_pad_was_noted():
+    truth = np.zeros((4, 6, 2))
+    estimate = truth.copy()
+    estimate[:, 0, 0] = 9.0, 2.0, 2.0, 5.0
+    estimate[:, 1, 0] = 0.0, 1.0, 1.0, 5.0
+    estimate[:, 2] = 100.0  # height does not count
+    assert largest_horizontal_error(estimate, truth, None) == pytest.approx([9.0, 0.0])
+    assert largest_horizontal_error(estimate, truth, 1) == pytest.approx([5.0, 0.0])
+
+
+# -- order statistics --------------------------------------------------------------------------------------
+def test_a_percentile_is_the_smallest_value_that_the_share_does_not_exceed():
+    values = np.arange(1.0, 101.0)[::-1]
+    assert percentile_with_interval(values, 0.95)[0] == 95.0
+    assert percentile_with_interval(values, 0.5)[0] == 50.0
+    assert percentile_with_interval(np.array([7.0]), 0.95) == (7.0, 7.0, np.inf)
+    assert percentile_with_interval(np.append(values[10:], [np.inf] * 10), 0.95)[0] == np.inf
+    with pytest.raises(ValueError, match="no values"):
+        percentile_with_interval(np.array([]), 0.95)
+
+
+def test_the_interval_lies_between_the_binomial_order_statistics():
+    values = np.arange(1.0, 1001.0)
+    low, high = stats.binom.ppf([0.025, 0.975], 1000, 0.95)
+    assert percentile_with_interval(values, 0.95)[1:] == (low, high + 1.0)
+
+
+def test_the_interval_covers_the_true_percentile_as_often_as_it_says():
+    draw, truth = np.random.default_rng(5), stats.rayleigh.ppf(0.95)
+    covered = 0
+    for _ in range(2000):
+        _, low, high = percentile_with_interval(draw.rayleigh(size=200), 0.95)
+        covered += low <= truth <= high
+    assert covered / 2000 > 0.95 - 4.0 * np.sqrt(0.95 * 0.05 / 2000)
+    assert covered / 2000 < 0.985

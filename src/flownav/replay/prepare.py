@@ -37,6 +37,7 @@ class IdentifiedFlow(NamedTuple):
     gain_u: float
     gain_v: float
     latency_s: float
+    axes: tuple[tuple[float, float], tuple[float, float]] = ((1.0, 0.0), (0.0, 1.0))  # sensor's = axes @ vehicle's
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,8 @@ def prepare(log: Log, options: ReplayOptions) -> Prepared:
             streams[sensor] = replace(streams[sensor], delay_s=options.gps_delay_s)
     for sensor in FLOW:
         if sensor in streams:
+            if options.identified is not None:
+                streams[sensor] = put_right(streams[sensor], options.identified)
             streams[sensor] = _exposed(_scaled(streams[sensor], options.flow_scale))
     if Sensor.FLOW_RATE in streams:
         streams[Sensor.FLOW_RATE], chosen = _with_gyro(streams[Sensor.FLOW_RATE], streams)
@@ -162,12 +165,44 @@ def corrected(stream: Stream, identified: IdentifiedFlow) -> Stream:
     return replace(stream, value=value, delay_s=identified.latency_s)
 
 
+def put_right(stream: Stream, identified: IdentifiedFlow) -> Stream:
+    """The stream in the vehicle's axes: those of a sensor that is turned or wired otherwise, as its file says.
+
+    A sensor's axes are the vehicle's, each with a sign and perhaps swapped, so the way back is the transpose. Angular
+    flow and the sensor's own gyro turn as the velocity (flow_y, -flow_x) does.
+    """
+    back = np.transpose(identified.axes)
+    value = stream.value.copy()
+    pairs = ((0, 1), (2, 3)) if stream.sensor == Sensor.FLOW_RATE else ((0, 1),)
+    for x, y in pairs:
+        if stream.sensor == Sensor.FLOW_RATE:
+            forward, right = back @ np.array([value[:, y], -value[:, x]])
+            value[:, y], value[:, x] = forward, -right
+        else:
+            value[:, x], value[:, y] = back @ value[:, [x, y]].T
+    return replace(stream, value=value)
+
+
+def identified_axes(verdict: str) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    """What a sensor file says of the axes, as sensor's = axes @ vehicle's; None where it does not know."""
+    if "unclear" in verdict or "mirrored" in verdict.replace("not mirrored", ""):
+        return None
+    both = "signs of x and y" in verdict or "both signs" in verdict
+    x = -1.0 if both or "sign of x" in verdict else 1.0
+    y = -1.0 if both or "sign of y" in verdict else 1.0
+    return ((0.0, x), (y, 0.0)) if "swapped" in verdict else ((x, 0.0), (0.0, y))
+
+
 def identified_flow(sensor: FlowSensor) -> IdentifiedFlow:
-    """A sensor file's gains and latency; those of its dynamics where no log was identified."""
+    """A sensor file's axes, gains and latency; those of its dynamics where no log was identified.
+
+    InputError where the file's axes are not known.
+    """
     found = sensor.identification
     if found is None:
         return IdentifiedFlow(sensor.dynamics.gain, sensor.dynamics.gain, sensor.dynamics.delay_s)
-    if "swapped" in found.axes or "inverted" in found.axes:
+    axes = identified_axes(found.axes)
+    if axes is None:
         raise InputError(f"{sensor.name}: {found.axes}; mend the log's axes, then identify again")
 
     def gain_of(axis: str) -> float:
@@ -176,7 +211,7 @@ def identified_flow(sensor: FlowSensor) -> IdentifiedFlow:
         sure = any(not r.gain_low <= 1.0 <= r.gain_high for r in rows)
         return float(np.mean([r.gain for r in rows])) if sure else 1.0
 
-    return IdentifiedFlow(gain_of("x"), gain_of("y"), found.latency_s)
+    return IdentifiedFlow(gain_of("x"), gain_of("y"), found.latency_s, axes)
 
 
 class Chosen(NamedTuple):

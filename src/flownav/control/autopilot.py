@@ -52,6 +52,7 @@ class AutopilotGains(NamedTuple):
     land_speed_m_s: float = 1e9
     align_height_m: float = 0.0  # below it, down to commit_height_m, no descent while farther than align_radius_m
     align_radius_m: float = 1e9
+    align_speed_m_s: float = 1e9  # nor while faster than this over the ground
     commit_height_m: float = 0.0
 
 
@@ -141,7 +142,8 @@ def descent_limit(reference: Reference, estimate: Estimate, gains: AutopilotGain
     height = gains.pad_pos_d_m - estimate.pos_d
     off_n, off_e = reference.pos_n - estimate.pos_n, reference.pos_e - estimate.pos_e
     far = off_n * off_n + off_e * off_e > gains.align_radius_m * gains.align_radius_m
-    aligning = far and height < gains.align_height_m and height > gains.commit_height_m
+    fast = estimate.u * estimate.u + estimate.v * estimate.v > gains.align_speed_m_s * gains.align_speed_m_s
+    aligning = (far or fast) and height < gains.align_height_m and height > gains.commit_height_m
     slow = gains.land_speed_m_s if height < gains.land_height_m else gains.climb_limit_m_s + reference.vel_d
     return 0.0 if aligning else slow
 

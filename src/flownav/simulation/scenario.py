@@ -90,6 +90,7 @@ class PrecisionSection(ParameterModel):
     land_speed_m_s: Number = Field(0.3, gt=0.0, le=5.0)
     align_height_m: Number = Field(0.6, gt=0.0, le=100.0)
     align_radius_m: Number = Field(0.03, gt=0.0, le=100.0)
+    align_speed_m_s: Number = Field(1.0, gt=0.0, le=100.0)
     commit_height_m: Number = Field(0.3, ge=0.0, le=100.0)
 
 

@@ -91,7 +91,7 @@ def seen_velocity(filter_: Landing, lag: FlowLag) -> np.ndarray:
 
 def step_apart(filter_: Landing, dt_s: float, numbers: LandingSettings, lag: FlowLag | None) -> None:
     """The filter's nonlinear step with exact rotations and dense matrices."""
-    x, channels = filter_.x, filter_.x[FLOW_LAG:].reshape(2, 2)
+    x, channels = filter_.x, filter_.x[FLOW_LAG : FLOW_LAG + 4].reshape(2, 2)
     start = seen_velocity(filter_, lag) if lag else None
     rate = filter_.work[GYRO] - x[GYRO_BIAS : GYRO_BIAS + 3]
     force = filter_.work[ACCEL] - x[ACCEL_BIAS : ACCEL_BIAS + 3]

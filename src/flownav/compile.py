@@ -1,8 +1,9 @@
-"""The only place that knows Numba: scalar equations, the kernels built from them, and lanes.
+"""The only place that knows Numba: scalar equations, procedures, the kernels built from them, and lanes.
 
 An `@equation` is a short pure function of scalars and named tuples. Called from Python it is plain Python,
 which takes floats, complex numbers (for exact derivatives) and, where it has no branch, NumPy arrays; called
-from a kernel it is compiled and inlined. A `@kernel` is an entry point: it releases the interpreter lock and
+from a kernel it is compiled and inlined. A `@procedure` is an equation too long for that: it is compiled once and
+called. A `@kernel` is an entry point: it releases the interpreter lock and
 is cached on disk.
 
 *Lanes* are flights that a kernel advances side by side. A kernel takes a lane marker, `ONE_LANE` or
@@ -82,12 +83,19 @@ if _HOST_FEATURES.get("avx512f") and not os.environ.get("NUMBA_CPU_FEATURES"):
 
 def equation(function: Function) -> Function:
     """A scalar law: plain Python where Python calls it, compiled and inlined where a kernel does."""
-    return register_jitable(forceinline=True, error_model="numpy")(function)
+    return register_jitable(forceinline=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(
+        function
+    )
 
 
 def kernel(function: Function) -> Function:
     """An entry point built from equations: releases the lock, cached on disk."""
     return cast(Function, numba.njit(nogil=True, cache=True, error_model="numpy")(function))
+
+
+def procedure(function: Function) -> Function:
+    """An equation too long to be inlined: kernels call it, and it is compiled once for each type of its arguments."""
+    return register_jitable(error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)(function)
 
 
 def lane_access(bundle: type, row: int) -> tuple[Callable[..., Any], Callable[..., Any]]:

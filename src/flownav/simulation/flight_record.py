@@ -67,14 +67,13 @@ def record_of(setup: Setup, history: Array, seed: int, index: int) -> Record:
         table("pad", "pad", COLUMNS[Sensor.PAD], fixes, quality=255.0 * flown["pad", "valid"][fixes])
     if setup.flight.plan.draws.imu:
         table("imu", "imu", COLUMNS[Sensor.IMU], quality=every)
-    kinematic = setup.flight.kinematic
-    record.add("innovation", _innovations(t_s, flown, kinematic.settings.gate_sigma if kinematic else None))
+    record.add("innovation", _innovations(t_s, flown))
     record.add("events", _events(t_s, flown))
     return record
 
 
-def _innovations(t_s: Array, flown: dict[tuple[str, str], Array], gate_sigma: float | None) -> Table:
-    """One row per measurement component offered to the filter, in time order; gate_sigma None: no gate."""
+def _innovations(t_s: Array, flown: dict[tuple[str, str], Array]) -> Table:
+    """One row per measurement component offered to the filter, in time order."""
     names = (*POSITION_NED, *VELOCITY_BODY)
     count = len(names)
 
@@ -85,14 +84,11 @@ def _innovations(t_s: Array, flown: dict[tuple[str, str], Array], gate_sigma: fl
     engaged = np.repeat(flown["flow", "engaged"], count) > 0.0
     source = np.where(is_position, "gps_position", np.where(engaged, "flow_velocity", "gps_velocity"))
     arrived = is_position | (np.repeat(flown["measured", "velocity_arrived"], count) > 0.0)
-    if gate_sigma is not None:  # the kinematic filter takes flow here; INS velocity is a measurement of its own
-        arrived = is_position | engaged
     variances = interleaved(lambda i: flown["innovation", f"innovation_variance_{i}"])
     kept = arrived & (variances > 0.0)  # no variance: the filter does not take that component
     variance = variances[kept]
     innovation = interleaved(lambda i: flown["innovation", f"innovation_{i}"])[kept]
-    ratio = innovation**2 / ((gate_sigma or GATE_SIGMA_SHOWN) ** 2 * variance)
-    fused = (ratio <= 1.0) | (gate_sigma is None)
+    ratio = innovation**2 / (GATE_SIGMA_SHOWN**2 * variance)
     return {
         "t_s": np.repeat(t_s, count)[kept],
         "sensor": source[kept],
@@ -101,8 +97,8 @@ def _innovations(t_s: Array, flown: dict[tuple[str, str], Array], gate_sigma: fl
         "innovation": innovation,
         "innovation_variance": variance,
         "test_ratio": ratio,
-        "fused": fused.astype(float),
-        "reason": np.where(fused, "fused", "innovation_gate"),
+        "fused": np.ones(len(ratio)),
+        "reason": np.full(len(ratio), "fused"),
     }
 
 

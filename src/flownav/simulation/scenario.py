@@ -78,7 +78,7 @@ class VehicleSection(ParameterModel):
 class FilterSection(ParameterModel):
     """Which filter flies, and where it starts: at the known pad, or at the first GPS reading."""
 
-    name: Literal["paper", "kinematic", "landing"] = "landing"
+    name: Literal["paper", "landing"] = "landing"
     flow_min_height_m: Number = Field(0.3, ge=0.0, le=100.0)
     start: Literal["known", "gps"] | None = None
 

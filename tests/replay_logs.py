@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pymap3d
 
-from flownav.estimation.kinematic_filter import GRAVITY_M_S2
+from flownav.frames import GRAVITY_M_S2
 
 ORIGIN = (47.0, 8.5, 400.0)
 GPS_DELAY_S = 0.22

@@ -194,7 +194,7 @@ def replay(duration_s: float = 849.0, seed: int = 2, autopilot: bool = True, flo
              "test_ratio": residual.T.ravel() ** 2 / 2.7, "fused": np.tile(fused, 3)}  # fmt: skip
     record.add("innovation", parts)
     record.manifest = {
-        "kind": "replay", "log": "quad-px4flow-outdoor", "filter": "kinematic", "duration_s": duration_s,
+        "kind": "replay", "log": "quad-px4flow-outdoor", "filter": "landing", "duration_s": duration_s,
         "delays_s": {"gps_position": 0.22, "gps_velocity": 0.22},
         "parameters": {"gps_outages_s": [list(window)]},
         "scores": {

@@ -88,14 +88,7 @@ def test_a_seed_gives_the_same_flight_again(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "choice",
-    [
-        ("--filter", "kinematic"),
-        ("--filter", "paper"),
-        ("--truth", "linear"),
-        ("--feedback", "truth"),
-        ("--gps", "midg"),
-    ],
+    "choice", [("--filter", "paper"), ("--truth", "linear"), ("--feedback", "truth"), ("--gps", "midg")]
 )
 def test_choices_replace_the_files_own(tmp_path, choice):
     done = run("fly", short(tmp_path), "--json", "--no-report", *choice, "--out", tmp_path / "c.fnr", cwd=tmp_path)
@@ -120,7 +113,7 @@ def test_choices_replace_the_files_own(tmp_path, choice):
         (("fly", "landing", "--gps", "rtk"), "command line: gps.model: Input should be 'white' or 'midg', got 'rtk'"),
         (
             ("fly", "landing", "--filter", "ukf"),
-            "command line: filter.name: Input should be 'paper', 'kinematic' or 'landing', got 'ukf'",
+            "command line: filter.name: Input should be 'paper' or 'landing', got 'ukf'",
         ),
         (
             ("fly", "landing", "--truth", "real"),

@@ -13,7 +13,6 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from flownav.errors import InputError
-from flownav.estimation.kinematic_settings import default_settings
 from flownav.logs.absences import INSTEAD
 from flownav.logs.mavlink_flight import WANTED
 from flownav.logs.mavlink_log import read_tlog
@@ -22,6 +21,7 @@ from flownav.logs.rates import attitude_rates
 from flownav.mavlink.dialect import coder
 from flownav.mavlink.signing import sign_outgoing
 from flownav.measurement import Sensor
+from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replay.prepare import ReplayOptions
 from flownav.replay.session import replay
 from mavlink_logs import PX4, START_US, Tlog, arbitrary_payload, flight_log, made, packed_payload
@@ -470,7 +470,7 @@ def test_the_helicopters_flow_is_truths_flow(helicopter):
 
 
 def test_the_helicopters_log_replays(helicopter):
-    result = replay(helicopter, ReplayOptions(), default_settings())
+    result = replay(helicopter, ReplayOptions(), NavigatorSettingsFile())
     scores = result.truth_scores()
     assert scores["horizontal_rms_m"] < 1.0
     assert scores["vertical_rms_m"] < 1.0

@@ -34,4 +34,4 @@ def test_what_was_not_tested_does_not_count():
     assert nis_of(np.array([np.nan, 1.0]), np.array([1.0, np.nan])) is None
     found = nis_of(np.array([np.nan, 1.0, 5.0]), np.array([1.0, 1.0, 0.0]))
     assert found is not None
-    assert found.count == 1
+    assert found.tested == 1

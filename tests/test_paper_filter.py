@@ -28,30 +28,12 @@ def step(work, lanes, model):
     paper_filter.update(work, lanes, ROWS, MEASURED, ARRIVED, SEEN, model)
 
 
-@kernel
-def step_joseph(work, lanes, model):
-    """The same with Joseph's form, component by component."""
-    paper_filter.predict(work, lanes, ROWS, INPUT, model)
-    for component in range(6):
-        for i in range(6):
-            for lane in range(len(lanes)):
-                work[(ROWS.observation + i) * len(lanes) + lane] = 1.0 if i == component else 0.0
-        for lane in range(len(lanes)):
-            state = work[(ROWS.state + component) * len(lanes) + lane]
-            work[ROWS.innovation * len(lanes) + lane] = work[(MEASURED + component) * len(lanes) + lane] - state
-            work[ROWS.noise * len(lanes) + lane] = model.measurement_noise[component]
-            work[ROWS.offered * len(lanes) + lane] = work[(ARRIVED + component) * len(lanes) + lane]
-        kalman.test_innovation(work, lanes, ROWS, 6, 1e6)
-        kalman.correct_state(work, lanes, ROWS, 6)
-        kalman.correct_covariance_joseph(work, lanes, ROWS, 6)
-
-
 @pytest.fixture(scope="module")
 def model() -> PaperModel:
     return assemble(load_scenario("landing")).flight.paper
 
 
-def run(model, inputs, readings, arrived, lanes=ONE_LANE, stepper=step):
+def run(model, inputs, readings, arrived, lanes=ONE_LANE):
     """Trajectories of x (n, 6) and P (n, 6, 6) of the last lane."""
     count = len(lanes)
     work = np.zeros(END * count)
@@ -62,13 +44,14 @@ def run(model, inputs, readings, arrived, lanes=ONE_LANE, stepper=step):
         rows[INPUT:MEASURED] = u[:, None]
         rows[MEASURED:ARRIVED] = z[:, None]
         rows[ARRIVED:SEEN] = here[:, None]
-        stepper(work, lanes, model)
+        step(work, lanes, model)
         states.append(rows[ROWS.state : ROWS.state + 6, -1].copy())
         covariances.append(rows[ROWS.covariance : ROWS.covariance + 36, -1].reshape(6, 6).copy())
     return np.array(states), np.array(covariances)
 
 
 def filterpy_run(model, inputs, readings, arrived):
+    """FilterPy corrects P by Joseph's form, the paper by equation 30: the same for the optimal gain."""
     oracle = KalmanFilter(dim_x=6, dim_z=6, dim_u=4)
     oracle.F, oracle.B, oracle.Q = model.transition, model.input_matrix, np.diag(model.process_noise)
     oracle.P = 0.5 * np.eye(6)
@@ -96,12 +79,6 @@ def test_components_one_by_one_are_the_joint_update_of_filterpy(model, flight_da
     ours, theirs = run(model, *flight_data), filterpy_run(model, *flight_data)
     assert np.allclose(ours[0], theirs[0], rtol=0, atol=1e-11)
     assert np.allclose(ours[1], theirs[1], rtol=0, atol=1e-12)
-
-
-def test_joseph_and_the_papers_equation_30_agree(model, flight_data):
-    short, joseph = run(model, *flight_data), run(model, *flight_data, stepper=step_joseph)
-    assert np.allclose(short[0], joseph[0], rtol=0, atol=1e-11)
-    assert np.allclose(short[1], joseph[1], rtol=0, atol=1e-12)
 
 
 def test_every_lane_is_the_single_filter_bit_for_bit(model, flight_data):

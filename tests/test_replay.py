@@ -10,10 +10,10 @@ import pytest
 
 from flownav.errors import InputError
 from flownav.estimation.gating import Reason
-from flownav.estimation.kinematic_settings import default_settings
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
 from flownav.measurement import Sensor
+from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.record import Record
 from flownav.replay.bundle import to_record
 from flownav.replay.prepare import ReplayOptions
@@ -34,7 +34,7 @@ def log(flight, tmp_path_factory) -> Log:
 
 
 def flown(log: Log, settings=None, **options) -> Replay:
-    return replay(log, ReplayOptions(**options), settings or default_settings())
+    return replay(log, ReplayOptions(**options), settings or NavigatorSettingsFile())
 
 
 def error_of(run: Replay, flight: SyntheticLog) -> np.ndarray:
@@ -249,7 +249,7 @@ def test_without_gps_the_filter_starts_with_the_flow_at_the_local_origin(log, fl
 
 def test_a_cut_from_the_start_still_starts(log, flight):
     run = flown(log, gps_outages_s=((-1.0, 30.0),))
-    assert run.estimate[0, 0] == pytest.approx(default_settings().start_wait_s, abs=0.5)
+    assert run.estimate[0, 0] == pytest.approx(NavigatorSettingsFile().start_wait_s, abs=0.5)
     assert np.abs(error_of(run, flight))[run.estimate[:, 0] > 50.0, :2].max() < 0.5
 
 
@@ -324,7 +324,7 @@ def test_the_tables_last_window_is_shorter_where_the_length_does_not_fit():
 def test_the_table_is_each_window_alone(log):
     windows = table_windows(15.0, 55.0, 20.0)
     assert windows == [(15.0, 35.0), (35.0, 55.0)]
-    errors = outage_table(log, ReplayOptions(), default_settings(), windows)
+    errors = outage_table(log, ReplayOptions(), NavigatorSettingsFile(), windows)
     assert errors == [flown(log, gps_outages_s=(window,)).outage(*window) for window in windows]
     summary = outage_summary(errors)
     assert summary["outage_median_rms_m"] == pytest.approx(np.mean([e.horizontal_rms_m for e in errors]))
@@ -346,7 +346,7 @@ def test_the_record_holds_the_whole_replay_and_loads_again(log, tmp_path):
         "estimate", "gps_position", "gps_velocity", "flow_rate", "range", "baro", "innovation", "events"
     }  # fmt: skip
     manifest = record.manifest
-    assert (manifest["kind"], manifest["log"], manifest["filter"]) == ("replay", "flight", "kinematic")
+    assert (manifest["kind"], manifest["log"], manifest["filter"]) == ("replay", "flight", "landing")
     assert manifest["delays_s"]["gps_position"] == 0.22
     assert manifest["scores"] == scores
     assert manifest["provenance"]["inputs"]["flow.csv"]["sha256"] == log.inputs["flow.csv"]

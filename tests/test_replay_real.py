@@ -7,10 +7,10 @@ from dataclasses import replace as altered
 import numpy as np
 import pytest
 
-from flownav.estimation.kinematic_settings import default_settings
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
 from flownav.measurement import Sensor
+from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replay.prepare import ReplayOptions
 from flownav.replay.session import outage_summary, outage_table, replay, table_windows
 
@@ -29,7 +29,7 @@ def mocap(data_folder) -> Log:
 
 def table(log: Log, **options) -> tuple[float, float]:
     """Median and worst rms of the twelve windows."""
-    summary = outage_summary(outage_table(log, ReplayOptions(**options), default_settings(), WINDOWS))
+    summary = outage_summary(outage_table(log, ReplayOptions(**options), NavigatorSettingsFile(), WINDOWS))
     assert summary["outage_median_rms_m"] is not None
     assert summary["outage_worst_rms_m"] is not None
     return summary["outage_median_rms_m"], summary["outage_worst_rms_m"]
@@ -54,12 +54,12 @@ def test_without_flow_the_same_outages_are_tens_of_metres(outdoor):
 
 
 def test_fourteen_minutes_without_gps(outdoor):
-    run = replay(outdoor, ReplayOptions(gps_outages_s=((10.0, 840.0),)), default_settings())
+    run = replay(outdoor, ReplayOptions(gps_outages_s=((10.0, 840.0),)), NavigatorSettingsFile())
     assert run.outage(10.0, 840.0).horizontal_rms_m < 9.0
 
 
 def test_gps_aided_velocity_agrees_with_gps_and_hardly_anything_is_rejected(outdoor):
-    run = replay(outdoor, ReplayOptions(), default_settings())
+    run = replay(outdoor, ReplayOptions(), NavigatorSettingsFile())
     velocity = run.velocity_rms()
     assert velocity is not None
     assert velocity < 0.25
@@ -68,14 +68,14 @@ def test_gps_aided_velocity_agrees_with_gps_and_hardly_anything_is_rejected(outd
 
 
 def test_the_log_replayed_again_gives_the_same_bytes(outdoor):
-    first, second = (replay(outdoor, ReplayOptions(), default_settings()) for _ in range(2))
+    first, second = (replay(outdoor, ReplayOptions(), NavigatorSettingsFile()) for _ in range(2))
     assert first.estimate.tobytes() == second.estimate.tobytes()
 
 
 def test_stated_uncertainty_is_honest_through_the_outages(outdoor):
     """At the end of each window the horizontal error lies inside three standard deviations and the GPS floor."""
     for t0, t1 in WINDOWS:
-        run = replay(outdoor, ReplayOptions(gps_outages_s=((t0, t1),)), default_settings())
+        run = replay(outdoor, ReplayOptions(gps_outages_s=((t0, t1),)), NavigatorSettingsFile())
         last = run.estimate[np.searchsorted(run.estimate[:, 0], t1 - 0.5)]
         assert run.outage(t0, t1).horizontal_max_m < 3.0 * np.hypot(last[11], last[12]) + 0.5
 
@@ -120,7 +120,7 @@ def test_spikes_in_flow_and_range_are_ridden_out(outdoor):
 
 def test_against_motion_capture(mocap):
     """50 s by a sensor whose scale is 0.75 and whose noise is larger than the motion: the path stays within 0.4 m."""
-    truth = replay(mocap, ReplayOptions(), default_settings()).truth_scores()
+    truth = replay(mocap, ReplayOptions(), NavigatorSettingsFile()).truth_scores()
     assert truth is not None
     assert truth["horizontal_rms_m"] < 0.4
     assert truth["velocity_rms_m_s"] < 0.3

@@ -1,9 +1,9 @@
-"""The only place that knows Numba: scalar equations, the kernels built from them, and lanes.
+"""The only place that knows Numba: scalar equations, procedures, the kernels built from them, and lanes.
 
 An `@equation` is a short pure function of scalars and named tuples. Called from Python it is plain Python,
 which takes floats, complex numbers (for exact derivatives) and, where it has no branch, NumPy arrays; called
-from a kernel it is compiled and inlined. A `@kernel` is an entry point: it releases the interpreter lock and
-is cached on disk.
+from a kernel it is compiled and inlined. A `@procedure` is an equation too long for that: it is compiled once
+and called. A `@kernel` is an entry point: it releases the interpreter lock and is cached on disk.
 
 *Lanes* are flights that a kernel advances side by side. A kernel takes a lane marker, `ONE_LANE` or
 `LANES`, whose length is part of its type and so a compile-time constant: the same source compiles to the
@@ -80,14 +80,23 @@ if _HOST_FEATURES.get("avx512f") and not os.environ.get("NUMBA_CPU_FEATURES"):
     setattr(numba.config, "CPU_FEATURES", _HOST_FEATURES.flatten() + ",-prefer-256-bit")  # noqa: B010
 
 
+# what only kernels call needs no entry for Python and for C, which would take as long to compile as a short law
+UNWRAPPED = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+
 def equation(function: Function) -> Function:
     """A scalar law: plain Python where Python calls it, compiled and inlined where a kernel does."""
-    return register_jitable(forceinline=True, error_model="numpy")(function)
+    return register_jitable(forceinline=True, **UNWRAPPED)(function)
 
 
 def kernel(function: Function) -> Function:
     """An entry point built from equations: releases the lock, cached on disk."""
     return cast(Function, numba.njit(nogil=True, cache=True, error_model="numpy")(function))
+
+
+def procedure(function: Function) -> Function:
+    """An equation too long to be inlined: kernels call it, and it is compiled once for each type of its arguments."""
+    return register_jitable(**UNWRAPPED)(function)
 
 
 def lane_access(bundle: type, row: int) -> tuple[Callable[..., Any], Callable[..., Any]]:

@@ -26,7 +26,7 @@ def command(
     flight: Annotated[int | None, typer.Option(help="Fly this one flight of the seed again, counted from 0.")] = None,
     seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
     gps: Annotated[str | None, typer.Option(help="GPS error model: white or midg.")] = None,
-    filter_name: Annotated[str | None, typer.Option("--filter", help="Filter: landing, paper or kinematic.")] = None,
+    filter_name: Annotated[str | None, typer.Option("--filter", help="Filter: landing or paper.")] = None,
     feedback: Annotated[str | None, typer.Option(help="What the autopilot flies on: estimate or truth.")] = None,
     truth: Annotated[str | None, typer.Option(help="The plant: nonlinear, or the paper's linear model.")] = None,
     sensor: Annotated[str | None, typer.Option(help="A flow sensor file (TOML).")] = None,

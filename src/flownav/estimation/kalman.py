@@ -25,7 +25,6 @@ class KalmanRows(NamedTuple):
 
     state: int  # n rows: x
     covariance: int  # n*n rows: P, row by row
-    observation: int  # n rows: h, the row of H that maps the state to this component
     cross: int  # n rows: P h'
     gain: int  # n rows: K
     scratch: int  # n*n rows
@@ -39,14 +38,14 @@ class KalmanRows(NamedTuple):
 
 def kalman_rows(first: int, n: int) -> KalmanRows:
     """Rows for a filter of n states, from row `first` on."""
-    sizes = (n, n * n, n, n, n, n * n, 1, 1, 1, 1, 1, 1)
+    sizes = (n, n * n, n, n, n * n, 1, 1, 1, 1, 1, 1)
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]) + first
     return KalmanRows(*(int(start) for start in starts))
 
 
 def kalman_row_count(n: int) -> int:
     """How many rows `kalman_rows` takes."""
-    return 2 * n * n + 4 * n + 6
+    return 2 * n * n + 3 * n + 6
 
 
 @equation
@@ -86,30 +85,6 @@ def propagate_covariance(
                     total += work[(rows.scratch + i * n + k) * len(lanes) + lane] * transition[j, k]
                 work[(rows.covariance + i * n + j) * len(lanes) + lane] = total
                 work[(rows.covariance + j * n + i) * len(lanes) + lane] = total
-
-
-@equation
-def test_innovation(work: Work, lanes: Lanes, rows: KalmanRows, n: int, gate_sigma: float) -> None:
-    """P h', S = h P h' + R, the test ratio nu^2/(gate^2 S), the verdict and the gain K = P h'/S.
-
-    Reads rows.observation, innovation, noise and offered; writes cross, innovation_variance, test_ratio,
-    accepted and gain. A rejected or absent component (NaN included) gets a gain of zero.
-    """
-    for i in range(n):
-        for lane in range(len(lanes)):
-            total = 0.0
-            for k in range(n):
-                total += (
-                    work[(rows.covariance + i * n + k) * len(lanes) + lane]
-                    * work[(rows.observation + k) * len(lanes) + lane]
-                )
-            work[(rows.cross + i) * len(lanes) + lane] = total
-    for lane in range(len(lanes)):
-        variance = work[rows.noise * len(lanes) + lane]
-        for k in range(n):
-            variance += work[(rows.observation + k) * len(lanes) + lane] * work[(rows.cross + k) * len(lanes) + lane]
-        work[rows.innovation_variance * len(lanes) + lane] = variance
-    judge(work, lanes, rows, n, gate_sigma)
 
 
 @equation
@@ -164,42 +139,6 @@ def correct_covariance_short(work: Work, lanes: Lanes, rows: KalmanRows, n: int)
                 corrected = work[(rows.covariance + i * n + j) * len(lanes) + lane] - (
                     work[(rows.gain + i) * len(lanes) + lane]
                     * work[rows.innovation_variance * len(lanes) + lane]
-                    * work[(rows.gain + j) * len(lanes) + lane]
-                )
-                work[(rows.covariance + i * n + j) * len(lanes) + lane] = corrected
-                work[(rows.covariance + j * n + i) * len(lanes) + lane] = corrected
-
-
-@equation
-def correct_covariance_joseph(work: Work, lanes: Lanes, rows: KalmanRows, n: int) -> None:
-    """P <- (I - K h) P (I - K h)' + K R K' (Joseph), for any gain; exactly symmetric.
-
-    With M = P - K (P h')' (the left factor applied) the right factor is M - (M h') K'.
-    """
-    for i in range(n):
-        for j in range(n):
-            for lane in range(len(lanes)):
-                work[(rows.scratch + i * n + j) * len(lanes) + lane] = (
-                    work[(rows.covariance + i * n + j) * len(lanes) + lane]
-                    - work[(rows.gain + i) * len(lanes) + lane] * work[(rows.cross + j) * len(lanes) + lane]
-                )
-    for i in range(n):
-        for lane in range(len(lanes)):
-            total = 0.0
-            for k in range(n):
-                total += (
-                    work[(rows.scratch + i * n + k) * len(lanes) + lane]
-                    * work[(rows.observation + k) * len(lanes) + lane]
-                )
-            work[(rows.cross + i) * len(lanes) + lane] = total
-    for i in range(n):
-        for j in range(i, n):
-            for lane in range(len(lanes)):
-                corrected = (
-                    work[(rows.scratch + i * n + j) * len(lanes) + lane]
-                    - work[(rows.cross + i) * len(lanes) + lane] * work[(rows.gain + j) * len(lanes) + lane]
-                    + work[(rows.gain + i) * len(lanes) + lane]
-                    * work[rows.noise * len(lanes) + lane]
                     * work[(rows.gain + j) * len(lanes) + lane]
                 )
                 work[(rows.covariance + i * n + j) * len(lanes) + lane] = corrected

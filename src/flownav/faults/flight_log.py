@@ -22,7 +22,7 @@ def log_of(record: Record, setup: Setup, *, flow: Sensor = Sensor.FLOW_VELOCITY,
     has no IMU (the paper's filter flies without one) or `flow` is no flow.
     """
     if "imu" not in record.tables:
-        raise ValueError("the flight has no IMU; fly it with the kinematic or the landing filter")
+        raise ValueError("the flight has no IMU; fly it with the landing filter")
     streams = [_imu(record), *_gps(record, setup), _range(record, setup), _landed(record)]
     if flow == Sensor.FLOW_VELOCITY:
         streams.append(_flow_velocity(record))

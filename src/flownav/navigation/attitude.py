@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import ONE_LANE, kernel
+from flownav.compile import ONE_LANE, procedure
 from flownav.estimation.landing.observe import (
     ATTITUDE_STATES,
     HEADING_STATES,
@@ -37,7 +37,7 @@ LEAST_FIELD_GAUSS = 1e-3
 BRIDGE_SIGMA_RAD = 0.02
 
 
-@kernel
+@procedure
 def take_attitude(reading: Reading, on: Running) -> None:
     """An autopilot's or INS's attitude: all of it where no IMU serves, its heading where nothing else gives one."""
     value, memory, work = reading.value, on.memory, on.work
@@ -56,8 +56,8 @@ def take_attitude(reading: Reading, on: Running) -> None:
             sigma = on.settings.ins_tilt_white_rad
             observe_attitude(work, ONE_LANE, ROWS, axis, VALUE, 0.0)
             observation = work[ROWS.innovation]
-            put(sigma * sigma, reason, on)
-            conclude(reading, axis, observation, ATTITUDE_STATES[axis], reason, on)
+            put(sigma * sigma, reason, ATTITUDE_STATES[axis], on.work)
+            conclude(reading, axis, observation, reason, on)
         return
     bridge(reading, on)
     if memory[USE_HEADING] == FROM_ATTITUDE:
@@ -66,7 +66,7 @@ def take_attitude(reading: Reading, on: Running) -> None:
         offer_heading(reading, heading, heading_variance(reading.t_s, on), reason, on)
 
 
-@kernel
+@procedure
 def bridge(reading: Reading, on: Running) -> None:
     """Across a gap of the IMU the filter turns as the logged attitude did: q_before conj(read_before) read, measured.
 
@@ -97,13 +97,13 @@ def bridge(reading: Reading, on: Running) -> None:
             turn += work[ROWS.coefficient + 1 + k] * work[error + k]
             work[ROWS.coefficient + 1 + k] = 0.0
         work[ROWS.innovation] = turn
-        put(memory[SPREAD_BEFORE + axis] + BRIDGE_SIGMA_RAD**2, FUSED, on)
-        conclude(reading, axis, turn, ATTITUDE_STATES[axis], FUSED, on)
+        put(memory[SPREAD_BEFORE + axis] + BRIDGE_SIGMA_RAD**2, FUSED, ATTITUDE_STATES[axis], on.work)
+        conclude(reading, axis, turn, FUSED, on)
     for i in range(4):
         work[VALUE + i] = saved[i]
 
 
-@kernel
+@procedure
 def magnetic_heading(on: Running) -> float:
     """The heading that the latest magnetometer reading and the filter's tilt give, from magnetic north [rad]."""
     rotation = rotation_of(on.work, ONE_LANE, ROWS, 0)
@@ -111,7 +111,7 @@ def magnetic_heading(on: Running) -> float:
     return heading
 
 
-@kernel
+@procedure
 def heading_variance(t_s: float, on: Running) -> float:
     """Variance of one heading [rad2] whose error lasts for many: 2 sigma^2 tau/dt, at least sigma^2."""
     settings, memory = on.settings, on.memory
@@ -121,7 +121,7 @@ def heading_variance(t_s: float, on: Running) -> float:
     return variance
 
 
-@kernel
+@procedure
 def take_mag(reading: Reading, on: Running) -> None:
     """A magnetometer: the level field points to magnetic north; the declination is part of the heading error state."""
     value, memory = reading.value, on.memory
@@ -138,7 +138,7 @@ def take_mag(reading: Reading, on: Running) -> None:
         offer_heading(reading, magnetic_heading(on), heading_variance(reading.t_s, on), reason, on)
 
 
-@kernel
+@procedure
 def take_yaw(reading: Reading, on: Running) -> None:
     """An external heading."""
     variance = reading.variance[0]
@@ -149,10 +149,10 @@ def take_yaw(reading: Reading, on: Running) -> None:
         offer_heading(reading, reading.value[0], variance, reason, on)
 
 
-@kernel
+@procedure
 def offer_heading(reading: Reading, heading_rad: float, variance: float, reason: int, on: Running) -> None:
     """A heading, with its slow error as a state."""
     on.work[VALUE] = heading_rad
     observe_heading(on.work, ONE_LANE, ROWS, VALUE)
-    put(variance, reason, on)
-    conclude(reading, 0, heading_rad, HEADING_STATES, reason, on)
+    put(variance, reason, HEADING_STATES, on.work)
+    conclude(reading, 0, heading_rad, reason, on)

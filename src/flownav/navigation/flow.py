@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import ONE_LANE, kernel
+from flownav.compile import ONE_LANE, procedure
 from flownav.estimation.landing.observe import (
     BODY_VELOCITY_STATES,
     FLOW_RATE_STATES,
@@ -50,7 +50,7 @@ LONGEST_STEP_S = 1.0
 UNKNOWN_RANGE_M = 2.0
 
 
-@kernel
+@procedure
 def take_flow(reading: Reading, on: Running) -> None:
     """Two components of flow [rad/s], or two or three of body velocity [m/s], with noise scheduled on the height."""
     memory, settings, value = on.memory, on.settings, reading.value
@@ -93,7 +93,7 @@ def take_flow(reading: Reading, on: Running) -> None:
         memory[FLOW_CLOCK] = reading.t_s
 
 
-@kernel
+@procedure
 def offer_flow(reading: Reading, channel: int, observation: float, noise: float, reason: int, on: Running) -> int:
     """Offer one component; what became of it."""
     work = on.work
@@ -101,15 +101,15 @@ def offer_flow(reading: Reading, channel: int, observation: float, noise: float,
     if reading.sensor == Sensor.FLOW_RATE:
         set_lever(1 if channel == 0 else 0, on)
         observe_flow_rate(work, ONE_LANE, ROWS, channel, VALUE, LEVER, on.settings.flow_below_m)
-        put(noise, reason, on)
-        return conclude(reading, channel, observation, FLOW_RATE_STATES, reason, on)
+        put(noise, reason, FLOW_RATE_STATES, on.work)
+        return conclude(reading, channel, observation, reason, on)
     set_lever(channel, on)
     observe_body_velocity(work, ONE_LANE, ROWS, channel, VALUE, LEVER)
-    put(noise, reason, on)
-    return conclude(reading, channel, observation, BODY_VELOCITY_STATES, reason, on)
+    put(noise, reason, BODY_VELOCITY_STATES, on.work)
+    return conclude(reading, channel, observation, reason, on)
 
 
-@kernel
+@procedure
 def set_lever(component: int, on: Running) -> None:
     """Velocity of the lens from rotation, w x l, along one body axis."""
     work, settings = on.work, on.settings
@@ -123,7 +123,7 @@ def set_lever(component: int, on: Running) -> None:
     work[LEVER] = lever if on.memory[USE_IMU] > 0.0 else 0.0
 
 
-@kernel
+@procedure
 def rotation_rate(reading: Reading, on: Running) -> tuple[float, float]:
     """The turning that the flow saw [rad/s]: the chosen gyro of columns 2 and 3 less its bias.
 
@@ -145,7 +145,7 @@ def rotation_rate(reading: Reading, on: Running) -> tuple[float, float]:
     return own_x - memory[FLOW_BIAS_X], own_y - memory[FLOW_BIAS_X + 1]
 
 
-@kernel
+@procedure
 def velocity_variance(range_m: float, speed_m_s: float, quality: float, angular: bool, on: Running) -> float:
     """Variance of a flow velocity [m2/s2]: (sigma_flow r)^2 + floor^2, sigma_flow by quality (as PX4's EKF2).
 
@@ -158,7 +158,7 @@ def velocity_variance(range_m: float, speed_m_s: float, quality: float, angular:
     return sigma * sigma + settings.flow_floor_m_s * settings.flow_floor_m_s + scaled
 
 
-@kernel
+@procedure
 def learn_flow_noise(t_s: float, on: Running) -> None:
     """Follow how many times noisier than its model the flow is: the mean of (nu^2 - h P h')/R, at least 1.
 

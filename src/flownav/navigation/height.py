@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import ONE_LANE, kernel
+from flownav.compile import ONE_LANE, procedure
 from flownav.estimation.landing.algebra import forget
 from flownav.estimation.landing.observe import BARO_STATES, RANGE_STATES, observe_baro, observe_range, rotation_of
 from flownav.estimation.landing.states import BARO, GROUND, POSITION, STATES, VELOCITY
@@ -46,14 +46,14 @@ DOUBTING_S = 0.05  # a range that alone tells the height and is rejected so long
 ALONE = 5.0  # times the travel, where nothing else tells the height
 
 
-@kernel
+@procedure
 def range_variance(range_m: float, on: Running) -> float:
     """Variance of a range reading [m2]: a floor and a share of the range."""
     share = on.settings.range_relative_sigma * range_m
     return on.settings.range_sigma_m * on.settings.range_sigma_m + share * share
 
 
-@kernel
+@procedure
 def stuck(reading: Reading, on: Running) -> bool:
     """Whether the range repeats one value to the last digit while the filter's height travels.
 
@@ -71,7 +71,7 @@ def stuck(reading: Reading, on: Running) -> bool:
     return repeating
 
 
-@kernel
+@procedure
 def take_range(reading: Reading, on: Running) -> None:
     """Height over the ground below. Where range is rejected for long, the ground has a step."""
     t_s, memory, settings, work = reading.t_s, on.memory, on.settings, on.work
@@ -98,8 +98,8 @@ def take_range(reading: Reading, on: Running) -> None:
         write_event(t_s, GROUND_FOUND, below, on.tape)
     work[VALUE] = range_m
     observe_range(work, ONE_LANE, ROWS, VALUE, settings.range_below_m)
-    put(noise, reason, on)
-    reason = conclude(reading, 0, range_m, RANGE_STATES, reason, on)
+    put(noise, reason, RANGE_STATES, on.work)
+    reason = conclude(reading, 0, range_m, reason, on)
     if reason == FUSED or reason == DATUM:  # noqa: SIM109
         memory[RANGE_CLOCK], memory[RANGE_SINCE] = t_s, np.nan
     elif reason == INNOVATION_GATE:
@@ -114,7 +114,7 @@ def take_range(reading: Reading, on: Running) -> None:
             write_event(t_s, GROUND_RESET, below, on.tape)
 
 
-@kernel
+@procedure
 def set_ground(below_m: float, on: Running) -> None:
     """The ground is unknown but for this reading, which is about to be fused."""
     on.work[ROWS.state + GROUND] = below_m
@@ -122,7 +122,7 @@ def set_ground(below_m: float, on: Running) -> None:
     forget(on.work, ONE_LANE, ROWS, GROUND, UNKNOWN_M * UNKNOWN_M, VALUE)
 
 
-@kernel
+@procedure
 def take_baro(reading: Reading, on: Running) -> None:
     """Height from pressure; the first reading finds the offset."""
     work, memory = on.work, on.memory
@@ -140,6 +140,6 @@ def take_baro(reading: Reading, on: Running) -> None:
         write_event(reading.t_s, BARO_FOUND, work[ROWS.state + BARO], on.tape)
     work[VALUE] = altitude_m
     observe_baro(work, ONE_LANE, ROWS, VALUE)
-    put(noise, reason, on)
-    if conclude(reading, 0, altitude_m, BARO_STATES, reason, on) == FUSED:
+    put(noise, reason, BARO_STATES, on.work)
+    if conclude(reading, 0, altitude_m, reason, on) == FUSED:
         memory[HEIGHT_CLOCK] = reading.t_s

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from flownav.compile import ONE_LANE, kernel
+from flownav.compile import ONE_LANE, procedure
 from flownav.estimation.gating import Reason
-from flownav.estimation.landing.algebra import fuse
-from flownav.measurement import Sensor
+from flownav.estimation.landing.algebra import expect, settle
+from flownav.measurement import Array, Sensor
 from flownav.navigation.state import (
     AIDED,
     AIDED_AGAIN,
@@ -31,7 +29,7 @@ from flownav.navigation.state import (
 CLOCK_SLACK_S = 1e-6
 
 
-@kernel
+@procedure
 def too_old(reading: Reading, on: Running) -> bool:
     """Whether the reading repeats or precedes one of its sensor, or describes what the filter has left behind."""
     memory, sensor = on.memory, reading.sensor
@@ -50,7 +48,7 @@ def too_old(reading: Reading, on: Running) -> bool:
     return True
 
 
-@kernel
+@procedure
 def usable(quality: float, value: float, variance: float, on: Running) -> int:
     """FUSED where a reading may be offered, or the reason why not."""
     reason = FUSED
@@ -65,17 +63,21 @@ def usable(quality: float, value: float, variance: float, on: Running) -> int:
     return reason
 
 
-@kernel
-def put(variance: float, reason: int, on: Running) -> None:
-    """The variance of the component whose law stands in the observation rows, and whether it may be fused."""
-    on.work[ROWS.noise] = variance
-    on.work[ROWS.offered] = 1.0 if reason == FUSED else 0.0
+@procedure
+def put(variance: float, reason: int, index: tuple[int, ...], work: Array) -> None:
+    """The variance of the component whose law stands in the observation rows, and whether it may be fused.
+
+    `index` are the law's states; this is the only part of a correction that their number compiles anew.
+    """
+    work[ROWS.noise] = variance
+    work[ROWS.offered] = 1.0 if reason == FUSED else 0.0
+    expect(work, ONE_LANE, ROWS, index)
 
 
-@kernel
-def conclude(reading: Reading, component: Any, observation: float, index: Any, reason: int, on: Running) -> int:
-    """Test, fuse and write down the component that stands in the observation rows; what became of it."""
-    fuse(on.work, ONE_LANE, ROWS, index, on.settings.filter.gate_sigma)
+@procedure
+def conclude(reading: Reading, component: int, observation: float, reason: int, on: Running) -> int:
+    """Test, fuse and write down the component that was put; what became of it."""
+    settle(on.work, ONE_LANE, ROWS, on.settings.filter.gate_sigma)
     if reason == FUSED and on.work[ROWS.accepted] == 0.0:
         reason = INNOVATION_GATE
     write_offer(reading, component, observation, reason, on)
@@ -83,7 +85,7 @@ def conclude(reading: Reading, component: Any, observation: float, index: Any, r
 
 
 # -- horizontal aid ---------------------------------------------------------------------------------------
-@kernel
+@procedure
 def note_aid(t_s: float, on: Running) -> None:
     """Something horizontal was fused."""
     memory = on.memory
@@ -92,7 +94,7 @@ def note_aid(t_s: float, on: Running) -> None:
     memory[AIDED], memory[FLAG] = t_s, 0.0
 
 
-@kernel
+@procedure
 def note_aid_age(t_s: float, on: Running) -> None:
     """Flag dead reckoning, and then an invalid position, when no horizontal aid has been fused for long."""
     memory, settings = on.memory, on.settings

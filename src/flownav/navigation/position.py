@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from flownav.compile import ONE_LANE, kernel
+from flownav.compile import ONE_LANE, procedure
 from flownav.estimation.landing.algebra import forget
 from flownav.estimation.landing.observe import (
     GPS_POSITION_STATES,
@@ -52,7 +50,7 @@ LEAST_REJECTIONS = 5
 LEAST_PAD_DISTANCE_M = 0.05
 
 
-@kernel
+@procedure
 def take_gps(reading: Reading, on: Running) -> None:
     """Position or velocity, axis by axis, with its Gauss-Markov errors; where it is rejected for long, a reset."""
     settings, work = on.settings, on.work
@@ -70,12 +68,12 @@ def take_gps(reading: Reading, on: Running) -> None:
         work[VALUE] = reading.value[axis]
         if position:
             observe_gps_position(work, ONE_LANE, ROWS, axis, VALUE, 0.0)
-            put(noise, reason, on)
-            reason = conclude(reading, axis, reading.value[axis], GPS_POSITION_STATES[axis], reason, on)
+            put(noise, reason, GPS_POSITION_STATES[axis], on.work)
+            reason = conclude(reading, axis, reading.value[axis], reason, on)
         else:
             observe_gps_velocity(work, ONE_LANE, ROWS, axis, VALUE, 0.0)
-            put(noise, reason, on)
-            reason = conclude(reading, axis, reading.value[axis], GPS_VELOCITY_STATES[axis], reason, on)
+            put(noise, reason, GPS_VELOCITY_STATES[axis], on.work)
+            reason = conclude(reading, axis, reading.value[axis], reason, on)
         fused = fused or (reason == FUSED and axis < 2)
         if reason == FUSED and position and axis == 2:
             on.memory[HEIGHT_CLOCK] = reading.t_s
@@ -84,7 +82,7 @@ def take_gps(reading: Reading, on: Running) -> None:
         note_aid(reading.t_s, on)
 
 
-@kernel
+@procedure
 def mind_rejections(reading: Reading, axis: int, reason: int, noise: float, on: Running) -> None:
     """Where GPS has been rejected again and again for a state, the filter is wrong: that state goes to GPS."""
     work, memory = on.work, on.memory
@@ -118,7 +116,7 @@ def mind_rejections(reading: Reading, axis: int, reason: int, noise: float, on: 
     write_event(reading.t_s, GPS_RESET, reading.value[axis] - before, on.tape)
 
 
-@kernel
+@procedure
 def take_pose(reading: Reading, on: Running) -> None:
     """An external position in the local frame."""
     for axis in range(3):
@@ -128,15 +126,15 @@ def take_pose(reading: Reading, on: Running) -> None:
         reason = usable(reading.quality, reading.value[axis], noise, on)
         on.work[VALUE] = reading.value[axis]
         observe_state(on.work, ONE_LANE, ROWS, POSITION + axis, VALUE)
-        put(noise, reason, on)
-        reason = conclude(reading, axis, reading.value[axis], STATE_ITSELF[POSITION + axis], reason, on)
+        put(noise, reason, STATE_ITSELF[POSITION + axis], on.work)
+        reason = conclude(reading, axis, reading.value[axis], reason, on)
         if reason == FUSED and axis < 2:
             note_aid(reading.t_s, on)
         elif reason == FUSED:
             on.memory[HEIGHT_CLOCK] = reading.t_s
 
 
-@kernel
+@procedure
 def take_pad(reading: Reading, on: Running) -> None:
     """The pad: the first fix says where it lies; every later one tells the vehicle's place from it."""
     work, memory, value = on.work, on.memory, reading.value
@@ -158,15 +156,15 @@ def take_pad(reading: Reading, on: Running) -> None:
         sigma = on.settings.pad_distance_sigma if component == 2 else on.settings.pad_angle_sigma_rad
         spread = sigma * distance
         observe_pad(work, ONE_LANE, ROWS, component, VALUE, on.settings.flow_below_m)
-        put(spread * spread if np.isnan(stated) else stated, reason, on)
-        outcome = conclude(reading, component, value[component], PAD_STATES, reason, on)
+        put(spread * spread if np.isnan(stated) else stated, reason, PAD_STATES, on.work)
+        outcome = conclude(reading, component, value[component], reason, on)
         if outcome == FUSED:
             memory[HEIGHT_CLOCK] = reading.t_s
             note_aid(reading.t_s, on)
     shift(on, 1.0)
 
 
-@kernel
+@procedure
 def find_pad(reading: Reading, on: Running) -> None:
     """Where this fix puts the pad in the local frame, by the filter's own place."""
     work, memory, value = on.work, on.memory, reading.value
@@ -180,7 +178,7 @@ def find_pad(reading: Reading, on: Running) -> None:
     write_event(reading.t_s, PAD_FOUND, np.sqrt(total), on.tape)
 
 
-@kernel
+@procedure
 def shift(on: Running, sign: float) -> None:
     """Position counted from the pad (-1), and back from the local origin (1)."""
     for i in range(3):
@@ -188,7 +186,7 @@ def shift(on: Running, sign: float) -> None:
         on.work[ROWS.state + POSITION + i] += sign * place if np.isfinite(place) else 0.0
 
 
-@kernel
+@procedure
 def take_landed(reading: Reading, on: Running) -> None:
     """On the ground: no velocity."""
     on.memory[LANDED] = reading.value[0]
@@ -197,14 +195,14 @@ def take_landed(reading: Reading, on: Running) -> None:
         noise = on.settings.still_sigma_m_s * on.settings.still_sigma_m_s
         reason = usable(reading.quality if reading.value[0] > 0.5 else 0.0, reading.value[0], noise, on)
         observe_state(on.work, ONE_LANE, ROWS, VELOCITY + axis, VALUE)
-        put(noise, reason, on)
+        put(noise, reason, STATE_ITSELF[VELOCITY + axis], on.work)
         conclude_still(reading, axis, reason, on)
 
 
-@kernel
-def conclude_still(reading: Reading, axis: Any, reason: int, on: Running) -> None:
+@procedure
+def conclude_still(reading: Reading, axis: int, reason: int, on: Running) -> None:
     """A zero velocity is written down where it was offered; in flight there is nothing to say."""
     if reading.value[0] > 0.5:
-        reason = conclude(reading, axis, 0.0, STATE_ITSELF[VELOCITY + axis], reason, on)
+        reason = conclude(reading, axis, 0.0, reason, on)
         if reason == FUSED:
             note_aid(reading.t_s, on)

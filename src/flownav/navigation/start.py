@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import kernel
+from flownav.compile import procedure
 from flownav.estimation.landing.states import ATTITUDE, POSITION, STATES
 from flownav.frames import quaternion_from_euler
 from flownav.measurement import Sensor
@@ -39,7 +39,7 @@ COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's
 LEAST_LEVELLING = 5
 
 
-@kernel
+@procedure
 def gather(reading: Reading, on: Running) -> None:
     """Before the start: the latest attitude, heading and IMU reading, and the mean specific force."""
     value, memory, work = reading.value, on.memory, on.work
@@ -63,7 +63,7 @@ def gather(reading: Reading, on: Running) -> None:
             memory[IMU_CLOCK] = reading.t_s
 
 
-@kernel
+@procedure
 def try_start(reading: Reading, on: Running) -> None:
     """Start at a fix, or at the local origin with the first flow, pose or range where no fix came in time."""
     t_s, sensor, value, memory, work = reading.t_s, reading.sensor, reading.value, on.memory, on.work
@@ -97,7 +97,7 @@ def try_start(reading: Reading, on: Running) -> None:
     write_event(t_s, START, 1.0 if at_fix else 0.0, on.tape)
 
 
-@kernel
+@procedure
 def level(on: Running) -> None:
     """Roll and pitch from the mean specific force, heading from the magnetometer where one was heard, else north."""
     memory, work = on.memory, on.work

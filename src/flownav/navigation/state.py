@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import ONE_LANE, kernel
+from flownav.compile import ONE_LANE, procedure
 from flownav.estimation.gating import Reason
 from flownav.estimation.landing.observe import rotation_of
 from flownav.estimation.landing.states import LANDING_ROW_COUNT, POSITION, STATES, VELOCITY, landing_rows
@@ -168,7 +168,7 @@ def new_memory() -> Array:
     return memory
 
 
-@kernel
+@procedure
 def write_event(t_s: float, kind: Any, value: float, tape: Tape) -> None:
     """A happening."""
     row = tape.used[2]
@@ -177,7 +177,7 @@ def write_event(t_s: float, kind: Any, value: float, tape: Tape) -> None:
         tape.used[2] = row + 1
 
 
-@kernel
+@procedure
 def write_offer(reading: Reading, component: int, observation: float, reason: int, on: Running) -> None:
     """What became of the component that was offered last."""
     row = on.tape.used[1]
@@ -193,7 +193,7 @@ def write_offer(reading: Reading, component: int, observation: float, reason: in
     line[7] = on.work[ROWS.test_ratio] if tested else np.nan
 
 
-@kernel
+@procedure
 def write_estimate(t_s: float, on: Running) -> None:
     """State, attitude and standard deviations at an instant; see ESTIMATE_COLUMNS."""
     work = on.work

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import ONE_LANE, clamp, kernel
+from flownav.compile import ONE_LANE, clamp, procedure
 from flownav.estimation.landing.algebra import add_noise
 from flownav.estimation.landing.states import ACCEL_BIAS, GYRO_BIAS, VELOCITY
 from flownav.measurement import Array
@@ -21,7 +21,7 @@ DOUBT_LASTS_S = 60.0
 DOUBTED_SPEED_M_S = 1.0  # what it may have done to the velocity
 
 
-@kernel
+@procedure
 def follow_vibration(value: Array, dt_s: float, on: Running) -> None:
     """The mean square of the differences between neighbouring readings, an axis: twice the variance of white noise."""
     square = 0.0
@@ -31,14 +31,14 @@ def follow_vibration(value: Array, dt_s: float, on: Running) -> None:
     on.memory[VIBRATION] += share * (square / 6.0 - on.memory[VIBRATION])
 
 
-@kernel
+@procedure
 def excess(on: Running) -> float:
     """The vibration beyond the harmless [m/s2]."""
     level: float = np.sqrt(on.memory[VIBRATION])
     return max(level - on.settings.vibration_free_m_s2, 0.0)
 
 
-@kernel
+@procedure
 def doubt(t_s: float, contradiction_m: float, on: Running) -> None:
     """The range contradicts the motion that the accelerometer made: both velocity and bias are set free."""
     if on.memory[DOUBT] < 0.5 * DOUBT_M_S2:
@@ -48,7 +48,7 @@ def doubt(t_s: float, contradiction_m: float, on: Running) -> None:
     add_noise(on.work, ONE_LANE, ROWS, ACCEL_BIAS + 2, DOUBT_M_S2 * DOUBT_M_S2)
 
 
-@kernel
+@procedure
 def add_vibration_noise(dt_s: float, on: Running) -> None:
     """Velocity and accelerometer bias are less sure by what vibration may have made of them; a doubt is vertical."""
     beyond, share = excess(on), on.settings.vibration_walk_per_rt_s
@@ -60,7 +60,7 @@ def add_vibration_noise(dt_s: float, on: Running) -> None:
             add_noise(on.work, ONE_LANE, ROWS, VELOCITY + i, on.memory[VIBRATION] * dt_s * dt_s)
 
 
-@kernel
+@procedure
 def limit_biases(on: Running) -> None:
     """Hold both biases to what such sensors, and this vibration, can make: the last resort."""
     settings, work = on.settings.filter, on.work

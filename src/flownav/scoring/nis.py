@@ -16,7 +16,7 @@ class Nis(NamedTuple):
     """Of one sensor's scalar components: how many were tested, the mean (1 where the filter is right), and the share
     inside the 95 % band of chi-square with one degree of freedom (0.95 where it is right)."""
 
-    count: int
+    tested: int
     mean: float
     inside_fraction: float
 

@@ -13,11 +13,9 @@ from flownav.control.autopilot import AutopilotGains
 from flownav.control.guidance import path_through
 from flownav.errors import InputError
 from flownav.estimation.discretise import discretised
-from flownav.estimation.kinematic_settings import default_settings
 from flownav.estimation.paper_filter import PaperModel
 from flownav.sensors.datasheet import FlowSensor, load_sensor
 from flownav.sensors.settings import NO_PAD_FIX
-from flownav.simulation.filtering import KinematicSetup
 from flownav.simulation.flight import ATTITUDE_S, Flight, FlightPlan
 from flownav.simulation.landing_filtering import LandingSetup
 from flownav.simulation.landing_setup import landing_setup
@@ -65,7 +63,6 @@ def assemble(scenario: Scenario) -> Setup:
         path=_path(scenario, vehicle),
         gains=_gains(scenario, vehicle, hover),
         paper=_paper_filter(paper) if scenario.filter.name == "paper" else None,
-        kinematic=_kinematic_filter(scenario, vehicle) if scenario.filter.name == "kinematic" else None,
         landing=_landing_filter(scenario, sensor, vehicle) if scenario.filter.name == "landing" else None,
         initial_variance=_initial_variance(scenario, paper),
         linear=_linear_truth(paper, hover) if scenario.truth == "linear" else None,
@@ -194,18 +191,6 @@ def _paper_filter(paper: ReducedModel) -> PaperModel:
     """The printed matrices, discretised with the inputs held over an epoch."""
     transition, input_matrix = discretised(paper.a, paper.b, EPOCH_S)
     return PaperModel(transition, input_matrix, np.diag(paper.q).copy(), np.diag(paper.r).copy())
-
-
-def _kinematic_filter(scenario: Scenario, vehicle: VehicleParameters) -> KinematicSetup:
-    """Default settings, the accuracy that the GPS/INS states of itself, and where the sonar looks from."""
-    velocity = scenario.gps.velocity_sigma_total_m_s
-    return KinematicSetup(
-        settings=default_settings(),
-        gps_position_variance=np.square(scenario.gps.position_sigma_m),
-        gps_velocity_variance=np.full(3, velocity**2 if velocity > 0.0 else np.inf),
-        lens_below_cg_m=vehicle.cg_above_skid_m - scenario.vehicle.lens_above_skid_m,
-        sonar_floor_m=scenario.rangefinder.floor_m,
-    )
 
 
 def _landing_filter(scenario: Scenario, sensor: FlowSensor, vehicle: VehicleParameters) -> LandingSetup:

@@ -31,7 +31,7 @@ from flownav.sensors.flow import step_flow
 from flownav.sensors.gps_ins import attitude_with_error
 from flownav.sensors.rangefinder import slant_range
 from flownav.simulation import layout
-from flownav.simulation.filtering import KinematicSetup, run_filter, start_filter
+from flownav.simulation.filtering import run_filter, start_filter
 from flownav.simulation.history import write_history
 from flownav.simulation.landing_filtering import LandingSetup
 from flownav.simulation.layout import (
@@ -87,7 +87,7 @@ class FlightPlan(NamedTuple):
 
 
 class Flight(NamedTuple):
-    """Everything constant over a flight: one of `paper`, `kinematic` and `landing`; `linear` only for that truth."""
+    """Everything constant over a flight: one of `paper` and `landing`; `linear` only for that truth."""
 
     plan: FlightPlan
     vehicle: VehicleParameters
@@ -96,7 +96,6 @@ class Flight(NamedTuple):
     path: Path
     gains: AutopilotGains
     paper: PaperModel | None
-    kinematic: KinematicSetup | None
     landing: LandingSetup | None
     initial_variance: NDArray[np.float64]
     linear: LinearTruth | None
@@ -267,7 +266,7 @@ def fly_block(flight: Flight, seed: int, first: int, lanes: Lanes, work: Work, h
         sense(work, lanes, epoch, flight.sensors, flight.vehicle.gravity_m_s2)
         if epoch == 0:
             start_filter(work, lanes, flight.initial_variance, flight.plan.start_known, flight.landing)
-        run_filter(work, lanes, epoch, flight.paper, flight.kinematic, flight.landing)
+        run_filter(work, lanes, epoch, flight.paper, flight.landing)
         estimate_for_autopilot(work, lanes, flight)
         note_home(work, lanes, epoch, reference, flight)
         command(work, lanes, t_s, reference, flight)

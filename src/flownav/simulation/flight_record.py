@@ -70,9 +70,6 @@ def record_of(setup: Setup, history: Array, seed: int, index: int) -> Record:
         table("pad", "pad", COLUMNS[Sensor.PAD], fixes, quality=255.0 * flown["pad", "valid"][fixes])
     if setup.flight.plan.draws.imu:
         table("imu", "imu", COLUMNS[Sensor.IMU], quality=every)
-    if scenario.pad_fix is not None:
-        looks = slice(None, None, PAD_EPOCHS)
-        table("pad", "pad", COLUMNS[Sensor.PAD], looks, quality=255.0 * flown["pad", "valid"][looks])
     record.add("innovation", _innovations(t_s, flown, _gate_sigma(setup)))
     record.add("events", _events(t_s, flown))
     return record
@@ -80,8 +77,7 @@ def record_of(setup: Setup, history: Array, seed: int, index: int) -> Record:
 
 def _gate_sigma(setup: Setup) -> float | None:
     """The gate of the filter that flew; None for the paper's, which has none."""
-    gated = setup.flight.landing or setup.flight.kinematic
-    return gated.settings.gate_sigma if gated else None
+    return setup.flight.landing.settings.gate_sigma if setup.flight.landing else None
 
 
 def _innovations(t_s: Array, flown: dict[tuple[str, str], Array], gate_sigma: float | None) -> Table:

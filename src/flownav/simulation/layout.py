@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from flownav.compile import lane_access
 from flownav.control.autopilot import AutopilotState, Estimate
-from flownav.estimation.kinematic_filter import KINEMATIC_ROW_COUNT, kinematic_rows
+from flownav.estimation.kalman import kalman_row_count, kalman_rows
 from flownav.estimation.landing.states import LANDING_ROW_COUNT, landing_rows
 from flownav.estimation.paper_filter import INPUTS, STATES
 from flownav.sensors.flow import FlowState
@@ -71,10 +71,8 @@ IMU_NORMALS = _rows.take(len(ImuNormals._fields))
 PAD_NORMALS = _rows.take(len(PadFixNormals._fields))
 NORMALS_END = _rows.next
 
-# the filter that flies: state and covariance, attitude and force for the kinematic one; inputs and measurements
-KINEMATIC = kinematic_rows(_rows.take(KINEMATIC_ROW_COUNT))
-FILTER = KINEMATIC.kalman
-OFFER = _rows.take(3)  # a reading, its variance, and whether it is here
+# the paper's filter: state and covariance, inputs and measurements; then the landing filter
+FILTER = kalman_rows(_rows.take(kalman_row_count(STATES)), STATES)
 INPUT = _rows.take(INPUTS)
 MEASURED = _rows.take(STATES)
 ARRIVED = _rows.take(STATES)

@@ -78,7 +78,7 @@ class VehicleSection(ParameterModel):
 class FilterSection(ParameterModel):
     """Which filter flies, and where it starts: at the known pad, or at the first GPS reading."""
 
-    name: Literal["paper", "kinematic", "landing"] = "landing"
+    name: Literal["paper", "landing"] = "landing"
     flow_min_height_m: Number = Field(0.3, ge=0.0, le=100.0)
     start: Literal["known", "gps"] | None = None
 
@@ -148,7 +148,7 @@ def load_scenario(name: str) -> Scenario:
     )
 
 
-def with_filter(scenario: Scenario, name: Literal["paper", "kinematic", "landing"]) -> Scenario:
+def with_filter(scenario: Scenario, name: Literal["paper", "landing"]) -> Scenario:
     """The scenario flown with another filter."""
     return scenario.model_copy(update={"filter": scenario.filter.model_copy(update={"name": name})})
 

@@ -105,6 +105,13 @@ def fuse(work: Work, lanes: Lanes, rows: LandingRows, index: tuple[int, ...], ga
     Reads rows.innovation, noise and offered; writes innovation_variance, test_ratio and accepted. What is absent,
     beyond the gate or not finite corrects nothing.
     """
+    expect(work, lanes, rows, index)
+    settle(work, lanes, rows, gate_sigma)
+
+
+@equation
+def expect(work: Work, lanes: Lanes, rows: LandingRows, index: tuple[int, ...]) -> None:
+    """P h', the innovation's variance h P h' + R, and in rows.accepted whether the reading may be tested at all."""
     observe_cross(work, lanes, rows, index)
     for lane in range(len(lanes)):
         noise = work[rows.noise * len(lanes) + lane]
@@ -116,6 +123,11 @@ def fuse(work: Work, lanes: Lanes, rows: LandingRows, index: tuple[int, ...], ga
             work[rows.innovation_variance * len(lanes) + lane] += (
                 work[(rows.coefficient + t) * len(lanes) + lane] * work[(rows.cross + index[t]) * len(lanes) + lane]
             )
+
+
+@equation
+def settle(work: Work, lanes: Lanes, rows: LandingRows, gate_sigma: float) -> None:
+    """Test what `expect` left, and correct with what passes."""
     for lane in range(len(lanes)):
         variance = work[rows.innovation_variance * len(lanes) + lane]
         innovation = work[rows.innovation * len(lanes) + lane]

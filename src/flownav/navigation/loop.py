@@ -12,6 +12,7 @@ from flownav.measurement import EventQueue, Sensor
 from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
 from flownav.navigation.flow import take_flow
 from flownav.navigation.height import take_baro, take_range
+from flownav.navigation.journal import note_estimate, note_prediction
 from flownav.navigation.offers import note_aid_age, too_old
 from flownav.navigation.position import take_gps, take_landed, take_pad, take_pose
 from flownav.navigation.start import gather, try_start
@@ -83,6 +84,7 @@ def take(reading: Reading, on: Running) -> None:
         if t_s - memory[WRITTEN] >= ESTIMATE_PERIOD_S:
             limit_biases(on)
             write_estimate(t_s, on)
+            note_estimate(on)
 
 
 @kernel
@@ -130,6 +132,7 @@ def advance(t_s: float, on: Running) -> None:
             memory[GAP] = 1.0
             hold_still(on)
             predict(work, ONE_LANE, ROWS, dt_s, on.settings.coasting, None)
+        note_prediction(dt_s, on)
         memory[RANGE_TRAVEL] += dt_s * work[ROWS.state + VELOCITY + 2]
     memory[CLOCK] = t_s
 

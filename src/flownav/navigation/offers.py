@@ -10,6 +10,7 @@ from flownav.compile import ONE_LANE, kernel
 from flownav.estimation.gating import Reason
 from flownav.estimation.landing.algebra import fuse
 from flownav.measurement import Sensor
+from flownav.navigation.journal import note_correction
 from flownav.navigation.state import (
     AIDED,
     AIDED_AGAIN,
@@ -78,6 +79,8 @@ def conclude(reading: Reading, component: Any, observation: float, index: Any, r
     fuse(on.work, ONE_LANE, ROWS, index, on.settings.filter.gate_sigma)
     if reason == FUSED and on.work[ROWS.accepted] == 0.0:
         reason = INNOVATION_GATE
+    if on.work[ROWS.accepted] > 0.0:
+        note_correction(index, on)
     write_offer(reading, component, observation, reason, on)
     return reason
 

@@ -2,7 +2,7 @@
 
 Three arrays, so that the loop compiles and a live session can stop and go on: `work`, a lane buffer of one lane
 with the landing filter's rows; `memory`, the scalars that are no part of the filter (clocks, timers, datums); and
-the `Tape`.
+the `Tape`. A smoother's `Journal` is beside them.
 """
 
 from __future__ import annotations
@@ -116,6 +116,17 @@ class Tape(NamedTuple):
     used: NDArray[np.int64]
 
 
+class Journal(NamedTuple):
+    """What a smoother needs (navigation/journal.py): entry (n, ENTRY), state and quaternion (m, STATES + 4), covariance
+    (m, STATES, STATES) of each estimate, used (2,): how many entries and estimates there were, kept or not.
+    """
+
+    entry: Array
+    state: Array
+    covariance: Array
+    used: NDArray[np.int64]
+
+
 class Running(NamedTuple):
     """A navigator at work."""
 
@@ -124,6 +135,7 @@ class Running(NamedTuple):
     work: Array
     memory: Array
     tape: Tape
+    journal: Journal
 
 
 class Reading(NamedTuple):

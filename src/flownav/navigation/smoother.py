@@ -74,13 +74,15 @@ def smooth(queue: EventQueue, running: Running, chunk: int = CHUNK) -> Array:
 
 
 def _part(queue: EventQueue, first: int, last: int) -> EventQueue:
-    return EventQueue(*(column[first:last] for column in queue))
+    rows = slice(first, last)
+    return EventQueue(
+        queue.t_s[rows], queue.sensor[rows], queue.value[rows], queue.variance[rows], queue.quality[rows],
+        queue.row[rows],
+    )  # fmt: skip
 
 
 def _mark(running: Running) -> Mark:
-    return Mark(
-        running.work.copy(), running.memory.copy(), running.tape.used.copy(), running.journal.used.copy()
-    )
+    return Mark(running.work.copy(), running.memory.copy(), running.tape.used.copy(), running.journal.used.copy())
 
 
 @kernel

@@ -144,7 +144,7 @@ class Replay:
         return scores | {name: found for name, found in beside.items() if found is not None}
 
     def path_scores(self) -> dict[str, Any]:
-        """Errors of the path: through each outage, of velocity against GPS, and against the truth where there is one."""
+        """Errors of the path: through each outage, of velocity against GPS, against the truth where there is one."""
         truth = self.truth_scores()
         return {
             "outages": [outage_entry(self.outage(t0, t1)) for t0, t1 in self.options.gps_outages_s],

@@ -47,6 +47,13 @@ TABLES: dict[str, tuple[str, ...]] = {
         *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)),
         "nees",  # normalised estimation error squared of position and velocity, where the truth is known
     ),
+    # what the filter says once it has seen the whole flight
+    "smoothed": (
+        *POSITION_NED,
+        *VELOCITY_BODY,
+        *QUATERNION,
+        *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)),
+    ),
     # what another estimator said (an autopilot's own)
     "autopilot": (*POSITION_NED, *VELOCITY_BODY, *QUATERNION),
     # what the vehicle was told: references and controls

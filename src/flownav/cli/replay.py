@@ -41,6 +41,9 @@ def command(
     settings: Annotated[
         Path | None, typer.Option("--settings", help="TOML of filter settings (docs/landing-filter.md).")
     ] = None,
+    smooth: Annotated[
+        bool, typer.Option("--smooth", help="Also the best estimate after the flight (docs/smoother.md).")
+    ] = False,
     out: Annotated[
         Path | None, typer.Option("--out", help="The record; out/FOLDER.fnr where unsaid.", show_default=False)
     ] = None,
@@ -62,7 +65,7 @@ def command(
     outages = tuple((t0, t1) for t0, t1 in windows)
     options = ReplayOptions(gps_delay, outages, not no_flow, (scale[0], scale[1]), identified)
     log, numbers = _read(folder, flow_instance), _settings(settings)
-    flown = replay(log, options, numbers)
+    flown = replay(log, options, numbers, smoothed=smooth)
     scores = flown.scores()
     if table:
         scores.update(_fly_table(flown, table, scores["outages"]))
@@ -143,6 +146,8 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
             f"{truth['horizontal_rms_m']:.2f} m rms, {truth['horizontal_max_m']:.2f} m max; "
             f"velocity {truth['velocity_rms_m_s']:.3f} m/s rms"
         )
+    if "smoothed" in scores:
+        console.print(f"Smoothed over the whole flight: {_smoothed_errors(scores['smoothed'])}")
     if scores.get("autopilot", {}).get("against"):
         own = scores["autopilot"]
         console.print(f"The autopilot's own estimate ({own['name']}) {autopilot_errors(own)}")
@@ -159,6 +164,20 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
     for name in ("record", "report"):
         if name in scores:
             console.print(f"{name.capitalize()}: {scores[name]}", soft_wrap=True)
+
+
+def _smoothed_errors(scores: dict[str, Any]) -> str:
+    """The smoothed path's errors in words."""
+    said = [
+        f"GPS cut {cut['t0']:g} to {cut['t1']:g} s: {_figure(cut['horizontal_rms_m'])} m rms, "
+        f"{_figure(cut['horizontal_max_m'])} m max"
+        for cut in scores["outages"]
+    ]
+    if scores["velocity_rms_m_s"] is not None:
+        said.append(f"velocity against GPS {scores['velocity_rms_m_s']:.3f} m/s rms")
+    if "truth" in scores:
+        said.append(f"against truth {scores['truth']['horizontal_rms_m']:.2f} m rms horizontally")
+    return "; ".join(said) or "nothing to compare it with"
 
 
 def _figure(value: float | None) -> str:

@@ -14,7 +14,7 @@ from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 
 Array = NDArray[np.float64]
 
-PATHS = ("estimate", "truth", "autopilot")
+PATHS = ("estimate", "smoothed", "truth", "autopilot")
 FRAMES = ("ned", "enu")
 ENU_FROM_NED = (0.0, np.sqrt(0.5), np.sqrt(0.5), 0.0)  # swaps north and east, turns down up
 FRD_FROM_FLU = (0.0, 1.0, 0.0, 0.0)  # half a turn about forward
@@ -23,7 +23,7 @@ FRD_FROM_FLU = (0.0, 1.0, 0.0, 0.0)  # half a turn about forward
 class Trajectory(NamedTuple):
     """A path, rows in order of time.
 
-    name: "estimate", "truth" or "autopilot". t_s (n,); position_m (n, 3) in the earth frame; quaternion (n, 4)
+    name: of PATHS. t_s (n,); position_m (n, 3) in the earth frame; quaternion (n, 4)
     w, x, y, z, body to earth; velocity_m_s (n, 3) in the earth frame, None where the record cannot tell;
     oriented: False where no attitude was recorded and `quaternion` is level, facing north; row (n,): which row
     of the record's table each is; left_out: how many rows had no finite time, position or attitude.
@@ -51,7 +51,7 @@ def trajectories(record: Record, frame: str = "ned") -> list[Trajectory]:
     """Every path that the record holds, in NED/FRD or (`frame` "enu") in ENU/FLU. InputError without any."""
     found = [path for name in PATHS if (path := _trajectory(record, name)) is not None]
     if not found:
-        raise InputError("the record holds no path (no finite position in estimate, truth or autopilot)")
+        raise InputError(f"the record holds no path (no finite position in {', '.join(PATHS)})")
     return found if frame == "ned" else [in_enu(path) for path in found]
 
 

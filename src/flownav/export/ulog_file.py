@@ -25,7 +25,7 @@ from flownav.provenance import hash_of
 from flownav.record import Record
 
 NAMED = {"estimate": "", "truth": "_groundtruth"}  # what PX4 calls the estimate and the truth of a simulation
-APART = ("estimate", "truth", "autopilot", "innovation", "events")
+APART = ("estimate", "smoothed", "truth", "autopilot", "innovation", "events")
 
 
 class Contents(NamedTuple):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.measurement import Array, Sensor, Stream
+from flownav.navigation.journal import new_journal
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.state import (
     DEADLINE,
@@ -63,4 +64,5 @@ def new_navigator(
         np.zeros(WORK_ROWS),
         memory,
         tape,
+        new_journal(0, 0),
     )

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import ONE_LANE, procedure
-from flownav.estimation.landing.algebra import forget
 from flownav.estimation.landing.observe import BARO_STATES, RANGE_STATES, observe_baro, observe_range, rotation_of
 from flownav.estimation.landing.states import BARO, GROUND, POSITION, STATES, VELOCITY
+from flownav.navigation.journal import reset_state
 from flownav.navigation.offers import (
     DATUM,
     FUSED,
@@ -118,8 +118,7 @@ def take_range(reading: Reading, on: Running) -> None:
 def set_ground(below_m: float, on: Running) -> None:
     """The ground is unknown but for this reading, which is about to be fused."""
     on.work[ROWS.state + GROUND] = below_m
-    on.work[VALUE] = 1.0
-    forget(on.work, ONE_LANE, ROWS, GROUND, UNKNOWN_M * UNKNOWN_M, VALUE)
+    reset_state(GROUND, UNKNOWN_M * UNKNOWN_M, on)
 
 
 @procedure
@@ -134,8 +133,7 @@ def take_baro(reading: Reading, on: Running) -> None:
         return
     if reason == FUSED and memory[BARO_KNOWN] == 0.0:
         work[ROWS.state + BARO] = altitude_m + work[ROWS.state + POSITION + 2]
-        work[VALUE] = 1.0
-        forget(work, ONE_LANE, ROWS, BARO, UNKNOWN_M * UNKNOWN_M, VALUE)
+        reset_state(BARO, UNKNOWN_M * UNKNOWN_M, on)
         memory[BARO_KNOWN] = 1.0
         write_event(reading.t_s, BARO_FOUND, work[ROWS.state + BARO], on.tape)
     work[VALUE] = altitude_m

@@ -13,6 +13,7 @@ from flownav.measurement import Array, EventQueue, Sensor
 from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
 from flownav.navigation.flow import take_flow
 from flownav.navigation.height import take_baro, take_range
+from flownav.navigation.journal import note_estimate, note_prediction
 from flownav.navigation.offers import note_aid_age, too_old
 from flownav.navigation.position import take_gps, take_landed, take_pad, take_pose
 from flownav.navigation.start import gather, try_start
@@ -81,6 +82,7 @@ def run(queue: EventQueue, on: Running) -> None:
             if t_s - memory[WRITTEN] >= ESTIMATE_PERIOD_S:
                 limit_biases(on)
                 write_estimate(t_s, on)
+                note_estimate(on)
 
 
 @procedure
@@ -125,6 +127,7 @@ def advance(t_s: float, on: Running) -> None:
         step(dt_s, on.settings.filter if moved else on.settings.coasting, work)
         if moved:
             add_vibration_noise(dt_s, on)
+        note_prediction(dt_s, on)
         memory[RANGE_TRAVEL] += dt_s * work[ROWS.state + VELOCITY + 2]
     memory[CLOCK] = t_s
 

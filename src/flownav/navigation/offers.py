@@ -8,6 +8,7 @@ from flownav.compile import ONE_LANE, procedure
 from flownav.estimation.gating import Reason
 from flownav.estimation.landing.algebra import expect, settle
 from flownav.measurement import Array, Sensor
+from flownav.navigation.journal import note_correction
 from flownav.navigation.state import (
     AIDED,
     AIDED_AGAIN,
@@ -15,6 +16,7 @@ from flownav.navigation.state import (
     DEAD_RECKONING,
     FLAG,
     LAST,
+    OBSERVED,
     POSITION_INVALID,
     ROWS,
     STARTED,
@@ -71,6 +73,9 @@ def put(variance: float, reason: int, index: tuple[int, ...], work: Array) -> No
     """
     work[ROWS.noise] = variance
     work[ROWS.offered] = 1.0 if reason == FUSED else 0.0
+    work[OBSERVED] = len(index)
+    for i in range(len(index)):
+        work[OBSERVED + 1 + i] = index[i]
     expect(work, ONE_LANE, ROWS, index)
 
 
@@ -80,6 +85,8 @@ def conclude(reading: Reading, component: int, observation: float, reason: int, 
     settle(on.work, ONE_LANE, ROWS, on.settings.filter.gate_sigma)
     if reason == FUSED and on.work[ROWS.accepted] == 0.0:
         reason = INNOVATION_GATE
+    if on.work[ROWS.accepted] > 0.0:
+        note_correction(on)
     write_offer(reading, component, observation, reason, on)
     return reason
 

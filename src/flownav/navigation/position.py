@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import ONE_LANE, procedure
-from flownav.estimation.landing.algebra import forget
 from flownav.estimation.landing.observe import (
     GPS_POSITION_STATES,
     GPS_VELOCITY_STATES,
@@ -19,6 +18,7 @@ from flownav.estimation.landing.observe_pad import PAD_STATES, observe_pad
 from flownav.estimation.landing.states import GPS_FAST, GPS_SLOW, GPS_VELOCITY, POSITION, VELOCITY
 from flownav.frames import to_earth
 from flownav.measurement import Sensor
+from flownav.navigation.journal import reset_state
 from flownav.navigation.offers import (
     BEFORE_START,
     DATUM,
@@ -97,20 +97,19 @@ def mind_rejections(reading: Reading, axis: int, reason: int, noise: float, on: 
     if memory[COUNT + place] < LEAST_REJECTIONS or reading.t_s - memory[SINCE + place] < on.settings.gps_reset_s:
         return
     before = work[ROWS.state + place]
-    work[VALUE] = 1.0
     settings = on.settings.filter
     if first == 0:
         slow = settings.gps_slow_sigma_down_m if axis == 2 else settings.gps_slow_sigma_m
         fast = settings.gps_fast_sigma_down_m if axis == 2 else settings.gps_fast_sigma_m
         work[ROWS.state + GPS_SLOW + axis], work[ROWS.state + GPS_FAST + axis] = 0.0, 0.0
-        forget(work, ONE_LANE, ROWS, GPS_SLOW + axis, slow * slow, VALUE)
-        forget(work, ONE_LANE, ROWS, GPS_FAST + axis, fast * fast, VALUE)
-        forget(work, ONE_LANE, ROWS, POSITION + axis, slow * slow + fast * fast + noise, VALUE)
+        reset_state(GPS_SLOW + axis, slow * slow, on)
+        reset_state(GPS_FAST + axis, fast * fast, on)
+        reset_state(POSITION + axis, slow * slow + fast * fast + noise, on)
     else:
         lasting = settings.gps_velocity_sigma_m_s
         work[ROWS.state + GPS_VELOCITY + axis] = 0.0
-        forget(work, ONE_LANE, ROWS, GPS_VELOCITY + axis, lasting * lasting, VALUE)
-        forget(work, ONE_LANE, ROWS, VELOCITY + axis, lasting * lasting + noise, VALUE)
+        reset_state(GPS_VELOCITY + axis, lasting * lasting, on)
+        reset_state(VELOCITY + axis, lasting * lasting + noise, on)
     work[ROWS.state + place] = reading.value[axis]
     memory[COUNT + place] = 0.0
     write_event(reading.t_s, GPS_RESET, reading.value[axis] - before, on.tape)

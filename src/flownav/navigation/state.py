@@ -2,7 +2,7 @@
 
 Three arrays, so that the loop compiles and a live session can stop and go on: `work`, a lane buffer of one lane
 with the landing filter's rows; `memory`, the scalars that are no part of the filter (clocks, timers, datums); and
-the `Tape`.
+the `Tape`. A smoother's `Journal` is beside them.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ ROWS = landing_rows(0)
 LATEST_IMU = LANDING_ROW_COUNT  # 6: the last reading, which stands until the next
 VALUE = LATEST_IMU + 6  # 4: what is offered
 LEVER = VALUE + 4  # 1: velocity of the lens from rotation [m/s]
-WORK_ROWS = LEVER + 1
+OBSERVED = LEVER + 1  # 10: how many states the offered component reads, and which
+WORK_ROWS = OBSERVED + 10
 
 # places in `memory`; SINCE and COUNT hold one value for each of six states (how long GPS has been rejected for it),
 # LAST the newest time of each sensor, LEVEL the sum of specific force before the start
@@ -116,6 +117,17 @@ class Tape(NamedTuple):
     used: NDArray[np.int64]
 
 
+class Journal(NamedTuple):
+    """What a smoother needs (navigation/journal.py): entry (n, ENTRY), state and quaternion (m, STATES + 4), covariance
+    (m, STATES, STATES) of each estimate, used (2,): how many entries and estimates there were, kept or not.
+    """
+
+    entry: Array
+    state: Array
+    covariance: Array
+    used: NDArray[np.int64]
+
+
 class Running(NamedTuple):
     """A navigator at work."""
 
@@ -124,6 +136,7 @@ class Running(NamedTuple):
     work: Array
     memory: Array
     tape: Tape
+    journal: Journal
 
 
 class Reading(NamedTuple):

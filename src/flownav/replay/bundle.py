@@ -35,8 +35,9 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str]) -> Rec
     """The record of a replay. `scores` go into its manifest; `command` is what the user typed."""
     record = Record(_manifest(replay, scores, command))
     estimate = replay.estimate
-    names = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)))
-    record.add("estimate", {"t_s": estimate[:, 0], **dict(zip(names, estimate[:, 1:17].T, strict=True))})
+    record.add("estimate", _path(estimate))
+    if replay.smoothed is not None:
+        record.add("smoothed", _path(replay.smoothed))
     for sensor in KEPT:
         if sensor in replay.log.streams:
             stream = replay.log.streams[sensor]
@@ -50,6 +51,12 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str]) -> Rec
     record.add("innovation", _innovation(replay))
     record.add("events", _events(replay))
     return record
+
+
+def _path(estimate: Array) -> dict[str, Array]:
+    """The record's columns of a tape's estimate."""
+    names = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)))
+    return {"t_s": estimate[:, 0], **dict(zip(names, estimate[:, 1:17].T, strict=True))}
 
 
 def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dict[str, Any]:

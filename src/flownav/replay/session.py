@@ -18,6 +18,7 @@ from flownav.measurement import Array, Sensor
 from flownav.navigation.feed import SLOWEST_IMU_HZ, new_navigator
 from flownav.navigation.loop import run
 from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.smoother import smooth
 from flownav.navigation.state import Tape, new_tape
 from flownav.replay.autopilot import autopilot_scores
 from flownav.replay.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
@@ -40,6 +41,7 @@ class Replay:
     settings: NavigatorSettingsFile
     prepared: Prepared
     tape: Tape
+    smoothed: Array | None = None  # the estimate smoothed over the whole log, where that was asked for
 
     @cached_property
     def estimate(self) -> Array:
@@ -131,23 +133,40 @@ class Replay:
         start, end = self.log.span_s
         scores: dict[str, Any] = {
             "duration_s": end - start,
-            "outages": [outage_entry(self.outage(t0, t1)) for t0, t1 in self.options.gps_outages_s],
-            "velocity_rms_m_s": self.velocity_rms(),
+            **self.path_scores(),
             "rejected": self.rejected(),
             "warnings": [finding.text for finding in self.findings],
         }
         beside = {
-            "truth": self.truth_scores(),
             "autopilot": autopilot_scores(self.log, self.options.gps_delay_s),
+            "smoothed": self.smoothed_scores(),
         }
         return scores | {name: found for name, found in beside.items() if found is not None}
 
+    def path_scores(self) -> dict[str, Any]:
+        """Errors of the path: through each outage, of velocity against GPS, against the truth where there is one."""
+        truth = self.truth_scores()
+        return {
+            "outages": [outage_entry(self.outage(t0, t1)) for t0, t1 in self.options.gps_outages_s],
+            "velocity_rms_m_s": self.velocity_rms(),
+            **({} if truth is None else {"truth": truth}),
+        }
 
-def replay(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile) -> Replay:
-    """Run a log through the filter. InputError where an option cannot be, or the filter never starts."""
+    def smoothed_scores(self) -> dict[str, Any] | None:
+        """The same of the smoothed path; None without one."""
+        if self.smoothed is None:
+            return None
+        return replace(self, tape=self.tape._replace(estimate=self.smoothed), smoothed=None).path_scores()
+
+
+def replay(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, *, smoothed: bool = False) -> Replay:
+    """Run a log through the filter, and back through it for a smoothed path.
+
+    InputError where an option cannot be, or the filter never starts.
+    """
     with announce_compilation("replay"):
         prepared = prepare(log, options)
-        return _run(log, options, settings, prepared)
+        return _run(log, options, settings, prepared, smoothed=smoothed)
 
 
 def outage_table(
@@ -209,14 +228,20 @@ def _number(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
 
 
-def _run(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, prepared: Prepared) -> Replay:
+def _run(
+    log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, prepared: Prepared, *, smoothed: bool = False
+) -> Replay:
     queue = withhold(log, prepared.queue, options)
     gyro_is_imu = prepared.flow_gyro_is_imu
     running = new_navigator(prepared.streams, float(queue.t_s[0]), gyro_is_imu, settings, new_tape(queue))
-    run(queue, running)
+    path = None
+    if smoothed:
+        path = smooth(queue, running)
+    else:
+        run(queue, running)
     if running.tape.used[0] < 2:
         raise InputError(
             f"{log.path}: the filter never started; it needs an attitude or an IMU of {SLOWEST_IMU_HZ:g} Hz, then a "
             "GPS fix or flow of quality above 0"
         )
-    return Replay(log, options, settings, prepared, running.tape)
+    return Replay(log, options, settings, prepared, running.tape, path)

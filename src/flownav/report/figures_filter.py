@@ -225,13 +225,14 @@ def consistency(record: Record) -> list[Panel]:
 
 
 def error_against_gps(record: Record) -> Panel:
-    """Horizontal distance from GPS of the estimate and of the autopilot, outages shaded; for flights without truth."""
+    """Horizontal distance from GPS of the estimate, smoothed or the autopilot's too, outages shaded; without truth."""
     key, title = "gps-distance", "Horizontal distance from GPS"
     gps, estimate = readings(record, Sensor.GPS_POSITION), track(record, "estimate", POSITION_NED)
     if gps is None or estimate is None:
         return Panel(key, title, absent=f"The record holds no {'GPS position' if gps is None else 'estimate'}.")
     stack = Stack(("distance (m)",), row_height_px=250)
-    for role, source in (("autopilot", track(record, "autopilot", POSITION_NED)), ("estimate", estimate)):
+    others = [(role, track(record, role, POSITION_NED)) for role in ("autopilot", "smoothed")]
+    for role, source in (*others, ("estimate", estimate)):
         if source is not None:
             apart = difference(gps, source)
             distance = np.hypot(*apart.value[:, :2].T)

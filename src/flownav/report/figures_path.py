@@ -48,7 +48,7 @@ def pad(record: Record) -> Pad | None:
 
 def _paths(record: Record) -> list[tuple[str, Track]]:
     """Lines to draw by role, the truth last and so on top."""
-    sources = [(role, track(record, role, POSITION_NED)) for role in ("autopilot", "estimate", "truth")]
+    sources = [(role, track(record, role, POSITION_NED)) for role in ("autopilot", "smoothed", "estimate", "truth")]
     return [(role, source) for role, source in sources if source is not None]
 
 

@@ -58,14 +58,19 @@ def position(record: Record, view: View = POSITION) -> Panel:
     """Position x, y, z: GPS readings, estimate, truth (figures 17 and 22)."""
     dots = [Source("gps", "GPS", readings(record, Sensor.GPS_POSITION))]
     lines = [Source("command", "reference", track(record, "command", REFERENCE))]
-    lines += [Source(role, role, track(record, role, POSITION_NED)) for role in ("autopilot", "estimate", "truth")]
+    lines += [
+        Source(role, role, track(record, role, POSITION_NED)) for role in ("autopilot", "smoothed", "estimate", "truth")
+    ]
     note = DOWN if view.with_gps else "The legend switches the GPS readings on."
     return _states(record, POSITION_TITLES, dots, lines, view, note)
 
 
 def velocity(record: Record, view: View = VELOCITY) -> Panel:
     """Body velocity u, v, w: flow, estimate, truth (figures 18 to 25)."""
-    lines = [Source(role, role, track(record, role, VELOCITY_BODY)) for role in ("autopilot", "estimate", "truth")]
+    lines = [
+        Source(role, role, track(record, role, VELOCITY_BODY))
+        for role in ("autopilot", "smoothed", "estimate", "truth")
+    ]
     flow = flow_velocity(record)
     name = "flow sensor" if has(record, "flow_velocity") else "flow \N{MULTIPLICATION SIGN} range"
     dots = [Source("flow", name, flow)]

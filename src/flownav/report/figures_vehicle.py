@@ -20,7 +20,7 @@ CONTROLS = {
 def attitude(record: Record) -> Panel:
     """Roll, pitch and yaw [deg] of truth, estimate and autopilot; of the attitude sensor where none of them has any."""
     key, title = "attitude", "Attitude"
-    sources = [(role, role, track(record, role, QUATERNION)) for role in ("autopilot", "estimate", "truth")]
+    sources = [(role, role, track(record, role, QUATERNION)) for role in ("autopilot", "smoothed", "estimate", "truth")]
     if all(source is None for _, _, source in sources):
         sources = [("estimate", "attitude sensor", readings(record, Sensor.ATTITUDE))]
     if all(source is None for _, _, source in sources):

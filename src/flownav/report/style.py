@@ -18,6 +18,7 @@ PALETTE: dict[str, tuple[str, str]] = {
     "grid": ("#e9ecef", "#2a313a"),
     "truth": ("#16191d", "#f5f6f7"),
     "estimate": ("#0a5fb4", "#62b3ff"),
+    "smoothed": ("#9a2f6b", "#f08bc0"),
     "gps": ("#bf5b0b", "#f2a354"),
     "flow": ("#0e7a5f", "#45cfa2"),
     "autopilot": ("#8339a8", "#cb9df2"),
@@ -37,6 +38,7 @@ FONT = 'system-ui, -apple-system, "Segoe UI", Roboto, "Helvetica Neue", Arial, "
 LINES: dict[str, dict[str, Any]] = {
     "truth": {"color": COLOUR["truth"], "width": 1.3, "dash": "5px,3px"},
     "estimate": {"color": COLOUR["estimate"], "width": 1.6},
+    "smoothed": {"color": COLOUR["smoothed"], "width": 1.3},
     "gps": {"color": COLOUR["gps"], "width": 1.5},
     "flow": {"color": COLOUR["flow"], "width": 1.5},
     "autopilot": {"color": COLOUR["autopilot"], "width": 1.4},

@@ -1,0 +1,344 @@
+"""The smoother against dense Rauch-Tung-Striebel smoothers, and on flights whose truth is known."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace as altered
+
+import numpy as np
+import pytest
+import typer
+from filterpy.kalman import KalmanFilter
+from typer.testing import CliRunner
+
+from flownav.cli.replay import command
+from flownav.estimation.landing.backward import (
+    back_over_correction,
+    back_over_prediction,
+    back_over_reset,
+    smoothed_covariance,
+)
+from flownav.estimation.landing.states import BARO, GROUND, STATES
+from flownav.frames import quaternion_product
+from flownav.logs.csv_folder import read_csv_folder
+from flownav.logs.log import Log
+from flownav.measurement import EventQueue, Sensor
+from flownav.navigation.feed import new_navigator
+from flownav.navigation.journal import new_journal
+from flownav.navigation.loop import run
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.smoother import smooth
+from flownav.navigation.state import ROWS, STARTED, Running, new_tape
+from flownav.record import Record
+from flownav.replay.prepare import ReplayOptions, prepare, withhold
+from flownav.replay.session import Replay, replay
+from replay_logs import SyntheticLog, log_of_flight
+from smoother_oracles import dense_transition, smoother_gain
+
+SETTINGS = NavigatorSettingsFile()
+CUT = ((8.0, 26.0),)
+
+
+def spoiled(log: Log, seed: int, share: float = 1.0) -> Log:
+    """The log with sensor errors drawn as the navigator's default settings say they are, or a share of them."""
+    random, streams = np.random.default_rng(seed), dict(log.streams)
+
+    def markov(t_s: np.ndarray, sigma: float | list[float], tau_s: float) -> np.ndarray:
+        error = random.normal(0.0, sigma, (len(t_s), 3))
+        factor = np.exp(-np.diff(t_s) / tau_s)
+        for k in range(1, len(t_s)):
+            error[k] = factor[k - 1] * error[k - 1] + np.sqrt(1.0 - factor[k - 1] ** 2) * error[k]
+        return error
+
+    def put(sensor: Sensor, error: np.ndarray) -> None:
+        value = streams[sensor].value.copy()
+        value[:, : error.shape[1]] += share * error
+        streams[sensor] = altered(streams[sensor], value=value)
+
+    imu, fix = streams[Sensor.IMU], streams[Sensor.GPS_POSITION].t_s
+    rate = 1.0 / np.median(np.diff(imu.t_s))
+    spread = np.repeat([SETTINGS.gyro_noise_rad_s_rt_hz, SETTINGS.accel_noise_m_s2_rt_hz], 3) * np.sqrt(rate)
+    bias = random.normal(0.0, np.repeat([SETTINGS.gyro_bias_sigma_rad_s, SETTINGS.accel_bias_sigma_m_s2], 3))
+    put(Sensor.IMU, bias + random.normal(0.0, spread, (len(imu), 6)))
+    put(
+        Sensor.GPS_POSITION,
+        markov(fix, [1.5, 1.5, 2.5], 300.0) + markov(fix, [0.5, 0.5, 1.0], 20.0)
+        + random.normal(0.0, [0.4, 0.4, 0.8], (len(fix), 3)),
+    )  # fmt: skip
+    put(Sensor.GPS_VELOCITY, markov(fix, 0.1, 5.0) + random.normal(0.0, [0.4, 0.4, 0.5], (len(fix), 3)))
+    put(Sensor.FLOW_RATE, random.normal(0.0, 0.05, (len(streams[Sensor.FLOW_RATE]), 2)))
+    put(Sensor.RANGE, random.normal(0.0, 0.05, (len(streams[Sensor.RANGE]), 1)))
+    put(Sensor.BARO, random.normal(0.0, 1.0, (len(streams[Sensor.BARO]), 1)))
+    del streams[Sensor.MAG]
+    return altered(log, streams=streams)
+
+
+@pytest.fixture(scope="module")
+def flight() -> SyntheticLog:
+    return log_of_flight(30.0, flow_hz=25.0, range_hz=25.0)
+
+
+@pytest.fixture(scope="module")
+def clean(flight, tmp_path_factory) -> Log:
+    return read_csv_folder(flight.write(tmp_path_factory.mktemp("log") / "flight"))
+
+
+@pytest.fixture(scope="module")
+def log(clean) -> Log:
+    return spoiled(clean, 1)
+
+
+@pytest.fixture(scope="module")
+def flown(log) -> Replay:
+    return replay(log, ReplayOptions(gps_outages_s=CUT), SETTINGS, smoothed=True)
+
+
+def queue_of(log: Log, until_s: float, outages=()):
+    """A log's streams and their events up to an instant, on a grid of microseconds, the IMU first at each."""
+    options = ReplayOptions(gps_outages_s=outages)
+    prepared = prepare(log, options)
+    queue = withhold(log, prepared.queue, options)
+    instants = np.round(queue.t_s, 6)
+    order = np.lexsort((queue.sensor != Sensor.IMU, instants))
+    order = order[instants[order] <= until_s]
+    return prepared, queue._replace(t_s=instants)._replace(
+        **{name: column[order] for name, column in queue._replace(t_s=instants)._asdict().items()}
+    )
+
+
+def navigator(prepared, queue) -> Running:
+    first_s = float(queue.t_s[0])
+    return new_navigator(prepared.streams, first_s, prepared.flow_gyro_is_imu, SETTINGS, new_tape(queue))
+
+
+# -- against dense smoothers ---------------------------------------------------------------------------------
+def test_predictions_and_corrections_backwards_are_the_rts_smoother_of_filterpy():
+    random, numbers = np.random.default_rng(5), SETTINGS.settings().filter
+    steps, dt_s = 40, 0.2
+    transitions, laws, motions = [], [], []
+    for _ in range(steps):
+        middle = np.linalg.qr(random.normal(size=(3, 3)))[0]
+        force = random.normal(0.0, 8.0, 3)
+        motions.append((middle.ravel(), force))
+        transitions.append(dense_transition(dt_s, middle, force, numbers))
+        laws.append(np.where(random.random(STATES) < 0.2, random.normal(size=STATES), 0.0))
+    model = KalmanFilter(STATES, 1)
+    model.x, model.P = np.zeros((STATES, 1)), np.diag(random.uniform(0.1, 2.0, STATES))
+    noise, variance = np.diag(random.uniform(1e-3, 1e-2, STATES)), 0.3
+    states, covariances, corrections = [], [], []
+    for transition, law in zip(transitions, laws, strict=True):
+        model.predict(F=transition, Q=noise)
+        model.update(random.normal(0.0, 2.0), R=variance, H=law[None])
+        states.append(model.x.copy())
+        covariances.append(model.P.copy())
+        corrections.append((law, model.K.ravel().copy(), float(model.y.item()), float(model.S.item())))
+    wanted, wanted_covariance, *_ = model.rts_smoother(
+        np.array(states), np.array(covariances), np.array(transitions), np.array([noise] * steps)
+    )
+    vector, matrix = np.zeros(STATES), np.zeros((STATES, STATES))
+    for k in range(steps - 1, -1, -1):
+        found = states[k].ravel() - covariances[k] @ vector
+        assert found == pytest.approx(wanted[k].ravel(), rel=1e-7, abs=1e-7)
+        assert smoothed_covariance(covariances[k], matrix) == pytest.approx(wanted_covariance[k], rel=1e-6, abs=1e-8)
+        back_over_correction(vector, matrix, *corrections[k])
+        back_over_prediction(vector, matrix, dt_s, *motions[k], numbers)
+        assert (matrix == matrix.T).all()
+
+
+def test_a_reset_backwards_is_a_transition_that_forgets():
+    random = np.random.default_rng(2)
+    vector, root = random.normal(size=STATES), random.normal(size=(STATES, STATES))
+    matrix = root @ root.T
+    forgets = np.eye(STATES)
+    forgets[7, 7] = 0.0
+    wanted = forgets @ vector, forgets @ matrix @ forgets
+    back_over_reset(vector, matrix, 7)
+    assert (vector == wanted[0]).all()
+    assert (matrix == wanted[1]).all()
+
+
+class Step:
+    """The navigator's error state over one event: before, after, and what lay between."""
+
+    def __init__(self, before: np.ndarray, on: Running, moved: bool, reset: list[int]) -> None:
+        self.covariance = before[ROWS.covariance : ROWS.attitude].reshape(STATES, STATES)
+        after = on.work[ROWS.covariance : ROWS.attitude].reshape(STATES, STATES).copy()
+        if moved:
+            step_s = float(on.memory[0]) - moved
+            middle, force = on.work[ROWS.middle : ROWS.middle + 9], on.work[ROWS.force : ROWS.force + 3]
+            self.transition = dense_transition(step_s, middle, force, on.settings.filter)
+            self.predicted, self.change = after, np.zeros(STATES)
+            return
+        self.transition = np.eye(STATES)
+        self.transition[reset, reset] = 0.0
+        self.predicted = self.transition @ self.covariance @ self.transition
+        self.predicted[reset, reset] = 1e4
+        self.change = on.work[: ROWS.covariance] - before[: ROWS.covariance]
+        w, x, y, z = before[ROWS.attitude : ROWS.attitude + 4]
+        turn = quaternion_product(tuple(on.work[ROWS.attitude : ROWS.attitude + 4]), (w, -x, -y, -z))
+        self.change[6:9] = 2.0 * np.array(turn[1:]) / turn[0]
+
+
+def steps_of(prepared, queue) -> tuple[list[Step], np.ndarray, list[int]]:
+    """Every event after the start, taken one by one; the filter's last covariance; how many estimates each wrote."""
+    on, steps, written = navigator(prepared, queue), [], []
+    for k in range(len(queue.t_s)):
+        started, events, clock = on.memory[STARTED], int(on.tape.used[2]), float(on.memory[0])
+        before, estimates = on.work.copy(), int(on.tape.used[0])
+        run(EventQueue(*(column[k : k + 1] for column in queue)), on)
+        happened = on.tape.event[events : on.tape.used[2], 1]
+        if started:
+            moved = clock if on.memory[0] > clock else 0.0
+            assert not moved or queue.sensor[k] == Sensor.IMU
+            reset = [state for kind, state in ((1, GROUND), (3, BARO)) if kind in happened]
+            steps.append(Step(before, on, moved, reset))
+            written.append(int(on.tape.used[0]) - estimates)
+    return steps, on.work[ROWS.covariance : ROWS.attitude].reshape(STATES, STATES).copy(), written
+
+
+def test_a_whole_run_of_the_navigator_is_smoothed_as_by_dense_rts(clean):
+    """Event by event, with resets of ground and barometer, through a cut: C = P F' P_predicted^-1 in NumPy.
+
+    With a hundredth of the sensors' errors: rotations add up to second order only.
+    """
+    prepared, queue = queue_of(spoiled(clean, 1, 0.01), 9.0, ((3.0, 7.0),))
+    steps, last, written = steps_of(prepared, queue)
+    on = navigator(prepared, queue)
+    path = smooth(queue, on)
+    filtered = on.tape.estimate[: on.tape.used[0]]
+    deviation, covariance = np.zeros(STATES), last
+    found = []
+    for step, wrote in zip(steps[::-1], written[::-1], strict=True):
+        if wrote:
+            found.append((deviation, covariance))
+        gain = smoother_gain(step.covariance, step.transition, step.predicted)
+        deviation = gain @ (deviation + step.change)
+        covariance = step.covariance + gain @ (covariance - step.predicted) @ gain.T
+    assert len(found) == len(path) - 1 > 300  # all but that of the start
+    largest = 0.0
+    for own, better, (wanted, spread) in zip(filtered[1:], path[1:], found[::-1], strict=True):
+        sigma = np.sqrt(np.diag(spread))
+        scale = np.maximum(sigma, 1e-6)
+        shift = np.concatenate([better[1:4] - own[1:4], better[17:20] - own[17:20]])
+        turn = quaternion_product(tuple(better[7:11]), (own[7], -own[8], -own[9], -own[10]))
+        shift = np.concatenate([shift, 2.0 * np.array(turn[1:]) / turn[0], better[23:] - own[23:]])
+        assert (np.abs(shift - wanted[:30]) < 1e-5 * scale[:30]).all()
+        largest = max(largest, float(np.abs(shift / scale[:30]).max()))
+        assert better[[11, 12, 13, 20, 21, 22]] == pytest.approx(sigma[[0, 1, 2, 6, 7, 8]], rel=1e-9)
+    assert largest > 0.01
+
+
+def test_pieces_of_any_length_give_the_same_bytes_and_leave_the_filter_as_it_was(log):
+    prepared, queue = queue_of(log, 12.0)
+    alone = navigator(prepared, queue)
+    run(queue, alone)
+    paths = []
+    for chunk in (10**6, 333):
+        on = navigator(prepared, queue)
+        paths.append(smooth(queue, on, chunk))
+        for own, its in ((on.work, alone.work), (on.memory, alone.memory)):
+            assert own.tobytes() == its.tobytes()
+        written = slice(0, int(on.tape.used[0]))
+        assert on.tape.estimate[written].tobytes() == alone.tape.estimate[written].tobytes()
+    assert paths[0].tobytes() == paths[1].tobytes()
+
+
+def test_a_journal_of_no_rows_counts_and_one_of_as_many_holds_all(log):
+    prepared, queue = queue_of(log, 5.0)
+    first = navigator(prepared, queue)
+    run(queue, first)
+    entries, estimates = first.journal.used.tolist()
+    assert entries > len(queue.t_s)
+    assert estimates == first.tape.used[0]
+    again = navigator(prepared, queue)._replace(journal=new_journal(entries, estimates))
+    run(queue, again)
+    assert again.journal.used.tolist() == [entries, estimates]
+    for estimate in again.journal.covariance:
+        assert np.linalg.eigvalsh(estimate).min() > -1e-12 * np.trace(estimate)
+
+
+# -- what it is for ------------------------------------------------------------------------------------------
+def test_with_nothing_after_it_the_last_estimate_is_the_filters(log):
+    prepared, queue = queue_of(log, 6.0)
+    on = navigator(prepared, queue)
+    run(queue, on)
+    last_s = on.tape.estimate[on.tape.used[0] - 1, 0]
+    written = np.flatnonzero(queue.t_s == last_s)[0] + 1
+    cut = type(queue)(*(column[:written] for column in queue))
+    on = navigator(prepared, cut)
+    path = smooth(cut, on)
+    assert path[-1, 0] == last_s
+    assert path[-1] == pytest.approx(on.tape.estimate[on.tape.used[0] - 1], rel=1e-12, abs=1e-15)
+
+
+def errors(path: np.ndarray, flight: SyntheticLog) -> np.ndarray:
+    """Position and NED velocity less the truth, (n, 6)."""
+    truth = np.column_stack([flight.position, flight.velocity])
+    return path[:, [1, 2, 3, 17, 18, 19]] - np.column_stack([np.interp(path[:, 0], flight.t_s, c) for c in truth.T])
+
+
+def test_over_many_flights_it_errs_less_than_the_filter_and_as_much_as_it_says(clean, flight):
+    """Sensors that err as the settings say; GPS cut in the middle. Normalised by the stated deviations, both are 1."""
+    squares = {"filtered": [], "smoothed": []}
+    normalised = {"filtered": [], "smoothed": []}
+    for seed in range(24):
+        flown = replay(spoiled(clean, 100 + seed), ReplayOptions(gps_outages_s=CUT), SETTINGS, smoothed=True)
+        assert flown.smoothed is not None
+        for name, path in (("filtered", flown.estimate), ("smoothed", flown.smoothed)):
+            rows = np.searchsorted(path[:, 0], np.arange(2.0, 28.0, 2.0))
+            off = errors(path, flight)[rows]
+            squares[name].append(off**2)
+            normalised[name].append(off[:, :3] ** 2 / path[rows, 11:14] ** 2)
+    filtered, smoothed = (np.mean(squares[name], axis=(0, 1)) for name in ("filtered", "smoothed"))
+    assert (smoothed[:3] < filtered[:3]).all()
+    assert (smoothed[3:] < 0.6 * filtered[3:]).all()
+    for name, values in normalised.items():
+        assert 0.5 < np.mean(values) < 1.5, name
+
+
+def test_it_never_says_that_it_knows_less_than_the_filter(flown):
+    assert flown.smoothed is not None
+    assert (flown.smoothed[:, 0] == flown.estimate[:, 0]).all()
+    assert np.isfinite(flown.smoothed).all()
+    for column in (11, 12, 13, 20, 21, 22):
+        assert (flown.smoothed[:, column] <= flown.estimate[:, column] * (1.0 + 1e-9)).all()
+    assert np.linalg.norm(flown.smoothed[:, 7:11], axis=1) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_the_middle_of_an_outage_is_known_from_both_sides(flown):
+    """Without flow the filter's spread grows to the end of the cut; the smoothed one's is largest inside it."""
+    alone = replay(flown.log, ReplayOptions(gps_outages_s=CUT, use_flow=False), SETTINGS, smoothed=True)
+    assert alone.smoothed is not None
+    inside = (alone.estimate[:, 0] > 8.0) & (alone.estimate[:, 0] < 25.5)
+    before, after = alone.estimate[inside, 11], alone.smoothed[inside, 11]
+    assert before.argmax() > 0.98 * len(before)
+    assert 0.2 * len(after) < after.argmax() < 0.8 * len(after)
+    assert after.max() < 0.5 * before.max()
+
+
+def test_on_the_outdoor_flight_it_drifts_less_through_an_outage(data_folder):
+    outdoor = read_csv_folder(data_folder / "quad-px4flow-outdoor")
+    scores = replay(outdoor, ReplayOptions(gps_outages_s=((200.0, 260.0),)), SETTINGS, smoothed=True).scores()
+    smoothed, filtered = scores["smoothed"]["outages"][0], scores["outages"][0]
+    assert smoothed["horizontal_rms_m"] < filtered["horizontal_rms_m"]
+    assert smoothed["horizontal_max_m"] < filtered["horizontal_max_m"]
+
+
+# -- the command ---------------------------------------------------------------------------------------------
+def test_the_command_adds_a_table_and_scores_beside_the_filters(flight, tmp_path):
+    folder, out = flight.write(tmp_path / "flight"), tmp_path / "flight.fnr"
+    arguments = [str(folder), "--gps-outage", "8:26", "--out", str(out)]
+    app = typer.Typer()
+    app.command()(command)
+    plain = CliRunner().invoke(app, [*arguments, "--no-report", "--json"])
+    assert "smoothed" not in json.loads(plain.stdout)
+    assert "smoothed" not in Record.load(out).tables
+    answer = CliRunner().invoke(app, [*arguments, "--smooth", "--json"])
+    scores = json.loads(answer.stdout)
+    assert set(scores["smoothed"]) == {"outages", "velocity_rms_m_s"}
+    assert scores["smoothed"]["outages"][0]["t1"] == 26.0
+    record = Record.load(out)
+    assert list(record.tables["smoothed"]) == list(record.tables["estimate"])
+    assert "smoothed" in out.with_suffix(".html").read_text(encoding="utf-8")
+    people = CliRunner().invoke(app, [*arguments, "--smooth", "--no-report"])
+    assert "Smoothed over the whole flight: GPS cut 8 to 26 s: " in people.stdout

@@ -28,6 +28,7 @@ class FaultScores(NamedTuple):
     """The figures of one fault; None where there is none (never noticed, never back, no touchdown, not a number)."""
 
     detected_after_s: float | None
+    moved_m: float | None
     max_error_m: float | None
     recovered_after_s: float | None
     wrongly_fused: int
@@ -62,6 +63,7 @@ def score(
     after = course.t_s >= t0_s
     return FaultScores(
         detected_after_s=detected_after(run, without, sensors, t0_s),
+        moved_m=moved(run, without, window_s),
         max_error_m=_finite(course.error_m[after].max(initial=0.0)),
         recovered_after_s=recovered_after(course, course_of(without, truth), t1_s),
         wrongly_fused=sum(
@@ -163,6 +165,16 @@ def recovered_after(course: Course, without: Course, t1_s: float) -> float | Non
         if not len(later) or later[0] - start > STAYS_S:
             return float(start - t1_s)
     return None
+
+
+def moved(run: Navigated, without: Navigated, window_s: tuple[float, float]) -> float | None:
+    """How far the fault moved the estimate while it lasted: the largest distance from the run without it."""
+    lasting = (run.t_s >= window_s[0]) & (run.t_s < window_s[1])
+    t_s = run.t_s[lasting]
+    if not len(t_s):
+        return 0.0
+    usual = np.column_stack([np.interp(t_s, without.t_s, axis) for axis in without.position_ned_m.T])
+    return _finite(np.linalg.norm(run.position_ned_m[lasting] - usual, axis=1).max())
 
 
 def touchdown_error(course: Course, truth: Table) -> float | None:

@@ -17,12 +17,25 @@ from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.feed import new_navigator
 from flownav.navigation.loop import run
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.state import AIDED_AGAIN, DEAD_RECKONING, EVENT_NAMES, POSITION_INVALID, Tape, new_tape
+from flownav.navigation.state import (
+    AIDED_AGAIN,
+    DEAD_RECKONING,
+    EVENT_NAMES,
+    FLOW_DOUBTED,
+    FLOW_TRUSTED,
+    POSITION_INVALID,
+    Tape,
+    new_tape,
+)
 from flownav.replay.prepare import IdentifiedFlow, Prepared, ReplayOptions, identified_flow, prepare
 from flownav.simulation.assemble import Setup
 
 TAKEN_IN = (Reason.FUSED, Reason.DATUM)
-RAISING = {int(DEAD_RECKONING): int(AIDED_AGAIN), int(POSITION_INVALID): int(AIDED_AGAIN)}
+RAISING = {
+    int(DEAD_RECKONING): int(AIDED_AGAIN),
+    int(POSITION_INVALID): int(AIDED_AGAIN),
+    int(FLOW_DOUBTED): int(FLOW_TRUSTED),
+}
 ABOVE_FLOOR_M = 0.01  # a sonar that reads its floor says only that there is no more
 
 

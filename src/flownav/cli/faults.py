@@ -106,7 +106,8 @@ def _show(rows: list[Row], seed: int) -> None:
     console.width = max(console.width, WIDE)
     console.print(table)
     console.print(
-        "noticed: first rejection, event or flag. moved: from the run without, while it lasts. back: as good as without the fault, after its end. "
+        "noticed: first rejection, event or flag. moved: from the run without, "
+        "while it lasts. back: as good as without the fault, after its end. "
         "unsaid: longest time beyond 3 sigma with no event or flag. -: never.",
         highlight=False,
     )

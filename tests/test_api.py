@@ -39,7 +39,7 @@ ALLOWED = {
     "navigation": GROUND | EQUATIONS,
     "replay": GROUND | EQUATIONS | {"navigation", "logs", "scoring"},
     "campaign": GROUND | EQUATIONS | {"simulation", "scoring"},
-    "faults": GROUND | EQUATIONS | {"logs", "simulation", "campaign", "scoring"},
+    "faults": GROUND | EQUATIONS | {"logs", "simulation", "campaign", "scoring", "navigation", "replay"},
     "report": GROUND | {"scoring"},
     "export": GROUND,
     "paper": GROUND | EQUATIONS | {"simulation", "campaign", "scoring", "rig", "identification", "report"},

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
 
 HEIGHTS_M = (0.3, 20.0)
 DURATIONS_S = (0.1, 60.0)
-WIDE = 116  # columns that the table takes
+WIDE = 130  # columns that the table takes
 
 
 def command(
     faults: Annotated[str | None, typer.Option(help="Which faults, with commas between; all where unsaid.")] = None,
     heights: Annotated[str, typer.Option(help="Skids above the pad in hover [m], with commas between.")] = "0.5,1.5,3",
-    durations: Annotated[str, typer.Option(help="How long a fault lasts [s], with commas between.")] = "1,5",
+    durations: Annotated[str, typer.Option(help="How long a fault lasts [s], with commas between.")] = "2,5",
     seed: Annotated[int, typer.Option(help="The noise of flights and faults; the same seed gives the same table.")] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
@@ -44,10 +44,12 @@ def command(
 
 
 def navigator() -> Navigate:
-    """The navigator on trial. TO BE WIRED: its module and name, once `navigation/` is there."""
-    from flownav.navigation.trial import navigate  # type: ignore[import-not-found]
+    """The navigator on trial, told what the datasheets of the vehicle's sensors state."""
+    from flownav.faults.navigator import navigator_of
+    from flownav.faults.table import scenario_at
+    from flownav.simulation.assemble import assemble
 
-    return navigate  # type: ignore[no-any-return]
+    return navigator_of(assemble(scenario_at(1.0, 1.0)))
 
 
 def _words(option: str, text: str) -> list[str]:
@@ -78,26 +80,38 @@ def _show(rows: list[Row], seed: int) -> None:
 
     table = Table(title=f"Failing sensors on a landing, seed {seed}", title_justify="left")
     table.add_column("fault", no_wrap=True)
-    columns = ("height m", "lasts s", "noticed s", "largest m", "back s", "wrongly fused", "touchdown m", "unsaid s")
+    columns = (
+        "height m",
+        "lasts s",
+        "noticed s",
+        "moved m",
+        "largest m",
+        "back s",
+        "wrongly fused",
+        "touchdown m",
+        "unsaid s",
+    )
     for name in columns:
         table.add_column(name, justify="right")
     for row in rows:
-        noticed, largest, back, fused, touchdown, unsaid = row.scores
+        noticed, moved, largest, back, fused, touchdown, unsaid = row.scores
         faulty = row.duration_s > 0.0
         table.add_row(
             row.fault, f"{row.height_m:g}", f"{row.duration_s:g}" if faulty else "",
-            _cell(noticed) if faulty else "", _cell(largest), _cell(back) if faulty else "",
+            _cell(noticed) if faulty else "",
+            _cell(moved, 3) if faulty else "", _cell(largest), _cell(back) if faulty else "",
             str(fused) if faulty else "", _cell(touchdown), _cell(unsaid),
         )  # fmt: skip
     console = Console()
     console.width = max(console.width, WIDE)
     console.print(table)
     console.print(
-        "noticed: first rejection, event or flag. back: as good as without the fault, after its end. "
+        "noticed: first rejection, event or flag. moved: from the run without, "
+        "while it lasts. back: as good as without the fault, after its end. "
         "unsaid: longest time beyond 3 sigma with no event or flag. -: never.",
         highlight=False,
     )
 
 
-def _cell(number: float | None) -> str:
-    return "-" if number is None else f"{number:.2f}"
+def _cell(number: float | None, digits: int = 2) -> str:
+    return "-" if number is None else f"{number:.{digits}f}"

@@ -26,6 +26,7 @@ class Reason(IntEnum):
     STUCK = 12
     NEAR_GROUND = 13
     NOT_NEEDED = 14
+    AHEAD = 15
 
     @property
     def label(self) -> str:
@@ -54,4 +55,5 @@ MESSAGES: dict[Reason, str] = {
     Reason.STUCK: "The sensor repeats one value while the vehicle moves.",
     Reason.NEAR_GROUND: "The vehicle is nearer to the ground than the sensor can be trusted.",
     Reason.NOT_NEEDED: "Another source of the same kind serves; this one is only watched.",
+    Reason.AHEAD: "The reading's time stamp lies ahead of the receiver's clock.",
 }

@@ -25,13 +25,17 @@ DEGREE_S = math.radians(1.0)
 
 
 class Fault(NamedTuple):
-    """A fault: its name, one sentence of what it does, the sensors it strikes, and how long where that is fixed [s]."""
+    """A fault: its name, one sentence of what it does, the sensors it strikes, and how long where that is fixed [s].
+
+    in_descent: it begins with the descent, and not in hover.
+    """
 
     name: str
     what: str
     sensors: tuple[Sensor, ...]
     injector: Injector
     lasts_s: float | None = None
+    in_descent: bool = False
 
     def inject(self, streams: Mapping[Sensor, Stream], t0_s: float, t1_s: float, seed: int = 0) -> dict[Sensor, Stream]:
         """The streams with the fault in readings that arrive in [t0, t1).
@@ -81,6 +85,13 @@ _CATALOGUE = (
         inject.low_texture(TEXTURE_SHARE, TEXTURE_NOISE_RAD_S, 255.0),
     ),
     Fault("range_stuck", "The rangefinder repeats its last range.", (Sensor.RANGE,), inject.stuck),
+    Fault(
+        "range_stuck_descent",
+        "The rangefinder repeats its last range from the start of the descent.",
+        (Sensor.RANGE,),
+        inject.stuck,
+        in_descent=True,
+    ),
     Fault("range_floor", "The rangefinder reports its least range, 0.3 m.", (Sensor.RANGE,), inject.always(FLOOR_M)),
     Fault(
         "range_spikes",

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flownav.faults.arrival import Restamped
 from flownav.measurement import Array, Sensor, Stream
 
 FLOW_COLUMNS = slice(0, 2)  # the two channels, as rates and as velocities
@@ -87,10 +88,11 @@ def reversed_in_blocks(readings: int) -> Injector:
 
 
 def restamped(jump_s: float) -> Injector:
-    """The clock is off: every time stamp is moved by so much."""
+    """The clock is off: every time stamp is moved by so much; readings arrive when they always did."""
 
     def inject(stream: Stream, strike: Strike) -> Stream:
-        return replace(stream, t_s=np.where(strike.inside, stream.t_s + jump_s, stream.t_s))
+        stamps = np.where(strike.inside, stream.t_s + jump_s, stream.t_s)
+        return Restamped(**vars(stream) | {"t_s": stamps}, arrival_s=stream.t_s)
 
     return inject
 

@@ -21,6 +21,8 @@ SIGMAS = 3.0
 AS_GOOD_AS_WITHOUT_M = 0.1
 STAYS_S = 1.0
 SAME_S = 0.05  # happenings of two runs that lie no further apart are the same
+BY_COLUMN = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE,
+             Sensor.BARO, Sensor.POSE, Sensor.PAD)  # component k observes column k  # fmt: skip
 FILTER = "filter"  # the source of what the navigator says of itself
 
 
@@ -28,6 +30,7 @@ class FaultScores(NamedTuple):
     """The figures of one fault; None where there is none (never noticed, never back, no touchdown, not a number)."""
 
     detected_after_s: float | None
+    moved_m: float | None
     max_error_m: float | None
     recovered_after_s: float | None
     wrongly_fused: int
@@ -62,6 +65,7 @@ def score(
     after = course.t_s >= t0_s
     return FaultScores(
         detected_after_s=detected_after(run, without, sensors, t0_s),
+        moved_m=moved(run, without, window_s),
         max_error_m=_finite(course.error_m[after].max(initial=0.0)),
         recovered_after_s=recovered_after(course, course_of(without, truth), t1_s),
         wrongly_fused=sum(
@@ -110,30 +114,33 @@ def _signs(run: Navigated, sensors: tuple[Sensor, ...]) -> list[tuple[float, str
 
 # -- taken in ----------------------------------------------------------------------------------------------
 def wrongly_fused(run: Navigated, clean: Stream, faulty: Stream) -> int:
-    """Readings of a stream that the fault altered, or added, and that were fused all the same.
+    """Readings of a stream of which the fault altered, or added, a component that was fused all the same.
 
     A reading is known by sensor and time stamp; where a good one has the same stamp, only what was fused beyond it
     counts.
     """
     offers = run.offers
     here = np.flatnonzero((offers.sensor == int(clean.sensor)) & offers.fused)
-    by_component = Counter((_stamp(offers.t_s[k]), int(offers.component[k])) for k in here)
-    fused: dict[int, int] = {}
-    for (stamp, _), count in by_component.items():
-        fused[stamp] = max(count, fused.get(stamp, 0))
-    given, good = Counter(_readings(faulty)), Counter(_readings(clean))
-    bad: Counter[int] = Counter()
-    fine: Counter[int] = Counter()
-    for reading, count in given.items():
-        right = min(count, good[reading])
-        fine[reading[0]] += right
-        bad[reading[0]] += count - right
-    return sum(min(count, max(0, fused.get(stamp, 0) - fine[stamp])) for stamp, count in bad.items())
+    fused = Counter((_stamp(offers.t_s[k]), int(offers.component[k])) for k in here)
+    wrong: dict[int, int] = {}
+    for component in {component for _, component in fused}:
+        given, good = Counter(_said(faulty, component)), Counter(_said(clean, component))
+        bad: Counter[int] = Counter()
+        fine: Counter[int] = Counter()
+        for said, count in given.items():
+            right = min(count, good[said])
+            fine[said[0]] += right
+            bad[said[0]] += count - right
+        for stamp, count in bad.items():
+            taken = min(count, max(0, fused[stamp, component] - fine[stamp]))
+            wrong[stamp] = max(taken, wrong.get(stamp, 0))
+    return sum(wrong.values())
 
 
-def _readings(stream: Stream) -> list[tuple[int, bytes]]:
-    """Every reading as its time stamp and the bytes of what it says."""
-    content = np.column_stack([stream.value, stream.variance, stream.quality])
+def _said(stream: Stream, component: int) -> list[tuple[int, bytes]]:
+    """What every reading says of a component: its time stamp and the bytes, of all where the component is of all."""
+    columns = slice(component, component + 1) if stream.sensor in BY_COLUMN else slice(None)
+    content = np.column_stack([stream.value[:, columns], stream.variance[:, columns], stream.quality])
     return [(_stamp(t_s), row.tobytes()) for t_s, row in zip(stream.t_s, content, strict=True)]
 
 
@@ -163,6 +170,16 @@ def recovered_after(course: Course, without: Course, t1_s: float) -> float | Non
         if not len(later) or later[0] - start > STAYS_S:
             return float(start - t1_s)
     return None
+
+
+def moved(run: Navigated, without: Navigated, window_s: tuple[float, float]) -> float | None:
+    """How far the fault moved the estimate while it lasted: the largest distance from the run without it."""
+    lasting = (run.t_s >= window_s[0]) & (run.t_s < window_s[1])
+    t_s = run.t_s[lasting]
+    if not len(t_s):
+        return 0.0
+    usual = np.column_stack([np.interp(t_s, without.t_s, axis) for axis in without.position_ned_m.T])
+    return _finite(np.linalg.norm(run.position_ned_m[lasting] - usual, axis=1).max())
 
 
 def touchdown_error(course: Course, truth: Table) -> float | None:

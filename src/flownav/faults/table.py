@@ -5,22 +5,27 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from flownav.campaign.local import fly_recorded
 from flownav.faults.catalogue import Fault
 from flownav.faults.flight_log import log_of
 from flownav.faults.navigated import Navigate
 from flownav.faults.score import FaultScores, score
 from flownav.logs.log import Log
+from flownav.measurement import Sensor, Stream
 from flownav.parameter_files import check
+from flownav.record import POSITION_NED
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import Scenario, load_scenario
 
 HEIGHTS_M = (0.5, 1.5, 3.0)
-DURATIONS_S = (1.0, 5.0)
+DURATIONS_S = (2.0, 5.0)
 BASE = "pad_return"  # its vehicle, sensors, wind and pad
 TAKEOFF_S, CLIMB_M_S, SETTLING_S, AFTER_S = 5.0, 1.0, 10.0, 5.0
 SINK_M_S, RESTING_S = 0.3, 5.0
 NO_FAULT = "none"
+PLACED_S, PLACED_SIGMA_M = 1.0, 0.02  # when and how well a vehicle on the pad is told where it stands
 
 
 class Row(NamedTuple):
@@ -50,15 +55,16 @@ def fault_table(
     rows = []
     for height_m in heights_m:
         longest_s = longest(faults, durations_s)
-        t0_s = window_start(height_m)
         log = flight_at(height_m, longest_s, seed)
         without = navigate(log.streams)
         truth = log.truth or {}
-        nothing = score(without, without, truth, (), (t0_s, t0_s), log.streams, log.streams)
+        hover_s = window_start(height_m)
+        nothing = score(without, without, truth, (), (hover_s, hover_s), log.streams, log.streams)
         rows.append(Row(NO_FAULT, height_m, 0.0, nothing))
         on_progress(1)
         for fault in faults:
             for duration_s in durations_of(fault, durations_s):
+                t0_s = hover_s + longest_s + AFTER_S if fault.in_descent else hover_s
                 window = (t0_s, t0_s + duration_s)
                 streams = fault.inject(log.streams, *window, seed)
                 run = navigate(streams)
@@ -90,9 +96,18 @@ def window_start(height_m: float) -> float:
 
 
 def flight_at(height_m: float, longest_s: float, seed: int) -> Log:
-    """The log of one flight that hovers at a height for as long as any fault takes, and then lands."""
+    """The log of one flight that hovers at a height for as long as any fault takes, and then lands.
+
+    With the INS's attitude, for its heading, and one POSE: a vehicle on its pad is told where it stands.
+    """
     setup = assemble(scenario_at(height_m, longest_s))
-    return log_of(fly_recorded(setup, seed), setup)
+    log = log_of(fly_recorded(setup, seed), setup, attitude=True)
+    assert log.truth is not None
+    row = int(np.searchsorted(log.truth["t_s"], PLACED_S))
+    stands = np.array([[log.truth[name][row] for name in POSITION_NED]])
+    variance = np.full((1, 3), PLACED_SIGMA_M**2)
+    log.streams[Sensor.POSE] = Stream.of(Sensor.POSE, log.truth["t_s"][row : row + 1], stands, variance=variance)
+    return log
 
 
 def scenario_at(height_m: float, longest_s: float) -> Scenario:

@@ -32,8 +32,12 @@ from flownav.navigation.state import (
     FLOW_BIAS_COUNT,
     FLOW_BIAS_X,
     FLOW_CLOCK,
+    FLOW_DOUBT,
+    FLOW_DOUBTED,
     FLOW_EXCESS,
     FLOW_GYRO_IS_IMU,
+    FLOW_RATIO,
+    FLOW_TRUSTED,
     LATEST_IMU,
     LEVER,
     RANGE_CLOCK,
@@ -43,9 +47,12 @@ from flownav.navigation.state import (
     VALUE,
     Reading,
     Running,
+    write_event,
 )
 
 LARGEST_EXCESS = 400.0
+AGREEMENT_S = 1.0
+DOUBTED_RATIO, TRUSTED_RATIO = 4.0, 2.0  # on average 1
 LONGEST_STEP_S = 1.0
 UNKNOWN_RANGE_M = 2.0
 
@@ -84,13 +91,16 @@ def take_flow(reading: Reading, on: Running) -> None:
         model = scale_of_noise * velocity_variance(range_m, speed, reading.quality, angular, on)
         noise = memory[FLOW_EXCESS] * model if np.isnan(stated) else stated
         outcome = offer_flow(reading, channel, observation, noise, reason, on)
-        if np.isnan(stated) and (outcome == FUSED or outcome == INNOVATION_GATE):  # noqa: SIM109
-            learn_flow_noise(reading.t_s, on)
+        if outcome == FUSED or outcome == INNOVATION_GATE:  # noqa: SIM109
+            follow_agreement(reading.t_s, on)
+            if np.isnan(stated):
+                learn_flow_noise(reading.t_s, on)
             tested = True
         if outcome == FUSED:
             note_aid(reading.t_s, on)
     if tested:
         memory[FLOW_CLOCK] = reading.t_s
+        judge_agreement(reading.t_s, on)
 
 
 @procedure
@@ -156,6 +166,31 @@ def velocity_variance(range_m: float, speed_m_s: float, quality: float, angular:
     sigma = (low + (good - low) * quality / 255.0) * range_m
     scaled = 0.0 if angular else speed_m_s * speed_m_s * range_variance(range_m, on) / (range_m * range_m)
     return sigma * sigma + settings.flow_floor_m_s * settings.flow_floor_m_s + scaled
+
+
+@procedure
+def follow_agreement(t_s: float, on: Running) -> None:
+    """Follow how well flow agrees with what the filter expects of it: nu^2 over its variance, 1 on average.
+
+    A wrong sign, swapped axes or garbage stay within the gate reading by reading, but not on average.
+    """
+    memory, work = on.memory, on.work
+    gate, total = on.settings.filter.gate_sigma, work[ROWS.innovation_variance]
+    square = min(work[ROWS.innovation] ** 2, gate * gate * total) / total
+    share = min(max(t_s - memory[FLOW_CLOCK], 0.0) / AGREEMENT_S, 1.0)
+    memory[FLOW_RATIO] += 0.5 * share * (square - memory[FLOW_RATIO])
+
+
+@procedure
+def judge_agreement(t_s: float, on: Running) -> None:
+    """Say that flow is doubted, and that it is trusted again."""
+    memory = on.memory
+    if memory[FLOW_DOUBT] == 0.0 and memory[FLOW_RATIO] > DOUBTED_RATIO:
+        memory[FLOW_DOUBT] = 1.0
+        write_event(t_s, FLOW_DOUBTED, memory[FLOW_RATIO], on.tape)
+    elif memory[FLOW_DOUBT] > 0.0 and memory[FLOW_RATIO] < TRUSTED_RATIO:
+        memory[FLOW_DOUBT] = 0.0
+        write_event(t_s, FLOW_TRUSTED, memory[FLOW_RATIO], on.tape)
 
 
 @procedure

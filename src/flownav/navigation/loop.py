@@ -98,8 +98,10 @@ def take_imu(reading: Reading, on: Running) -> bool:
     if memory[USE_IMU] == 0.0 or not np.isfinite(total):
         return False
     fresh = reading.t_s - memory[IMU_CLOCK] <= on.settings.imu_stale_s
-    if not fresh and np.isfinite(memory[IMU_CLOCK]):
-        write_event(reading.t_s, IMU_LOST, reading.t_s - memory[IMU_CLOCK], on.tape)
+    if not fresh:
+        advance(reading.t_s, on)  # the gap is coasted: this reading knows nothing of it
+        if np.isfinite(memory[IMU_CLOCK]):
+            write_event(reading.t_s, IMU_LOST, reading.t_s - memory[IMU_CLOCK], on.tape)
     if fresh:
         follow_vibration(value, reading.t_s - memory[IMU_CLOCK], on)
     for i in range(6):

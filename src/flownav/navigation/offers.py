@@ -27,7 +27,7 @@ from flownav.navigation.state import (
 )
 
 (FUSED, INNOVATION_GATE, NO_DATA, NOT_FINITE, OUT_OF_RANGE, NO_HEIGHT, TILTED, BEFORE_START, DATUM, OUTAGE,
- DUPLICATE, LATE, STUCK, NEAR_GROUND, NOT_NEEDED) = map(int, Reason)  # fmt: skip
+ DUPLICATE, LATE, STUCK, NEAR_GROUND, NOT_NEEDED, AHEAD) = map(int, Reason)  # fmt: skip
 CLOCK_SLACK_S = 1e-6
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import ONE_LANE, procedure
+from flownav.estimation.landing.algebra import settle
 from flownav.estimation.landing.observe import (
     GPS_POSITION_STATES,
     GPS_VELOCITY_STATES,
@@ -53,18 +54,14 @@ LEAST_PAD_DISTANCE_M = 0.05
 @procedure
 def take_gps(reading: Reading, on: Running) -> None:
     """Position or velocity, axis by axis, with its Gauss-Markov errors; where it is rejected for long, a reset."""
-    settings, work = on.settings, on.work
+    work = on.work
     position = reading.sensor == Sensor.GPS_POSITION
-    fused = False
+    fused, level = False, level_agrees(reading, on)
     for axis in range(3):
-        stated = reading.variance[axis]
-        if position:
-            white = settings.gps_white_sigma_down_m if axis == 2 else settings.gps_white_sigma_m
-        else:
-            white = settings.gps_velocity_white_down_m_s if axis == 2 else settings.gps_velocity_white_m_s
-        share = settings.gps_white_share * settings.gps_white_share * (0.0 if np.isnan(stated) else stated)
-        noise = white * white + share
+        noise = gps_noise(reading, axis, on)
         reason = usable(reading.quality, reading.value[axis], noise, on)
+        if reason == FUSED and axis < 2 and not level:
+            reason = INNOVATION_GATE
         work[VALUE] = reading.value[axis]
         if position:
             observe_gps_position(work, ONE_LANE, ROWS, axis, VALUE, 0.0)
@@ -80,6 +77,38 @@ def take_gps(reading: Reading, on: Running) -> None:
         mind_rejections(reading, axis, reason, noise, on)
     if fused:
         note_aid(reading.t_s, on)
+
+
+@procedure
+def gps_noise(reading: Reading, axis: int, on: Running) -> float:
+    """Variance of what changes from fix to fix."""
+    settings, stated = on.settings, reading.variance[axis]
+    if reading.sensor == Sensor.GPS_POSITION:
+        white = settings.gps_white_sigma_down_m if axis == 2 else settings.gps_white_sigma_m
+    else:
+        white = settings.gps_velocity_white_down_m_s if axis == 2 else settings.gps_velocity_white_m_s
+    share = settings.gps_white_share * settings.gps_white_share * (0.0 if np.isnan(stated) else stated)
+    return white * white + share
+
+
+@procedure
+def level_agrees(reading: Reading, on: Running) -> bool:
+    """Whether north and east both pass the gate: they come of one fix, and a jump along one axis spoils both."""
+    work, agrees = on.work, True
+    if on.memory[STARTED] == 0.0:
+        return agrees
+    for axis in range(2):
+        work[VALUE] = reading.value[axis]
+        noise = gps_noise(reading, axis, on)
+        if reading.sensor == Sensor.GPS_POSITION:
+            observe_gps_position(work, ONE_LANE, ROWS, axis, VALUE, 0.0)
+            put(noise, INNOVATION_GATE, GPS_POSITION_STATES[axis], work)
+        else:
+            observe_gps_velocity(work, ONE_LANE, ROWS, axis, VALUE, 0.0)
+            put(noise, INNOVATION_GATE, GPS_VELOCITY_STATES[axis], work)
+        settle(work, ONE_LANE, ROWS, on.settings.filter.gate_sigma)
+        agrees = agrees and not work[ROWS.test_ratio] > 1.0
+    return agrees
 
 
 @procedure

@@ -72,7 +72,9 @@ PAD = LEVEL + 3  # where the first pad fix puts the pad, NED [m]
 OWN_BEFORE = PAD + 3  # the filter's attitude at the last attitude reading with a fresh IMU
 READ_BEFORE = OWN_BEFORE + 4  # that reading
 SPREAD_BEFORE = READ_BEFORE + 4  # and the filter's variances [rad2]
-MEMORY_SIZE = SPREAD_BEFORE + 3
+FLOW_RATIO = SPREAD_BEFORE + 3  # mean of nu^2 over its variance, flow of the last second
+FLOW_DOUBT = FLOW_RATIO + 1  # 1 while flow is doubted
+MEMORY_SIZE = FLOW_DOUBT + 1
 
 # headings: none, a magnetometer's, an external attitude's or YAW's
 NO_HEADING, FROM_MAG, FROM_ATTITUDE = 0.0, 1.0, 2.0
@@ -91,7 +93,7 @@ COMPONENTS = {Sensor.GPS_POSITION: 3, Sensor.GPS_VELOCITY: 3, Sensor.FLOW_RATE: 
 # Kinds of event: source, kind, what the value is. NumPy numbers them, because Numba compiles a function anew
 # for each Python integer that it is called with.
 (START, GROUND_FOUND, GROUND_RESET, BARO_FOUND, GPS_RESET, DEAD_RECKONING, POSITION_INVALID, AIDED_AGAIN,
- RANGE_STUCK, PAD_FOUND, IMU_LOST, IMU_DOUBTED) = np.arange(12)  # fmt: skip
+ RANGE_STUCK, PAD_FOUND, IMU_LOST, IMU_DOUBTED, FLOW_DOUBTED, FLOW_TRUSTED) = np.arange(14)  # fmt: skip
 EVENT_NAMES = (
     ("filter", "start", "at a GPS fix (1) or at the local origin (0)"),
     ("range", "datum", "ground level below the first range, down in the local frame [m]"),
@@ -105,6 +107,8 @@ EVENT_NAMES = (
     ("pad", "datum", "the pad's distance from the local origin [m]"),
     ("imu", "lost", "no reading for this long [s]; attitude and velocity coast"),
     ("imu", "doubted", "range contradicts it by this much [m]; the accelerometer's bias is set free"),
+    ("flow", "doubted", "it contradicts IMU and GPS: mean square innovation over its variance"),
+    ("flow", "trusted", "it agrees again: mean square innovation over its variance"),
 )
 
 
@@ -173,7 +177,8 @@ def new_memory() -> Array:
              LANDED, LEVEL_COUNT,
              FLOW_BIAS_X, FLOW_BIAS_Y, FLOW_BIAS_COUNT, FLOW_GYRO_IS_IMU, RANGE_TRAVEL]  # fmt: skip
     memory[zeros] = 0.0
-    memory[FLOW_EXCESS] = 1.0
+    memory[[FLOW_EXCESS, FLOW_RATIO]] = 1.0
+    memory[FLOW_DOUBT] = 0.0
     memory[[HEIGHT_CLOCK, HEADING_CLOCK, IMU_CLOCK, ATTITUDE_CLOCK, FLOW_CLOCK, WRITTEN, RANGE_CLOCK]] = -np.inf
     memory[COUNT : COUNT + 6] = 0.0
     memory[LAST:LEVEL] = -np.inf

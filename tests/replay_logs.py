@@ -13,6 +13,7 @@ from flownav.frames import GRAVITY_M_S2
 
 ORIGIN = (47.0, 8.5, 400.0)
 GPS_DELAY_S = 0.22
+FIELD_MGAUSS = (210.0, 0.0, 430.0)  # magnetic north is true north here
 
 
 @dataclass
@@ -103,9 +104,8 @@ def log_of_flight(duration_s: float = 60.0, *, start_s: float = 0.0, yaw_rate: f
     tables["range"] = _table(s, start_s, ("range_m",), at(s, boresight[:, None])) | {"valid": np.ones(len(s))}
     s = times(10.0)
     tables["baro"] = _table(s, start_s, ("alt_m",), 12.0 + at(s, -position[:, 2:]))
-    tables["mag"] = _table(
-        s, start_s, ("mag_x_mgauss", "mag_y_mgauss", "mag_z_mgauss"), np.tile([210.0, 10.0, 430.0], (len(s), 1))
-    )
+    field = _to_body(*(np.interp(s, t, angle) for angle in (roll, pitch, yaw)), np.tile(FIELD_MGAUSS, (len(s), 1)))
+    tables["mag"] = _table(s, start_s, ("mag_x_mgauss", "mag_y_mgauss", "mag_z_mgauss"), field)
     return SyntheticLog(tables, t + start_s, position - path(np.array([-GPS_DELAY_S])), velocity)
 
 

@@ -138,7 +138,7 @@ def rotation_rate(reading: Reading, on: Running) -> tuple[float, float]:
     """The turning that the flow saw [rad/s]: the chosen gyro of columns 2 and 3 less its bias.
 
     The vehicle's IMU (columns 4 and 5, its mean over the exposure) has the filter's bias; a sensor's own gyro is
-    followed against it.
+    followed against it, but not where it has no data: it may say zero then for its gyro too.
     """
     value, memory, work = reading.value, on.memory, on.work
     imu_x, imu_y = value[4] - work[ROWS.state + GYRO_BIAS], value[5] - work[ROWS.state + GYRO_BIAS + 1]
@@ -146,7 +146,7 @@ def rotation_rate(reading: Reading, on: Running) -> tuple[float, float]:
     if memory[FLOW_GYRO_IS_IMU] > 0.0 and imu_here:
         return imu_x, imu_y
     own_x, own_y = value[2], value[3]
-    if imu_here and np.isfinite(own_x + own_y):
+    if imu_here and np.isfinite(own_x + own_y) and reading.quality != 0.0:
         memory[FLOW_BIAS_COUNT] += 1.0
         step_s = min(max(reading.t_s - memory[FLOW_CLOCK], 0.0), LONGEST_STEP_S)
         share = max(1.0 - np.exp(-step_s / on.settings.flow_gyro_time_s), 1.0 / memory[FLOW_BIAS_COUNT])

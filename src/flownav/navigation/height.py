@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import ONE_LANE, procedure
+from flownav.estimation.landing.algebra import settle
 from flownav.estimation.landing.observe import BARO_STATES, RANGE_STATES, observe_baro, observe_range, rotation_of
 from flownav.estimation.landing.states import BARO, GROUND, POSITION, STATES, VELOCITY
 from flownav.navigation.journal import reset_state
@@ -96,9 +97,7 @@ def take_range(reading: Reading, on: Running) -> None:
         set_ground(below, on)
         memory[GROUND_SET] = 1.0
         write_event(t_s, GROUND_FOUND, below, on.tape)
-    work[VALUE] = range_m
-    observe_range(work, ONE_LANE, ROWS, VALUE, settings.range_below_m)
-    put(noise, reason, RANGE_STATES, on.work)
+    offer_range(range_m, noise, reason, on)
     reason = conclude(reading, 0, range_m, reason, on)
     if reason == FUSED or reason == DATUM:  # noqa: SIM109
         memory[RANGE_CLOCK], memory[RANGE_SINCE] = t_s, np.nan
@@ -110,8 +109,18 @@ def take_range(reading: Reading, on: Running) -> None:
             doubt(t_s, work[ROWS.innovation], on)
         if t_s - memory[RANGE_SINCE] >= settings.ground_reset_s:
             set_ground(below, on)
-            memory[RANGE_SINCE] = np.nan
+            offer_range(range_m, noise, FUSED, on)
+            settle(work, ONE_LANE, ROWS, settings.filter.gate_sigma)
+            memory[RANGE_CLOCK], memory[RANGE_SINCE] = t_s, np.nan
             write_event(t_s, GROUND_RESET, below, on.tape)
+
+
+@procedure
+def offer_range(range_m: float, noise: float, reason: int, on: Running) -> None:
+    """The law of a range, put for its test."""
+    on.work[VALUE] = range_m
+    observe_range(on.work, ONE_LANE, ROWS, VALUE, on.settings.range_below_m)
+    put(noise, reason, RANGE_STATES, on.work)
 
 
 @procedure

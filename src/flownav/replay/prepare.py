@@ -267,21 +267,25 @@ def _gyro_candidates(flow: Stream, streams: dict[Sensor, Stream]) -> dict[str, A
         candidates[TURNING] = turning
     if imu_serves(streams):
         rates = _imu_over(flow, streams, exposure_s)
-        candidates[IMU] = rates if turning is None else rates - _followed(flow.t_s, rates - turning)
+        candidates[IMU] = rates if turning is None else rates - _followed(flow, rates - turning)
     own = flow.value[:, 2:4]
     known = np.asarray(np.isfinite(own).all(axis=1))
     if not candidates or (known.mean() > 0.5 and np.all(np.ptp(own[known], axis=0))):
         spare = next(iter(candidates.values()), np.zeros_like(own))
         filled = np.where(known[:, None], own, spare)
-        candidates[OWN] = filled if turning is None else filled - _followed(flow.t_s, filled - turning)
+        candidates[OWN] = filled if turning is None else filled - _followed(flow, filled - turning)
     return candidates
 
 
-def _followed(t_s: Array, difference: Array) -> Array:
-    """A first-order low-pass of a gyro's difference from the attitude's rates: its bias, as known at each instant."""
-    gain = 1.0 - np.exp(-np.diff(t_s, prepend=t_s[0]) / GYRO_BIAS_TIME_S)
-    gain = np.maximum(gain, 1.0 / np.arange(1, len(t_s) + 1))
-    return np.asarray(_low_pass(difference, gain))
+def _followed(flow: Stream, difference: Array) -> Array:
+    """A first-order low-pass of a gyro's difference from the attitude's rates: its bias, as known at each instant.
+
+    A reading of no data (quality 0) may hold zeros for its gyro too, and says nothing of it.
+    """
+    good = flow.quality != 0.0
+    gain = 1.0 - np.exp(-np.diff(flow.t_s, prepend=flow.t_s[0]) / GYRO_BIAS_TIME_S)
+    gain = np.maximum(gain, 1.0 / np.maximum(np.cumsum(good), 1))
+    return np.asarray(_low_pass(difference, np.where(good, gain, 0.0)))
 
 
 @kernel

@@ -20,6 +20,7 @@ from flownav.navigation.loop import run
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.state import Tape, new_tape
 from flownav.replay.autopilot import autopilot_scores
+from flownav.replay.fed import prepared_as_fed, run_as_fed
 from flownav.replay.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replay.sentinel import Finding, findings
 from flownav.scoring.alignment import Alignment, align, velocity_of
@@ -145,8 +146,9 @@ class Replay:
 
 def replay(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile) -> Replay:
     """Run a log through the filter. InputError where an option cannot be, or the filter never starts."""
+    check_windows(log, options.gps_outages_s, "--gps-outage")
     with announce_compilation("replay"):
-        prepared = prepare(log, options)
+        prepared = prepared_as_fed(log) if log.fed else prepare(log, options)
         return _run(log, options, settings, prepared)
 
 
@@ -168,7 +170,7 @@ def outage_table(
 
     errors = []
     with announce_compilation("replay"), ThreadPoolExecutor(2) as pool:
-        prepared = prepare(log, replace(options, gps_outages_s=()))
+        prepared = prepared_as_fed(log) if log.fed else prepare(log, replace(options, gps_outages_s=()))
         for error in pool.map(error_of, windows):
             errors.append(error)
             on_progress(1)
@@ -210,13 +212,17 @@ def _number(value: float) -> float | None:
 
 
 def _run(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, prepared: Prepared) -> Replay:
-    queue = withhold(log, prepared.queue, options)
-    gyro_is_imu = prepared.flow_gyro_is_imu
-    running = new_navigator(prepared.streams, float(queue.t_s[0]), gyro_is_imu, settings, new_tape(queue))
-    run(queue, running)
-    if running.tape.used[0] < 2:
+    if log.fed:
+        tape = run_as_fed(log, settings, lambda queue: withhold(log, queue, options))
+    else:
+        queue = withhold(log, prepared.queue, options)
+        gyro_is_imu = prepared.flow_gyro_is_imu
+        running = new_navigator(prepared.streams, float(queue.t_s[0]), gyro_is_imu, settings, new_tape(queue))
+        run(queue, running)
+        tape = running.tape
+    if tape.used[0] < 2:
         raise InputError(
             f"{log.path}: the filter never started; it needs an attitude or an IMU of {SLOWEST_IMU_HZ:g} Hz, then a "
             "GPS fix or flow of quality above 0"
         )
-    return Replay(log, options, settings, prepared, running.tape)
+    return Replay(log, options, settings, prepared, tape)

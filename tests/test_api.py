@@ -38,6 +38,7 @@ ALLOWED = {
     "simulation": GROUND | EQUATIONS,
     "navigation": GROUND | EQUATIONS,
     "replay": GROUND | EQUATIONS | {"navigation", "logs", "scoring"},
+    "live": GROUND | EQUATIONS | {"mavlink", "logs", "navigation", "replay"},
     "campaign": GROUND | EQUATIONS | {"simulation", "scoring"},
     "faults": GROUND | EQUATIONS | {"logs", "simulation", "campaign", "scoring", "navigation", "replay"},
     "report": GROUND | {"scoring"},

@@ -26,6 +26,11 @@ POSITION_NED = ("pos_n_m", "pos_e_m", "pos_d_m")
 VELOCITY_BODY = ("vel_u_m_s", "vel_v_m_s", "vel_w_m_s")
 QUATERNION = ("qw", "qx", "qy", "qz")
 
+# What a live filter was fed, row by row in its order: the instant that the reading describes (t_s), its stamp on
+# arrival, measurement.Sensor, values and variances (unused ones NaN), quality, and which of `segments` took it.
+FED = ("t_s", "arrival_s", "sensor", *(f"value_{i}" for i in range(6)), *(f"variance_{i}" for i in range(6)),
+       "quality", "segment")  # fmt: skip
+
 # The vocabulary: every table has `t_s` first; a writer may leave a table or a trailing column out.
 TABLES: dict[str, tuple[str, ...]] = {
     # what was so (simulation, motion capture)
@@ -72,6 +77,7 @@ TABLES: dict[str, tuple[str, ...]] = {
     ),
     # one row per happening: source, kind, detail (text), value
     "events": ("source", "kind", "detail", "value"),
+    "fed": FED[1:],
     # measurement streams are tables "gps_position", "flow_velocity", ...: measurement.COLUMNS and "quality"
 }
 

@@ -14,6 +14,7 @@ from flownav.cli import flow as flow
 from flownav.cli import fly as fly
 from flownav.cli import identify as identify
 from flownav.cli import info as info
+from flownav.cli import live as live
 from flownav.cli import pad as pad
 from flownav.cli import paper as paper
 from flownav.cli import replay as replay
@@ -33,6 +34,7 @@ app = typer.Typer(
 for name, command, what in (
     ("fly", fly.command, "Fly a take-off or landing in closed loop, scored beside the paper."),
     ("replay", replay.command, "Fuse a recorded flight; measure the drift without GPS."),
+    ("live", live.command, "Navigate a MAVLink vehicle in real time; send it the estimate."),
     ("info", info.command, "What a log holds: sensors, rates, gaps, signs, what it lacks."),
     ("identify", identify.command, "Identify a flow sensor from rig or flight logs; write its file."),
     ("rig", rig.command, "Swing a flow sensor over a pad beside an encoder, from pixels."),

@@ -11,6 +11,8 @@ import typer
 from flownav.errors import InputError, VerdictError
 
 if TYPE_CHECKING:
+    from flownav.record import Record
+    from flownav.simulation.assemble import Setup
     from flownav.simulation.scenario import Scenario
 
 
@@ -32,6 +34,11 @@ def command(
     sensor: Annotated[str | None, typer.Option(help="A flow sensor file (TOML).")] = None,
     out: Annotated[Path | None, typer.Option(help="The record to write; out/SCENARIO.fnr where unsaid.")] = None,
     report: Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report beside it.")] = True,
+    mavlink: Annotated[
+        str | None, typer.Option(metavar="URL", help="Then tell the flight as a MAVLink autopilot (docs/live.md).")
+    ] = None,
+    speed: Annotated[float, typer.Option(help="Of the telling: 1 is real time.")] = 1.0,
+    signing_key: Annotated[Path | None, typer.Option(help="Sign what is told: 32 bytes or 64 digits.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
@@ -46,6 +53,7 @@ def command(
     require_between("--flights", flights, 1, 10_000_000)
     require_between("--seed", seed, 0, 2**63 - 1)
     require_between("--flight", flight or 0, 0, 10_000_000)
+    require_between("--speed", speed, 0.01, 100.0)
     if flight is not None and flights > 1:
         raise InputError("--flight names one flight, --flights many; give one of the two")
     chosen = _overridden(load_scenario(scenario), gps, filter_name, feedback, truth, sensor)
@@ -78,6 +86,8 @@ def command(
     facts |= scores | save(record, record_path, report=report)
     if percentiles:
         facts["paper_percentile"] = percentiles
+    if mavlink is not None:
+        facts["told"] = _tell(setup, record, mavlink, speed, signing_key)
     if as_json:
         typer.echo(json.dumps(facts))
     else:
@@ -86,6 +96,28 @@ def command(
         show(facts, record.manifest["paper"], index)
     if int(facts["crashed"]) > CRASHES_ALLOWED * flights:
         raise VerdictError(f"{int(facts['crashed'])} of {flights} flights crashed (see `crashed` in docs/scenarios.md)")
+
+
+def _tell(setup: Setup, record: Record, url: str, speed: float, key: Path | None) -> dict[str, Any]:
+    """The flight as an autopilot tells it; how far it came, and what was heard."""
+    from flownav.faults.flight_log import log_of
+    from flownav.live.link import open_link
+    from flownav.live.loop import run_vehicle, stoppable
+    from flownav.live.simulated import SimulatedVehicle
+    from flownav.mavlink.signing import load_key
+    from flownav.measurement import Sensor
+
+    if "imu" not in record.tables or "gps_velocity" not in record.tables:
+        raise InputError("--mavlink: the flight has no IMU or no GPS velocity; give --filter landing --gps midg")
+    log = log_of(record, setup, flow=Sensor.FLOW_RATE, attitude=True)
+    vehicle = SimulatedVehicle(log, key=load_key(key) if key else None)
+    link = open_link(url)
+    try:
+        with stoppable() as asked:
+            reached_s = run_vehicle(vehicle, link, speed, asked)
+    finally:
+        link.close()
+    return {"flight_s": min(reached_s, vehicle.end_s), "speed": speed, "heard": dict(vehicle.counts)}
 
 
 def _overridden(

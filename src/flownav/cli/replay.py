@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def command(
     folder: Annotated[
-        Path, typer.Argument(help="A log: CSV folder, .ulg, .bin or .tlog (docs/logs.md).", show_default=False)
+        Path, typer.Argument(help="A log: CSV folder, .ulg, .bin, .tlog, or a live .fnr.", show_default=False)
     ],
     gps_outage: Annotated[
         list[str] | None,
@@ -54,6 +54,7 @@ def command(
     from flownav.cli.output import save
     from flownav.errors import VerdictError
     from flownav.replay.bundle import to_record
+    from flownav.replay.fed import as_fed
     from flownav.replay.prepare import ReplayOptions, identified_flow
     from flownav.replay.session import replay, table_windows
     from flownav.sensors.datasheet import load_sensor
@@ -64,7 +65,8 @@ def command(
     identified = identified_flow(load_sensor(sensor)) if sensor else None
     outages = tuple((t0, t1) for t0, t1 in windows)
     options = ReplayOptions(gps_delay, outages, not no_flow, (scale[0], scale[1]), identified)
-    log, numbers = _read(folder, flow_instance), _settings(settings)
+    log = _read(folder, flow_instance)
+    options, numbers = as_fed(log, options, _settings(settings) if settings else None)
     flown = replay(log, options, numbers, smoothed=smooth)
     scores = flown.scores()
     if table:
@@ -100,11 +102,11 @@ def _read(path: Path, flow_instance: int | None) -> Any:
     return open_flight(path, flow_instance=flow_instance)
 
 
-def _settings(path: Path | None) -> Any:
+def _settings(path: Path) -> Any:
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.parameter_files import load
 
-    return load(path, NavigatorSettingsFile) if path else NavigatorSettingsFile()
+    return load(path, NavigatorSettingsFile)
 
 
 def _fly_table(flown: Replay, table: list[tuple[float, float]], explicit: list[dict[str, Any]]) -> dict[str, Any]:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from flownav.measurement import Sensor, Stream
+from flownav.measurement import EventQueue, Sensor, Stream
 from flownav.record import Table
 
 
@@ -15,6 +15,13 @@ class Absence(NamedTuple):
 
     what: str
     instead: str
+
+
+class FedSegment(NamedTuple):
+    """What one navigator was fed: its equipment (fields of navigation.feed.Equipment by name), and the queue."""
+
+    equipment: dict[str, Any]
+    queue: EventQueue
 
 
 @dataclass(frozen=True)
@@ -28,6 +35,8 @@ class Log:
     truth: an external reference, columns as record.TABLES["truth"]; its frame may be turned in yaw.
     inputs: SHA-256 of each file read, by name. notes: what a reader would tell the user, one line each.
     autopilot: what the vehicle's own estimator said, columns as record.TABLES["autopilot"], and its name.
+    fed: of a live session, what its filter was fed, in order, navigator by navigator; fed_settings: the filter's
+    settings and what else shaped it.
     limits: what a sensor states of itself, lowest and highest, by name with unit ("range_m", "flow_height_m",
     "flow_rad_s"). absences: what the log lacks.
     """
@@ -43,6 +52,8 @@ class Log:
     limits: dict[str, tuple[float, float]] = field(default_factory=dict)
     absences: tuple[Absence, ...] = ()
     clock_start_s: float | None = None
+    fed: tuple[FedSegment, ...] = ()
+    fed_settings: dict[str, Any] = field(default_factory=dict)
 
     @property
     def span_s(self) -> tuple[float, float]:

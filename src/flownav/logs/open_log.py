@@ -9,10 +9,14 @@ from flownav.errors import InputError
 from flownav.logs.log import Log
 from flownav.measurement import Sensor
 
-KNOWN = "a folder of CSV files, a PX4 ULog (.ulg), an ArduPilot DataFlash log (.bin) or a MAVLink telemetry log (.tlog)"
+KNOWN = (
+    "a folder of CSV files, a PX4 ULog (.ulg), an ArduPilot DataFlash log (.bin), a MAVLink telemetry log (.tlog) or a "
+    "live session's record (.fnr)"
+)
 ULOG_MAGIC = b"\x55\x4c\x6f\x67\x01\x12\x35"
 DATAFLASH_MAGIC = b"\xa3\x95"
 DATAFLASH_FORMAT = b"\xa3\x95\x80"  # the message that describes others: a log that has lost its start still has many
+ZIP_MAGIC = b"PK\x03\x04"
 MAVLINK_MAGIC = b"\xfd\xfe"
 LOOKED_AT_BYTES = 4096
 YEARS_US = (1.0e15, 4.2e15)  # microseconds of the years 2001 to 2103
@@ -58,13 +62,17 @@ def _reader(kind: str) -> Callable[..., Log]:
         from flownav.logs.dataflash import read_dataflash
 
         return read_dataflash
+    if kind == "record":
+        from flownav.logs.live_record import read_live_record
+
+        return read_live_record
     from flownav.logs.mavlink_log import read_tlog
 
     return read_tlog
 
 
 def log_kind(path: Path) -> str:
-    """ "ulog", "dataflash" or "tlog" by a file's first bytes and its suffix; "" for anything else.
+    """ "ulog", "dataflash", "tlog" or "record" by a file's first bytes and its suffix; "" for anything else.
 
     InputError where a file cannot be read.
     """
@@ -79,6 +87,8 @@ def log_kind(path: Path) -> str:
         return "ulog"
     if head.startswith(DATAFLASH_MAGIC) or (path.suffix.lower() == ".bin" and DATAFLASH_FORMAT in head):
         return "dataflash"
+    if path.suffix.lower() == ".fnr" and head.startswith(ZIP_MAGIC):
+        return "record"
     dated = YEARS_US[0] < int.from_bytes(head[:8], "big") < YEARS_US[1]
     if path.suffix.lower() == ".tlog" or (dated and len(head) > 8 and head[8] in MAVLINK_MAGIC):
         return "tlog"

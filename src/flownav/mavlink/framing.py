@@ -1,4 +1,4 @@
-"""Frames in the bytes of a tlog: 8 bytes of arrival time (big-endian UNIX microseconds), then a MAVLink frame.
+"""Frames in the bytes of a tlog, 8 bytes of arrival time (big-endian UNIX microseconds) before each, or of a link.
 
 Only a frame whose checksum holds is believed. After damage the search goes on at the next byte that could begin a
 frame, so that nothing but the damaged frames is lost; what is lost is counted. A frame is 280 bytes at most, so no
@@ -23,6 +23,8 @@ HEADER_1, HEADER_2 = 6, 10
 CHECKSUM_BYTES, SIGNATURE_BYTES = 2, 13
 SIGNED = 0x01
 TIMESTAMP_BYTES = 8
+LARGEST_FRAME = HEADER_2 + 255 + CHECKSUM_BYTES + SIGNATURE_BYTES
+OPEN_END = re.compile(rb"\xfd.{0,8}\Z", re.DOTALL)  # the beginning of a header whose rest is still to come
 BEGINNING = re.compile(rb"\xfd.[\x00\x01].{6}\x00|\xfe", re.DOTALL)  # ids of known messages fit in two bytes
 
 
@@ -43,7 +45,7 @@ def tlog_frames(content: bytes, damage: Counter[str]) -> Iterator[Frame]:
 
     `bad_checksum`, `truncated` and `unknown_message` count frames, `skipped_bytes` bytes that belong to no frame.
     """
-    check = _Check()
+    check = Check()
     place, size = 0, len(content)
     while place < size:
         frame = check.frame(content, place + TIMESTAMP_BYTES, place)
@@ -61,7 +63,7 @@ def tlog_frames(content: bytes, damage: Counter[str]) -> Iterator[Frame]:
         place = frame.end
 
 
-def _resume(content: bytes, check: _Check, place: int) -> Frame | None:
+def _resume(content: bytes, check: Check, place: int) -> Frame | None:
     """The next frame whose checksum holds, with its timestamp in front, from just after `place`."""
     for match in BEGINNING.finditer(content, place + TIMESTAMP_BYTES + 1):
         frame = check.frame(content, match.start(), match.start() - TIMESTAMP_BYTES)
@@ -70,7 +72,42 @@ def _resume(content: bytes, check: _Check, place: int) -> Frame | None:
     return None
 
 
-class _Check:
+class StreamFrames:
+    """The frames in what arrives on a link, piece by piece. Holds no more than one frame's bytes between pieces.
+
+    damage: as of `tlog_frames`.
+    """
+
+    def __init__(self) -> None:
+        self.damage: Counter[str] = Counter()
+        self._check = Check()
+        self._rest = b""
+
+    def feed(self, piece: bytes, *, whole: bool = False) -> Iterator[tuple[Frame, bytes]]:
+        """Every whole frame of a known message, with its bytes. whole: a datagram, in which no frame is left open."""
+        content = self._rest + piece
+        self._rest = b""
+        place = 0
+        while place < len(content):
+            frame = self._check.frame(content, place)
+            if frame == "truncated" and not whole and len(content) - place < LARGEST_FRAME:
+                self._rest = content[place:]
+                return
+            if isinstance(frame, str):
+                self.damage[frame] += frame != "no_header"
+                found = BEGINNING.search(content, place + 1) or OPEN_END.search(content, place + 1)
+                following = found.start() if found else len(content)
+                self.damage["skipped_bytes"] += following - place
+                place = following
+                continue
+            if self._check.known(frame.message_id):
+                yield frame, content[frame.start : frame.end]
+            else:
+                self.damage["unknown_message"] += 1
+            place = frame.end
+
+
+class Check:
     """The dialect's checksum seeds and lengths, by message id."""
 
     def __init__(self) -> None:
@@ -80,10 +117,11 @@ class _Check:
         self._sizes = {number: kind.unpacker.size for number, kind in module.mavlink_map.items()}
 
     def known(self, message_id: int) -> bool:
+        """Whether the dialect has the message."""
         return message_id in self._seeds
 
-    def frame(self, content: bytes, start: int, timestamp: int) -> Frame | str:
-        """The frame at `start`, or why there is none."""
+    def frame(self, content: bytes, start: int, timestamp: int | None = None) -> Frame | str:
+        """The frame at `start`, or why there is none; its arrival time is at `timestamp` (None: it has none)."""
         size = len(content)
         if start >= size or content[start] not in (MAVLINK_1, MAVLINK_2):
             return "truncated" if start >= size else "no_header"
@@ -107,10 +145,11 @@ class _Check:
             return "truncated"
         seed = self._seeds.get(message_id)
         if seed is None:  # its checksum needs its definition: believe it if another frame follows
-            following = end + TIMESTAMP_BYTES
+            following = end + (0 if timestamp is None else TIMESTAMP_BYTES)
             if end != size and not (following < size and content[following] in (MAVLINK_1, MAVLINK_2)):
                 return "bad_checksum"
         elif self._crc(content[start + 1 : checksum] + seed) != content[checksum] | content[checksum + 1] << 8:
             return "bad_checksum"
-        arrival_us = int.from_bytes(content[timestamp : timestamp + TIMESTAMP_BYTES], "big")
+        arrival = b"" if timestamp is None else content[timestamp : timestamp + TIMESTAMP_BYTES]
+        arrival_us = int.from_bytes(arrival, "big")
         return Frame(start, end, arrival_us, message_id, system, component, signed)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from flownav.measurement import Array, Sensor, Stream
@@ -46,23 +48,52 @@ def heading_source(streams: dict[Sensor, Stream]) -> float:
     return FROM_ATTITUDE if Sensor.ATTITUDE in streams else NO_HEADING
 
 
-def new_navigator(
-    streams: dict[Sensor, Stream], first_s: float, flow_gyro_is_imu: bool, settings: NavigatorSettingsFile, tape: Tape
-) -> Running:
-    """A navigator that has heard nothing; `first_s` is the instant from which it waits for a fix."""
-    memory = new_memory()
-    memory[USE_IMU] = float(imu_serves(streams))
-    memory[USE_ATTITUDE] = float(not imu_serves(streams) and Sensor.ATTITUDE in streams)
-    memory[USE_HEADING] = heading_source(streams)
-    memory[FLOW_GYRO_IS_IMU] = float(flow_gyro_is_imu)
+class Equipment(NamedTuple):
+    """Which sensors serve a navigator. heading: of navigation.state; deadline_s: how long it waits for a fix."""
+
+    use_imu: bool
+    use_attitude: bool
+    heading: float
+    flow_gyro_is_imu: bool
+    deadline_s: float
+
+
+def equipment_of(
+    streams: dict[Sensor, Stream], first_s: float, flow_gyro_is_imu: bool, settings: NavigatorSettingsFile
+) -> Equipment:
+    """What the streams offer; `first_s` is the instant from which the navigator waits for a fix."""
+    serves = imu_serves(streams)
     fixes = Sensor.GPS_POSITION in streams and bool(np.any(streams[Sensor.GPS_POSITION].quality > 0.0))
-    memory[DEADLINE] = first_s + float(settings.start_wait_s) if fixes else -np.inf
-    headed = memory[USE_HEADING] != NO_HEADING or memory[USE_ATTITUDE] > 0.0
+    return Equipment(
+        serves,
+        not serves and Sensor.ATTITUDE in streams,
+        heading_source(streams),
+        flow_gyro_is_imu,
+        first_s + float(settings.start_wait_s) if fixes else -np.inf,
+    )
+
+
+def start_navigator(equipment: Equipment, settings: NavigatorSettingsFile, tape: Tape) -> Running:
+    """A navigator that has heard nothing."""
+    memory = new_memory()
+    memory[USE_IMU] = float(equipment.use_imu)
+    memory[USE_ATTITUDE] = float(equipment.use_attitude)
+    memory[USE_HEADING] = equipment.heading
+    memory[FLOW_GYRO_IS_IMU] = float(equipment.flow_gyro_is_imu)
+    memory[DEADLINE] = equipment.deadline_s
+    headed = equipment.heading != NO_HEADING or equipment.use_attitude
     return Running(
         settings.settings(),
-        settings.start_sigma(has_heading=headed, compass=memory[USE_HEADING] == FROM_MAG),
+        settings.start_sigma(has_heading=headed, compass=equipment.heading == FROM_MAG),
         np.zeros(WORK_ROWS),
         memory,
         tape,
         new_journal(0, 0),
     )
+
+
+def new_navigator(
+    streams: dict[Sensor, Stream], first_s: float, flow_gyro_is_imu: bool, settings: NavigatorSettingsFile, tape: Tape
+) -> Running:
+    """A navigator for these streams that has heard nothing; from `first_s` on it waits for a fix."""
+    return start_navigator(equipment_of(streams, first_s, flow_gyro_is_imu, settings), settings, tape)

@@ -13,7 +13,7 @@ from flownav.frames import rotation_from_quaternion
 from flownav.logs.rates import attitude_at
 from flownav.measurement import COLUMNS, Array, Sensor, Stream
 from flownav.navigation.state import EVENT_NAMES
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record, Table
 from flownav.replay.autopilot import autopilot_path
 from flownav.replay.session import Replay
 from flownav.scoring.alignment import velocity_of
@@ -35,9 +35,9 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str]) -> Rec
     """The record of a replay. `scores` go into its manifest; `command` is what the user typed."""
     record = Record(_manifest(replay, scores, command))
     estimate = replay.estimate
-    record.add("estimate", _path(estimate))
+    record.add("estimate", estimate_table(estimate))
     if replay.smoothed is not None:
-        record.add("smoothed", _path(replay.smoothed))
+        record.add("smoothed", estimate_table(replay.smoothed))
     for sensor in KEPT:
         if sensor in replay.log.streams:
             stream = replay.log.streams[sensor]
@@ -48,15 +48,15 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str]) -> Rec
     own = autopilot_path(replay.log, replay.options.gps_delay_s, estimate[:, 0], estimate[:, 1:4])
     if own is not None:
         record.add("autopilot", own)
-    record.add("innovation", _innovation(replay))
+    record.add("innovation", innovation_table(replay.innovation))
     record.add("events", _events(replay))
     return record
 
 
-def _path(estimate: Array) -> dict[str, Array]:
-    """The record's columns of a tape's estimate."""
+def estimate_table(rows: Array) -> Table:
+    """Rows of a tape's estimate as the record's table."""
     names = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)))
-    return {"t_s": estimate[:, 0], **dict(zip(names, estimate[:, 1:17].T, strict=True))}
+    return {"t_s": rows[:, 0], **dict(zip(names, rows[:, 1:17].T, strict=True))}
 
 
 def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dict[str, Any]:
@@ -103,9 +103,8 @@ def _truth(replay: Replay) -> dict[str, Array]:
     return {"t_s": truth["t_s"], **dict(zip(POSITION_NED, position.T, strict=True)), **body}
 
 
-def _innovation(replay: Replay) -> dict[str, Array]:
-    """One row for each offered component; `t_s` is the instant that the reading describes."""
-    rows = replay.innovation
+def innovation_table(rows: Array) -> Table:
+    """Rows of a tape's innovation, one for each offered component; `t_s` is the instant that the reading describes."""
     sensor, component, reason = rows[:, 1].astype(int), rows[:, 2].astype(int), rows[:, 8].astype(int)
     sensor_names = np.array(["", *(s.name.lower() for s in Sensor)])
     reasons = np.array([r.label for r in Reason])

@@ -21,6 +21,7 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import smooth
 from flownav.navigation.state import Tape, new_tape
 from flownav.replay.autopilot import autopilot_scores
+from flownav.replay.fed import prepared_as_fed, run_as_fed
 from flownav.replay.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replay.sentinel import Finding, findings
 from flownav.scoring.alignment import Alignment, align, velocity_of
@@ -162,10 +163,13 @@ class Replay:
 def replay(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, *, smoothed: bool = False) -> Replay:
     """Run a log through the filter, and back through it for a smoothed path.
 
-    InputError where an option cannot be, or the filter never starts.
+    InputError where an option cannot be, the filter never starts, or a live session's record is to be smoothed.
     """
+    if smoothed and log.fed:
+        raise InputError(f"{log.path}: --smooth takes a log; a live session's record is replayed as it was fed")
+    check_windows(log, options.gps_outages_s, "--gps-outage")
     with announce_compilation("replay"):
-        prepared = prepare(log, options)
+        prepared = prepared_as_fed(log) if log.fed else prepare(log, options)
         return _run(log, options, settings, prepared, smoothed=smoothed)
 
 
@@ -187,7 +191,7 @@ def outage_table(
 
     errors = []
     with announce_compilation("replay"), ThreadPoolExecutor(2) as pool:
-        prepared = prepare(log, replace(options, gps_outages_s=()))
+        prepared = prepared_as_fed(log) if log.fed else prepare(log, replace(options, gps_outages_s=()))
         for error in pool.map(error_of, windows):
             errors.append(error)
             on_progress(1)
@@ -231,17 +235,21 @@ def _number(value: float) -> float | None:
 def _run(
     log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, prepared: Prepared, *, smoothed: bool = False
 ) -> Replay:
-    queue = withhold(log, prepared.queue, options)
-    gyro_is_imu = prepared.flow_gyro_is_imu
-    running = new_navigator(prepared.streams, float(queue.t_s[0]), gyro_is_imu, settings, new_tape(queue))
     path = None
-    if smoothed:
-        path = smooth(queue, running)
+    if log.fed:
+        tape = run_as_fed(log, settings, lambda queue: withhold(log, queue, options))
     else:
-        run(queue, running)
-    if running.tape.used[0] < 2:
+        queue = withhold(log, prepared.queue, options)
+        gyro_is_imu = prepared.flow_gyro_is_imu
+        running = new_navigator(prepared.streams, float(queue.t_s[0]), gyro_is_imu, settings, new_tape(queue))
+        if smoothed:
+            path = smooth(queue, running)
+        else:
+            run(queue, running)
+        tape = running.tape
+    if tape.used[0] < 2:
         raise InputError(
             f"{log.path}: the filter never started; it needs an attitude or an IMU of {SLOWEST_IMU_HZ:g} Hz, then a "
             "GPS fix or flow of quality above 0"
         )
-    return Replay(log, options, settings, prepared, running.tape, path)
+    return Replay(log, options, settings, prepared, tape, path)

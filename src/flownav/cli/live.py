@@ -1,0 +1,162 @@
+"""`flownav live`: a MAVLink vehicle in real time through the filter, its estimate sent back."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from flownav.live.loop import Latency
+    from flownav.live.options import Options
+    from flownav.live.session import Session
+
+
+def command(
+    url: Annotated[
+        str,
+        typer.Argument(help="udp:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:PORT or serial:DEVICE[:BAUD]."),
+    ],
+    sensor: Annotated[
+        Path | None, typer.Option(help="A flow sensor file: its gains and latency correct the flow.")
+    ] = None,
+    send: Annotated[str, typer.Option(help="odometry, vision, landing-target or none.")] = "odometry",
+    record: Annotated[Path | None, typer.Option(help="The record to write; `flownav replay` reproduces it.")] = None,
+    signing_key: Annotated[Path | None, typer.Option(help="MAVLink 2 signing key: 32 bytes or 64 digits.")] = None,
+    system: Annotated[int | None, typer.Option(help="Listen to this system only; the first autopilot's.")] = None,
+    component: Annotated[int | None, typer.Option(help="Listen to this component only.")] = None,
+    gps_delay: Annotated[float, typer.Option(metavar="S", help="How old a GPS reading is when it arrives.")] = 0.22,
+    settings: Annotated[Path | None, typer.Option(help="TOML of filter settings (docs/landing-filter.md).")] = None,
+    duration: Annotated[float | None, typer.Option(help="End after so many seconds; Ctrl-C where unsaid.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Navigate a vehicle that is connected by MAVLink: fuse its sensors, send the estimate, show and record it."""
+    from flownav.cli.output import require_between, require_writable
+    from flownav.errors import InputError
+    from flownav.live.link import open_link
+    from flownav.live.loop import Latency, run_session, stoppable
+    from flownav.live.options import SENDINGS
+    from flownav.live.recorder import NoRecorder, Recorder
+    from flownav.live.session import Session
+    from flownav.live.warm import warm_up
+
+    if send not in SENDINGS:
+        raise InputError(f"--send {send}: one of {', '.join(SENDINGS)} is needed")
+    for option, number in (("--system", system), ("--component", component)):
+        require_between(option, 1 if number is None else number, 1, 255)
+    require_between("--gps-delay", gps_delay, 0.0, 1.0)
+    require_between("--duration", 1.0 if duration is None else duration, 0.1, 1e6)
+    if record is not None:
+        require_writable(record)
+    options = _options(send, system, component, signing_key, gps_delay, sensor, settings)
+    warm_up()
+    link = open_link(url)
+    recorder = Recorder(record) if record is not None else NoRecorder()
+    now_s, latency = time.monotonic(), Latency()
+    session = Session(options, recorder, now_s, time.time())
+    end_s = float("inf") if duration is None else now_s + duration
+    try:
+        with stoppable() as asked, _screen(session, latency, url, show=not as_json) as show:
+            run_session(session, link, latency, lambda: asked() or time.monotonic() >= end_s, show)
+    finally:
+        link.close()
+        facts = _facts(session, latency, time.monotonic() - now_s) | {"link": dict(link.counts)}
+        if isinstance(recorder, Recorder):
+            recorder.finish(options, session.origin_deg_m, facts)
+            facts["record"] = str(record)
+    if as_json:
+        typer.echo(json.dumps(facts))
+    else:
+        _print(facts)
+
+
+def _options(
+    send: Any,
+    system: int | None,
+    component: int | None,
+    key: Path | None,
+    gps_delay_s: float,
+    sensor: Path | None,
+    settings: Path | None,
+) -> Options:
+    from flownav.live.options import Options
+    from flownav.mavlink.signing import load_key
+    from flownav.navigation.settings import NavigatorSettingsFile
+    from flownav.parameter_files import load
+    from flownav.replay.prepare import identified_flow
+    from flownav.sensors.datasheet import load_sensor
+
+    return Options(
+        send=send,
+        system=system,
+        component=component,
+        key=load_key(key) if key else None,
+        gps_delay_s=gps_delay_s,
+        identified=identified_flow(load_sensor(sensor)) if sensor else None,
+        settings=load(settings, NavigatorSettingsFile) if settings else NavigatorSettingsFile(),
+    )
+
+
+@contextmanager
+def _screen(session: Session, latency: Latency, url: str, *, show: bool) -> Iterator[Callable[[float], None]]:
+    """What is called with our clock four times a second; nothing is shown where nobody looks."""
+    if not show or not sys.stdout.isatty():
+        yield lambda now_s: None
+        return
+    from rich.live import Live
+
+    from flownav.live.screen import Screen
+
+    screen = Screen(session, latency, url)
+    with Live(auto_refresh=False, screen=True) as shown:
+        yield lambda now_s: shown.update(screen.look(now_s), refresh=True)
+
+
+def _facts(session: Session, latency: Latency, duration_s: float) -> dict[str, Any]:
+    vehicle = session.reception.vehicle
+    best = session.clock.best(time.monotonic()) if session.clock else None
+    return {
+        "duration_s": duration_s,
+        "vehicle": vehicle._asdict() if vehicle else None,
+        "other_autopilots": session.reception.others,
+        "sent": session.sent,
+        "withheld": dict(session.withheld),
+        "readings": {sensor.name.lower(): count for sensor, count in sorted(session.readings.items())},
+        "sources": session.sources.names(),
+        "dropped": session.dropped,
+        "resets": session.filtering.jumps,
+        "requests": dict(session.requests.answers),
+        "refused": session.requests.refused,
+        "timesync_round_trip_ms": 1e3 * best.round_trip_s if best else None,
+        "latency_ms": {
+            name: 1e3 * latency.quantile_s(share) if latency.counts.any() else None
+            for name, share in (("p50", 0.5), ("p90", 0.9), ("p99", 0.99), ("max", 1.0))
+        },
+    }
+
+
+def _print(facts: dict[str, Any]) -> None:
+    """The same figures for people."""
+    from rich.console import Console
+
+    from flownav.live.estimating import WITHHELD
+
+    console = Console(markup=False, highlight=False)
+    vehicle = facts["vehicle"]
+    who = f"system {vehicle['system']}, component {vehicle['component']}" if vehicle else "no vehicle was heard"
+    console.print(f"{facts['duration_s']:.1f} s, {who}; {facts['sent']} estimates sent, {facts['resets']} resets")
+    for reason, count in facts["withheld"].items():
+        console.print(f"Withheld {count}: {WITHHELD[reason]}")
+    for name, count in facts["dropped"].items():
+        console.print(f"Dropped {count}: {name}")
+    if facts["latency_ms"]["p50"] is not None:
+        figures = ", ".join(f"{name} {value:.2f} ms" for name, value in facts["latency_ms"].items())
+        console.print(f"From a flow reading's arrival to the estimate's departure: {figures}")
+    if "record" in facts:
+        console.print(f"Record: {facts['record']}", soft_wrap=True)

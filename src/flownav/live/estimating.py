@@ -1,0 +1,109 @@
+"""The estimate of now, with its covariance, and whether it may be sent."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from flownav.estimation.landing.states import ATTITUDE, GYRO_BIAS, POSITION, STATES, VELOCITY
+from flownav.live.options import Limits
+from flownav.mavlink.outgoing import Estimate
+from flownav.measurement import Array
+from flownav.navigation.ahead import AHEAD, ahead
+from flownav.navigation.state import AIDED, CLOCK, FLAG, IMU_CLOCK, ROWS, STARTED, USE_IMU, Running
+
+LONGEST_AHEAD_S = 2.0
+WITHHELD = {
+    "no_vehicle": "no autopilot's HEARTBEAT is heard",
+    "listening": "the vehicle is being listened to",
+    "not_started": "the filter waits for an attitude and a fix or flow",
+    "stale": "the newest reading is too old",
+    "position_invalid": "no horizontal aid for long: the position is invalid",
+    "dead_reckoning": "no horizontal aid for too long",
+    "not_finite": "the estimate is not a finite number",
+    "uncertain": "the estimate's standard deviation is too large",
+    "no_pad": "no pad has been seen",
+    "nothing_asked": "--send none",
+}
+
+
+def why_withheld(on: Running | None, t_s: float, newest_s: float, limits: Limits) -> str:
+    """Why no estimate of `t_s` may be sent, "" where it may; newest_s: the vehicle's newest reading. See WITHHELD."""
+    if on is None:
+        return "listening"
+    memory, settings = on.memory, on.settings
+    if memory[STARTED] == 0.0:
+        return "not_started"
+    imu_stale = memory[USE_IMU] > 0.0 and not memory[CLOCK] - memory[IMU_CLOCK] <= settings.imu_stale_s
+    if imu_stale or not t_s - newest_s <= limits.age_s or not t_s - memory[CLOCK] <= LONGEST_AHEAD_S:
+        return "stale"
+    aid_age_s = memory[CLOCK] - memory[AIDED]
+    if memory[FLAG] >= 2.0 or aid_age_s > settings.invalid_s:
+        return "position_invalid"
+    return "dead_reckoning" if aid_age_s > limits.dead_reckoning_s else ""
+
+
+def estimate_of(on: Running, imu: Array, t_s: float, boot_s: float, resets: int) -> Estimate:
+    """The state carried on to t_s. imu (n, 7): readings later than the filter's clock. boot_s: t_s on their clock."""
+    out = np.empty(AHEAD)
+    ahead(on.work, on.memory, imu, t_s, out)
+    state = [float(value) for value in out]
+    covariance = on.work[ROWS.covariance : ROWS.covariance + STATES * STATES].reshape(STATES, STATES)
+    pose, velocity = _covariances(on, covariance, max(t_s - float(on.memory[CLOCK]), 0.0), _heading(state[6:10]))
+    if on.memory[USE_IMU] == 0.0:
+        state[10:13] = [float("nan")] * 3
+    return Estimate(
+        max(0, round(boot_s * 1e6)),
+        (state[0], state[1], state[2]),
+        (state[3], state[4], state[5]),
+        (state[6], state[7], state[8], state[9]),
+        (state[10], state[11], state[12]),
+        pose,
+        velocity,
+        resets,
+    )
+
+
+def fault_of(estimate: Estimate, limits: Limits) -> str:
+    """What is wrong with an estimate itself: `not_finite`, `uncertain`, or ""."""
+    assert estimate.pose_covariance is not None
+    assert estimate.velocity_covariance is not None
+    pose, velocity = np.diag(estimate.pose_covariance), np.diag(estimate.velocity_covariance)
+    numbers = (*estimate.pos_ned_m, *estimate.vel_ned_m_s, *estimate.quaternion)
+    if not (np.isfinite(numbers).all() and np.isfinite(pose).all() and np.isfinite(velocity).all()):
+        return "not_finite"
+    if max(pose[0], pose[1]) > limits.sigma_m**2 or max(velocity[0], velocity[1]) > limits.sigma_m_s**2:
+        return "uncertain"
+    return ""
+
+
+def _covariances(on: Running, covariance: Array, dt_s: float, heading_rad: float) -> tuple[Array, Array]:
+    """Pose (north, east, down, roll, pitch, yaw) and velocity (NED, body rates) of dt later.
+
+    P' = F P F' + Q with dp <- dp + dt dv, and the IMU's white noise. A small rotation of the level body about the
+    earth's axes is one of roll and pitch turned by the heading.
+    """
+    motion = np.ix_(range(ATTITUDE + 3), range(ATTITUDE + 3))
+    block = covariance[motion].copy()
+    step = np.eye(ATTITUDE + 3)
+    step[POSITION : POSITION + 3, VELOCITY : VELOCITY + 3] = dt_s * np.eye(3)
+    block = step @ block @ step.T
+    settings = on.settings.filter if on.memory[USE_IMU] > 0.0 else on.settings.coasting
+    for i in range(3):
+        block[VELOCITY + i, VELOCITY + i] += settings.accel_noise_m_s2_rt_hz**2 * dt_s
+        block[ATTITUDE + i, ATTITUDE + i] += settings.gyro_noise_rad_s_rt_hz**2 * dt_s
+    turn = np.eye(6)
+    cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
+    turn[3:5, 3:5] = [[cosine, sine], [-sine, cosine]]
+    places = [*range(POSITION, POSITION + 3), *range(ATTITUDE, ATTITUDE + 3)]
+    pose = turn @ block[np.ix_(places, places)] @ turn.T
+    velocity = np.zeros((6, 6))
+    velocity[:3, :3] = block[VELOCITY : VELOCITY + 3, VELOCITY : VELOCITY + 3]
+    velocity[3:, 3:] = covariance[GYRO_BIAS : GYRO_BIAS + 3, GYRO_BIAS : GYRO_BIAS + 3]
+    return pose, velocity
+
+
+def _heading(quaternion: list[float]) -> float:
+    w, x, y, z = quaternion
+    return math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))

@@ -1,0 +1,190 @@
+"""The navigator behind the horizon: what it is fed, in batches of one queue, and what comes of it."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from flownav.live.horizon import Waiting
+from flownav.live.options import Options
+from flownav.logs.rates import attitude_rates, mean_over
+from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, Stream
+from flownav.navigation.feed import Equipment, equipment_of, start_navigator
+from flownav.navigation.loop import run
+from flownav.navigation.state import CLOCK, COMPONENTS, GPS_RESET, START, Running, empty_tape
+
+BATCH = 128  # readings at a time
+KEPT_IMU = 2048
+KEPT_ATTITUDES = 256
+FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
+JUMPS = (int(START), int(GPS_RESET))  # events at which the estimate jumps
+
+
+class Keeper(Protocol):
+    """Who keeps what the navigator was fed and what it wrote (recorder.py, or nobody)."""
+
+    def segment(self, equipment: Equipment) -> None:
+        """A navigator begins."""
+
+    def fed(self, queue: EventQueue, arrival_s: Array) -> None:
+        """A batch is about to be fed."""
+
+    def written(self, estimate: Array, innovation: Array, event: Array) -> None:
+        """What came of it."""
+
+
+class Outcome(NamedTuple):
+    """What the last batch brought: innovations (m, 9) and events (k, 3) of the tape."""
+
+    innovation: Array
+    event: Array
+
+
+class Filtering:
+    """One navigator from start to restart."""
+
+    def __init__(self, options: Options, keeper: Keeper) -> None:
+        self._options = options
+        self._keeper = keeper
+        self.running: Running | None = None
+        self.jumps = 0
+        self._imu: deque[tuple[float, ...]] = deque(maxlen=KEPT_IMU)
+        self._attitude: deque[tuple[float, ...]] = deque(maxlen=KEPT_ATTITUDES)
+        most = max(COMPONENTS.values())
+        self._tape = empty_tape(BATCH + 2, most * BATCH, 8 * BATCH + 8)
+
+    def heard(self, waiting: Waiting) -> None:
+        """A reading has arrived: IMU and attitude are kept for the flow's exposure and for the way from then to now."""
+        reading = waiting.reading
+        if reading.sensor == Sensor.IMU and (not self._imu or waiting.t_s > self._imu[-1][0]):
+            self._imu.append((waiting.t_s, *reading.value))
+        elif reading.sensor == Sensor.ATTITUDE and (not self._attitude or waiting.t_s > self._attitude[-1][0]):
+            self._attitude.append((waiting.t_s, *reading.value))
+
+    def begin(self, listened: list[Waiting], gps_heard: bool) -> None:
+        """A navigator for the sensors that were listened to. gps_heard: a receiver is there, with a fix or without."""
+        streams = _streams(listened)
+        if gps_heard and Sensor.GPS_POSITION not in streams:
+            streams[Sensor.GPS_POSITION] = Stream.of(Sensor.GPS_POSITION, np.zeros(0), np.zeros((0, 3)))
+        first_s = listened[0].t_s
+        settings = self._options.settings
+        equipment = equipment_of(streams, first_s, _own_gyro_is_dead(streams), settings)
+        if gps_heard:
+            equipment = equipment._replace(deadline_s=first_s + float(settings.start_wait_s))
+        self.running = start_navigator(equipment, settings, self._tape)
+        self._keeper.segment(equipment)
+
+    def stop(self) -> None:
+        """No navigator until the next `begin`."""
+        self.running = None
+        self.jumps += 1
+        self._imu.clear()
+        self._attitude.clear()
+
+    def feed(self, released: list[Waiting]) -> Outcome:
+        """At most BATCH readings, in the order of their instants."""
+        on = self.running
+        assert on is not None
+        rows = [self._row(waiting) for waiting in released]
+        value = np.array([row[0] for row in rows])
+        variance = np.array([row[1] for row in rows])
+        queue = EventQueue(
+            np.array([waiting.t_s for waiting in released]),
+            np.array([int(waiting.reading.sensor) for waiting in released], np.int64),
+            value,
+            variance,
+            np.array([waiting.reading.quality for waiting in released], float),
+            np.arange(len(released)),
+        )
+        self._keeper.fed(queue, np.array([waiting.reading.t_s for waiting in released]))
+        on.tape.used[:] = 0
+        run(queue, on)
+        used = on.tape.used
+        outcome = Outcome(on.tape.innovation[: used[1]].copy(), on.tape.event[: used[2]].copy())
+        self._keeper.written(on.tape.estimate[: used[0]].copy(), *outcome)
+        self.jumps += int(np.isin(outcome.event[:, 1], JUMPS).sum())
+        return outcome
+
+    def imu_after(self, t_s: float) -> Array:
+        """IMU readings later than an instant, (n, 7)."""
+        later = []
+        for row in reversed(self._imu):
+            if row[0] <= t_s:
+                break
+            later.append(row)
+        return np.array(later[::-1]) if later else np.zeros((0, 7))
+
+    @property
+    def clock_s(self) -> float:
+        """The instant that the navigator has reached; NaN without one."""
+        return float(self.running.memory[CLOCK]) if self.running is not None else float("nan")
+
+    # -- what a reading becomes -------------------------------------------------------------------------------
+    def _row(self, waiting: Waiting) -> tuple[list[float], list[float]]:
+        """Values and variances, MAX_VALUES each; flow with the turning over its exposure and without its gain error."""
+        reading = waiting.reading
+        value = list(reading.value)
+        if reading.sensor == Sensor.FLOW_RATE:
+            value = self._with_turning(value, reading.t_s, waiting.exposure_s)
+        if reading.sensor in FLOW and self._options.identified is not None:
+            gain_u, gain_v = self._options.identified[:2]
+            if reading.sensor == Sensor.FLOW_RATE:
+                value[0] = value[2] + (value[0] - value[2]) / gain_v
+                value[1] = value[3] + (value[1] - value[3]) / gain_u
+            else:
+                value[0], value[1] = value[0] / gain_u, value[1] / gain_v
+        spare = MAX_VALUES - len(value)
+        return value + [np.nan] * spare, list(reading.variance) + [np.nan] * (MAX_VALUES - len(reading.variance))
+
+    def _with_turning(self, value: list[float], end_s: float, exposure_s: float) -> list[float]:
+        """The IMU's mean rates over the exposure beside the sensor's own gyro, or in its place where it has none."""
+        start = np.array([end_s - exposure_s])
+        end = np.array([end_s])
+        imu = self._since(self._imu, end_s - 2.0 * exposure_s)
+        spare = np.full(2, np.nan)
+        turning = spare
+        if len(imu) > 1:
+            spare = turning = mean_over(imu[:, 0], imu[:, 1:4], start, end)[0, :2]
+        elif len(self._attitude) > 1:
+            attitude = np.array(self._attitude)
+            stream = Stream.of(Sensor.ATTITUDE, attitude[:, 0], attitude[:, 1:5])
+            spare = attitude_rates(stream, start, end)[0, :2]
+        own = [value[2 + i] if np.isfinite(value[2 + i]) else float(spare[i]) for i in range(2)]
+        return [value[0], value[1], *own, *map(float, turning)]
+
+    @staticmethod
+    def _since(rows: deque[tuple[float, ...]], t_s: float) -> Array:
+        """Rows from an instant on, and the one before it."""
+        found = []
+        for row in reversed(rows):
+            found.append(row)
+            if row[0] <= t_s:
+                break
+        return np.array(found[::-1])
+
+
+def _streams(listened: list[Waiting]) -> dict[Sensor, Stream]:
+    """What was listened to, as streams."""
+    by_sensor: dict[Sensor, list[Waiting]] = {}
+    for waiting in listened:
+        by_sensor.setdefault(waiting.reading.sensor, []).append(waiting)
+    return {
+        sensor: Stream.of(
+            sensor,
+            np.array([w.t_s for w in found]),
+            np.array([w.reading.value for w in found]).reshape(len(found), len(COLUMNS[sensor])),
+            quality=np.array([w.reading.quality for w in found]),
+        )
+        for sensor, found in by_sensor.items()
+    }
+
+
+def _own_gyro_is_dead(streams: dict[Sensor, Stream]) -> bool:
+    """Whether the flow sensor states no turning of its own, or the same for ever."""
+    if Sensor.FLOW_RATE not in streams or not len(streams[Sensor.FLOW_RATE]):
+        return False
+    own = streams[Sensor.FLOW_RATE].value[:, 2:4]
+    known = np.isfinite(own).all(axis=1)
+    return bool(known.mean() <= 0.5 or not np.all(np.ptp(own[known], axis=0)))

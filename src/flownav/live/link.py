@@ -1,0 +1,291 @@
+"""Links to a vehicle: UDP, TCP and serial, none of which ever blocks. Loopback unless told otherwise."""
+
+from __future__ import annotations
+
+import re
+import socket
+from collections import Counter
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+from flownav.errors import InputError
+
+FORMS = "udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:[HOST:]PORT or serial:DEVICE[:BAUD]"
+LOOPBACK = "127.0.0.1"
+DEFAULT_BAUD = 115200  # a bare PX4FLOW's
+MOST_BYTES = 65536
+MOST_READS = 64  # in a row, before the session has its turn
+MOST_UNSENT = 1 << 18  # bytes that wait for a slow link
+RECONNECT_S = 1.0
+
+
+class Address(NamedTuple):
+    """Where a link leads. kind: udp (listens), udpout, tcp, tcpin (listens), serial; number: port or baud."""
+
+    kind: str
+    host: str
+    number: int
+
+
+def parse_url(url: str) -> Address:
+    """udp:14550 listens on loopback only; udp:0.0.0.0:14550 on every interface. InputError where it is no link."""
+    kind, _, rest = url.partition(":")
+    rest = rest.removeprefix("//")
+    if kind == "serial":
+        found = re.fullmatch(r"(?P<device>.+?)(?::(?P<baud>\d+))?", rest)
+        if found and found["device"]:
+            return Address("serial", found["device"], int(found["baud"] or DEFAULT_BAUD))
+    elif kind in ("udp", "udpin", "udpout", "tcp", "tcpin"):
+        host, _, port = rest.rpartition(":")
+        listens = kind in ("udp", "udpin", "tcpin")
+        if port.isdecimal() and int(port) < 65536 and (host or listens):
+            return Address("udp" if kind == "udpin" else kind, host or LOOPBACK, int(port))
+    raise InputError(f"{url}: no link; give {FORMS}")
+
+
+Sender = tuple[str, int] | None
+Piece = tuple[bytes, Sender]  # what arrived, and from whom
+
+
+class Link:
+    """What a session is run over. counts: `not_sent`, `unreachable`, `other_sender`, `reconnected`."""
+
+    datagrams = False
+
+    def __init__(self) -> None:
+        self.counts: Counter[str] = Counter()
+
+    def fileno(self) -> int:
+        """For select; -1 while there is no connection."""
+        raise NotImplementedError
+
+    def read(self) -> list[Piece]:
+        """What has arrived, without waiting."""
+        raise NotImplementedError
+
+    def write(self, frame: bytes) -> None:
+        """Send a frame, or drop and count it."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Let go."""
+
+    def believe(self, sender: Sender) -> None:
+        """The vehicle spoke from there: it is answered there, and nobody else is listened to."""
+
+    def forget(self) -> None:
+        """The vehicle is silent: anyone may speak."""
+
+
+def open_link(url: str) -> Link:
+    """InputError where the URL is wrong or the address cannot be had."""
+    address = parse_url(url)
+    try:
+        if address.kind in ("udp", "udpout"):
+            return UdpLink(address)
+        return SerialLink(address) if address.kind == "serial" else TcpLink(address)
+    except OSError as error:
+        raise InputError(f"{url}: cannot be opened ({error.strerror or error}); {FORMS}") from error
+
+
+class UdpLink(Link):
+    """Datagrams. udp listens to anyone until the vehicle has spoken; udpout talks to the address that is named."""
+
+    datagrams = True
+
+    def __init__(self, address: Address) -> None:
+        super().__init__()
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._named: Sender = None
+        with suppress(OSError):
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
+        try:
+            if address.kind == "udp":
+                self._socket.bind((address.host, address.number))
+            else:
+                self._named = (socket.gethostbyname(address.host), address.number)
+                self._socket.bind((LOOPBACK if self._named[0].startswith("127.") else "", 0))
+        except OSError:
+            self._socket.close()
+            raise
+        self._peer = self._named
+        self.port = int(self._socket.getsockname()[1])
+
+    def fileno(self) -> int:
+        """Of the socket."""
+        return self._socket.fileno()
+
+    def believe(self, sender: Sender) -> None:
+        """Answer there, and listen to nobody else."""
+        self._peer = sender
+
+    def forget(self) -> None:
+        """Listen to anyone again, where no address was named."""
+        self._peer = self._named
+
+    def read(self) -> list[Piece]:
+        """Whole datagrams."""
+        pieces: list[Piece] = []
+        for _ in range(MOST_READS):
+            try:
+                piece, sender = self._socket.recvfrom(MOST_BYTES)
+            except BlockingIOError:
+                break
+            except OSError:  # an earlier datagram of ours found nobody
+                self.counts["unreachable"] += 1
+                continue
+            if self._peer is not None and sender != self._peer:
+                self.counts["other_sender"] += 1
+            else:
+                pieces.append((piece, sender))
+        return pieces
+
+    def write(self, frame: bytes) -> None:
+        """A datagram; nothing where nobody has spoken yet."""
+        if self._peer is None:
+            return
+        try:
+            self._socket.sendto(frame, self._peer)
+        except OSError:
+            self.counts["not_sent"] += 1
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+
+class TcpLink(Link):
+    """A connection that is made again when it breaks: by calling (tcp) or by waiting for a caller (tcpin)."""
+
+    def __init__(self, address: Address) -> None:
+        super().__init__()
+        self._address = address
+        self._server: socket.socket | None = None
+        self._connection: socket.socket | None = None
+        self._unsent = b""
+        self._tries = 0
+        if address.kind == "tcpin":
+            self._server = socket.create_server((address.host, address.number), backlog=1)
+            self._server.setblocking(False)
+            self.port = int(self._server.getsockname()[1])
+        else:
+            self._connection = self._called()
+
+    def _called(self) -> socket.socket:
+        connection = socket.create_connection((self._address.host, self._address.number), timeout=RECONNECT_S)
+        connection.setblocking(False)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return connection
+
+    def fileno(self) -> int:
+        """Of the connection, or of the server that waits for one."""
+        found = self._connection or self._server
+        return found.fileno() if found else -1
+
+    def read(self) -> list[Piece]:
+        """What has arrived; a broken connection is made again."""
+        if self._connection is None:
+            self._connect()
+            return []
+        try:
+            piece = self._connection.recv(MOST_BYTES)
+        except BlockingIOError:
+            return []
+        except OSError:
+            piece = b""
+        if not piece:
+            self._broken()
+        return [(piece, None)] if piece else []
+
+    def _connect(self) -> None:
+        try:
+            if self._server is not None:
+                self._connection, _ = self._server.accept()
+                self._connection.setblocking(False)
+            else:
+                self._tries += 1
+                if self._tries % 100 == 0:  # every half second
+                    self._connection = self._called()
+        except OSError:
+            return
+        if self._connection is not None:
+            self.counts["reconnected"] += 1
+
+    def _broken(self) -> None:
+        if self._connection is not None:
+            self._connection.close()
+        self._connection, self._unsent = None, b""
+
+    def write(self, frame: bytes) -> None:
+        """Send what the connection takes now; the rest waits, up to a limit."""
+        if self._connection is None or len(self._unsent) > MOST_UNSENT:
+            self.counts["not_sent"] += 1
+            return
+        self._unsent += frame
+        try:
+            self._unsent = self._unsent[self._connection.send(self._unsent) :]
+        except BlockingIOError:
+            return
+        except OSError:
+            self.counts["not_sent"] += 1
+            self._broken()
+
+    def close(self) -> None:
+        """Close connection and server."""
+        self._broken()
+        if self._server is not None:
+            self._server.close()
+
+
+class SerialLink(Link):
+    """A serial port that is opened again when its cable was pulled."""
+
+    def __init__(self, address: Address) -> None:
+        super().__init__()
+        self._address = address
+        self._tries = 0
+        self._port: Any = self._opened()
+
+    def _opened(self) -> Any:
+        try:
+            import serial
+        except ImportError as error:
+            raise InputError("a serial link needs pyserial; install it with `pip install 'flownav[live]'`") from error
+        return serial.Serial(self._address.host, self._address.number, timeout=0, write_timeout=0)
+
+    def fileno(self) -> int:
+        """Of the port."""
+        return int(self._port.fileno()) if self._port is not None else -1
+
+    def read(self) -> list[Piece]:
+        """What has arrived."""
+        if self._port is None:
+            self._tries += 1
+            if self._tries % 100 == 0:
+                with suppress(OSError):
+                    self._port = self._opened()
+                    self.counts["reconnected"] += 1
+            return []
+        try:
+            piece = bytes(self._port.read(MOST_BYTES))
+        except OSError:
+            self.close()
+            return []
+        return [(piece, None)] if piece else []
+
+    def write(self, frame: bytes) -> None:
+        """Send, or drop and count."""
+        try:
+            if self._port is not None and self._port.write(frame) == len(frame):
+                return
+        except OSError:
+            pass
+        self.counts["not_sent"] += 1
+
+    def close(self) -> None:
+        """Close the port."""
+        if self._port is not None:
+            with suppress(OSError):
+                self._port.close()
+        self._port = None

@@ -1,0 +1,132 @@
+"""The loop between a link and a session, and between a simulated vehicle and its link: select, clock, signals."""
+
+from __future__ import annotations
+
+import select
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+import numpy as np
+
+from flownav.live.link import Link
+from flownav.live.session import Session
+from flownav.live.simulated import SimulatedVehicle
+
+WAIT_S = 0.005
+SILENT_S = 3.0  # after so long without the vehicle anyone may speak on a UDP port
+SCREEN_S = 0.25
+EDGES_S = np.geomspace(1e-6, 10.0, 281)  # of the latency's histogram, 40 a decade
+
+
+class Latency:
+    """How long it takes from a flow reading's arrival to the estimate's departure: a histogram, which does not grow."""
+
+    def __init__(self) -> None:
+        self.counts = np.zeros(len(EDGES_S) + 1, np.int64)
+        self.longest_s = 0.0
+
+    def take(self, latency_s: float) -> None:
+        """One more."""
+        self.counts[np.searchsorted(EDGES_S, latency_s)] += 1
+        self.longest_s = max(self.longest_s, latency_s)
+
+    def quantile_s(self, share: float) -> float:
+        """The latency that this share stays below (the upper edge of its bin, 6 % wide); NaN without any."""
+        total = int(self.counts.sum())
+        if not total:
+            return float("nan")
+        place = int(np.searchsorted(np.cumsum(self.counts), share * total))
+        return float(min(EDGES_S[min(place, len(EDGES_S) - 1)], self.longest_s))
+
+
+@contextmanager
+def stoppable() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C or a termination was asked for; a second one breaks off at once."""
+    asked: list[int] = []
+    handled = (signal.SIGINT, signal.SIGTERM)
+
+    def note(number: int, frame: FrameType | None) -> None:
+        if asked:
+            raise KeyboardInterrupt
+        asked.append(number)
+
+    before = [signal.signal(number, note) for number in handled]
+    try:
+        yield lambda: bool(asked)
+    finally:
+        for number, handler in zip(handled, before, strict=True):
+            signal.signal(number, handler)
+
+
+def run_session(
+    session: Session,
+    link: Link,
+    latency: Latency,
+    stop: Callable[[], bool],
+    show: Callable[[float], None] = lambda now_s: None,
+    clock: Callable[[], float] = time.monotonic,
+) -> None:
+    """Until `stop`: what arrives goes in as it arrives, what the session says goes out."""
+    shown_s = spoke_s = clock()
+    while not stop():
+        _wait(link)
+        for piece, sender in link.read():
+            now_s = clock()
+            flow = session.due
+            if session.take(piece, now_s, whole=link.datagrams):
+                link.believe(sender)
+                spoke_s = now_s
+            if session.due and not flow:
+                before = session.sent
+                session.tick(clock())
+                _send(session, link)
+                if session.sent > before:
+                    latency.take(clock() - now_s)
+        now_s = clock()
+        session.tick(now_s)
+        _send(session, link)
+        if now_s - spoke_s > SILENT_S:
+            link.forget()
+            spoke_s = now_s
+        if now_s - shown_s >= SCREEN_S:
+            shown_s = now_s
+            show(now_s)
+
+
+def _send(session: Session, link: Link) -> None:
+    while session.outbox:
+        link.write(session.outbox.popleft())
+
+
+def _wait(link: Link) -> None:
+    number = link.fileno()
+    if number < 0:
+        time.sleep(WAIT_S)
+    else:
+        select.select([number], [], [], WAIT_S)
+
+
+def run_vehicle(
+    vehicle: SimulatedVehicle,
+    link: Link,
+    speed: float,
+    stop: Callable[[], bool],
+    clock: Callable[[], float] = time.monotonic,
+) -> float:
+    """Tell the flight at `speed` times its pace until it ends or `stop`; the time of the flight that was reached [s].
+
+    Stamps are of the flight, so that at another speed than 1 the vehicle's clock runs faster than ours.
+    """
+    start_s, unix_s = clock(), time.time()
+    t_s = 0.0
+    while not stop() and not vehicle.finished:
+        _wait(link)
+        now_s = clock()
+        t_s = speed * (now_s - start_s)
+        answers = [frame for piece, _ in link.read() for frame in vehicle.hear(piece, t_s)]
+        for frame in [*answers, *vehicle.due(t_s, unix_s + now_s - start_s)]:
+            link.write(frame)
+    return t_s

@@ -1,0 +1,54 @@
+"""What a live session is asked to do, and the limits within which it sends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.replay.prepare import IdentifiedFlow
+
+Sending = Literal["odometry", "vision", "landing-target", "none"]
+SENDINGS = get_args(Sending)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Beyond any of these no estimate is sent.
+
+    age_s: of the newest reading of the vehicle. dead_reckoning_s: since a horizontal aid was fused. sigma_m,
+    sigma_m_s: one standard deviation of horizontal position and velocity.
+    """
+
+    age_s: float = 0.3
+    dead_reckoning_s: float = 5.0
+    sigma_m: float = 5.0
+    sigma_m_s: float = 1.5
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a session is asked to do.
+
+    key: a MAVLink signing key. margin_s: what the horizon waits beyond the largest delay: an IMU period and the link's
+    jitter. listen_s: how long the vehicle is listened to before it is decided which sensors serve. restart_s: a longer
+    silence of the vehicle, or its reboot, begins the navigation anew.
+    """
+
+    send: Sending = "odometry"
+    system: int | None = None
+    component: int | None = None
+    key: bytes | None = None
+    gps_delay_s: float = 0.22
+    identified: IdentifiedFlow | None = None
+    settings: NavigatorSettingsFile = NavigatorSettingsFile()  # noqa: RUF009  (frozen)
+    limits: Limits = Limits()
+    margin_s: float = 0.05
+    listen_s: float = 2.0
+    restart_s: float = 10.0
+
+    @property
+    def horizon_s(self) -> float:
+        """How old an instant is when it is fused."""
+        latency_s = self.identified.latency_s if self.identified else 0.0
+        return max(self.gps_delay_s, latency_s, 0.1) + self.margin_s

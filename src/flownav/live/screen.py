@@ -1,0 +1,113 @@
+"""The live screen: what arrives and how old it is, what the filter makes of it, the estimate, and recent signals."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+from flownav.estimation.gating import Reason
+from flownav.live.estimating import WITHHELD
+from flownav.live.loop import Latency
+from flownav.live.session import Session
+from flownav.measurement import COLUMNS, Sensor
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+STRIP = 60  # columns of a strip of signals
+BARS = "▁▂▃▄▅▆▇█"
+SHOWN = {
+    Sensor.FLOW_RATE: (0, 1), Sensor.FLOW_VELOCITY: (0, 1), Sensor.RANGE: (0,), Sensor.IMU: (5,),
+}  # fmt: skip
+
+
+class Screen:
+    """Keeps what the strips show; `rows` renders it."""
+
+    def __init__(self, session: Session, latency: Latency, url: str) -> None:
+        self._session, self._latency, self._url = session, latency, url
+        self._strips: dict[str, deque[float]] = {}
+        self._before: dict[Sensor, int] = {}
+        self._at_s = float("nan")
+        self._rates: dict[Sensor, float] = {}
+
+    def look(self, now_s: float) -> RenderableType:
+        """The screen at an instant of our clock."""
+        from rich.console import Group
+        from rich.table import Table
+
+        session = self._session
+        self._follow(now_s)
+        sensors = Table("sensor", "Hz", "age [s]", "innovation", "ratio", "", title=self._title(), title_justify="left")
+        for sensor in sorted(session.readings):
+            age_s = now_s - session.heard_s[sensor]
+            found = [session.innovations[key] for key in sorted(session.innovations) if key[0] == sensor]
+            sensors.add_row(
+                sensor.name.lower(),
+                f"{self._rates.get(sensor, 0.0):.0f}",
+                f"{age_s:.2f}",
+                " ".join(_figure(innovation) for innovation, _, _ in found),
+                " ".join(_figure(ratio) for _, ratio, _ in found),
+                " ".join(dict.fromkeys(Reason(reason).label for _, _, reason in found if reason)),
+            )
+        strips = Table.grid(padding=(0, 1))
+        for name, values in self._strips.items():
+            strips.add_row(name, strip(values), _figure(values[-1]))
+        dropped = ", ".join(f"{name} {count}" for name, count in sorted(session.dropped.items())) or "nothing"
+        return Group(sensors, self._estimate(), strips, f"dropped: {dropped}", self._footing())
+
+    def _title(self) -> str:
+        vehicle = self._session.reception.vehicle
+        who = f"system {vehicle.system}, component {vehicle.component}" if vehicle else "no vehicle yet"
+        state = f"withheld: {WITHHELD[self._session.reason]}" if self._session.reason else "sending"
+        return f"{self._url}  {who}  {state}"
+
+    def _estimate(self) -> Any:
+        from rich.table import Table
+
+        table = Table("", "north", "east", "down")
+        found = self._session.estimate
+        if found is not None and found.pose_covariance is not None and found.velocity_covariance is not None:
+            for name, values, covariance in (
+                ("position [m]", found.pos_ned_m, found.pose_covariance),
+                ("velocity [m/s]", found.vel_ned_m_s, found.velocity_covariance),
+            ):
+                spread = [3.0 * math.sqrt(max(float(covariance[i, i]), 0.0)) for i in range(3)]
+                table.add_row(name, *(f"{value:8.2f} ±{s:.2f}" for value, s in zip(values, spread, strict=True)))
+        return table
+
+    def _footing(self) -> str:
+        session = self._session
+        p50, p99 = (1e3 * self._latency.quantile_s(share) for share in (0.5, 0.99))
+        withheld = ", ".join(f"{name} {count}" for name, count in sorted(session.withheld.items()))
+        refused = ", ".join(session.requests.refused)
+        return (
+            f"sent {session.sent}; withheld: {withheld or 'none'}; resets {session.filtering.jumps}; "
+            f"latency p50 {p50:.2f} ms, p99 {p99:.2f} ms" + (f"; vehicle refuses {refused}" if refused else "")
+        )
+
+    def _follow(self, now_s: float) -> None:
+        session, elapsed_s = self._session, now_s - self._at_s
+        for sensor, count in session.readings.items():
+            if elapsed_s > 0.0:
+                self._rates[sensor] = (count - self._before.get(sensor, 0)) / elapsed_s
+            self._before[sensor] = count
+        self._at_s = now_s
+        for sensor, places in SHOWN.items():
+            reading = session.latest.get(sensor)
+            for place in places if reading else ():
+                values = self._strips.setdefault(COLUMNS[sensor][place], deque(maxlen=STRIP))
+                values.append(reading.value[place] if reading else float("nan"))
+
+
+def strip(values: deque[float]) -> str:
+    """Values as a row of bars, from the least to the greatest of them; a blank where one is not finite."""
+    finite = [value for value in values if math.isfinite(value)]
+    low, high = min(finite, default=0.0), max(finite, default=0.0)
+    scale = (len(BARS) - 1) / (high - low) if high > low else 0.0
+    return "".join(BARS[round((value - low) * scale)] if math.isfinite(value) else " " for value in values)
+
+
+def _figure(value: float) -> str:
+    return f"{value:.2g}" if math.isfinite(value) else "-"

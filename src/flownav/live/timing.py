@@ -1,0 +1,98 @@
+"""The vehicle's time now: its stamps laid on our monotonic clock, and TIMESYNC where it answers."""
+
+from __future__ import annotations
+
+from collections import Counter, deque
+from typing import NamedTuple
+
+from flownav.mavlink.clock import Aligned, ClockState, align, stamp_of, timesync_offset_s, told_unix_time
+from flownav.mavlink.dialect import Message
+
+NAN = float("nan")
+LONGEST_ROUND_TRIP_S = 0.5
+LARGEST_DIFFERENCE_S = 1.0  # a TIMESYNC that contradicts the stamps by more is not believed
+REMEMBERED = 16
+FRESH_S = 20.0
+WINDOW_S = 2.0
+
+
+class Exchange(NamedTuple):
+    """One TIMESYNC: when it ended on our clock, their boot clock less ours, and the round trip [s]."""
+
+    now_s: float
+    offset_s: float
+    round_trip_s: float
+
+
+class VehicleClock:
+    """Session time: the vehicle's time since boot, which goes on through a reboot (see mavlink/clock.py).
+
+    Of stamps alone, the least wait on the link passes for none; a TIMESYNC exchange tells it, to within half its round
+    trip. counts: `clock_jump`, `wrapped`, and exchanges not believed (`timesync_refused`).
+    """
+
+    def __init__(self, system: int, component: int) -> None:
+        self._state = ClockState((system, component, "boot"))
+        self._leads: deque[tuple[float, float]] = deque(maxlen=2)  # since when, and session time less ours [s]
+        self._exchanges: deque[Exchange] = deque(maxlen=REMEMBERED)
+        self.counts: Counter[str] = Counter()
+
+    def stamped(self, message: Message, system: int, component: int, now_s: float) -> Aligned:
+        """The session time of a message that arrived at `now_s` of our clock."""
+        stamp = stamp_of(message, system, component, self._state.reference_s)
+        self._state, aligned = align(self._state, now_s, stamp)
+        if aligned.event:
+            self.counts[aligned.event] += 1
+        if stamp is not None and stamp.clock == self._state.reference and not aligned.reason:
+            if aligned.event == "clock_jump":
+                self._exchanges.clear()
+                self._leads = deque(maxlen=2)
+            self._note_lead(aligned.t_s - now_s, now_s)
+        return aligned
+
+    def _note_lead(self, lead_s: float, now_s: float) -> None:
+        """The least wait on the link is the greatest lead; it is remembered for two windows."""
+        if not self._leads or now_s - self._leads[-1][0] >= WINDOW_S:
+            self._leads.append((now_s, lead_s))
+        elif lead_s > self._leads[-1][1]:
+            self._leads[-1] = self._leads[-1][0], lead_s
+
+    @property
+    def _offset_s(self) -> float:
+        """Session time less ours, by the least wait seen; NaN before the first stamp."""
+        return max((lead_s for _, lead_s in self._leads), default=NAN)
+
+    def told_unix(self, message: Message, system: int, component: int) -> None:
+        """SYSTEM_TIME."""
+        if message.time_boot_ms:
+            clock = (system, component, "unix")
+            self._state = told_unix_time(self._state, clock, message.time_unix_usec * 1e-6, message.time_boot_ms * 1e-3)
+
+    def exchanged(self, tc1_ns: int, ts1_ns: int, now_s: float) -> None:
+        """A TIMESYNC reply to a request that we sent at `ts1_ns` of our clock."""
+        offset_s, round_trip_s = timesync_offset_s(tc1_ns, ts1_ns, round(now_s * 1e9))
+        differs = abs(offset_s + self._shift_s - self._offset_s)
+        if not 0.0 <= round_trip_s <= LONGEST_ROUND_TRIP_S or not differs <= LARGEST_DIFFERENCE_S:
+            self.counts["timesync_refused"] += 1
+            return
+        self._exchanges.append(Exchange(now_s, offset_s, round_trip_s))
+
+    @property
+    def _shift_s(self) -> float:
+        """Session time less the vehicle's time since boot: not 0 after a reboot."""
+        clock = self._state.clocks.get(self._state.reference)
+        return clock.offset_s if clock else 0.0
+
+    def best(self, now_s: float) -> Exchange | None:
+        """The exchange with the shortest round trip among the fresh ones."""
+        fresh = [exchange for exchange in self._exchanges if now_s - exchange.now_s <= FRESH_S]
+        return min(fresh, key=lambda exchange: exchange.round_trip_s, default=None)
+
+    def now_s(self, now_s: float) -> float:
+        """Session time at an instant of our clock; NaN before the vehicle's clock was heard. Never behind a stamp."""
+        best = self.best(now_s)
+        return now_s + (self._offset_s if best is None else max(best.offset_s + self._shift_s, self._offset_s))
+
+    def boot_s(self, t_s: float) -> float:
+        """The vehicle's time since boot at a session time."""
+        return t_s - self._shift_s

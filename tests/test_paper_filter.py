@@ -30,7 +30,9 @@ def step(work, lanes, model):
 
 @pytest.fixture(scope="module")
 def model() -> PaperModel:
-    return assemble(load_scenario("landing")).flight.paper
+    scenario = load_scenario("landing")
+    flown = scenario.filter.model_copy(update={"name": "paper"})
+    return assemble(scenario.model_copy(update={"filter": flown})).flight.paper
 
 
 def run(model, inputs, readings, arrived, lanes=ONE_LANE):

@@ -45,7 +45,7 @@ MESSAGES: dict[Reason, str] = {
     Reason.NO_DATA: "The sensor says that it has no data (quality 0), which is not zero motion.",
     Reason.NOT_FINITE: "The reading or its variance is not a finite number.",
     Reason.OUT_OF_RANGE: "The reading lies outside what the sensor can measure.",
-    Reason.NO_HEIGHT: "Flow needs the height above ground, and no range has been accepted lately.",
+    Reason.NO_HEIGHT: "Flow needs the height above ground, and no range has been accepted lately, or the latest not.",
     Reason.TILTED: "The vehicle tilts too far for a downward-looking sensor.",
     Reason.BEFORE_START: "The filter had not started: it waits for an attitude and a first position.",
     Reason.DATUM: "The reading set the sensor's datum (ground level, pressure offset) and holds no more news.",

@@ -41,6 +41,7 @@ from flownav.navigation.state import (
     LATEST_IMU,
     LEVER,
     RANGE_CLOCK,
+    RANGE_SINCE,
     ROWS,
     STARTED,
     USE_IMU,
@@ -69,7 +70,8 @@ def take_flow(reading: Reading, on: Running) -> None:
     range_m = height_range(on.work, ONE_LANE, ROWS, 0, settings.flow_below_m) if known else UNKNOWN_RANGE_M
     turning_x, turning_y = rotation_rate(reading, on) if angular else (0.0, 0.0)
     reason = usable(reading.quality, value[0] + value[1] + turning_x + turning_y, 0.0, on)
-    if reason == FUSED and angular and not known:
+    disputed = np.isfinite(memory[RANGE_SINCE])  # over a step of the ground the flow would move the height
+    if reason == FUSED and angular and (disputed or not known):
         reason = NO_HEIGHT
     if reason == FUSED and angular and max(abs(value[0]), abs(value[1])) > settings.flow_limit_rad_s:
         reason = OUT_OF_RANGE

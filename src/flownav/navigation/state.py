@@ -63,8 +63,9 @@ WORK_ROWS = OBSERVED + 10
     HEIGHT_CLOCK,
     VIBRATION,
     DOUBT,
-) = range(32)
-SINCE = 32
+    RANGE_JUMPED,
+) = range(33)
+SINCE = 33
 COUNT = SINCE + 6
 LAST = COUNT + 6
 LEVEL = LAST + max(Sensor) + 1
@@ -173,7 +174,7 @@ def empty_tape(estimates: int, components: int, events: int) -> Tape:
 def new_memory() -> Array:
     """Nothing has been heard."""
     memory = np.full(MEMORY_SIZE, np.nan)
-    zeros = [DOUBT, VIBRATION, GAP, STARTED, USE_IMU, USE_ATTITUDE, USE_HEADING, GROUND_SET, BARO_KNOWN, FLAG,
+    zeros = [RANGE_JUMPED, DOUBT, VIBRATION, GAP, STARTED, USE_IMU, USE_ATTITUDE, USE_HEADING, GROUND_SET, BARO_KNOWN, FLAG,
              LANDED, LEVEL_COUNT,
              FLOW_BIAS_X, FLOW_BIAS_Y, FLOW_BIAS_COUNT, FLOW_GYRO_IS_IMU, RANGE_TRAVEL]  # fmt: skip
     memory[zeros] = 0.0

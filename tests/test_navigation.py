@@ -1,0 +1,154 @@
+"""The navigator on flights of known truth: what it learns, what aids it, what it starts from."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flownav.estimation.landing.states import ACCEL_BIAS, COMPASS, INS_ERROR, VELOCITY_LAG
+from flownav.measurement import Sensor, Stream
+from navigation_streams import circle, fly, navigate, still
+
+GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
+
+
+def test_it_starts_level_from_the_accelerometer_alone():
+    flown = fly(still, 3.0).without(Sensor.ATTITUDE, Sensor.MAG)
+    roll, pitch = 0.1, -0.06  # it stands on a slope
+    imu = flown.streams[Sensor.IMU].value.copy()
+    g = -imu[:, 5]
+    imu[:, 3:] = np.column_stack([g * np.sin(pitch), -g * np.sin(roll) * np.cos(pitch),
+                                  -g * np.cos(roll) * np.cos(pitch)])  # fmt: skip
+    flown = flown.changed(Sensor.IMU, value=imu)
+    for sensor in (*GPS, Sensor.FLOW_RATE):  # later than the accelerometer's first readings
+        flown = flown.cut(sensor, 0.0, 0.5)
+    run = navigate(flown)
+    w, x, y, z = run.estimate[0, 7:11]
+    assert 2 * np.arctan2(x, w) == pytest.approx(roll, abs=5e-3)
+    assert 2 * np.arctan2(y, w) == pytest.approx(pitch, abs=5e-3)
+    assert run.events("filter", "start")[:, 1] == pytest.approx([1.0])
+
+
+def test_without_imu_an_attitude_of_50_hz_serves():
+    run = navigate(fly(circle, 30.0, 0.2).without(Sensor.IMU, Sensor.MAG))
+    late = run.t_s > 10.0
+    assert np.abs(run.error[late, :2]).max() < 0.5
+    assert np.abs(run.yaw_error[late]).max() < 0.05
+    assert run.reasons(Sensor.ATTITUDE)["fused"] > 4000
+
+
+def test_neither_attitude_nor_imu_is_no_start():
+    run = navigate(fly(still, 3.0).without(Sensor.IMU, Sensor.ATTITUDE))
+    assert len(run.estimate) == 0
+    assert set(run.reasons(Sensor.GPS_POSITION)) == {"before_start"}
+
+
+def test_laps_teach_the_compass_deviation():
+    """A + B sin + C cos: GPS and the IMU tell the heading while the vehicle accelerates, and the compass its error."""
+    flown = fly(circle, 120.0, 0.3).without(Sensor.ATTITUDE)
+    a, b, c = 0.12, 0.10, -0.08
+    t_s = flown.streams[Sensor.MAG].t_s
+    yaw = np.interp(t_s, flown.t_s, flown.yaw)
+    wrong = yaw + a + b * np.sin(yaw) + c * np.cos(yaw)
+    field = np.column_stack([0.21 * np.cos(wrong), -0.21 * np.sin(wrong), 0 * wrong + 0.43])
+    run = navigate(flown.changed(Sensor.MAG, value=field))
+    assert np.abs(run.yaw_error[run.t_s > 90.0]).max() < 0.02
+    assert run.state(INS_ERROR + 2) == pytest.approx(a, abs=0.02)
+    assert [run.state(COMPASS), run.state(COMPASS + 1)] == pytest.approx([b, c], abs=0.02)
+
+
+def test_the_lag_of_gps_velocity_is_learned():
+    flown = fly(circle, 90.0)
+    late = flown.at(flown.streams[Sensor.GPS_VELOCITY].t_s - 0.15, flown.velocity)
+    run = navigate(flown.changed(Sensor.GPS_VELOCITY, value=late))
+    assert run.state(VELOCITY_LAG) == pytest.approx(0.15, abs=0.04)
+    assert np.abs(run.velocity_error[run.t_s > 60.0]).max() < 0.05
+
+
+def test_a_gap_of_the_imu_is_bridged_by_the_logged_attitude():
+    """Three seconds of turning at half a radian per second without an IMU."""
+    flown = fly(circle, 30.0, 0.5).cut(Sensor.IMU, 15.0, 18.0)
+    run = navigate(flown)
+    lost = run.events("imu", "lost")
+    assert lost[:, 1] == pytest.approx([3.0], abs=0.03)
+    after = run.t_s > 18.2
+    assert np.abs(run.yaw_error[after]).max() < 0.05
+    assert np.abs(run.error[after, :2]).max() < 0.5
+    alone = navigate(flown.without(Sensor.ATTITUDE, Sensor.MAG, Sensor.FLOW_RATE))  # nor what else shows a heading
+    just = (alone.t_s > 18.05) & (alone.t_s < 18.15)
+    assert np.abs(alone.yaw_error[just]).min() > 1.0
+
+
+def test_zero_velocity_on_the_ground_holds_the_place():
+    """A biased accelerometer on the ground, no other aid: LANDED keeps it still."""
+    flown = fly(lambda t: 0.0 * still(t), 20.0).without(Sensor.FLOW_RATE, Sensor.RANGE)
+    imu = flown.streams[Sensor.IMU].value + [0, 0, 0, 0.15, -0.1, 0.05]
+    flown = flown.changed(Sensor.IMU, value=imu)
+    for sensor in GPS:
+        flown = flown.cut(sensor, 3.0, 99.0)
+    t_s = np.arange(0.0, 20.0, 0.1)
+    landed = flown.added(Stream.of(Sensor.LANDED, t_s, np.ones((len(t_s), 1))))
+    held, free = navigate(landed), navigate(flown)
+    assert np.abs(held.velocity_error[held.t_s > 10.0]).max() < 0.02
+    assert np.abs(held.error[-1, :2]).max() < 0.1
+    assert np.abs(free.error[-1, :2]).max() > 2.0
+    assert len(held.events("filter", "dead_reckoning")) == 0
+    flying = navigate(flown.added(Stream.of(Sensor.LANDED, t_s, np.zeros((len(t_s), 1)))))
+    assert flying.reasons(Sensor.LANDED) == {}
+    assert np.abs(flying.error[-1, :2]).max() > 2.0
+
+
+def test_pad_fixes_pull_the_position_to_centimetres():
+    """GPS is half a metre off over the pad; the first fix says where the pad is, every later one the place from it."""
+    flown = fly(still, 30.0).without(Sensor.FLOW_RATE, Sensor.BARO)
+    random = np.random.default_rng(3)
+    noisy = flown.streams[Sensor.GPS_POSITION].value + random.normal(0.0, 0.5, (150, 3))
+    flown = flown.changed(Sensor.GPS_POSITION, value=noisy)
+    t_s = np.arange(1.0, 30.0, 0.1)
+    fixes = np.column_stack([0 * t_s, 0 * t_s, 0 * t_s + 2.0])
+    run = navigate(flown.added(Stream.of(Sensor.PAD, t_s, fixes, variance=np.full((len(t_s), 3), 1e-6))))
+    late = run.t_s > 5.0
+    assert np.ptp(run.estimate[late, 1:3], axis=0) == pytest.approx(0.0, abs=0.03)
+    without = navigate(flown)
+    assert np.ptp(without.estimate[without.t_s > 5.0, 1]) > 0.05
+    assert len(run.events("pad", "datum")) == 1
+    assert run.reasons(Sensor.PAD)["fused"] > 800
+    assert run.reasons(Sensor.PAD)["datum"] == 3
+
+
+def test_an_external_pose_is_enough():
+    flown = fly(circle, 20.0, 0.2).only(Sensor.IMU)
+    t_s = np.arange(0.2, 20.0, 0.05)
+    run = navigate(flown.added(Stream.of(Sensor.POSE, t_s, flown.at(t_s, flown.position - flown.position[1000]))))
+    truth = flown.at(run.t_s, flown.position - flown.position[1000])
+    assert np.abs(run.estimate[:, 1:4] - truth).max() < 0.1
+    assert np.abs(run.velocity_error[run.t_s > 10.0]).max() < 0.05
+    assert run.events("filter", "start")[:, 1] == pytest.approx([0.0])
+
+
+def test_an_external_heading_is_taken():
+    flown = fly(still, 20.0, 0.3).without(Sensor.ATTITUDE, Sensor.MAG)
+    t_s = np.arange(0.0, 20.0, 0.2)
+    yaw = np.interp(t_s, flown.t_s, flown.yaw) + 0.5  # the navigator began at north, and is told otherwise
+    told = Stream.of(Sensor.YAW, t_s, yaw[:, None], variance=np.full((len(t_s), 1), 1e-4))
+    run = navigate(flown.added(told))
+    assert run.reasons(Sensor.YAW)["fused"] == len(t_s) - 1  # the first came before the start
+    assert run.yaw_error[-1] == pytest.approx(0.5, abs=0.1) or run.state(INS_ERROR + 2) == pytest.approx(0.5, abs=0.2)
+
+
+def test_vibration_at_take_off_leaves_the_height_right():
+    """3 m/s2 of rectified vibration from take-off on, and a range alone to tell the height."""
+
+    def climb(t):
+        up = np.clip((t - 5.0) / 6.0, 0.0, 1.0)
+        return np.column_stack([0 * t, 0 * t, -0.05 - 2.0 * up**3 * (10 - 15 * up + 6 * up**2)])
+
+    flown = fly(climb, 20.0).without(Sensor.BARO, *GPS)
+    imu = flown.streams[Sensor.IMU]
+    flying = imu.t_s > 5.0
+    value = imu.value + np.where(flying[:, None], [0, 0, 0, 0, 0, 3.0], 0.0)
+    run = navigate(flown.changed(Sensor.IMU, value=value))
+    off = run.error[:, 2] - run.error[0, 2]  # the start is the origin
+    assert np.abs(off[run.t_s > 8.0]).max() < 0.25
+    assert len(run.events("imu", "doubted")) == 1
+    assert run.state(ACCEL_BIAS + 2) == pytest.approx(3.0, abs=0.5)

@@ -1,0 +1,272 @@
+"""What the navigator refuses, counts and says: one run for each safeguard."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flownav.estimation.gating import Reason
+from flownav.measurement import EventQueue, Sensor, Stream, merge
+from flownav.navigation.state import EVENT_NAMES
+from navigation_streams import Flown, Navigated, circle, fly, navigate, still
+
+GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
+
+
+@pytest.fixture(scope="module")
+def hover() -> Flown:
+    return fly(still, 20.0)
+
+
+def with_rows(queue: EventQueue, places: list[int], rows: EventQueue) -> EventQueue:
+    """The queue with rows put in before the given places."""
+    return EventQueue(*(np.insert(column, places, extra, axis=0) for column, extra in zip(queue, rows, strict=True)))
+
+
+def rows_of(queue: EventQueue, places: list[int]) -> EventQueue:
+    return EventQueue(*(column[places].copy() for column in queue))
+
+
+def places_of(queue: EventQueue, sensor: Sensor, t0_s: float) -> np.ndarray:
+    return np.flatnonzero((queue.sensor == sensor) & (queue.t_s >= t0_s))
+
+
+def descending(t_s: np.ndarray) -> np.ndarray:
+    """5 m, then down at 0.3 m/s from 5 s to 17 s."""
+    return np.column_stack([0 * t_s, 0 * t_s, -5.0 + 0.3 * np.clip(t_s - 5.0, 0.0, 12.0)])
+
+
+# -- readings that are no readings ---------------------------------------------------------------------------
+FED = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_RATE, Sensor.RANGE, Sensor.BARO, Sensor.MAG, Sensor.IMU)
+
+
+@pytest.mark.parametrize("sensor", FED)
+@pytest.mark.parametrize("how", ["twice", "backward"])
+def test_a_reading_that_repeats_or_precedes_changes_nothing(hover, sensor, how):
+    queue = merge(hover.streams.values())
+    place = places_of(queue, sensor, 10.0)[3]
+    extra = rows_of(queue, [place])
+    extra.value[:] += 3.0
+    if how == "backward":
+        extra.t_s[:] -= 1e-3
+    run, plain = navigate(hover, with_rows(queue, [place + 1], extra)), navigate(hover, queue)
+    assert run.estimate.tobytes() == plain.estimate.tobytes()
+    assert run.on.work.tobytes() == plain.on.work.tobytes()
+    if sensor != Sensor.IMU:  # of the IMU nothing is offered
+        assert run.reasons(sensor)["duplicate"] == 1
+
+
+@pytest.mark.parametrize("sensor", FED)
+def test_a_late_reading_changes_nothing(hover, sensor):
+    """It describes 10.0 s, and comes when the filter is at 10.3 s; none of its sensor came in between."""
+    flown = hover.cut(sensor, 9.99, 10.35)
+    queue = merge(flown.streams.values())
+    extra = rows_of(queue, [int(places_of(queue, sensor, 9.0)[0])])
+    extra.t_s[:] = 10.0
+    place = int(np.searchsorted(queue.t_s, 10.3))
+    run, plain = navigate(flown, with_rows(queue, [place], extra)), navigate(flown, queue)
+    assert run.estimate.tobytes() == plain.estimate.tobytes()
+    if sensor != Sensor.IMU:
+        assert run.reasons(sensor)["late"] == 1
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("sensor", [*FED, Sensor.PAD, Sensor.POSE, Sensor.YAW, Sensor.ATTITUDE, Sensor.LANDED])
+def test_what_is_no_number_is_counted_and_never_fused(hover, sensor, bad):
+    """Every second reading of one sensor is broken: what is estimated is what it is without those readings."""
+    flown = hover
+    if sensor in (Sensor.PAD, Sensor.POSE, Sensor.YAW, Sensor.LANDED):
+        t_s = np.arange(1.0, 20.0, 0.5)
+        good = {Sensor.PAD: [0.0, 0.0, 2.0], Sensor.POSE: [0.0, 0.0, -2.0], Sensor.YAW: [0.0], Sensor.LANDED: [0.0]}
+        flown = hover.added(Stream.of(sensor, t_s, np.tile(good[sensor], (len(t_s), 1))))
+    stream = flown.streams[sensor]
+    value = stream.value.copy()
+    value[1::2] = bad
+    run = navigate(flown.changed(sensor, value=value))
+    assert np.isfinite(run.estimate).all()
+    assert np.isfinite(run.on.work).all() or sensor != Sensor.IMU
+    late = run.t_s > 5.0
+    assert np.abs(run.error[late]).max() < 0.1
+    rows = run.offers[run.offers[:, 1] == sensor]
+    fused = rows[rows[:, 8] == Reason.FUSED]
+    assert np.isfinite(fused).all()
+    if sensor not in (Sensor.IMU, Sensor.MAG, Sensor.ATTITUDE, Sensor.LANDED):
+        assert run.reasons(sensor)["not_finite"] >= len(stream) // 2 - 1
+
+
+def test_a_time_that_is_no_number_is_counted(hover):
+    queue = merge(hover.streams.values())
+    place = int(places_of(queue, Sensor.RANGE, 10.0)[0])
+    extra = rows_of(queue, [place])
+    extra.t_s[:] = np.nan
+    run, plain = navigate(hover, with_rows(queue, [place + 1], extra)), navigate(hover, queue)
+    assert run.estimate.tobytes() == plain.estimate.tobytes()
+    assert run.reasons(Sensor.RANGE)["not_finite"] == 1
+
+
+def test_the_same_queue_gives_the_same_bytes(hover):
+    first, second = navigate(hover), navigate(hover)
+    assert first.estimate.tobytes() == second.estimate.tobytes()
+    assert first.offers.tobytes() == second.offers.tobytes()
+
+
+# -- GPS -----------------------------------------------------------------------------------------------------
+def jumping(hover: Flown) -> Navigated:
+    stream = hover.streams[Sensor.GPS_POSITION]
+    return navigate(
+        hover.changed(
+            Sensor.GPS_POSITION, value=stream.value + np.where(stream.t_s[:, None] >= 10.0, [20.0, 0.0, 0.0], 0.0)
+        )
+    )
+
+
+def test_a_gps_jump_of_20_m_is_refused_and_after_7_s_accepted(hover):
+    run = jumping(hover)
+    before = run.estimate[np.searchsorted(run.t_s, 9.99), 1]
+    during = run.estimate[(run.t_s >= 10.0) & (run.t_s < 12.0), 1]
+    assert np.abs(during - before).max() < 0.01
+    reset = run.events("gps", "reset")
+    assert len(reset) == 1
+    assert reset[0] == pytest.approx([17.0, 20.0], abs=0.21)
+    assert run.reasons(Sensor.GPS_POSITION)["innovation_gate"] == 36
+    assert run.estimate[-1, 1] == pytest.approx(20.0, abs=0.5)
+
+
+def blind(hover: Flown) -> Navigated:
+    flown = hover.without(Sensor.FLOW_RATE)
+    for sensor in GPS:
+        flown = flown.cut(sensor, 5.0, 13.0)
+    return navigate(flown)
+
+
+def test_without_any_horizontal_aid_it_says_so_after_1_s_and_after_5_s(hover):
+    run = blind(hover)
+    last = 4.8
+    assert run.events("filter", "dead_reckoning")[:, 0] == pytest.approx([last + 1.0], abs=0.03)
+    assert run.events("filter", "position_invalid")[:, 0] == pytest.approx([last + 5.0], abs=0.03)
+    assert run.events("filter", "aided") == pytest.approx(np.array([[13.0, 8.2]]), abs=0.03)
+
+
+def test_flow_is_aid_enough(hover):
+    flown = hover
+    for sensor in GPS:
+        flown = flown.cut(sensor, 5.0, 13.0)
+    run = navigate(flown)
+    assert len(run.events("filter", "dead_reckoning")) == 0
+    assert np.abs(run.error[:, :2]).max() < 0.05
+
+
+# -- range and flow ------------------------------------------------------------------------------------------
+def stuck() -> Navigated:
+    flown = fly(descending, 20.0)
+    stream = flown.streams[Sensor.RANGE]
+    held = np.where(stream.t_s[:, None] > 8.0, stream.value[np.searchsorted(stream.t_s, 8.0)], stream.value)
+    return navigate(flown.changed(Sensor.RANGE, value=held))
+
+
+def test_a_stuck_range_is_found_within_2_s_of_a_slow_descent():
+    run = stuck()
+    assert 8.0 < run.events("range", "stuck")[0, 0] < 10.0
+    assert run.reasons(Sensor.RANGE)["stuck"] > 100
+    assert np.abs(run.error[:, 2]).max() < 0.5
+
+
+def over_a_step(hover: Flown) -> Navigated:
+    """A roof 1.2 m high below from 10 s on."""
+    ranges = hover.streams[Sensor.RANGE]
+    value = np.where(ranges.t_s[:, None] >= 10.0, ranges.value - 1.2, ranges.value)
+    return navigate(hover.changed(Sensor.RANGE, value=value))
+
+
+def test_a_step_of_the_ground_is_accepted_after_1_s(hover):
+    run = over_a_step(hover)
+    resets = run.events("range", "reset")
+    assert len(resets) == 1
+    assert resets[0] == pytest.approx([11.0, -1.2], abs=0.11)
+    assert np.abs(run.error[:, 2]).max() < 0.1
+    assert np.count_nonzero(run.offers[run.offers[:, 1] == Sensor.RANGE, 8] == Reason.INNOVATION_GATE) < 25
+
+
+def test_flow_is_not_fused_below_its_least_height():
+    run = navigate(fly(lambda t: 0.1 * still(t), 10.0))
+    assert set(run.reasons(Sensor.FLOW_RATE)) <= {"near_ground", "no_height"}
+    assert run.reasons(Sensor.FLOW_RATE)["near_ground"] > 300
+
+
+def test_flow_and_range_are_not_taken_at_a_steep_tilt(hover):
+    """The attitude says 57 degrees from 10 s on, the gyro that it went there."""
+    imu = hover.streams[Sensor.IMU]
+    turning = (imu.t_s >= 10.0) & (imu.t_s < 11.0)
+    value = imu.value + np.where(turning[:, None], [1.0, 0, 0, 0, 0, 0], 0.0)
+    run = navigate(hover.changed(Sensor.IMU, value=value).only(Sensor.IMU, Sensor.FLOW_RATE, Sensor.RANGE))
+    assert run.reasons(Sensor.FLOW_RATE)["tilted"] > 50
+    assert run.reasons(Sensor.RANGE)["tilted"] > 50
+
+
+def test_flow_without_a_range_waits_for_a_height(hover):
+    run = navigate(hover.without(Sensor.RANGE))
+    assert set(run.reasons(Sensor.FLOW_RATE)) == {"no_height"}
+
+
+def test_an_echo_is_not_taken_for_an_accelerometer_that_lies(hover):
+    """Six range readings of twice the height where the range alone tells it: refused, and nothing else happens."""
+    flown = hover.without(Sensor.BARO, *GPS)
+    stream = flown.streams[Sensor.RANGE]
+    echo = (stream.t_s >= 10.0) & (stream.t_s < 10.3)
+    run = navigate(flown.changed(Sensor.RANGE, value=np.where(echo[:, None], 2.0 * stream.value, stream.value)))
+    assert run.reasons(Sensor.RANGE)["innovation_gate"] == 6
+    assert len(run.events("imu", "doubted")) == 0
+    assert np.ptp(run.estimate[run.t_s > 9.0, 3]) < 0.02
+
+
+# -- every reason and every event ----------------------------------------------------------------------------
+def test_every_reason_has_its_case(hover):
+    """But for `not_needed`, which the navigator does not give."""
+    seen: set[str] = set()
+
+    def look(run: Navigated) -> None:
+        for sensor in Sensor:
+            seen.update(run.reasons(sensor))
+
+    look(jumping(hover))
+    look(stuck())
+    look(navigate(fly(lambda t: 0.1 * still(t), 3.0)))
+    look(navigate(hover.without(Sensor.RANGE)))
+    look(navigate(fly(still, 3.0).without(Sensor.IMU, Sensor.ATTITUDE)))
+    imu = hover.streams[Sensor.IMU]
+    rolled = imu.value + np.where((imu.t_s >= 10.0)[:, None] & (imu.t_s < 11.0)[:, None], [1.0, 0, 0, 0, 0, 0], 0.0)
+    look(navigate(hover.changed(Sensor.IMU, value=rolled).only(Sensor.IMU, Sensor.FLOW_RATE, Sensor.RANGE)))
+    ranges, flow = hover.streams[Sensor.RANGE], hover.streams[Sensor.FLOW_RATE]
+    far, lost = ranges.value.copy(), flow.quality.copy()
+    far[100], far[101] = 300.0, np.nan
+    lost[100], lost[101] = 0.0, -1.0
+    hurt = hover.changed(Sensor.RANGE, value=far).changed(Sensor.FLOW_RATE, quality=lost)
+    queue = merge(hurt.streams.values())
+    again = places_of(queue, Sensor.BARO, 10.0)[:1].tolist()
+    run = navigate(hurt, with_rows(queue, [again[0] + 1], rows_of(queue, again)))
+    look(run)
+    assert run.reasons(Sensor.RANGE) == {"fused": 397, "out_of_range": 1, "not_finite": 1} | {
+        name: count for name, count in run.reasons(Sensor.RANGE).items() if name == "innovation_gate"
+    }
+    t_s = np.arange(1.0, 20.0, 0.1)
+    look(navigate(hover.added(Stream.of(Sensor.PAD, t_s, np.tile([0.0, 0.0, 2.0], (len(t_s), 1))))))
+    flown = hover.cut(Sensor.BARO, 9.99, 10.35)
+    queue = merge(flown.streams.values())
+    late = rows_of(queue, places_of(queue, Sensor.BARO, 9.0)[:1].tolist())
+    late.t_s[:] = 10.0
+    look(navigate(flown, with_rows(queue, [int(np.searchsorted(queue.t_s, 10.3))], late)))
+    assert seen == {reason.label for reason in Reason} - {"not_needed"}
+
+
+def test_every_event_has_its_case(hover):
+    seen: set[int] = set()
+    t_s = np.arange(1.0, 20.0, 0.1)
+    pad = hover.added(Stream.of(Sensor.PAD, t_s, np.tile([0.0, 0.0, 2.0], (len(t_s), 1))))
+    imu = hover.streams[Sensor.IMU]
+    lying = imu.value + np.where(imu.t_s[:, None] > 5.0, [0, 0, 0, 0, 0, 3.0], 0.0)
+    alone = hover.without(Sensor.BARO, *GPS).changed(Sensor.IMU, value=lying)
+    runs = (jumping(hover), blind(hover), stuck(), over_a_step(hover), navigate(pad), navigate(alone),
+            navigate(fly(circle, 10.0).cut(Sensor.IMU, 5.0, 6.0)))  # fmt: skip
+    for run in runs:
+        seen.update(run.on.tape.event[: run.on.tape.used[2], 1].astype(int).tolist())
+    assert seen == set(range(len(EVENT_NAMES)))

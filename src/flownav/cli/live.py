@@ -109,12 +109,13 @@ def _screen(session: Session, latency: Latency, url: str, *, show: bool) -> Iter
     if not show or not sys.stdout.isatty():
         yield lambda now_s: None
         return
+    from rich.console import Console
     from rich.live import Live
 
     from flownav.live.screen import Screen
 
     screen = Screen(session, latency, url)
-    with Live(auto_refresh=False, screen=True) as shown:
+    with Live(console=Console(markup=False, highlight=False), auto_refresh=False, screen=True) as shown:
         yield lambda now_s: shown.update(screen.look(now_s), refresh=True)
 
 

@@ -1,0 +1,149 @@
+"""A small autopilot that hovers, and its wire to a session: real UDP sockets on loopback, a clock of the test's own."""
+
+from __future__ import annotations
+
+import math
+import random
+import socket
+from dataclasses import dataclass, field
+from typing import Any
+
+from flownav.live.link import UdpLink, open_link
+from flownav.live.options import Options
+from flownav.live.recorder import NoRecorder
+from flownav.live.session import Session
+from flownav.mavlink import sensors_outgoing as say
+from flownav.mavlink.dialect import coder
+from flownav.mavlink.signing import sign_outgoing
+from flownav.measurement import Measurement, Sensor
+
+ORIGIN = (47.0, 8.5, 400.0)
+HEIGHT_M = 2.0
+UNIX_S = 1.8e9
+START_S = 5000.0  # of the test's clock
+STEP_S = 0.01
+GRAVITY = 9.80665
+
+
+def reading(sensor: Sensor, *value: float, variance: float = math.nan) -> Measurement:
+    return Measurement(0.0, sensor, value, (variance,) * len(value))
+
+
+@dataclass
+class Hover:
+    """IMU and flow at 100 and 50 Hz, attitude 50 Hz, range 20 Hz, GPS 5 Hz; stamps are boot_s + the test's time."""
+
+    boot_s: float = 20.0
+    system: int = 1
+    key: bytes | None = None
+    gps: bool = True
+    flow: bool = True
+    imu: bool = True
+    sigma_m: float = 0.5
+    noise: random.Random = field(default_factory=lambda: random.Random(4))
+    steps: int = 0
+
+    def __post_init__(self) -> None:
+        self.mav: Any = coder(self.system, 1)
+
+    def frames(self, t_s: float) -> list[bytes]:
+        """What is sent in the step of 10 ms that ends at a time since the start."""
+        step, time_us = self.steps, round((self.boot_s + t_s) * 1e6)
+        self.steps += 1
+        if self.key is not None:
+            sign_outgoing(self.mav, self.key, UNIX_S + t_s)
+        shake = [self.noise.gauss(0.0, 1.0) for _ in range(6)]
+        messages = [say.heartbeat(self.mav, armed=True)] if step % 100 == 0 else []
+        if self.imu:
+            rates = [0.002 * value for value in shake[:3]]
+            force = [0.02 * shake[3], 0.02 * shake[4], -GRAVITY + 0.02 * shake[5]]
+            messages.append(say.highres_imu(self.mav, time_us, reading(Sensor.IMU, *rates, *force)))
+        if step % 2 == 0:
+            messages.append(say.attitude_quaternion(self.mav, time_us // 1000, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+        if step % 2 == 0 and self.flow:
+            flow = reading(Sensor.FLOW_RATE, 0.01 * shake[0], 0.01 * shake[1], 0.002 * shake[0], 0.002 * shake[1])
+            messages.append(say.optical_flow_rad(self.mav, time_us, flow, 0.02))
+        if step % 5 == 0:
+            seen = reading(Sensor.RANGE, HEIGHT_M + 0.02 * shake[2])
+            messages.append(say.distance_sensor(self.mav, time_us // 1000, seen, (0.1, 40.0)))
+        if step % 20 == 0 and self.gps:
+            velocity = reading(Sensor.GPS_VELOCITY, 0.05 * shake[3], 0.05 * shake[4], math.nan, variance=0.04)
+            messages.append(
+                say.gps_raw_int(
+                    self.mav, time_us, ORIGIN, velocity, horizontal_sigma_m=self.sigma_m, vertical_sigma_m=self.sigma_m
+                )
+            )
+        return [bytes(message.pack(self.mav)) for message in messages]
+
+
+class Wire:
+    """A session behind a UDP link, and a vehicle's socket. `heard` are the messages that the vehicle received."""
+
+    def __init__(self, vehicle: Hover, options: Options | None = None, keeper: Any = None) -> None:
+        self.vehicle, self.t_s = vehicle, 0.0
+        self.session = Session(options or Options(), keeper or NoRecorder(), START_S, UNIX_S)
+        link = open_link("udp:0")
+        assert isinstance(link, UdpLink)
+        self.link = link
+        self.socket = self.another()
+        self.heard: list[Any] = []
+        self.heard_s: list[float] = []
+        self.frames: list[bytes] = []
+        self.last: tuple[bytes, ...] = ()
+        self._coder = coder()
+
+    def another(self) -> socket.socket:
+        """A socket that talks to the session."""
+        made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        made.bind(("127.0.0.1", 0))
+        made.connect(("127.0.0.1", self.link.port))
+        made.setblocking(False)
+        return made
+
+    @property
+    def now_s(self) -> float:
+        return START_S + self.t_s
+
+    def send(self, *pieces: bytes) -> None:
+        for piece in pieces:
+            self.socket.send(piece)
+        self.last = pieces
+        self.pump()
+
+    def pump(self) -> None:
+        """The session's turn, as the loop gives it."""
+        while pieces := self.link.read():
+            for piece, sender in pieces:
+                if self.session.take(piece, self.now_s, whole=True):
+                    self.link.believe(sender)
+        self.session.tick(self.now_s)
+        while self.session.outbox:
+            self.link.write(self.session.outbox.popleft())
+        while True:
+            try:
+                frame = self.socket.recv(4096)
+            except BlockingIOError:
+                return
+            self.frames.append(frame)
+            self.heard.append(self._coder.decode(bytearray(frame)))
+            self.heard_s.append(self.t_s)
+
+    def fly(self, seconds: float, *, silent: bool = False, beside: Any = None) -> Wire:
+        """Time passes; the vehicle talks, unless it is silent. `beside` is called at each step."""
+        for _ in range(round(seconds / STEP_S)):
+            self.t_s += STEP_S
+            if beside is not None:
+                beside()
+            if silent:
+                self.pump()
+            else:
+                self.send(*self.vehicle.frames(self.t_s))
+        return self
+
+    def estimates(self, since_s: float = 0.0) -> list[Any]:
+        found = zip(self.heard, self.heard_s, strict=True)
+        return [message for message, t_s in found if message.msgname == "ODOMETRY" and t_s > since_s]
+
+    def close(self) -> None:
+        self.link.close()
+        self.socket.close()

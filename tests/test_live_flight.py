@@ -1,0 +1,245 @@
+"""Both ends against each other, and the record: it is complete, and a replay of it gives the same bits."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from io import StringIO
+
+import numpy as np
+import pymap3d
+import pytest
+
+from flownav.campaign.local import fly_recorded
+from flownav.errors import InputError
+from flownav.faults.flight_log import log_of
+from flownav.live.link import open_link
+from flownav.live.loop import Latency, run_session, run_vehicle
+from flownav.live.options import Options
+from flownav.live.recorder import NoRecorder, Recorder
+from flownav.live.screen import Screen
+from flownav.live.session import Session
+from flownav.live.simulated import BOOT_S, ORIGIN_DEG_M, SimulatedVehicle
+from flownav.live.warm import warm_up
+from flownav.logs.open_log import open_flight
+from flownav.measurement import Sensor
+from flownav.record import Record
+from flownav.replay.bundle import estimate_table, innovation_table
+from flownav.replay.fed import as_fed
+from flownav.replay.prepare import ReplayOptions
+from flownav.replay.session import replay
+from flownav.simulation.assemble import assemble
+from flownav.simulation.scenario import load_scenario
+from live_ends import Hover, Wire
+
+SPEED = 10.0
+
+
+def replayed(path):
+    log = open_flight(path)
+    return replay(log, *as_fed(log, ReplayOptions(), None))
+
+
+def assert_same_bits(path):
+    record, again = Record.load(path), replayed(path)
+    for name, table in (
+        ("estimate", estimate_table(again.estimate)),
+        ("innovation", innovation_table(again.innovation)),
+    ):
+        assert set(table) == set(record.tables[name])
+        for column, values in table.items():
+            recorded = record.tables[name][column]
+            same = np.array_equal(values, recorded, equal_nan=values.dtype.kind == "f")
+            assert same, f"{name}.{column}"
+    return record
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory):
+    """pad_return, told over loopback at ten times its pace; the session's clock is the machine's."""
+    warm_up()
+    setup = assemble(load_scenario("pad_return"))
+    vehicle = SimulatedVehicle(log_of(fly_recorded(setup, 1), setup, flow=Sensor.FLOW_RATE, attitude=True))
+    path = tmp_path_factory.mktemp("live") / "flight.fnr"
+    recorder, options = Recorder(path), Options(gps_delay_s=0.02)
+    link = open_link("udp:0")
+    session = Session(options, recorder, time.monotonic(), time.time())
+    latency, ended = Latency(), threading.Event()
+    telling = threading.Thread(target=_tell, args=(vehicle, f"udpout:127.0.0.1:{link.port}", ended))
+    telling.start()
+    run_session(session, link, latency, ended.is_set)
+    telling.join()
+    link.close()
+    recorder.finish(options, session.origin_deg_m, {})
+    return vehicle, session, latency, path
+
+
+def _tell(vehicle, url, ended):
+    link = open_link(url)
+    try:
+        run_vehicle(vehicle, link, SPEED, lambda: False)
+    finally:
+        link.close()
+        ended.set()
+
+
+def test_the_estimate_that_comes_back_follows_the_truth(flight):
+    """Velocity within 0.5 m/s, path within 1.5 m, beside the constant error of the first fix, which is the origin."""
+    vehicle, session, _, _ = flight
+    told = [message for _, message in vehicle.received if message.msgname == "ODOMETRY"]
+    assert len(told) > 500
+    origin = np.array(pymap3d.geodetic2ned(*session.origin_deg_m, *ORIGIN_DEG_M))
+    errors = []
+    for message in told:
+        position, velocity = vehicle.truth_at(message.time_usec * 1e-6 - BOOT_S)
+        w, x, y, z = message.q
+        speed = np.hypot(message.vx, message.vy) - np.hypot(*velocity[:2])
+        errors.append([message.x + origin[0], message.y + origin[1], message.z + origin[2], speed])
+        errors[-1][:3] -= position
+        assert abs(w * w + x * x + y * y + z * z - 1.0) < 1e-5
+    away = np.array(errors)
+    path = np.abs(away[:, :3] - np.median(away[:, :3], axis=0)).max(axis=0)
+    assert path.max() < 1.5, path
+    assert np.abs(away[:, 3]).max() < 0.5
+    assert len({message.reset_counter for message in told}) == 1
+
+
+def test_the_simulated_vehicle_answers_what_it_is_asked(flight):
+    vehicle, session, _, _ = flight
+    assert session.requests.answers["accepted"] == 5 + 1
+    assert session.requests.refused == ["OPTICAL_FLOW", "SCALED_PRESSURE", "SYSTEM_TIME", "GPS_GLOBAL_ORIGIN"]
+    assert vehicle.counts["HEARTBEAT"] >= 4
+    assert session.clock.best(time.monotonic()) is not None
+
+
+def test_the_latency_was_measured_for_every_estimate_that_flow_brought(flight):
+    _, session, latency, _ = flight
+    assert 0 < latency.counts.sum() <= session.sent
+    assert 0.0 < latency.quantile_s(0.5) < latency.longest_s
+
+
+def test_a_replay_of_the_record_is_the_same_bits(flight):
+    record = assert_same_bits(flight[3])
+    assert {"fed", "truth", "imu", "flow_rate", "gps_position", "range"} <= set(record.tables)
+    assert record.manifest["kind"] == "live"
+    assert replayed(flight[3]).truth_scores()["velocity_rms_m_s"] < 0.3
+
+
+def test_the_screen_shows_rates_ages_and_the_estimate(flight):
+    from rich.console import Console
+
+    _, session, latency, _ = flight
+    screen, console = Screen(session, latency, "udp:1"), Console(width=160, record=True, file=StringIO(), markup=False)
+    for now_s in (0.0, 1.0):
+        console.print(screen.look(now_s))
+    text = console.export_text()
+    for word in ("flow_rate", "range", "position [m]", "±", "sent", "latency", "dropped"):
+        assert word in text
+
+
+def test_a_restart_in_the_record_is_replayed_too(tmp_path):
+    path = tmp_path / "restart.fnr"
+    options, recorder = Options(), Recorder(path)
+    wire = Wire(Hover(), options, recorder)
+    wire.fly(4.0)
+    wire.vehicle.boot_s = 1.0 - wire.t_s  # it reboots
+    wire.fly(4.0)
+    wire.close()
+    recorder.finish(options, wire.session.origin_deg_m, {})
+    record = assert_same_bits(path)
+    assert len(record.manifest["segments"]) == 2
+    assert "restart" in record.tables["events"]["kind"]
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_options_that_would_change_what_was_fed_are_refused(flight):
+    log = open_flight(flight[3])
+    with pytest.raises(InputError, match="without --flow-scale"):
+        as_fed(log, ReplayOptions(flow_scale=(2.0, 1.0)), None)
+    with pytest.raises(InputError, match="of one flow sensor"):
+        open_flight(flight[3], flow_instance=1)
+    cut = replay(log, *as_fed(log, ReplayOptions(gps_outages_s=((BOOT_S + 20.0, BOOT_S + 30.0),)), None))
+    assert cut.rejected()["gps_position"]["outage"] > 0
+
+
+def test_a_record_of_another_kind_is_refused(tmp_path):
+    path = tmp_path / "x.fnr"
+    record = Record({"kind": "fly"})
+    record.add("truth", {"t_s": [0.0]})
+    record.save(path)
+    with pytest.raises(InputError, match="of kind 'fly'"):
+        open_flight(path)
+
+
+def test_memory_does_not_grow_with_the_session():
+    import tracemalloc
+
+    wire = Wire(Hover(), Options(), NoRecorder()).fly(10.0)
+    wire.heard.clear(), wire.frames.clear(), wire.heard_s.clear()
+    tracemalloc.start()
+    wire.fly(2.0)
+    wire.heard.clear(), wire.frames.clear(), wire.heard_s.clear()
+    before, _ = tracemalloc.get_traced_memory()
+    wire.fly(8.0)
+    wire.heard.clear(), wire.frames.clear(), wire.heard_s.clear()
+    after, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    wire.close()
+    assert after - before < 300e3  # the rings of IMU and attitude fill
+
+
+def free_port():
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def test_ctrl_c_leaves_a_complete_record(tmp_path):
+    path, port = tmp_path / "live.fnr", free_port()
+    command = [sys.executable, "-m", "flownav", "live", f"udp:{port}", "--record", str(path), "--json"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    vehicle, link = Hover(), open_link(f"udpout:127.0.0.1:{port}")
+    try:
+        start = time.monotonic()
+        heard = 0
+        while time.monotonic() - start < 60.0 and heard < 30:
+            time.sleep(0.01)
+            for frame in vehicle.frames(time.monotonic() - start):
+                link.write(frame)
+            heard += sum(b"\xfd" in piece and piece[7] == 331 % 256 for piece, _ in link.read())
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=30)
+    finally:
+        process.kill()
+        link.close()
+    assert process.returncode == 0, errors
+    facts = json.loads(output)
+    assert facts["sent"] >= 30
+    assert facts["record"] == str(path)
+    assert_same_bits(path)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["nowhere"], "no link"),
+        (["udp:0", "--send", "everything"], "--send everything: one of odometry, vision, landing-target, none"),
+        (["udp:0", "--system", "0"], "--system 0: must be from 1 to 255"),
+        (["udp:0", "--duration", "0"], "--duration 0.0: must be from 0.1"),
+        (["udp:0", "--gps-delay", "2"], "--gps-delay 2.0: must be from 0.0 to 1.0"),
+        (["udp:0", "--signing-key", "no.key"], "no.key: cannot be read"),
+    ],
+)
+def test_mistakes_are_one_line(options, said):
+    from typer.testing import CliRunner
+
+    from flownav.cli import app
+
+    result = CliRunner().invoke(app, ["live", *options])
+    assert isinstance(result.exception, InputError)
+    assert said in str(result.exception)

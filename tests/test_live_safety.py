@@ -1,0 +1,317 @@
+"""A live session over loopback sockets: what it sends is finite, fresh and of its vehicle, whatever is sent to it.
+
+Time is the test's own, so that a cable can be pulled for half a minute without waiting for it.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+import pytest
+
+from flownav.live.horizon import MOST_WAITING
+from flownav.live.options import Limits, Options
+from flownav.mavlink.dialect import coder
+from flownav.mavlink.position_messages import LOCAL_FRD
+from flownav.mavlink.signing import SignatureCheck
+from live_ends import HEIGHT_M, UNIX_S, Hover, Wire
+
+KEY = bytes(range(32))
+
+
+@pytest.fixture
+def wires():
+    """Makes wires; their sockets are closed afterwards."""
+    made = []
+
+    def make(vehicle=None, **options):
+        made.append(Wire(vehicle or Hover(), Options(**options)))
+        return made[-1]
+
+    yield make
+    for wire in made:
+        wire.close()
+
+
+def is_good(message):
+    numbers = [message.x, message.y, message.z, message.vx, message.vy, message.vz, *message.q]
+    return all(map(math.isfinite, numbers)) and math.hypot(message.x, message.y) < 3.0
+
+
+def assert_all_good(wire, at_least=1):
+    """Every estimate that was ever sent was finite, near the vehicle, and stamped with the vehicle's own time."""
+    estimates = wire.estimates()
+    assert len(estimates) >= at_least
+    assert all(is_good(message) for message in estimates)
+
+
+def test_the_estimate_is_sent_with_covariance_frames_and_the_vehicles_time(wires):
+    wire = wires().fly(8.0)
+    assert wire.session.reason == ""
+    last = wire.estimates()[-1]
+    assert_all_good(wire, at_least=200)
+    assert abs(last.z) < 1.5  # the origin is the first fix, at the vehicle's own height
+    assert math.hypot(last.vx, last.vy) < 0.2
+    assert last.frame_id == LOCAL_FRD
+    assert np.isfinite(last.pose_covariance).all()
+    assert np.isfinite(last.velocity_covariance).all()
+    assert 0.0 < last.pose_covariance[0] < 4.0
+    assert last.time_usec == pytest.approx((wire.vehicle.boot_s + wire.t_s) * 1e6, abs=30e3)
+    assert len({message.reset_counter for message in wire.estimates(4.0)}) == 1
+
+
+def test_streams_are_asked_for_and_timesync_is_answered_in_the_vehicles_time(wires):
+    wire = wires().fly(3.0)
+    asked = {int(m.param1) for m in wire.heard if m.msgname == "COMMAND_LONG" and m.command == 511}
+    assert {105, 106} & asked  # sent again until it is acknowledged
+    wire.send(bytes(wire.vehicle.mav.timesync_encode(0, 123).pack(wire.vehicle.mav)))
+    answer = [m for m in wire.heard if m.msgname == "TIMESYNC"][-1]
+    assert answer.ts1 == 123
+    assert answer.tc1 * 1e-9 == pytest.approx(wire.vehicle.boot_s + wire.t_s, abs=0.02)
+
+
+def test_commands_follow_one_another_as_they_are_answered(wires):
+    wire = wires()
+
+    def answer():
+        for message in wire.heard:
+            if message.msgname == "COMMAND_LONG" and id(message) not in seen:
+                seen.add(id(message))
+                denied = message.param1 == 29
+                ack = wire.vehicle.mav.command_ack_encode(message.command, 4 if denied else 0)
+                wire.socket.send(bytes(ack.pack(wire.vehicle.mav)))
+
+    seen = set()
+    wire.fly(2.0, beside=answer)
+    assert wire.session.requests.refused == ["SCALED_PRESSURE"]
+    assert wire.session.requests.answers["accepted"] >= 8
+
+
+def test_malformed_packets_are_counted_and_change_nothing(wires):
+    wire, chance = wires(), random.Random(1)
+
+    def damage():
+        frame = bytearray(wire.vehicle.mav.heartbeat_encode(2, 3, 0, 0, 4, 3).pack(wire.vehicle.mav))
+        frame[chance.randrange(len(frame))] ^= 1 << chance.randrange(8)
+        wire.socket.send(bytes(frame))
+        wire.socket.send(chance.randbytes(chance.randrange(1, 300)))
+        wire.socket.send(bytes(frame[: chance.randrange(1, len(frame))]))
+        wire.socket.send(b"\xfd" * chance.randrange(1, 600))
+
+    wire.fly(6.0, beside=damage)
+    assert wire.session.reason == ""
+    assert wire.session.dropped["link: skipped_bytes"] > 10_000
+    assert_all_good(wire, at_least=100)
+
+
+def test_values_that_cannot_be_never_reach_what_is_sent(wires):
+    wire = wires().fly(4.0)
+    mav, chance = wire.vehicle.mav, random.Random(2)
+
+    def nonsense():
+        worst = [math.nan, math.inf, -math.inf, 1e30]
+        time_us = round((wire.vehicle.boot_s + wire.t_s) * 1e6)
+        values = [chance.choice(worst) for _ in range(9)]
+        wire.socket.send(bytes(mav.highres_imu_encode(time_us, *values, 1e3, 0.0, 0.0, 0.0, 0x1FF).pack(mav)))
+        quaternion = [chance.choice(worst) for _ in range(4)]
+        wire.socket.send(bytes(mav.attitude_quaternion_encode(time_us // 1000, *quaternion, 0, 0, 0).pack(mav)))
+
+    wire.fly(4.0, beside=nonsense)
+    assert wire.session.dropped["imu: not_finite"] > 100
+    assert wire.session.reason == ""
+    assert_all_good(wire, at_least=200)
+
+
+def test_a_flood_is_dropped_and_counted_and_memory_stays(wires):
+    wire = wires().fly(4.0)
+    mav = wire.vehicle.mav
+    ahead_us = round((wire.vehicle.boot_s + wire.t_s) * 1e6)
+    for k in range(2 * MOST_WAITING):
+        stamp = ahead_us + 1_000_000 + k  # a second ahead: all would wait
+        message = mav.highres_imu_encode(stamp, 0, 0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F)
+        wire.session.take(bytes(message.pack(mav)), wire.now_s, whole=True)
+        assert len(wire.session.horizon) <= MOST_WAITING
+    assert wire.session.dropped["horizon: overflow"] > MOST_WAITING // 2
+    began = wire.t_s
+    wire.fly(12.0)
+    assert wire.session.reason == ""
+    assert wire.estimates(began + 8.0)
+    assert_all_good(wire)
+
+
+def test_a_second_autopilot_is_not_listened_to(wires):
+    wire = wires().fly(0.1)
+    other = Hover(system=9, boot_s=900.0)
+    wire.fly(6.0, beside=lambda: [wire.socket.send(frame) for frame in other.frames(wire.t_s)])
+    assert wire.session.reception.vehicle[:2] == (1, 1)
+    assert wire.session.reception.others == [(9, 1)]
+    assert wire.session.dropped["link: other_system"] > 500
+    assert wire.session.reason == ""
+    assert_all_good(wire, at_least=100)
+
+
+def test_a_stranger_with_the_vehicles_number_on_another_port_is_not_listened_to(wires):
+    wire = wires().fly(4.0)
+    stranger, forger = wire.another(), Hover(boot_s=777.0)
+    wire.fly(2.0, beside=lambda: [stranger.send(frame) for frame in forger.frames(wire.t_s)])
+    stranger.close()
+    assert wire.link.counts["other_sender"] > 300
+    assert wire.session.reason == ""
+
+
+def test_the_system_that_was_asked_for_is_waited_for(wires):
+    wire = wires(Hover(system=3), system=4).fly(2.0)
+    assert wire.session.reception.vehicle is None
+    assert not wire.heard
+    assert wire.session.dropped["link: other_system"] > 100
+
+
+def test_with_a_key_unsigned_forged_and_replayed_packets_are_rejected(wires):
+    wire = wires(Hover(key=KEY), key=KEY)
+    unsigned, forger = Hover(), Hover(key=bytes(32))
+
+    def attack():
+        for frame in (*wire.last, *unsigned.frames(wire.t_s), *forger.frames(wire.t_s)):
+            wire.socket.send(frame)
+
+    wire.fly(6.0, beside=attack)
+    dropped = wire.session.dropped
+    assert dropped["link: unsigned"] > 500
+    assert dropped["link: bad_signature"] > 500
+    assert dropped["link: replayed"] > 500
+    assert wire.session.reason == ""
+    assert_all_good(wire, at_least=100)
+    check = SignatureCheck(KEY, UNIX_S)
+    assert all(check.accepts(frame) for frame in wire.frames)
+
+
+def test_a_cable_pulled_for_thirty_seconds_stops_the_sending_and_it_goes_on_by_itself(wires):
+    wire = wires().fly(6.0)
+    before = wire.estimates()[-1].reset_counter
+    pulled = wire.t_s
+    wire.fly(30.0, silent=True)
+    assert wire.session.reason == "stale"
+    assert not wire.estimates(pulled + Limits().age_s + 0.02)
+    back = wire.t_s
+    wire.fly(6.0)
+    assert wire.session.reason == ""
+    assert wire.estimates(back)
+    assert wire.estimates()[-1].reset_counter != before  # the vehicle may have been carried
+    assert wire.session.withheld["stale"] > 100
+    assert_all_good(wire)
+
+
+def test_a_short_silence_needs_no_new_start(wires):
+    wire = wires().fly(6.0)
+    jumps = wire.session.filtering.jumps
+    wire.fly(1.0, silent=True)
+    assert wire.session.reason == "stale"
+    wire.fly(2.0)
+    assert wire.session.reason == ""
+    assert wire.session.filtering.jumps == jumps
+
+
+def test_a_vehicle_that_reboots_is_navigated_anew(wires):
+    wire = wires().fly(6.0)
+    before = wire.estimates()[-1].reset_counter
+    wire.vehicle.boot_s = 1.0 - wire.t_s
+    wire.fly(6.0)
+    assert wire.session.reason == ""
+    assert wire.session.dropped["clock: clock_jump"] == 1
+    last = wire.estimates()[-1]
+    assert last.reset_counter != before
+    assert last.time_usec == pytest.approx((wire.vehicle.boot_s + wire.t_s) * 1e6, abs=30e3)
+    assert_all_good(wire)
+
+
+@pytest.mark.parametrize("jump_s", [1.5, 100.0, -1.0, -15.0])
+def test_a_clock_that_jumps_is_followed(wires, jump_s):
+    wire = wires().fly(6.0)
+    wire.vehicle.boot_s += jump_s
+    wire.fly(9.0)
+    assert wire.session.reason == ""
+    assert wire.estimates(wire.t_s - 1.0)
+    assert_all_good(wire)
+
+
+@pytest.mark.parametrize("stray_s", [1.9, 9.0, 5000.0, -9.0])
+def test_one_stamp_that_cannot_be_does_not_stop_it_for_long(wires, stray_s):
+    wire = wires().fly(5.0)
+    mav = wire.vehicle.mav
+    stamp = round(max(0.0, wire.vehicle.boot_s + wire.t_s + stray_s) * 1e6)
+    wire.send(bytes(mav.highres_imu_encode(stamp, 0, 0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F).pack(mav)))
+    wire.fly(9.0)
+    assert wire.session.reason == ""
+    assert_all_good(wire)
+
+
+def test_without_any_horizontal_aid_it_stops_and_says_why(wires):
+    wire = wires().fly(5.0)
+    wire.vehicle.gps = wire.vehicle.flow = False
+    lost = wire.t_s
+    wire.fly(7.0)
+    assert wire.session.reason == "position_invalid"
+    assert not wire.estimates(lost + 5.5)
+    wire.vehicle.gps = wire.vehicle.flow = True
+    wire.fly(2.0)
+    assert wire.session.reason == ""
+    assert_all_good(wire)
+
+
+def test_the_limit_of_dead_reckoning_may_be_tighter(wires):
+    wire = wires(limits=Limits(dead_reckoning_s=1.5)).fly(5.0)
+    wire.vehicle.gps = wire.vehicle.flow = False
+    wire.fly(3.0)
+    assert wire.session.reason == "dead_reckoning"
+
+
+def test_without_its_imu_the_estimate_is_not_sent(wires):
+    wire = wires().fly(5.0)
+    wire.vehicle.imu = False
+    wire.fly(2.0)
+    assert wire.session.reason == "stale"
+
+
+def test_an_uncertain_estimate_is_not_sent(wires):
+    wire = wires(limits=Limits(sigma_m=0.01)).fly(5.0)
+    assert wire.session.reason == "uncertain"
+    assert not wire.estimates()
+
+
+def test_without_gps_the_flow_starts_it_and_nothing_is_sent_before(wires):
+    wire = wires(Hover(gps=False)).fly(1.5)
+    assert wire.session.reason == "listening"
+    assert not wire.estimates()
+    wire.fly(4.0)
+    assert wire.session.reason == ""
+    assert_all_good(wire)
+
+
+@pytest.mark.parametrize(
+    ("send", "names"),
+    [("vision", {"VISION_POSITION_ESTIMATE", "VISION_SPEED_ESTIMATE"}), ("none", set()), ("landing-target", set())],
+)
+def test_what_is_sent_is_what_was_asked_for(wires, send, names):
+    wire = wires(send=send).fly(5.0)
+    sent = {message.msgname for message in wire.heard} - {"HEARTBEAT", "TIMESYNC", "COMMAND_LONG"}
+    assert sent == names
+    assert wire.session.reason == {"vision": "", "none": "nothing_asked", "landing-target": "no_pad"}[send]
+
+
+def test_the_pad_is_told_once_it_was_seen(wires):
+    wire = wires(send="landing-target").fly(4.0)
+    mav = wire.vehicle.mav
+
+    def see():
+        time_us = round((wire.vehicle.boot_s + wire.t_s) * 1e6)
+        message = mav.landing_target_encode(time_us, 0, 12, 0.1, -0.2, HEIGHT_M, 0, 0)
+        wire.socket.send(bytes(message.pack(mav)))
+
+    wire.fly(3.0, beside=see)
+    last = [message for message in wire.heard if message.msgname == "LANDING_TARGET"][-1]
+    assert last.angle_x == pytest.approx(0.1, abs=0.05)
+    assert last.angle_y == pytest.approx(-0.2, abs=0.05)
+    assert last.position_valid == 1
+    assert coder().decode(bytearray(wire.frames[-1])).get_srcSystem() == 1

@@ -136,13 +136,27 @@ def test_no_folder(tmp_path):
 
 def test_an_empty_folder_names_everything_it_needs(tmp_path):
     text = complaint(tmp_path)
-    assert "attitude.csv and one of gps.csv, flow.csv, px4flow.csv missing" in text
+    assert "one of attitude.csv, imu.csv and one of gps.csv, flow.csv, px4flow.csv missing" in text
     assert "range.csv" in text
 
 
-def test_attitude_is_needed(folder):
+def test_an_attitude_or_an_imu_is_needed(folder):
     (folder / "attitude.csv").unlink()
-    assert "attitude.csv missing" in complaint(folder)
+    assert Sensor.ATTITUDE not in read_csv_folder(folder).streams
+    (folder / "imu.csv").unlink()
+    assert "one of attitude.csv, imu.csv missing" in complaint(folder)
+
+
+def test_without_attitude_the_imus_clock_is_the_common_one(folder):
+    (folder / "attitude.csv").unlink()
+    header, *rows = rows_of(folder / "range.csv")
+    place = header.index("t_s")
+    for row in rows:
+        row[place] = str(float(row[place]) + 1e5)
+    write_rows(folder / "range.csv", [header, *rows])
+    said = complaint(folder)
+    assert "range.csv covers" in said
+    assert "imu.csv" in said
 
 
 def test_gps_or_flow_is_needed(folder):

@@ -23,7 +23,7 @@ def test_it_starts_level_from_the_accelerometer_alone():
     for sensor in (*GPS, Sensor.FLOW_RATE):  # later than the accelerometer's first readings
         flown = flown.cut(sensor, 0.0, 0.5)
     run = navigate(flown)
-    w, x, y, z = run.estimate[0, 7:11]
+    w, x, y, _ = run.estimate[0, 7:11]
     assert 2 * np.arctan2(x, w) == pytest.approx(roll, abs=5e-3)
     assert 2 * np.arctan2(y, w) == pytest.approx(pitch, abs=5e-3)
     assert run.events("filter", "start")[:, 1] == pytest.approx([1.0])
@@ -82,7 +82,7 @@ def test_a_gap_of_the_imu_is_bridged_by_the_logged_attitude():
 def test_zero_velocity_on_the_ground_holds_the_place():
     """A biased accelerometer on the ground, no other aid: LANDED keeps it still."""
     flown = fly(lambda t: 0.0 * still(t), 20.0).without(Sensor.FLOW_RATE, Sensor.RANGE)
-    imu = flown.streams[Sensor.IMU].value + [0, 0, 0, 0.15, -0.1, 0.05]
+    imu = flown.streams[Sensor.IMU].value + np.array([0, 0, 0, 0.15, -0.1, 0.05])
     flown = flown.changed(Sensor.IMU, value=imu)
     for sensor in GPS:
         flown = flown.cut(sensor, 3.0, 99.0)

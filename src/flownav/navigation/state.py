@@ -45,7 +45,7 @@ WORK_ROWS = LEVER + 1
     RANGE_SINCE,
     RANGE_LAST,
     RANGE_SAME_SINCE,
-    RANGE_TRAVEL,
+    RANGE_DOWN,
     BARO_KNOWN,
     FLOW_EXCESS,
     FLOW_CLOCK,
@@ -157,9 +157,9 @@ def empty_tape(estimates: int, components: int, events: int) -> Tape:
 def new_memory() -> Array:
     """Nothing has been heard."""
     memory = np.full(MEMORY_SIZE, np.nan)
-    zeros = [RANGE_JUMPED, DOUBT, VIBRATION, GAP, STARTED, USE_IMU, USE_ATTITUDE, USE_HEADING, GROUND_SET, BARO_KNOWN, FLAG,
-             LANDED, LEVEL_COUNT,
-             FLOW_BIAS_X, FLOW_BIAS_Y, FLOW_BIAS_COUNT, FLOW_GYRO_IS_IMU, RANGE_TRAVEL]  # fmt: skip
+    zeros = [DOUBT, VIBRATION, GAP, STARTED, USE_IMU, USE_ATTITUDE, USE_HEADING, GROUND_SET, BARO_KNOWN, FLAG,
+             LANDED, LEVEL_COUNT, RANGE_JUMPED,
+             FLOW_BIAS_X, FLOW_BIAS_Y, FLOW_BIAS_COUNT, FLOW_GYRO_IS_IMU, RANGE_DOWN]  # fmt: skip
     memory[zeros] = 0.0
     memory[FLOW_EXCESS] = 1.0
     memory[[HEIGHT_CLOCK, HEADING_CLOCK, IMU_CLOCK, ATTITUDE_CLOCK, FLOW_CLOCK, WRITTEN, RANGE_CLOCK]] = -np.inf

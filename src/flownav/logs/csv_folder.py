@@ -102,9 +102,9 @@ def _tables(folder: Path) -> dict[str, CsvTable]:
         lacking = [*([] if moved else ["one of attitude.csv, imu.csv"])]
         lacking += [] if aided else ["one of gps.csv, flow.csv, px4flow.csv"]
         raise InputError(
-            f"{folder}: {' and '.join(lacking)} missing; a replay needs attitude.csv or imu.csv (of 20 Hz), and gps.csv "
-            "or flow.csv (or px4flow.csv); range.csv (flow's height), baro.csv, mag.csv and truth.csv are used where "
-            "present"
+            f"{folder}: {' and '.join(lacking)} missing; a replay needs attitude.csv or imu.csv (of 20 Hz), and "
+            "gps.csv or flow.csv (or px4flow.csv); range.csv (flow's height), baro.csv, mag.csv and truth.csv are used "
+            "where present"
         )
     if "flow" in present:
         present -= {"px4flow"}  # the same sensor again, in its other message

@@ -27,8 +27,8 @@ from flownav.navigation.state import (
     GROUND_SET,
     HEIGHT_CLOCK,
     RANGE_CLOCK,
+    RANGE_DOUBTED,
     RANGE_DOWN,
-    RANGE_JUMPED,
     RANGE_LAST,
     RANGE_SAME_SINCE,
     RANGE_SINCE,
@@ -45,8 +45,6 @@ from flownav.navigation.vibration import doubt
 UNKNOWN_M = 100.0
 SLOW_S = 10.0
 DOUBTING_S = 0.05  # a range that alone tells the height and is rejected so long is believed, not the accelerometer
-JUMP = 2.0  # gates: a range that leaves at once by so much is an echo or a step; an accelerometer's error grows
-JUMPING_S = 0.5  # since the last good range
 ALONE = 5.0  # times the travel, where nothing else tells the height
 
 
@@ -111,11 +109,11 @@ def take_range(reading: Reading, on: Running) -> None:
     elif reason == INNOVATION_GATE:
         if np.isnan(memory[RANGE_SINCE]):
             memory[RANGE_SINCE] = t_s
-            followed = t_s - memory[RANGE_CLOCK] <= JUMPING_S
-            memory[RANGE_JUMPED] = 1.0 if followed and work[ROWS.test_ratio] > JUMP * JUMP else 0.0
+            memory[RANGE_DOUBTED] = 0.0
         alone = t_s - memory[HEIGHT_CLOCK] > settings.height_hold_s
-        if alone and memory[RANGE_JUMPED] == 0.0 and t_s - memory[RANGE_SINCE] >= DOUBTING_S:
+        if alone and memory[RANGE_DOUBTED] == 0.0 and t_s - memory[RANGE_SINCE] >= DOUBTING_S:
             doubt(t_s, work[ROWS.innovation], on)
+            memory[RANGE_DOUBTED] = 1.0  # once: doubted at each reading, a short echo would be believed too
         if t_s - memory[RANGE_SINCE] >= settings.ground_reset_s:
             set_ground(below, on)
             offer_range(range_m, noise, FUSED, on)

@@ -62,7 +62,7 @@ WORK_ROWS = LEVER + 1
     HEIGHT_CLOCK,
     VIBRATION,
     DOUBT,
-    RANGE_JUMPED,
+    RANGE_DOUBTED,
 ) = range(33)
 SINCE = 33
 COUNT = SINCE + 6
@@ -158,7 +158,7 @@ def new_memory() -> Array:
     """Nothing has been heard."""
     memory = np.full(MEMORY_SIZE, np.nan)
     zeros = [DOUBT, VIBRATION, GAP, STARTED, USE_IMU, USE_ATTITUDE, USE_HEADING, GROUND_SET, BARO_KNOWN, FLAG,
-             LANDED, LEVEL_COUNT, RANGE_JUMPED,
+             LANDED, LEVEL_COUNT, RANGE_DOUBTED,
              FLOW_BIAS_X, FLOW_BIAS_Y, FLOW_BIAS_COUNT, FLOW_GYRO_IS_IMU, RANGE_DOWN]  # fmt: skip
     memory[zeros] = 0.0
     memory[FLOW_EXCESS] = 1.0

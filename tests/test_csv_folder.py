@@ -64,7 +64,9 @@ def test_every_sensor_arrives_in_si_units_and_the_conventions_of_measurement(fol
     header, first, *_ = rows_of(folder / "attitude.csv")
     angles = [float(first[header.index(name)]) for name in ("roll_rad", "pitch_rad", "yaw_rad")]
     assert euler_from_quaternion(*log.streams[Sensor.ATTITUDE].value[0]) == pytest.approx(angles, abs=1e-12)
-    assert log.streams[Sensor.MAG].value[0] == pytest.approx([0.21, 0.01, 0.43])
+    header, first, *_ = rows_of(folder / "mag.csv")
+    mgauss = [float(first[header.index(f"mag_{axis}_mgauss")]) for axis in "xyz"]
+    assert log.streams[Sensor.MAG].value[0] == pytest.approx(np.array(mgauss) / 1000.0)
     assert log.span_s == pytest.approx((0.0, DURATION_S - 0.02))
     assert set(log.inputs) == {f"{name}.csv" for name in FILES if name not in ("px4flow", "truth")}
     assert all(len(digest) == 64 for digest in log.inputs.values())
@@ -136,13 +138,27 @@ def test_no_folder(tmp_path):
 
 def test_an_empty_folder_names_everything_it_needs(tmp_path):
     text = complaint(tmp_path)
-    assert "attitude.csv and one of gps.csv, flow.csv, px4flow.csv missing" in text
+    assert "one of attitude.csv, imu.csv and one of gps.csv, flow.csv, px4flow.csv missing" in text
     assert "range.csv" in text
 
 
-def test_attitude_is_needed(folder):
+def test_an_attitude_or_an_imu_is_needed(folder):
     (folder / "attitude.csv").unlink()
-    assert "attitude.csv missing" in complaint(folder)
+    assert Sensor.ATTITUDE not in read_csv_folder(folder).streams
+    (folder / "imu.csv").unlink()
+    assert "one of attitude.csv, imu.csv missing" in complaint(folder)
+
+
+def test_without_attitude_the_imus_clock_is_the_common_one(folder):
+    (folder / "attitude.csv").unlink()
+    header, *rows = rows_of(folder / "range.csv")
+    place = header.index("t_s")
+    for row in rows:
+        row[place] = str(float(row[place]) + 1e5)
+    put(folder / "range.csv", [header, *rows])
+    said = complaint(folder)
+    assert "range.csv covers" in said
+    assert "imu.csv" in said
 
 
 def test_gps_or_flow_is_needed(folder):

@@ -1,8 +1,8 @@
 """A folder of CSV files, one a sensor, as a Log. docs/csv-folder.md is the format.
 
 Units stand in the column names; time is seconds of one clock; body axes are forward-right-down, the flow is in
-PX4's sensor convention. Sensors a folder lacks are left out; `attitude.csv` and one of `gps.csv`, `flow.csv`,
-`px4flow.csv` must be there.
+PX4's sensor convention. Sensors a folder lacks are left out; one of `attitude.csv` and `imu.csv`, and one of
+`gps.csv`, `flow.csv`, `px4flow.csv` must be there.
 """
 
 from __future__ import annotations
@@ -97,13 +97,14 @@ def _tables(folder: Path) -> dict[str, CsvTable]:
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; replay takes a folder of CSV files (docs/csv-folder.md)")
     present = {name for name in FILES if (folder / f"{name}.csv").exists()}
-    if "attitude" not in present or not present & {"gps", "flow", "px4flow"}:
-        lacking = [*(["attitude.csv"] if "attitude" not in present else [])]
-        if not present & {"gps", "flow", "px4flow"}:
-            lacking.append("one of gps.csv, flow.csv, px4flow.csv")
+    moved, aided = present & {"attitude", "imu"}, present & {"gps", "flow", "px4flow"}
+    if not moved or not aided:
+        lacking = [*([] if moved else ["one of attitude.csv, imu.csv"])]
+        lacking += [] if aided else ["one of gps.csv, flow.csv, px4flow.csv"]
         raise InputError(
-            f"{folder}: {' and '.join(lacking)} missing; a replay needs attitude.csv and gps.csv or flow.csv (or "
-            "px4flow.csv); imu.csv, range.csv (flow's height), baro.csv, mag.csv and truth.csv are used where present"
+            f"{folder}: {' and '.join(lacking)} missing; a replay needs attitude.csv or imu.csv (of 20 Hz), and "
+            "gps.csv or flow.csv (or px4flow.csv); range.csv (flow's height), baro.csv, mag.csv and truth.csv are used "
+            "where present"
         )
     if "flow" in present:
         present -= {"px4flow"}  # the same sensor again, in its other message
@@ -111,13 +112,14 @@ def _tables(folder: Path) -> dict[str, CsvTable]:
 
 
 def _check_overlap(folder: Path, tables: dict[str, CsvTable]) -> None:
-    """Sensors of one flight share a clock: their times must meet the attitude's."""
-    attitude = tables["attitude"].t_s
+    """Sensors of one flight share a clock: their times must meet the attitude's, or the IMU's where there is none."""
+    common = "attitude" if "attitude" in tables else "imu"
+    clock = tables[common].t_s
     for name, table in tables.items():
-        if table.t_s[-1] < attitude[0] or table.t_s[0] > attitude[-1]:
+        if table.t_s[-1] < clock[0] or table.t_s[0] > clock[-1]:
             raise InputError(
-                f"{folder}: {name}.csv covers {table.t_s[0]:g} to {table.t_s[-1]:g} s and attitude.csv "
-                f"{attitude[0]:g} to {attitude[-1]:g} s; all files need one clock, in seconds"
+                f"{folder}: {name}.csv covers {table.t_s[0]:g} to {table.t_s[-1]:g} s and {common}.csv "
+                f"{clock[0]:g} to {clock[-1]:g} s; all files need one clock, in seconds"
             )
 
 

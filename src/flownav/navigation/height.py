@@ -28,12 +28,12 @@ from flownav.navigation.state import (
     GROUND_SET,
     HEIGHT_CLOCK,
     RANGE_CLOCK,
-    RANGE_JUMPED,
+    RANGE_DOUBTED,
+    RANGE_DOWN,
     RANGE_LAST,
     RANGE_SAME_SINCE,
     RANGE_SINCE,
     RANGE_STUCK,
-    RANGE_TRAVEL,
     ROWS,
     STARTED,
     VALUE,
@@ -44,9 +44,8 @@ from flownav.navigation.state import (
 from flownav.navigation.vibration import doubt
 
 UNKNOWN_M = 100.0
+SLOW_S = 10.0
 DOUBTING_S = 0.05  # a range that alone tells the height and is rejected so long is believed, not the accelerometer
-JUMP = 2.0  # gates: a range that leaves at once by so much is an echo or a step; an accelerometer's error grows
-JUMPING_S = 0.5  # since the last good range
 ALONE = 5.0  # times the travel, where nothing else tells the height
 
 
@@ -59,19 +58,23 @@ def range_variance(range_m: float, on: Running) -> float:
 
 @procedure
 def stuck(reading: Reading, on: Running) -> bool:
-    """Whether the range repeats one value to the last digit while the filter's height travels.
+    """Whether the range repeats one value to the last digit while the filter's height travels, by what else tells it.
 
+    The velocity would not do: the range itself holds that back. Slower than 0.1 m in SLOW_S is drift, not travel.
     Where no barometer, GPS or pad has told the height lately, the filter's own drift must be told from a travel.
     """
     memory, settings, range_m = on.memory, on.settings, reading.value[0]
+    down = on.work[ROWS.state + POSITION + 2]
     if range_m != memory[RANGE_LAST]:
-        memory[RANGE_LAST], memory[RANGE_SAME_SINCE], memory[RANGE_TRAVEL] = range_m, reading.t_s, 0.0
+        memory[RANGE_LAST], memory[RANGE_SAME_SINCE], memory[RANGE_DOWN] = range_m, reading.t_s, down
         return False
     lasting_s = reading.t_s - memory[RANGE_SAME_SINCE]
     drift = 3.0 * np.sqrt(on.work[ROWS.covariance + (VELOCITY + 2) * (STATES + 1)]) * lasting_s
     alone = reading.t_s - memory[HEIGHT_CLOCK] > settings.height_hold_s
     least = settings.range_stuck_travel_m + (ALONE * settings.range_stuck_travel_m + drift if alone else 0.0)
-    repeating: bool = lasting_s >= settings.range_stuck_s and abs(memory[RANGE_TRAVEL]) >= least
+    repeating: bool = lasting_s >= settings.range_stuck_s and abs(down - memory[RANGE_DOWN]) >= least
+    if lasting_s >= SLOW_S and not repeating:
+        memory[RANGE_SAME_SINCE], memory[RANGE_DOWN] = reading.t_s, down
     return repeating
 
 
@@ -107,11 +110,11 @@ def take_range(reading: Reading, on: Running) -> None:
     elif reason == INNOVATION_GATE:
         if np.isnan(memory[RANGE_SINCE]):
             memory[RANGE_SINCE] = t_s
-            followed = t_s - memory[RANGE_CLOCK] <= JUMPING_S
-            memory[RANGE_JUMPED] = 1.0 if followed and work[ROWS.test_ratio] > JUMP * JUMP else 0.0
+            memory[RANGE_DOUBTED] = 0.0
         alone = t_s - memory[HEIGHT_CLOCK] > settings.height_hold_s
-        if alone and memory[RANGE_JUMPED] == 0.0 and t_s - memory[RANGE_SINCE] >= DOUBTING_S:
+        if alone and memory[RANGE_DOUBTED] == 0.0 and t_s - memory[RANGE_SINCE] >= DOUBTING_S:
             doubt(t_s, work[ROWS.innovation], on)
+            memory[RANGE_DOUBTED] = 1.0  # once: doubted at each reading, a short echo would be believed too
         if t_s - memory[RANGE_SINCE] >= settings.ground_reset_s:
             set_ground(below, on)
             offer_range(range_m, noise, FUSED, on)

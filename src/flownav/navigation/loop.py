@@ -7,7 +7,7 @@ import numpy as np
 from flownav.compile import ONE_LANE, kernel, procedure
 from flownav.estimation.landing.predict import predict
 from flownav.estimation.landing.settings import LandingSettings
-from flownav.estimation.landing.states import ACCEL_BIAS, GYRO_BIAS, VELOCITY
+from flownav.estimation.landing.states import ACCEL_BIAS, GYRO_BIAS
 from flownav.frames import GRAVITY_M_S2
 from flownav.measurement import Array, EventQueue, Sensor
 from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
@@ -24,7 +24,6 @@ from flownav.navigation.state import (
     IMU_CLOCK,
     IMU_LOST,
     LATEST_IMU,
-    RANGE_TRAVEL,
     ROWS,
     STARTED,
     USE_IMU,
@@ -130,7 +129,6 @@ def advance(t_s: float, on: Running) -> None:
         if moved:
             add_vibration_noise(dt_s, on)
         note_prediction(dt_s, on)
-        memory[RANGE_TRAVEL] += dt_s * work[ROWS.state + VELOCITY + 2]
     memory[CLOCK] = t_s
 
 

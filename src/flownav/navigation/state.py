@@ -46,7 +46,7 @@ WORK_ROWS = OBSERVED + 10
     RANGE_SINCE,
     RANGE_LAST,
     RANGE_SAME_SINCE,
-    RANGE_TRAVEL,
+    RANGE_DOWN,
     BARO_KNOWN,
     FLOW_EXCESS,
     FLOW_CLOCK,
@@ -63,7 +63,7 @@ WORK_ROWS = OBSERVED + 10
     HEIGHT_CLOCK,
     VIBRATION,
     DOUBT,
-    RANGE_JUMPED,
+    RANGE_DOUBTED,
 ) = range(33)
 SINCE = 33
 COUNT = SINCE + 6
@@ -174,9 +174,9 @@ def empty_tape(estimates: int, components: int, events: int) -> Tape:
 def new_memory() -> Array:
     """Nothing has been heard."""
     memory = np.full(MEMORY_SIZE, np.nan)
-    zeros = [RANGE_JUMPED, DOUBT, VIBRATION, GAP, STARTED, USE_IMU, USE_ATTITUDE, USE_HEADING, GROUND_SET, BARO_KNOWN,
-             FLAG, LANDED, LEVEL_COUNT, FLOW_BIAS_X, FLOW_BIAS_Y, FLOW_BIAS_COUNT, FLOW_GYRO_IS_IMU,
-             RANGE_TRAVEL]  # fmt: skip
+    zeros = [DOUBT, VIBRATION, GAP, STARTED, USE_IMU, USE_ATTITUDE, USE_HEADING, GROUND_SET, BARO_KNOWN, FLAG,
+             LANDED, LEVEL_COUNT, RANGE_DOUBTED,
+             FLOW_BIAS_X, FLOW_BIAS_Y, FLOW_BIAS_COUNT, FLOW_GYRO_IS_IMU, RANGE_DOWN]  # fmt: skip
     memory[zeros] = 0.0
     memory[[FLOW_EXCESS, FLOW_RATIO]] = 1.0
     memory[FLOW_DOUBT] = 0.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import signal
 import socket
@@ -9,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+import tracemalloc
 from io import StringIO
 
 import numpy as np
@@ -37,7 +39,7 @@ from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 from live_ends import Hover, Wire
 
-SPEED = 10.0
+SPEED = 8.0
 
 
 def replayed(path):
@@ -61,7 +63,7 @@ def assert_same_bits(path):
 
 @pytest.fixture(scope="module")
 def flight(tmp_path_factory):
-    """pad_return, told over loopback at ten times its pace; the session's clock is the machine's."""
+    """pad_return, told over loopback at eight times its pace; the session's clock is the machine's."""
     warm_up()
     setup = assemble(load_scenario("pad_return"))
     vehicle = SimulatedVehicle(log_of(fly_recorded(setup, 1), setup, flow=Sensor.FLOW_RATE, attitude=True))
@@ -89,7 +91,7 @@ def _tell(vehicle, url, ended):
 
 
 def test_the_estimate_that_comes_back_follows_the_truth(flight):
-    """Velocity within 0.5 m/s, path within 1.5 m, beside the constant error of the first fix, which is the origin."""
+    """Horizontal speed within 0.5 m/s, path within 2 m, beside the constant error of the first fix (the origin)."""
     vehicle, session, _, _ = flight
     told = [message for _, message in vehicle.received if message.msgname == "ODOMETRY"]
     assert len(told) > 500
@@ -104,7 +106,8 @@ def test_the_estimate_that_comes_back_follows_the_truth(flight):
         assert abs(w * w + x * x + y * y + z * z - 1.0) < 1e-5
     away = np.array(errors)
     path = np.abs(away[:, :3] - np.median(away[:, :3], axis=0)).max(axis=0)
-    assert path.max() < 1.5, path
+    assert session.dropped.get("link: lost", 0) < 100
+    assert path.max() < 2.0, path
     assert np.abs(away[:, 3]).max() < 0.5
     assert len({message.reset_counter for message in told}) == 1
 
@@ -177,20 +180,21 @@ def test_a_record_of_another_kind_is_refused(tmp_path):
 
 
 def test_memory_does_not_grow_with_the_session():
-    import tracemalloc
+    wire = Wire(Hover(), Options(), NoRecorder()).fly(4.0)
 
-    wire = Wire(Hover(), Options(), NoRecorder()).fly(10.0)
-    wire.heard.clear(), wire.frames.clear(), wire.heard_s.clear()
+    def held(seconds):
+        wire.fly(seconds)
+        for kept in (wire.heard, wire.frames, wire.heard_s):
+            kept.clear()
+        gc.collect()
+        return tracemalloc.get_traced_memory()[0]
+
     tracemalloc.start()
-    wire.fly(2.0)
-    wire.heard.clear(), wire.frames.clear(), wire.heard_s.clear()
-    before, _ = tracemalloc.get_traced_memory()
-    wire.fly(8.0)
-    wire.heard.clear(), wire.frames.clear(), wire.heard_s.clear()
-    after, _ = tracemalloc.get_traced_memory()
+    before = held(12.0)  # by then the rings of IMU and attitude have been renewed
+    after = held(6.0)
     tracemalloc.stop()
     wire.close()
-    assert after - before < 300e3  # the rings of IMU and attitude fill
+    assert after - before < 40e3  # 6 s bring 1500 messages
 
 
 def free_port():

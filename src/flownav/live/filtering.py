@@ -16,8 +16,8 @@ from flownav.navigation.loop import run
 from flownav.navigation.state import CLOCK, COMPONENTS, GPS_RESET, START, Running, empty_tape
 
 BATCH = 128  # readings at a time
-KEPT_IMU = 2048
-KEPT_ATTITUDES = 256
+KEPT_IMU = 512  # two seconds at 250 Hz, more than the horizon and an exposure
+KEPT_ATTITUDES = 128
 FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 JUMPS = (int(START), int(GPS_RESET))  # events at which the estimate jumps
 

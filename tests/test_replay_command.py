@@ -124,3 +124,11 @@ def test_a_folder_that_is_not_there(tmp_path):
 def test_a_record_that_cannot_be_written(folder, tmp_path):
     (tmp_path / "taken").write_text("")
     assert "cannot be written" in complaint(folder, "--out", tmp_path / "taken" / "garden.fnr")
+
+
+def test_a_folder_without_attitude_is_replayed_by_its_imu(tmp_path):
+    logged = log_of_flight(40.0)
+    del logged.tables["attitude"]
+    facts = answer(logged.write(tmp_path / "bare"), "--gps-outage", "20:38")
+    assert facts["outages"][0]["horizontal_rms_m"] < 0.1
+    assert facts["velocity_rms_m_s"] < 0.05

@@ -146,7 +146,6 @@ class Replay:
 
 def replay(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile) -> Replay:
     """Run a log through the filter. InputError where an option cannot be, or the filter never starts."""
-    check_windows(log, options.gps_outages_s, "--gps-outage")
     with announce_compilation("replay"):
         prepared = prepared_as_fed(log) if log.fed else prepare(log, options)
         return _run(log, options, settings, prepared)

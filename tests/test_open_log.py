@@ -67,7 +67,10 @@ def test_the_kind_of_a_file(tmp_path, name, head, kind):
 
 def test_what_is_no_log_is_said_with_what_would_be(tmp_path):
     (tmp_path / "notes.txt").write_text("hello")
-    known = r"CSV files, a PX4 ULog \(.ulg\), an ArduPilot DataFlash log \(.bin\) or a MAVLink telemetry log \(.tlog\)"
+    known = (
+        r"CSV files, a PX4 ULog \(.ulg\), an ArduPilot DataFlash log \(.bin\), a MAVLink telemetry log \(.tlog\) "
+        r"or a live session's record \(.fnr\)"
+    )
     with pytest.raises(InputError, match=rf"notes.txt: not a log that is known; give a folder of {known}"):
         open_log(tmp_path / "notes.txt")
     with pytest.raises(InputError, match=rf"absent.ulg: no such log; give a folder of {known}"):

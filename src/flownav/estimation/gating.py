@@ -52,7 +52,7 @@ MESSAGES: dict[Reason, str] = {
     Reason.OUTAGE: "The user withheld the reading (a GPS cut, or no flow); its innovation is still shown.",
     Reason.DUPLICATE: "The same reading came before, or one of this sensor that is not older.",
     Reason.LATE: "The reading describes a time that the filter has left behind.",
-    Reason.STUCK: "The sensor repeats one value while the vehicle moves.",
+    Reason.STUCK: "The sensor has repeated one value for long, which is no news, and may be stuck.",
     Reason.NEAR_GROUND: "The vehicle is nearer to the ground than the sensor can be trusted.",
     Reason.NOT_NEEDED: "Another source of the same kind serves; this one is only watched.",
     Reason.AHEAD: "The reading's time stamp lies ahead of the receiver's clock.",

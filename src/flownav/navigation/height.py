@@ -31,6 +31,7 @@ from flownav.navigation.state import (
     RANGE_DOUBTED,
     RANGE_DOWN,
     RANGE_LAST,
+    RANGE_SAID,
     RANGE_SAME_SINCE,
     RANGE_SINCE,
     RANGE_STUCK,
@@ -44,7 +45,6 @@ from flownav.navigation.state import (
 from flownav.navigation.vibration import doubt
 
 UNKNOWN_M = 100.0
-SLOW_S = 10.0
 DOUBTING_S = 0.05  # a range that alone tells the height and is rejected so long is believed, not the accelerometer
 ALONE = 5.0  # times the travel, where nothing else tells the height
 
@@ -57,25 +57,30 @@ def range_variance(range_m: float, on: Running) -> float:
 
 
 @procedure
-def stuck(reading: Reading, on: Running) -> bool:
-    """Whether the range repeats one value to the last digit while the filter's height travels, by what else tells it.
+def repeats(reading: Reading, on: Running) -> bool:
+    """Whether the range has repeated one value to the last digit for long: no news, whatever the vehicle does.
 
-    The velocity would not do: the range itself holds that back. Slower than 0.1 m in SLOW_S is drift, not travel.
-    Where no barometer, GPS or pad has told the height lately, the filter's own drift must be told from a travel.
+    Where no barometer, GPS or pad has told the height lately, the range is all there is, and it is believed unless
+    the height travels by more than the filter's own drift.
     """
     memory, settings, range_m = on.memory, on.settings, reading.value[0]
-    down = on.work[ROWS.state + POSITION + 2]
     if range_m != memory[RANGE_LAST]:
-        memory[RANGE_LAST], memory[RANGE_SAME_SINCE], memory[RANGE_DOWN] = range_m, reading.t_s, down
+        memory[RANGE_LAST], memory[RANGE_SAME_SINCE] = range_m, reading.t_s
+        memory[RANGE_DOWN] = on.work[ROWS.state + POSITION + 2]
         return False
     lasting_s = reading.t_s - memory[RANGE_SAME_SINCE]
-    drift = 3.0 * np.sqrt(on.work[ROWS.covariance + (VELOCITY + 2) * (STATES + 1)]) * lasting_s
     alone = reading.t_s - memory[HEIGHT_CLOCK] > settings.height_hold_s
-    least = settings.range_stuck_travel_m + (ALONE * settings.range_stuck_travel_m + drift if alone else 0.0)
-    repeating: bool = lasting_s >= settings.range_stuck_s and abs(down - memory[RANGE_DOWN]) >= least
-    if lasting_s >= SLOW_S and not repeating:
-        memory[RANGE_SAME_SINCE], memory[RANGE_DOWN] = reading.t_s, down
+    drift = 3.0 * np.sqrt(on.work[ROWS.covariance + (VELOCITY + 2) * (STATES + 1)]) * lasting_s
+    least = ALONE * settings.range_stuck_travel_m + drift if alone else 0.0
+    repeating: bool = lasting_s >= settings.range_stuck_s and travelled(on) >= least
     return repeating
+
+
+@procedure
+def travelled(on: Running) -> float:
+    """How far the height has gone since the range began to repeat itself [m]."""
+    travel: float = np.abs(on.work[ROWS.state + POSITION + 2] - on.memory[RANGE_DOWN])
+    return travel
 
 
 @procedure
@@ -93,11 +98,11 @@ def take_range(reading: Reading, on: Running) -> None:
         reason = OUT_OF_RANGE
     if reason == FUSED and upright < np.cos(settings.tilt_limit_rad):
         reason = TILTED
-    if reason == FUSED and stuck(reading, on):
+    if reason == FUSED and repeats(reading, on):
         reason = STUCK
-        if t_s - memory[RANGE_CLOCK] < settings.range_stuck_s:
+        if travelled(on) >= settings.range_stuck_travel_m and memory[RANGE_SAID] != memory[RANGE_SAME_SINCE]:
             write_event(t_s, RANGE_STUCK, range_m, on.tape)
-            memory[RANGE_CLOCK] -= settings.range_stuck_s
+            memory[RANGE_SAID] = memory[RANGE_SAME_SINCE]
     below = work[ROWS.state + POSITION + 2] + (range_m + settings.range_below_m) * upright
     if reason == FUSED and memory[GROUND_SET] == 0.0:
         set_ground(below, on)

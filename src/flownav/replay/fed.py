@@ -15,7 +15,7 @@ from flownav.navigation.loop import run
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.state import Tape, new_tape
 from flownav.parameter_files import check
-from flownav.replay.prepare import Prepared, ReplayOptions
+from flownav.replay.prepare import Prepared, ReplayOptions, check_windows
 
 
 def as_fed(
@@ -23,7 +23,7 @@ def as_fed(
 ) -> tuple[ReplayOptions, NavigatorSettingsFile]:
     """Options and settings of the session, but for what the user asks for (settings not None).
 
-    InputError where an option would have to change what was fed.
+    InputError where an option would have to change what was fed, or a GPS cut lies outside it.
     """
     if not log.fed:
         return options, settings or NavigatorSettingsFile()
@@ -31,6 +31,7 @@ def as_fed(
         raise InputError(
             f"{log.path}: a live record holds flow as it was fed; replay it without --flow-scale, --sensor"
         )
+    check_windows(log, options.gps_outages_s, "--gps-outage")
     recorded = check(dict(log.fed_settings["filter"]), NavigatorSettingsFile, str(log.path))
     return replace(options, gps_delay_s=float(log.fed_settings["gps_delay_s"])), settings or recorded
 

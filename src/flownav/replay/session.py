@@ -167,7 +167,6 @@ def replay(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, *,
     """
     if smoothed and log.fed:
         raise InputError(f"{log.path}: --smooth takes a log; a live session's record is replayed as it was fed")
-    check_windows(log, options.gps_outages_s, "--gps-outage")
     with announce_compilation("replay"):
         prepared = prepared_as_fed(log) if log.fed else prepare(log, options)
         return _run(log, options, settings, prepared, smoothed=smoothed)

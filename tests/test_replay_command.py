@@ -132,3 +132,4 @@ def test_a_folder_without_attitude_is_replayed_by_its_imu(tmp_path):
     facts = answer(logged.write(tmp_path / "bare"), "--gps-outage", "20:38")
     assert facts["outages"][0]["horizontal_rms_m"] < 0.1
     assert facts["velocity_rms_m_s"] < 0.05
+    assert facts["warnings"] == []

@@ -219,9 +219,9 @@ def test_a_replay_that_fuses_nothing_says_so(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     tables = log_of_flight(20.0).tables
     folder = SyntheticLog({name: tables[name] for name in ("attitude", "flow")}).write(tmp_path / "blind")
-    assert "Note: nothing was fused" in call(folder, "--no-report").stdout
+    assert "Note: nothing horizontal was fused" in call(folder, "--no-report").stdout
     facts = json.loads(call(folder, "--no-report", "--json").stdout)
-    assert facts["warnings"][0].startswith("nothing was fused")
+    assert facts["warnings"][0].startswith("nothing horizontal was fused")
 
 
 def test_without_flow_or_gps_the_barometer_alone_is_nothing_horizontal(tmp_path, monkeypatch):

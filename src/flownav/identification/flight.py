@@ -76,6 +76,8 @@ def flight(log: Log, reference: str = "auto") -> Flight:
         raise InputError(f"{log.path}: no flow readings; a log with a flow sensor's is needed to identify it")
     if Sensor.RANGE not in log.streams:
         raise InputError(f"{log.path}: no range readings; a range is needed for the flow's scale and height")
+    if Sensor.ATTITUDE not in log.streams:
+        raise InputError(f"{log.path}: no attitude; it turns the reference into the sensor's axes")
     chosen, reference_t_s, reference_m = _reference(log, reference)
     prepared = prepare(log, ReplayOptions(gps_delay_s=0.0))
     mine = prepared.queue.sensor == sensor

@@ -134,7 +134,7 @@ def _findings(log: Log) -> tuple[str, list[Finding]]:
 
 def _witness(log: Log) -> Stream | None:
     """The reference's body velocity in the axes of the log's attitude, for want of GPS velocity; None without one."""
-    if log.truth is None or not set(VELOCITY_BODY) <= log.truth.keys():
+    if log.truth is None or Sensor.ATTITUDE not in log.streams or not set(VELOCITY_BODY) <= log.truth.keys():
         return None
     t_s = np.asarray(log.truth["t_s"], float)
     body = np.column_stack([np.asarray(log.truth[name], float) for name in VELOCITY_BODY])

@@ -93,7 +93,7 @@ def findings(streams: dict[Sensor, Stream], gps_outages_s: Iterable[tuple[float,
     }
     found = _of_climb(streams, heard)
     flow = streams.get(Sensor.FLOW_RATE) or streams.get(Sensor.FLOW_VELOCITY)
-    if flow is None or Sensor.GPS_VELOCITY not in heard:
+    if flow is None or Sensor.GPS_VELOCITY not in heard or Sensor.ATTITUDE not in streams:
         return found
     flow = _usable(flow, streams)
     if len(flow) < LEAST_PAIRS:

@@ -14,7 +14,7 @@ from flownav.compile import announce_compilation
 from flownav.errors import InputError
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
-from flownav.measurement import Array, Sensor
+from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.feed import SLOWEST_IMU_HZ, new_navigator
 from flownav.navigation.loop import run
 from flownav.navigation.settings import NavigatorSettingsFile
@@ -58,7 +58,8 @@ class Replay:
     def findings(self) -> list[Finding]:
         """What is wrong with the log, as far as its sensors show, and whether anything was fused at all."""
         fused = self.innovation[self.innovation[:, 8] == Reason.FUSED, 1]
-        found = findings(self.prepared.streams, self.options.gps_outages_s)
+        own = Stream.of(Sensor.ATTITUDE, self.estimate[:, 0], self.estimate[:, 7:11])
+        found = findings({Sensor.ATTITUDE: own, **self.prepared.streams}, self.options.gps_outages_s)
         if not np.isin(fused, HORIZONTAL).any():
             what = "horizontal was fused" if len(fused) else "was fused"
             text = f"nothing {what}: the path is dead reckoning on attitude and accelerometer alone"

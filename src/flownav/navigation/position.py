@@ -74,7 +74,8 @@ def take_gps(reading: Reading, on: Running) -> None:
         fused = fused or (reason == FUSED and axis < 2)
         if reason == FUSED and position and axis == 2:
             on.memory[HEIGHT_CLOCK] = reading.t_s
-        mind_rejections(reading, axis, reason, noise, on)
+        beside = reason == INNOVATION_GATE and not work[ROWS.test_ratio] > 1.0  # refused for the other axis alone
+        mind_rejections(reading, axis, FUSED if beside else reason, noise, on)
     if fused:
         note_aid(reading.t_s, on)
 

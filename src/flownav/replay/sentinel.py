@@ -209,7 +209,7 @@ def _usable(flow: Stream, streams: dict[Sensor, Stream]) -> Stream:
     good = (flow.quality > 0) & np.isfinite(flow.value[:, :2]).all(axis=1)
     good &= rotation_from_quaternion(*attitude_at(streams[Sensor.ATTITUDE], t_s).T)[8] > np.cos(LARGEST_TILT_RAD)
     if flow.sensor == Sensor.FLOW_RATE:
-        good &= np.isfinite(flow.value).all(axis=1)
+        good &= np.isfinite(flow.value[:, :4]).all(axis=1)
         ranges = _ranges(streams)
         good &= _near(ranges[0], t_s) if len(ranges[0]) > 1 else False
     value = flow.value[good, : len(COLUMNS[flow.sensor])]

@@ -133,8 +133,8 @@ def test_json_is_one_object_with_a_row_for_each(command):
         ("silence", 0.5, 5.0),
     ]
     assert set(facts["rows"][0]) == {
-        "fault", "height_m", "duration_s", "detected_after_s", "max_error_m", "recovered_after_s", "wrongly_fused",
-        "touchdown_error_m", "unflagged_above_3_sigma_s",
+        "fault", "height_m", "duration_s", "detected_after_s", "moved_m", "max_error_m", "recovered_after_s",
+        "wrongly_fused", "touchdown_error_m", "unflagged_above_3_sigma_s",
     }  # fmt: skip
 
 

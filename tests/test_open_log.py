@@ -79,8 +79,9 @@ def test_what_is_no_log_is_said_with_what_would_be(tmp_path):
 
 @pytest.mark.parametrize(("topics", "lacking"), [
     (("vehicle_attitude",), "GPS or optical flow"),
-    (("sensor_gps",), "an attitude"),
-    (("vehicle_imu",), "an attitude and GPS or optical flow"),
+    (("sensor_gps",), "an attitude or an IMU"),
+    (("vehicle_imu",), "GPS or optical flow"),
+    (("vehicle_air_data",), "an attitude or an IMU and GPS or optical flow"),
 ])  # fmt: skip
 def test_a_flight_needs_an_attitude_and_something_that_moves(tmp_path, topics, lacking):
     writer = ulog_of_flight(log_of_flight(5.0).tables)

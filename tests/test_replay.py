@@ -226,7 +226,7 @@ def test_gps_that_stays_away_from_the_filter_wins_in_the_end(log):
     stream = log.streams[Sensor.GPS_POSITION]
     value = stream.value + np.where(stream.t_s[:, None] > 30.0, [60.0, 0.0, 0.0], 0.0)
     run = flown(with_stream(log, Sensor.GPS_POSITION, value=value))
-    assert 35 <= reasons(run, Sensor.GPS_POSITION)["innovation_gate"] <= 37
+    assert 70 <= reasons(run, Sensor.GPS_POSITION)["innovation_gate"] <= 74  # both axes of a fix
     record = to_record(run, run.scores(), [])
     events = record.tables["events"]
     reset = np.flatnonzero((events["source"] == "gps") & (events["kind"] == "reset"))

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import ONE_LANE, clamp, procedure
+from flownav.compile import ONE_LANE, procedure
 from flownav.estimation.landing.algebra import add_noise
+from flownav.estimation.landing.bias_limits import hold
 from flownav.estimation.landing.states import ACCEL_BIAS, GYRO_BIAS, VELOCITY
 from flownav.measurement import Array
 from flownav.navigation.state import DOUBT, IMU_DOUBTED, LATEST_IMU, ROWS, VIBRATION, Running, write_event
@@ -63,10 +64,9 @@ def add_vibration_noise(dt_s: float, on: Running) -> None:
 @procedure
 def limit_biases(on: Running) -> None:
     """Hold both biases to what such sensors, and this vibration, can make: the last resort."""
-    settings, work = on.settings.filter, on.work
+    settings = on.settings.filter
     for i in range(3):
         harm = max(excess(on), on.memory[DOUBT]) if i == 2 else excess(on)
         limit = settings.accel_bias_limit_m_s2 + on.settings.vibration_bias_share * harm
-        gyro, force = ROWS.state + GYRO_BIAS + i, ROWS.state + ACCEL_BIAS + i
-        work[gyro] = clamp(work[gyro], -settings.gyro_bias_limit_rad_s, settings.gyro_bias_limit_rad_s)
-        work[force] = clamp(work[force], -limit, limit)
+        hold(on.work, ONE_LANE, ROWS, GYRO_BIAS + i, settings.gyro_bias_limit_rad_s)
+        hold(on.work, ONE_LANE, ROWS, ACCEL_BIAS + i, limit)

@@ -9,13 +9,16 @@ from flownav.estimation.landing.states import ACCEL_BIAS, GYRO_BIAS, LandingRows
 
 
 @equation
+def hold(work: Work, lanes: Lanes, rows: LandingRows, state: int, limit: float) -> None:
+    """One state held between -limit and limit."""
+    for lane in range(len(lanes)):
+        value = work[(rows.state + state) * len(lanes) + lane]
+        work[(rows.state + state) * len(lanes) + lane] = clamp(value, -limit, limit)
+
+
+@equation
 def limit_biases(work: Work, lanes: Lanes, rows: LandingRows, settings: LandingSettings) -> None:
     """Hold gyro and accelerometer biases to what such a sensor can have."""
     for i in range(3):
-        for lane in range(len(lanes)):
-            gyro = work[(rows.state + GYRO_BIAS + i) * len(lanes) + lane]
-            limit = settings.gyro_bias_limit_rad_s
-            work[(rows.state + GYRO_BIAS + i) * len(lanes) + lane] = clamp(gyro, -limit, limit)
-            accel = work[(rows.state + ACCEL_BIAS + i) * len(lanes) + lane]
-            limit = settings.accel_bias_limit_m_s2
-            work[(rows.state + ACCEL_BIAS + i) * len(lanes) + lane] = clamp(accel, -limit, limit)
+        hold(work, lanes, rows, GYRO_BIAS + i, settings.gyro_bias_limit_rad_s)
+        hold(work, lanes, rows, ACCEL_BIAS + i, settings.accel_bias_limit_m_s2)

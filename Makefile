@@ -16,7 +16,7 @@ test-slow: $(VENV)/.ready-test
 	$(BIN)/python -m pytest -m slow
 
 fuzz: $(VENV)/.ready-test
-	FLOWNAV_FUZZ=$${FLOWNAV_FUZZ:-20000} $(BIN)/python -m pytest -m fuzz tests/test_fuzz_logs.py
+	FLOWNAV_FUZZ=$${FLOWNAV_FUZZ:-20000} $(BIN)/python -m pytest -m fuzz tests/logs/test_fuzz_logs.py
 
 lint: $(VENV)/.ready-lint
 	$(BIN)/ruff check .

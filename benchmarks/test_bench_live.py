@@ -23,7 +23,7 @@ from flownav.live.session import Session
 from flownav.live.warm import warm_up
 from flownav.measurement import Sensor
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "helpers"))
 
 DURATION_S = float(os.environ.get("FLOWNAV_LIVE_BENCH_S", "20"))
 FLOW_HZ = 250

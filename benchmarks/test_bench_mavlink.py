@@ -12,7 +12,7 @@ import pytest
 
 from flownav.logs.mavlink_log import read_tlog
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "helpers"))
 from mavlink_logs import flight_log
 
 

@@ -7,12 +7,7 @@ from pathlib import Path
 
 import pytest
 
-SHARED = Path(__file__).resolve().parents[2] / "shared"
-
-
-def data_root() -> Path:
-    """Where the recorded logs would be."""
-    return Path(os.environ.get("FLOWNAV_DATA") or SHARED / "data")
+from places import SHARED
 
 
 def _folder(variable: str, name: str) -> Path:

@@ -2,7 +2,7 @@
 
 ArduPilot's OF message has PX4's convention already: flowX is the rate about body x with a still scene,
 flow_x = w_x - v_y / r, flow_y = w_y + v_x / r, bodyX and bodyY the gyro's rates over the same time
-(a simulated flight's truth bears that out: tests/test_dataflash_flight.py).
+(a simulated flight's truth bears that out: tests/logs/test_dataflash_flight.py).
 """
 
 from __future__ import annotations

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
@@ -18,6 +16,7 @@ from flownav.estimation.landing.observe_pad import PAD_STATES, observe_pad
 from flownav.estimation.landing.settings import FlowLag, LandingSettings
 from flownav.estimation.landing.states import ATTITUDE, LARGEST_TRANSFORM, STATE_NAMES
 from landing_filter import READING, ROWS, STATES, Landing, cross_matrix, landing, random_covariance
+from places import DOCS
 
 SEEDS = st.integers(0, 2**32 - 1)
 OTHERS = [i for i in range(STATES) if not ATTITUDE <= i < ATTITUDE + 3]
@@ -277,6 +276,6 @@ def test_every_state_has_a_name_and_every_row_a_place():
 
 # -- what is written about it --------------------------------------------------------------------------------------
 def test_the_documentation_names_every_setting_and_every_reason():
-    page = (Path(__file__).parents[1] / "docs" / "landing-filter.md").read_text(encoding="utf-8")
+    page = (DOCS / "landing-filter.md").read_text(encoding="utf-8")
     for name in (*LandingSettings._fields, *FlowLag._fields, *(reason.label for reason in Reason)):
         assert f"`{name}`" in page or name in {"f12", "f21"}, name

@@ -14,6 +14,7 @@ from flownav.errors import InputError
 from flownav.frames import euler_from_quaternion
 from flownav.logs.csv_folder import FILES, read_csv_folder
 from flownav.measurement import Sensor
+from places import DOCS
 from replay_logs import ORIGIN, log_of_flight, path, write_table
 
 DURATION_S = 30.0
@@ -426,7 +427,7 @@ def test_mutilated_rows_are_counted_or_refused_in_one_line(folder, data):
 
 
 def test_the_documentation_names_every_file_and_column():
-    page = (Path(__file__).parents[1] / "docs" / "csv-folder.md").read_text(encoding="utf-8")
+    page = (DOCS / "csv-folder.md").read_text(encoding="utf-8")
     for name, columns in FILES.items():
         assert f"`{name}.csv`" in page
         for column in columns:

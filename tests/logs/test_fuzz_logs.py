@@ -18,7 +18,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from conftest import data_root
 from dataflash_files import HEAD, DataFlashWriter, dataflash_of
 from flownav.errors import InputError
 from flownav.logs.csv_folder import read_csv_folder
@@ -32,6 +31,7 @@ from flownav.logs.ulog import read_ulog
 from flownav.measurement import COLUMNS
 from log_mutations import mutate
 from mavlink_logs import flight_log
+from places import data_root
 from replay_logs import SyntheticLog, log_of_flight
 from ulog_files import ulog_of_flight
 

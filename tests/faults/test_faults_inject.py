@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +13,7 @@ from flownav.compile import announce_compilation
 from flownav.errors import InputError
 from flownav.faults.catalogue import FAULTS, FLOW, MEASURED, TEXTURE_NOISE_RAD_S, TEXTURE_SHARE, faults_named
 from flownav.measurement import COLUMNS, Sensor, Stream
+from places import DOCS
 
 RATES_HZ = {Sensor.RANGE: 10.0, Sensor.GPS_POSITION: 5.0, Sensor.GPS_VELOCITY: 5.0, Sensor.PAD: 10.0}
 
@@ -277,7 +277,7 @@ def test_faults_are_found_by_name_in_the_order_asked_for():
 
 
 def test_the_page_names_every_fault_and_no_other():
-    page = (Path(__file__).parents[1] / "docs" / "faults.md").read_text(encoding="utf-8")
+    page = (DOCS / "faults.md").read_text(encoding="utf-8")
     table = page.split("## The faults")[1].split("## The figures")[0]
     assert re.findall(r"^\| `(\w+)` \|", table, re.M) == list(FAULTS)
 

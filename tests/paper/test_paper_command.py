@@ -14,6 +14,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from browsing import CHROMIUM, QUIET, SOFTWARE_GL, Visit
 from flownav.cli import paper as paper_command
 from flownav.errors import InputError, VerdictError
 from flownav.paper import findings, laboratory, published
@@ -22,7 +23,6 @@ from flownav.paper.published import HEIGHTS_M, ErrorRow
 from flownav.paper.reproduction import reproduce
 from flownav.rig.experiment import RigSettings, run_experiment
 from flownav.sensors.datasheet import Dynamics
-from test_report_browser import CHROMIUM, QUIET, SOFTWARE_GL, Visit
 
 FLIGHTS = 48
 FIGURES = {"fit-height", "gain-delay", "orders-swing", "orders-chirp", "error-height", "figure-2-frames",

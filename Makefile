@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-slow fuzz lint bench docs clean
+.PHONY: demo test test-slow fuzz lint bench bench-once docs clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr
@@ -25,7 +25,11 @@ lint: $(VENV)/.ready-lint
 
 bench: $(VENV)/.ready-test
 	$(BIN)/flownav bench
-	$(BIN)/python -m pytest benchmarks --benchmark-only --benchmark-disable-gc
+	$(BIN)/python -m pytest benchmarks --benchmark-disable-gc
+
+bench-once: $(VENV)/.ready-test
+	$(BIN)/flownav bench --flights 16
+	FLOWNAV_LIVE_BENCH_S=$${FLOWNAV_LIVE_BENCH_S:-8} $(BIN)/python -m pytest benchmarks --benchmark-disable
 
 docs: $(VENV)/.ready-docs
 	$(BIN)/zensical build --strict --config-file mkdocs.yml

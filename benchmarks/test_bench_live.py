@@ -11,7 +11,6 @@ import gc
 import multiprocessing
 import os
 import resource
-import sys
 import time
 from pathlib import Path
 
@@ -22,8 +21,6 @@ from flownav.live.recorder import Recorder
 from flownav.live.session import Session
 from flownav.live.warm import warm_up
 from flownav.measurement import Sensor
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "helpers"))
 
 DURATION_S = float(os.environ.get("FLOWNAV_LIVE_BENCH_S", "20"))
 FLOW_HZ = 250

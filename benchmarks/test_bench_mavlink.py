@@ -5,14 +5,9 @@ Run with `python -m pytest benchmarks/test_bench_mavlink.py --benchmark-only`; t
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import pytest
 
 from flownav.logs.mavlink_log import read_tlog
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "helpers"))
 from mavlink_logs import flight_log
 
 

@@ -43,7 +43,7 @@ def report(benchmark, name: str, work: Callable[[], NDArray[np.float64]], truth:
     """Time the work; note frames per CPU second and error; returns the former."""
     found = work()  # compiles
     rates = []
-    for _ in range(3):
+    for _ in range(1 if benchmark.disabled else 3):
         start = time.process_time()
         work()
         rates.append(len(truth) / (time.process_time() - start))
@@ -66,7 +66,7 @@ def test_block_matching(benchmark, scene, version: str) -> None:  # type: ignore
     frames, truth = scene
     firmware = VERSIONS[version]._replace(half_pixel_y_defect=False)
     rate = report(benchmark, f"block matching {version}", lambda: raw_flow(frames, firmware)[0], truth)
-    assert rate >= ASKED_FPS
+    assert benchmark.disabled or rate >= ASKED_FPS
 
 
 @pytest.mark.benchmark(group="flow of 64x64 frames")

@@ -1,0 +1,94 @@
+"""Named tuples kept in flat buffers: code that loads and stores them, written out field by field.
+
+LLVM vectorises straight-line code only, so the functions are generated, not looped.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import linecache
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.compiling.engine import equation
+
+
+def write_function(name: str, source: str, scope: dict[str, Any]) -> Callable[..., Any]:
+    """The function `name` that `source` defines; tracebacks and compilers find its source."""
+    file = f"<flownav {name} {hashlib.sha256(source.encode()).hexdigest()[:12]}>"
+    linecache.cache[file] = (len(source), None, source.splitlines(True), file)
+    exec(compile(source, file, "exec"), scope)
+    function: Callable[..., Any] = scope[name]
+    return function
+
+
+def lane_access(bundle: type, row: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """`load(work, lanes, lane)` and `store(work, lanes, lane, value)` of a named tuple kept in a lane buffer.
+
+    `bundle` is a NamedTuple class of scalars, `row` the constant row of its first field. Field `i` of lane
+    `k` lies at `(row + i) * len(lanes) + k`.
+    """
+    fields: tuple[str, ...] = bundle._fields  # type: ignore[attr-defined]
+    loads = ", ".join(f"work[{row + i} * len(lanes) + lane]" for i in range(len(fields)))
+    stores = "\n".join(f"    work[{row + i} * len(lanes) + lane] = value.{name}" for i, name in enumerate(fields))
+    scope: dict[str, Any] = {"bundle": bundle}
+    load = write_function("load", f"def load(work, lanes, lane):\n    return bundle({loads})\n", scope)
+    store = write_function("store", f"def store(work, lanes, lane, value):\n{stores}\n", scope)
+    return equation(load), equation(store)
+
+
+class FlatAccess(NamedTuple):
+    """A nested named tuple as float64s in a row: how many, how to write them (Python), how to read them (kernels)."""
+
+    size: int
+    pack: Callable[[Any], NDArray[np.float64]]
+    load: Callable[..., Any]
+
+
+def flat_access(bundle: type) -> FlatAccess:
+    """`(size, pack, load)` of a NamedTuple class of floats, ints, bools, such classes and fixed tuples of these.
+
+    `pack(value)` gives the float64s; `load(p)` or `load(p, first)`, an equation, builds the tuple from a pointer
+    (or an array), an `int` field as an int and a `bool` field as a bool.
+    """
+    scope: dict[str, Any] = {}
+    leaves: list[type] = []
+    expression = _load_expression(bundle, scope, leaves)
+    load = write_function("load", f"def load(p, first=0):\n    return {expression}\n", scope)
+
+    def pack(value: Any) -> NDArray[np.float64]:
+        """The float64s of one such tuple, in the order of its fields."""
+        packed = np.array(list(_flattened(value)), dtype=np.float64)
+        if packed.shape != (len(leaves),):
+            raise ValueError(f"{bundle.__name__} has {len(leaves)} numbers, not {packed.size}")
+        return packed
+
+    return FlatAccess(len(leaves), pack, equation(load))
+
+
+def _load_expression(kind: Any, scope: dict[str, Any], leaves: list[type]) -> str:
+    """Source that builds `kind` from `p[first + i]`, i counted by `leaves`; `scope` collects the classes it names."""
+    if kind in (float, int, bool):
+        leaves.append(kind)
+        element = f"p[first + {len(leaves) - 1}]"
+        return {float: element, int: f"int({element})", bool: f"bool({element} != 0.0)"}[kind]
+    if get_origin(kind) is tuple and Ellipsis not in get_args(kind):
+        return "(" + "".join(_load_expression(part, scope, leaves) + ", " for part in get_args(kind)) + ")"
+    if hasattr(kind, "_fields"):
+        hints = get_type_hints(kind)
+        name = f"{kind.__name__}_{len(scope)}"
+        scope[name] = kind
+        return f"{name}(" + ", ".join(_load_expression(hints[field], scope, leaves) for field in kind._fields) + ")"
+    raise TypeError(f"flat_access keeps floats, ints, bools and named tuples of them, not {kind}")
+
+
+def _flattened(value: Any) -> Iterator[float]:
+    """The numbers of nested tuples, in order."""
+    if isinstance(value, tuple):
+        for part in value:
+            yield from _flattened(part)
+    else:
+        yield float(value)

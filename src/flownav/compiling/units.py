@@ -1,0 +1,120 @@
+"""Units: pieces of a kernel that are compiled and cached by themselves and called through their addresses."""
+
+from __future__ import annotations
+
+import ast
+import ctypes
+import inspect
+import linecache
+import textwrap
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numba
+import numpy as np
+from numba import types
+
+LETTERS = {
+    "p": (types.CPointer(types.float64), ctypes.c_void_p, np.float64),
+    "q": (types.CPointer(types.int64), ctypes.c_void_p, np.int64),
+    "d": (types.float64, ctypes.c_double, None),
+    "i": (types.int64, ctypes.c_int64, None),
+}
+
+
+class Unit:
+    """A function with a C interface, compiled apart from its callers; kernels call it by `invoke(address, ...)`."""
+
+    def __init__(self, function: Callable[..., Any], signature: str, constants: dict[str, Any]) -> None:
+        unknown = sorted(set(signature.split()) - set(LETTERS))
+        if unknown:
+            raise ValueError(f"a unit's signature is made of {', '.join(LETTERS)}, not {', '.join(unknown)}")
+        self.function = function
+        self.letters = signature.split()
+        self.constants = constants
+        self.__name__ = function.__name__
+        self.__doc__ = function.__doc__
+
+    def python(self, *arguments: Any) -> None:
+        """The plain Python function on these arguments, its constants bound."""
+        names = [name for name in inspect.signature(self.function).parameters if name not in self.constants]
+        self.function(**dict(zip(names, arguments, strict=True)), **self.constants)
+
+    @cached_property
+    def _compiled(self) -> Any:
+        """Numba's C function, compiled or taken from the cache."""
+        bound = bind_constants(self.function, self.constants)
+        signature = types.void(*(LETTERS[letter][0] for letter in self.letters))
+        return numba.cfunc(signature, cache=False, error_model="numpy")(bound)
+
+    @property
+    def address(self) -> int:
+        """The address of the compiled function, which is compiled or loaded at the first use."""
+        return int(self._compiled.address)
+
+    @cached_property
+    def _entry(self) -> Any:
+        kinds = [LETTERS[letter][1] for letter in self.letters]
+        return ctypes.CFUNCTYPE(None, *kinds)(self.address)
+
+    def __call__(self, *arguments: Any) -> None:
+        """Run the compiled code from Python; a pointer may be given as an array, an address or a ctypes pointer."""
+        if len(arguments) != len(self.letters):
+            raise TypeError(f"{self.__name__} takes {len(self.letters)} arguments, not {len(arguments)}")
+        self._entry(*(_passed(letter, argument) for letter, argument in zip(self.letters, arguments, strict=True)))
+
+
+def unit(function: Callable[..., Any], signature: str, **constants: Any) -> Unit:
+    """A kernel with a C interface, compiled and cached by itself and called through its address.
+
+    `signature` names its arguments: `p` float64*, `q` int64*, `d` a float64, `i` an int64, for example "p p q d i".
+    `constants` are the function's other parameters, fixed when it is compiled: `lanes=LANES` makes `len(lanes)` a
+    constant. It returns nothing and holds or releases no lock: its callers do.
+    """
+    return Unit(function, signature, constants)
+
+
+def _passed(letter: str, argument: Any) -> Any:
+    """An argument as ctypes takes it; an array must be what the letter says."""
+    dtype = LETTERS[letter][2]
+    if dtype is not None and isinstance(argument, np.ndarray):
+        if argument.dtype != dtype or not argument.flags.c_contiguous:
+            raise TypeError(f"'{letter}' takes a contiguous array of {np.dtype(dtype)}, not of {argument.dtype}")
+        return argument.ctypes.data
+    return argument
+
+
+def bind_constants(function: Callable[..., Any], constants: dict[str, Any]) -> Callable[..., Any]:
+    """The function without the parameters `constants`, which become globals and so constants of the compiler."""
+    if not constants:
+        return function
+    source, first_line = inspect.getsource(function), function.__code__.co_firstlineno
+    tree = ast.parse(textwrap.dedent(source))
+    definition = tree.body[0]
+    assert isinstance(definition, ast.FunctionDef)
+    missing = sorted(set(constants) - {argument.arg for argument in _parameters(definition)})
+    if missing:
+        raise TypeError(f"{function.__name__} has no parameter {', '.join(missing)}")
+    _remove_parameters(definition, constants)
+    ast.increment_lineno(tree, first_line - 1)
+    linecache.checkcache(function.__code__.co_filename)
+    names = inspect.getclosurevars(function)
+    scope = {**function.__globals__, **names.nonlocals, **constants}
+    exec(compile(tree, function.__code__.co_filename, "exec", dont_inherit=True), scope)
+    bound: Callable[..., Any] = scope[function.__name__]
+    bound.__qualname__ = function.__qualname__
+    return bound
+
+
+def _parameters(definition: ast.FunctionDef) -> list[ast.arg]:
+    return [*definition.args.posonlyargs, *definition.args.args, *definition.args.kwonlyargs]
+
+
+def _remove_parameters(definition: ast.FunctionDef, constants: dict[str, Any]) -> None:
+    """Take out the parameters of these names, all defaults (a C function has none), annotations and decorators."""
+    kept = [argument for argument in _parameters(definition) if argument.arg not in constants]
+    for argument in kept:
+        argument.annotation = None
+    definition.args = ast.arguments(posonlyargs=[], args=kept, kwonlyargs=[], kw_defaults=[], defaults=[])
+    definition.decorator_list, definition.returns = [], None

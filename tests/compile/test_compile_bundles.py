@@ -1,0 +1,88 @@
+"""Named tuples in flat buffers."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from flownav.compile import equation, flat_access, kernel, lane_access, pointer
+
+
+class Wheel(NamedTuple):
+    radius_m: float
+    spokes: int
+
+
+class Cart(NamedTuple):
+    mass_kg: float
+    left: Wheel
+    braked: bool
+    right: Wheel
+    axle: tuple[float, float]
+
+
+class Named(NamedTuple):
+    name: str
+
+
+CART = Cart(12.5, Wheel(0.25, 8), True, Wheel(0.5, 9), (1.0, 2.0))
+SIZE, pack, load = flat_access(Cart)
+
+
+@kernel
+def rolled(p, first, out):
+    cart = load(pointer(p), first)
+    out[0] = cart.mass_kg * cart.right.radius_m + (100.0 if cart.braked else 0.0)
+    out[1] = cart.left.spokes // 3 + cart.right.spokes % 2 + cart.axle[1]
+
+
+def test_packing_and_loading_give_the_same_tuple():
+    packed = pack(CART)
+    assert SIZE == len(packed) == 8
+    again = load(packed)
+    assert again == CART
+    assert [type(again.left.spokes), type(again.braked), type(again.left)] == [int, bool, Wheel]
+    assert load(np.concatenate([[7.0, 7.0], packed]), 2) == CART
+
+
+def test_a_kernel_loads_ints_as_ints_and_truths_as_truths():
+    out = np.zeros(2)
+    rolled(np.concatenate([[7.0], pack(CART)]), 1, out)
+    assert out.tolist() == [12.5 * 0.5 + 100.0, 8 // 3 + 9 % 2 + 2.0]
+
+
+def test_what_is_no_number_is_refused():
+    with pytest.raises(TypeError, match="not <class 'str'>"):
+        flat_access(Named)
+
+
+def test_a_tuple_of_another_size_is_refused():
+    with pytest.raises(ValueError, match="8 numbers, not 2"):
+        pack(CART.left)
+
+
+def test_lanes_load_what_they_store():
+    load_wheel, store_wheel = lane_access(Wheel, 3)
+    lanes = (0, 0)
+    work = np.zeros(5 * 2)
+    store_wheel(work, lanes, 1, Wheel(0.5, 4))
+    assert load_wheel(work, lanes, 1) == Wheel(0.5, 4)
+    assert work.tolist() == [0, 0, 0, 0, 0, 0, 0, 0.5, 0, 4.0]
+
+
+@equation
+def spin(wheel):
+    return wheel.radius_m * wheel.spokes
+
+
+@kernel
+def spun(p, out):
+    out[0] = spin(load(pointer(p)).left)
+
+
+def test_a_part_of_a_bundle_is_a_bundle():
+    out = np.zeros(1)
+    spun(pack(CART), out)
+    assert out[0] == 2.0

@@ -1,0 +1,114 @@
+"""The datasheet of an inertial measurement unit, and the coefficients that follow from it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import ClassVar
+
+from pydantic import Field
+
+from flownav.frames import GRAVITY_M_S2
+from flownav.parameter_files import Number, ParameterModel
+from flownav.sensors.inertial import InertialParameters
+from flownav.sensors.sheet import SensorSheet
+
+
+class GyroSheet(ParameterModel):
+    """density: one-sided; bias: at the start, one standard deviation; scale, misalignment, g-sensitivity: the same."""
+
+    density_deg_s_rthz: Number = Field(ge=0.0, le=100.0)
+    bias_deg_s: Number = Field(ge=0.0, le=100.0)
+    walk_deg_s_rts: Number = Field(ge=0.0, le=100.0)
+    scale_percent: Number = Field(ge=0.0, le=20.0)
+    misalignment_deg: Number = Field(ge=0.0, le=5.0)
+    g_sensitivity_deg_s_g: Number = Field(ge=0.0, le=10.0)
+    range_deg_s: Number = Field(gt=0.0, le=1e4)
+
+
+class AccelerometerSheet(ParameterModel):
+    """As the gyro's; densities and biases in parts of standard gravity."""
+
+    density_ug_rthz: Number = Field(ge=0.0, le=1e5)
+    bias_mg: Number = Field(ge=0.0, le=1000.0)
+    walk_mg_rts: Number = Field(ge=0.0, le=1000.0)
+    scale_percent: Number = Field(ge=0.0, le=20.0)
+    misalignment_deg: Number = Field(ge=0.0, le=5.0)
+    range_g: Number = Field(gt=0.0, le=1000.0)
+
+
+class Tone(ParameterModel):
+    """Amplitudes at one frequency, where the unit is fixed: along body x and y, along z, about x and y, about z."""
+
+    level_m_s2: Number = Field(0.0, ge=0.0, le=200.0)
+    vertical_m_s2: Number = Field(0.0, ge=0.0, le=200.0)
+    tilt_deg_s: Number = Field(0.0, ge=0.0, le=500.0)
+    yaw_deg_s: Number = Field(0.0, ge=0.0, le=500.0)
+
+
+class Vibration(ParameterModel):
+    """Tones at the rotor's and at the blades' frequency; `spread` is the share by which flights differ."""
+
+    spread: Number = Field(0.0, ge=0.0, le=2.0)
+    rotor: Tone = Tone()
+    blades: Tone = Tone()
+
+
+class InertialSheet(SensorSheet):
+    """An IMU. `bandwidth_hz`: of the filter ahead of the mean over the period (-3 dB, first order)."""
+
+    shipped_file: ClassVar[str] = "inertial.toml"
+
+    rate_hz: Number = Field(ge=100.0, le=1000.0)
+    bandwidth_hz: Number = Field(gt=0.0, le=1e5)
+    gyro: GyroSheet
+    accelerometer: AccelerometerSheet
+    vibration: Vibration = Vibration()
+
+    def left_of_tone(self, frequency_hz: float) -> float:
+        """Amplitude in the readings over amplitude where the unit is fixed: bandwidth, and the mean over a period."""
+        turn = math.pi * frequency_hz * self.period_s
+        mean = math.sin(turn) / turn if turn > 0.0 else 1.0
+        return mean / math.hypot(1.0, frequency_hz / self.bandwidth_hz)
+
+    def parameters(self, rotor_speed_rad_s: float, blade_count: float) -> InertialParameters:
+        """Coefficients of one period on a vehicle with this rotor (of a multirotor: one of its propellers)."""
+        rt_period, per_reading = math.sqrt(self.period_s), math.sqrt(0.5 * self.rate_hz)
+        mg = 1e-3 * GRAVITY_M_S2
+        gyro, accel, shake = self.gyro, self.accelerometer, self.vibration
+        blades_rad_s = rotor_speed_rad_s * blade_count
+        return InertialParameters(
+            gyro_sigma_rad_s=math.radians(gyro.density_deg_s_rthz) * per_reading,
+            gyro_bias_rad_s=math.radians(gyro.bias_deg_s),
+            gyro_walk_rad_s=math.radians(gyro.walk_deg_s_rts) * rt_period,
+            gyro_scale=0.01 * gyro.scale_percent,
+            gyro_misalignment_rad=math.radians(gyro.misalignment_deg),
+            gyro_per_force_rad_s=math.radians(gyro.g_sensitivity_deg_s_g) / GRAVITY_M_S2,
+            gyro_range_rad_s=math.radians(gyro.range_deg_s),
+            accel_sigma_m_s2=1e-3 * mg * accel.density_ug_rthz * per_reading,
+            accel_bias_m_s2=mg * accel.bias_mg,
+            accel_walk_m_s2=mg * accel.walk_mg_rts * rt_period,
+            accel_scale=0.01 * accel.scale_percent,
+            accel_misalignment_rad=math.radians(accel.misalignment_deg),
+            accel_range_m_s2=GRAVITY_M_S2 * accel.range_g,
+            **self._tone("rev", shake.rotor, rotor_speed_rad_s),
+            **self._tone("blade", shake.blades, blades_rad_s),
+            vibration_spread=shake.spread,
+        )
+
+    def _tone(self, name: str, tone: Tone, speed_rad_s: float) -> dict[str, float]:
+        left = self.left_of_tone(speed_rad_s / (2.0 * math.pi))
+        turn = speed_rad_s * self.period_s
+        return {
+            f"{name}_cosine": math.cos(turn),
+            f"{name}_sine": math.sin(turn),
+            f"{name}_level_m_s2": left * tone.level_m_s2,
+            f"{name}_vertical_m_s2": left * tone.vertical_m_s2,
+            f"{name}_tilt_rad_s": left * math.radians(tone.tilt_deg_s),
+            f"{name}_yaw_rad_s": left * math.radians(tone.yaw_deg_s),
+        }
+
+
+def load_inertial_sheet(path: Path | str | None = None) -> InertialSheet:
+    """The IMU of a file; the shipped one where `path` is None."""
+    return InertialSheet.read(path)

@@ -48,16 +48,16 @@ class FlatAccess(NamedTuple):
     load: Callable[..., Any]
 
 
-def flat_access(bundle: type) -> FlatAccess:
+def flat_access(bundle: type, at: int = 0) -> FlatAccess:
     """`(size, pack, load)` of a NamedTuple class of floats, ints, bools, such classes and fixed tuples of these.
 
     `pack(value)` gives the float64s; `load(p)` or `load(p, first)`, an equation, builds the tuple from a pointer
-    (or an array), an `int` field as an int and a `bool` field as a bool.
+    (or an array), an `int` field as an int and a `bool` field as a bool. at: where it starts unless `first` says.
     """
     scope: dict[str, Any] = {}
     leaves: list[type] = []
     expression = _load_expression(bundle, scope, leaves)
-    load = write_function("load", f"def load(p, first=0):\n    return {expression}\n", scope)
+    load = write_function("load", f"def load(p, first={at}):\n    return {expression}\n", scope)
 
     def pack(value: Any) -> NDArray[np.float64]:
         """The float64s of one such tuple, in the order of its fields."""

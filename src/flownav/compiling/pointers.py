@@ -51,12 +51,10 @@ class _PointerType(AbstractTemplate):
         return None
 
 
-@lower_builtin(pointer, types.Array)
 def _lower_pointer(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return context.make_array(sig.args[0])(context, builder, value=args[0]).data
 
 
-@lower_builtin(pointer, types.CPointer)
 def _lower_same_pointer(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return args[0]
 
@@ -79,9 +77,13 @@ def _passed(argument: Any) -> Any:
     return types.float64 if isinstance(argument, types.Float) else types.int64
 
 
-@lower_builtin(invoke, types.Integer, types.VarArg(types.Any))
 def _lower_invoke(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     address, *arguments = args
     callee = ir.FunctionType(ir.VoidType(), [a.type for a in arguments])
     builder.call(builder.inttoptr(address, callee.as_pointer()), arguments)
     return context.get_dummy_value()
+
+
+lower_builtin(pointer, types.Array)(_lower_pointer)
+lower_builtin(pointer, types.CPointer)(_lower_same_pointer)
+lower_builtin(invoke, types.Integer, types.VarArg(types.Any))(_lower_invoke)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, kernel
+from flownav.compile import equation, kernel, pointer
 from flownav.control.autopilot import (
     AutopilotGains,
     AutopilotState,
@@ -257,6 +257,7 @@ def fly_block(flight: Flight, seed: int, first: int, lanes: Lanes, work: Work, h
     work (ROWS * len(lanes),) is scratch, zeroed here; history (epochs, len(HISTORY), len(lanes)) is filled.
     """
     work[:] = 0.0
+    work = pointer(work)
     start_block(work, lanes, seed, first, flight)
     for epoch in range(flight.plan.epochs):
         t_s = epoch * EPOCH_S

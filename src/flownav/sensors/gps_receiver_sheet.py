@@ -1,0 +1,93 @@
+"""The datasheet of a GPS receiver, and the coefficients that follow from it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import ClassVar
+
+from pydantic import Field
+
+from flownav.parameter_files import Number, ParameterModel
+from flownav.sensors.first_order import lag_weights
+from flownav.sensors.gauss_markov import gauss_markov_coefficients
+from flownav.sensors.gps_receiver import GpsReceiverParameters
+from flownav.sensors.quantisation import steps_per_unit
+from flownav.sensors.sheet import Lever, SensorSheet, Spells
+
+
+class PositionErrors(ParameterModel):
+    """Slow, fast and white error of an axis; `spread`: the share by which flights differ in all of them."""
+
+    slow_sigma_m: Number = Field(ge=0.0, le=100.0)
+    slow_sigma_down_m: Number = Field(ge=0.0, le=100.0)
+    slow_tau_s: Number = Field(ge=0.0, le=1e5)
+    fast_sigma_m: Number = Field(ge=0.0, le=100.0)
+    fast_sigma_down_m: Number = Field(ge=0.0, le=100.0)
+    fast_tau_s: Number = Field(ge=0.0, le=1e5)
+    white_sigma_m: Number = Field(ge=0.0, le=100.0)
+    white_sigma_down_m: Number = Field(ge=0.0, le=100.0)
+    quantum_m: Number = Field(0.0, ge=0.0, le=1.0)
+    spread: Number = Field(0.0, ge=0.0, le=2.0)
+
+
+class VelocityErrors(ParameterModel):
+    """Correlated and white error of an axis, and the time constant of the receiver's own smoothing."""
+
+    sigma_m_s: Number = Field(ge=0.0, le=10.0)
+    sigma_down_m_s: Number = Field(ge=0.0, le=10.0)
+    tau_s: Number = Field(ge=0.0, le=1e5)
+    white_m_s: Number = Field(ge=0.0, le=10.0)
+    white_down_m_s: Number = Field(ge=0.0, le=10.0)
+    smoothing_tau_s: Number = Field(0.0, ge=0.0, le=2.0)
+    quantum_m_s: Number = Field(0.0, ge=0.0, le=1.0)
+
+
+class GpsReceiverSheet(SensorSheet):
+    """A receiver. `stated_spread`: the share by which the accuracies that it states are wrong."""
+
+    shipped_file: ClassVar[str] = "gps_receiver.toml"
+
+    rate_hz: Number = Field(ge=0.2, le=50.0)
+    position: PositionErrors
+    velocity: VelocityErrors
+    stated_spread: Number = Field(0.0, ge=0.0, le=2.0)
+    outage: Spells = Spells()
+    antenna: Lever = Lever()
+
+    @property
+    def horizontal_sigma_m(self) -> float:
+        """Standard deviation of a horizontal axis, all position errors together."""
+        e = self.position
+        return math.hypot(e.slow_sigma_m, e.fast_sigma_m, e.white_sigma_m)
+
+    @property
+    def vertical_sigma_m(self) -> float:
+        """The same of the vertical."""
+        e = self.position
+        return math.hypot(e.slow_sigma_down_m, e.fast_sigma_down_m, e.white_sigma_down_m)
+
+    @property
+    def speed_sigma_m_s(self) -> float:
+        """Standard deviation of a horizontal velocity, its lag apart."""
+        return math.hypot(self.velocity.sigma_m_s, self.velocity.white_m_s)
+
+    def parameters(self) -> GpsReceiverParameters:
+        """Coefficients of one period."""
+        e, v, period = self.position, self.velocity, self.period_s
+        return GpsReceiverParameters(
+            self.antenna.forward_m, self.antenna.right_m, self.antenna.down_m,
+            *gauss_markov_coefficients(e.slow_tau_s, period), e.slow_sigma_m, e.slow_sigma_down_m,
+            *gauss_markov_coefficients(e.fast_tau_s, period), e.fast_sigma_m, e.fast_sigma_down_m,
+            e.white_sigma_m, e.white_sigma_down_m,
+            *gauss_markov_coefficients(v.tau_s, period), v.sigma_m_s, v.sigma_down_m_s, v.white_m_s, v.white_down_m_s,
+            *lag_weights(v.smoothing_tau_s, period),
+            e.quantum_m, steps_per_unit(e.quantum_m), v.quantum_m_s, steps_per_unit(v.quantum_m_s),
+            self.horizontal_sigma_m, self.vertical_sigma_m, self.speed_sigma_m_s,
+            self.stated_spread, e.spread, *self.outage.levels(period),
+        )  # fmt: skip
+
+
+def load_gps_receiver_sheet(path: Path | str | None = None) -> GpsReceiverSheet:
+    """The receiver of a file; the shipped one where `path` is None."""
+    return GpsReceiverSheet.read(path)

@@ -1,0 +1,116 @@
+"""The datasheet of a flow camera: what a sensor file (`datasheet.FlowSensor`: dynamics, noise, limits) does not say."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import ClassVar
+
+from pydantic import Field, ValidationInfo, field_validator
+
+from flownav.parameter_files import Number, ParameterModel
+from flownav.sensors.chance import level_of
+from flownav.sensors.flow_camera import FlowCameraParameters
+from flownav.sensors.sheet import Lever, SensorSheet, Spells
+
+
+class Gain(ParameterModel):
+    """The gain over the sensor file's, at heights from low to high: its spread, and where it is cut off."""
+
+    sigma: Number = Field(ge=0.0, le=1.0)
+    lowest: Number = Field(gt=0.0, le=1.0)
+    highest: Number = Field(ge=1.0, le=10.0)
+    low_height_m: Number = Field(gt=0.0, le=1000.0)
+    high_height_m: Number = Field(gt=0.0, le=1000.0)
+
+    @field_validator("high_height_m")
+    @classmethod
+    def _above(cls, value: float, info: ValidationInfo) -> float:
+        if value <= info.data.get("low_height_m", 0.0):
+            raise ValueError(f"more than low_height_m = {info.data['low_height_m']:g} is needed")
+        return value
+
+
+class CameraGyro(ParameterModel):
+    """The gyro on the camera's board; density one-sided, the others one standard deviation."""
+
+    density_deg_s_rthz: Number = Field(ge=0.0, le=100.0)
+    bias_deg_s: Number = Field(ge=0.0, le=100.0)
+    walk_deg_s_rts: Number = Field(ge=0.0, le=100.0)
+    scale_percent: Number = Field(ge=0.0, le=50.0)
+
+
+class Texture(ParameterModel):
+    """The least texture (0 to 1) that it can follow; spells that leave `remaining` of it and multiply the noise."""
+
+    least: Number = Field(0.05, ge=0.0, le=1.0)
+    low: Spells = Spells()
+    remaining: Number = Field(0.3, ge=0.0, le=1.0)
+    noise_factor: Number = Field(3.0, ge=1.0, le=100.0)
+
+
+class Quality(ParameterModel):
+    """best: low, slow, over good texture; shares of it lost at the sensor file's greatest height and fastest flow."""
+
+    best: Number = Field(ge=1.0, le=255.0)
+    lost_at_height: Number = Field(ge=0.0, le=1.0)
+    lost_at_speed: Number = Field(ge=0.0, le=1.0)
+    sigma: Number = Field(ge=0.0, le=255.0)
+
+
+class Outliers(ParameterModel):
+    """What share of the readings is off by an error of this standard deviation."""
+
+    share: Number = Field(0.0, ge=0.0, le=1.0)
+    sigma_rad_s: Number = Field(1.0, ge=0.0, le=100.0)
+
+
+class FlowCameraSheet(SensorSheet):
+    """A flow camera. `exposure_s`: over which it sums image and gyro; `lost_share`: of readings that never arrive."""
+
+    shipped_file: ClassVar[str] = "flow_camera.toml"
+
+    rate_hz: Number = Field(ge=1.0, le=500.0)
+    exposure_s: Number = Field(gt=0.0, le=1.0)
+    lost_share: Number = Field(0.0, ge=0.0, le=1.0)
+    misalignment_deg: Number = Field(ge=0.0, le=10.0)
+    noise_spread: Number = Field(0.0, ge=0.0, le=2.0)
+    gain: Gain
+    gyro: CameraGyro
+    texture: Texture = Texture()
+    quality: Quality
+    outliers: Outliers = Outliers()
+    lens: Lever = Lever()
+
+    def parameters(self) -> FlowCameraParameters:
+        """Coefficients of one reading."""
+        low, high = self.gain.low_height_m**0.25, self.gain.high_height_m**0.25
+        return FlowCameraParameters(
+            gain_sigma=self.gain.sigma,
+            gain_lowest=self.gain.lowest,
+            gain_highest=self.gain.highest,
+            gain_centre=0.5 * (low + high),
+            gain_scale=2.0 / (high - low),
+            noise_spread=self.noise_spread,
+            misalignment_rad=math.radians(self.misalignment_deg),
+            gyro_sigma_rad_s=math.radians(self.gyro.density_deg_s_rthz) / math.sqrt(2.0 * self.exposure_s),
+            gyro_bias_rad_s=math.radians(self.gyro.bias_deg_s),
+            gyro_walk_rad_s=math.radians(self.gyro.walk_deg_s_rts) * math.sqrt(self.period_s),
+            gyro_scale=0.01 * self.gyro.scale_percent,
+            least_texture=self.texture.least,
+            low_texture=self.texture.remaining,
+            low_texture_noise=self.texture.noise_factor,
+            **dict(zip(("low_begins_above", "low_ends_above"), self.texture.low.levels(self.period_s), strict=True)),
+            outlier_above=level_of(self.outliers.share),
+            outlier_sigma_rad_s=self.outliers.sigma_rad_s,
+            best_quality=self.quality.best,
+            quality_fall_height=self.quality.lost_at_height,
+            quality_fall_flow=self.quality.lost_at_speed,
+            quality_sigma=self.quality.sigma,
+            lost_above=level_of(self.lost_share),
+        )
+
+
+def load_flow_camera_sheet(path: Path | str | None = None) -> FlowCameraSheet:
+    """The flow camera of a file; the shipped one where `path` is None."""
+    return FlowCameraSheet.read(path)

@@ -1,0 +1,248 @@
+"""The filter's covariance on lanes: test, correct, forget, add noise.
+
+P is symmetric, so only its upper triangle is kept, column by column: element (i, j), i <= j, lies at row
+COVARIANCE + j (j + 1)/2 + i. Nothing can make it unsymmetric. The number of states `n` is an argument: 36, or 40 where
+the flow sensor's dynamics are carried. Observations are scalars, fused one after the other, which for uncorrelated
+noise is the joint update and inverts nothing. A lane that is not offered a reading, or refuses it, keeps every bit.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.compile import equation, procedure
+from flownav.estimation.states import (
+    ACCEPTED,
+    ATTITUDE,
+    COEFFICIENT,
+    COVARIANCE,
+    CROSS,
+    GAIN,
+    INNOVATION,
+    INNOVATION_VARIANCE,
+    NOISE,
+    OBSERVED,
+    OFFERED,
+    QUATERNION,
+    REST,
+    STATE,
+    TEST_RATIO,
+)
+
+Work = Any  # a flat float64 array in Python, the address of its first element in kernels (`compile.pointer`)
+Lanes = tuple[int, ...]
+
+LARGEST_VARIANCE = 1e30
+
+
+@equation
+def at(i: int, j: int) -> int:
+    """Row of element (i, j), i <= j."""
+    return COVARIANCE + j * (j + 1) // 2 + i
+
+
+@equation
+def place(i: int, j: int) -> int:
+    """Row of element (i, j) in either order."""
+    return at(i, j) if i <= j else at(j, i)
+
+
+# -- one reading ----------------------------------------------------------------------------------------------
+@procedure
+def fuse(work: Work, lanes: Lanes, n: int, gate_sigma: float) -> None:
+    """Test and fuse the observation whose law, NOISE and OFFERED stand in their rows."""
+    expect(work, lanes, n, True)
+    settle(work, lanes, n, gate_sigma)
+
+
+@procedure
+def expect(work: Work, lanes: Lanes, n: int, always: bool) -> None:
+    """c = P h', S = h c + R, and in ACCEPTED whether the reading may be tested at all: offered, of a sound variance.
+
+    Where no lane offers it, CROSS and INNOVATION_VARIANCE are left as they are, unless they are wanted `always`.
+    """
+    offering = 0
+    for lane in range(len(lanes)):
+        noise = work[NOISE * len(lanes) + lane]
+        sound = noise >= 0.0 and noise < LARGEST_VARIANCE
+        offered = sound and work[OFFERED * len(lanes) + lane] > 0.0
+        work[ACCEPTED * len(lanes) + lane] = 1.0 if offered else 0.0
+        work[INNOVATION_VARIANCE * len(lanes) + lane] = noise if sound else 1.0
+        offering += 1 if offered else 0
+    if offering == 0 and not always:
+        return
+    for j in range(n):
+        for lane in range(len(lanes)):
+            work[(CROSS + j) * len(lanes) + lane] = 0.0
+    for t in range(int(work[OBSERVED * len(lanes)])):
+        observed = int(work[(OBSERVED + 1 + t) * len(lanes)])
+        add_row(work, lanes, n, observed, COEFFICIENT + t)
+    for t in range(int(work[OBSERVED * len(lanes)])):
+        observed = int(work[(OBSERVED + 1 + t) * len(lanes)])
+        for lane in range(len(lanes)):
+            product = work[(COEFFICIENT + t) * len(lanes) + lane] * work[(CROSS + observed) * len(lanes) + lane]
+            work[INNOVATION_VARIANCE * len(lanes) + lane] += product
+
+
+@equation
+def add_row(work: Work, lanes: Lanes, n: int, i: int, factor: int) -> None:
+    """c <- c + h_i P_i: a row of P, times the coefficient in row `factor`."""
+    for j in range(i + 1):
+        for lane in range(len(lanes)):
+            product = work[factor * len(lanes) + lane] * work[at(j, i) * len(lanes) + lane]
+            work[(CROSS + j) * len(lanes) + lane] += product
+    for j in range(i + 1, n):
+        for lane in range(len(lanes)):
+            product = work[factor * len(lanes) + lane] * work[at(i, j) * len(lanes) + lane]
+            work[(CROSS + j) * len(lanes) + lane] += product
+
+
+@procedure
+def settle(work: Work, lanes: Lanes, n: int, gate_sigma: float) -> None:
+    """Test what `expect` left, nu^2 <= gate^2 S, and correct with what passes."""
+    for lane in range(len(lanes)):
+        variance = work[INNOVATION_VARIANCE * len(lanes) + lane]
+        innovation = work[INNOVATION * len(lanes) + lane]
+        ratio = innovation * innovation / (gate_sigma * gate_sigma * variance)
+        fused = work[ACCEPTED * len(lanes) + lane] > 0.0 and variance > 0.0 and ratio <= 1.0
+        work[TEST_RATIO * len(lanes) + lane] = ratio
+        work[ACCEPTED * len(lanes) + lane] = 1.0 if fused else 0.0
+    correct(work, lanes, n)
+
+
+@procedure
+def correct(work: Work, lanes: Lanes, n: int) -> None:
+    """x <- x + K nu and Joseph's P <- (I - K h) P (I - K h)' + K R K' in the lanes that accepted.
+
+    Written out, with c = P h', S = h c + R and d = c - K S/2, it is P - (K d' + d K'), whatever the gain (Bucy and
+    Joseph, Filtering for Stochastic Processes with Applications to Guidance, 1968).
+    """
+    fused_lanes = 0
+    for lane in range(len(lanes)):
+        fused_lanes += 1 if work[ACCEPTED * len(lanes) + lane] > 0.0 else 0
+    if fused_lanes == 0:
+        return
+    for i in range(n):
+        for lane in range(len(lanes)):
+            fused = work[ACCEPTED * len(lanes) + lane] > 0.0
+            variance = work[INNOVATION_VARIANCE * len(lanes) + lane] if fused else 1.0
+            cross = work[(CROSS + i) * len(lanes) + lane] if fused else 0.0
+            gain = cross / variance
+            before = work[(STATE + i) * len(lanes) + lane]
+            after = before + gain * work[INNOVATION * len(lanes) + lane]
+            work[(GAIN + i) * len(lanes) + lane] = gain
+            work[(REST + i) * len(lanes) + lane] = cross - 0.5 * gain * variance
+            work[(STATE + i) * len(lanes) + lane] = after if fused else before
+    for j in range(n):
+        for i in range(j + 1):
+            for lane in range(len(lanes)):
+                gain_i, gain_j = work[(GAIN + i) * len(lanes) + lane], work[(GAIN + j) * len(lanes) + lane]
+                rest_i, rest_j = work[(REST + i) * len(lanes) + lane], work[(REST + j) * len(lanes) + lane]
+                work[at(i, j) * len(lanes) + lane] -= gain_i * rest_j + gain_j * rest_i
+    fold_attitude(work, lanes)
+
+
+@procedure
+def fold_attitude(work: Work, lanes: Lanes) -> None:
+    """The correction of the attitude error into the quaternion: q <- (1, theta/2) q, of unit length; theta <- 0.
+
+    Without a correction the quaternion keeps its last bit.
+    """
+    for lane in range(len(lanes)):
+        x = 0.5 * work[(STATE + ATTITUDE) * len(lanes) + lane]
+        y = 0.5 * work[(STATE + ATTITUDE + 1) * len(lanes) + lane]
+        z = 0.5 * work[(STATE + ATTITUDE + 2) * len(lanes) + lane]
+        qw = work[QUATERNION * len(lanes) + lane]
+        qx = work[(QUATERNION + 1) * len(lanes) + lane]
+        qy = work[(QUATERNION + 2) * len(lanes) + lane]
+        qz = work[(QUATERNION + 3) * len(lanes) + lane]
+        w = qw - x * qx - y * qy - z * qz
+        a = qx + x * qw + y * qz - z * qy
+        b = qy - x * qz + y * qw + z * qx
+        c = qz + x * qy - y * qx + z * qw
+        corrected = x != 0.0 or y != 0.0 or z != 0.0
+        shrink = 1.0 / np.sqrt(w * w + a * a + b * b + c * c)
+        work[QUATERNION * len(lanes) + lane] = w * shrink if corrected else qw
+        work[(QUATERNION + 1) * len(lanes) + lane] = a * shrink if corrected else qx
+        work[(QUATERNION + 2) * len(lanes) + lane] = b * shrink if corrected else qy
+        work[(QUATERNION + 3) * len(lanes) + lane] = c * shrink if corrected else qz
+        work[(STATE + ATTITUDE) * len(lanes) + lane] = 0.0
+        work[(STATE + ATTITUDE + 1) * len(lanes) + lane] = 0.0
+        work[(STATE + ATTITUDE + 2) * len(lanes) + lane] = 0.0
+
+
+# -- single states --------------------------------------------------------------------------------------------
+@equation
+def add_noise(work: Work, lanes: Lanes, state: int, variance: float) -> None:
+    """P_ii <- P_ii + variance, in every lane."""
+    for lane in range(len(lanes)):
+        work[at(state, state) * len(lanes) + lane] += variance
+
+
+@equation
+def add_noise_lane(work: Work, lanes: Lanes, state: int, lane: int, variance: float) -> None:
+    """P_ii <- P_ii + variance, in one lane."""
+    work[at(state, state) * len(lanes) + lane] += variance
+
+
+@procedure
+def decay(work: Work, lanes: Lanes, n: int, state: int, factor: float) -> None:
+    """x_i <- factor x_i, in every lane: the transition of a Gauss-Markov error."""
+    for lane in range(len(lanes)):
+        work[(STATE + state) * len(lanes) + lane] *= factor
+        work[at(state, state) * len(lanes) + lane] *= factor
+    for j in range(state + 1):
+        for lane in range(len(lanes)):
+            work[at(j, state) * len(lanes) + lane] *= factor
+    for j in range(state + 1, n):
+        for lane in range(len(lanes)):
+            work[at(state, j) * len(lanes) + lane] *= factor
+
+
+@procedure
+def forget(work: Work, lanes: Lanes, n: int, state: int, variance: float, where_row: int) -> None:
+    """Where row `where_row` is above 0: the state loses its correlations and gets this variance (a reset)."""
+    for lane in range(len(lanes)):
+        if work[where_row * len(lanes) + lane] > 0.0:
+            forget_lane(work, lanes, n, state, lane, variance)
+
+
+@procedure
+def forget_lane(work: Work, lanes: Lanes, n: int, state: int, lane: int, variance: float) -> None:
+    """The state of one lane loses its correlations and gets this variance."""
+    for j in range(n):
+        work[place(state, j) * len(lanes) + lane] = 0.0
+    work[at(state, state) * len(lanes) + lane] = variance
+
+
+@equation
+def variance_of(work: Work, lanes: Lanes, state: int, lane: int) -> float:
+    """P_ii of a lane."""
+    value: float = work[at(state, state) * len(lanes) + lane]
+    return value
+
+
+@equation
+def covariance_of(work: Work, lanes: Lanes, i: int, j: int, lane: int) -> float:
+    """P_ij of a lane."""
+    value: float = work[place(i, j) * len(lanes) + lane]
+    return value
+
+
+# -- for Python's callers ---------------------------------------------------------------------------------------
+def unpack(work: NDArray[np.float64], lanes: Lanes, lane: int, n: int) -> NDArray[np.float64]:
+    """P of a lane, (n, n)."""
+    column, row = np.tril_indices(n)
+    packed = work[at(0, 0) * len(lanes) + lane :: len(lanes)][: len(row)]
+    full = np.zeros((n, n), work.dtype)
+    full[row, column] = full[column, row] = packed
+    return full
+
+
+def pack(work: NDArray[np.float64], lanes: Lanes, lane: int, n: int, covariance: NDArray[np.float64]) -> None:
+    """Put a symmetric P, (n, n), into a lane."""
+    column, row = np.tril_indices(n)
+    work[at(0, 0) * len(lanes) + lane :: len(lanes)][: len(row)] = covariance[row, column]

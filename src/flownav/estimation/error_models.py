@@ -1,0 +1,102 @@
+"""How the sensors' errors, the ground and the pad change with time: random walks and Gauss-Markov errors.
+
+A random walk of w per square root of a second gains the variance w^2 dt in dt. A Gauss-Markov error of standard
+deviation sigma and time constant tau obeys x <- exp(-dt/tau) x and gains sigma^2 (1 - exp(-2 dt/tau)), which keeps it
+at sigma for any dt (Groves, Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems, 2013,
+section 3.2 and appendix B.4). Motion neither reads nor drives the Gauss-Markov errors, so their steps may be taken
+together, later, for as long as no law has read them in between.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import equation, procedure
+from flownav.estimation.covariance import Lanes, Work, add_noise, decay
+from flownav.estimation.states import (
+    ACCEL_BIAS,
+    BARO,
+    GPS_FAST,
+    GPS_SLOW,
+    GPS_VELOCITY,
+    GROUND,
+    GYRO_BIAS,
+    INS_ERROR,
+    PAD,
+)
+
+
+class FilterSettings(NamedTuple):
+    """Noise densities (per square root of hertz), random walks (per square root of a second), standard deviations and
+    time constants of Gauss-Markov errors, limits. docs/landing-filter.md says how to choose each.
+    """
+
+    accel_noise_m_s2_rt_hz: float
+    gyro_noise_rad_s_rt_hz: float
+    accel_walk_m_s2_rt_s: float
+    gyro_walk_rad_s_rt_s: float
+    position_walk_m_rt_s: float
+    gps_slow_sigma_m: float
+    gps_slow_sigma_down_m: float
+    gps_slow_tau_s: float
+    gps_fast_sigma_m: float
+    gps_fast_sigma_down_m: float
+    gps_fast_tau_s: float
+    gps_velocity_sigma_m_s: float
+    gps_velocity_tau_s: float
+    ins_tilt_sigma_rad: float
+    ins_tilt_tau_s: float
+    ins_heading_sigma_rad: float
+    ins_heading_tau_s: float
+    ground_walk_m_rt_s: float
+    baro_walk_m_rt_s: float
+    pad_walk_m_rt_s: float
+    flow_scale_sigma: float
+    gate_sigma: float
+    accel_bias_limit_m_s2: float
+    gyro_bias_limit_rad_s: float
+
+
+@procedure
+def propagate_errors(work: Work, lanes: Lanes, n: int, dt_s: float, settings: FilterSettings) -> None:
+    """Both kinds of error, dt on."""
+    propagate_walks(work, lanes, dt_s, settings)
+    propagate_gauss_markov(work, lanes, n, dt_s, settings)
+
+
+@procedure
+def propagate_walks(work: Work, lanes: Lanes, dt_s: float, settings: FilterSettings) -> None:
+    """Random walks, dt on. They must not lag behind the motion, which reads the biases."""
+    for axis in range(3):
+        add_noise(work, lanes, GYRO_BIAS + axis, settings.gyro_walk_rad_s_rt_s**2 * dt_s)
+        add_noise(work, lanes, ACCEL_BIAS + axis, settings.accel_walk_m_s2_rt_s**2 * dt_s)
+        add_noise(work, lanes, PAD + axis, settings.pad_walk_m_rt_s**2 * dt_s)
+    add_noise(work, lanes, GROUND, settings.ground_walk_m_rt_s**2 * dt_s)
+    add_noise(work, lanes, BARO, settings.baro_walk_m_rt_s**2 * dt_s)
+
+
+@procedure
+def propagate_gauss_markov(work: Work, lanes: Lanes, n: int, dt_s: float, settings: FilterSettings) -> None:
+    """Gauss-Markov errors, dt on."""
+    for axis in range(3):
+        down = axis == 2
+        slow = settings.gps_slow_sigma_down_m if down else settings.gps_slow_sigma_m
+        fast = settings.gps_fast_sigma_down_m if down else settings.gps_fast_sigma_m
+        turn = settings.ins_heading_sigma_rad if down else settings.ins_tilt_sigma_rad
+        turn_tau_s = settings.ins_heading_tau_s if down else settings.ins_tilt_tau_s
+        forget_slowly(work, lanes, n, GPS_SLOW + axis, slow, settings.gps_slow_tau_s, dt_s)
+        forget_slowly(work, lanes, n, GPS_FAST + axis, fast, settings.gps_fast_tau_s, dt_s)
+        forget_slowly(
+            work, lanes, n, GPS_VELOCITY + axis, settings.gps_velocity_sigma_m_s, settings.gps_velocity_tau_s, dt_s
+        )
+        forget_slowly(work, lanes, n, INS_ERROR + axis, turn, turn_tau_s, dt_s)
+
+
+@equation
+def forget_slowly(work: Work, lanes: Lanes, n: int, state: int, sigma: float, tau_s: float, dt_s: float) -> None:
+    """x <- exp(-dt/tau) x, with the noise that keeps its standard deviation at sigma."""
+    factor = np.exp(-dt_s / tau_s)
+    decay(work, lanes, n, state, factor)
+    add_noise(work, lanes, state, sigma * sigma * (1.0 - factor * factor))

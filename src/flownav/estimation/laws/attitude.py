@@ -1,0 +1,103 @@
+"""Attitude and heading: an INS's or autopilot's attitude, a compass, a gap of the IMU that was bridged."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import equation, larger
+from flownav.estimation.law import law
+from flownav.estimation.laws.geometry import LEAST_UPRIGHT, component
+from flownav.frames import Quaternion, Vector, rotation_from_quaternion
+
+
+@equation
+def turn_between(read: Quaternion, own: Quaternion) -> Vector:
+    """theta of q_read = (1, theta/2) q_own, for small angles [rad], earth NED."""
+    rw, rx, ry, rz = read
+    qw, qx, qy, qz = own
+    w = rw * qw + rx * qx + ry * qy + rz * qz
+    twice = 2.0 if w.real >= 0.0 else -2.0
+    return (
+        twice * (-rw * qx + rx * qw - ry * qz + rz * qy),
+        twice * (-rw * qy + rx * qz + ry * qw - rz * qx),
+        twice * (-rw * qz - rx * qy + ry * qx + rz * qw),
+    )
+
+
+class OnAttitude(NamedTuple):
+    """The Jacobian of an external attitude."""
+
+    attitude: float
+    ins_roll: float
+    ins_pitch: float
+    ins_heading: float
+
+
+@law
+def attitude(
+    axis: int, ins_roll: float, ins_pitch: float, ins_heading: float, qw: float, qx: float, qy: float, qz: float,
+    measured_0: float, measured_1: float, measured_2: float, measured_3: float,
+) -> tuple[float, OnAttitude]:  # fmt: skip
+    """An external attitude's rotation from the filter's, about one earth axis [rad].
+
+    q_read q^-1 = theta + R (e_roll, e_pitch, 0) + (0, 0, e_heading), small angles; the quaternion is what is measured.
+    """
+    rotation = rotation_from_quaternion(qw, qx, qy, qz)
+    turn = turn_between((measured_0, measured_1, measured_2, measured_3), (qw, qx, qy, qz))
+    by_roll = component((rotation[0], rotation[3], rotation[6]), axis)
+    by_pitch = component((rotation[1], rotation[4], rotation[7]), axis)
+    by_heading = 1.0 if axis == 2 else 0.0
+    error = by_roll * ins_roll + by_pitch * ins_pitch + by_heading * ins_heading
+    return component(turn, axis) - error, OnAttitude(1.0, by_roll, by_pitch, by_heading)
+
+
+class OnOwnAttitude(NamedTuple):
+    """The Jacobian of an attitude without errors of its own."""
+
+    attitude: float
+
+
+@law
+def bridged_attitude(
+    axis: int, qw: float, qx: float, qy: float, qz: float,
+    measured_0: float, measured_1: float, measured_2: float, measured_3: float,
+) -> tuple[float, OnOwnAttitude]:  # fmt: skip
+    """q_read q^-1 = theta about one earth axis [rad]: an attitude that has white noise alone."""
+    turn = turn_between((measured_0, measured_1, measured_2, measured_3), (qw, qx, qy, qz))
+    return component(turn, axis), OnOwnAttitude(1.0)
+
+
+class OnHeading(NamedTuple):
+    """The Jacobian of a heading."""
+
+    tilt_n: float
+    tilt_e: float
+    heading: float
+    ins_heading: float
+    compass_sin: float
+    compass_cos: float
+
+
+@law
+def heading(
+    axis: int, ins_heading: float, compass_sin: float, compass_cos: float,
+    qw: float, qx: float, qy: float, qz: float, measured: float,
+) -> tuple[float, OnHeading]:  # fmt: skip
+    """z = psi + A + B sin psi + C cos psi [rad], wrapped to half a turn: a compass, or a heading from elsewhere.
+
+    A is the slow error of the heading (declination, mounting); B and C are the deviation that hard iron makes, which
+    turns with the vehicle (0 of anything but a compass). psi = atan2(R_21, R_11).
+    """
+    rotation = rotation_from_quaternion(qw, qx, qy, qz)
+    forward_n, forward_e, forward_d = rotation[0], rotation[3], rotation[6]
+    level = larger(forward_n * forward_n + forward_e * forward_e, LEAST_UPRIGHT * LEAST_UPRIGHT)
+    cosine, sine = forward_n / np.sqrt(level), forward_e / np.sqrt(level)
+    predicted = np.arctan2(forward_e, forward_n) + ins_heading + compass_sin * sine + compass_cos * cosine
+    difference = measured - predicted
+    by_heading = 1.0 + compass_sin * cosine - compass_cos * sine
+    return np.arctan2(np.sin(difference), np.cos(difference)), OnHeading(
+        tilt_n=-by_heading * forward_d * forward_n / level, tilt_e=-by_heading * forward_d * forward_e / level,
+        heading=by_heading, ins_heading=1.0, compass_sin=sine, compass_cos=cosine,
+    )  # fmt: skip

@@ -1,0 +1,114 @@
+"""Optical flow: angular rates less the vehicle's turning, metric velocities, and a sensor with its own dynamics."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flownav.compile import equation
+from flownav.estimation.covariance import Lanes, Work
+from flownav.estimation.law import law
+from flownav.estimation.laws.geometry import body_axis, component, cross, lens_range
+from flownav.estimation.motion import rotation_of
+from flownav.estimation.states import GROUND, POSITION, STATE
+from flownav.frames import rotation_from_quaternion
+
+
+@equation
+def lens_range_of(work: Work, lanes: Lanes, lane: int, lens_below_m: float) -> float:
+    """The range from the lens that a lane's state implies [m], at least `geometry.LEAST_RANGE_M`."""
+    height_m = work[(STATE + GROUND) * len(lanes) + lane] - work[(STATE + POSITION + 2) * len(lanes) + lane]
+    return lens_range(rotation_of(work, lanes, lane), height_m, (0.0, 0.0, lens_below_m))[0]
+
+
+class OnFlowRate(NamedTuple):
+    """The Jacobian of a flow rate."""
+
+    vel_n: float
+    vel_e: float
+    vel_d: float
+    tilt_n: float
+    tilt_e: float
+    heading: float
+    flow_scale: float
+    pos_d: float
+    ground: float
+
+
+@law
+def flow_rate(
+    axis: int, vel_n: float, vel_e: float, vel_d: float, pos_d: float, ground: float, flow_scale: float,
+    qw: float, qx: float, qy: float, qz: float, rate_x: float, rate_y: float, rate_z: float,
+    *, forward_m: float, right_m: float, below_m: float, lens_below_m: float,
+) -> tuple[float, OnFlowRate]:  # fmt: skip
+    """Flow less rotation: z_x = -(1 + scale) v/r (axis 0), z_y = (1 + scale) u/r (axis 1) [rad/s].
+
+    PX4's convention. u and v are the lens's velocity along body forward and right, R_BE v + w x l with the lever
+    l = (forward, right, below), body FRD (0 where no gyro tells w); r is the distance along body down from a lens
+    `lens_below_m` below the IMU to level ground.
+    """
+    rotation = rotation_from_quaternion(qw, qx, qy, qz)
+    body = 1 if axis == 0 else 0
+    direction = body_axis(rotation, body)
+    turn = cross(direction, (vel_n, vel_e, vel_d))
+    swing = component(cross((rate_x, rate_y, rate_z), (forward_m, right_m, below_m)), body)
+    along = direction[0] * vel_n + direction[1] * vel_e + direction[2] * vel_d + swing
+    range_m, by_height, by_north, by_east = lens_range(rotation, ground - pos_d, (0.0, 0.0, lens_below_m))
+    sign = -1.0 if axis == 0 else 1.0
+    per_speed = sign * (1.0 + flow_scale) / range_m
+    by_range = -per_speed * along / range_m
+    return per_speed * along, OnFlowRate(
+        vel_n=per_speed * direction[0], vel_e=per_speed * direction[1], vel_d=per_speed * direction[2],
+        tilt_n=per_speed * turn[0] + by_range * by_north, tilt_e=per_speed * turn[1] + by_range * by_east,
+        heading=per_speed * turn[2], flow_scale=sign * along / range_m,
+        pos_d=-by_range * by_height, ground=by_range * by_height,
+    )  # fmt: skip
+
+
+class OnBodyVelocity(NamedTuple):
+    """The Jacobian of a body velocity."""
+
+    vel_n: float
+    vel_e: float
+    vel_d: float
+    tilt_n: float
+    tilt_e: float
+    heading: float
+    flow_scale: float
+
+
+@law
+def body_velocity(
+    axis: int, vel_n: float, vel_e: float, vel_d: float, flow_scale: float,
+    qw: float, qx: float, qy: float, qz: float, rate_x: float, rate_y: float, rate_z: float,
+    *, forward_m: float, right_m: float, below_m: float,
+) -> tuple[float, OnBodyVelocity]:  # fmt: skip
+    """z = (1 + scale)(R_BE v + w x l) [m/s]: metric flow, one body axis (0 forward, 1 right, 2 down)."""
+    direction = body_axis(rotation_from_quaternion(qw, qx, qy, qz), axis)
+    turn = cross(direction, (vel_n, vel_e, vel_d))
+    swing = component(cross((rate_x, rate_y, rate_z), (forward_m, right_m, below_m)), axis)
+    along = direction[0] * vel_n + direction[1] * vel_e + direction[2] * vel_d + swing
+    scale = 1.0 + flow_scale
+    return scale * along, OnBodyVelocity(
+        vel_n=scale * direction[0], vel_e=scale * direction[1], vel_d=scale * direction[2],
+        tilt_n=scale * turn[0], tilt_e=scale * turn[1], heading=scale * turn[2], flow_scale=along,
+    )  # fmt: skip
+
+
+class OnLaggedFlow(NamedTuple):
+    """The Jacobian of a lagged flow."""
+
+    lag_u1: float
+    lag_v1: float
+    flow_scale: float
+
+
+@law
+def lagged_flow(
+    axis: int, lag_u1: float, lag_v1: float, flow_scale: float, *, gain: float
+) -> tuple[float, OnLaggedFlow]:
+    """z = (1 + scale) gain x1 [m/s]: metric flow of a sensor whose dynamics are states, axis 0 forward, 1 right."""
+    unscaled = gain * (lag_u1 if axis == 0 else lag_v1)
+    slope = (1.0 + flow_scale) * gain
+    return (1.0 + flow_scale) * unscaled, OnLaggedFlow(
+        lag_u1=slope if axis == 0 else 0.0, lag_v1=0.0 if axis == 0 else slope, flow_scale=unscaled
+    )

@@ -1,0 +1,43 @@
+"""States read as they are: an external position, and a vehicle at rest, whose velocity and turning are 0."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flownav.estimation.law import law
+
+
+class OnOwnPosition(NamedTuple):
+    """The Jacobian of a position."""
+
+    pos: float
+
+
+@law
+def position_itself(axis: int, pos: float) -> tuple[float, OnOwnPosition]:
+    """z = p [m], local NED: an external pose."""
+    return pos, OnOwnPosition(1.0)
+
+
+class OnOwnVelocity(NamedTuple):
+    """The Jacobian of a velocity."""
+
+    vel: float
+
+
+@law
+def velocity_itself(axis: int, vel: float) -> tuple[float, OnOwnVelocity]:
+    """z = v [m/s], NED: 0 of a vehicle at rest."""
+    return vel, OnOwnVelocity(1.0)
+
+
+class OnGyroBias(NamedTuple):
+    """The Jacobian of a gyro at rest."""
+
+    gyro_bias: float
+
+
+@law
+def gyro_at_rest(axis: int, gyro_bias: float) -> tuple[float, OnGyroBias]:
+    """z = b [rad/s], body FRD: what a gyro reads when nothing turns."""
+    return gyro_bias, OnGyroBias(1.0)

@@ -1,0 +1,71 @@
+"""Where a beam from the vehicle meets the ground: a plane with a slope and one straight step in it.
+
+The ground's height over the datum, metres upwards, north and east from the origin:
+
+    z(n, e) = slope_n n + slope_e e + (step where (n - edge_n) dir_n + (e - edge_e) dir_e > 0)
+
+A deck's edge, a kerb and a box's side are steps; their faces are vertical. Plane geometry, exact.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import equation, larger, smaller
+from flownav.frames import Rotation
+
+SMALLEST_APPROACH = 0.1  # of a beam on a plane, per metre of beam: one that grazes the ground stays finite
+
+
+class Ground(NamedTuple):
+    """Slopes (rise over run), the step's height, a point of its edge, and the unit direction towards the upper side."""
+
+    slope_n: float
+    slope_e: float
+    step_m: float
+    edge_n_m: float
+    edge_e_m: float
+    direction_n: float
+    direction_e: float
+
+
+class BeamHit(NamedTuple):
+    """Distance along the beam, and the cosine of the angle between the beam and the sloping ground's normal."""
+
+    distance_m: float
+    incidence_cosine: float
+
+
+LEVEL = Ground(0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+
+
+@equation
+def ground_height(pos_n_m: float, pos_e_m: float, ground: Ground) -> float:
+    """Height of the ground over the datum at this place [m]."""
+    g = ground
+    beyond = (pos_n_m - g.edge_n_m) * g.direction_n + (pos_e_m - g.edge_e_m) * g.direction_e
+    return g.slope_n * pos_n_m + g.slope_e * pos_e_m + (g.step_m if beyond > 0.0 else 0.0)
+
+
+@equation
+def beam_distance(pos_n_m: float, pos_e_m: float, height_m: float, rotation: Rotation, ground: Ground) -> BeamHit:
+    """From a lens at (n, e), `height_m` over the datum, along body z to the ground; attitude R_EB.
+
+    The beam meets the lower plane at t0 and the upper at t1. Each counts where its point lies on its own side of the
+    edge, the nearer if both do; if neither does, the beam meets the step's face.
+    """
+    g = ground
+    north, east, down = rotation[2], rotation[5], rotation[8]
+    approach = larger(down + (g.slope_n * north + g.slope_e * east), SMALLEST_APPROACH)
+    over_plane = height_m - (g.slope_n * pos_n_m + g.slope_e * pos_e_m)
+    low, high = over_plane / approach, (over_plane - g.step_m) / approach
+    beyond = (pos_n_m - g.edge_n_m) * g.direction_n + (pos_e_m - g.edge_e_m) * g.direction_e
+    towards = north * g.direction_n + east * g.direction_e
+    on_low, on_high = beyond + towards * low <= 0.0, beyond + towards * high > 0.0
+    face = -beyond / (towards if towards * towards > 1e-24 else 1e-12)
+    one = low if on_low else high
+    hit = smaller(low, high) if on_low & on_high else (one if on_low | on_high else face)
+    normal = 1.0 / np.sqrt(1.0 + g.slope_n * g.slope_n + g.slope_e * g.slope_e)
+    return BeamHit(larger(hit, 0.0), smaller(approach * normal, 1.0))

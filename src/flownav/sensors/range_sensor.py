@@ -1,0 +1,137 @@
+"""A rangefinder along the boresight, lidar or sonar: what of the true distance it reports, and when it does not.
+
+- A wide beam reads the nearest ground inside its cone: over a plane that is the perpendicular, h, while the tilt is
+  below half the beam's width b, and h/cos(tilt - b) beyond; a narrow one reads the slant. (Over a step it is as over
+  a plane.)
+- A scale (a sonar's speed of sound, 0.17 % a kelvin) and an offset of this unit; noise with a part that grows with the
+  distance; whole steps.
+- Nothing nearer than the floor is told apart: the floor is what it reads (the HRLV-MaxSonar: 300 mm). Beyond the
+  ceiling, by slant range, or where the beam grazes the ground, there is no echo: the reading is the ceiling with
+  quality 0.
+- Echoes: half of them the second one, twice as far; half of something near. Spells in which it repeats its last value,
+  and spells in which nothing arrives. A unit may be stuck for good.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import clamp, equation, larger
+from flownav.sensors.beam import BeamHit
+from flownav.sensors.chance import spell
+from flownav.sensors.quantisation import quantised
+
+SMALLEST_COSINE = 0.1
+
+
+class RangeSensorParameters(NamedTuple):
+    """Coefficients of one reading."""
+
+    beam_cosine: float  # of half the beam's width
+    beam_sine: float
+    least_incidence_cosine: float
+    floor_m: float
+    ceiling_m: float
+    resolution_m: float
+    steps_per_m: float
+    scale_sigma: float
+    offset_sigma_m: float
+    sigma_m: float
+    relative_sigma: float  # of the distance
+    echo_above: float
+    near_echo_m: float
+    lost_begins_above: float
+    lost_ends_above: float
+    held_begins_above: float
+    held_ends_above: float
+    stuck: float  # 1: every reading is stuck_m
+    stuck_m: float
+
+
+class RangeSensorUnit(NamedTuple):
+    """This unit's scale error and offset. As normals: one for each."""
+
+    scale: float
+    offset_m: float
+
+
+class RangeSensorNormals(NamedTuple):
+    """Standard normals of one reading."""
+
+    noise: float
+    echo: float
+    echo_kind: float
+    lost: float
+    held: float
+    spare: float
+
+
+class RangeSensorState(NamedTuple):
+    """The last reading and its quality, 1 in a spell that repeats it, 1 in a spell in which nothing arrives."""
+
+    last_m: float
+    last_quality: float
+    held: float
+    lost: float
+
+
+class RangeSensorReading(NamedTuple):
+    """A distance along the boresight, quality 0 (no echo) or 255, and 1 where it arrived."""
+
+    range_m: float
+    quality: float
+    arrived: float
+
+
+@equation
+def draw_range_sensor(n: RangeSensorUnit, p: RangeSensorParameters) -> RangeSensorUnit:
+    """This flight's unit."""
+    return RangeSensorUnit(p.scale_sigma * n.scale, p.offset_sigma_m * n.offset_m)
+
+
+@equation
+def start_range_sensor(truth: BeamHit, p: RangeSensorParameters) -> RangeSensorState:
+    """Working, the last reading that of the first moment."""
+    return RangeSensorState(clamp(truth.distance_m, p.floor_m, p.ceiling_m), 255.0, 0.0, 0.0)
+
+
+@equation
+def wide_beam(truth: BeamHit, p: RangeSensorParameters) -> float:
+    """Distance to the nearest ground inside the beam's cone: h, or h/cos(tilt - b) where the tilt is more than b."""
+    cosine = clamp(truth.incidence_cosine, SMALLEST_COSINE, 1.0)
+    sine = np.sqrt(larger(1.0 - cosine * cosine, 0.0))
+    slant = cosine * p.beam_cosine + sine * p.beam_sine
+    return truth.distance_m * (cosine / (slant if cosine < p.beam_cosine else 1.0))
+
+
+@equation
+def step_range_sensor(
+    state: RangeSensorState,
+    unit: RangeSensorUnit,
+    truth: BeamHit,
+    n: RangeSensorNormals,
+    p: RangeSensorParameters,
+) -> tuple[RangeSensorState, RangeSensorReading]:
+    """One reading of the distance along the beam (`beam.beam_distance`)."""
+    held = spell(state.held, n.held, p.held_begins_above, p.held_ends_above)
+    lost = spell(state.lost, n.lost, p.lost_begins_above, p.lost_ends_above)
+    nearest_m = wide_beam(truth, p)
+    growing = p.relative_sigma * nearest_m
+    sigma = np.sqrt(p.sigma_m * p.sigma_m + growing * growing)
+    measured_m = nearest_m * (1.0 + unit.scale) + unit.offset_m + sigma * n.noise
+    strayed_m = 2.0 * measured_m if n.echo_kind > 0.0 else p.near_echo_m
+    echo = n.echo > p.echo_above
+    read_m = quantised(strayed_m if echo else measured_m, p.resolution_m, p.steps_per_m)
+    returned = (truth.incidence_cosine >= p.least_incidence_cosine) | echo
+    heard = returned & ((strayed_m if echo else nearest_m) <= p.ceiling_m)
+    fresh_m = clamp(read_m, p.floor_m, p.ceiling_m) if heard else p.ceiling_m
+    fresh_quality = 255.0 if heard else 0.0
+    repeats = held > 0.5
+    working_m = state.last_m if repeats else fresh_m
+    stuck = p.stuck > 0.5
+    range_m = p.stuck_m if stuck else working_m
+    quality = 255.0 if stuck else (state.last_quality if repeats else fresh_quality)
+    after = RangeSensorState(range_m, quality, held, lost)
+    return after, RangeSensorReading(range_m, quality, 0.0 if lost > 0.5 else 1.0)

@@ -1,0 +1,138 @@
+"""A camera that finds the pad, with what goes wrong: boresight, missed fixes, false fixes, a wrong stated accuracy.
+
+The fix is `pad_fix.read_pad`'s (tangents towards body forward and right, distance; MAVLink LANDING_TARGET) of a camera
+whose axes are turned against the body by small angles that are drawn once a flight. What the turned camera sees is
+reported as if it were not turned.
+
+**Missed.** The detector finds the pad with a probability that falls with height and with how fast the image moves, a
+probit: it misses where a standard normal exceeds level - a h/h_max - b w/w_blur; the datasheet gives the three shares
+missed (low and slow; at the greatest height; at the image rate `blur_rad_s`) that fix level, a and b.
+
+**False.** With a share of the frames something else is taken for the pad, anywhere in the view, at about the true
+distance; also where the pad is out of view, while the height is within the limits.
+
+**Stated.** Variances of the tangents at the reported place, sigma^2 L^2 (1 + tan^2) with L^2 = 1 + both squares (noise
+across the sight, projected on the image plane), and of the distance, times a factor that is wrong by a share.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import clamp, equation, larger
+from flownav.frames import Rotation
+from flownav.sensors.chance import factor
+from flownav.sensors.geometry import turned_rotation
+from flownav.sensors.pad_fix import PadFixNormals, PadFixParameters, read_pad
+
+
+class PadCameraParameters(NamedTuple):
+    """Noise, limits and chances of one frame."""
+
+    angle_sigma_rad: float
+    distance_sigma: float  # of the distance
+    min_height_m: float
+    max_height_m: float
+    half_view_tangent: float
+    boresight_rad: float  # standard deviation of each angle
+    stated_spread: float
+    missed_above: float  # low and slow
+    missed_by_height: float  # taken off the level at the greatest height
+    missed_per_rad_s: float  # taken off per rad/s of image rate
+    false_above: float
+
+
+class PadCameraUnit(NamedTuple):
+    """This flight: the camera's small angles [rad], factor of the stated deviations. As normals: one for each."""
+
+    turned_x: float
+    turned_y: float
+    turned_z: float
+    stated: float
+
+
+class PadCameraNormals(NamedTuple):
+    """Standard normals of one frame."""
+
+    forward: float
+    right: float
+    distance: float
+    missed: float
+    false: float
+    false_forward: float
+    false_right: float
+    spare: float
+
+
+class PadCameraReading(NamedTuple):
+    """Tangents, distance, stated variances of each, quality 255 or 0, and 1 where there is a fix, true or false."""
+
+    tan_forward: float
+    tan_right: float
+    distance_m: float
+    forward_variance: float
+    right_variance: float
+    distance_variance_m2: float
+    quality: float
+    arrived: float
+
+
+@equation
+def draw_pad_camera(n: PadCameraUnit, p: PadCameraParameters) -> PadCameraUnit:
+    """This flight's camera."""
+    return PadCameraUnit(
+        p.boresight_rad * n.turned_x,
+        p.boresight_rad * n.turned_y,
+        p.boresight_rad * n.turned_z,
+        factor(p.stated_spread, n.stated),
+    )
+
+
+@equation
+def read_pad_camera(
+    unit: PadCameraUnit,
+    lens_n_m: float,
+    lens_e_m: float,
+    lens_d_m: float,
+    rotation: Rotation,
+    image_rate_rad_s: float,
+    n: PadCameraNormals,
+    p: PadCameraParameters,
+) -> PadCameraReading:
+    """One frame of a lens at (n, e, d) from the pad's centre, attitude R_EB; image_rate_rad_s: size of the flow."""
+    fix = read_pad(
+        lens_n_m, lens_e_m, lens_d_m,
+        turned_rotation(rotation, unit.turned_x, unit.turned_y, unit.turned_z),
+        PadFixNormals(n.forward, n.right, n.distance, n.spare),
+        PadFixParameters(
+            1.0, p.angle_sigma_rad, p.distance_sigma, p.min_height_m, p.max_height_m, p.half_view_tangent
+        ),
+    )  # fmt: skip
+    height_m = -lens_d_m
+    level = p.missed_above - p.missed_by_height * (height_m / p.max_height_m) - p.missed_per_rad_s * image_rate_rad_s
+    found = (fix.valid > 0.5) & (n.missed <= level)
+    in_height = (height_m >= p.min_height_m) & (height_m <= p.max_height_m)
+    false = in_height & (n.false > p.false_above)
+    edge = p.half_view_tangent
+    wrong_forward = clamp(0.5 * edge * n.false_forward, -edge, edge)
+    wrong_right = clamp(0.5 * edge * n.false_right, -edge, edge)
+    wrong_sight = np.sqrt(1.0 + wrong_forward * wrong_forward + wrong_right * wrong_right)
+    wrong_m = larger(height_m, 0.0) * wrong_sight * (1.0 + p.distance_sigma * n.distance)
+    forward = wrong_forward if false else fix.tan_forward
+    right = wrong_right if false else fix.tan_right
+    distance_m = wrong_m if false else fix.distance_m
+    across, along = unit.stated * p.angle_sigma_rad, unit.stated * p.distance_sigma * distance_m
+    spread = across * across * (1.0 + forward * forward + right * right)
+    there = false | found
+    return PadCameraReading(
+        forward,
+        right,
+        distance_m,
+        spread * (1.0 + forward * forward),
+        spread * (1.0 + right * right),
+        along * along,
+        255.0 if there else 0.0,
+        1.0 if there else 0.0,
+    )

@@ -1,0 +1,80 @@
+"""The datasheet of a camera that finds the pad, and the coefficients that follow from it."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import ClassVar
+
+from pydantic import Field, ValidationInfo, field_validator
+
+from flownav.parameter_files import Number, ParameterModel
+from flownav.sensors.chance import level_of
+from flownav.sensors.pad_camera import PadCameraParameters
+from flownav.sensors.sheet import Lever, SensorSheet
+
+
+class Missed(ParameterModel):
+    """Shares of frames in which the pad is not found: low and slow, at the greatest height, at this image rate.
+
+    A share that is worse than low and slow must not be less than that one's.
+    """
+
+    share: Number = Field(ge=1e-6, le=0.99)
+    share_at_max_height: Number = Field(ge=1e-6, le=0.9999)
+    share_at_blur: Number = Field(ge=1e-6, le=0.9999)
+    blur_rad_s: Number = Field(gt=0.0, le=100.0)
+
+    @field_validator("share_at_max_height", "share_at_blur")
+    @classmethod
+    def _not_better(cls, value: float, info: ValidationInfo) -> float:
+        if value < info.data.get("share", 0.0):
+            raise ValueError(f"at least share = {info.data['share']:g} is needed")
+        return value
+
+
+class PadCameraSheet(SensorSheet):
+    """A camera and its detector. `stated_spread`: the share by which the accuracies that it states are wrong."""
+
+    shipped_file: ClassVar[str] = "pad_camera.toml"
+
+    rate_hz: Number = Field(ge=0.5, le=200.0)
+    angle_sigma_mrad: Number = Field(gt=0.0, le=1000.0)
+    distance_sigma_percent: Number = Field(gt=0.0, le=100.0)
+    min_height_m: Number = Field(ge=0.0, le=100.0)
+    max_height_m: Number = Field(gt=0.0, le=100.0)
+    half_view_deg: Number = Field(gt=0.0, lt=80.0)
+    boresight_deg: Number = Field(ge=0.0, le=5.0)
+    stated_spread: Number = Field(0.0, ge=0.0, le=2.0)
+    missed: Missed
+    false_share: Number = Field(0.0, ge=0.0, le=1.0)
+    lens: Lever = Lever()
+
+    @field_validator("max_height_m")
+    @classmethod
+    def _above(cls, value: float, info: ValidationInfo) -> float:
+        if value <= info.data.get("min_height_m", 0.0):
+            raise ValueError(f"more than min_height_m = {info.data['min_height_m']:g} is needed")
+        return value
+
+    def parameters(self) -> PadCameraParameters:
+        """Coefficients of one frame."""
+        level = level_of(self.missed.share)
+        return PadCameraParameters(
+            angle_sigma_rad=1e-3 * self.angle_sigma_mrad,
+            distance_sigma=0.01 * self.distance_sigma_percent,
+            min_height_m=self.min_height_m,
+            max_height_m=self.max_height_m,
+            half_view_tangent=math.tan(math.radians(self.half_view_deg)),
+            boresight_rad=math.radians(self.boresight_deg),
+            stated_spread=self.stated_spread,
+            missed_above=level,
+            missed_by_height=level - level_of(self.missed.share_at_max_height),
+            missed_per_rad_s=(level - level_of(self.missed.share_at_blur)) / self.missed.blur_rad_s,
+            false_above=level_of(self.false_share),
+        )
+
+
+def load_pad_camera_sheet(path: Path | str | None = None) -> PadCameraSheet:
+    """The pad camera of a file; the shipped one where `path` is None."""
+    return PadCameraSheet.read(path)

@@ -1,0 +1,86 @@
+"""A switch under the skids: closed under load, debounced, and perhaps stuck.
+
+The load that it sees is the skids' with noise (rocking, vibration). It opens and closes at two loads, and what is
+reported follows once the contact has said the same for as many readings as the debounce takes (Ganssle, A Guide to
+Debouncing, 2004). A switch may be stuck open or closed for a whole flight.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flownav.compile import equation
+
+
+class SkidSwitchParameters(NamedTuple):
+    """Loads and chances. `stuck_open_above`, `stuck_closed_below`: levels of one normal."""
+
+    closing_load_n: float
+    opening_load_n: float
+    sigma_n: float
+    debounce_readings: float
+    stuck_open_above: float
+    stuck_closed_below: float
+
+
+class SkidSwitchUnit(NamedTuple):
+    """1 where it is stuck open, 1 where it is stuck closed. As normals: the first decides, the other is to spare."""
+
+    stuck_open: float
+    stuck_closed: float
+
+
+class SkidSwitchNormals(NamedTuple):
+    """Standard normals of one reading."""
+
+    load: float
+    spare: float
+
+
+class SkidSwitchState(NamedTuple):
+    """The contact, what is reported (1 closed, 0 open), and for how many readings the contact has said otherwise."""
+
+    contact: float
+    reported: float
+    otherwise: float
+
+
+class SkidSwitchReading(NamedTuple):
+    """1 on the ground, 0 in flight; quality is 255 and a reading always arrives (the switch is wired)."""
+
+    landed: float
+    quality: float
+    arrived: float
+
+
+@equation
+def draw_skid_switch(n: SkidSwitchUnit, p: SkidSwitchParameters) -> SkidSwitchUnit:
+    """Whether it works on this flight."""
+    return SkidSwitchUnit(
+        1.0 if n.stuck_open > p.stuck_open_above else 0.0,
+        1.0 if n.stuck_open < p.stuck_closed_below else 0.0,
+    )
+
+
+@equation
+def start_skid_switch(load_n: float, p: SkidSwitchParameters) -> SkidSwitchState:
+    """Settled on the load of the first moment."""
+    closed = 1.0 if load_n >= p.closing_load_n else 0.0
+    return SkidSwitchState(closed, closed, 0.0)
+
+
+@equation
+def step_skid_switch(
+    state: SkidSwitchState, unit: SkidSwitchUnit, load_n: float, n: SkidSwitchNormals, p: SkidSwitchParameters
+) -> tuple[SkidSwitchState, SkidSwitchReading]:
+    """One reading under the skids' load [N, positive where they carry weight]."""
+    seen_n = load_n + p.sigma_n * n.load
+    threshold_n = p.opening_load_n if state.contact > 0.5 else p.closing_load_n
+    loaded = 1.0 if seen_n >= threshold_n else 0.0
+    working = 0.0 if unit.stuck_open > 0.5 else loaded
+    contact = 1.0 if unit.stuck_closed > 0.5 else working
+    otherwise = state.otherwise + 1.0 if contact != state.reported else 0.0
+    follows = otherwise >= p.debounce_readings
+    reported = contact if follows else state.reported
+    after = SkidSwitchState(contact, reported, 0.0 if follows else otherwise)
+    return after, SkidSwitchReading(reported, 255.0, 1.0)

@@ -131,7 +131,8 @@ class EventQueue(NamedTuple):
     """Every stream's readings in one time order, as the kernels take them.
 
     t_s (n,) the instant each reading describes (arrival less delay); sensor (n,) int64; value and variance
-    (n, MAX_VALUES), unused columns NaN; quality (n,); row (n,) the row in its own stream.
+    (n, MAX_VALUES), unused columns NaN; quality (n,); row (n,) the row in its own stream; withheld (n,) 1.0 where the
+    user takes the reading away, which is then judged and noted, but not fused.
     """
 
     t_s: Array
@@ -140,6 +141,7 @@ class EventQueue(NamedTuple):
     variance: Array
     quality: Array
     row: NDArray[np.int64]
+    withheld: Array
 
 
 def merge(streams: Iterable[Stream]) -> EventQueue:
@@ -152,7 +154,7 @@ def merge(streams: Iterable[Stream]) -> EventQueue:
     if not streams:
         empty = np.zeros((0, MAX_VALUES))
         none = np.zeros(0)
-        return EventQueue(none, none.astype(np.int64), empty, empty, none, none.astype(np.int64))
+        return EventQueue(none, none.astype(np.int64), empty, empty, none, none.astype(np.int64), none)
     t_s = np.concatenate([s.t_s - s.delay_s for s in streams])
     order = np.argsort(t_s, kind="stable")
     return EventQueue(
@@ -162,4 +164,5 @@ def merge(streams: Iterable[Stream]) -> EventQueue:
         np.concatenate([padded(s.variance) for s in streams])[order],
         np.concatenate([s.quality for s in streams])[order],
         np.concatenate([np.arange(len(s)) for s in streams])[order],
+        np.zeros(len(order)),
     )

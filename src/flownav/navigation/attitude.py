@@ -4,155 +4,211 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import ONE_LANE, procedure
-from flownav.estimation.landing.observe import (
-    ATTITUDE_STATES,
-    HEADING_STATES,
-    observe_attitude,
-    observe_heading,
-    rotation_of,
-)
-from flownav.estimation.landing.states import ATTITUDE, INS_ERROR, STATES
-from flownav.frames import quaternion_product, to_earth
-from flownav.navigation.offers import FUSED, NOT_FINITE, conclude, put, usable
-from flownav.navigation.state import (
-    FROM_ATTITUDE,
-    FROM_MAG,
-    GAP,
-    HEADING_CLOCK,
-    MAG_HEADING,
-    OWN_BEFORE,
-    READ_BEFORE,
-    ROWS,
-    SPREAD_BEFORE,
-    STARTED,
-    USE_ATTITUDE,
-    USE_HEADING,
-    VALUE,
+from flownav.compile import equation, larger, procedure
+from flownav.estimation.covariance import variance_of
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading
+from flownav.estimation.motion import rotation_of
+from flownav.estimation.states import ATTITUDE, INNOVATION, MEASURED, QUATERNION
+from flownav.frames import quaternion_product, rotation_from_quaternion, to_earth
+from flownav.navigation.memory import (
+    OBSERVATION,
+    REASON,
+    BridgeMemory,
+    HeadingMemory,
+    ImuMemory,
     Reading,
-    Running,
+    load_bridge,
+    load_heading,
+    load_imu,
+    load_reading,
+    load_start,
+    store_bridge,
+    store_heading,
+    store_imu,
 )
+from flownav.navigation.offers import conclude, put, usable_in_flight
+from flownav.navigation.packed import load_attitude_settings
+from flownav.navigation.reasons import FUSED, NOT_FINITE, SILENT
+from flownav.navigation.settings import FROM_ATTITUDE, AttitudeSettings, Equipment
+from flownav.navigation.tape import Output
 
 LEAST_FIELD_GAUSS = 1e-3
 BRIDGE_SIGMA_RAD = 0.02
+LEAST_STEP_S = 1e-3
+
+
+# -- an external attitude -----------------------------------------------------------------------------------
+@equation
+def judge_attitude(reading: Reading, started: float) -> tuple[int, float]:
+    """The verdict on a quaternion, and its length."""
+    size = np.sqrt(reading.value_0**2 + reading.value_1**2 + reading.value_2**2 + reading.value_3**2)
+    reason = usable_in_flight(reading, size, 0.0, started)
+    sound = size > 0.5 and size < 2.0
+    return NOT_FINITE if reason == FUSED and not sound else reason, size
 
 
 @procedure
-def take_attitude(reading: Reading, on: Running) -> None:
+def take_attitude(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> None:
     """An autopilot's or INS's attitude: all of it where no IMU serves, its heading where nothing else gives one."""
-    value, memory, work = reading.value, on.memory, on.work
-    if memory[STARTED] == 0.0:
-        return
-    size = np.sqrt(value[0] ** 2 + value[1] ** 2 + value[2] ** 2 + value[3] ** 2)
-    reason = usable(reading.quality, size, 0.0, on)
-    if reason == FUSED and not 0.5 < size < 2.0:
-        reason = NOT_FINITE
-    if reason != FUSED:
-        return
-    for i in range(4):
-        work[VALUE + i] = value[i] / size
-    if memory[USE_ATTITUDE] > 0.0:
+    s = load_attitude_settings(p)
+    if fitted.use_attitude:
         for axis in range(3):
-            sigma = on.settings.ins_tilt_white_rad
-            observe_attitude(work, ONE_LANE, ROWS, axis, VALUE, 0.0)
-            observation = work[ROWS.innovation]
-            put(sigma * sigma, reason, ATTITUDE_STATES[axis], on.work)
-            conclude(reading, axis, observation, reason, on)
+            put_attitude(work, lanes, s.ins_tilt_white_rad * s.ins_tilt_white_rad)
+            attitude(work, lanes, axis)
+            for lane in range(len(lanes)):
+                work[OBSERVATION * len(lanes) + lane] = work[INNOVATION * len(lanes) + lane]
+            conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
         return
-    bridge(reading, on)
-    if memory[USE_HEADING] == FROM_ATTITUDE:
-        w, x, y, z = work[VALUE], work[VALUE + 1], work[VALUE + 2], work[VALUE + 3]
-        heading = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
-        offer_heading(reading, heading, heading_variance(reading.t_s, on), reason, on)
+    bridge(work, lanes, t_s, sensor, s, o)
+    if fitted.heading == FROM_ATTITUDE:
+        for lane in range(len(lanes)):
+            reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
+            reason, size = judge_attitude(reading, started)
+            w, x = reading.value_0 / size, reading.value_1 / size
+            y, z = reading.value_2 / size, reading.value_3 / size
+            read = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+            put_heading(work, lanes, lane, t_s, read, np.nan, SILENT if reason != FUSED else reason, s)
+        heading(work, lanes, 0)
+        conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
+
+
+@equation
+def put_attitude(work: Work, lanes: Lanes, variance: float) -> None:
+    """The quaternion that was read, of unit length, in the lanes where it is one; the others are silent."""
+    for lane in range(len(lanes)):
+        reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
+        reason, size = judge_attitude(reading, started)
+        put(work, lanes, lane, reading.value_0 / size, variance, SILENT if reason != FUSED else reason)
+        work[(MEASURED + 1) * len(lanes) + lane] = reading.value_1 / size
+        work[(MEASURED + 2) * len(lanes) + lane] = reading.value_2 / size
+        work[(MEASURED + 3) * len(lanes) + lane] = reading.value_3 / size
 
 
 @procedure
-def bridge(reading: Reading, on: Running) -> None:
-    """Across a gap of the IMU the filter turns as the logged attitude did: q_before conj(read_before) read, measured.
+def bridge(work: Work, lanes: Lanes, t_s: float, sensor: int, s: AttitudeSettings, o: Output) -> None:
+    """Across a gap of the IMU the filter turns as the read attitude did: q_before conj(read_before) read, measured.
 
-    Its variance is what the filter's was before the gap, and BRIDGE_SIGMA_RAD for the time between the two logs.
+    Its variance is what the filter's was before the gap, and BRIDGE_SIGMA_RAD for the time between the two.
     """
-    memory, work = on.memory, on.work
-    if memory[GAP] == 0.0:
-        for i in range(4):
-            memory[OWN_BEFORE + i], memory[READ_BEFORE + i] = work[ROWS.attitude + i], work[VALUE + i]
-        for i in range(3):
-            memory[SPREAD_BEFORE + i] = work[ROWS.covariance + (ATTITUDE + i) * (STATES + 1)]
+    crossed = False
+    for lane in range(len(lanes)):
+        crossed = note_bridge(work, lanes, lane) or crossed
+    if not crossed:
         return
-    memory[GAP] = 0.0
-    if not np.isfinite(memory[OWN_BEFORE]):
-        return
-    read = (work[VALUE], work[VALUE + 1], work[VALUE + 2], work[VALUE + 3])
-    own = (memory[OWN_BEFORE], memory[OWN_BEFORE + 1], memory[OWN_BEFORE + 2], memory[OWN_BEFORE + 3])
-    back = (memory[READ_BEFORE], -memory[READ_BEFORE + 1], -memory[READ_BEFORE + 2], -memory[READ_BEFORE + 3])
-    turned = quaternion_product(own, quaternion_product(back, read))
-    saved = (work[VALUE], work[VALUE + 1], work[VALUE + 2], work[VALUE + 3])
-    for i in range(4):
-        work[VALUE + i] = turned[i]
     for axis in range(3):
-        observe_attitude(work, ONE_LANE, ROWS, axis, VALUE, 0.0)
-        error = ROWS.state + INS_ERROR
-        turn = work[ROWS.innovation]
-        for k in range(3):  # the bridge has no slow error of its own
-            turn += work[ROWS.coefficient + 1 + k] * work[error + k]
-            work[ROWS.coefficient + 1 + k] = 0.0
-        work[ROWS.innovation] = turn
-        put(memory[SPREAD_BEFORE + axis] + BRIDGE_SIGMA_RAD**2, FUSED, ATTITUDE_STATES[axis], on.work)
-        conclude(reading, axis, turn, FUSED, on)
-    for i in range(4):
-        work[VALUE + i] = saved[i]
+        put_bridged(work, lanes, axis)
+        bridged_attitude(work, lanes, axis)
+        for lane in range(len(lanes)):
+            work[OBSERVATION * len(lanes) + lane] = work[INNOVATION * len(lanes) + lane]
+        conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
+    for lane in range(len(lanes)):
+        m = load_imu(work, lanes, lane)
+        store_imu(work, lanes, lane, bridged(m))
+
+
+@equation
+def bridged(m: ImuMemory) -> ImuMemory:
+    """No gap is open any more."""
+    return ImuMemory(
+        m.read_s, m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z, m.vibration, m.doubt_m_s2, 0.0
+    )
 
 
 @procedure
-def magnetic_heading(on: Running) -> float:
-    """The heading that the latest magnetometer reading and the filter's tilt give, from magnetic north [rad]."""
-    rotation = rotation_of(on.work, ONE_LANE, ROWS, 0)
-    heading: float = np.arctan2(rotation[3], rotation[0]) - on.memory[MAG_HEADING]
-    return heading
+def note_bridge(work: Work, lanes: Lanes, lane: int) -> bool:
+    """Without a gap the filter's attitude and the read one are noted; whether this lane has a gap to cross."""
+    reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
+    reason, size = judge_attitude(reading, started)
+    if reason != FUSED:
+        return False
+    if load_imu(work, lanes, lane).gap > 0.0:
+        return True
+    store_bridge(
+        work, lanes, lane,
+        BridgeMemory(
+            work[QUATERNION * len(lanes) + lane], work[(QUATERNION + 1) * len(lanes) + lane],
+            work[(QUATERNION + 2) * len(lanes) + lane], work[(QUATERNION + 3) * len(lanes) + lane],
+            reading.value_0 / size, reading.value_1 / size, reading.value_2 / size, reading.value_3 / size,
+            variance_of(work, lanes, ATTITUDE, lane), variance_of(work, lanes, ATTITUDE + 1, lane),
+            variance_of(work, lanes, ATTITUDE + 2, lane),
+        ),
+    )  # fmt: skip
+    return False
 
 
 @procedure
-def heading_variance(t_s: float, on: Running) -> float:
+def put_bridged(work: Work, lanes: Lanes, axis: int) -> None:
+    """The attitude that the filter would have, had it turned over the gap as the read one did."""
+    for lane in range(len(lanes)):
+        reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
+        reason, size = judge_attitude(reading, started)
+        m = load_bridge(work, lanes, lane)
+        open_gap = load_imu(work, lanes, lane).gap > 0.0 and np.isfinite(m.own_w) and reason == FUSED
+        read = (reading.value_0 / size, reading.value_1 / size, reading.value_2 / size, reading.value_3 / size)
+        back = (m.read_w, -m.read_x, -m.read_y, -m.read_z)
+        turned = quaternion_product((m.own_w, m.own_x, m.own_y, m.own_z), quaternion_product(back, read))
+        before = m.variance_n if axis == 0 else (m.variance_e if axis == 1 else m.variance_d)
+        put(work, lanes, lane, turned[0], before + BRIDGE_SIGMA_RAD**2, FUSED if open_gap else SILENT)
+        work[(MEASURED + 1) * len(lanes) + lane] = turned[1]
+        work[(MEASURED + 2) * len(lanes) + lane] = turned[2]
+        work[(MEASURED + 3) * len(lanes) + lane] = turned[3]
+
+
+# -- headings -----------------------------------------------------------------------------------------------
+@equation
+def heading_variance(t_s: float, m: HeadingMemory, s: AttitudeSettings) -> float:
     """Variance of one heading [rad2] whose error lasts for many: 2 sigma^2 tau/dt, at least sigma^2."""
-    settings, memory = on.settings, on.memory
-    step_s = max(t_s - memory[HEADING_CLOCK], 1e-3)
-    memory[HEADING_CLOCK] = t_s
-    variance: float = settings.heading_noise_rad**2 * max(1.0, 2.0 * settings.heading_time_s / step_s)
-    return variance
+    step_s = larger(t_s - m.read_s, LEAST_STEP_S)
+    return s.heading_noise_rad * s.heading_noise_rad * larger(1.0, 2.0 * s.heading_time_s / step_s)
+
+
+@equation
+def put_heading(
+    work: Work, lanes: Lanes, lane: int, t_s: float, read_rad: float, stated: float, reason: int, s: AttitudeSettings
+) -> None:
+    """One lane's heading with the variance that is stated, or modelled from how often it is read."""
+    m = load_heading(work, lanes, lane)
+    modelled = not np.isfinite(stated)
+    put(work, lanes, lane, read_rad, heading_variance(t_s, m, s) if modelled else stated, reason)
+    store_heading(work, lanes, lane, HeadingMemory(t_s if modelled and reason != SILENT else m.read_s, m.field_rad))
+
+
+@equation
+def magnetic_heading(forward_n: float, forward_e: float, m: HeadingMemory) -> float:
+    """The heading that the latest level field and the filter's tilt give, from magnetic north [rad]."""
+    return np.arctan2(forward_e, forward_n) - m.field_rad
 
 
 @procedure
-def take_mag(reading: Reading, on: Running) -> None:
+def take_mag(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
     """A magnetometer: the level field points to magnetic north; the declination is part of the heading error state."""
-    value, memory = reading.value, on.memory
-    if memory[USE_HEADING] != FROM_MAG:
-        return
-    rotation = rotation_of(on.work, ONE_LANE, ROWS, 0)
-    north, east, _ = to_earth(rotation, value[0], value[1], value[2])
-    field = np.sqrt(north * north + east * east)
-    reason = usable(reading.quality, field, 0.0, on)
-    if not field > LEAST_FIELD_GAUSS:
-        return
-    memory[MAG_HEADING] = np.arctan2(east, north)
-    if memory[STARTED] > 0.0:
-        offer_heading(reading, magnetic_heading(on), heading_variance(reading.t_s, on), reason, on)
+    s = load_attitude_settings(p)
+    for lane in range(len(lanes)):
+        reading, start = load_reading(work, lanes, lane), load_start(work, lanes, lane)
+        started = start.started
+        waiting = rotation_from_quaternion(start.qw, start.qx, start.qy, start.qz)
+        rotation = rotation_of(work, lanes, lane) if started > 0.0 else waiting
+        north, east, _ = to_earth(rotation, reading.value_0, reading.value_1, reading.value_2)
+        level = np.sqrt(north * north + east * east)
+        m = load_heading(work, lanes, lane)
+        seen = reading.arrived > 0.0 and level > LEAST_FIELD_GAUSS
+        m = HeadingMemory(m.read_s, np.arctan2(east, north) if seen else m.field_rad)
+        store_heading(work, lanes, lane, m)
+        reason = usable_in_flight(reading, level, 0.0, started)
+        read = magnetic_heading(rotation[0], rotation[3], m)
+        put_heading(work, lanes, lane, t_s, read, np.nan, reason if seen else SILENT, s)
+    heading(work, lanes, 0)
+    conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
 
 
 @procedure
-def take_yaw(reading: Reading, on: Running) -> None:
+def take_yaw(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
     """An external heading."""
-    variance = reading.variance[0]
-    if np.isnan(variance):
-        variance = heading_variance(reading.t_s, on)
-    reason = usable(reading.quality, reading.value[0], variance, on)
-    if on.memory[STARTED] > 0.0:
-        offer_heading(reading, reading.value[0], variance, reason, on)
-
-
-@procedure
-def offer_heading(reading: Reading, heading_rad: float, variance: float, reason: int, on: Running) -> None:
-    """A heading, with its slow error as a state."""
-    on.work[VALUE] = heading_rad
-    observe_heading(on.work, ONE_LANE, ROWS, VALUE)
-    put(variance, reason, HEADING_STATES, on.work)
-    conclude(reading, 0, heading_rad, reason, on)
+    s = load_attitude_settings(p)
+    for lane in range(len(lanes)):
+        reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
+        reason = usable_in_flight(reading, reading.value_0, 0.0, started)
+        put_heading(work, lanes, lane, t_s, reading.value_0, reading.variance_0, reason, s)
+    heading(work, lanes, 0)
+    conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)

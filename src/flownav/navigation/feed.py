@@ -1,27 +1,16 @@
-"""From streams to a navigator that is ready for them: which sensors serve, and the queue they are fed in."""
+"""From streams to a navigator that is ready for them: which sensors serve."""
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 
 from flownav.measurement import Array, Sensor, Stream
-from flownav.navigation.journal import new_journal
-from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.state import (
-    DEADLINE,
-    FLOW_GYRO_IS_IMU,
+from flownav.navigation.settings import (
     FROM_ATTITUDE,
     FROM_MAG,
     NO_HEADING,
-    USE_ATTITUDE,
-    USE_HEADING,
-    USE_IMU,
-    WORK_ROWS,
-    Running,
-    Tape,
-    new_memory,
+    Equipment,
+    NavigatorSettingsFile,
 )
 
 SLOWEST_IMU_HZ = 20.0
@@ -48,16 +37,6 @@ def heading_source(streams: dict[Sensor, Stream]) -> float:
     return FROM_ATTITUDE if Sensor.ATTITUDE in streams else NO_HEADING
 
 
-class Equipment(NamedTuple):
-    """Which sensors serve a navigator. heading: of navigation.state; deadline_s: how long it waits for a fix."""
-
-    use_imu: bool
-    use_attitude: bool
-    heading: float
-    flow_gyro_is_imu: bool
-    deadline_s: float
-
-
 def equipment_of(
     streams: dict[Sensor, Stream], first_s: float, flow_gyro_is_imu: bool, settings: NavigatorSettingsFile
 ) -> Equipment:
@@ -71,29 +50,3 @@ def equipment_of(
         flow_gyro_is_imu,
         first_s + float(settings.start_wait_s) if fixes else -np.inf,
     )
-
-
-def start_navigator(equipment: Equipment, settings: NavigatorSettingsFile, tape: Tape) -> Running:
-    """A navigator that has heard nothing."""
-    memory = new_memory()
-    memory[USE_IMU] = float(equipment.use_imu)
-    memory[USE_ATTITUDE] = float(equipment.use_attitude)
-    memory[USE_HEADING] = equipment.heading
-    memory[FLOW_GYRO_IS_IMU] = float(equipment.flow_gyro_is_imu)
-    memory[DEADLINE] = equipment.deadline_s
-    headed = equipment.heading != NO_HEADING or equipment.use_attitude
-    return Running(
-        settings.settings(),
-        settings.start_sigma(has_heading=headed, compass=equipment.heading == FROM_MAG),
-        np.zeros(WORK_ROWS),
-        memory,
-        tape,
-        new_journal(0, 0),
-    )
-
-
-def new_navigator(
-    streams: dict[Sensor, Stream], first_s: float, flow_gyro_is_imu: bool, settings: NavigatorSettingsFile, tape: Tape
-) -> Running:
-    """A navigator for these streams that has heard nothing; from `first_s` on it waits for a fix."""
-    return start_navigator(equipment_of(streams, first_s, flow_gyro_is_imu, settings), settings, tape)

@@ -2,211 +2,251 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flownav.compile import ONE_LANE, procedure
-from flownav.estimation.landing.observe import (
-    BODY_VELOCITY_STATES,
-    FLOW_RATE_STATES,
-    height_range,
-    observe_body_velocity,
-    observe_flow_rate,
-    rotation_of,
-)
-from flownav.estimation.landing.states import GYRO_BIAS
+from flownav.compile import equation, larger, procedure, smaller
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.laws.flow import body_velocity, flow_rate, lens_range_of
+from flownav.estimation.motion import rotation_of
+from flownav.estimation.states import GYRO_BIAS, INNOVATION, INNOVATION_VARIANCE, NOISE, STATE
 from flownav.measurement import Sensor
 from flownav.navigation.height import range_variance
-from flownav.navigation.offers import (
+from flownav.navigation.memory import (
+    LENS_RANGE,
+    REASON,
+    TESTED,
+    TURNING,
+    FlowMemory,
+    Reading,
+    load_flow,
+    load_range,
+    load_reading,
+    load_start,
+    store_flow,
+)
+from flownav.navigation.offers import conclude, note_aid, put, usable_in_flight
+from flownav.navigation.packed import load_flow_settings
+from flownav.navigation.reasons import (
     FUSED,
     INNOVATION_GATE,
     NEAR_GROUND,
     NO_HEIGHT,
     OUT_OF_RANGE,
+    SILENT,
     TILTED,
-    conclude,
-    note_aid,
-    put,
-    usable,
 )
-from flownav.navigation.state import (
-    FLOW_BIAS_COUNT,
-    FLOW_BIAS_X,
-    FLOW_CLOCK,
-    FLOW_DOUBT,
-    FLOW_DOUBTED,
-    FLOW_EXCESS,
-    FLOW_GYRO_IS_IMU,
-    FLOW_RATIO,
-    FLOW_TRUSTED,
-    LATEST_IMU,
-    LEVER,
-    RANGE_CLOCK,
-    RANGE_SINCE,
-    ROWS,
-    STARTED,
-    USE_IMU,
-    VALUE,
-    Reading,
-    Running,
-    write_event,
-)
+from flownav.navigation.settings import FlowSettings
+from flownav.navigation.tape import FLOW_DOUBTED, FLOW_TRUSTED, Output, write_event
+from flownav.sensors.flow import flow_noise_sigma
 
 LARGEST_EXCESS = 400.0
 AGREEMENT_S = 1.0
 DOUBTED_RATIO, TRUSTED_RATIO = 4.0, 2.0  # on average 1
 LONGEST_STEP_S = 1.0
 UNKNOWN_RANGE_M = 2.0
+FULL_QUALITY = 255.0
 
 
-@procedure
-def take_flow(reading: Reading, on: Running) -> None:
-    """Two components of flow [rad/s], or two or three of body velocity [m/s], with noise scheduled on the height."""
-    memory, settings, value = on.memory, on.settings, reading.value
-    if memory[STARTED] == 0.0:
-        return
-    angular = reading.sensor == Sensor.FLOW_RATE
-    upright = rotation_of(on.work, ONE_LANE, ROWS, 0)[8]
-    known = reading.t_s - memory[RANGE_CLOCK] <= settings.height_hold_s
-    range_m = height_range(on.work, ONE_LANE, ROWS, 0, settings.flow_below_m) if known else UNKNOWN_RANGE_M
-    turning_x, turning_y = rotation_rate(reading, on) if angular else (0.0, 0.0)
-    reason = usable(reading.quality, value[0] + value[1] + turning_x + turning_y, 0.0, on)
-    disputed = np.isfinite(memory[RANGE_SINCE])  # over a step of the ground the flow would move the height
-    if reason == FUSED and angular and (disputed or not known):
-        reason = NO_HEIGHT
-    if reason == FUSED and angular and max(abs(value[0]), abs(value[1])) > settings.flow_limit_rad_s:
-        reason = OUT_OF_RANGE
-    if reason == FUSED and upright < np.cos(settings.tilt_limit_rad):
-        reason = TILTED
-    if reason == FUSED and known and range_m * upright < settings.flow_min_height_m:
-        reason = NEAR_GROUND
-    components = 3 if not angular and np.isfinite(value[2]) else 2
-    tested = False
-    for channel in range(components):
-        if angular:
-            observation = value[channel] - (turning_x if channel == 0 else turning_y)
-            speed = observation * range_m
-            scale_of_noise = 1.0 / (range_m * range_m)
-        else:
-            observation = speed = value[channel]
-            scale_of_noise = 1.0
-        stated = np.nan if angular else reading.variance[channel]
-        model = scale_of_noise * velocity_variance(range_m, speed, reading.quality, angular, on)
-        noise = memory[FLOW_EXCESS] * model if np.isnan(stated) else stated
-        outcome = offer_flow(reading, channel, observation, noise, reason, on)
-        if outcome == FUSED or outcome == INNOVATION_GATE:  # noqa: SIM109
-            follow_agreement(reading.t_s, on)
-            if np.isnan(stated):
-                learn_flow_noise(reading.t_s, on)
-            tested = True
-        if outcome == FUSED:
-            note_aid(reading.t_s, on)
-    if tested:
-        memory[FLOW_CLOCK] = reading.t_s
-        judge_agreement(reading.t_s, on)
-
-
-@procedure
-def offer_flow(reading: Reading, channel: int, observation: float, noise: float, reason: int, on: Running) -> int:
-    """Offer one component; what became of it."""
-    work = on.work
-    work[VALUE] = observation
-    if reading.sensor == Sensor.FLOW_RATE:
-        set_lever(1 if channel == 0 else 0, on)
-        observe_flow_rate(work, ONE_LANE, ROWS, channel, VALUE, LEVER, on.settings.flow_below_m)
-        put(noise, reason, FLOW_RATE_STATES, on.work)
-        return conclude(reading, channel, observation, reason, on)
-    set_lever(channel, on)
-    observe_body_velocity(work, ONE_LANE, ROWS, channel, VALUE, LEVER)
-    put(noise, reason, BODY_VELOCITY_STATES, on.work)
-    return conclude(reading, channel, observation, reason, on)
-
-
-@procedure
-def set_lever(component: int, on: Running) -> None:
-    """Velocity of the lens from rotation, w x l, along one body axis."""
-    work, settings = on.work, on.settings
-    p = work[LATEST_IMU] - work[ROWS.state + GYRO_BIAS]
-    q = work[LATEST_IMU + 1] - work[ROWS.state + GYRO_BIAS + 1]
-    r = work[LATEST_IMU + 2] - work[ROWS.state + GYRO_BIAS + 2]
-    forward = q * settings.flow_below_m - r * settings.flow_right_m
-    right = r * settings.flow_forward_m - p * settings.flow_below_m
-    down = p * settings.flow_right_m - q * settings.flow_forward_m
-    lever = forward if component == 0 else (right if component == 1 else down)
-    work[LEVER] = lever if on.memory[USE_IMU] > 0.0 else 0.0
-
-
-@procedure
-def rotation_rate(reading: Reading, on: Running) -> tuple[float, float]:
-    """The turning that the flow saw [rad/s]: the chosen gyro of columns 2 and 3 less its bias.
-
-    The vehicle's IMU (columns 4 and 5, its mean over the exposure) has the filter's bias; a sensor's own gyro is
-    followed against it, but not where it has no data: it may say zero then for its gyro too.
+class View(NamedTuple):
+    """What the filter says of the ground that the lens sees: the range along the boresight, whether it is known, whether
+    the latest range reading is disputed, and R_33.
     """
-    value, memory, work = reading.value, on.memory, on.work
-    imu_x, imu_y = value[4] - work[ROWS.state + GYRO_BIAS], value[5] - work[ROWS.state + GYRO_BIAS + 1]
-    imu_here = np.isfinite(imu_x + imu_y)
-    if memory[FLOW_GYRO_IS_IMU] > 0.0 and imu_here:
-        return imu_x, imu_y
-    own_x, own_y = value[2], value[3]
-    if imu_here and np.isfinite(own_x + own_y) and reading.quality != 0.0:
-        memory[FLOW_BIAS_COUNT] += 1.0
-        step_s = min(max(reading.t_s - memory[FLOW_CLOCK], 0.0), LONGEST_STEP_S)
-        share = max(1.0 - np.exp(-step_s / on.settings.flow_gyro_time_s), 1.0 / memory[FLOW_BIAS_COUNT])
-        memory[FLOW_BIAS_X] += share * (own_x - imu_x - memory[FLOW_BIAS_X])
-        memory[FLOW_BIAS_X + 1] += share * (own_y - imu_y - memory[FLOW_BIAS_X + 1])
-    return own_x - memory[FLOW_BIAS_X], own_y - memory[FLOW_BIAS_X + 1]
+
+    range_m: float
+    known: bool
+    disputed: bool
+    upright: float
 
 
-@procedure
-def velocity_variance(range_m: float, speed_m_s: float, quality: float, angular: bool, on: Running) -> float:
-    """Variance of a flow velocity [m2/s2]: (sigma_flow r)^2 + floor^2, sigma_flow by quality (as PX4's EKF2).
+# -- pure laws ----------------------------------------------------------------------------------------------
+@equation
+def turning_of(
+    reading: Reading, t_s: float, bias_x: float, bias_y: float, gyro_is_imu: bool, m: FlowMemory, s: FlowSettings
+) -> tuple[float, float, FlowMemory]:
+    """The turning that the flow saw [rad/s]: its own gyro less its bias, or the vehicle's IMU over the exposure.
 
-    A metric sensor multiplied by a range of its own, whose error scales its velocity.
+    bias_x, bias_y: the filter's gyro bias, which the IMU's mean has. A sensor's own gyro is followed against the IMU,
+    but not where it has no data: it may say zero then for its gyro too.
     """
-    settings = on.settings
-    low, good = settings.flow_low_quality_sigma_rad_s, settings.flow_sigma_rad_s
-    sigma = (low + (good - low) * quality / 255.0) * range_m
-    scaled = 0.0 if angular else speed_m_s * speed_m_s * range_variance(range_m, on) / (range_m * range_m)
-    return sigma * sigma + settings.flow_floor_m_s * settings.flow_floor_m_s + scaled
+    imu_x, imu_y = reading.value_4 - bias_x, reading.value_5 - bias_y
+    own_x, own_y = reading.value_2, reading.value_3
+    imu_here = bool(np.isfinite(imu_x + imu_y))
+    by_imu = gyro_is_imu and imu_here
+    follows = imu_here and not by_imu and bool(np.isfinite(own_x + own_y)) and reading.quality != 0.0
+    count = m.bias_count + 1.0 if follows else m.bias_count
+    step_s = smaller(larger(t_s - m.taken_s, 0.0), LONGEST_STEP_S)
+    share = larger(1.0 - np.exp(-step_s / s.flow_gyro_time_s), 1.0 / larger(count, 1.0)) if follows else 0.0
+    bias_own_x = m.bias_x + share * (own_x - imu_x - m.bias_x) if follows else m.bias_x
+    bias_own_y = m.bias_y + share * (own_y - imu_y - m.bias_y) if follows else m.bias_y
+    after = FlowMemory(m.taken_s, m.excess, bias_own_x, bias_own_y, count, m.ratio, m.doubted)
+    x = imu_x if by_imu else own_x - bias_own_x
+    y = imu_y if by_imu else own_y - bias_own_y
+    return x, y, after
 
 
-@procedure
-def follow_agreement(t_s: float, on: Running) -> None:
-    """Follow how well flow agrees with what the filter expects of it: nu^2 over its variance, 1 on average.
+@equation
+def judge_flow(
+    reading: Reading, angular: bool, turning_x: float, turning_y: float, started: float, view: View, s: FlowSettings
+) -> int:
+    """The verdict on a flow reading as a whole."""
+    turning = turning_x + turning_y if angular else 0.0
+    reason = usable_in_flight(reading, reading.value_0 + reading.value_1 + turning, 0.0, started)
+    blind = angular and (view.disputed or not view.known)  # over a step of the ground the flow would move the height
+    reason = NO_HEIGHT if reason == FUSED and blind else reason
+    fast = angular and larger(abs(reading.value_0), abs(reading.value_1)) > s.flow_limit_rad_s
+    reason = OUT_OF_RANGE if reason == FUSED and fast else reason
+    reason = TILTED if reason == FUSED and view.upright < np.cos(s.tilt_limit_rad) else reason
+    near = view.known and view.range_m * view.upright < s.flow_min_height_m
+    return NEAR_GROUND if reason == FUSED and near else reason
+
+
+@equation
+def flow_variance(range_m: float, speed_m_s: float, quality: float, angular: bool, s: FlowSettings) -> float:
+    """Variance of a flow velocity [m2/s2]: the sensor file's noise at this height, or (sigma_flow r)^2 + floor^2.
+
+    sigma_flow goes with the quality (as PX4's EKF2). A metric sensor multiplied by a range of its own, whose error
+    scales its velocity.
+    """
+    low, good = s.flow_low_quality_sigma_rad_s, s.flow_sigma_rad_s
+    sigma = (low + (good - low) * quality / FULL_QUALITY) * range_m
+    modelled = sigma * sigma + s.flow_floor_m_s * s.flow_floor_m_s
+    stated = flow_noise_sigma(range_m, s.noise)
+    spread = range_variance(range_m, s.range_sigma_m, s.range_relative_sigma) / (range_m * range_m)
+    scaled = 0.0 if angular else speed_m_s * speed_m_s * spread
+    return (stated * stated if s.noise.stated > 0.0 else modelled) + scaled
+
+
+@equation
+def followed_agreement(square: float, t_s: float, m: FlowMemory) -> float:
+    """How well flow agrees with what the filter expects of it: nu^2 over its variance, 1 on average.
 
     A wrong sign, swapped axes or garbage stay within the gate reading by reading, but not on average.
     """
-    memory, work = on.memory, on.work
-    gate, total = on.settings.filter.gate_sigma, work[ROWS.innovation_variance]
-    square = min(work[ROWS.innovation] ** 2, gate * gate * total) / total
-    share = min(max(t_s - memory[FLOW_CLOCK], 0.0) / AGREEMENT_S, 1.0)
-    memory[FLOW_RATIO] += 0.5 * share * (square - memory[FLOW_RATIO])
+    share = smaller(larger(t_s - m.taken_s, 0.0) / AGREEMENT_S, 1.0)
+    return m.ratio + 0.5 * share * (square - m.ratio)
 
 
-@procedure
-def judge_agreement(t_s: float, on: Running) -> None:
-    """Say that flow is doubted, and that it is trusted again."""
-    memory = on.memory
-    if memory[FLOW_DOUBT] == 0.0 and memory[FLOW_RATIO] > DOUBTED_RATIO:
-        memory[FLOW_DOUBT] = 1.0
-        write_event(t_s, FLOW_DOUBTED, memory[FLOW_RATIO], on.tape)
-    elif memory[FLOW_DOUBT] > 0.0 and memory[FLOW_RATIO] < TRUSTED_RATIO:
-        memory[FLOW_DOUBT] = 0.0
-        write_event(t_s, FLOW_TRUSTED, memory[FLOW_RATIO], on.tape)
-
-
-@procedure
-def learn_flow_noise(t_s: float, on: Running) -> None:
-    """Follow how many times noisier than its model the flow is: the mean of (nu^2 - h P h')/R, at least 1.
+@equation
+def followed_excess(innovation: float, total: float, noise: float, gate: float, t_s: float, m: FlowMemory,
+                    s: FlowSettings) -> float:  # fmt: skip
+    """How many times noisier than its model the flow is: the mean of (nu^2 - h P h')/R, at least 1.
 
     A poor lens or floor shows in the innovations; the model alone would take its noise for motion and gate the
     rest away. Flow smoother than modelled is not trusted more: what is left of its error lasts.
     """
-    memory, work = on.memory, on.work
-    noise, total = work[ROWS.noise], work[ROWS.innovation_variance]
-    gate = on.settings.filter.gate_sigma
-    square = min(work[ROWS.innovation] ** 2, gate * gate * total)
-    found = (square - (total - noise)) * memory[FLOW_EXCESS] / noise
-    share = min(max(t_s - memory[FLOW_CLOCK], 0.0), LONGEST_STEP_S) / on.settings.flow_noise_time_s
-    followed = memory[FLOW_EXCESS] + 0.5 * share * (found - memory[FLOW_EXCESS])
-    memory[FLOW_EXCESS] = min(max(followed, 1.0), LARGEST_EXCESS)
+    square = smaller(innovation * innovation, gate * gate * total)
+    seen = (square - (total - noise)) * m.excess / noise
+    share = smaller(larger(t_s - m.taken_s, 0.0), LONGEST_STEP_S) / s.flow_noise_time_s
+    return smaller(larger(m.excess + 0.5 * share * (seen - m.excess), 1.0), LARGEST_EXCESS)
+
+
+@equation
+def lasting_doubt(doubted: float, ratio: float) -> float:
+    """Doubted above one ratio, trusted again below a smaller one."""
+    return 1.0 if ratio > DOUBTED_RATIO else (0.0 if ratio < TRUSTED_RATIO else doubted)
+
+
+# -- on lanes -----------------------------------------------------------------------------------------------
+@procedure
+def take_flow(
+    work: Work, lanes: Lanes, t_s: float, sensor: int, gyro_is_imu: bool, p: Work, o: Output
+) -> None:
+    """Two components of flow [rad/s], or two or three of body velocity [m/s], with noise scheduled on the height."""
+    s = load_flow_settings(p)
+    angular = sensor == Sensor.FLOW_RATE
+    look(work, lanes, t_s, angular, gyro_is_imu, s)
+    for component in range(2 if angular else 3):
+        offer_component(work, lanes, component, angular, s)
+        if angular:
+            flow_rate(
+                work, lanes, component, s.flow_forward_m, s.flow_right_m, s.flow_below_m, s.flow_below_m
+            )
+        else:
+            body_velocity(work, lanes, component, s.flow_forward_m, s.flow_right_m, s.flow_below_m)
+        conclude(work, lanes, t_s, sensor, component, s.gate_sigma, o)
+        learn(work, lanes, t_s, angular, component, s)
+        note_aid(work, lanes, t_s, o)
+    judge_agreement(work, lanes, t_s, o)
+
+
+@procedure
+def look(work: Work, lanes: Lanes, t_s: float, angular: bool, gyro_is_imu: bool, s: FlowSettings) -> None:
+    """TURNING, LENS_RANGE and, in TESTED, the verdict on the whole reading."""
+    for lane in range(len(lanes)):
+        reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
+        ranged, m = load_range(work, lanes, lane), load_flow(work, lanes, lane)
+        known = t_s - ranged.taken_s <= s.height_hold_s
+        range_m = lens_range_of(work, lanes, lane, s.flow_below_m) if known else UNKNOWN_RANGE_M
+        upright = rotation_of(work, lanes, lane)[8]
+        view = View(range_m, known, bool(np.isfinite(ranged.refused_s)), upright)
+        bias_x = work[(STATE + GYRO_BIAS) * len(lanes) + lane]
+        bias_y = work[(STATE + GYRO_BIAS + 1) * len(lanes) + lane]
+        x, y, after = turning_of(reading, t_s, bias_x, bias_y, gyro_is_imu, m, s)
+        if angular and started > 0.0 and reading.arrived > 0.0:
+            store_flow(work, lanes, lane, after)
+        work[TURNING * len(lanes) + lane] = x
+        work[(TURNING + 1) * len(lanes) + lane] = y
+        work[LENS_RANGE * len(lanes) + lane] = range_m
+        work[TESTED * len(lanes) + lane] = judge_flow(reading, angular, x, y, started, view, s)
+
+
+@procedure
+def offer_component(work: Work, lanes: Lanes, component: int, angular: bool, s: FlowSettings) -> None:
+    """One component without turning and gain error, with its variance. A sensor without a down velocity has NaN there."""
+    for lane in range(len(lanes)):
+        reading, m = load_reading(work, lanes, lane), load_flow(work, lanes, lane)
+        raw = reading.value_0 if component == 0 else (reading.value_1 if component == 1 else reading.value_2)
+        turning = work[(TURNING + (0 if component == 0 else 1)) * len(lanes) + lane]
+        along_x = component == (1 if angular else 0)  # flow_y shows the speed forward
+        gain = s.flow_gain_x if along_x else (1.0 if component == 2 else s.flow_gain_y)
+        observation = ((raw - turning) if angular else raw) / gain
+        range_m = work[LENS_RANGE * len(lanes) + lane]
+        speed = observation * range_m if angular else observation
+        per_speed = 1.0 / (range_m * range_m) if angular else 1.0
+        listed = reading.variance_0 if component == 0 else (
+            reading.variance_1 if component == 1 else reading.variance_2
+        )  # fmt: skip
+        stated = np.nan if angular else listed
+        model = m.excess * per_speed * flow_variance(range_m, speed, reading.quality, angular, s)
+        reason = int(work[TESTED * len(lanes) + lane])
+        absent = component == 2 and not np.isfinite(raw)
+        put(work, lanes, lane, observation, stated if np.isfinite(stated) else model, SILENT if absent else reason)
+
+
+@procedure
+def learn(work: Work, lanes: Lanes, t_s: float, angular: bool, component: int, s: FlowSettings) -> None:
+    """Agreement and excess noise from the component that was just tested."""
+    for lane in range(len(lanes)):
+        reason = work[REASON * len(lanes) + lane]
+        if reason == FUSED or reason == INNOVATION_GATE:
+            m, reading = load_flow(work, lanes, lane), load_reading(work, lanes, lane)
+            innovation, total = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]
+            square = smaller(innovation * innovation, s.gate_sigma * s.gate_sigma * total) / total
+            ratio = followed_agreement(square, t_s, m)
+            listed = reading.variance_0 if component == 0 else (
+                reading.variance_1 if component == 1 else reading.variance_2
+            )  # fmt: skip
+            excess = m.excess
+            if angular or not np.isfinite(listed):
+                noise = work[NOISE * len(lanes) + lane]
+                excess = followed_excess(innovation, total, noise, s.gate_sigma, t_s, m, s)
+            store_flow(
+                work, lanes, lane, FlowMemory(m.taken_s, excess, m.bias_x, m.bias_y, m.bias_count, ratio, m.doubted)
+            )
+
+
+@procedure
+def judge_agreement(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
+    """Say that flow is doubted, and that it is trusted again; note when it was tested last."""
+    for lane in range(len(lanes)):
+        reason = work[TESTED * len(lanes) + lane]
+        if reason == FUSED:
+            m = load_flow(work, lanes, lane)
+            doubted = lasting_doubt(m.doubted, m.ratio)
+            if doubted != m.doubted:
+                write_event(lanes, lane, t_s, FLOW_DOUBTED if doubted > 0.0 else FLOW_TRUSTED, m.ratio, o)
+            store_flow(
+                work, lanes, lane, FlowMemory(t_s, m.excess, m.bias_x, m.bias_y, m.bias_count, m.ratio, doubted)
+            )

@@ -2,164 +2,220 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flownav.compile import ONE_LANE, procedure
-from flownav.estimation.landing.algebra import settle
-from flownav.estimation.landing.observe import BARO_STATES, RANGE_STATES, observe_baro, observe_range, rotation_of
-from flownav.estimation.landing.states import BARO, GROUND, POSITION, STATES, VELOCITY
+from flownav.compile import equation, procedure
+from flownav.estimation.covariance import variance_of
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.laws.height import baro_altitude, range_along_boresight
+from flownav.estimation.motion import rotation_of
+from flownav.estimation.states import BARO, GROUND, INNOVATION, POSITION, STATE, VELOCITY
 from flownav.navigation.journal import reset_state
-from flownav.navigation.offers import (
-    DATUM,
-    FUSED,
-    INNOVATION_GATE,
-    OUT_OF_RANGE,
-    STUCK,
-    TILTED,
-    conclude,
-    put,
-    usable,
-)
-from flownav.navigation.state import (
-    BARO_FOUND,
+from flownav.navigation.memory import (
     BARO_KNOWN,
-    GROUND_FOUND,
-    GROUND_RESET,
-    GROUND_SET,
-    HEIGHT_CLOCK,
-    RANGE_CLOCK,
-    RANGE_DOUBTED,
-    RANGE_DOWN,
-    RANGE_LAST,
-    RANGE_SAID,
-    RANGE_SAME_SINCE,
-    RANGE_SINCE,
-    RANGE_STUCK,
-    ROWS,
-    STARTED,
-    VALUE,
+    REASON,
+    RangeMemory,
     Reading,
-    Running,
-    write_event,
+    load_aid,
+    load_range,
+    load_reading,
+    load_start,
+    store_range,
 )
-from flownav.navigation.vibration import doubt
+from flownav.navigation.offers import conclude, fuse_offered, note_height, put, usable_in_flight
+from flownav.navigation.packed import load_height_settings
+from flownav.navigation.reasons import FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT, STUCK, TILTED
+from flownav.navigation.settings import HeightSettings
+from flownav.navigation.tape import BARO_FOUND, GROUND_FOUND, GROUND_RESET, RANGE_STUCK, Output, write_event
+from flownav.navigation.vibration import doubt_imu
 
 UNKNOWN_M = 100.0
-DOUBTING_S = 0.05  # a range that alone tells the height and is rejected so long is believed, not the accelerometer
+DOUBTING_S = 0.05  # a range that alone tells the height and is refused so long is believed, not the accelerometer
 ALONE = 5.0  # times the travel, where nothing else tells the height
 
 
-@procedure
-def range_variance(range_m: float, on: Running) -> float:
+class Height(NamedTuple):
+    """What the filter says of a lane's height: down and its speed's standard deviation, and R_33."""
+
+    pos_d_m: float
+    speed_sigma_m_s: float
+    upright: float
+
+
+@equation
+def range_variance(range_m: float, sigma_m: float, relative_sigma: float) -> float:
     """Variance of a range reading [m2]: a floor and a share of the range."""
-    share = on.settings.range_relative_sigma * range_m
-    return on.settings.range_sigma_m * on.settings.range_sigma_m + share * share
+    share = relative_sigma * range_m
+    return sigma_m * sigma_m + share * share
 
 
-@procedure
-def repeats(reading: Reading, on: Running) -> bool:
+@equation
+def repeats(t_s: float, m: RangeMemory, height: Height, alone: bool, s: HeightSettings) -> bool:
     """Whether the range has repeated one value to the last digit for long: no news, whatever the vehicle does.
 
     Where no barometer, GPS or pad has told the height lately, the range is all there is, and it is believed unless
     the height travels by more than the filter's own drift.
     """
-    memory, settings, range_m = on.memory, on.settings, reading.value[0]
-    if range_m != memory[RANGE_LAST]:
-        memory[RANGE_LAST], memory[RANGE_SAME_SINCE] = range_m, reading.t_s
-        memory[RANGE_DOWN] = on.work[ROWS.state + POSITION + 2]
-        return False
-    lasting_s = reading.t_s - memory[RANGE_SAME_SINCE]
-    alone = reading.t_s - memory[HEIGHT_CLOCK] > settings.height_hold_s
-    drift = 3.0 * np.sqrt(on.work[ROWS.covariance + (VELOCITY + 2) * (STATES + 1)]) * lasting_s
-    least = ALONE * settings.range_stuck_travel_m + drift if alone else 0.0
-    repeating: bool = lasting_s >= settings.range_stuck_s and travelled(on) >= least
-    return repeating
+    lasting_s = t_s - m.same_s
+    travelled = abs(height.pos_d_m - m.down_m)
+    least = ALONE * s.range_stuck_travel_m + 3.0 * height.speed_sigma_m_s * lasting_s if alone else 0.0
+    return lasting_s >= s.range_stuck_s and travelled >= least
+
+
+@equation
+def judge_range(
+    reading: Reading, t_s: float, started: float, height: Height, alone: bool, m: RangeMemory, s: HeightSettings
+) -> tuple[int, float, RangeMemory]:
+    """Verdict, variance and what is remembered of one range [m] along the boresight."""
+    range_m = reading.value_0
+    stated = reading.variance_0
+    variance = stated if np.isfinite(stated) else range_variance(range_m, s.range_sigma_m, s.range_relative_sigma)
+    reason = usable_in_flight(reading, range_m, variance, started)
+    within = range_m >= s.range_min_m and range_m <= s.range_max_m
+    reason = OUT_OF_RANGE if reason == FUSED and not within else reason
+    reason = TILTED if reason == FUSED and height.upright < np.cos(s.tilt_limit_rad) else reason
+    news = range_m != m.last_m
+    stuck = reason == FUSED and not news and repeats(t_s, m, height, alone, s)
+    heard = reason == FUSED
+    after = RangeMemory(
+        m.taken_s,
+        m.refused_s,
+        range_m if heard and news else m.last_m,
+        t_s if heard and news else m.same_s,
+        height.pos_d_m if heard and news else m.down_m,
+        m.said_s,
+        m.doubted,
+        m.ground_known,
+    )
+    return STUCK if stuck else reason, variance, after
 
 
 @procedure
-def travelled(on: Running) -> float:
-    """How far the height has gone since the range began to repeat itself [m]."""
-    travel: float = np.abs(on.work[ROWS.state + POSITION + 2] - on.memory[RANGE_DOWN])
-    return travel
+def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
+    """Height over the ground below. Where range is refused for long, the ground has a step."""
+    s = load_height_settings(p)
+    for lane in range(len(lanes)):
+        reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
+        height = height_of(work, lanes, lane)
+        alone = t_s - load_aid(work, lanes, lane).height_s > s.height_hold_s
+        reason, variance, m = judge_range(reading, t_s, started, height, alone, load_range(work, lanes, lane), s)
+        if reason == STUCK and abs(height.pos_d_m - m.down_m) >= s.range_stuck_travel_m and m.said_s != m.same_s:
+            write_event(lanes, lane, t_s, RANGE_STUCK, reading.value_0, o)
+            m = said(m)
+        if reason == FUSED and m.ground_known == 0.0:
+            m = found(m)
+            set_ground(work, lanes, lane, t_s, reading, height, s, GROUND_FOUND, o)
+        store_range(work, lanes, lane, m)
+        put(work, lanes, lane, reading.value_0, variance, reason)
+    range_along_boresight(work, lanes, 0, s.range_below_m, 0.0, 0.0)
+    conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
+    again = False
+    for lane in range(len(lanes)):
+        again = mind_refusals(work, lanes, lane, t_s, s, o) or again
+    if again:  # the ground was found anew: the reading that said so is fused
+        range_along_boresight(work, lanes, 0, s.range_below_m, 0.0, 0.0)
+        fuse_offered(work, lanes, s.gate_sigma, o)
+
+
+@equation
+def said(m: RangeMemory) -> RangeMemory:
+    """This repetition has been reported."""
+    return RangeMemory(
+        m.taken_s, m.refused_s, m.last_m, m.same_s, m.down_m, m.same_s, m.doubted, m.ground_known
+    )  # fmt: skip
+
+
+@equation
+def found(m: RangeMemory) -> RangeMemory:
+    """A range has found the ground."""
+    return RangeMemory(m.taken_s, m.refused_s, m.last_m, m.same_s, m.down_m, m.said_s, m.doubted, 1.0)
+
+
+@equation
+def height_of(work: Work, lanes: Lanes, lane: int) -> Height:
+    """What the filter says of a lane's height."""
+    return Height(
+        work[(STATE + POSITION + 2) * len(lanes) + lane],
+        np.sqrt(variance_of(work, lanes, VELOCITY + 2, lane)),
+        rotation_of(work, lanes, lane)[8],
+    )
 
 
 @procedure
-def take_range(reading: Reading, on: Running) -> None:
-    """Height over the ground below. Where range is rejected for long, the ground has a step."""
-    t_s, memory, settings, work = reading.t_s, on.memory, on.settings, on.work
-    range_m, noise = reading.value[0], reading.variance[0]
-    if np.isnan(noise):
-        noise = range_variance(range_m, on)
-    reason = usable(reading.quality, range_m, noise, on)
-    if memory[STARTED] == 0.0:
-        return
-    upright = rotation_of(work, ONE_LANE, ROWS, 0)[8]
-    if reason == FUSED and not settings.range_min_m <= range_m <= settings.range_max_m:
-        reason = OUT_OF_RANGE
-    if reason == FUSED and upright < np.cos(settings.tilt_limit_rad):
-        reason = TILTED
-    if reason == FUSED and repeats(reading, on):
-        reason = STUCK
-        if travelled(on) >= settings.range_stuck_travel_m and memory[RANGE_SAID] != memory[RANGE_SAME_SINCE]:
-            write_event(t_s, RANGE_STUCK, range_m, on.tape)
-            memory[RANGE_SAID] = memory[RANGE_SAME_SINCE]
-    below = work[ROWS.state + POSITION + 2] + (range_m + settings.range_below_m) * upright
-    if reason == FUSED and memory[GROUND_SET] == 0.0:
-        set_ground(below, on)
-        memory[GROUND_SET] = 1.0
-        write_event(t_s, GROUND_FOUND, below, on.tape)
-    offer_range(range_m, noise, reason, on)
-    reason = conclude(reading, 0, range_m, reason, on)
-    if reason == FUSED or reason == DATUM:  # noqa: SIM109
-        memory[RANGE_CLOCK], memory[RANGE_SINCE] = t_s, np.nan
-    elif reason == INNOVATION_GATE:
-        if np.isnan(memory[RANGE_SINCE]):
-            memory[RANGE_SINCE] = t_s
-            memory[RANGE_DOUBTED] = 0.0
-        alone = t_s - memory[HEIGHT_CLOCK] > settings.height_hold_s
-        if alone and memory[RANGE_DOUBTED] == 0.0 and t_s - memory[RANGE_SINCE] >= DOUBTING_S:
-            doubt(t_s, work[ROWS.innovation], on)
-            memory[RANGE_DOUBTED] = 1.0  # once: doubted at each reading, a short echo would be believed too
-        if t_s - memory[RANGE_SINCE] >= settings.ground_reset_s:
-            set_ground(below, on)
-            offer_range(range_m, noise, FUSED, on)
-            settle(work, ONE_LANE, ROWS, settings.filter.gate_sigma)
-            memory[RANGE_CLOCK], memory[RANGE_SINCE] = t_s, np.nan
-            write_event(t_s, GROUND_RESET, below, on.tape)
-
-
-@procedure
-def offer_range(range_m: float, noise: float, reason: int, on: Running) -> None:
-    """The law of a range, put for its test."""
-    on.work[VALUE] = range_m
-    observe_range(on.work, ONE_LANE, ROWS, VALUE, on.settings.range_below_m)
-    put(noise, reason, RANGE_STATES, on.work)
-
-
-@procedure
-def set_ground(below_m: float, on: Running) -> None:
+def set_ground(
+    work: Work, lanes: Lanes, lane: int, t_s: float, reading: Reading, height: Height, s: HeightSettings, kind: int,
+    o: Output,
+) -> None:  # fmt: skip
     """The ground is unknown but for this reading, which is about to be fused."""
-    on.work[ROWS.state + GROUND] = below_m
-    reset_state(GROUND, UNKNOWN_M * UNKNOWN_M, on)
+    below = height.pos_d_m + (reading.value_0 + s.range_below_m) * height.upright
+    work[(STATE + GROUND) * len(lanes) + lane] = below
+    reset_state(work, lanes, lane, GROUND, UNKNOWN_M * UNKNOWN_M, o)
+    write_event(lanes, lane, t_s, kind, below, o)
 
 
 @procedure
-def take_baro(reading: Reading, on: Running) -> None:
+def mind_refusals(work: Work, lanes: Lanes, lane: int, t_s: float, s: HeightSettings, o: Output) -> bool:
+    """After the test: a range that is refused first makes the accelerometer doubted, then the ground new.
+
+    True where the ground of this lane was found anew, and the reading is to be offered once more.
+    """
+    reason = work[REASON * len(lanes) + lane]
+    m = load_range(work, lanes, lane)
+    work[REASON * len(lanes) + lane] = SILENT  # of the second offer, unless the ground is new
+    if reason == FUSED:
+        store_range(
+            work, lanes, lane,
+            RangeMemory(t_s, np.nan, m.last_m, m.same_s, m.down_m, m.said_s, m.doubted, m.ground_known),
+        )  # fmt: skip
+        return False
+    if reason != INNOVATION_GATE:
+        return False
+    first = not np.isfinite(m.refused_s)
+    since_s = t_s if first else m.refused_s
+    doubted = 0.0 if first else m.doubted
+    alone = t_s - load_aid(work, lanes, lane).height_s > s.height_hold_s
+    if alone and doubted == 0.0 and t_s - since_s >= DOUBTING_S:
+        doubt_imu(work, lanes, lane, t_s, work[INNOVATION * len(lanes) + lane], o)
+        doubted = 1.0  # once: doubted at each reading, a short echo would be believed too
+    step = t_s - since_s >= s.ground_reset_s
+    store_range(
+        work, lanes, lane,
+        RangeMemory(
+            t_s if step else m.taken_s, np.nan if step else since_s, m.last_m, m.same_s, m.down_m, m.said_s, doubted,
+            m.ground_known,
+        ),
+    )  # fmt: skip
+    if step:
+        reading, height = load_reading(work, lanes, lane), height_of(work, lanes, lane)
+        set_ground(work, lanes, lane, t_s, reading, height, s, GROUND_RESET, o)
+        work[REASON * len(lanes) + lane] = FUSED
+    return step
+
+
+@equation
+def judge_baro(reading: Reading, started: float, s: HeightSettings) -> tuple[int, float]:
+    """Verdict and variance of a pressure altitude [m]."""
+    stated = reading.variance_0
+    variance = stated if np.isfinite(stated) else s.baro_sigma_m * s.baro_sigma_m
+    return usable_in_flight(reading, reading.value_0, variance, started), variance
+
+
+@procedure
+def take_baro(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
     """Height from pressure; the first reading finds the offset."""
-    work, memory = on.work, on.memory
-    altitude_m, noise = reading.value[0], reading.variance[0]
-    if np.isnan(noise):
-        noise = on.settings.baro_sigma_m * on.settings.baro_sigma_m
-    reason = usable(reading.quality, altitude_m, noise, on)
-    if memory[STARTED] == 0.0:
-        return
-    if reason == FUSED and memory[BARO_KNOWN] == 0.0:
-        work[ROWS.state + BARO] = altitude_m + work[ROWS.state + POSITION + 2]
-        reset_state(BARO, UNKNOWN_M * UNKNOWN_M, on)
-        memory[BARO_KNOWN] = 1.0
-        write_event(reading.t_s, BARO_FOUND, work[ROWS.state + BARO], on.tape)
-    work[VALUE] = altitude_m
-    observe_baro(work, ONE_LANE, ROWS, VALUE)
-    put(noise, reason, BARO_STATES, on.work)
-    if conclude(reading, 0, altitude_m, reason, on) == FUSED:
-        memory[HEIGHT_CLOCK] = reading.t_s
+    s = load_height_settings(p)
+    for lane in range(len(lanes)):
+        reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
+        reason, variance = judge_baro(reading, started, s)
+        if reason == FUSED and work[BARO_KNOWN * len(lanes) + lane] == 0.0:
+            offset = reading.value_0 + work[(STATE + POSITION + 2) * len(lanes) + lane]
+            work[(STATE + BARO) * len(lanes) + lane] = offset
+            reset_state(work, lanes, lane, BARO, UNKNOWN_M * UNKNOWN_M, o)
+            work[BARO_KNOWN * len(lanes) + lane] = 1.0
+            write_event(lanes, lane, t_s, BARO_FOUND, offset, o)
+        put(work, lanes, lane, reading.value_0, variance, reason)
+    baro_altitude(work, lanes, 0)
+    conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
+    note_height(work, lanes, t_s)

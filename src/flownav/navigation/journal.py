@@ -1,97 +1,115 @@
-"""What a smoother needs of a run, written as it happens: predictions, corrections, resets, and the estimates.
+"""What a smoother needs of a run, written as it happens: predictions, corrections, resets, decays, and the estimates.
 
-A journal of no rows is written nowhere and only counts; that is what a run without a smoother has.
+A journal of no rows is written nowhere and only counts; that is what a run without a smoother has. It is of one lane.
 """
 
 from __future__ import annotations
 
-import numpy as np
-
-from flownav.compile import ONE_LANE, procedure
-from flownav.estimation.landing.algebra import forget
-from flownav.estimation.landing.states import STATES
-from flownav.navigation.state import OBSERVED, ROWS, VALUE, Journal, Running
-
-# kinds of entry, and where their numbers stand in it
-PREDICTED, CORRECTED, FORGOTTEN, WRITTEN = 0.0, 1.0, 2.0, 3.0
-STEP, MIDDLE, FORCE = 1, 2, 11  # a prediction: dt [s], R_EB in its middle (9), specific force NED (3)
-INNOVATION, INNOVATION_VARIANCE, JACOBIAN, GAIN = 1, 2, 3, 3 + STATES  # a correction: nu, S, h, K
-STATE = 1  # a reset: which
-ENTRY = 3 + 2 * STATES
-
-
-def new_journal(entries: int, estimates: int) -> Journal:
-    """A journal of so many rows."""
-    return Journal(
-        np.zeros((entries, ENTRY)),
-        np.zeros((estimates, STATES + 4)),
-        np.zeros((estimates, STATES, STATES)),
-        np.zeros(2, np.int64),
-    )
+from flownav.compile import procedure
+from flownav.estimation.covariance import covariance_of, forget_lane
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.states import (
+    COEFFICIENT,
+    FORCE,
+    GAIN,
+    INNOVATION,
+    INNOVATION_VARIANCE,
+    MIDDLE,
+    OBSERVED,
+    QUATERNION,
+    STATE,
+    STATES,
+)
+from flownav.navigation.tape import (
+    CORRECTED,
+    DECAYED,
+    ENTRIES,
+    ENTRY,
+    FORCE_AT,
+    FORGOTTEN,
+    GAIN_AT,
+    INNOVATION_AT,
+    JACOBIAN_AT,
+    MIDDLE_AT,
+    NOTED,
+    NOTES,
+    PREDICTED,
+    STATE_AT,
+    STEP,
+    VARIANCE_AT,
+    Output,
+)
 
 
 @procedure
-def next_entry(kind: float, on: Running) -> int:
-    """The row of a new entry; -1 where the journal has no such row."""
-    journal = on.journal
-    row = journal.used[0]
-    journal.used[0] = row + 1
-    if row >= len(journal.entry):
+def next_entry(kind: float, o: Output) -> int:
+    """Where a new entry begins; -1 where the journal has no such row."""
+    row = o.used[ENTRIES]
+    o.used[ENTRIES] = row + 1
+    if row >= o.room[3]:
         return -1
-    journal.entry[row, 0] = kind
-    return int(row)
+    o.entry[row * ENTRY] = kind
+    return int(row * ENTRY)
 
 
 @procedure
-def note_prediction(dt_s: float, on: Running) -> None:
+def note_prediction(work: Work, lanes: Lanes, dt_s: float, o: Output) -> None:
     """The prediction that was just made."""
-    row = next_entry(PREDICTED, on)
-    if row < 0:
+    first = next_entry(PREDICTED, o)
+    if first < 0:
         return
-    line = on.journal.entry[row]
-    line[STEP] = dt_s
+    o.entry[first + STEP] = dt_s
     for i in range(9):
-        line[MIDDLE + i] = on.work[ROWS.middle + i]
+        o.entry[first + MIDDLE_AT + i] = work[(MIDDLE + i) * len(lanes)]
     for i in range(3):
-        line[FORCE + i] = on.work[ROWS.force + i]
+        o.entry[first + FORCE_AT + i] = work[(FORCE + i) * len(lanes)]
 
 
 @procedure
-def note_correction(on: Running) -> None:
-    """The correction that was just made, its Jacobian on the states that `offers.put` named."""
-    row = next_entry(CORRECTED, on)
-    if row < 0:
+def note_decay(dt_s: float, o: Output) -> None:
+    """The Gauss-Markov errors went on by dt."""
+    first = next_entry(DECAYED, o)
+    if first >= 0:
+        o.entry[first + STEP] = dt_s
+
+
+@procedure
+def note_correction(work: Work, lanes: Lanes, o: Output) -> None:
+    """The correction that was just made, its Jacobian on the states that its law named."""
+    first = next_entry(CORRECTED, o)
+    if first < 0:
         return
-    line, work = on.journal.entry[row], on.work
-    line[INNOVATION], line[INNOVATION_VARIANCE] = work[ROWS.innovation], work[ROWS.innovation_variance]
+    o.entry[first + INNOVATION_AT] = work[INNOVATION * len(lanes)]
+    o.entry[first + VARIANCE_AT] = work[INNOVATION_VARIANCE * len(lanes)]
     for i in range(STATES):
-        line[JACOBIAN + i], line[GAIN + i] = 0.0, work[ROWS.gain + i]
-    for i in range(int(work[OBSERVED])):
-        line[JACOBIAN + int(work[OBSERVED + 1 + i])] = work[ROWS.coefficient + i]
+        o.entry[first + JACOBIAN_AT + i] = 0.0
+        o.entry[first + GAIN_AT + i] = work[(GAIN + i) * len(lanes)]
+    for i in range(int(work[OBSERVED * len(lanes)])):
+        state = int(work[(OBSERVED + 1 + i) * len(lanes)])
+        o.entry[first + JACOBIAN_AT + state] = work[(COEFFICIENT + i) * len(lanes)]
 
 
 @procedure
-def reset_state(state: int, variance: float, on: Running) -> None:
-    """A state loses its correlations and gets this variance."""
-    on.work[VALUE] = 1.0
-    forget(on.work, ONE_LANE, ROWS, state, variance, VALUE)
-    row = next_entry(FORGOTTEN, on)
-    if row >= 0:
-        on.journal.entry[row, STATE] = state
+def reset_state(work: Work, lanes: Lanes, lane: int, state: int, variance: float, o: Output) -> None:
+    """A state of one lane loses its correlations and gets this variance."""
+    forget_lane(work, lanes, STATES, state, lane, variance)
+    if len(lanes) == 1:
+        first = next_entry(FORGOTTEN, o)
+        if first >= 0:
+            o.entry[first + STATE_AT] = state
 
 
 @procedure
-def note_estimate(on: Running) -> None:
+def note_estimate(work: Work, lanes: Lanes, o: Output) -> None:
     """State, attitude and covariance of the estimate that was just written."""
-    next_entry(WRITTEN, on)
-    journal, work = on.journal, on.work
-    row = journal.used[1]
-    journal.used[1] = row + 1
-    if row >= len(journal.state):
+    next_entry(NOTED, o)
+    row = o.used[NOTES]
+    o.used[NOTES] = row + 1
+    if row >= o.room[4]:
         return
     for i in range(STATES):
-        journal.state[row, i] = work[ROWS.state + i]
+        o.state[row * (STATES + 4) + i] = work[(STATE + i) * len(lanes)]
         for j in range(STATES):
-            journal.covariance[row, i, j] = work[ROWS.covariance + i * STATES + j]
+            o.covariance[(row * STATES + i) * STATES + j] = covariance_of(work, lanes, i, j, 0)
     for i in range(4):
-        journal.state[row, STATES + i] = work[ROWS.attitude + i]
+        o.state[row * (STATES + 4) + STATES + i] = work[(QUATERNION + i) * len(lanes)]

@@ -1,150 +1,90 @@
-"""The event loop: measurements in time order through the landing filter, one vehicle."""
+"""One vehicle's readings in the order of their instants: a queue through the navigator, on one lane."""
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
-from flownav.compile import ONE_LANE, kernel, procedure
-from flownav.estimation.landing.predict import predict
-from flownav.estimation.landing.settings import LandingSettings
-from flownav.estimation.landing.states import ACCEL_BIAS, GYRO_BIAS
-from flownav.frames import GRAVITY_M_S2
-from flownav.measurement import Array, EventQueue, Sensor
-from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
-from flownav.navigation.flow import take_flow
-from flownav.navigation.height import take_baro, take_range
-from flownav.navigation.journal import note_estimate, note_prediction
-from flownav.navigation.offers import note_aid_age, too_old
-from flownav.navigation.position import take_gps, take_landed, take_pad, take_pose
-from flownav.navigation.start import gather, try_start
-from flownav.navigation.state import (
-    CLOCK,
-    ESTIMATE_PERIOD_S,
-    GAP,
-    IMU_CLOCK,
-    IMU_LOST,
-    LATEST_IMU,
-    ROWS,
-    STARTED,
-    USE_IMU,
-    WRITTEN,
-    Reading,
-    Running,
-    write_estimate,
-    write_event,
-)
-from flownav.navigation.vibration import add_vibration_noise, follow_vibration, limit_biases
+from flownav.compile import ONE_LANE, equation, invoke, kernel, pointer
+from flownav.estimation.kalman import Work
+from flownav.measurement import MAX_VALUES, Array, EventQueue
+from flownav.navigation.memory import CLOCK, READING, Reading, new_work
+from flownav.navigation.packed import pack
+from flownav.navigation.settings import Equipment, FlowNoise, NO_STATED_NOISE, NavigatorSettings, NavigatorSettingsFile
+from flownav.navigation.settings import FROM_MAG, NO_HEADING
+from flownav.navigation.take import navigate_one
+from flownav.navigation.tape import Tape, room_of
 
-LONGEST_STEP_S = 0.1
+STATED = 3  # variances that a reading carries
+
+
+class Running(NamedTuple):
+    """A navigator at work on one lane: what it was told, its lane buffer, and the tape it writes."""
+
+    told: NavigatorSettings
+    settings: Array
+    work: Array
+    tape: Tape
+
+    @property
+    def clock_s(self) -> float:
+        """The instant that it has reached [s]."""
+        return float(self.work[CLOCK])
+
+
+def start_navigator(
+    equipment: Equipment, settings: NavigatorSettingsFile, tape: Tape, noise: FlowNoise = NO_STATED_NOISE
+) -> Running:
+    """A navigator that has heard nothing. noise: what a sensor file says of the flow's."""
+    headed = equipment.heading != NO_HEADING or equipment.use_attitude
+    told = settings.settings(equipment, noise)
+    sigma = settings.start_sigma(has_heading=headed, compass=equipment.heading == FROM_MAG)
+    return Running(told, pack(told, sigma), new_work(ONE_LANE), tape)
+
+
+def run(queue: EventQueue, on: Running, *, compiled: bool = True) -> None:
+    """Feed every event of the queue, in its order, and write what becomes of it onto the tape.
+
+    compiled False: in plain Python, step by step (tests; it is a thousand times slower).
+    """
+    take = navigate_one.address if compiled else navigate_one.python
+    feed: Any = feed_all if compiled else feed_all.py_func
+    journal = on.tape.journal
+    feed(
+        take, queue.t_s, queue.sensor, queue.value, queue.variance, queue.quality, queue.withheld, on.work, on.settings,
+        on.tape.estimate.reshape(-1), on.tape.innovation.reshape(-1), on.tape.event.reshape(-1),
+        journal.entry.reshape(-1), journal.state.reshape(-1), journal.covariance.reshape(-1), room_of(on.tape),
+        on.tape.used,
+    )  # fmt: skip
 
 
 @kernel
-def run(queue: EventQueue, on: Running) -> None:
-    """Feed every event of the queue, in its order: bring the filter to its instant, fuse it, write what came of it."""
-    memory = on.memory
-    for k in range(len(queue.t_s)):
-        t_s, sensor = queue.t_s[k], queue.sensor[k]
-        reading = Reading(t_s, sensor, queue.quality[k], queue.value[k], queue.variance[k])
-        if too_old(reading, on):
-            continue
-        gather(reading, on)
-        if memory[STARTED] == 0.0:
-            try_start(reading, on)
-        if memory[STARTED] > 0.0:
-            moving = sensor == Sensor.IMU and take_imu(reading, on)
-            advance(t_s, on)
-            if moving:
-                for i in range(6):
-                    on.work[LATEST_IMU + i] = reading.value[i]
-        if sensor == Sensor.ATTITUDE:
-            take_attitude(reading, on)
-        elif sensor == Sensor.GPS_POSITION or sensor == Sensor.GPS_VELOCITY:
-            take_gps(reading, on)
-        elif sensor == Sensor.FLOW_RATE or sensor == Sensor.FLOW_VELOCITY:
-            take_flow(reading, on)
-        elif sensor == Sensor.RANGE:
-            take_range(reading, on)
-        elif sensor == Sensor.BARO:
-            take_baro(reading, on)
-        elif sensor == Sensor.MAG:
-            take_mag(reading, on)
-        elif sensor == Sensor.YAW:
-            take_yaw(reading, on)
-        elif sensor == Sensor.POSE:
-            take_pose(reading, on)
-        elif sensor == Sensor.PAD:
-            take_pad(reading, on)
-        elif sensor == Sensor.LANDED:
-            take_landed(reading, on)
-        if memory[STARTED] > 0.0:
-            note_aid_age(t_s, on)
-            if t_s - memory[WRITTEN] >= ESTIMATE_PERIOD_S:
-                limit_biases(on)
-                write_estimate(t_s, on)
-                note_estimate(on)
+def feed_all(
+    take: Any, t_s: Array, sensor: NDArray[np.int64], value: Array, variance: Array, quality: Array, withheld: Array,
+    work: Work, settings: Work, estimate: Work, innovation: Work, event: Work, entry: Work, state: Work,
+    covariance: Work, room: NDArray[np.int64], used: NDArray[np.int64],
+) -> None:  # fmt: skip
+    """Reading by reading into the rows of READING, and on to the navigator at the address `take`."""
+    for k in range(len(t_s)):
+        put_reading(pointer(work), value[k], variance[k], quality[k], withheld[k])
+        invoke(
+            take, pointer(work), pointer(settings), pointer(estimate), pointer(innovation), pointer(event),
+            pointer(entry), pointer(state), pointer(covariance), pointer(room), pointer(used), t_s[k], sensor[k],
+        )  # fmt: skip
 
 
-@procedure
-def take_imu(reading: Reading, on: Running) -> bool:
-    """The mean of this reading and the last stands for the time between them; whether this one stands for what follows.
-
-    What is not finite is no reading.
-    """
-    value, memory = reading.value, on.memory
-    total = 0.0
-    for i in range(6):
-        total += value[i]
-    if memory[USE_IMU] == 0.0 or not np.isfinite(total):
-        return False
-    fresh = reading.t_s - memory[IMU_CLOCK] <= on.settings.imu_stale_s
-    if not fresh:
-        advance(reading.t_s, on)  # the gap is coasted: this reading knows nothing of it
-        if np.isfinite(memory[IMU_CLOCK]):
-            write_event(reading.t_s, IMU_LOST, reading.t_s - memory[IMU_CLOCK], on.tape)
-    if fresh:
-        follow_vibration(value, reading.t_s - memory[IMU_CLOCK], on)
-    for i in range(6):
-        on.work[LATEST_IMU + i] = 0.5 * (value[i] + on.work[LATEST_IMU + i]) if fresh else value[i]
-    memory[IMU_CLOCK] = reading.t_s
-    return True
+@equation
+def put_reading(work: Work, value: Array, variance: Array, quality: float, withheld: float) -> None:
+    """A queue's row as the reading at hand of one lane."""
+    for i in range(MAX_VALUES):
+        work[READING + i] = value[i]
+    for i in range(STATED):
+        work[READING + MAX_VALUES + i] = variance[i]
+    work[READING + MAX_VALUES + STATED] = quality
+    work[READING + MAX_VALUES + STATED + 1] = 1.0
+    work[READING + MAX_VALUES + STATED + 2] = withheld
 
 
-@procedure
-def advance(t_s: float, on: Running) -> None:
-    """Bring the filter to an instant, with the IMU where it is fresh, in steps short enough for its laws."""
-    memory, work = on.memory, on.work
-    ahead_s = t_s - memory[CLOCK]
-    if not ahead_s > 0.0:
-        return
-    steps = min(int(np.ceil(ahead_s / LONGEST_STEP_S)), 10000)
-    dt_s = ahead_s / steps
-    moved = memory[USE_IMU] > 0.0 and t_s - memory[IMU_CLOCK] <= on.settings.imu_stale_s
-    for _ in range(steps):
-        for i in range(6):
-            work[ROWS.imu + i] = work[LATEST_IMU + i]
-        if not moved:
-            memory[GAP] = 1.0
-            hold_still(on)
-        step(dt_s, on.settings.filter if moved else on.settings.coasting, work)
-        if moved:
-            add_vibration_noise(dt_s, on)
-        note_prediction(dt_s, on)
-    memory[CLOCK] = t_s
-
-
-@procedure
-def step(dt_s: float, settings: LandingSettings, work: Array) -> None:
-    """One prediction of the filter."""
-    predict(work, ONE_LANE, ROWS, dt_s, settings, None)
-
-
-@procedure
-def hold_still(on: Running) -> None:
-    """An IMU reading of no turning and no acceleration, in the filter's own attitude and biases."""
-    work = on.work
-    w, x = work[ROWS.attitude], work[ROWS.attitude + 1]
-    y, z = work[ROWS.attitude + 2], work[ROWS.attitude + 3]
-    down = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
-    for i in range(3):
-        work[ROWS.imu + i] = work[ROWS.state + GYRO_BIAS + i]
-        work[ROWS.imu + 3 + i] = work[ROWS.state + ACCEL_BIAS + i] - GRAVITY_M_S2 * down[i]
+assert Reading._fields[MAX_VALUES + STATED :] == ("quality", "arrived", "withheld")

@@ -1,114 +1,165 @@
-"""Offering one component to the filter: checks common to all sensors, the test, and what is written of it."""
+"""Offering one component to the filter on lanes: checks common to all sensors, the test, and what is written of it."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import ONE_LANE, procedure
-from flownav.estimation.gating import Reason
-from flownav.estimation.landing.algebra import expect, settle
-from flownav.measurement import Array, Sensor
+from flownav.compile import equation, procedure
+from flownav.estimation.covariance import expect, settle
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.states import ACCEPTED, MEASURED, NOISE, OFFERED, STATES
+from flownav.measurement import Sensor
 from flownav.navigation.journal import note_correction
-from flownav.navigation.state import (
-    AIDED,
-    AIDED_AGAIN,
+from flownav.navigation.memory import (
     CLOCK,
-    DEAD_RECKONING,
-    FLAG,
     LAST,
-    OBSERVED,
-    POSITION_INVALID,
-    ROWS,
-    STARTED,
+    OBSERVATION,
+    REASON,
+    AidMemory,
     Reading,
-    Running,
+    load_aid,
+    load_reading,
+    share,
+    shared,
+    store_aid,
+)
+from flownav.navigation.reasons import (
+    BEFORE_START,
+    DUPLICATE,
+    FUSED,
+    INNOVATION_GATE,
+    LATE,
+    NO_DATA,
+    NOT_FINITE,
+    OUTAGE,
+    SILENT,
+)
+from flownav.navigation.settings import AidSettings
+from flownav.navigation.tape import (
+    AIDED_AGAIN,
+    DEAD_RECKONING,
+    POSITION_INVALID,
+    Output,
     write_event,
     write_offer,
 )
 
-(FUSED, INNOVATION_GATE, NO_DATA, NOT_FINITE, OUT_OF_RANGE, NO_HEIGHT, TILTED, BEFORE_START, DATUM, OUTAGE,
- DUPLICATE, LATE, STUCK, NEAR_GROUND, NOT_NEEDED, AHEAD) = map(int, Reason)  # fmt: skip
 CLOCK_SLACK_S = 1e-6
 
 
+# -- checks -----------------------------------------------------------------------------------------------
+@equation
+def usable(reading: Reading, value: float, variance: float, started: float) -> int:
+    """FUSED where a reading may be offered, or the reason why not; SILENT where there is none."""
+    reason = FUSED if np.isfinite(value + variance) else NOT_FINITE
+    reason = NO_DATA if reading.quality == 0.0 else reason
+    reason = OUTAGE if reading.withheld > 0.0 else reason
+    reason = BEFORE_START if started == 0.0 else reason
+    return SILENT if reading.arrived == 0.0 else reason
+
+
+@equation
+def usable_in_flight(reading: Reading, value: float, variance: float, started: float) -> int:
+    """The same, of a sensor of which nothing is said before the start."""
+    return SILENT if started == 0.0 else usable(reading, value, variance, started)
+
+
 @procedure
-def too_old(reading: Reading, on: Running) -> bool:
-    """Whether the reading repeats or precedes one of its sensor, or describes what the filter has left behind."""
-    memory, sensor = on.memory, reading.sensor
+def too_old(work: Work, lanes: Lanes, t_s: float, sensor: int, o: Output) -> bool:
+    """Whether the reading repeats or precedes one of its sensor, or describes what the filter has left behind.
+
+    The schedule is the same in all lanes, so one answer holds for all.
+    """
     reason = FUSED
-    if not np.isfinite(reading.t_s):
+    if not np.isfinite(t_s):
         reason = NOT_FINITE
-    elif reading.t_s <= memory[LAST + sensor]:
+    elif t_s <= shared(work, lanes, LAST + sensor):
         reason = DUPLICATE
-    elif memory[STARTED] > 0.0 and reading.t_s < memory[CLOCK] - CLOCK_SLACK_S:
+    elif t_s < shared(work, lanes, CLOCK) - CLOCK_SLACK_S:
         reason = LATE
     if reason == FUSED:
-        memory[LAST + sensor] = reading.t_s
+        share(work, lanes, LAST + sensor, t_s)
         return False
     if sensor != Sensor.IMU:
-        write_offer(reading, 0, reading.value[0], reason, on)
+        for lane in range(len(lanes)):
+            reading = load_reading(work, lanes, lane)
+            work[REASON * len(lanes) + lane] = reason if reading.arrived > 0.0 else SILENT
+            work[OBSERVATION * len(lanes) + lane] = reading.value_0
+            work[NOISE * len(lanes) + lane] = np.nan
+        write_offer(work, lanes, t_s, sensor, 0, o)
     return True
 
 
-@procedure
-def usable(quality: float, value: float, variance: float, on: Running) -> int:
-    """FUSED where a reading may be offered, or the reason why not."""
-    reason = FUSED
-    if on.memory[STARTED] == 0.0:
-        reason = BEFORE_START
-    elif quality < 0.0:
-        reason = OUTAGE
-    elif quality == 0.0:
-        reason = NO_DATA
-    elif not np.isfinite(value + variance):
-        reason = NOT_FINITE
-    return reason
+# -- one component ----------------------------------------------------------------------------------------
+@equation
+def put(work: Work, lanes: Lanes, lane: int, measured: float, variance: float, reason: int) -> None:
+    """One lane's measured value, variance and verdict; a law and `conclude` follow."""
+    work[MEASURED * len(lanes) + lane] = measured
+    work[OBSERVATION * len(lanes) + lane] = measured
+    work[NOISE * len(lanes) + lane] = variance
+    work[REASON * len(lanes) + lane] = reason
 
 
 @procedure
-def put(variance: float, reason: int, index: tuple[int, ...], work: Array) -> None:
-    """The variance of the component whose law stands in the observation rows, and whether it may be fused.
+def conclude(
+    work: Work, lanes: Lanes, t_s: float, sensor: int, component: int, gate_sigma: float, o: Output
+) -> None:
+    """Test, fuse and write down the component whose law stands in the observation rows; REASON says what became of it.
 
-    `index` are the law's states; this is the only part of a correction that their number compiles anew.
+    What no lane offers corrects nothing and costs nothing, and its innovation is computed for the tape alone.
     """
-    work[ROWS.noise] = variance
-    work[ROWS.offered] = 1.0 if reason == FUSED else 0.0
-    work[OBSERVED] = len(index)
-    for i in range(len(index)):
-        work[OBSERVED + 1 + i] = index[i]
-    expect(work, ONE_LANE, ROWS, index)
+    fuse_offered(work, lanes, gate_sigma, o)
+    write_offer(work, lanes, t_s, sensor, component, o)
 
 
 @procedure
-def conclude(reading: Reading, component: int, observation: float, reason: int, on: Running) -> int:
-    """Test, fuse and write down the component that was put; what became of it."""
-    settle(on.work, ONE_LANE, ROWS, on.settings.filter.gate_sigma)
-    if reason == FUSED and on.work[ROWS.accepted] == 0.0:
-        reason = INNOVATION_GATE
-    if on.work[ROWS.accepted] > 0.0:
-        note_correction(on)
-    write_offer(reading, component, observation, reason, on)
-    return reason
+def fuse_offered(work: Work, lanes: Lanes, gate_sigma: float, o: Output) -> None:
+    """Test and fuse the component in the lanes whose REASON is FUSED; INNOVATION_GATE where it does not pass."""
+    for lane in range(len(lanes)):
+        work[OFFERED * len(lanes) + lane] = 1.0 if work[REASON * len(lanes) + lane] == FUSED else 0.0
+    expect(work, lanes, STATES, o.room[1] > 0)
+    settle(work, lanes, STATES, gate_sigma)
+    for lane in range(len(lanes)):
+        reason = work[REASON * len(lanes) + lane]
+        refused = reason == FUSED and work[ACCEPTED * len(lanes) + lane] == 0.0
+        work[REASON * len(lanes) + lane] = INNOVATION_GATE if refused else reason
+    if len(lanes) == 1 and work[ACCEPTED] > 0.0:
+        note_correction(work, lanes, o)
 
 
 # -- horizontal aid ---------------------------------------------------------------------------------------
 @procedure
-def note_aid(t_s: float, on: Running) -> None:
-    """Something horizontal was fused."""
-    memory = on.memory
-    if memory[FLAG] > 0.0:
-        write_event(t_s, AIDED_AGAIN, t_s - memory[AIDED], on.tape)
-    memory[AIDED], memory[FLAG] = t_s, 0.0
+def note_aid(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
+    """Something horizontal was fused in the lanes whose REASON is FUSED."""
+    for lane in range(len(lanes)):
+        if work[REASON * len(lanes) + lane] == FUSED:
+            aid = load_aid(work, lanes, lane)
+            if aid.flag > 0.0:
+                write_event(lanes, lane, t_s, AIDED_AGAIN, t_s - aid.aided_s, o)
+            store_aid(work, lanes, lane, AidMemory(t_s, 0.0, aid.height_s, aid.landed))
 
 
 @procedure
-def note_aid_age(t_s: float, on: Running) -> None:
-    """Flag dead reckoning, and then an invalid position, when no horizontal aid has been fused for long."""
-    memory, settings = on.memory, on.settings
-    age_s = t_s - memory[AIDED]
-    if memory[FLAG] == 0.0 and age_s > settings.dead_reckoning_s:
-        memory[FLAG] = 1.0
-        write_event(t_s, DEAD_RECKONING, age_s, on.tape)
-    if memory[FLAG] == 1.0 and age_s > settings.invalid_s:
-        memory[FLAG] = 2.0
-        write_event(t_s, POSITION_INVALID, age_s, on.tape)
+def note_height(work: Work, lanes: Lanes, t_s: float) -> None:
+    """Something other than the range told the height in the lanes whose REASON is FUSED."""
+    for lane in range(len(lanes)):
+        aid = load_aid(work, lanes, lane)
+        told = work[REASON * len(lanes) + lane] == FUSED
+        height_s = t_s if told else aid.height_s
+        store_aid(work, lanes, lane, AidMemory(aid.aided_s, aid.flag, height_s, aid.landed))
+
+
+@procedure
+def note_aid_age(work: Work, lanes: Lanes, t_s: float, s: AidSettings, o: Output) -> None:
+    """Flag dead reckoning, and then an invalid position, where no horizontal aid has been fused for long."""
+    for lane in range(len(lanes)):
+        aid = load_aid(work, lanes, lane)
+        age_s = t_s - aid.aided_s  # NaN before the start: no flag
+        flag = aid.flag
+        if flag == 0.0 and age_s > s.dead_reckoning_s:
+            flag = 1.0
+            write_event(lanes, lane, t_s, DEAD_RECKONING, age_s, o)
+        if flag == 1.0 and age_s > s.invalid_s:
+            flag = 2.0
+            write_event(lanes, lane, t_s, POSITION_INVALID, age_s, o)
+        store_aid(work, lanes, lane, AidMemory(aid.aided_s, flag, aid.height_s, aid.landed))

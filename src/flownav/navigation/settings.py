@@ -5,13 +5,13 @@ The defaults are for any small VTOL with consumer sensors. None is fitted to a l
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from pydantic import Field
 
-from flownav.estimation.landing.settings import LandingSettings
-from flownav.estimation.landing.states import (
+from flownav.estimation.error_models import FilterSettings
+from flownav.estimation.states import (
     ACCEL_BIAS,
     COMPASS,
     FLOW_SCALE,
@@ -28,22 +28,55 @@ from flownav.measurement import Array
 from flownav.parameter_files import Number, ParameterModel
 
 
-class NavigatorSettings(NamedTuple):
-    """The settings as the kernels take them; `NavigatorSettingsFile` documents each. `coasting`: without an IMU."""
+# headings: none, a magnetometer's, an external attitude's or YAW's
+NO_HEADING, FROM_MAG, FROM_ATTITUDE = 0.0, 1.0, 2.0
 
-    filter: LandingSettings
-    coasting: LandingSettings
-    vibration_free_m_s2: float
-    vibration_walk_per_rt_s: float
-    vibration_bias_share: float
+
+class GpsSettings(NamedTuple):
+    """A receiver: noise of one fix beside its lasting errors, its antenna, and how long it may be refused."""
+
     gps_white_share: float
     gps_white_sigma_m: float
     gps_white_sigma_down_m: float
     gps_velocity_white_m_s: float
     gps_velocity_white_down_m_s: float
-    ins_tilt_white_rad: float
-    heading_noise_rad: float
-    heading_time_s: float
+    gps_slow_sigma_m: float
+    gps_slow_sigma_down_m: float
+    gps_fast_sigma_m: float
+    gps_fast_sigma_down_m: float
+    gps_velocity_sigma_m_s: float
+    gps_forward_m: float
+    gps_right_m: float
+    gps_below_m: float
+    gps_reset_s: float
+    gate_sigma: float
+
+
+class FlowNoise(NamedTuple):
+    """A sensor file's noise against height [m/s]: `sensors.flow.flow_noise_sigma`'s polynomial; used where `stated`."""
+
+    stated: float
+    noise_low_m: float
+    noise_high_m: float
+    noise_centre: float
+    noise_scale: float
+    noise_0: float
+    noise_1: float
+    noise_2: float
+    noise_3: float
+    noise_4: float
+    noise_5: float
+    noise_6: float
+    noise_7: float
+    noise_8: float
+    noise_floor_m_s: float
+
+
+class FlowSettings(NamedTuple):
+    """A flow sensor: gain, noise, limits, its lens from the IMU."""
+
+    flow_gain_x: float
+    flow_gain_y: float
     flow_sigma_rad_s: float
     flow_low_quality_sigma_rad_s: float
     flow_floor_m_s: float
@@ -54,6 +87,17 @@ class NavigatorSettings(NamedTuple):
     flow_forward_m: float
     flow_right_m: float
     flow_below_m: float
+    tilt_limit_rad: float
+    height_hold_s: float
+    range_sigma_m: float
+    range_relative_sigma: float
+    gate_sigma: float
+    noise: FlowNoise
+
+
+class HeightSettings(NamedTuple):
+    """Rangefinder and barometer."""
+
     range_below_m: float
     range_sigma_m: float
     range_relative_sigma: float
@@ -62,18 +106,85 @@ class NavigatorSettings(NamedTuple):
     range_stuck_s: float
     range_stuck_travel_m: float
     baro_sigma_m: float
+    tilt_limit_rad: float
+    height_hold_s: float
+    ground_reset_s: float
+    gate_sigma: float
+
+
+class AttitudeSettings(NamedTuple):
+    """An external attitude, a compass, an external heading."""
+
+    ins_tilt_white_rad: float
+    heading_noise_rad: float
+    heading_time_s: float
+    gate_sigma: float
+
+
+class PlaceSettings(NamedTuple):
+    """A pad camera, an external position, a vehicle at rest."""
+
     pad_angle_sigma_rad: float
     pad_distance_sigma: float
     pose_sigma_m: float
     still_sigma_m_s: float
-    tilt_limit_rad: float
+    flow_below_m: float
+    gate_sigma: float
+
+
+class ImuSettings(NamedTuple):
+    """The inertial sensors: noise with them and without, what vibration does, when a reading is stale."""
+
+    accel_noise_m_s2_rt_hz: float
+    gyro_noise_rad_s_rt_hz: float
+    coasting_accel_m_s2_rt_hz: float
+    coasting_rate_rad_s_rt_hz: float
+    imu_integrates: float
     imu_stale_s: float
-    height_hold_s: float
-    ground_reset_s: float
-    gps_reset_s: float
+    vibration_free_m_s2: float
+    vibration_walk_per_rt_s: float
+    vibration_bias_share: float
+    accel_bias_limit_m_s2: float
+    gyro_bias_limit_rad_s: float
+
+
+class AidSettings(NamedTuple):
+    """When the position is said to be dead reckoning, and invalid."""
+
     dead_reckoning_s: float
     invalid_s: float
-    start_wait_s: float
+
+
+class Equipment(NamedTuple):
+    """Which sensors serve a navigator.
+
+    heading: 0 none, 1 a compass's, 2 an external attitude's or YAW's; deadline_s: how long it waits for a fix.
+    """
+
+    use_imu: bool
+    use_attitude: bool
+    heading: float
+    flow_gyro_is_imu: bool
+    deadline_s: float
+
+
+class NavigatorSettings(NamedTuple):
+    """Everything a navigator is told, subject by subject, as its kernels take it; `NavigatorSettingsFile` documents
+    each key. start: standard deviations of the error states before the first reading.
+    """
+
+    filter: FilterSettings
+    imu: ImuSettings
+    gps: GpsSettings
+    flow: FlowSettings
+    height: HeightSettings
+    attitude: AttitudeSettings
+    place: PlaceSettings
+    aid: AidSettings
+    equipment: Equipment
+
+
+NO_STATED_NOISE = FlowNoise(*([0.0] * len(FlowNoise._fields)))
 
 
 class NavigatorSettingsFile(ParameterModel):
@@ -90,6 +201,9 @@ class NavigatorSettingsFile(ParameterModel):
     )
     accel_walk_m_s2_rt_s: Number = Field(0.003, ge=0, le=1, description="accelerometer bias, PX4's 0.003")
     gyro_walk_rad_s_rt_s: Number = Field(1e-4, ge=0, le=0.1, description="gyro bias over minutes of warming")
+    imu_integrates: Number = Field(
+        0.0, ge=0, le=1, description="1: a reading is the mean since the last (an integrating IMU); 0: it is of its instant"
+    )
     vibration_free_m_s2: Number = Field(
         1.0, ge=0, le=100, description="sample-to-sample accelerometer noise, rms, that harms nothing"
     )
@@ -120,6 +234,9 @@ class NavigatorSettingsFile(ParameterModel):
     gps_velocity_white_m_s: Number = Field(0.4, gt=0, le=20, description="GPS velocity: noise, and lag in manoeuvres")
     gps_velocity_white_down_m_s: Number = Field(0.5, gt=0, le=20, description="and vertically")
     gps_velocity_lag_sigma_s: Number = Field(0.15, ge=0, le=2, description="receivers smooth their velocity, and lag")
+    gps_forward_m: Number = Field(0.0, ge=-10, le=10, description="the antenna from the IMU, body forward")
+    gps_right_m: Number = Field(0.0, ge=-10, le=10, description="body right")
+    gps_below_m: Number = Field(0.0, ge=-10, le=10, description="body down; above it is negative")
     ins_tilt_sigma_rad: Number = Field(0.01, ge=0, le=1, description="an autopilot's tilt error, 0.6 deg")
     ins_tilt_tau_s: Number = Field(30.0, gt=0, le=1e6, description="follows the manoeuvres")
     ins_tilt_white_rad: Number = Field(0.01, gt=0, le=1, description="time alignment of such an attitude")
@@ -134,6 +251,8 @@ class NavigatorSettingsFile(ParameterModel):
     baro_walk_m_rt_s: Number = Field(0.1, ge=0, le=5, description="pressure drifts 0.8 m in a minute")
     baro_sigma_m: Number = Field(1.0, gt=0, le=100, description="pressure height in the rotor's own wash")
     flow_scale_sigma: Number = Field(0.03, ge=0, le=0.5, description="optics and their mounting, without a sensor file")
+    flow_gain_x: Number = Field(1.0, gt=0, le=10, description="reported over true flow of velocity, body forward")
+    flow_gain_y: Number = Field(1.0, gt=0, le=10, description="and body right")
     flow_sigma_rad_s: Number = Field(
         0.05, gt=0, le=5, description="flow at full quality; pixel quantisation and gyro mismatch of a 10-50 Hz sensor"
     )
@@ -161,6 +280,7 @@ class NavigatorSettingsFile(ParameterModel):
     pad_distance_sigma: Number = Field(0.05, gt=0, le=1, description="share of the distance")
     pose_sigma_m: Number = Field(0.05, gt=0, le=10, description="an external position that states no accuracy")
     still_sigma_m_s: Number = Field(0.02, gt=0, le=1, description="a vehicle on the ground, its rotor turning")
+    pad_walk_m_rt_s: Number = Field(0.002, ge=0, le=5, description="a pad lies still; the local frame is not exact")
     gate_sigma: Number = Field(5.0, gt=0, le=100, description="innovation gate, standard deviations (ArduPilot's 5)")
     accel_bias_limit_m_s2: Number = Field(0.6, gt=0, le=10, description="60 mg")
     gyro_bias_limit_rad_s: Number = Field(0.15, gt=0, le=1, description="9 deg/s")
@@ -174,17 +294,17 @@ class NavigatorSettingsFile(ParameterModel):
     start_wait_s: Number = Field(10.0, ge=0, le=600, description="wait this long for a fix, then start without")
     start_velocity_sigma_m_s: Number = Field(2.0, gt=0, le=100, description="velocity before the first reading of it")
 
-    def settings(self) -> NavigatorSettings:
+    def settings(self, equipment: Equipment, noise: FlowNoise = NO_STATED_NOISE) -> NavigatorSettings:
         """The numbers alone, for the kernels."""
         stated = {name: float(value) for name, value in self.model_dump().items()}
-        common = {name: stated[name] for name in NavigatorSettings._fields if name in stated}
-        own = {name: stated[name] for name in LandingSettings._fields if name in stated}
-        flying = LandingSettings(imu_lag=0.0, **own)
-        coasting = flying._replace(
-            accel_noise_m_s2_rt_hz=float(self.coasting_accel_m_s2_rt_hz),
-            gyro_noise_rad_s_rt_hz=float(self.coasting_rate_rad_s_rt_hz),
-        )
-        return NavigatorSettings(filter=flying, coasting=coasting, **common)
+
+        def of(bundle: Any, **more: Any) -> Any:
+            return bundle(**{name: stated[name] for name in bundle._fields if name in stated}, **more)
+
+        return NavigatorSettings(
+            of(FilterSettings), of(ImuSettings), of(GpsSettings), of(FlowSettings, noise=noise), of(HeightSettings),
+            of(AttitudeSettings), of(PlaceSettings), of(AidSettings), equipment,
+        )  # fmt: skip
 
     def start_sigma(self, *, has_heading: bool, compass: bool) -> Array:
         """Standard deviations of the error states before the first reading, (STATES,).

@@ -4,31 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import procedure
-from flownav.estimation.landing.states import ATTITUDE, POSITION, STATES
-from flownav.frames import quaternion_from_euler
+from flownav.compile import equation, procedure
+from flownav.estimation.covariance import place
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.states import ATTITUDE, POSITION, QUATERNION, STATE, STATES
+from flownav.frames import Quaternion, quaternion_from_euler
 from flownav.measurement import Sensor
-from flownav.navigation.attitude import magnetic_heading
-from flownav.navigation.state import (
-    AIDED,
-    ATTITUDE_CLOCK,
-    CLOCK,
-    DEADLINE,
-    FROM_MAG,
-    IMU_CLOCK,
-    LATEST_IMU,
-    LEVEL,
-    LEVEL_COUNT,
-    MAG_HEADING,
-    NO_HEADING,
-    ROWS,
-    START,
-    STARTED,
-    USE_HEADING,
+from flownav.navigation.memory import (
+    AidMemory,
     Reading,
-    Running,
-    write_event,
+    StartMemory,
+    load_aid,
+    load_heading,
+    load_imu,
+    load_reading,
+    load_start,
+    store_aid,
+    store_imu,
+    store_start,
 )
+from flownav.navigation.packed import START_SIGMA
+from flownav.navigation.settings import FROM_MAG, NO_HEADING, Equipment
+from flownav.navigation.tape import START, Output, write_event
+from flownav.navigation.vibration import with_reading
 
 ORIGIN_SIGMA_M = 0.1  # the local origin, where the navigator's start defines it
 LOST_SIGMA_M = 10.0  # the same where the log's fixes define it and came too late, and about a first fix
@@ -36,77 +34,119 @@ READ_TILT_RAD = 0.03  # an attitude that was read
 LEVELLED_TILT_RAD = 0.1  # one from the accelerometer
 READ_HEADING_RAD = 0.1  # an autopilot's, whose compass is calibrated
 COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's
-LEAST_LEVELLING = 5
+DATUM_HEADING_RAD = 1e-3  # the start defines the frame
+LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0
+
+
+@equation
+def levelled(reading: Reading, m: StartMemory) -> StartMemory:
+    """The mean specific force [m/s2] with one reading more."""
+    share = 1.0 / min(m.count + 1.0, MOST_LEVELLING)
+    return StartMemory(
+        m.started, m.attitude_s, m.qw, m.qx, m.qy, m.qz,
+        m.force_x + share * (reading.value_3 - m.force_x),
+        m.force_y + share * (reading.value_4 - m.force_y),
+        m.force_z + share * (reading.value_5 - m.force_z),
+        m.count + 1.0,
+    )  # fmt: skip
 
 
 @procedure
-def gather(reading: Reading, on: Running) -> None:
-    """Before the start: the latest attitude, heading and IMU reading, and the mean specific force."""
-    value, memory, work = reading.value, on.memory, on.work
-    if memory[STARTED] > 0.0:
-        return
-    if reading.sensor == Sensor.ATTITUDE:
-        size = np.sqrt(value[0] ** 2 + value[1] ** 2 + value[2] ** 2 + value[3] ** 2)
-        if size > 0.5 and size < 2.0:
-            for i in range(4):
-                work[ROWS.attitude + i] = value[i] / size
-            memory[ATTITUDE_CLOCK] = reading.t_s
-    elif reading.sensor == Sensor.IMU:
-        total = value[0] + value[1] + value[2] + value[3] + value[4] + value[5]
-        if np.isfinite(total):
-            for i in range(6):
-                work[LATEST_IMU + i] = value[i]
-            share = 1.0 / min(memory[LEVEL_COUNT] + 1.0, 100.0)
-            for i in range(3):
-                memory[LEVEL + i] += share * (value[3 + i] - memory[LEVEL + i])
-            memory[LEVEL_COUNT] += 1.0
-            memory[IMU_CLOCK] = reading.t_s
+def gather(work: Work, lanes: Lanes, t_s: float, sensor: int) -> None:
+    """Before the start: the latest attitude, IMU reading, and the mean specific force."""
+    for lane in range(len(lanes)):
+        m, reading = load_start(work, lanes, lane), load_reading(work, lanes, lane)
+        if m.started > 0.0 or reading.arrived == 0.0:
+            continue
+        if sensor == Sensor.ATTITUDE:
+            square = reading.value_0**2 + reading.value_1**2 + reading.value_2**2 + reading.value_3**2
+            size = np.sqrt(square)
+            if size > 0.5 and size < 2.0:
+                w, x, y, z = reading.value_0, reading.value_1, reading.value_2, reading.value_3
+                after = StartMemory(
+                    0.0, t_s, w / size, x / size, y / size, z / size, m.force_x, m.force_y, m.force_z, m.count
+                )
+                store_start(work, lanes, lane, after)
+        elif sensor == Sensor.IMU:
+            gyro = reading.value_0 + reading.value_1 + reading.value_2
+            if np.isfinite(gyro + reading.value_3 + reading.value_4 + reading.value_5):
+                store_imu(work, lanes, lane, with_reading(reading, t_s, load_imu(work, lanes, lane)))
+                store_start(work, lanes, lane, levelled(reading, m))
 
 
 @procedure
-def try_start(reading: Reading, on: Running) -> None:
-    """Start at a fix, or at the local origin with the first flow, pose or range where no fix came in time."""
-    t_s, sensor, value, memory, work = reading.t_s, reading.sensor, reading.value, on.memory, on.work
-    read = np.isfinite(memory[ATTITUDE_CLOCK])
-    if not read and memory[LEVEL_COUNT] < LEAST_LEVELLING:
-        return
-    heard = reading.quality > 0.0 and np.isfinite(value[0])
-    at_fix = heard and sensor == Sensor.GPS_POSITION and np.isfinite(value[0] + value[1] + value[2])
+def try_start(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> bool:
+    """Start lanes at a fix, or at the local origin with the first flow, pose or range where no fix came in time.
+
+    Whether any lane runs.
+    """
+    running = False
+    position = sensor == Sensor.GPS_POSITION
     other = sensor == Sensor.FLOW_RATE or sensor == Sensor.FLOW_VELOCITY or sensor == Sensor.POSE
-    at_origin = heard and other and t_s >= memory[DEADLINE]
-    if not (at_fix or at_origin):
-        return
-    if not read:
-        level(on)
-    lost = np.isfinite(memory[DEADLINE])
-    for i in range(STATES):
-        work[ROWS.state + i] = 0.0
-        for j in range(STATES):
-            work[ROWS.covariance + i * STATES + j] = on.start_sigma[i] ** 2 if i == j else 0.0
-    for i in range(2):
-        tilt = READ_TILT_RAD if read else LEVELLED_TILT_RAD
-        work[ROWS.covariance + (ATTITUDE + i) * (STATES + 1)] = tilt * tilt
-    known = memory[USE_HEADING] == NO_HEADING and not lost  # the start defines the frame
-    heading = 1e-3 if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
-    work[ROWS.covariance + (ATTITUDE + 2) * (STATES + 1)] = heading * heading
-    for i in range(3):
-        sigma = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M
-        work[ROWS.covariance + (POSITION + i) * (STATES + 1)] = sigma * sigma
-        work[ROWS.state + POSITION + i] = value[i] if at_fix else 0.0
-    memory[STARTED], memory[CLOCK], memory[AIDED] = 1.0, t_s, t_s
-    write_event(t_s, START, 1.0 if at_fix else 0.0, on.tape)
+    for lane in range(len(lanes)):
+        m, reading = load_start(work, lanes, lane), load_reading(work, lanes, lane)
+        if m.started == 0.0 and (np.isfinite(m.attitude_s) or m.count >= LEAST_LEVELLING):
+            heard = reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
+            heard = heard and bool(np.isfinite(reading.value_0))
+            at_fix = heard and position and bool(np.isfinite(reading.value_0 + reading.value_1 + reading.value_2))
+            at_origin = heard and other and t_s >= fitted.deadline_s
+            if at_fix or at_origin:
+                start_lane(work, lanes, lane, t_s, at_fix, reading, m, fitted, p)
+                write_event(lanes, lane, t_s, START, 1.0 if at_fix else 0.0, o)
+        running = running or load_start(work, lanes, lane).started > 0.0
+    return running
 
 
 @procedure
-def level(on: Running) -> None:
-    """Roll and pitch from the mean specific force, heading from the magnetometer where one was heard, else north."""
-    memory, work = on.memory, on.work
-    x, y, z = memory[LEVEL], memory[LEVEL + 1], memory[LEVEL + 2]
-    roll, pitch = np.arctan2(-y, -z), np.arctan2(x, np.sqrt(y * y + z * z))
-    w0, x0, y0, z0 = quaternion_from_euler(roll, pitch, 0.0)
-    work[ROWS.attitude], work[ROWS.attitude + 1], work[ROWS.attitude + 2], work[ROWS.attitude + 3] = w0, x0, y0, z0
-    heading = 0.0
-    if memory[USE_HEADING] == FROM_MAG and np.isfinite(memory[MAG_HEADING]):
-        heading = magnetic_heading(on)
-    w0, x0, y0, z0 = quaternion_from_euler(roll, pitch, heading)
-    work[ROWS.attitude], work[ROWS.attitude + 1], work[ROWS.attitude + 2], work[ROWS.attitude + 3] = w0, x0, y0, z0
+def start_lane(
+    work: Work, lanes: Lanes, lane: int, t_s: float, at_fix: bool, reading: Reading, m: StartMemory,
+    fitted: Equipment, p: Work,
+) -> None:  # fmt: skip
+    """State and covariance of one lane at its first instant."""
+    read = bool(np.isfinite(m.attitude_s))
+    w, x, y, z = (m.qw, m.qx, m.qy, m.qz) if read else level(m, load_heading(work, lanes, lane).field_rad, fitted)
+    work[QUATERNION * len(lanes) + lane] = w
+    work[(QUATERNION + 1) * len(lanes) + lane] = x
+    work[(QUATERNION + 2) * len(lanes) + lane] = y
+    work[(QUATERNION + 3) * len(lanes) + lane] = z
+    lost = bool(np.isfinite(fitted.deadline_s))
+    for j in range(STATES):
+        work[(STATE + j) * len(lanes) + lane] = 0.0
+        for i in range(j):
+            work[place(i, j) * len(lanes) + lane] = 0.0
+        sigma = p[START_SIGMA + j]
+        work[place(j, j) * len(lanes) + lane] = sigma * sigma
+    tilt = READ_TILT_RAD if read else LEVELLED_TILT_RAD
+    known = fitted.heading == NO_HEADING and not lost
+    turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
+    spread = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M
+    for i in range(3):
+        work[place(POSITION + i, POSITION + i) * len(lanes) + lane] = spread * spread
+        angle = turned if i == 2 else tilt
+        work[place(ATTITUDE + i, ATTITUDE + i) * len(lanes) + lane] = angle * angle
+    work[(STATE + POSITION) * len(lanes) + lane] = reading.value_0 if at_fix else 0.0
+    work[(STATE + POSITION + 1) * len(lanes) + lane] = reading.value_1 if at_fix else 0.0
+    work[(STATE + POSITION + 2) * len(lanes) + lane] = reading.value_2 if at_fix else 0.0
+    store_start(work, lanes, lane, started(m))
+    aid = load_aid(work, lanes, lane)
+    store_aid(work, lanes, lane, AidMemory(t_s, 0.0, aid.height_s, aid.landed))
+
+
+@equation
+def started(m: StartMemory) -> StartMemory:
+    """The filter runs."""
+    return StartMemory(
+        1.0, m.attitude_s, m.qw, m.qx, m.qy, m.qz, m.force_x, m.force_y, m.force_z, m.count
+    )  # fmt: skip
+
+
+@equation
+def level(m: StartMemory, field_rad: float, fitted: Equipment) -> Quaternion:
+    """Roll and pitch from the mean specific force, heading from the magnetometer where one was heard, else north.
+
+    The field was noted in the axes of a vehicle that takes itself to be level and to head north.
+    """
+    roll = np.arctan2(-m.force_y, -m.force_z)
+    pitch = np.arctan2(m.force_x, np.sqrt(m.force_y * m.force_y + m.force_z * m.force_z))
+    magnetic = fitted.heading == FROM_MAG and bool(np.isfinite(field_rad))
+    return quaternion_from_euler(roll, pitch, -field_rad if magnetic else 0.0)

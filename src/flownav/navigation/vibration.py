@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import ONE_LANE, procedure
-from flownav.estimation.landing.algebra import add_noise
-from flownav.estimation.landing.bias_limits import hold
-from flownav.estimation.landing.states import ACCEL_BIAS, GYRO_BIAS, VELOCITY
-from flownav.measurement import Array
-from flownav.navigation.state import DOUBT, IMU_DOUBTED, LATEST_IMU, ROWS, VIBRATION, Running, write_event
+from flownav.compile import clamp, equation, larger, procedure
+from flownav.estimation.covariance import add_noise_lane
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, STATE, VELOCITY
+from flownav.navigation.memory import ImuMemory, Reading, load_imu, store_imu
+from flownav.navigation.settings import ImuSettings
+from flownav.navigation.tape import IMU_DOUBTED, Output, write_event
 
 FOLLOWING_S = 1.0
 DOUBT_M_S2 = 2.0  # of an accelerometer that the range contradicts
@@ -22,51 +23,82 @@ DOUBT_LASTS_S = 60.0
 DOUBTED_SPEED_M_S = 1.0  # what it may have done to the velocity
 
 
-@procedure
-def follow_vibration(value: Array, dt_s: float, on: Running) -> None:
+@equation
+def followed_vibration(reading: Reading, m: ImuMemory, dt_s: float) -> float:
     """The mean square of the differences between neighbouring readings, an axis: twice the variance of white noise."""
-    square = 0.0
-    for i in range(3, 6):
-        square += (value[i] - on.work[LATEST_IMU + i]) ** 2
-    share = min(dt_s / FOLLOWING_S, 1.0)
-    on.memory[VIBRATION] += share * (square / 6.0 - on.memory[VIBRATION])
+    x, y, z = reading.value_3 - m.accel_x, reading.value_4 - m.accel_y, reading.value_5 - m.accel_z
+    share = dt_s / FOLLOWING_S if dt_s < FOLLOWING_S else 1.0
+    return m.vibration + share * ((x * x + y * y + z * z) / 6.0 - m.vibration)
 
 
-@procedure
-def excess(on: Running) -> float:
+@equation
+def with_reading(reading: Reading, t_s: float, m: ImuMemory) -> ImuMemory:
+    """The newest reading remembered."""
+    return ImuMemory(
+        t_s, reading.value_0, reading.value_1, reading.value_2, reading.value_3, reading.value_4, reading.value_5,
+        m.vibration, m.doubt_m_s2, m.gap,
+    )  # fmt: skip
+
+
+@equation
+def vibration_beyond(m: ImuMemory, s: ImuSettings) -> float:
     """The vibration beyond the harmless [m/s2]."""
-    level: float = np.sqrt(on.memory[VIBRATION])
-    return max(level - on.settings.vibration_free_m_s2, 0.0)
+    return larger(np.sqrt(m.vibration) - s.vibration_free_m_s2, 0.0)
 
 
 @procedure
-def doubt(t_s: float, contradiction_m: float, on: Running) -> None:
+def doubt_imu(work: Work, lanes: Lanes, lane: int, t_s: float, contradiction_m: float, o: Output) -> None:
     """The range contradicts the motion that the accelerometer made: both velocity and bias are set free."""
-    if on.memory[DOUBT] < 0.5 * DOUBT_M_S2:
-        write_event(t_s, IMU_DOUBTED, contradiction_m, on.tape)
-    on.memory[DOUBT] = DOUBT_M_S2
-    add_noise(on.work, ONE_LANE, ROWS, VELOCITY + 2, DOUBTED_SPEED_M_S * DOUBTED_SPEED_M_S)
-    add_noise(on.work, ONE_LANE, ROWS, ACCEL_BIAS + 2, DOUBT_M_S2 * DOUBT_M_S2)
+    m = load_imu(work, lanes, lane)
+    if m.doubt_m_s2 < 0.5 * DOUBT_M_S2:
+        write_event(lanes, lane, t_s, IMU_DOUBTED, contradiction_m, o)
+    doubted = ImuMemory(
+        m.read_s, m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z, m.vibration, DOUBT_M_S2, m.gap
+    )
+    store_imu(work, lanes, lane, doubted)
+    add_noise_lane(work, lanes, VELOCITY + 2, lane, DOUBTED_SPEED_M_S * DOUBTED_SPEED_M_S)
+    add_noise_lane(work, lanes, ACCEL_BIAS + 2, lane, DOUBT_M_S2 * DOUBT_M_S2)
 
 
 @procedure
-def add_vibration_noise(dt_s: float, on: Running) -> None:
+def add_vibration_noise(work: Work, lanes: Lanes, dt_s: float, s: ImuSettings) -> None:
     """Velocity and accelerometer bias are less sure by what vibration may have made of them; a doubt is vertical."""
-    beyond, share = excess(on), on.settings.vibration_walk_per_rt_s
-    on.memory[DOUBT] *= 1.0 - min(dt_s / DOUBT_LASTS_S, 1.0)
-    for i in range(3):
-        walk = share * (max(beyond, on.memory[DOUBT]) if i == 2 else beyond)
-        add_noise(on.work, ONE_LANE, ROWS, ACCEL_BIAS + i, walk * walk * dt_s)
-        if beyond > 0.0:
-            add_noise(on.work, ONE_LANE, ROWS, VELOCITY + i, on.memory[VIBRATION] * dt_s * dt_s)
+    fading = 1.0 - (dt_s / DOUBT_LASTS_S if dt_s < DOUBT_LASTS_S else 1.0)
+    for lane in range(len(lanes)):
+        m = load_imu(work, lanes, lane)
+        doubt = fading * m.doubt_m_s2
+        faded = ImuMemory(
+            m.read_s, m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z, m.vibration, doubt, m.gap
+        )
+        store_imu(work, lanes, lane, faded)
+        beyond = vibration_beyond(m, s)
+        level = s.vibration_walk_per_rt_s * beyond
+        down = s.vibration_walk_per_rt_s * larger(beyond, doubt)
+        shaken = m.vibration * dt_s * dt_s if beyond > 0.0 else 0.0
+        add_noise_lane(work, lanes, ACCEL_BIAS, lane, level * level * dt_s)
+        add_noise_lane(work, lanes, ACCEL_BIAS + 1, lane, level * level * dt_s)
+        add_noise_lane(work, lanes, ACCEL_BIAS + 2, lane, down * down * dt_s)
+        for i in range(3):
+            add_noise_lane(work, lanes, VELOCITY + i, lane, shaken)
 
 
 @procedure
-def limit_biases(on: Running) -> None:
+def limit_biases(work: Work, lanes: Lanes, s: ImuSettings) -> None:
     """Hold both biases to what such sensors, and this vibration, can make: the last resort."""
-    settings = on.settings.filter
-    for i in range(3):
-        harm = max(excess(on), on.memory[DOUBT]) if i == 2 else excess(on)
-        limit = settings.accel_bias_limit_m_s2 + on.settings.vibration_bias_share * harm
-        hold(on.work, ONE_LANE, ROWS, GYRO_BIAS + i, settings.gyro_bias_limit_rad_s)
-        hold(on.work, ONE_LANE, ROWS, ACCEL_BIAS + i, limit)
+    for lane in range(len(lanes)):
+        m = load_imu(work, lanes, lane)
+        beyond = vibration_beyond(m, s)
+        level = s.accel_bias_limit_m_s2 + s.vibration_bias_share * beyond
+        down = s.accel_bias_limit_m_s2 + s.vibration_bias_share * larger(beyond, m.doubt_m_s2)
+        hold(work, lanes, lane, ACCEL_BIAS, level)
+        hold(work, lanes, lane, ACCEL_BIAS + 1, level)
+        hold(work, lanes, lane, ACCEL_BIAS + 2, down)
+        for i in range(3):
+            hold(work, lanes, lane, GYRO_BIAS + i, s.gyro_bias_limit_rad_s)
+
+
+@equation
+def hold(work: Work, lanes: Lanes, lane: int, state: int, limit: float) -> None:
+    """One state of one lane held between -limit and limit."""
+    value = work[(STATE + state) * len(lanes) + lane]
+    work[(STATE + state) * len(lanes) + lane] = clamp(value, -limit, limit)

@@ -20,7 +20,6 @@ from flownav.measurement import Array, EventQueue, Sensor, Stream, merge
 from flownav.navigation.feed import imu_serves
 from flownav.sensors.datasheet import FlowSensor
 
-WITHHELD = -1.0  # the quality of a reading that the user takes away
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
 FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 GYRO_BIAS_TIME_S = 10.0  # as PX4's EKF2 follows it at 10 Hz
@@ -92,17 +91,17 @@ def prepare(log: Log, options: ReplayOptions) -> Prepared:
 
 
 def withhold(log: Log, queue: EventQueue, options: ReplayOptions) -> EventQueue:
-    """The queue without what the options take away: GPS that arrives in [t0, t1) of an outage, and flow."""
-    quality = queue.quality.copy()
+    """The queue with what the options take away marked: GPS that arrives in [t0, t1) of an outage, and flow."""
+    withheld = queue.withheld.copy()
     for sensor in GPS:
         if sensor in log.streams:
             rows = np.flatnonzero(queue.sensor == sensor)
             arrival = log.streams[sensor].t_s[queue.row[rows]]
             for t0, t1 in options.gps_outages_s:
-                quality[rows[(arrival >= t0) & (arrival < t1)]] = WITHHELD
+                withheld[rows[(arrival >= t0) & (arrival < t1)]] = 1.0
     if not options.use_flow:
-        quality[np.isin(queue.sensor, [int(sensor) for sensor in FLOW])] = WITHHELD
-    return queue._replace(quality=quality)
+        withheld[np.isin(queue.sensor, [int(sensor) for sensor in FLOW])] = 1.0
+    return queue._replace(withheld=withheld)
 
 
 def _check(log: Log, options: ReplayOptions) -> None:

@@ -1,0 +1,172 @@
+"""GPS position and velocity: a fix is judged as a whole, fused axis by axis, and believed where it is refused for long."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flownav.compile import equation, procedure
+from flownav.estimation.covariance import expect
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.laws.gps import gps_position, gps_velocity
+from flownav.estimation.states import (
+    GPS_FAST,
+    GPS_SLOW,
+    GPS_VELOCITY,
+    INNOVATION,
+    INNOVATION_VARIANCE,
+    NOISE,
+    OFFERED,
+    POSITION,
+    STATE,
+    STATES,
+    VELOCITY,
+)
+from flownav.measurement import Sensor
+from flownav.navigation.journal import reset_state
+from flownav.navigation.memory import (
+    LEVEL_RATIO,
+    REASON,
+    Reading,
+    RejectionMemory,
+    load_reading,
+    load_rejection,
+    load_start,
+    store_rejection,
+)
+from flownav.navigation.offers import conclude, note_aid, note_height, put, usable
+from flownav.navigation.packed import load_gps_settings
+from flownav.navigation.reasons import FUSED, INNOVATION_GATE
+from flownav.navigation.settings import GpsSettings
+from flownav.navigation.tape import GPS_RESET, Output, write_event
+
+LEAST_REJECTIONS = 5
+
+
+@equation
+def judge_gps(
+    reading: Reading, axis: int, position: bool, started: float, level_ratio: float, s: GpsSettings
+) -> tuple[int, float]:
+    """Verdict and variance of one axis: the white part of a fix's noise, and a share of the accuracy that it states.
+
+    North and east come of one fix, and a jump along one axis spoils both.
+    """
+    value = reading.value_0 if axis == 0 else (reading.value_1 if axis == 1 else reading.value_2)
+    stated = reading.variance_0 if axis == 0 else (reading.variance_1 if axis == 1 else reading.variance_2)
+    white_position = s.gps_white_sigma_down_m if axis == 2 else s.gps_white_sigma_m
+    white_velocity = s.gps_velocity_white_down_m_s if axis == 2 else s.gps_velocity_white_m_s
+    white = white_position if position else white_velocity
+    share = s.gps_white_share * s.gps_white_share * (stated if np.isfinite(stated) else 0.0)
+    variance = white * white + share
+    reason = usable(reading, value, variance, started)
+    spoilt = reason == FUSED and axis < 2 and level_ratio > 1.0
+    return INNOVATION_GATE if spoilt else reason, variance
+
+
+@equation
+def judge_rejections(
+    refused: bool, t_s: float, m: RejectionMemory, s: GpsSettings
+) -> tuple[bool, RejectionMemory]:
+    """Whether GPS has been refused for a state so often and so long that the filter is wrong, and the count."""
+    since_s = m.since_s if m.count > 0.0 else t_s
+    count = m.count + 1.0
+    reset = refused and count >= LEAST_REJECTIONS and t_s - since_s >= s.gps_reset_s
+    return reset, RejectionMemory(count if refused and not reset else 0.0, since_s)
+
+
+@procedure
+def take_gps(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
+    """Position or velocity with its lasting errors; where it is refused for long, a reset."""
+    s = load_gps_settings(p)
+    position = sensor == Sensor.GPS_POSITION
+    note_level_ratio(work, lanes, position, s)
+    for axis in range(3):
+        offer_axis(work, lanes, axis, position, False, s)
+        conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
+        if axis < 2:
+            note_aid(work, lanes, t_s, o)
+        elif position:
+            note_height(work, lanes, t_s)
+        mind_rejections(work, lanes, t_s, axis, position, s, o)
+
+
+@procedure
+def offer_axis(work: Work, lanes: Lanes, axis: int, position: bool, alone: bool, s: GpsSettings) -> None:
+    """One axis of a fix, judged and put before its law. alone: whatever the other axes say."""
+    for lane in range(len(lanes)):
+        reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
+        value = reading.value_0 if axis == 0 else (reading.value_1 if axis == 1 else reading.value_2)
+        ratio = 0.0 if alone else work[LEVEL_RATIO * len(lanes) + lane]
+        reason, variance = judge_gps(reading, axis, position, started, ratio, s)
+        put(work, lanes, lane, value, variance, reason)
+    if position:
+        gps_position(work, lanes, axis, s.gps_forward_m, s.gps_right_m, s.gps_below_m)
+    else:
+        gps_velocity(work, lanes, axis, s.gps_forward_m, s.gps_right_m, s.gps_below_m)
+
+
+@procedure
+def note_level_ratio(work: Work, lanes: Lanes, position: bool, s: GpsSettings) -> None:
+    """LEVEL_RATIO: the larger test ratio of north and east, 0 where the fix cannot be offered."""
+    for lane in range(len(lanes)):
+        work[LEVEL_RATIO * len(lanes) + lane] = 0.0
+    for axis in range(2):
+        offer_axis(work, lanes, axis, position, True, s)
+        for lane in range(len(lanes)):
+            work[OFFERED * len(lanes) + lane] = 0.0
+        expect(work, lanes, STATES, True)
+        for lane in range(len(lanes)):
+            innovation = work[INNOVATION * len(lanes) + lane]
+            variance = work[INNOVATION_VARIANCE * len(lanes) + lane]
+            ratio = innovation * innovation / (s.gate_sigma * s.gate_sigma * variance)
+            judged = work[REASON * len(lanes) + lane] == FUSED
+            before = work[LEVEL_RATIO * len(lanes) + lane]
+            work[LEVEL_RATIO * len(lanes) + lane] = ratio if judged and ratio > before else before
+
+
+@procedure
+def mind_rejections(
+    work: Work, lanes: Lanes, t_s: float, axis: int, position: bool, s: GpsSettings, o: Output
+) -> None:
+    """Where GPS has been refused again and again for a state, the filter is wrong: that state goes to GPS.
+
+    An axis that is refused for the other's sake alone does not count.
+    """
+    place = axis if position else 3 + axis
+    for lane in range(len(lanes)):
+        ratio = work[INNOVATION * len(lanes) + lane] ** 2
+        ratio /= s.gate_sigma * s.gate_sigma * work[INNOVATION_VARIANCE * len(lanes) + lane]
+        refused = work[REASON * len(lanes) + lane] == INNOVATION_GATE and ratio > 1.0
+        heard = load_reading(work, lanes, lane).arrived > 0.0
+        memory = load_rejection(work, lanes, place, lane)
+        reset, after = judge_rejections(refused, t_s, memory, s)
+        if heard:
+            store_rejection(work, lanes, place, lane, after)
+        if heard and reset:
+            go_to_gps(work, lanes, lane, t_s, axis, position, s, o)
+
+
+@procedure
+def go_to_gps(
+    work: Work, lanes: Lanes, lane: int, t_s: float, axis: int, position: bool, s: GpsSettings, o: Output
+) -> None:
+    """One state of one lane goes to the fix, its lasting errors are forgotten."""
+    reading = load_reading(work, lanes, lane)
+    value = reading.value_0 if axis == 0 else (reading.value_1 if axis == 1 else reading.value_2)
+    noise = work[NOISE * len(lanes) + lane]
+    if position:
+        slow = s.gps_slow_sigma_down_m if axis == 2 else s.gps_slow_sigma_m
+        fast = s.gps_fast_sigma_down_m if axis == 2 else s.gps_fast_sigma_m
+        work[(STATE + GPS_SLOW + axis) * len(lanes) + lane] = 0.0
+        work[(STATE + GPS_FAST + axis) * len(lanes) + lane] = 0.0
+        reset_state(work, lanes, lane, GPS_SLOW + axis, slow * slow, o)
+        reset_state(work, lanes, lane, GPS_FAST + axis, fast * fast, o)
+        reset_state(work, lanes, lane, POSITION + axis, slow * slow + fast * fast + noise, o)
+    else:
+        lasting = s.gps_velocity_sigma_m_s
+        work[(STATE + GPS_VELOCITY + axis) * len(lanes) + lane] = 0.0
+        reset_state(work, lanes, lane, GPS_VELOCITY + axis, lasting * lasting, o)
+        reset_state(work, lanes, lane, VELOCITY + axis, lasting * lasting + noise, o)
+    state = STATE + (POSITION if position else VELOCITY) + axis
+    before = work[state * len(lanes) + lane]
+    work[state * len(lanes) + lane] = value
+    write_event(lanes, lane, t_s, GPS_RESET, value - before, o)

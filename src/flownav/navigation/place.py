@@ -1,0 +1,134 @@
+"""Where the vehicle is from something near it: an external pose, the pad in a camera, the ground under the skids."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flownav.compile import equation, procedure
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.laws.pad import pad_fix
+from flownav.estimation.laws.still import position_itself, velocity_itself
+from flownav.estimation.motion import rotation_of
+from flownav.estimation.states import MEASURED, PAD, POSITION, STATE
+from flownav.frames import to_earth
+from flownav.navigation.journal import reset_state
+from flownav.navigation.memory import (
+    OBSERVATION,
+    PAD_KNOWN,
+    AidMemory,
+    Reading,
+    load_aid,
+    load_reading,
+    load_start,
+    store_aid,
+)
+from flownav.navigation.offers import conclude, note_aid, note_height, put, usable, usable_in_flight
+from flownav.navigation.packed import load_place_settings
+from flownav.navigation.reasons import FUSED, OUT_OF_RANGE, SILENT
+from flownav.navigation.settings import PlaceSettings
+from flownav.navigation.tape import PAD_FOUND, Output, write_event
+
+LEAST_PAD_DISTANCE_M = 0.05
+UNKNOWN_M = 100.0
+ON_GROUND = 0.5
+
+
+@equation
+def component_of(reading: Reading, component: int) -> tuple[float, float]:
+    """A reading's value and stated variance of component 0, 1 or 2."""
+    value = reading.value_0 if component == 0 else (reading.value_1 if component == 1 else reading.value_2)
+    stated = reading.variance_0 if component == 0 else (reading.variance_1 if component == 1 else reading.variance_2)
+    return value, stated
+
+
+# -- an external position -----------------------------------------------------------------------------------
+@procedure
+def take_pose(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
+    """An external position in the local frame."""
+    s = load_place_settings(p)
+    for axis in range(3):
+        for lane in range(len(lanes)):
+            reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
+            value, stated = component_of(reading, axis)
+            variance = stated if np.isfinite(stated) else s.pose_sigma_m * s.pose_sigma_m
+            put(work, lanes, lane, value, variance, usable(reading, value, variance, started))
+        position_itself(work, lanes, axis)
+        conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
+        if axis < 2:
+            note_aid(work, lanes, t_s, o)
+        else:
+            note_height(work, lanes, t_s)
+
+
+# -- the pad ------------------------------------------------------------------------------------------------
+@equation
+def judge_pad(reading: Reading, component: int, started: float, s: PlaceSettings) -> tuple[int, float]:
+    """Verdict and variance of a pad fix's component: across its line of sight (0, 1) and along it (2) [m2]."""
+    distance = reading.value_2
+    _, stated = component_of(reading, component)
+    sigma = (s.pad_distance_sigma if component == 2 else s.pad_angle_sigma_rad) * distance
+    reason = usable_in_flight(reading, reading.value_0 + reading.value_1 + distance, 0.0, started)
+    near = distance < LEAST_PAD_DISTANCE_M
+    return OUT_OF_RANGE if reason == FUSED and near else reason, stated if np.isfinite(stated) else sigma * sigma
+
+
+@procedure
+def take_pad(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
+    """The pad from the lens. Its place is a state: the first fix finds it, every one tells both it and the vehicle."""
+    s = load_place_settings(p)
+    for lane in range(len(lanes)):
+        reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
+        reason, _ = judge_pad(reading, 0, started, s)
+        if reason == FUSED and work[PAD_KNOWN * len(lanes) + lane] == 0.0:
+            find_pad(work, lanes, lane, t_s, reading, s, o)
+    for component in range(3):
+        for lane in range(len(lanes)):
+            reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
+            reason, variance = judge_pad(reading, component, started, s)
+            value, _ = component_of(reading, component)
+            put(work, lanes, lane, reading.value_0, variance, reason)
+            work[OBSERVATION * len(lanes) + lane] = value
+            work[(MEASURED + 1) * len(lanes) + lane] = reading.value_1
+            work[(MEASURED + 2) * len(lanes) + lane] = reading.value_2
+        pad_fix(work, lanes, component, s.flow_below_m, 0.0, 0.0)
+        conclude(work, lanes, t_s, sensor, component, s.gate_sigma, o)
+        note_height(work, lanes, t_s)
+        note_aid(work, lanes, t_s, o)
+
+
+@procedure
+def find_pad(
+    work: Work, lanes: Lanes, lane: int, t_s: float, reading: Reading, s: PlaceSettings, o: Output
+) -> None:
+    """The pad is unknown but for this fix, which is about to be fused."""
+    rotation = rotation_of(work, lanes, lane)
+    depth = reading.value_2 / np.sqrt(reading.value_0 * reading.value_0 + reading.value_1 * reading.value_1 + 1.0)
+    off = to_earth(rotation, reading.value_0 * depth, reading.value_1 * depth, depth + s.flow_below_m)
+    total = 0.0
+    for i in range(3):
+        place = work[(STATE + POSITION + i) * len(lanes) + lane] + off[i]
+        work[(STATE + PAD + i) * len(lanes) + lane] = place
+        reset_state(work, lanes, lane, PAD + i, UNKNOWN_M * UNKNOWN_M, o)
+        total += place * place
+    work[PAD_KNOWN * len(lanes) + lane] = 1.0
+    write_event(lanes, lane, t_s, PAD_FOUND, np.sqrt(total), o)
+
+
+# -- at rest ------------------------------------------------------------------------------------------------
+@procedure
+def take_landed(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
+    """On the ground: no velocity. In flight there is nothing to say."""
+    s = load_place_settings(p)
+    for lane in range(len(lanes)):
+        aid, reading = load_aid(work, lanes, lane), load_reading(work, lanes, lane)
+        landed = reading.value_0 if reading.arrived > 0.0 else aid.landed
+        store_aid(work, lanes, lane, AidMemory(aid.aided_s, aid.flag, aid.height_s, landed))
+    variance = s.still_sigma_m_s * s.still_sigma_m_s
+    for axis in range(3):
+        for lane in range(len(lanes)):
+            reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
+            reason = usable(reading, reading.value_0, variance, started)
+            put(work, lanes, lane, 0.0, variance, reason if reading.value_0 > ON_GROUND else SILENT)
+        velocity_itself(work, lanes, axis)
+        conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
+        note_aid(work, lanes, t_s, o)

@@ -1,0 +1,259 @@
+"""One reading of one sensor on lanes: the filter brought to its instant, the reading judged and fused, its fate noted.
+
+`navigate` is the only way into the filter: a log's and a live link's readings come through `loop.run` on one lane, the
+simulator's on one or sixteen. The schedule (which sensor, at what instant) is the same in all lanes; what was read,
+whether it arrived, and every verdict are each lane's own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flownav.compile import LANES, ONE_LANE, equation, pointer, procedure, unit
+from flownav.estimation.error_models import propagate_gauss_markov, propagate_walks
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.motion import hold_still, predict
+from flownav.estimation.states import ACCEL_NOISE, GYRO_NOISE, IMU, STATES
+from flownav.measurement import Sensor
+from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
+from flownav.navigation.flow import take_flow
+from flownav.navigation.gps import take_gps
+from flownav.navigation.height import take_baro, take_range
+from flownav.navigation.journal import note_decay, note_estimate, note_prediction
+from flownav.navigation.memory import (
+    CLOCK,
+    ERRORS_CLOCK,
+    MOVING,
+    WRITTEN,
+    ImuMemory,
+    Reading,
+    load_imu,
+    load_reading,
+    load_start,
+    share,
+    shared,
+    store_imu,
+)
+from flownav.navigation.offers import note_aid_age, too_old
+from flownav.navigation.packed import (
+    load_aid_settings,
+    load_equipment,
+    load_filter_settings,
+    load_imu_settings,
+)
+from flownav.navigation.place import take_landed, take_pad, take_pose
+from flownav.navigation.settings import FROM_MAG, Equipment, ImuSettings
+from flownav.navigation.start import gather, try_start
+from flownav.navigation.tape import ESTIMATE_PERIOD_S, IMU_LOST, Output, output_of, write_estimate, write_event
+from flownav.navigation.vibration import add_vibration_noise, followed_vibration, limit_biases, with_reading
+
+LONGEST_STEP_S = 0.1
+MOST_STEPS = 10000
+LONGEST_LAG_OF_ERRORS_S = 0.1  # Gauss-Markov errors go on at least so often
+
+
+@procedure
+def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: int) -> None:
+    """Take the reading that lies in the rows of `memory.READING`: of `sensor`, describing the instant t_s."""
+    if too_old(work, lanes, t_s, sensor, o):
+        return
+    fitted = load_equipment(p)
+    gather(work, lanes, t_s, sensor)
+    heard = sensor == Sensor.IMU and fitted.use_imu
+    running = any_started(work, lanes)
+    if running:
+        choose_motion(work, lanes, t_s, heard, fitted, load_imu_settings(p), o)
+        advance(work, lanes, t_s, p, o)
+        if heard:
+            keep_imu(work, lanes, t_s)
+    share(work, lanes, CLOCK, t_s)
+    if not running:
+        running = try_start(work, lanes, t_s, sensor, fitted, p, o)
+    elif len(lanes) > 1:
+        try_start(work, lanes, t_s, sensor, fitted, p, o)
+    take(work, lanes, t_s, sensor, fitted, p, o)
+    if running:
+        note_aid_age(work, lanes, t_s, load_aid_settings(p), o)
+    if t_s - shared(work, lanes, WRITTEN) >= ESTIMATE_PERIOD_S:
+        share(work, lanes, WRITTEN, t_s)
+        if running:
+            limit_biases(work, lanes, load_imu_settings(p))
+            write_estimate(work, lanes, t_s, o)
+            if len(lanes) == 1:
+                note_estimate(work, lanes, o)
+
+
+@procedure
+def take(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> None:
+    """Each sensor's own way."""
+    if sensor == Sensor.GPS_POSITION or sensor == Sensor.GPS_VELOCITY:
+        catch_up_errors(work, lanes, t_s, p, o)
+        take_gps(work, lanes, t_s, sensor, p, o)
+    elif sensor == Sensor.FLOW_RATE or sensor == Sensor.FLOW_VELOCITY:
+        take_flow(work, lanes, t_s, sensor, fitted.flow_gyro_is_imu, p, o)
+    elif sensor == Sensor.RANGE:
+        take_range(work, lanes, t_s, sensor, p, o)
+    elif sensor == Sensor.BARO:
+        take_baro(work, lanes, t_s, sensor, p, o)
+    elif sensor == Sensor.ATTITUDE:
+        catch_up_errors(work, lanes, t_s, p, o)
+        take_attitude(work, lanes, t_s, sensor, fitted, p, o)
+    elif sensor == Sensor.MAG:
+        if fitted.heading == FROM_MAG:
+            catch_up_errors(work, lanes, t_s, p, o)
+            take_mag(work, lanes, t_s, sensor, p, o)
+    elif sensor == Sensor.YAW:
+        catch_up_errors(work, lanes, t_s, p, o)
+        take_yaw(work, lanes, t_s, sensor, p, o)
+    elif sensor == Sensor.POSE:
+        take_pose(work, lanes, t_s, sensor, p, o)
+    elif sensor == Sensor.PAD:
+        take_pad(work, lanes, t_s, sensor, p, o)
+    elif sensor == Sensor.LANDED:
+        take_landed(work, lanes, t_s, sensor, p, o)
+
+
+@equation
+def any_started(work: Work, lanes: Lanes) -> bool:
+    """Whether the filter runs in any lane."""
+    running = 0.0
+    for lane in range(len(lanes)):
+        running += load_start(work, lanes, lane).started
+    return running > 0.0
+
+
+# -- inertial readings --------------------------------------------------------------------------------------
+@equation
+def sound(reading: Reading) -> bool:
+    """Whether an inertial reading is one: it arrived, and all of it is finite."""
+    gyro = reading.value_0 + reading.value_1 + reading.value_2
+    total = gyro + reading.value_3 + reading.value_4 + reading.value_5
+    return reading.arrived > 0.0 and reading.withheld == 0.0 and bool(np.isfinite(total))
+
+
+@equation
+def motion_between(reading: Reading, m: ImuMemory, integrates: float) -> tuple[float, float, float, float, float, float]:
+    """What stands for the time between two inertial readings: their mean (trapezium), or the later one of a unit that
+    integrates over that time itself.
+    """
+    share = 1.0 if integrates > 0.5 else 0.5
+    rest = 1.0 - share
+    return (
+        share * reading.value_0 + rest * m.gyro_x,
+        share * reading.value_1 + rest * m.gyro_y,
+        share * reading.value_2 + rest * m.gyro_z,
+        share * reading.value_3 + rest * m.accel_x,
+        share * reading.value_4 + rest * m.accel_y,
+        share * reading.value_5 + rest * m.accel_z,
+    )
+
+
+@procedure
+def choose_motion(
+    work: Work, lanes: Lanes, t_s: float, heard: bool, fitted: Equipment, s: ImuSettings, o: Output
+) -> None:
+    """MOVING, and the IMU's rows, for the step to t_s: the readings at its ends, the newest reading, or none.
+
+    heard: an inertial reading is at hand. After a gap it knows nothing of the gap, which is coasted.
+    """
+    for lane in range(len(lanes)):
+        m = load_imu(work, lanes, lane)
+        fresh = fitted.use_imu and t_s - m.read_s <= s.imu_stale_s
+        reading = load_reading(work, lanes, lane)
+        now = heard and sound(reading)
+        if now and not fresh and np.isfinite(m.read_s) and load_start(work, lanes, lane).started > 0.0:
+            write_event(lanes, lane, t_s, IMU_LOST, t_s - m.read_s, o)
+        between = motion_between(reading, m, s.imu_integrates)
+        set_imu(work, lanes, lane, 0, between[0] if now else m.gyro_x)
+        set_imu(work, lanes, lane, 1, between[1] if now else m.gyro_y)
+        set_imu(work, lanes, lane, 2, between[2] if now else m.gyro_z)
+        set_imu(work, lanes, lane, 3, between[3] if now else m.accel_x)
+        set_imu(work, lanes, lane, 4, between[4] if now else m.accel_y)
+        set_imu(work, lanes, lane, 5, between[5] if now else m.accel_z)
+        vibration = followed_vibration(reading, m, t_s - m.read_s) if now and fresh else m.vibration
+        started = load_start(work, lanes, lane).started > 0.0
+        moving = fresh and started
+        work[MOVING * len(lanes) + lane] = 1.0 if moving else 0.0
+        accel = s.accel_noise_m_s2_rt_hz if moving else s.coasting_accel_m_s2_rt_hz
+        gyro = s.gyro_noise_rad_s_rt_hz if moving else s.coasting_rate_rad_s_rt_hz
+        work[ACCEL_NOISE * len(lanes) + lane] = accel * accel
+        work[GYRO_NOISE * len(lanes) + lane] = gyro * gyro
+        gap = m.gap if moving or not started else 1.0
+        store_imu(
+            work, lanes, lane,
+            ImuMemory(
+                m.read_s, m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z, vibration, m.doubt_m_s2, gap
+            ),
+        )  # fmt: skip
+
+
+@equation
+def set_imu(work: Work, lanes: Lanes, lane: int, part: int, value: float) -> None:
+    """One of the six inertial scalars that move the filter."""
+    work[(IMU + part) * len(lanes) + lane] = value
+
+
+@procedure
+def keep_imu(work: Work, lanes: Lanes, t_s: float) -> None:
+    """The reading at hand stands for what follows, until the next."""
+    for lane in range(len(lanes)):
+        reading, m = load_reading(work, lanes, lane), load_imu(work, lanes, lane)
+        if sound(reading) and load_start(work, lanes, lane).started > 0.0:
+            store_imu(work, lanes, lane, with_reading(reading, t_s, m))
+
+
+# -- from instant to instant ----------------------------------------------------------------------------------
+@procedure
+def advance(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> None:
+    """Bring the filter to an instant, in steps short enough for its laws; lanes without a fresh IMU coast."""
+    ahead_s = t_s - shared(work, lanes, CLOCK)
+    if not ahead_s > 0.0 or not np.isfinite(ahead_s):
+        return
+    settings = load_filter_settings(p)
+    imu = load_imu_settings(p)
+    steps = min(int(np.ceil(ahead_s / LONGEST_STEP_S)), MOST_STEPS)
+    dt_s = ahead_s / steps
+    for _ in range(steps):
+        for lane in range(len(lanes)):
+            if work[MOVING * len(lanes) + lane] == 0.0:
+                hold_still(work, lanes, lane)
+        predict(work, lanes, STATES, dt_s, settings)
+        propagate_walks(work, lanes, dt_s, settings)
+        add_vibration_noise(work, lanes, dt_s, imu)
+        if len(lanes) == 1:
+            note_prediction(work, lanes, dt_s, o)
+    if t_s - shared(work, lanes, ERRORS_CLOCK) >= LONGEST_LAG_OF_ERRORS_S:
+        catch_up_errors(work, lanes, t_s, p, o)
+
+
+@procedure
+def catch_up_errors(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> None:
+    """The Gauss-Markov errors, brought to an instant. They turn with nothing, so this may wait until they are read."""
+    before_s = shared(work, lanes, ERRORS_CLOCK)
+    share(work, lanes, ERRORS_CLOCK, t_s)
+    dt_s = t_s - before_s
+    if not dt_s > 0.0 or not np.isfinite(dt_s):
+        return
+    propagate_gauss_markov(work, lanes, STATES, dt_s, load_filter_settings(p))
+    if len(lanes) == 1:
+        note_decay(dt_s, o)
+
+
+# -- units --------------------------------------------------------------------------------------------------
+def take_one(
+    work: Work, p: Work, estimate: Work, innovation: Work, event: Work, entry: Work, state: Work, covariance: Work,
+    room: Work, used: Work, t_s: float, sensor: int, lanes: Lanes,
+) -> None:  # fmt: skip
+    """`navigate` with a C interface: pointers of the lane buffer, the packed settings and the tape."""
+    o = output_of(estimate, innovation, event, entry, state, covariance, room, used)
+    navigate(work, lanes, p, o, t_s, sensor)
+
+
+UNIT_SIGNATURE = "p p p p p p p p q q d i"
+navigate_one = unit(take_one, UNIT_SIGNATURE, lanes=ONE_LANE)
+navigate_lanes = unit(take_one, UNIT_SIGNATURE, lanes=LANES)
+
+
+def navigator_unit(lanes: Lanes) -> object:
+    """The unit of so many lanes."""
+    return navigate_one if len(lanes) == 1 else navigate_lanes

@@ -1,0 +1,253 @@
+"""What a navigator writes as it runs: estimates, what became of each component, happenings, and a smoother's journal.
+
+A `Tape` holds them for every lane, and `Output` is what kernels take of it: pointers. Estimates and components are
+written at the same instants in all lanes (their schedule is the same); a lane that has nothing to say there has NaN
+for its time, or the reason SILENT. Happenings come when they come, lane by lane. A tape without rows only counts.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.compile import equation, pointer, procedure
+from flownav.estimation.covariance import covariance_of, variance_of
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.motion import rotation_of
+from flownav.estimation.states import (
+    ATTITUDE,
+    GYRO_BIAS,
+    INNOVATION,
+    INNOVATION_VARIANCE,
+    NOISE,
+    POSITION,
+    QUATERNION,
+    STATE,
+    STATES,
+    TEST_RATIO,
+    VELOCITY,
+)
+from flownav.frames import to_body
+from flownav.measurement import Array, EventQueue, Sensor
+from flownav.navigation.memory import OBSERVATION, REASON, load_start
+from flownav.navigation.reasons import BEFORE_START, DUPLICATE, LATE, SILENT
+
+OFFER_COLUMNS = ("t_s", "sensor", "component", "observation", "observation_variance", "innovation",
+                 "innovation_variance", "test_ratio", "reason")  # fmt: skip
+OFFERS = len(OFFER_COLUMNS)
+# t, position 3, body velocity 3, quaternion 4, position and body velocity std 6, NED velocity 3, attitude std 3; then
+# the states from GYRO_BIAS on, and their standard deviations
+FIRST_EXTRA = GYRO_BIAS
+EXTRA_STATES = STATES - FIRST_EXTRA
+ESTIMATE_COLUMNS = 23 + 2 * EXTRA_STATES
+EVENT_COLUMNS = 3
+ESTIMATE_PERIOD_S = 0.02
+COMPONENTS = {Sensor.GPS_POSITION: 3, Sensor.GPS_VELOCITY: 3, Sensor.FLOW_RATE: 2, Sensor.FLOW_VELOCITY: 3,
+              Sensor.RANGE: 1, Sensor.BARO: 1, Sensor.MAG: 1, Sensor.YAW: 1, Sensor.ATTITUDE: 3, Sensor.POSE: 3,
+              Sensor.PAD: 3, Sensor.LANDED: 3}  # fmt: skip
+EVENTS_A_READING = 4
+
+# Kinds of happening: source, kind, what the value is. NumPy numbers them, because Numba compiles a function anew for
+# each Python integer that it is called with.
+(START, GROUND_FOUND, GROUND_RESET, BARO_FOUND, GPS_RESET, DEAD_RECKONING, POSITION_INVALID, AIDED_AGAIN,
+ RANGE_STUCK, PAD_FOUND, IMU_LOST, IMU_DOUBTED, FLOW_DOUBTED, FLOW_TRUSTED) = np.arange(14)  # fmt: skip
+EVENT_NAMES = (
+    ("filter", "start", "at a GPS fix (1) or at the local origin (0)"),
+    ("range", "datum", "ground level below the first range, down in the local frame [m]"),
+    ("range", "reset", "range was rejected for long: new ground level, down in the local frame [m]"),
+    ("baro", "datum", "pressure height of the local origin [m]"),
+    ("gps", "reset", "GPS was rejected for long: one state went to it, by this much [m or m/s]"),
+    ("filter", "dead_reckoning", "no horizontal aid for this long [s]"),
+    ("filter", "position_invalid", "no horizontal aid for this long [s]"),
+    ("filter", "aided", "horizontal aid is back after this long [s]"),
+    ("range", "stuck", "it repeats this value while the vehicle moves [m]"),
+    ("pad", "found", "the pad's distance from the local origin [m]"),
+    ("imu", "lost", "no reading for this long [s]; attitude and velocity coast"),
+    ("imu", "doubted", "range contradicts it by this much [m]; the accelerometer's bias is set free"),
+    ("flow", "doubted", "it contradicts IMU and GPS: mean square innovation over its variance"),
+    ("flow", "trusted", "it agrees again: mean square innovation over its variance"),
+)
+# kinds of journal entry, and where their numbers stand in it
+PREDICTED, CORRECTED, FORGOTTEN, NOTED, DECAYED = 0.0, 1.0, 2.0, 3.0, 4.0
+STEP, MIDDLE_AT, FORCE_AT = 1, 2, 11  # a prediction: dt [s], R_EB in its middle (9), specific force NED (3)
+INNOVATION_AT, VARIANCE_AT, JACOBIAN_AT, GAIN_AT = 1, 2, 3, 3 + STATES  # a correction: nu, S, h, K
+STATE_AT = 1  # a reset: which
+ENTRY = 3 + 2 * STATES
+# places in `used`
+ESTIMATES, OFFERED_ROWS, ENTRIES, NOTES, FIRST_EVENTS = 0, 1, 2, 3, 4
+
+
+class Journal(NamedTuple):
+    """What a smoother needs: entry (n, ENTRY), state and quaternion (m, STATES + 4), covariance (m, STATES, STATES)."""
+
+    entry: Array
+    state: Array
+    covariance: Array
+
+
+class Tape(NamedTuple):
+    """Rows that a run writes, and how many of each it used.
+
+    estimate (n, ESTIMATE_COLUMNS, lanes), innovation (m, OFFERS, lanes), event (k, 3, lanes); used: estimates,
+    components, journal entries, journal estimates, then happenings of each lane.
+    """
+
+    estimate: Array
+    innovation: Array
+    event: Array
+    journal: Journal
+    used: NDArray[np.int64]
+
+    def estimates(self, lane: int = 0) -> Array:
+        """The estimates of one lane, (n, ESTIMATE_COLUMNS)."""
+        rows = self.estimate[: self.used[ESTIMATES], :, lane]
+        return np.ascontiguousarray(rows[np.isfinite(rows[:, 0])])
+
+    def offers(self, lane: int = 0) -> Array:
+        """What became of each component in one lane, (m, OFFERS)."""
+        rows = self.innovation[: self.used[OFFERED_ROWS], :, lane]
+        return np.ascontiguousarray(rows[rows[:, OFFERS - 1] != SILENT])
+
+    def events(self, lane: int = 0) -> Array:
+        """The happenings of one lane, (k, 3): time, kind, value."""
+        return np.ascontiguousarray(self.event[: self.used[FIRST_EVENTS + lane], :, lane])
+
+
+class Output(NamedTuple):
+    """A tape as kernels take it. room: rows of estimate, innovation, event, entry and journal estimates."""
+
+    estimate: Work
+    innovation: Work
+    event: Work
+    entry: Work
+    state: Work
+    covariance: Work
+    room: NDArray[np.int64]
+    used: NDArray[np.int64]
+
+
+def empty_tape(estimates: int, components: int, events: int, lanes: int = 1, journal: tuple[int, int] = (0, 0)) -> Tape:
+    """A tape with this many rows; journal: its entries and estimates."""
+    return Tape(
+        np.full((estimates, ESTIMATE_COLUMNS, lanes), np.nan),
+        np.full((components, OFFERS, lanes), np.nan),
+        np.full((events, EVENT_COLUMNS, lanes), np.nan),
+        Journal(
+            np.zeros((journal[0], ENTRY)), np.zeros((journal[1], STATES + 4)), np.zeros((journal[1], STATES, STATES))
+        ),
+        np.zeros(FIRST_EVENTS + lanes, np.int64),
+    )  # fmt: skip
+
+
+def new_tape(queue: EventQueue) -> Tape:
+    """A tape long enough for a queue."""
+    components = sum(count * int(np.count_nonzero(queue.sensor == sensor)) for sensor, count in COMPONENTS.items())
+    estimates = min(len(queue.t_s), int((queue.t_s[-1] - queue.t_s[0]) / ESTIMATE_PERIOD_S) + 2)
+    return empty_tape(estimates, components, EVENTS_A_READING * len(queue.t_s) + 8)
+
+
+def room_of(tape: Tape) -> NDArray[np.int64]:
+    """How many rows of each kind a tape has."""
+    journal = tape.journal
+    return np.array([len(tape.estimate), len(tape.innovation), len(tape.event), len(journal.entry), len(journal.state)])
+
+
+@equation
+def output_of(
+    estimate: Array, innovation: Array, event: Array, entry: Array, state: Array, covariance: Array,
+    room: NDArray[np.int64], used: NDArray[np.int64],
+) -> Output:  # fmt: skip
+    """The pointers of a tape's arrays."""
+    return Output(
+        pointer(estimate), pointer(innovation), pointer(event), pointer(entry), pointer(state), pointer(covariance),
+        pointer(room), pointer(used),
+    )  # fmt: skip
+
+
+@procedure
+def write_event(lanes: Lanes, lane: int, t_s: float, kind: int, value: float, o: Output) -> None:
+    """A happening in one lane."""
+    row = o.used[FIRST_EVENTS + lane]
+    if row < o.room[2]:
+        first = row * EVENT_COLUMNS
+        o.event[first * len(lanes) + lane] = t_s
+        o.event[(first + 1) * len(lanes) + lane] = kind
+        o.event[(first + 2) * len(lanes) + lane] = value
+        o.used[FIRST_EVENTS + lane] = row + 1
+
+
+@procedure
+def write_offer(work: Work, lanes: Lanes, t_s: float, sensor: int, component: int, o: Output) -> None:
+    """What became of the component that was offered last, by its REASON in each lane; no row where all are silent."""
+    row = o.used[OFFERED_ROWS]
+    if row >= o.room[1]:
+        return
+    said = False
+    for lane in range(len(lanes)):
+        said = said or work[REASON * len(lanes) + lane] != SILENT
+    if not said:
+        return
+    o.used[OFFERED_ROWS] = row + 1
+    first = row * OFFERS
+    for lane in range(len(lanes)):
+        reason = work[REASON * len(lanes) + lane]
+        tested = reason != BEFORE_START and reason != DUPLICATE and reason != LATE
+        o.innovation[first * len(lanes) + lane] = t_s
+        o.innovation[(first + 1) * len(lanes) + lane] = sensor
+        o.innovation[(first + 2) * len(lanes) + lane] = component
+        o.innovation[(first + 3) * len(lanes) + lane] = work[OBSERVATION * len(lanes) + lane]
+        o.innovation[(first + 4) * len(lanes) + lane] = work[NOISE * len(lanes) + lane]
+        o.innovation[(first + 5) * len(lanes) + lane] = work[INNOVATION * len(lanes) + lane] if tested else np.nan
+        variance = work[INNOVATION_VARIANCE * len(lanes) + lane]
+        o.innovation[(first + 6) * len(lanes) + lane] = variance if tested else np.nan
+        o.innovation[(first + 7) * len(lanes) + lane] = work[TEST_RATIO * len(lanes) + lane] if tested else np.nan
+        o.innovation[(first + 8) * len(lanes) + lane] = reason
+
+
+@procedure
+def write_estimate(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
+    """State, attitude and standard deviations at an instant; see ESTIMATE_COLUMNS. NaN for a lane not started."""
+    row = o.used[ESTIMATES]
+    if row >= o.room[0]:
+        return
+    o.used[ESTIMATES] = row + 1
+    first = row * ESTIMATE_COLUMNS
+    for lane in range(len(lanes)):
+        started = load_start(work, lanes, lane).started > 0.0
+        rotation = rotation_of(work, lanes, lane)
+        velocity = to_body(
+            rotation,
+            work[(STATE + VELOCITY) * len(lanes) + lane],
+            work[(STATE + VELOCITY + 1) * len(lanes) + lane],
+            work[(STATE + VELOCITY + 2) * len(lanes) + lane],
+        )
+        o.estimate[first * len(lanes) + lane] = t_s if started else np.nan
+        for i in range(3):
+            place = first + i
+            o.estimate[(place + 1) * len(lanes) + lane] = work[(STATE + POSITION + i) * len(lanes) + lane]
+            o.estimate[(place + 4) * len(lanes) + lane] = velocity[i]
+            o.estimate[(place + 11) * len(lanes) + lane] = np.sqrt(variance_of(work, lanes, POSITION + i, lane))
+            o.estimate[(place + 17) * len(lanes) + lane] = work[(STATE + VELOCITY + i) * len(lanes) + lane]
+            o.estimate[(place + 20) * len(lanes) + lane] = np.sqrt(variance_of(work, lanes, ATTITUDE + i, lane))
+            variance = body_velocity_variance(work, lanes, lane, rotation[i], rotation[3 + i], rotation[6 + i])
+            o.estimate[(place + 14) * len(lanes) + lane] = np.sqrt(variance)
+        for i in range(4):
+            o.estimate[(first + 7 + i) * len(lanes) + lane] = work[(QUATERNION + i) * len(lanes) + lane]
+        for i in range(EXTRA_STATES):
+            value = work[(STATE + FIRST_EXTRA + i) * len(lanes) + lane]
+            spread = np.sqrt(max(variance_of(work, lanes, FIRST_EXTRA + i, lane), 0.0))
+            o.estimate[(first + 23 + i) * len(lanes) + lane] = value
+            o.estimate[(first + 23 + EXTRA_STATES + i) * len(lanes) + lane] = spread
+
+
+@equation
+def body_velocity_variance(work: Work, lanes: Lanes, lane: int, north: float, east: float, down: float) -> float:
+    """e' P_vv e of one body axis e in earth NED [m2/s2]."""
+    axis = (north, east, down)
+    variance = 0.0
+    for j in range(3):
+        for k in range(3):
+            variance += axis[j] * covariance_of(work, lanes, VELOCITY + j, VELOCITY + k, lane) * axis[k]
+    return max(variance, 0.0)

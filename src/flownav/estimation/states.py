@@ -99,6 +99,7 @@ CROSS = _rows.take(STATES_WITH_LAG)  # P h'
 GAIN = _rows.take(STATES_WITH_LAG)  # K
 REST = _rows.take(STATES_WITH_LAG)  # P h' - K S/2
 SCRATCH = _rows.take(15 * 15)  # a transition's own block of P, both triangles
+DRIVE = _rows.take(14)  # derivatives of what a flow sensor with dynamics sees
 FILTER_ROWS = _rows.next
 
 # names of single rows, beside the states', that laws and steps may read or write
@@ -111,6 +112,7 @@ ROWS_BY_NAME = {
     **{f"force_{axis}": FORCE + i for i, axis in enumerate("ned")},
     **{f"middle_{i}": MIDDLE + i for i in range(9)},
     **{f"measured_{i}": MEASURED + i for i in range(8)},
+    **{f"drive_{i}": DRIVE + i for i in range(14)},
     "measured": MEASURED,
     "accel_noise": ACCEL_NOISE,
     "gyro_noise": GYRO_NOISE,

@@ -1,0 +1,177 @@
+"""The flow sensor's identified dynamics inside the filter: two states a channel (docs/landing-filter.md).
+
+The sensor sees the body velocity m = o R_BE v, where o > 1 only below the floor of its own sonar, and reports
+gain x1 of x' = [0 1; -c -b] x + [0 1]' m. The filter carries x, so that a reading corrects what was, some 80 ms ago,
+as well as what is. Only a filter of STATES_WITH_LAG states has them: `lag_starts`, `motion.predict`, `lag_ends` are
+one step of it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flownav.compile import equation, procedure
+from flownav.estimation.covariance import Lanes, Work
+from flownav.estimation.law import step
+from flownav.estimation.laws.geometry import body_axis, cross, lens_range
+from flownav.estimation.states import STATES_WITH_LAG
+from flownav.estimation.transition import transition
+from flownav.frames import Rotation, rotation_from_quaternion
+
+
+class FlowLag(NamedTuple):
+    """A flow sensor's identified dynamics G(s) = a/(s^2 + b s + c) over one prediction of fixed length.
+
+    x <- F x + g0 m0 + g1 m1, where the seen velocity goes in a straight line from m0 to m1; reading = gain x1.
+    """
+
+    f11: float
+    f12: float
+    f21: float
+    f22: float
+    start_1: float  # g0
+    start_2: float
+    end_1: float  # g1
+    end_2: float
+    gain: float
+    sonar_floor_m: float  # below it the sensor multiplies its flow by this instead of the range; 0: it does not
+    lens_below_m: float  # the lens below the vehicle's reference point, along body down
+
+
+class Seen(NamedTuple):
+    """A seen velocity, and its derivatives on velocity, attitude error and height."""
+
+    value: float
+    vel: tuple[float, float, float]
+    turn: tuple[float, float, float]
+    height: float
+
+
+@equation
+def seen_velocity(
+    rotation: Rotation, vel_n: float, vel_e: float, vel_d: float, height_m: float, channel: int,
+    sonar_floor_m: float, lens_below_m: float,
+) -> Seen:  # fmt: skip
+    """What channel 0 (forward) or 1 (right) sees of the velocity: o e . v, with o = floor/range below the floor."""
+    e = body_axis(rotation, channel)
+    along = e[0] * vel_n + e[1] * vel_e + e[2] * vel_d
+    turn = cross(e, (vel_n, vel_e, vel_d))
+    range_m, by_height, by_north, by_east = lens_range(rotation, height_m, (0.0, 0.0, lens_below_m))
+    low = range_m.real < sonar_floor_m
+    over = sonar_floor_m / range_m if low else 1.0
+    by_range = -over * along / range_m if low else 0.0
+    return Seen(
+        over * along,
+        (over * e[0], over * e[1], over * e[2]),
+        (over * turn[0] + by_range * by_north, over * turn[1] + by_range * by_east, over * turn[2]),
+        by_range * by_height,
+    )
+
+
+class Lagged(NamedTuple):
+    """The states of the sensor's dynamics."""
+
+    lag_u1: float
+    lag_u2: float
+    lag_v1: float
+    lag_v2: float
+
+
+@step
+def move_lag(
+    lag_u1: float, lag_u2: float, lag_v1: float, lag_v2: float, vel_n: float, vel_e: float, vel_d: float,
+    pos_d: float, ground: float, qw: float, qx: float, qy: float, qz: float,
+    *, f11: float, f12: float, f21: float, f22: float, gain_1: float, gain_2: float,
+    sonar_floor_m: float, lens_below_m: float,
+) -> Lagged:  # fmt: skip
+    """x <- F x + g m of both channels, with the velocity that the state now has."""
+    rotation = rotation_from_quaternion(qw, qx, qy, qz)
+    u = seen_velocity(rotation, vel_n, vel_e, vel_d, ground - pos_d, 0, sonar_floor_m, lens_below_m).value
+    v = seen_velocity(rotation, vel_n, vel_e, vel_d, ground - pos_d, 1, sonar_floor_m, lens_below_m).value
+    return Lagged(
+        f11 * lag_u1 + f12 * lag_u2 + gain_1 * u, f21 * lag_u1 + f22 * lag_u2 + gain_2 * u,
+        f11 * lag_v1 + f12 * lag_v2 + gain_1 * v, f21 * lag_v1 + f22 * lag_v2 + gain_2 * v,
+    )  # fmt: skip
+
+
+class Drive(NamedTuple):
+    """Rows in which one step's derivatives of the seen velocities lie."""
+
+    drive_0: float
+    drive_1: float
+    drive_2: float
+    drive_3: float
+    drive_4: float
+    drive_5: float
+    drive_6: float
+    drive_7: float
+    drive_8: float
+    drive_9: float
+    drive_10: float
+    drive_11: float
+    drive_12: float
+    drive_13: float
+
+
+@step
+def set_drive(
+    vel_n: float, vel_e: float, vel_d: float, pos_d: float, ground: float,
+    qw: float, qx: float, qy: float, qz: float, *, sonar_floor_m: float, lens_below_m: float,
+) -> Drive:  # fmt: skip
+    """The derivatives of both seen velocities on velocity, attitude error and height."""
+    rotation = rotation_from_quaternion(qw, qx, qy, qz)
+    u = seen_velocity(rotation, vel_n, vel_e, vel_d, ground - pos_d, 0, sonar_floor_m, lens_below_m)
+    v = seen_velocity(rotation, vel_n, vel_e, vel_d, ground - pos_d, 1, sonar_floor_m, lens_below_m)
+    return Drive(
+        u.vel[0], u.vel[1], u.vel[2], u.turn[0], u.turn[1], u.turn[2], u.height,
+        v.vel[0], v.vel[1], v.vel[2], v.turn[0], v.turn[1], v.turn[2], v.height,
+    )  # fmt: skip
+
+
+@transition
+def errors_in_lag(
+    lag_u1: float, lag_u2: float, lag_v1: float, lag_v2: float, vel_n: float, vel_e: float, vel_d: float,
+    tilt_n: float, tilt_e: float, heading: float, pos_d: float, ground: float,
+    drive_0: float, drive_1: float, drive_2: float, drive_3: float, drive_4: float, drive_5: float, drive_6: float,
+    drive_7: float, drive_8: float, drive_9: float, drive_10: float, drive_11: float, drive_12: float, drive_13: float,
+    *, f11: float, f12: float, f21: float, f22: float, gain_1: float, gain_2: float,
+) -> Lagged:  # fmt: skip
+    """dx <- F dx + g dm, with the derivatives that `set_drive` left."""
+    height = ground - pos_d
+    u = (
+        drive_0 * vel_n + drive_1 * vel_e + drive_2 * vel_d
+        + drive_3 * tilt_n + drive_4 * tilt_e + drive_5 * heading + drive_6 * height
+    )  # fmt: skip
+    v = (
+        drive_7 * vel_n + drive_8 * vel_e + drive_9 * vel_d
+        + drive_10 * tilt_n + drive_11 * tilt_e + drive_12 * heading + drive_13 * height
+    )  # fmt: skip
+    return Lagged(
+        f11 * lag_u1 + f12 * lag_u2 + gain_1 * u, f21 * lag_u1 + f22 * lag_u2 + gain_2 * u,
+        f11 * lag_v1 + f12 * lag_v2 + gain_1 * v, f21 * lag_v1 + f22 * lag_v2 + gain_2 * v,
+    )  # fmt: skip
+
+
+@procedure
+def lag_step(
+    work: Work, lanes: Lanes, f11: float, f12: float, f21: float, f22: float, gain_1: float, gain_2: float,
+    sonar_floor_m: float, lens_below_m: float,
+) -> None:  # fmt: skip
+    """x <- F x + g m, state and covariance."""
+    set_drive(work, lanes, sonar_floor_m, lens_below_m)
+    move_lag(work, lanes, f11, f12, f21, f22, gain_1, gain_2, sonar_floor_m, lens_below_m)
+    errors_in_lag(work, lanes, STATES_WITH_LAG, f11, f12, f21, f22, gain_1, gain_2)
+
+
+@equation
+def lag_starts(work: Work, lanes: Lanes, lag: FlowLag) -> None:
+    """What the velocity at the start of a prediction leaves in the sensor at its end."""
+    lag_step(
+        work, lanes, lag.f11, lag.f12, lag.f21, lag.f22, lag.start_1, lag.start_2, lag.sonar_floor_m, lag.lens_below_m
+    )
+
+
+@equation
+def lag_ends(work: Work, lanes: Lanes, lag: FlowLag) -> None:
+    """What the velocity at the end of a prediction adds."""
+    lag_step(work, lanes, 1.0, 0.0, 0.0, 1.0, lag.end_1, lag.end_2, lag.sonar_floor_m, lag.lens_below_m)

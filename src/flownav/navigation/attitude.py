@@ -13,7 +13,6 @@ from flownav.estimation.states import ATTITUDE, INNOVATION, MEASURED, QUATERNION
 from flownav.frames import quaternion_product, rotation_from_quaternion, to_earth
 from flownav.navigation.memory import (
     OBSERVATION,
-    REASON,
     BridgeMemory,
     HeadingMemory,
     ImuMemory,
@@ -30,8 +29,8 @@ from flownav.navigation.memory import (
 from flownav.navigation.offers import conclude, put, usable_in_flight
 from flownav.navigation.packed import load_attitude_settings
 from flownav.navigation.reasons import FUSED, NOT_FINITE, SILENT
-from flownav.navigation.settings import FROM_ATTITUDE, AttitudeSettings, Equipment
 from flownav.navigation.tape import Output
+from flownav.navigation.told import FROM_ATTITUDE, AttitudeSettings, Equipment
 
 LEAST_FIELD_GAUSS = 1e-3
 BRIDGE_SIGMA_RAD = 0.02

@@ -5,13 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.measurement import Array, Sensor, Stream
-from flownav.navigation.settings import (
-    FROM_ATTITUDE,
-    FROM_MAG,
-    NO_HEADING,
-    Equipment,
-    NavigatorSettingsFile,
-)
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.told import FROM_ATTITUDE, FROM_MAG, NO_HEADING, Equipment
 
 SLOWEST_IMU_HZ = 20.0
 

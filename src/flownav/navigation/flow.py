@@ -37,8 +37,8 @@ from flownav.navigation.reasons import (
     SILENT,
     TILTED,
 )
-from flownav.navigation.settings import FlowSettings
 from flownav.navigation.tape import FLOW_DOUBTED, FLOW_TRUSTED, Output, write_event
+from flownav.navigation.told import FlowSettings
 from flownav.sensors.flow import flow_noise_sigma
 
 LARGEST_EXCESS = 400.0
@@ -50,8 +50,8 @@ FULL_QUALITY = 255.0
 
 
 class View(NamedTuple):
-    """What the filter says of the ground that the lens sees: the range along the boresight, whether it is known, whether
-    the latest range reading is disputed, and R_33.
+    """The ground that the lens sees: the range along the boresight by the filter, whether a range reading has told it
+    lately, whether the latest one is disputed, and R_33.
     """
 
     range_m: float
@@ -150,9 +150,7 @@ def lasting_doubt(doubted: float, ratio: float) -> float:
 
 # -- on lanes -----------------------------------------------------------------------------------------------
 @procedure
-def take_flow(
-    work: Work, lanes: Lanes, t_s: float, sensor: int, gyro_is_imu: bool, p: Work, o: Output
-) -> None:
+def take_flow(work: Work, lanes: Lanes, t_s: float, sensor: int, gyro_is_imu: bool, p: Work, o: Output) -> None:
     """Two components of flow [rad/s], or two or three of body velocity [m/s], with noise scheduled on the height."""
     s = load_flow_settings(p)
     angular = sensor == Sensor.FLOW_RATE
@@ -160,9 +158,7 @@ def take_flow(
     for component in range(2 if angular else 3):
         offer_component(work, lanes, component, angular, s)
         if angular:
-            flow_rate(
-                work, lanes, component, s.flow_forward_m, s.flow_right_m, s.flow_below_m, s.flow_below_m
-            )
+            flow_rate(work, lanes, component, s.flow_forward_m, s.flow_right_m, s.flow_below_m, s.flow_below_m)
         else:
             body_velocity(work, lanes, component, s.flow_forward_m, s.flow_right_m, s.flow_below_m)
         conclude(work, lanes, t_s, sensor, component, s.gate_sigma, o)
@@ -194,7 +190,7 @@ def look(work: Work, lanes: Lanes, t_s: float, angular: bool, gyro_is_imu: bool,
 
 @procedure
 def offer_component(work: Work, lanes: Lanes, component: int, angular: bool, s: FlowSettings) -> None:
-    """One component without turning and gain error, with its variance. A sensor without a down velocity has NaN there."""
+    """One component without turning and gain error, with its variance. A down velocity that no sensor has is NaN."""
     for lane in range(len(lanes)):
         reading, m = load_reading(work, lanes, lane), load_flow(work, lanes, lane)
         raw = reading.value_0 if component == 0 else (reading.value_1 if component == 1 else reading.value_2)
@@ -220,7 +216,8 @@ def learn(work: Work, lanes: Lanes, t_s: float, angular: bool, component: int, s
     """Agreement and excess noise from the component that was just tested."""
     for lane in range(len(lanes)):
         reason = work[REASON * len(lanes) + lane]
-        if reason == FUSED or reason == INNOVATION_GATE:
+        refused = reason == INNOVATION_GATE
+        if reason == FUSED or refused:
             m, reading = load_flow(work, lanes, lane), load_reading(work, lanes, lane)
             innovation, total = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]
             square = smaller(innovation * innovation, s.gate_sigma * s.gate_sigma * total) / total
@@ -247,6 +244,4 @@ def judge_agreement(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
             doubted = lasting_doubt(m.doubted, m.ratio)
             if doubted != m.doubted:
                 write_event(lanes, lane, t_s, FLOW_DOUBTED if doubted > 0.0 else FLOW_TRUSTED, m.ratio, o)
-            store_flow(
-                work, lanes, lane, FlowMemory(t_s, m.excess, m.bias_x, m.bias_y, m.bias_count, m.ratio, doubted)
-            )
+            store_flow(work, lanes, lane, FlowMemory(t_s, m.excess, m.bias_x, m.bias_y, m.bias_count, m.ratio, doubted))

@@ -1,4 +1,4 @@
-"""GPS position and velocity: a fix is judged as a whole, fused axis by axis, and believed where it is refused for long."""
+"""GPS position and velocity: a fix is judged as a whole, fused axis by axis, and believed where refused for long."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ from flownav.navigation.memory import (
 from flownav.navigation.offers import conclude, note_aid, note_height, put, usable
 from flownav.navigation.packed import load_gps_settings
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE
-from flownav.navigation.settings import GpsSettings
 from flownav.navigation.tape import GPS_RESET, Output, write_event
+from flownav.navigation.told import GpsSettings
 
 LEAST_REJECTIONS = 5
 
@@ -63,9 +63,7 @@ def judge_gps(
 
 
 @equation
-def judge_rejections(
-    refused: bool, t_s: float, m: RejectionMemory, s: GpsSettings
-) -> tuple[bool, RejectionMemory]:
+def judge_rejections(refused: bool, t_s: float, m: RejectionMemory, s: GpsSettings) -> tuple[bool, RejectionMemory]:
     """Whether GPS has been refused for a state so often and so long that the filter is wrong, and the count."""
     since_s = m.since_s if m.count > 0.0 else t_s
     count = m.count + 1.0
@@ -124,9 +122,7 @@ def note_level_ratio(work: Work, lanes: Lanes, position: bool, s: GpsSettings) -
 
 
 @procedure
-def mind_rejections(
-    work: Work, lanes: Lanes, t_s: float, axis: int, position: bool, s: GpsSettings, o: Output
-) -> None:
+def mind_rejections(work: Work, lanes: Lanes, t_s: float, axis: int, position: bool, s: GpsSettings, o: Output) -> None:
     """Where GPS has been refused again and again for a state, the filter is wrong: that state goes to GPS.
 
     An axis that is refused for the other's sake alone does not count.

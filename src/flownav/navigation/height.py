@@ -27,8 +27,8 @@ from flownav.navigation.memory import (
 from flownav.navigation.offers import conclude, fuse_offered, note_height, put, usable_in_flight
 from flownav.navigation.packed import load_height_settings
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT, STUCK, TILTED
-from flownav.navigation.settings import HeightSettings
 from flownav.navigation.tape import BARO_FOUND, GROUND_FOUND, GROUND_RESET, RANGE_STUCK, Output, write_event
+from flownav.navigation.told import HeightSettings
 from flownav.navigation.vibration import doubt_imu
 
 UNKNOWN_M = 100.0

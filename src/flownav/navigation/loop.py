@@ -12,10 +12,10 @@ from flownav.estimation.kalman import Work
 from flownav.measurement import MAX_VALUES, Array, EventQueue
 from flownav.navigation.memory import CLOCK, READING, Reading, new_work
 from flownav.navigation.packed import pack
-from flownav.navigation.settings import Equipment, FlowNoise, NO_STATED_NOISE, NavigatorSettings, NavigatorSettingsFile
-from flownav.navigation.settings import FROM_MAG, NO_HEADING
+from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.take import navigate_one
 from flownav.navigation.tape import Tape, room_of
+from flownav.navigation.told import FROM_MAG, NO_HEADING, NO_STATED_NOISE, Equipment, FlowNoise, NavigatorSettings
 
 STATED = 3  # variances that a reading carries
 

@@ -34,7 +34,6 @@ from flownav.navigation.reasons import (
     OUTAGE,
     SILENT,
 )
-from flownav.navigation.settings import AidSettings
 from flownav.navigation.tape import (
     AIDED_AGAIN,
     DEAD_RECKONING,
@@ -43,6 +42,7 @@ from flownav.navigation.tape import (
     write_event,
     write_offer,
 )
+from flownav.navigation.told import AidSettings
 
 CLOCK_SLACK_S = 1e-6
 
@@ -101,9 +101,7 @@ def put(work: Work, lanes: Lanes, lane: int, measured: float, variance: float, r
 
 
 @procedure
-def conclude(
-    work: Work, lanes: Lanes, t_s: float, sensor: int, component: int, gate_sigma: float, o: Output
-) -> None:
+def conclude(work: Work, lanes: Lanes, t_s: float, sensor: int, component: int, gate_sigma: float, o: Output) -> None:
     """Test, fuse and write down the component whose law stands in the observation rows; REASON says what became of it.
 
     What no lane offers corrects nothing and costs nothing, and its innovation is computed for the tape alone.

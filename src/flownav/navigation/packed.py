@@ -9,19 +9,19 @@ import numpy as np
 from flownav.compile import flat_access
 from flownav.estimation.error_models import FilterSettings
 from flownav.measurement import Array
-from flownav.navigation import settings
-from flownav.navigation.settings import NavigatorSettings
+from flownav.navigation import told
+from flownav.navigation.told import NavigatorSettings
 
 PARTS: dict[str, type[Any]] = {
     "filter": FilterSettings,
-    "imu": settings.ImuSettings,
-    "gps": settings.GpsSettings,
-    "flow": settings.FlowSettings,
-    "height": settings.HeightSettings,
-    "attitude": settings.AttitudeSettings,
-    "place": settings.PlaceSettings,
-    "aid": settings.AidSettings,
-    "equipment": settings.Equipment,
+    "imu": told.ImuSettings,
+    "gps": told.GpsSettings,
+    "flow": told.FlowSettings,
+    "height": told.HeightSettings,
+    "attitude": told.AttitudeSettings,
+    "place": told.PlaceSettings,
+    "aid": told.AidSettings,
+    "equipment": told.Equipment,
 }
 
 
@@ -54,7 +54,7 @@ load_aid_settings = flat_access(PARTS["aid"], _starts.aid).load
 load_equipment = flat_access(PARTS["equipment"], _starts.equipment).load
 
 
-def pack(told: NavigatorSettings, start_sigma: Array) -> Array:
+def pack(settings: NavigatorSettings, start_sigma: Array) -> Array:
     """Settings and the standard deviations before the first reading, as kernels take them."""
-    parts = [_access[name].pack(getattr(told, name)) for name in PARTS]
+    parts = [_access[name].pack(getattr(settings, name)) for name in PARTS]
     return np.concatenate([*parts, start_sigma])

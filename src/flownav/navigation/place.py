@@ -25,8 +25,8 @@ from flownav.navigation.memory import (
 from flownav.navigation.offers import conclude, note_aid, note_height, put, usable, usable_in_flight
 from flownav.navigation.packed import load_place_settings
 from flownav.navigation.reasons import FUSED, OUT_OF_RANGE, SILENT
-from flownav.navigation.settings import PlaceSettings
 from flownav.navigation.tape import PAD_FOUND, Output, write_event
+from flownav.navigation.told import PlaceSettings
 
 LEAST_PAD_DISTANCE_M = 0.05
 UNKNOWN_M = 100.0
@@ -97,9 +97,7 @@ def take_pad(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
 
 
 @procedure
-def find_pad(
-    work: Work, lanes: Lanes, lane: int, t_s: float, reading: Reading, s: PlaceSettings, o: Output
-) -> None:
+def find_pad(work: Work, lanes: Lanes, lane: int, t_s: float, reading: Reading, s: PlaceSettings, o: Output) -> None:
     """The pad is unknown but for this fix, which is about to be fused."""
     rotation = rotation_of(work, lanes, lane)
     depth = reading.value_2 / np.sqrt(reading.value_0 * reading.value_0 + reading.value_1 * reading.value_1 + 1.0)

@@ -5,7 +5,7 @@ The defaults are for any small VTOL with consumer sensors. None is fitted to a l
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from pydantic import Field
@@ -25,166 +25,20 @@ from flownav.estimation.states import (
     VELOCITY_LAG,
 )
 from flownav.measurement import Array
+from flownav.navigation.told import (
+    NO_STATED_NOISE,
+    AidSettings,
+    AttitudeSettings,
+    Equipment,
+    FlowNoise,
+    FlowSettings,
+    GpsSettings,
+    HeightSettings,
+    ImuSettings,
+    NavigatorSettings,
+    PlaceSettings,
+)
 from flownav.parameter_files import Number, ParameterModel
-
-
-# headings: none, a magnetometer's, an external attitude's or YAW's
-NO_HEADING, FROM_MAG, FROM_ATTITUDE = 0.0, 1.0, 2.0
-
-
-class GpsSettings(NamedTuple):
-    """A receiver: noise of one fix beside its lasting errors, its antenna, and how long it may be refused."""
-
-    gps_white_share: float
-    gps_white_sigma_m: float
-    gps_white_sigma_down_m: float
-    gps_velocity_white_m_s: float
-    gps_velocity_white_down_m_s: float
-    gps_slow_sigma_m: float
-    gps_slow_sigma_down_m: float
-    gps_fast_sigma_m: float
-    gps_fast_sigma_down_m: float
-    gps_velocity_sigma_m_s: float
-    gps_forward_m: float
-    gps_right_m: float
-    gps_below_m: float
-    gps_reset_s: float
-    gate_sigma: float
-
-
-class FlowNoise(NamedTuple):
-    """A sensor file's noise against height [m/s]: `sensors.flow.flow_noise_sigma`'s polynomial; used where `stated`."""
-
-    stated: float
-    noise_low_m: float
-    noise_high_m: float
-    noise_centre: float
-    noise_scale: float
-    noise_0: float
-    noise_1: float
-    noise_2: float
-    noise_3: float
-    noise_4: float
-    noise_5: float
-    noise_6: float
-    noise_7: float
-    noise_8: float
-    noise_floor_m_s: float
-
-
-class FlowSettings(NamedTuple):
-    """A flow sensor: gain, noise, limits, its lens from the IMU."""
-
-    flow_gain_x: float
-    flow_gain_y: float
-    flow_sigma_rad_s: float
-    flow_low_quality_sigma_rad_s: float
-    flow_floor_m_s: float
-    flow_min_height_m: float
-    flow_limit_rad_s: float
-    flow_noise_time_s: float
-    flow_gyro_time_s: float
-    flow_forward_m: float
-    flow_right_m: float
-    flow_below_m: float
-    tilt_limit_rad: float
-    height_hold_s: float
-    range_sigma_m: float
-    range_relative_sigma: float
-    gate_sigma: float
-    noise: FlowNoise
-
-
-class HeightSettings(NamedTuple):
-    """Rangefinder and barometer."""
-
-    range_below_m: float
-    range_sigma_m: float
-    range_relative_sigma: float
-    range_min_m: float
-    range_max_m: float
-    range_stuck_s: float
-    range_stuck_travel_m: float
-    baro_sigma_m: float
-    tilt_limit_rad: float
-    height_hold_s: float
-    ground_reset_s: float
-    gate_sigma: float
-
-
-class AttitudeSettings(NamedTuple):
-    """An external attitude, a compass, an external heading."""
-
-    ins_tilt_white_rad: float
-    heading_noise_rad: float
-    heading_time_s: float
-    gate_sigma: float
-
-
-class PlaceSettings(NamedTuple):
-    """A pad camera, an external position, a vehicle at rest."""
-
-    pad_angle_sigma_rad: float
-    pad_distance_sigma: float
-    pose_sigma_m: float
-    still_sigma_m_s: float
-    flow_below_m: float
-    gate_sigma: float
-
-
-class ImuSettings(NamedTuple):
-    """The inertial sensors: noise with them and without, what vibration does, when a reading is stale."""
-
-    accel_noise_m_s2_rt_hz: float
-    gyro_noise_rad_s_rt_hz: float
-    coasting_accel_m_s2_rt_hz: float
-    coasting_rate_rad_s_rt_hz: float
-    imu_integrates: float
-    imu_stale_s: float
-    vibration_free_m_s2: float
-    vibration_walk_per_rt_s: float
-    vibration_bias_share: float
-    accel_bias_limit_m_s2: float
-    gyro_bias_limit_rad_s: float
-
-
-class AidSettings(NamedTuple):
-    """When the position is said to be dead reckoning, and invalid."""
-
-    dead_reckoning_s: float
-    invalid_s: float
-
-
-class Equipment(NamedTuple):
-    """Which sensors serve a navigator.
-
-    heading: 0 none, 1 a compass's, 2 an external attitude's or YAW's; deadline_s: how long it waits for a fix.
-    """
-
-    use_imu: bool
-    use_attitude: bool
-    heading: float
-    flow_gyro_is_imu: bool
-    deadline_s: float
-
-
-class NavigatorSettings(NamedTuple):
-    """Everything a navigator is told, subject by subject, as its kernels take it; `NavigatorSettingsFile` documents
-    each key. start: standard deviations of the error states before the first reading.
-    """
-
-    filter: FilterSettings
-    imu: ImuSettings
-    gps: GpsSettings
-    flow: FlowSettings
-    height: HeightSettings
-    attitude: AttitudeSettings
-    place: PlaceSettings
-    aid: AidSettings
-    equipment: Equipment
-
-
-NO_STATED_NOISE = FlowNoise(*([0.0] * len(FlowNoise._fields)))
 
 
 class NavigatorSettingsFile(ParameterModel):
@@ -202,7 +56,10 @@ class NavigatorSettingsFile(ParameterModel):
     accel_walk_m_s2_rt_s: Number = Field(0.003, ge=0, le=1, description="accelerometer bias, PX4's 0.003")
     gyro_walk_rad_s_rt_s: Number = Field(1e-4, ge=0, le=0.1, description="gyro bias over minutes of warming")
     imu_integrates: Number = Field(
-        0.0, ge=0, le=1, description="1: a reading is the mean since the last (an integrating IMU); 0: it is of its instant"
+        0.0,
+        ge=0,
+        le=1,
+        description="1: a reading is the mean since the last, of a unit that integrates; 0: of its instant",
     )
     vibration_free_m_s2: Number = Field(
         1.0, ge=0, le=100, description="sample-to-sample accelerometer noise, rms, that harms nothing"

@@ -24,8 +24,8 @@ from flownav.navigation.memory import (
     store_start,
 )
 from flownav.navigation.packed import START_SIGMA
-from flownav.navigation.settings import FROM_MAG, NO_HEADING, Equipment
 from flownav.navigation.tape import START, Output, write_event
+from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
 from flownav.navigation.vibration import with_reading
 
 ORIGIN_SIGMA_M = 0.1  # the local origin, where the navigator's start defines it

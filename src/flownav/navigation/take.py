@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import LANES, ONE_LANE, equation, pointer, procedure, unit
+from flownav.compile import LANES, ONE_LANE, equation, procedure, unit
 from flownav.estimation.error_models import propagate_gauss_markov, propagate_walks
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.motion import hold_still, predict
@@ -42,10 +42,12 @@ from flownav.navigation.packed import (
     load_imu_settings,
 )
 from flownav.navigation.place import take_landed, take_pad, take_pose
-from flownav.navigation.settings import FROM_MAG, Equipment, ImuSettings
 from flownav.navigation.start import gather, try_start
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, IMU_LOST, Output, output_of, write_estimate, write_event
+from flownav.navigation.told import FROM_MAG, Equipment, ImuSettings
 from flownav.navigation.vibration import add_vibration_noise, followed_vibration, limit_biases, with_reading
+
+Motion = tuple[float, float, float, float, float, float]  # body rate [rad/s] and specific force [m/s2], body FRD
 
 LONGEST_STEP_S = 0.1
 MOST_STEPS = 10000
@@ -132,7 +134,7 @@ def sound(reading: Reading) -> bool:
 
 
 @equation
-def motion_between(reading: Reading, m: ImuMemory, integrates: float) -> tuple[float, float, float, float, float, float]:
+def motion_between(reading: Reading, m: ImuMemory, integrates: float) -> Motion:
     """What stands for the time between two inertial readings: their mean (trapezium), or the later one of a unit that
     integrates over that time itself.
     """

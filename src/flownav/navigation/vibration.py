@@ -14,8 +14,8 @@ from flownav.estimation.covariance import add_noise_lane
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, STATE, VELOCITY
 from flownav.navigation.memory import ImuMemory, Reading, load_imu, store_imu
-from flownav.navigation.settings import ImuSettings
 from flownav.navigation.tape import IMU_DOUBTED, Output, write_event
+from flownav.navigation.told import ImuSettings
 
 FOLLOWING_S = 1.0
 DOUBT_M_S2 = 2.0  # of an accelerometer that the range contradicts

@@ -77,7 +77,6 @@ class Rows:
 _rows = Rows()
 STATE = _rows.take(STATES_WITH_LAG)  # nominal; the three of ATTITUDE stay 0 but within a correction
 QUATERNION = _rows.take(4)  # attitude, body to earth
-COVARIANCE = _rows.take(STATES_WITH_LAG * (STATES_WITH_LAG + 1) // 2)  # packed upper triangle, column by column
 IMU = _rows.take(6)  # gyro [rad/s] and specific force [m/s2], body FRD, that move the filter over the next step
 RATE = _rows.take(3)  # body rate in the last step, the gyro's bias taken off [rad/s]
 FORCE = _rows.take(3)  # specific force in the last step, bias off, earth NED [m/s2]
@@ -100,6 +99,8 @@ GAIN = _rows.take(STATES_WITH_LAG)  # K
 REST = _rows.take(STATES_WITH_LAG)  # P h' - K S/2
 SCRATCH = _rows.take(15 * 15)  # a transition's own block of P, both triangles
 DRIVE = _rows.take(14)  # derivatives of what a flow sensor with dynamics sees
+# the packed upper triangle of P, column by column: last, so that a compiler sees that no element is another row
+COVARIANCE = _rows.take(STATES_WITH_LAG * (STATES_WITH_LAG + 1) // 2)
 FILTER_ROWS = _rows.next
 
 # names of single rows, beside the states', that laws and steps may read or write

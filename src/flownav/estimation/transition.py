@@ -51,12 +51,12 @@ def transition(function: Callable[..., Any]) -> Transition:
     lines = [f"def move(work, lanes, n{''.join(f', {name}' for name in scalars)}):"]
     for first, end in gaps(sources):  # columns of states that the law does not read
         lines += [f"    for j in range({first}, {end}):", *call(partial(beside, first), targets)]
-    blocks = runs(sources, targets)
-    for a, one in enumerate(blocks):  # its own block, both triangles, column by column into SCRATCH
-        for other in blocks[a:]:
+    for a, one in enumerate(runs(sources, [])):  # its own block, both triangles, column by column into SCRATCH
+        for other in runs(sources, [])[a:]:
             lines += copied(one, other, width, position, out=True)
     lines += [f"    for k in range({width}):"]  # by columns
     lines += call(lambda state: at(f"{SCRATCH + position[state]} + k * {width}"), targets)
+    blocks = runs(sources, targets)
     for one in blocks:  # by rows
         if one[0] in targets:
             lines += [f"    for k in range({position[one[0]]}, {position[one[-1]] + 1}):"]
@@ -89,7 +89,7 @@ def runs(order: list[int], targets: list[int]) -> list[list[int]]:
 def beside(first: int, state: int) -> str:
     """Element (state, j) of P, for a j that runs from `first` on, on one side of the state."""
     if state < first:
-        return at(f"{COVARIANCE + state} + j * (j + 1) // 2")
+        return at(f"{COVARIANCE + state} + (j * (j + 1) // 2 & 1023)")
     return at(f"{COVARIANCE + state * (state + 1) // 2} + j")
 
 
@@ -99,7 +99,7 @@ def copied(
     """Source that copies elements (i, j), i <= j, i in `one` and j in `other`, to SCRATCH or back."""
     i, j = f"(i - {one[0] - position[one[0]]})", f"(j - {other[0] - position[other[0]]})"
     below, above = at(f"{SCRATCH} + {i} * {width} + {j}"), at(f"{SCRATCH} + {j} * {width} + {i}")
-    element = at(f"{COVARIANCE} + j * (j + 1) // 2 + i")
+    element = at(f"{COVARIANCE} + (j * (j + 1) // 2 & 1023) + i")
     end = "j + 1" if one == other else f"{one[-1] + 1}"
     copies = [f"{above} = {element}", f"{below} = {element}"] if out else [f"{element} = {above if by_row else below}"]
     return [

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import json
 import zipfile
 
 import numpy as np
 import pytest
 
 from flownav.errors import InputError
-from flownav.record import Record
+from flownav.record import SCHEMA_VERSION, Record
 
 
 def test_a_table_needs_time_and_equal_lengths():
@@ -34,7 +35,7 @@ def test_a_file_that_is_no_record_is_refused(tmp_path, content):
 def test_a_newer_schema_is_refused(tmp_path):
     path = tmp_path / "new.fnr"
     with zipfile.ZipFile(path, "w") as bundle:
-        bundle.writestr("manifest.json", '{"schema": 99}')
+        bundle.writestr("manifest.json", json.dumps({"schema": SCHEMA_VERSION + 1}))
     with pytest.raises(InputError, match="newer than this flownav"):
         Record.load(path)
 

@@ -156,6 +156,19 @@ def test_below_the_sonars_floor_velocity_is_over_scaled_by_floor_over_range() ->
     assert w == pytest.approx(0.1 * SENSOR.dynamics.gain)  # no range stands in the vertical channel
 
 
+@pytest.mark.parametrize("range_m", [0.05, 0.15, 0.29, 0.5, 2.0])
+def test_forward_and_sideways_are_one_sensor_turned_by_a_quarter(range_m: float) -> None:
+    """Over-scale and shake are the sonar's and the mount's, which know no direction."""
+    p = parameters()
+    ahead, aside = start(0.0, 0.0, 0.0, 0.0, p), start(0.0, 0.0, 0.0, 0.0, p)
+    for _ in range(100):
+        ahead = step(ahead, 0.4, -0.1, 0.0, range_m, G, p)
+        aside = step(aside, -0.1, 0.4, 0.0, range_m, G, p)
+    (u, v, w), (u_aside, v_aside, w_aside) = quiet(ahead, p), quiet(aside, p)
+    assert (u, v, w) == (v_aside, u_aside, w_aside)
+    assert u != v
+
+
 def test_the_over_scaling_can_be_switched_off() -> None:
     assert overscale(0.05, parameters(sonar_overscale=False)) == 1.0
 

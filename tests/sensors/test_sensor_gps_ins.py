@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -186,3 +187,37 @@ def test_a_wrong_setting_is_one_line_with_its_key(entries: dict[str, object], me
     with pytest.raises(InputError) as error:
         check(entries, GpsInsSettings, "here.toml")
     assert str(error.value).startswith(message)
+
+
+SILENT = GpsInsNormals(*(0.0,) * len(GpsInsNormals._fields))
+FINE = {"position_quantum_m": 0.0, "position_steps_per_m": 0.0, "velocity_quantum_m_s": 0.0,
+        "velocity_steps_per_m_s": 0.0, "late": 0.0}  # fmt: skip
+EVERYTHING = {"jitter_sigma_m": 0.3, "jitter_sigma_down_m": 0.4, "velocity_sigma_m_s": 0.2, "velocity_white_m_s": 0.1}
+
+
+@pytest.mark.parametrize("name", GpsInsNormals._fields)
+def test_a_normal_moves_the_axis_that_bears_its_name_and_no_other(name: str) -> None:
+    """At the start, and in a step from a unit without error: so no two axes share their errors."""
+    p = GpsInsSettings().parameters()._replace(**EVERYTHING, **FINE)
+    one, truth = SILENT._replace(**{name: 1.0}), AT_PAD._replace(pos_n_m=3.0, vel_d_m_s=0.5)
+    quiet = step(start(truth, SILENT, p), truth, SILENT, p)[1]
+    kind, _, axis = name.partition("_")
+    expected = [f"{'vel' if kind in ('velocity', 'white') else 'pos'}_{axis}"]
+    if not axis:
+        expected = [{"roll": "qx", "pitch": "qy", "heading": "qz"}[name]]
+    for at_start, in_step in ((one, SILENT), (SILENT, one)):
+        if kind == "white" and at_start is one:
+            continue  # a white error of the start is forgotten by the next reading
+        reading = step(start(truth, at_start, p), truth, in_step, p)[1]
+        moved = [what for what, a, b in zip(NavSolution._fields, reading, quiet, strict=True) if abs(a - b) > 1e-6]
+        assert [what.removesuffix("_m_s").removesuffix("_m") for what in moved if what != "qw"] == expected
+
+
+def test_a_late_unit_holds_back_all_that_it_reports() -> None:
+    p = GpsInsSettings().parameters()._replace(**FINE)._replace(late=1.0)
+    flown = [NavSolution(*(i * k for i in range(1, 7)), *quaternion_from_euler(0.1 * k, -0.05 * k, 0.2 * k))
+             for k in range(5)]  # fmt: skip
+    state = start(flown[0], SILENT, p)
+    for before, now in pairwise(flown):
+        state, reading = step(state, now, SILENT, p)
+        np.testing.assert_allclose(reading, before, atol=1e-12)

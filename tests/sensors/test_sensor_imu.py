@@ -85,3 +85,31 @@ def test_readings_stop_at_the_range() -> None:
     _, reading = step(start(wild, SILENT, p), wild, SILENT, p)
     rate, force = math.radians(300.0), 6.0 * STANDARD_GRAVITY_M_S2
     np.testing.assert_allclose(reading, (rate, -rate, 0.0, force, -force, 0.0))
+
+
+@pytest.mark.parametrize("name", ImuNormals._fields)
+def test_a_normal_moves_the_axis_that_bears_its_name_and_no_other(name: str) -> None:
+    """At the start, and in a step from a settled state: so the axes are independent, each with noise of its own."""
+    p = ImuSettings(bandwidth_hz=10.0, accel_walk_mg_rts=1.0, gyro_walk_deg_s_rts=0.1).parameters()
+    one = SILENT._replace(**{name: 1.0})
+    for at_start, in_step in ((one, SILENT), (SILENT, one)):
+        _, reading = step(start(HOVER, at_start, p), HOVER, in_step, p)
+        moved = [axis for axis, a, b in zip(ImuReading._fields, reading, HOVER, strict=True) if abs(a - b) > 1e-9]
+        assert [axis.removesuffix("_rad_s").removesuffix("_m_s2") for axis in moved] == [name.replace("bias_", "")]
+
+
+def test_a_bias_of_either_instrument_walks_by_its_own_step() -> None:
+    p = ImuSettings(bandwidth_hz=10.0, accel_walk_mg_rts=1.0, gyro_walk_deg_s_rts=0.1).parameters()
+    walking = SILENT._replace(**{name: 1.0 for name in ImuNormals._fields if "bias" in name})
+    state, _ = step(start(HOVER, SILENT, p), HOVER, walking, p)
+    gyro = math.radians(0.1) * math.sqrt(PERIOD_S)
+    accel = 1e-3 * STANDARD_GRAVITY_M_S2 * math.sqrt(PERIOD_S)
+    np.testing.assert_allclose(state[6:], (gyro,) * 3 + (accel,) * 3, rtol=1e-12)
+
+
+def test_the_range_of_each_axis_is_its_own_instruments() -> None:
+    p = ImuSettings().parameters()
+    for k, axis in enumerate(ImuReading._fields):
+        wild = HOVER._replace(**{axis: 1e3})
+        _, reading = step(start(wild, SILENT, p), wild, SILENT, p)
+        assert reading[k] == (p.gyro_range_rad_s if "gyro" in axis else p.accel_range_m_s2)

@@ -37,6 +37,12 @@ def test_beyond_its_ceiling_it_reports_the_ceiling_and_says_so() -> None:
     assert read(4.99) == (pytest.approx(4.99), 1.0)
 
 
+def test_beyond_its_ceiling_is_told_by_the_slant_that_the_echo_travels() -> None:
+    cosine = 0.8  # 37 degrees: 4.5 m high is 5.6 m away
+    assert read(4.5, cosine) == (5.0, 0.0)
+    assert read(3.9, cosine) == (pytest.approx(3.9 / cosine, abs=1e-3), 1.0)
+
+
 def test_ranges_come_in_whole_millimetres() -> None:
     assert read(1.00049).range_m == pytest.approx(1.000, abs=1e-12)
     assert read(1.00051).range_m == pytest.approx(1.001, abs=1e-12)

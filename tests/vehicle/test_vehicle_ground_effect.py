@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flownav.frames import quaternion_from_euler, rotation_from_quaternion, to_body
 from flownav.vehicle import ground_effect
 from flownav.vehicle.helicopter import outputs
 from flownav.vehicle.loading import load_vehicle
@@ -50,3 +51,19 @@ def test_the_height_that_counts_is_the_hubs():
     near = outputs(level._replace(pos_d=-(R - vehicle.hub_above_cg_m)), 0.0, 0.0, 0.0, vehicle)
     assert near.thrust_n / free.thrust_n == pytest.approx(1.0667, abs=5e-5)
     assert near.torque_n_m == pytest.approx(free.torque_n_m)
+
+
+@pytest.mark.parametrize(("roll", "pitch"), [(0.0, 0.0), (0.3, 0.0), (0.0, -0.3), (0.25, 0.2)])
+def test_the_airspeed_that_counts_is_along_the_ground_however_the_body_is_tilted(roll, pitch):
+    vehicle = load_vehicle()
+    attitude = quaternion_from_euler(roll, pitch, 0.4)
+    rotation = rotation_from_quaternion(*attitude)
+    turned = trim(vehicle).state._replace(**dict(zip(("qw", "qx", "qy", "qz"), attitude, strict=True)))
+    for north, east, down in ((4.0, -3.0, 0.0), (0.0, 0.0, 1.5), (2.0, 1.0, -1.0)):
+        u, v, w = to_body(rotation, north, east, down)
+        moving = turned._replace(u=u, v=v, w=w)
+        free = outputs(moving._replace(pos_d=-1e6), 0.0, 0.0, 0.0, vehicle)
+        near = outputs(moving._replace(pos_d=-0.7), 0.0, 0.0, 0.0, vehicle)
+        hub = 0.7 + vehicle.hub_above_cg_m * rotation[8]
+        expected = multiplier(hub, np.hypot(north, east), near.induced_velocity_m_s, vehicle.main_radius_m)
+        assert near.thrust_n / free.thrust_n == pytest.approx(expected, rel=1e-9)

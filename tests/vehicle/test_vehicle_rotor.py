@@ -131,6 +131,14 @@ def test_torque_is_induced_and_profile_power():
     assert climbing * MAIN.speed_rad_s == pytest.approx(load * 1.0)
 
 
+def test_profile_torque_grows_with_the_advance_ratio_as_gavrilets_mettler_and_feron_print_it():
+    """C_Q = C_T·(λ0 - μ_z) + σ·C_D0/8·(1 + 7/3·μ²) (AIAA 2001-4003); without thrust its second part."""
+    for share in (0.05, 0.1, 0.3):
+        inplane = share * MAIN.tip_speed_m_s
+        grown = torque(0.0, inplane**2, 0.7, 2.0, MAIN) / torque(0.0, 0.0, 0.7, 2.0, MAIN) - 1.0
+        assert grown / share**2 == pytest.approx(7.0 / 3.0, rel=1e-9)
+
+
 def test_blowback_is_the_references_derivative():
     """2·(4/3·θ0 - λ0) plus 16·μ·μ_z / ((1 - μ²/2)·(8μ + a·σ))."""
     tip, a_sigma = VEHICLE.main_tip_speed_m_s, VEHICLE.main_lift_solidity

@@ -1,0 +1,136 @@
+"""The pad camera: boresight, missed and false fixes, what it states, limits, its datasheet."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation as Turn
+
+from flownav.errors import InputError
+from flownav.parameter_files import check
+from flownav.sensors.pad_camera import (
+    PadCameraNormals,
+    PadCameraParameters,
+    PadCameraReading,
+    PadCameraUnit,
+    draw_pad_camera,
+    read_pad_camera,
+)
+from flownav.sensors.pad_camera_sheet import PadCameraSheet, load_pad_camera_sheet
+from sensor_normals import draws, moved_by, silent
+
+SHEET = load_pad_camera_sheet()
+P = SHEET.parameters()
+PERFECT, QUIET = PadCameraUnit(0.0, 0.0, 0.0, 1.0), silent(PadCameraNormals)
+TURN = Turn.from_euler("ZYX", [0.6, 0.1, -0.15])
+ROTATION = tuple(float(x) for x in TURN.as_matrix().ravel())
+LENS = np.array([0.4, -0.3, -2.0])
+
+
+def read(
+    n: PadCameraNormals = QUIET,
+    unit: PadCameraUnit = PERFECT,
+    lens: np.ndarray = LENS,
+    rate: float = 0.0,
+    p: PadCameraParameters = P,
+) -> PadCameraReading:
+    return read_pad_camera(unit, *map(float, lens), ROTATION, rate, n, p)
+
+
+def test_a_perfect_camera_sees_where_the_pad_is() -> None:
+    ahead, right, below = TURN.inv().apply(-LENS)
+    reading = read()
+    assert reading[:3] == pytest.approx((ahead / below, right / below, np.linalg.norm(LENS)))
+    assert reading[-2:] == (255.0, 1.0)
+
+
+def test_a_turned_camera_is_off_by_its_angles() -> None:
+    angles = np.array([0.006, -0.009, 0.012])
+    ahead, right, below = (TURN * Turn.from_rotvec(angles)).inv().apply(-LENS)
+    reading = read(unit=PadCameraUnit(*angles, 1.0))
+    assert reading[:2] == pytest.approx((ahead / below, right / below), abs=3e-4)
+    assert abs(reading.tan_forward - read().tan_forward) > 0.005
+    assert draw_pad_camera(PadCameraUnit(1.0, -1.0, 2.0, 1.0), P) == pytest.approx(
+        (math.radians(0.4), -math.radians(0.4), math.radians(0.8), 1.3)
+    )
+
+
+def test_stated_variances_are_those_of_the_readings() -> None:
+    p = P._replace(missed_above=1e3, false_above=1e3)
+    lens = np.array([1.2, -1.0, -1.0])  # far off axis
+    readings = np.array([read(n, lens=lens, p=p) for n in draws(PadCameraNormals, 8000, 18)])
+    np.testing.assert_allclose(readings[:, :3].var(axis=0) / readings[:, 3:6].mean(axis=0), 1.0, atol=0.08)
+    wrong = read(unit=PERFECT._replace(stated=1.5))
+    np.testing.assert_allclose(np.array(wrong[3:6]) / read()[3:6], 2.25)
+    assert wrong[:3] == read()[:3]
+
+
+def share_missed(height: float, rate: float, count: int = 6000) -> float:
+    lens = np.array([0.0, 0.0, -height])
+    p = P._replace(false_above=1e3)
+    return 1.0 - float(
+        np.mean([read(n, lens=lens, rate=rate, p=p).arrived for n in draws(PadCameraNormals, count, 19)])
+    )
+
+
+def test_fixes_are_missed_with_the_sheets_shares() -> None:
+    assert share_missed(0.16, 0.0) == pytest.approx(0.02, abs=0.01)
+    assert share_missed(2.999, 0.0) == pytest.approx(0.2, abs=0.02)
+    assert share_missed(0.16, 2.0) == pytest.approx(0.5, abs=0.04)
+    assert share_missed(2.999, 2.0) > 0.8
+    missed = read(silent(PadCameraNormals, missed=5.0))
+    assert missed[-2:] == (0.0, 0.0)
+
+
+def test_false_fixes_come_anywhere_in_the_view_and_without_the_pad() -> None:
+    false = silent(PadCameraNormals, false=4.0, false_forward=0.6, false_right=-0.4, missed=9.0)
+    edge = math.tan(math.radians(60.0))
+    reading = read(false)
+    assert reading[:2] == pytest.approx((0.3 * edge, -0.2 * edge))
+    assert reading.distance_m == pytest.approx(2.0 * math.hypot(1.0, 0.3 * edge, 0.2 * edge))
+    assert reading[-2:] == (255.0, 1.0)
+    far = np.array([50.0, 0.0, -2.0])
+    assert read(lens=far)[-2:] == (0.0, 0.0)
+    assert read(false, lens=far)[-1] == 1.0
+    assert read(false, lens=np.array([0.0, 0.0, -3.5]))[-1] == 0.0
+    assert read(false._replace(false_forward=9.0)).tan_forward == edge
+    p = check(SHEET.model_dump() | {"false_share": 0.1}, PadCameraSheet, "false").parameters()
+    there = [read(n, lens=far, p=p).arrived for n in draws(PadCameraNormals, 5000, 20)]
+    assert np.mean(there) == pytest.approx(0.1, abs=0.02)
+
+
+def test_there_are_fixes_between_the_heights_and_within_the_view() -> None:
+    for height, there in ((0.14, 0.0), (0.16, 1.0), (2.99, 1.0), (3.01, 0.0)):
+        assert read(lens=np.array([0.0, 0.0, -height])).arrived == there
+    narrow = P._replace(half_view_tangent=0.17)
+    assert read(p=narrow).arrived == 0.0
+
+
+def test_each_normal_moves_its_own_output_alone() -> None:
+    plain = P._replace(missed_above=1.0)
+    moved = moved_by(PadCameraNormals, lambda n: read(n, lens=np.array([0.0, 0.0, -2.0]), p=plain)._replace(
+        forward_variance=0.0, right_variance=0.0))  # fmt: skip
+    assert moved["forward"] == {"tan_forward", "tan_right"}  # across a tilted sight
+    assert moved["right"] == {"tan_forward", "tan_right"}
+    assert moved["distance"] == {"distance_m", "distance_variance_m2"}
+    assert moved["missed"] == {"quality", "arrived"}
+    assert not moved["false"] | moved["false_forward"] | moved["false_right"] | moved["spare"]
+    for name, fields in moved_by(PadCameraUnit, lambda n: draw_pad_camera(n, P)).items():
+        assert fields == {name}
+
+
+def test_what_the_datasheet_refuses() -> None:
+    missed = SHEET.missed.model_dump()
+    for changes, message in (
+        ({"max_height_m": 0.1}, "max_height_m: more than min_height_m = 0.15 is needed"),
+        ({"missed": missed | {"share_at_blur": 0.01}}, "missed.share_at_blur: at least share = 0.02 is needed"),
+        (
+            {"missed": missed | {"share_at_max_height": 0.01}},
+            "missed.share_at_max_height: at least share = 0.02 is needed",
+        ),
+        ({"half_view_deg": 85}, "half_view_deg: Input should be less than 80"),
+    ):
+        with pytest.raises(InputError, match=f"^pad.toml: {message}"):
+            check(SHEET.model_dump() | changes, PadCameraSheet, "pad.toml")

@@ -1,62 +1,135 @@
 """From the filter's instant to a later one: its state carried on by the IMU readings in between.
 
-A live navigator is fed with a delay, so that readings of old instants find their place; what is sent must be of now.
+A navigator is fed with a delay, so that readings of old instants find their place; what is sent, and what an autopilot
+flies on, must be of now. One step is `carried`, the very law that moves the filter (`estimation.motion.strapdown`), on
+one lane here and on the simulator's.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flownav.compile import ONE_LANE, kernel
-from flownav.estimation.landing.predict import attitude_of, turned
-from flownav.estimation.landing.states import ACCEL_BIAS, GYRO_BIAS, POSITION, VELOCITY
-from flownav.frames import GRAVITY_M_S2, rotation_from_quaternion, to_earth
+from flownav.compile import ONE_LANE, equation, kernel, pointer
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.law import compiled
+from flownav.estimation.motion import strapdown
+from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, POSITION, QUATERNION, STATE, VELOCITY
 from flownav.measurement import Array
-from flownav.navigation.state import CLOCK, LATEST_IMU, ROWS, USE_IMU
+from flownav.navigation.inertial import Motion, motion_between, remembered
+from flownav.navigation.memory import CLOCK, load_imu
+from flownav.navigation.packed import load_equipment, load_imu_settings
 
 AHEAD = 13  # position NED [m], velocity NED [m/s], quaternion body to earth, body rate [rad/s]
 
+_strapdown = compiled(strapdown.law)
+
+
+class Carried(NamedTuple):
+    """A state on its way: position NED [m], velocity NED [m/s], quaternion body to earth, and the IMU's biases."""
+
+    pos_n: float
+    pos_e: float
+    pos_d: float
+    vel_n: float
+    vel_e: float
+    vel_d: float
+    qw: float
+    qx: float
+    qy: float
+    qz: float
+    gyro_bias_x: float
+    gyro_bias_y: float
+    gyro_bias_z: float
+    accel_bias_x: float
+    accel_bias_y: float
+    accel_bias_z: float
+
+
+@equation
+def state_of(work: Work, lanes: Lanes, lane: int) -> Carried:
+    """The filter's own, of one lane."""
+    return Carried(
+        work[(STATE + POSITION) * len(lanes) + lane],
+        work[(STATE + POSITION + 1) * len(lanes) + lane],
+        work[(STATE + POSITION + 2) * len(lanes) + lane],
+        work[(STATE + VELOCITY) * len(lanes) + lane],
+        work[(STATE + VELOCITY + 1) * len(lanes) + lane],
+        work[(STATE + VELOCITY + 2) * len(lanes) + lane],
+        work[QUATERNION * len(lanes) + lane],
+        work[(QUATERNION + 1) * len(lanes) + lane],
+        work[(QUATERNION + 2) * len(lanes) + lane],
+        work[(QUATERNION + 3) * len(lanes) + lane],
+        work[(STATE + GYRO_BIAS) * len(lanes) + lane],
+        work[(STATE + GYRO_BIAS + 1) * len(lanes) + lane],
+        work[(STATE + GYRO_BIAS + 2) * len(lanes) + lane],
+        work[(STATE + ACCEL_BIAS) * len(lanes) + lane],
+        work[(STATE + ACCEL_BIAS + 1) * len(lanes) + lane],
+        work[(STATE + ACCEL_BIAS + 2) * len(lanes) + lane],
+    )
+
+
+@equation
+def carried(s: Carried, between: Motion, dt_s: float) -> Carried:
+    """The state dt later; between: what the IMU read over that time, biases and all (`inertial.motion_between`)."""
+    moved = _strapdown(
+        s.pos_n, s.pos_e, s.pos_d, s.vel_n, s.vel_e, s.vel_d, s.qw, s.qx, s.qy, s.qz,
+        between[0], between[1], between[2], between[3], between[4], between[5],
+        s.gyro_bias_x, s.gyro_bias_y, s.gyro_bias_z, s.accel_bias_x, s.accel_bias_y, s.accel_bias_z, dt_s,
+    )  # fmt: skip
+    return Carried(
+        moved.pos_n, moved.pos_e, moved.pos_d, moved.vel_n, moved.vel_e, moved.vel_d,
+        moved.qw, moved.qx, moved.qy, moved.qz,
+        s.gyro_bias_x, s.gyro_bias_y, s.gyro_bias_z, s.accel_bias_x, s.accel_bias_y, s.accel_bias_z,
+    )  # fmt: skip
+
+
+@equation
+def coasted(s: Carried, dt_s: float) -> Carried:
+    """The state dt later where no IMU serves: attitude and velocity are held."""
+    return Carried(
+        s.pos_n + dt_s * s.vel_n, s.pos_e + dt_s * s.vel_e, s.pos_d + dt_s * s.vel_d, s.vel_n, s.vel_e, s.vel_d,
+        s.qw, s.qx, s.qy, s.qz,
+        s.gyro_bias_x, s.gyro_bias_y, s.gyro_bias_z, s.accel_bias_x, s.accel_bias_y, s.accel_bias_z,
+    )  # fmt: skip
+
 
 @kernel
-def ahead(work: Array, memory: Array, imu: Array, t_s: float, out: Array) -> None:
-    """out (AHEAD,): the state at t_s. imu (n, 7): time and reading of those later than the filter's clock, in order.
+def ahead(work: Array, settings: Array, imu: Array, t_s: float, out: Array) -> None:
+    """out (AHEAD,): the state of one lane at t_s. settings: packed.
 
-    q <- q exp(w dt), v <- v + (R_mid f + g) dt, p <- p + mean v dt, as `estimation/landing/predict.move`, each step
-    with the mean of the readings at its ends. Without an IMU attitude and velocity are held.
+    imu (n, 7): time and reading of those later than the filter's clock, in order. After the last of them, the last
+    stands. The body rate is 0 where no IMU serves.
     """
-    state = ROWS.state
-    q = attitude_of(work, ONE_LANE, ROWS, 0)
+    lanes = ONE_LANE
+    rows, told = pointer(work), pointer(settings)
+    state = state_of(rows, lanes, 0)
+    at_s = work[CLOCK]
+    rate = (0.0, 0.0, 0.0)
+    if load_equipment(told).use_imu:
+        integrates = load_imu_settings(told).imu_integrates
+        before = remembered(load_imu(rows, lanes, 0))
+        for k in range(len(imu)):
+            now = (imu[k, 1], imu[k, 2], imu[k, 3], imu[k, 4], imu[k, 5], imu[k, 6])
+            until_s = min(imu[k, 0], t_s)
+            if until_s > at_s:
+                state = carried(state, motion_between(before, now, integrates), until_s - at_s)
+                at_s = until_s
+            before = now
+        if t_s > at_s:
+            state = carried(state, before, t_s - at_s)
+        rate = (before[0] - state.gyro_bias_x, before[1] - state.gyro_bias_y, before[2] - state.gyro_bias_z)
+    else:
+        state = coasted(state, t_s - at_s)
+    for i in range(10):
+        out[i] = state[i]
     for i in range(3):
-        out[i], out[3 + i], out[10 + i] = work[state + POSITION + i], work[state + VELOCITY + i], 0.0
-    at_s = memory[CLOCK]
-    if memory[USE_IMU] == 0.0:
-        for i in range(3):
-            out[i] += (t_s - at_s) * out[3 + i]
-        out[6], out[7], out[8], out[9] = q
-        return
-    before, mean = np.empty(6), np.empty(6)
-    for i in range(6):
-        before[i] = work[LATEST_IMU + i] - work[state + (GYRO_BIAS + i if i < 3 else ACCEL_BIAS + i - 3)]
-    for k in range(len(imu) + 1):
-        last = k == len(imu)
-        until_s = t_s if last else min(imu[k, 0], t_s)
-        dt_s = until_s - at_s
-        for i in range(6):
-            bias = work[state + (GYRO_BIAS + i if i < 3 else ACCEL_BIAS + i - 3)]
-            now = before[i] if last else imu[k, 1 + i] - bias
-            mean[i] = 0.5 * (before[i] + now)
-            before[i] = now
-        if dt_s <= 0.0:
-            continue
-        middle = turned(q, 0.5 * dt_s * mean[0], 0.5 * dt_s * mean[1], 0.5 * dt_s * mean[2])
-        rotation = rotation_from_quaternion(middle[0], middle[1], middle[2], middle[3])
-        north, east, down = to_earth(rotation, mean[3], mean[4], mean[5])
-        force = (north, east, down + GRAVITY_M_S2)
-        for i in range(3):
-            out[i] += dt_s * (out[3 + i] + 0.5 * dt_s * force[i])
-            out[3 + i] += dt_s * force[i]
-        q = turned(q, dt_s * mean[0], dt_s * mean[1], dt_s * mean[2])
-        at_s = until_s
-    for i in range(3):
-        out[10 + i] = before[i]
-    out[6], out[7], out[8], out[9] = q
+        out[10 + i] = rate[i]
+
+
+def state_at(work: Array, settings: Array, imu: Array, t_s: float) -> Array:
+    """`ahead` into a new array."""
+    out = np.empty(AHEAD)
+    ahead(work, settings, imu, t_s, out)
+    return out

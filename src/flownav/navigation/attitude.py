@@ -176,7 +176,8 @@ def put_heading(
 @equation
 def magnetic_heading(forward_n: float, forward_e: float, m: HeadingMemory) -> float:
     """The heading that the latest level field and the filter's tilt give, from magnetic north [rad]."""
-    return np.arctan2(forward_e, forward_n) - m.field_rad
+    angle: float = np.arctan2(forward_e, forward_n) - m.field_rad
+    return angle
 
 
 @procedure

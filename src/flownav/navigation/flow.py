@@ -112,7 +112,7 @@ def flow_variance(range_m: float, speed_m_s: float, quality: float, angular: boo
     low, good = s.flow_low_quality_sigma_rad_s, s.flow_sigma_rad_s
     sigma = (low + (good - low) * quality / FULL_QUALITY) * range_m
     modelled = sigma * sigma + s.flow_floor_m_s * s.flow_floor_m_s
-    stated = flow_noise_sigma(range_m, s.noise)
+    stated = flow_noise_sigma(range_m, s.noise)  # type: ignore[arg-type]  # it reads the noise alone
     spread = range_variance(range_m, s.range_sigma_m, s.range_relative_sigma) / (range_m * range_m)
     scaled = 0.0 if angular else speed_m_s * speed_m_s * spread
     return (stated * stated if s.noise.stated > 0.0 else modelled) + scaled

@@ -65,8 +65,8 @@ def judge_gps(
 @equation
 def judge_rejections(refused: bool, t_s: float, m: RejectionMemory, s: GpsSettings) -> tuple[bool, RejectionMemory]:
     """Whether GPS has been refused for a state so often and so long that the filter is wrong, and the count."""
-    since_s = m.since_s if m.count > 0.0 else t_s
-    count = m.count + 1.0
+    since_s = m.since_s if m.times > 0.0 else t_s
+    count = m.times + 1.0
     reset = refused and count >= LEAST_REJECTIONS and t_s - since_s >= s.gps_reset_s
     return reset, RejectionMemory(count if refused and not reset else 0.0, since_s)
 

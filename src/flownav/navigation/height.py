@@ -145,7 +145,7 @@ def height_of(work: Work, lanes: Lanes, lane: int) -> Height:
 
 @procedure
 def set_ground(
-    work: Work, lanes: Lanes, lane: int, t_s: float, reading: Reading, height: Height, s: HeightSettings, kind: int,
+    work: Work, lanes: Lanes, lane: int, t_s: float, reading: Reading, height: Height, s: HeightSettings, kind: np.int_,
     o: Output,
 ) -> None:  # fmt: skip
     """The ground is unknown but for this reading, which is about to be fused."""

@@ -50,7 +50,8 @@ def run(queue: EventQueue, on: Running, *, compiled: bool = True) -> None:
     compiled False: in plain Python, step by step (tests; it is a thousand times slower).
     """
     take = navigate_one.address if compiled else navigate_one.python
-    feed: Any = feed_all if compiled else feed_all.py_func
+    entry: Any = feed_all
+    feed = entry if compiled else entry.py_func
     journal = on.tape.journal
     feed(
         take, queue.t_s, queue.sensor, queue.value, queue.variance, queue.quality, queue.withheld, on.work, on.settings,

@@ -51,7 +51,7 @@ class StartMemory(NamedTuple):
     force_x: float
     force_y: float
     force_z: float
-    count: float
+    readings: float
 
 
 class AidMemory(NamedTuple):
@@ -138,7 +138,7 @@ class BridgeMemory(NamedTuple):
 class RejectionMemory(NamedTuple):
     """How often GPS was refused for one state, one after the other, and since when."""
 
-    count: float
+    times: float
     since_s: float
 
 
@@ -240,5 +240,5 @@ def load_rejection(work: Work, lanes: Lanes, place: int, lane: int) -> Rejection
 def store_rejection(work: Work, lanes: Lanes, place: int, lane: int, value: RejectionMemory) -> None:
     """And back."""
     row = REJECTION + 2 * place
-    work[row * len(lanes) + lane] = value.count
+    work[row * len(lanes) + lane] = value.times
     work[(row + 1) * len(lanes) + lane] = value.since_s

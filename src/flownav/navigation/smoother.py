@@ -1,43 +1,53 @@
 """The best estimate after the flight: the navigator's run smoothed backwards over all of its readings.
 
-The run is deterministic and all it knows lies in three arrays, so it is not kept but repeated: forward once with a
-copy of them every CHUNK events, then, from the last chunk to the first, forward again with a journal and backward
-through that. Memory is a copy a chunk, one chunk's journal, and the result.
+The run is deterministic and all it knows lies in its lane buffer, so it is not kept but repeated: forward once with a
+copy of that buffer every CHUNK events, then, from the last chunk to the first, forward again with a journal and
+backward through that. Memory is a copy a chunk, one chunk's journal, and the result.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import ONE_LANE, kernel
-from flownav.estimation.landing.algebra import fold_attitude
-from flownav.estimation.landing.backward import (
+from flownav.compile import ONE_LANE, kernel, pointer
+from flownav.estimation.covariance import at, fold_attitude
+from flownav.estimation.error_models import FilterSettings
+from flownav.estimation.smoother import (
     back_over_correction,
+    back_over_decay,
     back_over_prediction,
     back_over_reset,
     smoothed_covariance,
 )
-from flownav.estimation.landing.states import STATES
+from flownav.estimation.states import QUATERNION, STATE, STATES
 from flownav.measurement import Array, EventQueue
-from flownav.navigation.journal import (
+from flownav.navigation.loop import Running, run
+from flownav.navigation.memory import StartMemory, new_work, store_start
+from flownav.navigation.tape import (
     CORRECTED,
-    FORCE,
+    DECAYED,
+    ENTRIES,
+    ESTIMATES,
+    FORCE_AT,
     FORGOTTEN,
-    GAIN,
-    INNOVATION,
-    INNOVATION_VARIANCE,
-    JACOBIAN,
-    MIDDLE,
+    GAIN_AT,
+    INNOVATION_AT,
+    JACOBIAN_AT,
+    MIDDLE_AT,
+    NOTES,
     PREDICTED,
-    STATE,
+    STATE_AT,
     STEP,
-    new_journal,
+    VARIANCE_AT,
+    Tape,
+    empty_tape,
+    output_of,
+    room_of,
+    write_estimate,
 )
-from flownav.navigation.loop import run
-from flownav.navigation.state import ROWS, WORK_ROWS, Running, empty_tape, new_memory, write_estimate
 
 CHUNK = 2048  # events
 
@@ -46,9 +56,14 @@ class Mark(NamedTuple):
     """A running navigator before a chunk of events."""
 
     work: Array
-    memory: Array
     used: NDArray[np.int64]
-    written: NDArray[np.int64]  # rows of the journal that were used or counted
+
+
+class Backward(NamedTuple):
+    """lambda (STATES,) and Lambda (STATES, STATES): what later readings say of the error state."""
+
+    vector: Array
+    matrix: Array
 
 
 def smooth(queue: EventQueue, running: Running, chunk: int = CHUNK) -> Array:
@@ -56,55 +71,77 @@ def smooth(queue: EventQueue, running: Running, chunk: int = CHUNK) -> Array:
 
     The rows are those of the tape's estimate, at the same instants. The tape is left as `run` leaves it.
     """
-    chunks = [_part(queue, first, first + chunk) for first in range(0, len(queue.t_s), chunk)]
+    chunks = [part_of(queue, first, first + chunk) for first in range(0, len(queue.t_s), chunk)]
     marks = [_mark(running)]
     for part in chunks:
         run(part, running)
         marks.append(_mark(running))
-    count = int(running.tape.used[0])
-    smoothed = running._replace(work=np.zeros(WORK_ROWS), memory=new_memory(), tape=empty_tape(count, 0, 0))
-    vector, matrix = np.zeros(STATES), np.zeros((STATES, STATES))
+    found = empty_tape(int(running.tape.used[ESTIMATES]), 0, 0)
+    work = new_work(ONE_LANE)
+    store_start(work, ONE_LANE, 0, StartMemory(1.0, *[0.0] * (len(StartMemory._fields) - 1)))
+    later = Backward(np.zeros(STATES), np.zeros((STATES, STATES)))
     for part, before, after in zip(chunks[::-1], marks[-2::-1], marks[:0:-1], strict=True):
-        again = running._replace(journal=new_journal(*(after.written - before.written).tolist()))
-        again.work[:], again.memory[:], again.tape.used[:] = before.work, before.memory, before.used
-        run(part, again)
-        go_back(again, vector, matrix, smoothed)
-    running.work[:], running.memory[:], running.tape.used[:] = marks[-1].work, marks[-1].memory, marks[-1].used
-    return smoothed.tape.estimate[::-1].copy()
+        tape = _repeated(part, running, before, after)
+        estimates = tape.estimate[before.used[ESTIMATES] : after.used[ESTIMATES], 0, 0]
+        _go_back(tape, estimates, running.told.filter, later, work, found)
+    running.work[:], running.tape.used[:] = marks[-1]
+    return found.estimates()[::-1].copy()
 
 
-def _part(queue: EventQueue, first: int, last: int) -> EventQueue:
-    rows = slice(first, last)
-    return EventQueue(
-        queue.t_s[rows], queue.sensor[rows], queue.value[rows], queue.variance[rows], queue.quality[rows],
-        queue.row[rows],
-    )  # fmt: skip
+def part_of(queue: EventQueue, first: int, last: int) -> EventQueue:
+    """Rows first to last of a queue."""
+    columns: dict[str, Any] = {name: column[first:last] for name, column in queue._asdict().items()}
+    return EventQueue(**columns)
 
 
 def _mark(running: Running) -> Mark:
-    return Mark(running.work.copy(), running.memory.copy(), running.tape.used.copy(), running.journal.used.copy())
+    return Mark(running.work.copy(), running.tape.used.copy())
+
+
+def _repeated(part: EventQueue, running: Running, before: Mark, after: Mark) -> Tape:
+    """The tape after the part was fed again, with a journal of it."""
+    entries, notes = (int(after.used[place] - before.used[place]) for place in (ENTRIES, NOTES))
+    tape = running.tape._replace(journal=empty_tape(0, 0, 0, journal=(entries, notes)).journal, used=before.used.copy())
+    tape.used[[ENTRIES, NOTES]] = 0
+    run(part, running._replace(work=before.work.copy(), tape=tape))
+    return tape
+
+
+def _go_back(tape: Tape, t_s: Array, told: FilterSettings, later: Backward, work: Array, found: Tape) -> None:
+    """Backward through a tape's journal; each of its estimates, the last first, smoothed onto the tape `found`."""
+    journal = tape.journal
+    go_back(
+        journal.entry, journal.state, journal.covariance, np.ascontiguousarray(t_s), told, later.vector, later.matrix,
+        work, found.estimate.reshape(-1), room_of(found), found.used,
+    )  # fmt: skip
 
 
 @kernel
-def go_back(on: Running, vector: Array, matrix: Array, smoothed: Running) -> None:
-    """Backward through a journal, lambda and Lambda with it; each estimate, the last first, smoothed onto a tape."""
-    journal = on.journal
-    estimate = journal.used[1]
-    for row in range(journal.used[0] - 1, -1, -1):
-        line = journal.entry[row]
+def go_back(
+    entry: Array, state: Array, covariance: Array, t_s: Array, told: FilterSettings, vector: Array, matrix: Array,
+    work: Array, found: Array, room: NDArray[np.int64], used: NDArray[np.int64],
+) -> None:  # fmt: skip
+    """Backward through a journal, lambda and Lambda with it; t_s: the instants of its estimates."""
+    output = output_of(found, found, found, found, found, found, room, used)
+    estimate = len(t_s)
+    for row in range(len(entry) - 1, -1, -1):
+        line = entry[row]
         kind = line[0]
         if kind == PREDICTED:
-            middle, force = line[MIDDLE : MIDDLE + 9], line[FORCE : FORCE + 3]
-            back_over_prediction(vector, matrix, line[STEP], middle, force, on.settings.filter)
+            back_over_prediction(
+                vector, matrix, line[STEP], line[MIDDLE_AT : MIDDLE_AT + 9], line[FORCE_AT : FORCE_AT + 3]
+            )
+        elif kind == DECAYED:
+            back_over_decay(vector, matrix, line[STEP], told)
         elif kind == CORRECTED:
-            jacobian, gain = line[JACOBIAN : JACOBIAN + STATES], line[GAIN : GAIN + STATES]
-            back_over_correction(vector, matrix, jacobian, gain, line[INNOVATION], line[INNOVATION_VARIANCE])
+            jacobian, gain = line[JACOBIAN_AT : JACOBIAN_AT + STATES], line[GAIN_AT : GAIN_AT + STATES]
+            back_over_correction(vector, matrix, jacobian, gain, line[INNOVATION_AT], line[VARIANCE_AT])
         elif kind == FORGOTTEN:
-            back_over_reset(vector, matrix, int(line[STATE]))
+            back_over_reset(vector, matrix, int(line[STATE_AT]))
         else:
             estimate -= 1
-            put_smoothed(journal.state[estimate], journal.covariance[estimate], vector, matrix, smoothed.work)
-            write_estimate(on.tape.estimate[on.tape.used[0] - journal.used[1] + estimate, 0], smoothed)
+            put_smoothed(state[estimate], covariance[estimate], vector, matrix, work)
+            write_estimate(pointer(work), ONE_LANE, t_s[estimate], output)
 
 
 @kernel
@@ -112,10 +149,10 @@ def put_smoothed(state: Array, covariance: Array, vector: Array, matrix: Array, 
     """x - P lambda, its attitude part turned onto the quaternion, and P - P Lambda P, in a lane buffer of one lane."""
     change = covariance @ vector
     better = smoothed_covariance(covariance, matrix)
-    for i in range(STATES):
-        work[ROWS.state + i] = state[i] - change[i]
-        for j in range(STATES):
-            work[ROWS.covariance + i * STATES + j] = better[i, j]
+    for j in range(STATES):
+        work[STATE + j] = state[j] - change[j]
+        for i in range(j + 1):
+            work[at(i, j)] = better[i, j]
     for i in range(4):
-        work[ROWS.attitude + i] = state[STATES + i]
-    fold_attitude(work, ONE_LANE, ROWS)
+        work[QUATERNION + i] = state[STATES + i]
+    fold_attitude(pointer(work), ONE_LANE)

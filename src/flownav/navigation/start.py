@@ -41,13 +41,13 @@ LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0
 @equation
 def levelled(reading: Reading, m: StartMemory) -> StartMemory:
     """The mean specific force [m/s2] with one reading more."""
-    share = 1.0 / min(m.count + 1.0, MOST_LEVELLING)
+    share = 1.0 / min(m.readings + 1.0, MOST_LEVELLING)
     return StartMemory(
         m.started, m.attitude_s, m.qw, m.qx, m.qy, m.qz,
         m.force_x + share * (reading.value_3 - m.force_x),
         m.force_y + share * (reading.value_4 - m.force_y),
         m.force_z + share * (reading.value_5 - m.force_z),
-        m.count + 1.0,
+        m.readings + 1.0,
     )  # fmt: skip
 
 
@@ -64,7 +64,7 @@ def gather(work: Work, lanes: Lanes, t_s: float, sensor: int) -> None:
             if size > 0.5 and size < 2.0:
                 w, x, y, z = reading.value_0, reading.value_1, reading.value_2, reading.value_3
                 after = StartMemory(
-                    0.0, t_s, w / size, x / size, y / size, z / size, m.force_x, m.force_y, m.force_z, m.count
+                    0.0, t_s, w / size, x / size, y / size, z / size, m.force_x, m.force_y, m.force_z, m.readings
                 )
                 store_start(work, lanes, lane, after)
         elif sensor == Sensor.IMU:
@@ -85,7 +85,7 @@ def try_start(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipme
     other = sensor == Sensor.FLOW_RATE or sensor == Sensor.FLOW_VELOCITY or sensor == Sensor.POSE
     for lane in range(len(lanes)):
         m, reading = load_start(work, lanes, lane), load_reading(work, lanes, lane)
-        if m.started == 0.0 and (np.isfinite(m.attitude_s) or m.count >= LEAST_LEVELLING):
+        if m.started == 0.0 and (np.isfinite(m.attitude_s) or m.readings >= LEAST_LEVELLING):
             heard = reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
             heard = heard and bool(np.isfinite(reading.value_0))
             at_fix = heard and position and bool(np.isfinite(reading.value_0 + reading.value_1 + reading.value_2))
@@ -136,7 +136,7 @@ def start_lane(
 def started(m: StartMemory) -> StartMemory:
     """The filter runs."""
     return StartMemory(
-        1.0, m.attitude_s, m.qw, m.qx, m.qy, m.qz, m.force_x, m.force_y, m.force_z, m.count
+        1.0, m.attitude_s, m.qw, m.qx, m.qy, m.qz, m.force_x, m.force_y, m.force_z, m.readings
     )  # fmt: skip
 
 

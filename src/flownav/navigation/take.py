@@ -8,31 +8,28 @@ whether it arrived, and every verdict are each lane's own.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.compile import LANES, ONE_LANE, equation, procedure, unit
 from flownav.estimation.error_models import propagate_gauss_markov, propagate_walks
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.motion import hold_still, predict
-from flownav.estimation.states import ACCEL_NOISE, GYRO_NOISE, IMU, STATES
+from flownav.estimation.states import STATES
 from flownav.measurement import Sensor
 from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
 from flownav.navigation.flow import take_flow
 from flownav.navigation.gps import take_gps
 from flownav.navigation.height import take_baro, take_range
+from flownav.navigation.inertial import choose_motion, keep_imu
 from flownav.navigation.journal import note_decay, note_estimate, note_prediction
 from flownav.navigation.memory import (
     CLOCK,
     ERRORS_CLOCK,
     MOVING,
     WRITTEN,
-    ImuMemory,
-    Reading,
-    load_imu,
-    load_reading,
     load_start,
     share,
     shared,
-    store_imu,
 )
 from flownav.navigation.offers import note_aid_age, too_old
 from flownav.navigation.packed import (
@@ -43,11 +40,9 @@ from flownav.navigation.packed import (
 )
 from flownav.navigation.place import take_landed, take_pad, take_pose
 from flownav.navigation.start import gather, try_start
-from flownav.navigation.tape import ESTIMATE_PERIOD_S, IMU_LOST, Output, output_of, write_estimate, write_event
-from flownav.navigation.told import FROM_MAG, Equipment, ImuSettings
-from flownav.navigation.vibration import add_vibration_noise, followed_vibration, limit_biases, with_reading
-
-Motion = tuple[float, float, float, float, float, float]  # body rate [rad/s] and specific force [m/s2], body FRD
+from flownav.navigation.tape import ESTIMATE_PERIOD_S, Output, output_of, write_estimate
+from flownav.navigation.told import FROM_MAG, Equipment
+from flownav.navigation.vibration import add_vibration_noise, limit_biases
 
 LONGEST_STEP_S = 0.1
 MOST_STEPS = 10000
@@ -124,86 +119,6 @@ def any_started(work: Work, lanes: Lanes) -> bool:
     return running > 0.0
 
 
-# -- inertial readings --------------------------------------------------------------------------------------
-@equation
-def sound(reading: Reading) -> bool:
-    """Whether an inertial reading is one: it arrived, and all of it is finite."""
-    gyro = reading.value_0 + reading.value_1 + reading.value_2
-    total = gyro + reading.value_3 + reading.value_4 + reading.value_5
-    return reading.arrived > 0.0 and reading.withheld == 0.0 and bool(np.isfinite(total))
-
-
-@equation
-def motion_between(reading: Reading, m: ImuMemory, integrates: float) -> Motion:
-    """What stands for the time between two inertial readings: their mean (trapezium), or the later one of a unit that
-    integrates over that time itself.
-    """
-    share = 1.0 if integrates > 0.5 else 0.5
-    rest = 1.0 - share
-    return (
-        share * reading.value_0 + rest * m.gyro_x,
-        share * reading.value_1 + rest * m.gyro_y,
-        share * reading.value_2 + rest * m.gyro_z,
-        share * reading.value_3 + rest * m.accel_x,
-        share * reading.value_4 + rest * m.accel_y,
-        share * reading.value_5 + rest * m.accel_z,
-    )
-
-
-@procedure
-def choose_motion(
-    work: Work, lanes: Lanes, t_s: float, heard: bool, fitted: Equipment, s: ImuSettings, o: Output
-) -> None:
-    """MOVING, and the IMU's rows, for the step to t_s: the readings at its ends, the newest reading, or none.
-
-    heard: an inertial reading is at hand. After a gap it knows nothing of the gap, which is coasted.
-    """
-    for lane in range(len(lanes)):
-        m = load_imu(work, lanes, lane)
-        fresh = fitted.use_imu and t_s - m.read_s <= s.imu_stale_s
-        reading = load_reading(work, lanes, lane)
-        now = heard and sound(reading)
-        if now and not fresh and np.isfinite(m.read_s) and load_start(work, lanes, lane).started > 0.0:
-            write_event(lanes, lane, t_s, IMU_LOST, t_s - m.read_s, o)
-        between = motion_between(reading, m, s.imu_integrates)
-        set_imu(work, lanes, lane, 0, between[0] if now else m.gyro_x)
-        set_imu(work, lanes, lane, 1, between[1] if now else m.gyro_y)
-        set_imu(work, lanes, lane, 2, between[2] if now else m.gyro_z)
-        set_imu(work, lanes, lane, 3, between[3] if now else m.accel_x)
-        set_imu(work, lanes, lane, 4, between[4] if now else m.accel_y)
-        set_imu(work, lanes, lane, 5, between[5] if now else m.accel_z)
-        vibration = followed_vibration(reading, m, t_s - m.read_s) if now and fresh else m.vibration
-        started = load_start(work, lanes, lane).started > 0.0
-        moving = fresh and started
-        work[MOVING * len(lanes) + lane] = 1.0 if moving else 0.0
-        accel = s.accel_noise_m_s2_rt_hz if moving else s.coasting_accel_m_s2_rt_hz
-        gyro = s.gyro_noise_rad_s_rt_hz if moving else s.coasting_rate_rad_s_rt_hz
-        work[ACCEL_NOISE * len(lanes) + lane] = accel * accel
-        work[GYRO_NOISE * len(lanes) + lane] = gyro * gyro
-        gap = m.gap if moving or not started else 1.0
-        store_imu(
-            work, lanes, lane,
-            ImuMemory(
-                m.read_s, m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z, vibration, m.doubt_m_s2, gap
-            ),
-        )  # fmt: skip
-
-
-@equation
-def set_imu(work: Work, lanes: Lanes, lane: int, part: int, value: float) -> None:
-    """One of the six inertial scalars that move the filter."""
-    work[(IMU + part) * len(lanes) + lane] = value
-
-
-@procedure
-def keep_imu(work: Work, lanes: Lanes, t_s: float) -> None:
-    """The reading at hand stands for what follows, until the next."""
-    for lane in range(len(lanes)):
-        reading, m = load_reading(work, lanes, lane), load_imu(work, lanes, lane)
-        if sound(reading) and load_start(work, lanes, lane).started > 0.0:
-            store_imu(work, lanes, lane, with_reading(reading, t_s, m))
-
-
 # -- from instant to instant ----------------------------------------------------------------------------------
 @procedure
 def advance(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> None:
@@ -244,7 +159,7 @@ def catch_up_errors(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) ->
 # -- units --------------------------------------------------------------------------------------------------
 def take_one(
     work: Work, p: Work, estimate: Work, innovation: Work, event: Work, entry: Work, state: Work, covariance: Work,
-    room: Work, used: Work, t_s: float, sensor: int, lanes: Lanes,
+    room: NDArray[np.int64], used: NDArray[np.int64], t_s: float, sensor: int, lanes: Lanes,
 ) -> None:  # fmt: skip
     """`navigate` with a C interface: pointers of the lane buffer, the packed settings and the tape."""
     o = output_of(estimate, innovation, event, entry, state, covariance, room, used)

@@ -1,0 +1,106 @@
+"""Inertial readings: which of them are sound, what stands for the time between two, and what moves the filter when."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flownav.compile import equation, procedure
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.states import ACCEL_NOISE, GYRO_NOISE, IMU
+from flownav.navigation.memory import MOVING, ImuMemory, Reading, load_imu, load_reading, load_start, store_imu
+from flownav.navigation.tape import IMU_LOST, Output, write_event
+from flownav.navigation.told import Equipment, ImuSettings
+from flownav.navigation.vibration import followed_vibration, with_reading
+
+Motion = tuple[float, float, float, float, float, float]  # body rate [rad/s] and specific force [m/s2], body FRD
+
+
+@equation
+def sound(reading: Reading) -> bool:
+    """Whether an inertial reading is one: it arrived, and all of it is finite."""
+    gyro = reading.value_0 + reading.value_1 + reading.value_2
+    total = gyro + reading.value_3 + reading.value_4 + reading.value_5
+    return reading.arrived > 0.0 and reading.withheld == 0.0 and bool(np.isfinite(total))
+
+
+@equation
+def said_by(reading: Reading) -> Motion:
+    """What an inertial reading says."""
+    return (reading.value_0, reading.value_1, reading.value_2, reading.value_3, reading.value_4, reading.value_5)
+
+
+@equation
+def remembered(m: ImuMemory) -> Motion:
+    """What the newest one that was kept said."""
+    return (m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z)
+
+
+@equation
+def motion_between(before: Motion, now: Motion, integrates: float) -> Motion:
+    """What stands for the time between two inertial readings: their mean (trapezium), or the later one of a unit that
+    integrates over that time itself.
+    """
+    share = 1.0 if integrates > 0.5 else 0.5
+    rest = 1.0 - share
+    return (
+        share * now[0] + rest * before[0],
+        share * now[1] + rest * before[1],
+        share * now[2] + rest * before[2],
+        share * now[3] + rest * before[3],
+        share * now[4] + rest * before[4],
+        share * now[5] + rest * before[5],
+    )
+
+
+@procedure
+def choose_motion(
+    work: Work, lanes: Lanes, t_s: float, heard: bool, fitted: Equipment, s: ImuSettings, o: Output
+) -> None:
+    """MOVING, and the IMU's rows, for the step to t_s: the readings at its ends, the newest reading, or none.
+
+    heard: an inertial reading is at hand. After a gap it knows nothing of the gap, which is coasted.
+    """
+    for lane in range(len(lanes)):
+        m = load_imu(work, lanes, lane)
+        fresh = fitted.use_imu and t_s - m.read_s <= s.imu_stale_s
+        reading = load_reading(work, lanes, lane)
+        now = heard and sound(reading)
+        if now and not fresh and np.isfinite(m.read_s) and load_start(work, lanes, lane).started > 0.0:
+            write_event(lanes, lane, t_s, IMU_LOST, t_s - m.read_s, o)
+        between = motion_between(remembered(m), said_by(reading), s.imu_integrates)
+        set_imu(work, lanes, lane, 0, between[0] if now else m.gyro_x)
+        set_imu(work, lanes, lane, 1, between[1] if now else m.gyro_y)
+        set_imu(work, lanes, lane, 2, between[2] if now else m.gyro_z)
+        set_imu(work, lanes, lane, 3, between[3] if now else m.accel_x)
+        set_imu(work, lanes, lane, 4, between[4] if now else m.accel_y)
+        set_imu(work, lanes, lane, 5, between[5] if now else m.accel_z)
+        vibration = followed_vibration(reading, m, t_s - m.read_s) if now and fresh else m.vibration
+        started = load_start(work, lanes, lane).started > 0.0
+        moving = fresh and started
+        work[MOVING * len(lanes) + lane] = 1.0 if moving else 0.0
+        accel = s.accel_noise_m_s2_rt_hz if moving else s.coasting_accel_m_s2_rt_hz
+        gyro = s.gyro_noise_rad_s_rt_hz if moving else s.coasting_rate_rad_s_rt_hz
+        work[ACCEL_NOISE * len(lanes) + lane] = accel * accel
+        work[GYRO_NOISE * len(lanes) + lane] = gyro * gyro
+        gap = m.gap if moving or not started else 1.0
+        store_imu(
+            work, lanes, lane,
+            ImuMemory(
+                m.read_s, m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z, vibration, m.doubt_m_s2, gap
+            ),
+        )  # fmt: skip
+
+
+@equation
+def set_imu(work: Work, lanes: Lanes, lane: int, part: int, value: float) -> None:
+    """One of the six inertial scalars that move the filter."""
+    work[(IMU + part) * len(lanes) + lane] = value
+
+
+@procedure
+def keep_imu(work: Work, lanes: Lanes, t_s: float) -> None:
+    """The reading at hand stands for what follows, until the next."""
+    for lane in range(len(lanes)):
+        reading, m = load_reading(work, lanes, lane), load_imu(work, lanes, lane)
+        if sound(reading) and load_start(work, lanes, lane).started > 0.0:
+            store_imu(work, lanes, lane, with_reading(reading, t_s, m))

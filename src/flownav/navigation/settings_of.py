@@ -1,0 +1,228 @@
+"""From datasheets to what the navigator is told: the one way, for every job.
+
+What no sheet says keeps its default, and what a user states in a settings file stands above what a sheet says.
+Standard deviations that a sheet gives for units of its kind become the filter's for this one; densities are one-sided
+in sheets and two-sided in the filter, where white noise of density N lets its integral's variance grow by N^2 t/2.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from flownav.frames import GRAVITY_M_S2
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
+from flownav.sensors.barometer_sheet import BarometerSheet
+from flownav.sensors.datasheet import FlowSensor
+from flownav.sensors.flow_camera_sheet import FlowCameraSheet
+from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
+from flownav.sensors.identified import identified_flow
+from flownav.sensors.inertial_sheet import InertialSheet
+from flownav.sensors.magnetometer_sheet import MagneticField, MagnetometerSheet
+from flownav.sensors.pad_camera_sheet import PadCameraSheet
+from flownav.sensors.range_sensor_sheet import RangeSensorSheet
+from flownav.sensors.sheets import SensorSheets
+
+ABOVE_FLOOR_M = 0.01  # a rangefinder that reads its floor says only that there is no more
+LEAST_SHARE = 0.05  # of a stated accuracy, where the sheet says what changes from fix to fix
+SURE = 3.0  # standard deviations that a limit of a bias leaves room for
+ALLOWED = 2.0  # times the stated vibration; what is beyond it, the sheet does not know
+CLIMB_M_S = 1.0  # by how much a lag errs, in a descent at this speed
+
+Keys = dict[str, float]
+
+
+class Told(NamedTuple):
+    """A navigator's settings, and the flow's noise by its sensor file, where that is to be used."""
+
+    settings: NavigatorSettingsFile
+    noise: FlowNoise = NO_STATED_NOISE
+
+
+def settings_of(
+    flow: FlowSensor | None = None,
+    sheets: SensorSheets | None = None,
+    *,
+    stated: NavigatorSettingsFile | None = None,
+    flow_noise_stated: bool = False,
+    rotor_hz: tuple[float, float] | None = None,
+) -> Told:
+    """What a navigator is told of these sensors.
+
+    flow: the flow sensor's file, else the sheets'. stated: a user's own settings; the keys that stand in it are kept.
+    flow_noise_stated: the flow's noise is the file's law of the height, not that of the reading's quality.
+    rotor_hz: of the rotor and of its blades; the IMU's own filter weakens their vibration.
+    InputError where the file's axes are not known.
+    """
+    sensor = flow if flow is not None else (sheets.flow_sensor if sheets is not None else None)
+    keys: Keys = {}
+    if sheets is not None:
+        keys |= of_sheets(sheets, rotor_hz)
+    if sensor is not None:
+        keys |= of_flow_sensor(sensor)
+    if stated is not None:
+        keys |= {name: getattr(stated, name) for name in stated.model_fields_set}
+    noise = noise_of(sensor) if sensor is not None and flow_noise_stated else NO_STATED_NOISE
+    return Told(NavigatorSettingsFile.model_validate(keys), noise)
+
+
+def of_sheets(sheets: SensorSheets, rotor_hz: tuple[float, float] | None = None) -> Keys:
+    """Every sheet that there is."""
+    keys = of_inertial(sheets.inertial, rotor_hz)
+    if sheets.gps_receiver is not None:
+        keys |= of_gps_receiver(sheets.gps_receiver)
+    if sheets.range_sensor is not None:
+        keys |= of_range_sensor(sheets.range_sensor)
+    if sheets.barometer is not None:
+        keys |= of_barometer(sheets.barometer)
+    if sheets.magnetometer is not None:
+        keys |= of_magnetometer(sheets.magnetometer, sheets.magnetic_field)
+    if sheets.flow_camera is not None:
+        keys |= of_flow_camera(sheets.flow_camera)
+    if sheets.pad_camera is not None:
+        keys |= of_pad_camera(sheets.pad_camera)
+    return keys
+
+
+# -- flow ---------------------------------------------------------------------------------------------------
+def of_flow_sensor(sensor: FlowSensor) -> Keys:
+    """Gains and limits. Latency and axes belong to those who feed the readings (`sensors.identified`)."""
+    found = identified_flow(sensor)
+    return {
+        "flow_gain_x": found.gain_u,
+        "flow_gain_y": found.gain_v,
+        "flow_min_height_m": sensor.limits.min_height_m,
+        "flow_limit_rad_s": sensor.limits.max_flow_rad_s,
+    }
+
+
+def noise_of(sensor: FlowSensor) -> FlowNoise:
+    """The file's law of the height."""
+    fit = sensor.noise.fit()
+    law = {f"noise_{i}": coefficient for i, coefficient in enumerate(fit.coefficients)}
+    return FlowNoise(
+        stated=1.0, noise_low_m=fit.low_m, noise_high_m=fit.high_m, noise_centre=fit.centre, noise_scale=fit.scale,
+        noise_floor_m_s=sensor.noise.floor_m_s, **law,
+    )  # fmt: skip
+
+
+def of_flow_camera(sheet: FlowCameraSheet) -> Keys:
+    """Where the lens is, and how far its gain may be from the sensor file's."""
+    return {
+        "flow_scale_sigma": sheet.gain.sigma,
+        "flow_forward_m": sheet.lens.forward_m,
+        "flow_right_m": sheet.lens.right_m,
+        "flow_below_m": sheet.lens.down_m,
+    }
+
+
+# -- inertial -----------------------------------------------------------------------------------------------
+def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = None) -> Keys:
+    """White noise with what vibration adds to it; biases with what scale errors, misalignment and weight make of them.
+
+    Tones are counted as white noise of the same rms: what aliases to near 0 Hz does as much harm, the rest less.
+    """
+    gyro, accel, rt_period_s = sheet.gyro, sheet.accelerometer, math.sqrt(sheet.period_s)
+    shaken_m_s2 = max(_shaken(sheet, "level_m_s2", rotor_hz), _shaken(sheet, "vertical_m_s2", rotor_hz))
+    turning_rad_s = math.radians(_shaken(sheet, "tilt_deg_s", rotor_hz))
+    mg = 1e-3 * GRAVITY_M_S2
+    accel_white = 1e-3 * mg * accel.density_ug_rthz / math.sqrt(2.0)
+    gyro_white = math.radians(gyro.density_deg_s_rthz) / math.sqrt(2.0)
+    by_weight = math.hypot(0.01 * accel.scale_percent, math.radians(accel.misalignment_deg))
+    accel_bias = math.hypot(mg * accel.bias_mg, by_weight * GRAVITY_M_S2)
+    gyro_bias = math.radians(math.hypot(gyro.bias_deg_s, gyro.g_sensitivity_deg_s_g))
+    usual = NavigatorSettingsFile()
+    return {
+        "accel_noise_m_s2_rt_hz": math.hypot(accel_white, shaken_m_s2 * rt_period_s),
+        "gyro_noise_rad_s_rt_hz": math.hypot(gyro_white, turning_rad_s * rt_period_s),
+        "accel_walk_m_s2_rt_s": mg * accel.walk_mg_rts,
+        "gyro_walk_rad_s_rt_s": math.radians(gyro.walk_deg_s_rts),
+        "accel_bias_sigma_m_s2": max(accel_bias, 1e-4),
+        "gyro_bias_sigma_rad_s": max(gyro_bias, 1e-6),
+        "accel_bias_limit_m_s2": max(float(usual.accel_bias_limit_m_s2), SURE * accel_bias),
+        "gyro_bias_limit_rad_s": max(float(usual.gyro_bias_limit_rad_s), SURE * gyro_bias),
+        "vibration_free_m_s2": max(float(usual.vibration_free_m_s2), ALLOWED * shaken_m_s2),
+        "imu_integrates": 1.0,
+    }
+
+
+def _shaken(sheet: InertialSheet, part: str, rotor_hz: tuple[float, float] | None) -> float:
+    """Rms of both tones together in the readings of a vehicle that shakes more than the sheet's by its spread."""
+    left = (1.0, 1.0) if rotor_hz is None else tuple(abs(sheet.left_of_tone(hz)) for hz in rotor_hz)
+    shake = sheet.vibration
+    amplitude = math.hypot(left[0] * getattr(shake.rotor, part), left[1] * getattr(shake.blades, part))
+    return (1.0 + shake.spread) * amplitude / math.sqrt(2.0)
+
+
+# -- position -----------------------------------------------------------------------------------------------
+def of_gps_receiver(sheet: GpsReceiverSheet) -> Keys:
+    """The receiver's errors as its sheet splits them, so that little is left for what it states of each fix.
+
+    The lasting error of the vertical velocity that exceeds the horizontal's counts as white.
+    """
+    position, velocity = sheet.position, sheet.velocity
+    beyond = max(velocity.sigma_down_m_s**2 - velocity.sigma_m_s**2, 0.0)
+    step_m, step_m_s = position.quantum_m / math.sqrt(12.0), velocity.quantum_m_s / math.sqrt(12.0)
+    return {
+        "gps_slow_sigma_m": position.slow_sigma_m,
+        "gps_slow_sigma_down_m": position.slow_sigma_down_m,
+        "gps_slow_tau_s": max(position.slow_tau_s, sheet.period_s),
+        "gps_fast_sigma_m": position.fast_sigma_m,
+        "gps_fast_sigma_down_m": position.fast_sigma_down_m,
+        "gps_fast_tau_s": max(position.fast_tau_s, sheet.period_s),
+        "gps_white_sigma_m": max(math.hypot(position.white_sigma_m, step_m), 1e-3),
+        "gps_white_sigma_down_m": max(math.hypot(position.white_sigma_down_m, step_m), 1e-3),
+        "gps_white_share": LEAST_SHARE,
+        "gps_velocity_sigma_m_s": velocity.sigma_m_s,
+        "gps_velocity_tau_s": max(velocity.tau_s, sheet.period_s),
+        "gps_velocity_white_m_s": max(math.hypot(velocity.white_m_s, step_m_s), 1e-3),
+        "gps_velocity_white_down_m_s": max(math.sqrt(velocity.white_down_m_s**2 + step_m_s**2 + beyond), 1e-3),
+        "gps_velocity_lag_sigma_s": velocity.smoothing_tau_s,
+        "gps_forward_m": sheet.antenna.forward_m,
+        "gps_right_m": sheet.antenna.right_m,
+        "gps_below_m": sheet.antenna.down_m,
+    }
+
+
+def of_pad_camera(sheet: PadCameraSheet) -> Keys:
+    """Where a fix states no accuracy: noise and mounting together."""
+    boresight = math.radians(sheet.boresight_deg)
+    return {
+        "pad_angle_sigma_rad": math.hypot(1e-3 * sheet.angle_sigma_mrad, boresight),
+        "pad_distance_sigma": 0.01 * sheet.distance_sigma_percent,
+    }
+
+
+# -- height and heading --------------------------------------------------------------------------------------
+def of_range_sensor(sheet: RangeSensorSheet) -> Keys:
+    """Noise, steps, offset and scale; its limits, the floor excepted, which is what nearer ground reads too."""
+    return {
+        "range_sigma_m": max(
+            math.hypot(sheet.sigma_m, sheet.resolution_m / math.sqrt(12.0), sheet.offset_sigma_m), 1e-3
+        ),
+        "range_relative_sigma": 0.01 * math.hypot(sheet.sigma_percent, sheet.scale_percent),
+        "range_min_m": sheet.floor_m + ABOVE_FLOOR_M,
+        "range_max_m": sheet.ceiling_m,
+        "range_below_m": sheet.lens.down_m,
+    }
+
+
+def of_barometer(sheet: BarometerSheet) -> Keys:
+    """Noise, and drift as the walk that it is over short times; in a rotor's wash the default noise stands."""
+    drift = sheet.drift_sigma_m * math.sqrt(2.0 / sheet.drift_tau_s) if sheet.drift_tau_s > 0.0 else 0.0
+    calm = math.hypot(sheet.sigma_m, sheet.resolution_m / math.sqrt(12.0), CLIMB_M_S * sheet.lag_s)
+    keys = {"baro_walk_m_rt_s": math.hypot(drift, sheet.ramp_m_per_h / 60.0 / math.sqrt(60.0))}
+    return keys if sheet.wash_share or sheet.ground_share else keys | {"baro_sigma_m": max(calm, 1e-3)}
+
+
+def of_magnetometer(sheet: MagnetometerSheet, field: MagneticField) -> Keys:
+    """Hard iron turns with the vehicle and is a state; soft iron, scale and currents are the noise that lasts."""
+    north, east, _ = field.ned_gauss
+    level_mgauss = 1e3 * math.hypot(north, east)
+    iron = 0.01 * math.hypot(sheet.scale_percent, sheet.soft_iron_percent)
+    current = sheet.current_mgauss_per_kw / level_mgauss
+    return {
+        "compass_sigma_rad": min(sheet.hard_iron_mgauss / level_mgauss, math.pi),
+        "heading_noise_rad": min(max(math.hypot(iron, current, sheet.sigma_mgauss / level_mgauss), 1e-3), math.pi),
+    }

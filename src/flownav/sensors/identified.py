@@ -1,0 +1,50 @@
+"""What a flow sensor's file says to those who use the sensor: gains, age of a reading, and how its axes lie."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.errors import InputError
+from flownav.sensors.datasheet import FlowSensor
+
+
+class IdentifiedFlow(NamedTuple):
+    """Reported over true velocity of each body axis, the age of a reading, and sensor's axes = axes @ vehicle's."""
+
+    gain_u: float
+    gain_v: float
+    latency_s: float
+    axes: tuple[tuple[float, float], tuple[float, float]] = ((1.0, 0.0), (0.0, 1.0))
+
+
+def identified_axes(verdict: str) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    """What a sensor file says of the axes, as sensor's = axes @ vehicle's; None where it does not know."""
+    if "unclear" in verdict or "mirrored" in verdict.replace("not mirrored", ""):
+        return None
+    both = "signs of x and y" in verdict or "both signs" in verdict
+    x = -1.0 if both or "sign of x" in verdict else 1.0
+    y = -1.0 if both or "sign of y" in verdict else 1.0
+    return ((0.0, x), (y, 0.0)) if "swapped" in verdict else ((x, 0.0), (0.0, y))
+
+
+def identified_flow(sensor: FlowSensor) -> IdentifiedFlow:
+    """A sensor file's axes, gains and latency; those of its dynamics where no log was identified.
+
+    InputError where the file's axes are not known.
+    """
+    found = sensor.identification
+    if found is None:
+        return IdentifiedFlow(sensor.dynamics.gain, sensor.dynamics.gain, sensor.dynamics.delay_s)
+    axes = identified_axes(found.axes)
+    if axes is None:
+        raise InputError(f"{sensor.name}: {found.axes}; mend the log's axes, then identify again")
+
+    def gain_of(axis: str) -> float:
+        """The axis' gain, 1 where no height's interval excludes it: an uncertain gain would do more harm than good."""
+        rows = [r for r in found.responses if r.axis == axis] or list(found.responses)
+        sure = any(not r.gain_low <= 1.0 <= r.gain_high for r in rows)
+        return float(np.mean([r.gain for r in rows])) if sure else 1.0
+
+    return IdentifiedFlow(gain_of("x"), gain_of("y"), found.latency_s, axes)

@@ -37,6 +37,7 @@ def reported(loads: list[float], unit: SkidSwitchUnit = WORKING, start_n: float 
 def test_it_follows_after_the_debounce() -> None:
     assert reported([12.1] * 8) == [0.0] * 4 + [1.0] * 4
     assert reported([0.0] * 8, start_n=80.0) == [1.0] * 4 + [0.0] * 4
+    assert reported([0.0] * 3 + [80.0] * 5) == [0.0] * 7 + [1.0]  # only readings that say otherwise count
 
 
 def test_it_closes_at_one_load_and_opens_at_another() -> None:

@@ -31,7 +31,8 @@ from flownav.sensors.flow_camera_sheet import FlowCameraSheet, load_flow_camera_
 from sensor_normals import draws, moved_by, silent
 
 SHEET = load_flow_camera_sheet()
-P = SHEET.parameters()
+# a camera whose quality tells more than the shipped one's
+P = SHEET.parameters()._replace(best_quality=250.0, quality_fall_height=0.4, quality_fall_flow=0.4, quality_sigma=20.0)
 FLOW = FlowSettings(sonar_overscale=False).parameters(load_sensor())
 PERFECT = silent(FlowCameraUnit, noise=1.0)
 QUIET = silent(FlowCameraNormals)
@@ -209,6 +210,16 @@ def test_quality_falls_with_height_speed_and_texture_and_is_whole() -> None:
     noisy = [read(HOVER._replace(texture=0.5), n).quality for n in draws(FlowCameraNormals, 2000, 10)]
     assert np.std(noisy) == pytest.approx(20.0, rel=0.1)
     assert read(HOVER._replace(texture=0.05), silent(FlowCameraNormals, quality=-9.0)).quality == 1.0
+
+
+def test_the_shipped_cameras_quality_is_that_of_outdoor_flights() -> None:
+    flown = [
+        read(HOVER._replace(height_m=h, range_m=h, seen_u_m_s=0.5), n, p=SHEET.parameters()).quality
+        for h in (0.5, 1.5, 3.3)
+        for n in draws(FlowCameraNormals, 300, 22)
+    ]
+    assert 246.0 < np.mean(flown) < 254.0
+    assert 3.0 < np.std(flown) < 8.0
 
 
 def test_frames_are_lost_with_their_share() -> None:

@@ -15,10 +15,8 @@ from flownav.errors import InputError
 from flownav.estimation.discretise import discretised
 from flownav.estimation.paper_filter import PaperModel
 from flownav.sensors.datasheet import FlowSensor, load_sensor
-from flownav.sensors.settings import NO_PAD_FIX
+from flownav.simulation.fitting import Fitted, fitted, timetable_of
 from flownav.simulation.flight import ATTITUDE_S, Flight, FlightPlan
-from flownav.simulation.landing_filtering import LandingSetup
-from flownav.simulation.landing_setup import landing_setup
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
@@ -37,11 +35,15 @@ YAW_RATE_RAD_S = 14.0
 
 @dataclass(frozen=True)
 class Setup:
-    """A scenario made ready: the numbers the kernel takes, and what reports say of them."""
+    """A scenario made ready: the numbers the kernel takes, and what reports say of them.
+
+    fitted: the sensors that feed the navigator, and what it is told; None where the paper's filter flies.
+    """
 
     scenario: Scenario
     sensor: FlowSensor
     flight: Flight
+    fitted: Fitted | None
     trim: Trim
     inputs: tuple[Path, ...]
     parameters: dict[str, Any]
@@ -55,15 +57,19 @@ def assemble(scenario: Scenario) -> Setup:
     sensor_file = Path(scenario.flow_sensor) if scenario.flow_sensor else None
     vehicle, sensor, paper = load_vehicle(vehicle_file), load_sensor(sensor_file), load_paper_model()
     hover = trim(vehicle)
+    plan = _plan(scenario, vehicle, hover)
+    carried = fitted(scenario, sensor, vehicle, plan.epochs) if scenario.filter.name == "landing" else None
     flight = Flight(
-        plan=_plan(scenario, vehicle, hover),
+        plan=plan,
         vehicle=vehicle,
         sensors=_sensors(scenario, sensor, vehicle),
         wind=scenario.wind.parameters(),
         path=_path(scenario, vehicle),
         gains=_gains(scenario, vehicle, hover),
         paper=_paper_filter(paper) if scenario.filter.name == "paper" else None,
-        landing=_landing_filter(scenario, sensor, vehicle) if scenario.filter.name == "landing" else None,
+        onboard=carried.onboard if carried else None,
+        table=timetable_of(carried.schedule) if carried else None,
+        settings=carried.settings if carried else np.zeros(0),
         initial_variance=_initial_variance(scenario, paper),
         linear=_linear_truth(paper, hover) if scenario.truth == "linear" else None,
     )
@@ -77,8 +83,12 @@ def assemble(scenario: Scenario) -> Setup:
         },
         "autopilot_gains": flight.gains._asdict(),
     }
+    if carried:
+        parameters["sensors"] = carried.sheets.model_dump(exclude={"flow_sensor"})
+        parameters["filter"] = carried.told.settings.model_dump()
+        parameters["horizon_s"] = carried.schedule.horizon_s
     inputs = tuple(path for path in (vehicle_file, sensor_file) if path)
-    return Setup(scenario, sensor, flight, hover, inputs, parameters)
+    return Setup(scenario, sensor, flight, carried, hover, inputs, parameters)
 
 
 def _gains(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> AutopilotGains:
@@ -134,11 +144,11 @@ def _plan(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> Flight
         fly_on_truth=scenario.autopilot.feedback == "truth",
         home_at_start=scenario.autopilot.home == "start",
         start_known=start_of(scenario) == "known",
+        handover_s=section.takeoff_at_s if on_ground else float(scenario.filter.handover_s),
         draws=Draws(
-            gps_drift=scenario.gps.model != "white",
+            paper=scenario.filter.name == "paper",
+            gps_drift=scenario.filter.name == "paper" and scenario.gps.model != "white",
             wind=scenario.wind.speed_20ft_m_s > 0.0,
-            imu=scenario.filter.name != "paper",
-            pad_fix=scenario.pad_fix is not None,
         ),
     )
 
@@ -179,8 +189,6 @@ def _sensors(scenario: Scenario, sensor: FlowSensor, vehicle: VehicleParameters)
         gps=scenario.gps.parameters(),
         flow=scenario.flow.parameters(sensor),
         rangefinder=scenario.rangefinder.parameters(),
-        imu=scenario.imu.parameters(),
-        pad_fix=scenario.pad_fix.parameters() if scenario.pad_fix else NO_PAD_FIX,
         lens_below_cg_m=vehicle.cg_above_skid_m - scenario.vehicle.lens_above_skid_m,
         pad_half_size_m=0.5 * scenario.pad.size_m,
         gps_offers_velocity=scenario.gps.velocity_sigma_total_m_s > 0.0,
@@ -191,12 +199,6 @@ def _paper_filter(paper: ReducedModel) -> PaperModel:
     """The printed matrices, discretised with the inputs held over an epoch."""
     transition, input_matrix = discretised(paper.a, paper.b, EPOCH_S)
     return PaperModel(transition, input_matrix, np.diag(paper.q).copy(), np.diag(paper.r).copy())
-
-
-def _landing_filter(scenario: Scenario, sensor: FlowSensor, vehicle: VehicleParameters) -> LandingSetup:
-    """The landing filter for these sensors."""
-    lens_below_cg_m = vehicle.cg_above_skid_m - scenario.vehicle.lens_above_skid_m
-    return landing_setup(scenario, sensor, scenario.flow.parameters(sensor), scenario.imu.parameters(), lens_below_cg_m)
 
 
 def _initial_variance(scenario: Scenario, paper: ReducedModel) -> Any:

@@ -6,26 +6,90 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flownav.compile import LANES, ONE_LANE, announce_compilation
+from flownav.measurement import Sensor
+from flownav.navigation.memory import new_work
+from flownav.navigation.take import navigate_lanes, navigate_one
+from flownav.navigation.tape import COMPONENTS, Tape, empty_tape, room_of
 from flownav.simulation import layout
-from flownav.simulation.flight import Flight, fly_block
+from flownav.simulation.flight import PHYSICS_S, Flight, fly_block
 from flownav.simulation.history import HISTORY
+from flownav.simulation.navigating import first_inertial, kept_inertials
+from flownav.simulation.ring import FIELDS
 
 Array = NDArray[np.float64]
 Result = TypeVar("Result")
 
 
+class Flown(NamedTuple):
+    """A block of flights with everything that was written: history (epochs, len(HISTORY), lanes), the navigator's tape,
+    and what it was fed (readings, fields of navigation.memory.Reading, lanes).
+    """
+
+    history: Array
+    tape: Tape
+    fed: Array
+
+
+class Buffers(NamedTuple):
+    """The scratch of one block."""
+
+    work: Array
+    nav: Array
+    tape: Tape
+    fed: Array
+    history: Array
+
+
+def buffers_of(flight: Flight, lanes: tuple[int, ...], epochs: int, *, written: bool) -> Buffers:
+    """Scratch for one block after the other; written: the navigator's tape and what it is fed are kept."""
+    table = flight.table
+    rows, nav, tape, fed = layout.ROWS, np.zeros(0), empty_tape(0, 0, 0, len(lanes)), np.zeros((0, FIELDS, len(lanes)))
+    if table is not None and flight.onboard is not None:
+        rows = first_inertial(table)
+        rows += 6 * kept_inertials(table, flight.onboard.inertial_steps * PHYSICS_S)
+        nav = new_work(lanes)
+        if written:
+            components = int(sum(COMPONENTS.get(Sensor(kind), 0) for kind in table.sensor))
+            tape = empty_tape(epochs + 2, components, 4 * epochs + 8, len(lanes))
+            fed = np.zeros((table.count, FIELDS, len(lanes)))
+    return Buffers(np.empty(rows * len(lanes)), nav, tape, fed, np.empty((epochs, len(HISTORY), len(lanes))))
+
+
+def fly_into(flight: Flight, seed: int, first: int, lanes: tuple[int, ...], b: Buffers, *, compiled: bool = True) -> None:
+    """Fly a block into its buffers. compiled False: in plain Python (tests; it is a thousand times slower)."""
+    if len(b.nav):
+        b.nav[:] = new_work(lanes)
+    b.tape.used[:] = 0
+    unit = navigate_one if len(lanes) == 1 else navigate_lanes
+    take: Any = 0 if flight.onboard is None else (unit.address if compiled else unit.python)
+    room = np.array([*room_of(b.tape), len(b.fed)])
+    fly: Any = fly_block if compiled else fly_block.py_func
+    fly(
+        flight, seed, first, lanes, b.work, b.nav, take, b.tape.estimate.reshape(-1), b.tape.innovation.reshape(-1),
+        b.tape.event.reshape(-1), b.fed.reshape(-1), room, b.tape.used, b.history,
+    )  # fmt: skip
+
+
+def fly_written(flight: Flight, seed: int, first: int = 0, lanes: tuple[int, ...] = ONE_LANE) -> Flown:
+    """A block of `len(lanes)` flights from number `first` on, with everything that the navigator was fed and wrote."""
+    buffers = buffers_of(flight, lanes, flight.plan.epochs, written=True)
+    with announce_compilation("single-flight" if len(lanes) == 1 else "batch"):
+        fly_into(flight, seed, first, lanes, buffers)
+    return Flown(buffers.history, buffers.tape, buffers.fed)
+
+
 def fly_one(flight: Flight, seed: int, index: int = 0) -> Array:
     """The history of flight `index` of a campaign, (epochs, len(HISTORY), 1): the same bytes as in any batch."""
-    history = np.empty((flight.plan.epochs, len(HISTORY), 1))
+    buffers = buffers_of(flight, ONE_LANE, flight.plan.epochs, written=False)
     with announce_compilation("single-flight"):
-        fly_block(flight, seed, index, ONE_LANE, np.empty(layout.ROWS), history)
-    return history
+        fly_into(flight, seed, index, ONE_LANE, buffers)
+    return buffers.history
 
 
 def fly_blocks(
@@ -39,18 +103,15 @@ def fly_blocks(
     own = threading.local()
 
     def fly(start: int) -> tuple[int, Result]:
-        if not hasattr(own, "history"):
-            own.work = np.empty(layout.ROWS * len(LANES))
-            own.history = np.empty((flight.plan.epochs, len(HISTORY), len(LANES)))
-        fly_block(flight, seed, first + start, LANES, own.work, own.history)
+        if not hasattr(own, "buffers"):
+            own.buffers = buffers_of(flight, LANES, flight.plan.epochs, written=False)
+        fly_into(flight, seed, first + start, LANES, own.buffers)
         left = min(len(LANES), flights - start)
-        return left, judge(own.history[:, :, :left])
+        return left, judge(own.buffers.history[:, :, :left])
 
     with announce_compilation("batch"):
         nothing = flight._replace(plan=flight.plan._replace(epochs=0))
-        fly_block(
-            nothing, seed, first, LANES, np.empty(layout.ROWS * len(LANES)), np.empty((0, len(HISTORY), len(LANES)))
-        )
+        fly_into(nothing, seed, first, LANES, buffers_of(nothing, LANES, 0, written=False))
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
         try:
             yield from pool.map(fly, range(0, flights, len(LANES)))

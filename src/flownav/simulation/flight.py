@@ -2,7 +2,7 @@
 
 `fly_block` is the one entry point: a block of one lane is a single flight, a block of `LANES` a slice of a
 batch, and both are the same bytes. Rates: physics 500 Hz (Runge-Kutta), flow dynamics and attitude loop
-250 Hz, sensors, filter and outer loop 50 Hz, rangefinder 10 Hz.
+250 Hz, outer loop 50 Hz; the paper's sensors and filter 50 Hz, the vehicle's own sensors by their datasheets.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, kernel, pointer
+from flownav.compile import equation, kernel, pointer, procedure
 from flownav.control.autopilot import (
     AutopilotGains,
     AutopilotState,
@@ -26,19 +26,18 @@ from flownav.control.autopilot import (
 from flownav.control.guidance import Path, Reference, reference_at
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.paper_filter import PaperModel
-from flownav.frames import GRAVITY_M_S2, rotation_from_quaternion
+from flownav.frames import GRAVITY_M_S2, Quaternion, Rotation, quaternion_product, rotation_from_quaternion
+from flownav.navigation.tape import Output, output_of
 from flownav.sensors.flow import step_flow
 from flownav.sensors.gps_ins import attitude_with_error
 from flownav.sensors.rangefinder import slant_range
 from flownav.simulation import layout
 from flownav.simulation.filtering import run_filter, start_filter
 from flownav.simulation.history import write_history
-from flownav.simulation.landing_filtering import LandingSetup
 from flownav.simulation.layout import (
     load_autopilot,
     load_estimate,
     load_flow,
-    load_gps,
     load_gps_errors,
     load_helicopter,
     load_wind,
@@ -48,8 +47,19 @@ from flownav.simulation.layout import (
     store_controls,
     store_flow,
     store_helicopter,
+    store_true_imu,
     store_wind,
 )
+from flownav.simulation.navigating import (
+    Timetable,
+    carry_ahead,
+    compare_at_horizon,
+    feed_due,
+    hand_to_autopilot,
+    keep_inertial,
+    note_truth,
+)
+from flownav.simulation.onboard import Onboard, read_inertial, sample, start_onboard
 from flownav.simulation.plant import LinearTruth, linear_step, observe_plant, runge_kutta_step
 from flownav.simulation.sensing import (
     EPOCH_S,
@@ -59,6 +69,7 @@ from flownav.simulation.sensing import (
     lens_height,
     sense,
     start_sensors,
+    true_imu,
 )
 from flownav.simulation.wind import WindParameters, start_wind, step_wind
 from flownav.vehicle.parameters import VehicleParameters
@@ -70,6 +81,7 @@ ATTITUDE_S = EPOCH_S / ATTITUDE_STEPS
 PHYSICS_S = ATTITUDE_S / PHYSICS_STEPS
 CONTACT_SHARE = 0.05  # of the weight on the skids counts as touching (a skid switch)
 START_STEP = 1 << 40  # the noise counter's step for the draws before the first epoch
+NOTHING = np.zeros(0)
 
 
 class FlightPlan(NamedTuple):
@@ -82,12 +94,16 @@ class FlightPlan(NamedTuple):
     may_land_after_s: float
     fly_on_truth: bool
     home_at_start: bool  # the pad is where the estimate first puts the start, else at the filter's origin
-    start_known: bool  # the filter starts at the true position, else at the first GPS reading
+    start_known: bool  # the paper's filter starts at the true position, else at the first GPS reading
+    handover_s: float  # until then the vehicle is flown on the truth, where it does not stand on its skids
     draws: Draws
 
 
 class Flight(NamedTuple):
-    """Everything constant over a flight: one of `paper` and `landing`; `linear` only for that truth."""
+    """Everything constant over a flight: the paper's filter, or the sensors that feed the navigator and their timetable.
+
+    linear: only for that truth.
+    """
 
     plan: FlightPlan
     vehicle: VehicleParameters
@@ -96,21 +112,18 @@ class Flight(NamedTuple):
     path: Path
     gains: AutopilotGains
     paper: PaperModel | None
-    landing: LandingSetup | None
+    onboard: Onboard | None
+    table: Timetable | None
+    settings: NDArray[np.float64]  # the navigator's, packed; of no length where the paper's filter flies
     initial_variance: NDArray[np.float64]
     linear: LinearTruth | None
 
 
 # -- start ------------------------------------------------------------------------------------------------
 @equation
-def start_block(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight) -> None:
-    """Vehicle, wind, sensors, autopilot and filter before the first epoch."""
-    for group in range(3):
-        draw_epoch(work, lanes, seed, first, START_STEP + 2 - group, flight.plan.draws)
-        for i in range(3):
-            for lane in range(len(lanes)):
-                normal = work[(layout.FLOW_NORMALS + i) * len(lanes) + lane]
-                work[(layout.START_NORMALS + 3 * group + i) * len(lanes) + lane] = normal
+def start_block(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight, onboard: Onboard | None) -> None:
+    """Vehicle, wind, sensors and autopilot before the first epoch."""
+    draw_epoch(work, lanes, seed, first, START_STEP, flight.plan.draws)
     for lane in range(len(lanes)):
         store_helicopter(work, lanes, lane, flight.plan.start)
         store_wind(work, lanes, lane, start_wind(load_wind_normals(work, lanes, lane), flight.wind))
@@ -118,6 +131,8 @@ def start_block(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight)
         store_autopilot(work, lanes, lane, autopilot)
     observe_plant(work, lanes, flight.vehicle)
     start_sensors(work, lanes, flight.sensors, flight.vehicle.mass_kg, flight.vehicle.gravity_m_s2)
+    if onboard is not None:
+        start_onboard(work, lanes, seed, first, START_STEP + 4, onboard)
 
 
 # -- one epoch --------------------------------------------------------------------------------------------
@@ -160,15 +175,16 @@ def note_home(work: Work, lanes: Lanes, epoch: int, reference: Reference, flight
 
 
 @equation
-def command(work: Work, lanes: Lanes, t_s: float, reference: Reference, flight: Flight) -> None:
+def command(
+    work: Work, lanes: Lanes, t_s: float, reference: Reference, flight: Flight, onboard: Onboard | None
+) -> None:
     """Landing logic and outer loop; the filter's inputs for the coming epoch."""
     plan, gains = flight.plan, flight.gains
     may_fly = 1.0 if t_s >= plan.takeoff_at_s else 0.0
     may_land = 1.0 if t_s >= plan.may_land_after_s else 0.0
     threshold = CONTACT_SHARE * flight.vehicle.mass_kg * flight.vehicle.gravity_m_s2
     for lane in range(len(lanes)):
-        gps = load_gps(work, lanes, lane)
-        rotation = rotation_from_quaternion(gps.qw, gps.qx, gps.qy, gps.qz)
+        rotation = flown_attitude(work, lanes, lane)
         estimate = load_estimate(work, lanes, lane)
         relative = Estimate(
             estimate.pos_n - work[layout.HOME * len(lanes) + lane],
@@ -178,9 +194,22 @@ def command(work: Work, lanes: Lanes, t_s: float, reference: Reference, flight: 
             estimate.v,
             estimate.w,
         )
-        contact = work[layout.CONTACT * len(lanes) + lane]
+        if onboard is None:
+            contact = work[layout.CONTACT * len(lanes) + lane]
+        else:  # the skid switch is all that the autopilot knows of its skids
+            contact = 2.0 * threshold * work[layout.LANDED * len(lanes) + lane]
         state = landing_logic(load_autopilot(work, lanes, lane), contact, threshold, may_fly, may_land, EPOCH_S)
         store_autopilot(work, lanes, lane, outer_loop(state, reference, relative, rotation, gains, EPOCH_S))
+
+
+@equation
+def flown_attitude(work: Work, lanes: Lanes, lane: int) -> Rotation:
+    """R_EB that the outer loop takes the vehicle to have: what the filter, or the INS, says."""
+    row = layout.ESTIMATED_ATTITUDE
+    return rotation_from_quaternion(
+        work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane], work[(row + 2) * len(lanes) + lane],
+        work[(row + 3) * len(lanes) + lane],
+    )  # fmt: skip
 
 
 @equation
@@ -198,14 +227,14 @@ def note_inputs(work: Work, lanes: Lanes, gains: AutopilotGains) -> None:
 
 
 @equation
-def steer(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None) -> None:
-    """The attitude loop: blade angles for the next 4 ms, on the INS attitude and the flybarless unit's gyros."""
+def steer(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None, onboard: Onboard | None) -> None:
+    """The attitude loop: blade angles for the next 4 ms, on the flown attitude and the flybarless unit's gyros."""
     for lane in range(len(lanes)):
         state = load_helicopter(work, lanes, lane)
-        error = load_gps_errors(work, lanes, lane)
-        qw, qx, qy, qz = attitude_with_error(
-            (state.qw, state.qx, state.qy, state.qz), error.roll_rad, error.pitch_rad, error.heading_rad
-        )
+        if onboard is None:
+            qw, qx, qy, qz = ins_attitude(work, lanes, lane)
+        else:
+            qw, qx, qy, qz = own_attitude(work, lanes, lane)
         rotation = rotation_from_quaternion(qw, qx, qy, qz)
         after, lon, lat, col, ped = inner_loop(
             load_autopilot(work, lanes, lane), rotation, state.p, state.q, state.r, flight.gains, ATTITUDE_S
@@ -215,6 +244,26 @@ def steer(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None) 
             store_controls(work, lanes, lane, Controls(lon, lat, col, ped))
         else:
             store_controls(work, lanes, lane, Controls(lon, lat, col, pedal_sideways(after, flight.gains, linear)))
+
+
+@equation
+def ins_attitude(work: Work, lanes: Lanes, lane: int) -> Quaternion:
+    """The paper's INS: the true attitude with its errors of this epoch."""
+    state, error = load_helicopter(work, lanes, lane), load_gps_errors(work, lanes, lane)
+    return attitude_with_error(
+        (state.qw, state.qx, state.qy, state.qz), error.roll_rad, error.pitch_rad, error.heading_rad
+    )
+
+
+@equation
+def own_attitude(work: Work, lanes: Lanes, lane: int) -> Quaternion:
+    """The navigator's attitude of this epoch, turned on since then as the flybarless unit's gyros say."""
+    state, row = load_helicopter(work, lanes, lane), layout.ATTITUDE_ERROR
+    error = (
+        work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane], work[(row + 2) * len(lanes) + lane],
+        work[(row + 3) * len(lanes) + lane],
+    )  # fmt: skip
+    return quaternion_product(error, (state.qw, state.qx, state.qy, state.qz))
 
 
 @equation
@@ -240,7 +289,7 @@ def follow_flow(work: Work, lanes: Lanes, flight: Flight) -> None:
 def advance(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None) -> None:
     """From one epoch to the next."""
     for _ in range(ATTITUDE_STEPS):
-        steer(work, lanes, flight, linear)
+        steer(work, lanes, flight, linear, None)
         follow_flow(work, lanes, flight)
         if linear is None:
             for _ in range(PHYSICS_STEPS):
@@ -250,27 +299,110 @@ def advance(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None
             linear_step(work, lanes, linear)
 
 
-@kernel
-def fly_block(flight: Flight, seed: int, first: int, lanes: Lanes, work: Work, history: NDArray[np.float64]) -> None:
-    """Fly `len(lanes)` flights, numbers `first` and up, of a campaign `seed`.
+@procedure
+def advance_sensing(
+    work: Work, lanes: Lanes, seed: int, first: int, epoch: int, taken: int, heard: int, flight: Flight,
+    onboard: Onboard, table: Timetable,
+) -> None:  # fmt: skip
+    """From one epoch to the next, with an inertial reading at the end of each of its periods."""
+    period_s = onboard.inertial_steps * PHYSICS_S
+    for step in range(ATTITUDE_STEPS * PHYSICS_STEPS):
+        if step % PHYSICS_STEPS == 0:
+            steer(work, lanes, flight, None, onboard)
+            follow_flow(work, lanes, flight)
+        runge_kutta_step(work, lanes, flight.vehicle, PHYSICS_S)
+        if (step + 1) % PHYSICS_STEPS == 0:
+            observe_plant(work, lanes, flight.vehicle)
+        if (step + 1) % onboard.inertial_steps == 0:
+            for lane in range(len(lanes)):
+                truth = true_imu(work, lanes, lane, period_s, flight.vehicle.gravity_m_s2)
+                store_true_imu(work, lanes, lane, truth)
+            part = (step + 1) // onboard.inertial_steps - 1
+            slot = (taken + part) % table.slots
+            read_inertial(work, lanes, seed, first, epoch, part, slot, onboard)
+            keep_inertial(work, lanes, slot, heard + part, period_s, table)
 
-    work (ROWS * len(lanes),) is scratch, zeroed here; history (epochs, len(HISTORY), len(lanes)) is filled.
-    """
-    work[:] = 0.0
-    work = pointer(work)
-    start_block(work, lanes, seed, first, flight)
+
+# -- whole flights ------------------------------------------------------------------------------------------
+@equation
+def fly_on_paper(
+    work: Work, lanes: Lanes, seed: int, first: int, flight: Flight, history: NDArray[np.float64]
+) -> None:
+    """Every epoch with the paper's sensors and its filter, or with no filter at all."""
     for epoch in range(flight.plan.epochs):
         t_s = epoch * EPOCH_S
         reference = reference_at(flight.path, t_s)
         draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
         blow(work, lanes, flight.wind)
-        sense(work, lanes, epoch, flight.sensors, flight.vehicle.gravity_m_s2)
+        sense(work, lanes, epoch, flight.sensors)
         if epoch == 0:
-            start_filter(work, lanes, flight.initial_variance, flight.plan.start_known, flight.landing)
-        run_filter(work, lanes, epoch, flight.paper, flight.landing)
+            start_filter(work, lanes, flight.initial_variance, flight.plan.start_known)
+        run_filter(work, lanes, epoch, flight.paper)
         estimate_for_autopilot(work, lanes, flight)
         note_home(work, lanes, epoch, reference, flight)
-        command(work, lanes, t_s, reference, flight)
+        command(work, lanes, t_s, reference, flight, None)
         write_history(work, lanes, epoch, reference, history)
         advance(work, lanes, flight, flight.linear)
         note_inputs(work, lanes, flight.gains)
+
+
+@equation
+def fly_navigated(
+    work: Work, nav: Work, lanes: Lanes, seed: int, first: int, flight: Flight, onboard: Onboard, table: Timetable,
+    take: int, settings: Work, o: Output, fed: Work, history: NDArray[np.float64],
+) -> None:  # fmt: skip
+    """Every epoch with the vehicle's own sensors and the navigator, on whose estimate of now the autopilot flies."""
+    period_s = onboard.inertial_steps * PHYSICS_S
+    parts = ATTITUDE_STEPS * PHYSICS_STEPS // onboard.inertial_steps
+    ahead = table.horizon_epochs * parts
+    taken, following, heard = 0, 0, 0
+    for epoch in range(flight.plan.epochs):
+        t_s = epoch * EPOCH_S
+        reference = reference_at(flight.path, t_s)
+        draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
+        blow(work, lanes, flight.wind)
+        taken = sample(work, lanes, seed, first, epoch, table.slots, taken, onboard)
+        note_truth(work, lanes, epoch, table)
+        following = feed_due(work, nav, lanes, epoch, following, take, settings, o, fed, table)
+        carry_ahead(work, nav, lanes, heard, ahead if heard >= ahead else heard, period_s, table)
+        compare_at_horizon(work, nav, lanes, epoch, table)
+        waiting = t_s < flight.plan.handover_s
+        hand_to_autopilot(work, nav, lanes, waiting, flight.plan.home_at_start, reference)
+        estimate_for_autopilot(work, lanes, flight)
+        command(work, lanes, t_s, reference, flight, onboard)
+        write_history(work, lanes, epoch, reference, history)
+        advance_sensing(work, lanes, seed, first, epoch, taken, heard, flight, onboard, table)
+        taken += parts
+        heard += parts
+
+
+@equation
+def fly(
+    work: Work, nav: Work, lanes: Lanes, seed: int, first: int, flight: Flight, onboard: Onboard | None,
+    table: Timetable | None, take: int, settings: Work, o: Output, fed: Work, history: NDArray[np.float64],
+) -> None:  # fmt: skip
+    """A block of flights, whichever filter flies; the compiler drops the branch of the other."""
+    start_block(work, lanes, seed, first, flight, onboard)
+    if onboard is None:
+        fly_on_paper(work, lanes, seed, first, flight, history)
+    elif table is not None:
+        fly_navigated(work, nav, lanes, seed, first, flight, onboard, table, take, settings, o, fed, history)
+
+
+@kernel
+def fly_block(
+    flight: Flight, seed: int, first: int, lanes: Lanes, work: NDArray[np.float64], nav: NDArray[np.float64],
+    take: int, estimate: NDArray[np.float64], innovation: NDArray[np.float64], event: NDArray[np.float64],
+    fed: NDArray[np.float64], room: NDArray[np.int64], used: NDArray[np.int64], history: NDArray[np.float64],
+) -> None:  # fmt: skip
+    """Fly `len(lanes)` flights, numbers `first` and up, of a campaign `seed`.
+
+    work (rows of `ring.work_rows` and more, times lanes) is scratch, zeroed here; nav: a navigator that has heard
+    nothing (`navigation.memory.new_work`), taken at the address `take`; its tape and what it is fed flattened; history (epochs, len(HISTORY), len(lanes)) is filled.
+    """
+    work[:] = 0.0
+    o = output_of(estimate, innovation, event, NOTHING, NOTHING, NOTHING, room, used)
+    fly(
+        pointer(work), pointer(nav), lanes, seed, first, flight, flight.onboard, flight.table, take,
+        pointer(flight.settings), o, pointer(fed), history,
+    )  # fmt: skip

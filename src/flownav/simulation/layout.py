@@ -9,31 +9,25 @@ from __future__ import annotations
 from flownav.compile import lane_access
 from flownav.control.autopilot import AutopilotState, Estimate
 from flownav.estimation.kalman import kalman_row_count, kalman_rows
-from flownav.estimation.landing.states import LANDING_ROW_COUNT, landing_rows
+from flownav.estimation.states import Rows
 from flownav.estimation.paper_filter import INPUTS, STATES
+from flownav.sensors.barometer import BarometerNormals, BarometerState, BarometerUnit
 from flownav.sensors.flow import FlowState
+from flownav.sensors.flow_camera import FlowCameraNormals, FlowCameraState, FlowCameraUnit
 from flownav.sensors.gps_ins import GpsInsErrors, GpsInsNormals, NavSolution
-from flownav.sensors.imu import ImuNormals, ImuReading, ImuState
-from flownav.sensors.pad_fix import PadFixNormals, PadFixReading
+from flownav.sensors.gps_receiver import GpsReceiverNormals, GpsReceiverState, GpsReceiverUnit
+from flownav.sensors.imu import ImuReading
+from flownav.sensors.inertial import InertialNormals, InertialState, InertialUnit
+from flownav.sensors.magnetometer import MagnetometerNormals, MagnetometerUnit
+from flownav.sensors.pad_camera import PadCameraNormals, PadCameraUnit
+from flownav.sensors.range_sensor import RangeSensorNormals, RangeSensorState, RangeSensorUnit
 from flownav.sensors.rangefinder import RangefinderState
+from flownav.sensors.skid_switch import SkidSwitchNormals, SkidSwitchState, SkidSwitchUnit
 from flownav.simulation.wind import WindNormals, WindState, WindVelocity
 from flownav.vehicle.state import Controls, HelicopterState, Inflow
 
 
-class _Rows:
-    """Hands out consecutive rows."""
-
-    def __init__(self) -> None:
-        self.next = 0
-
-    def take(self, count: int) -> int:
-        """The first of `count` new rows."""
-        first = self.next
-        self.next += count
-        return first
-
-
-_rows = _Rows()
+_rows = Rows()
 
 # the plant
 HELICOPTER = _rows.take(len(HelicopterState._fields))
@@ -45,6 +39,7 @@ WIND = _rows.take(len(WindState._fields))
 AIR = _rows.take(len(WindVelocity._fields))
 THRUST = _rows.take(1)  # main rotor thrust [N]
 CONTACT = _rows.take(1)  # total skid load [N]
+POWER = _rows.take(1)  # of the main rotor [W]
 PREVIOUS_VELOCITY = _rows.take(3)  # NED velocity one epoch ago [m/s]
 PREVIOUS_ATTITUDE = _rows.take(4)  # attitude one epoch ago
 
@@ -57,21 +52,15 @@ RANGEFINDER = _rows.take(len(RangefinderState._fields))
 FLOW_READING = _rows.take(4)  # u, v, w [m/s], and whether the sensor is engaged
 FLOW_SIGMA = _rows.take(1)  # of the published flow velocity [m/s]
 RANGE = _rows.take(2)  # the latest reading [m] and whether it is valid
-IMU = _rows.take(len(ImuState._fields))
-IMU_BIAS = IMU + ImuState._fields.index("accel_bias_x")
-IMU_READING = _rows.take(len(ImuReading._fields))
-PAD_READING = _rows.take(len(PadFixReading._fields))
 
 # standard normals of the epoch: pairs in the order of drawing
 GPS_NORMALS = _rows.take(len(GpsInsNormals._fields))
 GPS_JITTER = GPS_NORMALS + GpsInsNormals._fields.index("jitter_n")
 FLOW_NORMALS = _rows.take(4)  # u, v, w, range
 WIND_NORMALS = _rows.take(len(WindNormals._fields) + len(WindNormals._fields) % 2)
-IMU_NORMALS = _rows.take(len(ImuNormals._fields))
-PAD_NORMALS = _rows.take(len(PadFixNormals._fields))
 NORMALS_END = _rows.next
 
-# the paper's filter: state and covariance, inputs and measurements; then the landing filter
+# the paper's filter: state and covariance, inputs and measurements
 FILTER = kalman_rows(_rows.take(kalman_row_count(STATES)), STATES)
 INPUT = _rows.take(INPUTS)
 MEASURED = _rows.take(STATES)
@@ -79,11 +68,39 @@ ARRIVED = _rows.take(STATES)
 SCORED = STATES
 INNOVATION = _rows.take(2 * STATES)  # of each component, then their variances
 
-LANDING = landing_rows(_rows.take(LANDING_ROW_COUNT))
-START_NORMALS = _rows.take(9)  # of this flight's start: position, velocity, accelerometer bias
-STILL = _rows.take(1)  # 1.0 where the vehicle stands on its skids
-ALWAYS = _rows.take(1)  # 1.0
-NOTHING = _rows.take(1)  # 0.0
+# the sensors that feed the navigator: each unit as it was drawn for this flight, its state, its normals
+INERTIAL_UNIT = _rows.take(len(InertialUnit._fields))
+INERTIAL = _rows.take(len(InertialState._fields))
+INERTIAL_NORMALS = _rows.take(len(InertialNormals._fields))
+RECEIVER_UNIT = _rows.take(len(GpsReceiverUnit._fields))
+RECEIVER = _rows.take(len(GpsReceiverState._fields))
+RECEIVER_NORMALS = _rows.take(len(GpsReceiverNormals._fields))
+CAMERA_UNIT = _rows.take(len(FlowCameraUnit._fields))
+CAMERA = _rows.take(len(FlowCameraState._fields))
+CAMERA_NORMALS = _rows.take(len(FlowCameraNormals._fields))
+RANGE_UNIT = _rows.take(len(RangeSensorUnit._fields))
+RANGER = _rows.take(len(RangeSensorState._fields))
+RANGE_NORMALS = _rows.take(len(RangeSensorNormals._fields))
+BARO_UNIT = _rows.take(len(BarometerUnit._fields))
+BARO = _rows.take(len(BarometerState._fields))
+BARO_NORMALS = _rows.take(len(BarometerNormals._fields))
+MAG_UNIT = _rows.take(len(MagnetometerUnit._fields))
+MAG_NORMALS = _rows.take(len(MagnetometerNormals._fields))
+PAD_UNIT = _rows.take(len(PadCameraUnit._fields))
+PAD_NORMALS = _rows.take(len(PadCameraNormals._fields))
+SKID_UNIT = _rows.take(len(SkidSwitchUnit._fields))
+SKID = _rows.take(len(SkidSwitchState._fields))
+SKID_NORMALS = _rows.take(len(SkidSwitchNormals._fields))
+DRAWN = _rows.take(30)  # normals of a unit or of a start
+TRUE_IMU = _rows.take(len(ImuReading._fields))  # means over the last inertial period
+EXPOSED = _rows.take(5)  # since the last flow: sums of the true rate (3) and of what the gyro read about x and y
+LANDED = _rows.take(1)  # what the skid switch says
+# what the vehicle makes of the navigator: carried on to now
+PLACE = _rows.take(3)  # of the pad in the navigator's frame, as far as the vehicle knows it [m]
+ATTITUDE_ERROR = _rows.take(4)  # rotation from the true attitude to the one that is flown on, earth axes
+HORIZON_ERROR = _rows.take(6)  # position NED and body velocity at the horizon, less the truth then
+ELIMINATION = _rows.take(6 + 36)  # scratch of the normalised error
+HANDED_OVER = _rows.take(1)  # 1 once the autopilot flies on the estimate
 
 # what the filter says, whichever flies: position NED and body velocity, and their variances
 ESTIMATED = _rows.take(STATES)
@@ -110,12 +127,30 @@ load_gps_held, store_gps_held = lane_access(NavSolution, GPS_HELD)
 load_gps, store_gps = lane_access(NavSolution, GPS)
 load_flow, store_flow = lane_access(FlowState, FLOW)
 load_rangefinder, store_rangefinder = lane_access(RangefinderState, RANGEFINDER)
-load_imu, store_imu = lane_access(ImuState, IMU)
-load_imu_reading, store_imu_reading = lane_access(ImuReading, IMU_READING)
+load_true_imu, store_true_imu = lane_access(ImuReading, TRUE_IMU)
 load_gps_normals, _ = lane_access(GpsInsNormals, GPS_NORMALS)
 load_wind_normals, _ = lane_access(WindNormals, WIND_NORMALS)
-load_imu_normals, _ = lane_access(ImuNormals, IMU_NORMALS)
-load_pad_normals, _ = lane_access(PadFixNormals, PAD_NORMALS)
-load_pad_reading, store_pad_reading = lane_access(PadFixReading, PAD_READING)
+load_inertial_unit, store_inertial_unit = lane_access(InertialUnit, INERTIAL_UNIT)
+load_inertial, store_inertial = lane_access(InertialState, INERTIAL)
+load_inertial_normals, _ = lane_access(InertialNormals, INERTIAL_NORMALS)
+load_receiver_unit, store_receiver_unit = lane_access(GpsReceiverUnit, RECEIVER_UNIT)
+load_receiver, store_receiver = lane_access(GpsReceiverState, RECEIVER)
+load_receiver_normals, _ = lane_access(GpsReceiverNormals, RECEIVER_NORMALS)
+load_camera_unit, store_camera_unit = lane_access(FlowCameraUnit, CAMERA_UNIT)
+load_camera, store_camera = lane_access(FlowCameraState, CAMERA)
+load_camera_normals, _ = lane_access(FlowCameraNormals, CAMERA_NORMALS)
+load_range_unit, store_range_unit = lane_access(RangeSensorUnit, RANGE_UNIT)
+load_ranger, store_ranger = lane_access(RangeSensorState, RANGER)
+load_range_normals, _ = lane_access(RangeSensorNormals, RANGE_NORMALS)
+load_baro_unit, store_baro_unit = lane_access(BarometerUnit, BARO_UNIT)
+load_baro, store_baro = lane_access(BarometerState, BARO)
+load_baro_normals, _ = lane_access(BarometerNormals, BARO_NORMALS)
+load_mag_unit, store_mag_unit = lane_access(MagnetometerUnit, MAG_UNIT)
+load_mag_normals, _ = lane_access(MagnetometerNormals, MAG_NORMALS)
+load_pad_unit, store_pad_unit = lane_access(PadCameraUnit, PAD_UNIT)
+load_pad_normals, _ = lane_access(PadCameraNormals, PAD_NORMALS)
+load_skid_unit, store_skid_unit = lane_access(SkidSwitchUnit, SKID_UNIT)
+load_skid, store_skid = lane_access(SkidSwitchState, SKID)
+load_skid_normals, _ = lane_access(SkidSwitchNormals, SKID_NORMALS)
 load_estimate, store_estimate = lane_access(Estimate, ESTIMATE)
 load_autopilot, store_autopilot = lane_access(AutopilotState, AUTOPILOT)

@@ -141,3 +141,4 @@ def observe_plant(work: Work, lanes: Lanes, vehicle: VehicleParameters) -> None:
         seen = outputs(load_helicopter(work, lanes, lane), air.wind_n_m_s, air.wind_e_m_s, air.wind_d_m_s, vehicle)
         work[layout.THRUST * len(lanes) + lane] = seen.thrust_n
         work[layout.CONTACT * len(lanes) + lane] = seen.contact_force_n
+        work[layout.POWER * len(lanes) + lane] = seen.power_w

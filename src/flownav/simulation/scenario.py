@@ -15,7 +15,7 @@ from pydantic import Field, ValidationInfo, field_validator
 from flownav.errors import InputError
 from flownav.parameter_files import Number, ParameterModel, load, shipped
 from flownav.sensors.datasheet import FlowSettings
-from flownav.sensors.settings import GpsInsSettings, ImuSettings, PadFixSettings, RangefinderSettings
+from flownav.sensors.settings import GpsInsSettings, PadFixSettings, RangefinderSettings
 from flownav.simulation.wind import WindSettings
 
 SHIPPED = ("takeoff", "landing", "gusty", "pad_return", "approach")
@@ -76,10 +76,13 @@ class VehicleSection(ParameterModel):
 
 
 class FilterSection(ParameterModel):
-    """Which filter flies, and where it starts: at the known pad, or at the first GPS reading."""
+    """Which filter flies: the navigator's, or the paper's, which starts at the known pad or at the first GPS reading.
+
+    handover_s: a vehicle that starts in hover is flown on the truth so long, while the navigator listens.
+    """
 
     name: Literal["paper", "landing"] = "landing"
-    flow_min_height_m: Number = Field(0.3, ge=0.0, le=100.0)
+    handover_s: Number = Field(5.0, ge=0.0, le=600.0)
     start: Literal["known", "gps"] | None = None
 
 
@@ -92,6 +95,24 @@ class PrecisionSection(ParameterModel):
     align_radius_m: Number = Field(0.03, gt=0.0, le=100.0)
     align_speed_m_s: Number = Field(1.0, gt=0.0, le=100.0)
     commit_height_m: Number = Field(0.3, ge=0.0, le=100.0)
+
+
+class SensorsSection(ParameterModel):
+    """The datasheets of what the vehicle carries for its navigator; the shipped ones unless named.
+
+    `gps`, `rangefinder` and `pad_fix` of the scenario stand above what the sheets say. texture: whether flow finds it
+    everywhere or on the pad alone.
+    """
+
+    inertial: str | None = None
+    gps_receiver: str | None = None
+    flow_camera: str | None = None
+    range_sensor: str | None = None
+    barometer: str | None = None
+    magnetometer: str | None = None
+    pad_camera: str | None = None
+    skid_switch: str | None = None
+    texture: Literal["everywhere", "pad"] = "everywhere"
 
 
 class AutopilotSection(ParameterModel):
@@ -125,7 +146,7 @@ class Scenario(ParameterModel):
     flow: FlowSettings = FlowSettings()
     flow_sensor: str | None = None
     rangefinder: RangefinderSettings = RangefinderSettings()
-    imu: ImuSettings = ImuSettings()
+    sensors: SensorsSection = SensorsSection()
     pad_fix: PadFixSettings | None = None
     wind: WindSettings = WindSettings()
     filter: FilterSection = FilterSection()
@@ -144,6 +165,13 @@ def load_scenario(name: str) -> Scenario:
         update={
             "vehicle": scenario.vehicle.model_copy(update={"file": _beside(path, scenario.vehicle.file)}),
             "flow_sensor": _beside(path, scenario.flow_sensor),
+            "sensors": scenario.sensors.model_copy(
+                update={
+                    name: _beside(path, getattr(scenario.sensors, name))
+                    for name in type(scenario.sensors).model_fields
+                    if name != "texture"
+                }
+            ),
         }
     )
 

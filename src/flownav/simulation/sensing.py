@@ -18,8 +18,7 @@ from flownav.sensors.gps_ins import (
     start_gps_ins,
     step_gps_ins,
 )
-from flownav.sensors.imu import ImuParameters, ImuReading, start_imu, step_imu
-from flownav.sensors.pad_fix import PadFixParameters, read_pad
+from flownav.sensors.imu import ImuReading
 from flownav.sensors.rangefinder import RangefinderParameters, start_rangefinder, step_rangefinder
 from flownav.simulation import layout
 from flownav.simulation.layout import (
@@ -29,17 +28,11 @@ from flownav.simulation.layout import (
     load_gps_held,
     load_gps_normals,
     load_helicopter,
-    load_imu,
-    load_imu_normals,
-    load_pad_normals,
     load_rangefinder,
     store_flow,
     store_gps,
     store_gps_errors,
     store_gps_held,
-    store_imu,
-    store_imu_reading,
-    store_pad_reading,
     store_rangefinder,
 )
 from flownav.simulation.noise import normal_pair
@@ -47,7 +40,6 @@ from flownav.vehicle.helicopter import HelicopterState
 
 EPOCH_S = 0.02  # the GPS/INS unit, the published flow and the filters: 50 Hz
 RANGE_EPOCHS = 5  # the rangefinder: 10 Hz
-PAD_EPOCHS = 5  # the pad-relative fix: 10 Hz
 
 
 class SensorSuite(NamedTuple):
@@ -56,8 +48,6 @@ class SensorSuite(NamedTuple):
     gps: GpsInsParameters
     flow: FlowParameters
     rangefinder: RangefinderParameters
-    imu: ImuParameters
-    pad_fix: PadFixParameters
     lens_below_cg_m: float
     pad_half_size_m: float
     gps_offers_velocity: bool  # the unit's own velocity serves while the flow sensor is not engaged
@@ -66,10 +56,9 @@ class SensorSuite(NamedTuple):
 class Draws(NamedTuple):
     """Which groups of normals a scenario needs (those of a silent sensor are not drawn)."""
 
-    gps_drift: bool  # everything of the GPS/INS but the position's jitter, which is always drawn
+    paper: bool  # the paper's GPS/INS, flow and sonar fly
+    gps_drift: bool  # everything of the GPS/INS but the position's jitter
     wind: bool
-    imu: bool
-    pad_fix: bool
 
 
 @equation
@@ -87,17 +76,14 @@ def draw_normals(work: Work, lanes: Lanes, first_row: int, end_row: int, seed: i
 @equation
 def draw_epoch(work: Work, lanes: Lanes, seed: int, flight: int, step: int, draws: Draws) -> None:
     """Every normal of one epoch; `flight` is the index of the first lane's flight."""
-    draw_normals(work, lanes, layout.GPS_JITTER, layout.GPS_JITTER + 4, seed, flight, step)
+    if draws.paper:
+        draw_normals(work, lanes, layout.GPS_JITTER, layout.GPS_JITTER + 4, seed, flight, step)
+        draw_normals(work, lanes, layout.FLOW_NORMALS, layout.WIND_NORMALS, seed, flight, step)
     if draws.gps_drift:
         draw_normals(work, lanes, layout.GPS_NORMALS, layout.GPS_JITTER, seed, flight, step)
         draw_normals(work, lanes, layout.GPS_JITTER + 4, layout.FLOW_NORMALS, seed, flight, step)
-    draw_normals(work, lanes, layout.FLOW_NORMALS, layout.WIND_NORMALS, seed, flight, step)
     if draws.wind:
-        draw_normals(work, lanes, layout.WIND_NORMALS, layout.IMU_NORMALS, seed, flight, step)
-    if draws.imu:
-        draw_normals(work, lanes, layout.IMU_NORMALS, layout.PAD_NORMALS, seed, flight, step)
-    if draws.pad_fix:
-        draw_normals(work, lanes, layout.PAD_NORMALS, layout.NORMALS_END, seed, flight, step)
+        draw_normals(work, lanes, layout.WIND_NORMALS, layout.NORMALS_END, seed, flight, step)
 
 
 @equation
@@ -117,8 +103,8 @@ def lens_height(state: HelicopterState, cosine: float, lens_below_cg_m: float) -
 
 
 @equation
-def true_imu(work: Work, lanes: Lanes, lane: int, gravity_m_s2: float) -> ImuReading:
-    """Means over the last epoch in body axes, as an integrating IMU has them.
+def true_imu(work: Work, lanes: Lanes, lane: int, period_s: float, gravity_m_s2: float) -> ImuReading:
+    """Means over the last period in body axes, as an integrating IMU has them.
 
     Rate: the turn q0* q1 as a vector, over dt. Specific force: delta v / dt - g in the attitude of the middle.
     """
@@ -126,9 +112,9 @@ def true_imu(work: Work, lanes: Lanes, lane: int, gravity_m_s2: float) -> ImuRea
     rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
     vel_n, vel_e, vel_d = to_earth(rotation, state.u, state.v, state.w)
     row = layout.PREVIOUS_VELOCITY
-    accel_n = (vel_n - work[row * len(lanes) + lane]) / EPOCH_S
-    accel_e = (vel_e - work[(row + 1) * len(lanes) + lane]) / EPOCH_S
-    accel_d = (vel_d - work[(row + 2) * len(lanes) + lane]) / EPOCH_S
+    accel_n = (vel_n - work[row * len(lanes) + lane]) / period_s
+    accel_e = (vel_e - work[(row + 1) * len(lanes) + lane]) / period_s
+    accel_d = (vel_d - work[(row + 2) * len(lanes) + lane]) / period_s
     work[row * len(lanes) + lane] = vel_n
     work[(row + 1) * len(lanes) + lane] = vel_e
     work[(row + 2) * len(lanes) + lane] = vel_d
@@ -137,7 +123,7 @@ def true_imu(work: Work, lanes: Lanes, lane: int, gravity_m_s2: float) -> ImuRea
     y, z = work[(row + 2) * len(lanes) + lane], work[(row + 3) * len(lanes) + lane]
     turn = quaternion_product((w, -x, -y, -z), (state.qw, state.qx, state.qy, state.qz))
     half_square = turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3]
-    per_s = 2.0 * (1.0 + half_square / 6.0) / EPOCH_S
+    per_s = 2.0 * (1.0 + half_square / 6.0) / period_s
     w, x, y, z = w + state.qw, x + state.qx, y + state.qy, z + state.qz
     shrink = 1.0 / np.sqrt(w * w + x * x + y * y + z * z)
     middle = rotation_from_quaternion(w * shrink, x * shrink, y * shrink, z * shrink)
@@ -170,8 +156,6 @@ def start_sensors(work: Work, lanes: Lanes, suite: SensorSuite, mass_kg: float, 
         store_rangefinder(work, lanes, lane, start_rangefinder(height, cosine, suite.rangefinder))
         thrust = work[layout.THRUST * len(lanes) + lane] / mass_kg
         store_flow(work, lanes, lane, start_flow(state.u, state.v, state.w, thrust, suite.flow))
-        imu = start_imu(true_imu(work, lanes, lane, gravity_m_s2), load_imu_normals(work, lanes, lane), suite.imu)
-        store_imu(work, lanes, lane, imu)
 
 
 @equation
@@ -236,20 +220,6 @@ def read_flow_sensor(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
 
 
 @equation
-def read_pad_fix(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
-    """Where the camera sees the pad (10 Hz)."""
-    for lane in range(len(lanes)):
-        state = load_helicopter(work, lanes, lane)
-        rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
-        lens = suite.lens_below_cg_m
-        reading = read_pad(
-            state.pos_n + rotation[2] * lens, state.pos_e + rotation[5] * lens, state.pos_d + rotation[8] * lens,
-            rotation, load_pad_normals(work, lanes, lane), suite.pad_fix,
-        )  # fmt: skip
-        store_pad_reading(work, lanes, lane, reading)
-
-
-@equation
 def choose_velocity(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
     """The velocity of the paper's measurement: flow where it is engaged, else the GPS/INS's own, turned to the body."""
     for lane in range(len(lanes)):
@@ -265,26 +235,13 @@ def choose_velocity(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
 
 
 @equation
-def read_imu(work: Work, lanes: Lanes, suite: SensorSuite, gravity_m_s2: float) -> None:
-    """The inertial reading of this epoch."""
-    for lane in range(len(lanes)):
-        truth = true_imu(work, lanes, lane, gravity_m_s2)
-        after, reading = step_imu(load_imu(work, lanes, lane), truth, load_imu_normals(work, lanes, lane), suite.imu)
-        store_imu(work, lanes, lane, after)
-        store_imu_reading(work, lanes, lane, reading)
-
-
-@equation
-def sense(work: Work, lanes: Lanes, epoch: int, suite: SensorSuite, gravity_m_s2: float) -> None:
+def sense(work: Work, lanes: Lanes, epoch: int, suite: SensorSuite) -> None:
     """Every reading of one epoch, and which of them arrived."""
     read_gps(work, lanes, suite)
     if epoch % RANGE_EPOCHS == 0:
         read_rangefinder(work, lanes, suite)
     read_flow_sensor(work, lanes, suite)
     choose_velocity(work, lanes, suite)
-    read_imu(work, lanes, suite, gravity_m_s2)
-    if epoch % PAD_EPOCHS == 0:
-        read_pad_fix(work, lanes, suite)
     for component in range(3):
         for lane in range(len(lanes)):
             position = work[(layout.GPS + component) * len(lanes) + lane]

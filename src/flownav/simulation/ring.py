@@ -1,0 +1,61 @@
+"""Readings on their way: a ring of slots in the lane buffer, between the sensors and the navigator's horizon.
+
+A slot holds one reading of every lane, field by field as `navigation.memory.Reading` has them. Slots are filled in the
+order of sampling and emptied in the order of the instants that the readings describe, both known beforehand
+(`schedule`), so that no lane waits for another.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flownav.compile import equation
+from flownav.estimation.kalman import Lanes, Work
+from flownav.navigation.memory import READING, Reading
+from flownav.simulation import layout
+
+FIELDS = len(Reading._fields)
+FIRST = layout.ROWS
+
+
+def work_rows(slots: int) -> int:
+    """Rows of a lane buffer with so many slots."""
+    return FIRST + slots * FIELDS
+
+
+@equation
+def put_slot(work: Work, lanes: Lanes, slot: int, lane: int, reading: Reading) -> None:
+    """One lane's reading into a slot."""
+    row = FIRST + slot * FIELDS
+    work[row * len(lanes) + lane] = reading.value_0
+    work[(row + 1) * len(lanes) + lane] = reading.value_1
+    work[(row + 2) * len(lanes) + lane] = reading.value_2
+    work[(row + 3) * len(lanes) + lane] = reading.value_3
+    work[(row + 4) * len(lanes) + lane] = reading.value_4
+    work[(row + 5) * len(lanes) + lane] = reading.value_5
+    work[(row + 6) * len(lanes) + lane] = reading.variance_0
+    work[(row + 7) * len(lanes) + lane] = reading.variance_1
+    work[(row + 8) * len(lanes) + lane] = reading.variance_2
+    work[(row + 9) * len(lanes) + lane] = reading.quality
+    work[(row + 10) * len(lanes) + lane] = reading.arrived
+    work[(row + 11) * len(lanes) + lane] = reading.withheld
+
+
+@equation
+def reading_of(
+    value_0: float, value_1: float, value_2: float, variance_0: float, variance_1: float, variance_2: float,
+    quality: float, arrived: float,
+) -> Reading:  # fmt: skip
+    """A reading of up to three values, with the variances that it states (NaN where it states none)."""
+    return Reading(
+        value_0, value_1, value_2, np.nan, np.nan, np.nan, variance_0, variance_1, variance_2, quality, arrived, 0.0
+    )
+
+
+@equation
+def hand_over(work: Work, nav: Work, lanes: Lanes, slot: int) -> None:
+    """A slot's readings become the reading at hand of the navigator's buffer."""
+    row = FIRST + slot * FIELDS
+    for i in range(FIELDS):
+        for lane in range(len(lanes)):
+            nav[(READING + i) * len(lanes) + lane] = work[(row + i) * len(lanes) + lane]

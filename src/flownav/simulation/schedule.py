@@ -1,0 +1,108 @@
+"""When each sensor reads and when the navigator takes it: one timetable for all flights of a scenario.
+
+Every reading has three times: the instant at which it was taken, the instant that it describes as far as anybody
+knows (`t_s`: its arrival less the age that the datasheet states; arrivals are uneven, so this is off by the jitter),
+and the epoch in which the navigator takes it, a fixed horizon later. Readings are taken in the order of `t_s`, as a live
+session's horizon releases them. The timetable is a scenario's, not a flight's: what differs from flight to flight is
+what was read and whether it arrived.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.measurement import Sensor
+from flownav.simulation.onboard import EPOCH_S, PHYSICS_PERIOD_S, Clock, Onboard
+
+JITTER_KEY = 20251121  # of the timetable's own generator: it is part of the scenario, not of a seed
+SLACK_S = 1e-9
+
+
+class Timing(NamedTuple):
+    """lag_s: age of what is read at the instant of reading it (a sensor's own dynamics); latency_s: from there to its
+    arrival; jitter_s: how uneven arrivals are, and so how far off their stamps.
+    """
+
+    lag_s: float
+    latency_s: float
+    jitter_s: float
+
+
+class Schedule(NamedTuple):
+    """The readings in the order in which the navigator takes them.
+
+    t_s (n,), sensor (n,), slot (n,) of the ring, epoch (n,) in which it is taken; slots: of the ring; horizon_epochs:
+    how far the navigator lags behind the present.
+    """
+
+    t_s: NDArray[np.float64]
+    sensor: NDArray[np.int64]
+    slot: NDArray[np.int64]
+    epoch: NDArray[np.int64]
+    slots: int
+    horizon_epochs: int
+
+    @property
+    def horizon_s(self) -> float:
+        """How far the navigator lags behind the present [s]."""
+        return self.horizon_epochs * EPOCH_S
+
+
+def schedule_of(epochs: int, sensors: Onboard, timing: dict[Sensor, Timing]) -> Schedule:
+    """The timetable of a flight of `epochs` epochs; `timing` of each sensor that is fitted."""
+    horizon = max(1, math.ceil((max(t.lag_s + t.latency_s for t in timing.values()) - SLACK_S) / EPOCH_S))
+    t_s, sensor, sampled = sampled_readings(epochs, sensors, timing)
+    ready = np.ceil((t_s - SLACK_S) / EPOCH_S).astype(np.int64) + horizon
+    by_epoch = np.searchsorted(sampled, np.arange(epochs), side="right")  # how many were read by the end of an epoch
+    newest = by_epoch[np.clip(ready, 0, epochs - 1)]
+    slots = int(np.max(newest - np.arange(len(t_s)))) + 1
+    order = np.argsort(t_s, kind="stable")
+    slot = np.arange(len(t_s)) % slots
+    return Schedule(t_s[order], sensor[order], slot[order], ready[order], slots, horizon)
+
+
+def sampled_readings(
+    epochs: int, sensors: Onboard, timing: dict[Sensor, Timing]
+) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
+    """Every reading in the order of `onboard.sample`: the instant it is taken to describe, its sensor, its epoch."""
+    generator = np.random.Generator(np.random.Philox(JITTER_KEY))
+    parts = round(EPOCH_S / (sensors.inertial_steps * PHYSICS_PERIOD_S))
+    rows: list[tuple[float, int, int]] = []
+    late_s = 0.0
+    for epoch in range(epochs):
+        for sensor, clock in clocks(sensors):
+            if due_at(clock, epoch):
+                if sensor != Sensor.GPS_VELOCITY:  # which comes with the position
+                    late_s = timing[sensor].jitter_s * (2.0 * generator.random() - 1.0)
+                rows.append((epoch * EPOCH_S - timing[sensor].lag_s + late_s, int(sensor), epoch))
+        for part in range(parts):
+            t_s = epoch * EPOCH_S + (part + 1) * sensors.inertial_steps * PHYSICS_PERIOD_S
+            rows.append((t_s, int(Sensor.IMU), epoch))
+    described, kinds, epochs_of = zip(*rows, strict=True)
+    return np.array(described), np.array(kinds, np.int64), np.array(epochs_of, np.int64)
+
+
+def clocks(sensors: Onboard) -> list[tuple[Sensor, Clock]]:
+    """Every sensor but the inertial one, in the order in which `onboard.sample` reads them."""
+    velocity = sensors.receiver_clock._replace(
+        fitted=sensors.receiver_clock.fitted if sensors.receiver_offers_velocity else 0
+    )
+    return [
+        (Sensor.GPS_POSITION, sensors.receiver_clock),
+        (Sensor.GPS_VELOCITY, velocity),
+        (Sensor.BARO, sensors.baro_clock),
+        (Sensor.MAG, sensors.mag_clock),
+        (Sensor.RANGE, sensors.range_clock),
+        (Sensor.FLOW_RATE, sensors.camera_clock),
+        (Sensor.PAD, sensors.pad_clock),
+        (Sensor.LANDED, sensors.skid_clock),
+    ]
+
+
+def due_at(clock: Clock, epoch: int) -> bool:
+    """Whether a sensor reads in this epoch."""
+    return clock.fitted > 0 and epoch >= clock.first and (epoch - clock.first) % clock.every == 0

@@ -1,34 +1,24 @@
-"""A bare loop of landing-filter steps, for timing."""
+"""A bare loop of filter steps, for timing and for very long runs."""
 
 from __future__ import annotations
 
-from flownav.compile import kernel
-from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.landing.algebra import fuse
-from flownav.estimation.landing.observe import (
-    ATTITUDE_STATES,
-    GPS_POSITION_STATES,
-    GPS_VELOCITY_STATES,
-    LAGGED_FLOW_STATES,
-    RANGE_STATES,
-    observe_attitude,
-    observe_gps_position,
-    observe_gps_velocity,
-    observe_lagged_flow,
-    observe_range,
-    offer,
-)
-from flownav.estimation.landing.predict import predict
-from flownav.estimation.landing.settings import FlowLag, LandingSettings
-from flownav.estimation.landing.states import LANDING_ROW_COUNT, landing_rows
+from flownav.compile import equation, kernel, pointer
+from flownav.estimation.covariance import Lanes, Work, expect, settle
+from flownav.estimation.error_models import FilterSettings, propagate_errors
+from flownav.estimation.lag import FlowLag, lag_ends, lag_starts
+from flownav.estimation.laws.attitude import attitude
+from flownav.estimation.laws.flow import flow_rate, lagged_flow
+from flownav.estimation.laws.gps import gps_position, gps_velocity
+from flownav.estimation.laws.height import range_along_boresight
+from flownav.estimation.motion import predict
+from flownav.estimation.states import FILTER_ROWS, MEASURED, NOISE, OFFERED, STATES, STATES_WITH_LAG
 
-FILTER = landing_rows(0)
-ATTITUDE_READ = LANDING_ROW_COUNT  # quaternion
+ATTITUDE_READ = FILTER_ROWS  # quaternion
 POSITION_READ = ATTITUDE_READ + 4
 VELOCITY_READ = POSITION_READ + 3
-FLOW_READ = VELOCITY_READ + 3  # forward, right [m/s]
+FLOW_READ = VELOCITY_READ + 3  # forward, right [m/s] where the sensor has dynamics, else rates about x, y [rad/s]
 RANGE_READ = FLOW_READ + 2
-ARRIVED = RANGE_READ + 1
+ARRIVED = RANGE_READ + 1  # above 0 where the readings are offered
 ROWS = ARRIVED + 1
 SCALARS = 12  # fused in a step
 STEP_S = 0.02
@@ -36,33 +26,56 @@ ATTITUDE_VARIANCE, POSITION_VARIANCE, VELOCITY_VARIANCE = 1e-4, 0.04, 1e-3
 FLOW_VARIANCE, RANGE_VARIANCE, LENS_BELOW_M = 1e-3, 1e-4, 0.1
 
 
-@kernel
-def run_landing_filter(
-    work: Work, lanes: Lanes, steps: int, age_s: float, settings: LandingSettings, lag: FlowLag
-) -> None:
-    """Predict and fuse attitude, GPS position and velocity, flow and range, `steps` times; work (ROWS * len(lanes),).
+@equation
+def offer(work: Work, lanes: Lanes, read: int, count: int, variance: float) -> None:
+    """The reading in `count` rows from `read` on, of one variance, where it arrived."""
+    for i in range(count):
+        for lane in range(len(lanes)):
+            work[(MEASURED + i) * len(lanes) + lane] = work[(read + i) * len(lanes) + lane]
+    for lane in range(len(lanes)):
+        work[NOISE * len(lanes) + lane] = variance
+        work[OFFERED * len(lanes) + lane] = work[ARRIVED * len(lanes) + lane]
 
-    Row ARRIVED says where the readings are offered; GPS and attitude are of one prediction ago where age_s > 0.
-    """
+
+@equation
+def take(work: Work, lanes: Lanes, n: int, gate_sigma: float) -> None:
+    """Test and fuse what was observed."""
+    expect(work, lanes, n, False)
+    settle(work, lanes, n, gate_sigma)
+
+
+@kernel
+def run_landing_filter(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettings, lag: FlowLag | None) -> None:
+    """Predict and fuse attitude, GPS position and velocity, flow and range, `steps` times; (ROWS * len(lanes),)."""
+    work = pointer(buffer)
+    n = STATES if lag is None else STATES_WITH_LAG
     gate = settings.gate_sigma
     for _ in range(steps):
-        predict(work, lanes, FILTER, STEP_S, settings, lag)
+        if lag is not None:
+            lag_starts(work, lanes, lag)
+        predict(work, lanes, n, STEP_S, settings)
+        propagate_errors(work, lanes, n, STEP_S, settings)
+        if lag is not None:
+            lag_ends(work, lanes, lag)
         for axis in range(3):
-            offer(work, lanes, FILTER, ATTITUDE_VARIANCE, ARRIVED)
-            observe_attitude(work, lanes, FILTER, axis, ATTITUDE_READ, age_s)
-            fuse(work, lanes, FILTER, ATTITUDE_STATES[axis], gate)
+            offer(work, lanes, ATTITUDE_READ, 4, ATTITUDE_VARIANCE)
+            attitude(work, lanes, axis)
+            take(work, lanes, n, gate)
         for axis in range(3):
-            offer(work, lanes, FILTER, POSITION_VARIANCE, ARRIVED)
-            observe_gps_position(work, lanes, FILTER, axis, POSITION_READ + axis, age_s)
-            fuse(work, lanes, FILTER, GPS_POSITION_STATES[axis], gate)
+            offer(work, lanes, POSITION_READ + axis, 1, POSITION_VARIANCE)
+            gps_position(work, lanes, axis, 0.0, 0.0, 0.0)
+            take(work, lanes, n, gate)
         for axis in range(3):
-            offer(work, lanes, FILTER, VELOCITY_VARIANCE, ARRIVED)
-            observe_gps_velocity(work, lanes, FILTER, axis, VELOCITY_READ + axis, age_s)
-            fuse(work, lanes, FILTER, GPS_VELOCITY_STATES[axis], gate)
-        for channel in range(2):
-            offer(work, lanes, FILTER, FLOW_VARIANCE, ARRIVED)
-            observe_lagged_flow(work, lanes, FILTER, channel, FLOW_READ + channel, lag.gain)
-            fuse(work, lanes, FILTER, LAGGED_FLOW_STATES[channel], gate)
-        offer(work, lanes, FILTER, RANGE_VARIANCE, ARRIVED)
-        observe_range(work, lanes, FILTER, RANGE_READ, LENS_BELOW_M)
-        fuse(work, lanes, FILTER, RANGE_STATES, gate)
+            offer(work, lanes, VELOCITY_READ + axis, 1, VELOCITY_VARIANCE)
+            gps_velocity(work, lanes, axis, 0.0, 0.0, 0.0)
+            take(work, lanes, n, gate)
+        for axis in range(2):
+            offer(work, lanes, FLOW_READ + axis, 1, FLOW_VARIANCE)
+            if lag is not None:
+                lagged_flow(work, lanes, axis, lag.gain)
+            else:
+                flow_rate(work, lanes, axis, 0.0, 0.0, LENS_BELOW_M, LENS_BELOW_M)
+            take(work, lanes, n, gate)
+        offer(work, lanes, RANGE_READ, 1, RANGE_VARIANCE)
+        range_along_boresight(work, lanes, 0, LENS_BELOW_M, 0.0, 0.0)
+        take(work, lanes, n, gate)

@@ -137,11 +137,11 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
             variance = work[INNOVATION_VARIANCE * len(lanes) + lane] if fused else 1.0
             cross = work[(CROSS + i) * len(lanes) + lane] if fused else 0.0
             gain = cross / variance
+            innovation = work[INNOVATION * len(lanes) + lane] if fused else 0.0
             before = work[(STATE + i) * len(lanes) + lane]
-            after = before + gain * work[INNOVATION * len(lanes) + lane]
             work[(GAIN + i) * len(lanes) + lane] = gain
             work[(REST + i) * len(lanes) + lane] = cross - 0.5 * gain * variance
-            work[(STATE + i) * len(lanes) + lane] = after if fused else before
+            work[(STATE + i) * len(lanes) + lane] = before + gain * innovation if fused else before
     for j in range(n):
         for i in range(j + 1):
             for lane in range(len(lanes)):
@@ -155,12 +155,13 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
 def fold_attitude(work: Work, lanes: Lanes) -> None:
     """The correction of the attitude error into the quaternion: q <- (1, theta/2) q, of unit length; theta <- 0.
 
-    Without a correction the quaternion keeps its last bit.
+    A lane without a correction keeps every bit.
     """
     for lane in range(len(lanes)):
-        x = 0.5 * work[(STATE + ATTITUDE) * len(lanes) + lane]
-        y = 0.5 * work[(STATE + ATTITUDE + 1) * len(lanes) + lane]
-        z = 0.5 * work[(STATE + ATTITUDE + 2) * len(lanes) + lane]
+        north = work[(STATE + ATTITUDE) * len(lanes) + lane]
+        east = work[(STATE + ATTITUDE + 1) * len(lanes) + lane]
+        down = work[(STATE + ATTITUDE + 2) * len(lanes) + lane]
+        x, y, z = 0.5 * north, 0.5 * east, 0.5 * down
         qw = work[QUATERNION * len(lanes) + lane]
         qx = work[(QUATERNION + 1) * len(lanes) + lane]
         qy = work[(QUATERNION + 2) * len(lanes) + lane]
@@ -175,9 +176,9 @@ def fold_attitude(work: Work, lanes: Lanes) -> None:
         work[(QUATERNION + 1) * len(lanes) + lane] = a * shrink if corrected else qx
         work[(QUATERNION + 2) * len(lanes) + lane] = b * shrink if corrected else qy
         work[(QUATERNION + 3) * len(lanes) + lane] = c * shrink if corrected else qz
-        work[(STATE + ATTITUDE) * len(lanes) + lane] = 0.0
-        work[(STATE + ATTITUDE + 1) * len(lanes) + lane] = 0.0
-        work[(STATE + ATTITUDE + 2) * len(lanes) + lane] = 0.0
+        work[(STATE + ATTITUDE) * len(lanes) + lane] = 0.0 if corrected else north
+        work[(STATE + ATTITUDE + 1) * len(lanes) + lane] = 0.0 if corrected else east
+        work[(STATE + ATTITUDE + 2) * len(lanes) + lane] = 0.0 if corrected else down
 
 
 # -- single states --------------------------------------------------------------------------------------------

@@ -100,6 +100,26 @@ def test_a_name_that_nobody_knows_is_refused():
         transition(named(lambda pos_n: OnThree(1.0, 1.0, 1.0), Scattered))
 
 
+def test_a_law_that_reads_more_than_there_is_room_for_is_refused():
+    class OnMany(NamedTuple):
+        gps_slow_n: float
+        gps_slow_e: float
+        gps_slow_d: float
+        gps_fast_n: float
+        gps_fast_e: float
+        gps_fast_d: float
+        pos_n: float
+        pos_e: float
+        pos_d: float
+        vel_n: float
+        vel_e: float
+        vel_d: float
+        baro: float
+
+    with pytest.raises(ValueError, match="reads more than 12 states"):
+        law(named(lambda baro: (baro, OnMany(*[1.0] * 13)), tuple[float, OnMany]))
+
+
 # -- transitions -----------------------------------------------------------------------------------------------
 class Scattered(NamedTuple):
     baro: float

@@ -27,7 +27,7 @@ from filters import (
 )
 from flownav.compile import ONE_LANE
 from flownav.estimation.error_models import FilterSettings
-from flownav.estimation.lag import FlowLag, lag_ends, lag_starts, seen_velocity
+from flownav.estimation.lag import FlowLag, lag_ends, lag_over, lag_starts, seen_velocity
 from flownav.estimation.motion import predict
 from flownav.estimation.states import (
     ACCEL_NOISE,
@@ -121,6 +121,11 @@ def test_what_the_sensor_sees_has_its_derivative_above_and_below_its_floor(filte
         h[GROUND], h[POSITION + 2] = found.height, -found.height
         theirs = innovation_gradient(filter_, partial(seen, channel=channel))
         assert np.allclose(h, theirs, rtol=1e-11, atol=1e-11)
+
+
+def test_the_lag_over_a_step_is_the_ramps_integral():
+    for dt_s in (0.004, EPOCH_S, 0.1):
+        assert lag_over(A, B, C, dt_s, 0.3, 0.1) == pytest.approx(paper_lag(dt_s), rel=1e-11, abs=1e-15)
 
 
 def flight_with_steps_of_acceleration(lag: FlowLag, epochs: int = 60) -> tuple[np.ndarray, np.ndarray]:

@@ -10,8 +10,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from flownav.compile import equation, procedure
 from flownav.estimation.covariance import Lanes, Work
+from flownav.estimation.discretise import discretised
 from flownav.estimation.law import step
 from flownav.estimation.laws.geometry import body_axis, cross, lens_range
 from flownav.estimation.states import STATES_WITH_LAG
@@ -36,6 +39,24 @@ class FlowLag(NamedTuple):
     gain: float
     sonar_floor_m: float  # below it the sensor multiplies its flow by this instead of the range; 0: it does not
     lens_below_m: float  # the lens below the vehicle's reference point, along body down
+
+
+def lag_over(
+    a_1_s2: float, b_1_s: float, c_1_s2: float, dt_s: float, sonar_floor_m: float, lens_below_m: float
+) -> FlowLag:
+    """G(s) = a/(s^2 + b s + c) over steps of dt in which the seen velocity goes in a straight line.
+
+    The velocity is a third state whose slope is held (first-order hold; Franklin, Powell and Workman, Digital Control
+    of Dynamic Systems, 1998, section 6.3.2).
+    """
+    model = np.array([[0.0, 1.0, 0.0], [-c_1_s2, -b_1_s, 1.0], [0.0, 0.0, 0.0]])
+    whole, by_slope = discretised(model, np.array([[0.0], [0.0], [1.0]]), dt_s)
+    end = by_slope[:2, 0] / dt_s
+    start = whole[:2, 2] - end
+    return FlowLag(
+        float(whole[0, 0]), float(whole[0, 1]), float(whole[1, 0]), float(whole[1, 1]),
+        float(start[0]), float(start[1]), float(end[0]), float(end[1]), a_1_s2, sonar_floor_m, lens_below_m,
+    )  # fmt: skip
 
 
 class Seen(NamedTuple):

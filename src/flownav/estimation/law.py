@@ -20,6 +20,7 @@ from flownav.estimation.states import (
     COEFFICIENT,
     INNOVATION,
     MEASURED,
+    MOST_OBSERVED,
     OBSERVED,
     PLACES,
     ROWS_BY_NAME,
@@ -54,6 +55,8 @@ def law(function: Callable[..., tuple[Any, Any]]) -> Observation:
     """
     names, scalars = parameters(function)
     jacobian = get_args(get_type_hints(function)["return"])[1]
+    if len(jacobian._fields) > MOST_OBSERVED:
+        raise ValueError(f"{function.__name__} reads more than {MOST_OBSERVED} states")
     reads = any(name.startswith("measured") for name in names)
     noted = [f"work[{OBSERVED} * len(lanes)] = {len(jacobian._fields)}.0"]
     noted += [f"work[{OBSERVED + 1 + i} * len(lanes)] = {place(name)}" for i, name in enumerate(jacobian._fields)]

@@ -44,7 +44,10 @@ STATE_NAMES = (
     "pad_n_m", "pad_e_m", "pad_d_m", "lag_u1", "lag_u2", "lag_v1", "lag_v2",
 )  # fmt: skip
 
-# the same without units, as laws name them
+MOST_OBSERVED = 12  # states that one observation reads
+MOST_SOURCES = 15  # and one transition
+
+# STATE_NAMES without units, as laws name them
 SHORT_NAMES = (
     "pos_n", "pos_e", "pos_d", "vel_n", "vel_e", "vel_d", "tilt_n", "tilt_e", "heading",
     "gyro_bias_x", "gyro_bias_y", "gyro_bias_z", "accel_bias_x", "accel_bias_y", "accel_bias_z",
@@ -91,13 +94,15 @@ INNOVATION = _rows.take(1)
 INNOVATION_VARIANCE = _rows.take(1)  # h P h' + R
 TEST_RATIO = _rows.take(1)  # innovation^2 / (gate^2 h P h' + R); above 1 is refused
 ACCEPTED = _rows.take(1)  # 1 in lanes where it is to be fused, and then where it was
-COEFFICIENT = _rows.take(12)  # h on the states that OBSERVED names
-OBSERVED = _rows.take(13)  # in the first lane, for all of them: how many states the law reads, then their places
+COEFFICIENT = _rows.take(MOST_OBSERVED)  # h on the states that OBSERVED names
+OBSERVED = _rows.take(
+    1 + MOST_OBSERVED
+)  # in the first lane, for all of them: how many states the law reads, then their places
 # within a step
 CROSS = _rows.take(STATES_WITH_LAG)  # P h'
 GAIN = _rows.take(STATES_WITH_LAG)  # K
 REST = _rows.take(STATES_WITH_LAG)  # P h' - K S/2
-SCRATCH = _rows.take(15 * 15)  # a transition's own block of P, both triangles
+SCRATCH = _rows.take(MOST_SOURCES * MOST_SOURCES)  # a transition's own block of P, both triangles
 DRIVE = _rows.take(14)  # derivatives of what a flow sensor with dynamics sees
 # the packed upper triangle of P, column by column: last, so that a compiler sees that no element is another row
 COVARIANCE = _rows.take(STATES_WITH_LAG * (STATES_WITH_LAG + 1) // 2)

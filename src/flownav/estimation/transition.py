@@ -14,7 +14,7 @@ from typing import Any, Protocol, cast, get_type_hints
 
 from flownav.compiling.bundles import write_function
 from flownav.estimation.law import at, compiled, dressed, parameters, value_of
-from flownav.estimation.states import COVARIANCE, PLACES, SCRATCH, SHORT_NAMES
+from flownav.estimation.states import COVARIANCE, MOST_SOURCES, PLACES, SCRATCH, SHORT_NAMES
 
 
 class Transition(Protocol):
@@ -36,6 +36,8 @@ def transition(function: Callable[..., Any]) -> Transition:
     targets = [PLACES[name] for name in get_type_hints(function)["return"]._fields]
     if not set(targets) <= set(sources):
         raise NameError(f"{function.__name__} changes states that it does not read")
+    if len(sources) > MOST_SOURCES:
+        raise ValueError(f"{function.__name__} reads more than {MOST_SOURCES} states")
     width, position = len(sources), {state: k for k, state in enumerate(sources)}
 
     def call(where: Callable[[int], str], changed: list[int]) -> list[str]:

@@ -11,7 +11,7 @@ from flownav.record import POSITION_NED, VELOCITY_BODY, Record
 from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, score_block, scores_of_flight
 from flownav.scoring.paper_tables import published
 from flownav.simulation.assemble import Setup
-from flownav.simulation.engine import fly_blocks, fly_one
+from flownav.simulation.engine import fly_blocks, fly_written
 from flownav.simulation.flight import Flight
 from flownav.simulation.flight_record import record_of
 from flownav.simulation.history import column, columns
@@ -52,9 +52,9 @@ def fly_many(
 
 def fly_recorded(setup: Setup, seed: int, index: int = 0) -> Record:
     """One flight as a scored Record."""
-    history = fly_one(setup.flight, seed, index)
-    record = record_of(setup, history, seed, index)
-    record.manifest["scores"] = scores_of_flight(score_history(setup.flight, history)[0])
+    flown = fly_written(setup.flight, seed, index)
+    record = record_of(setup, flown, seed, index)
+    record.manifest["scores"] = scores_of_flight(score_history(setup.flight, flown.history)[0])
     record.manifest["paper"] = published(setup.scenario.paper_table)
     return record
 

@@ -142,6 +142,7 @@ def _plan(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> Flight
         takeoff_at_s=0.0 if linear else section.takeoff_at_s,
         may_land_after_s=NEVER_S if linear or section.may_land_after_s is None else section.may_land_after_s,
         fly_on_truth=scenario.autopilot.feedback == "truth",
+        along_truth=False,
         home_at_start=scenario.autopilot.home == "start",
         start_known=start_of(scenario) == "known",
         handover_s=section.takeoff_at_s if on_ground else float(scenario.filter.handover_s),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple, TypeVar
 
+import numpy as np
+
 from flownav.measurement import Array, Sensor
 from flownav.navigation.packed import pack
 from flownav.navigation.settings_of import Told, settings_of
@@ -35,7 +37,10 @@ START_WAIT_S = 10.0
 
 
 class Fitted(NamedTuple):
-    """What flies: sensors, their timetable, the navigator's settings (and packed), its equipment, the sheets."""
+    """What flies: sensors, their timetable, the navigator's settings (and packed), its equipment, the sheets.
+
+    ages_s: how old a reading is on arrival, by `measurement.Sensor`.
+    """
 
     onboard: Onboard
     schedule: Schedule
@@ -43,13 +48,18 @@ class Fitted(NamedTuple):
     equipment: Equipment
     settings: Array
     sheets: SensorSheets
+    ages_s: Array
 
 
 def fitted(scenario: Scenario, flow_sensor: FlowSensor, vehicle: VehicleParameters, epochs: int) -> Fitted:
     """The vehicle's sensors as a scenario wants them. InputError as the sheets' loaders say."""
     sheets = sheets_of(scenario, flow_sensor, vehicle)
     onboard = onboard_of(scenario, sheets, flow_sensor, vehicle)
-    schedule = schedule_of(epochs, onboard, timing_of(sheets, flow_sensor, onboard))
+    timing = timing_of(sheets, flow_sensor)
+    schedule = schedule_of(epochs, onboard, timing)
+    ages_s = np.zeros(max(Sensor) + 1)
+    for kind, late in timing.items():
+        ages_s[kind] = late.lag_s + late.latency_s
     rotor_hz = vehicle.main_speed_rad_s / (2.0 * math.pi)
     told = settings_of(
         flow_sensor, sheets, flow_noise_stated=True, rotor_hz=(rotor_hz, BLADES * rotor_hz)
@@ -57,7 +67,7 @@ def fitted(scenario: Scenario, flow_sensor: FlowSensor, vehicle: VehicleParamete
     equipment = Equipment(True, False, FROM_MAG, True, START_WAIT_S)
     sigma = told.settings.start_sigma(has_heading=True, compass=True)
     settings = pack(told.settings.settings(equipment, told.noise), sigma)
-    return Fitted(onboard, schedule, told, equipment, settings, sheets)
+    return Fitted(onboard, schedule, told, equipment, settings, sheets, ages_s)
 
 
 # -- datasheets -----------------------------------------------------------------------------------------------
@@ -197,7 +207,7 @@ def place_of(lens: Lever) -> Place:
     return Place(float(lens.forward_m), float(lens.right_m), float(lens.down_m))
 
 
-def timing_of(sheets: SensorSheets, flow_sensor: FlowSensor, onboard: Onboard) -> dict[Sensor, Timing]:
+def timing_of(sheets: SensorSheets, flow_sensor: FlowSensor) -> dict[Sensor, Timing]:
     """How old each sensor's readings are. The flow sensor's own lag is what its file says of a slow signal: b/c."""
     found: dict[Sensor, Timing] = {Sensor.IMU: Timing(0.0, float(sheets.inertial.latency_s), 0.0)}
     lag_s = flow_sensor.dynamics.delay_s

@@ -58,6 +58,7 @@ from flownav.simulation.navigating import (
     hand_to_autopilot,
     keep_inertial,
     note_truth,
+    put_on_truth,
 )
 from flownav.simulation.onboard import Onboard, read_inertial, sample, start_onboard
 from flownav.simulation.plant import LinearTruth, linear_step, observe_plant, runge_kutta_step
@@ -93,6 +94,7 @@ class FlightPlan(NamedTuple):
     takeoff_at_s: float
     may_land_after_s: float
     fly_on_truth: bool
+    along_truth: bool  # the navigator's Jacobians are taken on the truth: its covariance is the bound
     home_at_start: bool  # the pad is where the estimate first puts the start, else at the filter's origin
     start_known: bool  # the paper's filter starts at the true position, else at the first GPS reading
     handover_s: float  # until then the vehicle is flown on the truth, where it does not stand on its skids
@@ -366,6 +368,8 @@ def fly_navigated(
         following = feed_due(work, nav, lanes, epoch, following, take, settings, o, fed, table)
         carry_ahead(work, nav, lanes, heard, ahead if heard >= ahead else heard, period_s, table)
         compare_at_horizon(work, nav, lanes, epoch, table)
+        if flight.plan.along_truth:
+            put_on_truth(work, nav, lanes, epoch, table)
         waiting = t_s < flight.plan.handover_s
         hand_to_autopilot(work, nav, lanes, waiting, flight.plan.home_at_start, reference)
         estimate_for_autopilot(work, lanes, flight)

@@ -1,4 +1,8 @@
-"""From the history of one flight to its Record: tables, measurement streams, events."""
+"""From one flight to its Record: the truth, what was estimated and flown on, readings, innovations, events.
+
+A flight on the navigator keeps what the navigator was fed, reading by reading, so that `flownav replay` of the record
+runs the same navigator on the same readings.
+"""
 
 from __future__ import annotations
 
@@ -8,80 +12,130 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.measurement import COLUMNS, Sensor
+from flownav.measurement import COLUMNS, MAX_VALUES, Sensor
+from flownav.navigation.loop import STATED
+from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
 from flownav.provenance import command_line, provenance
-from flownav.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY, Record, Table
+from flownav.record import FED, POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY, Record, Table
 from flownav.simulation.assemble import Setup
+from flownav.simulation.engine import Flown
 from flownav.simulation.history import HISTORY
-from flownav.simulation.sensing import EPOCH_S, PAD_EPOCHS, RANGE_EPOCHS
+from flownav.simulation.sensing import EPOCH_S, RANGE_EPOCHS
 
 Array = NDArray[np.float64]
 GATE_SIGMA_SHOWN = 3.0  # the paper's filter has no gate: its test ratios are shown against 3 sigma and all are fused
 
 
-def record_of(setup: Setup, history: Array, seed: int, index: int) -> Record:
-    """The record of flight `index`, not yet scored; history (epochs, len(HISTORY), 1)."""
-    scenario = setup.scenario
-    flown = {key: history[:, i, 0] for i, key in enumerate(HISTORY)}
-    t_s: Array = np.arange(len(history), dtype=np.float64) * EPOCH_S
-    record = Record(
-        {
-            "kind": "fly",
-            "scenario": scenario.name,
-            "description": scenario.description,
-            "filter": scenario.filter.name,
-            "gps": scenario.gps.model,
-            "truth": scenario.truth,
-            "feedback": scenario.autopilot.feedback,
-            "seed": seed,
-            "flight": index,
-            "duration_s": float(t_s[-1]),
-            "pad_size_m": scenario.pad.size_m,
-            "command": command_line(),
-            "parameters": setup.parameters,
-            "provenance": provenance(setup.inputs),
-        }
-    )
+def record_of(setup: Setup, flown: Flown, seed: int, index: int, lane: int = 0) -> Record:
+    """The record of flight `index`, not yet scored: lane `lane` of a block that was flown with everything written."""
+    history = {key: flown.history[:, i, lane] for i, key in enumerate(HISTORY)}
+    t_s: Array = np.arange(len(flown.history), dtype=np.float64) * EPOCH_S
+    record = Record(_manifest(setup, seed, index, float(t_s[-1])))
 
     def table(name: str, source: str, columns: tuple[str, ...], rows: Any = slice(None), **more: Array) -> None:
-        record.add(name, {"t_s": t_s[rows], **{c: flown[source, c][rows] for c in columns}, **more})
+        record.add(name, {"t_s": t_s[rows], **{c: history[source, c][rows] for c in columns}, **more})
 
     truth = tuple(c for c in TABLES["truth"] if c != "on_ground")
-    table("truth", "truth", truth, on_ground=(flown["truth", "contact_n"] > 0.0).astype(float))
-    if setup.flight.landing is not None:
-        table("estimate", "estimate", TABLES["estimate"])
-    else:  # the others take the INS attitude as it comes, and say nothing of their consistency
-        attitude = {name: flown["gps", name] for name in QUATERNION}
-        own = tuple(c for c in TABLES["estimate"] if c not in (*QUATERNION, "nees"))
-        table("estimate", "estimate", own, **attitude)
+    table("truth", "truth", truth, on_ground=(history["truth", "contact_n"] > 0.0).astype(float))
     ground = -setup.flight.vehicle.cg_above_skid_m  # the reference of a landing runs on below the ground
-    flown["command", "pos_d_ref_m"] = np.minimum(flown["command", "pos_d_ref_m"], ground)
+    history["command", "pos_d_ref_m"] = np.minimum(history["command", "pos_d_ref_m"], ground)
     table("command", "command", TABLES["command"])
-    every = np.full(len(t_s), 255.0)
-    table("gps_position", "gps", COLUMNS[Sensor.GPS_POSITION], quality=every)
-    if scenario.gps.model != "white":  # with white noise the unit's velocity is the truth and nobody's input
-        table("gps_velocity", "gps", COLUMNS[Sensor.GPS_VELOCITY], quality=every)
-    table("attitude", "gps", COLUMNS[Sensor.ATTITUDE], quality=every)
-    table("flow_velocity", "flow", (*VELOCITY_BODY, "sigma_m_s"), quality=255.0 * flown["flow", "engaged"])
-    pings = slice(0, None, RANGE_EPOCHS)
-    table("range", "range", COLUMNS[Sensor.RANGE], pings, quality=255.0 * flown["range", "valid"][pings])
-    if setup.flight.plan.draws.pad_fix:
-        fixes = slice(0, None, PAD_EPOCHS)
-        table("pad", "pad", COLUMNS[Sensor.PAD], fixes, quality=255.0 * flown["pad", "valid"][fixes])
-    if setup.flight.plan.draws.imu:
-        table("imu", "imu", COLUMNS[Sensor.IMU], quality=every)
-    record.add("innovation", _innovations(t_s, flown, _gate_sigma(setup)))
-    record.add("events", _events(t_s, flown))
+    if setup.fitted is None:
+        _add_papers(record, setup, history, t_s, table)
+        happened = []
+    else:
+        table("flown", "estimate", (*POSITION_NED, *VELOCITY_BODY, *QUATERNION))
+        happened = _add_navigators(record, setup, flown, lane)
+    record.add("events", _events(t_s, history, happened, by_sensor=setup.fitted is None))
     return record
 
 
-def _gate_sigma(setup: Setup) -> float | None:
-    """The gate of the filter that flew; None for the paper's, which has none."""
-    return setup.flight.landing.settings.gate_sigma if setup.flight.landing else None
+def _manifest(setup: Setup, seed: int, index: int, duration_s: float) -> dict[str, Any]:
+    """What was flown, with what."""
+    scenario = setup.scenario
+    facts: dict[str, Any] = {
+        "kind": "fly",
+        "scenario": scenario.name,
+        "description": scenario.description,
+        "filter": scenario.filter.name,
+        "gps": scenario.gps.model,
+        "truth": scenario.truth,
+        "feedback": scenario.autopilot.feedback,
+        "seed": seed,
+        "flight": index,
+        "duration_s": duration_s,
+        "pad_size_m": scenario.pad.size_m,
+        "command": command_line(),
+        "parameters": setup.parameters,
+        "provenance": provenance(setup.inputs),
+    }
+    if setup.fitted is not None:
+        facts["segments"] = [setup.fitted.equipment._asdict()]
+    return facts
 
 
-def _innovations(t_s: Array, flown: dict[tuple[str, str], Array], gate_sigma: float | None) -> Table:
-    """One row per measurement component offered to the filter, in time order; gate_sigma None: no gate."""
+def _add_papers(
+    record: Record, setup: Setup, history: dict[tuple[str, str], Array], t_s: Array, table: Callable[..., None]
+) -> None:
+    """The paper's filter (or none), which takes the INS's attitude as it comes and says nothing of its consistency."""
+    attitude = {name: history["gps", name] for name in QUATERNION}
+    own = tuple(c for c in TABLES["estimate"] if c not in (*QUATERNION, "nees"))
+    table("estimate", "estimate", own, **attitude)
+    every = np.full(len(t_s), 255.0)
+    table("gps_position", "gps", COLUMNS[Sensor.GPS_POSITION], quality=every)
+    if setup.scenario.gps.model != "white":  # with white noise the unit's velocity is the truth and nobody's input
+        table("gps_velocity", "gps", COLUMNS[Sensor.GPS_VELOCITY], quality=every)
+    table("attitude", "gps", COLUMNS[Sensor.ATTITUDE], quality=every)
+    table("flow_velocity", "flow", (*VELOCITY_BODY, "sigma_m_s"), quality=255.0 * history["flow", "engaged"])
+    pings = slice(0, None, RANGE_EPOCHS)
+    table("range", "range", COLUMNS[Sensor.RANGE], pings, quality=255.0 * history["range", "valid"][pings])
+    record.add("innovation", _innovations(t_s, history))
+
+
+def _add_navigators(record: Record, setup: Setup, flown: Flown, lane: int) -> list[tuple[float, str, str, str, float]]:
+    """What the navigator said at its horizon, what it was fed, what became of each component; what happened to it."""
+    estimate = flown.tape.estimates(lane)
+    record.add("estimate", estimate_table(estimate))
+    record.add("states", states_table(estimate))
+    fed = fed_rows(setup, flown, lane)
+    record.add("fed", dict(zip(FED, fed.T, strict=True)))
+    first, arrived = FED.index("value_0"), fed[:, FED.index("arrived")] > 0.0
+    for sensor in Sensor:
+        rows = fed[(fed[:, FED.index("sensor")] == sensor) & arrived]
+        if len(rows):
+            values = rows[:, first : first + len(COLUMNS[sensor])]
+            columns = dict(zip(COLUMNS[sensor], values.T, strict=True))
+            quality = rows[:, FED.index("quality")]
+            record.add(sensor.name.lower(), {"t_s": rows[:, FED.index("arrival_s")], **columns, "quality": quality})
+    record.add("innovation", innovation_table(flown.tape.offers(lane)))
+    return happenings(flown.tape.events(lane))
+
+
+def fed_rows(setup: Setup, flown: Flown, lane: int) -> Array:
+    """What one lane's navigator was fed, row by row as `record.FED` has it."""
+    assert setup.fitted is not None
+    schedule = setup.fitted.schedule
+    taken = int(np.searchsorted(schedule.epoch, setup.flight.plan.epochs))
+    rows = np.full((taken, len(FED)), np.nan)
+    fed = flown.fed[:taken, :, lane]
+    columns = {
+        "t_s": schedule.t_s[:taken],
+        "arrival_s": schedule.t_s[:taken] + setup.fitted.ages_s[schedule.sensor[:taken]],
+        "sensor": schedule.sensor[:taken].astype(float),
+        "quality": fed[:, MAX_VALUES + STATED],
+        "arrived": fed[:, MAX_VALUES + STATED + 1],
+        "withheld": fed[:, MAX_VALUES + STATED + 2],
+        "segment": np.zeros(taken),
+        **{f"value_{i}": fed[:, i] for i in range(MAX_VALUES)},
+        **{f"variance_{i}": fed[:, MAX_VALUES + i] for i in range(STATED)},
+    }
+    for name, column in columns.items():
+        rows[:, FED.index(name)] = column
+    return rows
+
+
+def _innovations(t_s: Array, flown: dict[tuple[str, str], Array]) -> Table:
+    """One row per measurement component offered to the paper's filter, in time order; it has no gate."""
     names = (*POSITION_NED, *VELOCITY_BODY)
     count = len(names)
 
@@ -92,14 +146,11 @@ def _innovations(t_s: Array, flown: dict[tuple[str, str], Array], gate_sigma: fl
     engaged = np.repeat(flown["flow", "engaged"], count) > 0.0
     source = np.where(is_position, "gps_position", np.where(engaged, "flow_velocity", "gps_velocity"))
     arrived = is_position | (np.repeat(flown["measured", "velocity_arrived"], count) > 0.0)
-    if gate_sigma is not None:  # flow alone stands here; INS velocity is a measurement of its own
-        arrived = is_position | engaged
     variances = interleaved(lambda i: flown["innovation", f"innovation_variance_{i}"])
     kept = arrived & (variances > 0.0)  # no variance: the filter does not take that component
     variance = variances[kept]
     innovation = interleaved(lambda i: flown["innovation", f"innovation_{i}"])[kept]
-    ratio = innovation**2 / ((gate_sigma or GATE_SIGMA_SHOWN) ** 2 * variance)
-    fused = (ratio <= 1.0) | (gate_sigma is None)
+    ratio = innovation**2 / (GATE_SIGMA_SHOWN**2 * variance)
     return {
         "t_s": np.repeat(t_s, count)[kept],
         "sensor": source[kept],
@@ -108,25 +159,29 @@ def _innovations(t_s: Array, flown: dict[tuple[str, str], Array], gate_sigma: fl
         "innovation": innovation,
         "innovation_variance": variance,
         "test_ratio": ratio,
-        "fused": fused.astype(float),
-        "reason": np.where(fused, "fused", "innovation_gate"),
+        "fused": np.ones(len(ratio)),
+        "reason": np.full(len(ratio), "fused"),
     }
 
 
-def _events(t_s: Array, flown: dict[tuple[str, str], Array]) -> Table:
-    """Engagements of the flow sensor, lift-off and touchdown, in time order."""
+def _events(
+    t_s: Array, flown: dict[tuple[str, str], Array], happened: list[tuple[float, str, str, str, float]], *,
+    by_sensor: bool,
+) -> Table:  # fmt: skip
+    """What happened to the navigator, lift-off and touchdown, engagements of the paper's flow sensor, in time order."""
     height = -flown["truth", "pos_d_m"]
     contact = flown["truth", "contact_n"] > 0.0
     engaged = flown["flow", "engaged"] > 0.0
-    rows: list[tuple[float, str, str, str, float]] = []
+    rows: list[tuple[float, str, str, str, float]] = list(happened)
 
     def changes(signal: NDArray[np.bool_], source: str, begins: str, ends: str, detail: str, value: Array) -> None:
         for k in np.flatnonzero(np.diff(signal.astype(int))) + 1:
             rows.append((t_s[k], source, begins if signal[k] else ends, detail, float(value[k])))
 
-    if engaged[0]:
+    if by_sensor and engaged[0]:
         rows.append((t_s[0], "flow", "engaged", "centre of gravity above ground [m]", float(height[0])))
-    changes(engaged, "flow", "engaged", "disengaged", "centre of gravity above ground [m]", height)
+    if by_sensor:
+        changes(engaged, "flow", "engaged", "disengaged", "centre of gravity above ground [m]", height)
     sink = flown["truth", "sink_rate_m_s"]
     changes(contact, "vehicle", "touchdown", "lift-off", "sink rate [m/s]", np.roll(sink, 1))
     rows.sort(key=lambda row: row[0])

@@ -152,6 +152,26 @@ def normalised_error(work: Work, nav: Work, lanes: Lanes, lane: int, row: int) -
     return total
 
 
+@procedure
+def put_on_truth(work: Work, nav: Work, lanes: Lanes, epoch: int, table: Timetable) -> None:
+    """The navigator's position, velocity and attitude become the truth at its horizon, so that Jacobians are taken there.
+
+    Its covariance is then that of the posterior Cramér-Rao bound along this flight (`estimation.bound`), for its model.
+    """
+    then = epoch - table.horizon_epochs
+    row = first_truth(table) + (then % (table.horizon_epochs + 1)) * TRUTH
+    for lane in range(len(lanes)):
+        running = load_start(nav, lanes, lane).started > 0.0 and then >= 0
+        for i in range(6):
+            true = work[(row + i) * len(lanes) + lane]
+            said = nav[(STATE + i) * len(lanes) + lane]
+            nav[(STATE + i) * len(lanes) + lane] = true if running else said
+        for i in range(4):
+            true = work[(row + 6 + i) * len(lanes) + lane]
+            said = nav[(QUATERNION + i) * len(lanes) + lane]
+            nav[(QUATERNION + i) * len(lanes) + lane] = true if running else said
+
+
 # -- from the horizon to now --------------------------------------------------------------------------------------
 @procedure
 def carry_ahead(work: Work, nav: Work, lanes: Lanes, heard: int, ahead: int, period_s: float, table: Timetable) -> None:

@@ -7,14 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flownav.compile import ONE_LANE
+from flownav.estimation.covariance import variance_of
 from flownav.estimation.gating import Reason
-from flownav.estimation.landing.states import STATES
+from flownav.estimation.states import STATE
 from flownav.frames import GRAVITY_M_S2
 from flownav.measurement import EventQueue, Sensor, Stream, merge
-from flownav.navigation.feed import new_navigator
-from flownav.navigation.loop import run
+from flownav.navigation.feed import equipment_of
+from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.state import EVENT_NAMES, ROWS, Running, new_tape
+from flownav.navigation.tape import EVENT_NAMES, FIRST_EXTRA, new_tape
+from flownav.navigation.told import NO_STATED_NOISE, Equipment, FlowNoise
 
 FIELD_GAUSS = np.array([0.21, 0.0, 0.43])
 Path = Callable[[np.ndarray], np.ndarray]
@@ -115,11 +118,11 @@ class Navigated:
 
     @property
     def estimate(self) -> np.ndarray:
-        return self.on.tape.estimate[: self.on.tape.used[0]]
+        return self.on.tape.estimates()
 
     @property
     def offers(self) -> np.ndarray:
-        return self.on.tape.innovation[: self.on.tape.used[1]]
+        return self.on.tape.offers()
 
     @property
     def error(self) -> np.ndarray:
@@ -136,11 +139,16 @@ class Navigated:
         difference = yaw - np.interp(self.t_s, self.flown.t_s, self.flown.yaw)
         return np.arctan2(np.sin(difference), np.cos(difference))
 
+    def column(self, state: int, count: int = 1) -> np.ndarray:
+        """States from GYRO_BIAS on, as the estimates have them, (n, count)."""
+        first = 23 + state - FIRST_EXTRA
+        return self.estimate[:, first : first + count]
+
     def state(self, index: int) -> float:
-        return float(self.on.work[ROWS.state + index])
+        return float(self.on.work[STATE + index])
 
     def sigma(self, index: int) -> float:
-        return float(np.sqrt(self.on.work[ROWS.covariance + index * (STATES + 1)]))
+        return float(np.sqrt(variance_of(self.on.work, ONE_LANE, index, 0)))
 
     def reasons(self, sensor: Sensor) -> dict[str, int]:
         rows = self.offers[self.offers[:, 1] == sensor, 8].astype(int)
@@ -148,16 +156,23 @@ class Navigated:
 
     def events(self, source: str, kind: str) -> np.ndarray:
         """Rows t_s, value of one kind of event."""
-        rows = self.on.tape.event[: self.on.tape.used[2]]
+        rows = self.on.tape.events()
         codes = [code for code, (s, k, _) in enumerate(EVENT_NAMES) if (s, k) == (source, kind)]
         assert codes, (source, kind)
         return rows[rows[:, 1] == codes[0]][:, [0, 2]]
 
 
-def navigate(flown: Flown, queue: EventQueue | None = None, **settings) -> Navigated:
+def equipment(flown: Flown, queue: EventQueue, **settings) -> Equipment:
+    """What the streams offer."""
+    return equipment_of(flown.streams, float(np.nanmin(queue.t_s)), False, NavigatorSettingsFile(**settings))
+
+
+def navigate(
+    flown: Flown, queue: EventQueue | None = None, noise: FlowNoise = NO_STATED_NOISE, **settings
+) -> Navigated:
     """Run a new navigator over the streams, or over a queue made of them."""
     queue = merge(flown.streams.values()) if queue is None else queue
-    chosen = NavigatorSettingsFile(**settings)
-    on = new_navigator(flown.streams, float(np.nanmin(queue.t_s)), False, chosen, new_tape(queue))
+    fitted = equipment(flown, queue, **settings)
+    on = start_navigator(fitted, NavigatorSettingsFile(**settings), new_tape(queue), noise)
     run(queue, on)
     return Navigated(on, flown)

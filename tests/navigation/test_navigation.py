@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from flownav.estimation.landing.states import ACCEL_BIAS, COMPASS, INS_ERROR, VELOCITY_LAG
+from flownav.estimation.states import ACCEL_BIAS, COMPASS, INS_ERROR, PAD, VELOCITY_LAG
 from flownav.measurement import Sensor, Stream
 from navigation_streams import circle, fly, navigate, still
 
@@ -79,6 +81,16 @@ def test_a_gap_of_the_imu_is_bridged_by_the_logged_attitude():
     assert np.abs(alone.yaw_error[just]).min() > 1.0
 
 
+def test_a_gap_ends_once_whichever_of_two_readings_of_one_instant_comes_first():
+    """The attitude that ends the gap stands before the IMU's first reading after it."""
+    flown = fly(circle, 20.0, 0.5).cut(Sensor.IMU, 15.0, 15.5)
+    attitude_first = dict(sorted(flown.streams.items(), key=lambda entry: entry[0] != Sensor.ATTITUDE))
+    for streams in (flown.streams, attitude_first):
+        offers = navigate(replace(flown, streams=streams)).offers
+        bridged = offers[offers[:, 1] == Sensor.ATTITUDE, 0]
+        assert [bridged[0], bridged[-1]] == pytest.approx([15.26, 15.5])  # from where the IMU is stale
+
+
 def test_zero_velocity_on_the_ground_holds_the_place():
     """A biased accelerometer on the ground, no other aid: LANDED keeps it still."""
     flown = fly(lambda t: 0.0 * still(t), 20.0).without(Sensor.FLOW_RATE, Sensor.RANGE)
@@ -99,7 +111,7 @@ def test_zero_velocity_on_the_ground_holds_the_place():
 
 
 def test_pad_fixes_pull_the_position_to_centimetres():
-    """GPS is half a metre off over the pad; the first fix says where the pad is, every later one the place from it."""
+    """GPS is half a metre off; the pad's place is a state, and from it the vehicle's place is known to centimetres."""
     flown = fly(still, 30.0).without(Sensor.FLOW_RATE, Sensor.BARO)
     random = np.random.default_rng(3)
     noisy = flown.streams[Sensor.GPS_POSITION].value + random.normal(0.0, 0.5, (150, 3))
@@ -108,12 +120,12 @@ def test_pad_fixes_pull_the_position_to_centimetres():
     fixes = np.column_stack([0 * t_s, 0 * t_s, 0 * t_s + 2.0])
     run = navigate(flown.added(Stream.of(Sensor.PAD, t_s, fixes, variance=np.full((len(t_s), 3), 1e-6))))
     late = run.t_s > 5.0
-    assert np.ptp(run.estimate[late, 1:3], axis=0) == pytest.approx(0.0, abs=0.03)
-    without = navigate(flown)
-    assert np.ptp(without.estimate[without.t_s > 5.0, 1]) > 0.05
-    assert len(run.events("pad", "datum")) == 1
-    assert run.reasons(Sensor.PAD)["fused"] > 800
-    assert run.reasons(Sensor.PAD)["datum"] == 3
+    from_pad = run.estimate[late, 1:4] - run.column(PAD, 3)[late]
+    assert np.abs(from_pad - [0.0, 0.0, -2.0]).max() < 0.01
+    assert run.sigma(PAD) == pytest.approx(run.estimate[-1, 11], rel=0.01)  # in the earth it is no better known
+    assert run.sigma(PAD) > 0.2
+    assert len(run.events("pad", "found")) == 1
+    assert run.reasons(Sensor.PAD) == {"fused": 870}
 
 
 def test_an_external_pose_is_enough():

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flownav.compile import ONE_LANE
 from flownav.estimation.gating import Reason
+from flownav.estimation.states import IMU
 from flownav.measurement import EventQueue, Sensor, Stream, merge
-from flownav.navigation.state import EVENT_NAMES
+from flownav.navigation.memory import load_imu
+from flownav.navigation.tape import EVENT_NAMES
 from navigation_streams import Flown, Navigated, circle, fly, navigate, still
 
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
@@ -84,7 +87,8 @@ def test_what_is_no_number_is_counted_and_never_fused(hover, sensor, bad):
     value[1::2] = bad
     run = navigate(flown.changed(sensor, value=value))
     assert np.isfinite(run.estimate).all()
-    assert np.isfinite(run.on.work).all() or sensor != Sensor.IMU
+    assert np.isfinite(run.on.work[: IMU + 6]).all()  # state, covariance, the reading that moves it
+    assert np.isfinite(load_imu(run.on.work, ONE_LANE, 0)).all()
     late = run.t_s > 5.0
     assert np.abs(run.error[late]).max() < 0.1
     rows = run.offers[run.offers[:, 1] == sensor]
@@ -220,7 +224,10 @@ def test_an_echo_is_not_believed_where_the_range_alone_tells_the_height(hover):
 
 # -- every reason and every event ----------------------------------------------------------------------------
 def test_every_reason_has_its_case(hover):
-    """But for `not_needed` and `ahead`, which are given to readings before they reach the navigator."""
+    """But for `not_needed` and `ahead`, which are given to readings before they reach the navigator.
+
+    And `datum`, which older records have.
+    """
     seen: set[str] = set()
 
     def look(run: Navigated) -> None:
@@ -238,9 +245,10 @@ def test_every_reason_has_its_case(hover):
     ranges, flow = hover.streams[Sensor.RANGE], hover.streams[Sensor.FLOW_RATE]
     far, lost = ranges.value.copy(), flow.quality.copy()
     far[100], far[101] = 300.0, np.nan
-    lost[100], lost[101] = 0.0, -1.0
+    lost[100] = 0.0
     hurt = hover.changed(Sensor.RANGE, value=far).changed(Sensor.FLOW_RATE, quality=lost)
     queue = merge(hurt.streams.values())
+    queue.withheld[places_of(queue, Sensor.FLOW_RATE, 11.0)[0]] = 1.0
     again = places_of(queue, Sensor.BARO, 10.0)[:1].tolist()
     run = navigate(hurt, with_rows(queue, [again[0] + 1], rows_of(queue, again)))
     look(run)
@@ -252,7 +260,7 @@ def test_every_reason_has_its_case(hover):
     late = rows_of(queue, places_of(queue, Sensor.BARO, 9.0)[:1].tolist())
     late.t_s[:] = 10.0
     look(navigate(flown, with_rows(queue, [int(np.searchsorted(queue.t_s, 10.3))], late)))
-    assert seen == {reason.label for reason in Reason} - {"not_needed", "ahead"}
+    assert seen == {reason.label for reason in Reason} - {"not_needed", "ahead", "datum"}
 
 
 def test_every_event_has_its_case(hover):
@@ -265,6 +273,6 @@ def test_every_event_has_its_case(hover):
     runs = (jumping(hover), blind(hover), stuck(), over_a_step(hover), navigate(pad), navigate(alone),
             navigate(fly(circle, 10.0).cut(Sensor.IMU, 5.0, 6.0)))  # fmt: skip
     for run in runs:
-        seen.update(run.on.tape.event[: run.on.tape.used[2], 1].astype(int).tolist())
+        seen.update(run.on.tape.events()[:, 1].astype(int).tolist())
     flow = {k for k, (source, _, _) in enumerate(EVENT_NAMES) if source == "flow"}  # tests/test_faults_navigator.py
     assert seen | flow == set(range(len(EVENT_NAMES)))

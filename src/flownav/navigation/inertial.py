@@ -7,7 +7,17 @@ import numpy as np
 from flownav.compile import equation, procedure
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import ACCEL_NOISE, GYRO_NOISE, IMU
-from flownav.navigation.memory import MOVING, ImuMemory, Reading, load_imu, load_reading, load_start, store_imu
+from flownav.navigation.memory import (
+    CLOCK,
+    MOVING,
+    ImuMemory,
+    Reading,
+    load_imu,
+    load_reading,
+    load_start,
+    shared,
+    store_imu,
+)
 from flownav.navigation.tape import IMU_LOST, Output, write_event
 from flownav.navigation.told import Equipment, ImuSettings
 from flownav.navigation.vibration import followed_vibration, with_reading
@@ -58,8 +68,10 @@ def choose_motion(
 ) -> None:
     """MOVING, and the IMU's rows, for the step to t_s: the readings at its ends, the newest reading, or none.
 
-    heard: an inertial reading is at hand. After a gap it knows nothing of the gap, which is coasted.
+    heard: an inertial reading is at hand. After a gap it knows nothing of the gap, which is coasted. Where no time
+    passes there is no gap.
     """
+    passes = t_s > shared(work, lanes, CLOCK)
     for lane in range(len(lanes)):
         m = load_imu(work, lanes, lane)
         fresh = fitted.use_imu and t_s - m.read_s <= s.imu_stale_s
@@ -82,7 +94,7 @@ def choose_motion(
         gyro = s.gyro_noise_rad_s_rt_hz if moving else s.coasting_rate_rad_s_rt_hz
         work[ACCEL_NOISE * len(lanes) + lane] = accel * accel
         work[GYRO_NOISE * len(lanes) + lane] = gyro * gyro
-        gap = m.gap if moving or not started else 1.0
+        gap = 1.0 if passes and started and not moving else m.gap
         store_imu(
             work, lanes, lane,
             ImuMemory(

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger, procedure
+from flownav.compile import clamp, equation, larger, procedure, smaller
 from flownav.estimation.covariance import add_noise_lane
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, STATE, VELOCITY
-from flownav.navigation.memory import ImuMemory, Reading, load_imu, store_imu
+from flownav.navigation.memory import MOVING, ImuMemory, Reading, load_imu, store_imu
 from flownav.navigation.tape import IMU_DOUBTED, Output, write_event
 from flownav.navigation.told import ImuSettings
 
@@ -62,11 +62,14 @@ def doubt_imu(work: Work, lanes: Lanes, lane: int, t_s: float, contradiction_m: 
 
 @procedure
 def add_vibration_noise(work: Work, lanes: Lanes, dt_s: float, s: ImuSettings) -> None:
-    """Velocity and accelerometer bias are less sure by what vibration may have made of them; a doubt is vertical."""
-    fading = 1.0 - (dt_s / DOUBT_LASTS_S if dt_s < DOUBT_LASTS_S else 1.0)
+    """Velocity and accelerometer bias are less sure by what vibration may have made of them; a doubt is vertical.
+
+    Only in lanes that the IMU moves.
+    """
     for lane in range(len(lanes)):
+        moved_s = dt_s if work[MOVING * len(lanes) + lane] > 0.0 else 0.0
         m = load_imu(work, lanes, lane)
-        doubt = fading * m.doubt_m_s2
+        doubt = (1.0 - smaller(moved_s / DOUBT_LASTS_S, 1.0)) * m.doubt_m_s2
         faded = ImuMemory(
             m.read_s, m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z, m.vibration, doubt, m.gap
         )
@@ -74,10 +77,10 @@ def add_vibration_noise(work: Work, lanes: Lanes, dt_s: float, s: ImuSettings) -
         beyond = vibration_beyond(m, s)
         level = s.vibration_walk_per_rt_s * beyond
         down = s.vibration_walk_per_rt_s * larger(beyond, doubt)
-        shaken = m.vibration * dt_s * dt_s if beyond > 0.0 else 0.0
-        add_noise_lane(work, lanes, ACCEL_BIAS, lane, level * level * dt_s)
-        add_noise_lane(work, lanes, ACCEL_BIAS + 1, lane, level * level * dt_s)
-        add_noise_lane(work, lanes, ACCEL_BIAS + 2, lane, down * down * dt_s)
+        shaken = m.vibration * moved_s * moved_s if beyond > 0.0 else 0.0
+        add_noise_lane(work, lanes, ACCEL_BIAS, lane, level * level * moved_s)
+        add_noise_lane(work, lanes, ACCEL_BIAS + 1, lane, level * level * moved_s)
+        add_noise_lane(work, lanes, ACCEL_BIAS + 2, lane, down * down * moved_s)
         for i in range(3):
             add_noise_lane(work, lanes, VELOCITY + i, lane, shaken)
 

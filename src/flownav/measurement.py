@@ -132,7 +132,8 @@ class EventQueue(NamedTuple):
 
     t_s (n,) the instant each reading describes (arrival less delay); sensor (n,) int64; value and variance
     (n, MAX_VALUES), unused columns NaN; quality (n,); row (n,) the row in its own stream; withheld (n,) 1.0 where the
-    user takes the reading away, which is then judged and noted, but not fused.
+    user takes the reading away, which is then judged and noted, but not fused; arrived (n,) 0.0 where the sensor was
+    due and stayed silent, which brings the filter to that instant and no more.
     """
 
     t_s: Array
@@ -142,6 +143,7 @@ class EventQueue(NamedTuple):
     quality: Array
     row: NDArray[np.int64]
     withheld: Array
+    arrived: Array
 
 
 def merge(streams: Iterable[Stream]) -> EventQueue:
@@ -154,7 +156,7 @@ def merge(streams: Iterable[Stream]) -> EventQueue:
     if not streams:
         empty = np.zeros((0, MAX_VALUES))
         none = np.zeros(0)
-        return EventQueue(none, none.astype(np.int64), empty, empty, none, none.astype(np.int64), none)
+        return EventQueue(none, none.astype(np.int64), empty, empty, none, none.astype(np.int64), none, none)
     t_s = np.concatenate([s.t_s - s.delay_s for s in streams])
     order = np.argsort(t_s, kind="stable")
     return EventQueue(
@@ -165,4 +167,5 @@ def merge(streams: Iterable[Stream]) -> EventQueue:
         np.concatenate([s.quality for s in streams])[order],
         np.concatenate([np.arange(len(s)) for s in streams])[order],
         np.zeros(len(order)),
+        np.ones(len(order)),
     )

@@ -26,10 +26,25 @@ POSITION_NED = ("pos_n_m", "pos_e_m", "pos_d_m")
 VELOCITY_BODY = ("vel_u_m_s", "vel_v_m_s", "vel_w_m_s")
 QUATERNION = ("qw", "qx", "qy", "qz")
 
-# What a live filter was fed, row by row in its order: the instant that the reading describes (t_s), its stamp on
-# arrival, measurement.Sensor, values and variances (unused ones NaN), quality, and which of `segments` took it.
-FED = ("t_s", "arrival_s", "sensor", *(f"value_{i}" for i in range(6)), *(f"variance_{i}" for i in range(6)),
-       "quality", "segment")  # fmt: skip
+# What a navigator was fed, row by row in its order: the instant that the reading describes (t_s), its stamp on arrival,
+# measurement.Sensor, values and variances (unused ones NaN), quality, and which of `segments` took it. withheld: 1
+# where the user took it away; arrived: 0 where the sensor was due and stayed silent.
+FED_FIRST = ("t_s", "arrival_s", "sensor", *(f"value_{i}" for i in range(6)), *(f"variance_{i}" for i in range(6)),
+             "quality", "segment")  # of any record  # fmt: skip
+FED = (*FED_FIRST, "withheld", "arrived")
+
+# The filter's own states from the gyro's bias on, in its order (docs/landing-filter.md).
+FILTER_STATES = (
+    "gyro_bias_x_rad_s", "gyro_bias_y_rad_s", "gyro_bias_z_rad_s",
+    "accel_bias_x_m_s2", "accel_bias_y_m_s2", "accel_bias_z_m_s2",
+    "gps_slow_n_m", "gps_slow_e_m", "gps_slow_d_m", "gps_fast_n_m", "gps_fast_e_m", "gps_fast_d_m",
+    "gps_velocity_n_m_s", "gps_velocity_e_m_s", "gps_velocity_d_m_s",
+    "ins_roll_rad", "ins_pitch_rad", "ins_heading_rad",
+    "ground_d_m", "baro_m", "flow_scale", "compass_sin_rad", "compass_cos_rad", "velocity_lag_s",
+    "pad_n_m", "pad_e_m", "pad_d_m",
+)  # fmt: skip
+TILTS = ("tilt_n_rad", "tilt_e_rad", "heading_rad")  # errors of the attitude about north, east and down
+VELOCITY_NED = ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
 
 # The vocabulary: every table has `t_s` first; a writer may leave a table or a trailing column out.
 TABLES: dict[str, tuple[str, ...]] = {
@@ -52,6 +67,14 @@ TABLES: dict[str, tuple[str, ...]] = {
         *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)),
         "nees",  # normalised estimation error squared of position and velocity, where the truth is known
     ),
+    # the rest of what it says, at the same instants: velocity in the earth's axes, standard deviations of the attitude,
+    # and every other state with its own
+    "states": (
+        *VELOCITY_NED,
+        *(f"std_{name}" for name in TILTS),
+        *FILTER_STATES,
+        *(f"std_{name}" for name in FILTER_STATES),
+    ),
     # what the filter says once it has seen the whole flight
     "smoothed": (
         *POSITION_NED,
@@ -61,6 +84,8 @@ TABLES: dict[str, tuple[str, ...]] = {
     ),
     # what another estimator said (an autopilot's own)
     "autopilot": (*POSITION_NED, *VELOCITY_BODY, *QUATERNION),
+    # what an autopilot flew on: the estimate carried on to now, position from where the pad is taken to be
+    "flown": (*POSITION_NED, *VELOCITY_BODY, *QUATERNION),
     # what the vehicle was told: references and controls
     "command": ("pos_n_ref_m", "pos_e_ref_m", "pos_d_ref_m", "lon_rad", "lat_rad", "col_rad", "ped_rad"),
     # one row per measurement component offered to the filter (PX4's estimator_aid_src fields)

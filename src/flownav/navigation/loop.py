@@ -54,7 +54,8 @@ def run(queue: EventQueue, on: Running, *, compiled: bool = True) -> None:
     feed = entry if compiled else entry.py_func
     journal = on.tape.journal
     feed(
-        take, queue.t_s, queue.sensor, queue.value, queue.variance, queue.quality, queue.withheld, on.work, on.settings,
+        take, queue.t_s, queue.sensor, queue.value, queue.variance, queue.quality, queue.withheld,
+        queue.arrived, on.work, on.settings,
         on.tape.estimate.reshape(-1), on.tape.innovation.reshape(-1), on.tape.event.reshape(-1),
         journal.entry.reshape(-1), journal.state.reshape(-1), journal.covariance.reshape(-1), room_of(on.tape),
         on.tape.used,
@@ -64,12 +65,12 @@ def run(queue: EventQueue, on: Running, *, compiled: bool = True) -> None:
 @kernel
 def feed_all(
     take: Any, t_s: Array, sensor: NDArray[np.int64], value: Array, variance: Array, quality: Array, withheld: Array,
-    work: Work, settings: Work, estimate: Work, innovation: Work, event: Work, entry: Work, state: Work,
+    arrived: Array, work: Work, settings: Work, estimate: Work, innovation: Work, event: Work, entry: Work, state: Work,
     covariance: Work, room: NDArray[np.int64], used: NDArray[np.int64],
 ) -> None:  # fmt: skip
     """Reading by reading into the rows of READING, and on to the navigator at the address `take`."""
     for k in range(len(t_s)):
-        put_reading(pointer(work), value[k], variance[k], quality[k], withheld[k])
+        put_reading(pointer(work), value[k], variance[k], quality[k], arrived[k], withheld[k])
         invoke(
             take, pointer(work), pointer(settings), pointer(estimate), pointer(innovation), pointer(event),
             pointer(entry), pointer(state), pointer(covariance), pointer(room), pointer(used), t_s[k], sensor[k],
@@ -77,14 +78,16 @@ def feed_all(
 
 
 @equation
-def put_reading(work: Work, value: Array, variance: Array, quality: float, withheld: float) -> None:
+def put_reading(
+    work: Work, value: Array, variance: Array, quality: float, arrived: float, withheld: float
+) -> None:  # fmt: skip
     """A queue's row as the reading at hand of one lane."""
     for i in range(MAX_VALUES):
         work[READING + i] = value[i]
     for i in range(STATED):
         work[READING + MAX_VALUES + i] = variance[i]
     work[READING + MAX_VALUES + STATED] = quality
-    work[READING + MAX_VALUES + STATED + 1] = 1.0
+    work[READING + MAX_VALUES + STATED + 1] = arrived
     work[READING + MAX_VALUES + STATED + 2] = withheld
 
 

@@ -12,8 +12,8 @@ from flownav.estimation.gating import Reason
 from flownav.frames import rotation_from_quaternion
 from flownav.logs.rates import attitude_at
 from flownav.measurement import COLUMNS, Array, Sensor, Stream
-from flownav.navigation.state import EVENT_NAMES
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record, Table
+from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
+from flownav.record import POSITION_NED, VELOCITY_BODY, Record
 from flownav.replay.autopilot import autopilot_path
 from flownav.replay.session import Replay
 from flownav.scoring.alignment import velocity_of
@@ -36,6 +36,7 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str]) -> Rec
     record = Record(_manifest(replay, scores, command))
     estimate = replay.estimate
     record.add("estimate", estimate_table(estimate))
+    record.add("states", states_table(estimate))
     if replay.smoothed is not None:
         record.add("smoothed", estimate_table(replay.smoothed))
     for sensor in KEPT:
@@ -51,12 +52,6 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str]) -> Rec
     record.add("innovation", innovation_table(replay.innovation))
     record.add("events", _events(replay))
     return record
-
-
-def estimate_table(rows: Array) -> Table:
-    """Rows of a tape's estimate as the record's table."""
-    names = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)))
-    return {"t_s": rows[:, 0], **dict(zip(names, rows[:, 1:17].T, strict=True))}
 
 
 def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dict[str, Any]:
@@ -76,6 +71,7 @@ def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dic
             "use_flow": replay.options.use_flow,
             "flow_scale": list(replay.options.flow_scale),
             "flow_sensor": replay.options.identified._asdict() if replay.options.identified else None,
+            **({"flow_noise": replay.options.flow_noise._asdict()} if replay.options.flow_noise.stated else {}),
             **({} if log.origin_deg_m is None else {"origin_lat_lon_deg_alt_m": list(log.origin_deg_m)}),
         },
         "provenance": {
@@ -103,39 +99,6 @@ def _truth(replay: Replay) -> dict[str, Array]:
     return {"t_s": truth["t_s"], **dict(zip(POSITION_NED, position.T, strict=True)), **body}
 
 
-def innovation_table(rows: Array) -> Table:
-    """Rows of a tape's innovation, one for each offered component; `t_s` is the instant that the reading describes."""
-    sensor, component, reason = rows[:, 1].astype(int), rows[:, 2].astype(int), rows[:, 8].astype(int)
-    sensor_names = np.array(["", *(s.name.lower() for s in Sensor)])
-    reasons = np.array([r.label for r in Reason])
-    return {
-        "t_s": rows[:, 0],
-        "sensor": sensor_names[sensor],
-        "component": _component_names()[sensor, component],
-        "observation": rows[:, 3],
-        "observation_variance": rows[:, 4],
-        "innovation": rows[:, 5],
-        "innovation_variance": rows[:, 6],
-        "test_ratio": rows[:, 7],
-        "fused": reason == Reason.FUSED,
-        "reason": reasons[reason],
-    }
-
-
-def _component_names() -> Array:
-    """What each component of a sensor observes, by sensor number and component."""
-    names = np.full((max(Sensor) + 1, 3), "", dtype="U16")
-    for sensor in (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_VELOCITY, Sensor.POSE, Sensor.PAD):
-        names[sensor] = COLUMNS[sensor]
-    names[Sensor.LANDED] = COLUMNS[Sensor.GPS_VELOCITY]
-    names[Sensor.ATTITUDE] = ("tilt_n_rad", "tilt_e_rad", "heading_rad")
-    names[Sensor.MAG] = names[Sensor.YAW] = "heading_rad"
-    names[Sensor.FLOW_RATE, :2] = COLUMNS[Sensor.FLOW_RATE][:2]
-    names[Sensor.RANGE] = COLUMNS[Sensor.RANGE]
-    names[Sensor.BARO] = COLUMNS[Sensor.BARO]
-    return names
-
-
 def _events(replay: Replay) -> dict[str, Any]:
     """What happened, in order of time."""
     start, _ = replay.log.span_s
@@ -143,8 +106,7 @@ def _events(replay: Replay) -> dict[str, Any]:
     events += [(start, "replay", "warning", finding.text, np.nan) for finding in replay.findings]
     for name, counts in replay.rejected().items():
         events += [(start, name, "rejected", reason, float(count)) for reason, count in counts.items()]
-    for t_s, kind, value in replay.tape.event[: replay.tape.used[2]].tolist():
-        events.append((t_s, *EVENT_NAMES[int(kind)], value))
+    events += happenings(replay.written.event)
     for t0, t1 in replay.options.gps_outages_s:
         events += [(t0, "gps", "outage_start", "withheld on request", t1 - t0), (t1, "gps", "outage_end", "", np.nan)]
     for sensor in (Sensor.GPS_POSITION, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE):

@@ -1,19 +1,21 @@
-"""Replaying what a live filter was fed: the same rows in the same order, so that the estimates are the same bits."""
+"""Replaying what a navigator was fed: the same rows in the same order, so that the estimates are the same bits."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from flownav.errors import InputError
 from flownav.logs.log import Log
 from flownav.measurement import EventQueue
-from flownav.navigation.feed import Equipment, start_navigator
-from flownav.navigation.loop import run
+from flownav.navigation.loop import run, start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.state import Tape, new_tape
+from flownav.navigation.tables import Written, written_on
+from flownav.navigation.tape import new_tape
+from flownav.navigation.told import NO_STATED_NOISE, Equipment, FlowNoise
 from flownav.parameter_files import check
 from flownav.replay.prepare import Prepared, ReplayOptions, check_windows
 
@@ -28,32 +30,38 @@ def as_fed(
     if not log.fed:
         return options, settings or NavigatorSettingsFile()
     if options.flow_scale != (1.0, 1.0) or options.identified is not None:
-        raise InputError(
-            f"{log.path}: a live record holds flow as it was fed; replay it without --flow-scale, --sensor"
-        )
+        raise InputError(f"{log.path}: it holds flow as it was fed; replay it without --flow-scale, --sensor")
     check_windows(log, options.gps_outages_s, "--gps-outage")
     recorded = check(dict(log.fed_settings["filter"]), NavigatorSettingsFile, str(log.path))
-    return replace(options, gps_delay_s=float(log.fed_settings["gps_delay_s"])), settings or recorded
+    noise = log.fed_settings.get("flow_noise")
+    return (
+        replace(
+            options,
+            gps_delay_s=float(log.fed_settings["gps_delay_s"]),
+            flow_noise=FlowNoise(**noise) if noise else NO_STATED_NOISE,
+        ),
+        settings or recorded,
+    )
 
 
 def prepared_as_fed(log: Log) -> Prepared:
     """The queue of all navigators, one after the other."""
     parts = [segment.queue for segment in log.fed]
-    whole = EventQueue(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
-    return Prepared(dict(log.streams), whole, log.notes, bool(log.fed[0].equipment["flow_gyro_is_imu"]))
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in parts[0]._fields
+    }
+    return Prepared(dict(log.streams), EventQueue(**columns), log.notes, bool(log.fed[0].equipment["flow_gyro_is_imu"]))
 
 
-def run_as_fed(log: Log, settings: NavigatorSettingsFile, withhold: Callable[[EventQueue], EventQueue]) -> Tape:
-    """Each navigator of the session again; their tapes one after the other."""
-    tapes = []
+def run_as_fed(
+    log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, withhold: Callable[[EventQueue], EventQueue]
+) -> Written:
+    """Each navigator of the session again; what they wrote, one after the other."""
+    parts = []
     for segment in log.fed:
         queue = withhold(segment.queue)
         if len(queue.t_s):
-            running = start_navigator(Equipment(**segment.equipment), settings, new_tape(queue))
+            running = start_navigator(Equipment(**segment.equipment), settings, new_tape(queue), options.flow_noise)
             run(queue, running)
-            tapes.append(running.tape)
-    used = np.array([tape.used for tape in tapes])
-    estimate, innovation, event = (
-        np.concatenate([tape[part][: tape.used[part]] for tape in tapes]) for part in range(3)
-    )
-    return Tape(estimate, innovation, event, used.sum(axis=0))
+            parts.append(written_on(running.tape))
+    return Written(*(np.concatenate(rows) for rows in zip(*parts, strict=True)))

@@ -18,7 +18,8 @@ from flownav.logs.log import Log
 from flownav.logs.rates import attitude_rates, mean_over
 from flownav.measurement import Array, EventQueue, Sensor, Stream, merge
 from flownav.navigation.feed import imu_serves
-from flownav.sensors.datasheet import FlowSensor
+from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
+from flownav.sensors.identified import IdentifiedFlow
 
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
 FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
@@ -30,15 +31,6 @@ LEAST_FLOW_ROWS = 50
 SCALE_LIMITS = (0.1, 10.0)
 
 
-class IdentifiedFlow(NamedTuple):
-    """What a sensor file says of the flow: reported over true velocity of each body axis, and the age of a reading."""
-
-    gain_u: float
-    gain_v: float
-    latency_s: float
-    axes: tuple[tuple[float, float], tuple[float, float]] = ((1.0, 0.0), (0.0, 1.0))  # sensor's = axes @ vehicle's
-
-
 @dataclass(frozen=True)
 class ReplayOptions:
     """What a user may ask of a replay."""
@@ -47,7 +39,8 @@ class ReplayOptions:
     gps_outages_s: tuple[tuple[float, float], ...] = ()
     use_flow: bool = True
     flow_scale: tuple[float, float] = (1.0, 1.0)
-    identified: IdentifiedFlow | None = None  # from a sensor file
+    identified: IdentifiedFlow | None = None  # from a sensor file: its axes and latency (the navigator has the gains)
+    flow_noise: FlowNoise = NO_STATED_NOISE  # and its law of noise, where that is to be used
 
 
 @dataclass(frozen=True)
@@ -86,7 +79,7 @@ def prepare(log: Log, options: ReplayOptions) -> Prepared:
     if options.identified is not None:
         for sensor in FLOW:
             if sensor in streams:
-                streams[sensor] = corrected(streams[sensor], options.identified)
+                streams[sensor] = replace(streams[sensor], delay_s=options.identified.latency_s)
     return Prepared(streams, merge(streams.values()), tuple(notes), chosen.name == IMU)
 
 
@@ -148,22 +141,6 @@ def _scaled(stream: Stream, scale: tuple[float, float]) -> Stream:
     return replace(stream, value=value)
 
 
-def corrected(stream: Stream, identified: IdentifiedFlow) -> Stream:
-    """The stream as a sensor without gain error would have given it, with its identified age on arrival.
-
-    The gain is that of velocity: of angular flow, what is left when the rotation is taken off,
-    flow_x = p - g_v v/r and flow_y = q + g_u u/r.
-    """
-    value = stream.value.copy()
-    if stream.sensor == Sensor.FLOW_RATE:
-        value[:, 0] = value[:, 2] + (value[:, 0] - value[:, 2]) / identified.gain_v
-        value[:, 1] = value[:, 3] + (value[:, 1] - value[:, 3]) / identified.gain_u
-    else:
-        value[:, 0] /= identified.gain_u
-        value[:, 1] /= identified.gain_v
-    return replace(stream, value=value, delay_s=identified.latency_s)
-
-
 def put_right(stream: Stream, identified: IdentifiedFlow) -> Stream:
     """The stream in the vehicle's axes: those of a sensor that is turned or wired otherwise, as its file says.
 
@@ -180,37 +157,6 @@ def put_right(stream: Stream, identified: IdentifiedFlow) -> Stream:
         else:
             value[:, x], value[:, y] = back @ value[:, [x, y]].T
     return replace(stream, value=value)
-
-
-def identified_axes(verdict: str) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """What a sensor file says of the axes, as sensor's = axes @ vehicle's; None where it does not know."""
-    if "unclear" in verdict or "mirrored" in verdict.replace("not mirrored", ""):
-        return None
-    both = "signs of x and y" in verdict or "both signs" in verdict
-    x = -1.0 if both or "sign of x" in verdict else 1.0
-    y = -1.0 if both or "sign of y" in verdict else 1.0
-    return ((0.0, x), (y, 0.0)) if "swapped" in verdict else ((x, 0.0), (0.0, y))
-
-
-def identified_flow(sensor: FlowSensor) -> IdentifiedFlow:
-    """A sensor file's axes, gains and latency; those of its dynamics where no log was identified.
-
-    InputError where the file's axes are not known.
-    """
-    found = sensor.identification
-    if found is None:
-        return IdentifiedFlow(sensor.dynamics.gain, sensor.dynamics.gain, sensor.dynamics.delay_s)
-    axes = identified_axes(found.axes)
-    if axes is None:
-        raise InputError(f"{sensor.name}: {found.axes}; mend the log's axes, then identify again")
-
-    def gain_of(axis: str) -> float:
-        """The axis' gain, 1 where no height's interval excludes it: an uncertain gain would do more harm than good."""
-        rows = [r for r in found.responses if r.axis == axis] or list(found.responses)
-        sure = any(not r.gain_low <= 1.0 <= r.gain_high for r in rows)
-        return float(np.mean([r.gain for r in rows])) if sure else 1.0
-
-    return IdentifiedFlow(gain_of("x"), gain_of("y"), found.latency_s, axes)
 
 
 class Chosen(NamedTuple):

@@ -15,11 +15,12 @@ from flownav.errors import InputError
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor, Stream
-from flownav.navigation.feed import SLOWEST_IMU_HZ, new_navigator
-from flownav.navigation.loop import run
+from flownav.navigation.feed import SLOWEST_IMU_HZ, equipment_of
+from flownav.navigation.loop import run, start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import smooth
-from flownav.navigation.state import Tape, new_tape
+from flownav.navigation.tables import Written, written_on
+from flownav.navigation.tape import new_tape
 from flownav.replay.autopilot import autopilot_scores
 from flownav.replay.fed import prepared_as_fed, run_as_fed
 from flownav.replay.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
@@ -41,18 +42,18 @@ class Replay:
     options: ReplayOptions
     settings: NavigatorSettingsFile
     prepared: Prepared
-    tape: Tape
+    written: Written
     smoothed: Array | None = None  # the estimate smoothed over the whole log, where that was asked for
 
-    @cached_property
+    @property
     def estimate(self) -> Array:
-        """Rows of the tape's estimate that were written (n, ESTIMATE_COLUMNS)."""
-        return self.tape.estimate[: self.tape.used[0]]
+        """The navigator's estimates (n, ESTIMATE_COLUMNS)."""
+        return self.written.estimate
 
-    @cached_property
+    @property
     def innovation(self) -> Array:
-        """Rows of the tape's innovation that were written (m, 9)."""
-        return self.tape.innovation[: self.tape.used[1]]
+        """What became of each component (m, OFFERS)."""
+        return self.written.innovation
 
     @cached_property
     def findings(self) -> list[Finding]:
@@ -158,7 +159,7 @@ class Replay:
         """The same of the smoothed path; None without one."""
         if self.smoothed is None:
             return None
-        return replace(self, tape=self.tape._replace(estimate=self.smoothed), smoothed=None).path_scores()
+        return replace(self, written=self.written._replace(estimate=self.smoothed), smoothed=None).path_scores()
 
 
 def replay(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, *, smoothed: bool = False) -> Replay:
@@ -237,19 +238,19 @@ def _run(
 ) -> Replay:
     path = None
     if log.fed:
-        tape = run_as_fed(log, settings, lambda queue: withhold(log, queue, options))
+        written = run_as_fed(log, options, settings, lambda queue: withhold(log, queue, options))
     else:
         queue = withhold(log, prepared.queue, options)
-        gyro_is_imu = prepared.flow_gyro_is_imu
-        running = new_navigator(prepared.streams, float(queue.t_s[0]), gyro_is_imu, settings, new_tape(queue))
+        equipment = equipment_of(prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, settings)
+        running = start_navigator(equipment, settings, new_tape(queue), options.flow_noise)
         if smoothed:
             path = smooth(queue, running)
         else:
             run(queue, running)
-        tape = running.tape
-    if tape.used[0] < 2:
+        written = written_on(running.tape)
+    if len(written.estimate) < 2:
         raise InputError(
             f"{log.path}: the filter never started; it needs an attitude or an IMU of {SLOWEST_IMU_HZ:g} Hz, then a "
             "GPS fix or flow of quality above 0"
         )
-    return Replay(log, options, settings, prepared, tape, path)
+    return Replay(log, options, settings, prepared, written, path)

@@ -10,11 +10,12 @@ import pytest
 
 from flownav.errors import InputError
 from flownav.estimation.gating import Reason
+from flownav.estimation.states import ATTITUDE, GYRO_BIAS, STATE_NAMES, STATES, VELOCITY
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
 from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.record import Record
+from flownav.record import FILTER_STATES, TABLES, TILTS, VELOCITY_NED, Record
 from flownav.replay.bundle import to_record
 from flownav.replay.prepare import ReplayOptions
 from flownav.replay.session import Replay, outage_summary, outage_table, replay, table_windows
@@ -214,7 +215,7 @@ def test_a_step_of_the_ground_becomes_a_new_datum(log, flight):
     raised = with_stream(log, Sensor.FLOW_RATE, value=seen)
     value = np.where(ranges.t_s[:, None] > 30.0, ranges.value - 1.5, ranges.value)
     run = flown(with_stream(raised, Sensor.RANGE, value=value))
-    events = run.tape.event[: run.tape.used[2]]
+    events = run.written.event
     resets = events[(events[:, 1] == 2) & (events[:, 0] > 29)]
     assert len(resets) == 1
     assert 30.9 < resets[0, 0] < 31.3
@@ -360,7 +361,7 @@ def test_the_record_holds_the_whole_replay_and_loads_again(log, tmp_path):
     to_record(run, scores, ["flownav", "replay", "flight"]).save(tmp_path / "flight.fnr")
     record = Record.load(tmp_path / "flight.fnr")
     assert set(record.tables) == {
-        "estimate", "gps_position", "gps_velocity", "flow_rate", "range", "baro", "innovation", "events"
+        "estimate", "states", "gps_position", "gps_velocity", "flow_rate", "range", "baro", "innovation", "events"
     }  # fmt: skip
     manifest = record.manifest
     assert (manifest["kind"], manifest["log"], manifest["filter"]) == ("replay", "flight", "landing")
@@ -368,7 +369,7 @@ def test_the_record_holds_the_whole_replay_and_loads_again(log, tmp_path):
     assert manifest["scores"] == scores
     assert manifest["provenance"]["inputs"]["flow.csv"]["sha256"] == log.inputs["flow.csv"]
     assert "clock_start_s" not in manifest  # a folder of CSV files does not say
-    told = Replay(altered(log, clock_start_s=81.5), run.options, run.settings, run.prepared, run.tape)
+    told = Replay(altered(log, clock_start_s=81.5), run.options, run.settings, run.prepared, run.written)
     assert to_record(told, scores, []).manifest["clock_start_s"] == 81.5
     table = record.tables["innovation"]
     assert set(table["sensor"]) == {"gps_position", "gps_velocity", "flow_rate", "range", "baro", "mag"}
@@ -377,6 +378,24 @@ def test_the_record_holds_the_whole_replay_and_loads_again(log, tmp_path):
     assert "fused" not in table["reason"][~fused]
     assert np.all(table["test_ratio"][fused] <= 1.0)
     assert np.all(np.diff(record.tables["estimate"]["t_s"]) > 0)
+
+
+def test_every_state_of_the_filter_is_in_the_record_with_its_deviation(log):
+    """By its name, in the filter's order; those of position, body velocity and attitude stand in `estimate`."""
+    assert STATE_NAMES[GYRO_BIAS:STATES] == FILTER_STATES
+    assert STATE_NAMES[ATTITUDE:GYRO_BIAS] == TILTS
+    assert STATE_NAMES[VELOCITY:ATTITUDE] == VELOCITY_NED
+    run = flown(log)
+    record = to_record(run, run.scores(), [])
+    states, estimate = record.tables["states"], record.tables["estimate"]
+    assert ("t_s", *TABLES["states"]) == tuple(states)
+    assert (states["t_s"] == estimate["t_s"]).all()
+    first, spread = FILTER_STATES.index("baro_m"), len(FILTER_STATES)
+    assert (states["baro_m"] == run.estimate[:, 23 + first]).all()
+    assert (states["std_baro_m"] == run.estimate[:, 23 + spread + first]).all()
+    assert states["baro_m"][-1] == pytest.approx(12.0, abs=0.5)
+    assert 0.0 < states["std_baro_m"][-1] < 4.0
+    assert (states["std_heading_rad"] == run.estimate[:, 22]).all()
 
 
 def test_truth_is_turned_onto_the_estimate(log, flight):

@@ -1,29 +1,51 @@
-"""A sensor file corrects a replay's flow: gain of the translation alone, latency, uncertain gains left alone."""
+"""A sensor file in a replay: latency and axes of the readings, gains of the navigator, uncertain ones left alone."""
 
 from __future__ import annotations
+
+from dataclasses import replace as altered
 
 import numpy as np
 import pytest
 
 from flownav.errors import InputError
+from flownav.logs.csv_folder import read_csv_folder
+from flownav.logs.log import Log
 from flownav.measurement import Sensor, Stream
-from flownav.replay.prepare import IdentifiedFlow, corrected, identified_flow, put_right
-from flownav.sensors.angular_flow import angular_flow
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.replay.prepare import ReplayOptions, prepare, put_right
+from flownav.replay.session import replay
 from flownav.sensors.datasheet import load_sensor
+from flownav.sensors.identified import IdentifiedFlow, identified_flow
+from replay_logs import log_of_flight
 
 
-def test_gain_is_taken_off_the_translation_and_not_off_the_rotation():
-    u, v, p, q, r, gain_u, gain_v = 1.2, -0.7, 0.3, -0.4, 2.0, 1.1, 0.9
-    seen = angular_flow(gain_u * u, gain_v * v, p, q, r)
-    stream = Stream.of(Sensor.FLOW_RATE, np.array([0.0]), np.array([[*seen, p, q]]))
-    mended = corrected(stream, IdentifiedFlow(gain_u, gain_v, 0.08))
-    assert mended.value[0, :2] == pytest.approx(angular_flow(u, v, p, q, r))
-    assert mended.delay_s == 0.08
+@pytest.fixture(scope="module")
+def flight_log(tmp_path_factory) -> Log:
+    return read_csv_folder(log_of_flight(31.0).write(tmp_path_factory.mktemp("log") / "flight"))
 
 
-def test_metric_flow_is_divided_by_its_gains():
-    stream = Stream.of(Sensor.FLOW_VELOCITY, np.array([0.0]), np.array([[1.1, 1.8, np.nan]]))
-    assert corrected(stream, IdentifiedFlow(1.1, 0.9, 0.0)).value[0, :2] == pytest.approx((1.0, 2.0))
+def test_a_sensor_file_sets_the_age_of_flow_and_leaves_its_values(flight_log):
+    """Gains are the navigator's settings."""
+    plain = prepare(flight_log, ReplayOptions())
+    aged = prepare(flight_log, ReplayOptions(identified=IdentifiedFlow(1.1, 0.9, 0.08)))
+    assert aged.delays_s[Sensor.FLOW_RATE] == 0.08
+    assert (aged.streams[Sensor.FLOW_RATE].value == plain.streams[Sensor.FLOW_RATE].value).all()
+
+
+def test_gains_of_the_settings_are_taken_off_the_flow(flight_log):
+    """Flow with a gain error, told: the path is that without."""
+    flow = flight_log.streams[Sensor.FLOW_RATE]
+    turning, value = flow.value[:, 2:4], flow.value.copy()
+    value[:, :2] = turning + (value[:, :2] - turning) * [0.8, 1.25]
+    wrong = altered(flight_log, streams={**flight_log.streams, Sensor.FLOW_RATE: altered(flow, value=value)})
+    told = NavigatorSettingsFile(flow_gain_x=1.25, flow_gain_y=0.8)
+    cut = ReplayOptions(gps_outages_s=((15.0, 30.0),))
+    right, mended, unsaid = (
+        replay(log, cut, settings).estimate[:, 1:4]
+        for log, settings in ((flight_log, NavigatorSettingsFile()), (wrong, told), (wrong, NavigatorSettingsFile()))
+    )
+    assert np.abs(mended - right).max() < 0.02
+    assert np.abs(unsaid - right).max() > 0.5
 
 
 def test_the_papers_file_gives_the_gain_and_delay_of_its_dynamics():

@@ -88,18 +88,22 @@ def _options(
     from flownav.live.options import Options
     from flownav.mavlink.signing import load_key
     from flownav.navigation.settings import NavigatorSettingsFile
+    from flownav.navigation.settings_of import settings_of
     from flownav.parameter_files import load
-    from flownav.replay.prepare import identified_flow
     from flownav.sensors.datasheet import load_sensor
+    from flownav.sensors.identified import identified_flow
 
+    flow = load_sensor(sensor) if sensor else None
+    told = settings_of(flow, stated=load(settings, NavigatorSettingsFile) if settings else None)
     return Options(
         send=send,
         system=system,
         component=component,
         key=load_key(key) if key else None,
         gps_delay_s=gps_delay_s,
-        identified=identified_flow(load_sensor(sensor)) if sensor else None,
-        settings=load(settings, NavigatorSettingsFile) if settings else NavigatorSettingsFile(),
+        identified=identified_flow(flow) if flow else None,
+        settings=told.settings,
+        flow_noise=told.noise,
     )
 
 

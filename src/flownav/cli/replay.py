@@ -53,20 +53,24 @@ def command(
     """Fuse a recorded flight: its trajectory, its errors against its own GPS, and the drift through GPS outages."""
     from flownav.cli.output import save
     from flownav.errors import VerdictError
+    from flownav.navigation.settings_of import settings_of
     from flownav.replay.bundle import to_record
     from flownav.replay.fed import as_fed
-    from flownav.replay.prepare import ReplayOptions, identified_flow
+    from flownav.replay.prepare import ReplayOptions
     from flownav.replay.session import replay, table_windows
     from flownav.sensors.datasheet import load_sensor
+    from flownav.sensors.identified import identified_flow
 
     windows = tuple(_numbers("--gps-outage", text, ":", 2, "T0:T1") for text in gps_outage or [])
     scale = _numbers("--flow-scale", flow_scale, ",", 2, "X,Y")
     table = table_windows(*_numbers("--outage-table", outage_table, ":", 3, "T0:T1:LENGTH")) if outage_table else []
-    identified = identified_flow(load_sensor(sensor)) if sensor else None
+    flow, stated = load_sensor(sensor) if sensor else None, _settings(settings) if settings else None
+    told = settings_of(flow, stated=stated)
     outages = tuple((t0, t1) for t0, t1 in windows)
-    options = ReplayOptions(gps_delay, outages, not no_flow, (scale[0], scale[1]), identified)
+    identified = identified_flow(flow) if flow else None
+    options = ReplayOptions(gps_delay, outages, not no_flow, (scale[0], scale[1]), identified, told.noise)
     log = _read(folder, flow_instance)
-    options, numbers = as_fed(log, options, _settings(settings) if settings else None)
+    options, numbers = as_fed(log, options, told.settings if flow or stated else None)
     flown = replay(log, options, numbers, smoothed=smooth)
     scores = flown.scores()
     if table:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,11 +54,5 @@ def as_fed(streams: Mapping[Sensor, Stream]) -> EventQueue:
     turn = np.maximum(arrival, queue.t_s + horizon_s)
     order = np.lexsort((queue.t_s, turn))
     kept = order[~ahead[order]]
-    return EventQueue(
-        queue.t_s[kept],
-        queue.sensor[kept],
-        queue.value[kept],
-        queue.variance[kept],
-        queue.quality[kept],
-        queue.row[kept],
-    )
+    columns: dict[str, Any] = {name: column[kept] for name, column in queue._asdict().items()}
+    return EventQueue(**columns)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
+from flownav.estimation.states import PAD, STATE
 from flownav.frames import rotation_from_quaternion, to_body
 from flownav.live.options import Options
 from flownav.live.reception import Vehicle
@@ -15,7 +14,8 @@ from flownav.mavlink.outgoing import Estimate, landing_target, odometry, vision_
 from flownav.mavlink.position_messages import LOCAL_FRD, LOCAL_NED
 from flownav.mavlink.sensors_outgoing import MAVLINK_VERSION
 from flownav.mavlink.signing import sign_outgoing
-from flownav.navigation.state import PAD, Running
+from flownav.navigation.loop import Running
+from flownav.navigation.memory import PAD_KNOWN
 
 PX4, INVALID_AUTOPILOT = 12, 8
 ONBOARD_CONTROLLER, ACTIVE = 18, 4  # MAV_TYPE, MAV_STATE
@@ -65,9 +65,9 @@ class Answers:
             return [odometry(self._mav, estimate, frame=LOCAL_NED if vehicle.make == PX4 else LOCAL_FRD)]
         if send == "vision":
             return [vision_position_estimate(self._mav, estimate), vision_speed_estimate(self._mav, estimate)]
-        pad = [float(value) for value in on.memory[PAD : PAD + 3]]
-        if not np.isfinite(pad).all():
+        if on.work[PAD_KNOWN] == 0.0:
             return []
+        pad = [float(value) for value in on.work[STATE + PAD : STATE + PAD + 3]]
         north, east, down = (pad[i] - estimate.pos_ned_m[i] for i in range(3))
         x, y, z = to_body(rotation_from_quaternion(*estimate.quaternion), north, east, down)
         distance_m = math.sqrt(x * x + y * y + z * z)

@@ -6,14 +6,18 @@ import math
 
 import numpy as np
 
-from flownav.estimation.landing.states import ATTITUDE, GYRO_BIAS, POSITION, STATES, VELOCITY
+from flownav.compile import ONE_LANE
+from flownav.estimation.covariance import unpack
+from flownav.estimation.states import ATTITUDE, GYRO_BIAS, POSITION, STATES, VELOCITY
 from flownav.live.options import Limits
 from flownav.mavlink.outgoing import Estimate
 from flownav.measurement import Array
-from flownav.navigation.ahead import AHEAD, ahead
-from flownav.navigation.state import AIDED, CLOCK, FLAG, IMU_CLOCK, ROWS, STARTED, USE_IMU, Running
+from flownav.navigation.ahead import state_at
+from flownav.navigation.loop import Running
+from flownav.navigation.memory import load_aid, load_imu, load_start
 
 LONGEST_AHEAD_S = 2.0
+INVALID = 2.0  # the flag of `memory.AidMemory`
 WITHHELD = {
     "no_vehicle": "no autopilot's HEARTBEAT is heard",
     "listening": "the vehicle is being listened to",
@@ -32,26 +36,24 @@ def why_withheld(on: Running | None, t_s: float, newest_s: float, limits: Limits
     """Why no estimate of `t_s` may be sent, "" where it may; newest_s: the vehicle's newest reading. See WITHHELD."""
     if on is None:
         return "listening"
-    memory, settings = on.memory, on.settings
-    if memory[STARTED] == 0.0:
+    told, aid, imu = on.told, load_aid(on.work, ONE_LANE, 0), load_imu(on.work, ONE_LANE, 0)
+    if load_start(on.work, ONE_LANE, 0).started == 0.0:
         return "not_started"
-    imu_stale = memory[USE_IMU] > 0.0 and not memory[CLOCK] - memory[IMU_CLOCK] <= settings.imu_stale_s
-    if imu_stale or not t_s - newest_s <= limits.age_s or not t_s - memory[CLOCK] <= LONGEST_AHEAD_S:
+    imu_stale = told.equipment.use_imu and not on.clock_s - imu.read_s <= told.imu.imu_stale_s
+    if imu_stale or not t_s - newest_s <= limits.age_s or not t_s - on.clock_s <= LONGEST_AHEAD_S:
         return "stale"
-    aid_age_s = memory[CLOCK] - memory[AIDED]
-    if memory[FLAG] >= 2.0 or aid_age_s > settings.invalid_s:
+    aid_age_s = on.clock_s - aid.aided_s
+    if aid.flag >= INVALID or aid_age_s > told.aid.invalid_s:
         return "position_invalid"
     return "dead_reckoning" if aid_age_s > limits.dead_reckoning_s else ""
 
 
 def estimate_of(on: Running, imu: Array, t_s: float, boot_s: float, resets: int) -> Estimate:
     """The state carried on to t_s. imu (n, 7): readings later than the filter's clock. boot_s: t_s on their clock."""
-    out = np.empty(AHEAD)
-    ahead(on.work, on.memory, imu, t_s, out)
-    state = [float(value) for value in out]
-    covariance = on.work[ROWS.covariance : ROWS.covariance + STATES * STATES].reshape(STATES, STATES)
-    pose, velocity = _covariances(on, covariance, max(t_s - float(on.memory[CLOCK]), 0.0), _heading(state[6:10]))
-    if on.memory[USE_IMU] == 0.0:
+    state = [float(value) for value in state_at(on.work, on.settings, imu, t_s)]
+    covariance = unpack(on.work, ONE_LANE, 0, STATES)
+    pose, velocity = _covariances(on, covariance, max(t_s - on.clock_s, 0.0), _heading(state[6:10]))
+    if not on.told.equipment.use_imu:
         state[10:13] = [float("nan")] * 3
     return Estimate(
         max(0, round(boot_s * 1e6)),
@@ -89,10 +91,12 @@ def _covariances(on: Running, covariance: Array, dt_s: float, heading_rad: float
     step = np.eye(ATTITUDE + 3)
     step[POSITION : POSITION + 3, VELOCITY : VELOCITY + 3] = dt_s * np.eye(3)
     block = step @ block @ step.T
-    settings = on.settings.filter if on.memory[USE_IMU] > 0.0 else on.settings.coasting
+    told, moving = on.told.imu, on.told.equipment.use_imu
+    accel = told.accel_noise_m_s2_rt_hz if moving else told.coasting_accel_m_s2_rt_hz
+    gyro = told.gyro_noise_rad_s_rt_hz if moving else told.coasting_rate_rad_s_rt_hz
     for i in range(3):
-        block[VELOCITY + i, VELOCITY + i] += settings.accel_noise_m_s2_rt_hz**2 * dt_s
-        block[ATTITUDE + i, ATTITUDE + i] += settings.gyro_noise_rad_s_rt_hz**2 * dt_s
+        block[VELOCITY + i, VELOCITY + i] += accel**2 * dt_s
+        block[ATTITUDE + i, ATTITUDE + i] += gyro**2 * dt_s
     turn = np.eye(6)
     cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
     turn[3:5, 3:5] = [[cosine, sine], [-sine, cosine]]

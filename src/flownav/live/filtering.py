@@ -11,9 +11,12 @@ from flownav.live.horizon import Waiting
 from flownav.live.options import Options
 from flownav.logs.rates import attitude_rates, mean_over
 from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, Stream
-from flownav.navigation.feed import Equipment, equipment_of, start_navigator
-from flownav.navigation.loop import run
-from flownav.navigation.state import CLOCK, COMPONENTS, GPS_RESET, START, Running, empty_tape
+from flownav.navigation.feed import equipment_of
+from flownav.navigation.loop import Running, run, start_navigator
+from flownav.navigation.tables import written_on
+from flownav.navigation.tape import COMPONENTS, GPS_RESET, START, empty_tape
+from flownav.navigation.told import Equipment
+from flownav.sensors.identified import UNTURNED, in_vehicle_axes
 
 BATCH = 128  # readings at a time
 KEPT_IMU = 512  # two seconds at 250 Hz, more than the horizon and an exposure
@@ -73,7 +76,7 @@ class Filtering:
         equipment = equipment_of(streams, first_s, _own_gyro_is_dead(streams), settings)
         if gps_heard:
             equipment = equipment._replace(deadline_s=first_s + float(settings.start_wait_s))
-        self.running = start_navigator(equipment, settings, self._tape)
+        self.running = start_navigator(equipment, settings, self._tape, self._options.flow_noise)
         self._keeper.segment(equipment)
 
     def stop(self) -> None:
@@ -97,13 +100,15 @@ class Filtering:
             variance,
             np.array([waiting.reading.quality for waiting in released], float),
             np.arange(len(released)),
+            np.zeros(len(released)),
+            np.ones(len(released)),
         )
         self._keeper.fed(queue, np.array([waiting.reading.t_s for waiting in released]))
         on.tape.used[:] = 0
         run(queue, on)
-        used = on.tape.used
-        outcome = Outcome(on.tape.innovation[: used[1]].copy(), on.tape.event[: used[2]].copy())
-        self._keeper.written(on.tape.estimate[: used[0]].copy(), *outcome)
+        written = written_on(on.tape)
+        outcome = Outcome(written.innovation, written.event)
+        self._keeper.written(*written)
         self.jumps += int(np.isin(outcome.event[:, 1], JUMPS).sum())
         return outcome
 
@@ -119,22 +124,18 @@ class Filtering:
     @property
     def clock_s(self) -> float:
         """The instant that the navigator has reached; NaN without one."""
-        return float(self.running.memory[CLOCK]) if self.running is not None else float("nan")
+        return self.running.clock_s if self.running is not None else float("nan")
 
     # -- what a reading becomes -------------------------------------------------------------------------------
     def _row(self, waiting: Waiting) -> tuple[list[float], list[float]]:
-        """Values and variances, MAX_VALUES each; flow with the turning over its exposure and without its gain error."""
-        reading = waiting.reading
+        """Values and variances, MAX_VALUES each; flow in the vehicle's axes, with the turning over its exposure."""
+        reading, known = waiting.reading, self._options.identified
         value = list(reading.value)
+        if reading.sensor in FLOW and known is not None and known.axes != UNTURNED:
+            angular = reading.sensor == Sensor.FLOW_RATE
+            value = in_vehicle_axes(np.array([value]), known, angular=angular)[0].tolist()
         if reading.sensor == Sensor.FLOW_RATE:
             value = self._with_turning(value, reading.t_s, waiting.exposure_s)
-        if reading.sensor in FLOW and self._options.identified is not None:
-            gain_u, gain_v = self._options.identified[:2]
-            if reading.sensor == Sensor.FLOW_RATE:
-                value[0] = value[2] + (value[0] - value[2]) / gain_v
-                value[1] = value[3] + (value[1] - value[3]) / gain_u
-            else:
-                value[0], value[1] = value[0] / gain_u, value[1] / gain_v
         spare = MAX_VALUES - len(value)
         return value + [np.nan] * spare, list(reading.variance) + [np.nan] * (MAX_VALUES - len(reading.variance))
 

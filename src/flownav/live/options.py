@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.replay.prepare import IdentifiedFlow
+from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
+from flownav.sensors.identified import IdentifiedFlow
 
 Sending = Literal["odometry", "vision", "landing-target", "none"]
 SENDINGS = get_args(Sending)
@@ -30,9 +31,10 @@ class Limits:
 class Options:
     """What a session is asked to do.
 
-    key: a MAVLink signing key. margin_s: what the horizon waits beyond the largest delay: an IMU period and the link's
-    jitter. listen_s: how long the vehicle is listened to before it is decided which sensors serve. restart_s: a longer
-    silence of the vehicle, or its reboot, begins the navigation anew.
+    key: a MAVLink signing key. identified: a flow sensor's latency and axes; its gains are the settings'. margin_s:
+    what the horizon waits beyond the largest delay: an IMU period and the link's jitter. listen_s: how long the vehicle
+    is listened to before it is decided which sensors serve. restart_s: a longer silence of the vehicle, or its reboot,
+    begins the navigation anew.
     """
 
     send: Sending = "odometry"
@@ -42,6 +44,7 @@ class Options:
     gps_delay_s: float = 0.22
     identified: IdentifiedFlow | None = None
     settings: NavigatorSettingsFile = NavigatorSettingsFile()  # noqa: RUF009  (frozen)
+    flow_noise: FlowNoise = NO_STATED_NOISE
     limits: Limits = Limits()
     margin_s: float = 0.05
     listen_s: float = 2.0

@@ -14,11 +14,11 @@ import numpy as np
 from flownav.live.options import Options
 from flownav.mavlink.state_messages import TrueState
 from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor
-from flownav.navigation.feed import Equipment
-from flownav.navigation.state import ESTIMATE_COLUMNS, EVENT_NAMES, OFFER_COLUMNS
+from flownav.navigation.tables import estimate_table, fed_rows, fed_table, happenings, innovation_table, states_table
+from flownav.navigation.tape import ESTIMATE_COLUMNS, OFFER_COLUMNS
+from flownav.navigation.told import Equipment
 from flownav.provenance import command_line, provenance
 from flownav.record import FED, POSITION_NED, QUATERNION, VELOCITY_BODY, Record, Table
-from flownav.replay.bundle import estimate_table, innovation_table
 
 NAN = float("nan")
 WIDTHS = {"fed": len(FED), "estimate": ESTIMATE_COLUMNS, "innovation": len(OFFER_COLUMNS), "event": 3, "truth": 14}
@@ -47,12 +47,7 @@ class Recorder:
 
     def fed(self, queue: EventQueue, arrival_s: Array) -> None:
         """A batch."""
-        count = len(queue.t_s)
-        block = np.column_stack([
-            queue.t_s, arrival_s, queue.sensor, queue.value, queue.variance, queue.quality,
-            np.full(count, len(self._segments) - 1),
-        ])  # fmt: skip
-        self._files["fed"].write(block.tobytes())
+        self._files["fed"].write(fed_rows(queue, arrival_s, len(self._segments) - 1).tobytes())
 
     def written(self, estimate: Array, innovation: Array, event: Array) -> None:
         """What came of it."""
@@ -82,8 +77,10 @@ class Recorder:
         """Write the record, whole, and remove what it was made of. `facts`: the session's own figures."""
         fed, events = self._rows("fed"), self._rows("event")
         record = Record(self._manifest(options, origin_deg_m, facts, fed))
-        record.add("estimate", estimate_table(self._rows("estimate")))
-        record.add("fed", dict(zip(FED, fed.T, strict=True)))
+        estimate = self._rows("estimate")
+        record.add("estimate", estimate_table(estimate))
+        record.add("states", states_table(estimate))
+        record.add("fed", fed_table(fed))
         for sensor in Sensor:
             rows = fed[fed[:, FED.index("sensor")] == sensor]
             if len(rows):
@@ -109,6 +106,7 @@ class Recorder:
                 "gps_delay_s": options.gps_delay_s,
                 "horizon_s": options.horizon_s,
                 "flow_sensor": options.identified._asdict() if options.identified else None,
+                **({"flow_noise": options.flow_noise._asdict()} if options.flow_noise.stated else {}),
                 **({} if origin is None else {"origin_lat_lon_deg_alt_m": list(origin)}),
             },
             "segments": self._segments,
@@ -119,7 +117,7 @@ class Recorder:
         }
 
     def _events(self, rows: Array) -> dict[str, Any]:
-        events = [(t_s, *EVENT_NAMES[int(kind)], value) for t_s, kind, value in rows.tolist()] + self._notes
+        events = happenings(rows) + self._notes
         if self._notes_lost:
             events.append((events[-1][0], "live", "notes_lost", "happenings beyond these", float(self._notes_lost)))
         events.sort(key=lambda event: event[0])

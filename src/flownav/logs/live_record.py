@@ -1,4 +1,7 @@
-"""The record of a live session as a Log: what its filter was fed, in the very order, so that a replay is exact."""
+"""The record of a live session or a simulated flight as a Log: what its navigator was fed, in the very order.
+
+So that a replay is exact.
+"""
 
 from __future__ import annotations
 
@@ -11,41 +14,52 @@ from flownav.errors import InputError
 from flownav.logs.log import FedSegment, Log
 from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, Stream
 from flownav.provenance import hash_of
-from flownav.record import FED, Record
+from flownav.record import FED, FED_FIRST, Record
+
+KINDS = {"live": "a live session", "fly": "a simulated flight"}
 
 
 def read_live_record(path: Path, *, flow_instance: int | None = None) -> Log:
-    """Read a record that `flownav live --record` wrote.
+    """Read a record that `flownav live --record` or `flownav fly` wrote.
 
-    InputError where it cannot be read, is no live session's, holds nothing, or a flow instance is asked for.
+    InputError where it cannot be read, says not what a navigator was fed, or a flow instance is asked for.
     """
     if flow_instance is not None:
-        raise InputError(f"--flow-instance: {path} holds what a live filter was fed, of one flow sensor; leave it out")
+        raise InputError(f"--flow-instance: {path} holds what a navigator was fed, of one flow sensor; leave it out")
     record = Record.load(path)
-    if record.manifest.get("kind") != "live" or "fed" not in record.tables:
+    kind = str(record.manifest.get("kind"))
+    if kind not in KINDS or "fed" not in record.tables:
         raise InputError(
-            f"{path}: a record of kind {record.manifest.get('kind')!r}; `flownav live --record` writes one"
+            f"{path}: a record of kind {kind!r} that does not say what a navigator was fed; `flownav live --record` "
+            "and `flownav fly` write one that does"
         )
     try:
-        fed = record.matrix("fed", FED)
+        fed = _fed_of(record)
         segments = [dict(segment) for segment in record.manifest["segments"]]
         parameters = dict(record.manifest["parameters"])
         if not len(fed):
-            raise InputError(f"{path}: the session heard nothing that its filter could use")
+            raise InputError(f"{path}: its navigator heard nothing that it could use")
         numbers = fed[:, FED.index("segment")].astype(int)
         parts = tuple(FedSegment(_floats(segments[i]), _queue(fed, numbers == i)) for i in range(len(segments)))
     except (KeyError, IndexError, TypeError, ValueError) as error:
-        raise InputError(f"{path}: not a whole live record ({error}); record the session again") from error
+        raise InputError(f"{path}: not a whole record of kind {kind!r} ({error}); write it again") from error
     return Log(
         path,
         _streams(fed),
         _origin(parameters),
         record.tables.get("truth"),
         {path.name: hash_of(path)},
-        (f"a live session of {len(parts)} navigator{'s' * (len(parts) != 1)}: fed again as it was fed",),
+        (f"{KINDS[kind]} of {len(parts)} navigator{'s' * (len(parts) != 1)}: fed again as it was fed",),
         fed=parts,
         fed_settings=parameters,
     )
+
+
+def _fed_of(record: Record) -> Array:
+    """The rows of FED. Records from before a column was kept have nothing withheld, and every reading arrived."""
+    rows = record.matrix("fed", FED_FIRST)
+    usual = {"withheld": np.zeros(len(rows)), "arrived": np.ones(len(rows))}
+    return np.column_stack([rows, *(record.tables["fed"].get(name, usual[name]) for name in FED[len(FED_FIRST) :])])
 
 
 def _floats(equipment: dict[str, Any]) -> dict[str, Any]:
@@ -59,12 +73,13 @@ def _origin(parameters: dict[str, Any]) -> tuple[float, float, float] | None:
 
 
 def _queue(fed: Array, rows: Any) -> EventQueue:
-    """The rows as the navigator took them; `row` counts within each sensor's stream."""
+    """The rows as the navigator took them; `row` counts what arrived within each sensor's stream."""
     value, variance = FED.index("value_0"), FED.index("variance_0")
     sensor = fed[:, FED.index("sensor")].astype(np.int64)
     place = np.zeros(len(fed), np.int64)
     for kind in np.unique(sensor):
-        place[sensor == kind] = np.arange(np.count_nonzero(sensor == kind))
+        arrived = np.cumsum(fed[sensor == kind, FED.index("arrived")] > 0.0)
+        place[sensor == kind] = np.maximum(arrived - 1, 0)
     part = fed[rows]
     return EventQueue(
         np.ascontiguousarray(part[:, 0]),
@@ -73,6 +88,8 @@ def _queue(fed: Array, rows: Any) -> EventQueue:
         np.ascontiguousarray(part[:, variance : variance + MAX_VALUES]),
         np.ascontiguousarray(part[:, FED.index("quality")]),
         place[rows],
+        np.ascontiguousarray(part[:, FED.index("withheld")]),
+        np.ascontiguousarray(part[:, FED.index("arrived")]),
     )
 
 
@@ -81,7 +98,7 @@ def _streams(fed: Array) -> dict[Sensor, Stream]:
     value, variance = FED.index("value_0"), FED.index("variance_0")
     streams = {}
     for sensor in Sensor:
-        rows = fed[fed[:, FED.index("sensor")] == sensor]
+        rows = fed[(fed[:, FED.index("sensor")] == sensor) & (fed[:, FED.index("arrived")] > 0.0)]
         if len(rows):
             width = len(COLUMNS[sensor])
             arrival = rows[:, FED.index("arrival_s")]

@@ -19,7 +19,7 @@ from flownav.logs.rates import attitude_rates, mean_over
 from flownav.measurement import Array, EventQueue, Sensor, Stream, merge
 from flownav.navigation.feed import imu_serves
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
-from flownav.sensors.identified import IdentifiedFlow
+from flownav.sensors.identified import IdentifiedFlow, in_vehicle_axes
 
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
 FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
@@ -142,21 +142,9 @@ def _scaled(stream: Stream, scale: tuple[float, float]) -> Stream:
 
 
 def put_right(stream: Stream, identified: IdentifiedFlow) -> Stream:
-    """The stream in the vehicle's axes: those of a sensor that is turned or wired otherwise, as its file says.
-
-    A sensor's axes are the vehicle's, each with a sign and perhaps swapped, so the way back is the transpose. Angular
-    flow and the sensor's own gyro turn as the velocity (flow_y, -flow_x) does.
-    """
-    back = np.transpose(identified.axes)
-    value = stream.value.copy()
-    pairs = ((0, 1), (2, 3)) if stream.sensor == Sensor.FLOW_RATE else ((0, 1),)
-    for x, y in pairs:
-        if stream.sensor == Sensor.FLOW_RATE:
-            forward, right = back @ np.array([value[:, y], -value[:, x]])
-            value[:, y], value[:, x] = forward, -right
-        else:
-            value[:, x], value[:, y] = back @ value[:, [x, y]].T
-    return replace(stream, value=value)
+    """The stream in the vehicle's axes: those of a sensor that is turned or wired otherwise, as its file says."""
+    angular = stream.sensor == Sensor.FLOW_RATE
+    return replace(stream, value=in_vehicle_axes(stream.value, identified, angular=angular))
 
 
 class Chosen(NamedTuple):

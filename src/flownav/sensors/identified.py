@@ -5,9 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.errors import InputError
 from flownav.sensors.datasheet import FlowSensor
+
+Array = NDArray[np.float64]
+UNTURNED = ((1.0, 0.0), (0.0, 1.0))
 
 
 class IdentifiedFlow(NamedTuple):
@@ -16,7 +20,23 @@ class IdentifiedFlow(NamedTuple):
     gain_u: float
     gain_v: float
     latency_s: float
-    axes: tuple[tuple[float, float], tuple[float, float]] = ((1.0, 0.0), (0.0, 1.0))
+    axes: tuple[tuple[float, float], tuple[float, float]] = UNTURNED
+
+
+def in_vehicle_axes(value: Array, identified: IdentifiedFlow, *, angular: bool) -> Array:
+    """Readings (n, 2 or more) of a sensor that is turned or wired otherwise, in the vehicle's axes.
+
+    A sensor's axes are the vehicle's, each with a sign and perhaps swapped, so the way back is the transpose. Angular
+    flow and the sensor's own gyro (columns 2 and 3) turn as the velocity (flow_y, -flow_x) does.
+    """
+    back, value = np.transpose(identified.axes), value.copy()
+    for x, y in ((0, 1), (2, 3)) if angular else ((0, 1),):
+        if angular:
+            forward, right = back @ np.array([value[:, y], -value[:, x]])
+            value[:, y], value[:, x] = forward, -right
+        else:
+            value[:, x], value[:, y] = back @ value[:, [x, y]].T
+    return value
 
 
 def identified_axes(verdict: str) -> tuple[tuple[float, float], tuple[float, float]] | None:

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-slow fuzz lint bench bench-once docs clean
+.PHONY: demo test test-slow fuzz mutants lint bench bench-once docs clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr
@@ -17,6 +17,9 @@ test-slow: $(VENV)/.ready-test
 
 fuzz: $(VENV)/.ready-test
 	FLOWNAV_FUZZ=$${FLOWNAV_FUZZ:-20000} $(BIN)/python -m pytest -m fuzz tests/logs/test_fuzz_logs.py
+
+mutants: $(VENV)/.ready-test
+	$(BIN)/python tests/helpers/mutants.py $(PART)
 
 lint: $(VENV)/.ready-lint
 	$(BIN)/ruff check .

@@ -71,3 +71,19 @@ def test_quaternion_rate_is_equations_8_to_10(roll, theta, yaw, rates):
     moved = to_quaternion(*(np.array([roll, theta, yaw]) + 1j * h * euler_rate))
     by_complex_step = np.array([value.imag for value in moved]) / h
     assert quaternion_rate(*to_quaternion(roll, theta, yaw), p, q, r) == pytest.approx(by_complex_step, abs=1e-9)
+
+
+@given(st.tuples(angle, pitch, angle), st.tuples(angle, pitch, angle))
+def test_the_product_of_quaternions_is_that_of_their_rotations(first, second):
+    a, b = to_quaternion(*first), to_quaternion(*second)
+    product = np.reshape(to_rotation(*frames.quaternion_product(a, b)), (3, 3))
+    expected = np.reshape(to_rotation(*a), (3, 3)) @ np.reshape(to_rotation(*b), (3, 3))
+    assert product == pytest.approx(expected, abs=1e-13)
+
+
+def test_hamilton_s_units_multiply_as_he_cut_them_into_the_bridge():
+    one, i, j, k = (tuple(row) for row in np.eye(4))
+    minus_one = tuple(-np.eye(4)[0])
+    for left, right, is_ in ((i, i, minus_one), (j, j, minus_one), (k, k, minus_one), (i, j, k), (j, k, i), (k, i, j),
+                             (one, k, k), (j, one, j)):  # fmt: skip
+        assert frames.quaternion_product(left, right) == is_

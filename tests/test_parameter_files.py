@@ -9,6 +9,7 @@ import pytest
 
 from flownav.errors import InputError
 from flownav.parameter_files import shipped
+from flownav.vehicle.feasibility import require_feasible
 from flownav.vehicle.loading import describe_vehicle, load_vehicle
 from flownav.vehicle.paper_model import load_paper_model
 from flownav.vehicle.parameters import VehicleParameters
@@ -158,3 +159,25 @@ def test_the_papers_model_refuses_a_wrong_shape_and_a_negative_variance(tmp_path
     path = written(tmp_path, text.replace("process_variance = [0.0022", "process_variance = [-0.0022"), "reduced.toml")
     with pytest.raises(InputError, match=r"process_variance: variances should not be negative"):
         load_paper_model(path)
+
+
+def test_a_twentieth_more_thrust_than_hover_takes_is_asked_for():
+    vehicle = load_vehicle()
+    heaviest = vehicle.main_thrust_limit_n / vehicle.gravity_m_s2 / 1.05
+    free = {"collective_max_rad": 1.0, "pedal_max_rad": 1.0, "shaft_power_limit_w": 1e6, "tail_thrust_limit_n": 1e6}
+    require_feasible(vehicle._replace(mass_kg=0.999 * heaviest, **free), "here")
+    with pytest.raises(InputError, match="main_rotor: cannot hover, the blades stall"):
+        require_feasible(vehicle._replace(mass_kg=1.001 * heaviest, **free), "here")
+
+
+@pytest.mark.parametrize(("moments", "possible"), [((1.0, 2.0, 2.99), True), ((1.0, 2.0, 3.01), False),
+                                                   ((3.01, 1.0, 2.0), False), ((0.5, 0.5, 0.5), True)])  # fmt: skip
+def test_no_body_has_a_moment_of_inertia_above_the_sum_of_the_others(moments, possible):
+    """Of the principal moments, ∫(y² + z²) and so on, none exceeds the sum of the other two."""
+    names = ("inertia_xx_kg_m2", "inertia_yy_kg_m2", "inertia_zz_kg_m2")
+    body = load_vehicle()._replace(**dict(zip(names, moments, strict=True)))
+    if possible:
+        require_feasible(body, "here")
+    else:
+        with pytest.raises(InputError, match="no rigid body has these inertias"):
+            require_feasible(body, "here")

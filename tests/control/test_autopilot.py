@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from flownav.control import autopilot
 from flownav.control.autopilot import AutopilotGains, Estimate, grounded, hovering, inner_loop, integrate, outer_loop
 from flownav.control.guidance import Reference, path_through, reference_at
-from flownav.frames import quaternion_from_euler, rotation_from_quaternion
+from flownav.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion
 
 GAINS = AutopilotGains()
 LEVEL = rotation_from_quaternion(1.0, 0.0, 0.0, 0.0)
@@ -96,3 +96,90 @@ def test_touchdown_needs_a_tenth_of_a_second_of_weight_and_is_final():
     bounced = logic(hovering(GAINS)._replace(contact_time_s=0.08), 0.0)
     assert (bounced.flying, bounced.contact_time_s) == (1.0, 0.0)
     assert logic(hovering(GAINS)._replace(contact_time_s=9.0), 99.0, may_land=0.0).flying == 1.0
+
+
+@given(st.floats(-3.1, 3.1), st.floats(-3.0, 3.0), st.floats(-3.0, 3.0), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5))
+def test_what_it_does_turns_with_the_heading(yaw, ahead, aside, u, v):
+    """A target ahead and to the right is flown to alike, whichever way ahead and right point."""
+    limits = GAINS._replace(horizontal_speed_limit_m_s=1e3)  # north and east are limited each on its own
+    turned = rotation_from_quaternion(*quaternion_from_euler(0.0, 0.0, yaw))
+    estimate = HERE._replace(u=u, v=v)
+    north, east = np.cos(yaw) * ahead - np.sin(yaw) * aside, np.sin(yaw) * ahead + np.cos(yaw) * aside
+    one = outer_loop(hovering(limits), HOLD._replace(pos_n=ahead, pos_e=aside), estimate, LEVEL, limits, 0.02)
+    other = outer_loop(hovering(limits), HOLD._replace(pos_n=north, pos_e=east), estimate, turned, limits, 0.02)
+    assert np.array(other) == pytest.approx(np.array(one), abs=1e-12)
+
+
+def test_the_tilt_commanded_is_the_one_whose_weight_gives_the_acceleration():
+    for error in (0.1, -0.4):
+        moving = flown(HOLD._replace(vel_n=error, vel_e=error))
+        assert -moving.pitch_sine * GRAVITY_M_S2 == pytest.approx(GAINS.velocity_gain * error)
+        assert moving.roll_sine * GRAVITY_M_S2 == pytest.approx(GAINS.velocity_gain * error)
+
+
+def test_a_target_far_above_or_below_is_approached_at_the_climb_limit():
+    for far, speed in ((-100.0, -GAINS.climb_limit_m_s), (100.0, GAINS.climb_limit_m_s)):
+        asked = flown(HOLD._replace(pos_d=HOLD.pos_d + far))
+        assert asked.collective_command == pytest.approx(flown(HOLD._replace(vel_d=speed)).collective_command)
+
+
+@pytest.mark.parametrize("reverse", [1.0, -1.0])
+def test_a_body_rate_is_answered_against_itself_on_each_axis(reverse):
+    def blades(p, q, r):
+        return np.array(inner_loop(hovering(GAINS), LEVEL, p, q, r, GAINS, 0.004)[1:])
+
+    still, rate = blades(0.0, 0.0, 0.0), 0.4 * reverse
+    for axis, rates in ((0, (0.0, rate, 0.0)), (1, (rate, 0.0, 0.0)), (3, (0.0, 0.0, rate))):
+        answer = (blades(*rates) - still) * reverse
+        assert answer[axis] < -1e-3
+        assert np.delete(answer, axis) == pytest.approx(np.zeros(3), abs=1e-15)
+
+
+def test_a_nose_to_the_right_is_brought_back_to_north():
+    for yaw in (0.3, -0.3, 2.5):
+        turned = rotation_from_quaternion(*quaternion_from_euler(0.0, 0.0, yaw))
+        pedal = inner_loop(hovering(GAINS), turned, 0.0, 0.0, 0.0, GAINS, 0.004)[4]
+        assert (pedal - GAINS.pedal_trim_rad) * yaw < 0.0
+
+
+# -- the last metres of a precision landing -----------------------------------------------------------------
+PRECISE = GAINS._replace(
+    pad_pos_d_m=-0.2, land_height_m=1.0, land_speed_m_s=0.25, align_height_m=1.6, align_radius_m=0.15,
+    align_speed_m_s=0.2, commit_height_m=0.4,
+)  # fmt: skip
+DOWN = Reference(0.0, 0.0, 0.0, 0.0, 0.0, 0.3)
+
+
+def allowed(height, off_n=0.0, off_e=0.0, u=0.0, v=0.0):
+    """How fast it may descend with the skids so high over the pad, so far beside its middle."""
+    estimate = Estimate(off_n, off_e, PRECISE.pad_pos_d_m - height, u, v, 0.0)
+    return autopilot.descent_limit(DOWN, estimate, PRECISE)
+
+
+def test_near_the_pad_the_descent_is_slow_and_above_it_the_references():
+    assert allowed(0.9) == PRECISE.land_speed_m_s
+    assert allowed(1.1) == pytest.approx(PRECISE.climb_limit_m_s + DOWN.vel_d)
+
+
+@pytest.mark.parametrize(("off_n", "off_e"), [(0.16, 0.0), (-0.16, 0.0), (0.0, -0.16), (0.11, -0.11)])
+def test_beside_the_pads_middle_it_waits_before_the_last_half_metre_and_then_goes_on(off_n, off_e):
+    assert allowed(1.5, off_n, off_e) == 0.0
+    assert allowed(0.5, off_n, off_e) == 0.0
+    assert allowed(0.3, off_n, off_e) == PRECISE.land_speed_m_s
+    assert allowed(1.7, off_n, off_e) > 1.0
+
+
+@pytest.mark.parametrize(("off_n", "off_e"), [(0.1, 0.1), (-0.1, -0.1), (0.14, 0.0)])
+def test_over_the_pads_middle_it_goes_on_unless_it_is_fast(off_n, off_e):
+    assert allowed(1.2, off_n, off_e) > 0.0
+    assert allowed(1.2, off_n, off_e, u=-0.15, v=0.15) == 0.0
+    assert allowed(1.2, off_n, off_e, u=0.1, v=-0.1) > 0.0
+
+
+def test_the_limit_holds_in_the_loop():
+    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0)
+    over = beside._replace(pos_n=0.0)
+    waiting = outer_loop(hovering(PRECISE), DOWN, beside, LEVEL, PRECISE, 0.02)
+    going = outer_loop(hovering(PRECISE), DOWN, over, LEVEL, PRECISE, 0.02)
+    assert waiting.collective_command == pytest.approx(PRECISE.collective_trim_rad)
+    assert going.collective_command < PRECISE.collective_trim_rad

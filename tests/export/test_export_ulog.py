@@ -172,3 +172,15 @@ def test_the_shortest_record_is_a_log(tmp_path):
 def test_a_message_that_is_too_long_is_refused():
     with pytest.raises(ValueError, match="65535 bytes, not 65536"):
         message("L", bytes(65536))
+
+
+def test_heading_and_accuracies_are_each_their_own(tmp_path):
+    record = awkward()
+    export(record, "ulog", tmp_path / "a.ulg")
+    place = read(tmp_path / "a.ulg").get_dataset("vehicle_local_position")
+    table = record.tables["estimate"]
+    rows = np.flatnonzero(np.isfinite(table["pos_e_m"]))
+    rows = rows[np.argsort(table["t_s"][rows], kind="stable")]
+    yaw = [euler_from_quaternion(*(table[name][row] for name in QUATERNION))[2] for row in rows]
+    assert place.data["heading"] == pytest.approx(np.array(yaw), abs=1e-5)
+    assert place.data["epv"] == pytest.approx(table["std_pos_d_m"][rows], abs=1e-6)

@@ -71,6 +71,15 @@ def test_the_power_laws_intervals_hold_as_often_as_they_say_and_are_no_wider(sca
     assert np.mean(sigmas) == pytest.approx(np.std(exponents), rel=0.2)
 
 
+def test_two_heights_say_as_much_of_the_exponent_as_their_readings_do():
+    """A standard deviation of n normal readings is known to 1/sqrt(2n); no scatter is left to learn it from."""
+    random = np.random.default_rng(22)
+    laws = [fit_power_law(noisy_points(random, (0.5, 2.0), 100)) for _ in range(600)]
+    scatter = np.std([law.exponent.value for law in laws])
+    assert scatter == pytest.approx(sigma_of(laws[0].exponent), rel=0.12)
+    assert sigma_of(laws[0].exponent) == pytest.approx(0.1 / math.log(4.0), rel=1e-9)
+
+
 def test_the_power_law_is_held_outside_the_heights_it_was_fitted_to():
     law = fit_power_law([NoisePoint(h, 0.05 * h**2, 1000) for h in (0.5, 1.0, 2.0)])
     assert law.at([0.1, 0.5, 2.0, 9.0]) == pytest.approx([0.0125, 0.0125, 0.2, 0.2])

@@ -21,7 +21,7 @@ from flownav.identification.quantities import (
 )
 
 POINT = Point(np.log([14.8, 191.9]), 1.03, 0.02)
-ROOT = np.array([[0.040, 0.0, 0.0, 0.0], [0.015, 0.020, 0.0, 0.0], [0.004, -0.006, 0.010, 0.0],
+ROOT = np.array([[0.040, 0.0, 0.0, 0.0], [0.015, 0.020, 0.0, 0.0], [0.010, -0.015, 0.030, 0.0],
                  [0.0004, 0.0003, -0.0005, 0.0008]])  # fmt: skip
 FIT = SimpleNamespace(structure=Structure(2, True), point=POINT, covariance=ROOT @ ROOT.T)
 

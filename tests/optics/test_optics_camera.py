@@ -13,10 +13,12 @@ from scipy.special import j1
 from flownav.errors import InputError
 from flownav.optics.camera import (
     Camera,
+    box_transfer,
     defocus_px,
     disc_transfer,
     effective_focal_px,
     exposed,
+    gauss_transfer,
     light_named,
     refocused,
 )
@@ -45,6 +47,16 @@ def test_refocusing_halfway_halves_the_blur() -> None:
     whole, half = defocus_px(Camera(), 1.5), defocus_px(refocused(Camera(), 1.5, 0.5), 1.5)
     assert half == pytest.approx(0.5 * whole, rel=0.02)
     assert defocus_px(refocused(Camera(), 1.5, 1.0), 1.5) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_blurs_transfer_is_the_mean_of_the_pattern_over_it() -> None:
+    place = np.linspace(-20.0, 20.0, 40_001)
+    normal = np.exp(-0.5 * (place / 1.3) ** 2)
+    box = (np.abs(place) <= 1.25).astype(float)
+    for frequency in (0.0, 0.05, 0.2, 0.45):
+        pattern = np.cos(2.0 * np.pi * frequency * place)
+        assert gauss_transfer(frequency, 1.3) == pytest.approx(np.average(pattern, weights=normal), abs=1e-9)
+        assert box_transfer(frequency, 2.5) == pytest.approx(np.average(pattern, weights=box), abs=1e-3)
 
 
 def test_the_transfer_of_a_blur_disc_is_the_bessel_function() -> None:

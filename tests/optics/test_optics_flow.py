@@ -43,6 +43,7 @@ def test_velocity_has_the_sign_and_the_size_of_the_motion(vx: float, vy: float) 
     np.testing.assert_allclose(series.flow_px.mean(axis=0), np.array(expected) / FPS, atol=0.25)
     np.testing.assert_allclose(series.velocity_m_s.mean(axis=0), [vx, vy], atol=0.25 * HEIGHT_M * FPS / 666.0)
     assert np.sign(series.velocity_m_s.mean(axis=0) * [vx, vy]).min() >= 0
+    np.testing.assert_allclose(series.flow_rad_s, -series.velocity_m_s / HEIGHT_M, atol=1e-12)
 
 
 @pytest.mark.parametrize(("wx", "wy"), [(0.0, 0.4), (0.0, -0.4), (0.4, 0.0), (-0.4, 0.0)])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from flownav.optics.plane_pose import homography, mapped, plane_pose
@@ -37,17 +38,24 @@ def test_rms_is_what_each_coordinate_is_off_by():
     assert found.rms == pytest.approx(np.sqrt(np.mean(left**2)), rel=1e-6)
 
 
-def test_a_small_figures_two_poses_are_told_apart_by_what_they_leave():
-    rotation = Rotation.from_euler("xyz", (0.4, 0.1, 0.0)).as_matrix()
-    random, found = np.random.default_rng(2), []
-    for _ in range(40):
-        noisy = seen(rotation, np.array([0.1, 0.0, 3.0])) + 2e-4 * random.standard_normal((4, 2))
-        found.append(plane_pose(SQUARE, noisy))
-    for pose in found:
-        mirrored = np.linalg.norm(pose.rotation[:2, 2] + rotation[:2, 2]) < np.linalg.norm(
-            pose.rotation[:2, 2] - rotation[:2, 2]
-        )
-        assert not mirrored or pose.rms < 3e-4  # taken for the other only where that fits as well
+def best_of_many_starts(tangents: np.ndarray) -> float:
+    """The least rms that any pose leaves: least squares from tilts to all sides."""
+
+    def left(unknown: np.ndarray) -> np.ndarray:
+        return (seen(Rotation.from_rotvec(unknown[:3]).as_matrix(), unknown[3:]) - tangents).ravel()
+
+    start = [0.1, 0.0, 3.0]
+    tilts = [(0.4 * np.cos(a), 0.4 * np.sin(a), 0.0) for a in np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)]
+    return min(float(np.sqrt(np.mean(least_squares(left, [*tilt, *start]).fun ** 2))) for tilt in tilts)
+
+
+def test_of_a_small_figures_two_poses_the_better_one_is_found():
+    """Tilted either way about the line of sight it looks almost alike (Schweighofer and Pinz 2006)."""
+    random = np.random.default_rng(16)  # in the seventh draw the nearer start leads to the worse of the two
+    rotation = Rotation.from_euler("xyz", (0.5, 0.1, 0.0)).as_matrix()
+    for _ in range(10):
+        noisy = seen(rotation, np.array([0.1, 0.0, 3.0])) + 3e-3 * random.standard_normal((4, 2))
+        assert plane_pose(SQUARE, noisy).rms <= best_of_many_starts(noisy) * (1.0 + 1e-6) + 1e-12
 
 
 def test_a_projective_map_takes_four_points_to_four():

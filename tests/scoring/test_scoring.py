@@ -87,3 +87,25 @@ def test_the_papers_percentile_counts_flights_below_it():
     rows = np.zeros((4, len(SCORE_COLUMNS)))
     rows[:, SCORE_COLUMNS.index("max_position_error_m")] = [0.1, 0.2, 0.3, 0.4]
     assert percentile_of_paper(rows, table)["max_position_error_m"] == 50.0
+
+
+def test_the_largest_error_is_so_on_either_side():
+    error = np.array([1.0, -4.0, 3.0]).reshape(-1, 1, 1)
+    assert error_statistics(error, np.zeros_like(error))[0, 0, 3] == 4.0
+    assert error_statistics(-error, np.zeros_like(error))[0, 0, 3] == 4.0
+
+
+@pytest.mark.parametrize(("epochs", "airborne"), [(24, False), (25, True)])
+def test_half_a_second_without_contact_at_50_hz_is_a_flight(epochs, airborne):
+    on_ground = contacts([(1, 5), (0, epochs), (1, 5)])
+    t_s, zeros = np.arange(len(on_ground)) * 0.02, np.zeros((len(on_ground), 1))
+    (contact,) = first_contact(t_s, np.zeros((len(on_ground), 3, 1)), zeros, on_ground)
+    assert np.isfinite(contact[0]) == airborne
+    assert not airborne or contact[0] == pytest.approx((5 + epochs) * 0.02)
+
+
+def test_how_far_from_the_pad_it_touched_is_along_the_ground():
+    on_ground = contacts([(0, 30), (1, 5)])
+    position = np.tile(np.array([3.0, -4.0, -0.2])[:, None], (len(on_ground), 1, 1))
+    (contact,) = first_contact(np.arange(35.0), position, np.zeros((35, 1)), on_ground)
+    assert contact[1] == pytest.approx(5.0)

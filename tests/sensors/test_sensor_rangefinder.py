@@ -66,6 +66,16 @@ def test_a_stuck_sonar_reports_one_value_whatever_is_below(height: float) -> Non
     assert read(height, normal=3.0, stuck_at_m=0.8) == (0.8, 1.0)
 
 
+def test_the_firmwares_filter_takes_its_own_shares_of_an_error() -> None:
+    """x = x- + 0.8461 e, v = v + 6.2034 e: what px4flow's sonar.c has."""
+    p = RangefinderSettings(resolution_m=0.0).parameters()
+    state, _ = step(start(2.0, 1.0, p), 2.1, 1.0, 0.0, p)
+    assert state == pytest.approx((2.0 + 0.8461 * 0.1, 6.2034 * 0.1))
+    state, _ = step(state, 2.1, 1.0, 0.0, p)
+    left = 2.1 - (2.0 + 0.8461 * 0.1 + 6.2034 * 0.1 * PERIOD_S)
+    assert state.rate_m_s == pytest.approx(6.2034 * (0.1 + left))
+
+
 def descend(p: RangefinderParameters, speed_m_s: float, seconds: float, from_m: float) -> tuple[list[float], float]:
     """Rates of the firmware's filter during a steady descent, and the last range of the filter."""
     state = start(from_m, 1.0, p)

@@ -7,6 +7,7 @@ import pytest
 
 from flownav.vehicle import airframe
 from flownav.vehicle.airframe import AirMotion, Wrench
+from flownav.vehicle.helicopter import tail_inplane_sq
 from flownav.vehicle.loading import load_vehicle
 
 VEHICLE = load_vehicle()
@@ -69,3 +70,17 @@ def test_forces_turn_about_the_centre_of_gravity_where_they_act():
     )
     assert total[:3] == pytest.approx(force)
     assert total[3:] == pytest.approx(moment)
+
+
+def test_a_fin_before_the_tail_rotor_leaves_its_share_of_the_thrust():
+    still = AirMotion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for share in (1.0, 0.83, 0.5):
+        blocked = VEHICLE._replace(tail_fin_blockage=share, vertical_fin_area_m2=0.0)
+        assert airframe.tail_side_force(8.0, 6.0, still, blocked) == pytest.approx(-8.0 * share)
+
+
+def test_a_body_that_pitches_about_its_tail_rotor_leaves_that_rotor_at_rest():
+    """Its velocity is v + ω × r at r = (-l, 0, ·): a turn about the place where it stands moves it not."""
+    turning = AIR._replace(w=-ARM * AIR.q)
+    assert tail_inplane_sq(turning, VEHICLE) == pytest.approx(AIR.u**2)
+    assert tail_inplane_sq(AIR._replace(q=0.0), VEHICLE) == pytest.approx(AIR.u**2 + AIR.w**2)

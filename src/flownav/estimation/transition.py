@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from itertools import pairwise
-from typing import Any, Protocol, cast, get_type_hints
+from itertools import combinations_with_replacement, pairwise
+from typing import Any, NamedTuple, Protocol, cast, get_type_hints
 
 from flownav.compiling.bundles import write_function
 from flownav.estimation.law import at, compiled, dressed, parameters, value_of
@@ -38,39 +38,86 @@ def transition(function: Callable[..., Any]) -> Transition:
         raise NameError(f"{function.__name__} changes states that it does not read")
     if len(sources) > MOST_SOURCES:
         raise ValueError(f"{function.__name__} reads more than {MOST_SOURCES} states")
-    width, position = len(sources), {state: k for k, state in enumerate(sources)}
-
-    def call(where: Callable[[int], str], changed: list[int]) -> list[str]:
-        """Source that calls the law on errors that lie at `where`, and puts what becomes of them there."""
-        given = [where(PLACES[name]) if name in PLACES else value_of(name) for name in names]
-        passed = [f"{name}={name}" for name in scalars]
-        return [
-            "        for lane in range(len(lanes)):",
-            f"            found = law({', '.join([*given, *passed])})",
-            *(f"            {where(state)} = found.{SHORT_NAMES[state]}" for state in changed),
-        ]
-
+    plan = _Plan(names, scalars, sources, targets)
     lines = [f"def move(work, lanes, n{''.join(f', {name}' for name in scalars)}):"]
-    for first, end in gaps(sources):  # columns of states that the law does not read
-        lines += [f"    for j in range({first}, {end}):", *call(partial(beside, first), targets)]
-    for a, one in enumerate(runs(sources, [])):  # its own block, both triangles, column by column into SCRATCH
-        for other in runs(sources, [])[a:]:
-            lines += copied(one, other, width, position, out=True)
-    lines += [f"    for k in range({width}):"]  # by columns
-    lines += call(lambda state: at(f"{SCRATCH + position[state]} + k * {width}"), targets)
-    blocks = runs(sources, targets)
-    for one in blocks:  # by rows
-        if one[0] in targets:
-            lines += [f"    for k in range({position[one[0]]}, {position[one[-1]] + 1}):"]
-            lines += call(lambda state: at(f"{SCRATCH + position[state] * width} + k"), targets)
-    for a, one in enumerate(blocks):  # and back into the triangle
-        for other in blocks[a:]:
-            if one[0] in targets or other[0] in targets:
-                lines += copied(one, other, width, position, out=False, by_row=one[0] in targets)
+    lines += [*plan.columns_beside(), *plan.block_out(), *plan.block_moved(), *plan.block_back()]
     move = write_function("move", "\n".join(lines) + "\n", {"law": compiled(function)})
     return cast(Transition, dressed(move, function))
 
 
+class _Plan(NamedTuple):
+    """What a transition reads and changes, and the source of its pass, part by part.
+
+    The block of P on its own states goes through SCRATCH, where element (row, column) of both triangles lies at
+    `SCRATCH + column * width + row`, rows and columns counted along `sources`.
+    """
+
+    names: list[str]
+    scalars: list[str]
+    sources: list[int]
+    targets: list[int]
+
+    def columns_beside(self) -> list[str]:
+        """Columns of the states that the law does not read: what F makes of them stays where they are."""
+        lines = []
+        for first, end in gaps(self.sources):
+            lines += [f"    for j in range({first}, {end}):", *self._called(partial(beside, first))]
+        return lines
+
+    def block_out(self) -> list[str]:
+        """The transition's own block into SCRATCH, its upper triangle first and then mirrored."""
+        lines = []
+        for one, other in combinations_with_replacement(runs(self.sources, []), 2):
+            lines += self._copied(one, other, f"{self._scratch('i', 'j', one, other)} = {packed('i', 'j')}")
+        width = len(self.sources)
+        mirrored = f"{at(f'{SCRATCH} + i * {width} + j')} = {at(f'{SCRATCH} + j * {width} + i')}"
+        return [*lines, *loops(f"0, {width}", "0, j", mirrored)]
+
+    def block_moved(self) -> list[str]:
+        """F P by columns, and (F P) F' by rows."""
+        width, place = len(self.sources), self.sources.index
+        lines = [f"    for k in range({width}):"]
+        lines += self._called(lambda state: at(f"{SCRATCH + place(state)} + k * {width}"))
+        for run in self._runs_of_targets():
+            lines += [f"    for k in range({place(run[0])}, {place(run[-1]) + 1}):"]
+            lines += self._called(lambda state: at(f"{SCRATCH + place(state) * width} + k"))
+        return lines
+
+    def block_back(self) -> list[str]:
+        """The rows that changed, back into the triangle."""
+        lines, changed = [], self._runs_of_targets()
+        for one, other in combinations_with_replacement(runs(self.sources, self.targets), 2):
+            if one in changed:
+                lines += self._copied(one, other, f"{packed('i', 'j')} = {self._scratch('i', 'j', one, other)}")
+            elif other in changed:
+                lines += self._copied(one, other, f"{packed('i', 'j')} = {self._scratch('j', 'i', other, one)}")
+        return lines
+
+    def _called(self, where: Callable[[int], str]) -> list[str]:
+        """The law called on errors that lie at `where`; what becomes of them is put there."""
+        given = [where(PLACES[name]) if name in PLACES else value_of(name) for name in self.names]
+        passed = [f"{name}={name}" for name in self.scalars]
+        return [
+            "        for lane in range(len(lanes)):",
+            f"            found = law({', '.join([*given, *passed])})",
+            *(f"            {where(state)} = found.{SHORT_NAMES[state]}" for state in self.targets),
+        ]
+
+    def _runs_of_targets(self) -> list[list[int]]:
+        return [run for run in runs(self.sources, self.targets) if run[0] in self.targets]
+
+    def _scratch(self, row: str, column: str, rows: list[int], columns: list[int]) -> str:
+        """Where SCRATCH has the element of two states, given by variables that run through `rows` and `columns`."""
+        shift = self.sources.index(columns[0]) - columns[0]
+        along = self.sources.index(rows[0]) - rows[0]
+        return at(f"{SCRATCH + along} + ({column} + {shift}) * {len(self.sources)} + {row}")
+
+    def _copied(self, one: list[int], other: list[int], line: str) -> list[str]:
+        """A line for each element (i, j), i <= j, i in `one` and j in `other`."""
+        return loops(f"{other[0]}, {other[-1] + 1}", f"{one[0]}, {'j + 1' if one == other else one[-1] + 1}", line)
+
+
+# -- from states to source ----------------------------------------------------------------------------------
 def gaps(order: list[int]) -> list[tuple[int, int | str]]:
     """Ranges of the states that a transition does not read, in order; the last ends at `n`."""
     between: list[tuple[int, int | str]] = [(a + 1, b) for a, b in pairwise([-1, *order]) if b > a + 1]
@@ -88,6 +135,11 @@ def runs(order: list[int], targets: list[int]) -> list[list[int]]:
     return found
 
 
+def packed(i: str, j: str) -> str:
+    """Element (i, j) of P, i <= j, two variables; the mask is `covariance.column`'s."""
+    return at(f"{COVARIANCE} + ({j} * ({j} + 1) // 2 & 1023) + {i}")
+
+
 def beside(first: int, state: int) -> str:
     """Element (state, j) of P, for a j that runs from `first` on, on one side of the state."""
     if state < first:
@@ -95,18 +147,11 @@ def beside(first: int, state: int) -> str:
     return at(f"{COVARIANCE + state * (state + 1) // 2} + j")
 
 
-def copied(
-    one: list[int], other: list[int], width: int, position: dict[int, int], out: bool, by_row: bool = False
-) -> list[str]:
-    """Source that copies elements (i, j), i <= j, i in `one` and j in `other`, to SCRATCH or back."""
-    i, j = f"(i - {one[0] - position[one[0]]})", f"(j - {other[0] - position[other[0]]})"
-    below, above = at(f"{SCRATCH} + {i} * {width} + {j}"), at(f"{SCRATCH} + {j} * {width} + {i}")
-    element = at(f"{COVARIANCE} + (j * (j + 1) // 2 & 1023) + i")
-    end = "j + 1" if one == other else f"{one[-1] + 1}"
-    copies = [f"{above} = {element}", f"{below} = {element}"] if out else [f"{element} = {above if by_row else below}"]
+def loops(j: str, i: str, line: str) -> list[str]:
+    """A line in a loop over j, i and lanes."""
     return [
-        f"    for j in range({other[0]}, {other[-1] + 1}):",
-        f"        for i in range({one[0]}, {end}):",
+        f"    for j in range({j}):",
+        f"        for i in range({i}):",
         "            for lane in range(len(lanes)):",
-        *(f"                {line}" for line in copies),
+        f"                {line}",
     ]

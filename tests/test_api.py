@@ -88,6 +88,12 @@ def test_files_can_be_read_in_one_sitting(source):
     assert len(source.read_text(encoding="utf-8").splitlines()) <= LONGEST_FILE
 
 
+def test_folders_of_tests_are_rooms():
+    rooms = {source.relative_to(PACKAGE).parts[0].removesuffix(".py") for source in SOURCES}
+    folders = {path.parent.name for path in (PROJECT / "tests").glob("*/test_*.py")}
+    assert folders <= rooms
+
+
 def test_constraints_pin_every_dependency_and_name_no_address():
     lines = (PROJECT / "constraints.txt").read_text(encoding="utf-8").splitlines()
     assert all(re.fullmatch(r"[A-Za-z0-9._-]+==[A-Za-z0-9.+_-]+", line) for line in lines)

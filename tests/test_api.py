@@ -12,7 +12,6 @@ from pathlib import Path
 import pytest
 
 import flownav
-from flownav.compile import WITHOUT_KERNELS
 
 PACKAGE = Path(flownav.__file__).parent
 PROJECT = PACKAGE.parents[1]
@@ -75,12 +74,6 @@ def test_only_compile_knows_numba(source):
     if source.relative_to(PACKAGE).parts[0] not in ("compile.py", "compiling"):
         imported = re.findall(r"^\s*(?:import|from)\s+(numba|llvmlite)", source.read_text(encoding="utf-8"), re.M)
         assert not imported
-
-
-def test_rooms_that_compilation_ignores_hold_no_compiled_code():
-    for room in WITHOUT_KERNELS:
-        for source in (PACKAGE / room).rglob("*.py"):
-            assert not re.search(r"^@(kernel|equation)", source.read_text(encoding="utf-8"), re.M), source
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))

@@ -18,16 +18,9 @@ number of threads.
 from __future__ import annotations
 
 from flownav.compiling.bundles import FlatAccess, flat_access, lane_access
-from flownav.compiling.engine import (
-    CACHE_FOLDER,
-    LANES_WIDE,
-    WITHOUT_KERNELS,
-    announce_compilation,
-    equation,
-    kernel,
-    procedure,
-)
+from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
+from flownav.compiling.progress import announce_compilation
 from flownav.compiling.scalars import bits_from_float, clamp, float_from_bits, larger, magnitude, smaller
 from flownav.compiling.units import Unit, unit
 
@@ -35,11 +28,9 @@ ONE_LANE: tuple[int, ...] = (0,)
 LANES: tuple[int, ...] = (0,) * LANES_WIDE
 
 __all__ = [
-    "CACHE_FOLDER",
     "LANES",
     "LANES_WIDE",
     "ONE_LANE",
-    "WITHOUT_KERNELS",
     "FlatAccess",
     "Unit",
     "announce_compilation",

@@ -7,13 +7,21 @@ import ctypes
 import inspect
 import linecache
 import textwrap
+import threading
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
-import numba
 import numpy as np
 from numba import types
+from numba.core.ccallback import _CFuncCompiler  # type: ignore[attr-defined]
+from numba.core.compiler import Compiler
+from numba.core.registry import cpu_target
+
+from flownav.compiling.cache import KernelCache
+from flownav.compiling.engine import without_surprises
+from flownav.compiling.progress import compiling
+
+OPTIONS = {"error_model": "numpy"}
 
 LETTERS = {
     "p": (types.CPointer(types.float64), ctypes.c_void_p, np.float64),
@@ -35,34 +43,55 @@ class Unit:
         self.constants = constants
         self.__name__ = function.__name__
         self.__doc__ = function.__doc__
+        self._lock = threading.RLock()
+        self._entry: Any = None
 
     def python(self, *arguments: Any) -> None:
         """The plain Python function on these arguments, its constants bound."""
         names = [name for name in inspect.signature(self.function).parameters if name not in self.constants]
         self.function(**dict(zip(names, arguments, strict=True)), **self.constants)
 
-    @cached_property
-    def _compiled(self) -> Any:
-        """Numba's C function, compiled or taken from the cache."""
-        bound = bind_constants(self.function, self.constants)
-        signature = types.void(*(LETTERS[letter][0] for letter in self.letters))
-        return numba.cfunc(signature, cache=False, error_model="numpy")(bound)
-
     @property
     def address(self) -> int:
         """The address of the compiled function, which is compiled or loaded at the first use."""
-        return int(self._compiled.address)
-
-    @cached_property
-    def _entry(self) -> Any:
-        kinds = [LETTERS[letter][1] for letter in self.letters]
-        return ctypes.CFUNCTYPE(None, *kinds)(self.address)
+        return int(self._compiled[0])
 
     def __call__(self, *arguments: Any) -> None:
         """Run the compiled code from Python; a pointer may be given as an array, an address or a ctypes pointer."""
         if len(arguments) != len(self.letters):
             raise TypeError(f"{self.__name__} takes {len(self.letters)} arguments, not {len(arguments)}")
-        self._entry(*(_passed(letter, argument) for letter, argument in zip(self.letters, arguments, strict=True)))
+        self._compiled[1](
+            *(_passed(letter, argument) for letter, argument in zip(self.letters, arguments, strict=True))
+        )
+
+    @property
+    def _compiled(self) -> tuple[int, Any]:
+        """The address, and what Python calls; the third keeps the machine code alive."""
+        with self._lock:
+            if self._entry is None:
+                library, address = without_surprises(self._compile)
+                kinds = [LETTERS[letter][1] for letter in self.letters]
+                self._entry = address, ctypes.CFUNCTYPE(None, *kinds)(address), library
+            return self._entry[0], self._entry[1]
+
+    def _compile(self) -> tuple[Any, int]:
+        """The library and the address of its C function, from the cache where it is there."""
+        signature = types.void(*(LETTERS[letter][0] for letter in self.letters))
+        keeper = KernelCache(self.function, self.constants)
+        result = keeper.load_overload(signature, cpu_target.target_context)
+        if result is not None:
+            return result.library, _address(result)
+        with compiling(self.__name__):
+            bound = bind_constants(self.function, self.constants)
+            compiler = _CFuncCompiler(bound, cpu_target, OPTIONS, {}, Compiler)
+            result = compiler.compile(signature.args, signature.return_type)
+            address = _address(result)
+        keeper.save_overload(signature, result)
+        return result.library, address
+
+
+def _address(result: Any) -> int:
+    return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
 
 
 def unit(function: Callable[..., Any], signature: str, **constants: Any) -> Unit:

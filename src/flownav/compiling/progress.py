@@ -1,0 +1,128 @@
+"""What is being compiled, and for how long: said on standard error, at least every second on a terminal."""
+
+from __future__ import annotations
+
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+EVERY_S = 0.5
+
+
+class Progress:
+    """News of compilation, for as long as somebody has asked for them (`announce`)."""
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._listeners = 0
+        self._what = ""
+        self._working: list[str] = []
+        self._start = 0.0
+        self._done = 0
+        self._expected = 0
+        self._stop = threading.Event()
+        self._ticking: threading.Thread | None = None
+
+    @contextmanager
+    def announce(self, what: str) -> Iterator[None]:
+        """Tell of compilation inside the block; say nothing where all is in the cache."""
+        with self._lock:
+            self._listeners += 1
+            if self._listeners == 1:
+                self._what, self._start, self._done, self._expected = what, 0.0, 0, 0
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._listeners -= 1
+                if self._listeners == 0:
+                    self._finish()
+
+    @contextmanager
+    def expect(self, parts: int) -> Iterator[None]:
+        """Say of each of so many parts which it is."""
+        before, self._expected = self._expected, self._done + parts
+        try:
+            yield
+        finally:
+            self._expected = before
+
+    @contextmanager
+    def working(self, name: str) -> Iterator[None]:
+        """A part is being compiled inside the block; what is compiled for it goes under its name."""
+        self.begin(name)
+        done = False
+        try:
+            yield
+            done = True
+        finally:
+            self.end(name, done)
+
+    def begin(self, name: str) -> None:
+        """A part is being compiled from now on."""
+        with self._lock:
+            self._working.append(name)
+            if not self._listeners or threading.current_thread() is self._ticking:
+                return
+            self._start = self._start or time.monotonic()
+            if self._on_terminal():
+                self._tick()
+            elif len(self._working) == 1 or self._expected:
+                self._write(f"flownav: {self._line()} ...\n")
+
+    def end(self, name: str, done: bool = True) -> None:
+        """A part is compiled, or has failed."""
+        with self._lock:
+            self._working.remove(name)
+            self._done += done and (not self._working or self._expected > 0)
+
+    def _line(self) -> str:
+        """Such as "compiling navigator (2 of 3)"."""
+        names = ", ".join(name.replace("_", " ") for name in self._working[: None if self._expected else 1])
+        place = f" ({min(self._done + 1, self._expected)} of {self._expected})" if self._expected else ""
+        return f"compiling {names}{place}"
+
+    def _tick(self) -> None:
+        if self._ticking is None:
+            self._stop.clear()
+            self._ticking = threading.Thread(target=self._run, daemon=True)
+            self._ticking.start()
+
+    def _run(self) -> None:
+        while True:
+            with self._lock:
+                if self._working:
+                    self._write(f"\r\x1b[Kflownav: {self._line()}, {time.monotonic() - self._start:.0f} s ...")
+            if self._stop.wait(EVERY_S):
+                return
+
+    def _finish(self) -> None:
+        ticking, self._ticking = self._ticking, None
+        if ticking is not None:
+            self._stop.set()
+            self._lock.release()
+            ticking.join()
+            self._lock.acquire()
+            self._write("\r\x1b[K")
+        if self._done:
+            parts = "1 kernel" if self._done == 1 else f"{self._done} kernels"
+            taken = time.monotonic() - self._start
+            self._write(f"flownav: compiled {parts} ({self._what}) in {taken:.1f} s\n")
+
+    @staticmethod
+    def _on_terminal() -> bool:
+        """Whether a line can be written over: not where another display has taken hold of standard error."""
+        return sys.stderr is sys.__stderr__ and sys.stderr is not None and sys.stderr.isatty()
+
+    @staticmethod
+    def _write(text: str) -> None:
+        if sys.stderr is not None:
+            sys.stderr.write(text)
+            sys.stderr.flush()
+
+
+PROGRESS = Progress()
+announce_compilation = PROGRESS.announce
+compiling = PROGRESS.working

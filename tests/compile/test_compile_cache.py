@@ -1,0 +1,238 @@
+"""The cache of compiled kernels: what it notices, what it survives, and that it says so in one line."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from flownav.compiling import cache, closure
+
+KERNEL = """
+import sys
+import numpy as np
+from flownav.compile import announce_compilation, kernel, unit
+from helper_law import law
+
+@kernel
+def apply(p):
+    p[0] = law(p[0])
+
+def shift(p, n):
+    for i in range(n):
+        p[i] = p[i] + 1.0
+
+SHIFT = unit(shift, "p", n=2)
+
+if __name__ == "__main__":
+    with announce_compilation("test"):
+        p = np.array([3.0, 4.0])
+        apply(p)
+        SHIFT(p)
+    print(*p)
+"""
+LAW = """
+from flownav.compile import equation
+
+@equation
+def law(x):
+    '''Twice.'''
+    return 2.0 * x  # a remark
+"""
+
+
+class Place:
+    """A small program with a kernel and a unit, and a cache of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.cache = folder / "cache"
+        (folder / "program.py").write_text(KERNEL)
+        self.write_law(LAW)
+
+    def write_law(self, text: str) -> None:
+        (self.folder / "helper_law.py").write_text(text)
+
+    def run(self, **environment: str) -> tuple[str, list[str]]:
+        """What the program prints, and its lines on standard error, without the news of compilation's time."""
+        paths = os.pathsep.join([str(closure.PACKAGE.parent), str(self.folder)])
+        env = {**os.environ, "FLOWNAV_CACHE": str(self.cache), "PYTHONPATH": paths, **environment}
+        done = subprocess.run(
+            [sys.executable, "-W", "error", "-B", str(self.folder / "program.py")],
+            env=env,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return done.stdout.strip(), [line for line in done.stderr.splitlines() if "(test) in" not in line]
+
+    def files(self) -> list[Path]:
+        return sorted((self.cache / "kernels").glob("*.kernel"))
+
+
+COMPILING = ["flownav: compiling apply ...", "flownav: compiling shift ..."]
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Place:
+    return Place(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def first_run(tmp_path_factory: pytest.TempPathFactory) -> Place:
+    first = Place(tmp_path_factory.mktemp("first"))
+    assert first.run() == ("7.0 5.0", COMPILING)
+    assert len(first.files()) == 2
+    return first
+
+
+@pytest.fixture
+def filled(place: Place, first_run: Place) -> Place:
+    shutil.copytree(first_run.cache, place.cache)
+    return place
+
+
+def test_the_second_process_compiles_nothing(filled):
+    assert filled.run() == ("7.0 5.0", [])
+
+
+def test_a_remark_compiles_nothing(filled):
+    filled.write_law(LAW.replace("Twice", "Doubled").replace("a remark", "another"))
+    assert filled.run() == ("7.0 5.0", [])
+
+
+def test_a_change_in_what_is_imported_compiles_anew(filled):
+    filled.write_law(LAW.replace("2.0", "3.0"))
+    assert filled.run() == ("10.0 5.0", COMPILING)
+    filled.write_law(LAW)
+    assert filled.run() == ("7.0 5.0", [])
+
+
+@pytest.mark.parametrize("damages", [("empty", "cut"), ("a byte", "foreign text")])
+def test_a_damaged_file_is_replaced(filled, damages):
+    for file, damage in zip(filled.files(), damages, strict=True):
+        content = file.read_bytes()
+        changed = {
+            "empty": b"",
+            "cut": content[: len(content) // 2],
+            "a byte": content[:-1] + bytes([content[-1] ^ 1]),
+            "foreign text": b"no kernel at all",
+        }
+        file.write_bytes(changed[damage])
+    out, said = filled.run()
+    assert out == "7.0 5.0"
+    assert [line for line in said if "damaged" not in line] == COMPILING
+    assert len(said) == 4
+    assert filled.run() == ("7.0 5.0", [])
+
+
+def test_a_file_whose_content_cannot_be_loaded_is_replaced(filled):
+    for file in filled.files():
+        store = cache.Store(filled.cache, filled.folder / "none")
+        store.save(file.name, b"\x80\x04]q\x00.")
+    out, said = filled.run()
+    assert out == "7.0 5.0"
+    assert sum("damaged (" in line for line in said) == 2
+    assert filled.run() == ("7.0 5.0", [])
+
+
+def test_a_damaged_memory_of_sources_is_replaced(filled):
+    memory = filled.cache / "sources.json"
+    expected = closure.Sources(memory).stamp(["flownav.frames"])
+    for text in ("{", "[1]", '{"a": 3}', ""):
+        memory.write_text(text)
+        assert closure.Sources(memory).stamp(["flownav.frames"]) == expected
+        assert memory.read_text().startswith('{"')
+
+
+@pytest.mark.parametrize("folder", ["/proc/flownav", "/dev/null"])
+def test_a_folder_that_cannot_be_made_is_done_without(place, folder):
+    out, said = place.run(FLOWNAV_CACHE=folder)
+    assert out == "7.0 5.0"
+    assert len([line for line in said if "compiling" not in line]) == 1
+    assert "are not kept in" in "".join(said)
+
+
+def test_a_cache_that_is_a_file_is_done_without(place):
+    place.cache.write_text("not a folder")
+    out, said = place.run()
+    assert out == "7.0 5.0"
+    assert len([line for line in said if "are not kept in" in line]) == 1
+    assert place.cache.read_text() == "not a folder"
+
+
+def test_a_folder_without_leave_to_write_is_done_without(filled, monkeypatch, capsys):
+    store = cache.Store(filled.cache, filled.folder / "none")
+
+    def refuse(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "write_bytes", refuse)
+    store.save("a.kernel", b"x")
+    store.save("b.kernel", b"x")
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root can give files away")
+@pytest.mark.parametrize("what", ["folder", "files"])
+def test_what_belongs_to_another_user_is_not_run(filled, what):
+    given = [filled.cache / "kernels"] if what == "folder" else filled.files()
+    for path in given:
+        os.chown(path, 12345, 12345)
+    out, said = filled.run()
+    assert out == "7.0 5.0"
+    assert [line for line in said if "compiling" not in line and "belongs to another user" not in line] == []
+    assert sum("belongs to another user" in line for line in said) == 1
+
+
+def test_kernels_that_a_wheel_carries_are_looked_at_first(filled, monkeypatch, capsys):
+    store = cache.Store(filled.folder / "other", filled.cache / "kernels")
+    for file in filled.files():
+        assert store.load(file.name)
+    assert store.load("unknown.kernel") is None
+    assert capsys.readouterr().err == ""
+
+
+def test_what_is_not_used_for_long_is_removed(filled):
+    old, fresh = filled.files()
+    os.utime(old, (0, 0))
+    (filled.cache / "kernels-0123456789abcdef").mkdir()
+    cache.Store(filled.cache, filled.folder / "none").save("new.kernel", b"x")
+    assert fresh.exists()
+    assert not old.exists()
+    assert not (filled.cache / "kernels-0123456789abcdef").exists()
+
+
+def test_the_closure_holds_what_is_imported_and_no_face(tmp_path):
+    found = closure.Sources(tmp_path / "sources.json").closure(["flownav.simulation.flight"])
+    assert {"flownav.simulation.layout", "flownav.vehicle.rotor", "flownav.compile", "flownav.frames"} <= set(found)
+    assert not any(name.startswith(("flownav.cli", "flownav.report", "flownav.logs")) for name in found)
+
+
+@pytest.mark.parametrize(
+    ("text", "imported"),
+    [
+        ("import flownav.frames", ["flownav.frames"]),
+        ("from flownav import frames as f", ["flownav", "flownav.frames"]),
+        ("from .b import c", ["a.p.b", "a.p.b.c"]),
+        ("from . import b", ["a.p", "a.p.b"]),
+        ("from .. import b", ["a", "a.b"]),
+        ("import os, numpy.linalg\nfrom numba import types", []),
+        ("def f():\n    import x.y", []),
+        ("from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import x.y\nelse:\n    import z.y", ["z.y"]),
+        ("try:\n    import x.y\nexcept ImportError:\n    pass", ["x.y"]),
+    ],
+)
+def test_imports_are_found(text, imported):
+    assert list(closure.parse_source(text.encode(), "a.p.m", False).imports) == imported
+
+
+def test_a_file_changed_since_the_process_began_is_not_trusted(tmp_path, monkeypatch):
+    sources = closure.Sources(tmp_path / "sources.json")
+    assert sources.stamp(["flownav.frames"]) is not None
+    monkeypatch.setattr(closure, "START_S", 0.0)
+    assert sources.stamp(["flownav.frames", "flownav.compile"]) is None

@@ -1,0 +1,191 @@
+"""Kernels compiled the lean way behave as Numba's own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import numba
+import numpy as np
+import pytest
+
+from flownav.compile import LANES, ONE_LANE, equation, kernel, pointer, procedure, unit
+from flownav.compiling import target
+
+ROTATIONS = """
+import hashlib
+import numpy as np
+from flownav.compile import LANES, equation, kernel, pointer
+from flownav.frames import rotation_from_quaternion
+
+@equation
+def turned(w, x, y, z):
+    r = rotation_from_quaternion(w, x, y, z)
+    return r[0] * x + r[1] * y + r[2] * z + 0.1, r[3] * w - r[4] * x / (1.0 + r[5] * r[5])
+
+@kernel
+def turn(work, lanes):
+    p = pointer(work)
+    for _ in range(20):
+        for lane in range(len(lanes)):
+            a, b = turned(p[lane], p[len(lanes) + lane], p[2 * len(lanes) + lane], p[3 * len(lanes) + lane])
+            p[lane], p[2 * len(lanes) + lane] = a / (1.0 + a * a), b / (1.0 + b * b)
+
+work = np.random.default_rng(7).normal(size=4 * len(LANES))
+turn(work, LANES)
+print(hashlib.sha256(work.tobytes()).hexdigest(), len(work))
+"""
+
+
+@equation
+def halved(x):
+    if x < 0.0:
+        raise ValueError("x is negative")
+    return 0.5 * x
+
+
+@procedure
+def rooted(x):
+    return np.sqrt(halved(x))
+
+
+@equation
+def rows(work, lanes, first):
+    for lane in range(len(lanes)):
+        work[first * len(lanes) + lane] = rooted(work[first * len(lanes) + lane])
+
+
+@kernel
+def treat(work, lanes):
+    p = pointer(work)
+    rows(p, lanes, 0)
+    rows(p, lanes, 1)
+
+
+@kernel
+def treat_twice(work, lanes):
+    treat(work, lanes)
+    treat(work, lanes)
+
+
+@numba.njit(error_model="numpy")
+def treat_plainly(work, lanes):
+    rows(work, lanes, 0)
+    rows(work, lanes, 1)
+
+
+@kernel
+def total(count):
+    numbers = np.empty(count)
+    for i in range(count):
+        numbers[i] = i
+    return numbers.sum(), numbers
+
+
+def _work(lanes):
+    return np.arange(1.0, 1.0 + 2 * len(lanes))
+
+
+@pytest.mark.parametrize("lanes", [ONE_LANE, LANES])
+def test_kernels_call_equations_procedures_and_kernels(lanes):
+    work = _work(lanes)
+    expected = np.sqrt(0.5 * np.sqrt(0.5 * work))
+    treat_twice(work, lanes)
+    np.testing.assert_array_equal(work, expected)
+    assert target.is_lean() or os.environ.get("FLOWNAV_PLAIN")
+
+
+@pytest.mark.parametrize("lanes", [ONE_LANE, LANES])
+def test_plain_numba_calls_equations_that_a_kernel_has_compiled(lanes):
+    treat(_work(lanes), lanes)
+    work = _work(lanes)
+    treat_plainly(work, lanes)
+    np.testing.assert_array_equal(work, np.sqrt(0.5 * _work(lanes)))
+    treat(_work(lanes), lanes)
+
+
+def test_an_error_in_an_equation_reaches_python():
+    work = _work(ONE_LANE)
+    work[1] = -1.0
+    with pytest.raises(ValueError, match="x is negative"):
+        treat(work, ONE_LANE)
+
+
+def test_a_kernel_allocates_and_returns():
+    result, numbers = total(5)
+    assert result == 10.0
+    assert numbers.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+
+
+def test_an_error_in_a_unit_is_told_and_kept_from_its_caller(monkeypatch):
+    """C has no exceptions: Python is told through its hook for what cannot be raised."""
+
+    def fail(p):
+        if p[0] < 0.0:
+            raise ValueError("p is negative")
+        p[0] = 1.0
+
+    told = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda told_of: told.append(str(told_of.exc_value)))
+    values = np.array([-1.0])
+    unit(fail, "p")(values)
+    assert told == ["p is negative"]
+    values[0] = 2.0
+    unit(fail, "p")(values)
+    assert values[0] == 1.0
+
+
+def test_lanes_are_vectorised():
+    """The machine code of a lane loop works on whole registers."""
+
+    @equation
+    def scaled(x):
+        return 3.0 * x + 1.0
+
+    @kernel
+    def scale(work, lanes):
+        p = pointer(work)
+        for lane in range(len(lanes)):
+            p[lane] = scaled(p[lane])
+
+    scale(_work(LANES), LANES)
+    (code,) = scale.inspect_asm().values()
+    assert "vmulpd" in code
+
+
+@pytest.mark.parametrize("level", ["x86-64-v3", "host"])
+def test_every_level_gives_the_same_bits(level, tmp_path):
+    """Contraction is off, so no processor level rounds differently; one that this machine has not is not tried."""
+    if level == "x86-64-v3" and target.level().name not in target.LEVELS:
+        pytest.skip("this machine has no such level")
+    program = tmp_path / "program.py"
+    program.write_text(ROTATIONS)
+    ours, theirs = (
+        subprocess.run(
+            [sys.executable, str(program)],
+            env={**os.environ, "FLOWNAV_LEVEL": asked, "FLOWNAV_CACHE": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for asked in (target.level().name, level)
+    )
+    assert ours == theirs
+    assert len(ours.split()) == 2
+
+
+def test_lean_and_plain_give_the_same_bits(tmp_path):
+    program = tmp_path / "program.py"
+    program.write_text(ROTATIONS)
+    ours, plain = (
+        subprocess.run(
+            [sys.executable, str(program)],
+            env={**os.environ, "FLOWNAV_PLAIN": asked, "FLOWNAV_CACHE": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for asked in ("", "1")
+    )
+    assert ours == plain

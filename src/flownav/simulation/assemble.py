@@ -14,6 +14,7 @@ from flownav.control.guidance import path_through
 from flownav.errors import InputError
 from flownav.estimation.discretise import discretised
 from flownav.estimation.paper_filter import PaperModel
+from flownav.measurement import Sensor
 from flownav.sensors.datasheet import FlowSensor, load_sensor
 from flownav.simulation.fitting import Fitted, fitted, timetable_of
 from flownav.simulation.flight import ATTITUDE_S, Flight, FlightPlan
@@ -74,7 +75,7 @@ def assemble(scenario: Scenario) -> Setup:
         linear=_linear_truth(paper, hover) if scenario.truth == "linear" else None,
     )
     described = describe_vehicle(vehicle_file)
-    parameters = {
+    parameters: dict[str, Any] = {
         "scenario": scenario.model_dump(),
         "flow_sensor": sensor.model_dump(exclude={"identified_models"}),
         "vehicle": {
@@ -86,6 +87,8 @@ def assemble(scenario: Scenario) -> Setup:
     if carried:
         parameters["sensors"] = carried.sheets.model_dump(exclude={"flow_sensor"})
         parameters["filter"] = carried.told.settings.model_dump()
+        parameters["flow_noise"] = carried.told.noise._asdict()
+        parameters["gps_delay_s"] = float(carried.ages_s[Sensor.GPS_POSITION])
         parameters["horizon_s"] = carried.schedule.horizon_s
     inputs = tuple(path for path in (vehicle_file, sensor_file) if path)
     return Setup(scenario, sensor, flight, carried, hover, inputs, parameters)

@@ -19,7 +19,7 @@ from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet, load_gps_receiv
 from flownav.sensors.inertial_sheet import InertialSheet, load_inertial_sheet
 from flownav.sensors.magnetometer_sheet import MagneticField, load_magnetometer_sheet
 from flownav.sensors.pad_camera_sheet import PadCameraSheet, load_pad_camera_sheet
-from flownav.sensors.range_sensor_sheet import RangeSensorSheet, load_range_sensor_sheet
+from flownav.sensors.range_sensor_sheet import load_range_sensor_sheet
 from flownav.sensors.sheet import Lever, SensorSheet
 from flownav.sensors.sheets import SensorSheets
 from flownav.sensors.skid_switch_sheet import load_skid_switch_sheet
@@ -39,7 +39,7 @@ START_WAIT_S = 10.0
 class Fitted(NamedTuple):
     """What flies: sensors, their timetable, the navigator's settings (and packed), its equipment, the sheets.
 
-    ages_s: how old a reading is on arrival, by `measurement.Sensor`.
+    ages_s: how old the navigator takes a reading to be on arrival, by `measurement.Sensor`.
     """
 
     onboard: Onboard
@@ -48,6 +48,7 @@ class Fitted(NamedTuple):
     equipment: Equipment
     settings: Array
     sheets: SensorSheets
+    timing: dict[Sensor, Timing]
     ages_s: Array
 
 
@@ -57,17 +58,45 @@ def fitted(scenario: Scenario, flow_sensor: FlowSensor, vehicle: VehicleParamete
     onboard = onboard_of(scenario, sheets, flow_sensor, vehicle)
     timing = timing_of(sheets, flow_sensor)
     schedule = schedule_of(epochs, onboard, timing)
-    ages_s = np.zeros(max(Sensor) + 1)
-    for kind, late in timing.items():
-        ages_s[kind] = late.lag_s + late.latency_s
     rotor_hz = vehicle.main_speed_rad_s / (2.0 * math.pi)
     told = settings_of(
         flow_sensor, sheets, flow_noise_stated=True, rotor_hz=(rotor_hz, BLADES * rotor_hz)
     )
     equipment = Equipment(True, False, FROM_MAG, True, START_WAIT_S)
+    settings = packed(told, equipment)
+    return Fitted(onboard, schedule, told, equipment, settings, sheets, timing, ages_of(timing))
+
+
+def packed(told: Told, equipment: Equipment) -> Array:
+    """What the navigator is told, as its kernels take it."""
     sigma = told.settings.start_sigma(has_heading=True, compass=True)
-    settings = pack(told.settings.settings(equipment, told.noise), sigma)
-    return Fitted(onboard, schedule, told, equipment, settings, sheets, ages_s)
+    return pack(told.settings.settings(equipment, told.noise), sigma)
+
+
+def ages_of(timing: dict[Sensor, Timing]) -> Array:
+    """How old a reading is on arrival [s], by `measurement.Sensor`."""
+    ages_s = np.zeros(max(Sensor) + 1)
+    for kind, late in timing.items():
+        ages_s[kind] = late.lag_s + late.latency_s
+    return ages_s
+
+
+def refitted(
+    carried: Fitted, epochs: int, *, told: Told | None = None, onboard: Onboard | None = None,
+    stated: dict[Sensor, Timing] | None = None,
+) -> Fitted:  # fmt: skip
+    """The same vehicle whose navigator is told something else, or that carries something else; what is None stays.
+
+    stated: how old readings are said to be; how old they are stays.
+    """
+    told, onboard, stated = told or carried.told, onboard or carried.onboard, stated or carried.timing
+    return carried._replace(
+        onboard=onboard,
+        schedule=schedule_of(epochs, onboard, carried.timing, stated),
+        told=told,
+        settings=packed(told, carried.equipment),
+        ages_s=ages_of(stated),
+    )
 
 
 # -- datasheets -----------------------------------------------------------------------------------------------

@@ -71,6 +71,7 @@ def _manifest(setup: Setup, seed: int, index: int, duration_s: float) -> dict[st
     }
     if setup.fitted is not None:
         facts["segments"] = [setup.fitted.equipment._asdict()]
+        facts["delays_s"] = {sensor.name.lower(): float(setup.fitted.ages_s[sensor]) for sensor in Sensor}
     return facts
 
 

@@ -52,10 +52,17 @@ class Schedule(NamedTuple):
         return self.horizon_epochs * EPOCH_S
 
 
-def schedule_of(epochs: int, sensors: Onboard, timing: dict[Sensor, Timing]) -> Schedule:
-    """The timetable of a flight of `epochs` epochs; `timing` of each sensor that is fitted."""
-    horizon = max(1, math.ceil((max(t.lag_s + t.latency_s for t in timing.values()) - SLACK_S) / EPOCH_S))
-    t_s, sensor, sampled = sampled_readings(epochs, sensors, timing)
+def schedule_of(
+    epochs: int, sensors: Onboard, timing: dict[Sensor, Timing], stated: dict[Sensor, Timing] | None = None
+) -> Schedule:
+    """The timetable of a flight of `epochs` epochs; `timing` of each sensor that is fitted.
+
+    stated: what the navigator takes it for, where that is something else. The horizon has room for both.
+    """
+    stated = timing if stated is None else stated
+    ages_s = (t.lag_s + t.latency_s for t in (*timing.values(), *stated.values()))
+    horizon = max(1, math.ceil((max(ages_s) - SLACK_S) / EPOCH_S))
+    t_s, sensor, sampled = sampled_readings(epochs, sensors, timing, stated)
     ready = np.ceil((t_s - SLACK_S) / EPOCH_S).astype(np.int64) + horizon
     by_epoch = np.searchsorted(sampled, np.arange(epochs), side="right")  # how many were read by the end of an epoch
     newest = by_epoch[np.clip(ready, 0, epochs - 1)]
@@ -66,7 +73,7 @@ def schedule_of(epochs: int, sensors: Onboard, timing: dict[Sensor, Timing]) -> 
 
 
 def sampled_readings(
-    epochs: int, sensors: Onboard, timing: dict[Sensor, Timing]
+    epochs: int, sensors: Onboard, timing: dict[Sensor, Timing], stated: dict[Sensor, Timing]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
     """Every reading in the order of `onboard.sample`: the instant it is taken to describe, its sensor, its epoch."""
     generator = np.random.Generator(np.random.Philox(JITTER_KEY))
@@ -78,7 +85,8 @@ def sampled_readings(
             if due_at(clock, epoch):
                 if sensor != Sensor.GPS_VELOCITY:  # which comes with the position
                     late_s = timing[sensor].jitter_s * (2.0 * generator.random() - 1.0)
-                rows.append((epoch * EPOCH_S - timing[sensor].lag_s + late_s, int(sensor), epoch))
+                hidden_s = timing[sensor].latency_s - stated[sensor].latency_s
+                rows.append((epoch * EPOCH_S - stated[sensor].lag_s + late_s + hidden_s, int(sensor), epoch))
         for part in range(parts):
             t_s = epoch * EPOCH_S + (part + 1) * sensors.inertial_steps * PHYSICS_PERIOD_S
             rows.append((t_s, int(Sensor.IMU), epoch))

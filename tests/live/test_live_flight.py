@@ -30,8 +30,8 @@ from flownav.live.simulated import BOOT_S, ORIGIN_DEG_M, SimulatedVehicle
 from flownav.live.warm import warm_up
 from flownav.logs.open_log import open_flight
 from flownav.measurement import Sensor
+from flownav.navigation.tables import estimate_table, innovation_table, states_table
 from flownav.record import Record
-from flownav.replay.bundle import estimate_table, innovation_table
 from flownav.replay.fed import as_fed
 from flownav.replay.prepare import ReplayOptions
 from flownav.replay.session import replay
@@ -51,6 +51,7 @@ def assert_same_bits(path):
     record, again = Record.load(path), replayed(path)
     for name, table in (
         ("estimate", estimate_table(again.estimate)),
+        ("states", states_table(again.estimate)),
         ("innovation", innovation_table(again.innovation)),
     ):
         assert set(table) == set(record.tables[name])

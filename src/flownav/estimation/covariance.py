@@ -68,7 +68,7 @@ def fuse(work: Work, lanes: Lanes, n: int, gate_sigma: float) -> None:
 def expect(work: Work, lanes: Lanes, n: int, always: bool) -> None:
     """c = P h', S = h c + R, and in ACCEPTED whether the reading may be tested at all: offered, of a sound variance.
 
-    Where no lane offers it, CROSS and INNOVATION_VARIANCE are left as they are, unless they are wanted `always`.
+    Where no lane offers it neither c nor S is computed, unless they are wanted `always`.
     """
     offering = 0
     for lane in range(len(lanes)):

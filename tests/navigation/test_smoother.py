@@ -8,34 +8,53 @@ from dataclasses import replace as altered
 import numpy as np
 import pytest
 import typer
-from filterpy.kalman import KalmanFilter
 from typer.testing import CliRunner
 
 from flownav.cli.replay import command
-from flownav.estimation.landing.backward import (
-    back_over_correction,
-    back_over_prediction,
-    back_over_reset,
-    smoothed_covariance,
+from flownav.compile import ONE_LANE
+from flownav.estimation.covariance import unpack
+from flownav.estimation.states import (
+    ATTITUDE,
+    BARO,
+    FORCE,
+    GROUND,
+    MIDDLE,
+    QUATERNION,
+    STATE,
+    STATES,
 )
-from flownav.estimation.landing.states import BARO, GROUND, STATES
 from flownav.frames import quaternion_product
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
-from flownav.measurement import EventQueue, Sensor
-from flownav.navigation.feed import new_navigator
-from flownav.navigation.journal import new_journal
-from flownav.navigation.loop import run
+from flownav.measurement import Sensor
+from flownav.navigation.feed import equipment_of
+from flownav.navigation.loop import Running, run, start_navigator
+from flownav.navigation.memory import CLOCK, ERRORS_CLOCK, load_start
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.smoother import smooth
-from flownav.navigation.state import ROWS, STARTED, Running, new_tape
+from flownav.navigation.smoother import part_of, smooth
+from flownav.navigation.tape import (
+    BARO_FOUND,
+    CORRECTED,
+    DECAYED,
+    ENTRIES,
+    ESTIMATES,
+    EXTRA_STATES,
+    FORGOTTEN,
+    GROUND_FOUND,
+    NOTED,
+    NOTES,
+    PREDICTED,
+    empty_tape,
+    new_tape,
+)
 from flownav.record import Record
 from flownav.replay.prepare import ReplayOptions, prepare, withhold
 from flownav.replay.session import Replay, replay
 from replay_logs import SyntheticLog, log_of_flight
-from smoother_oracles import dense_transition, smoother_gain
+from smoother_oracles import dense_decay, dense_transition, smoother_gain
 
 SETTINGS = NavigatorSettingsFile()
+STATIONARY = SETTINGS.start_sigma(has_heading=True, compass=True)  # of the Gauss-Markov errors
 CUT = ((8.0, 26.0),)
 
 
@@ -107,93 +126,50 @@ def queue_of(log: Log, until_s: float, outages=()):
 
 
 def navigator(prepared, queue) -> Running:
-    first_s = float(queue.t_s[0])
-    return new_navigator(prepared.streams, first_s, prepared.flow_gyro_is_imu, SETTINGS, new_tape(queue))
+    fitted = equipment_of(prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, SETTINGS)
+    return start_navigator(fitted, SETTINGS, new_tape(queue))
 
 
-# -- against dense smoothers ---------------------------------------------------------------------------------
-def test_predictions_and_corrections_backwards_are_the_rts_smoother_of_filterpy():
-    random, numbers = np.random.default_rng(5), SETTINGS.settings().filter
-    steps, dt_s = 40, 0.2
-    transitions, laws, motions = [], [], []
-    for _ in range(steps):
-        middle = np.linalg.qr(random.normal(size=(3, 3)))[0]
-        force = random.normal(0.0, 8.0, 3)
-        motions.append((middle.ravel(), force))
-        transitions.append(dense_transition(dt_s, middle, force, numbers))
-        laws.append(np.where(random.random(STATES) < 0.2, random.normal(size=STATES), 0.0))
-    model = KalmanFilter(STATES, 1)
-    model.x, model.P = np.zeros((STATES, 1)), np.diag(random.uniform(0.1, 2.0, STATES))
-    noise, variance = np.diag(random.uniform(1e-3, 1e-2, STATES)), 0.3
-    states, covariances, corrections = [], [], []
-    for transition, law in zip(transitions, laws, strict=True):
-        model.predict(F=transition, Q=noise)
-        model.update(random.normal(0.0, 2.0), R=variance, H=law[None])
-        states.append(model.x.copy())
-        covariances.append(model.P.copy())
-        corrections.append((law, model.K.ravel().copy(), float(model.y.item()), float(model.S.item())))
-    wanted, wanted_covariance, *_ = model.rts_smoother(
-        np.array(states), np.array(covariances), np.array(transitions), np.array([noise] * steps)
-    )
-    vector, matrix = np.zeros(STATES), np.zeros((STATES, STATES))
-    for k in range(steps - 1, -1, -1):
-        found = states[k].ravel() - covariances[k] @ vector
-        assert found == pytest.approx(wanted[k].ravel(), rel=1e-7, abs=1e-7)
-        assert smoothed_covariance(covariances[k], matrix) == pytest.approx(wanted_covariance[k], rel=1e-6, abs=1e-8)
-        back_over_correction(vector, matrix, *corrections[k])
-        back_over_prediction(vector, matrix, dt_s, *motions[k], numbers)
-        assert (matrix == matrix.T).all()
-
-
-def test_a_reset_backwards_is_a_transition_that_forgets():
-    random = np.random.default_rng(2)
-    vector, root = random.normal(size=STATES), random.normal(size=(STATES, STATES))
-    matrix = root @ root.T
-    forgets = np.eye(STATES)
-    forgets[7, 7] = 0.0
-    wanted = forgets @ vector, forgets @ matrix @ forgets
-    back_over_reset(vector, matrix, 7)
-    assert (vector == wanted[0]).all()
-    assert (matrix == wanted[1]).all()
-
-
+# -- against a dense smoother ----------------------------------------------------------------------------------
 class Step:
     """The navigator's error state over one event: before, after, and what lay between."""
 
-    def __init__(self, before: np.ndarray, on: Running, moved: bool, reset: list[int]) -> None:
-        self.covariance = before[ROWS.covariance : ROWS.attitude].reshape(STATES, STATES)
-        after = on.work[ROWS.covariance : ROWS.attitude].reshape(STATES, STATES).copy()
-        if moved:
-            step_s = float(on.memory[0]) - moved
-            middle, force = on.work[ROWS.middle : ROWS.middle + 9], on.work[ROWS.force : ROWS.force + 3]
-            self.transition = dense_transition(step_s, middle, force, on.settings.filter)
+    def __init__(self, before: np.ndarray, on: Running, reset: list[int]) -> None:
+        self.covariance, after = unpack(before, ONE_LANE, 0, STATES), unpack(on.work, ONE_LANE, 0, STATES)
+        decayed_s = float(on.work[ERRORS_CLOCK] - before[ERRORS_CLOCK])
+        decay = dense_decay(decayed_s, on.told.filter) if 0.0 < decayed_s < np.inf else np.eye(STATES)
+        if on.clock_s > before[CLOCK]:
+            middle, force = on.work[MIDDLE : MIDDLE + 9], on.work[FORCE : FORCE + 3]
+            self.transition = decay @ dense_transition(on.clock_s - before[CLOCK], middle, force)
             self.predicted, self.change = after, np.zeros(STATES)
             return
-        self.transition = np.eye(STATES)
+        self.transition = decay.copy()
         self.transition[reset, reset] = 0.0
         self.predicted = self.transition @ self.covariance @ self.transition
+        kept = STATIONARY**2 * (1.0 - np.diag(decay) ** 2)
+        self.predicted += np.diag(kept)
         self.predicted[reset, reset] = 1e4
-        self.change = on.work[: ROWS.covariance] - before[: ROWS.covariance]
-        w, x, y, z = before[ROWS.attitude : ROWS.attitude + 4]
-        turn = quaternion_product(tuple(on.work[ROWS.attitude : ROWS.attitude + 4]), (w, -x, -y, -z))
-        self.change[6:9] = 2.0 * np.array(turn[1:]) / turn[0]
+        state = slice(STATE, STATE + STATES)
+        self.change = on.work[state] - np.diag(decay) * before[state]
+        w, x, y, z = before[QUATERNION : QUATERNION + 4]
+        turn = quaternion_product(tuple(on.work[QUATERNION : QUATERNION + 4]), (w, -x, -y, -z))
+        self.change[ATTITUDE : ATTITUDE + 3] = 2.0 * np.array(turn[1:]) / turn[0]
 
 
 def steps_of(prepared, queue) -> tuple[list[Step], np.ndarray, list[int]]:
     """Every event after the start, taken one by one; the filter's last covariance; how many estimates each wrote."""
     on, steps, written = navigator(prepared, queue), [], []
     for k in range(len(queue.t_s)):
-        started, events, clock = on.memory[STARTED], int(on.tape.used[2]), float(on.memory[0])
-        before, estimates = on.work.copy(), int(on.tape.used[0])
-        run(EventQueue(*(column[k : k + 1] for column in queue)), on)
-        happened = on.tape.event[events : on.tape.used[2], 1]
+        started, events = load_start(on.work, ONE_LANE, 0).started, len(on.tape.events())
+        before, estimates = on.work.copy(), int(on.tape.used[ESTIMATES])
+        run(part_of(queue, k, k + 1), on)
+        happened = on.tape.events()[events:, 1]
         if started:
-            moved = clock if on.memory[0] > clock else 0.0
-            assert not moved or queue.sensor[k] == Sensor.IMU
-            reset = [state for kind, state in ((1, GROUND), (3, BARO)) if kind in happened]
-            steps.append(Step(before, on, moved, reset))
-            written.append(int(on.tape.used[0]) - estimates)
-    return steps, on.work[ROWS.covariance : ROWS.attitude].reshape(STATES, STATES).copy(), written
+            assert on.clock_s == before[CLOCK] or queue.sensor[k] == Sensor.IMU
+            reset = [state for kind, state in ((GROUND_FOUND, GROUND), (BARO_FOUND, BARO)) if kind in happened]
+            steps.append(Step(before, on, reset))
+            written.append(int(on.tape.used[ESTIMATES]) - estimates)
+    return steps, unpack(on.work, ONE_LANE, 0, STATES), written
 
 
 def test_a_whole_run_of_the_navigator_is_smoothed_as_by_dense_rts(clean):
@@ -205,7 +181,7 @@ def test_a_whole_run_of_the_navigator_is_smoothed_as_by_dense_rts(clean):
     steps, last, written = steps_of(prepared, queue)
     on = navigator(prepared, queue)
     path = smooth(queue, on)
-    filtered = on.tape.estimate[: on.tape.used[0]]
+    filtered = on.tape.estimates()
     deviation, covariance = np.zeros(STATES), last
     found = []
     for step, wrote in zip(steps[::-1], written[::-1], strict=True):
@@ -214,17 +190,20 @@ def test_a_whole_run_of_the_navigator_is_smoothed_as_by_dense_rts(clean):
         gain = smoother_gain(step.covariance, step.transition, step.predicted)
         deviation = gain @ (deviation + step.change)
         covariance = step.covariance + gain @ (covariance - step.predicted) @ gain.T
-    assert len(found) == len(path) - 1 > 300  # all but that of the start
+    early = len(path) - len(found)  # that of the start
+    assert early <= 1 < 300 < len(path)
     largest = 0.0
-    for own, better, (wanted, spread) in zip(filtered[1:], path[1:], found[::-1], strict=True):
+    for own, better, (wanted, spread) in zip(filtered[early:], path[early:], found[::-1], strict=True):
         sigma = np.sqrt(np.diag(spread))
         scale = np.maximum(sigma, 1e-6)
         shift = np.concatenate([better[1:4] - own[1:4], better[17:20] - own[17:20]])
         turn = quaternion_product(tuple(better[7:11]), (own[7], -own[8], -own[9], -own[10]))
-        shift = np.concatenate([shift, 2.0 * np.array(turn[1:]) / turn[0], better[23:] - own[23:]])
-        assert (np.abs(shift - wanted[:30]) < 1e-5 * scale[:30]).all()
-        largest = max(largest, float(np.abs(shift / scale[:30]).max()))
-        assert better[[11, 12, 13, 20, 21, 22]] == pytest.approx(sigma[[0, 1, 2, 6, 7, 8]], rel=1e-9)
+        extra = slice(23, 23 + EXTRA_STATES)
+        shift = np.concatenate([shift, 2.0 * np.array(turn[1:]) / turn[0], better[extra] - own[extra]])
+        assert (np.abs(shift - wanted) < 1e-5 * scale).all()
+        largest = max(largest, float(np.abs(shift / scale).max()))
+        said = np.concatenate([better[[11, 12, 13, 20, 21, 22]], better[23 + EXTRA_STATES :]])
+        assert said == pytest.approx(np.concatenate([sigma[:3], sigma[6:9], sigma[9:]]), rel=1e-9)
     assert largest > 0.01
 
 
@@ -236,10 +215,9 @@ def test_pieces_of_any_length_give_the_same_bytes_and_leave_the_filter_as_it_was
     for chunk in (10**6, 333):
         on = navigator(prepared, queue)
         paths.append(smooth(queue, on, chunk))
-        for own, its in ((on.work, alone.work), (on.memory, alone.memory)):
-            assert own.tobytes() == its.tobytes()
-        written = slice(0, int(on.tape.used[0]))
-        assert on.tape.estimate[written].tobytes() == alone.tape.estimate[written].tobytes()
+        assert on.work.tobytes() == alone.work.tobytes()
+        assert on.tape.estimates().tobytes() == alone.tape.estimates().tobytes()
+        assert on.tape.used.tolist() == alone.tape.used.tolist()
     assert paths[0].tobytes() == paths[1].tobytes()
 
 
@@ -247,13 +225,15 @@ def test_a_journal_of_no_rows_counts_and_one_of_as_many_holds_all(log):
     prepared, queue = queue_of(log, 5.0)
     first = navigator(prepared, queue)
     run(queue, first)
-    entries, estimates = first.journal.used.tolist()
+    entries, estimates = (int(first.tape.used[place]) for place in (ENTRIES, NOTES))
     assert entries > len(queue.t_s)
-    assert estimates == first.tape.used[0]
-    again = navigator(prepared, queue)._replace(journal=new_journal(entries, estimates))
+    assert estimates == first.tape.used[ESTIMATES]
+    again = navigator(prepared, queue)
+    again = again._replace(tape=empty_tape(estimates, 0, 0, journal=(entries, estimates)))
     run(queue, again)
-    assert again.journal.used.tolist() == [entries, estimates]
-    for estimate in again.journal.covariance:
+    assert [int(again.tape.used[place]) for place in (ENTRIES, NOTES)] == [entries, estimates]
+    assert set(again.tape.journal.entry[:, 0]) == {PREDICTED, CORRECTED, FORGOTTEN, NOTED, DECAYED}
+    for estimate in again.tape.journal.covariance:
         assert np.linalg.eigvalsh(estimate).min() > -1e-12 * np.trace(estimate)
 
 
@@ -262,13 +242,13 @@ def test_with_nothing_after_it_the_last_estimate_is_the_filters(log):
     prepared, queue = queue_of(log, 6.0)
     on = navigator(prepared, queue)
     run(queue, on)
-    last_s = on.tape.estimate[on.tape.used[0] - 1, 0]
+    last_s = on.tape.estimates()[-1, 0]
     written = np.flatnonzero(queue.t_s == last_s)[0] + 1
-    cut = type(queue)(*(column[:written] for column in queue))
+    cut = part_of(queue, 0, written)
     on = navigator(prepared, cut)
     path = smooth(cut, on)
     assert path[-1, 0] == last_s
-    assert path[-1] == pytest.approx(on.tape.estimate[on.tape.used[0] - 1], rel=1e-12, abs=1e-15)
+    assert path[-1] == pytest.approx(on.tape.estimates()[-1], rel=1e-12, abs=1e-15)
 
 
 def errors(path: np.ndarray, flight: SyntheticLog) -> np.ndarray:

@@ -45,6 +45,7 @@ class FilterSettings(NamedTuple):
     gps_fast_sigma_down_m: float
     gps_fast_tau_s: float
     gps_velocity_sigma_m_s: float
+    gps_velocity_sigma_down_m_s: float
     gps_velocity_tau_s: float
     ins_tilt_sigma_rad: float
     ins_tilt_tau_s: float
@@ -88,9 +89,8 @@ def propagate_gauss_markov(work: Work, lanes: Lanes, n: int, dt_s: float, settin
         turn_tau_s = settings.ins_heading_tau_s if down else settings.ins_tilt_tau_s
         forget_slowly(work, lanes, n, GPS_SLOW + axis, slow, settings.gps_slow_tau_s, dt_s)
         forget_slowly(work, lanes, n, GPS_FAST + axis, fast, settings.gps_fast_tau_s, dt_s)
-        forget_slowly(
-            work, lanes, n, GPS_VELOCITY + axis, settings.gps_velocity_sigma_m_s, settings.gps_velocity_tau_s, dt_s
-        )
+        speed = settings.gps_velocity_sigma_down_m_s if down else settings.gps_velocity_sigma_m_s
+        forget_slowly(work, lanes, n, GPS_VELOCITY + axis, speed, settings.gps_velocity_tau_s, dt_s)
         forget_slowly(work, lanes, n, INS_ERROR + axis, turn, turn_tau_s, dt_s)
 
 

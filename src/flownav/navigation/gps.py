@@ -9,6 +9,7 @@ from flownav.estimation.covariance import expect
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.states import (
+    FORCE,
     GPS_FAST,
     GPS_SLOW,
     GPS_VELOCITY,
@@ -26,6 +27,7 @@ from flownav.navigation.journal import reset_state
 from flownav.navigation.memory import (
     LEVEL_RATIO,
     REASON,
+    STEADY_FORCE,
     Reading,
     RejectionMemory,
     load_reading,
@@ -99,6 +101,9 @@ def offer_axis(work: Work, lanes: Lanes, axis: int, position: bool, alone: bool,
     if position:
         gps_position(work, lanes, axis, s.gps_forward_m, s.gps_right_m, s.gps_below_m)
     else:
+        for lane in range(len(lanes)):  # the receiver's lag is of the motion, not of the vibration
+            steady = work[(STEADY_FORCE + axis) * len(lanes) + lane]
+            work[(FORCE + axis) * len(lanes) + lane] = steady
         gps_velocity(work, lanes, axis, s.gps_forward_m, s.gps_right_m, s.gps_below_m)
 
 
@@ -158,7 +163,7 @@ def go_to_gps(
         reset_state(work, lanes, lane, GPS_FAST + axis, fast * fast, o)
         reset_state(work, lanes, lane, POSITION + axis, slow * slow + fast * fast + noise, o)
     else:
-        lasting = s.gps_velocity_sigma_m_s
+        lasting = s.gps_velocity_sigma_down_m_s if axis == 2 else s.gps_velocity_sigma_m_s
         work[(STATE + GPS_VELOCITY + axis) * len(lanes) + lane] = 0.0
         reset_state(work, lanes, lane, GPS_VELOCITY + axis, lasting * lasting, o)
         reset_state(work, lanes, lane, VELOCITY + axis, lasting * lasting + noise, o)

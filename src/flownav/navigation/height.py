@@ -16,23 +16,29 @@ from flownav.navigation.journal import reset_state
 from flownav.navigation.memory import (
     BARO_KNOWN,
     REASON,
+    GroundMemory,
     RangeMemory,
     Reading,
     load_aid,
+    load_ground,
     load_range,
     load_reading,
     load_start,
+    store_ground,
     store_range,
 )
 from flownav.navigation.offers import conclude, fuse_offered, note_height, put, usable_in_flight
 from flownav.navigation.packed import load_height_settings
-from flownav.navigation.reasons import FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT, STUCK, TILTED
+from flownav.navigation.reasons import DATUM, FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT, STUCK, TILTED
 from flownav.navigation.tape import BARO_FOUND, GROUND_FOUND, GROUND_RESET, RANGE_STUCK, Output, write_event
 from flownav.navigation.told import HeightSettings
 from flownav.navigation.vibration import doubt_imu
 
 UNKNOWN_M = 100.0
 DOUBTING_S = 0.05  # a range that alone tells the height and is refused so long is believed, not the accelerometer
+AGREEMENT_M, AGREEMENT_SHARE = 0.2, 0.05  # ranges of one ground agree so far
+LEAST_AGREEING = 3.0
+STILL_S = 1.0  # a range that repeats itself so long while a ground is sought is of a vehicle that stands
 ALONE = 5.0  # times the travel, where nothing else tells the height
 
 
@@ -87,9 +93,24 @@ def judge_range(
         height.pos_d_m if heard and news else m.down_m,
         m.said_s,
         m.doubted,
-        m.ground_known,
     )
     return STUCK if stuck else reason, variance, after
+
+
+@equation
+def judge_ground(below_m: float, range_m: float, t_s: float, g: GroundMemory) -> tuple[bool, GroundMemory]:
+    """Whether ranges in a row agree on a ground that is new, and the memory of it.
+
+    One echo finds no ground. A range that repeats itself to the last digit must do so for long: a vehicle that stands
+    reads so, and so does a sensor that holds an old value for a moment.
+    """
+    agrees = g.count > 0.0 and abs(below_m - g.candidate_m) <= AGREEMENT_M + AGREEMENT_SHARE * range_m
+    since_s = g.since_s if agrees else t_s
+    first_m = g.first_m if agrees else range_m
+    count = g.count + 1.0 if agrees else 1.0
+    varied = 1.0 if agrees and (g.varied > 0.0 or range_m != first_m) else 0.0
+    lasting = varied > 0.0 or t_s - since_s >= STILL_S
+    return count >= LEAST_AGREEING and lasting, GroundMemory(g.known, below_m, since_s, first_m, count, varied)
 
 
 @procedure
@@ -103,34 +124,42 @@ def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Ou
         reason, variance, m = judge_range(reading, t_s, started, height, alone, load_range(work, lanes, lane), s)
         if reason == STUCK and abs(height.pos_d_m - m.down_m) >= s.range_stuck_travel_m and m.said_s != m.same_s:
             write_event(lanes, lane, t_s, RANGE_STUCK, reading.value_0, o)
-            m = said(m)
-        if reason == FUSED and m.ground_known == 0.0:
-            m = found(m)
-            set_ground(work, lanes, lane, t_s, reading, height, s, GROUND_FOUND, o)
+            m = RangeMemory(m.taken_s, m.refused_s, m.last_m, m.same_s, m.down_m, m.same_s, m.doubted)
         store_range(work, lanes, lane, m)
+        if reason == FUSED and load_ground(work, lanes, lane).known == 0.0:
+            found = seek_ground(work, lanes, lane, t_s, reading, height, s, GROUND_FOUND, o)
+            reason = FUSED if found else DATUM
         put(work, lanes, lane, reading.value_0, variance, reason)
-    range_along_boresight(work, lanes, 0, s.range_below_m, 0.0, 0.0)
+    range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
     again = False
     for lane in range(len(lanes)):
         again = mind_refusals(work, lanes, lane, t_s, s, o) or again
     if again:  # the ground was found anew: the reading that said so is fused
-        range_along_boresight(work, lanes, 0, s.range_below_m, 0.0, 0.0)
+        range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
         fuse_offered(work, lanes, s.gate_sigma, o)
 
 
-@equation
-def said(m: RangeMemory) -> RangeMemory:
-    """This repetition has been reported."""
-    return RangeMemory(
-        m.taken_s, m.refused_s, m.last_m, m.same_s, m.down_m, m.same_s, m.doubted, m.ground_known
-    )  # fmt: skip
-
-
-@equation
-def found(m: RangeMemory) -> RangeMemory:
-    """A range has found the ground."""
-    return RangeMemory(m.taken_s, m.refused_s, m.last_m, m.same_s, m.down_m, m.said_s, m.doubted, 1.0)
+@procedure
+def seek_ground(
+    work: Work, lanes: Lanes, lane: int, t_s: float, reading: Reading, height: Height, s: HeightSettings, kind: np.int_,
+    o: Output,
+) -> bool:  # fmt: skip
+    """Note a range that would mean a new ground; where enough agree, the ground is unknown but for the newest of them,
+    which is about to be fused.
+    """
+    below_m = height.pos_d_m + (reading.value_0 + s.range_below_m) * height.upright
+    confirmed, g = judge_ground(below_m, reading.value_0, t_s, load_ground(work, lanes, lane))
+    if confirmed:
+        work[(STATE + GROUND) * len(lanes) + lane] = below_m
+        reset_state(work, lanes, lane, GROUND, UNKNOWN_M * UNKNOWN_M, o)
+        write_event(lanes, lane, t_s, kind, below_m, o)
+        store_ground(work, lanes, lane, GroundMemory(1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+        m = load_range(work, lanes, lane)
+        store_range(work, lanes, lane, RangeMemory(t_s, np.nan, m.last_m, m.same_s, m.down_m, m.said_s, m.doubted))
+    else:
+        store_ground(work, lanes, lane, g)
+    return bool(confirmed)
 
 
 @equation
@@ -144,32 +173,19 @@ def height_of(work: Work, lanes: Lanes, lane: int) -> Height:
 
 
 @procedure
-def set_ground(
-    work: Work, lanes: Lanes, lane: int, t_s: float, reading: Reading, height: Height, s: HeightSettings, kind: np.int_,
-    o: Output,
-) -> None:  # fmt: skip
-    """The ground is unknown but for this reading, which is about to be fused."""
-    below = height.pos_d_m + (reading.value_0 + s.range_below_m) * height.upright
-    work[(STATE + GROUND) * len(lanes) + lane] = below
-    reset_state(work, lanes, lane, GROUND, UNKNOWN_M * UNKNOWN_M, o)
-    write_event(lanes, lane, t_s, kind, below, o)
-
-
-@procedure
 def mind_refusals(work: Work, lanes: Lanes, lane: int, t_s: float, s: HeightSettings, o: Output) -> bool:
     """After the test: a range that is refused first makes the accelerometer doubted, then the ground new.
 
-    True where the ground of this lane was found anew, and the reading is to be offered once more.
+    A streak of refusals ends where the sensor says something else. True where the ground of this lane was found anew,
+    and the reading is to be offered once more.
     """
     reason = work[REASON * len(lanes) + lane]
-    m = load_range(work, lanes, lane)
+    m, g = load_range(work, lanes, lane), load_ground(work, lanes, lane)
     work[REASON * len(lanes) + lane] = SILENT  # of the second offer, unless the ground is new
-    if reason == FUSED:
-        store_range(
-            work, lanes, lane,
-            RangeMemory(t_s, np.nan, m.last_m, m.same_s, m.down_m, m.said_s, m.doubted, m.ground_known),
-        )  # fmt: skip
-        return False
+    if reason == FUSED or reason == OUT_OF_RANGE:
+        taken_s = t_s if reason == FUSED else m.taken_s
+        store_range(work, lanes, lane, RangeMemory(taken_s, np.nan, m.last_m, m.same_s, m.down_m, m.said_s, m.doubted))
+        store_ground(work, lanes, lane, GroundMemory(g.known, 0.0, 0.0, 0.0, 0.0, 0.0))
     if reason != INNOVATION_GATE:
         return False
     first = not np.isfinite(m.refused_s)
@@ -179,19 +195,18 @@ def mind_refusals(work: Work, lanes: Lanes, lane: int, t_s: float, s: HeightSett
     if alone and doubted == 0.0 and t_s - since_s >= DOUBTING_S:
         doubt_imu(work, lanes, lane, t_s, work[INNOVATION * len(lanes) + lane], o)
         doubted = 1.0  # once: doubted at each reading, a short echo would be believed too
-    step = t_s - since_s >= s.ground_reset_s
-    store_range(
-        work, lanes, lane,
-        RangeMemory(
-            t_s if step else m.taken_s, np.nan if step else since_s, m.last_m, m.same_s, m.down_m, m.said_s, doubted,
-            m.ground_known,
-        ),
-    )  # fmt: skip
-    if step:
-        reading, height = load_reading(work, lanes, lane), height_of(work, lanes, lane)
-        set_ground(work, lanes, lane, t_s, reading, height, s, GROUND_RESET, o)
+    store_range(work, lanes, lane, RangeMemory(m.taken_s, since_s, m.last_m, m.same_s, m.down_m, m.said_s, doubted))
+    if g.known == 0.0:
+        return False
+    reading, height = load_reading(work, lanes, lane), height_of(work, lanes, lane)
+    if t_s - since_s < s.ground_reset_s:
+        below_m = height.pos_d_m + (reading.value_0 + s.range_below_m) * height.upright
+        store_ground(work, lanes, lane, judge_ground(below_m, reading.value_0, t_s, g)[1])
+        return False
+    found = seek_ground(work, lanes, lane, t_s, reading, height, s, GROUND_RESET, o)
+    if found:
         work[REASON * len(lanes) + lane] = FUSED
-    return step
+    return found
 
 
 @equation

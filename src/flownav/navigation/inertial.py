@@ -6,10 +6,13 @@ import numpy as np
 
 from flownav.compile import equation, procedure
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.states import ACCEL_NOISE, GYRO_NOISE, IMU
+from flownav.estimation.states import ACCEL_NOISE, FORCE, GYRO_NOISE, IMU
 from flownav.navigation.memory import (
     CLOCK,
     MOVING,
+    OWED,
+    SPENT,
+    STEADY_FORCE,
     ImuMemory,
     Reading,
     load_imu,
@@ -22,6 +25,8 @@ from flownav.navigation.tape import IMU_LOST, Output, write_event
 from flownav.navigation.told import Equipment, ImuSettings
 from flownav.navigation.vibration import followed_vibration, with_reading
 
+LEAST_STEP_S = 0.002  # a shorter step is not made to pay what is owed
+STEADY_S = 0.1
 Motion = tuple[float, float, float, float, float, float]  # body rate [rad/s] and specific force [m/s2], body FRD
 
 
@@ -71,30 +76,24 @@ def choose_motion(
     heard: an inertial reading is at hand. After a gap it knows nothing of the gap, which is coasted. Where no time
     passes there is no gap.
     """
-    passes = t_s > shared(work, lanes, CLOCK)
+    step_s = t_s - shared(work, lanes, CLOCK)
     for lane in range(len(lanes)):
-        m = load_imu(work, lanes, lane)
+        m, started = load_imu(work, lanes, lane), load_start(work, lanes, lane).started > 0.0
         fresh = fitted.use_imu and t_s - m.read_s <= s.imu_stale_s
         reading = load_reading(work, lanes, lane)
         now = heard and sound(reading)
-        if now and not fresh and np.isfinite(m.read_s) and load_start(work, lanes, lane).started > 0.0:
+        if now and not fresh and np.isfinite(m.read_s) and started:
             write_event(lanes, lane, t_s, IMU_LOST, t_s - m.read_s, o)
         between = motion_between(remembered(m), said_by(reading), s.imu_integrates)
-        set_imu(work, lanes, lane, 0, between[0] if now else m.gyro_x)
-        set_imu(work, lanes, lane, 1, between[1] if now else m.gyro_y)
-        set_imu(work, lanes, lane, 2, between[2] if now else m.gyro_z)
-        set_imu(work, lanes, lane, 3, between[3] if now else m.accel_x)
-        set_imu(work, lanes, lane, 4, between[4] if now else m.accel_y)
-        set_imu(work, lanes, lane, 5, between[5] if now else m.accel_z)
-        vibration = followed_vibration(reading, m, t_s - m.read_s) if now and fresh else m.vibration
-        started = load_start(work, lanes, lane).started > 0.0
         moving = fresh and started
+        pay(work, lanes, lane, step_s, t_s - m.read_s, now, moving, between, remembered(m))
+        vibration = followed_vibration(reading, m, t_s - m.read_s) if now and fresh else m.vibration
         work[MOVING * len(lanes) + lane] = 1.0 if moving else 0.0
         accel = s.accel_noise_m_s2_rt_hz if moving else s.coasting_accel_m_s2_rt_hz
         gyro = s.gyro_noise_rad_s_rt_hz if moving else s.coasting_rate_rad_s_rt_hz
         work[ACCEL_NOISE * len(lanes) + lane] = accel * accel
         work[GYRO_NOISE * len(lanes) + lane] = gyro * gyro
-        gap = 1.0 if passes and started and not moving else m.gap
+        gap = 1.0 if step_s > 0.0 and started and not moving else m.gap
         store_imu(
             work, lanes, lane,
             ImuMemory(
@@ -104,9 +103,39 @@ def choose_motion(
 
 
 @equation
-def set_imu(work: Work, lanes: Lanes, lane: int, part: int, value: float) -> None:
-    """One of the six inertial scalars that move the filter."""
-    work[(IMU + part) * len(lanes) + lane] = value
+def pay(
+    work: Work, lanes: Lanes, lane: int, step_s: float, period_s: float, now: bool, moving: bool, between: Motion,
+    held: Motion,
+) -> None:  # fmt: skip
+    """The IMU's rows of one lane for a step of step_s, such that the integral over each inertial period is as read.
+
+    Between two inertial readings the filter stops at other sensors' instants, moved there by the reading that it holds.
+    What that spent is taken off what the next reading says of its whole period, and the rest is paid over the rest of
+    the period, or, where that is too short, over the step after it. Without this, vibration that an IMU integrates
+    over its period would enter the velocity cut into pieces, as a random walk.
+    """
+    payable = step_s >= LEAST_STEP_S
+    for i in range(6):
+        spent = work[(SPENT + i) * len(lanes) + lane] if moving else 0.0
+        owed = work[(OWED + i) * len(lanes) + lane] if moving else 0.0
+        usual = between[i] if now else held[i]
+        total = between[i] * period_s - spent + owed if now else usual * step_s + owed
+        value = total / step_s if payable and moving else usual
+        left = total - value * step_s
+        work[(IMU + i) * len(lanes) + lane] = value
+        work[(OWED + i) * len(lanes) + lane] = left if moving else 0.0
+        work[(SPENT + i) * len(lanes) + lane] = 0.0 if now or not moving else spent + usual * step_s
+
+
+@procedure
+def steady_force(work: Work, lanes: Lanes, dt_s: float) -> None:
+    """STEADY_FORCE follows the specific force of the step that was just made."""
+    share = dt_s / (STEADY_S + dt_s)
+    for i in range(3):
+        for lane in range(len(lanes)):
+            before = work[(STEADY_FORCE + i) * len(lanes) + lane]
+            force = work[(FORCE + i) * len(lanes) + lane]
+            work[(STEADY_FORCE + i) * len(lanes) + lane] = before + share * (force - before)
 
 
 @procedure

@@ -85,7 +85,7 @@ class ImuMemory(NamedTuple):
 class RangeMemory(NamedTuple):
     """taken_s: of the last range that was fused; refused_s: since when they are refused; last_m and same_s: the last
     value and since when it repeats; down_m: where the vehicle was then; said_s: of the repetition that was reported;
-    doubted: 1 once the accelerometer was doubted for it; ground_known: 1 once a range has found the ground.
+    doubted: 1 once the accelerometer was doubted for it.
     """
 
     taken_s: float
@@ -95,7 +95,20 @@ class RangeMemory(NamedTuple):
     down_m: float
     said_s: float
     doubted: float
-    ground_known: float
+
+
+class GroundMemory(NamedTuple):
+    """known: 1 once ranges have found the ground. A ground that would be new: candidate_m, its down coordinate by the
+    newest range; since_s and first_m, when and by which range it was seen first; count, by how many in a row; varied: 1
+    where these were not all the same to the last digit.
+    """
+
+    known: float
+    candidate_m: float
+    since_s: float
+    first_m: float
+    count: float
+    varied: float
 
 
 class FlowMemory(NamedTuple):
@@ -148,12 +161,13 @@ START = _rows.take(len(StartMemory._fields))
 AID = _rows.take(len(AidMemory._fields))
 IMU_HEARD = _rows.take(len(ImuMemory._fields))
 RANGE = _rows.take(len(RangeMemory._fields))
+GROUND_SEEN = _rows.take(len(GroundMemory._fields))
 FLOW = _rows.take(len(FlowMemory._fields))
 HEADING = _rows.take(len(HeadingMemory._fields))
 BRIDGE = _rows.take(len(BridgeMemory._fields))
 REJECTION = _rows.take(6 * len(RejectionMemory._fields))  # of position and velocity, north, east, down
 BARO_KNOWN = _rows.take(1)
-PAD_KNOWN = _rows.take(1)
+PAD_KNOWN = _rows.take(1)  # 0 no, or how: STOOD_ON, LEFT, SEEN of `place`
 # what becomes of the component that is offered
 REASON = _rows.take(1)
 OBSERVATION = _rows.take(1)
@@ -162,6 +176,9 @@ LENS_RANGE = _rows.take(1)  # from the lens to the ground, along the boresight [
 KNOWN = _rows.take(1)  # 1 where that range is known
 TURNING = _rows.take(2)  # what the flow saw of the vehicle's turning [rad/s]
 TESTED = _rows.take(1)
+SPENT = _rows.take(6)  # what moved the filter since the last inertial reading: rate and specific force, integrated
+OWED = _rows.take(6)  # what past readings said and no step was long enough to pay, integrated
+STEADY_FORCE = _rows.take(3)  # specific force NED [m/s2], smoothed as a GPS receiver smooths its velocity
 MOVING = _rows.take(1)  # 1 where the IMU moves the filter over the step at hand
 # shared by all lanes (kept in the first)
 CLOCK = _rows.take(1)  # the instant that the filter has reached [s]
@@ -175,6 +192,7 @@ load_start, store_start = lane_access(StartMemory, START)
 load_aid, store_aid = lane_access(AidMemory, AID)
 load_imu, store_imu = lane_access(ImuMemory, IMU_HEARD)
 load_range, store_range = lane_access(RangeMemory, RANGE)
+load_ground, store_ground = lane_access(GroundMemory, GROUND_SEEN)
 load_flow, store_flow = lane_access(FlowMemory, FLOW)
 load_heading, store_heading = lane_access(HeadingMemory, HEADING)
 load_bridge, store_bridge = lane_access(BridgeMemory, BRIDGE)
@@ -184,7 +202,7 @@ _FRESH: dict[int, tuple[float, ...]] = {
     START: StartMemory(0.0, -np.inf, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     AID: AidMemory(np.nan, 0.0, -np.inf, 0.0),
     IMU_HEARD: ImuMemory(-np.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    RANGE: RangeMemory(-np.inf, np.nan, np.nan, np.nan, 0.0, np.nan, 0.0, 0.0),
+    RANGE: RangeMemory(-np.inf, np.nan, np.nan, np.nan, 0.0, np.nan, 0.0),
     FLOW: FlowMemory(-np.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0),
     HEADING: HeadingMemory(-np.inf, np.nan),
     BRIDGE: BridgeMemory(*([np.nan] * len(BridgeMemory._fields))),

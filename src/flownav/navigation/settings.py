@@ -87,6 +87,7 @@ class NavigatorSettingsFile(ParameterModel):
         0.3, gt=0, le=1, description="of the accuracy that a receiver states, the part that changes from fix to fix"
     )
     gps_velocity_sigma_m_s: Number = Field(0.1, ge=0, le=20, description="GPS velocity: the part that lasts")
+    gps_velocity_sigma_down_m_s: Number = Field(0.1, ge=0, le=20, description="and vertically")
     gps_velocity_tau_s: Number = Field(5.0, gt=0, le=1e6, description="for some seconds")
     gps_velocity_white_m_s: Number = Field(0.4, gt=0, le=20, description="GPS velocity: noise, and lag in manoeuvres")
     gps_velocity_white_down_m_s: Number = Field(0.5, gt=0, le=20, description="and vertically")
@@ -126,6 +127,8 @@ class NavigatorSettingsFile(ParameterModel):
     flow_forward_m: Number = Field(0.0, ge=-10, le=10, description="the lens from the IMU, body forward")
     flow_right_m: Number = Field(0.0, ge=-10, le=10, description="body right")
     flow_below_m: Number = Field(0.0, ge=-10, le=10, description="body down")
+    range_forward_m: Number = Field(0.0, ge=-10, le=10, description="the rangefinder from the IMU, body forward")
+    range_right_m: Number = Field(0.0, ge=-10, le=10, description="body right")
     range_below_m: Number = Field(0.0, ge=-10, le=10, description="the rangefinder below the IMU")
     range_sigma_m: Number = Field(0.05, gt=0, le=5, description="rangefinder noise and grass")
     range_relative_sigma: Number = Field(0.02, ge=0, le=0.5, description="share of the range added to it")
@@ -133,6 +136,9 @@ class NavigatorSettingsFile(ParameterModel):
     range_max_m: Number = Field(100.0, gt=0, le=1000, description="longer readings are no readings")
     range_stuck_s: Number = Field(0.5, gt=0, le=60, description="a range that repeats itself this long")
     range_stuck_travel_m: Number = Field(0.1, gt=0, le=10, description="while the height changes so much, is stuck")
+    pad_forward_m: Number = Field(0.0, ge=-10, le=10, description="the pad's camera from the IMU, body forward")
+    pad_right_m: Number = Field(0.0, ge=-10, le=10, description="body right")
+    pad_below_m: Number = Field(0.0, ge=-10, le=10, description="body down")
     pad_angle_sigma_rad: Number = Field(0.01, gt=0, le=1, description="a pad detector's line of sight")
     pad_distance_sigma: Number = Field(0.05, gt=0, le=1, description="share of the distance")
     pose_sigma_m: Number = Field(0.05, gt=0, le=10, description="an external position that states no accuracy")
@@ -174,7 +180,8 @@ class NavigatorSettingsFile(ParameterModel):
         sigma[ACCEL_BIAS : ACCEL_BIAS + 3] = self.accel_bias_sigma_m_s2
         sigma[GPS_SLOW : GPS_SLOW + 3] = self.gps_slow_sigma_m, self.gps_slow_sigma_m, self.gps_slow_sigma_down_m
         sigma[GPS_FAST : GPS_FAST + 3] = self.gps_fast_sigma_m, self.gps_fast_sigma_m, self.gps_fast_sigma_down_m
-        sigma[GPS_VELOCITY : GPS_VELOCITY + 3] = self.gps_velocity_sigma_m_s
+        level, down = self.gps_velocity_sigma_m_s, self.gps_velocity_sigma_down_m_s
+        sigma[GPS_VELOCITY : GPS_VELOCITY + 3] = level, level, down
         heading = self.ins_heading_sigma_rad if has_heading else 0.0
         sigma[INS_ERROR : INS_ERROR + 3] = self.ins_tilt_sigma_rad, self.ins_tilt_sigma_rad, heading
         sigma[COMPASS : COMPASS + 2] = self.compass_sigma_rad if compass else 0.0

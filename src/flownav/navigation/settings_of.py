@@ -28,6 +28,8 @@ ABOVE_FLOOR_M = 0.01  # a rangefinder that reads its floor says only that there 
 LEAST_SHARE = 0.05  # of a stated accuracy, where the sheet says what changes from fix to fix
 SURE = 3.0  # standard deviations that a limit of a bias leaves room for
 ALLOWED = 2.0  # times the stated vibration; what is beyond it, the sheet does not know
+AIDED_HZ = 2.0  # slower motion is held by what aids the IMU
+WASH_LASTS_S = 3.0
 CLIMB_M_S = 1.0  # by how much a lag errs, in a descent at this speed
 
 Keys = dict[str, float]
@@ -121,10 +123,15 @@ def of_flow_camera(sheet: FlowCameraSheet) -> Keys:
 def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = None) -> Keys:
     """White noise with what vibration adds to it; biases with what scale errors, misalignment and weight make of them.
 
-    Tones are counted as white noise of the same rms: what aliases to near 0 Hz does as much harm, the rest less.
+    A tone that aliases to near 0 Hz does the harm of white noise of its rms. One that stays at a frequency f integrates
+    to a velocity that swings by A/(2 pi f) and comes back: above AIDED_HZ, below which other sensors hold the velocity,
+    it counts by AIDED_HZ/f.
     """
     gyro, accel, rt_period_s = sheet.gyro, sheet.accelerometer, math.sqrt(sheet.period_s)
     shaken_m_s2 = max(_shaken(sheet, "level_m_s2", rotor_hz), _shaken(sheet, "vertical_m_s2", rotor_hz))
+    jumping_m_s2 = max(
+        _shaken(sheet, "level_m_s2", rotor_hz, whole=True), _shaken(sheet, "vertical_m_s2", rotor_hz, whole=True)
+    )
     turning_rad_s = math.radians(_shaken(sheet, "tilt_deg_s", rotor_hz))
     mg = 1e-3 * GRAVITY_M_S2
     accel_white = 1e-3 * mg * accel.density_ug_rthz / math.sqrt(2.0)
@@ -142,27 +149,37 @@ def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = Non
         "gyro_bias_sigma_rad_s": max(gyro_bias, 1e-6),
         "accel_bias_limit_m_s2": max(float(usual.accel_bias_limit_m_s2), SURE * accel_bias),
         "gyro_bias_limit_rad_s": max(float(usual.gyro_bias_limit_rad_s), SURE * gyro_bias),
-        "vibration_free_m_s2": max(float(usual.vibration_free_m_s2), ALLOWED * shaken_m_s2),
+        "vibration_free_m_s2": max(float(usual.vibration_free_m_s2), ALLOWED * jumping_m_s2),
         "imu_integrates": 1.0,
     }
 
 
-def _shaken(sheet: InertialSheet, part: str, rotor_hz: tuple[float, float] | None) -> float:
-    """Rms of both tones together in the readings of a vehicle that shakes more than the sheet's by its spread."""
-    left = (1.0, 1.0) if rotor_hz is None else tuple(abs(sheet.left_of_tone(hz)) for hz in rotor_hz)
+def _shaken(
+    sheet: InertialSheet, part: str, rotor_hz: tuple[float, float] | None, *, whole: bool = False
+) -> float:
+    """Rms of both tones together in the readings of a vehicle that shakes more than the sheet's by its spread.
+
+    whole: with nothing taken off for the frequency at which a tone is read.
+    """
+    left = [1.0, 1.0]
+    if rotor_hz is not None:
+        left = [abs(sheet.left_of_tone(hz)) * (1.0 if whole else _harm(hz, float(sheet.rate_hz))) for hz in rotor_hz]
     shake = sheet.vibration
     amplitude = math.hypot(left[0] * getattr(shake.rotor, part), left[1] * getattr(shake.blades, part))
     return (1.0 + shake.spread) * amplitude / math.sqrt(2.0)
 
 
+def _harm(tone_hz: float, rate_hz: float) -> float:
+    """The share by which a tone counts as white noise, read at this rate."""
+    read_hz = abs(tone_hz - rate_hz * round(tone_hz / rate_hz))
+    return min(1.0, AIDED_HZ / read_hz) if read_hz > 0.0 else 1.0
+
+
 # -- position -----------------------------------------------------------------------------------------------
 def of_gps_receiver(sheet: GpsReceiverSheet) -> Keys:
     """The receiver's errors as its sheet splits them, so that little is left for what it states of each fix.
-
-    The lasting error of the vertical velocity that exceeds the horizontal's counts as white.
     """
     position, velocity = sheet.position, sheet.velocity
-    beyond = max(velocity.sigma_down_m_s**2 - velocity.sigma_m_s**2, 0.0)
     step_m, step_m_s = position.quantum_m / math.sqrt(12.0), velocity.quantum_m_s / math.sqrt(12.0)
     return {
         "gps_slow_sigma_m": position.slow_sigma_m,
@@ -175,9 +192,10 @@ def of_gps_receiver(sheet: GpsReceiverSheet) -> Keys:
         "gps_white_sigma_down_m": max(math.hypot(position.white_sigma_down_m, step_m), 1e-3),
         "gps_white_share": LEAST_SHARE,
         "gps_velocity_sigma_m_s": velocity.sigma_m_s,
+        "gps_velocity_sigma_down_m_s": velocity.sigma_down_m_s,
         "gps_velocity_tau_s": max(velocity.tau_s, sheet.period_s),
         "gps_velocity_white_m_s": max(math.hypot(velocity.white_m_s, step_m_s), 1e-3),
-        "gps_velocity_white_down_m_s": max(math.sqrt(velocity.white_down_m_s**2 + step_m_s**2 + beyond), 1e-3),
+        "gps_velocity_white_down_m_s": max(math.hypot(velocity.white_down_m_s, step_m_s), 1e-3),
         "gps_velocity_lag_sigma_s": velocity.smoothing_tau_s,
         "gps_forward_m": sheet.antenna.forward_m,
         "gps_right_m": sheet.antenna.right_m,
@@ -191,6 +209,9 @@ def of_pad_camera(sheet: PadCameraSheet) -> Keys:
     return {
         "pad_angle_sigma_rad": math.hypot(1e-3 * sheet.angle_sigma_mrad, boresight),
         "pad_distance_sigma": 0.01 * sheet.distance_sigma_percent,
+        "pad_forward_m": sheet.lens.forward_m,
+        "pad_right_m": sheet.lens.right_m,
+        "pad_below_m": sheet.lens.down_m,
     }
 
 
@@ -204,16 +225,23 @@ def of_range_sensor(sheet: RangeSensorSheet) -> Keys:
         "range_relative_sigma": 0.01 * math.hypot(sheet.sigma_percent, sheet.scale_percent),
         "range_min_m": sheet.floor_m + ABOVE_FLOOR_M,
         "range_max_m": sheet.ceiling_m,
+        "range_forward_m": sheet.lens.forward_m,
+        "range_right_m": sheet.lens.right_m,
         "range_below_m": sheet.lens.down_m,
     }
 
 
 def of_barometer(sheet: BarometerSheet) -> Keys:
-    """Noise, and drift as the walk that it is over short times; in a rotor's wash the default noise stands."""
+    """Noise, and drift as the walk that it is over short times.
+
+    A rotor's wash is an error of the default's size that lasts while the vehicle manoeuvres: as white noise of so many
+    readings a second it weighs sqrt(2 tau rate) times as much.
+    """
     drift = sheet.drift_sigma_m * math.sqrt(2.0 / sheet.drift_tau_s) if sheet.drift_tau_s > 0.0 else 0.0
     calm = math.hypot(sheet.sigma_m, sheet.resolution_m / math.sqrt(12.0), CLIMB_M_S * sheet.lag_s)
     keys = {"baro_walk_m_rt_s": math.hypot(drift, sheet.ramp_m_per_h / 60.0 / math.sqrt(60.0))}
-    return keys if sheet.wash_share or sheet.ground_share else keys | {"baro_sigma_m": max(calm, 1e-3)}
+    washed = float(NavigatorSettingsFile().baro_sigma_m) * math.sqrt(max(2.0 * WASH_LASTS_S * sheet.rate_hz, 1.0))
+    return keys | {"baro_sigma_m": washed if sheet.wash_share or sheet.ground_share else max(calm, 1e-3)}
 
 
 def of_magnetometer(sheet: MagnetometerSheet, field: MagneticField) -> Keys:

@@ -20,7 +20,7 @@ from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
 from flownav.navigation.flow import take_flow
 from flownav.navigation.gps import take_gps
 from flownav.navigation.height import take_baro, take_range
-from flownav.navigation.inertial import choose_motion, keep_imu
+from flownav.navigation.inertial import choose_motion, keep_imu, steady_force
 from flownav.navigation.journal import note_decay, note_estimate, note_prediction
 from flownav.navigation.memory import (
     CLOCK,
@@ -135,6 +135,7 @@ def advance(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> None:
             if work[MOVING * len(lanes) + lane] == 0.0:
                 hold_still(work, lanes, lane)
         predict(work, lanes, STATES, dt_s, settings)
+        steady_force(work, lanes, dt_s)
         propagate_walks(work, lanes, dt_s, settings)
         add_vibration_noise(work, lanes, dt_s, imu)
         if len(lanes) == 1:

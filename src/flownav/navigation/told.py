@@ -26,6 +26,7 @@ class GpsSettings(NamedTuple):
     gps_fast_sigma_m: float
     gps_fast_sigma_down_m: float
     gps_velocity_sigma_m_s: float
+    gps_velocity_sigma_down_m_s: float
     gps_forward_m: float
     gps_right_m: float
     gps_below_m: float
@@ -79,6 +80,8 @@ class FlowSettings(NamedTuple):
 class HeightSettings(NamedTuple):
     """Rangefinder and barometer."""
 
+    range_forward_m: float
+    range_right_m: float
     range_below_m: float
     range_sigma_m: float
     range_relative_sigma: float
@@ -109,7 +112,9 @@ class PlaceSettings(NamedTuple):
     pad_distance_sigma: float
     pose_sigma_m: float
     still_sigma_m_s: float
-    flow_below_m: float
+    pad_forward_m: float
+    pad_right_m: float
+    pad_below_m: float
     gate_sigma: float
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from flownav.compile import lane_access
 from flownav.control.autopilot import AutopilotState, Estimate
 from flownav.estimation.kalman import kalman_row_count, kalman_rows
-from flownav.estimation.states import Rows
 from flownav.estimation.paper_filter import INPUTS, STATES
+from flownav.estimation.states import Rows
 from flownav.sensors.barometer import BarometerNormals, BarometerState, BarometerUnit
 from flownav.sensors.flow import FlowState
 from flownav.sensors.flow_camera import FlowCameraNormals, FlowCameraState, FlowCameraUnit
@@ -25,7 +25,6 @@ from flownav.sensors.rangefinder import RangefinderState
 from flownav.sensors.skid_switch import SkidSwitchNormals, SkidSwitchState, SkidSwitchUnit
 from flownav.simulation.wind import WindNormals, WindState, WindVelocity
 from flownav.vehicle.state import Controls, HelicopterState, Inflow
-
 
 _rows = Rows()
 

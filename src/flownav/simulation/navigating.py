@@ -18,7 +18,7 @@ from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import GROUND, PAD, POSITION, QUATERNION, STATE, VELOCITY
 from flownav.frames import quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.navigation.ahead import carried, state_of
-from flownav.navigation.memory import PAD_KNOWN, READING, load_range, load_start
+from flownav.navigation.memory import PAD_KNOWN, READING, load_ground, load_start
 from flownav.navigation.tape import Output, body_velocity_variance
 from flownav.simulation import layout
 from flownav.simulation.layout import load_helicopter
@@ -207,7 +207,7 @@ def carry_ahead(work: Work, nav: Work, lanes: Lanes, heard: int, ahead: int, per
 def find_place(work: Work, nav: Work, lanes: Lanes, lane: int) -> None:
     """PLACE by the pad's camera and by the range, where they have told."""
     known = nav[PAD_KNOWN * len(lanes) + lane] > 0.0
-    grounded = load_range(nav, lanes, lane).ground_known > 0.0
+    grounded = load_ground(nav, lanes, lane).known > 0.0
     row = layout.PLACE
     north, east = work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane]
     down = work[(row + 2) * len(lanes) + lane]

@@ -12,7 +12,6 @@ from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.navigation.memory import Reading
 from flownav.sensors.barometer import (
-    BarometerNormals,
     BarometerParameters,
     BarometerStartNormals,
     BarometerTruth,

@@ -31,6 +31,19 @@ def velocity_itself(axis: int, vel: float) -> tuple[float, OnOwnVelocity]:
     return vel, OnOwnVelocity(1.0)
 
 
+class OnPadBelow(NamedTuple):
+    """The Jacobian of a pad that one stands on."""
+
+    pad: float
+    pos: float
+
+
+@law
+def pad_below(axis: int, pad: float, pos: float) -> tuple[float, OnPadBelow]:
+    """z = pad - p [m], NED: 0 of a vehicle that stands where its pad is."""
+    return pad - pos, OnPadBelow(1.0, -1.0)
+
+
 class OnGyroBias(NamedTuple):
     """The Jacobian of a gyro at rest."""
 

@@ -1,0 +1,348 @@
+"""Judges and laws of the navigator as pure functions of plain floats: verdicts, variances, what is remembered."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from flownav.navigation.attitude import heading_variance, judge_attitude, magnetic_heading
+from flownav.navigation.flow import (
+    View,
+    flow_variance,
+    followed_agreement,
+    followed_excess,
+    judge_flow,
+    lasting_doubt,
+    turning_of,
+)
+from flownav.navigation.gps import judge_gps, judge_rejections
+from flownav.navigation.height import Height, judge_baro, judge_range, range_variance, repeats
+from flownav.navigation.inertial import motion_between, said_by, sound
+from flownav.navigation.memory import (
+    FlowMemory,
+    HeadingMemory,
+    ImuMemory,
+    RangeMemory,
+    Reading,
+    RejectionMemory,
+    StartMemory,
+)
+from flownav.navigation.offers import usable, usable_in_flight
+from flownav.navigation.place import component_of, judge_pad
+from flownav.navigation.reasons import (
+    BEFORE_START,
+    FUSED,
+    INNOVATION_GATE,
+    NEAR_GROUND,
+    NO_DATA,
+    NO_HEIGHT,
+    NOT_FINITE,
+    OUT_OF_RANGE,
+    OUTAGE,
+    SILENT,
+    STUCK,
+    TILTED,
+)
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.start import level, levelled
+from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
+from flownav.navigation.vibration import followed_vibration, vibration_beyond, with_reading
+
+NAN = math.nan
+FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
+TOLD = NavigatorSettingsFile().settings(FITTED)
+FRESH_FLOW = FlowMemory(-math.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+SEEN = View(2.0, True, False, 1.0)
+
+
+def told(**keys):
+    return NavigatorSettingsFile(**keys).settings(FITTED)
+
+
+def reading(*values: float, variance=(), quality=255.0, arrived=1.0, withheld=0.0) -> Reading:
+    return Reading(
+        *values, *[NAN] * (6 - len(values)), *variance, *[NAN] * (3 - len(variance)), quality, arrived, withheld
+    )
+
+
+# -- any reading ---------------------------------------------------------------------------------------------
+def test_what_is_said_of_any_reading_stands_in_this_order():
+    """No reading at all before no start, that before the user's will, that before no data, that before no number."""
+    bad = {"quality": 0.0, "withheld": 1.0}
+    assert usable(reading(1.0), 1.0, 1.0, 1.0) == FUSED
+    assert usable(reading(1.0), NAN, 1.0, 1.0) == NOT_FINITE
+    assert usable(reading(1.0), 1.0, math.inf, 1.0) == NOT_FINITE
+    assert usable(reading(1.0, quality=0.0), NAN, 1.0, 1.0) == NO_DATA
+    assert usable(reading(1.0, **bad), NAN, 1.0, 1.0) == OUTAGE
+    assert usable(reading(1.0, **bad), NAN, 1.0, 0.0) == BEFORE_START
+    assert usable(reading(1.0, arrived=0.0, **bad), NAN, 1.0, 0.0) == SILENT
+    assert usable_in_flight(reading(1.0), 1.0, 1.0, 0.0) == SILENT
+    assert usable_in_flight(reading(1.0), 1.0, 1.0, 1.0) == FUSED
+
+
+# -- GPS -----------------------------------------------------------------------------------------------------
+def test_the_noise_of_a_fix_is_its_white_part_and_a_share_of_what_it_states():
+    s = TOLD.gps
+    fix = reading(1.0, 2.0, 3.0, variance=(4.0, 9.0, 16.0))
+    white = (s.gps_white_sigma_m, s.gps_white_sigma_m, s.gps_white_sigma_down_m)
+    for axis in range(3):
+        reason, variance = judge_gps(fix, axis, True, 1.0, 0.0, s)
+        assert (reason, variance) == (FUSED, pytest.approx(white[axis] ** 2 + 0.09 * (axis + 2) ** 2))
+    unsaid = judge_gps(reading(1.0, 2.0, 3.0), 2, False, 1.0, 0.0, s)
+    assert unsaid == (FUSED, pytest.approx(s.gps_velocity_white_down_m_s**2))
+    assert judge_gps(reading(1.0, 2.0, 3.0), 0, False, 1.0, 0.0, s)[1] == pytest.approx(s.gps_velocity_white_m_s**2)
+
+
+def test_a_fix_that_jumps_along_one_axis_is_refused_along_both_and_keeps_its_height():
+    fix = reading(1.0, 2.0, 3.0)
+    assert [judge_gps(fix, axis, True, 1.0, 1.1, TOLD.gps)[0] for axis in range(3)] == [
+        INNOVATION_GATE, INNOVATION_GATE, FUSED
+    ]  # fmt: skip
+    assert judge_gps(fix, 0, True, 1.0, 1.0, TOLD.gps)[0] == FUSED
+    assert judge_gps(reading(1.0, 2.0, 3.0, withheld=1.0), 0, True, 1.0, 1.1, TOLD.gps)[0] == OUTAGE
+
+
+def test_gps_is_believed_once_it_was_refused_often_and_for_long():
+    m, times = RejectionMemory(0.0, 0.0), []
+    for t_s in np.arange(10.0, 30.0, 0.5).tolist():
+        reset, m = judge_rejections(True, t_s, m, TOLD.gps)
+        times += [t_s] * reset
+    assert times == [17.0, 24.5]  # 7 s each, and the count begins anew
+    m = RejectionMemory(0.0, 0.0)
+    for t_s in (10.0, 14.0, 17.5, 20.0):  # long, and not often
+        reset, m = judge_rejections(True, t_s, m, TOLD.gps)
+        assert not reset
+    assert judge_rejections(True, 21.0, m, TOLD.gps)[0]
+    assert judge_rejections(False, 21.0, m, TOLD.gps) == (False, RejectionMemory(0.0, 10.0))
+
+
+# -- flow ----------------------------------------------------------------------------------------------------
+def test_noise_of_flow_falls_as_its_quality_rises_and_grows_with_the_range():
+    """(sigma(q) r)^2 + floor^2, sigma from that of no quality to that of full."""
+    s = TOLD.flow
+    assert flow_variance(2.0, 0.0, 255.0, True, s) == pytest.approx((0.05 * 2.0) ** 2 + 0.03**2)
+    assert flow_variance(2.0, 0.0, 0.0, True, s) == pytest.approx((0.5 * 2.0) ** 2 + 0.03**2)
+    assert flow_variance(4.0, 0.0, 51.0, True, s) == pytest.approx((0.41 * 4.0) ** 2 + 0.03**2)
+
+
+def test_a_metric_flow_is_as_sure_as_the_range_that_scaled_it():
+    s = TOLD.flow
+    beside = flow_variance(2.0, 3.0, 255.0, False, s) - flow_variance(2.0, 0.0, 255.0, False, s)
+    assert beside == pytest.approx(9.0 * range_variance(2.0, s.range_sigma_m, s.range_relative_sigma) / 4.0)
+    assert flow_variance(2.0, 3.0, 255.0, True, s) == flow_variance(2.0, 0.0, 255.0, True, s)
+
+
+@pytest.mark.parametrize(("change", "view", "reason"), [
+    ({}, SEEN, FUSED),
+    ({}, SEEN._replace(known=False), NO_HEIGHT),
+    ({}, SEEN._replace(disputed=True), NO_HEIGHT),
+    ({}, SEEN._replace(upright=math.cos(0.81)), TILTED),
+    ({}, SEEN._replace(upright=math.cos(0.79)), FUSED),
+    ({}, SEEN._replace(range_m=0.29), NEAR_GROUND),
+    ({}, SEEN._replace(range_m=0.31), FUSED),
+    ({}, SEEN._replace(range_m=0.31, upright=0.9), NEAR_GROUND),  # the height counts, not the slant
+    ({"quality": 0.0}, SEEN, NO_DATA),
+    ({"withheld": 1.0}, SEEN, OUTAGE),
+    ({"arrived": 0.0}, SEEN, SILENT),
+])  # fmt: skip
+def test_verdicts_on_flow(change, view, reason):
+    seen = reading(0.2, -0.3, 0.0, 0.0, 0.0, 0.0, **change)
+    assert judge_flow(seen, True, 0.0, 0.0, 1.0, view, TOLD.flow) == reason
+
+
+def test_flow_that_no_sensor_measures_and_flow_that_is_no_number():
+    judged = [
+        judge_flow(reading(x, y, 0.0, 0.0), True, turning, 0.0, 1.0, SEEN, TOLD.flow)
+        for x, y, turning in ((10.1, 0.0, 0.0), (0.0, -10.1, 0.0), (9.9, -9.9, 0.0), (NAN, 0.0, 0.0), (0.0, 0.0, NAN))
+    ]
+    assert judged == [OUT_OF_RANGE, OUT_OF_RANGE, FUSED, NOT_FINITE, NOT_FINITE]
+    metric = judge_flow(reading(20.0, 0.0), False, NAN, NAN, 1.0, SEEN._replace(known=False), TOLD.flow)
+    assert metric == FUSED  # it needs no turning and no height, and its limit is another
+
+
+def test_the_turning_is_taken_from_the_imu_less_the_filters_bias_or_from_the_sensor_less_its_own():
+    seen = reading(0.0, 0.0, 0.5, 0.6, 0.3, 0.2)
+    assert turning_of(seen, 1.0, 0.01, 0.02, True, FRESH_FLOW, TOLD.flow) == (
+        pytest.approx(0.29), pytest.approx(0.18), FRESH_FLOW
+    )  # fmt: skip
+    x, y, m = turning_of(seen, 1.0, 0.01, 0.02, False, FRESH_FLOW, TOLD.flow)
+    assert (m.bias_x, m.bias_y, m.bias_count) == (pytest.approx(0.21), pytest.approx(0.42), 1.0)  # the first tells all
+    assert (x, y) == (pytest.approx(0.29), pytest.approx(0.18))
+    alone = reading(0.0, 0.0, 0.5, 0.6, NAN, NAN)
+    assert turning_of(alone, 1.0, 0.01, 0.02, True, m, TOLD.flow) == (pytest.approx(0.29), pytest.approx(0.18), m)
+
+
+def test_the_bias_of_a_flow_sensors_gyro_is_followed_at_its_pace_and_not_where_it_has_no_data():
+    known = FlowMemory(1.0, 1.0, 0.1, 0.0, 1e6, 1.0, 0.0)
+    seen = reading(0.0, 0.0, 0.5, 0.0, 0.0, 0.0)
+    _, _, m = turning_of(seen, 1.5, 0.0, 0.0, False, known, TOLD.flow)
+    assert m.bias_x == pytest.approx(0.1 + (1.0 - math.exp(-0.5 / 10.0)) * 0.4)
+    assert turning_of(seen._replace(quality=0.0), 1.5, 0.0, 0.0, False, known, TOLD.flow)[2] == known
+
+
+def test_flow_that_agrees_is_not_doubted_and_flow_that_does_not_is_for_long():
+    m = FlowMemory(1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+    assert followed_agreement(1.0, 1.1, m) == pytest.approx(1.0)
+    assert followed_agreement(25.0, 1.1, m) == pytest.approx(1.0 + 0.05 * 24.0)
+    assert followed_agreement(25.0, 9.0, m) == pytest.approx(1.0 + 0.5 * 24.0)
+    assert [lasting_doubt(0.0, ratio) for ratio in (1.0, 3.9, 4.1)] == [0.0, 0.0, 1.0]
+    assert [lasting_doubt(1.0, ratio) for ratio in (3.9, 2.1, 1.9)] == [1.0, 1.0, 0.0]
+
+
+def test_excess_noise_is_what_innovations_have_beyond_the_filters_own_doubt():
+    m = FlowMemory(1.0, 4.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+    s, share = TOLD.flow, 0.5 * 0.1 / 10.0
+    as_modelled = followed_excess(3.0, 9.0, 8.0, 5.0, 1.1, m, s)
+    assert as_modelled == pytest.approx(4.0)
+    noisier = followed_excess(5.0, 9.0, 8.0, 5.0, 1.1, m, s)
+    assert noisier == pytest.approx(4.0 + share * ((25.0 - 1.0) * 4.0 / 8.0 - 4.0))
+    assert followed_excess(1e3, 9.0, 8.0, 5.0, 1.1, m, s) == pytest.approx(4.0 + share * (28.0 * 4.0 - 4.0))  # the gate
+    assert followed_excess(0.0, 9.0, 8.0, 5.0, 1.1, m._replace(excess=1.0), s) == 1.0
+
+
+# -- height --------------------------------------------------------------------------------------------------
+def test_a_range_states_its_variance_or_has_a_floor_and_a_share():
+    m, height = range_memory(), Height(-2.0, 0.1, 1.0)
+    stated = judge_range(reading(2.0, variance=(0.25,)), 1.0, 1.0, height, False, m, TOLD.height)
+    modelled = judge_range(reading(2.0), 1.0, 1.0, height, False, m, TOLD.height)
+    assert stated[:2] == (FUSED, 0.25)
+    assert modelled[:2] == (FUSED, pytest.approx(0.05**2 + 0.04**2))
+
+
+def range_memory(**parts) -> RangeMemory:
+    empty = {"taken_s": -math.inf, "refused_s": NAN, "last_m": NAN, "same_s": NAN, "down_m": 0.0, "said_s": NAN}
+    return RangeMemory(**{name: 0.0 for name in RangeMemory._fields} | empty | parts)
+
+
+@pytest.mark.parametrize(("range_m", "upright", "reason"), [
+    (0.01, 1.0, OUT_OF_RANGE), (0.03, 1.0, FUSED), (99.0, 1.0, FUSED), (101.0, 1.0, OUT_OF_RANGE),
+    (2.0, math.cos(0.81), TILTED), (NAN, 1.0, NOT_FINITE),
+])  # fmt: skip
+def test_verdicts_on_a_range(range_m, upright, reason):
+    height = Height(-2.0, 0.1, upright)
+    assert judge_range(reading(range_m), 1.0, 1.0, height, False, range_memory(), TOLD.height)[0] == reason
+
+
+def test_a_range_that_repeats_itself_is_no_news_after_half_a_second():
+    height, m = Height(-2.0, 0.1, 1.0), range_memory()
+    reasons = []
+    for t_s in (10.0, 10.2, 10.4, 10.5, 10.6):
+        reason, _, m = judge_range(reading(2.0), t_s, 1.0, height, False, m, TOLD.height)
+        reasons.append(reason)
+    assert reasons == [FUSED, FUSED, FUSED, STUCK, STUCK]
+    assert (m.last_m, m.same_s, m.down_m) == (2.0, 10.0, -2.0)
+    reason, _, m = judge_range(reading(2.001), 10.7, 1.0, height, False, m, TOLD.height)
+    assert (reason, m.same_s) == (FUSED, 10.7)
+
+
+def test_the_only_range_is_believed_until_the_height_travels():
+    m = range_memory(last_m=2.0, same_s=10.0, down_m=-2.0)
+    s = TOLD.height
+    assert repeats(11.0, m, Height(-2.0, 0.1, 1.0), False, s)
+    assert not repeats(11.0, m, Height(-2.0, 0.1, 1.0), True, s)
+    assert not repeats(11.0, m, Height(-2.79, 0.1, 1.0), True, s)  # 5 x 0.1 m and three standard deviations of drift
+    assert repeats(11.0, m, Height(-2.81, 0.1, 1.0), True, s)
+
+
+def test_pressure_height():
+    assert judge_baro(reading(100.0), 1.0, TOLD.height) == (FUSED, 1.0)
+    assert judge_baro(reading(100.0, variance=(0.04,)), 1.0, TOLD.height) == (FUSED, 0.04)
+    assert judge_baro(reading(100.0), 0.0, TOLD.height)[0] == SILENT
+
+
+# -- attitude and heading --------------------------------------------------------------------------------------
+def test_a_quaternion_of_any_sensible_length_is_one():
+    assert judge_attitude(reading(0.0, 0.6, 0.0, 0.8), 1.0) == (FUSED, pytest.approx(1.0))
+    assert judge_attitude(reading(0.0, 0.1, 0.0, 0.1), 1.0)[0] == NOT_FINITE
+    assert judge_attitude(reading(3.0, 0.0, 0.0, 0.0), 1.0)[0] == NOT_FINITE
+    assert judge_attitude(reading(NAN, 0.0, 0.0, 0.0), 1.0)[0] == NOT_FINITE
+
+
+def test_headings_whose_error_lasts_count_once_in_its_time():
+    """2 sigma^2 tau/dt of one in dt, so that however many are read, what they say together stays the same."""
+    s = TOLD.attitude
+    assert heading_variance(10.1, HeadingMemory(10.0, NAN), s) == pytest.approx(0.04**2 * 2.0 * 5.0 / 0.1)
+    assert heading_variance(10.05, HeadingMemory(10.0, NAN), s) == pytest.approx(0.04**2 * 2.0 * 5.0 / 0.05)
+    assert heading_variance(99.0, HeadingMemory(10.0, NAN), s) == pytest.approx(0.04**2)
+
+
+def test_a_magnetic_heading_is_that_of_the_nose_less_that_of_the_field():
+    assert magnetic_heading(0.0, 1.0, HeadingMemory(0.0, 0.3)) == pytest.approx(math.pi / 2 - 0.3)
+
+
+# -- the pad -------------------------------------------------------------------------------------------------
+def test_noise_of_a_pad_fix_grows_with_its_distance():
+    s = TOLD.place
+    fix = reading(0.1, -0.2, 2.0)
+    across, along = (s.pad_angle_sigma_rad * 2.0) ** 2, (s.pad_distance_sigma * 2.0) ** 2
+    judged = [judge_pad(fix, component, 1.0, s) for component in range(3)]
+    assert judged == [(FUSED, pytest.approx(across)), (FUSED, pytest.approx(across)), (FUSED, pytest.approx(along))]
+    assert judge_pad(reading(0.0, 0.0, 0.04), 0, 1.0, s)[0] == OUT_OF_RANGE
+    assert judge_pad(reading(0.0, NAN, 2.0), 0, 1.0, s)[0] == NOT_FINITE
+
+
+def test_what_a_pad_fix_states_of_its_distance_is_taken_as_it_is():
+    fix = reading(0.0, 0.0, 2.0, variance=(1e-4, 1e-4, 0.01))
+    assert judge_pad(fix, 2, 1.0, TOLD.place) == (FUSED, 0.01)
+
+
+def test_components():
+    value = reading(1.0, 2.0, 3.0, variance=(4.0, 5.0, 6.0))
+    assert [component_of(value, k) for k in range(3)] == [(1.0, 4.0), (2.0, 5.0), (3.0, 6.0)]
+
+
+# -- inertial readings ---------------------------------------------------------------------------------------
+def test_between_two_readings_their_mean_stands_or_the_later_of_a_unit_that_integrates():
+    before, now = (0.0, 1.0, 2.0, 3.0, 4.0, 5.0), (1.0, 3.0, 5.0, 7.0, 9.0, 11.0)
+    assert motion_between(before, now, 0.0) == (0.5, 2.0, 3.5, 5.0, 6.5, 8.0)
+    assert motion_between(before, now, 1.0) == now
+
+
+def test_a_sound_reading_is_finite_arrived_and_not_withheld():
+    assert sound(reading(*[0.1] * 6))
+    assert said_by(reading(*range(6))) == (0, 1, 2, 3, 4, 5)
+    for bad in (reading(*[0.1] * 5, NAN), reading(*[0.1] * 6, arrived=0.0), reading(*[0.1] * 6, withheld=1.0)):
+        assert not sound(bad)
+
+
+def imu_memory(**parts) -> ImuMemory:
+    return ImuMemory(**{name: 0.0 for name in ImuMemory._fields} | parts)
+
+
+def test_the_vibration_of_white_noise_is_its_variance():
+    """Jumps of x, y, z: their mean square over 6, followed over a second."""
+    m = imu_memory(accel_x=1.0, accel_y=-1.0, accel_z=2.0)
+    jumped = reading(0.0, 0.0, 0.0, 3.0, 2.0, 8.0)
+    assert followed_vibration(jumped, m, 2.0) == pytest.approx((4.0 + 9.0 + 36.0) / 6.0)
+    assert followed_vibration(jumped, m._replace(vibration=1.0), 0.1) == pytest.approx(0.9 + 0.1 * 49.0 / 6.0)
+    random, sigma, m = np.random.default_rng(2), 1.7, imu_memory()
+    followed = []
+    for k in range(20000):
+        noise = reading(0.0, 0.0, 0.0, *random.normal(0.0, sigma, 3).tolist())
+        m = with_reading(noise, 0.01 * k, m._replace(vibration=followed_vibration(noise, m, 0.01)))
+        followed.append(m.vibration)
+    assert np.mean(followed[1000:]) == pytest.approx(sigma**2, rel=0.02)
+
+
+def test_vibration_up_to_the_harmless_does_no_harm():
+    assert vibration_beyond(imu_memory(vibration=0.9), TOLD.imu) == 0.0
+    assert vibration_beyond(imu_memory(vibration=9.0), TOLD.imu) == pytest.approx(2.0)
+    assert vibration_beyond(imu_memory(vibration=9.0), told(vibration_free_m_s2=3.5).imu) == 0.0
+
+
+# -- the start -----------------------------------------------------------------------------------------------
+def test_the_first_attitude_is_level_by_the_mean_force_and_heads_by_the_field():
+    m = StartMemory(0.0, -math.inf, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    roll, pitch = 0.2, -0.1
+    force = (9.8 * math.sin(pitch), -9.8 * math.sin(roll) * math.cos(pitch), -9.8 * math.cos(roll) * math.cos(pitch))
+    for sway in (0.5, -0.5, 0.5, -0.5):
+        m = levelled(reading(0.0, 0.0, 0.0, force[0] + sway, force[1], force[2] - sway), m)
+    assert m.readings == 4.0
+    w, x, y, z = level(m, 0.7, FITTED)
+    assert math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)) == pytest.approx(roll)
+    assert math.asin(2.0 * (w * y - x * z)) == pytest.approx(pitch)
+    assert math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)) == pytest.approx(0.0)
+    w, x, y, z = level(m, 0.7, FITTED._replace(heading=FROM_MAG))
+    assert math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)) == pytest.approx(-0.7)

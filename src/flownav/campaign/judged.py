@@ -1,4 +1,9 @@
-"""Flights of the landing filter judged for consistency and efficiency, and the bound that they are held against."""
+"""Flights judged: what they flew on for accuracy, the navigator at its horizon for consistency, and its bound.
+
+What is flown on is the estimate of now, counted from where the vehicle takes its pad to be. The navigator's own stands
+at its horizon, some 0.1 s ago and in its own frame, which GPS has put somewhere: there it states its covariance, and
+only there the two can be held against each other.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaign.local import score_history
+from flownav.campaign.local import counted_steps, score_history
 from flownav.record import POSITION_NED, VELOCITY_BODY
 from flownav.scoring.consistency import (
     GROUP_FLIGHTS,
@@ -32,7 +37,9 @@ from flownav.simulation.sensing import EPOCH_S
 
 Array = NDArray[np.float64]
 
-STD = tuple(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY))
+STATES = (*POSITION_NED, *VELOCITY_BODY)
+STD = tuple(f"std_{name}" for name in STATES)
+HORIZON = tuple(f"error_{name}" for name in STATES)
 TOUCHDOWN_ERROR = SCORE_COLUMNS.index("touchdown.horizontal_error_m")
 BOUND_FLIGHTS = 64  # the covariance hardly differs from flight to flight
 R_SHARE = 0.95
@@ -42,21 +49,26 @@ R_SHARE = 0.95
 class Judged:
     """What a batch of flights leaves: a row of scores and a largest horizontal error a flight, and sums.
 
-    scores (flights, len(SCORE_COLUMNS)); largest_horizontal_m (flights,), relative to where the vehicle noted its
-    pad; groups: steps inside the band, and steps, of each GROUP_FLIGHTS flights one after the other (of all where
-    there are fewer; a remainder is left out). Both are None for a filter that states no consistency.
+    scores (flights, len(SCORE_COLUMNS)); largest_horizontal_m (flights,), in flight and relative to where the vehicle
+    takes its pad to be; flown: errors in flight of what was flown on; sums: of the navigator at its horizon; groups:
+    steps inside the band, and steps, of each GROUP_FLIGHTS flights one after the other (of all where there are fewer;
+    a remainder is left out).
+    The last two are None for a filter that states no consistency.
     """
 
     scores: Array
     largest_horizontal_m: Array
-    errors: ErrorSums
+    flown: ErrorSums
     sums: ConsistencySums | None
     groups: tuple[tuple[int, int], ...] | None
 
 
 @dataclass(frozen=True)
 class Bound:
-    """Mean over flights of the bound: variance (epochs, 6) of position NED and body velocity, and sums in flight."""
+    """Mean over flights of the bound: variance (epochs, 6) of position NED and body velocity, and sums in flight.
+
+    The first row is the horizon's at the start of the flight.
+    """
 
     variance: Array
     sums: ErrorSums
@@ -73,48 +85,70 @@ def fly_judged(
     """Fly flights 0 to `flights - 1` and judge them; memory grows by a row of scores a flight."""
     home = home_epoch(flight)
 
-    def judge(history: Array) -> tuple[Array, Array, ConsistencySums]:
-        estimate = history[:, columns("estimate", (*POSITION_NED, *VELOCITY_BODY))]
-        truth = history[:, columns("truth", (*POSITION_NED, *VELOCITY_BODY))]
-        nees = history[:, column("estimate", "nees")]
-        sums = consistency_of_block(estimate, truth, nees, _skid_height(flight, history), _on_ground(history))
-        return score_history(flight, history), largest_horizontal_error(estimate, truth, home), sums
+    def judge(history: Array) -> tuple[Array, Array, ErrorSums, ConsistencySums | None]:
+        estimate = history[:, columns("estimate", STATES)]
+        truth = history[:, columns("truth", STATES)]
+        counted = counted_steps(flight, history)
+        in_flight = counted * (1.0 - _on_ground(history))
+        largest = largest_horizontal_error(estimate, truth, home, in_flight * _from(home, len(history)))
+        flown = error_sums((estimate - truth) ** 2, _skid_height(flight, history), in_flight)
+        return score_history(flight, history), largest, flown, _at_horizon(flight, history)
 
     rows, largest, groups = [], [], []
-    total = group = None
-    for flown, (scores, horizontal, sums) in fly_blocks(flight, seed, 0, flights, judge, threads):
+    total: ConsistencySums | None = None
+    group: ConsistencySums | None = None
+    flown_on: ErrorSums | None = None
+    for flown, (scores, horizontal, errors, sums) in fly_blocks(flight, seed, 0, flights, judge, threads):
         rows.append(scores)
         largest.append(horizontal)
-        total = sums if total is None else total + sums
-        group = sums if group is None else group + sums
-        if group.flights >= GROUP_FLIGHTS:
-            groups.append(inside_steps(group))
-            group = None
+        flown_on = errors if flown_on is None else flown_on + errors
+        if sums is not None:
+            total = sums if total is None else total + sums
+            group = sums if group is None else group + sums
+            if group.flights >= GROUP_FLIGHTS:
+                groups.append(inside_steps(group))
+                group = None
         on_progress(flown)
-    assert total is not None
-    found = np.concatenate(rows), np.concatenate(largest), total.errors
-    if flight.landing is None:
-        return Judged(*found, None, None)
-    return Judged(*found, total, tuple(groups) or (inside_steps(total),))
+    assert flown_on is not None
+    in_groups = None if total is None else tuple(groups) or (inside_steps(total),)
+    return Judged(np.concatenate(rows), np.concatenate(largest), flown_on, total, in_groups)
+
+
+def _from(step: int | None, epochs: int) -> Array:
+    """1 from a step on, 0 before; all 1 where there is none. (epochs, 1)."""
+    return np.asarray(np.arange(epochs)[:, None] >= (step or 0), float)
+
+
+def _at_horizon(flight: Flight, history: Array) -> ConsistencySums | None:
+    """The navigator's consistency: its errors and their squares over what it states, where it stands."""
+    if flight.table is None:
+        return None
+    behind = flight.table.horizon_epochs
+    error, nees = history[behind:, columns("horizon", HORIZON)], history[behind:, column("estimate", "nees")]
+    then = history[: len(history) - behind]
+    return consistency_of_block(error, nees, _skid_height(flight, then), _on_ground(then))
 
 
 def bound_of(setup: Setup, seed: int, flights: int, *, threads: int | None = None) -> Bound:
-    """The posterior Cramér-Rao bound of the landing filter's model, mean over flights.
+    """The posterior Cramér-Rao bound of the navigator's own model, mean over flights.
 
-    Each flight flies on the truth with every Jacobian taken there (`LandingSetup.along_truth`), so that the
-    covariance is the bound along that flight. ValueError where another filter flies.
+    Each flight flies on the truth with every Jacobian taken there (`FlightPlan.along_truth`), so that the covariance is
+    the bound along that flight. ValueError where the paper's filter flies.
     """
-    landing = setup.flight.landing
-    if landing is None:
-        raise ValueError(f"{setup.scenario.name}: the bound is the landing filter's, and it does not fly")
-    flight = setup.flight._replace(landing=landing._replace(along_truth=True))
+    table = setup.flight.table
+    if table is None:
+        raise ValueError(f"{setup.scenario.name}: the bound is the navigator's, and it does not fly")
+    flight = setup.flight._replace(plan=setup.flight.plan._replace(fly_on_truth=True, along_truth=True))
+    behind = table.horizon_epochs
 
     def judge(history: Array) -> tuple[Array, ErrorSums]:
-        variance = history[:, columns("estimate", STD)] ** 2
-        sums = error_sums(variance, _skid_height(flight, history), 1.0 - _on_ground(history))
+        running = np.isfinite(history[behind:, column("estimate", "nees")])
+        variance = np.where(running[:, None], history[behind:, columns("estimate", STD)] ** 2, 0.0)
+        then = history[: len(history) - behind]
+        sums = error_sums(variance, _skid_height(flight, then), running * (1.0 - _on_ground(then)))
         return variance.sum(axis=2), sums
 
-    variance, total = np.zeros((flight.plan.epochs, len(STD))), None
+    variance, total = np.zeros((flight.plan.epochs - behind, len(STD))), None
     for _, (block, sums) in fly_blocks(flight, seed, 0, flights, judge, threads):
         variance += block
         total = sums if total is None else total + sums
@@ -123,8 +157,11 @@ def bound_of(setup: Setup, seed: int, flights: int, *, threads: int | None = Non
 
 
 def home_epoch(flight: Flight) -> int | None:
-    """The step at which the vehicle last notes where its pad is; None where it takes the filter's origin for it."""
-    if not flight.plan.home_at_start:
+    """The step at which the paper's filter last notes where its pad is.
+
+    None where it takes the filter's origin for it, and for the navigator, whose estimate is counted from there.
+    """
+    if flight.onboard is not None or not flight.plan.home_at_start:
         return None
     parked = flight.plan.starts_on_ground and flight.plan.takeoff_at_s > 0.0
     last = int(np.ceil(flight.plan.takeoff_at_s / EPOCH_S)) - 1 if parked else 0
@@ -132,12 +169,13 @@ def home_epoch(flight: Flight) -> int | None:
 
 
 def consistency_facts(judged: Judged, bound: Bound) -> dict[str, Any]:
-    """What `flownav fly` says of many flights of the landing filter; null where no flight landed or flew."""
+    """What `flownav fly` says of many flights of the navigator; null where no flight landed or flew."""
     assert judged.groups is not None
+    assert judged.sums is not None
     inside = inside_fraction(judged.groups)
     low, high = touchdown_radius(judged)[1:]
     return {
-        "efficiency": {state: _finite(ratio) for state, ratio in efficiency(judged.errors, bound.sums).items()},
+        "rmse_over_bound": {s: _finite(ratio) for s, ratio in efficiency(judged.sums.errors, bound.sums).items()},
         "anees_inside_fraction": _finite(inside),
         "r95_m": _finite(touchdown_radius(judged)[0]),
         "r95_interval_m": [_finite(low), _finite(high)],

@@ -27,8 +27,23 @@ def score_history(flight: Flight, history: Array) -> Array:
     sink_rate = history[:, column("truth", "sink_rate_m_s")]
     on_ground = (history[:, column("truth", "contact_n")] > 0.0).astype(float)
     t_s: Array = np.arange(len(history), dtype=np.float64) * EPOCH_S
-    may_land_after_s = flight.plan.may_land_after_s
-    return score_block(t_s, estimate, truth, sink_rate, on_ground, may_land_after_s=may_land_after_s)
+    counted = counted_steps(flight, history)
+    return score_block(
+        t_s, estimate, truth, sink_rate, on_ground, may_land_after_s=flight.plan.may_land_after_s, counted=counted
+    )
+
+
+def counted_steps(flight: Flight, history: Array) -> Array:
+    """The steps whose errors are scored, (epochs, lanes) 0/1: of the paper's filter all, as the paper has it.
+
+    Of the navigator those in flight after the hand-over: until then the vehicle is flown on the truth, or stands on its
+    skids, and what it flies on has no error by definition; on the ground again, nothing is flown on it.
+    """
+    contact = history[:, column("truth", "contact_n")]
+    if flight.onboard is None:
+        return np.ones_like(contact)
+    handed = np.arange(len(history)) * EPOCH_S >= flight.plan.handover_s
+    return np.asarray(handed[:, None] & (contact <= 0.0), float)
 
 
 def fly_many(

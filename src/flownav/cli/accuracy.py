@@ -1,4 +1,4 @@
-"""`flownav accuracy`: what the landing filter promises, case by case, and what each piece of it is worth."""
+"""`flownav accuracy`: what the navigator promises, case by case, and what each piece of it is worth."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import typer
 if TYPE_CHECKING:
     from flownav.campaign.accuracy import Case
 
-EFFICIENCY_STATES = ("x", "y", "z", "u", "v", "w")
+STATES = ("x", "y", "z", "u", "v", "w")
+BOUND = "RMSE over the bound of the filter's own model"
 
 
 def command(
@@ -25,7 +26,7 @@ def command(
     out: Annotated[Path | None, typer.Option(help="Write the tables as Markdown, too.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
-    """Hold the landing filter against its targets: accuracy, consistency, efficiency, and what its pieces are worth."""
+    """Hold the navigator against its targets: accuracy, consistency with its own model, what its pieces are worth."""
     from flownav.campaign.accuracy import CASES, flights_of, run_case
     from flownav.cli.output import progress, require_between, require_writable
     from flownav.errors import InputError, VerdictError
@@ -60,7 +61,7 @@ def command(
 
 def markdown(made: list[Case]) -> str:
     """The tables as they are printed and as docs/accuracy.md has them."""
-    parts = [_targets(made), _efficiency(made), _by_height(made)]
+    parts = [_targets(made), _known(made), _consistency(made), _by_height(made), _accuracy(made)]
     parts += [_ablations(case) for case in made if case.ablations]
     return "\n\n".join(parts) + "\n"
 
@@ -74,18 +75,29 @@ def _targets(made: list[Case]) -> str:
     return _table(("case", "figure", "measured", "target", ""), rows)
 
 
-def _efficiency(made: list[Case]) -> str:
+def _known(made: list[Case]) -> str:
+    return _table(("case", "what the vehicle knows exactly"), [(case.name, case.known) for case in made])
+
+
+def _consistency(made: list[Case]) -> str:
     rows = [
-        (case.name, *(f"{case.facts['efficiency'][state]:.3f}" for state in EFFICIENCY_STATES),
-         f"{case.facts['anees']:.3f}", f"{case.facts['anees_inside_fraction_of_all_flights']:.3f}",
-         _interval(case.facts, "p95_largest_horizontal"), _interval(case.facts, "r95"), str(case.facts["crashed"]))
+        (case.name, *(_ratio(case.facts["rmse_over_bound"][state]) for state in STATES),
+         f"{case.facts['anees']:.3f}", f"{case.facts['anees_inside_fraction_of_all_flights']:.3f}")
+        for case in made
+    ]  # fmt: skip
+    heading = (f"{BOUND}, at the horizon", *STATES, "ANEES", "steps with the ANEES of all flights in its band")
+    return _table(heading, rows)
+
+
+def _accuracy(made: list[Case]) -> str:
+    rows = [
+        (case.name, *(_length(rms) for rms in case.facts["rms_error"]), _interval(case.facts, "p95_largest_horizontal"),
+         _interval(case.facts, "r95"), str(case.facts["crashed"]))
         for case in made
     ]  # fmt: skip
     heading = (
-        "RMSE over bound",
-        *EFFICIENCY_STATES,
-        "ANEES",
-        "steps with the ANEES of all flights in its band",
+        "RMSE of what was flown on, in flight [m, m/s]",
+        *STATES,
         "p95 of largest horizontal error [m] (95 % interval)",
         "touchdown R95 [m] (95 % interval)",
         "crashed",
@@ -95,19 +107,18 @@ def _efficiency(made: list[Case]) -> str:
 
 def _by_height(made: list[Case]) -> str:
     rows = [
-        (case.name, band, *(f"{ratios[state]:.3f}" for state in EFFICIENCY_STATES))
-        for case in made for band, ratios in case.facts["efficiency_by_height"].items()
+        (case.name, band, *(_ratio(ratios[state]) for state in STATES))
+        for case in made for band, ratios in case.facts["rmse_over_bound_by_height"].items()
     ]  # fmt: skip
-    return _table(("RMSE over bound", "height of the skids", *EFFICIENCY_STATES), rows)
+    return _table((BOUND, "height of the skids", *STATES), rows)
 
 
 def _ablations(case: Case) -> str:
     def cells(row: dict[str, Any]) -> tuple[str, ...]:
-        radius = "-" if row["r95_m"] is None else f"{row['r95_m']:.3f}"
         ratios = (row["horizontal_rms_ratio"], row["vertical_rms_ratio"], row["horizontal_speed_rms_ratio"])
         return (
-            f"{row['p95_largest_horizontal_m']:.3f}", *(f"{ratio:.2f}" for ratio in ratios), f"{row['anees']:.3g}",
-            radius, str(row["crashed"]),
+            _length(row["p95_largest_horizontal_m"]), *(f"{ratio:.2f}" for ratio in ratios), f"{row['anees']:.3g}",
+            _length(row["r95_m"]), str(row["crashed"]),
         )  # fmt: skip
 
     rows = [(lacking, *cells(row)) for lacking, row in case.ablations.items()]
@@ -122,6 +133,14 @@ def _ablations(case: Case) -> str:
         "crashed",
     )
     return _table(heading, rows)
+
+
+def _ratio(ratio: float) -> str:
+    return f"{ratio:.3f}"
+
+
+def _length(number: float | None) -> str:
+    return "-" if number is None else f"{number:.3f}"
 
 
 def _interval(facts: dict[str, Any], name: str) -> str:

@@ -19,7 +19,8 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
     console.width = max(console.width, WIDEST if many else WIDE)
     plant = "" if facts["truth"] == "nonlinear" else ", linear truth"
     flown_on = "" if facts["feedback"] == "estimate" else ", flown on the truth"
-    title = f"{facts['scenario']}: {facts['filter']} filter, {facts['gps']} GPS{plant}{flown_on}, seed {facts['seed']}"
+    flies = "the paper's filter" if facts["filter"] == "paper" else "the navigator"
+    title = f"{facts['scenario']}: {flies}, {facts['gps']} GPS{plant}{flown_on}, seed {facts['seed']}"
     table = Table(
         title=title + (f", {facts['flights']} flights: median (5-95 %)" if many else ""), title_justify="left"
     )
@@ -38,8 +39,11 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
     beside = f"   paper: {paper['max_position_error_m']:.4f} m" if paper else ""
     largest = _cell(facts["max_position_error_m"], 3 if many else 4)
     console.print(f"largest error of one position axis  {largest} m{beside}", highlight=False)
+    if "known_exactly" in facts:
+        console.print("errors are those of what was flown on, in flight after the hand-over", highlight=False)
+        console.print(f"known exactly  {facts['known_exactly']}", highlight=False)
     _show_touchdown(console, facts)
-    if facts.get("efficiency"):
+    if facts.get("rmse_over_bound"):
         _show_consistency(console, facts)
     if "paper_percentile" in facts:
         _show_percentiles(console, facts["paper_percentile"])
@@ -64,9 +68,9 @@ def _show_touchdown(console: Console, facts: dict[str, Any]) -> None:
 
 
 def _show_consistency(console: Console, facts: dict[str, Any]) -> None:
-    """Efficiency, consistency and touchdown radius of many flights of the landing filter."""
-    ratios = ", ".join(f"{state} {_or_dash(ratio)}" for state, ratio in facts["efficiency"].items())
-    console.print(f"RMSE over the Cramér-Rao bound, in flight  {ratios}", highlight=False)
+    """How consistent the navigator is with its own model, and the touchdown radius, of many flights."""
+    ratios = ", ".join(f"{state} {_or_dash(ratio)}" for state, ratio in facts["rmse_over_bound"].items())
+    console.print(f"RMSE over the bound of the filter's own model, in flight  {ratios}", highlight=False)
     inside = facts["anees_inside_fraction"]
     if inside is not None:
         console.print(f"ANEES inside its 95 % band  on {100.0 * inside:.1f} % of the steps in flight", highlight=False)
@@ -91,6 +95,8 @@ def _show_percentiles(console: Console, percentiles: dict[str, Any]) -> None:
 
 
 def _cell(number: Any, digits: int) -> str:
+    if number is None:
+        return "-"
     if isinstance(number, dict):
         return f"{number['median']:.{digits}f} ({number['p05']:.{digits}f}..{number['p95']:.{digits}f})"
     return f"{number:.{digits}f}"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from flownav.simulation.scenario import Scenario
 
 
-OF_MANY_FLIGHTS = ("efficiency", "anees_inside_fraction", "r95_m", "r95_interval_m")
+OF_MANY_FLIGHTS = ("rmse_over_bound", "anees_inside_fraction", "r95_m", "r95_interval_m")
 CRASHES_ALLOWED = 0.05  # of the flights, before the exit status says that the verdict is bad
 
 
@@ -42,6 +42,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
+    from flownav.campaign.accuracy import known_exactly
     from flownav.campaign.judged import BOUND_FLIGHTS, bound_of, consistency_facts, fly_judged
     from flownav.campaign.local import fly_recorded, median_flight
     from flownav.cli.output import progress, require_between, require_writable, save
@@ -75,14 +76,15 @@ def command(
             judged = fly_judged(setup.flight, seed, flights, on_progress=advance)
         rows = judged.scores
         index = median_flight(rows)
-        if setup.flight.landing is not None:
+        if setup.fitted is not None:
             facts |= consistency_facts(judged, bound_of(setup, seed, min(flights, BOUND_FLIGHTS)))
         table = published(chosen.paper_table)
         percentiles = percentile_of_paper(rows, table) if table else None
     record = fly_recorded(setup, seed, index)
     scores = record.manifest["scores"] if flights == 1 else scores_of_flights(rows)
-    if flights == 1 and setup.flight.landing is not None:
-        facts |= dict.fromkeys(OF_MANY_FLIGHTS)
+    if setup.fitted is not None:
+        facts["known_exactly"] = known_exactly(chosen)
+        facts |= dict.fromkeys(OF_MANY_FLIGHTS) if flights == 1 else {}
     facts |= scores | save(record, record_path, report=report)
     if percentiles:
         facts["paper_percentile"] = percentiles
@@ -105,12 +107,10 @@ def _tell(setup: Setup, record: Record, url: str, speed: float, key: Path | None
     from flownav.live.loop import run_vehicle, stoppable
     from flownav.live.simulated import SimulatedVehicle
     from flownav.mavlink.signing import load_key
-    from flownav.measurement import Sensor
 
     if "imu" not in record.tables or "gps_velocity" not in record.tables:
         raise InputError("--mavlink: the flight has no IMU or no GPS velocity; give --filter landing --gps midg")
-    log = log_of(record, setup, flow=Sensor.FLOW_RATE, attitude=True)
-    vehicle = SimulatedVehicle(log, key=load_key(key) if key else None)
+    vehicle = SimulatedVehicle(log_of(record, setup), key=load_key(key) if key else None)
     link = open_link(url)
     try:
         with stoppable() as asked:

@@ -1,4 +1,4 @@
-"""The navigator on trial: the event-driven landing filter behind a horizon, with what the datasheets state."""
+"""The navigator on trial, behind a horizon, told what the datasheets of the vehicle's sensors state."""
 
 from __future__ import annotations
 
@@ -14,20 +14,21 @@ from flownav.faults.arrival import as_fed, stamped_ahead
 from flownav.faults.navigated import Event, Flag, Navigate, Navigated, Offers
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor, Stream
-from flownav.navigation.feed import new_navigator
-from flownav.navigation.loop import run
-from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.state import (
+from flownav.navigation.feed import equipment_of
+from flownav.navigation.loop import run, start_navigator
+from flownav.navigation.settings_of import Told
+from flownav.navigation.tables import Written, written_on
+from flownav.navigation.tape import (
     AIDED_AGAIN,
     DEAD_RECKONING,
     EVENT_NAMES,
     FLOW_DOUBTED,
     FLOW_TRUSTED,
     POSITION_INVALID,
-    Tape,
     new_tape,
 )
-from flownav.replay.prepare import IdentifiedFlow, Prepared, ReplayOptions, identified_flow, prepare
+from flownav.replay.prepare import Prepared, ReplayOptions, prepare
+from flownav.sensors.identified import IdentifiedFlow
 from flownav.simulation.assemble import Setup
 
 TAKEN_IN = (Reason.FUSED, Reason.DATUM)
@@ -36,48 +37,36 @@ RAISING = {
     int(POSITION_INVALID): int(AIDED_AGAIN),
     int(FLOW_DOUBTED): int(FLOW_TRUSTED),
 }
-ABOVE_FLOOR_M = 0.01  # a sonar that reads its floor says only that there is no more
 
 
-def landing_navigator(settings: NavigatorSettingsFile, flow: IdentifiedFlow) -> Navigate:
-    """The navigator with these settings, and this gain and latency of the flow sensor."""
+def navigator_told(told: Told) -> Navigate:
+    """The navigator that is told this; how old readings are, their streams state."""
 
     def navigate(streams: Mapping[Sensor, Stream]) -> Navigated:
         """Raises InputError where the filter never starts."""
-        prepared = prepare(Log(Path("faults"), dict(streams)), ReplayOptions(_gps_delay(streams), identified=flow))
+        aged = ReplayOptions(_gps_delay(streams), identified=_flow_as_it_is(streams))
+        prepared = prepare(Log(Path("faults"), dict(streams)), aged)
         queue = as_fed(prepared.streams)
-        running = new_navigator(
-            prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, settings, new_tape(queue)
-        )
+        equipment = equipment_of(prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, told.settings)
+        running = start_navigator(equipment, told.settings, new_tape(queue), told.noise)
         with announce_compilation("faults"):
             run(queue, running)
-        if running.tape.used[0] < 2:
+        written = written_on(running.tape)
+        if len(written.estimate) < 2:
             raise InputError("faults: the navigator never started; it needs an IMU or an attitude, and a fix or flow")
-        return navigated(running.tape, prepared)
+        return navigated(written, prepared)
 
     return navigate
 
 
 def navigator_of(setup: Setup) -> Navigate:
-    """The navigator for a simulated vehicle: defaults, but for what its datasheets and its drawing state."""
-    gps, sonar, sensors = setup.scenario.gps, setup.scenario.rangefinder, setup.flight.sensors
-    settings = NavigatorSettingsFile(
-        gps_slow_sigma_m=gps.slow_sigma_m,
-        gps_slow_sigma_down_m=gps.slow_sigma_down_m,
-        gps_slow_tau_s=gps.slow_tau_s,
-        gps_fast_sigma_m=gps.fast_sigma_m,
-        gps_fast_sigma_down_m=gps.fast_sigma_down_m,
-        gps_fast_tau_s=gps.fast_tau_s,
-        gps_velocity_sigma_m_s=gps.velocity_sigma_total_m_s,
-        gps_velocity_tau_s=gps.velocity_tau_s,
-        range_min_m=float(sonar.floor_m) + ABOVE_FLOOR_M,
-        range_max_m=float(sonar.ceiling_m),
-        flow_min_height_m=sensors.flow.min_height_m,
-        flow_limit_rad_s=sensors.flow.max_flow_rad_s,
-        flow_below_m=sensors.lens_below_cg_m,
-        range_below_m=sensors.lens_below_cg_m,
-    )
-    return landing_navigator(settings, identified_flow(setup.sensor))
+    """The navigator of a simulated vehicle, told what it is told in flight.
+
+    ValueError where the vehicle carries no sensors of its own.
+    """
+    if setup.fitted is None:
+        raise ValueError(f"{setup.scenario.name}: the paper's filter flies, and no navigator")
+    return navigator_told(setup.fitted.told)
 
 
 def _gps_delay(streams: Mapping[Sensor, Stream]) -> float:
@@ -86,18 +75,23 @@ def _gps_delay(streams: Mapping[Sensor, Stream]) -> float:
     return max(delays_s, default=0.0)
 
 
+def _flow_as_it_is(streams: Mapping[Sensor, Stream]) -> IdentifiedFlow | None:
+    """The flow sensor's age as its stream states it, and its axes the vehicle's."""
+    flow = streams.get(Sensor.FLOW_RATE)
+    return None if flow is None else IdentifiedFlow(1.0, 1.0, flow.delay_s)
+
+
 # -- what came of it ---------------------------------------------------------------------------------------
-def navigated(tape: Tape, prepared: Prepared) -> Navigated:
-    """A tape as the judges of faults take it. A state that is no number has no standard deviation either."""
-    estimate = tape.estimate[: tape.used[0]]
-    happened = tape.event[: tape.used[2]]
+def navigated(written: Written, prepared: Prepared) -> Navigated:
+    """What was written as the judges of faults take it. A state that is no number has no standard deviation either."""
+    estimate = written.estimate
     return Navigated(
         estimate[:, 0],
         estimate[:, 1:4],
         estimate[:, 11:14],
-        offers_of(tape.innovation[: tape.used[1]], prepared),
-        tuple(Event(t_s, *EVENT_NAMES[int(kind)][:2]) for t_s, kind, _ in happened.tolist()),
-        flags_of(happened),
+        offers_of(written.innovation, prepared),
+        tuple(Event(t_s, *EVENT_NAMES[int(kind)][:2]) for t_s, kind, _ in written.event.tolist()),
+        flags_of(written.event),
     )
 
 

@@ -98,10 +98,10 @@ def window_start(height_m: float) -> float:
 def flight_at(height_m: float, longest_s: float, seed: int) -> Log:
     """The log of one flight that hovers at a height for as long as any fault takes, and then lands.
 
-    With the INS's attitude, for its heading, and one POSE: a vehicle on its pad is told where it stands.
+    With one POSE: a vehicle on its pad is told where it stands, so that errors are not those of the GPS's frame.
     """
     setup = assemble(scenario_at(height_m, longest_s))
-    log = log_of(fly_recorded(setup, seed), setup, attitude=True)
+    log = log_of(fly_recorded(setup, seed), setup)
     assert log.truth is not None
     row = int(np.searchsorted(log.truth["t_s"], PLACED_S))
     stands = np.array([[log.truth[name][row] for name in POSITION_NED]])

@@ -1,7 +1,7 @@
 """The other end of a link: a flight that was simulated, told as the vehicle's autopilot would tell it, in real time.
 
-Its readings go out when they would have arrived; it answers TIMESYNC and MAV_CMD_SET_MESSAGE_INTERVAL, and tells the
-truth (SIM_STATE), so that what comes back can be judged.
+What its own sensors read goes out when it arrived, and the attitude that its autopilot flew on; it answers TIMESYNC and
+MAV_CMD_SET_MESSAGE_INTERVAL, and tells the truth (SIM_STATE), so that what comes back can be judged.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from flownav.mavlink import sensors_outgoing as say
 from flownav.mavlink.dialect import Message, coder
 from flownav.mavlink.framing import StreamFrames
 from flownav.mavlink.signing import sign_outgoing
-from flownav.measurement import Array, Measurement, Sensor
+from flownav.measurement import Array, Measurement, Sensor, Stream
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY
 
 ORIGIN_DEG_M = (29.9765, 31.2780, 40.0)
@@ -31,7 +31,6 @@ NUMBERS = {105: "HIGHRES_IMU", 31: "ATTITUDE_QUATERNION", 24: "GPS_RAW_INT", 106
            132: "DISTANCE_SENSOR", 245: "EXTENDED_SYS_STATE", 108: "SIM_STATE"}  # fmt: skip
 OF_SENSOR = {
     Sensor.IMU: "HIGHRES_IMU",
-    Sensor.ATTITUDE: "ATTITUDE_QUATERNION",
     Sensor.GPS_POSITION: "GPS_RAW_INT",
     Sensor.FLOW_RATE: "OPTICAL_FLOW_RAD",
     Sensor.RANGE: "DISTANCE_SENSOR",
@@ -50,7 +49,7 @@ class Due(NamedTuple):
 
 
 class SimulatedVehicle:
-    """A flight as a list of messages. log: with an IMU, truth, and FLOW_RATE for the flow."""
+    """A flight as a list of messages. log: with an IMU, GPS, a skid switch and truth; what else it has is told, too."""
 
     def __init__(self, log: Log, *, key: bytes | None = None, system: int = SYSTEM, boot_s: float = BOOT_S) -> None:
         self._log, self._key, self._boot_s = log, key, boot_s
@@ -67,6 +66,7 @@ class SimulatedVehicle:
         self._velocity = np.column_stack([truth[name] for name in VELOCITY_BODY])
         self._quaternion = np.column_stack([truth[name] for name in QUATERNION])
         self.end_s = float(self._truth_s[-1])
+        self._imu_told_s = float("-inf")
         self._due: list[Due] = self._schedule()
 
     def _schedule(self) -> list[Due]:
@@ -75,7 +75,7 @@ class SimulatedVehicle:
             stream = self._log.streams.get(sensor)
             for row, t_s in enumerate(stream.t_s if stream is not None else ()):
                 due.append(Due(float(t_s), len(due), name, row))
-        for name in RATES_HZ.keys() - set(OF_SENSOR.values()):
+        for name in RATES_HZ:
             for step in range(int(self.end_s * RATES_HZ[name]) + 1):
                 due.append(Due(step / RATES_HZ[name], -1 if name == "HEARTBEAT" else len(due), name, step))
         heapq.heapify(due)
@@ -139,12 +139,9 @@ class SimulatedVehicle:
         if due.name == "HEARTBEAT":
             return say.heartbeat(self.mav, armed=True)
         if due.name == "HIGHRES_IMU":
-            return say.highres_imu(self.mav, time_us, self._reading(Sensor.IMU, due.row))
+            return self._imu(due, time_us)
         if due.name == "ATTITUDE_QUATERNION":
-            w, x, y, z = self._reading(Sensor.ATTITUDE, due.row).value
-            rate = self._log.streams[Sensor.IMU].value[min(due.row, len(self._log.streams[Sensor.IMU]) - 1), :3]
-            p, q, r = map(float, rate)
-            return say.attitude_quaternion(self.mav, time_ms, (w, x, y, z), (p, q, r))
+            return self._attitude(due.t_s, time_ms)
         if due.name == "OPTICAL_FLOW_RAD":
             return self._flow(due.row, time_us)
         if due.name == "DISTANCE_SENSOR":
@@ -152,15 +149,45 @@ class SimulatedVehicle:
             return say.distance_sensor(self.mav, time_ms, reading, self._log.limits["range_m"])
         if due.name == "GPS_RAW_INT":
             return self._fix(due.row, time_us)
-        return self._state(due)
+        if due.name == "EXTENDED_SYS_STATE":
+            landed = self._log.streams[Sensor.LANDED]
+            return say.extended_sys_state(self.mav, landed=bool(landed.value[_newest(landed, due.t_s), 0] > 0.5))
+        return self._truth(due.t_s)
 
-    def _flow(self, row: int, time_us: int) -> Message | None:
+    def _imu(self, due: Due, time_us: int) -> Message:
+        """The IMU with the field and the pressure that have come since it was told last."""
+
+        def news(sensor: Sensor) -> tuple[float, ...] | None:
+            stream = self._log.streams.get(sensor)
+            if stream is None or not len(stream):
+                return None
+            row = _newest(stream, due.t_s)
+            return tuple(map(float, stream.value[row])) if self._imu_told_s < stream.t_s[row] <= due.t_s else None
+
+        field, altitude = news(Sensor.MAG), news(Sensor.BARO)
+        self._imu_told_s = due.t_s
+        return say.highres_imu(
+            self.mav, time_us, self._reading(Sensor.IMU, due.row),
+            mag_gauss=None if field is None else (field[0], field[1], field[2]),
+            altitude_m=None if altitude is None else altitude[0],
+        )  # fmt: skip
+
+    def _attitude(self, t_s: float, time_ms: int) -> Message | None:
+        """What the autopilot says of its attitude: the one that it flies on."""
+        own = self._log.autopilot
+        if own is None:
+            return None
+        row = int(np.clip(np.searchsorted(own["t_s"], t_s, side="right") - 1, 0, len(own["t_s"]) - 1))
+        w, x, y, z = (float(own[name][row]) for name in QUATERNION)
+        imu = self._log.streams[Sensor.IMU]
+        p, q, r = map(float, imu.value[_newest(imu, t_s), :3])
+        return say.attitude_quaternion(self.mav, time_ms, (w, x, y, z), (p, q, r))
+
+    def _flow(self, row: int, time_us: int) -> Message:
+        """Flow and its turning over an exposure, which lasts from one reading to the next."""
         times = self._log.streams[Sensor.FLOW_RATE].t_s
-        if row == 0:
-            return None  # no exposure before the first
-        return say.optical_flow_rad(
-            self.mav, time_us, self._reading(Sensor.FLOW_RATE, row), float(times[row] - times[row - 1])
-        )
+        exposure_s = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+        return say.optical_flow_rad(self.mav, time_us, self._reading(Sensor.FLOW_RATE, row), exposure_s)
 
     def _fix(self, row: int, time_us: int) -> Message:
         import pymap3d
@@ -173,19 +200,22 @@ class SimulatedVehicle:
             self.mav, time_us, place, velocity, horizontal_sigma_m=float(across), vertical_sigma_m=float(along)
         )
 
-    def _state(self, due: Due) -> Message:
-        row = int(np.clip(np.searchsorted(self._truth_s, due.t_s), 0, len(self._truth_s) - 1))
-        if due.name == "EXTENDED_SYS_STATE":
-            landed = self._log.streams[Sensor.LANDED].value
-            return say.extended_sys_state(self.mav, landed=bool(landed[min(row, len(landed) - 1), 0] > 0.5))
+    def _truth(self, t_s: float) -> Message:
         import pymap3d
 
+        row = int(np.clip(np.searchsorted(self._truth_s, t_s), 0, len(self._truth_s) - 1))
         w, x, y, z = map(float, self._quaternion[row])
-        north, east, down = map(float, self.truth_at(due.t_s)[1])
-        imu = self._log.streams[Sensor.IMU].value[min(row, len(self._log.streams[Sensor.IMU]) - 1)]
+        north, east, down = map(float, self.truth_at(t_s)[1])
+        imu = self._log.streams[Sensor.IMU]
+        moved = imu.value[_newest(imu, t_s)]
         place = pymap3d.ned2geodetic(*self._position[row], *ORIGIN_DEG_M)
         angles = tuple(float(angle) for angle in euler_from_quaternion(w, x, y, z))
         return say.sim_state(
             self.mav, tuple(map(float, place)), (north, east, down), (w, x, y, z), angles,  # type: ignore[arg-type]
-            tuple(map(float, imu[:3])), tuple(map(float, imu[3:])),  # type: ignore[arg-type]
+            tuple(map(float, moved[:3])), tuple(map(float, moved[3:])),  # type: ignore[arg-type]
         )  # fmt: skip
+
+
+def _newest(stream: Stream, t_s: float) -> int:
+    """The row of the newest reading that has arrived; the first before that."""
+    return max(int(np.searchsorted(stream.t_s, t_s, side="right")) - 1, 0)

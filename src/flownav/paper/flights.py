@@ -7,13 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from flownav.campaign.local import fly_many, median_flight, score_history
+from flownav.compile import LANES
 from flownav.measurement import Array
 from flownav.parameter_files import check
 from flownav.record import Record
 from flownav.scoring.errors import STATES, scores_of_flight, scores_of_flights
 from flownav.scoring.paper_tables import percentile_of_paper, published
 from flownav.simulation.assemble import Setup, assemble
-from flownav.simulation.engine import fly_blocks
+from flownav.simulation.engine import fly_written
 from flownav.simulation.flight_record import record_of
 from flownav.simulation.scenario import Scenario, load_scenario, with_filter
 
@@ -88,9 +89,9 @@ def _flown(flight: Any, seed: int, flights: int, on_progress: Callable[[int], ob
 
 def _recorded(setup: Setup, seed: int, index: int, table: int) -> Record:
     """One flight as a scored Record, by the kernel that flew them all: that of a single flight compiles for 10 s."""
-    _, history = next(fly_blocks(setup.flight, seed, index, 1, lambda block: block[:, :, :1].copy(), threads=1))
-    record = record_of(setup, history, seed, index)
-    record.manifest["scores"] = scores_of_flight(score_history(setup.flight, history)[0])
+    flown = fly_written(setup.flight, seed, index, LANES)
+    record = record_of(setup, flown, seed, index)
+    record.manifest["scores"] = scores_of_flight(score_history(setup.flight, flown.history)[0])
     record.manifest["paper"] = published(table)
     return record
 

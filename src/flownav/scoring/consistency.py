@@ -1,8 +1,8 @@
-"""Consistency and efficiency of a filter over many flights: does it know how wrong it is, and how close to the bound.
+"""Consistency of a filter over many flights: does it know how wrong it is, and is it as good as its own model allows.
 
-Everything is over steps in flight, those without skid contact. At rest on the ground a filter is told that it does
-not move, a pseudo-measurement with no noise of its own whose stated sigma is a guess on the safe side: any filter
-then looks too modest, and its errors are none of a flying vehicle's.
+Everything is over steps in flight, those without skid contact, from the filter's start on. At rest on the ground a
+filter is told that it does not move, a pseudo-measurement with no noise of its own whose stated sigma is a guess on the
+safe side: any filter then looks too modest, and its errors are none of a flying vehicle's.
 
 Sums, not flights, are kept: memory does not grow with the number of flights.
 """
@@ -48,10 +48,13 @@ class ErrorSums:
 
 @dataclass(frozen=True)
 class ConsistencySums:
-    """Sums over flights at each step, (epochs,): normalised errors squared, and flights without skid contact."""
+    """Sums over flights at each step, (epochs,): normalised errors squared, flights whose filter runs, and of these
+    the flights without skid contact.
+    """
 
     flights: int
     nees: Array
+    running: Array
     airborne: Array
     errors: ErrorSums
 
@@ -59,6 +62,7 @@ class ConsistencySums:
         return ConsistencySums(
             self.flights + other.flights,
             self.nees + other.nees,
+            self.running + other.running,
             self.airborne + other.airborne,
             self.errors + other.errors,
         )
@@ -76,13 +80,13 @@ def error_sums(squares: Array, height_m: Array, airborne: Array) -> ErrorSums:
     return ErrorSums(sums, steps)
 
 
-def consistency_of_block(
-    estimate: Array, truth: Array, nees: Array, height_m: Array, on_ground: Array
-) -> ConsistencySums:
-    """Sums of one block: estimate and truth (epochs, 6, lanes), the others (epochs, lanes)."""
-    airborne = 1.0 - on_ground
-    errors = error_sums((estimate - truth) ** 2, height_m, airborne)
-    return ConsistencySums(nees.shape[1], nees.sum(axis=1), airborne.sum(axis=1), errors)
+def consistency_of_block(error: Array, nees: Array, height_m: Array, on_ground: Array) -> ConsistencySums:
+    """Sums of one block: error (epochs, 6, lanes), the others (epochs, lanes); NaN where the filter has not started."""
+    running = np.isfinite(nees)
+    airborne = running * (1.0 - on_ground)
+    errors = error_sums(np.where(running[:, None], error, 0.0) ** 2, height_m, airborne)
+    nees = np.where(running, nees, 0.0)
+    return ConsistencySums(nees.shape[1], nees.sum(axis=1), running.sum(axis=1), airborne.sum(axis=1), errors)
 
 
 # -- consistency ------------------------------------------------------------------------------------------
@@ -99,8 +103,8 @@ def chi_square_band(flights: int, probability: float = BAND) -> tuple[float, flo
 
 
 def steps_in_flight(sums: ConsistencySums) -> NDArray[np.bool_]:
-    """The steps at which nearly all flights have no skid contact, (epochs,)."""
-    return np.asarray(sums.airborne >= AIRBORNE_SHARE * sums.flights)
+    """The steps at which every filter runs and nearly all flights have no skid contact, (epochs,)."""
+    return np.asarray((sums.running == sums.flights) & (sums.airborne >= AIRBORNE_SHARE * sums.flights))
 
 
 def anees(sums: ConsistencySums) -> float:
@@ -124,7 +128,7 @@ def inside_fraction(groups: Sequence[tuple[int, int]]) -> float:
 
 # -- efficiency -------------------------------------------------------------------------------------------
 def efficiency(errors: ErrorSums, bound: ErrorSums) -> dict[str, float]:
-    """RMS error over the root of the mean bound, of each state: 1 is the best that any filter could do."""
+    """RMS error over the root of the mean bound, of each state: 1 is what a filter does whose model is the truth."""
     ratio = errors.root_mean_square() / bound.root_mean_square()
     return dict(zip(STATES, map(float, ratio), strict=True))
 
@@ -147,15 +151,17 @@ def band_name(band: int) -> str:
 
 
 # -- largest errors and touchdown -------------------------------------------------------------------------
-def largest_horizontal_error(estimate: Array, truth: Array, home: int | None) -> Array:
+def largest_horizontal_error(estimate: Array, truth: Array, home: int | None, counted: Array) -> Array:
     """Largest horizontal position error of each flight [m], (lanes,); estimate and truth (epochs, >= 2, lanes).
 
-    home: the step at which the vehicle noted where its pad is; the error is then relative to that step's, and taken
-    from it on. None: the pad is where the filter's origin is.
+    home: the step at which the vehicle noted where its pad is; the error is then relative to that step's. None: the
+    estimate is counted from where the vehicle takes its pad to be. counted (epochs, lanes) 0/1: the steps that count;
+    NaN of a flight without one.
     """
     error = (estimate - truth)[:, :2]
-    relative = error if home is None else error[home:] - error[home]
-    return np.asarray(np.sqrt((relative**2).sum(axis=1)).max(axis=0))
+    relative = error if home is None else error - error[home]
+    away = np.where(counted > 0.0, np.sqrt((relative**2).sum(axis=1)), -1.0).max(axis=0)
+    return np.asarray(np.where(away >= 0.0, away, np.nan))
 
 
 def percentile_with_interval(values: Array, share: float, confidence: float = 0.95) -> tuple[float, float, float]:

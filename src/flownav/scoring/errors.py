@@ -33,34 +33,39 @@ Array = NDArray[np.float64]
 
 
 @kernel
-def error_statistics(estimate: Array, truth: Array) -> Array:
-    """Mean, standard deviation, RMS and largest absolute error over time.
+def error_statistics(estimate: Array, truth: Array, counted: Array) -> Array:
+    """Mean, standard deviation, RMS and largest absolute error over the steps that count.
 
-    estimate and truth (epochs, states, lanes) -> (lanes, states, 4), in the order of STATISTICS. The standard
-    deviation is that of the error about its mean (the paper's "difference in standard deviation").
+    estimate and truth (epochs, states, lanes), counted (epochs, lanes) 0/1 -> (lanes, states, 4), in the order of
+    STATISTICS; NaN of a lane in which no step counts. The standard deviation is that of the error about its mean (the
+    paper's "difference in standard deviation").
     """
     epochs, states, lanes = estimate.shape
     total, squares, largest = np.zeros((states, lanes)), np.zeros((states, lanes)), np.zeros((states, lanes))
+    count = np.zeros(lanes)
     for k in range(epochs):
-        for state in range(states):
-            for lane in range(lanes):
-                error = estimate[k, state, lane] - truth[k, state, lane]
-                total[state, lane] += error
-                squares[state, lane] += error * error
-                largest[state, lane] = max(largest[state, lane], abs(error))
+        for lane in range(lanes):
+            if counted[k, lane] > 0.0:
+                count[lane] += 1.0
+                for state in range(states):
+                    error = estimate[k, state, lane] - truth[k, state, lane]
+                    total[state, lane] += error
+                    squares[state, lane] += error * error
+                    largest[state, lane] = max(largest[state, lane], abs(error))
     spread = np.zeros((states, lanes))
     for k in range(epochs):
-        for state in range(states):
-            for lane in range(lanes):
-                error = estimate[k, state, lane] - truth[k, state, lane]
-                spread[state, lane] += (error - total[state, lane] / epochs) ** 2
-    result = np.empty((lanes, states, 4))
-    for state in range(states):
         for lane in range(lanes):
-            result[lane, state, 0] = total[state, lane] / epochs
-            result[lane, state, 1] = np.sqrt(spread[state, lane] / epochs)
-            result[lane, state, 2] = np.sqrt(squares[state, lane] / epochs)
-            result[lane, state, 3] = largest[state, lane]
+            if counted[k, lane] > 0.0:
+                for state in range(states):
+                    error = estimate[k, state, lane] - truth[k, state, lane]
+                    spread[state, lane] += (error - total[state, lane] / count[lane]) ** 2
+    result = np.empty((lanes, states, 4))
+    for lane in range(lanes):
+        for state in range(states):
+            result[lane, state, 0] = total[state, lane] / count[lane]
+            result[lane, state, 1] = np.sqrt(spread[state, lane] / count[lane])
+            result[lane, state, 2] = np.sqrt(squares[state, lane] / count[lane])
+            result[lane, state, 3] = largest[state, lane] if count[lane] > 0.0 else np.nan
     return result
 
 
@@ -88,14 +93,16 @@ def first_contact(t_s: Array, position: Array, sink_rate: Array, on_ground: Arra
 
 
 def score_block(
-    t_s: Array, estimate: Array, truth: Array, sink_rate: Array, on_ground: Array, *, may_land_after_s: float
-) -> Array:
+    t_s: Array, estimate: Array, truth: Array, sink_rate: Array, on_ground: Array, *, may_land_after_s: float,
+    counted: Array | None = None,
+) -> Array:  # fmt: skip
     """Scores of a block of flights, (lanes, len(SCORE_COLUMNS)).
 
-    estimate and truth (epochs, 6, lanes): position NED [m] and velocity body FRD [m/s]. A first contact
-    before `may_land_after_s`, or harder than CRASH_SINK_RATE_M_S, is a crash; an earlier one is no touchdown.
+    estimate and truth (epochs, 6, lanes): position NED [m] and velocity body FRD [m/s]; counted (epochs, lanes) 0/1:
+    the steps whose errors count, all where it is None. A first contact before `may_land_after_s`, or harder than
+    CRASH_SINK_RATE_M_S, is a crash; an earlier one is no touchdown.
     """
-    statistics = error_statistics(estimate, truth)
+    statistics = error_statistics(estimate, truth, np.ones_like(on_ground) if counted is None else counted)
     lanes = statistics.shape[0]
     contact = first_contact(t_s, truth[:, :3], sink_rate, on_ground)
     too_early = contact[:, 0] < may_land_after_s
@@ -106,16 +113,18 @@ def score_block(
 
 
 def scores_of_flight(row: Array) -> dict[str, Any]:
-    """One flight's row of scores as the JSON of `flownav fly`; NaN touchdowns are null."""
-    return _nested(lambda column: float(row[column])) | {"crashed": bool(row[CRASHED])}
+    """One flight's row of scores as the JSON of `flownav fly`; what is NaN is null."""
+    return _nested(lambda column: _finite(float(row[column]))) | {"crashed": bool(row[CRASHED])}
 
 
 def scores_of_flights(rows: Array) -> dict[str, Any]:
     """Many flights' scores as the same JSON, each number its median and 5th and 95th percentile."""
 
-    def spread(column: int) -> dict[str, float]:
+    def spread(column: int) -> dict[str, float] | None:
         values = rows[~np.isnan(rows[:, column]), column]
-        low, median, high = np.percentile(values, [5, 50, 95]) if len(values) else (np.nan,) * 3
+        if not len(values):
+            return None
+        low, median, high = np.percentile(values, [5, 50, 95])
         return {"median": float(median), "p05": float(low), "p95": float(high)}
 
     landed = np.isfinite(rows[:, MAX_POSITION_ERROR + 1]) & (rows[:, CRASHED] == 0.0)
@@ -129,10 +138,12 @@ def _nested(number: Any) -> dict[str, Any]:
         for i, state in enumerate(STATES)
     }
     landing = {name: number(MAX_POSITION_ERROR + 1 + j) for j, name in enumerate(TOUCHDOWN)}
-    first = landing["t_s"]
-    landed = first == first if isinstance(first, float) else first["median"] == first["median"]
     return {
         "states": states,
         "max_position_error_m": number(MAX_POSITION_ERROR),
-        "touchdown": landing if landed else None,
+        "touchdown": None if landing["t_s"] is None else landing,
     }
+
+
+def _finite(value: float) -> float | None:
+    return value if np.isfinite(value) else None

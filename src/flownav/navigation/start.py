@@ -7,10 +7,11 @@ import numpy as np
 from flownav.compile import equation, procedure
 from flownav.estimation.covariance import place
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.states import ATTITUDE, POSITION, QUATERNION, STATE, STATES
+from flownav.estimation.states import ATTITUDE, FORCE, POSITION, QUATERNION, RATE, STATE, STATES
 from flownav.frames import Quaternion, quaternion_from_euler
 from flownav.measurement import Sensor
 from flownav.navigation.memory import (
+    STEADY_FORCE,
     AidMemory,
     Reading,
     StartMemory,
@@ -120,7 +121,10 @@ def start_lane(
     known = fitted.heading == NO_HEADING and not lost
     turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
     spread = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M
-    for i in range(3):
+    for i in range(3):  # of a motion before the start nothing is known
+        work[(RATE + i) * len(lanes) + lane] = 0.0
+        work[(FORCE + i) * len(lanes) + lane] = 0.0
+        work[(STEADY_FORCE + i) * len(lanes) + lane] = 0.0
         work[place(POSITION + i, POSITION + i) * len(lanes) + lane] = spread * spread
         angle = turned if i == 2 else tilt
         work[place(ATTITUDE + i, ATTITUDE + i) * len(lanes) + lane] = angle * angle

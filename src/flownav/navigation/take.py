@@ -63,6 +63,8 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
         advance(work, lanes, t_s, p, o)
         if heard:
             keep_imu(work, lanes, t_s)
+    if t_s - shared(work, lanes, ERRORS_CLOCK) >= LONGEST_LAG_OF_ERRORS_S:
+        catch_up_errors(work, lanes, t_s, p, o)
     share(work, lanes, CLOCK, t_s)
     if not running:
         running = try_start(work, lanes, t_s, sensor, fitted, p, o)
@@ -140,13 +142,14 @@ def advance(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> None:
         add_vibration_noise(work, lanes, dt_s, imu)
         if len(lanes) == 1:
             note_prediction(work, lanes, dt_s, o)
-    if t_s - shared(work, lanes, ERRORS_CLOCK) >= LONGEST_LAG_OF_ERRORS_S:
-        catch_up_errors(work, lanes, t_s, p, o)
 
 
 @procedure
 def catch_up_errors(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> None:
-    """The Gauss-Markov errors, brought to an instant. They turn with nothing, so this may wait until they are read."""
+    """The Gauss-Markov errors, brought to an instant. They turn with nothing, so this may wait until they are read.
+
+    When they are is the schedule's alone, whichever lanes run, so that a lane is what it would be by itself.
+    """
     before_s = shared(work, lanes, ERRORS_CLOCK)
     share(work, lanes, ERRORS_CLOCK, t_s)
     dt_s = t_s - before_s

@@ -41,7 +41,7 @@ def stationary(numbers: FilterSettings) -> tuple[np.ndarray, np.ndarray]:
     level_and_down = (
         (GPS_SLOW, n.gps_slow_sigma_m, n.gps_slow_sigma_down_m, n.gps_slow_tau_s, n.gps_slow_tau_s),
         (GPS_FAST, n.gps_fast_sigma_m, n.gps_fast_sigma_down_m, n.gps_fast_tau_s, n.gps_fast_tau_s),
-        (GPS_VELOCITY, n.gps_velocity_sigma_m_s, n.gps_velocity_sigma_m_s, n.gps_velocity_tau_s, n.gps_velocity_tau_s),
+        (GPS_VELOCITY, n.gps_velocity_sigma_m_s, n.gps_velocity_sigma_down_m_s, *[n.gps_velocity_tau_s] * 2),
         (INS_ERROR, n.ins_tilt_sigma_rad, n.ins_heading_sigma_rad, n.ins_tilt_tau_s, n.ins_heading_tau_s),
     )
     for first, level, down, tau_level, tau_down in level_and_down:

@@ -28,7 +28,7 @@ from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow, 
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.laws.height import baro_altitude, range_along_boresight
 from flownav.estimation.laws.pad import pad_fix
-from flownav.estimation.laws.still import gyro_at_rest, position_itself, velocity_itself
+from flownav.estimation.laws.still import gyro_at_rest, pad_below, position_itself, velocity_itself
 from flownav.estimation.motion import hold_still, predict
 from flownav.estimation.states import (
     ACCEPTED,
@@ -93,6 +93,8 @@ def every_step(buffer, lanes, settings, lag):  # type: ignore[no-untyped-def]
         velocity_itself(work, lanes, axis)
         fuse(work, lanes, n, 3.0)
         gyro_at_rest(work, lanes, axis)
+        fuse(work, lanes, n, 3.0)
+        pad_below(work, lanes, axis)
         fuse(work, lanes, n, 3.0)
     for channel in range(2):
         flow_rate(work, lanes, channel, 0.1, 0.0, 0.2, 0.15)

@@ -22,7 +22,7 @@ from flownav.estimation.laws.geometry import LEAST_RANGE_M
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.laws.height import baro_altitude, range_along_boresight
 from flownav.estimation.laws.pad import pad_fix, sight
-from flownav.estimation.laws.still import gyro_at_rest, position_itself, velocity_itself
+from flownav.estimation.laws.still import gyro_at_rest, pad_below, position_itself, velocity_itself
 from flownav.estimation.states import (
     ATTITUDE,
     BARO,
@@ -98,6 +98,7 @@ CASES = {
     "pad": Case(pad_fix, AXES, LENS, read_own_pad),
     "position": Case(position_itself, AXES),
     "velocity": Case(velocity_itself, AXES),
+    "pad below": Case(pad_below, AXES),
     "gyro at rest": Case(gyro_at_rest, AXES),
 }
 
@@ -357,6 +358,12 @@ def test_a_pad_that_nobody_knows_leaves_the_vehicle_where_it_is():
     assert filter_.x[:3] == pytest.approx(before, abs=1e-3)
     assert np.diag(filter_.p)[:3] == pytest.approx(4.0, rel=1e-4)
     assert np.diag(filter_.p)[PAD : PAD + 3] == pytest.approx(4.0 + 0.01, rel=1e-4)
+
+
+def test_a_vehicle_that_stands_on_its_pad_is_where_the_pad_is():
+    filter_ = still_life()
+    filter_.x[PAD : PAD + 3], filter_.x[:3] = (7.0, 3.0, 1.0), (5.0, 3.5, 1.0)
+    assert [predicted(filter_, pad_below, axis) for axis in AXES] == pytest.approx([2.0, -0.5, 0.0])
 
 
 def test_a_gyro_at_rest_reads_its_bias():

@@ -224,10 +224,7 @@ def test_an_echo_is_not_believed_where_the_range_alone_tells_the_height(hover):
 
 # -- every reason and every event ----------------------------------------------------------------------------
 def test_every_reason_has_its_case(hover):
-    """But for `not_needed` and `ahead`, which are given to readings before they reach the navigator.
-
-    And `datum`, which older records have.
-    """
+    """But for `not_needed` and `ahead`, which are given to readings before they reach the navigator."""
     seen: set[str] = set()
 
     def look(run: Navigated) -> None:
@@ -252,7 +249,7 @@ def test_every_reason_has_its_case(hover):
     again = places_of(queue, Sensor.BARO, 10.0)[:1].tolist()
     run = navigate(hurt, with_rows(queue, [again[0] + 1], rows_of(queue, again)))
     look(run)
-    assert run.reasons(Sensor.RANGE) == {"fused": 398, "out_of_range": 1, "not_finite": 1}
+    assert run.reasons(Sensor.RANGE) == {"datum": 2, "fused": 396, "out_of_range": 1, "not_finite": 1}
     t_s = np.arange(1.0, 20.0, 0.1)
     look(navigate(hover.added(Stream.of(Sensor.PAD, t_s, np.tile([0.0, 0.0, 2.0], (len(t_s), 1))))))
     flown = hover.cut(Sensor.BARO, 9.99, 10.35)
@@ -260,7 +257,7 @@ def test_every_reason_has_its_case(hover):
     late = rows_of(queue, places_of(queue, Sensor.BARO, 9.0)[:1].tolist())
     late.t_s[:] = 10.0
     look(navigate(flown, with_rows(queue, [int(np.searchsorted(queue.t_s, 10.3))], late)))
-    assert seen == {reason.label for reason in Reason} - {"not_needed", "ahead", "datum"}
+    assert seen == {reason.label for reason in Reason} - {"not_needed", "ahead"}
 
 
 def test_every_event_has_its_case(hover):

@@ -16,6 +16,7 @@ from flownav.mavlink.sensors_outgoing import MAVLINK_VERSION
 from flownav.mavlink.signing import sign_outgoing
 from flownav.navigation.loop import Running
 from flownav.navigation.memory import PAD_KNOWN
+from flownav.navigation.place import SEEN
 
 PX4, INVALID_AUTOPILOT = 12, 8
 ONBOARD_CONTROLLER, ACTIVE = 18, 4  # MAV_TYPE, MAV_STATE
@@ -65,7 +66,7 @@ class Answers:
             return [odometry(self._mav, estimate, frame=LOCAL_NED if vehicle.make == PX4 else LOCAL_FRD)]
         if send == "vision":
             return [vision_position_estimate(self._mav, estimate), vision_speed_estimate(self._mav, estimate)]
-        if on.work[PAD_KNOWN] == 0.0:
+        if on.work[PAD_KNOWN] != SEEN:  # the place of take-off is not what a camera lands on
             return []
         pad = [float(value) for value in on.work[STATE + PAD : STATE + PAD + 3]]
         north, east, down = (pad[i] - estimate.pos_ned_m[i] for i in range(3))

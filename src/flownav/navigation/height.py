@@ -98,11 +98,14 @@ def judge_range(
 
 
 @equation
-def judge_ground(below_m: float, range_m: float, t_s: float, g: GroundMemory) -> tuple[bool, GroundMemory]:
+def judge_ground(
+    below_m: float, range_m: float, t_s: float, alone: bool, g: GroundMemory
+) -> tuple[bool, GroundMemory]:
     """Whether ranges in a row agree on a ground that is new, and the memory of it.
 
     One echo finds no ground. A range that repeats itself to the last digit must do so for long: a vehicle that stands
-    reads so, and so does a sensor that holds an old value for a moment.
+    reads so, and so does a sensor that holds an old value for a moment. Where nothing else tells the height, the first
+    range must serve, before the vertical speed is lost.
     """
     agrees = g.count > 0.0 and abs(below_m - g.candidate_m) <= AGREEMENT_M + AGREEMENT_SHARE * range_m
     since_s = g.since_s if agrees else t_s
@@ -110,7 +113,8 @@ def judge_ground(below_m: float, range_m: float, t_s: float, g: GroundMemory) ->
     count = g.count + 1.0 if agrees else 1.0
     varied = 1.0 if agrees and (g.varied > 0.0 or range_m != first_m) else 0.0
     lasting = varied > 0.0 or t_s - since_s >= STILL_S
-    return count >= LEAST_AGREEING and lasting, GroundMemory(g.known, below_m, since_s, first_m, count, varied)
+    first = alone and g.known == 0.0
+    return first or (count >= LEAST_AGREEING and lasting), GroundMemory(g.known, below_m, since_s, first_m, count, varied)
 
 
 @procedure
@@ -127,7 +131,7 @@ def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Ou
             m = RangeMemory(m.taken_s, m.refused_s, m.last_m, m.same_s, m.down_m, m.same_s, m.doubted)
         store_range(work, lanes, lane, m)
         if reason == FUSED and load_ground(work, lanes, lane).known == 0.0:
-            found = seek_ground(work, lanes, lane, t_s, reading, height, s, GROUND_FOUND, o)
+            found = seek_ground(work, lanes, lane, t_s, reading, height, alone, s, GROUND_FOUND, o)
             reason = FUSED if found else DATUM
         put(work, lanes, lane, reading.value_0, variance, reason)
     range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
@@ -142,14 +146,14 @@ def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Ou
 
 @procedure
 def seek_ground(
-    work: Work, lanes: Lanes, lane: int, t_s: float, reading: Reading, height: Height, s: HeightSettings, kind: np.int_,
-    o: Output,
+    work: Work, lanes: Lanes, lane: int, t_s: float, reading: Reading, height: Height, alone: bool, s: HeightSettings,
+    kind: np.int_, o: Output,
 ) -> bool:  # fmt: skip
     """Note a range that would mean a new ground; where enough agree, the ground is unknown but for the newest of them,
     which is about to be fused.
     """
     below_m = height.pos_d_m + (reading.value_0 + s.range_below_m) * height.upright
-    confirmed, g = judge_ground(below_m, reading.value_0, t_s, load_ground(work, lanes, lane))
+    confirmed, g = judge_ground(below_m, reading.value_0, t_s, alone, load_ground(work, lanes, lane))
     if confirmed:
         work[(STATE + GROUND) * len(lanes) + lane] = below_m
         reset_state(work, lanes, lane, GROUND, UNKNOWN_M * UNKNOWN_M, o)
@@ -201,9 +205,9 @@ def mind_refusals(work: Work, lanes: Lanes, lane: int, t_s: float, s: HeightSett
     reading, height = load_reading(work, lanes, lane), height_of(work, lanes, lane)
     if t_s - since_s < s.ground_reset_s:
         below_m = height.pos_d_m + (reading.value_0 + s.range_below_m) * height.upright
-        store_ground(work, lanes, lane, judge_ground(below_m, reading.value_0, t_s, g)[1])
+        store_ground(work, lanes, lane, judge_ground(below_m, reading.value_0, t_s, False, g)[1])
         return False
-    found = seek_ground(work, lanes, lane, t_s, reading, height, s, GROUND_RESET, o)
+    found = seek_ground(work, lanes, lane, t_s, reading, height, False, s, GROUND_RESET, o)
     if found:
         work[REASON * len(lanes) + lane] = FUSED
     return found

@@ -32,6 +32,7 @@ LEAST_PAD_DISTANCE_M = 0.05
 UNKNOWN_M = 100.0
 ON_GROUND = 0.5
 STANDING_SIGMA_M = 0.005
+CARRIED_M = 0.1
 # how the pad is known: the vehicle stands on it before its flight, has left it, has seen it
 STOOD_ON, LEFT, SEEN = 1.0, 2.0, 3.0
 
@@ -148,7 +149,8 @@ def take_landed(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: O
 @procedure
 def stand_on_pad(work: Work, lanes: Lanes, t_s: float, s: PlaceSettings, o: Output) -> None:
     """The place of take-off is the pad until a camera sees one: a state tied to the vehicle's own while it stands, so that
-    what GPS later tells of the one it tells of the other, and the way back is known better than either.
+    what GPS later tells of the one it tells of the other, and the way back is known better than either. A vehicle that
+    is carried about before its flight takes the pad along.
     """
     standing = False
     for lane in range(len(lanes)):
@@ -156,7 +158,10 @@ def stand_on_pad(work: Work, lanes: Lanes, t_s: float, s: PlaceSettings, o: Outp
         known = work[PAD_KNOWN * len(lanes) + lane]
         sound = usable(reading, reading.value_0, 0.0, started) == FUSED
         landed = sound and reading.value_0 > ON_GROUND
-        if landed and known == 0.0:
+        off_n = work[(STATE + PAD) * len(lanes) + lane] - work[(STATE + POSITION) * len(lanes) + lane]
+        off_e = work[(STATE + PAD + 1) * len(lanes) + lane] - work[(STATE + POSITION + 1) * len(lanes) + lane]
+        carried = known == STOOD_ON and off_n * off_n + off_e * off_e > CARRIED_M * CARRIED_M
+        if landed and (known == 0.0 or carried):
             for i in range(3):
                 work[(STATE + PAD + i) * len(lanes) + lane] = work[(STATE + POSITION + i) * len(lanes) + lane]
                 reset_state(work, lanes, lane, PAD + i, UNKNOWN_M * UNKNOWN_M, o)

@@ -98,23 +98,23 @@ def judge_range(
 
 
 @equation
-def judge_ground(
-    below_m: float, range_m: float, t_s: float, alone: bool, g: GroundMemory
-) -> tuple[bool, GroundMemory]:
+def judge_ground(below_m: float, range_m: float, t_s: float, alone: bool, g: GroundMemory) -> tuple[bool, GroundMemory]:
     """Whether ranges in a row agree on a ground that is new, and the memory of it.
 
     One echo finds no ground. A range that repeats itself to the last digit must do so for long: a vehicle that stands
     reads so, and so does a sensor that holds an old value for a moment. Where nothing else tells the height, the first
     range must serve, before the vertical speed is lost.
     """
-    agrees = g.count > 0.0 and abs(below_m - g.candidate_m) <= AGREEMENT_M + AGREEMENT_SHARE * range_m
+    agrees = g.agreeing > 0.0 and abs(below_m - g.candidate_m) <= AGREEMENT_M + AGREEMENT_SHARE * range_m
     since_s = g.since_s if agrees else t_s
     first_m = g.first_m if agrees else range_m
-    count = g.count + 1.0 if agrees else 1.0
+    count = g.agreeing + 1.0 if agrees else 1.0
     varied = 1.0 if agrees and (g.varied > 0.0 or range_m != first_m) else 0.0
     lasting = varied > 0.0 or t_s - since_s >= STILL_S
     first = alone and g.known == 0.0
-    return first or (count >= LEAST_AGREEING and lasting), GroundMemory(g.known, below_m, since_s, first_m, count, varied)
+    return first or (count >= LEAST_AGREEING and lasting), GroundMemory(
+        g.known, below_m, since_s, first_m, count, varied
+    )
 
 
 @procedure
@@ -186,7 +186,7 @@ def mind_refusals(work: Work, lanes: Lanes, lane: int, t_s: float, s: HeightSett
     reason = work[REASON * len(lanes) + lane]
     m, g = load_range(work, lanes, lane), load_ground(work, lanes, lane)
     work[REASON * len(lanes) + lane] = SILENT  # of the second offer, unless the ground is new
-    if reason == FUSED or reason == OUT_OF_RANGE:
+    if reason == FUSED or reason == OUT_OF_RANGE:  # noqa: SIM109
         taken_s = t_s if reason == FUSED else m.taken_s
         store_range(work, lanes, lane, RangeMemory(taken_s, np.nan, m.last_m, m.same_s, m.down_m, m.said_s, m.doubted))
         store_ground(work, lanes, lane, GroundMemory(g.known, 0.0, 0.0, 0.0, 0.0, 0.0))

@@ -99,7 +99,7 @@ class RangeMemory(NamedTuple):
 
 class GroundMemory(NamedTuple):
     """known: 1 once ranges have found the ground. A ground that would be new: candidate_m, its down coordinate by the
-    newest range; since_s and first_m, when and by which range it was seen first; count, by how many in a row; varied: 1
+    newest range; since_s and first_m, when and by which range it was seen first; agreeing, by how many in a row; varied: 1
     where these were not all the same to the last digit.
     """
 
@@ -107,7 +107,7 @@ class GroundMemory(NamedTuple):
     candidate_m: float
     since_s: float
     first_m: float
-    count: float
+    agreeing: float
     varied: float
 
 

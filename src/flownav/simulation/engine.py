@@ -6,7 +6,7 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,11 +57,13 @@ def buffers_of(flight: Flight, lanes: tuple[int, ...], epochs: int, *, written: 
         if written:
             components = int(sum(COMPONENTS.get(Sensor(kind), 0) for kind in table.sensor))
             tape = empty_tape(epochs + 2, components, 4 * epochs + 8, len(lanes))
-            fed = np.zeros((table.count, FIELDS, len(lanes)))
+            fed = np.zeros((table.readings, FIELDS, len(lanes)))
     return Buffers(np.empty(rows * len(lanes)), nav, tape, fed, np.empty((epochs, len(HISTORY), len(lanes))))
 
 
-def fly_into(flight: Flight, seed: int, first: int, lanes: tuple[int, ...], b: Buffers, *, compiled: bool = True) -> None:
+def fly_into(
+    flight: Flight, seed: int, first: int, lanes: tuple[int, ...], b: Buffers, *, compiled: bool = True
+) -> None:
     """Fly a block into its buffers. compiled False: in plain Python (tests; it is a thousand times slower)."""
     if len(b.nav):
         b.nav[:] = new_work(lanes)
@@ -69,7 +71,7 @@ def fly_into(flight: Flight, seed: int, first: int, lanes: tuple[int, ...], b: B
     unit = navigate_one if len(lanes) == 1 else navigate_lanes
     take: Any = 0 if flight.onboard is None else (unit.address if compiled else unit.python)
     room = np.array([*room_of(b.tape), len(b.fed)])
-    fly: Any = fly_block if compiled else fly_block.py_func
+    fly: Any = fly_block if compiled else cast(Any, fly_block).py_func
     fly(
         flight, seed, first, lanes, b.work, b.nav, take, b.tape.estimate.reshape(-1), b.tape.innovation.reshape(-1),
         b.tape.event.reshape(-1), b.fed.reshape(-1), room, b.tape.used, b.history,

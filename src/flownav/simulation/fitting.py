@@ -1,4 +1,4 @@
-"""From a scenario to the sensors that feed the navigator: datasheets, clocks, and what the navigator is told of them."""
+"""From a scenario to the sensors that feed the navigator: datasheets, clocks, and what the navigator is told."""
 
 from __future__ import annotations
 
@@ -59,9 +59,7 @@ def fitted(scenario: Scenario, flow_sensor: FlowSensor, vehicle: VehicleParamete
     timing = timing_of(sheets, flow_sensor)
     schedule = schedule_of(epochs, onboard, timing)
     rotor_hz = vehicle.main_speed_rad_s / (2.0 * math.pi)
-    told = settings_of(
-        flow_sensor, sheets, flow_noise_stated=True, rotor_hz=(rotor_hz, BLADES * rotor_hz)
-    )
+    told = settings_of(flow_sensor, sheets, flow_noise_stated=True, rotor_hz=(rotor_hz, BLADES * rotor_hz))
     equipment = Equipment(True, False, FROM_MAG, True, START_WAIT_S)
     settings = packed(told, equipment)
     return Fitted(onboard, schedule, told, equipment, settings, sheets, timing, ages_of(timing))

@@ -60,8 +60,9 @@ from flownav.simulation.navigating import (
     note_truth,
     put_on_truth,
 )
-from flownav.simulation.onboard import Onboard, read_inertial, sample, start_onboard
+from flownav.simulation.onboard import Onboard
 from flownav.simulation.plant import LinearTruth, linear_step, observe_plant, runge_kutta_step
+from flownav.simulation.sampling import read_inertial, sample
 from flownav.simulation.sensing import (
     EPOCH_S,
     Draws,
@@ -72,6 +73,7 @@ from flownav.simulation.sensing import (
     start_sensors,
     true_imu,
 )
+from flownav.simulation.units import start_onboard
 from flownav.simulation.wind import WindParameters, start_wind, step_wind
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.state import Controls, HelicopterState
@@ -102,7 +104,7 @@ class FlightPlan(NamedTuple):
 
 
 class Flight(NamedTuple):
-    """Everything constant over a flight: the paper's filter, or the sensors that feed the navigator and their timetable.
+    """Everything constant over a flight: the paper's filter, or the navigator's sensors and their timetable.
 
     linear: only for that truth.
     """
@@ -327,9 +329,7 @@ def advance_sensing(
 
 # -- whole flights ------------------------------------------------------------------------------------------
 @equation
-def fly_on_paper(
-    work: Work, lanes: Lanes, seed: int, first: int, flight: Flight, history: NDArray[np.float64]
-) -> None:
+def fly_on_paper(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight, history: NDArray[np.float64]) -> None:
     """Every epoch with the paper's sensors and its filter, or with no filter at all."""
     for epoch in range(flight.plan.epochs):
         t_s = epoch * EPOCH_S
@@ -401,8 +401,9 @@ def fly_block(
 ) -> None:  # fmt: skip
     """Fly `len(lanes)` flights, numbers `first` and up, of a campaign `seed`.
 
-    work (rows of `ring.work_rows` and more, times lanes) is scratch, zeroed here; nav: a navigator that has heard
-    nothing (`navigation.memory.new_work`), taken at the address `take`; its tape and what it is fed flattened; history (epochs, len(HISTORY), len(lanes)) is filled.
+    work (rows of `engine.buffers_of`, times lanes) is scratch, zeroed here; nav: a navigator that has heard nothing
+    (`navigation.memory.new_work`), taken at the address `take`; its tape and what it is fed flattened; history (epochs,
+    len(HISTORY), len(lanes)) is filled.
     """
     work[:] = 0.0
     o = output_of(estimate, innovation, event, NOTHING, NOTHING, NOTHING, room, used)

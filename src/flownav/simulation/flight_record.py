@@ -46,6 +46,9 @@ def record_of(setup: Setup, flown: Flown, seed: int, index: int, lane: int = 0) 
     else:
         table("flown", "estimate", (*POSITION_NED, *VELOCITY_BODY, *QUATERNION))
         happened = _add_navigators(record, setup, flown, lane)
+        running = np.isfinite(history["estimate", "nees"])
+        then_s = t_s[running] - setup.fitted.schedule.horizon_s
+        record.add("consistency", {"t_s": then_s, "nees": history["estimate", "nees"][running]})
     record.add("events", _events(t_s, history, happened, by_sensor=setup.fitted is None))
     return record
 
@@ -80,7 +83,7 @@ def _add_papers(
 ) -> None:
     """The paper's filter (or none), which takes the INS's attitude as it comes and says nothing of its consistency."""
     attitude = {name: history["gps", name] for name in QUATERNION}
-    own = tuple(c for c in TABLES["estimate"] if c not in (*QUATERNION, "nees"))
+    own = tuple(c for c in TABLES["estimate"] if c not in QUATERNION)
     table("estimate", "estimate", own, **attitude)
     every = np.full(len(t_s), 255.0)
     table("gps_position", "gps", COLUMNS[Sensor.GPS_POSITION], quality=every)

@@ -38,7 +38,7 @@ class Timetable(NamedTuple):
     epoch: NDArray[np.int64]
     slots: int
     horizon_epochs: int
-    count: int
+    readings: int
 
 
 @equation
@@ -59,7 +59,7 @@ def feed_due(
     table: Timetable,
 ) -> int:  # fmt: skip
     """Every reading that is due in this epoch, in order; the next one's number. fed: a copy, where there is room."""
-    while following < table.count and table.epoch[following] <= epoch:
+    while following < table.readings and table.epoch[following] <= epoch:
         hand_over(work, nav, lanes, table.slot[following])
         if o.room[5] > following:
             for i in range(FIELDS):
@@ -112,7 +112,9 @@ def compare_at_horizon(work: Work, nav: Work, lanes: Lanes, epoch: int, table: T
             work[(row + 8) * len(lanes) + lane], work[(row + 9) * len(lanes) + lane],
         )  # fmt: skip
         v = STATE + VELOCITY
-        said = to_body(own, nav[v * len(lanes) + lane], nav[(v + 1) * len(lanes) + lane], nav[(v + 2) * len(lanes) + lane])
+        said = to_body(
+            own, nav[v * len(lanes) + lane], nav[(v + 1) * len(lanes) + lane], nav[(v + 2) * len(lanes) + lane]
+        )
         was = to_body(
             true, work[(row + 3) * len(lanes) + lane], work[(row + 4) * len(lanes) + lane],
             work[(row + 5) * len(lanes) + lane],
@@ -154,7 +156,7 @@ def normalised_error(work: Work, nav: Work, lanes: Lanes, lane: int, row: int) -
 
 @procedure
 def put_on_truth(work: Work, nav: Work, lanes: Lanes, epoch: int, table: Timetable) -> None:
-    """The navigator's position, velocity and attitude become the truth at its horizon, so that Jacobians are taken there.
+    """The navigator's position, velocity and attitude become the truth at its horizon, for Jacobians to be taken there.
 
     Its covariance is then that of the posterior Cramér-Rao bound along this flight (`estimation.bound`), for its model.
     """

@@ -2,8 +2,8 @@
 
 Every reading has three times: the instant at which it was taken, the instant that it describes as far as anybody
 knows (`t_s`: its arrival less the age that the datasheet states; arrivals are uneven, so this is off by the jitter),
-and the epoch in which the navigator takes it, a fixed horizon later. Readings are taken in the order of `t_s`, as a live
-session's horizon releases them. The timetable is a scenario's, not a flight's: what differs from flight to flight is
+and the epoch in which the navigator takes it, a fixed horizon later. Readings are taken in the order of `t_s`, as a
+live session's horizon releases them. The timetable is a scenario's, not a flight's: what differs from flight to flight is
 what was read and whether it arrived.
 """
 
@@ -75,7 +75,7 @@ def schedule_of(
 def sampled_readings(
     epochs: int, sensors: Onboard, timing: dict[Sensor, Timing], stated: dict[Sensor, Timing]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Every reading in the order of `onboard.sample`: the instant it is taken to describe, its sensor, its epoch."""
+    """Every reading in the order of `sampling.sample`: the instant it is taken to describe, its sensor, its epoch."""
     generator = np.random.Generator(np.random.Philox(JITTER_KEY))
     parts = round(EPOCH_S / (sensors.inertial_steps * PHYSICS_PERIOD_S))
     rows: list[tuple[float, int, int]] = []
@@ -95,7 +95,7 @@ def sampled_readings(
 
 
 def clocks(sensors: Onboard) -> list[tuple[Sensor, Clock]]:
-    """Every sensor but the inertial one, in the order in which `onboard.sample` reads them."""
+    """Every sensor but the inertial one, in the order in which `sampling.sample` reads them."""
     velocity = sensors.receiver_clock._replace(
         fitted=sensors.receiver_clock.fitted if sensors.receiver_offers_velocity else 0
     )

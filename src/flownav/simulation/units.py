@@ -1,0 +1,132 @@
+"""Before a flight: every sensor as it is on this flight, and its state at rest or from its stationary distribution."""
+
+from __future__ import annotations
+
+from flownav.compile import lane_access, procedure
+from flownav.estimation.kalman import Lanes, Work
+from flownav.frames import rotation_from_quaternion
+from flownav.sensors.barometer import BarometerStartNormals, BarometerUnit, draw_barometer, start_barometer
+from flownav.sensors.flow_camera import FlowCameraStartNormals, FlowCameraUnit, draw_flow_camera, start_flow_camera
+from flownav.sensors.gps_receiver import GpsReceiverStartNormals, GpsReceiverUnit, draw_gps_receiver, start_gps_receiver
+from flownav.sensors.inertial import InertialStartNormals, InertialUnit, draw_inertial, start_inertial
+from flownav.sensors.magnetometer import MagnetometerUnit, draw_magnetometer
+from flownav.sensors.pad_camera import PadCameraUnit, draw_pad_camera
+from flownav.sensors.range_sensor import RangeSensorUnit, draw_range_sensor, start_range_sensor
+from flownav.sensors.skid_switch import SkidSwitchUnit, draw_skid_switch, start_skid_switch
+from flownav.simulation import layout
+from flownav.simulation.draws import (
+    BARO_START,
+    CAMERA_START,
+    INERTIAL_START,
+    MAG_START,
+    PAD_START,
+    RANGE_START,
+    RECEIVER_START,
+    SKID_START,
+    draw,
+)
+from flownav.simulation.layout import (
+    load_baro_unit,
+    load_helicopter,
+    store_baro,
+    store_baro_unit,
+    store_camera,
+    store_camera_unit,
+    store_inertial,
+    store_inertial_unit,
+    store_mag_unit,
+    store_pad_unit,
+    store_range_unit,
+    store_ranger,
+    store_receiver,
+    store_receiver_unit,
+    store_skid,
+    store_skid_unit,
+)
+from flownav.simulation.onboard import Onboard, baro_truth, beam_of, receiver_truth
+
+drawn_inertial_unit, _ = lane_access(InertialUnit, layout.DRAWN)
+drawn_inertial_start, _ = lane_access(InertialStartNormals, layout.DRAWN)
+drawn_receiver_unit, _ = lane_access(GpsReceiverUnit, layout.DRAWN)
+drawn_receiver_start, _ = lane_access(GpsReceiverStartNormals, layout.DRAWN)
+drawn_camera_unit, _ = lane_access(FlowCameraUnit, layout.DRAWN)
+drawn_camera_start, _ = lane_access(FlowCameraStartNormals, layout.DRAWN)
+drawn_range_unit, _ = lane_access(RangeSensorUnit, layout.DRAWN)
+drawn_baro_unit, _ = lane_access(BarometerUnit, layout.DRAWN)
+drawn_baro_start, _ = lane_access(BarometerStartNormals, layout.DRAWN)
+drawn_mag_unit, _ = lane_access(MagnetometerUnit, layout.DRAWN)
+drawn_pad_unit, _ = lane_access(PadCameraUnit, layout.DRAWN)
+drawn_skid_unit, _ = lane_access(SkidSwitchUnit, layout.DRAWN)
+
+
+@procedure
+def start_onboard(work: Work, lanes: Lanes, seed: int, flight: int, step: int, s: Onboard) -> None:
+    """Every unit as it is on this flight, and its state at rest or from its stationary distribution."""
+    start_inertials(work, lanes, seed, flight, step, s)
+    start_receivers(work, lanes, seed, flight, step, s)
+    start_cameras(work, lanes, seed, flight, step, s)
+    start_rest(work, lanes, seed, flight, step, s)
+
+
+@procedure
+def start_inertials(work: Work, lanes: Lanes, seed: int, flight: int, step: int, s: Onboard) -> None:
+    """The inertial units."""
+    draw(work, lanes, layout.DRAWN, 28, seed, flight, step, INERTIAL_START)
+    for lane in range(len(lanes)):
+        store_inertial_unit(work, lanes, lane, draw_inertial(drawn_inertial_unit(work, lanes, lane), s.inertial))
+    draw(work, lanes, layout.DRAWN, 10, seed, flight, step + 1, INERTIAL_START)
+    for lane in range(len(lanes)):
+        store_inertial(work, lanes, lane, start_inertial(drawn_inertial_start(work, lanes, lane), s.inertial))
+
+
+@procedure
+def start_receivers(work: Work, lanes: Lanes, seed: int, flight: int, step: int, s: Onboard) -> None:
+    """The GPS receivers."""
+    draw(work, lanes, layout.DRAWN, 4, seed, flight, step, RECEIVER_START)
+    for lane in range(len(lanes)):
+        store_receiver_unit(work, lanes, lane, draw_gps_receiver(drawn_receiver_unit(work, lanes, lane), s.receiver))
+    draw(work, lanes, layout.DRAWN, 10, seed, flight, step + 1, RECEIVER_START)
+    for lane in range(len(lanes)):
+        state = load_helicopter(work, lanes, lane)
+        rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
+        normals = drawn_receiver_start(work, lanes, lane)
+        store_receiver(work, lanes, lane, start_gps_receiver(receiver_truth(state), rotation, normals, s.receiver))
+
+
+@procedure
+def start_cameras(work: Work, lanes: Lanes, seed: int, flight: int, step: int, s: Onboard) -> None:
+    """The flow cameras."""
+    draw(work, lanes, layout.DRAWN, 10, seed, flight, step, CAMERA_START)
+    for lane in range(len(lanes)):
+        store_camera_unit(work, lanes, lane, draw_flow_camera(drawn_camera_unit(work, lanes, lane), s.camera))
+    draw(work, lanes, layout.DRAWN, 2, seed, flight, step + 1, CAMERA_START)
+    for lane in range(len(lanes)):
+        store_camera(work, lanes, lane, start_flow_camera(drawn_camera_start(work, lanes, lane), s.camera))
+
+
+@procedure
+def start_rest(work: Work, lanes: Lanes, seed: int, flight: int, step: int, s: Onboard) -> None:
+    """Rangefinders, barometers, magnetometers, pad cameras and skid switches."""
+    draw(work, lanes, layout.DRAWN, 2, seed, flight, step, RANGE_START)
+    for lane in range(len(lanes)):
+        store_range_unit(work, lanes, lane, draw_range_sensor(drawn_range_unit(work, lanes, lane), s.ranger))
+        hit = beam_of(load_helicopter(work, lanes, lane), s.range_place, s.ground)
+        store_ranger(work, lanes, lane, start_range_sensor(hit, s.ranger))
+    draw(work, lanes, layout.DRAWN, 4, seed, flight, step, BARO_START)
+    for lane in range(len(lanes)):
+        store_baro_unit(work, lanes, lane, draw_barometer(drawn_baro_unit(work, lanes, lane), s.baro))
+    draw(work, lanes, layout.DRAWN, 2, seed, flight, step + 1, BARO_START)
+    for lane in range(len(lanes)):
+        truth, unit = baro_truth(work, lanes, lane, s), load_baro_unit(work, lanes, lane)
+        store_baro(work, lanes, lane, start_barometer(truth, unit, drawn_baro_start(work, lanes, lane), s.baro))
+    draw(work, lanes, layout.DRAWN, 16, seed, flight, step, MAG_START)
+    for lane in range(len(lanes)):
+        store_mag_unit(work, lanes, lane, draw_magnetometer(drawn_mag_unit(work, lanes, lane), s.mag))
+    draw(work, lanes, layout.DRAWN, 4, seed, flight, step, PAD_START)
+    for lane in range(len(lanes)):
+        store_pad_unit(work, lanes, lane, draw_pad_camera(drawn_pad_unit(work, lanes, lane), s.pad))
+    draw(work, lanes, layout.DRAWN, 2, seed, flight, step, SKID_START)
+    for lane in range(len(lanes)):
+        store_skid_unit(work, lanes, lane, draw_skid_switch(drawn_skid_unit(work, lanes, lane), s.skid))
+        load_n = work[layout.CONTACT * len(lanes) + lane]
+        store_skid(work, lanes, lane, start_skid_switch(load_n, s.skid))

@@ -65,8 +65,9 @@ TABLES: dict[str, tuple[str, ...]] = {
         *VELOCITY_BODY,
         *QUATERNION,
         *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)),
-        "nees",  # normalised estimation error squared of position and velocity, where the truth is known
     ),
+    # where the truth is known: the error squared of position and velocity over what the filter states (NEES)
+    "consistency": ("nees",),
     # the rest of what it says, at the same instants: velocity in the earth's axes, standard deviations of the attitude,
     # and every other state with its own
     "states": (

@@ -92,6 +92,23 @@ def flight(scenario: str = "landing", seed: int = 1, gps_sigma_m: float = 0.3) -
     return record
 
 
+def navigated(seed: int = 1) -> Record:
+    """The landing on the navigator: its estimate of other instants than the truth's, 2 m off, and what was flown on."""
+    record = flight("landing", seed)
+    truth, estimate = record.tables["truth"], record.tables.pop("estimate")
+    t_s = 0.06 + np.cumsum(np.random.default_rng(seed).uniform(0.02, 0.03, 1900))
+    moved = {name: np.interp(t_s, truth["t_s"], truth[name]) + 2.0 * (name == "pos_n_m") for name in POSITION}
+    rest = {name: np.interp(t_s, estimate["t_s"], column) for name, column in estimate.items() if name not in POSITION}
+    record.add("estimate", {**rest, "t_s": t_s, **moved})
+    handed = truth["t_s"] >= 5.0
+    flown = {name: np.where(handed, estimate[name], truth[name]) for name in (*POSITION, *VELOCITY)}
+    flown["pos_e_m"] = flown["pos_e_m"] + np.where(truth["t_s"] > 15.0, 1.0, 0.0)  # as a pad is found
+    attitude = {name: truth[name] for name in ("qw", "qx", "qy", "qz")}
+    record.add("flown", {"t_s": truth["t_s"], **flown, **attitude})
+    record.manifest |= {"filter": "landing", "known_exactly": "where it hovers for its first 5 s, flown on the truth"}
+    return record
+
+
 def _innovations(
     t_s: np.ndarray, gps: np.ndarray, flow: np.ndarray, engaged: np.ndarray, gps_sigma_m: float
 ) -> dict[str, np.ndarray]:

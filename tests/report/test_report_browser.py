@@ -11,7 +11,7 @@ import pytest
 from browsing import CHROMIUM, NO_GL, QUIET, SOFTWARE_GL, Visit
 from flownav.record import Record
 from flownav.report.html import write_report
-from report_records import flight, replay
+from report_records import flight, navigated, replay
 
 pytestmark = pytest.mark.browser
 WORDS_OF_NO_WEBGL = "This browser has no WebGL"
@@ -36,7 +36,7 @@ def browser(playwright: Any) -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("reports")
-    records: dict[str, Record] = {"landing": flight(), "takeoff": flight("takeoff"), "replay": replay(200.0)}
+    records: dict[str, Record] = {"landing": navigated(), "takeoff": flight("takeoff"), "replay": replay(200.0)}
     for name, record in records.items():
         write_report(record, folder / f"{name}.html")
     return {name: folder / f"{name}.html" for name in records}
@@ -44,7 +44,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 def test_every_figure_of_a_landing_is_drawn(browser: Any, pages: dict[str, Path]) -> None:
     visit = Visit(browser, pages["landing"], width=1440)
-    visit.check(count=13)
+    visit.check(count=15)
     buttons = visit.page.eval_on_selector_all(".modebar-btn", "all => all.map((b) => b.dataset.title || '')")
     assert buttons
     assert not [title for title in buttons if "hare" in title or "loud" in title]  # no "Share chart": it would upload

@@ -12,11 +12,12 @@ from hypothesis.extra.numpy import arrays
 
 from flownav.measurement import Sensor
 from flownav.record import Record
+from flownav.report.content import summary, tiles
 from flownav.report.figures_filter import consistency, error_against_gps, innovations, radius_of_uncertainty
 from flownav.report.figures_path import ground_track, path_over_pad
-from flownav.report.figures_states import close_ups, position, position_error, velocity
+from flownav.report.figures_states import close_ups, flown_errors, position, position_error, velocity
 from flownav.report.figures_vehicle import attitude
-from flownav.report.html import sections
+from flownav.report.html import render, sections
 from flownav.report.panels import Panel
 from flownav.report.series import (
     CROSS_POINTS,
@@ -34,7 +35,7 @@ from flownav.report.series import (
     thin_dots,
 )
 from flownav.report.style import COLOUR, LIGHT_TO_DARK, PALETTE
-from report_records import flight, replay
+from report_records import flight, navigated, replay
 
 VALUES = st.floats(-1e6, 1e6, width=32)
 
@@ -241,7 +242,7 @@ def test_an_axis_that_hardly_moves_does_not_magnify_rounding() -> None:
 
 
 def every_panel() -> list[Panel]:
-    records = (flight("landing"), flight("takeoff"), replay(60.0))
+    records = (flight("landing"), flight("takeoff"), navigated(), replay(60.0))
     return [panel for record in records for section in sections(record) for panel in section.panels if panel.figure]
 
 
@@ -313,9 +314,8 @@ def test_a_band_is_open_where_nothing_was_measured() -> None:
 def test_consistency_is_drawn_in_the_band_of_one_flight_where_the_record_has_it() -> None:
     record = flight()
     assert consistency(record) == []
-    estimate = record.tables["estimate"]
-    estimate["nees"] = np.full(len(estimate["t_s"]), 6.0)
-    estimate["nees"][: len(estimate["nees"]) // 4] = 20.0
+    t_s = record.tables["truth"]["t_s"]
+    record.add("consistency", {"t_s": t_s, "nees": np.where(np.arange(len(t_s)) < len(t_s) // 4, 20.0, 6.0)})
     (panel,) = consistency(record)
     lines = {trace.name: np.asarray(trace.y) for trace in panel.figure.data}
     assert lines["filter"].max() == 20.0
@@ -323,3 +323,63 @@ def test_consistency_is_drawn_in_the_band_of_one_flight_where_the_record_has_it(
     assert limits == pytest.approx([1.237, 14.449], abs=1e-3)  # chi-square of 6 degrees of freedom
     assert "here 75 % do" in panel.caption
     assert panel in next(section for section in sections(record) if section.key == "filter").panels
+
+
+# -- a flight on the navigator -------------------------------------------------------------------------------
+def test_errors_take_the_truth_at_the_estimates_own_instants() -> None:
+    record = navigated()
+    error = next(trace for trace in position_error(record).figure.data if "truth" in trace.name)
+    assert np.asarray(error.y) == pytest.approx(2.0, abs=1e-6)
+    assert set(np.float32(error.x)) <= set(np.float32(record.tables["estimate"]["t_s"]))
+
+
+def test_what_was_flown_on_has_errors_of_its_own_and_a_line_beside_the_estimate() -> None:
+    assert flown_errors(flight()) == []
+    record = navigated()
+    panels = flown_errors(record)
+    assert [panel.key for panel in panels] == ["flown-position-error", "flown-velocity-error"]
+    north, east, _ = panels[0].figure.data
+    assert np.abs(np.asarray(north.y)[np.asarray(north.x) < 5.0]).max() == 0.0
+    assert np.asarray(east.y)[-1] - np.asarray(east.y)[0] == pytest.approx(1.0, abs=0.5)
+    assert "by definition" in panels[0].caption
+    for panel in (position(record), velocity(record), attitude(record), ground_track(record), path_over_pad(record)):
+        assert "flown on" in {trace.name for trace in panel.figure.data}, panel.key
+    keys = [panel.key for section in sections(record) if section.key == "errors" for panel in section.panels]
+    assert keys == ["flown-position-error", "flown-velocity-error", "position-error", "velocity-error", "radius"]
+
+
+def test_a_path_that_jumps_is_open_there_and_no_other_is() -> None:
+    record = navigated()
+    paths = {trace.name: np.asarray(trace.x) for trace in ground_track(record).figure.data if trace.mode == "lines"}
+    assert np.isnan(paths["flown on"]).sum() == 1
+    assert not np.isnan(paths["estimate"]).any()
+
+
+def test_rare_peaks_do_not_flatten_an_axis_and_are_said() -> None:
+    record = navigated()
+    assert "rare peaks" not in position_error(record).caption
+    record.tables["estimate"]["pos_n_m"][3] += 50.0
+    panel = position_error(record)
+    assert panel.figure.layout.yaxis.range[1] == pytest.approx(1.2 * 2.0, abs=0.05)
+    assert "rare peaks" in panel.caption
+    assert max(panel.figure.data[1].y) == pytest.approx(52.0, abs=0.1)
+
+
+def test_ratios_far_inside_the_gate_have_no_axis_of_their_own() -> None:
+    record = flight()
+    table = record.tables["innovation"]
+    table["test_ratio"] = np.where(table["sensor"] == "flow_velocity", 1e-4, table["test_ratio"])
+    gps, flow = innovations(record)
+    assert [axis.title.text for axis in gps.figure.select_yaxes()][-1] == "test ratio"
+    assert "test ratio" not in [axis.title.text for axis in flow.figure.select_yaxes()]
+    assert "All test ratios are below 0.01" in flow.caption
+
+
+def test_the_words_say_what_was_flown_on_and_what_was_known() -> None:
+    words = summary(navigated())
+    assert "In flight no axis of the position that was flown on was off by more than" in words
+    assert "What the vehicle knew exactly: where it hovers for its first 5" in words
+    assert "knew exactly" not in summary(flight())
+    tile = tiles(navigated())[-1]
+    assert tile.label == "Flow sensor engaged"
+    assert "what was flown on against the truth, in flight" in render(navigated())

@@ -10,6 +10,7 @@ import numpy as np
 
 from flownav.campaign.ablations import ablations
 from flownav.campaign.judged import BOUND_FLIGHTS, Judged, bound_of, fly_judged, touchdown_radius
+from flownav.campaign.local import known_exactly
 from flownav.parameter_files import check
 from flownav.scoring.consistency import (
     BAND,
@@ -91,15 +92,6 @@ def scenario_of(name: str) -> Scenario:
     if name not in PAPERS_CONDITIONS:
         return scenario
     return check(scenario.model_dump(exclude_unset=True) | {"wind": WIND}, Scenario, f"{name} in wind")
-
-
-def known_exactly(scenario: Scenario) -> str:
-    """What the vehicle of a scenario is given that a real one would have to find out."""
-    if scenario.flight.start == "ground":
-        return f"that it stands where its path begins, until take-off at {scenario.flight.takeoff_at_s:g} s"
-    held = f"it is flown on the truth for its first {scenario.filter.handover_s:g} s"
-    noted = "and notes its place there" if scenario.autopilot.home == "start" else "but not told where it is"
-    return f"{held}, {noted}"
 
 
 def run_case(

@@ -15,6 +15,7 @@ from flownav.simulation.engine import fly_blocks, fly_written
 from flownav.simulation.flight import Flight
 from flownav.simulation.flight_record import record_of
 from flownav.simulation.history import column, columns
+from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S
 
 Array = NDArray[np.float64]
@@ -65,12 +66,24 @@ def fly_many(
     return scores
 
 
+def known_exactly(scenario: Scenario) -> str:
+    """What the vehicle of a scenario is given that a real one would have to find out."""
+    if scenario.flight.start == "ground":
+        return f"where it stands until take-off at {scenario.flight.takeoff_at_s:g} s"
+    held_s = float(scenario.filter.handover_s)
+    if scenario.autopilot.home == "start":
+        return f"where it hovers for its first {held_s:g} s, flown on the truth"
+    return f"nothing, but it is flown on the truth for its first {held_s:g} s"
+
+
 def fly_recorded(setup: Setup, seed: int, index: int = 0) -> Record:
     """One flight as a scored Record."""
     flown = fly_written(setup.flight, seed, index)
     record = record_of(setup, flown, seed, index)
     record.manifest["scores"] = scores_of_flight(score_history(setup.flight, flown.history)[0])
     record.manifest["paper"] = published(setup.scenario.paper_table)
+    if setup.fitted is not None:
+        record.manifest["known_exactly"] = known_exactly(setup.scenario)
     return record
 
 

@@ -42,9 +42,8 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
-    from flownav.campaign.accuracy import known_exactly
     from flownav.campaign.judged import BOUND_FLIGHTS, bound_of, consistency_facts, fly_judged
-    from flownav.campaign.local import fly_recorded, median_flight
+    from flownav.campaign.local import fly_recorded, known_exactly, median_flight
     from flownav.cli.output import progress, require_between, require_writable, save
     from flownav.scoring.errors import scores_of_flights
     from flownav.scoring.paper_tables import percentile_of_paper, published

@@ -94,7 +94,11 @@ def summary(record: Record) -> str:
     if largest is not None:
         published = mapping(manifest.get("paper")).get("max_position_error_m")
         beside = f" (the paper: {metres(published)} m)" if published is not None else ""
-        said.append(f"No axis of the estimated position was ever off by more than {metres(largest)} m{beside}.")
+        ever = "No axis of the estimated position was ever"
+        ever = "In flight no axis of the position that was flown on was" if has(record, "flown") else ever
+        said.append(f"{ever} off by more than {metres(largest)} m{beside}.")
+    if manifest.get("known_exactly"):
+        said.append(f"What the vehicle knew exactly: {manifest['known_exactly']}.")
     touchdown = mapping(scores.get("touchdown"))
     if touchdown:
         said.append(
@@ -136,7 +140,8 @@ def tiles(record: Record) -> list[Tile]:
     found = []
     if scores.get("max_position_error_m") is not None:
         published = paper.get("max_position_error_m")
-        note = f"paper {metres(published)} m" if published is not None else "estimate against truth"
+        against = "what was flown on" if has(record, "flown") else "estimate against truth"
+        note = f"paper {metres(published)} m" if published is not None else against
         found.append(Tile("Largest error of one axis", metres(scores["max_position_error_m"]), "m", note))
     touchdown = mapping(scores.get("touchdown"))
     if touchdown:
@@ -156,8 +161,8 @@ def tiles(record: Record) -> list[Tile]:
     if scores.get("velocity_rms_m_s") is not None:
         found.append(Tile("Velocity error", number(scores["velocity_rms_m_s"], 2), "m/s", "rms, against GPS"))
     share = flow_share(record)
-    simulated = record.manifest.get("kind") == "fly"  # only there a flow reading means that the sensor saw the pad
-    name = "Flow sensor engaged" if simulated else "Valid flow readings"
+    papers = record.manifest.get("kind") == "fly" and has(record, "flow_velocity")  # whose sensor reads above the pad
+    name = "Flow sensor engaged" if papers else "Valid flow readings"
     if share is None:
         return [*found, Tile(name, NONE, "", "no valid readings")]
     return [*found, Tile(name, f"{100 * share:.0f}", "%", "of the time")]

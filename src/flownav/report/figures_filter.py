@@ -51,6 +51,7 @@ SENSOR_TITLES = {
     "pose": "External position",
     "yaw": "External heading",
     "pad": "Pad fix",
+    "landed": "Skid switch (at rest)",
 }
 
 
@@ -71,6 +72,8 @@ def radius_of_uncertainty(record: Record) -> Panel:
         if truth is not None:
             spread.append(("gps", "GPS alone", gps and _radius(difference(gps, truth), axes)))
             spread.append(("estimate", "filter", _radius(difference(estimate, truth), axes)))
+            flown = track(record, "flown", POSITION_NED)
+            spread.append(("flown", "flown on", flown and _radius(difference(flown, truth), axes)))
         else:
             spread.append(("gps", "stated for GPS alone", _gps_stated(record, axes)))
         if stated is not None:
@@ -162,7 +165,8 @@ def axis_title(name: str) -> str:
 
 def _innovation_panel(record: Record, sensor: str, components: dict[str, dict[str, Array]]) -> Panel:
     title = f"Innovations: {SENSOR_TITLES.get(sensor, sensor.replace('_', ' '))}"
-    tested = any("test_ratio" in part for part in components.values())
+    ratios = [part["test_ratio"] for part in components.values() if "test_ratio" in part]
+    tested = any(np.any(ratio >= SMALLEST_RATIO) for ratio in ratios)
     stack = Stack([escape(axis_title(name)) for name in components] + ["test ratio"] * tested, row_height_px=118)
     colour = "flow" if sensor.startswith("flow") else "gps" if sensor.startswith("gps") else "estimate"
     gate_row, offered, refused = len(components) + 1, 0, 0
@@ -176,7 +180,7 @@ def _innovation_panel(record: Record, sensor: str, components: dict[str, dict[st
             stack.within(row, _reach(part["innovation"], expected))
         stack.dots(row, colour, "fused", t_s[fused], part["innovation"][fused])
         stack.crosses(row, "alert", "not fused", t_s[~fused], part["innovation"][~fused])
-        if "test_ratio" in part:
+        if tested and "test_ratio" in part:
             ratio = np.where(part["test_ratio"] < SMALLEST_RATIO, np.nan, part["test_ratio"])
             stack.dots(gate_row, colour, "fused", t_s[fused], ratio[fused])
             stack.crosses(gate_row, "alert", "not fused", t_s[~fused], ratio[~fused])
@@ -188,6 +192,8 @@ def _innovation_panel(record: Record, sensor: str, components: dict[str, dict[st
     caption = f"{offered} values offered, {refused} not fused."
     if tested:
         caption += f" A test ratio above 1 is outside the gate; those below {SMALLEST_RATIO} are not drawn."
+    elif ratios:
+        caption += f" All test ratios are below {SMALLEST_RATIO}, and so inside the gate."
     return Panel(f"innovation-{sensor}", title, caption, f"{title}: {caption}", figure)
 
 
@@ -200,7 +206,7 @@ def _reach(innovation: Array, expected: Array) -> float:
 
 def consistency(record: Record) -> list[Panel]:
     """Normalised estimation error squared of position and velocity over time; no panel where none was recorded."""
-    nees = track(record, "estimate", ("nees",))
+    nees = track(record, "consistency", ("nees",))
     if nees is None:
         return []
     from flownav.scoring.consistency import SCORED, chi_square_band
@@ -217,8 +223,7 @@ def consistency(record: Record) -> list[Panel]:
     caption = (
         f"Squared error of position and velocity in units of what the filter states, {SCORED} expected. Of a "
         f"consistent filter 95 % of the values lie between {low:.2f} and {high:.2f} over many flights; "
-        f"here {inside:.0f} % do. Errors last, so one flight strays; on the ground, told that it rests, a filter "
-        "looks too modest."
+        f"here {inside:.0f} % do. Errors last, so one flight strays."
     )
     title = "Consistency with the truth"
     return [Panel("nees", title, caption, f"{title}: NEES over time. {caption}", stack.figure(span, moments(record)))]

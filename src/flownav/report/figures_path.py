@@ -15,6 +15,7 @@ from flownav.report.series import (
     Array,
     Track,
     at,
+    estimates,
     moments,
     outages,
     readings,
@@ -26,6 +27,7 @@ from flownav.report.style import COLOUR, LINES, axis, layout
 
 # A 3-D view at most, in Plotly's units: the camera sees it whole.
 BOX_DIAGONAL, BOX_HEIGHT = 1.65, 1.1
+JUMP_M = 0.5  # from one row to the next
 
 
 class Pad(NamedTuple):
@@ -46,24 +48,18 @@ def pad(record: Record) -> Pad | None:
     return Pad(float(size_m)) if isinstance(size_m, (int, float)) else None
 
 
-def _paths(record: Record) -> list[tuple[str, Track]]:
-    """Lines to draw by role, the truth last and so on top."""
-    sources = [(role, track(record, role, POSITION_NED)) for role in ("autopilot", "smoothed", "estimate", "truth")]
-    return [(role, source) for role, source in sources if source is not None]
-
-
-def _touchdown(record: Record, paths: list[tuple[str, Track]]) -> Array | None:
+def _touchdown(record: Record, paths: list[tuple[str, str, Track]]) -> Array | None:
     touch = next((m.t_s for m in moments(record) if m.name == "touchdown"), None)
     if touch is None:
         return None
-    point = at(np.array([touch]), paths[-1][1])[0]
+    point = at(np.array([touch]), paths[-1][2])[0]
     return None if np.isnan(point).any() else point
 
 
 def ground_track(record: Record) -> Panel:
     """Top view: north up the page, east to the right, GPS readings, paths, pad, outages."""
     key, title = "ground-track", "Ground track"
-    paths, gps = _paths(record), readings(record, Sensor.GPS_POSITION)
+    paths, gps = estimates(record, POSITION_NED), readings(record, Sensor.GPS_POSITION)
     if not paths:
         return Panel(key, title, absent="The record holds no positions.")
     from plotly.graph_objects import Figure
@@ -81,11 +77,9 @@ def ground_track(record: Record) -> Panel:
         kept = thin_dots(DOT_POINTS, gps.value[:, 0], gps.value[:, 1])
         marker = {"color": COLOUR["gps"], "size": 3.5, "opacity": 0.45}
         _flat(figure, "GPS", gps.value[kept, 0], gps.value[kept, 1], mode="markers", marker=marker)
-    for role, path in paths:
-        kept = thin(LINE_POINTS, path.value[:, 0], path.value[:, 1])
-        _flat(
-            figure, role, path.value[kept, 0], path.value[kept, 1], mode="lines", line={**LINES[role], "dash": "solid"}
-        )
+    for role, name, path in paths:
+        values = _drawn_path(role, path)
+        _flat(figure, name, values[:, 0], values[:, 1], mode="lines", line={**LINES[role], "dash": "solid"})
     _outage_parts(figure, record)
     touch = _touchdown(record, paths)
     if touch is not None:
@@ -95,6 +89,14 @@ def ground_track(record: Record) -> Panel:
     caption += f" The pad is {where.size_m:g} m square." if where is not None else ""
     drawn_names = [str(trace.name) for trace in figure.data if trace.showlegend is not False]
     return Panel(key, title, caption, f"Path over the ground from above: {listed(drawn_names)}.", figure)
+
+
+def _drawn_path(role: str, path: Track) -> Array:
+    """A path as it is drawn: thinned, and what is flown on open where it jumps, as a pad is found."""
+    steps = np.linalg.norm(np.diff(path.value, axis=0), axis=1) if role == "flown" else np.zeros(0)
+    jumps = np.flatnonzero(steps > JUMP_M) + 1
+    kept = np.union1d(thin(LINE_POINTS, *path.value.T), np.concatenate([jumps - 1, jumps]))
+    return np.insert(path.value[kept], np.searchsorted(kept, jumps), np.nan, axis=0)
 
 
 def _flat(figure: Any, name: str, north: Array, east: Array, **style: Any) -> None:
@@ -118,7 +120,8 @@ def _outage_parts(figure: Any, record: Record) -> None:
 def path_over_pad(record: Record) -> Panel:
     """3-D view of the path over the pad; height is drawn upwards."""
     key, title = "path-3d", "Path over the pad" if pad(record) else "Path in space"
-    paths, gps, where = _paths(record), readings(record, Sensor.GPS_POSITION), pad(record)
+    paths, where = estimates(record, POSITION_NED), pad(record)
+    gps = readings(record, Sensor.GPS_POSITION)
     if not paths:
         return Panel(key, title, absent="The record holds no positions.")
     from plotly.graph_objects import Figure
@@ -144,9 +147,8 @@ def path_over_pad(record: Record) -> Panel:
         kept = thin_dots(DOT_POINTS, *gps.value.T)
         figure.add_scatter3d(**_space(gps.value[kept]), mode="markers", name="GPS", visible="legendonly",
                              marker={"color": COLOUR["gps"], "size": 2, "opacity": 0.5})  # fmt: skip
-    for role, path in paths:
-        kept = thin(LINE_POINTS, *path.value.T)
-        figure.add_scatter3d(**_space(path.value[kept]), mode="lines", name=role,
+    for role, name, path in paths:
+        figure.add_scatter3d(**_space(_drawn_path(role, path)), mode="lines", name=name,
                              line={"color": COLOUR[role], "width": 5 if role == "truth" else 3})  # fmt: skip
     touch = _touchdown(record, paths)
     if touch is not None:
@@ -154,13 +156,13 @@ def path_over_pad(record: Record) -> Panel:
                              marker={"symbol": "x", "size": 4, "color": COLOUR["alert"]})  # fmt: skip
     caption = "Drag to turn; the legend switches the GPS readings on."
     caption += "" if to_scale else " Height is drawn to a scale of its own."
-    alt = f"Path in space: {listed([role for role, _ in paths])}{', over the pad' if where else ''}."
+    alt = f"Path in space: {listed([name for _, name, _ in paths])}{', over the pad' if where else ''}."
     return Panel(key, title, caption, alt, figure, needs_webgl=True)
 
 
-def _proportions(paths: list[tuple[str, Track]], where: Pad | None) -> tuple[dict[str, float], bool]:
+def _proportions(paths: list[tuple[str, str, Track]], where: Pad | None) -> tuple[dict[str, float], bool]:
     """Sides of the box of a 3-D view, and whether they are true to scale: a very flat or slender path is not."""
-    points = np.concatenate([paths[-1][1].value, *([where.corners()] if where is not None else [])])
+    points = np.concatenate([paths[-1][2].value, *([where.corners()] if where is not None else [])])
     north, east, height = np.maximum(np.nanmax(points, axis=0) - np.nanmin(points, axis=0), 1e-3)
     across = max(north, east)
     to_scale = bool(across / 6.0 < height < 6.0 * across)

@@ -16,6 +16,7 @@ from flownav.report.series import (
     Track,
     Window,
     difference,
+    estimates,
     flow_velocity,
     gps_velocity_body,
     has,
@@ -29,7 +30,12 @@ from flownav.report.series import (
 
 POSITION_TITLES = ("x, north (m)", "y, east (m)", "z, down (m)")
 VELOCITY_TITLES = ("u, forward (m/s)", "v, right (m/s)", "w, down (m/s)")
+POSITION_ERRORS = ("x error (m)", "y error (m)", "z error (m)")
+VELOCITY_ERRORS = ("u error (m/s)", "v error (m/s)", "w error (m/s)")
+USUAL = 0.98  # of what is drawn of errors and bands is inside the axes
+FRAME = "At the filter's own instant and in its own frame, which GPS has put somewhere."
 REFERENCE = ("pos_n_ref_m", "pos_e_ref_m", "pos_d_ref_m")
+PLACED = "What is flown on counts from where the vehicle takes its pad to be, the estimate from the filter's origin."
 DOWN = "z is positive down (NED); its axis is drawn upside down, so that up on the page is up."
 
 
@@ -58,23 +64,19 @@ def position(record: Record, view: View = POSITION) -> Panel:
     """Position x, y, z: GPS readings, estimate, truth (figures 17 and 22)."""
     dots = [Source("gps", "GPS", readings(record, Sensor.GPS_POSITION))]
     lines = [Source("command", "reference", track(record, "command", REFERENCE))]
-    lines += [
-        Source(role, role, track(record, role, POSITION_NED)) for role in ("autopilot", "smoothed", "estimate", "truth")
-    ]
+    lines += [Source(*source) for source in estimates(record, POSITION_NED)]
     note = DOWN if view.with_gps else "The legend switches the GPS readings on."
+    note += f" {PLACED}" if has(record, "flown") and view.with_gps else ""
     return _states(record, POSITION_TITLES, dots, lines, view, note)
 
 
 def velocity(record: Record, view: View = VELOCITY) -> Panel:
     """Body velocity u, v, w: flow, estimate, truth (figures 18 to 25)."""
-    lines = [
-        Source(role, role, track(record, role, VELOCITY_BODY))
-        for role in ("autopilot", "smoothed", "estimate", "truth")
-    ]
+    lines = [Source(*source) for source in estimates(record, VELOCITY_BODY)]
     flow = flow_velocity(record)
     name = "flow sensor" if has(record, "flow_velocity") else "flow \N{MULTIPLICATION SIGN} range"
     dots = [Source("flow", name, flow)]
-    if lines[-1].track is None:
+    if not has(record, "truth", VELOCITY_BODY):
         dots.insert(0, Source("gps", "GPS velocity", gps_velocity_body(record)))
     note = "Body axes: forward, right, down."
     if flow is None:
@@ -87,7 +89,7 @@ def velocity(record: Record, view: View = VELOCITY) -> Panel:
 def _states(
     record: Record, titles: tuple[str, ...], dots: list[Source], lines: list[Source], view: View, note: str
 ) -> Panel:
-    if all(line.track is None for line in lines if line.role != "command"):
+    if all(line.role == "command" for line in lines):
         return Panel(view.key, view.title, absent="The record holds no estimate and no truth of these states.")
     stack = Stack(titles)
     for role, name, source in dots:
@@ -142,14 +144,12 @@ def close_up_window(moment: Moment, start_s: float, end_s: float) -> Window:
 
 def position_error(record: Record) -> Panel:
     """Position error with its 3-sigma band (figures 26 and 29)."""
-    titles = ("x error (m)", "y error (m)", "z error (m)")
-    return _error(record, POSITION_NED, titles, "position-error", "Position error")
+    return _error(record, POSITION_NED, POSITION_ERRORS, "position-error", "Position error")
 
 
 def velocity_error(record: Record) -> Panel:
     """Velocity error with its 3-sigma band (figures 27 and 30)."""
-    titles = ("u error (m/s)", "v error (m/s)", "w error (m/s)")
-    return _error(record, VELOCITY_BODY, titles, "velocity-error", "Velocity error")
+    return _error(record, VELOCITY_BODY, VELOCITY_ERRORS, "velocity-error", "Velocity error")
 
 
 def _error(record: Record, columns: tuple[str, ...], titles: tuple[str, ...], key: str, title: str) -> Panel:
@@ -159,24 +159,50 @@ def _error(record: Record, columns: tuple[str, ...], titles: tuple[str, ...], ke
         return Panel(key, title, absent=f"The record holds no {missing} of these states, so there is no error to draw.")
     stack = Stack(titles)
     deviation = track(record, "estimate", tuple(f"std_{name}" for name in columns))
-    error = difference(estimate, truth)
-    for row in (1, 2, 3):
+    error, beyond = difference(estimate, truth), False
+    for row, values in enumerate(error.value.T, 1):
+        band = np.zeros(1) if deviation is None else 3.0 * deviation.value[:, row - 1]
         if deviation is not None:
-            stack.band(
-                row,
-                "±3\N{GREEK SMALL LETTER SIGMA}, as the filter states it",
-                deviation.t_s,
-                3.0 * deviation.value[:, row - 1],
-            )
-        stack.line(row, "estimate", "estimate \N{MINUS SIGN} truth", error.t_s, error.value[:, row - 1])
+            stack.band(row, "±3\N{GREEK SMALL LETTER SIGMA}, as the filter states it", deviation.t_s, band)
+        reach = _reach(values, band)
+        stack.within(row, reach)
+        beyond = beyond or bool(np.abs(values).max(initial=0.0) > reach)
+        stack.line(row, "estimate", "estimate \N{MINUS SIGN} truth", error.t_s, values)
     figure = stack.figure(start_end_s(record), moments(record))
     caption = (
         "A consistent filter stays inside its band about 99.7 % of the time."
         if deviation is not None
         else "The filter states no standard deviations, so there is no band."
     )
+    caption += f" {FRAME}" if has(record, "flown") else ""
+    caption += " The axes leave out rare peaks; zoom out to see them." if beyond else ""
     alt = f"{title} over time: {', '.join(titles)}. Drawn: {listed(stack.names)}."
     return Panel(key, title, caption, alt, figure)
+
+
+def _reach(values: Array, band: Array) -> float:
+    """Half the height of an axis that shows error and band but for their first moments and rare peaks."""
+    usual = [np.quantile(np.abs(part[np.isfinite(part)]), USUAL) for part in (values, band) if np.isfinite(part).any()]
+    return 1.2 * max([*map(float, usual), 1e-6])
+
+
+def flown_errors(record: Record) -> list[Panel]:
+    """Errors of what an autopilot flew on, the estimate of now from where the pad is taken to be; none without."""
+    panels = []
+    for columns, titles, what in (
+        (POSITION_NED, POSITION_ERRORS, "position"),
+        (VELOCITY_BODY, VELOCITY_ERRORS, "velocity"),
+    ):
+        flown, truth = track(record, "flown", columns), track(record, "truth", columns)
+        if flown is None or truth is None:
+            return []
+        stack, error = Stack(titles), difference(flown, truth)
+        for row, values in enumerate(error.value.T, 1):
+            stack.line(row, "flown", "flown on \N{MINUS SIGN} truth", error.t_s, values)
+        figure, title = stack.figure(start_end_s(record), moments(record)), f"What was flown on: {what} error"
+        caption = "Until the hand-over the vehicle stands, or is flown on the truth: no error, by definition."
+        panels.append(Panel(f"flown-{what}-error", title, caption, f"{title} over time: {', '.join(titles)}.", figure))
+    return panels
 
 
 def lift_off_transient(record: Record, lift_off: Moment) -> Panel:

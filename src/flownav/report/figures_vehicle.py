@@ -7,7 +7,7 @@ import numpy as np
 from flownav.measurement import Sensor
 from flownav.record import QUATERNION, Record
 from flownav.report.panels import Panel, Stack, listed
-from flownav.report.series import LINE_POINTS, Track, euler_deg, moments, readings, start_end_s, thin, track
+from flownav.report.series import LINE_POINTS, Track, estimates, euler_deg, moments, readings, start_end_s, thin, track
 
 CONTROLS = {
     "lon_rad": "longitudinal (°)",
@@ -20,18 +20,17 @@ CONTROLS = {
 def attitude(record: Record) -> Panel:
     """Roll, pitch and yaw [deg] of truth, estimate and autopilot; of the attitude sensor where none of them has any."""
     key, title = "attitude", "Attitude"
-    sources = [(role, role, track(record, role, QUATERNION)) for role in ("autopilot", "smoothed", "estimate", "truth")]
-    if all(source is None for _, _, source in sources):
-        sources = [("estimate", "attitude sensor", readings(record, Sensor.ATTITUDE))]
-    if all(source is None for _, _, source in sources):
+    sources, own = estimates(record, QUATERNION), readings(record, Sensor.ATTITUDE)
+    if not sources and own is not None:
+        sources = [("estimate", "attitude sensor", own)]
+    if not sources:
         return Panel(key, title, absent="The record holds no attitude.")
     stack = Stack(("roll (°)", "pitch (°)", "yaw (°)"))
     for role, name, source in sources:
-        if source is not None:
-            kept = thin(LINE_POINTS, *source.value[:, 1:].T)
-            angles = euler_deg(Track(source.t_s[kept], source.value[kept]))
-            for row in (1, 2, 3):
-                stack.line(row, role, name, source.t_s[kept], _unbroken(angles[:, row - 1], row == 3))
+        kept = thin(LINE_POINTS, *source.value[:, 1:].T)
+        angles = euler_deg(Track(source.t_s[kept], source.value[kept]))
+        for row in (1, 2, 3):
+            stack.line(row, role, name, source.t_s[kept], _unbroken(angles[:, row - 1], row == 3))
     figure = stack.figure(start_end_s(record), moments(record))
     return Panel(key, title, "Z-Y-X Euler angles of body against earth; drawn in degrees.",
                  f"Roll, pitch and yaw in degrees: {listed(stack.names)}.", figure)  # fmt: skip

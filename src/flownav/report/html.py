@@ -51,6 +51,7 @@ def widened(panels: list[Panel]) -> Iterator[Panel]:
 def _sections(record: Record) -> list[tuple[str, str, list[Panel]]]:
     known = has(record, "truth")
     errors = [figures_states.position_error(record), figures_states.velocity_error(record)] if known else []
+    errors = [*figures_states.flown_errors(record), *errors]
     against_gps = [] if known else [figures_filter.error_against_gps(record)]
     uncertainty = [*errors, *against_gps, figures_filter.radius_of_uncertainty(record)]
     return [
@@ -85,6 +86,7 @@ def render(record: Record) -> str:
         lacking=content.lacking(record),
         paper=mapping(record.manifest.get("paper")),
         scores=content.score_rows(record),
+        flown=has(record, "flown"),
         outages=content.outage_rows(record),
         rejected=content.rejected_rows(record),
         sections=shown,

@@ -18,6 +18,8 @@ LINE_POINTS = 3000  # a drawn line has at most so many points
 DOT_POINTS = 900  # a cloud of readings so many dots
 CROSS_POINTS = 250  # and the exceptional ones so many crosses
 
+ESTIMATES = (("autopilot", "autopilot"), ("smoothed", "smoothed"), ("flown", "flown on"), ("estimate", "estimate"),
+             ("truth", "truth"))  # tables and what they are called  # fmt: skip
 LIFT_OFF_KINDS = ("lift-off", "lift_off", "takeoff")
 TOUCHDOWN_KINDS = ("touchdown",)
 
@@ -85,6 +87,12 @@ def track(record: Record, table: str, columns: tuple[str, ...]) -> Track | None:
     if not has(record, table, columns):
         return None
     return Track(np.asarray(record.tables[table]["t_s"], float), record.matrix(table, columns))
+
+
+def estimates(record: Record, columns: tuple[str, ...]) -> list[tuple[str, str, Track]]:
+    """Everything that says these states, as (role, name, track), the truth last and so on top."""
+    found = [(role, name, track(record, role, columns)) for role, name in ESTIMATES]
+    return [(role, name, source) for role, name, source in found if source is not None]
 
 
 def readings(record: Record, sensor: Sensor) -> Track | None:

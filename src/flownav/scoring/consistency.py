@@ -1,8 +1,8 @@
 """Consistency of a filter over many flights: does it know how wrong it is, and is it as good as its own model allows.
 
 Everything is over steps in flight, those without skid contact, from the filter's start on. At rest on the ground a
-filter is told that it does not move, a pseudo-measurement with no noise of its own whose stated sigma is a guess on the
-safe side: any filter then looks too modest, and its errors are none of a flying vehicle's.
+filter is told that it does not move, a pseudo-measurement whose stated sigma is a guess: its errors there are none of a
+flying vehicle's.
 
 Sums, not flights, are kept: memory does not grow with the number of flights.
 """

@@ -18,9 +18,15 @@ from flownav.scoring.errors import (
 from flownav.scoring.paper_tables import percentile_of_paper, published
 
 
+def statistics(error, counted=None):
+    """Mean, std, RMS and largest of an error (epochs, 1, 1)."""
+    counted = np.ones((len(error), 1)) if counted is None else counted
+    return error_statistics(error, np.zeros_like(error), counted)[0, 0]
+
+
 def test_statistics_of_a_known_error():
     error = np.array([1.0, -1.0, 3.0, 1.0]).reshape(-1, 1, 1)
-    mean, std, rms, largest = error_statistics(error, np.zeros_like(error))[0, 0]
+    mean, std, rms, largest = statistics(error)
     assert (mean, rms, largest) == (1.0, pytest.approx(np.sqrt(3.0)), 3.0)
     assert std == pytest.approx(np.std(error))
 
@@ -63,6 +69,19 @@ def test_a_contact_before_landing_is_allowed_or_a_hard_one_is_a_crash():
     assert scored(contacts([(0, 50), (1, 10)]), sink_m_s=3.0)["crashed"]
 
 
+def test_a_flight_of_which_nothing_counts_has_null_scores():
+    zeros, on_ground = np.zeros((50, 6, 2)), np.zeros((50, 2))
+    counted = np.zeros((50, 2))
+    counted[:, 1] = 1.0
+    rows = score_block(np.arange(50) * 0.02, zeros, zeros, on_ground, on_ground, may_land_after_s=0.0, counted=counted)
+    scores = scores_of_flight(rows[0])
+    assert scores["max_position_error_m"] is None
+    assert set(scores["states"]["x"].values()) == {None}
+    assert scores_of_flight(rows[1])["max_position_error_m"] == 0.0
+    assert scores_of_flights(rows[:1])["max_position_error_m"] is None
+    assert scores_of_flights(rows)["max_position_error_m"]["median"] == 0.0
+
+
 def test_many_flights_give_median_and_percentiles_in_the_same_layout():
     rows = np.tile(np.arange(101.0)[:, None], (1, len(SCORE_COLUMNS)))
     scores = scores_of_flights(rows)
@@ -91,8 +110,17 @@ def test_the_papers_percentile_counts_flights_below_it():
 
 def test_the_largest_error_is_so_on_either_side():
     error = np.array([1.0, -4.0, 3.0]).reshape(-1, 1, 1)
-    assert error_statistics(error, np.zeros_like(error))[0, 0, 3] == 4.0
-    assert error_statistics(-error, np.zeros_like(error))[0, 0, 3] == 4.0
+    assert statistics(error)[3] == 4.0
+    assert statistics(-error)[3] == 4.0
+
+
+def test_only_the_steps_that_count_are_scored_each_lane_by_itself():
+    error = np.array([9.0, 1.0, -3.0, 9.0])[:, None, None] * np.array([1.0, 2.0, 1.0])
+    counted = np.array([[0.0, 1.0, 1.0, 0.0]] * 2 + [[0.0] * 4]).T
+    found = error_statistics(error, np.zeros_like(error), counted)[:, 0]
+    assert found[0] == pytest.approx([-1.0, 2.0, np.sqrt(5.0), 3.0])
+    assert found[1] == pytest.approx(2.0 * np.array([-1.0, 2.0, np.sqrt(5.0), 3.0]))
+    assert np.isnan(found[2]).all()
 
 
 @pytest.mark.parametrize(("epochs", "airborne"), [(24, False), (25, True)])

@@ -99,8 +99,8 @@ class RangeMemory(NamedTuple):
 
 class GroundMemory(NamedTuple):
     """known: 1 once ranges have found the ground. A ground that would be new: candidate_m, its down coordinate by the
-    newest range; since_s and first_m, when and by which range it was seen first; agreeing, by how many in a row; varied: 1
-    where these were not all the same to the last digit.
+    newest range; since_s and first_m, when and by which range it was seen first; agreeing, by how many in a row;
+    varied: 1 where these were not all the same to the last digit.
     """
 
     known: float

@@ -126,7 +126,7 @@ def find_pad(work: Work, lanes: Lanes, lane: int, t_s: float, reading: Reading, 
 # -- at rest ------------------------------------------------------------------------------------------------
 @procedure
 def take_landed(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
-    """On the ground: no velocity, and before a flight the pad is where the vehicle stands. In flight nothing is said."""
+    """On the ground: no velocity, and before a flight the pad is where the vehicle stands. In flight, nothing."""
     s = load_place_settings(p)
     for lane in range(len(lanes)):
         aid, reading = load_aid(work, lanes, lane), load_reading(work, lanes, lane)
@@ -147,8 +147,8 @@ def take_landed(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: O
 @procedure
 def stand_on_pad(work: Work, lanes: Lanes, t_s: float, s: PlaceSettings, o: Output) -> None:
     """The place of take-off is the pad until a camera sees one: a state tied to the vehicle's own while it stands, so
-    that what GPS later tells of the one it tells of the other, and the way back is known better than either. A vehicle that
-    is carried about before its flight takes the pad along.
+    that what GPS later tells of the one it tells of the other, and the way back is known better than either. A
+    vehicle that is carried about before its flight takes the pad along.
     """
     standing = False
     for lane in range(len(lanes)):

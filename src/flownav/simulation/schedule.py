@@ -3,8 +3,8 @@
 Every reading has three times: the instant at which it was taken, the instant that it describes as far as anybody
 knows (`t_s`: its arrival less the age that the datasheet states; arrivals are uneven, so this is off by the jitter),
 and the epoch in which the navigator takes it, a fixed horizon later. Readings are taken in the order of `t_s`, as a
-live session's horizon releases them. The timetable is a scenario's, not a flight's: what differs from flight to flight is
-what was read and whether it arrived.
+live session's horizon releases them. The timetable is a scenario's, not a flight's: what differs from flight to
+flight is what was read and whether it arrived.
 """
 
 from __future__ import annotations

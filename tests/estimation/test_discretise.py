@@ -22,7 +22,7 @@ def test_hold_is_the_matrix_exponential(dt):
 
 
 def test_papers_model_at_50_hz_is_as_the_reference_computed():
-    """vehicle-and-sensors.md 1.6."""
+    """The eigenvalues of the printed matrix, held over 20 ms."""
     model = load_paper_model()
     transition, input_matrix = discretised(model.a, model.b, 0.02)
     block = [[0.99962, 0.00249, 0.00137], [-0.00252, 0.9994, 0.01074], [-0.00132, -0.01041, 0.9364]]

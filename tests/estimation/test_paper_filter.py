@@ -96,7 +96,7 @@ def test_covariance_stays_symmetric_and_positive(model, flight_data):
 
 
 def test_steady_gains_are_those_of_reading_the_printed_numbers_as_variances(model):
-    """vehicle-and-sensors.md 3.3: gains 0.095 (position), 0.144 (u, v), 0.103 (w)."""
+    """The steady gains of the printed matrices: 0.095 (position), 0.144 (u, v), 0.103 (w)."""
     n = 500
     _, covariances = run(model, np.zeros((n, 4)), np.zeros((n, 6)), np.ones((n, 6)))
     gains = np.diag(covariances[-1]) / model.measurement_noise

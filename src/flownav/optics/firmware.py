@@ -1,6 +1,6 @@
 """The PX4FLOW firmware's versions: what changed between 2013 and 2020, and the defects that came and went.
 
-Dates and commits are those of the public PX4/Flow history (vehicle-and-sensors.md, table 4.2). A version is a
+Dates and commits are those of the public PX4/Flow history (github.com/PX4/Flow). A version is a
 set of plain numbers and switches, so that a defect can be switched alone:
 `firmware_named("2013-09")._replace(gyro_scale=1.0)`.
 """

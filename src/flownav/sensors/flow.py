@@ -5,7 +5,7 @@ at the sensor's 250 Hz with the input held over each 4 ms. Readings are publishe
 standard deviation that grows with height. What else happens on a real vehicle is switchable by parameters:
 
 - the sonar cannot report less than its floor (0.30 m), and the sensor multiplies flow by the sonar's range, so
-  below the floor its velocity is too large by floor/range (vehicle-and-sensors.md 4.3);
+  below the floor its velocity is too large by floor/range (MaxBotix, HRLV-MaxSonar-EZ datasheet);
 - changes of rotor thrust shake the sensor on its elastic mount (figure 28): a mode xi'' + 2 zeta w xi' + w^2 xi
   = T/m whose velocity xi' adds to what the sensor sees, ahead of the lag;
 - PX4FLOW measures no vertical velocity (finding 10): the third channel is either declared `synthetic` (the same

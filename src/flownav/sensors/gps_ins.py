@@ -5,9 +5,9 @@ jitter. Velocity error: Gauss-Markov + white. Attitude error: Gauss-Markov tilt 
 and Gauss-Markov heading about the vertical. One equation serves both published readings of the unit; the
 parameters alone select:
 
-- `white`: what the paper must have simulated (vehicle-and-sensors.md 3.3): independent position noise of about
+- `white`: what the paper must have simulated (back-solved from its Tables 5 and 6): independent position noise of about
   0.3 m an axis at every 50 Hz sample, nothing else. It is the jitter with time constant zero.
-- `midg`: what 2 m CEP means (3.2): errors of metres that change over minutes, one sample (20 ms) late.
+- `midg`: what 2 m CEP means (Table 4): errors of metres that change over minutes, one sample (20 ms) late.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """How a flow sensor's noise grows with height: the laws, and the polynomial that the equations evaluate.
 
 - `constant`: one standard deviation.
-- `power`: sigma_r (h/h_r)^n. Table 2's means follow 0.0350 (h/0.6)^2.06 m/s (vehicle-and-sensors.md 4.6).
+- `power`: sigma_r (h/h_r)^n. Table 2's means follow 0.0350 (h/0.6)^2.06 m/s.
 - `accuracy`: (1 - A sqrt(h_r/h)) sigma_signal with A = 0.9, h_r = 0.6 m: the paper's accuracy rule (87, 92, 92,
   90 % after its scaling by field of view and speed) read as a fit of 100 (1 - sigma/sigma_signal) per cent.
 

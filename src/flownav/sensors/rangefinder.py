@@ -1,7 +1,7 @@
 """The rangefinder (HRLV-MaxSonar on the PX4FLOW, 10 Hz): floor, ceiling, resolution, noise, a stuck value.
 
 The sonar reports its floor, 300 mm, for anything nearer, whole millimetres, and nothing beyond 5 m
-(vehicle-and-sensors.md 4.3). The PX4FLOW firmware smooths its ranges with a fixed-gain filter, whose rate is
+(MaxBotix, HRLV-MaxSonar-EZ datasheet). The PX4FLOW firmware smooths its ranges with a fixed-gain filter, whose rate is
 the only vertical velocity that the sensor has:
 
     x- = x + v T,   e = range - x-,   x = x- + 0.8461 e,   v = v + 6.2034 e

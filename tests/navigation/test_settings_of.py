@@ -1,0 +1,126 @@
+"""From datasheets to what the navigator is told."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from flownav.frames import GRAVITY_M_S2
+from flownav.navigation.flow import flow_variance
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.settings_of import noise_of, of_gps_receiver, of_inertial, of_magnetometer, settings_of
+from flownav.navigation.told import NO_HEADING, NO_STATED_NOISE, Equipment
+from flownav.sensors.datasheet import load_sensor
+from flownav.sensors.gps_receiver_sheet import load_gps_receiver_sheet
+from flownav.sensors.inertial_sheet import Vibration, load_inertial_sheet
+from flownav.sensors.magnetometer_sheet import MagneticField, load_magnetometer_sheet
+from flownav.sensors.sheets import shipped_sheets
+
+FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
+
+
+def test_without_any_sheet_all_is_as_usual():
+    assert settings_of() == (NavigatorSettingsFile(), NO_STATED_NOISE)
+
+
+def test_a_flow_sensors_file_tells_gains_and_limits():
+    sensor = load_sensor()
+    told, noise = settings_of(sensor)
+    usual = NavigatorSettingsFile().model_dump()
+    changed = {name: value for name, value in told.model_dump().items() if value != usual[name]}
+    assert changed == {
+        "flow_gain_x": sensor.dynamics.gain, "flow_gain_y": sensor.dynamics.gain,
+        "flow_min_height_m": sensor.limits.min_height_m, "flow_limit_rad_s": sensor.limits.max_flow_rad_s,
+    }  # fmt: skip
+    assert noise == NO_STATED_NOISE
+
+
+def test_what_a_user_states_stands_above_every_sheet_and_what_he_does_not_below():
+    stated = NavigatorSettingsFile(flow_gain_x=0.9, gps_slow_sigma_m=7.0, gate_sigma=4.0)
+    told, _ = settings_of(load_sensor(), shipped_sheets(), stated=stated)
+    assert (told.flow_gain_x, told.gps_slow_sigma_m, told.gate_sigma) == (0.9, 7.0, 4.0)
+    assert told.flow_gain_y == load_sensor().dynamics.gain
+    assert told.gps_slow_tau_s == load_gps_receiver_sheet().position.slow_tau_s
+
+
+def test_the_files_law_of_noise_is_the_filters_where_it_is_asked_for():
+    """And then the reading's quality says nothing."""
+    sensor = load_sensor()
+    told, noise = settings_of(sensor, flow_noise_stated=True)
+    flow = told.settings(FITTED, noise).flow
+    for height_m in (0.6, 0.9, 1.5):
+        law = max(float(sensor.noise.curve()(np.array([height_m]))[0]), sensor.noise.floor_m_s)
+        assert flow_variance(height_m, 0.0, 255.0, True, flow) == pytest.approx(law**2, rel=1e-6)
+        assert flow_variance(height_m, 0.0, 10.0, True, flow) == flow_variance(height_m, 0.0, 255.0, True, flow)
+    assert flow_variance(5.0, 0.0, 255.0, True, flow) == flow_variance(1.5, 0.0, 255.0, True, flow)  # no extrapolation
+    assert noise == noise_of(sensor)
+
+
+def test_every_shipped_sheet_is_heard():
+    """Each tells something that the defaults do not; what none tells stays."""
+    sheets = shipped_sheets()
+    usual = settings_of(sheets=sheets)[0].model_dump()
+    for name in type(sheets).model_fields:
+        if name in ("inertial", "magnetic_field", "skid_switch"):
+            continue
+        without = settings_of(sheets=sheets.model_copy(update={name: None}))[0].model_dump()
+        assert without != usual, name
+    assert usual["ground_reset_s"] == NavigatorSettingsFile().ground_reset_s
+    lens, antenna = sheets.flow_camera.lens, sheets.gps_receiver.antenna
+    assert [usual[f"flow_{side}_m"] for side in ("forward", "right", "below")] == [
+        lens.forward_m, lens.right_m, lens.down_m
+    ]  # fmt: skip
+    assert [usual[f"gps_{side}_m"] for side in ("forward", "right", "below")] == [
+        antenna.forward_m, antenna.right_m, antenna.down_m
+    ]  # fmt: skip
+
+
+def test_the_velocity_that_white_noise_integrates_to_is_what_the_filter_expects():
+    """Readings of the sheet's own noise, summed: their spread after a second is the filter's density."""
+    sheet = load_inertial_sheet().model_copy(update={"vibration": Vibration()})
+    keys, parameters = of_inertial(sheet), sheet.parameters(0.0, 2.0)
+    random, count = np.random.default_rng(1), round(float(sheet.rate_hz))
+    for key, sigma in (
+        ("accel_noise_m_s2_rt_hz", parameters.accel_sigma_m_s2),
+        ("gyro_noise_rad_s_rt_hz", parameters.gyro_sigma_rad_s),
+    ):
+        summed = sheet.period_s * random.normal(0.0, sigma, (4000, count)).sum(axis=1)
+        assert summed.std() == pytest.approx(keys[key], rel=0.05)
+    assert keys["imu_integrates"] == 1.0
+
+
+def test_weight_turns_scale_and_misalignment_of_an_accelerometer_into_bias():
+    sheet = load_inertial_sheet()
+    own = 1e-3 * GRAVITY_M_S2 * sheet.accelerometer.bias_mg
+    still = sheet.accelerometer.model_copy(update={"scale_percent": 0.0, "misalignment_deg": 0.0})
+    alone = of_inertial(sheet.model_copy(update={"accelerometer": still}))
+    assert alone["accel_bias_sigma_m_s2"] == pytest.approx(own)
+    whole = math.hypot(own, GRAVITY_M_S2 * 0.003, GRAVITY_M_S2 * math.radians(0.3))
+    assert of_inertial(sheet)["accel_bias_sigma_m_s2"] == pytest.approx(whole)
+
+
+def test_vibration_of_the_sheet_counts_as_noise_and_as_harmless():
+    sheet = load_inertial_sheet()
+    calm = of_inertial(sheet.model_copy(update={"vibration": Vibration()}))
+    shaken, weakened = of_inertial(sheet), of_inertial(sheet, (23.0, 46.0))
+    for key in ("accel_noise_m_s2_rt_hz", "gyro_noise_rad_s_rt_hz"):
+        assert calm[key] < weakened[key] < shaken[key]
+    assert shaken["vibration_free_m_s2"] > calm["vibration_free_m_s2"] == NavigatorSettingsFile().vibration_free_m_s2
+
+
+def test_a_receivers_sheet_says_what_changes_from_fix_to_fix():
+    sheet = load_gps_receiver_sheet()
+    keys = of_gps_receiver(sheet)
+    assert keys["gps_white_sigma_m"] == pytest.approx(
+        math.hypot(sheet.position.white_sigma_m, sheet.position.quantum_m / math.sqrt(12.0))
+    )
+    assert keys["gps_white_share"] < NavigatorSettingsFile().gps_white_share
+    assert keys["gps_velocity_lag_sigma_s"] == sheet.velocity.smoothing_tau_s
+
+
+def test_hard_iron_is_an_angle_of_the_level_field():
+    field = MagneticField(strength_gauss=0.5, inclination_deg=60.0)
+    sheet = load_magnetometer_sheet().model_copy(update={"hard_iron_mgauss": 25.0})
+    assert of_magnetometer(sheet, field)["compass_sigma_rad"] == pytest.approx(0.1)

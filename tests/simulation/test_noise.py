@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
@@ -88,16 +88,19 @@ def test_a_later_start_continues_the_same_numbers():
     assert np.array_equal(normals(100)[40:], normals(60, first_step=40))
 
 
+@settings(deadline=None)
 @given(st.floats(min_value=2.0**-52, max_value=1.0))
 def test_logarithm_is_right_to_the_last_digit(u):
     assert logarithm(u) == pytest.approx(np.log(u), rel=3e-16, abs=3e-16)
 
 
+@settings(deadline=None)
 @given(st.floats(min_value=-np.pi / 4, max_value=np.pi / 4))
 def test_sine_and_cosine_are_right(r):
     assert sine_cosine(r) == pytest.approx((np.sin(r), np.cos(r)), abs=3e-16)
 
 
+@settings(deadline=None)
 @given(st.floats(allow_nan=False))
 def test_bits_go_and_come_back(value):
     assert float_from_bits(bits_from_float(value)) == value

@@ -75,23 +75,29 @@ def schedule_of(
 def sampled_readings(
     epochs: int, sensors: Onboard, timing: dict[Sensor, Timing], stated: dict[Sensor, Timing]
 ) -> tuple[NDArray[np.float64], NDArray[np.int64], NDArray[np.int64]]:
-    """Every reading in the order of `sampling.sample`: the instant it is taken to describe, its sensor, its epoch."""
-    generator = np.random.Generator(np.random.Philox(JITTER_KEY))
-    parts = round(EPOCH_S / (sensors.inertial_steps * PHYSICS_PERIOD_S))
-    rows: list[tuple[float, int, int]] = []
-    late_s = 0.0
-    for epoch in range(epochs):
-        for sensor, clock in clocks(sensors):
-            if due_at(clock, epoch):
-                if sensor != Sensor.GPS_VELOCITY:  # which comes with the position
-                    late_s = timing[sensor].jitter_s * (2.0 * generator.random() - 1.0)
-                hidden_s = timing[sensor].latency_s - stated[sensor].latency_s
-                rows.append((epoch * EPOCH_S - stated[sensor].lag_s + late_s + hidden_s, int(sensor), epoch))
-        for part in range(parts):
-            t_s = epoch * EPOCH_S + (part + 1) * sensors.inertial_steps * PHYSICS_PERIOD_S
-            rows.append((t_s, int(Sensor.IMU), epoch))
-    described, kinds, epochs_of = zip(*rows, strict=True)
-    return np.array(described), np.array(kinds, np.int64), np.array(epochs_of, np.int64)
+    """Every reading in the order of `sampling.sample`: the instant it is taken to describe, its sensor, its epoch.
+
+    Each sensor's jitter is drawn for itself: a vehicle without another sensor has the same.
+    """
+    parts: list[tuple[NDArray[np.float64], int, NDArray[np.int64]]] = []
+    for sensor, clock in clocks(sensors):
+        if clock.fitted == 0:
+            continue
+        due = np.arange(clock.first, epochs, clock.every, dtype=np.int64)
+        of = Sensor.GPS_POSITION if sensor == Sensor.GPS_VELOCITY else sensor  # the two come together
+        drawn = np.random.Generator(np.random.Philox(key=[JITTER_KEY, int(of)])).random(len(due))
+        late_s = timing[sensor].jitter_s * (2.0 * drawn - 1.0)
+        hidden_s = timing[sensor].latency_s - stated[sensor].latency_s
+        t_s = np.asarray(due * EPOCH_S - stated[sensor].lag_s + late_s + hidden_s, np.float64)
+        parts.append((t_s, int(sensor), due))
+    every = np.arange(epochs, dtype=np.int64)
+    for part in range(round(EPOCH_S / (sensors.inertial_steps * PHYSICS_PERIOD_S))):
+        t_s = np.asarray(every * EPOCH_S + (part + 1) * sensors.inertial_steps * PHYSICS_PERIOD_S, np.float64)
+        parts.append((t_s, int(Sensor.IMU), every))
+    epoch = np.concatenate([due for _, _, due in parts])
+    order = np.argsort(epoch, kind="stable")
+    kinds = np.concatenate([np.full(len(due), kind) for _, kind, due in parts])
+    return np.concatenate([t_s for t_s, _, _ in parts])[order], kinds[order], epoch[order]
 
 
 def clocks(sensors: Onboard) -> list[tuple[Sensor, Clock]]:
@@ -109,8 +115,3 @@ def clocks(sensors: Onboard) -> list[tuple[Sensor, Clock]]:
         (Sensor.PAD, sensors.pad_clock),
         (Sensor.LANDED, sensors.skid_clock),
     ]
-
-
-def due_at(clock: Clock, epoch: int) -> bool:
-    """Whether a sensor reads in this epoch."""
-    return clock.fitted > 0 and epoch >= clock.first and (epoch - clock.first) % clock.every == 0

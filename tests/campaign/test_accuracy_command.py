@@ -10,18 +10,17 @@ from typer.testing import CliRunner
 
 from flownav.campaign.ablations import (
     ablations,
+    ageless,
     constant_flow_noise,
-    first_order_lag,
-    no_lag,
+    without_compass_states,
     without_gps_states,
-    without_imu,
 )
 from flownav.campaign.accuracy import CASES, Target, flights_of, scenario_of
 from flownav.campaign.judged import fly_judged, home_epoch
-from flownav.campaign.local import fly_many
+from flownav.campaign.local import fly_many, known_exactly
 from flownav.cli import app
 from flownav.errors import InputError, VerdictError
-from flownav.estimation.landing.states import GPS_FAST, GPS_SLOW, GPS_VELOCITY
+from flownav.measurement import Sensor
 from flownav.scoring.consistency import GROUP_FLIGHTS
 from flownav.sensors.flow import flow_noise_sigma
 from flownav.simulation.assemble import assemble
@@ -39,85 +38,107 @@ def takeoff():
 
 
 def test_every_variant_lacks_one_piece_that_the_scenario_has(approach, takeoff):
-    everywhere = ["second-order dynamics", "latency and dynamics", "height schedule"]
-    assert list(ablations(takeoff)) == [*everywhere, "IMU", "flow"]
-    assert list(ablations(approach)) == [*everywhere, "GPS error states", "IMU", "pad fix", "flow"]
+    told, carried = ["flow's age", "height schedule", "compass deviation"], ["barometer", "flow"]
+    assert list(ablations(takeoff)) == [*told, *carried]
+    assert list(ablations(approach)) == [*told, "GPS error states", "barometer", "pad fix", "flow"]
+    whole = approach.flight
+    clocks = {"barometer": "baro_clock", "pad fix": "pad_clock", "flow": "camera_clock"}
     for lacking, flight in ablations(approach).items():
-        whole = approach.flight
-        assert flight.plan is whole.plan, lacking
-        assert (flight.vehicle, flight.wind, flight.path) == (whole.vehicle, whole.wind, whole.path), lacking
-        truth = flight.sensors._replace(imu=whole.sensors.imu, pad_fix=whole.sensors.pad_fix)
-        assert truth == whole.sensors, lacking
+        assert flight._replace(onboard=whole.onboard, table=whole.table, settings=whole.settings) == whole, lacking
+        assert flight.table.horizon_epochs == whole.table.horizon_epochs, lacking
+        differ = [
+            name for name in whole.onboard._fields if getattr(flight.onboard, name) != getattr(whole.onboard, name)
+        ]
+        assert differ == ([clocks[lacking]] if lacking in clocks else []), lacking
+        settings_differ = not np.array_equal(flight.settings, whole.settings)
+        assert settings_differ == (lacking not in clocks and lacking != "flow's age"), lacking
 
 
-def lagged(lag, speed, epochs):
-    """Readings of a lag whose seen velocity is speed(t) and goes in straight lines between epochs."""
-    x1 = x2 = 0.0
-    readings = []
-    for k in range(1, epochs):
-        m0, m1 = speed(0.02 * (k - 1)), speed(0.02 * k)
-        x1, x2 = (
-            lag.f11 * x1 + lag.f12 * x2 + lag.start_1 * m0 + lag.end_1 * m1,
-            lag.f21 * x1 + lag.f22 * x2 + lag.start_2 * m0 + lag.end_2 * m1,
-        )
-        readings.append(lag.gain * x1)
-    return np.array(readings)
+def flow_instants(flight):
+    """When the flow readings are taken to have been, and in which epoch they are taken."""
+    rows = flight.table.sensor == Sensor.FLOW_RATE
+    return flight.table.t_s[rows], flight.table.epoch[rows]
 
 
-def test_the_first_order_lag_has_the_gain_and_the_delay_of_the_sensor(approach):
-    landing, dynamics = approach.flight.landing, approach.sensor.dynamics
-    simple = first_order_lag(landing, dynamics.b_1_s, dynamics.c_1_s2)
-    for lag in (landing.lag, simple):
-        assert lagged(lag, lambda t: 1.0, 200)[-1] == pytest.approx(dynamics.gain, rel=1e-6)
-        late = dynamics.gain * 0.02 * 199 - lagged(lag, lambda t: t, 200)[-1]
-        assert late / dynamics.gain == pytest.approx(dynamics.delay_s, rel=0.03)
-    assert lagged(simple, lambda t: 1.0, 3)[0] != pytest.approx(lagged(landing.lag, lambda t: 1.0, 3)[0], rel=0.1)
+def test_an_ageless_flow_is_taken_for_that_of_its_arrival(approach):
+    timing = approach.fitted.timing[Sensor.FLOW_RATE]
+    assert ageless(approach.fitted) == timing._replace(lag_s=0.0, latency_s=0.0)
+    right, epochs = flow_instants(approach.flight)
+    wrong, later = flow_instants(ablations(approach)["flow's age"])
+    np.testing.assert_allclose(wrong - right, timing.lag_s + timing.latency_s, atol=1e-12)
+    assert (later >= epochs).all()
+    others = approach.flight.table.sensor != Sensor.FLOW_RATE
+    same = ablations(approach)["flow's age"].table
+    np.testing.assert_array_equal(same.t_s[same.sensor != Sensor.FLOW_RATE], approach.flight.table.t_s[others])
 
 
-def test_without_a_lag_the_reading_is_the_velocity_of_now(approach):
-    readings = lagged(no_lag(approach.flight.landing), np.sin, 100)
-    assert readings == pytest.approx(np.sin(0.02 * np.arange(1, 100)))
+def test_what_is_not_carried_is_not_in_the_timetable(approach):
+    for lacking, sensor in (("barometer", Sensor.BARO), ("pad fix", Sensor.PAD), ("flow", Sensor.FLOW_RATE)):
+        table = ablations(approach)[lacking].table
+        assert sensor not in table.sensor
+        assert sensor in approach.flight.table.sensor
+        others = approach.flight.table.sensor != sensor
+        np.testing.assert_array_equal(table.t_s, approach.flight.table.t_s[others])
 
 
 def test_the_constant_noise_is_the_schedules_root_mean_square(approach):
-    flow = approach.flight.landing.flow
-    constant = constant_flow_noise(flow)
+    noise = approach.fitted.told.noise
+    constant = constant_flow_noise(noise)
     sigma = [flow_noise_sigma(h, constant) for h in (0.3, 1.0, 3.0)]
     assert np.ptp(sigma) == 0.0
-    assert flow_noise_sigma(0.6, flow) < sigma[0] < flow_noise_sigma(1.5, flow)
-    assert flow_noise_sigma(0.6, approach.flight.sensors.flow) < sigma[0]  # the sensor itself is as it was
+    heights = np.linspace(noise.noise_low_m, noise.noise_high_m, 500)
+    rms = np.sqrt(np.mean([flow_noise_sigma(h, noise) ** 2 for h in heights]))
+    assert sigma[0] == pytest.approx(rms, rel=0.01)
+    assert flow_noise_sigma(0.6, noise) < sigma[0] < flow_noise_sigma(1.5, noise)
 
 
 def test_without_its_error_states_all_of_the_gps_error_is_white(approach):
-    landing = approach.flight.landing
-    without = without_gps_states(landing)
-    for state in (GPS_SLOW, GPS_FAST, GPS_VELOCITY):
-        assert not without.start_variance[state : state + 3].any()
-        assert landing.start_variance[state : state + 3].all()
-    gps = approach.scenario.gps
-    level = gps.slow_sigma_m**2 + gps.fast_sigma_m**2
-    assert without.gps_position_variance[0] == pytest.approx(landing.gps_position_variance[0] + level)
-    assert without.gps_velocity_variance == pytest.approx(landing.gps_velocity_variance + gps.velocity_sigma_m_s**2)
+    told = approach.fitted.told
+    before, after = told.settings, without_gps_states(told).settings
+    none = ("gps_slow_sigma_m", "gps_slow_sigma_down_m", "gps_fast_sigma_m", "gps_fast_sigma_down_m",
+            "gps_velocity_sigma_m_s")  # fmt: skip
+    assert all(getattr(after, name) == 0.0 < getattr(before, name) for name in none)
+    for down in ("", "_down"):
+        parts = [getattr(before, f"gps_{part}_sigma{down}_m") for part in ("white", "slow", "fast")]
+        assert getattr(after, f"gps_white_sigma{down}_m") == pytest.approx(np.sqrt(np.sum(np.square(parts))))
+        white, lasting = getattr(before, f"gps_velocity_white{down}_m_s"), before.gps_velocity_sigma_m_s
+        assert getattr(after, f"gps_velocity_white{down}_m_s") == pytest.approx(np.hypot(white, lasting))
 
 
-def test_without_an_imu_the_noise_is_in_the_sensor_and_in_the_filter_alike(approach):
-    flight, landing = approach.flight, approach.flight.landing
-    coasting = without_imu(flight, landing)
-    raised = coasting.landing.settings.accel_noise_m_s2_rt_hz / landing.settings.accel_noise_m_s2_rt_hz
-    assert raised > 100.0
-    assert coasting.sensors.imu.accel_sigma_m_s2 / flight.sensors.imu.accel_sigma_m_s2 == pytest.approx(raised)
+def test_without_its_deviation_states_all_of_the_compass_error_is_noise(approach):
+    before = approach.fitted.told.settings
+    after = without_compass_states(approach.fitted.told).settings
+    assert after.compass_sigma_rad == 0.0 < before.compass_sigma_rad
+    assert after.heading_noise_rad == pytest.approx(np.hypot(before.heading_noise_rad, before.compass_sigma_rad))
 
 
-def test_only_the_landing_filter_can_be_taken_apart():
-    with pytest.raises(ValueError, match="only the landing filter"):
+def test_only_the_navigator_can_be_taken_apart():
+    with pytest.raises(ValueError, match="only the navigator can be taken apart"):
         ablations(assemble(with_filter(load_scenario("approach"), "paper")))
 
 
 # -- judged flights ----------------------------------------------------------------------------------------
-def test_the_pad_is_noted_at_the_start_or_last_before_take_off(approach, takeoff):
-    assert home_epoch(approach.flight) is None
-    assert home_epoch(assemble(scenario_of("landing")).flight) == 0
+def test_the_papers_filter_notes_its_pad_at_the_start_or_last_before_take_off_and_the_navigator_counts_from_it():
+    def papers(name):
+        return assemble(with_filter(scenario_of(name), "paper"))
+
+    assert home_epoch(papers("approach").flight) is None
+    assert home_epoch(papers("landing").flight) == 0
+    takeoff = papers("takeoff")
     assert home_epoch(takeoff.flight) == round(takeoff.scenario.flight.takeoff_at_s / 0.02) - 1
+    assert home_epoch(assemble(scenario_of("takeoff")).flight) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "known"),
+    [
+        ("takeoff", "where it stands until take-off at 10 s"),
+        ("landing", "where it hovers for its first 5 s, flown on the truth"),
+        ("approach", "nothing, but it is flown on the truth for its first 5 s"),
+    ],
+)
+def test_what_a_vehicle_knows_exactly_is_said(name, known):
+    assert known_exactly(scenario_of(name)) == known
 
 
 def short(scenario, duration_s=8.0):
@@ -127,15 +148,31 @@ def short(scenario, duration_s=8.0):
 
 
 def test_judged_flights_have_the_scores_of_plain_ones_and_no_lane_of_the_last_block_too_many():
-    flight = short(scenario_of("landing"), 2.0).flight
+    setup = short(scenario_of("landing"), 6.0)
+    flight, epochs, handed = setup.flight, setup.flight.plan.epochs, round(5.0 / 0.02)
     judged = fly_judged(flight, 3, GROUP_FLIGHTS + 5)
     assert np.array_equal(judged.scores, fly_many(flight, 3, GROUP_FLIGHTS + 5), equal_nan=True)
     assert judged.largest_horizontal_m.shape == (GROUP_FLIGHTS + 5,)
+    assert judged.flown.steps.sum() == (GROUP_FLIGHTS + 5) * (epochs - handed)  # all in flight
     assert judged.sums.flights == GROUP_FLIGHTS + 5
-    assert judged.errors.steps.sum() == (GROUP_FLIGHTS + 5) * flight.plan.epochs  # all in flight
-    assert [steps for _, steps in judged.groups] == [flight.plan.epochs]  # one whole group; the rest is left out
+    started = np.argmax(judged.sums.running == judged.sums.flights)
+    in_all = epochs - flight.table.horizon_epochs
+    assert started < 50
+    assert judged.sums.errors.steps.sum() == judged.sums.running.sum()
+    assert [steps for _, steps in judged.groups] == [in_all - started]  # one whole group; the rest is left out
     few = fly_judged(flight, 3, 5)
-    assert [steps for _, steps in few.groups] == [flight.plan.epochs]
+    assert len(few.groups) == 1
+    worst = np.abs(judged.flown.squares).max()
+    assert 0.0 < worst < np.inf
+
+
+def test_the_papers_filter_is_judged_by_what_it_flew_on_alone():
+    flight = short(with_filter(scenario_of("landing"), "paper"), 2.0).flight
+    judged = fly_judged(flight, 3, 5)
+    assert judged.sums is None
+    assert judged.groups is None
+    assert judged.flown.steps.sum() == 5 * flight.plan.epochs
+    assert (judged.largest_horizontal_m > 0.0).all()
 
 
 # -- the command -------------------------------------------------------------------------------------------
@@ -145,10 +182,12 @@ def run(*arguments):
 
 def test_the_command_says_every_target_and_writes_what_it_prints(tmp_path):
     out = tmp_path / "accuracy.md"
-    done = run("--flights", 32, "--cases", "takeoff, approach", "--ablations", 16, "--out", out)
+    done = run("--flights", 16, "--cases", "takeoff, approach", "--ablations", 16, "--out", out)
     assert done.exception is None or isinstance(done.exception, VerdictError)
     assert done.stdout.strip() == out.read_text(encoding="utf-8").strip()
     assert "takeoff without" in done.stdout
+    assert "RMSE over the bound of the filter's own model, at the horizon" in done.stdout
+    assert "| takeoff  | where it stands until take-off at 10 s " in done.stdout
     assert "| pad fix " in done.stdout
     for line in done.stdout.splitlines():
         assert line == "" or (line.startswith("| ") and line.endswith(" |"))
@@ -159,9 +198,10 @@ def test_json_has_every_figure_and_the_exit_status_follows_the_targets():
     facts = json.loads(done.stdout)
     (case,) = facts["cases"]
     assert (case["case"], case["flights"], case["ablations"]) == ("landing", 32, {})
-    assert set(case["efficiency"]) == set("xyzuvw")
-    assert all(0.5 < ratio < 1.5 for ratio in case["efficiency"].values())
-    assert 0.03 < case["p95_largest_axis_m"] < 0.2
+    assert set(case["rmse_over_bound"]) == set("xyzuvw")
+    assert all(0.3 < ratio < 5.0 for ratio in case["rmse_over_bound"].values())
+    assert 0.03 < case["p95_largest_axis_m"] < 0.5
+    assert case["known_exactly"] == "where it hovers for its first 5 s, flown on the truth"
     missed = [target for target in case["targets"] if not target["kept"]]
     assert bool(missed) == isinstance(done.exception, VerdictError)
     for target in missed:

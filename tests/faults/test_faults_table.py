@@ -20,6 +20,7 @@ from flownav.measurement import Sensor, Stream
 LEAP_M = 8.0
 SILENT_S = 0.5
 SIGMA_M = 3.0
+FIX_S = 0.25  # a fix comes five times a second, and not quite evenly
 
 
 def follow_gps(streams: Mapping[Sensor, Stream]) -> Navigated:
@@ -59,27 +60,27 @@ def rows():
 def test_a_fault_of_another_sensor_leaves_every_figure_as_it_is(rows):
     usual, flow = rows["none"].scores, rows["flow_sign"].scores
     assert flow == usual._replace(recovered_after_s=flow.recovered_after_s)
-    assert (flow.detected_after_s, flow.recovered_after_s, flow.wrongly_fused) == (None, pytest.approx(0, abs=0.03), 0)
+    assert (flow.detected_after_s, flow.recovered_after_s, flow.wrongly_fused) == (None, pytest.approx(0, abs=FIX_S), 0)
 
 
 def test_a_leap_is_noticed_at_once_and_never_taken_in(rows):
     jump = rows["gps_jump"].scores
-    assert jump.detected_after_s == pytest.approx(0.0, abs=0.03)
+    assert 0.0 <= jump.detected_after_s <= FIX_S
     assert jump.wrongly_fused == 0
     assert jump.max_error_m < rows["none"].scores.max_error_m + 1.0
-    assert jump.recovered_after_s == pytest.approx(0.0, abs=0.1)
+    assert 0.0 <= jump.recovered_after_s <= FIX_S
 
 
 def test_a_drift_is_taken_in_reading_by_reading_and_shows_in_the_error(rows):
     drift = rows["gps_drift"].scores
     assert drift.detected_after_s is None
-    assert drift.wrongly_fused == pytest.approx(100, abs=1)  # 2 s at 50 Hz
-    assert drift.recovered_after_s == pytest.approx(0.0, abs=0.1)
+    assert drift.wrongly_fused == pytest.approx(10, abs=1)  # 2 s at 5 Hz
+    assert 0.0 <= drift.recovered_after_s <= FIX_S
 
 
 def test_lost_gps_is_noticed_by_its_flag_and_nothing_wrong_is_fused(rows):
     for name in ("gps_loss", "silence"):
-        assert rows[name].scores.detected_after_s == pytest.approx(SILENT_S, abs=0.05)
+        assert SILENT_S - FIX_S <= rows[name].scores.detected_after_s <= SILENT_S
         assert rows[name].scores.wrongly_fused == 0
     assert rows["silence"].duration_s == 5.0
     assert rows["gps_loss"].duration_s == 2.0
@@ -87,8 +88,8 @@ def test_lost_gps_is_noticed_by_its_flag_and_nothing_wrong_is_fused(rows):
 
 def test_nan_is_refused_and_duplicates_are_fused_twice(rows):
     assert rows["nan_bursts"].scores.wrongly_fused == 0
-    assert rows["nan_bursts"].scores.detected_after_s == pytest.approx(0.0, abs=0.03)
-    assert rows["duplicates"].scores.wrongly_fused == pytest.approx(100, abs=1)
+    assert 0.0 <= rows["nan_bursts"].scores.detected_after_s <= FIX_S
+    assert rows["duplicates"].scores.wrongly_fused == pytest.approx(10, abs=1)
 
 
 def test_every_fault_can_be_flown_at_once_and_counts_its_rows():

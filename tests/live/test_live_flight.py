@@ -35,11 +35,12 @@ from flownav.record import Record
 from flownav.replay.fed import as_fed
 from flownav.replay.prepare import ReplayOptions
 from flownav.replay.session import replay
+from flownav.sensors.identified import IdentifiedFlow
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 from live_ends import Hover, Wire
 
-SPEED = 8.0
+SPEED = 4.0
 
 
 def replayed(path):
@@ -64,12 +65,18 @@ def assert_same_bits(path):
 
 @pytest.fixture(scope="module")
 def flight(tmp_path_factory):
-    """pad_return, told over loopback at eight times its pace; the session's clock is the machine's."""
+    """pad_return, told over loopback at four times its pace; the session's clock is the machine's."""
     warm_up()
     setup = assemble(load_scenario("pad_return"))
-    vehicle = SimulatedVehicle(log_of(fly_recorded(setup, 1), setup, flow=Sensor.FLOW_RATE, attitude=True))
-    path = tmp_path_factory.mktemp("live") / "flight.fnr"
-    recorder, options = Recorder(path), Options(gps_delay_s=0.02)
+    vehicle = SimulatedVehicle(log_of(fly_recorded(setup, 1), setup))
+    told, ages_s = setup.fitted.told, setup.fitted.ages_s
+    path, recorder = (folder := tmp_path_factory.mktemp("live")) / "flight.fnr", Recorder(folder / "flight.fnr")
+    options = Options(
+        gps_delay_s=float(ages_s[Sensor.GPS_POSITION]),
+        identified=IdentifiedFlow(1.0, 1.0, float(ages_s[Sensor.FLOW_RATE])),
+        settings=told.settings,
+        flow_noise=told.noise,
+    )
     link = open_link("udp:0")
     session = Session(options, recorder, time.monotonic(), time.time())
     latency, ended = Latency(), threading.Event()

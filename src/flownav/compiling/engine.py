@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
-from numba.core.compiler import Compiler
 from numba.core.dispatcher import _FunctionCompiler  # type: ignore[attr-defined]
 from numba.core.errors import NumbaError
 from numba.core.registry import CPUDispatcher
@@ -14,6 +13,7 @@ from numba.extending import register_jitable
 
 from flownav.compiling import target
 from flownav.compiling.cache import KernelCache
+from flownav.compiling.pipeline import LeanCompiler
 from flownav.compiling.progress import compiling
 
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -21,7 +21,12 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 LANES_WIDE = 16
 
 # what only kernels call needs no entry for Python and for C, which would take as long to compile as a short law
-UNWRAPPED = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+UNWRAPPED: dict[str, Any] = {
+    "error_model": "numpy",
+    "no_cpython_wrapper": True,
+    "no_cfunc_wrapper": True,
+    "pipeline_class": LeanCompiler,
+}
 ENTRY = {"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck": None, "no_cfunc_wrapper": True}
 
 
@@ -45,7 +50,7 @@ class Kernel(CPUDispatcher):
 
     def __init__(self, py_func: Callable[..., Any]) -> None:
         super().__init__(py_func, targetoptions=dict(ENTRY))
-        self._compiler = _KernelCompiler(py_func, self.targetdescr, self.targetoptions, {}, Compiler)
+        self._compiler = _KernelCompiler(py_func, self.targetdescr, self.targetoptions, {}, LeanCompiler)
         self._cache = KernelCache(py_func, {})
 
     def compile(self, sig: Any) -> Any:

@@ -32,6 +32,8 @@ from numba.core.compiler_lock import global_compiler_lock
 from numba.core.environment import lookup_environment
 from numba.core.registry import cpu_target
 
+from flownav.compiling.remembered import remembering
+
 ENVIRONMENT_SYMBOL = "_ZN08NumbaEnv"
 
 # A lane loop must reach the vectoriser as a loop. Left alone, LLVM fully unrolls one whose body is still a
@@ -262,6 +264,7 @@ def lean() -> Iterator[None]:
         before = context._internal_codegen
         context._internal_codegen = _codegen() if is_lean() else before
         try:
-            yield
+            with remembering():
+                yield
         finally:
             context._internal_codegen = before

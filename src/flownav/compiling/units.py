@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 from numba import types
 from numba.core.ccallback import _CFuncCompiler  # type: ignore[attr-defined]
-from numba.core.compiler import Compiler
 from numba.core.registry import cpu_target
 
 from flownav.compiling.cache import KernelCache
 from flownav.compiling.engine import without_surprises
+from flownav.compiling.pipeline import LeanCompiler
 from flownav.compiling.progress import compiling
 
 OPTIONS = {"error_model": "numpy"}
@@ -83,7 +83,7 @@ class Unit:
             return result.library, _address(result)
         with compiling(self.__name__):
             bound = bind_constants(self.function, self.constants)
-            compiler = _CFuncCompiler(bound, cpu_target, OPTIONS, {}, Compiler)
+            compiler = _CFuncCompiler(bound, cpu_target, OPTIONS, {}, LeanCompiler)
             result = compiler.compile(signature.args, signature.return_type)
             address = _address(result)
         keeper.save_overload(signature, result)

@@ -1,0 +1,89 @@
+"""Numba's passes for what equations and kernels are made of, and no others.
+
+Numba prepares every function for closures, context managers, array expressions, literal loops and more, and computes
+the lifetimes of its variables anew after each pass (nine times a function). Equations and kernels need few of these;
+a function that holds something unusual takes Numba's own way.
+"""
+
+from __future__ import annotations
+
+import types as python_types
+from typing import Any
+
+from numba.core import transforms
+from numba.core.compiler import Compiler, DefaultPassBuilder
+from numba.core.compiler_machinery import PassManager
+from numba.core.typed_passes import (
+    InlineOverloads,
+    IRLegalization,
+    NativeLowering,
+    NoPythonBackend,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+)
+from numba.core.untyped_passes import (
+    DeadBranchPrune,
+    FixupArgs,
+    GenericRewrites,
+    IRProcessing,
+    ReconstructSSA,
+    RewriteDynamicRaises,
+    RewriteSemanticConstants,
+    TranslateByteCode,
+)
+
+PASSES = (
+    TranslateByteCode,
+    FixupArgs,
+    IRProcessing,
+    RewriteSemanticConstants,
+    DeadBranchPrune,
+    GenericRewrites,
+    RewriteDynamicRaises,
+    ReconstructSSA,
+    DeadBranchPrune,
+    NopythonTypeInference,
+    PreLowerStripPhis,
+    InlineOverloads,
+    IRLegalization,
+    NativeLowering,
+    NoPythonBackend,
+)
+UNUSUAL_NAMES = {"literal_unroll", "literally", "prange", "objmode"}
+UNUSUAL_FLAGS = 0x20 | 0x80 | 0x100 | 0x200  # generators and coroutines (inspect.CO_GENERATOR, ...)
+
+
+class LeanPasses(PassManager):
+    """Numba's pass manager without its bookkeeping."""
+
+    def _runPass(self, index: int, pss: Any, internal_state: Any) -> None:
+        pss.analysis = self._analysis
+        pss.run_initialization(internal_state)
+        changed = pss.run_pass(internal_state)
+        pss.run_finalizer(internal_state)
+        if changed and isinstance(pss, DeadBranchPrune):
+            internal_state.func_ir.blocks = transforms.canonicalize_cfg(internal_state.func_ir.blocks)
+
+
+class LeanCompiler(Compiler):
+    """Numba's compiler with few passes where a function allows it."""
+
+    def define_pipelines(self) -> list[Any]:
+        """The passes for this function."""
+        code = self.state.func_id.code
+        if self.state.func_ir is not None or not is_usual(code):
+            return [DefaultPassBuilder.define_nopython_pipeline(self.state)]
+        passes = LeanPasses("nopython")
+        for step in PASSES:
+            passes.add_pass(step, step.__name__)
+        passes.finalize()
+        return [passes]
+
+
+def is_usual(code: python_types.CodeType) -> bool:
+    """Whether a function holds no function of its own, does not yield and names nothing that needs other passes."""
+    return not (
+        any(isinstance(constant, python_types.CodeType) for constant in code.co_consts)
+        or code.co_flags & UNUSUAL_FLAGS
+        or UNUSUAL_NAMES & {*code.co_names, *code.co_freevars}
+    )

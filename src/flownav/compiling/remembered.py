@@ -1,0 +1,88 @@
+"""Work that Numba does again at every line, done once: typing of operators, looks into signatures and instructions.
+
+All of this is only in force inside `remembering()`, and changes no result.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from functools import cache
+from typing import Any
+
+from numba.core import base, errors, ir, types
+
+OPERATORS = frozenset(function for function in vars(operator).values() if callable(function))
+_typed: dict[tuple[Any, ...], Any] = {}
+
+
+@contextmanager
+def remembering() -> Iterator[None]:
+    """Remember inside the block, where this version of Numba has these parts."""
+    with ExitStack() as stack:
+        for owner, name, replacement in PATCHES:
+            stack.enter_context(_replaced(owner, name, replacement))
+        yield
+
+
+@contextmanager
+def _replaced(owner: Any, name: str, replacement: Any) -> Iterator[None]:
+    own = vars(owner).get(name)
+    setattr(owner, name, replacement)
+    try:
+        yield
+    finally:
+        if own is None:
+            delattr(owner, name)
+        else:
+            setattr(owner, name, own)
+
+
+def _type_of_call(self: Any, context: Any, args: Any, kws: Any) -> Any:
+    """The signature of an operator on these types, or the error that there is none; other functions as ever."""
+    if kws or self.typing_key not in OPERATORS:
+        return _original_type_of_call(self, context, args, kws)
+    known = self, tuple(args)
+    if known not in _typed:
+        try:
+            _typed[known] = _original_type_of_call(self, context, args, kws)
+        except errors.TypingError as error:
+            _typed[known] = error
+    found = _typed[known]
+    if isinstance(found, Exception):
+        raise found
+    return found
+
+
+def _variables(self: Any, value: Any) -> list[Any]:
+    """The variables that a part of an instruction names."""
+    found: list[Any] = []
+    _collect(value, found)
+    return found
+
+
+def _collect(value: Any, found: list[Any]) -> None:
+    """Most parts of an instruction are plain texts and numbers, which is seen at once."""
+    kind = type(value)
+    if kind in PLAIN:
+        return
+    if isinstance(value, ir.Var):
+        found.append(value)
+    elif isinstance(value, ir.Inst):
+        found.extend(value.list_vars())
+    elif isinstance(value, list | tuple):
+        for part in value:
+            _collect(part, found)
+    elif isinstance(value, dict):
+        for part in value.values():
+            _collect(part, found)
+
+
+_original_type_of_call = types.Function.get_call_type
+PLAIN = frozenset({str, int, float, bool, type(None), ir.Loc, ir.Scope})
+PATCHES: tuple[tuple[Any, str, Any], ...] = (
+    (types.Function, "get_call_type", _type_of_call),
+    (base, "_has_loc", cache(base._has_loc)),
+    (ir.Inst, "_rec_list_vars", _variables),
+)

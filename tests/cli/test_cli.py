@@ -29,10 +29,11 @@ def one_line_error(done):
 
 
 def short(tmp_path, text="", name="landing", duration="2.0"):
-    """A short copy of a shipped scenario, with lines added to its end."""
+    """A short copy of a shipped scenario, handed over after half a second, with lines added to its end."""
     path = tmp_path / "short.toml"
     original = shipped(f"{name}.toml").read_text(encoding="utf-8")
-    path.write_text(original.replace("duration_s = 50.0", f"duration_s = {duration}") + text, encoding="utf-8")
+    soon = "\n[filter]\nhandover_s = 0.5\n"
+    path.write_text(original.replace("duration_s = 50.0", f"duration_s = {duration}") + soon + text, encoding="utf-8")
     return path
 
 
@@ -58,11 +59,27 @@ def test_fly_json_has_every_key_and_its_record_is_there(tmp_path):
     assert list(facts["states"]) == list("xyzuvw")
     assert all(set(entry) == NUMBER_KEYS for entry in facts["states"].values())
     assert facts["touchdown"] is None
-    assert [facts[key] for key in ("efficiency", "anees_inside_fraction", "r95_m")] == [None, None, None]
+    assert [facts[key] for key in ("rmse_over_bound", "anees_inside_fraction", "r95_m")] == [None, None, None]
+    assert facts["known_exactly"] == "where it hovers for its first 0.5 s, flown on the truth"
     record = Record.load(tmp_path / "f.fnr")
-    error = record.matrix("estimate", ("pos_n_m",)) - record.matrix("truth", ("pos_n_m",))
+    handed = record.tables["truth"]["t_s"] >= 0.5
+    error = (record.matrix("flown", ("pos_n_m",)) - record.matrix("truth", ("pos_n_m",)))[handed]
     assert facts["states"]["x"]["rms_error"] == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
     assert (tmp_path / "f.html").stat().st_size > 1e6
+
+
+def test_a_flight_that_ends_before_the_hand_over_has_null_errors_and_a_table(tmp_path):
+    path = short(tmp_path)
+    path.write_text(path.read_text(encoding="utf-8").replace("handover_s = 0.5", "handover_s = 9.0"), encoding="utf-8")
+    done = run("fly", path, "--json", "--no-report", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    facts = json.loads(done.stdout)
+    assert facts["max_position_error_m"] is None
+    assert set(facts["states"]["w"].values()) == {None}
+    shown = run("fly", path, cwd=tmp_path)
+    assert shown.returncode == 0, shown.stderr
+    assert "known exactly  where it hovers for its first 9 s" in shown.stdout
+    assert (tmp_path / "out" / "landing.html").exists()
 
 
 def test_many_flights_turn_every_number_into_median_and_percentiles(tmp_path):
@@ -73,7 +90,7 @@ def test_many_flights_turn_every_number_into_median_and_percentiles(tmp_path):
         for number in entry.values():
             assert number["p05"] <= number["median"] <= number["p95"]
     assert 0 <= facts["paper_percentile"]["max_position_error_m"] <= 100
-    assert all(0.3 < facts["efficiency"][state] < 3.0 for state in "xyzuvw")
+    assert all(0.1 < facts["rmse_over_bound"][state] < 10.0 for state in "xyzuvw")
     assert 0.0 <= facts["anees_inside_fraction"] <= 1.0
     assert (facts["r95_m"], facts["r95_interval_m"]) == (None, [None, None])  # 2 s: none lands
     record = Record.load(tmp_path / facts["record"])
@@ -88,13 +105,14 @@ def test_a_seed_gives_the_same_flight_again(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "choice", [("--filter", "paper"), ("--truth", "linear"), ("--feedback", "truth"), ("--gps", "midg")]
+    "choice",
+    [("--filter", "paper"), ("--truth", "linear", "--filter", "paper"), ("--feedback", "truth"), ("--gps", "midg")],
 )
 def test_choices_replace_the_files_own(tmp_path, choice):
     done = run("fly", short(tmp_path), "--json", "--no-report", *choice, "--out", tmp_path / "c.fnr", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     manifest = Record.load(tmp_path / "c.fnr").manifest
-    assert ("efficiency" in json.loads(done.stdout)) == (manifest["filter"] == "landing")
+    assert ("rmse_over_bound" in json.loads(done.stdout)) == (manifest["filter"] == "landing")
     assert manifest[choice[0].removeprefix("--")] == choice[1]
 
 
@@ -109,6 +127,7 @@ def test_choices_replace_the_files_own(tmp_path, choice):
         (("fly", "landing", "--flights", "0"), "--flights 0: must be from 1 to"),
         (("fly", "landing", "--flights", "3", "--flight", "1"), "--flight names one flight, --flights many"),
         (("fly", "gusty", "--truth", "linear"), 'truth = "linear" has no air to move'),
+        (("fly", "landing", "--truth", "linear"), 'truth = "linear" has no forces for an IMU to feel'),
         (("fly", "landing", "--seed", "-1"), "--seed -1: must be from 0 to"),
         (("fly", "landing", "--gps", "rtk"), "command line: gps.model: Input should be 'white' or 'midg', got 'rtk'"),
         (

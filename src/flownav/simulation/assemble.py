@@ -54,6 +54,8 @@ def assemble(scenario: Scenario) -> Setup:
     """Read, check, trim and discretise everything a scenario names. InputError as the loaders say."""
     if scenario.truth == "linear" and scenario.wind.speed_20ft_m_s > 0.0:
         raise InputError(f'{scenario.name}: truth = "linear" has no air to move; remove [wind], or fly "nonlinear"')
+    if scenario.truth == "linear" and scenario.filter.name != "paper":
+        raise InputError(f'{scenario.name}: truth = "linear" has no forces for an IMU to feel; fly the "paper" filter')
     vehicle_file = Path(scenario.vehicle.file) if scenario.vehicle.file else None
     sensor_file = Path(scenario.flow_sensor) if scenario.flow_sensor else None
     vehicle, sensor, paper = load_vehicle(vehicle_file), load_sensor(sensor_file), load_paper_model()

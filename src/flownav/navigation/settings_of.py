@@ -154,9 +154,7 @@ def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = Non
     }
 
 
-def _shaken(
-    sheet: InertialSheet, part: str, rotor_hz: tuple[float, float] | None, *, whole: bool = False
-) -> float:
+def _shaken(sheet: InertialSheet, part: str, rotor_hz: tuple[float, float] | None, *, whole: bool = False) -> float:
     """Rms of both tones together in the readings of a vehicle that shakes more than the sheet's by its spread.
 
     whole: with nothing taken off for the frequency at which a tone is read.
@@ -177,8 +175,7 @@ def _harm(tone_hz: float, rate_hz: float) -> float:
 
 # -- position -----------------------------------------------------------------------------------------------
 def of_gps_receiver(sheet: GpsReceiverSheet) -> Keys:
-    """The receiver's errors as its sheet splits them, so that little is left for what it states of each fix.
-    """
+    """The receiver's errors as its sheet splits them, so that little is left for what it states of each fix."""
     position, velocity = sheet.position, sheet.velocity
     step_m, step_m_s = position.quantum_m / math.sqrt(12.0), velocity.quantum_m_s / math.sqrt(12.0)
     return {

@@ -1,0 +1,82 @@
+"""Records that say what a navigator was fed, read as a log: older ones too, silent and withheld readings in place."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flownav.errors import InputError
+from flownav.logs.open_log import open_flight
+from flownav.measurement import EventQueue, Sensor, merge
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.tables import fed_rows, fed_table
+from flownav.record import Record
+from flownav.replay.fed import as_fed
+from flownav.replay.prepare import ReplayOptions
+from flownav.replay.session import replay
+from navigation_streams import circle, equipment, fly, navigate
+
+FLOWN = fly(circle, 12.0, 0.2)
+
+
+def queue_of_flight() -> EventQueue:
+    """Every seventh fix stayed away, and one flow reading in ten was taken away."""
+    queue = merge(FLOWN.streams.values())
+    fixes = np.flatnonzero(queue.sensor == Sensor.GPS_POSITION)
+    flow = np.flatnonzero(queue.sensor == Sensor.FLOW_RATE)
+    queue.arrived[fixes[::7]] = 0.0
+    queue.withheld[flow[::10]] = 1.0
+    return queue
+
+
+def record_of(queue: EventQueue, kind: str = "fly", without: tuple[str, ...] = ()) -> Record:
+    record = Record({
+        "kind": kind,
+        "segments": [equipment(FLOWN, queue)._asdict()],
+        "parameters": {"filter": NavigatorSettingsFile().model_dump(), "gps_delay_s": 0.0},
+    })  # fmt: skip
+    table = fed_table(fed_rows(queue, queue.t_s, 0))
+    record.add("fed", {name: column for name, column in table.items() if name not in without})
+    return record
+
+
+def replayed(path, **options):
+    log = open_flight(path)
+    return log, replay(log, *as_fed(log, ReplayOptions(**options), None))
+
+
+def test_what_was_fed_is_fed_again_bit_for_bit(tmp_path):
+    queue = queue_of_flight()
+    record_of(queue).save(tmp_path / "flight.fnr")
+    log, again = replayed(tmp_path / "flight.fnr")
+    first = navigate(FLOWN, queue)
+    assert again.estimate.tobytes() == first.estimate.tobytes()
+    assert np.array_equal(again.innovation, first.offers, equal_nan=True)
+    assert again.rejected()["flow_rate"]["outage"] > 0
+    assert "a simulated flight of 1 navigator" in log.notes[0]
+
+
+def test_streams_hold_what_arrived_and_a_cut_finds_its_fixes(tmp_path):
+    queue = queue_of_flight()
+    record_of(queue).save(tmp_path / "flight.fnr")
+    log, cut = replayed(tmp_path / "flight.fnr", gps_outages_s=((6.0, 9.0),))
+    fixes = queue.sensor == Sensor.GPS_POSITION
+    assert len(log.streams[Sensor.GPS_POSITION]) == np.count_nonzero(fixes & (queue.arrived > 0.0))
+    inside = fixes & (queue.t_s >= 6.0) & (queue.t_s < 9.0) & (queue.arrived > 0.0)
+    assert cut.rejected()["gps_position"]["outage"] == 3 * np.count_nonzero(inside)
+
+
+def test_a_record_from_before_these_columns_is_read_as_it_was(tmp_path):
+    queue = merge(FLOWN.streams.values())
+    record_of(queue, "live", ("withheld", "arrived")).save(tmp_path / "old.fnr")
+    log, again = replayed(tmp_path / "old.fnr")
+    assert again.estimate.tobytes() == navigate(FLOWN, queue).estimate.tobytes()
+    assert "a live session" in log.notes[0]
+
+
+@pytest.mark.parametrize(("kind", "without"), [("replay", ()), ("fly", ("value_0",))])
+def test_what_does_not_say_it_is_refused_in_one_line(tmp_path, kind, without):
+    record_of(merge(FLOWN.streams.values()), kind, without).save(tmp_path / "other.fnr")
+    with pytest.raises(InputError) as error:
+        open_flight(tmp_path / "other.fnr")
+    assert "\n" not in str(error.value)

@@ -8,10 +8,8 @@ from filterpy.kalman import KalmanFilter
 
 from flownav.benchmark.filter_loop import ROWS, run_paper_filter
 from flownav.compile import LANES, ONE_LANE
-from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
-from flownav.simulation.flight import fly_block
-from flownav.simulation.history import HISTORY
+from flownav.simulation.engine import buffers_of, fly_into
 from flownav.simulation.scenario import load_scenario, with_filter
 
 STEPS = 1000
@@ -25,10 +23,12 @@ def flight():
 
 @pytest.mark.benchmark(group="one 50 s landing (divide the lanes' time by 16)")
 @pytest.mark.parametrize("lanes", [ONE_LANE, LANES], ids=["scalar", "16 lanes"])
-def test_flight(benchmark, flight, lanes):
-    work = np.zeros(layout.ROWS * len(lanes))
-    history = np.empty((flight.plan.epochs, len(HISTORY), len(lanes)))
-    benchmark(fly_block, flight, 1, 0, lanes, work, history)
+@pytest.mark.parametrize("name", ["paper", "landing"], ids=["the paper's filter", "the navigator"])
+def test_flight(benchmark, name, lanes):
+    flown = assemble(with_filter(load_scenario("landing"), name)).flight
+    buffers = buffers_of(flown, lanes, flown.plan.epochs, written=False)
+    fly_into(flown, 1, 0, lanes, buffers)
+    benchmark(fly_into, flown, 1, 0, lanes, buffers)
 
 
 @pytest.mark.benchmark(group=f"{STEPS} predict+update of six states")

@@ -17,7 +17,7 @@ number of threads.
 
 from __future__ import annotations
 
-from flownav.compiling.bundles import FlatAccess, flat_access, lane_access
+from flownav.compiling.bundles import FlatAccess, flat_access, lane_access, write_function
 from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
 from flownav.compiling.progress import announce_compilation
@@ -48,4 +48,5 @@ __all__ = [
     "procedure",
     "smaller",
     "unit",
+    "write_function",
 ]

@@ -86,7 +86,7 @@ def test_the_sensor_file_loads_and_flies(rig):
     assert load_sensor(folder / "sensor.toml").name
     text = shipped("landing.toml").read_text(encoding="utf-8")
     assert "duration_s = 50.0" in text
-    (folder / "short.toml").write_text(text.replace("duration_s = 50.0", "duration_s = 1.0"), encoding="utf-8")
+    (folder / "short.toml").write_text(text.replace("duration_s = 50.0", "duration_s = 7.0"), encoding="utf-8")
     done = run(
         "fly", "short.toml", "--sensor", "sensor.toml", "--json", "--no-report", "--out", "f.fnr", cwd=folder
     )  # fmt: skip

@@ -8,8 +8,8 @@ import pytest
 from flownav.compile import LANES, kernel
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
-from flownav.simulation.flight import PHYSICS_S
 from flownav.simulation.layout import store_controls, store_helicopter
+from flownav.simulation.plan import PHYSICS_S
 from flownav.simulation.plant import linear_step, runge_kutta_step
 from flownav.simulation.scenario import Scenario, load_scenario
 from flownav.vehicle import helicopter
@@ -64,7 +64,7 @@ def test_refining_the_inflow_between_stages_is_solving_it_in_each(flight):
 
 
 def test_linear_truth_is_the_matrix_equation():
-    entries = load_scenario("takeoff").model_dump(exclude_unset=True) | {"truth": "linear"}
+    entries = load_scenario("takeoff").model_dump(exclude_unset=True) | {"truth": "linear", "filter": {"name": "paper"}}
     flight = assemble(Scenario.model_validate(entries)).flight
     model = flight.linear
     work = np.zeros(layout.ROWS * len(LANES))

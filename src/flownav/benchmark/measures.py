@@ -10,45 +10,57 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Literal
 
 import numpy as np
 
 from flownav.compile import LANES, ONE_LANE
 from flownav.estimation.paper_filter import PaperModel
 from flownav.simulation.engine import fly_blocks, fly_one
-from flownav.simulation.flight import Flight
+from flownav.simulation.plan import Flight
 
 REPEATS = 5
+PART_STEPS, PART_ROUNDS = 1000, 50
+NAVIGATORS_SHARE = 4  # the navigator's batch is so many times smaller
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One measured figure: what it is, its value and unit, what was asked, and whether more or less is better."""
+    """One measured figure: what it is, its value and unit, what was asked, and whether more or less is better.
+
+    asked None: it stands beside the others and nothing was asked of it.
+    """
 
     name: str
     value: float
     unit: str
-    asked: float
+    asked: float | None
     more_is_better: bool
     note: str = ""
 
     @property
-    def reached(self) -> bool:
+    def reached(self) -> bool | None:
         """Whether the figure is at least as good as asked."""
+        if self.asked is None:
+            return None
         return self.value >= self.asked if self.more_is_better else self.value <= self.asked
 
 
-def measure_all(flights: int) -> Iterator[Figure]:
-    """Every figure, one after the other; `flights` is the size of the batch."""
-    flight = _landing()
-    yield single_flight(flight)
-    yield from batch(flight, flights)
-    yield filter_step()
-    yield from filter_against_filterpy()
-    yield from replay_of_recorded_flight()
-    yield help_time()
-    yield cold_compile()
-    yield memory_of_many_flights()
+def measure_all(flights: int) -> Iterator[list[Figure]]:
+    """Every figure, a few at a time; `flights` is the size of the batch. There are MEASUREMENTS of them."""
+    paper, navigated = _landing("paper"), _landing("landing")
+    yield single_flights(paper, navigated)
+    yield batches(paper, navigated, flights)
+    yield lanes_against_scalar(paper, navigated)
+    yield filter_parts()
+    yield [filter_step(), *filter_against_filterpy()]
+    yield list(replay_of_recorded_flight())
+    yield [help_time()]
+    yield cold_compiles()
+    yield [memory_of_many_flights()]
+
+
+MEASUREMENTS = 9
 
 
 def best_of(work: Callable[[], object], repeats: int = REPEATS) -> float:
@@ -62,42 +74,91 @@ def best_of(work: Callable[[], object], repeats: int = REPEATS) -> float:
     return min(times)
 
 
-def _landing() -> Flight:
-    """The paper's landing with the paper's filter."""
+def _landing(name: Literal["paper", "landing"]) -> Flight:
+    """The paper's landing on one of the filters."""
     from flownav.simulation.assemble import assemble
     from flownav.simulation.scenario import load_scenario, with_filter
 
-    return assemble(with_filter(load_scenario("landing"), "paper")).flight
+    return assemble(with_filter(load_scenario("landing"), name)).flight
 
 
 def _papers_model() -> PaperModel:
     """The matrices of the paper's filter, discretised."""
-    model = _landing().paper
+    model = _landing("paper").paper
     if model is None:
         raise RuntimeError("the landing scenario flies the paper's filter")
     return model
 
 
-def single_flight(flight: Flight) -> Figure:
+# -- flights -----------------------------------------------------------------------------------------------
+def single_flights(paper: Flight, navigated: Flight) -> list[Figure]:
     """One 50 s flight with its whole history, kernels warm."""
-    return Figure("one warm 50 s flight", 1e3 * best_of(lambda: fly_one(flight, 1)), "ms", 25.0, False)
+    papers_ms = 1e3 * best_of(lambda: fly_one(paper, 1))
+    navigators_ms = 1e3 * best_of(lambda: fly_one(navigated, 1))
+    return [
+        Figure("one warm 50 s flight, the paper's filter", papers_ms, "ms", 25.0, False),
+        Figure("one warm 50 s flight, the navigator", navigators_ms, "ms", None, False),
+    ]
 
 
-def batch(flight: Flight, flights: int) -> Iterator[Figure]:
-    """Flights a second with scores, on every core; and one core's lanes against one core's scalar build."""
+def batches(paper: Flight, navigated: Flight, flights: int) -> list[Figure]:
+    """Flights a second with scores, on every core: with the paper's filter, with the navigator, and their ratio."""
     from flownav.campaign.local import fly_many
 
-    def rate_of(threads: int, count: int) -> float:
-        return count / best_of(lambda: fly_many(flight, 1, count, threads=threads), 2)
-
     cores = os.cpu_count() or 1
-    yield Figure(
-        "flights a second, scored", rate_of(cores, flights), "1/s", 500.0, True, f"{flights} flights, {cores} threads"
+
+    def rate_of(flight: Flight, count: int) -> float:
+        return count / best_of(lambda: fly_many(flight, 1, count, threads=cores), 2)
+
+    fewer = max(len(LANES), flights // NAVIGATORS_SHARE)
+    papers, navigators = rate_of(paper, flights), rate_of(navigated, fewer)
+    what, on = "flights a second, scored", f"flights, {cores} threads"
+    return [
+        Figure(f"{what}, the paper's filter", papers, "1/s", 500.0, True, f"{flights} {on}"),
+        Figure(f"{what}, the navigator", navigators, "1/s", None, True, f"{fewer} {on}"),
+        Figure("the navigator's rate over the paper's filter's", navigators / papers, "x", 0.20, True, "the same run"),
+    ]
+
+
+def lanes_against_scalar(paper: Flight, navigated: Flight) -> list[Figure]:
+    """How many times faster a flight is as one of a block than alone, on one core."""
+
+    def ratio_of(flight: Flight) -> float:
+        block = best_of(lambda: list(fly_blocks(flight, 1, 0, len(LANES), lambda history: None, 1)), 3)
+        return len(LANES) * best_of(lambda: fly_one(flight, 1), 3) / block
+
+    what = f"{len(LANES)} lanes against scalar, one core"
+    return [
+        Figure(f"{what}, the paper's filter", ratio_of(paper), "x", 4.0, True),
+        Figure(f"{what}, the navigator", ratio_of(navigated), "x", None, True),
+    ]
+
+
+# -- the filters' steps --------------------------------------------------------------------------------------
+def filter_parts() -> list[Figure]:
+    """Prediction, correction, and one that nobody offers, of the navigator's filter: scalar, and a lane of sixteen."""
+    from flownav.benchmark.filter_parts import SETTINGS, correct_often, offer_nothing, predict_often, standing
+
+    def us_of(part: Callable[..., Any], lanes: tuple[int, ...]) -> float:
+        start = standing(lanes)
+        buffer, best = start.copy(), np.inf
+        for _ in range(PART_ROUNDS):
+            buffer[:] = start
+            begun = time.process_time()
+            part(buffer, lanes, PART_STEPS, SETTINGS)
+            best = min(best, time.process_time() - begun)
+        return 1e6 * best / (PART_STEPS * len(lanes))
+
+    rows: tuple[tuple[str, Callable[..., Any], float | None, float | None], ...] = (
+        ("prediction of the navigator's filter", predict_often, 1.5, None),
+        ("correction of the navigator's filter", correct_often, 0.45, 0.35),
+        ("correction that nobody offers", offer_nothing, 0.05, 0.05),
     )
-    lanes = sum(flown for flown, _ in fly_blocks(flight, 1, 0, len(LANES), lambda history: None, 1))
-    wide = best_of(lambda: list(fly_blocks(flight, 1, 0, lanes, lambda history: None, 1)), 3) / lanes
-    alone = best_of(lambda: fly_one(flight, 1), 3)
-    yield Figure(f"{len(LANES)} lanes against scalar, one core", alone / wide, "x", 4.0, True)
+    figures = []
+    for name, part, alone, of_lanes in rows:
+        figures.append(Figure(f"{name}, scalar", us_of(part, ONE_LANE), "us", alone, False))
+        figures.append(Figure(f"{name}, a lane of {len(LANES)}", us_of(part, LANES), "us", of_lanes, False))
+    return figures
 
 
 def _filter_runner() -> Callable[[int], float]:
@@ -122,7 +183,7 @@ def filter_step() -> Figure:
     run(10)
     steps = 50_000
     per_step = min(run(steps) for _ in range(REPEATS)) / steps
-    return Figure("filter step (6 states, predict + 6 updates)", 1e6 * per_step, "us", 5.0, False)
+    return Figure("step of the paper's filter (predict + 6 updates)", 1e6 * per_step, "us", 5.0, False)
 
 
 def filter_against_filterpy() -> Iterator[Figure]:
@@ -147,17 +208,20 @@ def filter_against_filterpy() -> Iterator[Figure]:
 
     theirs = best_of(steps, 3) / 500
     note = f"FilterPy {1e6 * theirs:.1f} us, ours {1e6 * ours:.2f} us a step"
-    yield Figure("filter step against FilterPy", theirs / ours, "x", 20.0, True, note)
+    yield Figure("step of the paper's filter against FilterPy", theirs / ours, "x", 20.0, True, note)
 
 
+# -- whole jobs -----------------------------------------------------------------------------------------------
 def replay_of_recorded_flight() -> Iterator[Figure]:
     """Reading and replaying the recorded 849 s flight; left out where the data folder is absent."""
-    from flownav.benchmark.recorded import recorded_flight, replay_once
+    from flownav.benchmark.recorded import navigator_run, recorded_flight, replay_once
 
     folder = recorded_flight()
     if folder is not None:
-        seconds = best_of(lambda: replay_once(folder), 3)
-        yield Figure("replay of the 849 s log", seconds, "s", 1.0, False, "read, replayed, bundled into a record")
+        engine_s, note = best_of(navigator_run(folder), 3), "in the engine, streams prepared"
+        yield Figure("the 849 s log through the navigator", engine_s, "s", 0.25, False, note)
+        whole_s = best_of(lambda: replay_once(folder), 3)
+        yield Figure("replay of the 849 s log", whole_s, "s", 1.0, False, "read, replayed, bundled into a record")
 
 
 def _subprocess(arguments: list[str], environment: dict[str, str] | None = None) -> float:
@@ -178,13 +242,17 @@ def help_time() -> Figure:
     return Figure("flownav --help, whole process", seconds, "s", 0.3, False)
 
 
-def cold_compile() -> Figure:
-    """The first flight with an empty cache, less the same with a full one."""
-    with tempfile.TemporaryDirectory() as cache, tempfile.TemporaryDirectory() as out:
-        command = ["fly", "landing", "--no-report", "--json", "--out", str(Path(out) / "cold.fnr")]
-        cold = _subprocess(command, {"FLOWNAV_CACHE": cache})
-        warm = _subprocess(command, {"FLOWNAV_CACHE": cache})
-    return Figure("cold first compile", cold - warm, "s", 20.0, False, f"whole process {cold:.1f} s, warm {warm:.2f} s")
+def cold_compiles() -> list[Figure]:
+    """The first `fly landing` with an empty cache, less the same with a full one, on each filter."""
+    figures = []
+    for name, more, asked in (("", [], 12.0), (" --filter paper", ["--filter", "paper"], 20.0)):
+        with tempfile.TemporaryDirectory() as cache, tempfile.TemporaryDirectory() as out:
+            command = ["fly", "landing", *more, "--no-report", "--json", "--out", str(Path(out) / "cold.fnr")]
+            cold = _subprocess(command, {"FLOWNAV_CACHE": cache})
+            warm = _subprocess(command, {"FLOWNAV_CACHE": cache})
+        note = f"whole process {cold:.1f} s, warm {warm:.2f} s"
+        figures.append(Figure(f"cold compile of `fly landing{name}`", cold - warm, "s", asked, False, note))
+    return figures
 
 
 def memory_of_many_flights(flights: int = 10_000) -> Figure:
@@ -193,7 +261,7 @@ def memory_of_many_flights(flights: int = 10_000) -> Figure:
         "import resource\n"
         "from flownav.benchmark.measures import _landing\n"
         "from flownav.campaign.local import fly_many\n"
-        f"fly_many(_landing(), 1, {flights})\n"
+        f"fly_many(_landing('paper'), 1, {flights})\n"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
     )
     done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)

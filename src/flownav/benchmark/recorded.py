@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 
 FLIGHT = "quad-px4flow-outdoor"
@@ -25,3 +26,26 @@ def replay_once(folder: Path) -> object:
 
     flown = replay(read_csv_folder(folder), ReplayOptions(), NavigatorSettingsFile())
     return to_record(flown, flown.scores(), ["flownav", "bench"])
+
+
+def navigator_run(folder: Path) -> Callable[[], object]:
+    """The navigator on the log's prepared readings, from its start to its end: what the engine does of a replay."""
+    from flownav.logs.csv_folder import read_csv_folder
+    from flownav.navigation.feed import equipment_of
+    from flownav.navigation.loop import run, start_navigator
+    from flownav.navigation.settings import NavigatorSettingsFile
+    from flownav.navigation.tape import new_tape
+    from flownav.replay.prepare import ReplayOptions, prepare
+
+    settings, prepared = NavigatorSettingsFile(), prepare(read_csv_folder(folder), ReplayOptions())
+    queue = prepared.queue
+    equipment = equipment_of(prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, settings)
+    tape = new_tape(queue)
+
+    def once() -> object:
+        tape.used[:] = 0
+        running = start_navigator(equipment, settings, tape)
+        run(queue, running)
+        return running
+
+    return once

@@ -20,7 +20,7 @@ from flownav.sensors.flow import flow_noise_sigma
 from flownav.sensors.noise_law import constant_noise
 from flownav.simulation.assemble import Setup
 from flownav.simulation.fitting import Fitted, refitted, timetable_of
-from flownav.simulation.flight import Flight
+from flownav.simulation.plan import Flight
 from flownav.simulation.schedule import Timing
 
 

@@ -24,7 +24,7 @@ from flownav.scoring.consistency import (
 )
 from flownav.scoring.errors import CRASHED, MAX_POSITION_ERROR
 from flownav.simulation.assemble import assemble
-from flownav.simulation.flight import Flight
+from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario, load_scenario, with_filter
 
 CASES = ("takeoff", "landing", "pad_return", "approach")

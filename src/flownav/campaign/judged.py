@@ -31,8 +31,8 @@ from flownav.scoring.consistency import (
 from flownav.scoring.errors import CRASHED, SCORE_COLUMNS
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_blocks
-from flownav.simulation.flight import Flight
 from flownav.simulation.history import column, columns
+from flownav.simulation.plan import Flight
 from flownav.simulation.sensing import EPOCH_S
 
 Array = NDArray[np.float64]

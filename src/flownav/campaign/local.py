@@ -12,9 +12,9 @@ from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, score_bloc
 from flownav.scoring.paper_tables import published
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_blocks, fly_written
-from flownav.simulation.flight import Flight
 from flownav.simulation.flight_record import record_of
 from flownav.simulation.history import column, columns
+from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S
 

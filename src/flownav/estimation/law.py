@@ -14,8 +14,7 @@ from collections.abc import Callable
 from types import FunctionType
 from typing import Any, Protocol, cast, get_args, get_type_hints
 
-from flownav.compile import equation, procedure
-from flownav.compiling.bundles import write_function
+from flownav.compile import equation, procedure, write_function
 from flownav.estimation.states import (
     COEFFICIENT,
     INNOVATION,

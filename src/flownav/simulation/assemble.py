@@ -17,7 +17,7 @@ from flownav.estimation.paper_filter import PaperModel
 from flownav.measurement import Sensor
 from flownav.sensors.datasheet import FlowSensor, load_sensor
 from flownav.simulation.fitting import Fitted, fitted, timetable_of
-from flownav.simulation.flight import ATTITUDE_S, Flight, FlightPlan
+from flownav.simulation.plan import ATTITUDE_S, Flight, FlightPlan
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite

@@ -17,9 +17,10 @@ from flownav.navigation.memory import new_work
 from flownav.navigation.take import navigate_lanes, navigate_one
 from flownav.navigation.tape import COMPONENTS, Tape, empty_tape, room_of
 from flownav.simulation import layout
-from flownav.simulation.flight import PHYSICS_S, Flight, fly_block
+from flownav.simulation.flight import fly_block
 from flownav.simulation.history import HISTORY
 from flownav.simulation.navigating import first_inertial, kept_inertials
+from flownav.simulation.plan import PHYSICS_S, Flight
 from flownav.simulation.ring import FIELDS
 
 Array = NDArray[np.float64]

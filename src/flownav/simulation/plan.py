@@ -1,0 +1,63 @@
+"""What a flight is: the plan, the vehicle, the sensors and the rates of the loop, as numbers that kernels take."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.control.autopilot import AutopilotGains
+from flownav.control.guidance import Path
+from flownav.estimation.paper_filter import PaperModel
+from flownav.simulation.navigating import Timetable
+from flownav.simulation.onboard import Onboard
+from flownav.simulation.plant import LinearTruth
+from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
+from flownav.simulation.wind import WindParameters
+from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.state import HelicopterState
+
+ATTITUDE_STEPS = 5  # 250 Hz within an epoch
+PHYSICS_STEPS = 2  # 500 Hz within an attitude step
+ATTITUDE_S = EPOCH_S / ATTITUDE_STEPS
+PHYSICS_S = ATTITUDE_S / PHYSICS_STEPS
+CONTACT_SHARE = 0.05  # of the weight on the skids counts as touching (a skid switch)
+START_STEP = 1 << 40  # the noise counter's step for the draws before the first epoch
+NOTHING = np.zeros(0)
+
+
+class FlightPlan(NamedTuple):
+    """What a scenario asks of the loop, as numbers the kernel takes."""
+
+    epochs: int
+    start: HelicopterState
+    starts_on_ground: bool
+    takeoff_at_s: float
+    may_land_after_s: float
+    fly_on_truth: bool
+    along_truth: bool  # the navigator's Jacobians are taken on the truth: its covariance is the bound
+    home_at_start: bool  # the pad is where the estimate first puts the start, else at the filter's origin
+    start_known: bool  # the paper's filter starts at the true position, else at the first GPS reading
+    handover_s: float  # until then the vehicle is flown on the truth, where it does not stand on its skids
+    draws: Draws
+
+
+class Flight(NamedTuple):
+    """Everything constant over a flight: the paper's filter, or the navigator's sensors and their timetable.
+
+    linear: only for that truth.
+    """
+
+    plan: FlightPlan
+    vehicle: VehicleParameters
+    sensors: SensorSuite
+    wind: WindParameters
+    path: Path
+    gains: AutopilotGains
+    paper: PaperModel | None
+    onboard: Onboard | None
+    table: Timetable | None
+    settings: NDArray[np.float64]  # the navigator's, packed; of no length where the paper's filter flies
+    initial_variance: NDArray[np.float64]
+    linear: LinearTruth | None

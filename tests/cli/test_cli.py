@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import socket
 import subprocess
 import sys
+from collections import Counter
+from contextlib import suppress
 
 import numpy as np
 import pytest
@@ -207,6 +210,28 @@ def test_files_that_a_scenario_names_lie_beside_it(tmp_path):
     (folder / "mine.toml").write_text(shipped("maxi_joker_3.toml").read_text(encoding="utf-8"), encoding="utf-8")
     path = short(folder, '\n[vehicle]\nfile = "mine.toml"\n')
     assert run("fly", path, "--json", "--no-report", cwd=tmp_path).returncode == 0
+
+
+def test_a_flight_is_told_as_an_autopilot_tells_it(tmp_path):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as ear:
+        ear.bind(("127.0.0.1", 0))
+        ear.setblocking(False)
+        url = f"udpout:127.0.0.1:{ear.getsockname()[1]}"
+        done = run("fly", short(tmp_path), "--gps", "midg", "--json", "--no-report", "--mavlink", url, "--speed", "4",
+                   cwd=tmp_path)  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        told = json.loads(done.stdout)["told"]
+        assert told["flight_s"] == pytest.approx(2.0, abs=0.1)
+        numbers = Counter()
+        with suppress(BlockingIOError):
+            while True:
+                piece = ear.recv(2048)
+                numbers[int.from_bytes(piece[7:10], "little")] += 1
+    assert numbers[105] > numbers[106] > numbers[132] > numbers[24] > 5  # IMU, flow, range, GPS
+    assert numbers[31] > 90  # attitude
+    white = run("fly", short(tmp_path), "--json", "--no-report", "--mavlink", url, cwd=tmp_path)
+    assert white.returncode == 2
+    assert "no GPS velocity; give --filter landing --gps midg" in white.stderr
 
 
 def test_help_lists_every_command(tmp_path):

@@ -227,7 +227,7 @@ def test_a_flight_is_told_as_an_autopilot_tells_it(tmp_path):
             while True:
                 piece = ear.recv(2048)
                 numbers[int.from_bytes(piece[7:10], "little")] += 1
-    assert numbers[105] > numbers[106] > numbers[132] > numbers[24] > 5  # IMU, flow, range, GPS
+    assert numbers[105] > numbers[106] > numbers[132] > numbers[24] >= 3  # IMU, flow, range, and GPS at 5 Hz
     assert numbers[31] > 90  # attitude
     white = run("fly", short(tmp_path), "--json", "--no-report", "--mavlink", url, cwd=tmp_path)
     assert white.returncode == 2

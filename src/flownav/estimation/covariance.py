@@ -18,11 +18,13 @@ from flownav.estimation.states import (
     ACCEPTED,
     ATTITUDE,
     COEFFICIENT,
+    CONSIDERED,
     COVARIANCE,
     CROSS,
     GAIN,
     INNOVATION,
     INNOVATION_VARIANCE,
+    KEPT,
     NOISE,
     OBSERVED,
     OFFERED,
@@ -124,13 +126,19 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
     """x <- x + K nu and Joseph's P <- (I - K h) P (I - K h)' + K R K' in the lanes that accepted.
 
     Written out, with c = P h', S = h c + R and d = c - K S/2, it is P - (K d' + d K'), whatever the gain (Bucy and
-    Joseph, Filtering for Stochastic Processes with Applications to Guidance, 1968).
+    Joseph, Filtering for Stochastic Processes with Applications to Guidance, 1968). That of the considered states is 0:
+    they stay as they are, and their uncertainty counts (Schmidt, Application of State-Space Methods to Navigation
+    Problems, 1966).
     """
     fused_lanes = 0
     for lane in range(len(lanes)):
         fused_lanes += 1 if work[ACCEPTED * len(lanes) + lane] > 0.0 else 0
     if fused_lanes == 0:
         return
+    for t in range(int(work[CONSIDERED * len(lanes)])):
+        considered = int(work[(CONSIDERED + 1 + t) * len(lanes)])
+        for lane in range(len(lanes)):
+            work[(KEPT + t) * len(lanes) + lane] = work[(STATE + considered) * len(lanes) + lane]
     for i in range(n):
         for lane in range(len(lanes)):
             fused = work[ACCEPTED * len(lanes) + lane] > 0.0
@@ -142,6 +150,13 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
             work[(GAIN + i) * len(lanes) + lane] = gain
             work[(REST + i) * len(lanes) + lane] = cross - 0.5 * gain * variance
             work[(STATE + i) * len(lanes) + lane] = before + gain * innovation if fused else before
+    for t in range(int(work[CONSIDERED * len(lanes)])):
+        considered = int(work[(CONSIDERED + 1 + t) * len(lanes)])
+        for lane in range(len(lanes)):
+            fused = work[ACCEPTED * len(lanes) + lane] > 0.0
+            work[(GAIN + considered) * len(lanes) + lane] = 0.0
+            work[(REST + considered) * len(lanes) + lane] = work[(CROSS + considered) * len(lanes) + lane] if fused else 0.0
+            work[(STATE + considered) * len(lanes) + lane] = work[(KEPT + t) * len(lanes) + lane]
     for j in range(n):
         for i in range(j + 1):
             for lane in range(len(lanes)):
@@ -149,6 +164,20 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
                 rest_i, rest_j = work[(REST + i) * len(lanes) + lane], work[(REST + j) * len(lanes) + lane]
                 work[at(i, j) * len(lanes) + lane] -= gain_i * rest_j + gain_j * rest_i
     fold_attitude(work, lanes)
+
+
+@equation
+def consider(work: Work, lanes: Lanes, state: int) -> None:
+    """One more state that corrections leave as it is, until `consider_none`."""
+    count = int(work[CONSIDERED * len(lanes)])
+    work[(CONSIDERED + 1 + count) * len(lanes)] = state
+    work[CONSIDERED * len(lanes)] = count + 1.0
+
+
+@equation
+def consider_none(work: Work, lanes: Lanes) -> None:
+    """Corrections concern all states."""
+    work[CONSIDERED * len(lanes)] = 0.0
 
 
 @procedure

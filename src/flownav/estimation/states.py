@@ -46,6 +46,7 @@ STATE_NAMES = (
 
 MOST_OBSERVED = 12  # states that one observation reads
 MOST_SOURCES = 15  # and one transition
+MOST_CONSIDERED = 6  # states that a correction may leave as they are
 
 # STATE_NAMES without units, as laws name them
 SHORT_NAMES = (
@@ -98,6 +99,8 @@ COEFFICIENT = _rows.take(MOST_OBSERVED)  # h on the states that OBSERVED names
 OBSERVED = _rows.take(
     1 + MOST_OBSERVED
 )  # in the first lane, for all of them: how many states the law reads, then their places
+CONSIDERED = _rows.take(1 + MOST_CONSIDERED)  # in the first lane: how many states corrections leave alone, their places
+KEPT = _rows.take(MOST_CONSIDERED)  # these states while a correction is made
 # within a step
 CROSS = _rows.take(STATES_WITH_LAG)  # P h'
 GAIN = _rows.take(STATES_WITH_LAG)  # K

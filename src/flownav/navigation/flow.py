@@ -37,8 +37,10 @@ from flownav.navigation.reasons import (
     SILENT,
     TILTED,
 )
+from flownav.navigation.still import watch_flow
 from flownav.navigation.tape import FLOW_DOUBTED, FLOW_TRUSTED, Output, write_event
 from flownav.navigation.told import FlowSettings
+from flownav.navigation.trust import watch_whiteness
 from flownav.sensors.flow import flow_noise_sigma
 
 LARGEST_EXCESS = 400.0
@@ -155,6 +157,7 @@ def take_flow(work: Work, lanes: Lanes, t_s: float, sensor: int, gyro_is_imu: bo
     s = load_flow_settings(p)
     angular = sensor == Sensor.FLOW_RATE
     look(work, lanes, t_s, angular, gyro_is_imu, s)
+    watch_flow(work, lanes, angular)
     for component in range(2 if angular else 3):
         offer_component(work, lanes, component, angular, s)
         if angular:
@@ -162,6 +165,7 @@ def take_flow(work: Work, lanes: Lanes, t_s: float, sensor: int, gyro_is_imu: bo
         else:
             body_velocity(work, lanes, component, s.flow_forward_m, s.flow_right_m, s.flow_below_m)
         conclude(work, lanes, t_s, sensor, component, s.gate_sigma, o)
+        watch_whiteness(work, lanes, t_s, 1 - component if angular else component)
         learn(work, lanes, t_s, angular, component, s)
         note_aid(work, lanes, t_s, o)
     judge_agreement(work, lanes, t_s, o)

@@ -32,6 +32,7 @@ from flownav.navigation.packed import load_height_settings
 from flownav.navigation.reasons import DATUM, FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT, STUCK, TILTED
 from flownav.navigation.tape import BARO_FOUND, GROUND_FOUND, GROUND_RESET, RANGE_STUCK, Output, write_event
 from flownav.navigation.told import HeightSettings
+from flownav.navigation.trust import watch_whiteness
 from flownav.navigation.vibration import doubt_imu
 
 UNKNOWN_M = 100.0
@@ -136,6 +137,7 @@ def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Ou
         put(work, lanes, lane, reading.value_0, variance, reason)
     range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
+    watch_whiteness(work, lanes, t_s, 2)
     again = False
     for lane in range(len(lanes)):
         again = mind_refusals(work, lanes, lane, t_s, s, o) or again

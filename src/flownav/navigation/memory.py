@@ -38,8 +38,8 @@ class Reading(NamedTuple):
 
 
 class StartMemory(NamedTuple):
-    """started: 1 once the filter runs. Before that, the newest attitude that was read and its time [s], and the mean
-    specific force [m/s2] of so many readings.
+    """started: 1 once the filter runs. Before that, the newest attitude that was read and its time [s], the mean specific
+    force [m/s2] of so many readings, and the mean square of an axis about it [m2/s4].
     """
 
     started: float
@@ -52,6 +52,7 @@ class StartMemory(NamedTuple):
     force_y: float
     force_z: float
     readings: float
+    shaken: float
 
 
 class AidMemory(NamedTuple):
@@ -148,6 +149,54 @@ class BridgeMemory(NamedTuple):
     variance_d: float
 
 
+class ImuWindow(NamedTuple):
+    """Inertial readings of a window: how many, the first (turning p, q, r [rad/s], specific force x, y, z [m/s2]), sums
+    of differences from it, and sums of their squares.
+    """
+
+    readings: float
+    first_p: float
+    first_q: float
+    first_r: float
+    first_x: float
+    first_y: float
+    first_z: float
+    sum_p: float
+    sum_q: float
+    sum_r: float
+    sum_x: float
+    sum_y: float
+    sum_z: float
+    gyro_square: float
+    accel_square: float
+
+
+class SeenWindow(NamedTuple):
+    """What else was read in a window: lowest and highest range [m] (the highest below 0: none), sums of the flow's
+    velocity [m/s] and of how many, and the fastest level velocity by GPS [m/s].
+    """
+
+    range_low_m: float
+    range_high_m: float
+    flow_u_m_s: float
+    flow_v_m_s: float
+    flows: float
+    gps_m_s: float
+
+
+class WhitenessMemory(NamedTuple):
+    """A block of innovations along one body axis: since when [s], their sum in standard deviations, how many. The block
+    before, the mean square of blocks, and when it ended [s].
+    """
+
+    since_s: float
+    total: float
+    count: float
+    before: float
+    square: float
+    ended_s: float
+
+
 class RejectionMemory(NamedTuple):
     """How often GPS was refused for one state, one after the other, and since when."""
 
@@ -166,6 +215,12 @@ FLOW = _rows.take(len(FlowMemory._fields))
 HEADING = _rows.take(len(HeadingMemory._fields))
 BRIDGE = _rows.take(len(BridgeMemory._fields))
 REJECTION = _rows.take(6 * len(RejectionMemory._fields))  # of position and velocity, north, east, down
+IMU_WINDOW = _rows.take(len(ImuWindow._fields))
+SEEN_WINDOW = _rows.take(len(SeenWindow._fields))
+WHITENESS = _rows.take(3 * len(WhitenessMemory._fields))  # forward, right, down
+ACCEL_FACTOR = _rows.take(3)  # how many times noisier than told the accelerometer is, by each of these
+STANDS = _rows.take(1)  # what the vehicle did in the last window: `still.MOVES`, SHAKEN or RESTS
+CONTACT = _rows.take(1)  # the range when it rested last [m]; NaN where it has not
 BARO_KNOWN = _rows.take(1)
 PAD_KNOWN = _rows.take(1)  # 0 no, or how: STOOD_ON, LEFT, SEEN of `place`
 # what becomes of the component that is offered
@@ -184,6 +239,7 @@ MOVING = _rows.take(1)  # 1 where the IMU moves the filter over the step at hand
 CLOCK = _rows.take(1)  # the instant that the filter has reached [s]
 WRITTEN = _rows.take(1)  # the last estimate's [s]
 ERRORS_CLOCK = _rows.take(1)  # the instant that the Gauss-Markov errors have reached [s]
+STILL_CLOCK = _rows.take(1)  # the end of the last window [s]
 LAST = _rows.take(max(Sensor) + 1)  # of each sensor, the newest instant [s]
 WORK_ROWS = _rows.next
 
@@ -195,17 +251,24 @@ load_range, store_range = lane_access(RangeMemory, RANGE)
 load_ground, store_ground = lane_access(GroundMemory, GROUND_SEEN)
 load_flow, store_flow = lane_access(FlowMemory, FLOW)
 load_heading, store_heading = lane_access(HeadingMemory, HEADING)
+load_imu_window, store_imu_window = lane_access(ImuWindow, IMU_WINDOW)
+load_seen_window, store_seen_window = lane_access(SeenWindow, SEEN_WINDOW)
 load_bridge, store_bridge = lane_access(BridgeMemory, BRIDGE)
 
 _FRESH: dict[int, tuple[float, ...]] = {
     QUATERNION: (1.0, 0.0, 0.0, 0.0),
-    START: StartMemory(0.0, -np.inf, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+    START: StartMemory(0.0, -np.inf, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     AID: AidMemory(np.nan, 0.0, -np.inf, 0.0),
     IMU_HEARD: ImuMemory(-np.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     RANGE: RangeMemory(-np.inf, np.nan, np.nan, np.nan, 0.0, np.nan, 0.0),
     FLOW: FlowMemory(-np.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0),
     HEADING: HeadingMemory(-np.inf, np.nan),
     BRIDGE: BridgeMemory(*([np.nan] * len(BridgeMemory._fields))),
+    SEEN_WINDOW: SeenWindow(1e9, -1.0, 0.0, 0.0, 0.0, 0.0),
+    CONTACT: (np.nan,),
+    ACCEL_FACTOR: (1.0, 1.0, 1.0),
+    WHITENESS: (0.0, 0.0, 0.0, 0.0, 1.0, -np.inf) * 3,
+    STILL_CLOCK: (-np.inf,),
     CLOCK: (-np.inf,),
     WRITTEN: (-np.inf,),
     ERRORS_CLOCK: (-np.inf,),
@@ -260,3 +323,25 @@ def store_rejection(work: Work, lanes: Lanes, place: int, lane: int, value: Reje
     row = REJECTION + 2 * place
     work[row * len(lanes) + lane] = value.times
     work[(row + 1) * len(lanes) + lane] = value.since_s
+
+
+@equation
+def load_whiteness(work: Work, lanes: Lanes, axis: int, lane: int) -> WhitenessMemory:
+    """Of body axis 0, 1 or 2."""
+    row = WHITENESS + 6 * axis
+    return WhitenessMemory(
+        work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane], work[(row + 2) * len(lanes) + lane],
+        work[(row + 3) * len(lanes) + lane], work[(row + 4) * len(lanes) + lane], work[(row + 5) * len(lanes) + lane],
+    )  # fmt: skip
+
+
+@equation
+def store_whiteness(work: Work, lanes: Lanes, axis: int, lane: int, value: WhitenessMemory) -> None:
+    """And back."""
+    row = WHITENESS + 6 * axis
+    work[row * len(lanes) + lane] = value.since_s
+    work[(row + 1) * len(lanes) + lane] = value.total
+    work[(row + 2) * len(lanes) + lane] = value.count
+    work[(row + 3) * len(lanes) + lane] = value.before
+    work[(row + 4) * len(lanes) + lane] = value.square
+    work[(row + 5) * len(lanes) + lane] = value.ended_s

@@ -7,8 +7,8 @@ import numpy as np
 from flownav.compile import equation, procedure
 from flownav.estimation.covariance import place
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.states import ATTITUDE, FORCE, POSITION, QUATERNION, RATE, STATE, STATES
-from flownav.frames import Quaternion, quaternion_from_euler
+from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, FORCE, POSITION, QUATERNION, RATE, STATE, STATES
+from flownav.frames import GRAVITY_M_S2, Quaternion, quaternion_from_euler, rotation_from_quaternion
 from flownav.measurement import Sensor
 from flownav.navigation.memory import (
     STEADY_FORCE,
@@ -32,7 +32,8 @@ from flownav.navigation.vibration import with_reading
 ORIGIN_SIGMA_M = 0.1  # the local origin, where the navigator's start defines it
 LOST_SIGMA_M = 10.0  # the same where the log's fixes define it and came too late, and about a first fix
 READ_TILT_RAD = 0.03  # an attitude that was read
-LEVELLED_TILT_RAD = 0.1  # one from the accelerometer
+STANDING_TILT_RAD = 0.07  # of a vehicle that stands, or hovers, before anything is read: 4 deg
+LEVELLED_FLOOR_RAD = 0.005  # of one from the accelerometer
 READ_HEADING_RAD = 0.1  # an autopilot's, whose compass is calibrated
 COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's
 DATUM_HEADING_RAD = 1e-3  # the start defines the frame
@@ -41,14 +42,14 @@ LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0
 
 @equation
 def levelled(reading: Reading, m: StartMemory) -> StartMemory:
-    """The mean specific force [m/s2] with one reading more."""
+    """The mean specific force [m/s2], and how it is shaken, with one reading more."""
     share = 1.0 / min(m.readings + 1.0, MOST_LEVELLING)
+    x, y, z = reading.value_3 - m.force_x, reading.value_4 - m.force_y, reading.value_5 - m.force_z
+    square = (x * x + y * y + z * z) / 3.0 if m.readings > 0.0 else 0.0
     return StartMemory(
         m.started, m.attitude_s, m.qw, m.qx, m.qy, m.qz,
-        m.force_x + share * (reading.value_3 - m.force_x),
-        m.force_y + share * (reading.value_4 - m.force_y),
-        m.force_z + share * (reading.value_5 - m.force_z),
-        m.readings + 1.0,
+        m.force_x + share * x, m.force_y + share * y, m.force_z + share * z, m.readings + 1.0,
+        m.shaken + share * (square - m.shaken),
     )  # fmt: skip
 
 
@@ -65,7 +66,7 @@ def gather(work: Work, lanes: Lanes, t_s: float, sensor: int) -> None:
             if size > 0.5 and size < 2.0:
                 w, x, y, z = reading.value_0, reading.value_1, reading.value_2, reading.value_3
                 after = StartMemory(
-                    0.0, t_s, w / size, x / size, y / size, z / size, m.force_x, m.force_y, m.force_z, m.readings
+                    0.0, t_s, w / size, x / size, y / size, z / size, m.force_x, m.force_y, m.force_z, m.readings, m.shaken
                 )
                 store_start(work, lanes, lane, after)
         elif sensor == Sensor.IMU:
@@ -105,7 +106,10 @@ def start_lane(
 ) -> None:  # fmt: skip
     """State and covariance of one lane at its first instant."""
     read = bool(np.isfinite(m.attitude_s))
-    w, x, y, z = (m.qw, m.qx, m.qy, m.qz) if read else level(m, load_heading(work, lanes, lane).field_rad, fitted)
+    doubt_m_s2 = np.sqrt(p[START_SIGMA + ACCEL_BIAS] ** 2 + m.shaken)
+    believed = STANDING_TILT_RAD**2 / (STANDING_TILT_RAD**2 + (doubt_m_s2 / GRAVITY_M_S2) ** 2)
+    field_rad = load_heading(work, lanes, lane).field_rad
+    w, x, y, z = (m.qw, m.qx, m.qy, m.qz) if read else level(m, believed, field_rad, fitted)
     work[QUATERNION * len(lanes) + lane] = w
     work[(QUATERNION + 1) * len(lanes) + lane] = x
     work[(QUATERNION + 2) * len(lanes) + lane] = y
@@ -117,7 +121,7 @@ def start_lane(
             work[place(i, j) * len(lanes) + lane] = 0.0
         sigma = p[START_SIGMA + j]
         work[place(j, j) * len(lanes) + lane] = sigma * sigma
-    tilt = READ_TILT_RAD if read else LEVELLED_TILT_RAD
+    tilt = READ_TILT_RAD if read else STANDING_TILT_RAD * np.sqrt(1.0 - believed) + LEVELLED_FLOOR_RAD
     known = fitted.heading == NO_HEADING and not lost
     turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
     spread = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M
@@ -131,6 +135,13 @@ def start_lane(
     work[(STATE + POSITION) * len(lanes) + lane] = reading.value_0 if at_fix else 0.0
     work[(STATE + POSITION + 1) * len(lanes) + lane] = reading.value_1 if at_fix else 0.0
     work[(STATE + POSITION + 2) * len(lanes) + lane] = reading.value_2 if at_fix else 0.0
+    for i in range(3):
+        bias_variance = doubt_m_s2 * doubt_m_s2
+        work[place(ACCEL_BIAS + i, ACCEL_BIAS + i) * len(lanes) + lane] = bias_variance
+    if not read and m.readings >= LEAST_LEVELLING:
+        rotation = rotation_from_quaternion(w, x, y, z)
+        work[(STATE + ACCEL_BIAS) * len(lanes) + lane] = m.force_x + GRAVITY_M_S2 * rotation[6]
+        work[(STATE + ACCEL_BIAS + 1) * len(lanes) + lane] = m.force_y + GRAVITY_M_S2 * rotation[7]
     store_start(work, lanes, lane, started(m))
     aid = load_aid(work, lanes, lane)
     store_aid(work, lanes, lane, AidMemory(t_s, 0.0, aid.height_s, aid.landed))
@@ -140,17 +151,17 @@ def start_lane(
 def started(m: StartMemory) -> StartMemory:
     """The filter runs."""
     return StartMemory(
-        1.0, m.attitude_s, m.qw, m.qx, m.qy, m.qz, m.force_x, m.force_y, m.force_z, m.readings
+        1.0, m.attitude_s, m.qw, m.qx, m.qy, m.qz, m.force_x, m.force_y, m.force_z, m.readings, m.shaken
     )  # fmt: skip
 
 
 @equation
-def level(m: StartMemory, field_rad: float, fitted: Equipment) -> Quaternion:
-    """Roll and pitch from the mean specific force, heading from the magnetometer where one was heard, else north.
+def level(m: StartMemory, believed: float, field_rad: float, fitted: Equipment) -> Quaternion:
+    """Roll and pitch from the mean specific force as far as it is believed (1: wholly), heading from the magnetometer where one was heard, else north.
 
     The field was noted in the axes of a vehicle that takes itself to be level and to head north.
     """
-    roll = np.arctan2(-m.force_y, -m.force_z)
-    pitch = np.arctan2(m.force_x, np.sqrt(m.force_y * m.force_y + m.force_z * m.force_z))
+    roll = believed * np.arctan2(-m.force_y, -m.force_z)
+    pitch = believed * np.arctan2(m.force_x, np.sqrt(m.force_y * m.force_y + m.force_z * m.force_z))
     magnetic = fitted.heading == FROM_MAG and bool(np.isfinite(field_rad))
     return quaternion_from_euler(roll, pitch, -field_rad if magnetic else 0.0)

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.compile import LANES, ONE_LANE, equation, procedure, unit
+from flownav.estimation.covariance import consider, consider_none
 from flownav.estimation.error_models import propagate_gauss_markov, propagate_walks
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.motion import hold_still, predict
-from flownav.estimation.states import STATES
+from flownav.estimation.states import ATTITUDE, FLOW_SCALE, GYRO_BIAS, STATES
 from flownav.measurement import Sensor
 from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
 from flownav.navigation.flow import take_flow
@@ -41,7 +42,8 @@ from flownav.navigation.packed import (
 from flownav.navigation.place import take_landed, take_pad, take_pose
 from flownav.navigation.start import gather, try_start
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, Output, output_of, write_estimate
-from flownav.navigation.told import FROM_MAG, Equipment
+from flownav.navigation.still import stand_still, watch_gps_velocity, watch_imu, watch_range
+from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
 from flownav.navigation.vibration import add_vibration_noise, limit_biases
 
 LONGEST_STEP_S = 0.1
@@ -63,6 +65,8 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
         advance(work, lanes, t_s, p, o)
         if heard:
             keep_imu(work, lanes, t_s)
+    if sensor == Sensor.IMU:
+        watch_imu(work, lanes)
     if t_s - shared(work, lanes, ERRORS_CLOCK) >= LONGEST_LAG_OF_ERRORS_S:
         catch_up_errors(work, lanes, t_s, p, o)
     share(work, lanes, CLOCK, t_s)
@@ -70,7 +74,12 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
         running = try_start(work, lanes, t_s, sensor, fitted, p, o)
     elif len(lanes) > 1:
         try_start(work, lanes, t_s, sensor, fitted, p, o)
+    watch_others(work, lanes, sensor)
+    consider_unseen(work, lanes, fitted)
     take(work, lanes, t_s, sensor, fitted, p, o)
+    if sensor == Sensor.IMU:
+        stand_still(work, lanes, t_s, p, o)
+    consider_none(work, lanes)
     if running:
         note_aid_age(work, lanes, t_s, load_aid_settings(p), o)
     if t_s - shared(work, lanes, WRITTEN) >= ESTIMATE_PERIOD_S:
@@ -80,6 +89,25 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
             write_estimate(work, lanes, t_s, o)
             if len(lanes) == 1:
                 note_estimate(work, lanes, o)
+
+
+@equation
+def watch_others(work: Work, lanes: Lanes, sensor: int) -> None:
+    """What ranges and GPS say to one who asks whether the vehicle stands."""
+    if sensor == Sensor.RANGE:
+        watch_range(work, lanes)
+    elif sensor == Sensor.GPS_VELOCITY:
+        watch_gps_velocity(work, lanes)
+
+
+@equation
+def consider_unseen(work: Work, lanes: Lanes, fitted: Equipment) -> None:
+    """A heading that nothing refers to the earth is a datum: only the gyro moves it, and only rest tells its bias."""
+    if fitted.heading == NO_HEADING and not fitted.use_attitude:
+        consider(work, lanes, ATTITUDE + 2)
+        consider(work, lanes, GYRO_BIAS + 2)
+        if not np.isfinite(fitted.deadline_s):
+            consider(work, lanes, FLOW_SCALE)
 
 
 @procedure

@@ -123,6 +123,7 @@ class ImuSettings(NamedTuple):
 
     accel_noise_m_s2_rt_hz: float
     gyro_noise_rad_s_rt_hz: float
+    accel_walk_m_s2_rt_s: float
     coasting_accel_m_s2_rt_hz: float
     coasting_rate_rad_s_rt_hz: float
     imu_integrates: float

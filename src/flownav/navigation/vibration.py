@@ -13,13 +13,15 @@ from flownav.compile import clamp, equation, larger, procedure, smaller
 from flownav.estimation.covariance import add_noise_lane
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, STATE, VELOCITY
-from flownav.navigation.memory import MOVING, ImuMemory, Reading, load_imu, store_imu
+from flownav.navigation.memory import MOVING, ImuMemory, Reading, load_imu, load_start, store_imu
 from flownav.navigation.tape import IMU_DOUBTED, Output, write_event
 from flownav.navigation.told import ImuSettings
+from flownav.navigation.trust import accel_factor
 
 FOLLOWING_S = 1.0
 DOUBT_M_S2 = 2.0  # of an accelerometer that the range contradicts
 DOUBT_LASTS_S = 60.0
+SURE = 3.0  # standard deviations that a limit leaves room for
 DOUBTED_SPEED_M_S = 1.0  # what it may have done to the velocity
 
 
@@ -78,6 +80,10 @@ def add_vibration_noise(work: Work, lanes: Lanes, dt_s: float, s: ImuSettings) -
         level = s.vibration_walk_per_rt_s * beyond
         down = s.vibration_walk_per_rt_s * larger(beyond, doubt)
         shaken = m.vibration * moved_s * moved_s if beyond > 0.0 else 0.0
+        freed = accel_factor(work, lanes, lane)
+        walk = (freed * freed - 1.0) * s.accel_walk_m_s2_rt_s * s.accel_walk_m_s2_rt_s
+        for i in range(3):
+            add_noise_lane(work, lanes, ACCEL_BIAS + i, lane, walk * moved_s)
         add_noise_lane(work, lanes, ACCEL_BIAS, lane, level * level * moved_s)
         add_noise_lane(work, lanes, ACCEL_BIAS + 1, lane, level * level * moved_s)
         add_noise_lane(work, lanes, ACCEL_BIAS + 2, lane, down * down * moved_s)
@@ -93,6 +99,10 @@ def limit_biases(work: Work, lanes: Lanes, s: ImuSettings) -> None:
         beyond = vibration_beyond(m, s)
         level = s.accel_bias_limit_m_s2 + s.vibration_bias_share * beyond
         down = s.accel_bias_limit_m_s2 + s.vibration_bias_share * larger(beyond, m.doubt_m_s2)
+        freed = (accel_factor(work, lanes, lane) - 1.0) * s.accel_bias_limit_m_s2
+        freed += SURE * np.sqrt(load_start(work, lanes, lane).shaken)
+        level += freed
+        down += freed
         hold(work, lanes, lane, ACCEL_BIAS, level)
         hold(work, lanes, lane, ACCEL_BIAS + 1, level)
         hold(work, lanes, lane, ACCEL_BIAS + 2, down)

@@ -1,0 +1,72 @@
+"""How far the accelerometer is trusted: as far as what the flow and the range say after it is white.
+
+Innovations of a filter whose model holds are white (Kailath, An Innovations Approach to Least-Squares Estimation, 1968;
+Mehra, On the Identification of Variances and Adaptive Kalman Filtering, 1970). A sensor noisier than told makes them
+larger, not alike; motion that errs, as by an accelerometer that vibration rectifies, makes neighbours alike. So their
+likeness over blocks of time, and not their size, moves the accelerometer's noise, up and down again.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flownav.compile import clamp, equation, larger, procedure
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE
+from flownav.navigation.memory import (
+    ACCEL_FACTOR,
+    REASON,
+    WhitenessMemory,
+    load_whiteness,
+    store_whiteness,
+)
+from flownav.navigation.reasons import FUSED, INNOVATION_GATE
+
+BLOCK_S = 0.1
+LONGEST_BLOCK_S = 1.0  # readings further apart say nothing of each other
+FOLLOWING_BLOCKS = 10.0
+LIKENESS_ALLOWED = 0.15
+PACE = 0.2  # by how much the factor grows or shrinks in a block, per likeness beyond what is allowed
+LARGEST_FACTOR = 30.0
+
+
+@equation
+def with_innovation(innovation: float, variance: float, t_s: float, m: WhitenessMemory) -> WhitenessMemory:
+    """The block's sum of innovations, in standard deviations of one; the first begins at its instant."""
+    return WhitenessMemory(
+        t_s if m.count == 0.0 else m.since_s, m.total + innovation / np.sqrt(variance), m.count + 1.0, m.before,
+        m.square, m.ended_s,
+    )  # fmt: skip
+
+
+@equation
+def block_ended(t_s: float, m: WhitenessMemory) -> tuple[float, WhitenessMemory]:
+    """How alike the block that ends and the one before are, 1 on average where all are the same; and a new block."""
+    block = clamp(m.total / np.sqrt(larger(m.count, 1.0)), -5.0, 5.0)
+    apart = t_s - m.ended_s > LONGEST_BLOCK_S
+    square = m.square + (block * block - m.square) / FOLLOWING_BLOCKS
+    likeness = 0.0 if apart else clamp(block * m.before / larger(square, 1e-6), -1.0, 1.0)
+    return likeness, WhitenessMemory(t_s, 0.0, 0.0, block, square, t_s)
+
+
+@procedure
+def watch_whiteness(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
+    """After the test of a component along body axis 0, 1 or 2: how alike its innovations are moves ACCEL_FACTOR."""
+    for lane in range(len(lanes)):
+        reason = work[REASON * len(lanes) + lane]
+        if reason != FUSED and reason != INNOVATION_GATE:
+            continue
+        m = load_whiteness(work, lanes, axis, lane)
+        innovation, variance = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]
+        if m.count > 0.0 and t_s - m.since_s >= BLOCK_S - 1e-3:
+            likeness, m = block_ended(t_s, m)
+            factor = work[(ACCEL_FACTOR + axis) * len(lanes) + lane] * np.exp(PACE * (likeness - LIKENESS_ALLOWED))
+            work[(ACCEL_FACTOR + axis) * len(lanes) + lane] = clamp(factor, 1.0, LARGEST_FACTOR)
+        store_whiteness(work, lanes, axis, lane, with_innovation(innovation, variance, t_s, m))
+
+
+@equation
+def accel_factor(work: Work, lanes: Lanes, lane: int) -> float:
+    """How many times the accelerometer's noise is what it was said to be, in the axis where it is worst."""
+    level = larger(work[ACCEL_FACTOR * len(lanes) + lane], work[(ACCEL_FACTOR + 1) * len(lanes) + lane])
+    return larger(level, work[(ACCEL_FACTOR + 2) * len(lanes) + lane])

@@ -6,14 +6,27 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, larger, procedure, smaller
+from flownav.compile import clamp, equation, larger, procedure, smaller
+from flownav.estimation.covariance import consider, covariance_of, variance_of
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.flow import body_velocity, flow_rate, lens_range_of
 from flownav.estimation.motion import rotation_of
-from flownav.estimation.states import GYRO_BIAS, INNOVATION, INNOVATION_VARIANCE, NOISE, STATE
+from flownav.estimation.states import (
+    ATTITUDE,
+    COMPASS,
+    GROUND,
+    GYRO_BIAS,
+    INNOVATION,
+    INNOVATION_VARIANCE,
+    INS_ERROR,
+    NOISE,
+    POSITION,
+    STATE,
+)
 from flownav.measurement import Sensor
 from flownav.navigation.height import range_variance
 from flownav.navigation.memory import (
+    INNOVATION_BEFORE,
     LENS_RANGE,
     REASON,
     TESTED,
@@ -21,7 +34,7 @@ from flownav.navigation.memory import (
     FlowMemory,
     Reading,
     load_flow,
-    load_range,
+    load_ground,
     load_reading,
     load_start,
     store_flow,
@@ -43,22 +56,22 @@ from flownav.navigation.told import FlowSettings
 from flownav.navigation.trust import watch_whiteness
 from flownav.sensors.flow import flow_noise_sigma
 
-LARGEST_EXCESS = 400.0
+SMALLEST_EXCESS, LARGEST_EXCESS = 1.0, 400.0
 AGREEMENT_S = 1.0
 DOUBTED_RATIO, TRUSTED_RATIO = 4.0, 2.0  # on average 1
 LONGEST_STEP_S = 1.0
+LARGEST_SPREAD = 0.5  # of the height over the ground, of which flow makes no speed
 UNKNOWN_RANGE_M = 2.0
 FULL_QUALITY = 255.0
 
 
 class View(NamedTuple):
-    """The ground that the lens sees: the range along the boresight by the filter, whether a range reading has told it
-    lately, whether the latest one is disputed, and R_33.
+    """The ground that the lens sees: the range along the boresight by the filter, whether that is known well enough, and
+    R_33.
     """
 
     range_m: float
     known: bool
-    disputed: bool
     upright: float
 
 
@@ -95,8 +108,7 @@ def judge_flow(
     """The verdict on a flow reading as a whole."""
     turning = turning_x + turning_y if angular else 0.0
     reason = usable_in_flight(reading, reading.value_0 + reading.value_1 + turning, 0.0, started)
-    blind = angular and (view.disputed or not view.known)  # over a step of the ground the flow would move the height
-    reason = NO_HEIGHT if reason == FUSED and blind else reason
+    reason = NO_HEIGHT if reason == FUSED and angular and not view.known else reason
     fast = angular and larger(abs(reading.value_0), abs(reading.value_1)) > s.flow_limit_rad_s
     reason = OUT_OF_RANGE if reason == FUSED and fast else reason
     reason = TILTED if reason == FUSED and view.upright < np.cos(s.tilt_limit_rad) else reason
@@ -131,17 +143,19 @@ def followed_agreement(square: float, t_s: float, m: FlowMemory) -> float:
 
 
 @equation
-def followed_excess(innovation: float, total: float, noise: float, gate: float, t_s: float, m: FlowMemory,
+def followed_excess(innovation: float, before: float, total: float, noise: float, gate: float, t_s: float, m: FlowMemory,
                     s: FlowSettings) -> float:  # fmt: skip
-    """How many times noisier than its model the flow is: the mean of (nu^2 - h P h')/R, at least 1.
+    """How many times noisier than its model the flow is: the mean of half the square of what changes in its innovation
+    from one reading to the next, over R.
 
-    A poor lens or floor shows in the innovations; the model alone would take its noise for motion and gate the
-    rest away. Flow smoother than modelled is not trusted more: what is left of its error lasts.
+    A poor lens or floor shows there, and a good one too. What lasts in an innovation is not the flow's noise: it is of
+    the motion, and counts against the accelerometer (`trust`).
     """
-    square = smaller(innovation * innovation, gate * gate * total)
-    seen = (square - (total - noise)) * m.excess / noise
+    limit = gate * np.sqrt(2.0 * total)
+    change = clamp(innovation - before, -limit, limit)
+    seen = 0.5 * change * change * m.excess / noise
     share = smaller(larger(t_s - m.taken_s, 0.0), LONGEST_STEP_S) / s.flow_noise_time_s
-    return smaller(larger(m.excess + 0.5 * share * (seen - m.excess), 1.0), LARGEST_EXCESS)
+    return clamp(m.excess + 0.5 * share * (seen - m.excess), SMALLEST_EXCESS, LARGEST_EXCESS)
 
 
 @equation
@@ -157,6 +171,7 @@ def take_flow(work: Work, lanes: Lanes, t_s: float, sensor: int, gyro_is_imu: bo
     s = load_flow_settings(p)
     angular = sensor == Sensor.FLOW_RATE
     look(work, lanes, t_s, angular, gyro_is_imu, s)
+    consider_others(work, lanes)
     watch_flow(work, lanes, angular)
     for component in range(2 if angular else 3):
         offer_component(work, lanes, component, angular, s)
@@ -176,11 +191,12 @@ def look(work: Work, lanes: Lanes, t_s: float, angular: bool, gyro_is_imu: bool,
     """TURNING, LENS_RANGE and, in TESTED, the verdict on the whole reading."""
     for lane in range(len(lanes)):
         reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
-        ranged, m = load_range(work, lanes, lane), load_flow(work, lanes, lane)
-        known = t_s - ranged.taken_s <= s.height_hold_s
-        range_m = lens_range_of(work, lanes, lane, s.flow_below_m) if known else UNKNOWN_RANGE_M
-        upright = rotation_of(work, lanes, lane)[8]
-        view = View(range_m, known, bool(np.isfinite(ranged.refused_s)), upright)
+        m = load_flow(work, lanes, lane)
+        range_m = lens_range_of(work, lanes, lane, s.flow_below_m)
+        spread_m = np.sqrt(larger(height_variance(work, lanes, lane), 0.0))
+        known = load_ground(work, lanes, lane).known > 0.0 and spread_m <= LARGEST_SPREAD * range_m
+        range_m = range_m if known else UNKNOWN_RANGE_M
+        view = View(range_m, known, rotation_of(work, lanes, lane)[8])
         bias_x = work[(STATE + GYRO_BIAS) * len(lanes) + lane]
         bias_y = work[(STATE + GYRO_BIAS + 1) * len(lanes) + lane]
         x, y, after = turning_of(reading, t_s, bias_x, bias_y, gyro_is_imu, m, s)
@@ -190,6 +206,27 @@ def look(work: Work, lanes: Lanes, t_s: float, angular: bool, gyro_is_imu: bool,
         work[(TURNING + 1) * len(lanes) + lane] = y
         work[LENS_RANGE * len(lanes) + lane] = range_m
         work[TESTED * len(lanes) + lane] = judge_flow(reading, angular, x, y, started, view, s)
+
+
+@equation
+def consider_others(work: Work, lanes: Lanes) -> None:
+    """What flow depends on and is no judge of: over a step of the ground it would move the height, and by accelerations
+    that err it would turn the heading. Where GPS tells the velocity too, that is what corrects them.
+    """
+    consider(work, lanes, POSITION + 2)
+    consider(work, lanes, GROUND)
+    consider(work, lanes, ATTITUDE + 2)
+    consider(work, lanes, GYRO_BIAS + 2)
+    consider(work, lanes, INS_ERROR + 2)
+    consider(work, lanes, COMPASS)
+    consider(work, lanes, COMPASS + 1)
+
+
+@equation
+def height_variance(work: Work, lanes: Lanes, lane: int) -> float:
+    """Of the height over the ground below [m2]."""
+    both = variance_of(work, lanes, POSITION + 2, lane) + variance_of(work, lanes, GROUND, lane)
+    return both - 2.0 * covariance_of(work, lanes, POSITION + 2, GROUND, lane)
 
 
 @procedure
@@ -232,7 +269,10 @@ def learn(work: Work, lanes: Lanes, t_s: float, angular: bool, component: int, s
             excess = m.excess
             if angular or not np.isfinite(listed):
                 noise = work[NOISE * len(lanes) + lane]
-                excess = followed_excess(innovation, total, noise, s.gate_sigma, t_s, m, s)
+                last = INNOVATION_BEFORE + component
+                before = work[last * len(lanes) + lane]
+                excess = followed_excess(innovation, before, total, noise, s.gate_sigma, t_s, m, s)
+                work[last * len(lanes) + lane] = innovation
             store_flow(
                 work, lanes, lane, FlowMemory(m.taken_s, excess, m.bias_x, m.bias_y, m.bias_count, ratio, m.doubted)
             )

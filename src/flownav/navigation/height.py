@@ -6,24 +6,38 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, procedure
-from flownav.estimation.covariance import variance_of
+from flownav.compile import equation, procedure, smaller
+from flownav.estimation.covariance import expect, variance_of
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.height import baro_altitude, range_along_boresight
 from flownav.estimation.motion import rotation_of
-from flownav.estimation.states import BARO, GROUND, INNOVATION, POSITION, STATE, VELOCITY
+from flownav.estimation.states import (
+    BARO,
+    GROUND,
+    INNOVATION,
+    INNOVATION_VARIANCE,
+    NOISE,
+    OFFERED,
+    POSITION,
+    STATE,
+    STATES,
+    VELOCITY,
+)
 from flownav.navigation.journal import reset_state
 from flownav.navigation.memory import (
     BARO_KNOWN,
     REASON,
+    EchoMemory,
     GroundMemory,
     RangeMemory,
     Reading,
     load_aid,
+    load_echo,
     load_ground,
     load_range,
     load_reading,
     load_start,
+    store_echo,
     store_ground,
     store_range,
 )
@@ -40,6 +54,11 @@ DOUBTING_S = 0.05  # a range that alone tells the height and is refused so long 
 AGREEMENT_M, AGREEMENT_SHARE = 0.2, 0.05  # ranges of one ground agree so far
 LEAST_AGREEING = 3.0
 STILL_S = 1.0  # a range that repeats itself so long while a ground is sought is of a vehicle that stands
+ECHO_M, ECHO_SHARE = 0.1, 0.03  # neighbouring ranges of one ground differ by no more
+ECHOES = 20.0  # ranges over which strays are counted
+STRAY_SHARE = 1.5  # some strays confirm each other
+STRAY_SPAN_M = 5.0
+MANY_STRAYS, FEW_STRAYS = 0.15, 0.02  # so many tell nothing of the ground's level, or of the accelerometer; so few none
 ALONE = 5.0  # times the travel, where nothing else tells the height
 
 
@@ -99,6 +118,30 @@ def judge_range(
 
 
 @equation
+def followed_echo(range_m: float, down_m: float, m: EchoMemory) -> EchoMemory:
+    """A range is a stray where neither of the two before it, moved by the climb since, confirms it; their share."""
+    near = ECHO_M + ECHO_SHARE * range_m
+    newest = abs(range_m - m.newest_m + down_m - m.newest_down_m)
+    older = abs(range_m - m.older_m + down_m - m.older_down_m)
+    strays = newest > near and older > near  # false of the first
+    stray = m.stray + (1.0 - m.stray) / ECHOES if strays else m.stray * (1.0 - 2.0 / ECHOES)
+    return EchoMemory(range_m, down_m, m.newest_m, m.newest_down_m, stray)
+
+
+@equation
+def stray_variance(innovation: float, total: float, variance: float, stray: float) -> float:
+    """The variance of a range [m2] that may be a stray: it is fused by the probability that it is none.
+
+    beta = (1 - p) N(nu; S) / ((1 - p) N(nu; S) + p/W) is that of the ground among strays spread over W (probabilistic
+    data association: Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001,
+    section 3.4), and a gain beta K is that of the variance R + S (1/beta - 1).
+    """
+    p = smaller(STRAY_SHARE * stray, 0.95)
+    likely = (1.0 - p) * np.exp(-0.5 * innovation * innovation / total) / np.sqrt(2.0 * np.pi * total)
+    return variance + total * p / (STRAY_SPAN_M * likely + 1e-6)
+
+
+@equation
 def judge_ground(below_m: float, range_m: float, t_s: float, alone: bool, g: GroundMemory) -> tuple[bool, GroundMemory]:
     """Whether ranges in a row agree on a ground that is new, and the memory of it.
 
@@ -131,11 +174,15 @@ def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Ou
             write_event(lanes, lane, t_s, RANGE_STUCK, reading.value_0, o)
             m = RangeMemory(m.taken_s, m.refused_s, m.last_m, m.same_s, m.down_m, m.same_s, m.doubted)
         store_range(work, lanes, lane, m)
+        if reason == FUSED or reason == DATUM:
+            echo = followed_echo(reading.value_0, height.pos_d_m, load_echo(work, lanes, lane))
+            store_echo(work, lanes, lane, echo)
         if reason == FUSED and load_ground(work, lanes, lane).known == 0.0:
             found = seek_ground(work, lanes, lane, t_s, reading, height, alone, s, GROUND_FOUND, o)
             reason = FUSED if found else DATUM
         put(work, lanes, lane, reading.value_0, variance, reason)
     range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
+    weigh_strays(work, lanes)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
     watch_whiteness(work, lanes, t_s, 2)
     again = False
@@ -144,6 +191,24 @@ def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Ou
     if again:  # the ground was found anew: the reading that said so is fused
         range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
         fuse_offered(work, lanes, s.gate_sigma, o)
+
+
+@procedure
+def weigh_strays(work: Work, lanes: Lanes) -> None:
+    """NOISE of a range among strays, in the lanes where there are any."""
+    any_strays = False
+    for lane in range(len(lanes)):
+        any_strays = any_strays or load_echo(work, lanes, lane).stray > FEW_STRAYS
+        work[OFFERED * len(lanes) + lane] = 0.0
+    if not any_strays:
+        return
+    expect(work, lanes, STATES, True)
+    for lane in range(len(lanes)):
+        stray = load_echo(work, lanes, lane).stray
+        innovation, total = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]
+        variance = work[NOISE * len(lanes) + lane]
+        weighed = stray_variance(innovation, total, variance, stray)
+        work[NOISE * len(lanes) + lane] = weighed if stray > FEW_STRAYS else variance
 
 
 @procedure
@@ -198,11 +263,12 @@ def mind_refusals(work: Work, lanes: Lanes, lane: int, t_s: float, s: HeightSett
     since_s = t_s if first else m.refused_s
     doubted = 0.0 if first else m.doubted
     alone = t_s - load_aid(work, lanes, lane).height_s > s.height_hold_s
-    if alone and doubted == 0.0 and t_s - since_s >= DOUBTING_S:
+    strays = load_echo(work, lanes, lane).stray > MANY_STRAYS
+    if alone and doubted == 0.0 and not strays and t_s - since_s >= DOUBTING_S:
         doubt_imu(work, lanes, lane, t_s, work[INNOVATION * len(lanes) + lane], o)
         doubted = 1.0  # once: doubted at each reading, a short echo would be believed too
     store_range(work, lanes, lane, RangeMemory(m.taken_s, since_s, m.last_m, m.same_s, m.down_m, m.said_s, doubted))
-    if g.known == 0.0:
+    if g.known == 0.0 or strays:
         return False
     reading, height = load_reading(work, lanes, lane), height_of(work, lanes, lane)
     if t_s - since_s < s.ground_reset_s:

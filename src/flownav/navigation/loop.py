@@ -40,7 +40,9 @@ def start_navigator(
     """A navigator that has heard nothing. noise: what a sensor file says of the flow's."""
     headed = equipment.heading != NO_HEADING or equipment.use_attitude
     told = settings.settings(equipment, noise)
-    sigma = settings.start_sigma(has_heading=headed, compass=equipment.heading == FROM_MAG)
+    sigma = settings.start_sigma(
+        has_heading=headed, compass=equipment.heading == FROM_MAG, scale=bool(np.isfinite(equipment.deadline_s))
+    )
     return Running(told, pack(told, sigma), new_work(ONE_LANE), tape)
 
 

@@ -98,6 +98,18 @@ class RangeMemory(NamedTuple):
     doubted: float
 
 
+class EchoMemory(NamedTuple):
+    """The two newest ranges [m], where the vehicle was then (down [m]), and the share of ranges that no neighbour
+    confirms.
+    """
+
+    newest_m: float
+    newest_down_m: float
+    older_m: float
+    older_down_m: float
+    stray: float
+
+
 class GroundMemory(NamedTuple):
     """known: 1 once ranges have found the ground. A ground that would be new: candidate_m, its down coordinate by the
     newest range; since_s and first_m, when and by which range it was seen first; agreeing, by how many in a row;
@@ -210,6 +222,7 @@ START = _rows.take(len(StartMemory._fields))
 AID = _rows.take(len(AidMemory._fields))
 IMU_HEARD = _rows.take(len(ImuMemory._fields))
 RANGE = _rows.take(len(RangeMemory._fields))
+ECHO = _rows.take(len(EchoMemory._fields))
 GROUND_SEEN = _rows.take(len(GroundMemory._fields))
 FLOW = _rows.take(len(FlowMemory._fields))
 HEADING = _rows.take(len(HeadingMemory._fields))
@@ -228,6 +241,7 @@ REASON = _rows.take(1)
 OBSERVATION = _rows.take(1)
 LEVEL_RATIO = _rows.take(1)  # the larger test ratio of a fix's north and east
 LENS_RANGE = _rows.take(1)  # from the lens to the ground, along the boresight [m]
+INNOVATION_BEFORE = _rows.take(3)  # of the flow's components, at the reading before
 KNOWN = _rows.take(1)  # 1 where that range is known
 TURNING = _rows.take(2)  # what the flow saw of the vehicle's turning [rad/s]
 TESTED = _rows.take(1)
@@ -248,6 +262,7 @@ load_start, store_start = lane_access(StartMemory, START)
 load_aid, store_aid = lane_access(AidMemory, AID)
 load_imu, store_imu = lane_access(ImuMemory, IMU_HEARD)
 load_range, store_range = lane_access(RangeMemory, RANGE)
+load_echo, store_echo = lane_access(EchoMemory, ECHO)
 load_ground, store_ground = lane_access(GroundMemory, GROUND_SEEN)
 load_flow, store_flow = lane_access(FlowMemory, FLOW)
 load_heading, store_heading = lane_access(HeadingMemory, HEADING)
@@ -261,6 +276,7 @@ _FRESH: dict[int, tuple[float, ...]] = {
     AID: AidMemory(np.nan, 0.0, -np.inf, 0.0),
     IMU_HEARD: ImuMemory(-np.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     RANGE: RangeMemory(-np.inf, np.nan, np.nan, np.nan, 0.0, np.nan, 0.0),
+    ECHO: EchoMemory(np.nan, 0.0, np.nan, 0.0, 0.0),
     FLOW: FlowMemory(-np.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0),
     HEADING: HeadingMemory(-np.inf, np.nan),
     BRIDGE: BridgeMemory(*([np.nan] * len(BridgeMemory._fields))),

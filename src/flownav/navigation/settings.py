@@ -108,7 +108,7 @@ class NavigatorSettingsFile(ParameterModel):
     ground_walk_m_rt_s: Number = Field(0.05, ge=0, le=5, description="the ground is not level: 0.4 m in a minute")
     baro_walk_m_rt_s: Number = Field(0.1, ge=0, le=5, description="pressure drifts 0.8 m in a minute")
     baro_sigma_m: Number = Field(1.0, gt=0, le=100, description="pressure height in the rotor's own wash")
-    flow_scale_sigma: Number = Field(0.03, ge=0, le=0.5, description="optics and their mounting, without a sensor file")
+    flow_scale_sigma: Number = Field(0.1, ge=0, le=0.5, description="optics and their mounting, without a sensor file")
     flow_gain_x: Number = Field(1.0, gt=0, le=10, description="reported over true flow of velocity, body forward")
     flow_gain_y: Number = Field(1.0, gt=0, le=10, description="and body right")
     flow_sigma_rad_s: Number = Field(
@@ -117,7 +117,7 @@ class NavigatorSettingsFile(ParameterModel):
     flow_low_quality_sigma_rad_s: Number = Field(0.5, gt=0, le=10, description="flow as its quality goes to 0")
     flow_floor_m_s: Number = Field(0.03, gt=0, le=5, description="body velocity near the ground, whatever the range")
     flow_min_height_m: Number = Field(
-        0.3, ge=0, le=100, description="no flow nearer to the ground, where a range's floor makes any scale (ArduPilot)"
+        0.05, ge=0, le=100, description="no flow nearer to the ground, where a lens is out of focus"
     )
     flow_limit_rad_s: Number = Field(10.0, gt=0, le=50, description="no sensor of this kind measures faster flow")
     flow_noise_time_s: Number = Field(
@@ -169,7 +169,7 @@ class NavigatorSettingsFile(ParameterModel):
             of(AttitudeSettings), of(PlaceSettings), of(AidSettings), equipment,
         )  # fmt: skip
 
-    def start_sigma(self, *, has_heading: bool, compass: bool) -> Array:
+    def start_sigma(self, *, has_heading: bool, compass: bool, scale: bool = True) -> Array:
         """Standard deviations of the error states before the first reading, (STATES,).
 
         Those of position and attitude are set at the start, those of the ground and the barometer when first read.
@@ -186,5 +186,5 @@ class NavigatorSettingsFile(ParameterModel):
         sigma[INS_ERROR : INS_ERROR + 3] = self.ins_tilt_sigma_rad, self.ins_tilt_sigma_rad, heading
         sigma[COMPASS : COMPASS + 2] = self.compass_sigma_rad if compass else 0.0
         sigma[VELOCITY_LAG] = self.gps_velocity_lag_sigma_s
-        sigma[FLOW_SCALE] = self.flow_scale_sigma
+        sigma[FLOW_SCALE] = self.flow_scale_sigma if scale else 0.0
         return sigma

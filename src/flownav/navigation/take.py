@@ -15,7 +15,7 @@ from flownav.estimation.covariance import consider, consider_none
 from flownav.estimation.error_models import propagate_gauss_markov, propagate_walks
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.motion import hold_still, predict
-from flownav.estimation.states import ATTITUDE, FLOW_SCALE, GYRO_BIAS, STATES
+from flownav.estimation.states import ATTITUDE, GYRO_BIAS, STATES
 from flownav.measurement import Sensor
 from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
 from flownav.navigation.flow import take_flow
@@ -75,7 +75,7 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
     elif len(lanes) > 1:
         try_start(work, lanes, t_s, sensor, fitted, p, o)
     watch_others(work, lanes, sensor)
-    consider_unseen(work, lanes, fitted)
+    consider_datum(work, lanes, fitted)
     take(work, lanes, t_s, sensor, fitted, p, o)
     if sensor == Sensor.IMU:
         stand_still(work, lanes, t_s, p, o)
@@ -101,13 +101,11 @@ def watch_others(work: Work, lanes: Lanes, sensor: int) -> None:
 
 
 @equation
-def consider_unseen(work: Work, lanes: Lanes, fitted: Equipment) -> None:
+def consider_datum(work: Work, lanes: Lanes, fitted: Equipment) -> None:
     """A heading that nothing refers to the earth is a datum: only the gyro moves it, and only rest tells its bias."""
     if fitted.heading == NO_HEADING and not fitted.use_attitude:
         consider(work, lanes, ATTITUDE + 2)
         consider(work, lanes, GYRO_BIAS + 2)
-        if not np.isfinite(fitted.deadline_s):
-            consider(work, lanes, FLOW_SCALE)
 
 
 @procedure

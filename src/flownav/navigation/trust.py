@@ -17,6 +17,7 @@ from flownav.navigation.memory import (
     ACCEL_FACTOR,
     REASON,
     WhitenessMemory,
+    load_echo,
     load_whiteness,
     store_whiteness,
 )
@@ -28,6 +29,7 @@ FOLLOWING_BLOCKS = 10.0
 LIKENESS_ALLOWED = 0.15
 PACE = 0.2  # by how much the factor grows or shrinks in a block, per likeness beyond what is allowed
 LARGEST_FACTOR = 30.0
+STRAYS = 0.02  # a share of ranges that say nothing
 
 
 @equation
@@ -45,7 +47,7 @@ def block_ended(t_s: float, m: WhitenessMemory) -> tuple[float, WhitenessMemory]
     block = clamp(m.total / np.sqrt(larger(m.count, 1.0)), -5.0, 5.0)
     apart = t_s - m.ended_s > LONGEST_BLOCK_S
     square = m.square + (block * block - m.square) / FOLLOWING_BLOCKS
-    likeness = 0.0 if apart else clamp(block * m.before / larger(square, 1e-6), -1.0, 1.0)
+    likeness = 0.0 if apart else clamp(block * m.before / larger(square, 1.0), -1.0, 1.0)
     return likeness, WhitenessMemory(t_s, 0.0, 0.0, block, square, t_s)
 
 
@@ -54,7 +56,8 @@ def watch_whiteness(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
     """After the test of a component along body axis 0, 1 or 2: how alike its innovations are moves ACCEL_FACTOR."""
     for lane in range(len(lanes)):
         reason = work[REASON * len(lanes) + lane]
-        if reason != FUSED and reason != INNOVATION_GATE:
+        strays = axis == 2 and load_echo(work, lanes, lane).stray > STRAYS
+        if strays or (reason != FUSED and reason != INNOVATION_GATE):
             continue
         m = load_whiteness(work, lanes, axis, lane)
         innovation, variance = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]

@@ -66,14 +66,16 @@ class Filtering:
         elif reading.sensor == Sensor.ATTITUDE and (not self._attitude or waiting.t_s > self._attitude[-1][0]):
             self._attitude.append((waiting.t_s, *reading.value))
 
-    def begin(self, listened: list[Waiting], gps_heard: bool) -> None:
+    def begin(
+        self, listened: list[Waiting], gps_heard: bool, origin_deg_m: tuple[float, float, float] | None = None
+    ) -> None:
         """A navigator for the sensors that were listened to. gps_heard: a receiver is there, with a fix or without."""
         streams = _streams(listened)
         if gps_heard and Sensor.GPS_POSITION not in streams:
             streams[Sensor.GPS_POSITION] = Stream.of(Sensor.GPS_POSITION, np.zeros(0), np.zeros((0, 3)))
         first_s = listened[0].t_s
         settings = self._options.settings
-        equipment = equipment_of(streams, first_s, _own_gyro_is_dead(streams), settings)
+        equipment = equipment_of(streams, first_s, _own_gyro_is_dead(streams), settings, origin_deg_m)
         if gps_heard:
             equipment = equipment._replace(deadline_s=first_s + float(settings.start_wait_s))
         self.running = start_navigator(equipment, settings, self._tape, self._options.flow_noise)

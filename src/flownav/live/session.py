@@ -206,7 +206,7 @@ class Session:
         t_s = self.clock.now_s(now_s)
         listened = t_s - self._listening_s >= self.options.listen_s
         if self.filtering.running is None and listened and len(self.horizon):
-            self.filtering.begin(self.horizon.waiting(), self._gps_heard)
+            self.filtering.begin(self.horizon.waiting(), self._gps_heard, self.origin_deg_m)
         if self.filtering.running is not None:
             self._feed(t_s - self.options.horizon_s)
         if self.due or now_s - self._sent_s >= SEND_EVERY_S:

@@ -174,15 +174,15 @@ def put_heading(
 
 
 @equation
-def magnetic_heading(forward_n: float, forward_e: float, m: HeadingMemory) -> float:
-    """The heading that the latest level field and the filter's tilt give, from magnetic north [rad]."""
-    angle: float = np.arctan2(forward_e, forward_n) - m.field_rad
+def magnetic_heading(forward_n: float, forward_e: float, declination_rad: float, m: HeadingMemory) -> float:
+    """The heading that the latest level field and the filter's tilt give, from true north [rad]."""
+    angle: float = np.arctan2(forward_e, forward_n) - m.field_rad + declination_rad
     return angle
 
 
 @procedure
-def take_mag(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
-    """A magnetometer: the level field points to magnetic north; the declination is part of the heading error state."""
+def take_mag(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> None:
+    """A magnetometer: the level field points to magnetic north."""
     s = load_attitude_settings(p)
     for lane in range(len(lanes)):
         reading, start = load_reading(work, lanes, lane), load_start(work, lanes, lane)
@@ -196,7 +196,7 @@ def take_mag(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
         m = HeadingMemory(m.read_s, np.arctan2(east, north) if seen else m.field_rad)
         store_heading(work, lanes, lane, m)
         reason = usable_in_flight(reading, level, 0.0, started)
-        read = magnetic_heading(rotation[0], rotation[3], m)
+        read = magnetic_heading(rotation[0], rotation[3], fitted.declination_rad, m)
         put_heading(work, lanes, lane, t_s, read, np.nan, reason if seen else SILENT, s)
     heading(work, lanes, 0)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)

@@ -7,6 +7,7 @@ import numpy as np
 from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import FROM_ATTITUDE, FROM_MAG, NO_HEADING, Equipment
+from flownav.sensors.earth_field import declination_rad
 
 SLOWEST_IMU_HZ = 20.0
 
@@ -33,9 +34,12 @@ def heading_source(streams: dict[Sensor, Stream]) -> float:
 
 
 def equipment_of(
-    streams: dict[Sensor, Stream], first_s: float, flow_gyro_is_imu: bool, settings: NavigatorSettingsFile
-) -> Equipment:
-    """What the streams offer; `first_s` is the instant from which the navigator waits for a fix."""
+    streams: dict[Sensor, Stream], first_s: float, flow_gyro_is_imu: bool, settings: NavigatorSettingsFile,
+    origin_deg_m: tuple[float, float, float] | None = None,
+) -> Equipment:  # fmt: skip
+    """What the streams offer; `first_s` is the instant from which the navigator waits for a fix, `origin_deg_m` where on
+    earth that is.
+    """
     serves = imu_serves(streams)
     fixes = Sensor.GPS_POSITION in streams and bool(np.any(streams[Sensor.GPS_POSITION].quality > 0.0))
     return Equipment(
@@ -44,4 +48,5 @@ def equipment_of(
         heading_source(streams),
         flow_gyro_is_imu,
         first_s + float(settings.start_wait_s) if fixes else -np.inf,
+        declination_rad(origin_deg_m),
     )

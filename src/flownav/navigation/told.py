@@ -145,7 +145,8 @@ class AidSettings(NamedTuple):
 class Equipment(NamedTuple):
     """Which sensors serve a navigator.
 
-    heading: 0 none, 1 a compass's, 2 an external attitude's or YAW's; deadline_s: how long it waits for a fix.
+    heading: 0 none, 1 a compass's, 2 an external attitude's or YAW's; deadline_s: how long it waits for a fix;
+    declination_rad: the heading of magnetic north where it is.
     """
 
     use_imu: bool
@@ -153,6 +154,7 @@ class Equipment(NamedTuple):
     heading: float
     flow_gyro_is_imu: bool
     deadline_s: float
+    declination_rad: float = 0.0
 
 
 class NavigatorSettings(NamedTuple):

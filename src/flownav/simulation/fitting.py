@@ -60,7 +60,8 @@ def fitted(scenario: Scenario, flow_sensor: FlowSensor, vehicle: VehicleParamete
     schedule = schedule_of(epochs, onboard, timing)
     rotor_hz = vehicle.main_speed_rad_s / (2.0 * math.pi)
     told = settings_of(flow_sensor, sheets, flow_noise_stated=True, rotor_hz=(rotor_hz, BLADES * rotor_hz))
-    equipment = Equipment(True, False, FROM_MAG, True, START_WAIT_S)
+    declination_rad = math.radians(sheets.magnetic_field.declination_deg)
+    equipment = Equipment(True, False, FROM_MAG, True, START_WAIT_S, declination_rad)
     settings = packed(told, equipment)
     return Fitted(onboard, schedule, told, equipment, settings, sheets, timing, ages_of(timing))
 

@@ -20,15 +20,6 @@ from flownav.navigation.flow import (
 from flownav.navigation.gps import judge_gps, judge_rejections
 from flownav.navigation.height import Height, judge_baro, judge_range, range_variance, repeats
 from flownav.navigation.inertial import motion_between, said_by, sound
-from flownav.navigation.memory import (
-    FlowMemory,
-    HeadingMemory,
-    ImuMemory,
-    RangeMemory,
-    Reading,
-    RejectionMemory,
-    StartMemory,
-)
 from flownav.navigation.offers import usable, usable_in_flight
 from flownav.navigation.place import component_of, judge_pad
 from flownav.navigation.reasons import (
@@ -44,6 +35,15 @@ from flownav.navigation.reasons import (
     SILENT,
     STUCK,
     TILTED,
+)
+from flownav.navigation.records import (
+    FlowMemory,
+    HeadingMemory,
+    ImuMemory,
+    RangeMemory,
+    Reading,
+    RejectionMemory,
+    StartMemory,
 )
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.start import level, levelled

@@ -12,8 +12,9 @@ from flownav.estimation.covariance import unpack
 from flownav.estimation.states import QUATERNION, STATE, STATES
 from flownav.measurement import MAX_VALUES, EventQueue, Sensor, Stream, merge
 from flownav.navigation.loop import Running, run, start_navigator
-from flownav.navigation.memory import READING, Reading, load_start, new_work
+from flownav.navigation.memory import READING, load_start, new_work
 from flownav.navigation.packed import pack
+from flownav.navigation.records import Reading
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.take import navigate_lanes
 from flownav.navigation.tape import COMPONENTS, EVENT_NAMES, Tape, empty_tape, new_tape, room_of

@@ -13,10 +13,6 @@ from flownav.estimation.states import ATTITUDE, INNOVATION, MEASURED, QUATERNION
 from flownav.frames import quaternion_product, rotation_from_quaternion, to_earth
 from flownav.navigation.memory import (
     OBSERVATION,
-    BridgeMemory,
-    HeadingMemory,
-    ImuMemory,
-    Reading,
     load_bridge,
     load_heading,
     load_imu,
@@ -29,6 +25,7 @@ from flownav.navigation.memory import (
 from flownav.navigation.offers import conclude, put, usable_in_flight
 from flownav.navigation.packed import load_attitude_settings
 from flownav.navigation.reasons import FUSED, NOT_FINITE, SILENT
+from flownav.navigation.records import BridgeMemory, HeadingMemory, ImuMemory, Reading
 from flownav.navigation.tape import Output
 from flownav.navigation.told import FROM_ATTITUDE, AttitudeSettings, Equipment
 

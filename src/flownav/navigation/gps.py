@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import equation, procedure
-from flownav.estimation.covariance import expect
+from flownav.estimation.covariance import expect, states_of
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.states import (
@@ -19,7 +19,6 @@ from flownav.estimation.states import (
     OFFERED,
     POSITION,
     STATE,
-    STATES,
     VELOCITY,
 )
 from flownav.measurement import Sensor
@@ -28,8 +27,6 @@ from flownav.navigation.memory import (
     LEVEL_RATIO,
     REASON,
     STEADY_FORCE,
-    Reading,
-    RejectionMemory,
     load_reading,
     load_rejection,
     load_start,
@@ -38,6 +35,7 @@ from flownav.navigation.memory import (
 from flownav.navigation.offers import conclude, note_aid, note_height, put, usable
 from flownav.navigation.packed import load_gps_settings
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE
+from flownav.navigation.records import Reading, RejectionMemory
 from flownav.navigation.tape import GPS_RESET, Output, write_event
 from flownav.navigation.told import GpsSettings
 
@@ -116,7 +114,7 @@ def note_level_ratio(work: Work, lanes: Lanes, position: bool, s: GpsSettings) -
         offer_axis(work, lanes, axis, position, True, s)
         for lane in range(len(lanes)):
             work[OFFERED * len(lanes) + lane] = 0.0
-        expect(work, lanes, STATES, True)
+        expect(work, lanes, states_of(lanes), True)
         for lane in range(len(lanes)):
             innovation = work[INNOVATION * len(lanes) + lane]
             variance = work[INNOVATION_VARIANCE * len(lanes) + lane]

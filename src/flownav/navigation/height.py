@@ -27,10 +27,6 @@ from flownav.navigation.journal import reset_state
 from flownav.navigation.memory import (
     BARO_KNOWN,
     REASON,
-    EchoMemory,
-    GroundMemory,
-    RangeMemory,
-    Reading,
     load_aid,
     load_echo,
     load_ground,
@@ -44,6 +40,7 @@ from flownav.navigation.memory import (
 from flownav.navigation.offers import conclude, fuse_offered, note_height, put, usable_in_flight
 from flownav.navigation.packed import load_height_settings
 from flownav.navigation.reasons import DATUM, FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT, STUCK, TILTED
+from flownav.navigation.records import EchoMemory, GroundMemory, RangeMemory, Reading
 from flownav.navigation.tape import BARO_FOUND, GROUND_FOUND, GROUND_RESET, RANGE_STUCK, Output, write_event
 from flownav.navigation.told import HeightSettings
 from flownav.navigation.trust import watch_whiteness

@@ -13,14 +13,13 @@ from flownav.navigation.memory import (
     OWED,
     SPENT,
     STEADY_FORCE,
-    ImuMemory,
-    Reading,
     load_imu,
     load_reading,
     load_start,
     shared,
     store_imu,
 )
+from flownav.navigation.records import ImuMemory, Reading
 from flownav.navigation.tape import IMU_LOST, Output, write_event
 from flownav.navigation.told import Equipment, ImuSettings
 from flownav.navigation.trust import accel_factor

@@ -12,19 +12,11 @@ from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import MEASURED, PAD, POSITION, STATE
 from flownav.frames import to_earth
 from flownav.navigation.journal import reset_state
-from flownav.navigation.memory import (
-    OBSERVATION,
-    PAD_KNOWN,
-    AidMemory,
-    Reading,
-    load_aid,
-    load_reading,
-    load_start,
-    store_aid,
-)
+from flownav.navigation.memory import OBSERVATION, PAD_KNOWN, load_aid, load_reading, load_start, store_aid
 from flownav.navigation.offers import conclude, fuse_offered, note_aid, note_height, put, usable, usable_in_flight
 from flownav.navigation.packed import load_place_settings
 from flownav.navigation.reasons import FUSED, OUT_OF_RANGE, SILENT
+from flownav.navigation.records import AidMemory, Reading
 from flownav.navigation.tape import PAD_FOUND, Output, write_event
 from flownav.navigation.told import PlaceSettings
 

@@ -5,26 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import equation, procedure
-from flownav.estimation.covariance import place
+from flownav.estimation.covariance import lagged, place
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, FORCE, POSITION, QUATERNION, RATE, STATE, STATES
+from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, FORCE, POSITION, QUATERNION, RATE, STATE, STATES, VELOCITY
 from flownav.frames import GRAVITY_M_S2, Quaternion, quaternion_from_euler, rotation_from_quaternion
 from flownav.measurement import Sensor
+from flownav.navigation.flow import start_lag
 from flownav.navigation.memory import (
+    SCALE_DOUBT,
     STEADY_FORCE,
-    AidMemory,
-    Reading,
-    StartMemory,
     load_aid,
     load_heading,
     load_imu,
     load_reading,
     load_start,
+    set_lane,
     store_aid,
     store_imu,
     store_start,
 )
-from flownav.navigation.packed import START_SIGMA
+from flownav.navigation.packed import START_SIGMA, load_filter_settings, load_flow_settings
+from flownav.navigation.records import AidMemory, Reading, StartMemory
 from flownav.navigation.tape import START, Output, write_event
 from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
 from flownav.navigation.vibration import with_reading
@@ -66,7 +67,17 @@ def gather(work: Work, lanes: Lanes, t_s: float, sensor: int) -> None:
             if size > 0.5 and size < 2.0:
                 w, x, y, z = reading.value_0, reading.value_1, reading.value_2, reading.value_3
                 after = StartMemory(
-                    0.0, t_s, w / size, x / size, y / size, z / size, m.force_x, m.force_y, m.force_z, m.readings, m.shaken
+                    0.0,
+                    t_s,
+                    w / size,
+                    x / size,
+                    y / size,
+                    z / size,
+                    m.force_x,
+                    m.force_y,
+                    m.force_z,
+                    m.readings,
+                    m.shaken,
                 )
                 store_start(work, lanes, lane, after)
         elif sensor == Sensor.IMU:
@@ -121,6 +132,7 @@ def start_lane(
             work[place(i, j) * len(lanes) + lane] = 0.0
         sigma = p[START_SIGMA + j]
         work[place(j, j) * len(lanes) + lane] = sigma * sigma
+    start_lag(work, lanes, lagged(lanes), lane, p[START_SIGMA + VELOCITY], load_flow_settings(p))
     tilt = READ_TILT_RAD if read else STANDING_TILT_RAD * np.sqrt(1.0 - believed) + LEVELLED_FLOOR_RAD
     known = fitted.heading == NO_HEADING and not lost
     turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
@@ -142,6 +154,8 @@ def start_lane(
         rotation = rotation_from_quaternion(w, x, y, z)
         work[(STATE + ACCEL_BIAS) * len(lanes) + lane] = m.force_x + GRAVITY_M_S2 * rotation[6]
         work[(STATE + ACCEL_BIAS + 1) * len(lanes) + lane] = m.force_y + GRAVITY_M_S2 * rotation[7]
+    doubted = 0.0 if lost else load_filter_settings(p).flow_scale_sigma
+    set_lane(work, lanes, SCALE_DOUBT, lane, doubted)
     store_start(work, lanes, lane, started(m))
     aid = load_aid(work, lanes, lane)
     store_aid(work, lanes, lane, AidMemory(t_s, 0.0, aid.height_s, aid.landed))

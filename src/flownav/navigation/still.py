@@ -13,15 +13,13 @@ from flownav.compile import equation, larger, procedure, smaller
 from flownav.estimation.covariance import consider_none
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.still import gyro_at_rest, velocity_itself
+from flownav.navigation.inertial import sound
 from flownav.navigation.memory import (
     CONTACT,
     LENS_RANGE,
     STANDS,
     STILL_CLOCK,
     TURNING,
-    ImuWindow,
-    Reading,
-    SeenWindow,
     load_imu_window,
     load_reading,
     load_seen_window,
@@ -31,10 +29,10 @@ from flownav.navigation.memory import (
     store_imu_window,
     store_seen_window,
 )
-from flownav.navigation.inertial import sound
 from flownav.navigation.offers import fuse_offered, put
 from flownav.navigation.packed import load_place_settings
 from flownav.navigation.reasons import FUSED, SILENT
+from flownav.navigation.records import ImuWindow, Reading, SeenWindow
 from flownav.navigation.tape import STOOD, Output, write_event
 from flownav.navigation.told import PlaceSettings
 

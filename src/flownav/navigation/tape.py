@@ -31,7 +31,7 @@ from flownav.estimation.states import (
 )
 from flownav.frames import to_body
 from flownav.measurement import Array, EventQueue, Sensor
-from flownav.navigation.memory import OBSERVATION, REASON, load_start
+from flownav.navigation.memory import OBSERVATION, REASON, SCALE_DOUBT, load_start
 from flownav.navigation.reasons import BEFORE_START, DUPLICATE, LATE, SILENT
 
 OFFER_COLUMNS = ("t_s", "sensor", "component", "observation", "observation_variance", "innovation",
@@ -229,7 +229,7 @@ def write_estimate(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
             place = first + i
             o.estimate[(place + 1) * len(lanes) + lane] = work[(STATE + POSITION + i) * len(lanes) + lane]
             o.estimate[(place + 4) * len(lanes) + lane] = velocity[i]
-            o.estimate[(place + 11) * len(lanes) + lane] = np.sqrt(variance_of(work, lanes, POSITION + i, lane))
+            o.estimate[(place + 11) * len(lanes) + lane] = np.sqrt(position_variance(work, lanes, i, lane))
             o.estimate[(place + 17) * len(lanes) + lane] = work[(STATE + VELOCITY + i) * len(lanes) + lane]
             o.estimate[(place + 20) * len(lanes) + lane] = np.sqrt(variance_of(work, lanes, ATTITUDE + i, lane))
             variance = body_velocity_variance(work, lanes, lane, rotation[i], rotation[3 + i], rotation[6 + i])
@@ -241,6 +241,13 @@ def write_estimate(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
             spread = np.sqrt(max(variance_of(work, lanes, FIRST_EXTRA + i, lane), 0.0))
             o.estimate[(first + 23 + i) * len(lanes) + lane] = value
             o.estimate[(first + 23 + EXTRA_STATES + i) * len(lanes) + lane] = spread
+
+
+@equation
+def position_variance(work: Work, lanes: Lanes, axis: int, lane: int) -> float:
+    """Of position [m2]; level, with what a flow scale that nothing tells makes of the way from the start."""
+    unknown_m = work[SCALE_DOUBT * len(lanes) + lane] * work[(STATE + POSITION + axis) * len(lanes) + lane]
+    return variance_of(work, lanes, POSITION + axis, lane) + (unknown_m * unknown_m if axis < 2 else 0.0)
 
 
 @equation

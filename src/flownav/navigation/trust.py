@@ -13,15 +13,9 @@ import numpy as np
 from flownav.compile import clamp, equation, larger, procedure
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE
-from flownav.navigation.memory import (
-    ACCEL_FACTOR,
-    REASON,
-    WhitenessMemory,
-    load_echo,
-    load_whiteness,
-    store_whiteness,
-)
+from flownav.navigation.memory import ACCEL_FACTOR, REASON, load_echo, load_whiteness, store_whiteness
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE
+from flownav.navigation.records import WhitenessMemory
 
 BLOCK_S = 0.1
 LONGEST_BLOCK_S = 1.0  # readings further apart say nothing of each other

@@ -13,7 +13,8 @@ from flownav.compile import clamp, equation, larger, procedure, smaller
 from flownav.estimation.covariance import add_noise_lane
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, STATE, VELOCITY
-from flownav.navigation.memory import MOVING, ImuMemory, Reading, load_imu, load_start, store_imu
+from flownav.navigation.memory import MOVING, load_imu, load_start, store_imu
+from flownav.navigation.records import ImuMemory, Reading
 from flownav.navigation.tape import IMU_DOUBTED, Output, write_event
 from flownav.navigation.told import ImuSettings
 from flownav.navigation.trust import accel_factor

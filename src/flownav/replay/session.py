@@ -241,7 +241,9 @@ def _run(
         written = run_as_fed(log, options, settings, lambda queue: withhold(log, queue, options))
     else:
         queue = withhold(log, prepared.queue, options)
-        equipment = equipment_of(prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, settings, log.origin_deg_m)
+        equipment = equipment_of(
+            prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, settings, log.origin_deg_m
+        )
         running = start_navigator(equipment, settings, new_tape(queue), options.flow_noise)
         if smoothed:
             path = smooth(queue, running)

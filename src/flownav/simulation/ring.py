@@ -11,7 +11,8 @@ import numpy as np
 
 from flownav.compile import equation
 from flownav.estimation.kalman import Lanes, Work
-from flownav.navigation.memory import READING, Reading
+from flownav.navigation.memory import READING
+from flownav.navigation.records import Reading
 from flownav.simulation import layout
 
 FIELDS = len(Reading._fields)

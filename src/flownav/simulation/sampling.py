@@ -8,7 +8,7 @@ from flownav.compile import equation, procedure
 from flownav.control.autopilot import AutopilotState
 from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import rotation_from_quaternion
-from flownav.navigation.memory import Reading
+from flownav.navigation.records import Reading
 from flownav.sensors.barometer import step_barometer
 from flownav.sensors.flow_camera import FlowCameraTruth, pad_texture, step_flow_camera
 from flownav.sensors.gps_receiver import step_gps_receiver

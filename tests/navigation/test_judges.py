@@ -54,7 +54,7 @@ NAN = math.nan
 FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
 TOLD = NavigatorSettingsFile().settings(FITTED)
 FRESH_FLOW = FlowMemory(-math.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
-SEEN = View(2.0, True, False, 1.0)
+SEEN = View(2.0, True, 1.0)
 
 
 def told(**keys):
@@ -334,7 +334,7 @@ def test_vibration_up_to_the_harmless_does_no_harm():
 
 # -- the start -----------------------------------------------------------------------------------------------
 def test_the_first_attitude_is_level_by_the_mean_force_and_heads_by_the_field():
-    m = StartMemory(0.0, -math.inf, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    m = StartMemory(0.0, -math.inf, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     roll, pitch = 0.2, -0.1
     force = (9.8 * math.sin(pitch), -9.8 * math.sin(roll) * math.cos(pitch), -9.8 * math.cos(roll) * math.cos(pitch))
     for sway in (0.5, -0.5, 0.5, -0.5):

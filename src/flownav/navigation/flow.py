@@ -68,9 +68,7 @@ FULL_QUALITY = 255.0
 
 
 class View(NamedTuple):
-    """The ground that the lens sees: the range along the boresight by the filter, whether that is known well enough, and
-    R_33.
-    """
+    """The ground that the lens sees: the range along the boresight by the filter, whether that is well known, R_33."""
 
     range_m: float
     known: bool
@@ -145,8 +143,16 @@ def followed_agreement(square: float, t_s: float, m: FlowMemory) -> float:
 
 
 @equation
-def followed_excess(innovation: float, before: float, total: float, noise: float, gate: float, t_s: float, m: FlowMemory,
-                    s: FlowSettings) -> float:  # fmt: skip
+def followed_excess(
+    innovation: float,
+    before: float,
+    total: float,
+    noise: float,
+    gate: float,
+    t_s: float,
+    m: FlowMemory,
+    s: FlowSettings,
+) -> float:
     """How many times noisier than its model the flow is: the mean of half the square of what changes in its innovation
     from one reading to the next, over R.
 

@@ -171,7 +171,7 @@ def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Ou
             write_event(lanes, lane, t_s, RANGE_STUCK, reading.value_0, o)
             m = RangeMemory(m.taken_s, m.refused_s, m.last_m, m.same_s, m.down_m, m.same_s, m.doubted)
         store_range(work, lanes, lane, m)
-        if reason == FUSED or reason == DATUM:
+        if reason == FUSED:
             echo = followed_echo(reading.value_0, height.pos_d_m, load_echo(work, lanes, lane))
             store_echo(work, lanes, lane, echo)
         if reason == FUSED and load_ground(work, lanes, lane).known == 0.0:

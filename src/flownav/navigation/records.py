@@ -1,4 +1,4 @@
-"""What a navigator remembers of each lane, subject by subject: named records of floats; `memory` says where they lie."""
+"""What a navigator remembers of each lane, subject by subject, as named records; `memory` says where they lie."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ class Reading(NamedTuple):
 
 
 class StartMemory(NamedTuple):
-    """started: 1 once the filter runs. Before that, the newest attitude that was read and its time [s], the mean specific
-    force [m/s2] of so many readings, and the mean square of an axis about it [m2/s4].
+    """started: 1 once the filter runs. Before that, the newest attitude that was read and its time [s], the mean
+    specific force [m/s2] of so many readings, and the mean square of an axis about it [m2/s4].
     """
 
     started: float

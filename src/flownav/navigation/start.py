@@ -171,7 +171,8 @@ def started(m: StartMemory) -> StartMemory:
 
 @equation
 def level(m: StartMemory, believed: float, field_rad: float, fitted: Equipment) -> Quaternion:
-    """Roll and pitch from the mean specific force as far as it is believed (1: wholly), heading from the magnetometer where one was heard, else north.
+    """Roll and pitch from the mean specific force as far as it is believed (1: wholly); heading from the magnetometer
+    where one was heard, else north.
 
     The field was noted in the axes of a vehicle that takes itself to be level and to head north.
     """

@@ -1,8 +1,8 @@
 """A vehicle that stands: found from what its IMU, range, flow and GPS read over a window, and what standing teaches.
 
 With its motors off an IMU is quieter than in any flight, and its gyro then reads nothing but its bias. With them
-running it is not, but a vehicle whose range reads what it reads on the ground, and does not change, while the flow shows
-no motion, has no velocity worth the name. Nothing is taught above the height of contact.
+running it is not, but a vehicle whose range reads what it reads on the ground, and does not change, while the flow
+shows no motion, has no velocity worth the name. Nothing is taught above the height of contact.
 """
 
 from __future__ import annotations

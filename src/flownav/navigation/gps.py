@@ -38,6 +38,7 @@ from flownav.navigation.reasons import FUSED, INNOVATION_GATE
 from flownav.navigation.records import Reading, RejectionMemory
 from flownav.navigation.tape import GPS_RESET, Output, write_event
 from flownav.navigation.told import GpsSettings
+from flownav.navigation.trust import OF_GPS, follow_noise, scale_noise
 
 LEAST_REJECTIONS = 5
 
@@ -78,8 +79,11 @@ def take_gps(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
     position = sensor == Sensor.GPS_POSITION
     note_level_ratio(work, lanes, position, s)
     for axis in range(3):
+        place = OF_GPS + axis + (0 if position else 3)
         offer_axis(work, lanes, axis, position, False, s)
+        scale_noise(work, lanes, place)
         conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
+        follow_noise(work, lanes, t_s, place, s.gate_sigma)
         if axis < 2:
             note_aid(work, lanes, t_s, o)
         elif position:

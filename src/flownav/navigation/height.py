@@ -43,7 +43,7 @@ from flownav.navigation.reasons import DATUM, FUSED, INNOVATION_GATE, OUT_OF_RAN
 from flownav.navigation.records import EchoMemory, GroundMemory, RangeMemory, Reading
 from flownav.navigation.tape import BARO_FOUND, GROUND_FOUND, GROUND_RESET, RANGE_STUCK, Output, write_event
 from flownav.navigation.told import HeightSettings
-from flownav.navigation.trust import watch_whiteness
+from flownav.navigation.trust import OF_BARO, OF_RANGE, follow_noise, scale_noise, watch_whiteness
 from flownav.navigation.vibration import doubt_imu
 
 UNKNOWN_M = 100.0
@@ -179,9 +179,11 @@ def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Ou
             reason = FUSED if found else DATUM
         put(work, lanes, lane, reading.value_0, variance, reason)
     range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
+    scale_noise(work, lanes, OF_RANGE)
     weigh_strays(work, lanes)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
     watch_whiteness(work, lanes, t_s, 2)
+    follow_noise(work, lanes, t_s, OF_RANGE, s.gate_sigma)
     again = False
     for lane in range(len(lanes)):
         again = mind_refusals(work, lanes, lane, t_s, s, o) or again
@@ -301,5 +303,7 @@ def take_baro(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Out
             write_event(lanes, lane, t_s, BARO_FOUND, offset, o)
         put(work, lanes, lane, reading.value_0, variance, reason)
     baro_altitude(work, lanes, 0)
+    scale_noise(work, lanes, OF_BARO)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
+    follow_noise(work, lanes, t_s, OF_BARO, s.gate_sigma)
     note_height(work, lanes, t_s)

@@ -21,6 +21,7 @@ from flownav.navigation.records import (
     HeadingMemory,
     ImuMemory,
     ImuWindow,
+    NoiseMemory,
     RangeMemory,
     Reading,
     RejectionMemory,
@@ -43,6 +44,7 @@ BRIDGE = _rows.take(len(BridgeMemory._fields))
 REJECTION = _rows.take(6 * len(RejectionMemory._fields))  # of position and velocity, north, east, down
 IMU_WINDOW = _rows.take(len(ImuWindow._fields))
 SEEN_WINDOW = _rows.take(len(SeenWindow._fields))
+NOISE_FOLLOWED = _rows.take(8 * 3)  # `records.NoiseMemory` of range, barometer, GPS position and velocity by axis
 WHITENESS = _rows.take(3 * len(WhitenessMemory._fields))  # forward, right, down
 ACCEL_FACTOR = _rows.take(3)  # how many times noisier than told the accelerometer is, by each of these
 STANDS = _rows.take(1)  # what the vehicle did in the last window: `still.MOVES`, SHAKEN or RESTS
@@ -96,6 +98,7 @@ _FRESH: dict[int, tuple[float, ...]] = {
     BRIDGE: BridgeMemory(*([np.nan] * len(BridgeMemory._fields))),
     SEEN_WINDOW: SeenWindow(1e9, -1.0, 0.0, 0.0, 0.0, 0.0),
     CONTACT: (np.nan,),
+    NOISE_FOLLOWED: (1.0, 0.0, -np.inf) * 8,
     ACCEL_FACTOR: (1.0, 1.0, 1.0),
     WHITENESS: (0.0, 0.0, 0.0, 0.0, 1.0, -np.inf) * 3,
     STILL_CLOCK: (-np.inf,),
@@ -175,3 +178,21 @@ def store_whiteness(work: Work, lanes: Lanes, axis: int, lane: int, value: White
     work[(row + 3) * len(lanes) + lane] = value.before
     work[(row + 4) * len(lanes) + lane] = value.square
     work[(row + 5) * len(lanes) + lane] = value.ended_s
+
+
+@equation
+def load_noise(work: Work, lanes: Lanes, place: int, lane: int) -> NoiseMemory:
+    """Of the component at a place of NOISE_FOLLOWED."""
+    row = NOISE_FOLLOWED + 3 * place
+    return NoiseMemory(
+        work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane], work[(row + 2) * len(lanes) + lane]
+    )
+
+
+@equation
+def store_noise(work: Work, lanes: Lanes, place: int, lane: int, value: NoiseMemory) -> None:
+    """And back."""
+    row = NOISE_FOLLOWED + 3 * place
+    work[row * len(lanes) + lane] = value.factor
+    work[(row + 1) * len(lanes) + lane] = value.before
+    work[(row + 2) * len(lanes) + lane] = value.heard_s

@@ -185,6 +185,14 @@ class SeenWindow(NamedTuple):
     gps_m_s: float
 
 
+class NoiseMemory(NamedTuple):
+    """factor: a component's noise over what is said of it [variance]; its innovation before, and when that was [s]."""
+
+    factor: float
+    before: float
+    heard_s: float
+
+
 class WhitenessMemory(NamedTuple):
     """A block of innovations along one body axis: since when [s], their sum in standard deviations, how many. The block
     before, the mean square of blocks, and when it ended [s].

@@ -12,10 +12,18 @@ import numpy as np
 
 from flownav.compile import clamp, equation, larger, procedure
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE
-from flownav.navigation.memory import ACCEL_FACTOR, REASON, load_echo, load_whiteness, store_whiteness
+from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE, NOISE
+from flownav.navigation.memory import (
+    ACCEL_FACTOR,
+    REASON,
+    load_echo,
+    load_noise,
+    load_whiteness,
+    store_noise,
+    store_whiteness,
+)
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE
-from flownav.navigation.records import WhitenessMemory
+from flownav.navigation.records import NoiseMemory, WhitenessMemory
 
 BLOCK_S = 0.1
 LONGEST_BLOCK_S = 1.0  # readings further apart say nothing of each other
@@ -23,6 +31,10 @@ FOLLOWING_BLOCKS = 10.0
 LIKENESS_ALLOWED = 0.15
 PACE = 0.2  # by how much the factor grows or shrinks in a block, per likeness beyond what is allowed
 LARGEST_FACTOR = 30.0
+NOISE_TIME_S = 20.0
+SMALLEST_NOISE, LARGEST_NOISE = 0.02, 25.0  # of the variance that is said
+# places of components whose noise is followed; GPS position and velocity have three
+OF_RANGE, OF_BARO, OF_GPS = 0, 1, 2
 STRAYS = 0.02  # a share of ranges that say nothing
 
 
@@ -67,3 +79,38 @@ def accel_factor(work: Work, lanes: Lanes, lane: int) -> float:
     """How many times the accelerometer's noise is what it was said to be, in the axis where it is worst."""
     level = larger(work[ACCEL_FACTOR * len(lanes) + lane], work[(ACCEL_FACTOR + 1) * len(lanes) + lane])
     return larger(level, work[(ACCEL_FACTOR + 2) * len(lanes) + lane])
+
+
+# -- a sensor's own noise -----------------------------------------------------------------------------------
+@equation
+def followed_noise(
+    innovation: float, total: float, noise: float, gate_sigma: float, t_s: float, m: NoiseMemory
+) -> NoiseMemory:
+    """A component's noise by what changes in its innovation from one reading to the next: half the mean square over R.
+
+    What lasts there is of the motion, or an error that the filter carries as a state.
+    """
+    step_s = t_s - m.heard_s
+    limit = gate_sigma * np.sqrt(2.0 * total)
+    change = clamp(innovation - m.before, -limit, limit)
+    share = 0.0 if step_s > LONGEST_BLOCK_S else step_s / NOISE_TIME_S
+    factor = m.factor + share * (0.5 * change * change / noise - 1.0) * m.factor
+    return NoiseMemory(clamp(factor, SMALLEST_NOISE, LARGEST_NOISE), innovation, t_s)
+
+
+@procedure
+def scale_noise(work: Work, lanes: Lanes, place: int) -> None:
+    """NOISE as it was followed, before the test."""
+    for lane in range(len(lanes)):
+        work[NOISE * len(lanes) + lane] *= load_noise(work, lanes, place, lane).factor
+
+
+@procedure
+def follow_noise(work: Work, lanes: Lanes, t_s: float, place: int, gate_sigma: float) -> None:
+    """And after it."""
+    for lane in range(len(lanes)):
+        strays = place == OF_RANGE and load_echo(work, lanes, lane).stray > STRAYS
+        if work[REASON * len(lanes) + lane] == FUSED and not strays:
+            innovation, total = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]
+            noise, m = work[NOISE * len(lanes) + lane], load_noise(work, lanes, place, lane)
+            store_noise(work, lanes, place, lane, followed_noise(innovation, total, noise, gate_sigma, t_s, m))

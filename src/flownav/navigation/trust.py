@@ -33,6 +33,7 @@ PACE = 0.2  # by how much the factor grows or shrinks in a block, per likeness b
 LARGEST_FACTOR = 30.0
 NOISE_TIME_S = 20.0
 SMALLEST_NOISE, LARGEST_NOISE = 0.02, 25.0  # of the variance that is said
+SMALLEST_OF_BARO = 0.1  # wash and gusts last
 # places of components whose noise is followed; GPS position and velocity have three
 OF_RANGE, OF_BARO, OF_GPS = 0, 1, 2
 STRAYS = 0.02  # a share of ranges that say nothing
@@ -84,7 +85,7 @@ def accel_factor(work: Work, lanes: Lanes, lane: int) -> float:
 # -- a sensor's own noise -----------------------------------------------------------------------------------
 @equation
 def followed_noise(
-    innovation: float, total: float, noise: float, gate_sigma: float, t_s: float, m: NoiseMemory
+    innovation: float, total: float, noise: float, smallest: float, gate_sigma: float, t_s: float, m: NoiseMemory
 ) -> NoiseMemory:
     """A component's noise by what changes in its innovation from one reading to the next: half the mean square over R.
 
@@ -95,7 +96,7 @@ def followed_noise(
     change = clamp(innovation - m.before, -limit, limit)
     share = 0.0 if step_s > LONGEST_BLOCK_S else step_s / NOISE_TIME_S
     factor = m.factor + share * (0.5 * change * change / noise - 1.0) * m.factor
-    return NoiseMemory(clamp(factor, SMALLEST_NOISE, LARGEST_NOISE), innovation, t_s)
+    return NoiseMemory(clamp(factor, smallest, LARGEST_NOISE), innovation, t_s)
 
 
 @procedure
@@ -108,9 +109,12 @@ def scale_noise(work: Work, lanes: Lanes, place: int) -> None:
 @procedure
 def follow_noise(work: Work, lanes: Lanes, t_s: float, place: int, gate_sigma: float) -> None:
     """And after it."""
+    smallest = SMALLEST_OF_BARO if place == OF_BARO else SMALLEST_NOISE
     for lane in range(len(lanes)):
         strays = place == OF_RANGE and load_echo(work, lanes, lane).stray > STRAYS
         if work[REASON * len(lanes) + lane] == FUSED and not strays:
             innovation, total = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]
             noise, m = work[NOISE * len(lanes) + lane], load_noise(work, lanes, place, lane)
-            store_noise(work, lanes, place, lane, followed_noise(innovation, total, noise, gate_sigma, t_s, m))
+            store_noise(
+                work, lanes, place, lane, followed_noise(innovation, total, noise, smallest, gate_sigma, t_s, m)
+            )

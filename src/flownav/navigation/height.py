@@ -135,7 +135,8 @@ def stray_variance(innovation: float, total: float, variance: float, stray: floa
     """
     p = smaller(STRAY_SHARE * stray, 0.95)
     likely = (1.0 - p) * np.exp(-0.5 * innovation * innovation / total) / np.sqrt(2.0 * np.pi * total)
-    return variance + total * p / (STRAY_SPAN_M * likely + 1e-6)
+    weighed: float = variance + total * p / (STRAY_SPAN_M * likely + 1e-6)
+    return weighed
 
 
 @equation

@@ -200,7 +200,7 @@ class WhitenessMemory(NamedTuple):
 
     since_s: float
     total: float
-    count: float
+    readings: float
     before: float
     square: float
     ended_s: float

@@ -43,7 +43,7 @@ STRAYS = 0.02  # a share of ranges that say nothing
 def with_innovation(innovation: float, variance: float, t_s: float, m: WhitenessMemory) -> WhitenessMemory:
     """The block's sum of innovations, in standard deviations of one; the first begins at its instant."""
     return WhitenessMemory(
-        t_s if m.count == 0.0 else m.since_s, m.total + innovation / np.sqrt(variance), m.count + 1.0, m.before,
+        t_s if m.readings == 0.0 else m.since_s, m.total + innovation / np.sqrt(variance), m.readings + 1.0, m.before,
         m.square, m.ended_s,
     )  # fmt: skip
 
@@ -51,7 +51,7 @@ def with_innovation(innovation: float, variance: float, t_s: float, m: Whiteness
 @equation
 def block_ended(t_s: float, m: WhitenessMemory) -> tuple[float, WhitenessMemory]:
     """How alike the block that ends and the one before are, 1 on average where all are the same; and a new block."""
-    block = clamp(m.total / np.sqrt(larger(m.count, 1.0)), -5.0, 5.0)
+    block = clamp(m.total / np.sqrt(larger(m.readings, 1.0)), -5.0, 5.0)
     apart = t_s - m.ended_s > LONGEST_BLOCK_S
     square = m.square + (block * block - m.square) / FOLLOWING_BLOCKS
     likeness = 0.0 if apart else clamp(block * m.before / larger(square, 1.0), -1.0, 1.0)
@@ -68,7 +68,7 @@ def watch_whiteness(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
             continue
         m = load_whiteness(work, lanes, axis, lane)
         innovation, variance = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]
-        if m.count > 0.0 and t_s - m.since_s >= BLOCK_S - 1e-3:
+        if m.readings > 0.0 and t_s - m.since_s >= BLOCK_S - 1e-3:
             likeness, m = block_ended(t_s, m)
             factor = work[(ACCEL_FACTOR + axis) * len(lanes) + lane] * np.exp(PACE * (likeness - LIKENESS_ALLOWED))
             work[(ACCEL_FACTOR + axis) * len(lanes) + lane] = clamp(factor, 1.0, LARGEST_FACTOR)

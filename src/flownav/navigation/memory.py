@@ -174,7 +174,7 @@ def store_whiteness(work: Work, lanes: Lanes, axis: int, lane: int, value: White
     row = WHITENESS + 6 * axis
     work[row * len(lanes) + lane] = value.since_s
     work[(row + 1) * len(lanes) + lane] = value.total
-    work[(row + 2) * len(lanes) + lane] = value.count
+    work[(row + 2) * len(lanes) + lane] = value.readings
     work[(row + 3) * len(lanes) + lane] = value.before
     work[(row + 4) * len(lanes) + lane] = value.square
     work[(row + 5) * len(lanes) + lane] = value.ended_s

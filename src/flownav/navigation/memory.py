@@ -26,6 +26,7 @@ from flownav.navigation.records import (
     Reading,
     RejectionMemory,
     SeenWindow,
+    SpikeMemory,
     StartMemory,
     WhitenessMemory,
 )
@@ -42,6 +43,7 @@ FLOW = _rows.take(len(FlowMemory._fields))
 HEADING = _rows.take(len(HeadingMemory._fields))
 BRIDGE = _rows.take(len(BridgeMemory._fields))
 REJECTION = _rows.take(6 * len(RejectionMemory._fields))  # of position and velocity, north, east, down
+SPIKE = _rows.take(len(SpikeMemory._fields))
 IMU_WINDOW = _rows.take(len(ImuWindow._fields))
 SEEN_WINDOW = _rows.take(len(SeenWindow._fields))
 NOISE_FOLLOWED = _rows.take(8 * 3)  # `records.NoiseMemory` of range, barometer, GPS position and velocity by axis
@@ -82,6 +84,7 @@ load_echo, store_echo = lane_access(EchoMemory, ECHO)
 load_ground, store_ground = lane_access(GroundMemory, GROUND_SEEN)
 load_flow, store_flow = lane_access(FlowMemory, FLOW)
 load_heading, store_heading = lane_access(HeadingMemory, HEADING)
+load_spike, store_spike = lane_access(SpikeMemory, SPIKE)
 load_imu_window, store_imu_window = lane_access(ImuWindow, IMU_WINDOW)
 load_seen_window, store_seen_window = lane_access(SeenWindow, SEEN_WINDOW)
 load_bridge, store_bridge = lane_access(BridgeMemory, BRIDGE)

@@ -150,6 +150,22 @@ class BridgeMemory(NamedTuple):
     variance_d: float
 
 
+class SpikeMemory(NamedTuple):
+    """How many inertial readings in a row were refused as spikes; the usual jump from one to the next, of gyro [rad/s]
+    and accelerometer [m/s2]; the newest reading, spike or not.
+    """
+
+    refused: float
+    gyro_rad_s: float
+    accel_m_s2: float
+    gyro_x: float
+    gyro_y: float
+    gyro_z: float
+    accel_x: float
+    accel_y: float
+    accel_z: float
+
+
 class ImuWindow(NamedTuple):
     """Inertial readings of a window: how many, the first (turning p, q, r [rad/s], specific force x, y, z [m/s2]), sums
     of differences from it, and sums of their squares.

@@ -42,6 +42,7 @@ from flownav.navigation.packed import (
     load_imu_settings,
 )
 from flownav.navigation.place import take_landed, take_pad, take_pose
+from flownav.navigation.spikes import drop_spikes
 from flownav.navigation.start import gather, try_start
 from flownav.navigation.still import stand_still, watch_gps_velocity, watch_imu, watch_range
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, Output, output_of, write_estimate
@@ -63,6 +64,8 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
     heard = sensor == Sensor.IMU and fitted.use_imu
     running = any_started(work, lanes)
     if running:
+        if heard:
+            drop_spikes(work, lanes, t_s, o)
         choose_motion(work, lanes, t_s, heard, fitted, load_imu_settings(p), o)
         advance(work, lanes, lagged(lanes), t_s, p, o)
         if heard:

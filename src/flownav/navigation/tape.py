@@ -52,7 +52,8 @@ EVENTS_A_READING = 4
 # Kinds of happening: source, kind, what the value is. NumPy numbers them, because Numba compiles a function anew for
 # each Python integer that it is called with.
 (START, GROUND_FOUND, GROUND_RESET, BARO_FOUND, GPS_RESET, DEAD_RECKONING, POSITION_INVALID, AIDED_AGAIN,
- RANGE_STUCK, PAD_FOUND, IMU_LOST, IMU_DOUBTED, FLOW_DOUBTED, FLOW_TRUSTED, STOOD) = np.arange(15)  # fmt: skip
+ RANGE_STUCK, PAD_FOUND, IMU_LOST, IMU_DOUBTED, FLOW_DOUBTED, FLOW_TRUSTED, STOOD,
+ IMU_SPIKE) = np.arange(16)  # fmt: skip
 EVENT_NAMES = (
     ("filter", "start", "at a GPS fix (1) or at the local origin (0)"),
     ("range", "datum", "ground level below the first range, down in the local frame [m]"),
@@ -69,6 +70,7 @@ EVENT_NAMES = (
     ("flow", "doubted", "it contradicts IMU and GPS: mean square innovation over its variance"),
     ("flow", "trusted", "it agrees again: mean square innovation over its variance"),
     ("filter", "standing", "the vehicle moves (0), stands with its motors running (1), or rests (2)"),
+    ("imu", "spike", "a reading that no vehicle can follow was dropped: it said this turning [rad/s]"),
 )
 # kinds of journal entry, and where their numbers stand in it
 PREDICTED, CORRECTED, FORGOTTEN, NOTED, DECAYED = 0.0, 1.0, 2.0, 3.0, 4.0

@@ -22,6 +22,7 @@ from flownav.navigation.trust import accel_factor
 FOLLOWING_S = 1.0
 DOUBT_M_S2 = 2.0  # of an accelerometer that the range contradicts
 DOUBT_LASTS_S = 60.0
+FREED_WALK_M_S2_RT_S = 0.02  # of a bias, for each time that the accelerometer is noisier than told
 SURE = 3.0  # standard deviations that a limit leaves room for
 DOUBTED_SPEED_M_S = 1.0  # what it may have done to the velocity
 
@@ -82,7 +83,7 @@ def add_vibration_noise(work: Work, lanes: Lanes, dt_s: float, s: ImuSettings) -
         down = s.vibration_walk_per_rt_s * larger(beyond, doubt)
         shaken = m.vibration * moved_s * moved_s if beyond > 0.0 else 0.0
         freed = accel_factor(work, lanes, lane)
-        walk = (freed * freed - 1.0) * s.accel_walk_m_s2_rt_s * s.accel_walk_m_s2_rt_s
+        walk = (FREED_WALK_M_S2_RT_S * (freed - 1.0)) ** 2
         for i in range(3):
             add_noise_lane(work, lanes, ACCEL_BIAS + i, lane, walk * moved_s)
         add_noise_lane(work, lanes, ACCEL_BIAS, lane, level * level * moved_s)

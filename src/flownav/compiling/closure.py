@@ -24,7 +24,7 @@ LIBRARIES = tuple({sys.prefix, sys.base_prefix, sys.exec_prefix})
 REMEMBERED_FILES = 2000
 START_S = time.time()
 # imported by every kernel's module through `flownav.compile`, and nothing in machine code comes from them
-WITHOUT_CODE = {"flownav.files", "flownav.compiling.cache", "flownav.compiling.closure", "flownav.compiling.progress"}
+WITHOUT_CODE = {"flownav.files", *(f"flownav.compiling.{part}" for part in ("beside", "cache", "closure", "progress"))}
 
 
 class Source(NamedTuple):

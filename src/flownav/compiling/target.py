@@ -107,6 +107,13 @@ class LeanLibrary(JITCodeLibrary):
         module.name = ir_module.name
         self.add_llvm_module(module)
 
+    def _optimize_functions(self, module: Any) -> None:
+        """Make a function small for its callers; one with a loop is optimised whole, soon."""
+        if self._has_loop:
+            module.data_layout = self._codegen._data_layout
+        else:
+            super()._optimize_functions(module)
+
     def finalize(self) -> None:
         """Link and optimise a function with a loop; leave another to its callers."""
         self._raise_if_finalized()

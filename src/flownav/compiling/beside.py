@@ -37,8 +37,9 @@ def compile_beside(unit: Unit, kernel: Any, *arguments: Any) -> None:
             return
         with PROGRESS.expect(2), _compiling_elsewhere(unit.__name__, name) as other:
             kernel.prepare(*arguments)
-            with suppress(subprocess.TimeoutExpired):
-                other.wait(PATIENCE_S)
+            if other is not None:
+                with suppress(subprocess.TimeoutExpired):
+                    other.wait(PATIENCE_S)
 
 
 def _are_both_missing(unit: Unit, kernel: Any, arguments: tuple[Any, ...]) -> bool:
@@ -64,17 +65,19 @@ def name_of(unit: Unit) -> tuple[str, str] | None:
 
 
 @contextmanager
-def _compiling_elsewhere(what: str, name: tuple[str, str]) -> Iterator[subprocess.Popen[bytes]]:
-    """Another process that compiles a unit, which is said for as long as it runs; it is gone after the block."""
-    PROGRESS.begin(what)
-    other = None
+def _compiling_elsewhere(what: str, name: tuple[str, str]) -> Iterator[subprocess.Popen[bytes] | None]:
+    """Another process that compiles a unit, or None where none can be had; it is gone after the block."""
     try:
         other = _start(name)
+    except OSError:
+        yield None
+        return
+    PROGRESS.begin(what)
+    try:
         yield other
     finally:
-        PROGRESS.end(what, other is not None and other.poll() == 0)
-        if other is not None:
-            _end(other)
+        PROGRESS.end(what, other.poll() == 0)
+        _end(other)
 
 
 def _start(name: tuple[str, str]) -> subprocess.Popen[bytes]:

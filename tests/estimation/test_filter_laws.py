@@ -17,7 +17,7 @@ from flownav.compile import ONE_LANE
 from flownav.estimation import laws
 from flownav.estimation.law import Observation
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading
-from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow, lens_range_of
+from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow, lagged_flow_rate, lens_range_of
 from flownav.estimation.laws.geometry import LEAST_RANGE_M
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.laws.height import baro_altitude, range_along_boresight
@@ -90,6 +90,7 @@ CASES = {
     "flow rate": Case(flow_rate, CHANNELS, {**LENS, "lens_below_m": 0.17}),
     "body velocity": Case(body_velocity, AXES, LENS),
     "lagged flow": Case(lagged_flow, CHANNELS, {"gain": 196.9}),
+    "lagged flow rate": Case(lagged_flow_rate, CHANNELS, {"gain": 196.9, "lens_below_m": 0.17}),
     "range": Case(range_along_boresight, (0,), LENS),
     "pressure altitude": Case(baro_altitude),
     "attitude": Case(attitude, AXES, prepare=read_own_attitude),

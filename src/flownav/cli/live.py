@@ -101,7 +101,7 @@ def _options(
         component=component,
         key=load_key(key) if key else None,
         gps_delay_s=gps_delay_s,
-        identified=identified_flow(flow) if flow else None,
+        identified=identified_flow(flow, told.lag_states) if flow else None,
         settings=told.settings,
         flow_noise=told.noise,
     )

@@ -67,7 +67,7 @@ def command(
     flow, stated = load_sensor(sensor) if sensor else None, _settings(settings) if settings else None
     told = settings_of(flow, stated=stated)
     outages = tuple((t0, t1) for t0, t1 in windows)
-    identified = identified_flow(flow) if flow else None
+    identified = identified_flow(flow, told.lag_states) if flow else None
     options = ReplayOptions(gps_delay, outages, not no_flow, (scale[0], scale[1]), identified, told.noise)
     log = _read(folder, flow_instance)
     options, numbers = as_fed(log, options, told.settings if flow or stated else None)

@@ -49,7 +49,7 @@ PASSES = (
     NativeLowering,
     NoPythonBackend,
 )
-UNUSUAL_NAMES = {"literal_unroll", "literally", "prange", "objmode"}
+UNUSUAL_NAMES = {"isinstance", "literal_unroll", "literally", "prange", "objmode"}
 UNUSUAL_FLAGS = 0x20 | 0x80 | 0x100 | 0x200  # generators and coroutines (inspect.CO_GENERATOR, ...)
 
 

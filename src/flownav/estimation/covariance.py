@@ -8,7 +8,7 @@ noise is the joint update and inverts nothing. A lane that is not offered a read
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,8 @@ from flownav.estimation.states import (
     QUATERNION,
     REST,
     STATE,
+    STATES,
+    STATES_WITH_LAG,
     TEST_RATIO,
 )
 
@@ -36,6 +38,29 @@ Work = Any  # a flat float64 array in Python, the address of its first element i
 Lanes = tuple[int, ...]
 
 LARGEST_VARIANCE = 1e30
+
+
+def with_lag(lanes: Lanes) -> Lanes:
+    """The marker of so many lanes of a filter of STATES_WITH_LAG states: of floats, which makes it another type."""
+    return cast(Lanes, tuple(float(lane) for lane in lanes))
+
+
+@equation
+def lagged(lanes: Lanes) -> bool | None:
+    """True for the lanes of `with_lag`, None for others.
+
+    What only lagged lanes need stands behind `lag is None` of a parameter that is given this: of an argument None the
+    compiler drops the branch before it types it. Behind a condition of any other type it would compile it for all.
+    """
+    if isinstance(lanes[0], float):
+        return True
+    return None
+
+
+@equation
+def states_of(lanes: Lanes) -> int:
+    """How many states the filter of these lanes carries: a constant of the compiler."""
+    return STATES if lagged(lanes) is None else STATES_WITH_LAG
 
 
 @equation

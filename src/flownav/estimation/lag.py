@@ -3,7 +3,7 @@
 The sensor sees the body velocity m = o R_BE v, where o > 1 only below the floor of its own sonar, and reports
 gain x1 of x' = [0 1; -c -b] x + [0 1]' m. The filter carries x, so that a reading corrects what was, some 80 ms ago,
 as well as what is. Only a filter of STATES_WITH_LAG states has them: `lag_starts`, `motion.predict`, `lag_ends` are
-one step of it.
+one step of it, which `predict_with_lag` takes.
 """
 
 from __future__ import annotations
@@ -15,8 +15,10 @@ import numpy as np
 from flownav.compile import equation, procedure
 from flownav.estimation.covariance import Lanes, Work
 from flownav.estimation.discretise import discretised
+from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.law import step
 from flownav.estimation.laws.geometry import body_axis, cross, lens_range
+from flownav.estimation.motion import predict
 from flownav.estimation.states import STATES_WITH_LAG
 from flownav.estimation.transition import transition
 from flownav.frames import Rotation, rotation_from_quaternion
@@ -39,6 +41,9 @@ class FlowLag(NamedTuple):
     gain: float
     sonar_floor_m: float  # below it the sensor multiplies its flow by this instead of the range; 0: it does not
     lens_below_m: float  # the lens below the vehicle's reference point, along body down
+    forward_m: float = 0.0  # the lens's lever from the IMU, body FRD; 0 where no gyro tells how it swings
+    right_m: float = 0.0
+    below_m: float = 0.0
 
 
 def lag_over(
@@ -59,6 +64,34 @@ def lag_over(
     )  # fmt: skip
 
 
+SLOW_TURN = 1e-4  # below it sine and argument are the same to 2e-9
+
+
+@equation
+def lag_of_step(b_1_s: float, c_1_s2: float, dt_s: float, forward_m: float, right_m: float, below_m: float) -> FlowLag:
+    """c/(s^2 + b s + c) over a step of any length, in closed form: `lag_over` in kernels, of gain 1 and no floor.
+
+    F = e^(-b t/2) ((cos wt + b/2 s) I + s [0 1; -c -b]), s = sin(wt)/w, w^2 = c - b^2/4; hyperbolic where w^2 < 0.
+    Its integral and the integral of that follow from A^-1 (F - I).
+    """
+    half = 0.5 * b_1_s
+    square = c_1_s2 - half * half
+    rate = np.sqrt(abs(square))
+    turn = rate * dt_s
+    cosine = np.cos(turn) if square > 0.0 else np.cosh(turn)
+    sine = np.sin(turn) if square > 0.0 else np.sinh(turn)
+    slope = sine / rate if turn > SLOW_TURN else dt_s
+    fade = np.exp(-half * dt_s)
+    f11, f12 = fade * (cosine + half * slope), fade * slope
+    f21, f22 = -c_1_s2 * fade * slope, fade * (cosine - half * slope)
+    held_1, held_2 = (1.0 - f22 - b_1_s * f12) / c_1_s2, f12
+    end_1, end_2 = (1.0 - (b_1_s * held_1 + held_2) / dt_s) / c_1_s2, held_1 / dt_s
+    return FlowLag(
+        f11, f12, f21, f22, held_1 - end_1, held_2 - end_2, end_1, end_2, c_1_s2, 0.0, below_m,
+        forward_m, right_m, below_m,
+    )  # fmt: skip
+
+
 class Seen(NamedTuple):
     """A seen velocity, and its derivatives on velocity, attitude error and height."""
 
@@ -71,11 +104,14 @@ class Seen(NamedTuple):
 @equation
 def seen_velocity(
     rotation: Rotation, vel_n: float, vel_e: float, vel_d: float, height_m: float, channel: int,
-    sonar_floor_m: float, lens_below_m: float,
+    sonar_floor_m: float, lens_below_m: float, swing_m_s: float = 0.0,
 ) -> Seen:  # fmt: skip
-    """What channel 0 (forward) or 1 (right) sees of the velocity: o e . v, with o = floor/range below the floor."""
+    """What channel 0 (forward) or 1 (right) sees of the velocity: o (e . v + swing), o = floor/range below the floor.
+
+    swing_m_s: what turning adds at the lens.
+    """
     e = body_axis(rotation, channel)
-    along = e[0] * vel_n + e[1] * vel_e + e[2] * vel_d
+    along = e[0] * vel_n + e[1] * vel_e + e[2] * vel_d + swing_m_s
     turn = cross(e, (vel_n, vel_e, vel_d))
     range_m, by_height, by_north, by_east = lens_range(rotation, height_m, (0.0, 0.0, lens_below_m))
     low = range_m.real < sonar_floor_m
@@ -102,13 +138,16 @@ class Lagged(NamedTuple):
 def move_lag(
     lag_u1: float, lag_u2: float, lag_v1: float, lag_v2: float, vel_n: float, vel_e: float, vel_d: float,
     pos_d: float, ground: float, qw: float, qx: float, qy: float, qz: float,
+    rate_x: float, rate_y: float, rate_z: float,
     *, f11: float, f12: float, f21: float, f22: float, gain_1: float, gain_2: float,
-    sonar_floor_m: float, lens_below_m: float,
+    sonar_floor_m: float, lens_below_m: float, forward_m: float, right_m: float, below_m: float,
 ) -> Lagged:  # fmt: skip
-    """x <- F x + g m of both channels, with the velocity that the state now has."""
+    """x <- F x + g m of both channels, with the velocity that the state now has and the last step's turning."""
     rotation = rotation_from_quaternion(qw, qx, qy, qz)
-    u = seen_velocity(rotation, vel_n, vel_e, vel_d, ground - pos_d, 0, sonar_floor_m, lens_below_m).value
-    v = seen_velocity(rotation, vel_n, vel_e, vel_d, ground - pos_d, 1, sonar_floor_m, lens_below_m).value
+    swing = cross((rate_x, rate_y, rate_z), (forward_m, right_m, below_m))
+    height_m = ground - pos_d
+    u = seen_velocity(rotation, vel_n, vel_e, vel_d, height_m, 0, sonar_floor_m, lens_below_m, swing[0]).value
+    v = seen_velocity(rotation, vel_n, vel_e, vel_d, height_m, 1, sonar_floor_m, lens_below_m, swing[1]).value
     return Lagged(
         f11 * lag_u1 + f12 * lag_u2 + gain_1 * u, f21 * lag_u1 + f22 * lag_u2 + gain_2 * u,
         f11 * lag_v1 + f12 * lag_v2 + gain_1 * v, f21 * lag_v1 + f22 * lag_v2 + gain_2 * v,
@@ -176,23 +215,32 @@ def errors_in_lag(
 @procedure
 def lag_step(
     work: Work, lanes: Lanes, f11: float, f12: float, f21: float, f22: float, gain_1: float, gain_2: float,
-    sonar_floor_m: float, lens_below_m: float,
+    lag: FlowLag,
 ) -> None:  # fmt: skip
     """x <- F x + g m, state and covariance."""
-    set_drive(work, lanes, sonar_floor_m, lens_below_m)
-    move_lag(work, lanes, f11, f12, f21, f22, gain_1, gain_2, sonar_floor_m, lens_below_m)
+    set_drive(work, lanes, lag.sonar_floor_m, lag.lens_below_m)
+    move_lag(
+        work, lanes, f11, f12, f21, f22, gain_1, gain_2, lag.sonar_floor_m, lag.lens_below_m,
+        lag.forward_m, lag.right_m, lag.below_m,
+    )  # fmt: skip
     errors_in_lag(work, lanes, STATES_WITH_LAG, f11, f12, f21, f22, gain_1, gain_2)
 
 
 @equation
 def lag_starts(work: Work, lanes: Lanes, lag: FlowLag) -> None:
     """What the velocity at the start of a prediction leaves in the sensor at its end."""
-    lag_step(
-        work, lanes, lag.f11, lag.f12, lag.f21, lag.f22, lag.start_1, lag.start_2, lag.sonar_floor_m, lag.lens_below_m
-    )
+    lag_step(work, lanes, lag.f11, lag.f12, lag.f21, lag.f22, lag.start_1, lag.start_2, lag)
 
 
 @equation
 def lag_ends(work: Work, lanes: Lanes, lag: FlowLag) -> None:
     """What the velocity at the end of a prediction adds."""
-    lag_step(work, lanes, 1.0, 0.0, 0.0, 1.0, lag.end_1, lag.end_2, lag.sonar_floor_m, lag.lens_below_m)
+    lag_step(work, lanes, 1.0, 0.0, 0.0, 1.0, lag.end_1, lag.end_2, lag)
+
+
+@procedure
+def predict_with_lag(work: Work, lanes: Lanes, dt_s: float, settings: FilterSettings, lag: FlowLag) -> None:
+    """`motion.predict` of a filter that carries the flow sensor's dynamics; lag: over a step of dt."""
+    lag_starts(work, lanes, lag)
+    predict(work, lanes, STATES_WITH_LAG, dt_s, settings)
+    lag_ends(work, lanes, lag)

@@ -7,10 +7,20 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import equation, larger, procedure, smaller
+from flownav.estimation.covariance import forget_lane
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.laws.flow import body_velocity, flow_rate, lens_range_of
+from flownav.estimation.lag import FlowLag, lag_of_step
+from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow, lagged_flow_rate, lens_range_of
 from flownav.estimation.motion import rotation_of
-from flownav.estimation.states import GYRO_BIAS, INNOVATION, INNOVATION_VARIANCE, NOISE, STATE
+from flownav.estimation.states import (
+    FLOW_LAG,
+    GYRO_BIAS,
+    INNOVATION,
+    INNOVATION_VARIANCE,
+    NOISE,
+    STATE,
+    STATES_WITH_LAG,
+)
 from flownav.measurement import Sensor
 from flownav.navigation.height import range_variance
 from flownav.navigation.memory import (
@@ -150,14 +160,21 @@ def lasting_doubt(doubted: float, ratio: float) -> float:
 
 # -- on lanes -----------------------------------------------------------------------------------------------
 @procedure
-def take_flow(work: Work, lanes: Lanes, t_s: float, sensor: int, gyro_is_imu: bool, p: Work, o: Output) -> None:
-    """Two components of flow [rad/s], or two or three of body velocity [m/s], with noise scheduled on the height."""
+def take_flow(
+    work: Work, lanes: Lanes, lag: bool | None, t_s: float, sensor: int, gyro_is_imu: bool, p: Work, o: Output
+) -> None:
+    """Two components of flow [rad/s], or two or three of body velocity [m/s], with noise scheduled on the height.
+
+    lag: `covariance.lagged`, whether the sensor's dynamics are states.
+    """
     s = load_flow_settings(p)
     angular = sensor == Sensor.FLOW_RATE
     look(work, lanes, t_s, angular, gyro_is_imu, s)
-    for component in range(2 if angular else 3):
+    for component in range(2 if angular or lag is not None else 3):
         offer_component(work, lanes, component, angular, s)
-        if angular:
+        if lag is not None:
+            observe_lagged(work, lanes, component, angular, s)
+        elif angular:
             flow_rate(work, lanes, component, s.flow_forward_m, s.flow_right_m, s.flow_below_m, s.flow_below_m)
         else:
             body_velocity(work, lanes, component, s.flow_forward_m, s.flow_right_m, s.flow_below_m)
@@ -165,6 +182,35 @@ def take_flow(work: Work, lanes: Lanes, t_s: float, sensor: int, gyro_is_imu: bo
         learn(work, lanes, t_s, angular, component, s)
         note_aid(work, lanes, t_s, o)
     judge_agreement(work, lanes, t_s, o)
+
+
+@equation
+def observe_lagged(work: Work, lanes: Lanes, component: int, angular: bool, s: FlowSettings) -> None:
+    """The law of a component of a sensor whose dynamics are states; there are none for a velocity down."""
+    if angular:
+        lagged_flow_rate(work, lanes, component, s.flow_lag_c_1_s2, s.flow_below_m)
+    else:
+        lagged_flow(work, lanes, component, s.flow_lag_c_1_s2)
+
+
+@equation
+def flow_lag(s: FlowSettings, dt_s: float) -> FlowLag:
+    """The sensor's dynamics over a step of dt."""
+    return lag_of_step(s.flow_lag_b_1_s, s.flow_lag_c_1_s2, dt_s, s.flow_forward_m, s.flow_right_m, s.flow_below_m)
+
+
+@equation
+def start_lag(work: Work, lanes: Lanes, lag: bool | None, lane: int, sigma_m_s: float, s: FlowSettings) -> None:
+    """The dynamics of one lane at its start: at rest, as its velocity is, and as unsure, c x1 and sqrt(c) x2 [m/s].
+
+    lag: `covariance.lagged`; nothing where they are no states.
+    """
+    if lag is not None:
+        for i in range(4):
+            state = FLOW_LAG + i
+            sigma = sigma_m_s / (s.flow_lag_c_1_s2 if i % 2 == 0 else np.sqrt(s.flow_lag_c_1_s2))
+            work[(STATE + state) * len(lanes) + lane] = 0.0
+            forget_lane(work, lanes, STATES_WITH_LAG, state, lane, sigma * sigma)
 
 
 @procedure

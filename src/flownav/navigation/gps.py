@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import equation, procedure
-from flownav.estimation.covariance import expect
+from flownav.estimation.covariance import expect, states_of
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.states import (
@@ -19,7 +19,6 @@ from flownav.estimation.states import (
     OFFERED,
     POSITION,
     STATE,
-    STATES,
     VELOCITY,
 )
 from flownav.measurement import Sensor
@@ -116,7 +115,7 @@ def note_level_ratio(work: Work, lanes: Lanes, position: bool, s: GpsSettings) -
         offer_axis(work, lanes, axis, position, True, s)
         for lane in range(len(lanes)):
             work[OFFERED * len(lanes) + lane] = 0.0
-        expect(work, lanes, STATES, True)
+        expect(work, lanes, states_of(lanes), True)
         for lane in range(len(lanes)):
             innovation = work[INNOVATION * len(lanes) + lane]
             variance = work[INNOVATION_VARIANCE * len(lanes) + lane]

@@ -6,7 +6,7 @@ A journal of no rows is written nowhere and only counts; that is what a run with
 from __future__ import annotations
 
 from flownav.compile import procedure
-from flownav.estimation.covariance import covariance_of, forget_lane
+from flownav.estimation.covariance import covariance_of, forget_lane, states_of
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import (
     COEFFICIENT,
@@ -92,7 +92,7 @@ def note_correction(work: Work, lanes: Lanes, o: Output) -> None:
 @procedure
 def reset_state(work: Work, lanes: Lanes, lane: int, state: int, variance: float, o: Output) -> None:
     """A state of one lane loses its correlations and gets this variance."""
-    forget_lane(work, lanes, STATES, state, lane, variance)
+    forget_lane(work, lanes, states_of(lanes), state, lane, variance)
     if len(lanes) == 1:
         first = next_entry(FORGOTTEN, o)
         if first >= 0:

@@ -13,9 +13,17 @@ from flownav.measurement import MAX_VALUES, Array, EventQueue
 from flownav.navigation.memory import CLOCK, READING, Reading, new_work
 from flownav.navigation.packed import pack
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.take import navigate_one
+from flownav.navigation.take import navigator_unit
 from flownav.navigation.tape import Tape, room_of
-from flownav.navigation.told import FROM_MAG, NO_HEADING, NO_STATED_NOISE, Equipment, FlowNoise, NavigatorSettings
+from flownav.navigation.told import (
+    FROM_MAG,
+    NO_HEADING,
+    NO_STATED_NOISE,
+    Equipment,
+    FlowNoise,
+    NavigatorSettings,
+    carries_lag,
+)
 
 STATED = 3  # variances that a reading carries
 
@@ -49,7 +57,8 @@ def run(queue: EventQueue, on: Running, *, compiled: bool = True) -> None:
 
     compiled False: in plain Python, step by step (tests; it is a thousand times slower).
     """
-    take = navigate_one.address if compiled else navigate_one.python
+    unit = navigator_unit(ONE_LANE, carries_lag(on.told.flow))
+    take = unit.address if compiled else unit.python
     entry: Any = feed_all
     feed = entry if compiled else entry.py_func
     journal = on.tape.journal

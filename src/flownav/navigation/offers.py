@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import equation, procedure
-from flownav.estimation.covariance import expect, settle
+from flownav.estimation.covariance import expect, settle, states_of
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.states import ACCEPTED, MEASURED, NOISE, OFFERED, STATES
+from flownav.estimation.states import ACCEPTED, MEASURED, NOISE, OFFERED
 from flownav.measurement import Sensor
 from flownav.navigation.journal import note_correction
 from flownav.navigation.memory import (
@@ -115,8 +115,8 @@ def fuse_offered(work: Work, lanes: Lanes, gate_sigma: float, o: Output) -> None
     """Test and fuse the component in the lanes whose REASON is FUSED; INNOVATION_GATE where it does not pass."""
     for lane in range(len(lanes)):
         work[OFFERED * len(lanes) + lane] = 1.0 if work[REASON * len(lanes) + lane] == FUSED else 0.0
-    expect(work, lanes, STATES, o.room[1] > 0)
-    settle(work, lanes, STATES, gate_sigma)
+    expect(work, lanes, states_of(lanes), o.room[1] > 0)
+    settle(work, lanes, states_of(lanes), gate_sigma)
     for lane in range(len(lanes)):
         reason = work[REASON * len(lanes) + lane]
         refused = reason == FUSED and work[ACCEPTED * len(lanes) + lane] == 0.0

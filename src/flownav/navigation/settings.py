@@ -120,6 +120,8 @@ class NavigatorSettingsFile(ParameterModel):
         0.3, ge=0, le=100, description="no flow nearer to the ground, where a range's floor makes any scale (ArduPilot)"
     )
     flow_limit_rad_s: Number = Field(10.0, gt=0, le=50, description="no sensor of this kind measures faster flow")
+    flow_lag_b_1_s: Number = Field(0.0, ge=0, le=1e4, description="the sensor's own dynamics c/(s2 + b s + c)")
+    flow_lag_c_1_s2: Number = Field(0.0, ge=0, le=1e7, description="0: a delay stands for them, else they are states")
     flow_noise_time_s: Number = Field(
         10.0, gt=0, le=1e9, description="flow noisier than modelled is followed at this pace; a surface lasts seconds"
     )

@@ -17,7 +17,7 @@ from flownav.sensors.barometer_sheet import BarometerSheet
 from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
-from flownav.sensors.identified import identified_flow
+from flownav.sensors.identified import identified_flow, needs_lag_states
 from flownav.sensors.inertial_sheet import InertialSheet
 from flownav.sensors.magnetometer_sheet import MagneticField, MagnetometerSheet
 from flownav.sensors.pad_camera_sheet import PadCameraSheet
@@ -40,6 +40,11 @@ class Told(NamedTuple):
 
     settings: NavigatorSettingsFile
     noise: FlowNoise = NO_STATED_NOISE
+
+    @property
+    def lag_states(self) -> bool:
+        """Whether the flow sensor's dynamics are states of the filter: by its file, or as the user says."""
+        return self.settings.flow_lag_c_1_s2 > 0.0
 
 
 def settings_of(
@@ -89,9 +94,14 @@ def of_sheets(sheets: SensorSheets, rotor_hz: tuple[float, float] | None = None)
 
 # -- flow ---------------------------------------------------------------------------------------------------
 def of_flow_sensor(sensor: FlowSensor) -> Keys:
-    """Gains and limits. Latency and axes belong to those who feed the readings (`sensors.identified`)."""
+    """Gains, limits, and dynamics that are more than a delay.
+
+    Latency and axes belong to those who feed the readings (`sensors.identified`).
+    """
     found = identified_flow(sensor)
-    return {
+    dynamics = sensor.dynamics
+    lag = {"flow_lag_b_1_s": dynamics.b_1_s, "flow_lag_c_1_s2": dynamics.c_1_s2} if needs_lag_states(sensor) else {}
+    return lag | {
         "flow_gain_x": found.gain_u,
         "flow_gain_y": found.gain_v,
         "flow_min_height_m": sensor.limits.min_height_m,

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.compile import ONE_LANE, kernel, pointer
+from flownav.errors import InputError
 from flownav.estimation.covariance import at, fold_attitude
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.smoother import (
@@ -48,6 +49,7 @@ from flownav.navigation.tape import (
     room_of,
     write_estimate,
 )
+from flownav.navigation.told import carries_lag
 
 CHUNK = 2048  # events
 
@@ -71,6 +73,8 @@ def smooth(queue: EventQueue, running: Running, chunk: int = CHUNK) -> Array:
 
     The rows are those of the tape's estimate, at the same instants. The tape is left as `run` leaves it.
     """
+    if carries_lag(running.told.flow):
+        raise InputError("the smoother knows no flow sensor's dynamics; it needs settings of flow_lag_c_1_s2 = 0")
     chunks = [part_of(queue, first, first + chunk) for first in range(0, len(queue.t_s), chunk)]
     marks = [_mark(running)]
     for part in chunks:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import equation, procedure
-from flownav.estimation.covariance import place
+from flownav.estimation.covariance import lagged, place
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.states import ATTITUDE, FORCE, POSITION, QUATERNION, RATE, STATE, STATES
+from flownav.estimation.states import ATTITUDE, FORCE, POSITION, QUATERNION, RATE, STATE, STATES, VELOCITY
 from flownav.frames import Quaternion, quaternion_from_euler
 from flownav.measurement import Sensor
+from flownav.navigation.flow import start_lag
 from flownav.navigation.memory import (
     STEADY_FORCE,
     AidMemory,
@@ -24,7 +25,7 @@ from flownav.navigation.memory import (
     store_imu,
     store_start,
 )
-from flownav.navigation.packed import START_SIGMA
+from flownav.navigation.packed import START_SIGMA, load_flow_settings
 from flownav.navigation.tape import START, Output, write_event
 from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
 from flownav.navigation.vibration import with_reading
@@ -117,6 +118,7 @@ def start_lane(
             work[place(i, j) * len(lanes) + lane] = 0.0
         sigma = p[START_SIGMA + j]
         work[place(j, j) * len(lanes) + lane] = sigma * sigma
+    start_lag(work, lanes, lagged(lanes), lane, p[START_SIGMA + VELOCITY], load_flow_settings(p))
     tilt = READ_TILT_RAD if read else LEVELLED_TILT_RAD
     known = fitted.heading == NO_HEADING and not lost
     turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)

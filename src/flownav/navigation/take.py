@@ -10,14 +10,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import LANES, ONE_LANE, equation, procedure, unit
+from flownav.compile import LANES, ONE_LANE, Unit, equation, procedure, unit
+from flownav.estimation.covariance import lagged, states_of, with_lag
 from flownav.estimation.error_models import propagate_gauss_markov, propagate_walks
 from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.lag import predict_with_lag
 from flownav.estimation.motion import hold_still, predict
 from flownav.estimation.states import STATES
 from flownav.measurement import Sensor
 from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
-from flownav.navigation.flow import take_flow
+from flownav.navigation.flow import flow_lag, take_flow
 from flownav.navigation.gps import take_gps
 from flownav.navigation.height import take_baro, take_range
 from flownav.navigation.inertial import choose_motion, keep_imu, steady_force
@@ -36,6 +38,7 @@ from flownav.navigation.packed import (
     load_aid_settings,
     load_equipment,
     load_filter_settings,
+    load_flow_settings,
     load_imu_settings,
 )
 from flownav.navigation.place import take_landed, take_pad, take_pose
@@ -60,7 +63,7 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
     running = any_started(work, lanes)
     if running:
         choose_motion(work, lanes, t_s, heard, fitted, load_imu_settings(p), o)
-        advance(work, lanes, t_s, p, o)
+        advance(work, lanes, lagged(lanes), t_s, p, o)
         if heard:
             keep_imu(work, lanes, t_s)
     if t_s - shared(work, lanes, ERRORS_CLOCK) >= LONGEST_LAG_OF_ERRORS_S:
@@ -89,7 +92,7 @@ def take(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p
         catch_up_errors(work, lanes, t_s, p, o)
         take_gps(work, lanes, t_s, sensor, p, o)
     elif sensor == Sensor.FLOW_RATE or sensor == Sensor.FLOW_VELOCITY:
-        take_flow(work, lanes, t_s, sensor, fitted.flow_gyro_is_imu, p, o)
+        take_flow(work, lanes, lagged(lanes), t_s, sensor, fitted.flow_gyro_is_imu, p, o)
     elif sensor == Sensor.RANGE:
         take_range(work, lanes, t_s, sensor, p, o)
     elif sensor == Sensor.BARO:
@@ -123,8 +126,11 @@ def any_started(work: Work, lanes: Lanes) -> bool:
 
 # -- from instant to instant ----------------------------------------------------------------------------------
 @procedure
-def advance(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> None:
-    """Bring the filter to an instant, in steps short enough for its laws; lanes without a fresh IMU coast."""
+def advance(work: Work, lanes: Lanes, lag: bool | None, t_s: float, p: Work, o: Output) -> None:
+    """Bring the filter to an instant, in steps short enough for its laws; lanes without a fresh IMU coast.
+
+    lag: `covariance.lagged`, whether the flow sensor's dynamics are states.
+    """
     ahead_s = t_s - shared(work, lanes, CLOCK)
     if not ahead_s > 0.0 or not np.isfinite(ahead_s):
         return
@@ -136,7 +142,10 @@ def advance(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> None:
         for lane in range(len(lanes)):
             if work[MOVING * len(lanes) + lane] == 0.0:
                 hold_still(work, lanes, lane)
-        predict(work, lanes, STATES, dt_s, settings)
+        if lag is not None:
+            predict_with_lag(work, lanes, dt_s, settings, flow_lag(load_flow_settings(p), dt_s))
+        else:
+            predict(work, lanes, STATES, dt_s, settings)
         steady_force(work, lanes, dt_s)
         propagate_walks(work, lanes, dt_s, settings)
         add_vibration_noise(work, lanes, dt_s, imu)
@@ -155,7 +164,7 @@ def catch_up_errors(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) ->
     dt_s = t_s - before_s
     if not dt_s > 0.0 or not np.isfinite(dt_s):
         return
-    propagate_gauss_markov(work, lanes, STATES, dt_s, load_filter_settings(p))
+    propagate_gauss_markov(work, lanes, states_of(lanes), dt_s, load_filter_settings(p))
     if len(lanes) == 1:
         note_decay(dt_s, o)
 
@@ -173,8 +182,12 @@ def take_one(
 UNIT_SIGNATURE = "p p p p p p p p q q d i"
 navigate_one = unit(take_one, UNIT_SIGNATURE, lanes=ONE_LANE)
 navigate_lanes = unit(take_one, UNIT_SIGNATURE, lanes=LANES)
+navigate_one_with_lag = unit(take_one, UNIT_SIGNATURE, lanes=with_lag(ONE_LANE))
+navigate_lanes_with_lag = unit(take_one, UNIT_SIGNATURE, lanes=with_lag(LANES))
 
 
-def navigator_unit(lanes: Lanes) -> object:
-    """The unit of so many lanes."""
+def navigator_unit(lanes: Lanes, lag: bool) -> Unit:
+    """The unit of so many lanes; lag: with the flow sensor's dynamics as states. It is compiled when it is run."""
+    if lag:
+        return navigate_one_with_lag if len(lanes) == 1 else navigate_lanes_with_lag
     return navigate_one if len(lanes) == 1 else navigate_lanes

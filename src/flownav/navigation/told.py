@@ -64,6 +64,8 @@ class FlowSettings(NamedTuple):
     flow_floor_m_s: float
     flow_min_height_m: float
     flow_limit_rad_s: float
+    flow_lag_b_1_s: float
+    flow_lag_c_1_s2: float
     flow_noise_time_s: float
     flow_gyro_time_s: float
     flow_forward_m: float
@@ -75,6 +77,11 @@ class FlowSettings(NamedTuple):
     range_relative_sigma: float
     gate_sigma: float
     noise: FlowNoise
+
+
+def carries_lag(s: FlowSettings) -> bool:
+    """Whether the sensor's own dynamics are states of the filter."""
+    return s.flow_lag_c_1_s2 > 0.0
 
 
 class HeightSettings(NamedTuple):

@@ -8,10 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.errors import InputError
-from flownav.sensors.datasheet import FlowSensor
+from flownav.sensors.datasheet import Dynamics, FlowSensor
 
 Array = NDArray[np.float64]
 UNTURNED = ((1.0, 0.0), (0.0, 1.0))
+
+
+BAND_HZ = 1.0  # of the closed loop: attitude follows to 5.4 rad/s (`simulation.assemble`), velocity less far
+DELAY_WITHIN_DEG = 10.0  # a delay stands for dynamics whose phase it follows so well
 
 
 class IdentifiedFlow(NamedTuple):
@@ -49,14 +53,34 @@ def identified_axes(verdict: str) -> tuple[tuple[float, float], tuple[float, flo
     return ((0.0, x), (y, 0.0)) if "swapped" in verdict else ((x, 0.0), (0.0, y))
 
 
-def identified_flow(sensor: FlowSensor) -> IdentifiedFlow:
+def phase_off_delay_deg(dynamics: Dynamics, band_hz: float = BAND_HZ) -> float:
+    """How far the phase of G(s) = a/(s^2 + b s + c) is at most from that of its delay b/c, from 0 to band_hz [deg].
+
+    Noise beyond the band does not matter: G is taken for what it does to motion that the vehicle makes.
+    """
+    w = 2.0 * np.pi * np.linspace(0.0, band_hz, 201)
+    lag = np.arctan2(dynamics.b_1_s * w, dynamics.c_1_s2 - w * w)
+    return float(np.degrees(np.max(np.abs(lag - dynamics.delay_s * w))))
+
+
+def needs_lag_states(sensor: FlowSensor) -> bool:
+    """Whether the sensor's dynamics are more than a delay over the flight's band, and were identified as such."""
+    found = sensor.identification
+    off = phase_off_delay_deg(sensor.dynamics) > DELAY_WITHIN_DEG
+    return off and (found is None or found.dynamics.validity == "identified")
+
+
+def identified_flow(sensor: FlowSensor, lag_states: bool | None = None) -> IdentifiedFlow:
     """A sensor file's axes, gains and latency; those of its dynamics where no log was identified.
 
-    InputError where the file's axes are not known.
+    lag_states: whether the dynamics are states of the filter; by default where the sensor needs it. The latency is then
+    without their delay. InputError where the file's axes are not known.
     """
     found = sensor.identification
+    lag_states = needs_lag_states(sensor) if lag_states is None else lag_states
+    carried_s = sensor.dynamics.delay_s if lag_states else 0.0
     if found is None:
-        return IdentifiedFlow(sensor.dynamics.gain, sensor.dynamics.gain, sensor.dynamics.delay_s)
+        return IdentifiedFlow(sensor.dynamics.gain, sensor.dynamics.gain, sensor.dynamics.delay_s - carried_s)
     axes = identified_axes(found.axes)
     if axes is None:
         raise InputError(f"{sensor.name}: {found.axes}; mend the log's axes, then identify again")
@@ -67,4 +91,4 @@ def identified_flow(sensor: FlowSensor) -> IdentifiedFlow:
         sure = any(not r.gain_low <= 1.0 <= r.gain_high for r in rows)
         return float(np.mean([r.gain for r in rows])) if sure else 1.0
 
-    return IdentifiedFlow(gain_of("x"), gain_of("y"), found.latency_s, axes)
+    return IdentifiedFlow(gain_of("x"), gain_of("y"), max(found.latency_s - carried_s, 0.0), axes)

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from flownav.compile import LANES, ONE_LANE, announce_compilation, compile_beside
 from flownav.measurement import Sensor
 from flownav.navigation.memory import new_work
-from flownav.navigation.take import navigate_lanes, navigate_one
+from flownav.navigation.packed import load_flow_settings
+from flownav.navigation.take import navigator_unit
 from flownav.navigation.tape import COMPONENTS, Tape, empty_tape, room_of
+from flownav.navigation.told import carries_lag
 from flownav.simulation import layout
 from flownav.simulation.flight import fly_block
 from flownav.simulation.history import HISTORY
@@ -69,16 +71,18 @@ def fly_into(
     if len(b.nav):
         b.nav[:] = new_work(lanes)
     b.tape.used[:] = 0
-    unit = navigate_one if len(lanes) == 1 else navigate_lanes
     room = np.array([*room_of(b.tape), len(b.fed)])
     told = flight, seed, first, lanes, b.work, b.nav
     written = (
         b.tape.estimate.reshape(-1), b.tape.innovation.reshape(-1), b.tape.event.reshape(-1), b.fed.reshape(-1), room,
         b.tape.used, b.history,
     )  # fmt: skip
-    if compiled and flight.onboard is not None:
-        compile_beside(unit, fly_block, *told, 0, *written)
-    take: Any = 0 if flight.onboard is None else (unit.address if compiled else unit.python)
+    take: Any = 0
+    if flight.onboard is not None:
+        unit = navigator_unit(lanes, carries_lag(load_flow_settings(flight.settings)))
+        if compiled:
+            compile_beside(unit, fly_block, *told, take, *written)
+        take = unit.address if compiled else unit.python
     fly: Any = fly_block if compiled else cast(Any, fly_block).py_func
     fly(*told, take, *written)
 

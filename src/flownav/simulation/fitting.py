@@ -16,6 +16,7 @@ from flownav.sensors.beam import LEVEL
 from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.flow_camera_sheet import load_flow_camera_sheet
 from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet, load_gps_receiver_sheet
+from flownav.sensors.identified import needs_lag_states
 from flownav.sensors.inertial_sheet import InertialSheet, load_inertial_sheet
 from flownav.sensors.magnetometer_sheet import MagneticField, load_magnetometer_sheet
 from flownav.sensors.pad_camera_sheet import PadCameraSheet, load_pad_camera_sheet
@@ -235,9 +236,13 @@ def place_of(lens: Lever) -> Place:
 
 
 def timing_of(sheets: SensorSheets, flow_sensor: FlowSensor) -> dict[Sensor, Timing]:
-    """How old each sensor's readings are. The flow sensor's own lag is what its file says of a slow signal: b/c."""
+    """How old each sensor's readings are.
+
+    The flow sensor's own lag is what its file says of a slow signal, b/c, unless the navigator carries its dynamics as
+    states: then a reading is of its own instant.
+    """
     found: dict[Sensor, Timing] = {Sensor.IMU: Timing(0.0, float(sheets.inertial.latency_s), 0.0)}
-    lag_s = flow_sensor.dynamics.delay_s
+    lag_s = 0.0 if needs_lag_states(flow_sensor) else flow_sensor.dynamics.delay_s
     for sensor, sheet in (
         (Sensor.GPS_POSITION, sheets.gps_receiver),
         (Sensor.GPS_VELOCITY, sheets.gps_receiver),

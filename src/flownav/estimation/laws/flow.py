@@ -94,6 +94,37 @@ def body_velocity(
     )  # fmt: skip
 
 
+class OnLaggedFlowRate(NamedTuple):
+    """The Jacobian of a lagged flow rate."""
+
+    lag_u1: float
+    lag_v1: float
+    flow_scale: float
+    tilt_n: float
+    tilt_e: float
+    pos_d: float
+    ground: float
+
+
+@law
+def lagged_flow_rate(
+    axis: int, lag_u1: float, lag_v1: float, flow_scale: float, pos_d: float, ground: float,
+    qw: float, qx: float, qy: float, qz: float, *, gain: float, lens_below_m: float,
+) -> tuple[float, OnLaggedFlowRate]:  # fmt: skip
+    """`flow_rate` of a sensor whose dynamics are states: gain x1, swing and all, over the range of now."""
+    rotation = rotation_from_quaternion(qw, qx, qy, qz)
+    range_m, by_height, by_north, by_east = lens_range(rotation, ground - pos_d, (0.0, 0.0, lens_below_m))
+    sign = -1.0 if axis == 0 else 1.0
+    along = gain * (lag_v1 if axis == 0 else lag_u1)
+    per_speed = sign * (1.0 + flow_scale) / range_m
+    by_range = -per_speed * along / range_m
+    return per_speed * along, OnLaggedFlowRate(
+        lag_u1=0.0 if axis == 0 else gain * per_speed, lag_v1=gain * per_speed if axis == 0 else 0.0,
+        flow_scale=sign * along / range_m, tilt_n=by_range * by_north, tilt_e=by_range * by_east,
+        pos_d=-by_range * by_height, ground=by_range * by_height,
+    )  # fmt: skip
+
+
 class OnLaggedFlow(NamedTuple):
     """The Jacobian of a lagged flow."""
 

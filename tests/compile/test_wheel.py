@@ -87,10 +87,14 @@ def flownav(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("installed")
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(place)], check=True)
     (site,) = place.glob("lib/python*/site-packages")
-    borrowed = [path for path in sys.path if path.endswith("-packages")]
-    (site / "borrowed.pth").write_text("\n".join(borrowed) + "\n")
     pip = [sys.executable, "-m", "pip", "--python", str(place / "bin" / "python"), "install", "--quiet"]
     subprocess.run([*pip, "--disable-pip-version-check", "--no-deps", "--no-index", str(wheel)], check=True)
+    borrowed = [path for path in sys.path if path.endswith("-packages")]  # after pip, which would find a flownav there
+    (site / "borrowed.pth").write_text("\n".join(borrowed) + "\n")
+    where = [str(place / "bin" / "python"), "-P", "-c", "import flownav; print(flownav.__file__)"]
+    outside = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    found = subprocess.run(where, env=outside, capture_output=True, text=True, check=True).stdout.strip()
+    assert Path(found).is_relative_to(place)
     return place / "bin" / "flownav"
 
 

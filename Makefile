@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-slow fuzz mutants lint bench bench-once docs clean
+.PHONY: demo test test-slow fuzz mutants lint bench bench-once docs wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr
@@ -37,8 +37,14 @@ bench-once: $(VENV)/.ready-test
 docs: $(VENV)/.ready-docs
 	$(BIN)/zensical build --strict --config-file mkdocs.yml
 
+wheel: $(VENV)/.ready-wheel
+	$(BIN)/python tools/build_wheel.py
+
+wheel-test: $(VENV)/.ready-test wheel
+	FLOWNAV_WHEEL=$$(ls dist/flownav-*.whl) $(BIN)/python -m pytest -m slow tests/compile/test_wheel.py
+
 clean:
-	rm -rf $(VENV) out .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf $(VENV) build dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
 
 $(VENV)/.python:
 	@$(PYTHON) -c 'import sys; sys.exit("flownav needs Python 3.11 or newer: make PYTHON=python3.x") if sys.version_info < (3, 11) else None'

@@ -17,6 +17,7 @@ number of threads.
 
 from __future__ import annotations
 
+from flownav.compiling.beside import compile_beside
 from flownav.compiling.bundles import FlatAccess, flat_access, lane_access, write_function
 from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
@@ -36,6 +37,7 @@ __all__ = [
     "announce_compilation",
     "bits_from_float",
     "clamp",
+    "compile_beside",
     "equation",
     "flat_access",
     "float_from_bits",

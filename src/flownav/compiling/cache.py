@@ -64,6 +64,18 @@ class Store:
         """The bytes of that name, or None where there are none that can be trusted."""
         return self._read(self.shipped / name, True) or (self._read(self.own / name, False) if self._usable else None)
 
+    def holds(self, name: str) -> bool:
+        """Whether there is a file of that name, whatever is in it."""
+        return (self.shipped / name).is_file() or (self.own / name).is_file()
+
+    def is_writable(self) -> bool:
+        """Whether what is saved would be kept."""
+        try:
+            self.own.mkdir(parents=True, exist_ok=True)
+            return self._usable and os.access(self.own, os.W_OK | os.X_OK) and not is_foreign(self.own.stat())
+        except OSError:
+            return False
+
     def save(self, name: str, payload: bytes) -> None:
         """Keep these bytes, or say why that cannot be."""
         if not self._usable:

@@ -21,10 +21,14 @@ from flownav.files import written_whole
 
 PACKAGE = Path(__file__).parents[1]
 LIBRARIES = tuple({sys.prefix, sys.base_prefix, sys.exec_prefix})
+INSTALLED = frozenset({"site-packages", "dist-packages"})
 REMEMBERED_FILES = 2000
 START_S = time.time()
 # imported by every kernel's module through `flownav.compile`, and nothing in machine code comes from them
-WITHOUT_CODE = {"flownav.files", "flownav.compiling.cache", "flownav.compiling.closure", "flownav.compiling.progress"}
+WITHOUT_CODE = {
+    "flownav.files",
+    *(f"flownav.compiling.{part}" for part in ("beside", "cache", "closure", "progress", "shipping")),
+}
 
 
 class Source(NamedTuple):
@@ -121,9 +125,14 @@ def source_file(module: str) -> Path | None:
         candidates = [path / "__init__.py", *([path.with_suffix(".py")] if path != PACKAGE else [])]
         return next((candidate for candidate in candidates if candidate.is_file()), None)
     file = getattr(sys.modules.get(module), "__file__", None)
-    if file is None or not file.endswith(".py") or file.startswith(LIBRARIES) or not Path(file).is_file():
+    if file is None or not file.endswith(".py") or is_of_library(file) or not Path(file).is_file():
         return None
     return Path(file)
+
+
+def is_of_library(file: str) -> bool:
+    """Whether a file was installed, wherever: a stamp must be the same in every installation of the same versions."""
+    return file.startswith(LIBRARIES) or not INSTALLED.isdisjoint(Path(file).parts)
 
 
 def parse_source(content: bytes, module: str, is_package: bool) -> Source:

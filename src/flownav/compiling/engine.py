@@ -57,6 +57,21 @@ class Kernel(CPUDispatcher):
         """The entry for arguments of these types: known, loaded or compiled."""
         return without_surprises(lambda: super(Kernel, self).compile(sig))
 
+    def prepare(self, *arguments: Any) -> None:
+        """Load or compile the entry for such arguments, and do not run it."""
+        self.compile(self._kinds(arguments))
+
+    def is_ready(self, *arguments: Any) -> bool:
+        """Whether the entry for such arguments is compiled or loaded already."""
+        return self._kinds(arguments) in self.overloads
+
+    def file_name(self, *arguments: Any) -> str | None:
+        """The name of that entry's file in the cache; None where it cannot be kept."""
+        return self._cache.file_name(self._kinds(arguments))
+
+    def _kinds(self, arguments: tuple[Any, ...]) -> tuple[Any, ...]:
+        return tuple(map(self.typeof_pyval, arguments))
+
 
 class _KernelCompiler(_FunctionCompiler):  # type: ignore[misc]
     """Numba's compiler of one function, which says that it is at work."""

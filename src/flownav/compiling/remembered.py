@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from functools import cache
 from typing import Any
 
-from numba.core import base, errors, ir, types
+from numba.core import base, errors, event, ir, types
+from numba.core.runtime.context import NRTContext
 
 OPERATORS = frozenset(function for function in vars(operator).values() if callable(function))
 _typed: dict[tuple[Any, ...], Any] = {}
@@ -63,26 +64,44 @@ def _variables(self: Any, value: Any) -> list[Any]:
 
 
 def _collect(value: Any, found: list[Any]) -> None:
-    """Most parts of an instruction are plain texts and numbers, which is seen at once."""
-    kind = type(value)
-    if kind in PLAIN:
-        return
-    if isinstance(value, ir.Var):
-        found.append(value)
-    elif isinstance(value, ir.Inst):
+    """Most parts of an instruction are variables, or plain texts and numbers, which is seen at once."""
+    if isinstance(value, ir.Inst):
         found.extend(value.list_vars())
-    elif isinstance(value, list | tuple):
-        for part in value:
-            _collect(part, found)
-    elif isinstance(value, dict):
-        for part in value.values():
-            _collect(part, found)
+    elif isinstance(value, dict | list | tuple):
+        for part in value.values() if isinstance(value, dict) else value:
+            kind = type(part)
+            if kind is ir.Var:
+                found.append(part)
+            elif kind not in PLAIN:
+                _collect(part, found)
+    elif isinstance(value, ir.Var):
+        found.append(value)
+
+
+def _counted_parts(self: Any, builder: Any, kind: Any, value: Any) -> list[Any]:
+    """The reference counts in a value; Numba takes every field of every tuple out of it to find that most have none."""
+    if not _is_counted(self._context.data_model_manager, kind):
+        return []
+    return list(_original_counted_parts(self, builder, kind, value))
+
+
+@cache
+def _is_counted(models: Any, kind: Any) -> bool:
+    return bool(models[kind].contains_nrt_meminfo())
+
+
+def _no_timer(*_: Any) -> Any:
+    """Numba times its locks at every call of LLVM, for a note on each kernel that nobody reads."""
+    return nullcontext()
 
 
 _original_type_of_call = types.Function.get_call_type
+_original_counted_parts = NRTContext.get_meminfos
 PLAIN = frozenset({str, int, float, bool, type(None), ir.Loc, ir.Scope})
 PATCHES: tuple[tuple[Any, str, Any], ...] = (
     (types.Function, "get_call_type", _type_of_call),
     (base, "_has_loc", cache(base._has_loc)),
     (ir.Inst, "_rec_list_vars", _variables),
+    (NRTContext, "get_meminfos", _counted_parts),
+    (event, "install_timer", _no_timer),
 )

@@ -16,6 +16,7 @@ to compile for, which this machine need not have.
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Iterator
@@ -34,6 +35,7 @@ from numba.core.registry import cpu_target
 
 from flownav.compiling.remembered import remembering
 
+COLLECT_AFTER = 50_000  # objects; Python's own 700 costs a tenth of the time of a compilation
 ENVIRONMENT_SYMBOL = "_ZN08NumbaEnv"
 
 # A lane loop must reach the vectoriser as a loop. Left alone, LLVM fully unrolls one whose body is still a
@@ -104,6 +106,13 @@ class LeanLibrary(JITCodeLibrary):
         module = llvm.parse_assembly(cgutils.normalize_ir_text(str(ir_module)))
         module.name = ir_module.name
         self.add_llvm_module(module)
+
+    def _optimize_functions(self, module: Any) -> None:
+        """Make a function small for its callers; one with a loop is optimised whole, soon."""
+        if self._has_loop:
+            module.data_layout = self._codegen._data_layout
+        else:
+            super()._optimize_functions(module)
 
     def finalize(self) -> None:
         """Link and optimise a function with a loop; leave another to its callers."""
@@ -256,6 +265,17 @@ def _codegen() -> LeanCodegen:
 
 
 @contextmanager
+def rarely_collecting() -> Iterator[None]:
+    """Python's search for unreachable cycles, which finds few among a compiler's many objects, more rarely."""
+    before = gc.get_threshold()
+    gc.set_threshold(max(before[0], COLLECT_AFTER), *before[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
+
+
+@contextmanager
 def lean() -> Iterator[None]:
     """Compile, load and link in this way inside the block, alone among threads."""
     with global_compiler_lock:
@@ -264,7 +284,7 @@ def lean() -> Iterator[None]:
         before = context._internal_codegen
         context._internal_codegen = _codegen() if is_lean() else before
         try:
-            with remembering():
+            with remembering(), rarely_collecting():
                 yield
         finally:
             context._internal_codegen = before

@@ -43,6 +43,8 @@ class Unit:
         self.constants = constants
         self.__name__ = function.__name__
         self.__doc__ = function.__doc__
+        self._signature = types.void(*(LETTERS[letter][0] for letter in self.letters))
+        self._keeper = KernelCache(function, constants)
         self._lock = threading.RLock()
         self._entry: Any = None
 
@@ -50,6 +52,15 @@ class Unit:
         """The plain Python function on these arguments, its constants bound."""
         names = [name for name in inspect.signature(self.function).parameters if name not in self.constants]
         self.function(**dict(zip(names, arguments, strict=True)), **self.constants)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it is compiled or loaded already."""
+        return self._entry is not None
+
+    def file_name(self) -> str | None:
+        """The name of its file in the cache; None where it cannot be kept."""
+        return self._keeper.file_name(self._signature)
 
     @property
     def address(self) -> int:
@@ -76,8 +87,7 @@ class Unit:
 
     def _compile(self) -> tuple[Any, int]:
         """The library and the address of its C function, from the cache where it is there."""
-        signature = types.void(*(LETTERS[letter][0] for letter in self.letters))
-        keeper = KernelCache(self.function, self.constants)
+        signature, keeper = self._signature, self._keeper
         result = keeper.load_overload(signature, cpu_target.target_context)
         if result is not None:
             return result.library, _address(result)

@@ -125,6 +125,14 @@ def back_over_reset(vector: Array, matrix: Array, state: int) -> None:
 
 @kernel
 def smoothed_covariance(covariance: Array, matrix: Array) -> Array:
-    """P - P Lambda P, symmetric to the last bit."""
-    found = covariance - covariance @ matrix @ covariance
-    return 0.5 * (found + found.T)
+    """P - P Lambda P, symmetric to the last bit.
+
+    Written out: Numba puts the path of this file into an expression of whole arrays, and a wheel would carry it.
+    """
+    product = covariance @ matrix @ covariance
+    found = np.empty_like(product)
+    for i in range(len(product)):
+        for j in range(len(product)):
+            ahead, across = covariance[i, j] - product[i, j], covariance[j, i] - product[j, i]
+            found[i, j] = 0.5 * (ahead + across)
+    return found

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import LANES, ONE_LANE, announce_compilation
+from flownav.compile import LANES, ONE_LANE, announce_compilation, compile_beside
 from flownav.measurement import Sensor
 from flownav.navigation.memory import new_work
 from flownav.navigation.packed import load_flow_settings
@@ -71,16 +71,20 @@ def fly_into(
     if len(b.nav):
         b.nav[:] = new_work(lanes)
     b.tape.used[:] = 0
+    room = np.array([*room_of(b.tape), len(b.fed)])
+    told = flight, seed, first, lanes, b.work, b.nav
+    written = (
+        b.tape.estimate.reshape(-1), b.tape.innovation.reshape(-1), b.tape.event.reshape(-1), b.fed.reshape(-1), room,
+        b.tape.used, b.history,
+    )  # fmt: skip
     take: Any = 0
     if flight.onboard is not None:
         unit = navigator_unit(lanes, carries_lag(load_flow_settings(flight.settings)))
+        if compiled:
+            compile_beside(unit, fly_block, *told, take, *written)
         take = unit.address if compiled else unit.python
-    room = np.array([*room_of(b.tape), len(b.fed)])
     fly: Any = fly_block if compiled else cast(Any, fly_block).py_func
-    fly(
-        flight, seed, first, lanes, b.work, b.nav, take, b.tape.estimate.reshape(-1), b.tape.innovation.reshape(-1),
-        b.tape.event.reshape(-1), b.fed.reshape(-1), room, b.tape.used, b.history,
-    )  # fmt: skip
+    fly(*told, take, *written)
 
 
 def fly_written(flight: Flight, seed: int, first: int = 0, lanes: tuple[int, ...] = ONE_LANE) -> Flown:

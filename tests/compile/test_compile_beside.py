@@ -1,0 +1,138 @@
+"""A unit compiled in a second process: that it is, that nothing depends on it, and that nothing is left of it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from flownav.compiling import beside, closure
+from flownav.compiling.units import unit
+
+PARTS = """
+from flownav.compile import invoke, kernel, pointer, unit
+
+def shift(p, n):
+    for i in range(n):
+        p[i] = p[i] + 1.0
+
+SHIFT = unit(shift, "p", n=2)
+
+@kernel
+def apply(take, p):
+    p[0] = 2.0 * p[0]
+    invoke(take, pointer(p))
+"""
+PROGRAM = """
+import os, sys
+import numpy as np
+from flownav.compile import announce_compilation, compile_beside
+from flownav.compiling.cache import STORE
+from parts import SHIFT, apply
+
+os.sched_getaffinity = lambda pid: set(range(int(os.environ.get("CORES", "2"))))
+sys.executable = os.environ.get("OTHER", sys.executable)
+p = np.array([3.0, 4.0])
+with announce_compilation("test"):
+    compile_beside(SHIFT, apply, 0, p)
+    made = "elsewhere" if not SHIFT.is_ready and STORE.holds(SHIFT.file_name()) else "here"
+    apply(SHIFT.address, p)
+print(*p, made)
+"""
+SIDE_BY_SIDE = ["flownav: compiling shift (1 of 2) ...", "flownav: compiling shift, apply (1 of 2) ..."]
+ONE_BY_ONE = ["flownav: compiling shift ...", "flownav: compiling apply ..."]
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    (tmp_path / "parts.py").write_text(PARTS)
+    (tmp_path / "program.py").write_text(PROGRAM)
+    return tmp_path
+
+
+def started(place: Path, *command: str, **environment: str) -> subprocess.Popen[str]:
+    paths = os.pathsep.join([str(closure.PACKAGE.parent), str(place)])
+    env = {**os.environ, "FLOWNAV_CACHE": str(place / "cache"), "PYTHONPATH": paths, **environment}
+    pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    return subprocess.Popen([sys.executable, "-B", *command], env=env, text=True, **pipes)
+
+
+def run(place: Path, **environment: str) -> tuple[str, list[str]]:
+    """What the program prints, and what it says of compilation without the time."""
+    with started(place, str(place / "program.py"), **environment) as program:
+        out, said = program.communicate()
+    assert program.returncode == 0, said
+    return out.strip(), [line.partition(" (test) in")[0] for line in said.splitlines()]
+
+
+def left_over(place: Path) -> list[Path]:
+    return [path for path in (place / "cache").rglob("*") if path.is_file() and path.suffix not in (".kernel", ".json")]
+
+
+def test_both_are_compiled_side_by_side_and_only_once(place):
+    assert run(place) == ("7.0 5.0 elsewhere", [*SIDE_BY_SIDE, "flownav: compiled 2 kernels"])
+    assert len(list((place / "cache" / "kernels").glob("*.kernel"))) == 2
+    assert run(place) == ("7.0 5.0 elsewhere", [])
+    assert left_over(place) == []
+
+
+def test_one_core_compiles_one_after_the_other(place):
+    assert run(place, CORES="1") == ("7.0 5.0 here", [*ONE_BY_ONE, "flownav: compiled 2 kernels"])
+
+
+def test_what_is_in_the_cache_is_not_compiled_beside(place):
+    run(place)
+    (kernel,) = (place / "cache" / "kernels").glob("*apply*")
+    kernel.unlink()
+    assert run(place)[1] == ["flownav: compiling apply ...", "flownav: compiled 1 kernel"]
+
+
+def test_without_a_cache_all_is_compiled_here(place):
+    out, said = run(place, FLOWNAV_CACHE="/proc/flownav")
+    assert out == "7.0 5.0 here"
+    assert sum("are not kept in" in line for line in said) == 1
+    assert [line for line in said if "compiling" in line] == ONE_BY_ONE
+
+
+def test_another_process_that_fails_costs_time_only(place):
+    out, said = run(place, OTHER="/bin/false")
+    assert out == "7.0 5.0 here"
+    assert said == [*SIDE_BY_SIDE, "flownav: compiling shift ...", "flownav: compiled 2 kernels"]
+
+
+def test_another_process_that_cannot_be_started_is_done_without(place):
+    assert run(place, OTHER=str(place / "none"))[0] == "7.0 5.0 here"
+
+
+def test_an_interrupted_program_leaves_no_process(place):
+    script = place / "slow"
+    script.write_text(f"#!/bin/sh\necho $$ > {place}/pid.part\nmv {place}/pid.part {place}/pid\nexec sleep 100\n")
+    script.chmod(0o755)
+    with started(place, str(place / "program.py"), OTHER=str(script)) as program:
+        until = time.monotonic() + 60.0
+        while not (place / "pid").exists():
+            assert time.monotonic() < until
+            time.sleep(0.05)
+        program.send_signal(signal.SIGINT)
+        program.communicate(timeout=60.0)
+    assert program.returncode != 0
+    with pytest.raises(ProcessLookupError):
+        os.kill(int((place / "pid").read_text()), 0)
+
+
+def test_the_other_process_ends_with_its_parent(place):
+    with started(place, "-m", "flownav.compiling.beside", "parts", "SHIFT") as other:
+        assert other.wait(60.0) == 1
+    assert left_over(place) == []
+
+
+def test_a_unit_that_no_other_process_finds_has_no_name():
+    def nothing(p):
+        p[0] = 0.0
+
+    assert beside.name_of(unit(nothing, "p")) is None

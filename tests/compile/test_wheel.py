@@ -1,0 +1,125 @@
+"""Kernels for a wheel, and the wheel itself: installed, it flies without compiling anything (`make wheel-test`)."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from flownav.compiling import closure, shipping
+from places import PROJECT
+
+PARTS = """
+from flownav.compile import LANES, ONE_LANE, kernel, unit
+
+def double(p, lanes):
+    for lane in range(len(lanes)):
+        p[lane] = p[lane] * 2.0
+
+ONE, MANY = unit(double, "p", lanes=ONE_LANE), unit(double, "p", lanes=LANES)
+
+@kernel
+def total(a):
+    return a[0] + a[1]
+"""
+USE = "import numpy as np; import parts; parts.ONE(np.ones(1)); parts.MANY(np.ones(16)); print(parts.total(np.ones(2)))"
+
+
+def in_python(place: Path, cache: str, level: str, *command: str) -> str:
+    paths = os.pathsep.join([str(closure.PACKAGE.parent), str(place)])
+    told = {"PYTHONPATH": paths, "FLOWNAV_CACHE": str(place / cache), "FLOWNAV_LEVEL": level}
+    done = subprocess.run(
+        [sys.executable, "-B", *command], env={**os.environ, **told}, capture_output=True, text=True, check=True
+    )
+    assert done.stderr == ""
+    return done.stdout.strip()
+
+
+@pytest.mark.skipif(sysconfig.get_platform() != "linux-x86_64", reason="wheels with kernels are built there")
+def test_kernels_are_compiled_for_a_level_without_being_run(tmp_path):
+    (tmp_path / "parts.py").write_text(PARTS)
+    assert in_python(tmp_path, "v3", "x86-64-v3", "-c", USE) == "2.0"
+    assert in_python(tmp_path, "v4", "x86-64-v4", "-m", "flownav.compiling.shipping", str(tmp_path / "v3")) == "3"
+    of_v3, of_v4 = ({path.name for path in (tmp_path / level / "kernels").iterdir()} for level in ("v3", "v4"))
+    assert len(of_v4) == 3
+    assert not of_v3 & of_v4
+    for name in of_v4:
+        shutil.copy(tmp_path / "v4" / "kernels" / name, tmp_path / "v3" / "kernels")
+    # what was compiled for the other level is what that level would have compiled
+    again = in_python(tmp_path, "v3", "x86-64-v4", "-m", "flownav.compiling.shipping", str(tmp_path / "v4"))
+    assert again == "3"
+    assert {path.name for path in (tmp_path / "v3" / "kernels").iterdir()} == of_v3 | of_v4
+
+
+def test_a_kernel_and_units_of_a_function_are_found():
+    from flownav.navigation.take import navigate_lanes, navigate_one
+
+    found = list(shipping.parts_of("flownav.navigation.take", "take_one"))
+    assert found[:2] == [navigate_one, navigate_lanes]
+    assert list(shipping.parts_of("flownav.navigation.take", "navigate")) == []
+
+
+def test_an_installed_library_is_one_wherever_it_lies():
+    assert closure.is_of_library("/home/user/.local/lib/python3.11/site-packages/pydantic/__init__.py")
+    assert closure.is_of_library("/usr/lib/python3/dist-packages/scipy/__init__.py")
+    assert not closure.is_of_library("/home/user/project/law.py")
+
+
+# -- the wheel itself --------------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def wheel() -> Path:
+    named = os.environ.get("FLOWNAV_WHEEL")
+    if not named:
+        pytest.skip("`make wheel-test` builds the wheel that this test installs")
+    return PROJECT / named
+
+
+@pytest.fixture(scope="module")
+def flownav(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The command in a fresh environment that borrows this one's libraries, not its flownav."""
+    place = tmp_path_factory.mktemp("installed")
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(place)], check=True)
+    (site,) = place.glob("lib/python*/site-packages")
+    pip = [sys.executable, "-m", "pip", "--python", str(place / "bin" / "python"), "install", "--quiet"]
+    subprocess.run([*pip, "--disable-pip-version-check", "--no-deps", "--no-index", str(wheel)], check=True)
+    borrowed = [path for path in sys.path if path.endswith("-packages")]  # after pip, which would find a flownav there
+    (site / "borrowed.pth").write_text("\n".join(borrowed) + "\n")
+    where = [str(place / "bin" / "python"), "-P", "-c", "import flownav; print(flownav.__file__)"]
+    outside = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    found = subprocess.run(where, env=outside, capture_output=True, text=True, check=True).stdout.strip()
+    assert Path(found).is_relative_to(place)
+    return place / "bin" / "flownav"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("level", ["", "x86-64-v3"])
+@pytest.mark.parametrize("more", [[], ["--filter", "paper"], ["--flights", "2"]], ids=["navigator", "paper", "flights"])
+def test_an_installed_wheel_flies_without_compiling(flownav, tmp_path, level, more):
+    environment = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "FLOWNAV_LEVEL")}
+    environment |= {"FLOWNAV_CACHE": str(tmp_path / "cache")} | ({"FLOWNAV_LEVEL": level} if level else {})
+    command = [str(flownav), "fly", "landing", *more, "--no-report", "--json", "--out", str(tmp_path / "flight.fnr")]
+    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout)["scenario"] == "landing"
+    assert "compil" not in done.stderr
+    assert not list((tmp_path / "cache").rglob("*.kernel"))
+
+
+@pytest.mark.slow
+def test_the_wheel_is_for_this_python_and_names_no_folder_of_this_machine(wheel):
+    version = f"cp{sys.version_info[0]}{sys.version_info[1]}"
+    assert wheel.name.endswith(f"-{version}-{version}-linux_x86_64.whl")
+    kernels = 0
+    with zipfile.ZipFile(wheel) as file:
+        for name in file.namelist():
+            content = file.read(name)
+            kernels += name.endswith(".kernel")
+            for folder in (PROJECT, Path.home(), Path(sys.prefix), Path(sys.base_prefix)):
+                assert os.fsencode(folder) + b"/" not in content, f"{name} names {folder}"
+    assert kernels >= 40

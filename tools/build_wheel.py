@@ -1,0 +1,77 @@
+"""Builds a wheel that carries compiled kernels for both processor levels: `make wheel`.
+
+The commands are run at the lower level, which any machine that builds a wheel has; what they compiled is compiled for
+the higher one, and not run. Both lie in `build/kernels` before `pip wheel` packs them into `dist`.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+PROJECT = Path(__file__).resolve().parents[1]
+GATHERED = PROJECT / "build" / "kernels"
+DIST = PROJECT / "dist"
+RUN_AT, COMPILED_FOR = "x86-64-v3", ("x86-64-v4",)
+
+
+def python(*arguments: object, **environment: object) -> None:
+    """Run this Python with the project's own source."""
+    told = {name: str(value) for name, value in environment.items()}
+    env = {**os.environ, "PYTHONPATH": str(PROJECT / "src"), **told}
+    subprocess.run([sys.executable, *map(str, arguments)], check=True, env=env)
+
+
+def gather(folder: Path) -> list[Path]:
+    """The kernels of every level, compiled into caches within a folder that holds nothing yet."""
+    run_at = folder / RUN_AT
+    print(f"running the commands at {RUN_AT}", flush=True)
+    python(PROJECT / "tools" / "commands_for_wheel.py", folder / "work", FLOWNAV_CACHE=run_at, FLOWNAV_LEVEL=RUN_AT)
+    for level in COMPILED_FOR:
+        print(f"compiling the same for {level}", flush=True)
+        python("-m", "flownav.compiling.shipping", run_at, FLOWNAV_CACHE=folder / level, FLOWNAV_LEVEL=level)
+    caches = {level: sorted((folder / level / "kernels").glob("*.kernel")) for level in (RUN_AT, *COMPILED_FOR)}
+    of_commands = {_function(path) for path in caches[RUN_AT]}
+    for level, files in caches.items():
+        if {_function(path) for path in files} != of_commands:
+            raise SystemExit(f"{level} has not the kernels that {RUN_AT} has")
+    return [path for files in caches.values() for path in files]
+
+
+def _function(kernel: Path) -> str:
+    return kernel.name.rpartition("-")[0]
+
+
+def machine_paths(content: bytes, folders: tuple[Path, ...]) -> list[str]:
+    """Which of these folders of the building machine a file names."""
+    return [str(folder) for folder in folders if os.fsencode(folder) + b"/" in content]
+
+
+def main() -> None:
+    """Gather, check, build."""
+    start = time.monotonic()
+    shutil.rmtree(GATHERED, ignore_errors=True)
+    GATHERED.mkdir(parents=True)
+    with tempfile.TemporaryDirectory() as temporary:
+        kernels = gather(Path(temporary))
+        told = PROJECT, Path(temporary), Path.home(), Path(sys.prefix), Path(sys.base_prefix)
+        for path in kernels:
+            if found := machine_paths(path.read_bytes(), told):
+                raise SystemExit(f"{path.name} names {', '.join(found)}: a wheel must not")
+            shutil.copyfile(path, GATHERED / path.name)
+    pip = ("-m", "pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps", "--no-build-isolation")
+    for old in DIST.glob("flownav-*.whl"):
+        old.unlink()
+    python(*pip, "--wheel-dir", DIST, PROJECT, FLOWNAV_KERNELS=GATHERED)
+    (wheel,) = DIST.glob("flownav-*.whl")
+    size = wheel.stat().st_size / 1e6
+    print(f"{wheel.relative_to(PROJECT)}: {len(kernels)} kernels, {size:.1f} MB, {time.monotonic() - start:.0f} s")
+
+
+if __name__ == "__main__":
+    main()

@@ -100,6 +100,7 @@ OBSERVED = _rows.take(
     1 + MOST_OBSERVED
 )  # in the first lane, for all of them: how many states the law reads, then their places
 CONSIDERED = _rows.take(1 + MOST_CONSIDERED)  # in the first lane: how many states corrections leave alone, their places
+CONSIDERS = _rows.take(1)  # in the first lane: 1 where states are considered at all
 KEPT = _rows.take(MOST_CONSIDERED)  # these states while a correction is made
 # within a step
 CROSS = _rows.take(STATES_WITH_LAG)  # P h'

@@ -171,7 +171,7 @@ def test_a_whole_run_of_the_navigator_is_smoothed_as_by_dense_rts(clean):
     With a hundredth of the sensors' errors: rotations add up to second order only.
     """
     in_flight_s = 5.0  # on the ground an inertial reading ends with what standing teaches, which is no prediction
-    prepared, queue = queue_of(spoiled(clean, 1, 0.01), 14.0, ((8.0, 12.0),), in_flight_s)
+    prepared, queue = queue_of(spoiled(clean, 1, 0.01), 18.0, ((9.0, 15.0),), in_flight_s)
     steps, last, written = steps_of(prepared, queue)
     on = navigator(prepared, queue)
     path = smooth(queue, on)

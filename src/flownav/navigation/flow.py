@@ -58,7 +58,7 @@ from flownav.navigation.told import FlowSettings
 from flownav.navigation.trust import watch_whiteness
 from flownav.sensors.flow import flow_noise_sigma
 
-SMALLEST_EXCESS, LARGEST_EXCESS = 0.15, 400.0
+SMALLEST_EXCESS, LARGEST_EXCESS = 0.25, 400.0
 AGREEMENT_S = 1.0
 DOUBTED_RATIO, TRUSTED_RATIO = 4.0, 2.0  # on average 1
 LONGEST_STEP_S = 1.0

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import clamp, equation, larger, procedure, smaller
-from flownav.estimation.covariance import consider, covariance_of, forget_lane, variance_of
+from flownav.estimation.covariance import add_noise_lane, consider, covariance_of, forget_lane, variance_of
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.lag import FlowLag, lag_of_step
 from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow, lagged_flow_rate, lens_range_of
@@ -27,10 +27,13 @@ from flownav.estimation.states import (
     POSITION,
     STATE,
     STATES_WITH_LAG,
+    VELOCITY,
 )
 from flownav.measurement import Sensor
 from flownav.navigation.height import range_variance
 from flownav.navigation.memory import (
+    COURSE_KNOWN,
+    GPS_FUSED,
     INNOVATION_BEFORE,
     LENS_RANGE,
     REASON,
@@ -48,6 +51,7 @@ from flownav.navigation.reasons import (
     FUSED,
     INNOVATION_GATE,
     NEAR_GROUND,
+    NO_HEADING,
     NO_HEIGHT,
     OUT_OF_RANGE,
     SILENT,
@@ -64,6 +68,7 @@ SMALLEST_EXCESS, LARGEST_EXCESS = 0.25, 400.0
 AGREEMENT_S = 1.0
 DOUBTED_RATIO, TRUSTED_RATIO = 4.0, 2.0  # on average 1
 LONGEST_STEP_S = 1.0
+UNHELD_S = 1.0  # without GPS
 LARGEST_SPREAD = 0.5  # of the height over the ground, of which flow makes no speed
 UNKNOWN_RANGE_M = 2.0
 FULL_QUALITY = 255.0
@@ -253,7 +258,9 @@ def look(work: Work, lanes: Lanes, t_s: float, angular: bool, gyro_is_imu: bool,
         work[TURNING * len(lanes) + lane] = x
         work[(TURNING + 1) * len(lanes) + lane] = y
         work[LENS_RANGE * len(lanes) + lane] = range_m
-        work[TESTED * len(lanes) + lane] = judge_flow(reading, angular, x, y, started, view, s)
+        verdict = judge_flow(reading, angular, x, y, started, view, s)
+        headed = verdict != FUSED or work[COURSE_KNOWN * len(lanes) + lane] > 0.0
+        work[TESTED * len(lanes) + lane] = verdict if headed else NO_HEADING
 
 
 @equation
@@ -314,6 +321,9 @@ def learn(work: Work, lanes: Lanes, t_s: float, angular: bool, component: int, s
             innovation, total = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]
             square = smaller(innovation * innovation, s.gate_sigma * s.gate_sigma * total) / total
             ratio = followed_agreement(square, t_s, m)
+            unheld = t_s - work[GPS_FUSED * len(lanes) + lane] > UNHELD_S
+            if refused and ratio > DOUBTED_RATIO and unheld:
+                free_velocity(work, lanes, lane, innovation, angular)
             listed = reading.variance_0 if component == 0 else (
                 reading.variance_1 if component == 1 else reading.variance_2
             )  # fmt: skip
@@ -327,6 +337,14 @@ def learn(work: Work, lanes: Lanes, t_s: float, angular: bool, component: int, s
             store_flow(
                 work, lanes, lane, FlowMemory(m.taken_s, excess, m.bias_x, m.bias_y, m.bias_count, ratio, m.doubted)
             )
+
+
+@equation
+def free_velocity(work: Work, lanes: Lanes, lane: int, innovation: float, angular: bool) -> None:
+    """Flow that is refused again and again, and nothing else tells the velocity: then that is what is wrong."""
+    freed = innovation * (work[LENS_RANGE * len(lanes) + lane] if angular else 1.0)
+    add_noise_lane(work, lanes, VELOCITY, lane, freed * freed)
+    add_noise_lane(work, lanes, VELOCITY + 1, lane, freed * freed)
 
 
 @procedure

@@ -126,11 +126,11 @@ def watch_imu(work: Work, lanes: Lanes) -> None:
 
 @procedure
 def watch_range(work: Work, lanes: Lanes) -> None:
-    """And a range, whatever the filter makes of it."""
+    """And a range, whatever the filter makes of it; many sensors say 0 for nothing."""
     for lane in range(len(lanes)):
         reading = load_reading(work, lanes, lane)
         heard = reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
-        if heard and reading.value_0 >= 0.0 and np.isfinite(reading.value_0):
+        if heard and reading.value_0 > 0.0 and np.isfinite(reading.value_0):
             store_seen_window(work, lanes, lane, with_range(reading.value_0, load_seen_window(work, lanes, lane)))
 
 

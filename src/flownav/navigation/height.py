@@ -116,8 +116,8 @@ def judge_range(
 
 @equation
 def followed_echo(range_m: float, down_m: float, m: EchoMemory) -> EchoMemory:
-    """A range is a stray where neither of the two before it confirms it, moved by the climb since or not (the filter may
-    err in that); and the share of strays.
+    """A range is a stray where neither of the two before it confirms it, moved by the climb since or not (the filter
+    may err in that); and the share of strays.
     """
     near = ECHO_M + ECHO_SHARE * range_m
     newest = smaller(abs(range_m - m.newest_m), abs(range_m - m.newest_m + down_m - m.newest_down_m))

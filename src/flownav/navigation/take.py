@@ -16,7 +16,7 @@ from flownav.estimation.error_models import propagate_gauss_markov, propagate_wa
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.lag import predict_with_lag
 from flownav.estimation.motion import hold_still, predict
-from flownav.estimation.states import ATTITUDE, GYRO_BIAS, STATES
+from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, STATES
 from flownav.measurement import Sensor
 from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
 from flownav.navigation.course import find_heading, note_flow_course
@@ -117,6 +117,12 @@ def consider_datum(work: Work, lanes: Lanes, fitted: Equipment) -> None:
     if fitted.heading == NO_HEADING and not fitted.use_attitude and unknown:
         consider(work, lanes, ATTITUDE + 2)
         consider(work, lanes, GYRO_BIAS + 2)
+        if not no_fixes:  # by a heading that may be any, GPS would turn every push into tilt
+            for i in range(2):
+                consider(work, lanes, ATTITUDE + i)
+                consider(work, lanes, GYRO_BIAS + i)
+            for i in range(3):
+                consider(work, lanes, ACCEL_BIAS + i)
 
 
 @procedure

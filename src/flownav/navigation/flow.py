@@ -61,6 +61,7 @@ from flownav.navigation.trust import watch_whiteness
 from flownav.sensors.flow import flow_noise_sigma
 
 SMALLEST_EXCESS, LARGEST_EXCESS = 0.25, 400.0
+LARGEST_CHANGE, MEAN_CHANGE = 4.0, 0.920  # E min(x^2, 4)
 AGREEMENT_S = 1.0
 DOUBTED_RATIO, TRUSTED_RATIO = 4.0, 2.0  # on average 1
 LONGEST_STEP_S = 1.0
@@ -161,9 +162,9 @@ def followed_excess(
     A poor lens or floor shows there, and a good one too. What lasts in an innovation is not the flow's noise: it is of
     the motion, and counts against the accelerometer (`trust`).
     """
-    limit = gate * np.sqrt(2.0 * total)
-    change = clamp(innovation - before, -limit, limit)
-    seen = 0.5 * change * change * m.excess / noise
+    change = innovation - before
+    usual = smaller(0.5 * change * change / total, LARGEST_CHANGE) / MEAN_CHANGE
+    seen = usual * m.excess * total / noise
     share = smaller(larger(t_s - m.taken_s, 0.0), LONGEST_STEP_S) / s.flow_noise_time_s
     return clamp(m.excess + 0.5 * share * (seen - m.excess), SMALLEST_EXCESS, LARGEST_EXCESS)
 

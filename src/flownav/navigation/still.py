@@ -100,7 +100,7 @@ def judge_standing(gyro: ImuWindow, seen: SeenWindow, contact_m: float) -> float
     flow_m_s = np.sqrt(seen.flow_u_m_s**2 + seen.flow_v_m_s**2) / flows
     unmoved = seen.gps_m_s < RESTING_GPS_M_S
     quiet = turning < QUIET_GYRO_RAD_S and shaking < QUIET_ACCEL_M_S2
-    rests = enough and quiet and unmoved and flow_m_s < RESTING_FLOW_M_S and (touching and steady or not ranged)
+    rests = enough and quiet and unmoved and flow_m_s < RESTING_FLOW_M_S and ((touching and steady) or not ranged)
     shaken = enough and unmoved and ranged and touching and steady and seen.flows > 0.0 and flow_m_s < SHAKEN_FLOW_M_S
     return RESTS if rests else (SHAKEN if shaken else MOVES)
 

@@ -37,6 +37,7 @@ from flownav.navigation.flow_noise import (
     followed_agreement,
     followed_excess,
     lasting_doubt,
+    lasting_walk,
 )
 from flownav.navigation.memory import (
     COURSE_KNOWN,
@@ -150,6 +151,7 @@ def take_flow(
         watch_whiteness(work, lanes, t_s, 1 - component if angular else component)
         learn(work, lanes, t_s, angular, component, s)
         note_aid(work, lanes, t_s, o)
+    walk_alone(work, lanes, t_s, s)
     judge_agreement(work, lanes, t_s, o)
 
 
@@ -290,6 +292,19 @@ def free_velocity(work: Work, lanes: Lanes, lane: int, innovation: float, angula
     freed = innovation * (work[LENS_RANGE * len(lanes) + lane] if angular else 1.0)
     add_noise_lane(work, lanes, VELOCITY, lane, freed * freed)
     add_noise_lane(work, lanes, VELOCITY + 1, lane, freed * freed)
+
+
+@procedure
+def walk_alone(work: Work, lanes: Lanes, t_s: float, s: FlowSettings) -> None:
+    """Where no GPS holds the position, it is less sure by what lasts of the flow's error since the reading before."""
+    for lane in range(len(lanes)):
+        unheld = t_s - work[GPS_FUSED * len(lanes) + lane] > UNHELD_S
+        step_s = smaller(t_s - load_flow(work, lanes, lane).taken_s, LONGEST_STEP_S)
+        north, east = work[(STATE + VELOCITY) * len(lanes) + lane], work[(STATE + VELOCITY + 1) * len(lanes) + lane]
+        walk = lasting_walk(work[LENS_RANGE * len(lanes) + lane], np.sqrt(north * north + east * east), s)
+        if unheld and work[TESTED * len(lanes) + lane] == FUSED:
+            add_noise_lane(work, lanes, POSITION, lane, walk * step_s)
+            add_noise_lane(work, lanes, POSITION + 1, lane, walk * step_s)
 
 
 @procedure

@@ -63,3 +63,14 @@ def followed_excess(
 def lasting_doubt(doubted: float, ratio: float) -> float:
     """Doubted above one ratio, trusted again below a smaller one."""
     return 1.0 if ratio > DOUBTED_RATIO else (0.0 if ratio < TRUSTED_RATIO else doubted)
+
+
+@equation
+def lasting_walk(range_m: float, speed_m_s: float, s: FlowSettings) -> float:
+    """The walk of a position that flow alone tells [m2/s]: 2 e^2 tau of a velocity error e that lasts for tau.
+
+    White noise averages out, and what lasts of a flow's error does not: a part as of a gyro, over the range, and a part
+    of the speed.
+    """
+    turning, scaled = s.flow_lasting_rad_s * range_m, s.flow_lasting_share * speed_m_s
+    return 2.0 * s.flow_lasting_s * (turning * turning + scaled * scaled)

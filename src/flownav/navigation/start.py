@@ -27,7 +27,7 @@ from flownav.navigation.memory import (
 from flownav.navigation.packed import START_SIGMA, load_filter_settings, load_flow_settings
 from flownav.navigation.records import AidMemory, Reading, StartMemory
 from flownav.navigation.tape import START, Output, write_event
-from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
+from flownav.navigation.told import FROM_MAG, FROM_YAW, NO_HEADING, Equipment
 from flownav.navigation.vibration import with_reading
 
 ORIGIN_SIGMA_M = 0.1  # the local origin, where the navigator's start defines it
@@ -38,6 +38,7 @@ LEVELLED_FLOOR_RAD = 0.005  # of one from the accelerometer
 READ_HEADING_RAD = 0.1  # an autopilot's, whose compass is calibrated
 COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's
 DATUM_HEADING_RAD = 1e-3  # the start defines the frame
+UNTOLD_HEADING_RAD = 3.0  # the first heading that is told will
 LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0
 
 
@@ -136,6 +137,7 @@ def start_lane(
     tilt = READ_TILT_RAD if read else STANDING_TILT_RAD * np.sqrt(1.0 - believed) + LEVELLED_FLOOR_RAD
     known = fitted.heading == NO_HEADING and not lost
     turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
+    turned = UNTOLD_HEADING_RAD if fitted.heading == FROM_YAW else turned
     spread = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M
     for i in range(3):  # of a motion before the start nothing is known
         work[(RATE + i) * len(lanes) + lane] = 0.0

@@ -154,16 +154,17 @@ def test_an_external_pose_is_enough():
 
 
 def test_an_external_heading_is_taken():
-    flown = fly(still, 20.0, 0.3).without(Sensor.ATTITUDE, Sensor.MAG)
+    """With an earth frame and without, after the start and, however far it is from north, before it."""
+    flown = late = fly(still, 20.0, 0.3).without(Sensor.ATTITUDE, Sensor.MAG)
+    for sensor in (*GPS, Sensor.FLOW_RATE):
+        late = late.cut(sensor, 0.0, 1.0)
     t_s = np.arange(0.0, 20.0, 0.2)
-    for off in (0.5, 2.5):
-        yaw = np.interp(t_s, flown.t_s, flown.yaw) + off  # the navigator began at north, and is told otherwise
-        told = Stream.of(Sensor.YAW, t_s, yaw[:, None], variance=np.full((len(t_s), 1), 1e-4))
-        for heard in (flown, flown.without(*GPS)):  # a heading without an earth frame is one, too
-            run = navigate(heard.added(told))
-            assert run.reasons(Sensor.YAW) == {"fused": len(t_s) - 1}  # the first came with the start
-            assert run.yaw_error[run.t_s > 5.0] == pytest.approx(off, abs=0.01)
-            assert abs(run.state(INS_ERROR + 2)) < 1e-3
+    for off, heard in ((0.5, flown), (0.5, flown.without(*GPS)), (2.5, late), (-2.5, late.without(*GPS))):
+        yaw = np.interp(t_s, flown.t_s, flown.yaw) + off
+        run = navigate(heard.added(Stream.of(Sensor.YAW, t_s, yaw[:, None], variance=np.full((len(t_s), 1), 1e-4))))
+        assert set(run.reasons(Sensor.YAW)) <= {"before_start", "fused"}
+        assert run.yaw_error[run.t_s > 5.0] == pytest.approx(off, abs=0.01)
+        assert abs(run.state(INS_ERROR + 2)) < 1e-3
 
 
 def test_vibration_at_take_off_leaves_the_height_right():

@@ -38,7 +38,7 @@ LEVELLED_FLOOR_RAD = 0.005  # of one from the accelerometer
 READ_HEADING_RAD = 0.1  # an autopilot's, whose compass is calibrated
 COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's
 DATUM_HEADING_RAD = 1e-3  # the start defines the frame
-UNTOLD_HEADING_RAD = 3.0  # the first heading that is told will
+UNTOLD_HEADING_RAD = 1.0  # the first heading that is told will
 LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0
 
 
@@ -137,7 +137,7 @@ def start_lane(
     tilt = READ_TILT_RAD if read else STANDING_TILT_RAD * np.sqrt(1.0 - believed) + LEVELLED_FLOOR_RAD
     known = fitted.heading == NO_HEADING and not lost
     turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
-    turned = UNTOLD_HEADING_RAD if fitted.heading == FROM_YAW else turned
+    turned = UNTOLD_HEADING_RAD if fitted.heading == FROM_YAW and not np.isfinite(field_rad) else turned
     spread = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M
     for i in range(3):  # of a motion before the start nothing is known
         work[(RATE + i) * len(lanes) + lane] = 0.0
@@ -174,11 +174,12 @@ def started(m: StartMemory) -> StartMemory:
 @equation
 def level(m: StartMemory, believed: float, field_rad: float, fitted: Equipment) -> Quaternion:
     """Roll and pitch from the mean specific force as far as it is believed (1: wholly); heading from the magnetometer
-    where one was heard, else north.
+    or what is told as one where that was heard, else north.
 
     The field was noted in the axes of a vehicle that takes itself to be level and to head north.
     """
     roll = believed * np.arctan2(-m.force_y, -m.force_z)
     pitch = believed * np.arctan2(m.force_x, np.sqrt(m.force_y * m.force_y + m.force_z * m.force_z))
-    magnetic = fitted.heading == FROM_MAG and bool(np.isfinite(field_rad))
-    return quaternion_from_euler(roll, pitch, fitted.declination_rad - field_rad if magnetic else 0.0)
+    heard = (fitted.heading == FROM_MAG or fitted.heading == FROM_YAW) and bool(np.isfinite(field_rad))
+    north_rad = fitted.declination_rad if fitted.heading == FROM_MAG else 0.0
+    return quaternion_from_euler(roll, pitch, north_rad - field_rad if heard else 0.0)

@@ -10,6 +10,7 @@ import pytest
 from flownav.compile import LANES, LANES_WIDE
 from flownav.estimation.covariance import unpack
 from flownav.estimation.states import QUATERNION, STATE, STATES
+from flownav.frames import GRAVITY_M_S2
 from flownav.measurement import MAX_VALUES, EventQueue, Sensor, Stream, merge
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import READING, load_start, new_work
@@ -83,13 +84,15 @@ def schedule(seed: int, without: tuple[Sensor, ...] = (), duration_s: float = 14
 
 
 def spoil(reading: np.ndarray, sensor: np.ndarray, t_s: np.ndarray, at: dict[str, int]) -> None:
-    """Each lane's own story: a late start, a jump, a gap, a step of the ground, a doubtful accelerometer, no number."""
+    """Each lane's own story: a late start, a jump, a gap, a step of the ground, a doubtful accelerometer, no number,
+    spikes, rest.
+    """
     gps = np.isin(sensor, [Sensor.GPS_POSITION, Sensor.GPS_VELOCITY])
     for lane in range(LANES_WIDE):
         reading[gps & (t_s < 0.25 * lane), at["arrived"], lane] = 0.0  # the last start at the origin
     reading[(sensor == Sensor.GPS_POSITION) & (t_s > 7.0), 0, 1] += 30.0
     reading[(sensor == Sensor.IMU) & (t_s > 8.0) & (t_s < 9.0), at["arrived"], 2] = 0.0
-    reading[(sensor == Sensor.RANGE) & (t_s > 8.0), 0, 3] -= 1.0
+    reading[(sensor == Sensor.RANGE) & (t_s > 8.0), 0, 3] += 4.0
     shaken = (sensor == Sensor.IMU) & (t_s > 6.0)
     reading[shaken, 3:6, 4] += 6.0 * np.sin(1e3 * t_s[shaken])[:, None]
     reading[(sensor == Sensor.BARO) | gps, at["arrived"], 5] = 0.0
@@ -101,6 +104,11 @@ def spoil(reading: np.ndarray, sensor: np.ndarray, t_s: np.ndarray, at: dict[str
     reading[aids & (t_s > 6.0) & (t_s < 10.0), at["arrived"], 9] = 0.0
     reading[:, at["arrived"], 10] = 0.0  # of this one nothing is ever heard
     reading[(sensor == Sensor.LANDED) & (t_s > 12.0), 0, 11] = 1.0
+    reading[np.flatnonzero((sensor == Sensor.IMU) & (t_s > 5.0))[::97], 0, 12] += 30.0
+    reading[(sensor == Sensor.BARO) | gps, at["arrived"], 13] = 0.0
+    reading[(sensor == Sensor.IMU) & (t_s > 6.0), 5, 13] += 6.0
+    reading[(sensor == Sensor.IMU) & (t_s < 3.0), :6, 14] = 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2
+    reading[(sensor == Sensor.RANGE) & (t_s < 3.0), 0, 14] = 0.1
 
 
 def all_lanes(plan: Schedule, fitted: Equipment) -> tuple[np.ndarray, Tape]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from flownav.estimation.states import ACCEL_BIAS, COMPASS, INS_ERROR, PAD, VELOCITY_LAG
+from flownav.frames import GRAVITY_M_S2
 from flownav.measurement import Sensor, Stream
 from navigation_streams import circle, fly, navigate, still
 
@@ -15,6 +16,7 @@ GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
 
 
 def test_it_starts_level_from_the_accelerometer_alone():
+    """As far as vehicles stand aslant (0.07 rad), beside what the accelerometer's bias (0.2 m/s2) would look like."""
     flown = fly(still, 3.0).without(Sensor.ATTITUDE, Sensor.MAG)
     roll, pitch = 0.1, -0.06  # it stands on a slope
     imu = flown.streams[Sensor.IMU].value.copy()
@@ -26,8 +28,13 @@ def test_it_starts_level_from_the_accelerometer_alone():
         flown = flown.cut(sensor, 0.0, 0.5)
     run = navigate(flown)
     w, x, y, _ = run.estimate[0, 7:11]
-    assert 2 * np.arctan2(x, w) == pytest.approx(roll, abs=5e-3)
-    assert 2 * np.arctan2(y, w) == pytest.approx(pitch, abs=5e-3)
+    believed = 0.07**2 / (0.07**2 + (0.2 / GRAVITY_M_S2) ** 2)
+    assert believed > 0.9
+    assert 2 * np.arctan2(x, w) == pytest.approx(believed * roll, abs=1e-3)
+    assert 2 * np.arctan2(y, w) == pytest.approx(believed * pitch, abs=1e-3)
+    left_x, left_y = run.column(ACCEL_BIAS, 2)[0] / GRAVITY_M_S2  # the rest is taken for the accelerometer's
+    assert [left_x, left_y] == pytest.approx([(1 - believed) * pitch, -(1 - believed) * roll], abs=1e-3)
+    assert np.abs(run.velocity_error).max() < 0.02
     assert run.events("filter", "start")[:, 1] == pytest.approx([1.0])
 
 
@@ -54,9 +61,11 @@ def test_laps_teach_the_compass_deviation():
     wrong = yaw + a + b * np.sin(yaw) + c * np.cos(yaw)
     field = np.column_stack([0.21 * np.cos(wrong), -0.21 * np.sin(wrong), 0 * wrong + 0.43])
     run = navigate(flown.changed(Sensor.MAG, value=field))
-    assert np.abs(run.yaw_error[run.t_s > 90.0]).max() < 0.02
+    assert np.abs(run.yaw_error[run.t_s > 90.0]).max() < 0.01
     assert run.state(INS_ERROR + 2) == pytest.approx(a, abs=0.02)
-    assert [run.state(COMPASS), run.state(COMPASS + 1)] == pytest.approx([b, c], abs=0.02)
+    for state, truth in ((COMPASS, b), (COMPASS + 1, c)):  # slowly: flow, which errs as motion does, tells no heading
+        assert run.sigma(state) < 0.02
+        assert abs(run.state(state) - truth) < 2.5 * run.sigma(state)
 
 
 def test_the_lag_of_gps_velocity_is_learned():
@@ -92,16 +101,22 @@ def test_a_gap_ends_once_whichever_of_two_readings_of_one_instant_comes_first():
 
 
 def test_zero_velocity_on_the_ground_holds_the_place():
-    """A biased accelerometer on the ground, no other aid: LANDED keeps it still."""
+    """A biased accelerometer on the ground, no other aid: LANDED keeps it still, and so does a quiet IMU."""
     flown = fly(lambda t: 0.0 * still(t), 20.0).without(Sensor.FLOW_RATE, Sensor.RANGE)
-    imu = flown.streams[Sensor.IMU].value + np.array([0, 0, 0, 0.15, -0.1, 0.05])
-    flown = flown.changed(Sensor.IMU, value=imu)
+    quiet = flown.streams[Sensor.IMU].value + np.array([0, 0, 0, 0.15, -0.1, 0.05])
+    shaken = quiet + np.random.default_rng(4).normal(0.0, 1.0, quiet.shape) * [0.02, 0.02, 0.02, 0.2, 0.2, 0.2]
+    resting = flown.changed(Sensor.IMU, value=quiet)
+    flown = flown.changed(Sensor.IMU, value=shaken)  # its rotor turns
     for sensor in GPS:
-        flown = flown.cut(sensor, 3.0, 99.0)
+        flown, resting = flown.cut(sensor, 3.0, 99.0), resting.cut(sensor, 3.0, 99.0)
+    rested = navigate(resting)
+    assert rested.events("filter", "standing")[:, 1] == pytest.approx([2.0])
+    assert np.abs(rested.velocity_error[rested.t_s > 1.0]).max() < 0.01
+    assert np.abs(rested.error[-1, :2]).max() < 0.02
     t_s = np.arange(0.0, 20.0, 0.1)
     landed = flown.added(Stream.of(Sensor.LANDED, t_s, np.ones((len(t_s), 1))))
     held, free = navigate(landed), navigate(flown)
-    assert np.abs(held.velocity_error[held.t_s > 10.0]).max() < 0.02
+    assert np.abs(held.velocity_error[held.t_s > 10.0]).max() < 0.03
     assert np.abs(held.error[-1, :2]).max() < 0.1
     assert np.abs(free.error[-1, :2]).max() > 2.0
     assert len(held.events("filter", "dead_reckoning")) == 0
@@ -139,13 +154,17 @@ def test_an_external_pose_is_enough():
 
 
 def test_an_external_heading_is_taken():
-    flown = fly(still, 20.0, 0.3).without(Sensor.ATTITUDE, Sensor.MAG)
+    """With an earth frame and without, after the start and, however far it is from north, before it."""
+    flown = late = fly(still, 20.0, 0.3).without(Sensor.ATTITUDE, Sensor.MAG)
+    for sensor in (*GPS, Sensor.FLOW_RATE):
+        late = late.cut(sensor, 0.0, 1.0)
     t_s = np.arange(0.0, 20.0, 0.2)
-    yaw = np.interp(t_s, flown.t_s, flown.yaw) + 0.5  # the navigator began at north, and is told otherwise
-    told = Stream.of(Sensor.YAW, t_s, yaw[:, None], variance=np.full((len(t_s), 1), 1e-4))
-    run = navigate(flown.added(told))
-    assert run.reasons(Sensor.YAW)["fused"] == len(t_s) - 1  # the first came before the start
-    assert run.yaw_error[-1] == pytest.approx(0.5, abs=0.1) or run.state(INS_ERROR + 2) == pytest.approx(0.5, abs=0.2)
+    for off, heard in ((0.5, flown), (0.5, flown.without(*GPS)), (2.5, late), (-2.5, late.without(*GPS))):
+        yaw = np.interp(t_s, flown.t_s, flown.yaw) + off
+        run = navigate(heard.added(Stream.of(Sensor.YAW, t_s, yaw[:, None], variance=np.full((len(t_s), 1), 1e-4))))
+        assert set(run.reasons(Sensor.YAW)) <= {"before_start", "fused"}
+        assert run.yaw_error[run.t_s > 5.0] == pytest.approx(off, abs=0.01)
+        assert abs(run.state(INS_ERROR + 2)) < 1e-3
 
 
 def test_vibration_at_take_off_leaves_the_height_right():
@@ -161,6 +180,6 @@ def test_vibration_at_take_off_leaves_the_height_right():
     value = imu.value + np.where(flying[:, None], [0, 0, 0, 0, 0, 3.0], 0.0)
     run = navigate(flown.changed(Sensor.IMU, value=value))
     off = run.error[:, 2] - run.error[0, 2]  # the start is the origin
-    assert np.abs(off[run.t_s > 8.0]).max() < 0.25
+    assert np.abs(off[run.t_s > 8.0]).max() < 0.3
     assert len(run.events("imu", "doubted")) == 1
     assert run.state(ACCEL_BIAS + 2) == pytest.approx(3.0, abs=0.5)

@@ -27,7 +27,7 @@ from flownav.navigation.packed import load_attitude_settings
 from flownav.navigation.reasons import FUSED, NOT_FINITE, SILENT
 from flownav.navigation.records import BridgeMemory, HeadingMemory, ImuMemory, Reading
 from flownav.navigation.tape import Output
-from flownav.navigation.told import FROM_ATTITUDE, AttitudeSettings, Equipment
+from flownav.navigation.told import FROM_ATTITUDE, FROM_YAW, AttitudeSettings, Equipment
 
 LEAST_FIELD_GAUSS = 1e-3
 BRIDGE_SIGMA_RAD = 0.02
@@ -200,12 +200,15 @@ def take_mag(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipmen
 
 
 @procedure
-def take_yaw(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
-    """An external heading."""
+def take_yaw(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> None:
+    """An external heading; before the start it is noted as the angle to north, as that of a level field is."""
     s = load_attitude_settings(p)
     for lane in range(len(lanes)):
         reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
         reason = usable_in_flight(reading, reading.value_0, 0.0, started)
+        heard = reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
+        if started == 0.0 and heard and np.isfinite(reading.value_0) and fitted.heading == FROM_YAW:
+            store_heading(work, lanes, lane, HeadingMemory(load_heading(work, lanes, lane).read_s, -reading.value_0))
         put_heading(work, lanes, lane, t_s, reading.value_0, reading.variance_0, reason, s)
     heading(work, lanes, 0)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)

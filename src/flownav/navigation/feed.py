@@ -6,7 +6,7 @@ import numpy as np
 
 from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.told import FROM_ATTITUDE, FROM_MAG, NO_HEADING, Equipment
+from flownav.navigation.told import FROM_ATTITUDE, FROM_MAG, FROM_YAW, NO_HEADING, Equipment
 from flownav.sensors.earth_field import declination_rad
 
 SLOWEST_IMU_HZ = 20.0
@@ -25,12 +25,13 @@ def imu_serves(streams: dict[Sensor, Stream]) -> bool:
 
 
 def heading_source(streams: dict[Sensor, Stream]) -> float:
-    """Where headings come from; none where there is no earth frame to refer them to."""
+    """Where headings come from; none where there is no earth frame to refer them to, but what is told as a heading."""
+    told = FROM_YAW if Sensor.YAW in streams and len(streams[Sensor.YAW]) else NO_HEADING
     if Sensor.GPS_POSITION not in streams and Sensor.GPS_VELOCITY not in streams:
-        return NO_HEADING
+        return told
     if Sensor.MAG in streams and len(streams[Sensor.MAG]):
         return FROM_MAG
-    return FROM_ATTITUDE if Sensor.ATTITUDE in streams else NO_HEADING
+    return FROM_ATTITUDE if Sensor.ATTITUDE in streams else told
 
 
 def equipment_of(

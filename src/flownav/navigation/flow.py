@@ -121,7 +121,7 @@ def judge_flow(
     fast = angular and larger(abs(reading.value_0), abs(reading.value_1)) > s.flow_limit_rad_s
     reason = OUT_OF_RANGE if reason == FUSED and fast else reason
     reason = TILTED if reason == FUSED and view.upright < np.cos(s.tilt_limit_rad) else reason
-    near = view.known and view.range_m * view.upright < s.flow_min_height_m
+    near = view.known and view.range_m * view.upright <= s.flow_min_height_m  # `lens_range_of` is at least 0.05
     return NEAR_GROUND if reason == FUSED and near else reason
 
 

@@ -17,8 +17,8 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.take import navigator_unit
 from flownav.navigation.tape import Tape, room_of
 from flownav.navigation.told import (
+    FROM_ATTITUDE,
     FROM_MAG,
-    NO_HEADING,
     NO_STATED_NOISE,
     Equipment,
     FlowNoise,
@@ -47,7 +47,7 @@ def start_navigator(
     equipment: Equipment, settings: NavigatorSettingsFile, tape: Tape, noise: FlowNoise = NO_STATED_NOISE
 ) -> Running:
     """A navigator that has heard nothing. noise: what a sensor file says of the flow's."""
-    headed = equipment.heading != NO_HEADING or equipment.use_attitude
+    headed = equipment.heading in (FROM_MAG, FROM_ATTITUDE) or equipment.use_attitude
     told = settings.settings(equipment, noise)
     sigma = settings.start_sigma(
         has_heading=headed, compass=equipment.heading == FROM_MAG, scale=bool(np.isfinite(equipment.deadline_s))

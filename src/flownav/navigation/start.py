@@ -28,7 +28,7 @@ from flownav.navigation.memory import (
 from flownav.navigation.packed import START_SIGMA, load_filter_settings, load_flow_settings
 from flownav.navigation.records import AidMemory, Reading, StartMemory
 from flownav.navigation.tape import START, Output, write_event
-from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
+from flownav.navigation.told import FROM_MAG, FROM_YAW, NO_HEADING, Equipment
 from flownav.navigation.vibration import with_reading
 
 ORIGIN_SIGMA_M = 0.1  # the local origin, where the navigator's start defines it
@@ -40,6 +40,7 @@ READ_HEADING_RAD = 0.1  # an autopilot's, whose compass is calibrated
 UNKNOWN_RAD = 1.5  # one that is to be found from the course
 COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's
 DATUM_HEADING_RAD = 1e-3  # the start defines the frame
+UNTOLD_HEADING_RAD = 1.0  # the first heading that is told will
 LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0
 
 
@@ -141,6 +142,7 @@ def start_lane(
     turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
     turned = UNKNOWN_RAD if unknown else turned
     set_lane(work, lanes, COURSE_KNOWN, lane, 0.0 if unknown else 1.0)
+    turned = UNTOLD_HEADING_RAD if fitted.heading == FROM_YAW and not np.isfinite(field_rad) else turned
     spread = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M
     for i in range(3):  # of a motion before the start nothing is known
         work[(RATE + i) * len(lanes) + lane] = 0.0
@@ -177,11 +179,12 @@ def started(m: StartMemory) -> StartMemory:
 @equation
 def level(m: StartMemory, believed: float, field_rad: float, fitted: Equipment) -> Quaternion:
     """Roll and pitch from the mean specific force as far as it is believed (1: wholly); heading from the magnetometer
-    where one was heard, else north.
+    or what is told as one where that was heard, else north.
 
     The field was noted in the axes of a vehicle that takes itself to be level and to head north.
     """
     roll = believed * np.arctan2(-m.force_y, -m.force_z)
     pitch = believed * np.arctan2(m.force_x, np.sqrt(m.force_y * m.force_y + m.force_z * m.force_z))
-    magnetic = fitted.heading == FROM_MAG and bool(np.isfinite(field_rad))
-    return quaternion_from_euler(roll, pitch, fitted.declination_rad - field_rad if magnetic else 0.0)
+    heard = (fitted.heading == FROM_MAG or fitted.heading == FROM_YAW) and bool(np.isfinite(field_rad))
+    north_rad = fitted.declination_rad if fitted.heading == FROM_MAG else 0.0
+    return quaternion_from_euler(roll, pitch, north_rad - field_rad if heard else 0.0)

@@ -150,7 +150,7 @@ def take(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p
             take_mag(work, lanes, t_s, sensor, fitted, p, o)
     elif sensor == Sensor.YAW:
         catch_up_errors(work, lanes, t_s, p, o)
-        take_yaw(work, lanes, t_s, sensor, p, o)
+        take_yaw(work, lanes, t_s, sensor, fitted, p, o)
     elif sensor == Sensor.POSE:
         take_pose(work, lanes, t_s, sensor, p, o)
     elif sensor == Sensor.PAD:

@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from flownav.estimation.error_models import FilterSettings
 
-# headings: none, a magnetometer's, an external attitude's or YAW's
-NO_HEADING, FROM_MAG, FROM_ATTITUDE = 0.0, 1.0, 2.0
+# headings: none, a magnetometer's, an external attitude's, what is told as one
+NO_HEADING, FROM_MAG, FROM_ATTITUDE, FROM_YAW = 0.0, 1.0, 2.0, 3.0
 
 
 class GpsSettings(NamedTuple):
@@ -155,7 +155,7 @@ class AidSettings(NamedTuple):
 class Equipment(NamedTuple):
     """Which sensors serve a navigator.
 
-    heading: 0 none, 1 a compass's, 2 an external attitude's or YAW's; deadline_s: how long it waits for a fix;
+    heading: 0 none, 1 a compass's, 2 an external attitude's, 3 YAW's; deadline_s: how long it waits for a fix;
     declination_rad: the heading of magnetic north where it is.
     """
 

@@ -12,7 +12,7 @@ import numpy as np
 from flownav.compile import clamp, equation, larger, procedure, smaller
 from flownav.estimation.covariance import add_noise_lane
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, STATE, VELOCITY
+from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, POSITION, STATE, VELOCITY
 from flownav.navigation.memory import MOVING, load_imu, load_start, store_imu
 from flownav.navigation.records import ImuMemory, Reading
 from flownav.navigation.tape import IMU_DOUBTED, Output, write_event
@@ -52,7 +52,7 @@ def vibration_beyond(m: ImuMemory, s: ImuSettings) -> float:
 
 @procedure
 def doubt_imu(work: Work, lanes: Lanes, lane: int, t_s: float, contradiction_m: float, o: Output) -> None:
-    """The range contradicts the motion that the accelerometer made: both velocity and bias are set free."""
+    """The range contradicts the motion that the accelerometer made: height, velocity and bias are set free."""
     m = load_imu(work, lanes, lane)
     if m.doubt_m_s2 < 0.5 * DOUBT_M_S2:
         write_event(lanes, lane, t_s, IMU_DOUBTED, contradiction_m, o)
@@ -60,6 +60,7 @@ def doubt_imu(work: Work, lanes: Lanes, lane: int, t_s: float, contradiction_m: 
         m.read_s, m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z, m.vibration, DOUBT_M_S2, m.gap
     )
     store_imu(work, lanes, lane, doubted)
+    add_noise_lane(work, lanes, POSITION + 2, lane, contradiction_m * contradiction_m)
     add_noise_lane(work, lanes, VELOCITY + 2, lane, DOUBTED_SPEED_M_S * DOUBTED_SPEED_M_S)
     add_noise_lane(work, lanes, ACCEL_BIAS + 2, lane, DOUBT_M_S2 * DOUBT_M_S2)
 

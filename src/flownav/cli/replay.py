@@ -152,11 +152,14 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
             f"{truth['horizontal_rms_m']:.2f} m rms, {truth['horizontal_max_m']:.2f} m max; "
             f"velocity {truth['velocity_rms_m_s']:.3f} m/s rms"
         )
+    if scores["end_drift_m"] is not None:
+        console.print(f"At the end of the flight, truth laid on it at take-off: {scores['end_drift_m']:.2f} m off")
     if "smoothed" in scores:
         console.print(f"Smoothed over the whole flight: {_smoothed_errors(scores['smoothed'])}")
     if scores.get("autopilot", {}).get("against"):
         own = scores["autopilot"]
         console.print(f"The autopilot's own estimate ({own['name']}) {autopilot_errors(own)}")
+    console.print(_sensors(scores))
     rejected = Table("sensor", "reason", "rejected", title="Not fused")
     for sensor, counts in scores["rejected"].items():
         for reason, count in counts.items():
@@ -170,6 +173,21 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
     for name in ("record", "report"):
         if name in scores:
             console.print(f"{name.capitalize()}: {scores[name]}", soft_wrap=True)
+
+
+def _sensors(scores: dict[str, Any]) -> Any:
+    """When each sensor spoke, and whether the filter's innovations are as large as it states, and news."""
+    from rich.table import Table
+
+    from flownav.scoring.consistency import verdict
+
+    table = Table("sensor", "from, to [s]", "innovations", "NIS", "verdict", title="Sensors and their innovations")
+    for name in dict.fromkeys([*scores["coverage"], *scores["consistency"]]):
+        span, judged = scores["coverage"].get(name), scores["consistency"].get(name)
+        said = (str(judged["samples"]), _figure(judged["nis_per_dof"])) if judged else ("", "")
+        words = verdict(judged["nis_per_dof"], white=judged["white"]) if judged else ""
+        table.add_row(name, f"{span['t0']:.1f}, {span['t1']:.1f}" if span else "", *said, words)
+    return table
 
 
 def _smoothed_errors(scores: dict[str, Any]) -> str:

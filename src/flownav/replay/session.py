@@ -19,13 +19,15 @@ from flownav.navigation.feed import SLOWEST_IMU_HZ, equipment_of
 from flownav.navigation.loop import run, start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import smooth
-from flownav.navigation.tables import Written, written_on
+from flownav.navigation.tables import Written, estimate_table, written_on
 from flownav.navigation.tape import new_tape
 from flownav.replay.autopilot import autopilot_scores
 from flownav.replay.fed import prepared_as_fed, run_as_fed
+from flownav.replay.judged import consistency_scores, coverage_scores, end_drift_of, motion_of
 from flownav.replay.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replay.sentinel import Finding, findings
 from flownav.scoring.alignment import Alignment, align, velocity_of
+from flownav.scoring.coverage import silences
 from flownav.scoring.outage import OutageError, difference_at, horizontal_rms, outage_error
 
 NO_REJECTION = (Reason.FUSED, Reason.DATUM)
@@ -65,7 +67,7 @@ class Replay:
             what = "horizontal was fused" if len(fused) else "was fused"
             text = f"nothing {what}: the path is dead reckoning on attitude and accelerometer alone"
             found.append(Finding(text, label="Note"))
-        return found
+        return found + [Finding(text) for text in silences(self.log.streams, self.log.span_s)]
 
     @cached_property
     def truth_alignment(self) -> Alignment | None:
@@ -131,12 +133,19 @@ class Replay:
             "velocity_rms_m_s": horizontal_rms(self.estimate[:, 0], self.estimate[:, 17:19], t_s, velocity[:, :2]),
         }
 
+    def end_drift(self) -> float | None:
+        """Horizontal error at the end of the flight, the truth laid on the estimate at take-off [m]; None without."""
+        return end_drift_of(self.log, motion_of(estimate_table(self.estimate)))
+
     def scores(self) -> dict[str, Any]:
         """What `--json` prints, but for the outage table and the record's path."""
         start, end = self.log.span_s
         scores: dict[str, Any] = {
             "duration_s": end - start,
             **self.path_scores(),
+            "end_drift_m": self.end_drift(),
+            "consistency": consistency_scores(self.innovation),
+            "coverage": coverage_scores(self.log),
             "rejected": self.rejected(),
             "warnings": [finding.text for finding in self.findings],
         }

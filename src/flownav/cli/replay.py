@@ -61,17 +61,17 @@ def command(
     from flownav.sensors.datasheet import load_sensor
     from flownav.sensors.identified import identified_flow
 
-    windows = tuple(_numbers("--gps-outage", text, ":", 2, "T0:T1") for text in gps_outage or [])
-    scale = _numbers("--flow-scale", flow_scale, ",", 2, "X,Y")
-    table = table_windows(*_numbers("--outage-table", outage_table, ":", 3, "T0:T1:LENGTH")) if outage_table else []
+    windows = tuple(numbers("--gps-outage", text, ":", 2, "T0:T1") for text in gps_outage or [])
+    scale = numbers("--flow-scale", flow_scale, ",", 2, "X,Y")
+    table = table_windows(*numbers("--outage-table", outage_table, ":", 3, "T0:T1:LENGTH")) if outage_table else []
     flow, stated = load_sensor(sensor) if sensor else None, _settings(settings) if settings else None
     told = settings_of(flow, stated=stated)
     outages = tuple((t0, t1) for t0, t1 in windows)
     identified = identified_flow(flow, told.lag_states) if flow else None
     options = ReplayOptions(gps_delay, outages, not no_flow, (scale[0], scale[1]), identified, told.noise)
     log = _read(folder, flow_instance)
-    options, numbers = as_fed(log, options, told.settings if flow or stated else None)
-    flown = replay(log, options, numbers, smoothed=smooth)
+    options, settled = as_fed(log, options, told.settings if flow or stated else None)
+    flown = replay(log, options, settled, smoothed=smooth)
     scores = flown.scores()
     if table:
         scores.update(_fly_table(flown, table, scores["outages"]))
@@ -86,18 +86,19 @@ def command(
         raise VerdictError(f"{folder}: {wrong[0]}")
 
 
-def _numbers(option: str, text: str, separator: str, count: int, form: str) -> tuple[float, ...]:
+def numbers(option: str, text: str, separator: str, count: int, form: str) -> tuple[float, ...]:
+    """An option's numbers; InputError where it has another form than it should."""
     from math import isfinite
 
     from flownav.errors import InputError
 
     try:
-        numbers = tuple(float(part) for part in text.split(separator))
+        found = tuple(float(part) for part in text.split(separator))
     except ValueError:
-        numbers = ()
-    if len(numbers) != count or not all(map(isfinite, numbers)):
+        found = ()
+    if len(found) != count or not all(map(isfinite, found)):
         raise InputError(f"{option} {text}: {form} is needed, numbers")
-    return numbers
+    return found
 
 
 def _read(path: Path, flow_instance: int | None) -> Any:

@@ -41,7 +41,7 @@ def end_drift_of(log: Log, estimate: Motion) -> float | None:
 
 def truth_motion(truth: Table, heading: Table | None) -> Motion:
     """A truth with its headings: those measured apart, else those of its attitude, else none."""
-    t_s, position = np.asarray(truth["t_s"], float), _columns(truth, POSITION_NED)
+    t_s, position = np.asarray(truth["t_s"], float), columns_of(truth, POSITION_NED)
     if heading is not None:
         return Motion(t_s, position, np.asarray(heading["t_s"], float), np.asarray(heading["yaw_rad"], float))
     return motion_of(truth)
@@ -49,14 +49,15 @@ def truth_motion(truth: Table, heading: Table | None) -> Motion:
 
 def motion_of(table: Table) -> Motion:
     """The path in a table of a record, with the headings of its attitude where it has one."""
-    t_s, position = np.asarray(table["t_s"], float), _columns(table, POSITION_NED)
+    t_s, position = np.asarray(table["t_s"], float), columns_of(table, POSITION_NED)
     if not set(QUATERNION) <= table.keys():
         return Motion(t_s, position, np.zeros(0), np.zeros(0))
-    w, x, y, z = _columns(table, QUATERNION).T
+    w, x, y, z = columns_of(table, QUATERNION).T
     heading = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
     known = np.isfinite(heading)
     return Motion(t_s, position, t_s[known], heading[known])
 
 
-def _columns(table: Table, names: tuple[str, ...]) -> Array:
+def columns_of(table: Table, names: tuple[str, ...]) -> Array:
+    """Columns of a table side by side, (n, len(names))."""
     return np.column_stack([np.asarray(table[name], float) for name in names])

@@ -208,17 +208,19 @@ def outage_table(
     return errors
 
 
-def table_windows(t0: float, t1: float, length_s: float) -> list[tuple[float, float]]:
+def table_windows(
+    t0: float, t1: float, length_s: float, *, option: str = "--outage-table"
+) -> list[tuple[float, float]]:
     """[t0, t0 + length), ... up to t1, the last one shorter where t1 asks for it.
 
-    InputError where that is no list of windows.
+    InputError where that is no list of windows; `option` asked for it.
     """
     if not (t0 < t1 and length_s > 0.0 and np.isfinite([t0, t1, length_s]).all()):
-        raise InputError(f"--outage-table {t0:g}:{t1:g}:{length_s:g}: T0:T1:LENGTH is needed, seconds, T0 before T1")
+        raise InputError(f"{option} {t0:g}:{t1:g}:{length_s:g}: T0:T1:LENGTH is needed, seconds, T0 before T1")
     count = int(np.floor((t1 - t0) / length_s + 1e-9))
     if not 1 <= count <= LONGEST_TABLE:
         raise InputError(
-            f"--outage-table {t0:g}:{t1:g}:{length_s:g}: that is {count} windows; 1 to {LONGEST_TABLE} can be flown"
+            f"{option} {t0:g}:{t1:g}:{length_s:g}: that is {count} windows; 1 to {LONGEST_TABLE} can be flown"
         )
     whole = [(t0 + k * length_s, t0 + (k + 1) * length_s) for k in range(count)]
     return whole if t1 - whole[-1][1] < LEAST_WINDOW_S else [*whole, (whole[-1][1], t1)]

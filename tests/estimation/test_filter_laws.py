@@ -33,6 +33,7 @@ from flownav.estimation.states import (
     GPS_VELOCITY,
     GROUND,
     GYRO_BIAS,
+    GYRO_SHARE,
     INNOVATION,
     INS_ERROR,
     NOISE,
@@ -65,6 +66,10 @@ class Case(NamedTuple):
     complex_step: bool = True
 
 
+def take_turning_off_by_the_gyro(filter_) -> None:
+    filter_.work[GYRO_SHARE] = 1.0
+
+
 def read_own_attitude(filter_: Filter) -> None:
     """The attitude reading that this filter expects of an INS without errors."""
     filter_.x[INS_ERROR : INS_ERROR + 3] = 0.0
@@ -88,6 +93,9 @@ CASES = {
     "gps position": Case(gps_position, AXES, LENS),
     "gps velocity": Case(gps_velocity, AXES, LENS),
     "flow rate": Case(flow_rate, CHANNELS, {**LENS, "lens_below_m": 0.17}),
+    "flow rate with the gyro's bias": Case(
+        flow_rate, CHANNELS, {**LENS, "lens_below_m": 0.17}, prepare=take_turning_off_by_the_gyro
+    ),
     "body velocity": Case(body_velocity, AXES, LENS),
     "lagged flow": Case(lagged_flow, CHANNELS, {"gain": 196.9}),
     "lagged flow rate": Case(lagged_flow_rate, CHANNELS, {"gain": 196.9, "lens_below_m": 0.17}),
@@ -186,6 +194,7 @@ def test_a_law_called_with_numbers_says_what_its_observation_does(name):
     rows |= {f"rate_{part}": filter_.work[RATE + i] for i, part in enumerate("xyz")}
     rows |= {f"measured_{i}": filter_.reading[i] for i in range(8)}
     rows |= {"measured": filter_.reading[0], "force": filter_.work[FORCE + axis]}
+    rows |= {"gyro_share": filter_.work[GYRO_SHARE]}
     names = list(case.law.law.__code__.co_varnames[: case.law.law.__code__.co_argcount])
     found, jacobian = case.law.law(*(rows[name] for name in names), **case.scalars)
     reads = any(name.startswith("measured") for name in names)

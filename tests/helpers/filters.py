@@ -19,6 +19,7 @@ from flownav.estimation.states import (
     ATTITUDE,
     BARO,
     COEFFICIENT,
+    CONSIDERS,
     COVARIANCE,
     FILTER_ROWS,
     FLOW_LAG,
@@ -92,7 +93,7 @@ class Filter:
     def __init__(self, dtype: type = np.float64) -> None:
         self.work = np.zeros(FILTER_ROWS, dtype)
         self.work[QUATERNION] = 1.0
-        self.work[OFFERED] = 1.0
+        self.work[[OFFERED, CONSIDERS]] = 1.0
 
     def copy(self, dtype: type = np.float64) -> Filter:
         other = Filter(dtype)

@@ -12,7 +12,6 @@ from flownav.navigation.flow import (
     View,
     flow_variance,
     followed_agreement,
-    followed_excess,
     judge_flow,
     lasting_doubt,
     turning_of,
@@ -43,11 +42,9 @@ from flownav.navigation.records import (
     RangeMemory,
     Reading,
     RejectionMemory,
-    StartMemory,
 )
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.start import level, levelled
-from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
+from flownav.navigation.told import NO_HEADING, Equipment
 from flownav.navigation.vibration import followed_vibration, vibration_beyond, with_reading
 
 NAN = math.nan
@@ -137,7 +134,6 @@ def test_a_metric_flow_is_as_sure_as_the_range_that_scaled_it():
 @pytest.mark.parametrize(("change", "view", "reason"), [
     ({}, SEEN, FUSED),
     ({}, SEEN._replace(known=False), NO_HEIGHT),
-    ({}, SEEN._replace(disputed=True), NO_HEIGHT),
     ({}, SEEN._replace(upright=math.cos(0.81)), TILTED),
     ({}, SEEN._replace(upright=math.cos(0.79)), FUSED),
     ({}, SEEN._replace(range_m=0.29), NEAR_GROUND),
@@ -149,7 +145,7 @@ def test_a_metric_flow_is_as_sure_as_the_range_that_scaled_it():
 ])  # fmt: skip
 def test_verdicts_on_flow(change, view, reason):
     seen = reading(0.2, -0.3, 0.0, 0.0, 0.0, 0.0, **change)
-    assert judge_flow(seen, True, 0.0, 0.0, 1.0, view, TOLD.flow) == reason
+    assert judge_flow(seen, True, 0.0, 0.0, 1.0, view, told(flow_min_height_m=0.3).flow) == reason
 
 
 def test_flow_that_no_sensor_measures_and_flow_that_is_no_number():
@@ -189,17 +185,6 @@ def test_flow_that_agrees_is_not_doubted_and_flow_that_does_not_is_for_long():
     assert followed_agreement(25.0, 9.0, m) == pytest.approx(1.0 + 0.5 * 24.0)
     assert [lasting_doubt(0.0, ratio) for ratio in (1.0, 3.9, 4.1)] == [0.0, 0.0, 1.0]
     assert [lasting_doubt(1.0, ratio) for ratio in (3.9, 2.1, 1.9)] == [1.0, 1.0, 0.0]
-
-
-def test_excess_noise_is_what_innovations_have_beyond_the_filters_own_doubt():
-    m = FlowMemory(1.0, 4.0, 0.0, 0.0, 0.0, 1.0, 0.0)
-    s, share = TOLD.flow, 0.5 * 0.1 / 10.0
-    as_modelled = followed_excess(3.0, 9.0, 8.0, 5.0, 1.1, m, s)
-    assert as_modelled == pytest.approx(4.0)
-    noisier = followed_excess(5.0, 9.0, 8.0, 5.0, 1.1, m, s)
-    assert noisier == pytest.approx(4.0 + share * ((25.0 - 1.0) * 4.0 / 8.0 - 4.0))
-    assert followed_excess(1e3, 9.0, 8.0, 5.0, 1.1, m, s) == pytest.approx(4.0 + share * (28.0 * 4.0 - 4.0))  # the gate
-    assert followed_excess(0.0, 9.0, 8.0, 5.0, 1.1, m._replace(excess=1.0), s) == 1.0
 
 
 # -- height --------------------------------------------------------------------------------------------------
@@ -268,8 +253,10 @@ def test_headings_whose_error_lasts_count_once_in_its_time():
     assert heading_variance(99.0, HeadingMemory(10.0, NAN), s) == pytest.approx(0.04**2)
 
 
-def test_a_magnetic_heading_is_that_of_the_nose_less_that_of_the_field():
-    assert magnetic_heading(0.0, 1.0, HeadingMemory(0.0, 0.3)) == pytest.approx(math.pi / 2 - 0.3)
+def test_a_magnetic_heading_is_that_of_the_nose_less_that_of_the_field_and_true_by_the_declination():
+    assert magnetic_heading(0.0, 1.0, 0.0, HeadingMemory(0.0, 0.3)) == pytest.approx(math.pi / 2 - 0.3)
+    assert magnetic_heading(1.0, 0.0, 0.2, HeadingMemory(0.0, 0.0)) == pytest.approx(0.2)  # the needle points east
+    assert magnetic_heading(0.0, 1.0, -0.2, HeadingMemory(0.0, 0.3)) == pytest.approx(math.pi / 2 - 0.5)
 
 
 # -- the pad -------------------------------------------------------------------------------------------------
@@ -330,19 +317,3 @@ def test_vibration_up_to_the_harmless_does_no_harm():
     assert vibration_beyond(imu_memory(vibration=0.9), TOLD.imu) == 0.0
     assert vibration_beyond(imu_memory(vibration=9.0), TOLD.imu) == pytest.approx(2.0)
     assert vibration_beyond(imu_memory(vibration=9.0), told(vibration_free_m_s2=3.5).imu) == 0.0
-
-
-# -- the start -----------------------------------------------------------------------------------------------
-def test_the_first_attitude_is_level_by_the_mean_force_and_heads_by_the_field():
-    m = StartMemory(0.0, -math.inf, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    roll, pitch = 0.2, -0.1
-    force = (9.8 * math.sin(pitch), -9.8 * math.sin(roll) * math.cos(pitch), -9.8 * math.cos(roll) * math.cos(pitch))
-    for sway in (0.5, -0.5, 0.5, -0.5):
-        m = levelled(reading(0.0, 0.0, 0.0, force[0] + sway, force[1], force[2] - sway), m)
-    assert m.readings == 4.0
-    w, x, y, z = level(m, 0.7, FITTED)
-    assert math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)) == pytest.approx(roll)
-    assert math.asin(2.0 * (w * y - x * z)) == pytest.approx(pitch)
-    assert math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)) == pytest.approx(0.0)
-    w, x, y, z = level(m, 0.7, FITTED._replace(heading=FROM_MAG))
-    assert math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)) == pytest.approx(-0.7)

@@ -52,7 +52,7 @@ def standing(lanes: Lanes, n: int = STATES) -> Array:
     rows[ACCEL_NOISE], rows[GYRO_NOISE] = SETTINGS.accel_noise_m_s2_rt_hz**2, SETTINGS.gyro_noise_rad_s_rt_hz**2
     for i in range(n):
         rows[at(i, i)] = 0.01
-    rows[OBSERVED : OBSERVED + 10] = np.array([9, 3, 4, 5, 6, 7, 8, 29, 2, 27])[:, None]  # as a flow rate
+    rows[OBSERVED : OBSERVED + 11] = np.array([10, 3, 4, 5, 6, 7, 8, 29, 2, 27, 9])[:, None]  # as a flow rate
     rows[COEFFICIENT : COEFFICIENT + 9], rows[CROSS : CROSS + n], rows[NOISE] = 0.1, 1e-8, 1.0
     return rows.reshape(-1)
 

@@ -19,6 +19,7 @@ from flownav.estimation.states import (
     ATTITUDE,
     COEFFICIENT,
     CONSIDERED,
+    CONSIDERS,
     COVARIANCE,
     CROSS,
     GAIN,
@@ -163,7 +164,9 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
     for t in range(int(work[CONSIDERED * len(lanes)])):
         considered = int(work[(CONSIDERED + 1 + t) * len(lanes)])
         for lane in range(len(lanes)):
-            work[(KEPT + t) * len(lanes) + lane] = work[(STATE + considered) * len(lanes) + lane]
+            fused = work[ACCEPTED * len(lanes) + lane] > 0.0
+            before = work[(KEPT + t) * len(lanes) + lane]
+            work[(KEPT + t) * len(lanes) + lane] = work[(STATE + considered) * len(lanes) + lane] if fused else before
     for i in range(n):
         for lane in range(len(lanes)):
             fused = work[ACCEPTED * len(lanes) + lane] > 0.0
@@ -183,7 +186,8 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
             work[(REST + considered) * len(lanes) + lane] = (
                 work[(CROSS + considered) * len(lanes) + lane] if fused else 0.0
             )
-            work[(STATE + considered) * len(lanes) + lane] = work[(KEPT + t) * len(lanes) + lane]
+            state = work[(STATE + considered) * len(lanes) + lane]
+            work[(STATE + considered) * len(lanes) + lane] = work[(KEPT + t) * len(lanes) + lane] if fused else state
     for j in range(n):
         for i in range(j + 1):
             for lane in range(len(lanes)):
@@ -195,10 +199,10 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
 
 @equation
 def consider(work: Work, lanes: Lanes, state: int) -> None:
-    """One more state that corrections leave as it is, until `consider_none`."""
+    """One more state that corrections leave as it is, until `consider_none`; nothing where CONSIDERS is 0."""
     count = int(work[CONSIDERED * len(lanes)])
     work[(CONSIDERED + 1 + count) * len(lanes)] = state
-    work[CONSIDERED * len(lanes)] = count + 1.0
+    work[CONSIDERED * len(lanes)] = count + work[CONSIDERS * len(lanes)]
 
 
 @equation

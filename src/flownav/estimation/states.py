@@ -100,7 +100,9 @@ OBSERVED = _rows.take(
     1 + MOST_OBSERVED
 )  # in the first lane, for all of them: how many states the law reads, then their places
 CONSIDERED = _rows.take(1 + MOST_CONSIDERED)  # in the first lane: how many states corrections leave alone, their places
+CONSIDERS = _rows.take(1)  # in the first lane: 1 where states are considered at all
 KEPT = _rows.take(MOST_CONSIDERED)  # these states while a correction is made
+GYRO_SHARE = _rows.take(1)  # by how much the gyro's bias is in a flow reading whose turning that gyro took off
 # within a step
 CROSS = _rows.take(STATES_WITH_LAG)  # P h'
 GAIN = _rows.take(STATES_WITH_LAG)  # K
@@ -125,5 +127,6 @@ ROWS_BY_NAME = {
     "measured": MEASURED,
     "accel_noise": ACCEL_NOISE,
     "gyro_noise": GYRO_NOISE,
+    "gyro_share": GYRO_SHARE,
 }
 VECTOR_ROWS = {**{name: STATE + first for name, first in VECTORS.items()}, "rate": RATE, "force": FORCE}

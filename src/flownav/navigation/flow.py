@@ -18,9 +18,11 @@ from flownav.estimation.states import (
     FLOW_LAG,
     GROUND,
     GYRO_BIAS,
+    GYRO_SHARE,
     INNOVATION,
     INNOVATION_VARIANCE,
     INS_ERROR,
+    MEASURED,
     NOISE,
     POSITION,
     STATE,
@@ -58,7 +60,7 @@ from flownav.navigation.told import FlowSettings
 from flownav.navigation.trust import watch_whiteness
 from flownav.sensors.flow import flow_noise_sigma
 
-SMALLEST_EXCESS, LARGEST_EXCESS = 0.15, 400.0
+SMALLEST_EXCESS, LARGEST_EXCESS = 0.25, 400.0
 AGREEMENT_S = 1.0
 DOUBTED_RATIO, TRUSTED_RATIO = 4.0, 2.0  # on average 1
 LONGEST_STEP_S = 1.0
@@ -246,6 +248,8 @@ def look(work: Work, lanes: Lanes, t_s: float, angular: bool, gyro_is_imu: bool,
         x, y, after = turning_of(reading, t_s, bias_x, bias_y, gyro_is_imu, m, s)
         if angular and started > 0.0 and reading.arrived > 0.0:
             store_flow(work, lanes, lane, after)
+        told = np.isfinite(reading.value_4 + reading.value_5)  # the IMU, by itself or as what the sensor's gyro follows
+        work[GYRO_SHARE * len(lanes) + lane] = 1.0 if told else 0.0
         work[TURNING * len(lanes) + lane] = x
         work[(TURNING + 1) * len(lanes) + lane] = y
         work[LENS_RANGE * len(lanes) + lane] = range_m
@@ -294,6 +298,9 @@ def offer_component(work: Work, lanes: Lanes, component: int, angular: bool, s: 
         reason = int(work[TESTED * len(lanes) + lane])
         absent = component == 2 and not np.isfinite(raw)
         put(work, lanes, lane, observation, stated if np.isfinite(stated) else model, SILENT if absent else reason)
+        if angular:  # the law has the gyro's bias, which TURNING does not
+            bias = work[(STATE + GYRO_BIAS + component) * len(lanes) + lane]
+            work[MEASURED * len(lanes) + lane] -= work[GYRO_SHARE * len(lanes) + lane] * bias
 
 
 @procedure

@@ -22,7 +22,7 @@ from flownav.navigation.memory import (
 from flownav.navigation.records import ImuMemory, Reading
 from flownav.navigation.tape import IMU_LOST, Output, write_event
 from flownav.navigation.told import Equipment, ImuSettings
-from flownav.navigation.trust import accel_factor
+from flownav.navigation.trust import accel_factors
 from flownav.navigation.vibration import followed_vibration, with_reading
 
 LEAST_STEP_S = 0.002  # a shorter step is not made to pay what is owed
@@ -89,7 +89,7 @@ def choose_motion(
         pay(work, lanes, lane, step_s, t_s - m.read_s, now, moving, between, remembered(m))
         vibration = followed_vibration(reading, m, t_s - m.read_s) if now and fresh else m.vibration
         work[MOVING * len(lanes) + lane] = 1.0 if moving else 0.0
-        told = accel_factor(work, lanes, lane) * s.accel_noise_m_s2_rt_hz
+        told = accel_factors(work, lanes, lane)[0] * s.accel_noise_m_s2_rt_hz
         accel = told if moving else s.coasting_accel_m_s2_rt_hz
         gyro = s.gyro_noise_rad_s_rt_hz if moving else s.coasting_rate_rad_s_rt_hz
         work[ACCEL_NOISE * len(lanes) + lane] = accel * accel

@@ -10,7 +10,7 @@ import numpy as np
 
 from flownav.compile import equation, lane_access
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.states import FILTER_ROWS, QUATERNION, Rows
+from flownav.estimation.states import CONSIDERS, FILTER_ROWS, QUATERNION, Rows
 from flownav.measurement import Array, Sensor
 from flownav.navigation.records import (
     AidMemory,
@@ -105,6 +105,7 @@ _FRESH: dict[int, tuple[float, ...]] = {
     ACCEL_FACTOR: (1.0, 1.0, 1.0),
     WHITENESS: (0.0, 0.0, 0.0, 0.0, 1.0, -np.inf) * 3,
     STILL_CLOCK: (-np.inf,),
+    CONSIDERS: (1.0,),
     CLOCK: (-np.inf,),
     WRITTEN: (-np.inf,),
     ERRORS_CLOCK: (-np.inf,),

@@ -23,10 +23,10 @@ from flownav.estimation.smoother import (
     back_over_reset,
     smoothed_covariance,
 )
-from flownav.estimation.states import QUATERNION, STATE, STATES
+from flownav.estimation.states import CONSIDERS, QUATERNION, STATE, STATES
 from flownav.measurement import Array, EventQueue
 from flownav.navigation.loop import Running, run
-from flownav.navigation.memory import new_work, store_start
+from flownav.navigation.memory import SCALE_DOUBT, new_work, store_start
 from flownav.navigation.records import StartMemory
 from flownav.navigation.tape import (
     CORRECTED,
@@ -72,10 +72,12 @@ class Backward(NamedTuple):
 def smooth(queue: EventQueue, running: Running, chunk: int = CHUNK) -> Array:
     """Run a navigator that has heard nothing through a queue; its estimates smoothed, (n, ESTIMATE_COLUMNS).
 
-    The rows are those of the tape's estimate, at the same instants. The tape is left as `run` leaves it.
+    The rows are those of the tape's estimate, at the same instants. No state is merely considered in this run: what
+    goes back over a correction is that of the gain P h'/S. The tape is left as such a run leaves it.
     """
     if carries_lag(running.told.flow):
         raise InputError("the smoother knows no flow sensor's dynamics; it needs settings of flow_lag_c_1_s2 = 0")
+    running.work[CONSIDERS] = 0.0
     chunks = [part_of(queue, first, first + chunk) for first in range(0, len(queue.t_s), chunk)]
     marks = [_mark(running)]
     for part in chunks:
@@ -84,6 +86,7 @@ def smooth(queue: EventQueue, running: Running, chunk: int = CHUNK) -> Array:
     found = empty_tape(int(running.tape.used[ESTIMATES]), 0, 0)
     work = new_work(ONE_LANE)
     store_start(work, ONE_LANE, 0, StartMemory(1.0, *[0.0] * (len(StartMemory._fields) - 1)))
+    work[SCALE_DOUBT] = running.work[SCALE_DOUBT]
     later = Backward(np.zeros(STATES), np.zeros((STATES, STATES)))
     for part, before, after in zip(chunks[::-1], marks[-2::-1], marks[:0:-1], strict=True):
         tape = _repeated(part, running, before, after)

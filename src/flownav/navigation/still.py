@@ -39,7 +39,7 @@ from flownav.navigation.told import PlaceSettings
 WINDOW_S = 0.5
 LEAST_READINGS = 5.0
 QUIET_GYRO_RAD_S, QUIET_ACCEL_M_S2 = 0.01, 0.12  # rms of all axes about the mean; in flight it is twice as much
-RESTING_TURN_RAD_S = 0.15  # a gyro's bias is smaller
+RESTING_TURN_RAD_S = 0.04  # 2 deg/s: the bias of a gyro that its autopilot calibrated is smaller, turning is larger
 STEADY_RANGE_M = 0.03
 CONTACT_M = 0.35  # a range on the ground, where none was seen there yet
 RESTING_FLOW_M_S, SHAKEN_FLOW_M_S = 0.3, 0.1

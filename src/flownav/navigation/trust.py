@@ -76,10 +76,10 @@ def watch_whiteness(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
 
 
 @equation
-def accel_factor(work: Work, lanes: Lanes, lane: int) -> float:
-    """How many times the accelerometer's noise is what it was said to be, in the axis where it is worst."""
+def accel_factors(work: Work, lanes: Lanes, lane: int) -> tuple[float, float]:
+    """How many times the accelerometer's noise is what it was said to be: level, in the worse axis, and down."""
     level = larger(work[ACCEL_FACTOR * len(lanes) + lane], work[(ACCEL_FACTOR + 1) * len(lanes) + lane])
-    return larger(level, work[(ACCEL_FACTOR + 2) * len(lanes) + lane])
+    return level, work[(ACCEL_FACTOR + 2) * len(lanes) + lane]
 
 
 # -- a sensor's own noise -----------------------------------------------------------------------------------

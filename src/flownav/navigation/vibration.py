@@ -17,7 +17,7 @@ from flownav.navigation.memory import MOVING, load_imu, load_start, store_imu
 from flownav.navigation.records import ImuMemory, Reading
 from flownav.navigation.tape import IMU_DOUBTED, Output, write_event
 from flownav.navigation.told import ImuSettings
-from flownav.navigation.trust import accel_factor
+from flownav.navigation.trust import accel_factors
 
 FOLLOWING_S = 1.0
 DOUBT_M_S2 = 2.0  # of an accelerometer that the range contradicts
@@ -82,10 +82,13 @@ def add_vibration_noise(work: Work, lanes: Lanes, dt_s: float, s: ImuSettings) -
         level = s.vibration_walk_per_rt_s * beyond
         down = s.vibration_walk_per_rt_s * larger(beyond, doubt)
         shaken = m.vibration * moved_s * moved_s if beyond > 0.0 else 0.0
-        freed = accel_factor(work, lanes, lane)
-        walk = (FREED_WALK_M_S2_RT_S * (freed - 1.0)) ** 2
+        freed, freed_down = accel_factors(work, lanes, lane)
+        told = s.accel_noise_m_s2_rt_hz * s.accel_noise_m_s2_rt_hz
         for i in range(3):
-            add_noise_lane(work, lanes, ACCEL_BIAS + i, lane, walk * moved_s)
+            walk = FREED_WALK_M_S2_RT_S * ((freed_down if i == 2 else freed) - 1.0)
+            add_noise_lane(work, lanes, ACCEL_BIAS + i, lane, walk * walk * moved_s)
+        shaken_down = larger(freed_down * freed_down - freed * freed, 0.0) * told * moved_s
+        add_noise_lane(work, lanes, VELOCITY + 2, lane, shaken_down)
         add_noise_lane(work, lanes, ACCEL_BIAS, lane, level * level * moved_s)
         add_noise_lane(work, lanes, ACCEL_BIAS + 1, lane, level * level * moved_s)
         add_noise_lane(work, lanes, ACCEL_BIAS + 2, lane, down * down * moved_s)
@@ -101,10 +104,10 @@ def limit_biases(work: Work, lanes: Lanes, s: ImuSettings) -> None:
         beyond = vibration_beyond(m, s)
         level = s.accel_bias_limit_m_s2 + s.vibration_bias_share * beyond
         down = s.accel_bias_limit_m_s2 + s.vibration_bias_share * larger(beyond, m.doubt_m_s2)
-        freed = (accel_factor(work, lanes, lane) - 1.0) * s.accel_bias_limit_m_s2
-        freed += SURE * np.sqrt(load_start(work, lanes, lane).shaken)
-        level += freed
-        down += freed
+        freed, freed_down = accel_factors(work, lanes, lane)
+        at_start = SURE * np.sqrt(load_start(work, lanes, lane).shaken)
+        level += (freed - 1.0) * s.accel_bias_limit_m_s2 + at_start
+        down += (freed_down - 1.0) * s.accel_bias_limit_m_s2 + at_start
         hold(work, lanes, lane, ACCEL_BIAS, level)
         hold(work, lanes, lane, ACCEL_BIAS + 1, level)
         hold(work, lanes, lane, ACCEL_BIAS + 2, down)

@@ -256,10 +256,9 @@ def _run(
             prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, settings, log.origin_deg_m
         )
         running = start_navigator(equipment, settings, new_tape(queue), options.flow_noise)
+        run(queue, running)
         if smoothed:
-            path = smooth(queue, running)
-        else:
-            run(queue, running)
+            path = smooth(queue, start_navigator(equipment, settings, new_tape(queue), options.flow_noise))
         written = written_on(running.tape)
     if len(written.estimate) < 2:
         raise InputError(

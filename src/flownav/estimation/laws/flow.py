@@ -32,15 +32,19 @@ class OnFlowRate(NamedTuple):
     flow_scale: float
     pos_d: float
     ground: float
+    gyro_bias: float
 
 
 @law
 def flow_rate(
     axis: int, vel_n: float, vel_e: float, vel_d: float, pos_d: float, ground: float, flow_scale: float,
     qw: float, qx: float, qy: float, qz: float, rate_x: float, rate_y: float, rate_z: float,
+    gyro_bias: float, gyro_share: float,
     *, forward_m: float, right_m: float, below_m: float, lens_below_m: float,
 ) -> tuple[float, OnFlowRate]:  # fmt: skip
-    """Flow less rotation: z_x = -(1 + scale) v/r (axis 0), z_y = (1 + scale) u/r (axis 1) [rad/s].
+    """Flow less rotation: z_x = -(1 + scale) v/r - k b_x (axis 0), z_y = (1 + scale) u/r - k b_y (axis 1) [rad/s].
+
+    k b is what the gyro that took the rotation off has left there: its bias b, k = `gyro_share`.
 
     PX4's convention. u and v are the lens's velocity along body forward and right, R_BE v + w x l with the lever
     l = (forward, right, below), body FRD (0 where no gyro tells w); r is the distance along body down from a lens
@@ -56,11 +60,11 @@ def flow_rate(
     sign = -1.0 if axis == 0 else 1.0
     per_speed = sign * (1.0 + flow_scale) / range_m
     by_range = -per_speed * along / range_m
-    return per_speed * along, OnFlowRate(
+    return per_speed * along - gyro_share * gyro_bias, OnFlowRate(
         vel_n=per_speed * direction[0], vel_e=per_speed * direction[1], vel_d=per_speed * direction[2],
         tilt_n=per_speed * turn[0] + by_range * by_north, tilt_e=per_speed * turn[1] + by_range * by_east,
         heading=per_speed * turn[2], flow_scale=sign * along / range_m,
-        pos_d=-by_range * by_height, ground=by_range * by_height,
+        pos_d=-by_range * by_height, ground=by_range * by_height, gyro_bias=-gyro_share,
     )  # fmt: skip
 
 

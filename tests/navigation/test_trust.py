@@ -1,0 +1,232 @@
+"""Trust: alike innovations are the accelerometer's, their changes the sensor's own noise."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from flownav.compile import ONE_LANE
+from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE, NOISE
+from flownav.navigation.flow import LARGEST_EXCESS, SMALLEST_EXCESS, followed_excess
+from flownav.navigation.memory import ACCEL_FACTOR, REASON, load_noise, new_work, set_lane, store_echo, store_noise
+from flownav.navigation.reasons import FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT
+from flownav.navigation.records import EchoMemory, FlowMemory, NoiseMemory, WhitenessMemory
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.told import NO_HEADING, Equipment
+from flownav.navigation.trust import (
+    LARGEST_FACTOR,
+    LARGEST_NOISE,
+    LIKENESS_ALLOWED,
+    OF_BARO,
+    OF_RANGE,
+    PACE,
+    SMALLEST_NOISE,
+    SMALLEST_OF_BARO,
+    accel_factors,
+    block_ended,
+    follow_noise,
+    followed_noise,
+    scale_noise,
+    watch_whiteness,
+    with_innovation,
+)
+
+TOLD = NavigatorSettingsFile().settings(Equipment(True, False, NO_HEADING, False, -math.inf))
+FRESH = WhitenessMemory(0.0, 0.0, 0.0, 0.0, 1.0, -math.inf)
+
+
+# -- likeness ------------------------------------------------------------------------------------------------
+def test_a_block_sums_innovations_in_standard_deviations_from_its_first_instant():
+    m = with_innovation(3.0, 4.0, 7.0, FRESH)
+    m = with_innovation(-1.0, 0.25, 7.5, m)
+    assert m == FRESH._replace(since_s=7.0, total=1.5 - 2.0, readings=2.0)
+
+
+def ended(total: float, before: float, apart_s: float = 0.1, square: float = 1.0, readings: float = 1.0) -> float:
+    return block_ended(9.0, WhitenessMemory(8.9, total, readings, before, square, 9.0 - apart_s))[0]
+
+
+def test_neighbouring_blocks_of_one_sign_are_alike_and_of_two_are_not():
+    assert ended(1.0, 1.0) == pytest.approx(1.0)
+    assert ended(-1.0, -1.0) == pytest.approx(1.0)
+    assert ended(1.0, -1.0) == pytest.approx(-1.0)
+    assert ended(0.5, 0.5) == pytest.approx(0.25)  # small ones say little
+
+
+def test_blocks_more_than_a_second_apart_say_nothing_of_each_other():
+    assert ended(1.0, 1.0, apart_s=0.9) > 0.5
+    assert ended(1.0, 1.0, apart_s=1.1) == 0.0
+    assert ended(1.0, 1.0, apart_s=math.inf) == 0.0
+
+
+def test_likeness_is_not_size():
+    """The same innovations, twenty times as large for long: no more alike."""
+    assert ended(4.0, 2.0, square=16.0) == pytest.approx(ended(1.0, 0.5), rel=1e-3)
+    assert abs(ended(1e6, 5.0, square=25.0)) <= 1.0
+
+
+def test_a_block_of_many_readings_has_the_variance_of_one_and_the_next_begins_empty():
+    likeness, m = block_ended(9.0, WhitenessMemory(8.9, 6.0, 4.0, 1.0, 2.0, 8.9))
+    assert m == WhitenessMemory(9.0, 0.0, 0.0, 3.0, pytest.approx(2.0 + (9.0 - 2.0) / 10.0), 9.0)
+    assert likeness == pytest.approx(min(1.0, 3.0 * 1.0 / 2.7))
+    assert block_ended(9.0, WhitenessMemory(8.9, -1e9, 4.0, 1.0, 2.0, 8.9))[1].before == -5.0
+
+
+def factors(innovations, reason=FUSED, axis=0, stray=0.0, variance=1.0, hz=20.0, start=1.0) -> np.ndarray:
+    """ACCEL_FACTOR of an axis after each innovation."""
+    work = new_work(ONE_LANE)
+    set_lane(work, ONE_LANE, ACCEL_FACTOR + axis, 0, start)
+    store_echo(work, ONE_LANE, 0, EchoMemory(2.0, 0.0, 2.0, 0.0, stray))
+    work[[REASON, INNOVATION_VARIANCE]] = reason, variance
+    found = []
+    for k, innovation in enumerate(innovations):
+        work[INNOVATION] = innovation
+        watch_whiteness(work, ONE_LANE, k / hz, axis)
+        found.append(work[ACCEL_FACTOR + axis])
+    return np.array(found)
+
+
+def test_innovations_that_are_alike_raise_the_accelerometers_noise_whatever_their_size():
+    for size in (1.0, 4.0):
+        grown = factors(np.full(400, size))
+        assert grown[-1] > 3.0
+        assert np.all(np.diff(grown) >= 0.0)
+    assert factors(np.full(4000, 1.0)).max() == LARGEST_FACTOR
+    assert factors(np.full(20, 1.0))[-1] < 10.0  # and not at once
+
+
+def test_white_innovations_do_not_raise_it_however_large():
+    for sigma in (1.0, 5.0):
+        white = np.random.default_rng(3).normal(0.0, sigma, 6000)
+        assert np.median(factors(white)) < 1.3
+        assert factors(white, start=20.0)[-1] < 2.0  # and lower what was raised
+
+
+def test_it_falls_by_what_is_allowed_where_nothing_is_alike_and_never_below_one():
+    assert factors([1.0, 0.0, 0.0, 0.0, 0.0], start=10.0)[-1] == pytest.approx(
+        10.0 * math.exp(-PACE * LIKENESS_ALLOWED * 2.0)
+    )
+    assert factors(np.zeros(4000), start=10.0)[-1] == 1.0
+
+
+@pytest.mark.parametrize(("reason", "counts"), [(FUSED, 1), (INNOVATION_GATE, 1), (OUT_OF_RANGE, 0), (SILENT, 0)])
+def test_what_was_tested_counts_and_what_was_not_does_not(reason, counts):
+    assert (factors(np.full(200, 1.0), reason)[-1] > 2.0) == bool(counts)
+
+
+def test_a_range_among_strays_says_nothing_of_the_accelerometer_and_flow_does():
+    assert factors(np.full(200, 1.0), axis=2, stray=0.03)[-1] == 1.0
+    assert factors(np.full(200, 1.0), axis=2, stray=0.01)[-1] > 2.0
+    assert factors(np.full(200, 1.0), axis=0, stray=0.03)[-1] > 2.0
+
+
+def test_level_it_is_as_noisy_as_along_the_worse_axis_and_down_by_itself():
+    for axis, factors_ in ((0, (7.0, 1.0)), (1, (7.0, 1.0)), (2, (1.0, 7.0))):
+        work = new_work(ONE_LANE)
+        assert accel_factors(work, ONE_LANE, 0) == (1.0, 1.0)
+        set_lane(work, ONE_LANE, ACCEL_FACTOR + axis, 0, 7.0)
+        assert accel_factors(work, ONE_LANE, 0) == factors_
+
+
+# -- a sensor's own noise ------------------------------------------------------------------------------------
+def follow(innovations, noise: float, smallest: float = SMALLEST_NOISE, hz: float = 10.0) -> float:
+    """The mean factor of a component whose noise is said to be so, after 100 s."""
+    m, seen = NoiseMemory(1.0, 0.0, -math.inf), []
+    for k, innovation in enumerate(innovations):
+        m = followed_noise(innovation, 2.0 * noise * m.factor, noise * m.factor, smallest, 5.0, k / hz, m)
+        seen.append(m.factor)
+    return float(np.mean(seen[len(seen) // 2 :]))
+
+
+@pytest.mark.parametrize("times", [0.1, 1.0, 9.0])
+def test_a_noise_goes_to_the_variance_of_what_changes_from_reading_to_reading(times):
+    white = np.random.default_rng(5).normal(0.0, math.sqrt(times * 0.04), 8000)
+    assert follow(white, 0.04) == pytest.approx(times, rel=0.15)
+    slow = 3.0 * np.sin(np.arange(8000) / 300.0)  # what lasts is of the motion
+    assert follow(white + slow, 0.04) == pytest.approx(times, rel=0.15)
+
+
+def test_one_reading_moves_a_noise_by_its_share_of_twenty_seconds():
+    m = NoiseMemory(2.0, 0.3, 5.0)
+    after = followed_noise(0.9, 9.0, 0.5, 0.02, 5.0, 5.2, m)
+    assert after == NoiseMemory(pytest.approx(2.0 + 0.01 * (0.5 * 0.36 / 0.5 - 1.0) * 2.0), 0.9, 5.2)
+    assert followed_noise(1e3, 0.5, 0.5, 0.02, 5.0, 5.2, m).factor == pytest.approx(2.0 + 0.01 * (25.0 - 1.0) * 2.0)
+
+
+def test_readings_more_than_a_second_apart_say_nothing_of_the_noise():
+    assert followed_noise(9.0, 1.0, 0.5, 0.02, 5.0, 6.1, NoiseMemory(2.0, 0.0, 5.0)) == NoiseMemory(2.0, 9.0, 6.1)
+    assert followed_noise(9.0, 1.0, 0.5, 0.02, 5.0, 6.1, NoiseMemory(1.0, 0.0, -math.inf)).factor == 1.0
+
+
+def test_a_noise_stays_between_a_fiftieth_and_twenty_five_times_what_is_said():
+    assert follow(np.zeros(3000), 0.04) == pytest.approx(SMALLEST_NOISE, rel=1e-6)
+    assert follow(np.zeros(3000), 0.04, SMALLEST_OF_BARO) == pytest.approx(SMALLEST_OF_BARO, rel=1e-6)
+    assert follow(np.tile([-9.0, 9.0], 4000), 0.04) <= LARGEST_NOISE
+
+
+def heard(place: int, reason: int = FUSED, stray: float = 0.0, change: float = 0.0) -> NoiseMemory:
+    """The noise of a component after one reading, half a second after the one before."""
+    work = new_work(ONE_LANE)
+    store_noise(work, ONE_LANE, place, 0, NoiseMemory(0.1, 0.0, 0.5))
+    store_echo(work, ONE_LANE, 0, EchoMemory(2.0, 0.0, 2.0, 0.0, stray))
+    work[[REASON, INNOVATION, INNOVATION_VARIANCE, NOISE]] = reason, change, 2.0, 1.0
+    scale_noise(work, ONE_LANE, place)
+    assert work[NOISE] == pytest.approx(0.1)
+    follow_noise(work, ONE_LANE, 1.0, place, 5.0)
+    return load_noise(work, ONE_LANE, place, 0)
+
+
+def test_what_is_fused_teaches_its_noise_and_a_stray_or_what_is_refused_does_not():
+    taught = heard(OF_RANGE)
+    assert taught == NoiseMemory(pytest.approx(0.1 - 0.025 * 0.1), 0.0, 1.0)
+    untaught = NoiseMemory(0.1, 0.0, 0.5)
+    assert heard(OF_RANGE, INNOVATION_GATE) == untaught
+    assert heard(OF_RANGE, stray=0.03) == untaught
+    assert heard(OF_RANGE, stray=0.01) == taught
+    assert heard(OF_BARO) == NoiseMemory(SMALLEST_OF_BARO, 0.0, 1.0)  # wash and gusts last
+    assert heard(OF_BARO, stray=0.03, change=1.0).factor > 0.1  # strays are the range's
+
+
+# -- the flow's ----------------------------------------------------------------------------------------------
+FLOW = FlowMemory(1.0, 4.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+SHARE = 0.5 * 0.1 / 10.0
+
+
+def test_excess_noise_is_what_changes_in_the_flows_innovation():
+    s = TOLD.flow
+    assert followed_excess(7.0, 3.0, 9.0, 8.0, 5.0, 1.1, FLOW, s) == pytest.approx(4.0)  # half of 16 is the noise
+    noisier = followed_excess(9.0, 3.0, 9.0, 8.0, 5.0, 1.1, FLOW, s)
+    assert noisier == pytest.approx(4.0 + SHARE * (0.5 * 36.0 * 4.0 / 8.0 - 4.0))
+    gated = followed_excess(1e3, 3.0, 9.0, 8.0, 5.0, 1.1, FLOW, s)
+    assert gated == pytest.approx(4.0 + SHARE * (0.5 * 25.0 * 18.0 * 4.0 / 8.0 - 4.0))
+
+
+def test_a_flow_innovation_that_lasts_is_not_its_noise():
+    assert followed_excess(9.0, 9.0, 9.0, 8.0, 5.0, 1.1, FLOW, TOLD.flow) == pytest.approx(4.0 - SHARE * 4.0)
+
+
+def settled(times: float, drift: float = 0.0) -> float:
+    """The mean excess of a flow whose noise is so many times its model of 0.01."""
+    random, m, before, seen = np.random.default_rng(6), FLOW._replace(taken_s=0.0, excess=1.0), 0.0, []
+    for k in range(12000):
+        t_s = 0.05 * (k + 1)
+        innovation = float(random.normal(0.0, math.sqrt(0.01 * times))) + drift * math.sin(0.1 * t_s)
+        total = 0.01 * m.excess + 0.01 * times
+        excess = followed_excess(innovation, before, total, 0.01 * m.excess, 5.0, t_s, m, TOLD.flow)
+        m, before = m._replace(taken_s=t_s, excess=excess), innovation
+        seen.append(excess)
+    return float(np.mean(seen[6000:]))
+
+
+@pytest.mark.parametrize("times", [0.5, 1.0, 30.0])
+def test_the_excess_goes_to_how_many_times_noisier_the_flow_is_and_a_good_lens_shows_too(times):
+    assert settled(times) == pytest.approx(times, rel=0.1)
+    assert settled(times, drift=1.0) == pytest.approx(times, rel=0.1)
+
+
+def test_the_excess_is_bounded():
+    assert settled(0.01) == pytest.approx(SMALLEST_EXCESS, rel=1e-3)
+    assert settled(1e4) == pytest.approx(LARGEST_EXCESS, rel=1e-3)
+    assert (SMALLEST_EXCESS, LARGEST_EXCESS) == (0.25, 400.0)

@@ -60,6 +60,11 @@ def test_a_heading_that_is_wrong_at_take_off_is_no_drift_but_one_that_turns_away
     assert end_drift(wrong, TRUTH) == pytest.approx(2.0 * np.sin(0.05) * way, rel=0.02)
 
 
+def test_the_heading_counts_at_take_off_alone():
+    swung = estimated(2.0)._replace(heading_rad=TRUTH.heading_rad + 2.0 + 0.3 * (T_S > 20.0))
+    assert end_drift(swung, TRUTH) == pytest.approx(0.0, abs=1e-9)
+
+
 @pytest.mark.parametrize("bare", ["estimate", "truth"])
 def test_without_a_heading_the_paths_are_turned_onto_each_other(bare):
     estimate, truth = estimated(2.0)._replace(heading_rad=0.0 * T_S), TRUTH

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -13,7 +14,8 @@ from flownav.frames import GRAVITY_M_S2
 
 ORIGIN = (47.0, 8.5, 400.0)
 GPS_DELAY_S = 0.22
-FIELD_MGAUSS = (210.0, 0.0, 430.0)  # magnetic north is true north here
+DECLINATION_RAD = math.radians(3.5)  # there, by NOAA's World Magnetic Model 2025
+FIELD_MGAUSS = (210.0 * math.cos(DECLINATION_RAD), 210.0 * math.sin(DECLINATION_RAD), 430.0)
 
 
 @dataclass

@@ -113,9 +113,6 @@ def test_an_accelerometer_that_reads_3_too_much_at_once_does_not_carry_the_posit
     assert np.abs(lying(0, 1e-9).error[:, :2]).max() < 5.0
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a wrong climb of the filter's makes strays of sound ranges: the height runs off"
-)
 def test_one_that_reads_6_too_much_along_the_vertical_at_once_leaves_the_height_by_the_range():
     flown = lying(2, 0.5, 6.0)
     assert np.abs(flown.error[:, 2] - flown.error[0, 2]).max() < 5.0
@@ -156,9 +153,6 @@ def test_echoes_that_are_refused_do_not_move_the_height():
     assert np.abs(flown.error[:, 2] - flown.error[0, 2]).max() < 0.3
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a wrong climb of the filter's makes strays of sound ranges: the height runs off"
-)
 def test_a_step_of_the_ground_below_a_range_that_is_alone_moves_the_height_by_no_more_than_itself():
     """Nothing tells a roof from a drop of 1.2 m; either way the vertical speed comes back to 0."""
     flown = fly(still, 20.0).only(*OWN)

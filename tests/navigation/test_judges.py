@@ -8,14 +8,8 @@ import numpy as np
 import pytest
 
 from flownav.navigation.attitude import heading_variance, judge_attitude, magnetic_heading
-from flownav.navigation.flow import (
-    View,
-    flow_variance,
-    followed_agreement,
-    judge_flow,
-    lasting_doubt,
-    turning_of,
-)
+from flownav.navigation.flow import View, judge_flow, turning_of
+from flownav.navigation.flow_noise import flow_variance, followed_agreement, lasting_doubt
 from flownav.navigation.gps import judge_gps, judge_rejections
 from flownav.navigation.height import Height, judge_baro, judge_range, range_variance, repeats
 from flownav.navigation.inertial import motion_between, said_by, sound

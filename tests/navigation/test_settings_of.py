@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flownav.frames import GRAVITY_M_S2
-from flownav.navigation.flow import flow_variance
+from flownav.navigation.flow_noise import flow_variance
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import noise_of, of_gps_receiver, of_inertial, of_magnetometer, settings_of
 from flownav.navigation.told import NO_HEADING, NO_STATED_NOISE, Equipment

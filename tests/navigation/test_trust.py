@@ -9,7 +9,7 @@ import pytest
 
 from flownav.compile import ONE_LANE
 from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE, NOISE
-from flownav.navigation.flow import LARGEST_EXCESS, SMALLEST_EXCESS, followed_excess
+from flownav.navigation.flow_noise import LARGEST_CHANGE, LARGEST_EXCESS, MEAN_CHANGE, SMALLEST_EXCESS, followed_excess
 from flownav.navigation.memory import ACCEL_FACTOR, REASON, load_noise, new_work, set_lane, store_echo, store_noise
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT
 from flownav.navigation.records import EchoMemory, FlowMemory, NoiseMemory, WhitenessMemory
@@ -196,25 +196,27 @@ SHARE = 0.5 * 0.1 / 10.0
 
 def test_excess_noise_is_what_changes_in_the_flows_innovation():
     s = TOLD.flow
-    assert followed_excess(7.0, 3.0, 9.0, 8.0, 5.0, 1.1, FLOW, s) == pytest.approx(4.0)  # half of 16 is the noise
-    noisier = followed_excess(9.0, 3.0, 9.0, 8.0, 5.0, 1.1, FLOW, s)
-    assert noisier == pytest.approx(4.0 + SHARE * (0.5 * 36.0 * 4.0 / 8.0 - 4.0))
-    gated = followed_excess(1e3, 3.0, 9.0, 8.0, 5.0, 1.1, FLOW, s)
-    assert gated == pytest.approx(4.0 + SHARE * (0.5 * 25.0 * 18.0 * 4.0 / 8.0 - 4.0))
+    as_said = 3.0 + 4.0 * math.sqrt(MEAN_CHANGE)
+    assert followed_excess(as_said, 3.0, 8.0, 1.1, FLOW, s) == pytest.approx(4.0)  # half of 16 is the noise
+    noisier = followed_excess(9.0, 3.0, 8.0, 1.1, FLOW, s)
+    assert noisier == pytest.approx(4.0 + SHARE * (0.5 * 36.0 * 4.0 / 8.0 / MEAN_CHANGE - 4.0))
+    assert followed_excess(1e3, 3.0, 8.0, 1.1, FLOW, s) == followed_excess(1e6, 3.0, 8.0, 1.1, FLOW, s)
+    spike = followed_excess(1e3, 3.0, 8.0, 1.1, FLOW, s)
+    assert spike == pytest.approx(4.0 + SHARE * (LARGEST_CHANGE * 4.0 / MEAN_CHANGE - 4.0))
 
 
 def test_a_flow_innovation_that_lasts_is_not_its_noise():
-    assert followed_excess(9.0, 9.0, 9.0, 8.0, 5.0, 1.1, FLOW, TOLD.flow) == pytest.approx(4.0 - SHARE * 4.0)
+    assert followed_excess(9.0, 9.0, 8.0, 1.1, FLOW, TOLD.flow) == pytest.approx(4.0 - SHARE * 4.0)
 
 
-def settled(times: float, drift: float = 0.0) -> float:
-    """The mean excess of a flow whose noise is so many times its model of 0.01."""
+def settled(times: float, drift: float = 0.0, spikes: float = 0.0) -> float:
+    """The mean excess of a flow whose noise is so many times its model of 0.01, and of which so many are spikes."""
     random, m, before, seen = np.random.default_rng(6), FLOW._replace(taken_s=0.0, excess=1.0), 0.0, []
     for k in range(12000):
         t_s = 0.05 * (k + 1)
         innovation = float(random.normal(0.0, math.sqrt(0.01 * times))) + drift * math.sin(0.1 * t_s)
-        total = 0.01 * m.excess + 0.01 * times
-        excess = followed_excess(innovation, before, total, 0.01 * m.excess, 5.0, t_s, m, TOLD.flow)
+        innovation += 100.0 if random.random() < spikes else 0.0
+        excess = followed_excess(innovation, before, 0.01 * m.excess, t_s, m, TOLD.flow)
         m, before = m._replace(taken_s=t_s, excess=excess), innovation
         seen.append(excess)
     return float(np.mean(seen[6000:]))
@@ -224,6 +226,11 @@ def settled(times: float, drift: float = 0.0) -> float:
 def test_the_excess_goes_to_how_many_times_noisier_the_flow_is_and_a_good_lens_shows_too(times):
     assert settled(times) == pytest.approx(times, rel=0.1)
     assert settled(times, drift=1.0) == pytest.approx(times, rel=0.1)
+
+
+def test_spikes_hardly_count_as_noise():
+    """One reading in 20 is far off, and so two changes in 20: by Huber's proposal R is 2.6 times as large at most."""
+    assert 1.0 < settled(1.0, spikes=0.05) < 3.0
 
 
 def test_the_excess_is_bounded():

@@ -26,6 +26,7 @@ from flownav.estimation.states import (
     INNOVATION,
     INNOVATION_VARIANCE,
     KEPT,
+    MOST_CONSIDERED,
     NOISE,
     OBSERVED,
     OFFERED,
@@ -199,8 +200,10 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
 
 @equation
 def consider(work: Work, lanes: Lanes, state: int) -> None:
-    """One more state that corrections leave as it is, until `consider_none`; nothing where CONSIDERS is 0."""
-    count = int(work[CONSIDERED * len(lanes)])
+    """One more state that corrections leave as it is, until `consider_none`; nothing where CONSIDERS is 0, or beyond
+    MOST_CONSIDERED.
+    """
+    count = min(int(work[CONSIDERED * len(lanes)]), MOST_CONSIDERED - 1)
     work[(CONSIDERED + 1 + count) * len(lanes)] = state
     work[CONSIDERED * len(lanes)] = count + work[CONSIDERS * len(lanes)]
 

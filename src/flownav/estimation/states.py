@@ -46,7 +46,7 @@ STATE_NAMES = (
 
 MOST_OBSERVED = 12  # states that one observation reads
 MOST_SOURCES = 15  # and one transition
-MOST_CONSIDERED = 10  # states that a correction may leave as they are
+MOST_CONSIDERED = 18  # states that a correction may leave as they are
 
 # STATE_NAMES without units, as laws name them
 SHORT_NAMES = (

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger, procedure, smaller
-from flownav.estimation.covariance import consider, covariance_of, forget_lane, variance_of
+from flownav.compile import equation, larger, procedure, smaller
+from flownav.estimation.covariance import add_noise_lane, consider, covariance_of, forget_lane, variance_of
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.lag import FlowLag, lag_of_step
 from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow, lagged_flow_rate, lens_range_of
@@ -27,10 +27,21 @@ from flownav.estimation.states import (
     POSITION,
     STATE,
     STATES_WITH_LAG,
+    VELOCITY,
 )
 from flownav.measurement import Sensor
-from flownav.navigation.height import range_variance
+from flownav.navigation.flow_noise import (
+    DOUBTED_RATIO,
+    LONGEST_STEP_S,
+    flow_variance,
+    followed_agreement,
+    followed_excess,
+    lasting_doubt,
+    lasting_walk,
+)
 from flownav.navigation.memory import (
+    COURSE_KNOWN,
+    GPS_FUSED,
     INNOVATION_BEFORE,
     LENS_RANGE,
     REASON,
@@ -48,6 +59,7 @@ from flownav.navigation.reasons import (
     FUSED,
     INNOVATION_GATE,
     NEAR_GROUND,
+    NO_HEADING,
     NO_HEIGHT,
     OUT_OF_RANGE,
     SILENT,
@@ -58,15 +70,10 @@ from flownav.navigation.still import watch_flow
 from flownav.navigation.tape import FLOW_DOUBTED, FLOW_TRUSTED, Output, write_event
 from flownav.navigation.told import FlowSettings
 from flownav.navigation.trust import watch_whiteness
-from flownav.sensors.flow import flow_noise_sigma
 
-SMALLEST_EXCESS, LARGEST_EXCESS = 0.25, 400.0
-AGREEMENT_S = 1.0
-DOUBTED_RATIO, TRUSTED_RATIO = 4.0, 2.0  # on average 1
-LONGEST_STEP_S = 1.0
+UNHELD_S = 1.0  # without GPS
 LARGEST_SPREAD = 0.5  # of the height over the ground, of which flow makes no speed
 UNKNOWN_RANGE_M = 2.0
-FULL_QUALITY = 255.0
 
 
 class View(NamedTuple):
@@ -118,62 +125,6 @@ def judge_flow(
     return NEAR_GROUND if reason == FUSED and near else reason
 
 
-@equation
-def flow_variance(range_m: float, speed_m_s: float, quality: float, angular: bool, s: FlowSettings) -> float:
-    """Variance of a flow velocity [m2/s2]: the sensor file's noise at this height, or (sigma_flow r)^2 + floor^2.
-
-    sigma_flow goes with the quality (as PX4's EKF2). A metric sensor multiplied by a range of its own, whose error
-    scales its velocity.
-    """
-    low, good = s.flow_low_quality_sigma_rad_s, s.flow_sigma_rad_s
-    sigma = (low + (good - low) * quality / FULL_QUALITY) * range_m
-    modelled = sigma * sigma + s.flow_floor_m_s * s.flow_floor_m_s
-    stated = flow_noise_sigma(range_m, s.noise)  # type: ignore[arg-type]  # it reads the noise alone
-    spread = range_variance(range_m, s.range_sigma_m, s.range_relative_sigma) / (range_m * range_m)
-    scaled = 0.0 if angular else speed_m_s * speed_m_s * spread
-    return (stated * stated if s.noise.stated > 0.0 else modelled) + scaled
-
-
-@equation
-def followed_agreement(square: float, t_s: float, m: FlowMemory) -> float:
-    """How well flow agrees with what the filter expects of it: nu^2 over its variance, 1 on average.
-
-    A wrong sign, swapped axes or garbage stay within the gate reading by reading, but not on average.
-    """
-    share = smaller(larger(t_s - m.taken_s, 0.0) / AGREEMENT_S, 1.0)
-    return m.ratio + 0.5 * share * (square - m.ratio)
-
-
-@equation
-def followed_excess(
-    innovation: float,
-    before: float,
-    total: float,
-    noise: float,
-    gate: float,
-    t_s: float,
-    m: FlowMemory,
-    s: FlowSettings,
-) -> float:
-    """How many times noisier than its model the flow is: the mean of half the square of what changes in its innovation
-    from one reading to the next, over R.
-
-    A poor lens or floor shows there, and a good one too. What lasts in an innovation is not the flow's noise: it is of
-    the motion, and counts against the accelerometer (`trust`).
-    """
-    limit = gate * np.sqrt(2.0 * total)
-    change = clamp(innovation - before, -limit, limit)
-    seen = 0.5 * change * change * m.excess / noise
-    share = smaller(larger(t_s - m.taken_s, 0.0), LONGEST_STEP_S) / s.flow_noise_time_s
-    return clamp(m.excess + 0.5 * share * (seen - m.excess), SMALLEST_EXCESS, LARGEST_EXCESS)
-
-
-@equation
-def lasting_doubt(doubted: float, ratio: float) -> float:
-    """Doubted above one ratio, trusted again below a smaller one."""
-    return 1.0 if ratio > DOUBTED_RATIO else (0.0 if ratio < TRUSTED_RATIO else doubted)
-
-
 # -- on lanes -----------------------------------------------------------------------------------------------
 @procedure
 def take_flow(
@@ -200,6 +151,7 @@ def take_flow(
         watch_whiteness(work, lanes, t_s, 1 - component if angular else component)
         learn(work, lanes, t_s, angular, component, s)
         note_aid(work, lanes, t_s, o)
+    walk_alone(work, lanes, t_s, s)
     judge_agreement(work, lanes, t_s, o)
 
 
@@ -253,7 +205,9 @@ def look(work: Work, lanes: Lanes, t_s: float, angular: bool, gyro_is_imu: bool,
         work[TURNING * len(lanes) + lane] = x
         work[(TURNING + 1) * len(lanes) + lane] = y
         work[LENS_RANGE * len(lanes) + lane] = range_m
-        work[TESTED * len(lanes) + lane] = judge_flow(reading, angular, x, y, started, view, s)
+        verdict = judge_flow(reading, angular, x, y, started, view, s)
+        headed = verdict != FUSED or work[COURSE_KNOWN * len(lanes) + lane] > 0.0
+        work[TESTED * len(lanes) + lane] = verdict if headed else NO_HEADING
 
 
 @equation
@@ -314,6 +268,9 @@ def learn(work: Work, lanes: Lanes, t_s: float, angular: bool, component: int, s
             innovation, total = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]
             square = smaller(innovation * innovation, s.gate_sigma * s.gate_sigma * total) / total
             ratio = followed_agreement(square, t_s, m)
+            unheld = t_s - work[GPS_FUSED * len(lanes) + lane] > UNHELD_S
+            if refused and ratio > DOUBTED_RATIO and unheld:
+                free_velocity(work, lanes, lane, innovation, angular)
             listed = reading.variance_0 if component == 0 else (
                 reading.variance_1 if component == 1 else reading.variance_2
             )  # fmt: skip
@@ -322,11 +279,32 @@ def learn(work: Work, lanes: Lanes, t_s: float, angular: bool, component: int, s
                 noise = work[NOISE * len(lanes) + lane]
                 last = INNOVATION_BEFORE + component
                 before = work[last * len(lanes) + lane]
-                excess = followed_excess(innovation, before, total, noise, s.gate_sigma, t_s, m, s)
+                excess = followed_excess(innovation, before, noise, t_s, m, s)
                 work[last * len(lanes) + lane] = innovation
             store_flow(
                 work, lanes, lane, FlowMemory(m.taken_s, excess, m.bias_x, m.bias_y, m.bias_count, ratio, m.doubted)
             )
+
+
+@equation
+def free_velocity(work: Work, lanes: Lanes, lane: int, innovation: float, angular: bool) -> None:
+    """Flow that is refused again and again, and nothing else tells the velocity: then that is what is wrong."""
+    freed = innovation * (work[LENS_RANGE * len(lanes) + lane] if angular else 1.0)
+    add_noise_lane(work, lanes, VELOCITY, lane, freed * freed)
+    add_noise_lane(work, lanes, VELOCITY + 1, lane, freed * freed)
+
+
+@procedure
+def walk_alone(work: Work, lanes: Lanes, t_s: float, s: FlowSettings) -> None:
+    """Where no GPS holds the position, it is less sure by what lasts of the flow's error since the reading before."""
+    for lane in range(len(lanes)):
+        unheld = t_s - work[GPS_FUSED * len(lanes) + lane] > UNHELD_S
+        step_s = smaller(t_s - load_flow(work, lanes, lane).taken_s, LONGEST_STEP_S)
+        north, east = work[(STATE + VELOCITY) * len(lanes) + lane], work[(STATE + VELOCITY + 1) * len(lanes) + lane]
+        walk = lasting_walk(work[LENS_RANGE * len(lanes) + lane], np.sqrt(north * north + east * east), s)
+        if unheld and work[TESTED * len(lanes) + lane] == FUSED:
+            add_noise_lane(work, lanes, POSITION, lane, walk * step_s)
+            add_noise_lane(work, lanes, POSITION + 1, lane, walk * step_s)
 
 
 @procedure

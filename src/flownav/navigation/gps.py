@@ -24,6 +24,7 @@ from flownav.estimation.states import (
 from flownav.measurement import Sensor
 from flownav.navigation.journal import reset_state
 from flownav.navigation.memory import (
+    GPS_FUSED,
     LEVEL_RATIO,
     REASON,
     STEADY_FORCE,
@@ -86,6 +87,9 @@ def take_gps(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
         follow_noise(work, lanes, t_s, place, s.gate_sigma)
         if axis < 2:
             note_aid(work, lanes, t_s, o)
+            for lane in range(len(lanes)):
+                before_s = work[GPS_FUSED * len(lanes) + lane]
+                work[GPS_FUSED * len(lanes) + lane] = t_s if work[REASON * len(lanes) + lane] == FUSED else before_s
         elif position:
             note_height(work, lanes, t_s)
         mind_rejections(work, lanes, t_s, axis, position, s, o)

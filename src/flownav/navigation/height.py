@@ -116,10 +116,12 @@ def judge_range(
 
 @equation
 def followed_echo(range_m: float, down_m: float, m: EchoMemory) -> EchoMemory:
-    """A range is a stray where neither of the two before it, moved by the climb since, confirms it; their share."""
+    """A range is a stray where neither of the two before it confirms it, moved by the climb since or not (the filter
+    may err in that); and the share of strays.
+    """
     near = ECHO_M + ECHO_SHARE * range_m
-    newest = abs(range_m - m.newest_m + down_m - m.newest_down_m)
-    older = abs(range_m - m.older_m + down_m - m.older_down_m)
+    newest = smaller(abs(range_m - m.newest_m), abs(range_m - m.newest_m + down_m - m.newest_down_m))
+    older = smaller(abs(range_m - m.older_m), abs(range_m - m.older_m + down_m - m.older_down_m))
     strays = newest > near and older > near  # false of the first
     stray = m.stray + (1.0 - m.stray) / ECHOES if strays else m.stray * (1.0 - 2.0 / ECHOES)
     return EchoMemory(range_m, down_m, m.newest_m, m.newest_down_m, stray)

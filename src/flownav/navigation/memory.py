@@ -15,6 +15,7 @@ from flownav.measurement import Array, Sensor
 from flownav.navigation.records import (
     AidMemory,
     BridgeMemory,
+    CourseMemory,
     EchoMemory,
     FlowMemory,
     GroundMemory,
@@ -49,6 +50,9 @@ SEEN_WINDOW = _rows.take(len(SeenWindow._fields))
 NOISE_FOLLOWED = _rows.take(8 * 3)  # `records.NoiseMemory` of range, barometer, GPS position and velocity by axis
 WHITENESS = _rows.take(3 * len(WhitenessMemory._fields))  # forward, right, down
 ACCEL_FACTOR = _rows.take(3)  # how many times noisier than told the accelerometer is, by each of these
+COURSE = _rows.take(len(CourseMemory._fields))
+COURSE_KNOWN = _rows.take(1)  # 0 while a heading that no sensor reads is to be found
+GPS_FUSED = _rows.take(1)  # when GPS last told north or east [s]
 STANDS = _rows.take(1)  # what the vehicle did in the last window: `still.MOVES`, SHAKEN or RESTS
 CONTACT = _rows.take(1)  # the range when it rested last [m]; NaN where it has not
 BARO_KNOWN = _rows.take(1)
@@ -85,6 +89,7 @@ load_ground, store_ground = lane_access(GroundMemory, GROUND_SEEN)
 load_flow, store_flow = lane_access(FlowMemory, FLOW)
 load_heading, store_heading = lane_access(HeadingMemory, HEADING)
 load_spike, store_spike = lane_access(SpikeMemory, SPIKE)
+load_course, store_course = lane_access(CourseMemory, COURSE)
 load_imu_window, store_imu_window = lane_access(ImuWindow, IMU_WINDOW)
 load_seen_window, store_seen_window = lane_access(SeenWindow, SEEN_WINDOW)
 load_bridge, store_bridge = lane_access(BridgeMemory, BRIDGE)
@@ -106,6 +111,9 @@ _FRESH: dict[int, tuple[float, ...]] = {
     WHITENESS: (0.0, 0.0, 0.0, 0.0, 1.0, -np.inf) * 3,
     STILL_CLOCK: (-np.inf,),
     CONSIDERS: (1.0,),
+    COURSE: CourseMemory(0.0, 0.0, 0.0, 0.0, 0.0, -np.inf, -np.inf, 0.0, 0.0),
+    COURSE_KNOWN: (1.0,),
+    GPS_FUSED: (-np.inf,),
     CLOCK: (-np.inf,),
     WRITTEN: (-np.inf,),
     ERRORS_CLOCK: (-np.inf,),

@@ -209,6 +209,22 @@ class NoiseMemory(NamedTuple):
     heard_s: float
 
 
+class CourseMemory(NamedTuple):
+    """The way as GPS and the flow saw it, weighed by time: sums of v.w and v x w [m2/s], and of both squares; its
+    length [m]; when GPS was heard and the flow [s]; the flow's smoothed velocity by the filter's own heading [m/s].
+    """
+
+    along: float
+    across: float
+    gps: float
+    flow: float
+    travel_m: float
+    gps_s: float
+    flow_s: float
+    north_m_s: float
+    east_m_s: float
+
+
 class WhitenessMemory(NamedTuple):
     """A block of innovations along one body axis: since when [s], their sum in standard deviations, how many. The block
     before, the mean square of blocks, and when it ended [s].

@@ -125,6 +125,11 @@ class NavigatorSettingsFile(ParameterModel):
     flow_noise_time_s: Number = Field(
         10.0, gt=0, le=1e9, description="flow noisier than modelled is followed at this pace; a surface lasts seconds"
     )
+    flow_lasting_rad_s: Number = Field(
+        0.003, ge=0, le=1, description="what lasts of a flow's error where nothing else tells the velocity: 0.2 deg/s"
+    )
+    flow_lasting_share: Number = Field(0.03, ge=0, le=1, description="and of the speed: scale, height, texture")
+    flow_lasting_s: Number = Field(10.0, ge=0, le=1e4, description="and for how long")
     flow_gyro_time_s: Number = Field(10.0, gt=0, le=1e6, description="a flow sensor's gyro bias is followed so")
     flow_forward_m: Number = Field(0.0, ge=-10, le=10, description="the lens from the IMU, body forward")
     flow_right_m: Number = Field(0.0, ge=-10, le=10, description="body right")

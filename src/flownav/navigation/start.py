@@ -12,6 +12,7 @@ from flownav.frames import GRAVITY_M_S2, Quaternion, quaternion_from_euler, rota
 from flownav.measurement import Sensor
 from flownav.navigation.flow import start_lag
 from flownav.navigation.memory import (
+    COURSE_KNOWN,
     SCALE_DOUBT,
     STEADY_FORCE,
     load_aid,
@@ -36,6 +37,7 @@ READ_TILT_RAD = 0.03  # an attitude that was read
 STANDING_TILT_RAD = 0.07  # of a vehicle that stands, or hovers, before anything is read: 4 deg
 LEVELLED_FLOOR_RAD = 0.005  # of one from the accelerometer
 READ_HEADING_RAD = 0.1  # an autopilot's, whose compass is calibrated
+UNKNOWN_RAD = 1.5  # one that is to be found from the course
 COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's
 DATUM_HEADING_RAD = 1e-3  # the start defines the frame
 LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0
@@ -135,7 +137,10 @@ def start_lane(
     start_lag(work, lanes, lagged(lanes), lane, p[START_SIGMA + VELOCITY], load_flow_settings(p))
     tilt = READ_TILT_RAD if read else STANDING_TILT_RAD * np.sqrt(1.0 - believed) + LEVELLED_FLOOR_RAD
     known = fitted.heading == NO_HEADING and not lost
+    unknown = fitted.heading == NO_HEADING and lost and not read
     turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
+    turned = UNKNOWN_RAD if unknown else turned
+    set_lane(work, lanes, COURSE_KNOWN, lane, 0.0 if unknown else 1.0)
     spread = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M
     for i in range(3):  # of a motion before the start nothing is known
         work[(RATE + i) * len(lanes) + lane] = 0.0

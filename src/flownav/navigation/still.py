@@ -95,13 +95,13 @@ def judge_standing(gyro: ImuWindow, seen: SeenWindow, contact_m: float) -> float
     enough = gyro.readings >= LEAST_READINGS and turn < RESTING_TURN_RAD_S
     ranged = seen.range_high_m >= 0.0
     touching = seen.range_high_m <= larger(CONTACT_M, contact_m + STEADY_RANGE_M if np.isfinite(contact_m) else 0.0)
-    steady = ranged and touching and seen.range_high_m - seen.range_low_m <= STEADY_RANGE_M
+    steady = seen.range_high_m - seen.range_low_m <= STEADY_RANGE_M
     flows = larger(seen.flows, 1.0)
     flow_m_s = np.sqrt(seen.flow_u_m_s**2 + seen.flow_v_m_s**2) / flows
     unmoved = seen.gps_m_s < RESTING_GPS_M_S
     quiet = turning < QUIET_GYRO_RAD_S and shaking < QUIET_ACCEL_M_S2
-    rests = enough and quiet and unmoved and flow_m_s < RESTING_FLOW_M_S and (touching or not ranged)
-    shaken = enough and unmoved and steady and seen.flows > 0.0 and flow_m_s < SHAKEN_FLOW_M_S
+    rests = enough and quiet and unmoved and flow_m_s < RESTING_FLOW_M_S and ((touching and steady) or not ranged)
+    shaken = enough and unmoved and ranged and touching and steady and seen.flows > 0.0 and flow_m_s < SHAKEN_FLOW_M_S
     return RESTS if rests else (SHAKEN if shaken else MOVES)
 
 
@@ -126,11 +126,11 @@ def watch_imu(work: Work, lanes: Lanes) -> None:
 
 @procedure
 def watch_range(work: Work, lanes: Lanes) -> None:
-    """And a range, whatever the filter makes of it."""
+    """And a range, whatever the filter makes of it; many sensors say 0 for nothing."""
     for lane in range(len(lanes)):
         reading = load_reading(work, lanes, lane)
         heard = reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
-        if heard and reading.value_0 >= 0.0 and np.isfinite(reading.value_0):
+        if heard and reading.value_0 > 0.0 and np.isfinite(reading.value_0):
             store_seen_window(work, lanes, lane, with_range(reading.value_0, load_seen_window(work, lanes, lane)))
 
 

@@ -16,9 +16,10 @@ from flownav.estimation.error_models import propagate_gauss_markov, propagate_wa
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.lag import predict_with_lag
 from flownav.estimation.motion import hold_still, predict
-from flownav.estimation.states import ATTITUDE, GYRO_BIAS, STATES
+from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, STATES
 from flownav.measurement import Sensor
 from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
+from flownav.navigation.course import find_heading, note_flow_course
 from flownav.navigation.flow import flow_lag, take_flow
 from flownav.navigation.gps import take_gps
 from flownav.navigation.height import take_baro, take_range
@@ -26,6 +27,7 @@ from flownav.navigation.inertial import choose_motion, keep_imu, steady_force
 from flownav.navigation.journal import note_decay, note_estimate, note_prediction
 from flownav.navigation.memory import (
     CLOCK,
+    COURSE_KNOWN,
     ERRORS_CLOCK,
     MOVING,
     WRITTEN,
@@ -107,10 +109,20 @@ def watch_others(work: Work, lanes: Lanes, sensor: int) -> None:
 
 @equation
 def consider_datum(work: Work, lanes: Lanes, fitted: Equipment) -> None:
-    """A heading that nothing refers to the earth is a datum: only the gyro moves it, and only rest tells its bias."""
-    if fitted.heading == NO_HEADING and not fitted.use_attitude:
+    """A heading that nothing refers to the earth is a datum: only the gyro moves it, and only rest tells its bias. So
+    is one that is yet to be found from the course (by the first lane: all lanes hear the same sensors).
+    """
+    no_fixes = not np.isfinite(fitted.deadline_s)
+    unknown = no_fixes or work[COURSE_KNOWN * len(lanes)] == 0.0
+    if fitted.heading == NO_HEADING and not fitted.use_attitude and unknown:
         consider(work, lanes, ATTITUDE + 2)
         consider(work, lanes, GYRO_BIAS + 2)
+        if not no_fixes:  # by a heading that may be any, GPS would turn every push into tilt
+            for i in range(2):
+                consider(work, lanes, ATTITUDE + i)
+                consider(work, lanes, GYRO_BIAS + i)
+            for i in range(3):
+                consider(work, lanes, ACCEL_BIAS + i)
 
 
 @procedure
@@ -119,8 +131,12 @@ def take(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p
     if sensor == Sensor.GPS_POSITION or sensor == Sensor.GPS_VELOCITY:
         catch_up_errors(work, lanes, t_s, p, o)
         take_gps(work, lanes, t_s, sensor, p, o)
+        if sensor == Sensor.GPS_VELOCITY and fitted.heading == NO_HEADING:
+            find_heading(work, lanes, t_s, o)
     elif sensor == Sensor.FLOW_RATE or sensor == Sensor.FLOW_VELOCITY:
         take_flow(work, lanes, lagged(lanes), t_s, sensor, fitted.flow_gyro_is_imu, p, o)
+        if fitted.heading == NO_HEADING:
+            note_flow_course(work, lanes, t_s, sensor == Sensor.FLOW_RATE)
     elif sensor == Sensor.RANGE:
         take_range(work, lanes, t_s, sensor, p, o)
     elif sensor == Sensor.BARO:

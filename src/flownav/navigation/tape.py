@@ -53,7 +53,7 @@ EVENTS_A_READING = 4
 # each Python integer that it is called with.
 (START, GROUND_FOUND, GROUND_RESET, BARO_FOUND, GPS_RESET, DEAD_RECKONING, POSITION_INVALID, AIDED_AGAIN,
  RANGE_STUCK, PAD_FOUND, IMU_LOST, IMU_DOUBTED, FLOW_DOUBTED, FLOW_TRUSTED, STOOD,
- IMU_SPIKE) = np.arange(16)  # fmt: skip
+ IMU_SPIKE, HEADING_FOUND) = np.arange(17)  # fmt: skip
 EVENT_NAMES = (
     ("filter", "start", "at a GPS fix (1) or at the local origin (0)"),
     ("range", "datum", "ground level below the first range, down in the local frame [m]"),
@@ -71,6 +71,7 @@ EVENT_NAMES = (
     ("flow", "trusted", "it agrees again: mean square innovation over its variance"),
     ("filter", "standing", "the vehicle moves (0), stands with its motors running (1), or rests (2)"),
     ("imu", "spike", "a reading that no vehicle can follow was dropped: it said this turning [rad/s]"),
+    ("heading", "found", "from the course by GPS and flow: it was off by this much [rad]"),
 )
 # kinds of journal entry, and where their numbers stand in it
 PREDICTED, CORRECTED, FORGOTTEN, NOTED, DECAYED = 0.0, 1.0, 2.0, 3.0, 4.0

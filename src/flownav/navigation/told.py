@@ -67,6 +67,9 @@ class FlowSettings(NamedTuple):
     flow_lag_b_1_s: float
     flow_lag_c_1_s2: float
     flow_noise_time_s: float
+    flow_lasting_rad_s: float
+    flow_lasting_share: float
+    flow_lasting_s: float
     flow_gyro_time_s: float
     flow_forward_m: float
     flow_right_m: float

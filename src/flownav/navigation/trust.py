@@ -64,7 +64,8 @@ def watch_whiteness(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
     for lane in range(len(lanes)):
         reason = work[REASON * len(lanes) + lane]
         strays = axis == 2 and load_echo(work, lanes, lane).stray > STRAYS
-        if strays or (reason != FUSED and reason != INNOVATION_GATE):
+        refused = reason == INNOVATION_GATE and axis < 2  # a refused echo is as alike as a wrong height
+        if strays or not (reason == FUSED or refused):
             continue
         m = load_whiteness(work, lanes, axis, lane)
         innovation, variance = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]

@@ -1,0 +1,113 @@
+"""A heading that no sensor reads, found from the course: the flow's velocity turned onto that of GPS.
+
+As complex numbers, north + i east, the flow's velocity w by the filter's own heading and GPS velocity v differ by the
+heading's error: v = w exp(i error). The sum of v conj(w) over the way has the error as its angle, whatever it is;
+a Kalman filter, which takes errors for small, would lose itself where it is large. Until it is found nothing corrects
+the heading (`take.consider_datum`), and the flow, by whose variance so large a doubt counts, tells little.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flownav.compile import equation, procedure
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.motion import rotation_of
+from flownav.estimation.states import ATTITUDE, QUATERNION
+from flownav.frames import quaternion_product
+from flownav.navigation.journal import reset_state
+from flownav.navigation.memory import COURSE_KNOWN, LENS_RANGE, TURNING, load_course, load_reading, store_course
+from flownav.navigation.records import CourseMemory, Reading
+from flownav.navigation.tape import HEADING_FOUND, Output, write_event
+
+LEAST_TRAVEL_M = 2.0
+LEAST_SPEED_M_S = 0.3
+LEAST_LIKENESS = 0.85
+LATEST_S = 0.25  # a flow older than this is of another motion
+FOUND_RAD = 0.1
+SLOWLY_S = 0.3  # the flow's velocity is smoothed as a receiver smooths its own
+
+
+@equation
+def with_flow(north_m_s: float, east_m_s: float, t_s: float, m: CourseMemory) -> CourseMemory:
+    """The flow's velocity by the filter's own heading, smoothed."""
+    step_s = t_s - m.flow_s
+    share = step_s / (SLOWLY_S + step_s) if step_s < 1.0 else 1.0
+    return CourseMemory(
+        m.along, m.across, m.gps, m.flow, m.travel_m, m.gps_s, t_s,
+        m.north_m_s + share * (north_m_s - m.north_m_s), m.east_m_s + share * (east_m_s - m.east_m_s),
+    )  # fmt: skip
+
+
+@equation
+def with_gps(reading: Reading, t_s: float, m: CourseMemory) -> CourseMemory:
+    """The sums with one GPS velocity more, where the flow tells of the same motion."""
+    v_n, v_e, w_n, w_e = reading.value_0, reading.value_1, m.north_m_s, m.east_m_s
+    speed_m_s = np.sqrt(v_n * v_n + v_e * v_e)
+    step_s = t_s - m.gps_s
+    counts = t_s - m.flow_s <= LATEST_S and speed_m_s > LEAST_SPEED_M_S and step_s < 1.0
+    weight = step_s if counts else 0.0
+    return CourseMemory(
+        m.along + weight * (v_n * w_n + v_e * w_e), m.across + weight * (v_e * w_n - v_n * w_e),
+        m.gps + weight * speed_m_s * speed_m_s, m.flow + weight * (w_n * w_n + w_e * w_e),
+        m.travel_m + weight * speed_m_s, t_s, m.flow_s, m.north_m_s, m.east_m_s,
+    )  # fmt: skip
+
+
+@equation
+def judge_course(m: CourseMemory) -> tuple[bool, float]:
+    """Whether the way says how the heading errs, and by how much: true less own [rad]."""
+    power = m.gps * m.flow
+    likeness = np.sqrt((m.along * m.along + m.across * m.across) / power) if power > 0.0 else 0.0
+    return m.travel_m >= LEAST_TRAVEL_M and likeness >= LEAST_LIKENESS, np.arctan2(m.across, m.along)
+
+
+@procedure
+def note_flow_course(work: Work, lanes: Lanes, t_s: float, angular: bool) -> None:
+    """The flow reading at hand, whose turning and range stand in their rows."""
+    for lane in range(len(lanes)):
+        if work[COURSE_KNOWN * len(lanes) + lane] > 0.0:
+            continue
+        reading = load_reading(work, lanes, lane)
+        range_m = work[LENS_RANGE * len(lanes) + lane]
+        x = reading.value_0 - (work[TURNING * len(lanes) + lane] if angular else 0.0)
+        y = reading.value_1 - (work[(TURNING + 1) * len(lanes) + lane] if angular else 0.0)
+        u, v = (y * range_m, -x * range_m) if angular else (x, y)
+        rotation = rotation_of(work, lanes, lane)
+        level = np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
+        cosine, sine = rotation[0] / level, rotation[3] / level
+        if reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0 and np.isfinite(u + v):
+            after = with_flow(cosine * u - sine * v, sine * u + cosine * v, t_s, load_course(work, lanes, lane))
+            store_course(work, lanes, lane, after)
+
+
+@procedure
+def find_heading(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
+    """At a GPS velocity: where the way says how the heading errs, the heading and the velocity are turned by it."""
+    for lane in range(len(lanes)):
+        reading = load_reading(work, lanes, lane)
+        unknown = work[COURSE_KNOWN * len(lanes) + lane] == 0.0
+        heard = reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
+        if not unknown or not heard or not np.isfinite(reading.value_0 + reading.value_1):
+            continue
+        m = with_gps(reading, t_s, load_course(work, lanes, lane))
+        store_course(work, lanes, lane, m)
+        found, error_rad = judge_course(m)
+        if found:
+            turn_heading(work, lanes, lane, error_rad, o)
+            work[COURSE_KNOWN * len(lanes) + lane] = 1.0
+            write_event(lanes, lane, t_s, HEADING_FOUND, error_rad, o)
+
+
+@procedure
+def turn_heading(work: Work, lanes: Lanes, lane: int, by_rad: float, o: Output) -> None:
+    """The heading of one lane turned, and sure to FOUND_RAD; what was correlated with it is not any more."""
+    turn = (np.cos(0.5 * by_rad), 0.0, 0.0, np.sin(0.5 * by_rad))
+    before = (
+        work[QUATERNION * len(lanes) + lane], work[(QUATERNION + 1) * len(lanes) + lane],
+        work[(QUATERNION + 2) * len(lanes) + lane], work[(QUATERNION + 3) * len(lanes) + lane],
+    )  # fmt: skip
+    after = quaternion_product(turn, before)
+    for i in range(4):
+        work[(QUATERNION + i) * len(lanes) + lane] = after[i]
+    reset_state(work, lanes, lane, ATTITUDE + 2, FOUND_RAD * FOUND_RAD, o)

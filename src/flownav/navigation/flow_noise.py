@@ -1,0 +1,76 @@
+"""The noise of a flow reading: what the sensor file or the settings say, and what the innovations show."""
+
+from __future__ import annotations
+
+from flownav.compile import clamp, equation, larger, smaller
+from flownav.navigation.height import range_variance
+from flownav.navigation.records import FlowMemory
+from flownav.navigation.told import FlowSettings
+from flownav.sensors.flow import flow_noise_sigma
+
+SMALLEST_EXCESS, LARGEST_EXCESS = 0.25, 400.0
+LARGEST_CHANGE, MEAN_CHANGE = 6.25, 0.9776  # E min(x^2, 6.25) of a normal x
+AGREEMENT_S = 1.0
+DOUBTED_RATIO, TRUSTED_RATIO = 4.0, 2.0  # on average 1
+LONGEST_STEP_S = 1.0
+FULL_QUALITY = 255.0
+
+
+@equation
+def flow_variance(range_m: float, speed_m_s: float, quality: float, angular: bool, s: FlowSettings) -> float:
+    """Variance of a flow velocity [m2/s2]: the sensor file's noise at this height, or (sigma_flow r)^2 + floor^2.
+
+    sigma_flow goes with the quality (as PX4's EKF2). A metric sensor multiplied by a range of its own, whose error
+    scales its velocity.
+    """
+    low, good = s.flow_low_quality_sigma_rad_s, s.flow_sigma_rad_s
+    sigma = (low + (good - low) * quality / FULL_QUALITY) * range_m
+    modelled = sigma * sigma + s.flow_floor_m_s * s.flow_floor_m_s
+    stated = flow_noise_sigma(range_m, s.noise)  # type: ignore[arg-type]  # it reads the noise alone
+    spread = range_variance(range_m, s.range_sigma_m, s.range_relative_sigma) / (range_m * range_m)
+    scaled = 0.0 if angular else speed_m_s * speed_m_s * spread
+    return (stated * stated if s.noise.stated > 0.0 else modelled) + scaled
+
+
+@equation
+def followed_agreement(square: float, t_s: float, m: FlowMemory) -> float:
+    """How well flow agrees with what the filter expects of it: nu^2 over its variance, 1 on average.
+
+    A wrong sign, swapped axes or garbage stay within the gate reading by reading, but not on average.
+    """
+    share = smaller(larger(t_s - m.taken_s, 0.0) / AGREEMENT_S, 1.0)
+    return m.ratio + 0.5 * share * (square - m.ratio)
+
+
+@equation
+def followed_excess(
+    innovation: float, before: float, noise: float, t_s: float, m: FlowMemory, s: FlowSettings
+) -> float:
+    """How many times noisier than its model the flow is: the mean of half the square of what changes in its innovation
+    from one reading to the next, over R.
+
+    A poor lens or floor shows there, and a good one too. What lasts in an innovation is not the flow's noise: it is of
+    the motion, and counts against the accelerometer (`trust`). Nor are spikes, which the gate refuses: a change counts
+    as no more than 2.5 standard deviations (Huber, Robust Estimation of a Location Parameter, 1964, proposal 2).
+    """
+    change = innovation - before
+    seen = m.excess * smaller(0.5 * change * change / noise, LARGEST_CHANGE) / MEAN_CHANGE
+    share = smaller(larger(t_s - m.taken_s, 0.0), LONGEST_STEP_S) / s.flow_noise_time_s
+    return clamp(m.excess + 0.5 * share * (seen - m.excess), SMALLEST_EXCESS, LARGEST_EXCESS)
+
+
+@equation
+def lasting_doubt(doubted: float, ratio: float) -> float:
+    """Doubted above one ratio, trusted again below a smaller one."""
+    return 1.0 if ratio > DOUBTED_RATIO else (0.0 if ratio < TRUSTED_RATIO else doubted)
+
+
+@equation
+def lasting_walk(range_m: float, speed_m_s: float, s: FlowSettings) -> float:
+    """The walk of a position that flow alone tells [m2/s]: 2 e^2 tau of a velocity error e that lasts for tau.
+
+    White noise averages out, and what lasts of a flow's error does not: a part as of a gyro, over the range, and a part
+    of the speed.
+    """
+    turning, scaled = s.flow_lasting_rad_s * range_m, s.flow_lasting_share * speed_m_s
+    return 2.0 * s.flow_lasting_s * (turning * turning + scaled * scaled)

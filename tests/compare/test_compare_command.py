@@ -45,7 +45,7 @@ def hall(tmp_path_factory) -> Path:
 @pytest.fixture(autouse=True)
 def elsewhere(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "200")
+    monkeypatch.setenv("COLUMNS", "80")
 
 
 def call(*arguments):
@@ -81,6 +81,14 @@ def test_each_log_has_its_estimators_and_each_row_its_keys(garden, hall):
     assert inside["outages"] == {"median_m": None, "worst_m": None, "windows": []}
 
 
+def test_a_log_with_nothing_to_hold_it_against_says_so(hall, tmp_path):
+    bare = Path(shutil.copytree(hall, tmp_path / "bare"))
+    (bare / "truth.csv").unlink()
+    for row in answer(bare):
+        assert row["against"] is row["horizontal_rms_m"] is row["velocity_rms_m_s"] is row["airborne"] is None
+        assert row["samples"] == 0
+
+
 def test_every_setting_gives_a_row(garden, tmp_path):
     (tmp_path / "a.toml").write_text("gate_sigma = 0.001\n")
     (tmp_path / "b.toml").write_text("gate_sigma = 5.0\n")
@@ -113,7 +121,7 @@ def test_the_autopilots_own_estimate_is_scored_at_its_own_instants(tmp_path):
 def test_people_get_one_table_and_a_page(garden, hall):
     result = call(garden, hall, "--out", "pages/compared.html", "--outages", "15:35:10")
     assert result.exception is None, result.exception
-    for word in ("garden", "hall", "flownav (default)", "dead reckoning", "end drift"):
+    for word in ("garden, by gps", "hall, by truth", "  flownav (default) ", "  dead reckoning ", "end drift"):
         assert word in result.stdout
     text = Path("pages/compared.html").read_text()
     assert "</html>" in text

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from flownav.compare.job import Setting
 
 DEFAULT = "default"
+SHORT = ("", "place\n[m]", "flying\n[m]", "speed\n[m/s]", "flying\n[m/s]", "end\n[m]", "cut [m]\nmedian", "worst")
+TITLE = "rms errors where all estimators of a log have rows; end drift; GPS cuts"
 
 
 def command(
@@ -106,22 +108,25 @@ def _write(rows: list[dict[str, Any]], path: Path) -> dict[str, str]:
 
 
 def _print(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
-    """The same figures for people."""
+    """The same figures for people: a log's name, then its estimators."""
+    from rich import box
     from rich.console import Console
     from rich.table import Table
 
-    from flownav.compare.rows import HEADINGS, cells
+    from flownav.compare.rows import cells
 
     console = Console(markup=False, highlight=False)
-    table = Table(*HEADINGS, title="rms errors at the instants that all estimators of a log have")
-    for column in table.columns[3:]:
-        column.justify = "right"
+    table = Table(*SHORT, title=TITLE, box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    table.columns[0].overflow = "fold"
+    for column in table.columns[1:]:
+        column.justify, column.no_wrap = "right", True
     log = ""
     for row in rows:
-        name, *rest = cells(row)
-        if log and name != log:
+        name, estimator, against, *figures = cells(row)
+        if name != log:
             table.add_section()
-        table.add_row(name if name != log else "", *rest)
+            table.add_row(name if against == "-" else f"{name}, by {against}")
+        table.add_row(f"  {estimator}", *figures)
         log = name
     console.print(table)
     for name, place in written.items():

@@ -189,7 +189,8 @@ def test_lanes_that_accept_consider_and_the_others_keep_every_bit():
         pack(work, LANES, lane, STATES, p)
     seen, considered = [4, 9, 21], [9, 30]
     rows[OBSERVED, 0], rows[OBSERVED + 1 : OBSERVED + 4, 0] = 3, seen
-    rows[CONSIDERED, 0], rows[CONSIDERED + 1 : CONSIDERED + 3, 0] = 2, considered
+    rows[CONSIDERED, 0], rows[CONSIDERED + 1 : CONSIDERED + 5, 0] = 2, [9, 0, 30, MIDDLE]
+    rows[MIDDLE] = np.arange(wide) % 4 == 1  # the second is considered in every other lane of those that accept
     rows[NOISE], rows[INNOVATION], rows[OFFERED] = 0.5, 0.1, np.arange(wide) % 2
     before = work.copy().reshape(FILTER_ROWS, wide)
     fuse(work, LANES, STATES, 1e6)
@@ -202,11 +203,11 @@ def test_lanes_that_accept_consider_and_the_others_keep_every_bit():
         h[seen] = before[COEFFICIENT : COEFFICIENT + 3, lane]
         p = np.eye(N)
         p[:STATES, :STATES] = covariances[lane]
-        _, after = joseph(p, h, 0.5, considered)
+        left = considered if lane % 4 == 1 else considered[:1]
+        _, after = joseph(p, h, 0.5, left)
         assert np.allclose(unpack(work, LANES, lane, STATES), after[:STATES, :STATES], rtol=1e-12, atol=1e-13)
-        assert np.array_equal(
-            rows[[STATE + i for i in considered], lane], before[[STATE + i for i in considered], lane]
-        )
+        kept = [rows[STATE + i, lane] == before[STATE + i, lane] for i in considered]
+        assert kept == [True, lane % 4 == 1]
 
 
 def test_correct_alone_considers_too():
@@ -223,9 +224,13 @@ def test_correct_alone_considers_too():
 def test_a_flow_without_heading_considers_no_more_than_there_is_room_for():
     ours = Filter()
     consider_datum(ours.work, ONE_LANE, Equipment(True, False, NO_HEADING, False, -np.inf))
-    assert list(ours.rows(CONSIDERED, 3)) == [2, HEADING, GYRO_BIAS + 2]
+    assert list(ours.rows(CONSIDERED, 5)) == [2, HEADING, 0, GYRO_BIAS + 2, 0]
     consider_others(ours.work, ONE_LANE)
-    assert ours.work[CONSIDERED] <= MOST_CONSIDERED
+    assert ours.work[CONSIDERED] < MOST_CONSIDERED
+    consider_none(ours.work, ONE_LANE)
+    consider_datum(ours.work, ONE_LANE, Equipment(True, False, NO_HEADING, False, 10.0))  # sought from the course
+    consider_others(ours.work, ONE_LANE)
+    assert ours.work[CONSIDERED] < MOST_CONSIDERED
     consider_none(ours.work, ONE_LANE)
     consider_datum(ours.work, ONE_LANE, Equipment(False, True, NO_HEADING, False, -np.inf))  # an attitude tells it
     assert ours.work[CONSIDERED] == 0.0

@@ -163,9 +163,11 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
     if fused_lanes == 0:
         return
     for t in range(int(work[CONSIDERED * len(lanes)])):
-        considered = int(work[(CONSIDERED + 1 + t) * len(lanes)])
+        considered = int(work[(CONSIDERED + 1 + 2 * t) * len(lanes)])
+        where = int(work[(CONSIDERED + 2 + 2 * t) * len(lanes)])
         for lane in range(len(lanes)):
-            fused = work[ACCEPTED * len(lanes) + lane] > 0.0
+            here = where == 0 or work[where * len(lanes) + lane] > 0.0
+            fused = here and work[ACCEPTED * len(lanes) + lane] > 0.0
             before = work[(KEPT + t) * len(lanes) + lane]
             work[(KEPT + t) * len(lanes) + lane] = work[(STATE + considered) * len(lanes) + lane] if fused else before
     for i in range(n):
@@ -180,14 +182,16 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
             work[(REST + i) * len(lanes) + lane] = cross - 0.5 * gain * variance
             work[(STATE + i) * len(lanes) + lane] = before + gain * innovation if fused else before
     for t in range(int(work[CONSIDERED * len(lanes)])):
-        considered = int(work[(CONSIDERED + 1 + t) * len(lanes)])
+        considered = int(work[(CONSIDERED + 1 + 2 * t) * len(lanes)])
+        where = int(work[(CONSIDERED + 2 + 2 * t) * len(lanes)])
         for lane in range(len(lanes)):
-            fused = work[ACCEPTED * len(lanes) + lane] > 0.0
-            work[(GAIN + considered) * len(lanes) + lane] = 0.0
-            work[(REST + considered) * len(lanes) + lane] = (
-                work[(CROSS + considered) * len(lanes) + lane] if fused else 0.0
-            )
+            here = where == 0 or work[where * len(lanes) + lane] > 0.0
+            fused = here and work[ACCEPTED * len(lanes) + lane] > 0.0
+            gain, rest = work[(GAIN + considered) * len(lanes) + lane], work[(REST + considered) * len(lanes) + lane]
+            cross = work[(CROSS + considered) * len(lanes) + lane]
             state = work[(STATE + considered) * len(lanes) + lane]
+            work[(GAIN + considered) * len(lanes) + lane] = 0.0 if fused else gain
+            work[(REST + considered) * len(lanes) + lane] = cross if fused else rest
             work[(STATE + considered) * len(lanes) + lane] = work[(KEPT + t) * len(lanes) + lane] if fused else state
     for j in range(n):
         for i in range(j + 1):
@@ -199,12 +203,13 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
 
 
 @equation
-def consider(work: Work, lanes: Lanes, state: int) -> None:
+def consider(work: Work, lanes: Lanes, state: int, where: int = 0) -> None:
     """One more state that corrections leave as it is, until `consider_none`; nothing where CONSIDERS is 0, or beyond
-    MOST_CONSIDERED.
+    MOST_CONSIDERED. where: in lanes whose row of that number is above 0; 0: in all.
     """
     count = min(int(work[CONSIDERED * len(lanes)]), MOST_CONSIDERED - 1)
-    work[(CONSIDERED + 1 + count) * len(lanes)] = state
+    work[(CONSIDERED + 1 + 2 * count) * len(lanes)] = state
+    work[(CONSIDERED + 2 + 2 * count) * len(lanes)] = where
     work[CONSIDERED * len(lanes)] = count + work[CONSIDERS * len(lanes)]
 
 

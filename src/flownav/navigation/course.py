@@ -16,7 +16,7 @@ from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import ATTITUDE, QUATERNION
 from flownav.frames import quaternion_product
 from flownav.navigation.journal import reset_state
-from flownav.navigation.memory import COURSE_KNOWN, LENS_RANGE, TURNING, load_course, load_reading, store_course
+from flownav.navigation.memory import LENS_RANGE, SOUGHT, TURNING, load_course, load_reading, store_course
 from flownav.navigation.records import CourseMemory, Reading
 from flownav.navigation.tape import HEADING_FOUND, Output, write_event
 
@@ -66,7 +66,7 @@ def judge_course(m: CourseMemory) -> tuple[bool, float]:
 def note_flow_course(work: Work, lanes: Lanes, t_s: float, angular: bool) -> None:
     """The flow reading at hand, whose turning and range stand in their rows."""
     for lane in range(len(lanes)):
-        if work[COURSE_KNOWN * len(lanes) + lane] > 0.0:
+        if work[SOUGHT * len(lanes) + lane] == 0.0:
             continue
         reading = load_reading(work, lanes, lane)
         range_m = work[LENS_RANGE * len(lanes) + lane]
@@ -86,7 +86,7 @@ def find_heading(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
     """At a GPS velocity: where the way says how the heading errs, the heading and the velocity are turned by it."""
     for lane in range(len(lanes)):
         reading = load_reading(work, lanes, lane)
-        unknown = work[COURSE_KNOWN * len(lanes) + lane] == 0.0
+        unknown = work[SOUGHT * len(lanes) + lane] > 0.0
         heard = reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
         if not unknown or not heard or not np.isfinite(reading.value_0 + reading.value_1):
             continue
@@ -95,7 +95,7 @@ def find_heading(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
         found, error_rad = judge_course(m)
         if found:
             turn_heading(work, lanes, lane, error_rad, o)
-            work[COURSE_KNOWN * len(lanes) + lane] = 1.0
+            work[SOUGHT * len(lanes) + lane] = 0.0
             write_event(lanes, lane, t_s, HEADING_FOUND, error_rad, o)
 
 

@@ -40,11 +40,11 @@ from flownav.navigation.flow_noise import (
     lasting_walk,
 )
 from flownav.navigation.memory import (
-    COURSE_KNOWN,
     GPS_FUSED,
     INNOVATION_BEFORE,
     LENS_RANGE,
     REASON,
+    SOUGHT,
     TESTED,
     TURNING,
     load_flow,
@@ -206,7 +206,7 @@ def look(work: Work, lanes: Lanes, t_s: float, angular: bool, gyro_is_imu: bool,
         work[(TURNING + 1) * len(lanes) + lane] = y
         work[LENS_RANGE * len(lanes) + lane] = range_m
         verdict = judge_flow(reading, angular, x, y, started, view, s)
-        headed = verdict != FUSED or work[COURSE_KNOWN * len(lanes) + lane] > 0.0
+        headed = verdict != FUSED or work[SOUGHT * len(lanes) + lane] == 0.0
         work[TESTED * len(lanes) + lane] = verdict if headed else NO_HEADING
 
 

@@ -51,7 +51,7 @@ NOISE_FOLLOWED = _rows.take(8 * 3)  # `records.NoiseMemory` of range, barometer,
 WHITENESS = _rows.take(3 * len(WhitenessMemory._fields))  # forward, right, down
 ACCEL_FACTOR = _rows.take(3)  # how many times noisier than told the accelerometer is, by each of these
 COURSE = _rows.take(len(CourseMemory._fields))
-COURSE_KNOWN = _rows.take(1)  # 0 while a heading that no sensor reads is to be found
+SOUGHT = _rows.take(1)  # 1 while a heading that no sensor reads is to be found
 GPS_FUSED = _rows.take(1)  # when GPS last told north or east [s]
 STANDS = _rows.take(1)  # what the vehicle did in the last window: `still.MOVES`, SHAKEN or RESTS
 CONTACT = _rows.take(1)  # the range when it rested last [m]; NaN where it has not
@@ -112,7 +112,6 @@ _FRESH: dict[int, tuple[float, ...]] = {
     STILL_CLOCK: (-np.inf,),
     CONSIDERS: (1.0,),
     COURSE: CourseMemory(0.0, 0.0, 0.0, 0.0, 0.0, -np.inf, -np.inf, 0.0, 0.0),
-    COURSE_KNOWN: (1.0,),
     GPS_FUSED: (-np.inf,),
     CLOCK: (-np.inf,),
     WRITTEN: (-np.inf,),

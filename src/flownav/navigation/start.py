@@ -12,8 +12,8 @@ from flownav.frames import GRAVITY_M_S2, Quaternion, quaternion_from_euler, rota
 from flownav.measurement import Sensor
 from flownav.navigation.flow import start_lag
 from flownav.navigation.memory import (
-    COURSE_KNOWN,
     SCALE_DOUBT,
+    SOUGHT,
     STEADY_FORCE,
     load_aid,
     load_heading,
@@ -141,7 +141,7 @@ def start_lane(
     unknown = fitted.heading == NO_HEADING and lost and not read
     turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
     turned = UNKNOWN_RAD if unknown else turned
-    set_lane(work, lanes, COURSE_KNOWN, lane, 0.0 if unknown else 1.0)
+    set_lane(work, lanes, SOUGHT, lane, 1.0 if unknown else 0.0)
     turned = UNTOLD_HEADING_RAD if fitted.heading == FROM_YAW and not np.isfinite(field_rad) else turned
     spread = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M
     for i in range(3):  # of a motion before the start nothing is known

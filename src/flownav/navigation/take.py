@@ -27,9 +27,9 @@ from flownav.navigation.inertial import choose_motion, keep_imu, steady_force
 from flownav.navigation.journal import note_decay, note_estimate, note_prediction
 from flownav.navigation.memory import (
     CLOCK,
-    COURSE_KNOWN,
     ERRORS_CLOCK,
     MOVING,
+    SOUGHT,
     WRITTEN,
     load_start,
     share,
@@ -109,20 +109,19 @@ def watch_others(work: Work, lanes: Lanes, sensor: int) -> None:
 
 @equation
 def consider_datum(work: Work, lanes: Lanes, fitted: Equipment) -> None:
-    """A heading that nothing refers to the earth is a datum: only the gyro moves it, and only rest tells its bias. So
-    is one that is yet to be found from the course (by the first lane: all lanes hear the same sensors).
+    """A heading that nothing refers to the earth is a datum: only the gyro moves it, and only rest tells its bias. One
+    that is yet to be found from the course is one until then, and by it GPS would turn every push into tilt.
     """
-    no_fixes = not np.isfinite(fitted.deadline_s)
-    unknown = no_fixes or work[COURSE_KNOWN * len(lanes)] == 0.0
-    if fitted.heading == NO_HEADING and not fitted.use_attitude and unknown:
-        consider(work, lanes, ATTITUDE + 2)
-        consider(work, lanes, GYRO_BIAS + 2)
-        if not no_fixes:  # by a heading that may be any, GPS would turn every push into tilt
+    if fitted.heading == NO_HEADING and not fitted.use_attitude:
+        sought = SOUGHT if np.isfinite(fitted.deadline_s) else 0
+        consider(work, lanes, ATTITUDE + 2, sought)
+        consider(work, lanes, GYRO_BIAS + 2, sought)
+        if sought > 0:
             for i in range(2):
-                consider(work, lanes, ATTITUDE + i)
-                consider(work, lanes, GYRO_BIAS + i)
+                consider(work, lanes, ATTITUDE + i, sought)
+                consider(work, lanes, GYRO_BIAS + i, sought)
             for i in range(3):
-                consider(work, lanes, ACCEL_BIAS + i)
+                consider(work, lanes, ACCEL_BIAS + i, sought)
 
 
 @procedure

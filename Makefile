@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-slow fuzz mutants lint bench bench-once docs wheel wheel-test clean
+.PHONY: demo test test-slow fuzz mutants league lint bench bench-once docs wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr
@@ -20,6 +20,9 @@ fuzz: $(VENV)/.ready-test
 
 mutants: $(VENV)/.ready-test
 	$(BIN)/python tests/helpers/mutants.py $(PART)
+
+league: $(VENV)/.ready
+	$(BIN)/python tools/league.py $${FLOWNAV_DATA:-../shared/data} docs/league.md
 
 lint: $(VENV)/.ready-lint
 	$(BIN)/ruff check .

@@ -37,6 +37,7 @@ ALLOWED = {
     "simulation": GROUND | EQUATIONS | {"navigation"},
     "navigation": GROUND | EQUATIONS,
     "replay": GROUND | EQUATIONS | {"navigation", "logs", "scoring"},
+    "compare": GROUND | EQUATIONS | {"navigation", "logs", "replay", "scoring"},
     "live": GROUND | EQUATIONS | {"mavlink", "logs", "navigation", "replay"},
     "campaign": GROUND | EQUATIONS | {"simulation", "navigation", "scoring"},
     "faults": GROUND | EQUATIONS | {"logs", "simulation", "campaign", "scoring", "navigation", "replay"},

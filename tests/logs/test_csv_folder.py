@@ -69,7 +69,9 @@ def test_every_sensor_arrives_in_si_units_and_the_conventions_of_measurement(fol
     mgauss = [float(first[header.index(f"mag_{axis}_mgauss")]) for axis in "xyz"]
     assert log.streams[Sensor.MAG].value[0] == pytest.approx(np.array(mgauss) / 1000.0)
     assert log.span_s == pytest.approx((0.0, DURATION_S - 0.02))
-    assert set(log.inputs) == {f"{name}.csv" for name in FILES if name not in ("px4flow", "truth")}
+    assert set(log.inputs) == {
+        f"{name}.csv" for name in FILES if name not in ("px4flow", "landed", "truth", "heading_truth")
+    }
     assert all(len(digest) == 64 for digest in log.inputs.values())
 
 
@@ -106,6 +108,25 @@ def test_flow_without_a_gyro_is_flow_with_gyro_unknown(folder):
     keep = [header.index(name) for name in ("t_s", "flow_x_rad_s", "flow_y_rad_s", "quality")]
     put(folder / "flow.csv", [[row[i] for i in keep] for row in (header, *rows)])
     assert np.isnan(read_csv_folder(folder).streams[Sensor.FLOW_RATE].value[:, 2:]).all()
+
+
+def test_what_says_that_it_stands_and_where_its_nose_truly_was(folder):
+    write_table(folder / "landed.csv", {"t_s": np.array([0.0, 3.0, 29.0]), "landed": np.array([1.0, 0.0, 1.0])})
+    t_s = np.arange(0.0, 29.0, 0.5)
+    write_table(folder / "heading_truth.csv", {"t_s": t_s, "yaw_rad": 0.3 * t_s})
+    log = read_csv_folder(folder)
+    assert log.streams[Sensor.LANDED].value.tolist() == [[1.0], [0.0], [1.0]]  # however seldom, it is said in seconds
+    assert log.heading_truth["yaw_rad"] == pytest.approx(0.3 * t_s)
+    assert {"landed.csv", "heading_truth.csv"} <= set(log.inputs)
+
+
+def test_a_heading_in_degrees_and_a_landed_of_two_are_refused(folder):
+    t_s = np.arange(0.0, 29.0, 0.5)
+    write_table(folder / "heading_truth.csv", {"t_s": t_s, "yaw_rad": 90.0 + t_s})
+    assert "heading_truth.csv: yaw_rad" in complaint(folder)
+    (folder / "heading_truth.csv").unlink()
+    write_table(folder / "landed.csv", {"t_s": t_s, "landed": 2.0 + 0.0 * t_s})
+    assert "landed.csv: landed" in complaint(folder)
 
 
 def test_px4flow_gives_velocity_and_range_and_yields_to_flow(folder, tmp_path):

@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import typer
 from typer.testing import CliRunner
 
 from flownav.cli.replay import command
 from flownav.errors import InputError
-from flownav.record import Record
-from replay_logs import log_of_flight
+from flownav.record import POSITION_NED, QUATERNION, Record
+from replay_logs import log_of_flight, write_table
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +50,8 @@ def complaint(*arguments) -> str:
 
 def test_json_holds_the_promised_keys_and_nothing_else_is_printed(folder):
     facts = answer(folder, "--gps-outage", "15:25", "--gps-outage", "30:38")
-    assert set(facts) == {"duration_s", "outages", "velocity_rms_m_s", "rejected", "warnings", "record"}
+    assert set(facts) == {"duration_s", "outages", "velocity_rms_m_s", "end_drift_m", "consistency", "coverage",
+                          "rejected", "warnings", "record"}  # fmt: skip
     assert facts["warnings"] == []
     assert facts["duration_s"] == pytest.approx(39.98)
     assert [(o["t0"], o["t1"]) for o in facts["outages"]] == [(15.0, 25.0), (30.0, 38.0)]
@@ -58,6 +60,68 @@ def test_json_holds_the_promised_keys_and_nothing_else_is_printed(folder):
     assert facts["rejected"]["gps_position"]["outage"] == 3 * (50 + 40)
     assert facts["record"] == "out/garden.fnr"
     assert Record.load(Path(facts["record"])).manifest["command"][0] == "flownav"
+
+
+def test_every_sensor_says_when_it_spoke_and_whether_the_filter_knew_it(folder):
+    facts = answer(folder)
+    assert set(facts["coverage"]) == {"attitude", "imu", "gps_velocity", "gps_position", "flow_rate", "range", "baro",
+                                      "mag"}  # fmt: skip
+    assert facts["coverage"]["gps_position"] == pytest.approx({"t0": 0.0, "t1": 39.8})
+    assert set(facts["consistency"]) <= set(facts["coverage"]) - {"imu"}
+    for judged in facts["consistency"].values():
+        assert set(judged) == {"nis_per_dof", "samples", "white"}
+        assert judged["nis_per_dof"] > 0.0
+        assert judged["samples"] > 0
+        assert judged["white"] in (True, False)
+    assert facts["end_drift_m"] is None
+
+
+@pytest.fixture
+def hall(tmp_path) -> Path:
+    """The flight without GPS, with a truth of its own making: the replay's own path, turned by a radian and moved."""
+    flown = log_of_flight(40.0)
+    del flown.tables["gps"]
+    folder = flown.write(tmp_path / "hall")
+    answer(folder)
+    record = Record.load(Path("out/hall.fnr"))
+    t_s = record.tables["estimate"]["t_s"]
+    north, east, down = record.matrix("estimate", POSITION_NED).T
+    c, s = np.cos(1.0), np.sin(1.0)
+    columns = {"t_s": t_s, "x_m": c * north - s * east + 3.0, "y_m": s * north + c * east - 4.0, "z_m": down}
+    write_table(folder / "truth.csv", columns)
+    return folder
+
+
+def test_a_truth_tells_where_the_flight_ended(hall):
+    assert answer(hall)["end_drift_m"] == pytest.approx(0.0, abs=1e-6)  # turned onto it by least squares
+    record = Record.load(Path("out/hall.fnr"))
+    w, x, y, z = record.matrix("estimate", QUATERNION).T
+    yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    heading = {"t_s": record.tables["estimate"]["t_s"], "yaw_rad": yaw + 1.0}
+    write_table(hall / "heading_truth.csv", heading)
+    assert answer(hall)["end_drift_m"] == pytest.approx(0.0, abs=1e-6)
+    write_table(hall / "heading_truth.csv", heading | {"yaw_rad": yaw + 1.2})
+    position = record.matrix("estimate", POSITION_NED)
+    away = np.flatnonzero(abs(position[:, 2] - position[0, 2]) > 0.05)
+    way = np.hypot(*(position[away[-1]] - position[away[0]])[:2])
+    assert answer(hall)["end_drift_m"] == pytest.approx(2.0 * np.sin(0.1) * way, rel=1e-3)
+    told = call(hall, "--no-report")
+    assert "At the end of the flight" in told.stdout
+
+
+def test_a_sensor_that_falls_silent_is_a_warning_in_all_that_is_said(hall):
+    lines = (hall / "range.csv").read_text().splitlines()
+    (hall / "range.csv").write_text("\n".join(lines[:501]) + "\n")
+    said = "range ends at 24.9 s of 40.0 s"
+    assert answer(hall)["warnings"] == [said]
+    assert said in Record.load(Path("out/hall.fnr")).tables["events"]["detail"].tolist()
+    told = call(hall)
+    assert told.exception is None  # a warning is no bad verdict
+    assert f"Warning: {said}" in told.stdout
+    assert "Sensors and their innovations" in told.stdout
+    page = Path("out/hall.html").read_text()
+    assert said in page
+    assert "0.0 to 24.9" in page
 
 
 def test_the_outage_table_adds_its_median_and_worst(folder):

@@ -18,6 +18,7 @@ from flownav import files
 from flownav.cli import report as report_command
 from flownav.errors import InputError
 from flownav.record import Record
+from flownav.report import content
 from flownav.report.html import render, write_report
 from report_records import flight, replay
 
@@ -103,6 +104,24 @@ def test_scores_are_shown_as_the_record_carries_them_beside_the_papers() -> None
     text = Page(render(record)).text
     assert "v , right (m/s) \N{MINUS SIGN}7.1234 0.0069 8.2345 0.0446 9.3456 6.4567" in text
     assert "beside the paper's Table 6" in text
+
+
+def test_sensors_are_judged_in_words_and_the_drift_at_the_end_is_told() -> None:
+    record = replay()
+    record.manifest["scores"] |= {
+        "end_drift_m": 0.417,
+        "coverage": {"range": {"t0": 1.0, "t1": 31.25}, "imu": {"t0": 0.0, "t1": 60.0}},
+        "consistency": {"range": {"nis_per_dof": 2.5, "samples": 1234, "white": False}},
+    }
+    said = "optimistic: errors are larger than stated; coloured: errors last"
+    assert content.sensor_rows(record) == [
+        ("Rangefinder", "1.0 to 31.2", "1,234", "2.50", said),
+        ("IMU", "0.0 to 60.0", content.NONE, content.NONE, ""),
+    ]
+    page = render(record)
+    assert "coloured: errors last" in page
+    assert "0.417" in page
+    assert content.sensor_rows(Record()) == []
 
 
 def test_without_a_paper_table_the_scores_stand_alone() -> None:

@@ -15,15 +15,19 @@ from flownav.scoring.consistency import (
     anees,
     band_name,
     chi_square_band,
+    consistency_of,
     consistency_of_block,
     efficiency,
     efficiency_by_height,
     error_sums,
     inside_fraction,
     inside_steps,
+    is_white,
+    lag_one,
     largest_horizontal_error,
     percentile_with_interval,
     steps_in_flight,
+    verdict,
 )
 
 
@@ -158,3 +162,64 @@ def test_the_interval_covers_the_true_percentile_as_often_as_it_says():
         covered += low <= truth <= high
     assert covered / 2000 > 0.95 - 4.0 * np.sqrt(0.95 * 0.05 / 2000)
     assert covered / 2000 < 0.985
+
+
+# -- one flight, by its innovations ------------------------------------------------------------------------
+def lasting(count: int, share: float, seed: int = 3):
+    """Unit noise of which this share stays from one to the next."""
+    news = np.random.default_rng(seed).standard_normal(count)
+    out = news.copy()
+    for k in range(1, count):
+        out[k] = share * out[k - 1] + np.sqrt(1.0 - share**2) * news[k]
+    return out
+
+
+@pytest.mark.parametrize("share", [-0.6, 0.0, 0.3, 0.9])
+def test_autocorrelation_is_what_stays(share):
+    assert lag_one(lasting(50_000, share)) == pytest.approx(share, abs=0.02)
+    assert is_white(lasting(50_000, share)) == (share == 0.0)
+
+
+def test_little_colour_and_few_readings_are_white():
+    assert is_white(lasting(50_000, 0.15))
+    assert not is_white(lasting(50_000, 0.25))
+    assert is_white(np.ones(6))  # 5/6 of its power, but chance does that to six readings: within 2.58 / sqrt(6)
+    assert not is_white(np.ones(40))  # a bias is colour
+    assert is_white(np.zeros(0))
+    assert is_white(np.zeros(9))
+
+
+def test_chance_colours_one_white_sensor_in_a_hundred():
+    draw = np.random.default_rng(4)
+    white = sum(is_white(draw.standard_normal(50)) for _ in range(2000))
+    assert white / 2000 == pytest.approx(0.99, abs=0.008)
+
+
+def test_each_component_is_held_against_its_own_kind():
+    """Two white components by turns with means of different size would look coloured, or hide a coloured one."""
+    first, second = lasting(4000, 0.0), lasting(4000, 0.9, seed=8)
+    component = np.tile([0.0, 1.0], 4000)
+    both = np.column_stack([first, second]).ravel()
+    found = consistency_of(component, 2.0 * both, np.full(8000, 4.0))
+    assert found.samples == 8000
+    assert found.nis_per_dof == pytest.approx(1.0, abs=0.1)
+    assert not found.white
+    assert consistency_of(np.zeros(4000), first, np.ones(4000)).white
+
+
+def test_what_was_not_tested_does_not_count_and_may_leave_nothing():
+    assert consistency_of(np.zeros(2), np.array([np.nan, 1.0]), np.array([1.0, np.nan])) is None
+    assert consistency_of(np.zeros(3), np.array([2.0, 9.0, np.nan]), np.array([1.0, 0.0, 1.0])) == (4.0, 1, True)
+
+
+@pytest.mark.parametrize(("mean", "white", "said"), [
+    (1.0, True, "consistent"),
+    (0.51, True, "consistent"),
+    (1.99, True, "consistent"),
+    (0.49, True, "pessimistic: errors are smaller than stated"),
+    (2.01, True, "optimistic: errors are larger than stated"),
+    (1.0, False, "coloured: errors last"),
+    (0.1, False, "pessimistic: errors are smaller than stated; coloured: errors last"),
+])  # fmt: skip
+def test_the_verdict_in_words(mean, white, said):
+    assert verdict(mean, white=white) == said

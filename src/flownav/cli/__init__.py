@@ -8,6 +8,7 @@ import typer
 
 from flownav.cli import accuracy as accuracy
 from flownav.cli import bench as bench
+from flownav.cli import compare as compare
 from flownav.cli import export as export
 from flownav.cli import faults as faults
 from flownav.cli import flow as flow
@@ -34,6 +35,7 @@ app = typer.Typer(
 for name, command, what in (
     ("fly", fly.command, "Fly a take-off or landing in closed loop, scored beside the paper."),
     ("replay", replay.command, "Fuse a recorded flight; measure the drift without GPS."),
+    ("compare", compare.command, "Many logs, many settings, beside dead reckoning and the autopilot."),
     ("live", live.command, "Navigate a MAVLink vehicle in real time; send it the estimate."),
     ("info", info.command, "What a log holds: sensors, rates, gaps, signs, what it lacks."),
     ("identify", identify.command, "Identify a flow sensor from rig or flight logs; write its file."),

@@ -61,17 +61,17 @@ def command(
     from flownav.sensors.datasheet import load_sensor
     from flownav.sensors.identified import identified_flow
 
-    windows = tuple(_numbers("--gps-outage", text, ":", 2, "T0:T1") for text in gps_outage or [])
-    scale = _numbers("--flow-scale", flow_scale, ",", 2, "X,Y")
-    table = table_windows(*_numbers("--outage-table", outage_table, ":", 3, "T0:T1:LENGTH")) if outage_table else []
+    windows = tuple(numbers("--gps-outage", text, ":", 2, "T0:T1") for text in gps_outage or [])
+    scale = numbers("--flow-scale", flow_scale, ",", 2, "X,Y")
+    table = table_windows(*numbers("--outage-table", outage_table, ":", 3, "T0:T1:LENGTH")) if outage_table else []
     flow, stated = load_sensor(sensor) if sensor else None, _settings(settings) if settings else None
     told = settings_of(flow, stated=stated)
     outages = tuple((t0, t1) for t0, t1 in windows)
     identified = identified_flow(flow, told.lag_states) if flow else None
     options = ReplayOptions(gps_delay, outages, not no_flow, (scale[0], scale[1]), identified, told.noise)
     log = _read(folder, flow_instance)
-    options, numbers = as_fed(log, options, told.settings if flow or stated else None)
-    flown = replay(log, options, numbers, smoothed=smooth)
+    options, settled = as_fed(log, options, told.settings if flow or stated else None)
+    flown = replay(log, options, settled, smoothed=smooth)
     scores = flown.scores()
     if table:
         scores.update(_fly_table(flown, table, scores["outages"]))
@@ -86,18 +86,19 @@ def command(
         raise VerdictError(f"{folder}: {wrong[0]}")
 
 
-def _numbers(option: str, text: str, separator: str, count: int, form: str) -> tuple[float, ...]:
+def numbers(option: str, text: str, separator: str, count: int, form: str) -> tuple[float, ...]:
+    """An option's numbers; InputError where it has another form than it should."""
     from math import isfinite
 
     from flownav.errors import InputError
 
     try:
-        numbers = tuple(float(part) for part in text.split(separator))
+        found = tuple(float(part) for part in text.split(separator))
     except ValueError:
-        numbers = ()
-    if len(numbers) != count or not all(map(isfinite, numbers)):
+        found = ()
+    if len(found) != count or not all(map(isfinite, found)):
         raise InputError(f"{option} {text}: {form} is needed, numbers")
-    return numbers
+    return found
 
 
 def _read(path: Path, flow_instance: int | None) -> Any:
@@ -152,11 +153,14 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
             f"{truth['horizontal_rms_m']:.2f} m rms, {truth['horizontal_max_m']:.2f} m max; "
             f"velocity {truth['velocity_rms_m_s']:.3f} m/s rms"
         )
+    if scores["end_drift_m"] is not None:
+        console.print(f"At the end of the flight, truth laid on it at take-off: {scores['end_drift_m']:.2f} m off")
     if "smoothed" in scores:
         console.print(f"Smoothed over the whole flight: {_smoothed_errors(scores['smoothed'])}")
     if scores.get("autopilot", {}).get("against"):
         own = scores["autopilot"]
         console.print(f"The autopilot's own estimate ({own['name']}) {autopilot_errors(own)}")
+    console.print(_sensors(scores))
     rejected = Table("sensor", "reason", "rejected", title="Not fused")
     for sensor, counts in scores["rejected"].items():
         for reason, count in counts.items():
@@ -170,6 +174,21 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
     for name in ("record", "report"):
         if name in scores:
             console.print(f"{name.capitalize()}: {scores[name]}", soft_wrap=True)
+
+
+def _sensors(scores: dict[str, Any]) -> Any:
+    """When each sensor spoke, and whether the filter's innovations are as large as it states, and news."""
+    from rich.table import Table
+
+    from flownav.scoring.consistency import verdict
+
+    table = Table("sensor", "from, to [s]", "innovations", "NIS", "verdict", title="Sensors and their innovations")
+    for name in dict.fromkeys([*scores["coverage"], *scores["consistency"]]):
+        span, judged = scores["coverage"].get(name), scores["consistency"].get(name)
+        said = (str(judged["samples"]), _figure(judged["nis_per_dof"])) if judged else ("", "")
+        words = verdict(judged["nis_per_dof"], white=judged["white"]) if judged else ""
+        table.add_row(name, f"{span['t0']:.1f}, {span['t1']:.1f}" if span else "", *said, words)
+    return table
 
 
 def _smoothed_errors(scores: dict[str, Any]) -> str:

@@ -63,8 +63,11 @@ FILES: dict[str, tuple[Column, ...]] = {
     "range": (Column("range_m", -1.0, 200.0, METRES), Column("valid", 0, 1, "valid is 0 or 1")),
     "baro": (Column("alt_m", -1000.0, 20000.0, "metres of altitude are needed (pascal?)"),),
     "mag": tuple(Column(f"mag_{axis}_mgauss", -2e4, 2e4, "milligauss are needed (nanotesla?)") for axis in "xyz"),
+    "landed": (Column("landed", 0, 1, "landed is 0 or 1"),),
     "truth": tuple(Column(f"{axis}_m", -1e5, 1e5, METRES) for axis in "xyz"),
+    "heading_truth": (Column("yaw_rad", -10 * HALF_TURN, 10 * HALF_TURN, RADIANS),),  # may be counted on over turns
 }
+SELDOM = ("landed",)  # written when there is something to say
 
 
 def read_csv_folder(folder: Path) -> Log:
@@ -90,6 +93,7 @@ def read_csv_folder(folder: Path) -> Log:
         {f"{name}.csv": table.sha256 for name, table in tables.items()},
         tuple(note for table in tables.values() for note in table.notes),
         absences=tuple(absences_of(streams)),
+        heading_truth=_heading_truth(tables["heading_truth"]) if "heading_truth" in tables else None,
     )
 
 
@@ -103,12 +107,16 @@ def _tables(folder: Path) -> dict[str, CsvTable]:
         lacking += [] if aided else ["one of gps.csv, flow.csv, px4flow.csv"]
         raise InputError(
             f"{folder}: {' and '.join(lacking)} missing; a replay needs attitude.csv or imu.csv (of 20 Hz), and "
-            "gps.csv or flow.csv (or px4flow.csv); range.csv (flow's height), baro.csv, mag.csv and truth.csv are used "
-            "where present"
+            "gps.csv or flow.csv (or px4flow.csv); range.csv (flow's height), baro.csv, mag.csv, landed.csv, truth.csv "
+            "and heading_truth.csv are used where present"
         )
     if "flow" in present:
         present -= {"px4flow"}  # the same sensor again, in its other message
-    return {name: read_csv_table(folder / f"{name}.csv", FILES[name]) for name in FILES if name in present}
+    return {
+        name: read_csv_table(folder / f"{name}.csv", FILES[name], seldom=name in SELDOM)
+        for name in FILES
+        if name in present
+    }
 
 
 def _check_overlap(folder: Path, tables: dict[str, CsvTable]) -> None:
@@ -177,9 +185,17 @@ def _mag(table: CsvTable) -> list[Stream]:
     return [Stream.of(Sensor.MAG, table.t_s, field, rejected=table.rejected)]
 
 
+def _landed(table: CsvTable) -> list[Stream]:
+    return [Stream.of(Sensor.LANDED, table.t_s, table.matrix("landed"), rejected=table.rejected)]
+
+
 def _truth(table: CsvTable) -> dict[str, Array]:
     names = {"pos_n_m": "x_m", "pos_e_m": "y_m", "pos_d_m": "z_m"}
     return {"t_s": table.t_s, **{name: table.columns[column] for name, column in names.items()}}
+
+
+def _heading_truth(table: CsvTable) -> dict[str, Array]:
+    return {"t_s": table.t_s, "yaw_rad": table.columns["yaw_rad"]}
 
 
 CONVERTERS: dict[str, Callable[[CsvTable], list[Stream]]] = {
@@ -191,4 +207,5 @@ CONVERTERS: dict[str, Callable[[CsvTable], list[Stream]]] = {
     "range": _range,
     "baro": _baro,
     "mag": _mag,
+    "landed": _landed,
 }

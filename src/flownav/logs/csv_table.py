@@ -43,8 +43,11 @@ class CsvTable(Rows):
     notes: list[str] = field(default_factory=list)
 
 
-def read_csv_table(path: Path, columns: Sequence[Column]) -> CsvTable:
-    """Read and check one file. InputError where it cannot be read, lacks a column or cannot be in the units."""
+def read_csv_table(path: Path, columns: Sequence[Column], *, seldom: bool = False) -> CsvTable:
+    """Read and check one file. InputError where it cannot be read, lacks a column or cannot be in the units.
+
+    seldom: rows stand where something happened, however far apart.
+    """
     content = _content(path)
     malformed: list[int] = []
     raw = _parse(path, content, [column.name for column in columns], malformed)
@@ -57,7 +60,8 @@ def read_csv_table(path: Path, columns: Sequence[Column]) -> CsvTable:
     check_finite(table, columns)
     _check_limits(table, columns)
     check_clock(table)
-    _check_step(table)
+    if not seldom:
+        _check_step(table)
     if not len(table.t_s):
         reasons = ", ".join(f"{count} {reason}" for reason, count in table.rejected.items()) or "it is empty"
         raise InputError(f"{path}: no usable row ({reasons})")

@@ -33,6 +33,7 @@ class Log:
     where the log does not say.
     origin_deg_m: latitude, longitude [deg] and altitude [m] of the local frame's origin; None without GPS.
     truth: an external reference, columns as record.TABLES["truth"]; its frame may be turned in yaw.
+    heading_truth: the vehicle's heading in the truth's frame, columns t_s and yaw_rad, where it came apart from it.
     inputs: SHA-256 of each file read, by name. notes: what a reader would tell the user, one line each.
     autopilot: what the vehicle's own estimator said, columns as record.TABLES["autopilot"], and its name.
     fed: of a live session, what its filter was fed, in order, navigator by navigator; fed_settings: the filter's
@@ -54,6 +55,7 @@ class Log:
     clock_start_s: float | None = None
     fed: tuple[FedSegment, ...] = ()
     fed_settings: dict[str, Any] = field(default_factory=dict)
+    heading_truth: Table | None = None
 
     @property
     def span_s(self) -> tuple[float, float]:

@@ -19,13 +19,15 @@ from flownav.navigation.feed import SLOWEST_IMU_HZ, equipment_of
 from flownav.navigation.loop import run, start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import smooth
-from flownav.navigation.tables import Written, written_on
+from flownav.navigation.tables import Written, estimate_table, written_on
 from flownav.navigation.tape import new_tape
 from flownav.replay.autopilot import autopilot_scores
 from flownav.replay.fed import prepared_as_fed, run_as_fed
+from flownav.replay.judged import consistency_scores, coverage_scores, end_drift_of, motion_of
 from flownav.replay.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replay.sentinel import Finding, findings
 from flownav.scoring.alignment import Alignment, align, velocity_of
+from flownav.scoring.coverage import silences
 from flownav.scoring.outage import OutageError, difference_at, horizontal_rms, outage_error
 
 NO_REJECTION = (Reason.FUSED, Reason.DATUM)
@@ -65,7 +67,7 @@ class Replay:
             what = "horizontal was fused" if len(fused) else "was fused"
             text = f"nothing {what}: the path is dead reckoning on attitude and accelerometer alone"
             found.append(Finding(text, label="Note"))
-        return found
+        return found + [Finding(text) for text in silences(self.log.streams, self.log.span_s)]
 
     @cached_property
     def truth_alignment(self) -> Alignment | None:
@@ -131,12 +133,19 @@ class Replay:
             "velocity_rms_m_s": horizontal_rms(self.estimate[:, 0], self.estimate[:, 17:19], t_s, velocity[:, :2]),
         }
 
+    def end_drift(self) -> float | None:
+        """Horizontal error at the end of the flight, the truth laid on the estimate at take-off [m]; None without."""
+        return end_drift_of(self.log, motion_of(estimate_table(self.estimate)))
+
     def scores(self) -> dict[str, Any]:
         """What `--json` prints, but for the outage table and the record's path."""
         start, end = self.log.span_s
         scores: dict[str, Any] = {
             "duration_s": end - start,
             **self.path_scores(),
+            "end_drift_m": self.end_drift(),
+            "consistency": consistency_scores(self.innovation),
+            "coverage": coverage_scores(self.log),
             "rejected": self.rejected(),
             "warnings": [finding.text for finding in self.findings],
         }
@@ -199,17 +208,19 @@ def outage_table(
     return errors
 
 
-def table_windows(t0: float, t1: float, length_s: float) -> list[tuple[float, float]]:
+def table_windows(
+    t0: float, t1: float, length_s: float, *, option: str = "--outage-table"
+) -> list[tuple[float, float]]:
     """[t0, t0 + length), ... up to t1, the last one shorter where t1 asks for it.
 
-    InputError where that is no list of windows.
+    InputError where that is no list of windows; `option` asked for it.
     """
     if not (t0 < t1 and length_s > 0.0 and np.isfinite([t0, t1, length_s]).all()):
-        raise InputError(f"--outage-table {t0:g}:{t1:g}:{length_s:g}: T0:T1:LENGTH is needed, seconds, T0 before T1")
+        raise InputError(f"{option} {t0:g}:{t1:g}:{length_s:g}: T0:T1:LENGTH is needed, seconds, T0 before T1")
     count = int(np.floor((t1 - t0) / length_s + 1e-9))
     if not 1 <= count <= LONGEST_TABLE:
         raise InputError(
-            f"--outage-table {t0:g}:{t1:g}:{length_s:g}: that is {count} windows; 1 to {LONGEST_TABLE} can be flown"
+            f"{option} {t0:g}:{t1:g}:{length_s:g}: that is {count} windows; 1 to {LONGEST_TABLE} can be flown"
         )
     whole = [(t0 + k * length_s, t0 + (k + 1) * length_s) for k in range(count)]
     return whole if t1 - whole[-1][1] < LEAST_WINDOW_S else [*whole, (whole[-1][1], t1)]

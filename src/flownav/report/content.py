@@ -27,6 +27,7 @@ from flownav.report.series import (
     scored_outages,
     start_end_s,
 )
+from flownav.scoring.consistency import verdict
 
 EVENTS_LISTED = 300
 NONE, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
@@ -121,6 +122,8 @@ def summary(record: Record) -> str:
         said.append(
             f"Against the recorded truth its position is off by {rms} m rms, {largest} m at most, horizontally."
         )
+    if scores.get("end_drift_m") is not None:
+        said.append(f"Laid on each other at take-off, the two end {metres(scores['end_drift_m'])} m apart.")
     own = mapping(scores.get("autopilot"))
     if own.get("against"):
         rms, largest = number(own.get("horizontal_rms_m"), 2), number(own.get("horizontal_max_m"), 2)
@@ -158,6 +161,10 @@ def tiles(record: Record) -> list[Tile]:
     if truth:
         largest = f"at most {number(truth.get('horizontal_max_m'), 2)} m"
         found.append(Tile("Horizontal error", number(truth.get("horizontal_rms_m"), 2), "m", f"rms, {largest}"))
+    if scores.get("end_drift_m") is not None:
+        found.append(
+            Tile("Drift at the end", metres(scores["end_drift_m"]), "m", "horizontal, truth laid on at take-off")
+        )
     if scores.get("velocity_rms_m_s") is not None:
         found.append(Tile("Velocity error", number(scores["velocity_rms_m_s"], 2), "m/s", "rms, against GPS"))
     share = flow_share(record)
@@ -242,6 +249,22 @@ def rejected_rows(record: Record) -> list[tuple[str, str, str]]:
     rows = [(sensor, reason, count) for sensor, reasons in counts.items() for reason, count in mapping(reasons).items()]
     rows.sort(key=lambda row: -float(row[2]))
     return [(SENSOR_TITLES.get(s, s.replace("_", " ")), r.replace("_", " "), f"{c:,}") for s, r, c in rows]
+
+
+def sensor_rows(record: Record) -> list[tuple[str, str, str, str, str]]:
+    """Sensors as (name, from and to in seconds, innovations tested, their mean square per component, verdict)."""
+    scores = mapping(record.manifest.get("scores"))
+    spans, judged = mapping(scores.get("coverage")), mapping(scores.get("consistency"))
+    rows = []
+    for name in dict.fromkeys([*spans, *judged]):
+        span, found = mapping(spans.get(name)), mapping(judged.get(name))
+        heard = f"{number(span.get('t0'), 1)} to {number(span.get('t1'), 1)}" if span else NONE
+        mean, tested, said = NONE, NONE, ""
+        if found:
+            mean, tested = number(found.get("nis_per_dof"), 2), f"{found.get('samples') or 0:,}"
+            said = verdict(float(found.get("nis_per_dof") or 0.0), white=bool(found.get("white")))
+        rows.append((SENSOR_TITLES.get(name, name.replace("_", " ")), heard, tested, mean, said))
+    return rows
 
 
 @dataclass(frozen=True)

@@ -88,6 +88,7 @@ def render(record: Record) -> str:
         scores=content.score_rows(record),
         flown=has(record, "flown"),
         outages=content.outage_rows(record),
+        sensors=content.sensor_rows(record),
         rejected=content.rejected_rows(record),
         sections=shown,
         thinned=_thinned(record),

@@ -1,8 +1,9 @@
-"""Consistency of a filter over many flights: does it know how wrong it is, and is it as good as its own model allows.
+"""Consistency of a filter: does it know how wrong it is, and is it as good as its own model allows.
 
-Everything is over steps in flight, those without skid contact, from the filter's start on. At rest on the ground a
-filter is told that it does not move, a pseudo-measurement whose stated sigma is a guess: its errors there are none of a
-flying vehicle's.
+Of one flight by its innovations (`consistency_of`): are they as large as it states, and is each one news. Of many
+flights by their errors from a known truth. Those are over steps in flight, those without skid contact, from the
+filter's start on: at rest on the ground a filter is told that it does not move, a pseudo-measurement whose stated sigma
+is a guess, and its errors there are none of a flying vehicle's.
 
 Sums, not flights, are kept: memory does not grow with the number of flights.
 """
@@ -11,11 +12,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flownav.scoring.errors import STATES
+from flownav.scoring.nis import nis_of
 
 Array = NDArray[np.float64]
 
@@ -23,6 +26,9 @@ SCORED = 6  # position and velocity, the degrees of freedom of a normalised erro
 GROUP_FLIGHTS = 96  # flights whose mean is held against the band: the test is as sharp however many are flown
 BAND = 0.95  # probability of the chi-square band
 AIRBORNE_SHARE = 0.9  # of the flights without contact: the step is one in flight
+SURE_99 = 2.5758293035489004  # standard deviations of a normal distribution that hold 99 % of it
+LITTLE_COLOUR = 0.2  # an autocorrelation that does no harm, however many readings prove that it is there
+MODEST = (0.5, 2.0)  # mean squares within which the stated errors are of the right size: a factor of 1.4 in the errors
 LEAST_SHARE = 0.01  # of the steps in flight: a height band with fewer says nothing
 HEIGHTS_M = (0.0, 0.3, 1.0, 3.5, np.inf)  # of the skids: between them lie the height bands
 
@@ -89,7 +95,56 @@ def consistency_of_block(error: Array, nees: Array, height_m: Array, on_ground: 
     return ConsistencySums(nees.shape[1], nees.sum(axis=1), running.sum(axis=1), airborne.sum(axis=1), errors)
 
 
-# -- consistency ------------------------------------------------------------------------------------------
+# -- one flight, by its innovations -----------------------------------------------------------------------
+class InnovationConsistency(NamedTuple):
+    """Of one sensor in one flight: the mean normalised innovation squared of its tested components (1 where the filter
+    states its errors rightly), how many were tested, and whether each one is news, unlike the one before."""
+
+    nis_per_dof: float
+    samples: int
+    white: bool
+
+
+def consistency_of(component: Array, innovation: Array, variance: Array) -> InnovationConsistency | None:
+    """Of one sensor's tested components in order of time, (n,) each; None where none was tested.
+
+    component: which of the sensor's values; each is held against the one before of its own kind. variance: of the
+    innovation, in its unit squared.
+    """
+    found = nis_of(innovation, variance)
+    if found is None:
+        return None
+    known = np.isfinite(innovation) & np.isfinite(variance) & (variance > 0.0)
+    normal, kind = innovation[known] / np.sqrt(variance[known]), component[known]
+    white = all(is_white(normal[kind == one]) for one in np.unique(kind))
+    return InnovationConsistency(found.mean, found.tested, white)
+
+
+def is_white(normalised: Array) -> bool:
+    """Whether normalised innovations (n,) tell no more of the next than chance would, or too little to matter."""
+    band = SURE_99 / np.sqrt(max(len(normalised), 1))
+    return bool(abs(lag_one(normalised)) <= max(band, LITTLE_COLOUR))
+
+
+def lag_one(normalised: Array) -> float:
+    """Autocorrelation of neighbours about zero, -1 to 1: an innovation's mean is zero, and a bias is colour too."""
+    power = float(np.sum(normalised**2))
+    return float(np.sum(normalised[1:] * normalised[:-1])) / power if power > 0.0 else 0.0
+
+
+def verdict(nis_per_dof: float, *, white: bool) -> str:
+    """What a sensor's innovations say of the filter, in words."""
+    said = []
+    if nis_per_dof < MODEST[0]:
+        said.append("pessimistic: errors are smaller than stated")
+    if nis_per_dof > MODEST[1]:
+        said.append("optimistic: errors are larger than stated")
+    if not white:
+        said.append("coloured: errors last")
+    return "; ".join(said) or "consistent"
+
+
+# -- many flights, by their errors -----------------------------------------------------------------------
 def chi_square_band(flights: int, probability: float = BAND) -> tuple[float, float]:
     """Where the mean normalised error squared of `flights` independent flights lies with this probability.
 

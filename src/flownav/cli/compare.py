@@ -1,0 +1,133 @@
+"""`flownav compare`: many logs, many settings, and what else could have navigated."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from flownav.compare.job import Setting
+
+DEFAULT = "default"
+SHORT = ("", "place\n[m]", "flying\n[m]", "speed\n[m/s]", "flying\n[m/s]", "end\n[m]", "cut [m]\nmedian", "worst")
+TITLE = "rms errors where all estimators of a log have rows; end drift; GPS cuts"
+
+
+def command(
+    logs: Annotated[
+        list[Path], typer.Argument(help="Logs: CSV folders, .ulg, .bin, .tlog, live .fnr.", show_default=False)
+    ],
+    settings: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--with", metavar="FILE", help=f"TOML of filter settings, or `{DEFAULT}`; may be repeated.",
+            show_default=False,
+        ),
+    ] = None,
+    sensor: Annotated[
+        Path | None, typer.Option("--sensor", help="A flow sensor file: its gains and latency correct the flow.")
+    ] = None,
+    outages: Annotated[
+        str | None,
+        typer.Option("--outages", metavar="T0:T1:LENGTH", help="GPS cuts; whole minutes of the flight where unsaid."),
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", help="The comparison as one HTML page.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:  # fmt: skip
+    """Score every log by every setting, beside dead reckoning on its flow and its autopilot's own estimate."""
+    from flownav.cli.output import progress, require_writable
+    from flownav.cli.replay import numbers
+    from flownav.compare.job import compare_log, windows_of
+    from flownav.compare.rows import names_of
+    from flownav.errors import InputError
+    from flownav.logs.open_log import open_flight
+    from flownav.measurement import Sensor
+    from flownav.replay.session import table_windows
+
+    option = f"--outages {outages}"
+    asked = table_windows(*numbers("--outages", outages, ":", 3, "T0:T1:LENGTH"), option="--outages") if outages else []
+    chosen = settings_asked(settings or [DEFAULT], sensor)
+    if out is not None:
+        require_writable(out)
+    flights = [open_flight(path) for path in logs]
+    if asked and not any(Sensor.GPS_POSITION in log.streams for log in flights):
+        raise InputError(f"{option}: none of the logs has GPS to cut; leave it out")
+    windows = [windows_of(log, asked, option) for log in flights]
+    rows: list[dict[str, Any]] = []
+    with progress("replays", sum(len(chosen) * (len(cuts) + 1) for cuts in windows)) as advance:
+        for name, log, cuts in zip(names_of(logs), flights, windows, strict=True):
+            rows += compare_log(name, log, chosen, cuts, advance)
+    written = {} if out is None else _write(rows, out)
+    if as_json:
+        typer.echo(json.dumps({"rows": rows, **written}))
+    else:
+        _print(rows, written)
+
+
+def settings_asked(asked: list[str], sensor: Path | None) -> list[Setting]:
+    """Each `--with` as what a replay takes; InputError where a file is not right, or one is named twice."""
+    from flownav.compare.job import Setting
+    from flownav.compare.rows import names_of
+    from flownav.errors import InputError
+    from flownav.navigation.settings import NavigatorSettingsFile
+    from flownav.navigation.settings_of import settings_of
+    from flownav.parameter_files import load
+    from flownav.replay.prepare import ReplayOptions
+    from flownav.sensors.datasheet import load_sensor
+    from flownav.sensors.identified import identified_flow
+
+    twice = sorted({name for name in asked if asked.count(name) > 1})
+    if twice:
+        raise InputError(f"--with {twice[0]}: named twice; once is enough")
+    flow = load_sensor(sensor) if sensor else None
+    names = dict(zip(asked, names_of([Path(name) for name in asked]), strict=True))
+    found = []
+    for text in asked:
+        stated = None if text == DEFAULT else load(Path(text), NavigatorSettingsFile)
+        told = settings_of(flow, stated=stated)
+        identified = identified_flow(flow, told.lag_states) if flow else None
+        options = ReplayOptions(identified=identified, flow_noise=told.noise)
+        found.append(Setting(names[text], options, told.settings if flow or stated else None))
+    return found
+
+
+def _write(rows: list[dict[str, Any]], path: Path) -> dict[str, str]:
+    """The page; where it lies. InputError where it cannot."""
+    from flownav.compare.rows import HEADINGS, cells
+    from flownav.errors import InputError
+    from flownav.report.comparison import write_comparison
+
+    try:
+        write_comparison(HEADINGS, [cells(row) for row in rows], rows, path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
+    return {"page": str(path)}
+
+
+def _print(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
+    """The same figures for people: a log's name, then its estimators."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    from flownav.compare.rows import cells
+
+    console = Console(markup=False, highlight=False)
+    table = Table(*SHORT, title=TITLE, box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    table.columns[0].overflow = "fold"
+    for column in table.columns[1:]:
+        column.justify, column.no_wrap = "right", True
+    log = ""
+    for row in rows:
+        name, estimator, against, *figures = cells(row)
+        if name != log:
+            table.add_section()
+            table.add_row(name if against == "-" else f"{name}, by {against}")
+        table.add_row(f"  {estimator}", *figures)
+        log = name
+    console.print(table)
+    for name, place in written.items():
+        console.print(f"{name.capitalize()}: {place}", soft_wrap=True)

@@ -1,0 +1,1 @@
+"""Comparison: many logs, many settings, and what else could have navigated, all scored alike."""

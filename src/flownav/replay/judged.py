@@ -1,0 +1,63 @@
+"""What a replay says of itself besides its errors: innovations, coverage of the sensors, where the path ended."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flownav.estimation.gating import Reason
+from flownav.logs.log import Log
+from flownav.measurement import Array, Sensor
+from flownav.record import POSITION_NED, QUATERNION, Table
+from flownav.scoring.consistency import consistency_of
+from flownav.scoring.coverage import coverage_of
+from flownav.scoring.drift import Motion, end_drift
+
+TESTED = (Reason.FUSED, Reason.INNOVATION_GATE)
+
+
+def consistency_scores(innovation: Array) -> dict[str, dict[str, Any]]:
+    """By sensor, of the components that were held against their prediction; innovation (m, tape.OFFERS)."""
+    tested = innovation[np.isin(innovation[:, 8], TESTED)]
+    found = {}
+    for sensor in Sensor:
+        _, _, component, _, _, news, variance, _, _ = tested[tested[:, 1] == sensor].T
+        judged = consistency_of(component, news, variance)
+        if judged is not None:
+            found[sensor.name.lower()] = judged._asdict()
+    return found
+
+
+def coverage_scores(log: Log) -> dict[str, dict[str, float]]:
+    """By stream, its first and last reading [s]."""
+    return {name: {"t0": first, "t1": last} for name, (first, last) in coverage_of(log.streams).items()}
+
+
+def end_drift_of(log: Log, estimate: Motion) -> float | None:
+    """Where an estimate of this log's flight ended, off the log's truth [m]; None without one."""
+    return None if log.truth is None else end_drift(estimate, truth_motion(log.truth, log.heading_truth))
+
+
+def truth_motion(truth: Table, heading: Table | None) -> Motion:
+    """A truth with its headings: those measured apart, else those of its attitude, else none."""
+    t_s, position = np.asarray(truth["t_s"], float), columns_of(truth, POSITION_NED)
+    if heading is not None:
+        return Motion(t_s, position, np.asarray(heading["t_s"], float), np.asarray(heading["yaw_rad"], float))
+    return motion_of(truth)
+
+
+def motion_of(table: Table) -> Motion:
+    """The path in a table of a record, with the headings of its attitude where it has one."""
+    t_s, position = np.asarray(table["t_s"], float), columns_of(table, POSITION_NED)
+    if not set(QUATERNION) <= table.keys():
+        return Motion(t_s, position, np.zeros(0), np.zeros(0))
+    w, x, y, z = columns_of(table, QUATERNION).T
+    heading = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+    known = np.isfinite(heading)
+    return Motion(t_s, position, t_s[known], heading[known])
+
+
+def columns_of(table: Table, names: tuple[str, ...]) -> Array:
+    """Columns of a table side by side, (n, len(names))."""
+    return np.column_stack([np.asarray(table[name], float) for name in names])

@@ -108,7 +108,6 @@ def test_one_that_reads_3_too_much_along_the_vertical_leaves_the_height_by_the_r
     assert len(flown.events("imu", "doubted")) == 0
 
 
-@pytest.mark.xfail(strict=True, reason="flow that is refused frees no velocity: it runs off for seconds, or for good")
 def test_an_accelerometer_that_reads_3_too_much_at_once_does_not_carry_the_position_off():
     assert np.abs(lying(0, 1e-9).error[:, :2]).max() < 5.0
 
@@ -147,7 +146,6 @@ def test_a_refused_range_does_not_keep_the_flow_waiting():
     assert np.abs(flown.error[:, :2]).max() < 1.0
 
 
-@pytest.mark.xfail(strict=True, reason="refused ranges are alike, and raise the accelerometer's noise until they pass")
 def test_echoes_that_are_refused_do_not_move_the_height():
     flown = echoing(1.2)
     assert np.abs(flown.error[:, 2] - flown.error[0, 2]).max() < 0.3

@@ -188,9 +188,6 @@ def test_open_windows_know_nothing():
     assert (load_imu_window(fresh, ONE_LANE, 0), load_seen_window(fresh, ONE_LANE, 0)) == (EMPTY, UNSEEN)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="a range of 0, as many sensors say of nothing, is one at contact, and times flow"
-)
 def test_a_range_of_nothing_is_no_contact():
     """A flight beyond the range of its sensor, which says 0, with 1 rad/s of flow: nothing says that it stands."""
     work = watched(watch_range, reading(0.0))

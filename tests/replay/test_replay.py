@@ -159,7 +159,11 @@ def test_range_spikes_and_gaps_are_ridden_out(log, flight):
                        quality=stream.quality[keep])  # fmt: skip
     run = flown(hurt, gps_outages_s=CUT)
     assert np.abs(error_of(run, flight))[:, :2].max() < 0.15
-    assert reasons(run, Sensor.RANGE)["innovation_gate"] >= 0.8 * np.count_nonzero(spikes & keep)
+    assert np.abs(error_of(run, flight))[run.estimate[:, 0] > 4.0, 2].max() < 0.03
+    assert len(run.written.event[run.written.event[:, 1] == 2]) == 0  # no new ground
+    rows = run.innovation[run.innovation[:, 1] == Sensor.RANGE]
+    far = rows[(np.abs(rows[:, 5]) > 1.0) & (rows[:, 8] == Reason.FUSED)]
+    assert np.all(np.abs(far[:, 5]) < 0.3 * np.sqrt(far[:, 6]))  # what is not refused weighs next to nothing
 
 
 def test_flow_spikes_and_lost_flow_are_ridden_out(log, flight):
@@ -170,7 +174,7 @@ def test_flow_spikes_and_lost_flow_are_ridden_out(log, flight):
     value[spikes, :2] += random.normal(0, 4.0, (np.count_nonzero(spikes), 2))
     quality[random.random(len(stream)) < 0.3] = 0.0
     run = flown(with_stream(log, Sensor.FLOW_RATE, value=value, quality=quality), gps_outages_s=CUT)
-    assert np.abs(error_of(run, flight))[:, :2].max() < 1.0
+    assert np.abs(error_of(run, flight))[:, :2].max() < 0.3
     assert reasons(run, Sensor.FLOW_RATE)["no_data"] > 500
 
 
@@ -220,7 +224,7 @@ def test_a_step_of_the_ground_becomes_a_new_datum(log, flight):
     events = run.written.event
     resets = events[(events[:, 1] == 2) & (events[:, 0] > 29)]
     assert len(resets) == 1
-    assert 30.9 < resets[0, 0] < 31.3
+    assert resets[0, 0] == pytest.approx(31.5, abs=0.06)  # nine may be strays, then it is refused for a second
     assert np.abs(error_of(run, flight))[:, 2].max() < 0.15
 
 

@@ -269,18 +269,18 @@ def learn(work: Work, lanes: Lanes, t_s: float, angular: bool, component: int, s
             square = smaller(innovation * innovation, s.gate_sigma * s.gate_sigma * total) / total
             ratio = followed_agreement(square, t_s, m)
             unheld = t_s - work[GPS_FUSED * len(lanes) + lane] > UNHELD_S
-            if refused and ratio > DOUBTED_RATIO and unheld:
-                free_velocity(work, lanes, lane, innovation, angular)
+            last = INNOVATION_BEFORE + component
+            before = work[last * len(lanes) + lane]
+            work[last * len(lanes) + lane] = innovation
+            if refused and ratio > DOUBTED_RATIO and unheld and innovation * before > 0.0:  # spikes are not alike
+                free_velocity(work, lanes, lane, smaller(abs(innovation), abs(before)), angular)
             listed = reading.variance_0 if component == 0 else (
                 reading.variance_1 if component == 1 else reading.variance_2
             )  # fmt: skip
             excess = m.excess
             if angular or not np.isfinite(listed):
                 noise = work[NOISE * len(lanes) + lane]
-                last = INNOVATION_BEFORE + component
-                before = work[last * len(lanes) + lane]
                 excess = followed_excess(innovation, before, noise, t_s, m, s)
-                work[last * len(lanes) + lane] = innovation
             store_flow(
                 work, lanes, lane, FlowMemory(m.taken_s, excess, m.bias_x, m.bias_y, m.bias_count, ratio, m.doubted)
             )

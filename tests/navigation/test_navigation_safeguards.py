@@ -246,6 +246,7 @@ def test_every_reason_has_its_case(hover):
     look(stuck())
     look(navigate(fly(lambda t: 0.02 * still(t), 3.0)))
     look(navigate(hover.without(Sensor.RANGE)))
+    look(navigate(fly(circle, 10.0).without(Sensor.ATTITUDE, Sensor.MAG)))
     look(navigate(fly(still, 3.0).without(Sensor.IMU, Sensor.ATTITUDE)))
     imu = hover.streams[Sensor.IMU]
     rolled = imu.value + np.where((imu.t_s >= 10.0)[:, None] & (imu.t_s < 11.0)[:, None], [1.0, 0, 0, 0, 0, 0], 0.0)
@@ -283,7 +284,8 @@ def test_every_event_has_its_case(hover):
     spiked = navigate(hover.changed(Sensor.IMU, value=hit))
     standing = navigate(fly(lambda t: 0.02 * still(t), 3.0))
     runs = (spiked, standing, jumping(hover), blind(hover), stuck(), over_a_step(hover), navigate(pad), navigate(alone),
-            navigate(fly(circle, 10.0).cut(Sensor.IMU, 5.0, 6.0)))  # fmt: skip
+            navigate(fly(circle, 10.0).cut(Sensor.IMU, 5.0, 6.0)),
+            navigate(fly(circle, 10.0).without(Sensor.ATTITUDE, Sensor.MAG)))  # fmt: skip
     for run in runs:
         seen.update(run.on.tape.events()[:, 1].astype(int).tolist())
     flow = {k for k, (source, _, _) in enumerate(EVENT_NAMES) if source == "flow"}  # tests/test_faults_navigator.py

@@ -44,7 +44,7 @@ from flownav.replay.session import Replay, replay
 from replay_logs import SyntheticLog, log_of_flight
 from smoother_oracles import dense_decay, dense_transition, smoother_gain
 
-SETTINGS = NavigatorSettingsFile()
+SETTINGS = NavigatorSettingsFile(flow_lasting_s=0.0)  # or a correction ends with noise, which `Step` does not know
 STATIONARY = SETTINGS.start_sigma(has_heading=True, compass=True)  # of the Gauss-Markov errors
 CUT = ((8.0, 26.0),)
 

@@ -22,6 +22,7 @@ from flownav.estimation.states import (
     GYRO_BIAS,
     INNOVATION,
     INNOVATION_VARIANCE,
+    MIDDLE,
     MOST_CONSIDERED,
     NOISE,
     OBSERVED,

@@ -99,7 +99,7 @@ COEFFICIENT = _rows.take(MOST_OBSERVED)  # h on the states that OBSERVED names
 OBSERVED = _rows.take(
     1 + MOST_OBSERVED
 )  # in the first lane, for all of them: how many states the law reads, then their places
-# in the first lane: how many states corrections leave alone, their places, and the rows that say in which lanes (0: all)
+# in the first lane: how many states corrections leave alone, their places, and rows that say in which lanes (0: all)
 CONSIDERED = _rows.take(1 + 2 * MOST_CONSIDERED)
 CONSIDERS = _rows.take(1)  # in the first lane: 1 where states are considered at all
 KEPT = _rows.take(MOST_CONSIDERED)  # these states while a correction is made

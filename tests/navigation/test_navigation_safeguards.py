@@ -10,7 +10,7 @@ from flownav.estimation.gating import Reason
 from flownav.estimation.states import IMU
 from flownav.measurement import EventQueue, Sensor, Stream, merge
 from flownav.navigation.memory import load_imu
-from flownav.navigation.tape import EVENT_NAMES
+from flownav.navigation.tape import EVENT_NAMES, HEADING_FOUND
 from navigation_streams import Flown, Navigated, circle, fly, navigate, still
 
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
@@ -235,7 +235,9 @@ def test_an_echo_is_not_believed_where_the_range_alone_tells_the_height(hover):
 
 # -- every reason and every event ----------------------------------------------------------------------------
 def test_every_reason_has_its_case(hover):
-    """But for `not_needed` and `ahead`, which are given to readings before they reach the navigator."""
+    """But for `not_needed` and `ahead`, which are given to readings before they reach the navigator, and `no_heading`
+    (tests/replay/test_unknown_heading.py).
+    """
     seen: set[str] = set()
 
     def look(run: Navigated) -> None:
@@ -269,7 +271,7 @@ def test_every_reason_has_its_case(hover):
     late = rows_of(queue, places_of(queue, Sensor.BARO, 9.0)[:1].tolist())
     late.t_s[:] = 10.0
     look(navigate(flown, with_rows(queue, [int(np.searchsorted(queue.t_s, 10.3))], late)))
-    assert seen == {reason.label for reason in Reason} - {"not_needed", "ahead"}
+    assert seen == {reason.label for reason in Reason} - {"not_needed", "ahead", "no_heading"}
 
 
 def test_every_event_has_its_case(hover):
@@ -289,4 +291,5 @@ def test_every_event_has_its_case(hover):
     for run in runs:
         seen.update(run.on.tape.events()[:, 1].astype(int).tolist())
     flow = {k for k, (source, _, _) in enumerate(EVENT_NAMES) if source == "flow"}  # tests/test_faults_navigator.py
-    assert seen | flow == set(range(len(EVENT_NAMES)))
+    heading = {int(HEADING_FOUND)}  # tests/replay/test_unknown_heading.py
+    assert seen | flow | heading == set(range(len(EVENT_NAMES)))

@@ -271,7 +271,7 @@ def test_every_reason_has_its_case(hover):
     late = rows_of(queue, places_of(queue, Sensor.BARO, 9.0)[:1].tolist())
     late.t_s[:] = 10.0
     look(navigate(flown, with_rows(queue, [int(np.searchsorted(queue.t_s, 10.3))], late)))
-    assert seen == {reason.label for reason in Reason} - {"not_needed", "ahead", "no_heading"}
+    assert seen == {reason.label for reason in Reason} - {"not_needed", "ahead"}
 
 
 def test_every_event_has_its_case(hover):

@@ -39,7 +39,9 @@ from flownav.navigation.flow_noise import (
     lasting_doubt,
     lasting_walk,
 )
+from flownav.navigation.height import MANY_STRAYS
 from flownav.navigation.memory import (
+    BLIND,
     GPS_FUSED,
     INNOVATION_BEFORE,
     LENS_RANGE,
@@ -47,10 +49,13 @@ from flownav.navigation.memory import (
     SOUGHT,
     TESTED,
     TURNING,
+    load_echo,
     load_flow,
     load_ground,
+    load_range,
     load_reading,
     load_start,
+    set_lane,
     store_flow,
 )
 from flownav.navigation.offers import conclude, note_aid, put, usable_in_flight
@@ -191,6 +196,9 @@ def look(work: Work, lanes: Lanes, t_s: float, angular: bool, gyro_is_imu: bool,
         reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
         m = load_flow(work, lanes, lane)
         range_m = lens_range_of(work, lanes, lane, s.flow_below_m)
+        ranged, strays = load_range(work, lanes, lane), load_echo(work, lanes, lane).stray > MANY_STRAYS
+        told = t_s - ranged.taken_s <= s.height_hold_s and not np.isfinite(ranged.refused_s) and not strays
+        set_lane(work, lanes, BLIND, lane, 0.0 if told else 1.0)
         spread_m = np.sqrt(larger(height_variance(work, lanes, lane), 0.0))
         known = load_ground(work, lanes, lane).known > 0.0 and spread_m <= LARGEST_SPREAD * range_m
         range_m = range_m if known else UNKNOWN_RANGE_M
@@ -215,8 +223,8 @@ def consider_others(work: Work, lanes: Lanes) -> None:
     """What flow depends on and is no judge of: over a step of the ground it would move the height, and by accelerations
     that err it would turn the heading. Where GPS tells the velocity too, that is what corrects them.
     """
-    consider(work, lanes, POSITION + 2)
-    consider(work, lanes, GROUND)
+    consider(work, lanes, POSITION + 2, BLIND)
+    consider(work, lanes, GROUND, BLIND)
     consider(work, lanes, ATTITUDE + 2)
     consider(work, lanes, GYRO_BIAS + 2)
     consider(work, lanes, INS_ERROR + 2)

@@ -51,6 +51,7 @@ NOISE_FOLLOWED = _rows.take(8 * 3)  # `records.NoiseMemory` of range, barometer,
 WHITENESS = _rows.take(3 * len(WhitenessMemory._fields))  # forward, right, down
 ACCEL_FACTOR = _rows.take(3)  # how many times noisier than told the accelerometer is, by each of these
 COURSE = _rows.take(len(CourseMemory._fields))
+BLIND = _rows.take(1)  # 1 where no range tells the height of the flow now: none lately, or a disputed one, or strays
 SOUGHT = _rows.take(1)  # 1 while a heading that no sensor reads is to be found
 GPS_FUSED = _rows.take(1)  # when GPS last told north or east [s]
 STANDS = _rows.take(1)  # what the vehicle did in the last window: `still.MOVES`, SHAKEN or RESTS

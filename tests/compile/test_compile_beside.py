@@ -59,7 +59,12 @@ def started(place: Path, *command: str, **environment: str) -> subprocess.Popen[
     paths = os.pathsep.join([str(closure.PACKAGE.parent), str(place)])
     env = {**os.environ, "FLOWNAV_CACHE": str(place / "cache"), "PYTHONPATH": paths, **environment}
     pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-    return subprocess.Popen([sys.executable, "-B", *command], env=env, text=True, **pipes)
+    return subprocess.Popen([sys.executable, "-B", *command], env=env, text=True, preexec_fn=interruptible, **pipes)
+
+
+def interruptible() -> None:
+    """Ctrl-C reaches it, though who runs the tests may ignore it (nohup, a shell's background)."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def run(place: Path, **environment: str) -> tuple[str, list[str]]:

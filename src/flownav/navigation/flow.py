@@ -77,6 +77,7 @@ from flownav.navigation.told import FlowSettings
 from flownav.navigation.trust import watch_whiteness
 
 UNHELD_S = 1.0  # without GPS
+NEAR_LIMIT = 0.98  # a sensor that has reached its limit reads the limit, whatever the flow
 LARGEST_SPREAD = 0.5  # of the height over the ground, of which flow makes no speed
 UNKNOWN_RANGE_M = 2.0
 
@@ -123,7 +124,7 @@ def judge_flow(
     turning = turning_x + turning_y if angular else 0.0
     reason = usable_in_flight(reading, reading.value_0 + reading.value_1 + turning, 0.0, started)
     reason = NO_HEIGHT if reason == FUSED and angular and not view.known else reason
-    fast = angular and larger(abs(reading.value_0), abs(reading.value_1)) > s.flow_limit_rad_s
+    fast = angular and larger(abs(reading.value_0), abs(reading.value_1)) >= NEAR_LIMIT * s.flow_limit_rad_s
     reason = OUT_OF_RANGE if reason == FUSED and fast else reason
     reason = TILTED if reason == FUSED and view.upright < np.cos(s.tilt_limit_rad) else reason
     near = view.known and view.range_m * view.upright <= s.flow_min_height_m  # `lens_range_of` is at least 0.05

@@ -10,7 +10,7 @@ demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr
 
 test: $(VENV)/.ready-test
-	$(BIN)/python -m pytest -m "not slow"
+	$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile -p no:benchmark
 
 test-slow: $(VENV)/.ready-test
 	$(BIN)/python -m pytest -m slow

@@ -50,9 +50,9 @@ SEED = 5
 SETTLED = 500  # epochs
 # m/s, of docs/landing-filter.md: in sixteen gusty landings, at the horizon and flown on, with the delay and with states
 IN_LANDINGS = {
-    "2 Hz, damping 0.7": ((0.0331, 0.0359), (0.0331, 0.0365)),
-    "2 Hz, damping 1.5": ((0.0364, 0.0381), (0.0349, 0.0383)),
-    "0.5 Hz, damping 0.7": ((0.0470, 0.0553), (0.0354, 0.0388)),
+    "2 Hz, damping 0.7": ((0.0318, 0.0345), (0.0317, 0.0352)),
+    "2 Hz, damping 1.5": ((0.0357, 0.0371), (0.0328, 0.0364)),
+    "0.5 Hz, damping 0.7": ((0.0445, 0.0527), (0.0341, 0.0375)),
 }
 SENSORS = {"2 Hz, damping 0.7": (2.0, 0.7), "2 Hz, damping 1.5": (2.0, 1.5), "0.5 Hz, damping 0.7": (0.5, 0.7)}
 

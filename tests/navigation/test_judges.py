@@ -145,7 +145,7 @@ def test_verdicts_on_flow(change, view, reason):
 def test_flow_that_no_sensor_measures_and_flow_that_is_no_number():
     judged = [
         judge_flow(reading(x, y, 0.0, 0.0), True, turning, 0.0, 1.0, SEEN, TOLD.flow)
-        for x, y, turning in ((10.1, 0.0, 0.0), (0.0, -10.1, 0.0), (9.9, -9.9, 0.0), (NAN, 0.0, 0.0), (0.0, 0.0, NAN))
+        for x, y, turning in ((10.0, 0.0, 0.0), (0.0, -9.85, 0.0), (9.7, -9.7, 0.0), (NAN, 0.0, 0.0), (0.0, 0.0, NAN))
     ]
     assert judged == [OUT_OF_RANGE, OUT_OF_RANGE, FUSED, NOT_FINITE, NOT_FINITE]
     metric = judge_flow(reading(20.0, 0.0), False, NAN, NAN, 1.0, SEEN._replace(known=False), TOLD.flow)

@@ -12,6 +12,7 @@ from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
 from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.replay.bundle import to_record
 from flownav.replay.prepare import ReplayOptions
 from flownav.replay.session import outage_summary, outage_table, replay, table_windows
 
@@ -130,3 +131,10 @@ def test_against_motion_capture(mocap):
     assert truth["horizontal_rms_m"] < 0.4
     assert truth["vertical_rms_m"] < 0.4
     assert truth["velocity_rms_m_s"] < 0.3
+
+
+def test_the_record_of_a_flow_without_a_gyro_holds_the_turning_that_was_taken_off(data_folder):
+    log = read_csv_folder(data_folder / "indoor-made" / "a-clean")
+    record = to_record(replay(log, ReplayOptions(), NavigatorSettingsFile()), {"duration_s": 60.0}, [])
+    assert np.isnan(log.streams[Sensor.FLOW_RATE].value[:, 2]).all()
+    assert np.isfinite(record.tables["flow_rate"]["gyro_x_rad_s"]).mean() > 0.95

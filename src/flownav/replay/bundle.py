@@ -42,7 +42,7 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str]) -> Rec
     for sensor in KEPT:
         if sensor in replay.log.streams:
             stream = replay.log.streams[sensor]
-            columns = dict(zip(COLUMNS[sensor], stream.value.T, strict=True))
+            columns = dict(zip(COLUMNS[sensor], _with_turning(replay, sensor).T, strict=True))
             record.add(sensor.name.lower(), {"t_s": stream.t_s, **columns, "quality": stream.quality})
     if replay.truth_alignment is not None:
         record.add("truth", _truth(replay))
@@ -52,6 +52,16 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str]) -> Rec
     record.add("innovation", innovation_table(replay.innovation))
     record.add("events", _events(replay))
     return record
+
+
+def _with_turning(replay: Replay, sensor: Sensor) -> Array:
+    """A sensor's values as the log has them; of a flow sensor without a gyro, with the turning that was taken off."""
+    value = replay.log.streams[sensor].value
+    prepared = replay.prepared.streams[sensor].value
+    if sensor != Sensor.FLOW_RATE or len(prepared) != len(value):
+        return value
+    width = value.shape[1]
+    return np.where(np.isnan(value) & (np.arange(width) >= 2), prepared[:, :width], value)
 
 
 def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dict[str, Any]:

@@ -25,7 +25,6 @@ from flownav.estimation.states import (
     GAIN,
     INNOVATION,
     INNOVATION_VARIANCE,
-    KEPT,
     MOST_CONSIDERED,
     NOISE,
     OBSERVED,
@@ -162,37 +161,31 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
         fused_lanes += 1 if work[ACCEPTED * len(lanes) + lane] > 0.0 else 0
     if fused_lanes == 0:
         return
-    for t in range(int(work[CONSIDERED * len(lanes)])):
-        considered = int(work[(CONSIDERED + 1 + 2 * t) * len(lanes)])
-        where = int(work[(CONSIDERED + 2 + 2 * t) * len(lanes)])
-        for lane in range(len(lanes)):
-            here = where == 0 or work[where * len(lanes) + lane] > 0.0
-            fused = here and work[ACCEPTED * len(lanes) + lane] > 0.0
-            before = work[(KEPT + t) * len(lanes) + lane]
-            work[(KEPT + t) * len(lanes) + lane] = work[(STATE + considered) * len(lanes) + lane] if fused else before
     for i in range(n):
         for lane in range(len(lanes)):
             fused = work[ACCEPTED * len(lanes) + lane] > 0.0
             variance = work[INNOVATION_VARIANCE * len(lanes) + lane] if fused else 1.0
             cross = work[(CROSS + i) * len(lanes) + lane] if fused else 0.0
             gain = cross / variance
-            innovation = work[INNOVATION * len(lanes) + lane] if fused else 0.0
-            before = work[(STATE + i) * len(lanes) + lane]
             work[(GAIN + i) * len(lanes) + lane] = gain
             work[(REST + i) * len(lanes) + lane] = cross - 0.5 * gain * variance
-            work[(STATE + i) * len(lanes) + lane] = before + gain * innovation if fused else before
     for t in range(int(work[CONSIDERED * len(lanes)])):
         considered = int(work[(CONSIDERED + 1 + 2 * t) * len(lanes)])
         where = int(work[(CONSIDERED + 2 + 2 * t) * len(lanes)])
         for lane in range(len(lanes)):
             here = where == 0 or work[where * len(lanes) + lane] > 0.0
-            fused = here and work[ACCEPTED * len(lanes) + lane] > 0.0
+            left = here and work[ACCEPTED * len(lanes) + lane] > 0.0
             gain, rest = work[(GAIN + considered) * len(lanes) + lane], work[(REST + considered) * len(lanes) + lane]
             cross = work[(CROSS + considered) * len(lanes) + lane]
-            state = work[(STATE + considered) * len(lanes) + lane]
-            work[(GAIN + considered) * len(lanes) + lane] = 0.0 if fused else gain
-            work[(REST + considered) * len(lanes) + lane] = cross if fused else rest
-            work[(STATE + considered) * len(lanes) + lane] = work[(KEPT + t) * len(lanes) + lane] if fused else state
+            work[(GAIN + considered) * len(lanes) + lane] = 0.0 if left else gain
+            work[(REST + considered) * len(lanes) + lane] = cross if left else rest
+    for i in range(n):
+        for lane in range(len(lanes)):
+            fused = work[ACCEPTED * len(lanes) + lane] > 0.0
+            innovation = work[INNOVATION * len(lanes) + lane] if fused else 0.0
+            before = work[(STATE + i) * len(lanes) + lane]
+            after = before + work[(GAIN + i) * len(lanes) + lane] * innovation
+            work[(STATE + i) * len(lanes) + lane] = after if fused else before
     for j in range(n):
         for i in range(j + 1):
             for lane in range(len(lanes)):

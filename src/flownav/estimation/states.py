@@ -102,7 +102,6 @@ OBSERVED = _rows.take(
 # in the first lane: how many states corrections leave alone; of each its place, and the row that says where (0: all)
 CONSIDERED = _rows.take(1 + 2 * MOST_CONSIDERED)
 CONSIDERS = _rows.take(1)  # in the first lane: 1 where states are considered at all
-KEPT = _rows.take(MOST_CONSIDERED)  # these states while a correction is made
 GYRO_SHARE = _rows.take(1)  # by how much the gyro's bias is in a flow reading whose turning that gyro took off
 # within a step
 CROSS = _rows.take(STATES_WITH_LAG)  # P h'

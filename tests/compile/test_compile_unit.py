@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from flownav.compile import LANES, ONE_LANE, unit
+from flownav.compiling import target
+from flownav.compiling.engine import without_surprises
 
 SCALE = 3.0
 
@@ -76,3 +78,23 @@ def test_an_unknown_letter_is_refused():
 def test_an_unknown_constant_is_refused():
     with pytest.raises(TypeError, match="has no parameter width"):
         unit(scale_lanes, "p i d", lanes=LANES, width=3)(np.zeros(16), 1, 1.0)
+
+
+def test_a_wrong_unit_does_not_change_how_the_others_are_compiled():
+    before = target.is_lean()
+    with pytest.raises(TypeError, match="has no parameter width"):
+        unit(scale_lanes, "p i d", lanes=LANES, width=3)(np.zeros(16), 1, 1.0)
+    assert target.is_lean() == before
+
+
+def test_where_only_the_plain_way_works_it_is_kept_and_said(monkeypatch, capsys):
+    monkeypatch.setattr(target._Leanness, "wanted", True)
+
+    def compile_it():
+        if target.is_lean():
+            raise AttributeError("no such part")
+        return "compiled"
+
+    assert without_surprises(compile_it) == "compiled"
+    assert not target.is_lean()
+    assert "compiles the slow way here (AttributeError: no such part)" in capsys.readouterr().err

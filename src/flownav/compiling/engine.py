@@ -82,13 +82,15 @@ class _KernelCompiler(_FunctionCompiler):  # type: ignore[misc]
 
 
 def without_surprises(compile_it: Callable[[], Any]) -> Any:
-    """Compile the lean way; where Numba's inside is not what that needs, the plain way."""
+    """Compile the lean way; where Numba's inside is not what that needs, the plain way, from then on.
+
+    What fails either way is the fault of what was to be compiled, and changes nothing.
+    """
     try:
         with target.lean():
             return compile_it()
     except (AttributeError, TypeError, AssertionError, KeyError, ImportError) as error:
         if isinstance(error, NumbaError) or not target.is_lean():
             raise
-        target.be_plain(error)
-        with target.lean():
+        with target.plainly(error), target.lean():
             return compile_it()

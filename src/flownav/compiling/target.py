@@ -252,9 +252,15 @@ def is_lean() -> bool:
     return _Leanness.wanted and all(hasattr(JITCodeLibrary, part) for part in parts)
 
 
-def be_plain(error: Exception) -> None:
-    """From now on compile as Numba does by itself, because it has turned out to differ from what is known here."""
+@contextmanager
+def plainly(error: Exception) -> Iterator[None]:
+    """Compile as Numba does by itself inside the block, and from then on if that succeeds where the lean way failed."""
     _Leanness.wanted = False
+    try:
+        yield
+    except BaseException:
+        _Leanness.wanted = True
+        raise
     why = f"{type(error).__name__}: {error}".splitlines()[0]
     print(f"flownav: Numba {numba.__version__} compiles the slow way here ({why})", file=sys.stderr, flush=True)
 

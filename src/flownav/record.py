@@ -44,6 +44,7 @@ FILTER_STATES = (
     "pad_n_m", "pad_e_m", "pad_d_m",
 )  # fmt: skip
 TILTS = ("tilt_n_rad", "tilt_e_rad", "heading_rad")  # errors of the attitude about north, east and down
+PROTECTION_LEVELS = ("protection_horizontal_m", "protection_vertical_m")
 VELOCITY_NED = ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
 
 # The vocabulary: every table has `t_s` first; a writer may leave a table or a trailing column out.
@@ -59,12 +60,13 @@ TABLES: dict[str, tuple[str, ...]] = {
         "thrust_n",
         "on_ground",
     ),
-    # what the filter says, with one standard deviation of each
+    # what the filter says, with one standard deviation of each, and how far off it may be if a sensor fails unseen
     "estimate": (
         *POSITION_NED,
         *VELOCITY_BODY,
         *QUATERNION,
         *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)),
+        *PROTECTION_LEVELS,
     ),
     # where the truth is known: the error squared of position and velocity over what the filter states (NEES)
     "consistency": ("nees",),

@@ -30,6 +30,7 @@ from flownav.navigation.tape import (
     ENTRIES,
     ESTIMATES,
     EXTRA_STATES,
+    LEVELS_AT,
     FORGOTTEN,
     GROUND_FOUND,
     NOTED,
@@ -196,7 +197,7 @@ def test_a_whole_run_of_the_navigator_is_smoothed_as_by_dense_rts(clean):
         shift = np.concatenate([shift, 2.0 * np.array(turn[1:]) / turn[0], better[extra] - own[extra]])
         assert (np.abs(shift - wanted) < 1e-5 * scale).all()
         largest = max(largest, float(np.abs(shift / scale).max()))
-        said = np.concatenate([better[[11, 12, 13, 20, 21, 22]], better[23 + EXTRA_STATES :]])
+        said = np.concatenate([better[[11, 12, 13, 20, 21, 22]], better[23 + EXTRA_STATES : LEVELS_AT]])
         assert said == pytest.approx(np.concatenate([sigma[:3], sigma[6:9], sigma[9:]]), rel=1e-9)
     assert largest > 0.01
 

@@ -23,6 +23,7 @@ from flownav.estimation.states import (
     COVARIANCE,
     CROSS,
     GAIN,
+    HYPOTHESES,
     INNOVATION,
     INNOVATION_VARIANCE,
     MOST_CONSIDERED,
@@ -31,6 +32,8 @@ from flownav.estimation.states import (
     OFFERED,
     QUATERNION,
     REST,
+    SHARE,
+    SIGNATURE,
     STATE,
     STATES,
     STATES_WITH_LAG,
@@ -67,9 +70,15 @@ def states_of(lanes: Lanes) -> int:
 
 
 @equation
+def columns_of(work: Work, lanes: Lanes, n: int) -> int:
+    """How many columns are kept: the n states', and the effects of the faults that are followed (`hypotheses`)."""
+    return n + int(work[HYPOTHESES * len(lanes)])
+
+
+@equation
 def column(j: int) -> int:
     """Row of element (0, j). The mask changes nothing; it shows the compiler that j (j + 1)/2 is never negative."""
-    return COVARIANCE + (j * (j + 1) // 2 & 1023)
+    return COVARIANCE + (j * (j + 1) // 2 & 2047)
 
 
 @equation
@@ -108,17 +117,22 @@ def expect(work: Work, lanes: Lanes, n: int, always: bool) -> None:
         offering += 1 if offered else 0
     if offering == 0 and not always:
         return
-    for j in range(n):
+    columns = columns_of(work, lanes, n)
+    for j in range(columns):
         for lane in range(len(lanes)):
             work[(CROSS + j) * len(lanes) + lane] = 0.0
     for t in range(int(work[OBSERVED * len(lanes)])):
         observed = int(work[(OBSERVED + 1 + t) * len(lanes)])
-        add_row(work, lanes, n, observed, COEFFICIENT + t)
+        add_row(work, lanes, columns, observed, COEFFICIENT + t)
     for t in range(int(work[OBSERVED * len(lanes)])):
         observed = int(work[(OBSERVED + 1 + t) * len(lanes)])
         for lane in range(len(lanes)):
             product = work[(COEFFICIENT + t) * len(lanes) + lane] * work[(CROSS + observed) * len(lanes) + lane]
             work[INNOVATION_VARIANCE * len(lanes) + lane] += product
+    for k in range(columns - n):
+        for lane in range(len(lanes)):
+            shown = work[(SHARE + k) * len(lanes) + lane] * work[(CROSS + n + k) * len(lanes) + lane]
+            work[(CROSS + n + k) * len(lanes) + lane] = shown + work[(SIGNATURE + k) * len(lanes) + lane]
 
 
 @equation
@@ -154,7 +168,8 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
     Written out, with c = P h', S = h c + R and d = c - K S/2, it is P - (K d' + d K'), whatever the gain (Bucy and
     Joseph, Filtering for Stochastic Processes with Applications to Guidance, 1968). That of the considered states is 0:
     they stay as they are, and their uncertainty counts (Schmidt, Application of State-Space Methods to Navigation
-    Problems, 1966).
+    Problems, 1966). So are the hypotheses' columns, what one unit of a fault does to the error: with k = SHARE,
+    s <- s - K (k h s + h_b) (`hypotheses`).
     """
     fused_lanes = 0
     for lane in range(len(lanes)):
@@ -179,6 +194,12 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
             cross = work[(CROSS + considered) * len(lanes) + lane]
             work[(GAIN + considered) * len(lanes) + lane] = 0.0 if left else gain
             work[(REST + considered) * len(lanes) + lane] = cross if left else rest
+    columns = columns_of(work, lanes, n)
+    for j in range(n, columns):
+        for lane in range(len(lanes)):
+            fused = work[ACCEPTED * len(lanes) + lane] > 0.0
+            work[(GAIN + j) * len(lanes) + lane] = 0.0
+            work[(REST + j) * len(lanes) + lane] = work[(CROSS + j) * len(lanes) + lane] if fused else 0.0
     for i in range(n):
         for lane in range(len(lanes)):
             fused = work[ACCEPTED * len(lanes) + lane] > 0.0
@@ -186,8 +207,8 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
             before = work[(STATE + i) * len(lanes) + lane]
             after = before + work[(GAIN + i) * len(lanes) + lane] * innovation
             work[(STATE + i) * len(lanes) + lane] = after if fused else before
-    for j in range(n):
-        for i in range(j + 1):
+    for j in range(columns):
+        for i in range(min(j + 1, n)):
             for lane in range(len(lanes)):
                 gain_i, gain_j = work[(GAIN + i) * len(lanes) + lane], work[(GAIN + j) * len(lanes) + lane]
                 rest_i, rest_j = work[(REST + i) * len(lanes) + lane], work[(REST + j) * len(lanes) + lane]
@@ -265,7 +286,7 @@ def decay(work: Work, lanes: Lanes, n: int, state: int, factor: float) -> None:
     for j in range(state + 1):
         for lane in range(len(lanes)):
             work[at(j, state) * len(lanes) + lane] *= factor
-    for j in range(state + 1, n):
+    for j in range(state + 1, columns_of(work, lanes, n)):
         for lane in range(len(lanes)):
             work[at(state, j) * len(lanes) + lane] *= factor
 
@@ -281,7 +302,7 @@ def forget(work: Work, lanes: Lanes, n: int, state: int, variance: float, where_
 @procedure
 def forget_lane(work: Work, lanes: Lanes, n: int, state: int, lane: int, variance: float) -> None:
     """The state of one lane loses its correlations and gets this variance."""
-    for j in range(n):
+    for j in range(columns_of(work, lanes, n)):
         work[place(state, j) * len(lanes) + lane] = 0.0
     work[at(state, state) * len(lanes) + lane] = variance
 

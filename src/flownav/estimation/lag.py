@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import equation, procedure
-from flownav.estimation.covariance import Lanes, Work
+from flownav.estimation.covariance import Lanes, Work, columns_of
 from flownav.estimation.discretise import discretised
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.law import step
@@ -223,7 +223,7 @@ def lag_step(
         work, lanes, f11, f12, f21, f22, gain_1, gain_2, lag.sonar_floor_m, lag.lens_below_m,
         lag.forward_m, lag.right_m, lag.below_m,
     )  # fmt: skip
-    errors_in_lag(work, lanes, STATES_WITH_LAG, f11, f12, f21, f22, gain_1, gain_2)
+    errors_in_lag(work, lanes, columns_of(work, lanes, STATES_WITH_LAG), f11, f12, f21, f22, gain_1, gain_2)
 
 
 @equation

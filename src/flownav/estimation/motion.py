@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import equation, procedure
-from flownav.estimation.covariance import Lanes, Work, add_noise, at
+from flownav.estimation.covariance import Lanes, Work, add_noise, at, columns_of
 from flownav.estimation.error_models import FilterSettings
+from flownav.estimation.hypotheses import push
 from flownav.estimation.law import step
 from flownav.estimation.states import (
     ACCEL_BIAS,
@@ -71,7 +72,8 @@ def predict(work: Work, lanes: Lanes, n: int, dt_s: float, settings: FilterSetti
     The walks of the biases and of everything else, and Gauss-Markov errors, are `error_models`' and no part of it.
     """
     strapdown(work, lanes, dt_s=dt_s)
-    errors_in_motion(work, lanes, n, dt_s=dt_s)
+    errors_in_motion(work, lanes, columns_of(work, lanes, n), dt_s=dt_s)
+    push(work, lanes, n, dt_s)
     add_motion_noise(work, lanes, dt_s, settings.position_walk_m_rt_s)
 
 

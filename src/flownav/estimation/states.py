@@ -47,6 +47,8 @@ STATE_NAMES = (
 MOST_OBSERVED = 12  # states that one observation reads
 MOST_SOURCES = 15  # and one transition
 MOST_CONSIDERED = 18  # states that a correction may leave as they are
+MOST_HYPOTHESES = 11  # faults whose effects on the state are followed (`hypotheses`)
+COLUMNS = STATES_WITH_LAG + MOST_HYPOTHESES
 
 # STATE_NAMES without units, as laws name them
 SHORT_NAMES = (
@@ -103,14 +105,20 @@ OBSERVED = _rows.take(
 CONSIDERED = _rows.take(1 + 2 * MOST_CONSIDERED)
 CONSIDERS = _rows.take(1)  # in the first lane: 1 where states are considered at all
 GYRO_SHARE = _rows.take(1)  # by how much the gyro's bias is in a flow reading whose turning that gyro took off
-# within a step
-CROSS = _rows.take(STATES_WITH_LAG)  # P h'
-GAIN = _rows.take(STATES_WITH_LAG)  # K
-REST = _rows.take(STATES_WITH_LAG)  # P h' - K S/2
+HYPOTHESES = _rows.take(1)  # in the first lane: how many faults are followed
+SIGNATURE = _rows.take(MOST_HYPOTHESES)  # what one unit of each adds to the reading at hand
+SHARE = _rows.take(MOST_HYPOTHESES)  # how much of the state's error the reading shows while the fault is there
+INFORMATION = _rows.take(MOST_HYPOTHESES)  # what innovations tell of its size [1 / its unit squared]
+SCORE = _rows.take(MOST_HYPOTHESES)  # that information times the size that they tell
+# within a step; beside the states stand the hypotheses
+CROSS = _rows.take(COLUMNS)  # P h'
+GAIN = _rows.take(COLUMNS)  # K
+REST = _rows.take(COLUMNS)  # P h' - K S/2
 SCRATCH = _rows.take(MOST_SOURCES * MOST_SOURCES)  # a transition's own block of P, both triangles
 DRIVE = _rows.take(14)  # derivatives of what a flow sensor with dynamics sees
-# the packed upper triangle of P, column by column: last, so that a compiler sees that no element is another row
-COVARIANCE = _rows.take(STATES_WITH_LAG * (STATES_WITH_LAG + 1) // 2)
+# the packed upper triangle of P, column by column, and beside it a column for each hypothesis: last, so that a compiler
+# sees that no element is another row
+COVARIANCE = _rows.take(COLUMNS * (COLUMNS + 1) // 2)
 FILTER_ROWS = _rows.next
 
 # names of single rows, beside the states', that laws and steps may read or write

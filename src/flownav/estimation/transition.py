@@ -137,13 +137,13 @@ def runs(order: list[int], targets: list[int]) -> list[list[int]]:
 
 def packed(i: str, j: str) -> str:
     """Element (i, j) of P, i <= j, two variables; the mask is `covariance.column`'s."""
-    return at(f"{COVARIANCE} + ({j} * ({j} + 1) // 2 & 1023) + {i}")
+    return at(f"{COVARIANCE} + ({j} * ({j} + 1) // 2 & 2047) + {i}")
 
 
 def beside(first: int, state: int) -> str:
     """Element (state, j) of P, for a j that runs from `first` on, on one side of the state."""
     if state < first:
-        return at(f"{COVARIANCE + state} + (j * (j + 1) // 2 & 1023)")
+        return at(f"{COVARIANCE + state} + (j * (j + 1) // 2 & 2047)")
     return at(f"{COVARIANCE + state * (state + 1) // 2} + j")
 
 

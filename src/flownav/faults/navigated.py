@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.measurement import Array, Sensor, Stream
+from flownav.navigation.flags import Flag
 
 
 class Offers(NamedTuple):
@@ -31,15 +32,6 @@ class Event(NamedTuple):
     """A happening: a reset, a datum, a flag raised or taken down. source: "gps", "flow", "range", ... or "filter"."""
 
     t_s: float
-    source: str
-    kind: str
-
-
-class Flag(NamedTuple):
-    """A warning that stood from t0_s until before t1_s (infinity: to the end), such as dead reckoning."""
-
-    t0_s: float
-    t1_s: float
     source: str
     kind: str
 

@@ -11,32 +11,20 @@ from flownav.compile import announce_compilation
 from flownav.errors import InputError
 from flownav.estimation.gating import Reason
 from flownav.faults.arrival import as_fed, stamped_ahead
-from flownav.faults.navigated import Event, Flag, Navigate, Navigated, Offers
+from flownav.faults.navigated import Event, Navigate, Navigated, Offers
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.feed import equipment_of
+from flownav.navigation.flags import flags_of
 from flownav.navigation.loop import run, start_navigator
 from flownav.navigation.settings_of import Told
 from flownav.navigation.tables import Written, written_on
-from flownav.navigation.tape import (
-    AIDED_AGAIN,
-    DEAD_RECKONING,
-    EVENT_NAMES,
-    FLOW_DOUBTED,
-    FLOW_TRUSTED,
-    POSITION_INVALID,
-    new_tape,
-)
+from flownav.navigation.tape import EVENT_NAMES, new_tape
 from flownav.replay.prepare import Prepared, ReplayOptions, prepare
 from flownav.sensors.identified import IdentifiedFlow
 from flownav.simulation.assemble import Setup
 
 TAKEN_IN = (Reason.FUSED, Reason.DATUM)
-RAISING = {
-    int(DEAD_RECKONING): int(AIDED_AGAIN),
-    int(POSITION_INVALID): int(AIDED_AGAIN),
-    int(FLOW_DOUBTED): int(FLOW_TRUSTED),
-}
 
 
 def navigator_told(told: Told) -> Navigate:
@@ -111,13 +99,3 @@ def offers_of(rows: Array, prepared: Prepared) -> Offers:
         np.concatenate([np.isin(reasons, TAKEN_IN), np.zeros(refused, bool)]),
         np.concatenate([labels[reasons], np.full(refused, Reason.AHEAD.label)]),
     )
-
-
-def flags_of(happened: Array) -> tuple[Flag, ...]:
-    """Warnings that stood: each from the event that raised it to the one that took it down, or to the end."""
-    flags = []
-    for t_s, kind, _ in happened.tolist():
-        if int(kind) in RAISING:
-            down = happened[(happened[:, 1] == RAISING[int(kind)]) & (happened[:, 0] >= t_s), 0]
-            flags.append(Flag(t_s, float(down.min(initial=np.inf)), *EVENT_NAMES[int(kind)][:2]))
-    return tuple(flags)

@@ -6,6 +6,7 @@ import numpy as np
 
 from flownav.compile import equation, larger, procedure
 from flownav.estimation.covariance import variance_of
+from flownav.estimation.hypotheses import HEADING_OFF, sign_all
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading
 from flownav.estimation.motion import rotation_of
@@ -66,6 +67,7 @@ def take_attitude(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equ
             read = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
             put_heading(work, lanes, lane, t_s, read, np.nan, SILENT if reason != FUSED else reason, s)
         heading(work, lanes, 0)
+        sign_all(work, lanes, HEADING_OFF, 1.0)
         conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
 
 
@@ -196,6 +198,7 @@ def take_mag(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipmen
         read = magnetic_heading(rotation[0], rotation[3], fitted.declination_rad, m)
         put_heading(work, lanes, lane, t_s, read, np.nan, reason if seen else SILENT, s)
     heading(work, lanes, 0)
+    sign_all(work, lanes, HEADING_OFF, 1.0)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
 
 
@@ -211,4 +214,5 @@ def take_yaw(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipmen
             store_heading(work, lanes, lane, HeadingMemory(load_heading(work, lanes, lane).read_s, -reading.value_0))
         put_heading(work, lanes, lane, t_s, reading.value_0, reading.variance_0, reason, s)
     heading(work, lanes, 0)
+    sign_all(work, lanes, HEADING_OFF, 1.0)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)

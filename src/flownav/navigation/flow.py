@@ -60,6 +60,7 @@ from flownav.navigation.memory import (
 )
 from flownav.navigation.offers import conclude, note_aid, put, usable_in_flight
 from flownav.navigation.packed import load_flow_settings
+from flownav.navigation.protection import sign_flow
 from flownav.navigation.reasons import (
     FUSED,
     INNOVATION_GATE,
@@ -153,6 +154,7 @@ def take_flow(
             flow_rate(work, lanes, component, s.flow_forward_m, s.flow_right_m, s.flow_below_m, s.flow_below_m)
         else:
             body_velocity(work, lanes, component, s.flow_forward_m, s.flow_right_m, s.flow_below_m)
+        sign_flow(work, lanes, t_s, component, angular)
         conclude(work, lanes, t_s, sensor, component, s.gate_sigma, o)
         watch_whiteness(work, lanes, t_s, 1 - component if angular else component)
         learn(work, lanes, t_s, angular, component, s)

@@ -35,6 +35,7 @@ from flownav.navigation.memory import (
 )
 from flownav.navigation.offers import conclude, note_aid, note_height, put, usable
 from flownav.navigation.packed import load_gps_settings
+from flownav.navigation.protection import sign_drift
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE
 from flownav.navigation.records import Reading, RejectionMemory
 from flownav.navigation.tape import GPS_RESET, Output, write_event
@@ -83,6 +84,8 @@ def take_gps(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
         place = OF_GPS + axis + (0 if position else 3)
         offer_axis(work, lanes, axis, position, False, s)
         scale_noise(work, lanes, place)
+        if position:
+            sign_drift(work, lanes, t_s, axis)
         conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
         follow_noise(work, lanes, t_s, place, s.gate_sigma)
         if axis < 2:

@@ -8,6 +8,7 @@ import numpy as np
 
 from flownav.compile import equation, procedure, smaller
 from flownav.estimation.covariance import expect, variance_of
+from flownav.estimation.hypotheses import RANGE_OFFSET, sign_all
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.height import baro_altitude, range_along_boresight
 from flownav.estimation.motion import rotation_of
@@ -184,6 +185,7 @@ def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Ou
     range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
     scale_noise(work, lanes, OF_RANGE)
     weigh_strays(work, lanes)
+    sign_all(work, lanes, RANGE_OFFSET, 1.0)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
     watch_whiteness(work, lanes, t_s, 2)
     follow_noise(work, lanes, t_s, OF_RANGE, s.gate_sigma)

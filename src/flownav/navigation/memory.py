@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import equation, lane_access
+from flownav.estimation.hypotheses import COUNT as FAULTS_FOLLOWED
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.states import CONSIDERS, FILTER_ROWS, QUATERNION, Rows
+from flownav.estimation.states import CONSIDERS, FILTER_ROWS, HYPOTHESES, MOST_HYPOTHESES, QUATERNION, SHARE, Rows
 from flownav.measurement import Array, Sensor
 from flownav.navigation.records import (
     AidMemory,
@@ -72,11 +73,20 @@ OWED = _rows.take(6)  # what past readings said and no step was long enough to p
 STEADY_FORCE = _rows.take(3)  # specific force NED [m/s2], smoothed as a GPS receiver smooths its velocity
 SCALE_DOUBT = _rows.take(1)  # standard deviation of a flow scale that nothing can tell; 0 where the filter learns it
 MOVING = _rows.take(1)  # 1 where the IMU moves the filter over the step at hand
+FLOW_BEFORE = _rows.take(2)  # what the flow sensor was to read at the reading before, by the filter [rad/s or m/s]
+TURNED_BEFORE = _rows.take(2)  # TURNING at the reading before
+FLOW_SPEED = _rows.take(1)  # of both together, over the ground, turning and all [m/s]
+PUZZLED_AT = _rows.take(1)  # when innovations last hinted at a flow that is reversed or swapped [s]
+PROTECTION = _rows.take(2)  # levels at the last estimate, horizontal and vertical [m]
+LEFT_OVER = _rows.take(1)  # how far off a fault may have put the position before it was excluded [m]
+SUSPECTED_AT = _rows.take(1)  # since when a fault is suspected [s]
+SUSPECTED = _rows.take(1)  # 0, or 1 and the number of the fault of `hypotheses` that is suspected
 # shared by all lanes (kept in the first)
 CLOCK = _rows.take(1)  # the instant that the filter has reached [s]
 WRITTEN = _rows.take(1)  # the last estimate's [s]
 ERRORS_CLOCK = _rows.take(1)  # the instant that the Gauss-Markov errors have reached [s]
 STILL_CLOCK = _rows.take(1)  # the end of the last window [s]
+DRIFT_SINCE = _rows.take(1)  # from when a drift of GPS is sought [s]
 LAST = _rows.take(max(Sensor) + 1)  # of each sensor, the newest instant [s]
 WORK_ROWS = _rows.next
 
@@ -112,6 +122,11 @@ _FRESH: dict[int, tuple[float, ...]] = {
     WHITENESS: (0.0, 0.0, 0.0, 0.0, 1.0, -np.inf) * 3,
     STILL_CLOCK: (-np.inf,),
     CONSIDERS: (1.0,),
+    PUZZLED_AT: (-np.inf,),
+    PROTECTION: (np.nan, np.nan),
+    HYPOTHESES: (FAULTS_FOLLOWED,),
+    SHARE: (1.0,) * MOST_HYPOTHESES,
+    DRIFT_SINCE: (-np.inf,),
     COURSE: CourseMemory(0.0, 0.0, 0.0, 0.0, 0.0, -np.inf, -np.inf, 0.0, 0.0),
     GPS_FUSED: (-np.inf,),
     CLOCK: (-np.inf,),

@@ -6,6 +6,7 @@ import numpy as np
 
 from flownav.compile import equation, procedure
 from flownav.estimation.covariance import expect, settle, states_of
+from flownav.estimation.hypotheses import weigh
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import ACCEPTED, MEASURED, NOISE, OFFERED
 from flownav.measurement import Sensor
@@ -34,6 +35,7 @@ from flownav.navigation.tape import (
 from flownav.navigation.told import AidSettings
 
 CLOCK_SLACK_S = 1e-6
+COLOR = 4.0  # so many readings after one another err alike
 
 
 # -- checks -----------------------------------------------------------------------------------------------
@@ -106,6 +108,7 @@ def fuse_offered(work: Work, lanes: Lanes, gate_sigma: float, o: Output) -> None
         work[OFFERED * len(lanes) + lane] = 1.0 if work[REASON * len(lanes) + lane] == FUSED else 0.0
     expect(work, lanes, states_of(lanes), o.room[1] > 0)
     settle(work, lanes, states_of(lanes), gate_sigma)
+    weigh(work, lanes, states_of(lanes), COLOR)
     for lane in range(len(lanes)):
         reason = work[REASON * len(lanes) + lane]
         refused = reason == FUSED and work[ACCEPTED * len(lanes) + lane] == 0.0

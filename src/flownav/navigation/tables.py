@@ -8,8 +8,18 @@ import numpy as np
 
 from flownav.estimation.gating import Reason
 from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor
-from flownav.navigation.tape import EVENT_NAMES, EXTRA_STATES, Tape
-from flownav.record import FED, FILTER_STATES, POSITION_NED, QUATERNION, TILTS, VELOCITY_BODY, VELOCITY_NED, Table
+from flownav.navigation.tape import EVENT_NAMES, EXTRA_STATES, LEVELS_AT, Tape
+from flownav.record import (
+    FED,
+    FILTER_STATES,
+    POSITION_NED,
+    PROTECTION_LEVELS,
+    QUATERNION,
+    TILTS,
+    VELOCITY_BODY,
+    VELOCITY_NED,
+    Table,
+)
 
 Happening = tuple[float, str, str, str, float]  # time [s], source, kind, what the value is, value
 
@@ -28,14 +38,16 @@ def written_on(tape: Tape, lane: int = 0) -> Written:
 
 
 def estimate_table(rows: Array) -> Table:
-    """Rows of a tape's estimate: position, body velocity, attitude, standard deviations."""
+    """Rows of a tape's estimate: position, body velocity, attitude, standard deviations, protection levels."""
     names = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)))
-    return {"t_s": rows[:, 0], **dict(zip(names, rows[:, 1:17].T, strict=True))}
+    followed = bool(np.isfinite(rows[:, LEVELS_AT:]).any())  # a smoother has none
+    levels = dict(zip(PROTECTION_LEVELS, rows[:, LEVELS_AT:].T, strict=True)) if followed else {}
+    return {"t_s": rows[:, 0], **dict(zip(names, rows[:, 1:17].T, strict=True)), **levels}
 
 
 def states_table(rows: Array) -> Table:
     """The rest of the same rows: every other state with its standard deviation."""
-    spreads = rows[:, 23 + EXTRA_STATES :].T
+    spreads = rows[:, 23 + EXTRA_STATES : LEVELS_AT].T
     return {
         "t_s": rows[:, 0],
         **dict(zip(VELOCITY_NED, rows[:, 17:20].T, strict=True)),

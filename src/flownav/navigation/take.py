@@ -44,6 +44,7 @@ from flownav.navigation.packed import (
     load_imu_settings,
 )
 from flownav.navigation.place import take_landed, take_pad, take_pose
+from flownav.navigation.protection import mind_faults, set_levels
 from flownav.navigation.spikes import drop_spikes
 from flownav.navigation.start import gather, try_start
 from flownav.navigation.still import stand_still, watch_gps_velocity, watch_imu, watch_range
@@ -93,6 +94,7 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
         share(work, lanes, WRITTEN, t_s)
         if running:
             limit_biases(work, lanes, load_imu_settings(p))
+            set_levels(work, lanes)
             write_estimate(work, lanes, t_s, o)
             if len(lanes) == 1:
                 note_estimate(work, lanes, o)
@@ -208,6 +210,7 @@ def catch_up_errors(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) ->
     if not dt_s > 0.0 or not np.isfinite(dt_s):
         return
     propagate_gauss_markov(work, lanes, states_of(lanes), dt_s, load_filter_settings(p))
+    mind_faults(work, lanes, t_s, dt_s, o)
     if len(lanes) == 1:
         note_decay(dt_s, o)
 

@@ -31,17 +31,18 @@ from flownav.estimation.states import (
 )
 from flownav.frames import to_body
 from flownav.measurement import Array, EventQueue, Sensor
-from flownav.navigation.memory import OBSERVATION, REASON, SCALE_DOUBT, load_start
+from flownav.navigation.memory import OBSERVATION, PROTECTION, REASON, SCALE_DOUBT, load_start
 from flownav.navigation.reasons import BEFORE_START, DUPLICATE, LATE, SILENT
 
 OFFER_COLUMNS = ("t_s", "sensor", "component", "observation", "observation_variance", "innovation",
                  "innovation_variance", "test_ratio", "reason")  # fmt: skip
 OFFERS = len(OFFER_COLUMNS)
 # t, position 3, body velocity 3, quaternion 4, position and body velocity std 6, NED velocity 3, attitude std 3; then
-# the states from GYRO_BIAS on, and their standard deviations
+# the states from GYRO_BIAS on, and their standard deviations; protection levels, horizontal and vertical
 FIRST_EXTRA = GYRO_BIAS
 EXTRA_STATES = STATES - FIRST_EXTRA
-ESTIMATE_COLUMNS = 23 + 2 * EXTRA_STATES
+LEVELS_AT = 23 + 2 * EXTRA_STATES
+ESTIMATE_COLUMNS = LEVELS_AT + 2
 EVENT_COLUMNS = 3
 ESTIMATE_PERIOD_S = 0.02
 COMPONENTS = {Sensor.GPS_POSITION: 3, Sensor.GPS_VELOCITY: 3, Sensor.FLOW_RATE: 2, Sensor.FLOW_VELOCITY: 3,
@@ -53,7 +54,7 @@ EVENTS_A_READING = 4
 # each Python integer that it is called with.
 (START, GROUND_FOUND, GROUND_RESET, BARO_FOUND, GPS_RESET, DEAD_RECKONING, POSITION_INVALID, AIDED_AGAIN,
  RANGE_STUCK, PAD_FOUND, IMU_LOST, IMU_DOUBTED, FLOW_DOUBTED, FLOW_TRUSTED, STOOD,
- IMU_SPIKE, HEADING_FOUND) = np.arange(17)  # fmt: skip
+ IMU_SPIKE, HEADING_FOUND, FAULT_SUSPECTED, FAULT_CLEARED) = np.arange(19)  # fmt: skip
 EVENT_NAMES = (
     ("filter", "start", "at a GPS fix (1) or at the local origin (0)"),
     ("range", "datum", "ground level below the first range, down in the local frame [m]"),
@@ -72,6 +73,8 @@ EVENT_NAMES = (
     ("filter", "standing", "the vehicle moves (0), stands with its motors running (1), or rests (2)"),
     ("imu", "spike", "a reading that no vehicle can follow was dropped: it said this turning [rad/s]"),
     ("heading", "found", "from the course by GPS and flow: it was off by this much [rad]"),
+    ("filter", "suspects", "a fault that innovations tell of, by its number in `estimation.hypotheses`"),
+    ("filter", "cleared", "that fault is no more suspected"),
 )
 # kinds of journal entry, and where their numbers stand in it
 PREDICTED, CORRECTED, FORGOTTEN, NOTED, DECAYED = 0.0, 1.0, 2.0, 3.0, 4.0
@@ -239,6 +242,9 @@ def write_estimate(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
             o.estimate[(place + 14) * len(lanes) + lane] = np.sqrt(variance)
         for i in range(4):
             o.estimate[(first + 7 + i) * len(lanes) + lane] = work[(QUATERNION + i) * len(lanes) + lane]
+        for i in range(2):
+            level_m = work[(PROTECTION + i) * len(lanes) + lane]
+            o.estimate[(first + LEVELS_AT + i) * len(lanes) + lane] = level_m
         for i in range(EXTRA_STATES):
             value = work[(STATE + FIRST_EXTRA + i) * len(lanes) + lane]
             spread = np.sqrt(max(variance_of(work, lanes, FIRST_EXTRA + i, lane), 0.0))

@@ -9,10 +9,14 @@ import numpy as np
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
+from flownav.navigation.flags import flagged, flags_of
+from flownav.navigation.tables import Written, estimate_table
+from flownav.navigation.tape import LEVELS_AT
 from flownav.record import POSITION_NED, QUATERNION, Table
 from flownav.scoring.consistency import consistency_of
 from flownav.scoring.coverage import coverage_of
-from flownav.scoring.drift import Motion, end_drift
+from flownav.scoring.drift import Motion, drift_of, end_drift
+from flownav.scoring.protection import protection_of
 
 TESTED = (Reason.FUSED, Reason.INNOVATION_GATE)
 
@@ -32,6 +36,17 @@ def consistency_scores(innovation: Array) -> dict[str, dict[str, Any]]:
 def coverage_scores(log: Log) -> dict[str, dict[str, float]]:
     """By stream, its first and last reading [s]."""
     return {name: {"t0": first, "t1": last} for name, (first, last) in coverage_of(log.streams).items()}
+
+
+def protection_scores(log: Log, written: Written) -> dict[str, Any] | None:
+    """The levels of a replay, and how often they were exceeded unsaid."""
+    rows = written.estimate
+    drift = (
+        None
+        if log.truth is None
+        else drift_of(motion_of(estimate_table(rows)), truth_motion(log.truth, log.heading_truth))
+    )
+    return protection_of(rows[:, 0], rows[:, LEVELS_AT:], flagged(rows[:, 0], flags_of(written.event)), drift)
 
 
 def end_drift_of(log: Log, estimate: Motion) -> float | None:

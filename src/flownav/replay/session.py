@@ -23,7 +23,13 @@ from flownav.navigation.tables import Written, estimate_table, written_on
 from flownav.navigation.tape import new_tape
 from flownav.replay.autopilot import autopilot_scores
 from flownav.replay.fed import prepared_as_fed, run_as_fed
-from flownav.replay.judged import consistency_scores, coverage_scores, end_drift_of, motion_of
+from flownav.replay.judged import (
+    consistency_scores,
+    coverage_scores,
+    end_drift_of,
+    motion_of,
+    protection_scores,
+)
 from flownav.replay.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replay.sentinel import Finding, findings
 from flownav.scoring.alignment import Alignment, align, velocity_of
@@ -144,6 +150,7 @@ class Replay:
             "duration_s": end - start,
             **self.path_scores(),
             "end_drift_m": self.end_drift(),
+            "protection": protection_scores(self.log, self.written),
             "consistency": consistency_scores(self.innovation),
             "coverage": coverage_scores(self.log),
             "rejected": self.rejected(),

@@ -36,8 +36,16 @@ def flight_of(t_s: Array, down_m: Array) -> Window | None:
     return (float(t_s[away[0]]), float(t_s[away[-1]])) if len(away) else None
 
 
-def end_drift(estimate: Motion, truth: Motion) -> float | None:
-    """Horizontal error [m] at the last instant of flight that both cover; None without such a flight.
+class Drift(NamedTuple):
+    """The error of an estimate that was right at take-off: t_s (n,), horizontal and vertical [m], (n,) each."""
+
+    t_s: Array
+    horizontal_m: Array
+    vertical_m: Array
+
+
+def drift_of(estimate: Motion, truth: Motion) -> Drift | None:
+    """The error at the truth's instants of flight that both cover; None without such a flight.
 
     The truth is laid on the estimate at take-off, turned by the difference of headings there; without a heading of
     either by what fits the two paths best over the flight (least squares).
@@ -52,8 +60,15 @@ def end_drift(estimate: Motion, truth: Motion) -> float | None:
     ours = position + difference_at(estimate.t_s, estimate.position, t_s, position)
     turn = _heading_between(estimate, truth, float(t_s[0]))
     yaw = align(ours, position).yaw_rad if turn is None else turn
-    moved = Alignment(yaw, (0.0, 0.0, 0.0)).turned((position[-1] - position[0])[None, :])[0]
-    return float(np.hypot(*(ours[-1] - ours[0] - moved)[:2]))
+    moved = Alignment(yaw, (0.0, 0.0, 0.0)).turned(position - position[0])
+    error = ours - ours[0] - moved
+    return Drift(t_s, np.hypot(error[:, 0], error[:, 1]), abs(error[:, 2]))
+
+
+def end_drift(estimate: Motion, truth: Motion) -> float | None:
+    """Horizontal error [m] at the last instant of flight that both cover (`drift_of`); None without such a flight."""
+    found = drift_of(estimate, truth)
+    return None if found is None else float(found.horizontal_m[-1])
 
 
 def _heading_between(estimate: Motion, truth: Motion, at_s: float) -> float | None:

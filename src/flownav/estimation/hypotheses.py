@@ -1,0 +1,145 @@
+"""Faults that may be there and are not modelled: what one unit of each does to the error, and what innovations tell.
+
+A hypothesis is a constant b that adds h_b b to a reading, or moves the filter by a steady specific force. The mean
+error that it causes is s b, where s goes through the filter as a considered state's covariance does (Schmidt):
+
+    s <- F s + g   over a step,      s <- s - K c,   c = k h s + h_b   with a reading,
+
+in columns beside the covariance, which change nothing of the estimate. The innovation's mean is then c b, so that
+innovations tell b by a likelihood ratio: information J = sum c^2/S, score d = sum c nu/S, b = d/J (Willsky and Jones, A
+Generalized Likelihood Ratio Approach to the Detection and Estimation of Jumps in Linear Systems, IEEE Transactions on
+Automatic Control 21(1), 1976).
+What the filter estimates by itself leaves no trace in c: a flow scale that is learnt is no fault.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import equation, larger, procedure
+from flownav.estimation.covariance import Lanes, Work, at
+from flownav.estimation.states import (
+    ACCEPTED,
+    CROSS,
+    HYPOTHESES,
+    INFORMATION,
+    INNOVATION,
+    INNOVATION_VARIANCE,
+    MIDDLE,
+    SCORE,
+    SHARE,
+    SIGNATURE,
+    VELOCITY,
+)
+
+# what each hypothesis is, and its unit
+FLOW_SCALE = 0  # flow too large; 1: twice
+FLOW_AGE = 1  # flow older than said [s]
+RANGE_OFFSET = 2  # range too long [m]
+GPS_DRIFT = 3  # 3: GPS position drifts off north, east, down [m/s]
+HEADING_OFF = 6  # what is read as heading, too large [rad]
+FORCE = 7  # 2: specific force, forward and right [m/s2]
+# faults that are there (1) or are not
+FLOW_SWAPPED = 9  # its channels
+FLOW_REVERSED = 10  # both
+COUNT = 11
+
+
+class Size(NamedTuple):
+    """What is known of a fault's size: estimate, standard deviation, and (estimate / standard deviation) squared."""
+
+    size: float
+    sigma: float
+    evidence: float
+
+
+@equation
+def size_of(information: float, score: float, prior_sigma: float) -> Size:
+    """The size by its innovations, and by what sizes such faults have (mean 0, prior_sigma)."""
+    total = information + 1.0 / (prior_sigma * prior_sigma)
+    return Size(score / total, 1.0 / np.sqrt(total), score * score / total)
+
+
+@equation
+def effect_of(work: Work, lanes: Lanes, n: int, fault: int, state: int, lane: int) -> float:
+    """s: what one unit of a fault has done to a state's error in a lane."""
+    value: float = work[at(state, n + fault) * len(lanes) + lane]
+    return value
+
+
+@procedure
+def push(work: Work, lanes: Lanes, n: int, dt_s: float) -> None:
+    """What a steady specific force along body x or y does to the velocity over a step: s_v <- s_v + dt R_EB e."""
+    if work[HYPOTHESES * len(lanes)] > 0.0:
+        for axis in range(2):
+            for i in range(3):
+                for lane in range(len(lanes)):
+                    direction = work[(MIDDLE + 3 * i + axis) * len(lanes) + lane]
+                    work[at(VELOCITY + i, n + FORCE + axis) * len(lanes) + lane] += dt_s * direction
+
+
+@procedure
+def weigh(work: Work, lanes: Lanes, n: int, color: float) -> None:
+    """What the innovation that was just fused tells of each fault; color: how many readings err alike, in effect."""
+    for k in range(int(work[HYPOTHESES * len(lanes)])):
+        for lane in range(len(lanes)):
+            fused = work[ACCEPTED * len(lanes) + lane] > 0.0
+            variance = color * work[INNOVATION_VARIANCE * len(lanes) + lane] if fused else 1.0
+            cross = work[(CROSS + n + k) * len(lanes) + lane] if fused else 0.0
+            innovation = work[INNOVATION * len(lanes) + lane] if fused else 0.0
+            work[(INFORMATION + k) * len(lanes) + lane] += cross * cross / variance
+            work[(SCORE + k) * len(lanes) + lane] += cross * innovation / variance
+            work[(SIGNATURE + k) * len(lanes) + lane] = 0.0
+            work[(SHARE + k) * len(lanes) + lane] = 1.0
+
+
+@procedure
+def fade(work: Work, lanes: Lanes, factor: float) -> None:
+    """What was told long ago is told of another fault: J <- factor J, d <- factor d."""
+    for k in range(int(work[HYPOTHESES * len(lanes)])):
+        for lane in range(len(lanes)):
+            work[(INFORMATION + k) * len(lanes) + lane] *= factor
+            work[(SCORE + k) * len(lanes) + lane] *= factor
+
+
+@procedure
+def begin_anew(work: Work, lanes: Lanes, n: int, fault: int) -> None:
+    """A fault that would begin now: it has done nothing yet, and nothing is known of it."""
+    for lane in range(len(lanes)):
+        begin_lane_anew(work, lanes, n, fault, lane)
+
+
+@procedure
+def begin_lane_anew(work: Work, lanes: Lanes, n: int, fault: int, lane: int) -> None:
+    """The same in one lane."""
+    for i in range(n):
+        work[at(i, n + fault) * len(lanes) + lane] = 0.0
+    work[(INFORMATION + fault) * len(lanes) + lane] = 0.0
+    work[(SCORE + fault) * len(lanes) + lane] = 0.0
+
+
+@equation
+def sign(work: Work, lanes: Lanes, fault: int, lane: int, value: float, share: float = 1.0) -> None:
+    """h_b: what one unit of a fault adds to the reading at hand; k: the share of the state's error that it then shows.
+
+    A reversed flow shows -1 of it: corrections push the state away, and a small error grows.
+    """
+    work[(SIGNATURE + fault) * len(lanes) + lane] = value
+    work[(SHARE + fault) * len(lanes) + lane] = share
+
+
+@equation
+def sign_all(work: Work, lanes: Lanes, fault: int, value: float) -> None:
+    """The same in every lane."""
+    for lane in range(len(lanes)):
+        sign(work, lanes, fault, lane, value)
+
+
+@equation
+def larger_axis(variance_n: float, variance_e: float, covariance: float) -> float:
+    """The larger semi-axis of the ellipse of one sigma of two errors."""
+    mean, half = 0.5 * (variance_n + variance_e), 0.5 * (variance_n - variance_e)
+    semi_axis: float = np.sqrt(larger(mean + np.sqrt(half * half + covariance * covariance), 0.0))
+    return semi_axis

@@ -1,0 +1,54 @@
+"""Warnings that stand: from the happening that raises one to the one that takes it down."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.measurement import Array
+from flownav.navigation.tape import (
+    AIDED_AGAIN,
+    DEAD_RECKONING,
+    EVENT_NAMES,
+    FAULT_CLEARED,
+    FAULT_SUSPECTED,
+    FLOW_DOUBTED,
+    FLOW_TRUSTED,
+    POSITION_INVALID,
+)
+
+RAISING = {
+    int(DEAD_RECKONING): int(AIDED_AGAIN),
+    int(POSITION_INVALID): int(AIDED_AGAIN),
+    int(FLOW_DOUBTED): int(FLOW_TRUSTED),
+    int(FAULT_SUSPECTED): int(FAULT_CLEARED),
+}
+
+
+class Flag(NamedTuple):
+    """A warning that stood from t0_s until before t1_s (infinity: to the end), such as dead reckoning."""
+
+    t0_s: float
+    t1_s: float
+    source: str
+    kind: str
+
+
+def flags_of(happened: Array) -> tuple[Flag, ...]:
+    """The warnings of rows of a tape's events, (k, 3)."""
+    flags = []
+    for t_s, kind, _ in happened.tolist():
+        if int(kind) in RAISING:
+            down = happened[(happened[:, 1] == RAISING[int(kind)]) & (happened[:, 0] >= t_s), 0]
+            flags.append(Flag(t_s, float(down.min(initial=np.inf)), *EVENT_NAMES[int(kind)][:2]))
+    return tuple(flags)
+
+
+def flagged(t_s: Array, flags: tuple[Flag, ...]) -> NDArray[np.bool_]:
+    """At which instants (n,) some warning stands."""
+    stands = np.zeros(len(t_s), bool)
+    for flag in flags:
+        stands |= (t_s >= flag.t0_s) & (t_s < flag.t1_s)
+    return stands

@@ -20,6 +20,8 @@ from flownav.estimation.states import (
     FILTER_ROWS,
     GAIN,
     GYRO_BIAS,
+    HELD_BACK,
+    HYPOTHESES,
     INNOVATION,
     INNOVATION_VARIANCE,
     MIDDLE,
@@ -193,6 +195,7 @@ def test_lanes_that_accept_consider_and_the_others_keep_every_bit():
     rows[CONSIDERED, 0], rows[CONSIDERED + 1 : CONSIDERED + 5, 0] = 2, [9, 0, 30, MIDDLE]
     rows[MIDDLE] = np.arange(wide) % 4 == 1  # the second is considered in every other lane of those that accept
     rows[NOISE], rows[INNOVATION], rows[OFFERED] = 0.5, 0.1, np.arange(wide) % 2
+    rows[HYPOTHESES] = rows[HELD_BACK] = 0.0
     before = work.copy().reshape(FILTER_ROWS, wide)
     fuse(work, LANES, STATES, 1e6)
     for lane in range(wide):

@@ -19,7 +19,6 @@ from flownav.estimation.covariance import (
     decay,
     expect,
     fold_attitude,
-    forget,
     forget_lane,
     pack,
     place,
@@ -134,7 +133,7 @@ def test_a_forgotten_state_keeps_its_variance_alone(where):
         expected = ours.p
         if where > 0.0:
             expected[state], expected[:, state], expected[state, state] = 0.0, 0.0, 9.0
-        forget(ours.work, ONE_LANE, N, state, 9.0, MEASURED)
+        forget_lane(ours.work, ONE_LANE, N, state, 0, 9.0)
         assert np.array_equal(ours.p, expected)
 
 

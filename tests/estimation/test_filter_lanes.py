@@ -14,7 +14,6 @@ from flownav.estimation.covariance import (
     at,
     covariance_of,
     expect,
-    forget,
     forget_lane,
     fuse,
     settle,
@@ -107,7 +106,9 @@ def every_step(buffer, lanes, settings, lag):  # type: ignore[no-untyped-def]
     fuse(work, lanes, n, 3.0)
     baro_altitude(work, lanes, 0)
     fuse(work, lanes, n, 3.0)
-    forget(work, lanes, n, GROUND, 1.0, MEASURED)
+    for lane in range(len(lanes)):
+        if work[MEASURED * len(lanes) + lane] > 0.0:
+            forget_lane(work, lanes, n, GROUND, lane, 1.0)
     total = 0.0
     for lane in range(len(lanes)):
         add_noise_lane(work, lanes, 5, lane, 0.1)

@@ -177,8 +177,16 @@ def test_flow_that_agrees_is_not_doubted_and_flow_that_does_not_is_for_long():
     assert followed_agreement(1.0, 1.1, m) == pytest.approx(1.0)
     assert followed_agreement(25.0, 1.1, m) == pytest.approx(1.0 + 0.05 * 24.0)
     assert followed_agreement(25.0, 9.0, m) == pytest.approx(1.0 + 0.5 * 24.0)
-    assert [lasting_doubt(0.0, ratio) for ratio in (1.0, 3.9, 4.1)] == [0.0, 0.0, 1.0]
-    assert [lasting_doubt(1.0, ratio) for ratio in (3.9, 2.1, 1.9)] == [1.0, 1.0, 0.0]
+
+
+def test_a_flow_is_doubted_above_one_ratio_and_trusted_below_a_smaller_one():
+    never = -np.inf
+    assert [lasting_doubt(9.0, ratio, never, held=False) for ratio in (1.0, 3.9, 4.1)] == [never, never, 9.0]
+    assert [lasting_doubt(9.0, ratio, 8.0, held=False) for ratio in (3.9, 2.1, 1.9)] == [9.0, 9.0, never]
+
+
+def test_where_gps_holds_the_velocity_a_doubt_lasts_5_s():
+    assert [lasting_doubt(t_s, 1.0, 8.0, held=True) for t_s in (9.0, 13.0, 13.1)] == [8.0, 8.0, -np.inf]
 
 
 # -- height --------------------------------------------------------------------------------------------------

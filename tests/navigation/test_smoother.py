@@ -30,16 +30,16 @@ from flownav.navigation.tape import (
     ENTRIES,
     ESTIMATES,
     EXTRA_STATES,
-    LEVELS_AT,
     FORGOTTEN,
     GROUND_FOUND,
+    LEVELS_AT,
     NOTED,
     NOTES,
     PREDICTED,
     empty_tape,
     new_tape,
 )
-from flownav.record import Record
+from flownav.record import PROTECTION_LEVELS, Record
 from flownav.replay.prepare import ReplayOptions, prepare, withhold
 from flownav.replay.session import Replay, replay
 from replay_logs import SyntheticLog, log_of_flight
@@ -243,7 +243,7 @@ def test_with_nothing_after_it_the_last_estimate_is_the_filters(log):
     on = navigator(prepared, cut)
     path = smooth(cut, on)
     assert path[-1, 0] == last_s
-    assert path[-1] == pytest.approx(on.tape.estimates()[-1], rel=1e-12, abs=1e-15)
+    assert path[-1, :LEVELS_AT] == pytest.approx(on.tape.estimates()[-1, :LEVELS_AT], rel=1e-12, abs=1e-15)
 
 
 def errors(path: np.ndarray, flight: SyntheticLog) -> np.ndarray:
@@ -274,7 +274,7 @@ def test_over_many_flights_it_errs_less_than_the_filter_and_as_much_as_it_says(c
 def test_it_never_says_that_it_knows_less_than_the_filter(flown):
     assert flown.smoothed is not None
     assert (flown.smoothed[:, 0] == flown.estimate[:, 0]).all()
-    assert np.isfinite(flown.smoothed).all()
+    assert np.isfinite(flown.smoothed[:, :LEVELS_AT]).all()
     for column in (11, 12, 13, 20, 21, 22):
         assert (flown.smoothed[:, column] <= flown.estimate[:, column] * (1.0 + 1e-9)).all()
     assert np.linalg.norm(flown.smoothed[:, 7:11], axis=1) == pytest.approx(1.0, abs=1e-12)
@@ -313,7 +313,7 @@ def test_the_command_adds_a_table_and_scores_beside_the_filters(flight, tmp_path
     assert set(scores["smoothed"]) == {"outages", "velocity_rms_m_s"}
     assert scores["smoothed"]["outages"][0]["t1"] == 26.0
     record = Record.load(out)
-    assert list(record.tables["smoothed"]) == list(record.tables["estimate"])
+    assert [*record.tables["smoothed"], *PROTECTION_LEVELS] == list(record.tables["estimate"])
     assert "smoothed" in out.with_suffix(".html").read_text(encoding="utf-8")
     people = CliRunner().invoke(app, [*arguments, "--smooth", "--no-report"])
     assert "Smoothed over the whole flight: GPS cut 8 to 26 s: " in people.stdout

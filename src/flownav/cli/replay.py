@@ -155,6 +155,8 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
         )
     if scores["end_drift_m"] is not None:
         console.print(f"At the end of the flight, truth laid on it at take-off: {scores['end_drift_m']:.2f} m off")
+    if scores["protection"]:
+        console.print(_protection(scores["protection"]))
     if "smoothed" in scores:
         console.print(f"Smoothed over the whole flight: {_smoothed_errors(scores['smoothed'])}")
     if scores.get("autopilot", {}).get("against"):
@@ -189,6 +191,17 @@ def _sensors(scores: dict[str, Any]) -> Any:
         words = verdict(judged["nis_per_dof"], white=judged["white"]) if judged else ""
         table.add_row(name, f"{span['t0']:.1f}, {span['t1']:.1f}" if span else "", *said, words)
     return table
+
+
+def _protection(found: dict[str, Any]) -> str:
+    """Protection levels in words."""
+    level, unsaid = found["horizontal_m"], found["exceeded_unsaid_fraction"]
+    said = f"Protection level, horizontal: {level['median']:.2f} m in the median, {level['p95']:.2f} m at 95 %"
+    return (
+        said
+        if unsaid is None
+        else f"{said}; the error is larger and nothing says so {100.0 * unsaid:.2f} % of the time"
+    )
 
 
 def _smoothed_errors(scores: dict[str, Any]) -> str:

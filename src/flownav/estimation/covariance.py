@@ -23,6 +23,7 @@ from flownav.estimation.states import (
     COVARIANCE,
     CROSS,
     GAIN,
+    HELD_BACK,
     HYPOTHESES,
     INNOVATION,
     INNOVATION_VARIANCE,
@@ -150,12 +151,13 @@ def add_row(work: Work, lanes: Lanes, n: int, i: int, factor: int) -> None:
 
 @procedure
 def settle(work: Work, lanes: Lanes, n: int, gate_sigma: float) -> None:
-    """Test what `expect` left, nu^2 <= gate^2 S, and correct with what passes."""
+    """Test what `expect` left, nu^2 <= gate^2 S, and correct with what passes in the lanes that HELD_BACK lets."""
     for lane in range(len(lanes)):
         variance = work[INNOVATION_VARIANCE * len(lanes) + lane]
         innovation = work[INNOVATION * len(lanes) + lane]
         ratio = innovation * innovation / (gate_sigma * gate_sigma * variance)
-        fused = work[ACCEPTED * len(lanes) + lane] > 0.0 and variance > 0.0 and ratio <= 1.0
+        passes = variance > 0.0 and ratio <= 1.0 and work[HELD_BACK * len(lanes) + lane] == 0.0
+        fused = work[ACCEPTED * len(lanes) + lane] > 0.0 and passes
         work[TEST_RATIO * len(lanes) + lane] = ratio
         work[ACCEPTED * len(lanes) + lane] = 1.0 if fused else 0.0
     correct(work, lanes, n)
@@ -176,12 +178,13 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
         fused_lanes += 1 if work[ACCEPTED * len(lanes) + lane] > 0.0 else 0
     if fused_lanes == 0:
         return
-    for i in range(n):
+    columns = columns_of(work, lanes, n)
+    for i in range(columns):
         for lane in range(len(lanes)):
             fused = work[ACCEPTED * len(lanes) + lane] > 0.0
             variance = work[INNOVATION_VARIANCE * len(lanes) + lane] if fused else 1.0
             cross = work[(CROSS + i) * len(lanes) + lane] if fused else 0.0
-            gain = cross / variance
+            gain = cross / variance if i < n else 0.0
             work[(GAIN + i) * len(lanes) + lane] = gain
             work[(REST + i) * len(lanes) + lane] = cross - 0.5 * gain * variance
     for t in range(int(work[CONSIDERED * len(lanes)])):
@@ -194,12 +197,6 @@ def correct(work: Work, lanes: Lanes, n: int) -> None:
             cross = work[(CROSS + considered) * len(lanes) + lane]
             work[(GAIN + considered) * len(lanes) + lane] = 0.0 if left else gain
             work[(REST + considered) * len(lanes) + lane] = cross if left else rest
-    columns = columns_of(work, lanes, n)
-    for j in range(n, columns):
-        for lane in range(len(lanes)):
-            fused = work[ACCEPTED * len(lanes) + lane] > 0.0
-            work[(GAIN + j) * len(lanes) + lane] = 0.0
-            work[(REST + j) * len(lanes) + lane] = work[(CROSS + j) * len(lanes) + lane] if fused else 0.0
     for i in range(n):
         for lane in range(len(lanes)):
             fused = work[ACCEPTED * len(lanes) + lane] > 0.0
@@ -289,14 +286,6 @@ def decay(work: Work, lanes: Lanes, n: int, state: int, factor: float) -> None:
     for j in range(state + 1, columns_of(work, lanes, n)):
         for lane in range(len(lanes)):
             work[at(state, j) * len(lanes) + lane] *= factor
-
-
-@procedure
-def forget(work: Work, lanes: Lanes, n: int, state: int, variance: float, where_row: int) -> None:
-    """Where row `where_row` is above 0: the state loses its correlations and gets this variance (a reset)."""
-    for lane in range(len(lanes)):
-        if work[where_row * len(lanes) + lane] > 0.0:
-            forget_lane(work, lanes, n, state, lane, variance)
 
 
 @procedure

@@ -45,6 +45,10 @@ FORCE = 7  # 2: specific force, forward and right [m/s2]
 FLOW_SWAPPED = 9  # its channels
 FLOW_REVERSED = 10  # both
 COUNT = 11
+NAMES = (
+    "flow scale", "flow age", "range offset", "GPS drift north", "GPS drift east", "GPS drift down", "heading off",
+    "accelerometer forward", "accelerometer right", "flow axes swapped", "flow reversed",
+)  # fmt: skip
 
 
 class Size(NamedTuple):
@@ -71,13 +75,13 @@ def effect_of(work: Work, lanes: Lanes, n: int, fault: int, state: int, lane: in
 
 @procedure
 def push(work: Work, lanes: Lanes, n: int, dt_s: float) -> None:
-    """What a steady specific force along body x or y does to the velocity over a step: s_v <- s_v + dt R_EB e."""
+    """What a steady specific force along body x or y does to the velocity over a step: s_v <- s_v - dt R_EB e."""
     if work[HYPOTHESES * len(lanes)] > 0.0:
         for axis in range(2):
             for i in range(3):
                 for lane in range(len(lanes)):
                     direction = work[(MIDDLE + 3 * i + axis) * len(lanes) + lane]
-                    work[at(VELOCITY + i, n + FORCE + axis) * len(lanes) + lane] += dt_s * direction
+                    work[at(VELOCITY + i, n + FORCE + axis) * len(lanes) + lane] -= dt_s * direction
 
 
 @procedure

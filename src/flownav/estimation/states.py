@@ -96,6 +96,7 @@ NOISE = _rows.take(1)  # its variance
 INNOVATION = _rows.take(1)
 INNOVATION_VARIANCE = _rows.take(1)  # h P h' + R
 TEST_RATIO = _rows.take(1)  # innovation^2 / (gate^2 h P h' + R); above 1 is refused
+HELD_BACK = _rows.take(1)  # above 0 in lanes that test readings and fuse none
 ACCEPTED = _rows.take(1)  # 1 in lanes where it is to be fused, and then where it was
 COEFFICIENT = _rows.take(MOST_OBSERVED)  # h on the states that OBSERVED names
 OBSERVED = _rows.take(

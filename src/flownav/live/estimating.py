@@ -14,7 +14,7 @@ from flownav.mavlink.outgoing import Estimate
 from flownav.measurement import Array
 from flownav.navigation.ahead import state_at
 from flownav.navigation.loop import Running
-from flownav.navigation.memory import load_aid, load_imu, load_start
+from flownav.navigation.memory import PROTECTION, SUSPECTED, load_aid, load_imu, load_start
 
 LONGEST_AHEAD_S = 2.0
 INVALID = 2.0  # the flag of `memory.AidMemory`
@@ -25,6 +25,8 @@ WITHHELD = {
     "stale": "the newest reading is too old",
     "position_invalid": "no horizontal aid for long: the position is invalid",
     "dead_reckoning": "no horizontal aid for too long",
+    "fault_suspected": "innovations tell of a sensor that fails",
+    "unprotected": "a sensor that fails unseen may have put the position too far off",
     "not_finite": "the estimate is not a finite number",
     "uncertain": "the estimate's standard deviation is too large",
     "no_pad": "no pad has been seen",
@@ -45,7 +47,11 @@ def why_withheld(on: Running | None, t_s: float, newest_s: float, limits: Limits
     aid_age_s = on.clock_s - aid.aided_s
     if aid.flag >= INVALID or aid_age_s > told.aid.invalid_s:
         return "position_invalid"
-    return "dead_reckoning" if aid_age_s > limits.dead_reckoning_s else ""
+    if aid_age_s > limits.dead_reckoning_s:
+        return "dead_reckoning"
+    if on.work[SUSPECTED] > 0.0:
+        return "fault_suspected"
+    return "unprotected" if on.work[PROTECTION] > limits.protection_m else ""
 
 
 def estimate_of(on: Running, imu: Array, t_s: float, boot_s: float, resets: int) -> Estimate:

@@ -18,13 +18,15 @@ class Limits:
     """Beyond any of these no estimate is sent.
 
     age_s: of the newest reading of the vehicle. dead_reckoning_s: since a horizontal aid was fused. sigma_m,
-    sigma_m_s: one standard deviation of horizontal position and velocity.
+    sigma_m_s: one standard deviation of horizontal position and velocity. protection_m: how far off the position may be
+    although no fault is noticed, the horizontal protection level.
     """
 
     age_s: float = 0.3
     dead_reckoning_s: float = 5.0
     sigma_m: float = 5.0
     sigma_m_s: float = 1.5
+    protection_m: float = 20.0
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,12 @@ from collections import deque
 from typing import TYPE_CHECKING, Any
 
 from flownav.estimation.gating import Reason
+from flownav.estimation.hypotheses import NAMES
 from flownav.live.estimating import WITHHELD
 from flownav.live.loop import Latency
 from flownav.live.session import Session
 from flownav.measurement import COLUMNS, Sensor
+from flownav.navigation.memory import PROTECTION, SUSPECTED
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -55,7 +57,7 @@ class Screen:
         for name, values in self._strips.items():
             strips.add_row(name, strip(values), _figure(values[-1]))
         dropped = ", ".join(f"{name} {count}" for name, count in sorted(session.dropped.items())) or "nothing"
-        return Group(sensors, self._estimate(), strips, f"dropped: {dropped}", self._footing())
+        return Group(sensors, self._estimate(), self._protection(), strips, f"dropped: {dropped}", self._footing())
 
     def _title(self) -> str:
         vehicle = self._session.reception.vehicle
@@ -76,6 +78,16 @@ class Screen:
                 spread = [3.0 * math.sqrt(max(float(covariance[i, i]), 0.0)) for i in range(3)]
                 table.add_row(name, *(f"{value:8.2f} ±{s:.2f}" for value, s in zip(values, spread, strict=True)))
         return table
+
+    def _protection(self) -> str:
+        """How far off the position may be, and which fault is suspected."""
+        on = self._session.filtering.running
+        if on is None or not math.isfinite(on.work[PROTECTION]):
+            return "protection levels: none yet"
+        suspected = int(on.work[SUSPECTED])
+        doubt = f"; suspected: {NAMES[suspected - 1]}" if suspected else ""
+        horizontal_m, vertical_m = (float(level_m) for level_m in on.work[PROTECTION : PROTECTION + 2])
+        return f"protection levels: {horizontal_m:.2f} m horizontal, {vertical_m:.2f} m vertical{doubt}"
 
     def _footing(self) -> str:
         session = self._session

@@ -7,18 +7,17 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import equation, larger, procedure, smaller
-from flownav.estimation.covariance import add_noise_lane, consider, covariance_of, forget_lane, variance_of
+from flownav.estimation.covariance import add_noise_lane, consider, covariance_of, variance_of
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.lag import FlowLag, lag_of_step
-from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow, lagged_flow_rate, lens_range_of
+from flownav.estimation.laws.flow import body_velocity, flow_rate, lens_range_of
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import (
     ATTITUDE,
     COMPASS,
-    FLOW_LAG,
     GROUND,
     GYRO_BIAS,
     GYRO_SHARE,
+    HELD_BACK,
     INNOVATION,
     INNOVATION_VARIANCE,
     INS_ERROR,
@@ -26,7 +25,6 @@ from flownav.estimation.states import (
     NOISE,
     POSITION,
     STATE,
-    STATES_WITH_LAG,
     VELOCITY,
 )
 from flownav.measurement import Sensor
@@ -40,6 +38,7 @@ from flownav.navigation.flow_noise import (
     lasting_walk,
 )
 from flownav.navigation.height import MANY_STRAYS
+from flownav.navigation.lagged_flow import observe_lagged
 from flownav.navigation.memory import (
     BLIND,
     GPS_FUSED,
@@ -49,6 +48,7 @@ from flownav.navigation.memory import (
     SOUGHT,
     TESTED,
     TURNING,
+    UNHELD_S,
     load_echo,
     load_flow,
     load_ground,
@@ -77,7 +77,6 @@ from flownav.navigation.tape import FLOW_DOUBTED, FLOW_TRUSTED, Output, write_ev
 from flownav.navigation.told import FlowSettings
 from flownav.navigation.trust import watch_whiteness
 
-UNHELD_S = 1.0  # without GPS
 NEAR_LIMIT = 0.98  # a sensor that has reached its limit reads the limit, whatever the flow
 LARGEST_SPREAD = 0.5  # of the height over the ground, of which flow makes no speed
 UNKNOWN_RANGE_M = 2.0
@@ -111,7 +110,7 @@ def turning_of(
     share = larger(1.0 - np.exp(-step_s / s.flow_gyro_time_s), 1.0 / larger(count, 1.0)) if follows else 0.0
     bias_own_x = m.bias_x + share * (own_x - imu_x - m.bias_x) if follows else m.bias_x
     bias_own_y = m.bias_y + share * (own_y - imu_y - m.bias_y) if follows else m.bias_y
-    after = FlowMemory(m.taken_s, m.excess, bias_own_x, bias_own_y, count, m.ratio, m.doubted)
+    after = FlowMemory(m.taken_s, m.excess, bias_own_x, bias_own_y, count, m.ratio, m.doubted_s)
     x = imu_x if by_imu else own_x - bias_own_x
     y = imu_y if by_imu else own_y - bias_own_y
     return x, y, after
@@ -163,35 +162,6 @@ def take_flow(
     judge_agreement(work, lanes, t_s, o)
 
 
-@equation
-def observe_lagged(work: Work, lanes: Lanes, component: int, angular: bool, s: FlowSettings) -> None:
-    """The law of a component of a sensor whose dynamics are states; there are none for a velocity down."""
-    if angular:
-        lagged_flow_rate(work, lanes, component, s.flow_lag_c_1_s2, s.flow_below_m)
-    else:
-        lagged_flow(work, lanes, component, s.flow_lag_c_1_s2)
-
-
-@equation
-def flow_lag(s: FlowSettings, dt_s: float) -> FlowLag:
-    """The sensor's dynamics over a step of dt."""
-    return lag_of_step(s.flow_lag_b_1_s, s.flow_lag_c_1_s2, dt_s, s.flow_forward_m, s.flow_right_m, s.flow_below_m)
-
-
-@equation
-def start_lag(work: Work, lanes: Lanes, lag: bool | None, lane: int, sigma_m_s: float, s: FlowSettings) -> None:
-    """The dynamics of one lane at its start: at rest, as its velocity is, and as unsure, c x1 and sqrt(c) x2 [m/s].
-
-    lag: `covariance.lagged`; nothing where they are no states.
-    """
-    if lag is not None:
-        for i in range(4):
-            state = FLOW_LAG + i
-            sigma = sigma_m_s / (s.flow_lag_c_1_s2 if i % 2 == 0 else np.sqrt(s.flow_lag_c_1_s2))
-            work[(STATE + state) * len(lanes) + lane] = 0.0
-            forget_lane(work, lanes, STATES_WITH_LAG, state, lane, sigma * sigma)
-
-
 @procedure
 def look(work: Work, lanes: Lanes, t_s: float, angular: bool, gyro_is_imu: bool, s: FlowSettings) -> None:
     """TURNING, LENS_RANGE and, in TESTED, the verdict on the whole reading."""
@@ -219,6 +189,8 @@ def look(work: Work, lanes: Lanes, t_s: float, angular: bool, gyro_is_imu: bool,
         verdict = judge_flow(reading, angular, x, y, started, view, s)
         headed = verdict != FUSED or work[SOUGHT * len(lanes) + lane] == 0.0
         work[TESTED * len(lanes) + lane] = verdict if headed else NO_HEADING
+        held = t_s - work[GPS_FUSED * len(lanes) + lane] <= UNHELD_S
+        work[HELD_BACK * len(lanes) + lane] = 1.0 if held and np.isfinite(m.doubted_s) else 0.0
 
 
 @equation
@@ -293,7 +265,7 @@ def learn(work: Work, lanes: Lanes, t_s: float, angular: bool, component: int, s
                 noise = work[NOISE * len(lanes) + lane]
                 excess = followed_excess(innovation, before, noise, t_s, m, s)
             store_flow(
-                work, lanes, lane, FlowMemory(m.taken_s, excess, m.bias_x, m.bias_y, m.bias_count, ratio, m.doubted)
+                work, lanes, lane, FlowMemory(m.taken_s, excess, m.bias_x, m.bias_y, m.bias_count, ratio, m.doubted_s)
             )
 
 
@@ -320,12 +292,13 @@ def walk_alone(work: Work, lanes: Lanes, t_s: float, s: FlowSettings) -> None:
 
 @procedure
 def judge_agreement(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
-    """Say that flow is doubted, and that it is trusted again; note when it was tested last."""
+    """Say that flow is doubted, and that it is trusted again; note when it was tested last. No other is held back."""
     for lane in range(len(lanes)):
-        reason = work[TESTED * len(lanes) + lane]
-        if reason == FUSED:
+        work[HELD_BACK * len(lanes) + lane] = 0.0
+        if work[TESTED * len(lanes) + lane] == FUSED:
             m = load_flow(work, lanes, lane)
-            doubted = lasting_doubt(m.doubted, m.ratio)
-            if doubted != m.doubted:
-                write_event(lanes, lane, t_s, FLOW_DOUBTED if doubted > 0.0 else FLOW_TRUSTED, m.ratio, o)
-            store_flow(work, lanes, lane, FlowMemory(t_s, m.excess, m.bias_x, m.bias_y, m.bias_count, m.ratio, doubted))
+            held = t_s - work[GPS_FUSED * len(lanes) + lane] <= UNHELD_S
+            last_s = lasting_doubt(t_s, m.ratio, m.doubted_s, held)
+            if np.isinf(last_s) != np.isinf(m.doubted_s):
+                write_event(lanes, lane, t_s, FLOW_TRUSTED if np.isinf(last_s) else FLOW_DOUBTED, m.ratio, o)
+            store_flow(work, lanes, lane, FlowMemory(t_s, m.excess, m.bias_x, m.bias_y, m.bias_count, m.ratio, last_s))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from flownav.compile import clamp, equation, larger, smaller
 from flownav.navigation.height import range_variance
 from flownav.navigation.records import FlowMemory
@@ -12,6 +14,7 @@ SMALLEST_EXCESS, LARGEST_EXCESS = 0.25, 400.0
 LARGEST_CHANGE, MEAN_CHANGE = 6.25, 0.9776  # E min(x^2, 6.25) of a normal x
 AGREEMENT_S = 1.0
 DOUBTED_RATIO, TRUSTED_RATIO = 4.0, 2.0  # on average 1
+DOUBT_S = 5.0
 LONGEST_STEP_S = 1.0
 FULL_QUALITY = 255.0
 
@@ -60,9 +63,14 @@ def followed_excess(
 
 
 @equation
-def lasting_doubt(doubted: float, ratio: float) -> float:
-    """Doubted above one ratio, trusted again below a smaller one."""
-    return 1.0 if ratio > DOUBTED_RATIO else (0.0 if ratio < TRUSTED_RATIO else doubted)
+def lasting_doubt(t_s: float, ratio: float, doubted_s: float, held: bool) -> float:
+    """When a doubted flow last disagreed [s], -infinity for one that is trusted: doubted above one ratio, trusted again
+    below a smaller one, and where GPS holds the velocity (held) only after DOUBT_S: a flow of the wrong sign agrees
+    while the vehicle happens to stand.
+    """
+    disagrees = ratio > (DOUBTED_RATIO if np.isinf(doubted_s) else TRUSTED_RATIO)
+    last_s = t_s if disagrees else doubted_s
+    return last_s if (held and t_s - last_s <= DOUBT_S) or disagrees else -np.inf
 
 
 @equation

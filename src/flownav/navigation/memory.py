@@ -33,6 +33,8 @@ from flownav.navigation.records import (
     WhitenessMemory,
 )
 
+UNHELD_S = 1.0  # without a fix of GPS, nothing but flow tells the velocity
+
 _rows = Rows(FILTER_ROWS)
 READING = _rows.take(len(Reading._fields))
 START = _rows.take(len(StartMemory._fields))
@@ -112,7 +114,7 @@ _FRESH: dict[int, tuple[float, ...]] = {
     IMU_HEARD: ImuMemory(-np.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     RANGE: RangeMemory(-np.inf, np.nan, np.nan, np.nan, 0.0, np.nan, 0.0),
     ECHO: EchoMemory(np.nan, 0.0, np.nan, 0.0, 0.0),
-    FLOW: FlowMemory(-np.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0),
+    FLOW: FlowMemory(-np.inf, 1.0, 0.0, 0.0, 0.0, 1.0, -np.inf),
     HEADING: HeadingMemory(-np.inf, np.nan),
     BRIDGE: BridgeMemory(*([np.nan] * len(BridgeMemory._fields))),
     SEEN_WINDOW: SeenWindow(1e9, -1.0, 0.0, 0.0, 0.0, 0.0),

@@ -50,6 +50,7 @@ from flownav.navigation.memory import (
     DRIFT_SINCE,
     FLOW_BEFORE,
     FLOW_SPEED,
+    GPS_FUSED,
     LEFT_OVER,
     LENS_RANGE,
     PROTECTION,
@@ -59,6 +60,7 @@ from flownav.navigation.memory import (
     SUSPECTED_AT,
     TURNED_BEFORE,
     TURNING,
+    UNHELD_S,
     load_flow,
     of_lane,
     set_lane,
@@ -244,7 +246,8 @@ def mind_faults(work: Work, lanes: Lanes, t_s: float, dt_s: float, o: Output) ->
         elif before > 0.0 and worst < CLEAR and t_s - of_lane(work, lanes, SUSPECTED_AT, lane) > HELD_S:
             set_lane(work, lanes, SUSPECTED, lane, 0.0)
             write_event(lanes, lane, t_s, FAULT_CLEARED, before - 1.0, o)
-        if worst_flow > PUZZLING:
+        unheld = t_s - of_lane(work, lanes, GPS_FUSED, lane) > UNHELD_S
+        if worst_flow > PUZZLING or (unheld and np.isfinite(load_flow(work, lanes, lane).doubted_s)):
             set_lane(work, lanes, PUZZLED_AT, lane, t_s)
         if t_s - of_lane(work, lanes, PUZZLED_AT, lane) < HELD_S:
             work[LEFT_OVER * len(lanes) + lane] += 2.0 * dt_s * work[FLOW_SPEED * len(lanes) + lane]

@@ -115,7 +115,8 @@ class GroundMemory(NamedTuple):
 
 class FlowMemory(NamedTuple):
     """taken_s: of the last tested flow; excess: how many times noisier than its model; bias of the sensor's own gyro
-    [rad/s] and from how many readings; ratio: mean of nu^2 over its variance; doubted: 1 while that is too large.
+    [rad/s] and from how many readings; ratio: mean of nu^2 over its variance; doubted_s: when that was
+    too large last, of a flow that is doubted; else -infinity.
     """
 
     taken_s: float
@@ -124,7 +125,7 @@ class FlowMemory(NamedTuple):
     bias_y: float
     bias_count: float
     ratio: float
-    doubted: float
+    doubted_s: float
 
 
 class HeadingMemory(NamedTuple):

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import equation, procedure
-from flownav.estimation.covariance import lagged, place
+from flownav.estimation.covariance import lagged, place, states_of
+from flownav.estimation.hypotheses import COUNT, begin_lane_anew
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, FORCE, POSITION, QUATERNION, RATE, STATE, STATES, VELOCITY
 from flownav.frames import GRAVITY_M_S2, Quaternion, quaternion_from_euler, rotation_from_quaternion
 from flownav.measurement import Sensor
-from flownav.navigation.flow import start_lag
+from flownav.navigation.lagged_flow import start_lag
 from flownav.navigation.memory import (
     SCALE_DOUBT,
     SOUGHT,
@@ -161,6 +162,8 @@ def start_lane(
         rotation = rotation_from_quaternion(w, x, y, z)
         work[(STATE + ACCEL_BIAS) * len(lanes) + lane] = m.force_x + GRAVITY_M_S2 * rotation[6]
         work[(STATE + ACCEL_BIAS + 1) * len(lanes) + lane] = m.force_y + GRAVITY_M_S2 * rotation[7]
+    for fault in range(COUNT):
+        begin_lane_anew(work, lanes, states_of(lanes), fault, lane)
     doubted = 0.0 if lost else load_filter_settings(p).flow_scale_sigma
     set_lane(work, lanes, SCALE_DOUBT, lane, doubted)
     store_start(work, lanes, lane, started(m))

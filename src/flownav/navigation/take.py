@@ -20,11 +20,12 @@ from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, STATES
 from flownav.measurement import Sensor
 from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
 from flownav.navigation.course import find_heading, note_flow_course
-from flownav.navigation.flow import flow_lag, take_flow
+from flownav.navigation.flow import take_flow
 from flownav.navigation.gps import take_gps
 from flownav.navigation.height import take_baro, take_range
 from flownav.navigation.inertial import choose_motion, keep_imu, steady_force
 from flownav.navigation.journal import note_decay, note_estimate, note_prediction
+from flownav.navigation.lagged_flow import flow_lag
 from flownav.navigation.memory import (
     CLOCK,
     ERRORS_CLOCK,

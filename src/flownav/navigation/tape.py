@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from flownav.compile import equation, pointer, procedure
 from flownav.estimation.covariance import covariance_of, variance_of
+from flownav.estimation.hypotheses import NAMES as FAULTS
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import (
@@ -73,7 +74,7 @@ EVENT_NAMES = (
     ("filter", "standing", "the vehicle moves (0), stands with its motors running (1), or rests (2)"),
     ("imu", "spike", "a reading that no vehicle can follow was dropped: it said this turning [rad/s]"),
     ("heading", "found", "from the course by GPS and flow: it was off by this much [rad]"),
-    ("filter", "suspects", "a fault that innovations tell of, by its number in `estimation.hypotheses`"),
+    ("filter", "suspects", f"a fault that innovations tell of: {', '.join(f'{i} {n}' for i, n in enumerate(FAULTS))}"),
     ("filter", "cleared", "that fault is no more suspected"),
 )
 # kinds of journal entry, and where their numbers stand in it

@@ -12,7 +12,7 @@ from typing import Any
 
 from flownav.files import written_whole
 from flownav.record import Record
-from flownav.report import content, figures_filter, figures_path, figures_states, figures_vehicle
+from flownav.report import content, figures_filter, figures_path, figures_protection, figures_states, figures_vehicle
 from flownav.report.panels import Panel, Section
 from flownav.report.series import DOT_POINTS, LINE_POINTS, has, mapping
 from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
@@ -53,7 +53,8 @@ def _sections(record: Record) -> list[tuple[str, str, list[Panel]]]:
     errors = [figures_states.position_error(record), figures_states.velocity_error(record)] if known else []
     errors = [*figures_states.flown_errors(record), *errors]
     against_gps = [] if known else [figures_filter.error_against_gps(record)]
-    uncertainty = [*errors, *against_gps, figures_filter.radius_of_uncertainty(record)]
+    levels = figures_protection.protection(record)
+    uncertainty = [*errors, *against_gps, figures_filter.radius_of_uncertainty(record), *levels]
     return [
         ("path", "Flight path", [figures_path.path_over_pad(record), figures_path.ground_track(record)]),
         ("states", "Position and velocity", [figures_states.position(record), figures_states.velocity(record)]),

@@ -16,7 +16,7 @@ from flownav.measurement import COLUMNS, MAX_VALUES, Sensor
 from flownav.navigation.loop import STATED
 from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
 from flownav.provenance import command_line, provenance
-from flownav.record import FED, POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY, Record, Table
+from flownav.record import FED, POSITION_NED, PROTECTION_LEVELS, QUATERNION, TABLES, VELOCITY_BODY, Record, Table
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import Flown
 from flownav.simulation.history import HISTORY
@@ -83,7 +83,7 @@ def _add_papers(
 ) -> None:
     """The paper's filter (or none), which takes the INS's attitude as it comes and says nothing of its consistency."""
     attitude = {name: history["gps", name] for name in QUATERNION}
-    own = tuple(c for c in TABLES["estimate"] if c not in QUATERNION)
+    own = tuple(c for c in TABLES["estimate"] if c not in (*QUATERNION, *PROTECTION_LEVELS))
     table("estimate", "estimate", own, **attitude)
     every = np.full(len(t_s), 255.0)
     table("gps_position", "gps", COLUMNS[Sensor.GPS_POSITION], quality=every)

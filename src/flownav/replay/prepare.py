@@ -85,12 +85,15 @@ def prepare(log: Log, options: ReplayOptions) -> Prepared:
 
 
 def withhold(log: Log, queue: EventQueue, options: ReplayOptions) -> EventQueue:
-    """The queue with what the options take away marked: GPS and flow that arrive in [t0, t1) of an outage, and flow."""
+    """The queue with what the options take away marked: GPS and flow that arrive in [t0, t1) of an outage, and flow.
+
+    A flow reading of no data is none that could be withheld.
+    """
     withheld = queue.withheld.copy()
     for sensors, outages in ((GPS, options.gps_outages_s), (FLOW, options.flow_outages_s)):
         for sensor in sensors:
             if sensor in log.streams:
-                rows = np.flatnonzero(queue.sensor == sensor)
+                rows = np.flatnonzero((queue.sensor == sensor) & ((queue.quality > 0.0) | (sensors == GPS)))
                 arrival = log.streams[sensor].t_s[queue.row[rows]]
                 for t0, t1 in outages:
                     withheld[rows[(arrival >= t0) & (arrival < t1)]] = 1.0

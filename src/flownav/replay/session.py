@@ -191,7 +191,7 @@ def replay(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, *,
 
 
 def replay_again(flown: Replay, options: ReplayOptions, settings: NavigatorSettingsFile) -> Replay:
-    """The same streams, prepared once, with other GPS cuts and settings; the rest of the options must be those of before.
+    """The same streams, prepared once, with other GPS and flow cuts and settings; other options stay as they were.
 
     InputError where the filter never starts.
     """

@@ -138,7 +138,9 @@ def _knobs(courses: Sequence[Course], settings: NavigatorSettingsFile) -> list[K
     knobs = sorted(set(found), key=found.index)
     first = courses[0].flown.log.path
     if not any(np.isfinite(course.start.density).any() for course in courses) or not knobs:
-        raise InputError(f"{first}: in no window was any sensor predicted, so that nothing can be tuned; see `flownav info`")
+        raise InputError(
+            f"{first}: in no window was any sensor predicted, so that nothing can be tuned; see `flownav info`"
+        )
     return knobs
 
 

@@ -74,7 +74,7 @@ def _verdict(total: Judged | None, error: Judged | None, apart: Judged | None) -
     if error.low <= 0.0 or error.mean < WORTH:
         return False, "in the held-out windows the path's error does not shrink beyond chance and 2 %"
     if total.low <= 0.0:
-        return False, "in the held-out windows the path's error shrinks by less than the predictions of the sensors lose"
+        return False, "in the held-out windows the path's error shrinks by less than the sensors' predictions lose"
     if apart is not None and apart.mean <= 0.0:
         return False, "the path's error does not shrink in the logs that were held out whole"
     return True, "the path's error shrinks in the held-out windows"

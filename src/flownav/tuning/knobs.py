@@ -35,7 +35,9 @@ KNOBS = (  # in the order in which they are sought: what moves the path most com
     Knob("gyro noise", ("gyro_noise_rad_s_rt_hz",), "rad/s per root hertz", (Sensor.IMU,)),
     Knob("accelerometer noise", ("accel_noise_m_s2_rt_hz",), "m/s2 per root hertz", (Sensor.IMU,)),
     Knob("GPS position noise", ("gps_white_sigma_m", "gps_white_sigma_down_m"), "m", (Sensor.GPS_POSITION,)),
-    Knob("GPS velocity noise", ("gps_velocity_white_m_s", "gps_velocity_white_down_m_s"), "m/s", (Sensor.GPS_VELOCITY,)),
+    Knob(
+        "GPS velocity noise", ("gps_velocity_white_m_s", "gps_velocity_white_down_m_s"), "m/s", (Sensor.GPS_VELOCITY,)
+    ),
     Knob("flow noise", ("flow_sigma_rad_s", "flow_low_quality_sigma_rad_s"), "rad/s", FLOWS),
     Knob("flow's lasting error", ("flow_lasting_rad_s", "flow_lasting_share"), "rad/s; share of the speed", FLOWS),
     Knob("range noise", ("range_sigma_m", "range_relative_sigma"), "m; share of the range", (Sensor.RANGE,)),

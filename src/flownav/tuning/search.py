@@ -40,7 +40,7 @@ def mean_gain(gains: Sequence[Gains]) -> float:
 
 
 def search(trials: Trials, settings: NavigatorSettingsFile) -> Found:
-    """Coordinate search; then what cannot be told from the start is put back, and the rest sought again until all can."""
+    """Coordinate search; what cannot be told from the start is put back and the rest sought again, until all can."""
     limits = [limits_of(knob, settings) for knob in trials.knobs]
     kept, steps, best = list(range(len(limits))), STEPS, np.zeros(len(limits))
     while True:

@@ -48,7 +48,8 @@ def gain_words(error: Judged | None) -> str:
     if error is None:
         return "nothing shows the path's error"
     mean, low, high = (smaller_percent(gain) for gain in error[:3])
-    return f"the path's error is smaller by {mean:.1f} % (95 % interval {low:.1f} to {high:.1f} %, {error.windows} windows)"
+    interval = f"95 % interval {low:.1f} to {high:.1f} %, {error.windows} windows"
+    return f"the path's error is smaller by {mean:.1f} % ({interval})"
 
 
 def smaller_percent(gain: float) -> float:

@@ -1,4 +1,4 @@
-"""Which parts of a flight are fitted and which judge the fit: alternate windows, and whole logs where there are several.
+"""Which parts of flights are fitted and which judge the fit: alternate windows, and whole logs of several.
 
 Between two windows lies a gap, so that what lasts of an error in one is not found again in the next.
 """

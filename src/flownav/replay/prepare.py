@@ -92,7 +92,7 @@ def withhold(log: Log, queue: EventQueue, options: ReplayOptions) -> EventQueue:
     withheld = queue.withheld.copy()
     for sensors, outages in ((GPS, options.gps_outages_s), (FLOW, options.flow_outages_s)):
         for sensor in sensors:
-            if sensor in log.streams:
+            if outages and sensor in log.streams:
                 rows = np.flatnonzero((queue.sensor == sensor) & ((queue.quality > 0.0) | (sensors == GPS)))
                 arrival = log.streams[sensor].t_s[queue.row[rows]]
                 for t0, t1 in outages:

@@ -15,12 +15,12 @@ from flownav.logs.log import Log
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replay.fed import as_fed
 from flownav.replay.prepare import ReplayOptions
-from flownav.replay.session import Replay
+from flownav.replay.session import replay
 from flownav.tuning.judge import UNMOVED, Judgement, judge
 from flownav.tuning.knobs import Knob, knobs_of, rounded, turned
 from flownav.tuning.scores import Gains, reference_name
 from flownav.tuning.search import Found, search
-from flownav.tuning.trials import Course, Trials, course_of, prepared
+from flownav.tuning.trials import Course, Trials, course_of
 from flownav.tuning.windows import Split, split_flights
 
 RUNS_A_KNOB = 30  # about as many as a search takes, for the progress bar
@@ -79,8 +79,8 @@ def tune(
     names, order = names_of(paths), _ordered(paths, logs)
     logs = [logs[k] for k in order]
     splits = split_flights(logs)
-    flown = [_prepared(log, options, stated) for log in logs]
     settings = stated or NavigatorSettingsFile()
+    flown = [replay(log, *as_fed(log, options, settings)) for log in logs]
     fitted = [course_of(run, split.fit) for run, split in zip(flown, splits, strict=True) if not split.whole]
     knobs = _knobs(fitted, settings)
     trials = Trials(fitted, knobs, settings, on_progress)
@@ -126,10 +126,6 @@ def _ordered(paths: Sequence[Path], logs: Sequence[Log]) -> list[int]:
             )
     names = names_of(paths)
     return sorted(range(len(paths)), key=lambda k: (names[k], contents[k]))
-
-
-def _prepared(log: Log, options: ReplayOptions, stated: NavigatorSettingsFile | None) -> Replay:
-    return prepared(log, *as_fed(log, options, stated or NavigatorSettingsFile()))
 
 
 def _knobs(courses: Sequence[Course], settings: NavigatorSettingsFile) -> list[Knob]:

@@ -90,4 +90,4 @@ def limits_of(knob: Knob, settings: NavigatorSettingsFile) -> tuple[float, float
 
 def penalty(knobs: Sequence[Knob], log_factors: Array) -> float:
     """Minus the logarithm of the prior: what a log does not show stays as it was."""
-    return 0.5 * sum((factor / knob.spread) ** 2 for knob, factor in zip(knobs, log_factors, strict=True))
+    return 0.5 * sum((float(factor) / knob.spread) ** 2 for knob, factor in zip(knobs, log_factors, strict=True))

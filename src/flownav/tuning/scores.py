@@ -7,6 +7,7 @@ worth ln f more, and an error of the path that is smaller by f counts the same l
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
 from flownav.replay.judged import TESTED
-from flownav.replay.prepare import FLOW
+from flownav.replay.prepare import FLOW, ReplayOptions
 from flownav.replay.session import Replay
 from flownav.scoring.alignment import velocity_of
 from flownav.scoring.outage import difference_at
@@ -71,17 +72,18 @@ def reference_name(log: Log) -> str | None:
     return AGAINST_FLOW if any(sensor in log.streams for sensor in FLOW) else None
 
 
-def cuts_in(log: Log, windows: Sequence[Window]) -> dict[str, tuple[Window, ...]]:
-    """Options of a replay that withhold in these windows what the path is measured against."""
+def with_cuts(log: Log, options: ReplayOptions, windows: Sequence[Window]) -> ReplayOptions:
+    """Options of a replay that withholds in these windows what the path is measured against."""
     reference = reference_name(log)
-    return {
-        "gps_outages_s": tuple(windows) if reference == AGAINST_GPS else (),
-        "flow_outages_s": tuple(windows) if reference == AGAINST_FLOW else (),
-    }
+    return replace(
+        options,
+        gps_outages_s=tuple(windows) if reference == AGAINST_GPS else (),
+        flow_outages_s=tuple(windows) if reference == AGAINST_FLOW else (),
+    )
 
 
 def scores_of(flown: Replay, windows: Sequence[Window]) -> Scores:
-    """A run with `cuts_in` these windows."""
+    """A run with `with_cuts` in these windows."""
     density, readings = densities(flown.innovation, windows)
     error, floor = path_errors(flown, windows)
     return Scores(density, readings, 0.5 * np.log(error**2 + floor**2), error)
@@ -124,7 +126,7 @@ def densities(innovation: Array, windows: Sequence[Window]) -> tuple[Array, Arra
     cell = np.ravel_multi_index((where, part, sensor[tested].astype(int), component[tested].astype(int)), shape)
     size = int(np.prod(shape))
     count = np.bincount(cell, minlength=size)
-    sums, variances = (np.bincount(cell, column[tested], size) for column in (news, variance))
+    sums, variances = (np.bincount(cell, column[tested], size).astype(float) for column in (news, variance))
     filled = count > 0
     by_sum = np.zeros(size)
     by_sum[filled] = _log_density(sums[filled], variances[filled]) + 0.5 * np.log(count[filled])

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from flownav.compare.like_for_like import Window
 from flownav.errors import InputError
-from flownav.logs.log import Log
 from flownav.measurement import Array
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.replay.prepare import ReplayOptions
-from flownav.replay.session import Replay, replay, replay_again
+from flownav.replay.session import Replay, replay_again
 from flownav.tuning.knobs import Knob, turned
-from flownav.tuning.scores import LOSS, Gains, Scores, cuts_in, gains_of, scores_of
+from flownav.tuning.scores import LOSS, Gains, Scores, gains_of, scores_of, with_cuts
 
 WORKERS = 2
 
@@ -42,19 +40,14 @@ class Course:
             return Gains(lost, np.where(np.isfinite(self.start.log_error), LOSS, np.nan))
 
 
-def prepared(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile) -> Replay:
-    """The log flown once as the start says. InputError where the filter never starts."""
-    return replay(log, options, settings)
-
-
 def course_of(flown: Replay, windows: Sequence[Window]) -> Course:
-    """A log on these windows, with `scores.cuts_in` them and nowhere else."""
+    """A log on these windows, with `scores.with_cuts` in them and nowhere else."""
     return Course(flown, tuple(windows), _scores(flown, windows, {}))
 
 
 def _scores(flown: Replay, windows: Sequence[Window], keys: dict[str, float]) -> Scores:
     settings = NavigatorSettingsFile.model_validate(flown.settings.model_dump(exclude_unset=True) | keys)
-    options = replace(flown.options, **cuts_in(flown.log, windows))
+    options = with_cuts(flown.log, flown.options, windows)
     return scores_of(replay_again(flown, options, settings), windows)
 
 

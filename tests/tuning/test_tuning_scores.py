@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from flownav.estimation.gating import Reason
-from flownav.measurement import Sensor
+from flownav.logs.log import Log
+from flownav.measurement import COLUMNS, Sensor, Stream
+from flownav.replay.prepare import ReplayOptions
 from flownav.tuning.scores import (
     LEAST_SHARE,
     LOSS,
@@ -15,6 +19,8 @@ from flownav.tuning.scores import (
     _flow_errors,
     densities,
     gains_of,
+    reference_name,
+    with_cuts,
 )
 
 WINDOWS = [(0.0, 10.0), (20.0, 30.0)]
@@ -106,6 +112,21 @@ def test_nobody_gains_by_predicting_less():
     nothing = gains_of(scores(density=np.nan, error=np.nan), scores())
     assert nothing.prediction == pytest.approx([tempered(LOSS)] * 2)
     assert nothing.error[0] == pytest.approx(tempered(LOSS))
+
+
+@pytest.mark.parametrize(("sensors", "truth", "named", "gps_cuts", "flow_cuts"), [
+    ((Sensor.GPS_POSITION, Sensor.FLOW_RATE), {}, "gps cuts", tuple(WINDOWS), ()),
+    ((Sensor.FLOW_RATE,), {}, "truth velocity", (), ()),
+    ((Sensor.FLOW_VELOCITY,), None, "flow cuts", (), tuple(WINDOWS)),
+    ((Sensor.RANGE,), None, None, (), ()),
+])  # fmt: skip
+def test_what_the_path_is_held_against_is_withheld(sensors, truth, named, gps_cuts, flow_cuts):
+    one = np.zeros(1)
+    streams = {sensor: Stream.of(sensor, one, np.zeros((1, len(COLUMNS[sensor])))) for sensor in sensors}
+    log = Log(Path("made"), streams, truth=truth)
+    options = with_cuts(log, ReplayOptions(gps_delay_s=0.1), WINDOWS)
+    assert reference_name(log) == named
+    assert (options.gps_outages_s, options.flow_outages_s, options.gps_delay_s) == (gps_cuts, flow_cuts, 0.1)
 
 
 def test_withheld_flow_is_an_error_of_the_path():

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from flownav.logs.log import Log
+from flownav.measurement import COLUMNS, Sensor, Stream
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.tuning.judge import ACCEPTED, NOT_ACCEPTED, judge, judged
-from flownav.tuning.knobs import KNOBS, MOST_NOISE, limits_of, rounded, turned
+from flownav.tuning.knobs import KNOBS, MOST_NOISE, knobs_of, limits_of, rounded, turned
 from flownav.tuning.resampling import interval_of, resampled
 from flownav.tuning.scores import Gains
 from flownav.tuning.search import search
@@ -31,6 +34,7 @@ class Hills:
 
     def gains(self, log_factors):
         drawn = self.spread * np.random.default_rng(0).standard_normal((self.windows, len(self.knobs)))
+        drawn -= drawn.mean(axis=0)
         off = np.asarray(log_factors) - self.tops - drawn
         start = 0.0 - self.tops - drawn
         total = (self.worth * (start**2 - off**2)).sum(axis=1)
@@ -49,8 +53,9 @@ def test_the_search_finds_what_the_windows_show_and_leaves_the_rest():
 
 
 def test_what_chance_could_have_moved_stays():
-    found = search(Hills(np.log([1.3, 1.0, 1.0]), np.array([1.0, 1.0, 1.0]), spread=1.0), SETTINGS)
-    assert not found.log_factors.any()
+    tops, worth = np.log([1.5, 1.0, 1.0]), np.array([1.0, 0.0, 0.0])
+    assert search(Hills(tops, worth, spread=0.2), SETTINGS).log_factors[0] > 0.0
+    assert not search(Hills(tops, worth, spread=1.0), SETTINGS).log_factors.any()
 
 
 def test_what_is_worth_little_stays():
@@ -72,6 +77,31 @@ def test_every_knob_stays_within_the_schema(knob):
         assert low < 0.0 < high
         for factor in (low, high):
             NavigatorSettingsFile.model_validate(turned(settings, [knob], [factor * (1.0 - 1e-3)]))
+
+
+@pytest.mark.parametrize(("sensors", "truth", "gain"), [
+    ((Sensor.FLOW_RATE, Sensor.RANGE), None, False),
+    ((Sensor.FLOW_RATE, Sensor.RANGE), {}, True),
+    ((Sensor.FLOW_VELOCITY, Sensor.GPS_POSITION), None, True),
+    ((Sensor.FLOW_RATE, Sensor.POSE), None, True),
+])  # fmt: skip
+def test_a_gain_is_sought_only_where_something_tells_the_speed(sensors, truth, gain):
+    streams = {sensor: Stream.of(sensor, np.zeros(1), np.zeros((1, len(COLUMNS[sensor])))) for sensor in sensors}
+    names = [knob.name for knob in knobs_of(Log(Path("made"), streams, truth=truth), SETTINGS)]
+    assert ("flow gain" in names) == gain
+    assert "flow noise" in names
+    assert "barometer noise" not in names
+
+
+def test_an_imu_that_serves_leaves_no_attitude_to_tune():
+    def names(imu_hz: float) -> list[str]:
+        t_s = np.arange(0.0, 2.0, 1.0 / imu_hz)
+        streams = {sensor: Stream.of(sensor, t_s, np.zeros((len(t_s), len(COLUMNS[sensor]))))
+                   for sensor in (Sensor.IMU, Sensor.ATTITUDE)}  # fmt: skip
+        return [knob.name for knob in knobs_of(Log(Path("made"), streams), SETTINGS)]
+
+    assert names(100.0) == ["gyro noise", "accelerometer noise"]
+    assert names(5.0) == ["attitude noise"]
 
 
 def test_factors_make_settings_with_few_digits():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 from flownav import __version__
@@ -47,14 +46,8 @@ def gain_words(error: Judged | None) -> str:
     """What the proposal does to the path's error, with the interval."""
     if error is None:
         return "nothing shows the path's error"
-    mean, low, high = (smaller_percent(gain) for gain in error[:3])
-    interval = f"95 % interval {low:.1f} to {high:.1f} %, {error.windows} windows"
-    return f"the path's error is smaller by {mean:.1f} % ({interval})"
-
-
-def smaller_percent(gain: float) -> float:
-    """A gain of errors [nats] as the share by which they are smaller [%]; negative where they grew."""
-    return 100.0 * (1.0 - math.exp(-gain))
+    interval = f"95 % interval {error.low:.3f} to {error.high:.3f}, {error.windows} windows"
+    return f"gain of the path's error {error.mean:.3f} nats ({interval}); half the error would be 0.53"
 
 
 def _part(log: OfLog) -> str:

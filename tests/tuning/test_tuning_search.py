@@ -11,11 +11,12 @@ import pytest
 from flownav.logs.log import Log
 from flownav.measurement import COLUMNS, Sensor, Stream
 from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.tuning.job import proposals
 from flownav.tuning.judge import ACCEPTED, NOT_ACCEPTED, judge, judged
 from flownav.tuning.knobs import KNOBS, MOST_NOISE, knobs_of, limits_of, rounded, turned
 from flownav.tuning.resampling import interval_of, resampled
 from flownav.tuning.scores import Gains
-from flownav.tuning.search import search
+from flownav.tuning.search import Found, search
 
 SETTINGS = NavigatorSettingsFile()
 NOISES = [knob for knob in KNOBS if knob.name in ("gyro noise", "accelerometer noise", "range noise")]
@@ -107,6 +108,15 @@ def test_an_imu_that_serves_leaves_no_attitude_to_tune():
 def test_factors_make_settings_with_few_digits():
     assert turned(SETTINGS, NOISES, [np.log(3.0), 0.0, 0.0]) == {"gyro_noise_rad_s_rt_hz": 0.012}
     assert rounded(0.123456) == 0.1235
+
+
+def test_each_key_has_its_own_unit():
+    found = Found(np.log([2.0]), [(np.log(1.5), np.log(3.0))])
+    rows = proposals(found, [knob for knob in KNOBS if knob.name == "range noise"], SETTINGS)
+    assert [(row.key, row.unit, row.default, row.value, row.low, row.high) for row in rows] == [
+        ("range_sigma_m", "m", 0.05, 0.1, 0.075, 0.15),
+        ("range_relative_sigma", "share of the range", 0.02, 0.04, 0.03, 0.06),
+    ]
 
 
 # -- the verdict ---------------------------------------------------------------------------------------------

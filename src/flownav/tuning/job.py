@@ -111,7 +111,7 @@ def proposals(found: Found, knobs: Sequence[Knob], settings: NavigatorSettingsFi
             for key in knob.keys:
                 default = float(getattr(settings, key))
                 values = (rounded(default * math.exp(x)) for x in (float(factor), *interval))
-                rows.append(Proposed(key, knob.unit, knob.name, default, *values))
+                rows.append(Proposed(key, knob.unit_of(key), knob.name, default, *values))
     return rows
 
 

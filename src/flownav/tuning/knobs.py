@@ -18,6 +18,9 @@ MOST_SCALE = 0.35
 FLOW_GAIN = "flow gain"
 
 
+SHARES = {"flow_lasting_share": "share of the speed", "range_relative_sigma": "share of the range"}
+
+
 class Knob(NamedTuple):
     """Settings that one factor moves together; spread: how far the factor's logarithm is expected to be from 0."""
 
@@ -27,6 +30,10 @@ class Knob(NamedTuple):
     sensors: tuple[Sensor, ...]
     spread: float = USUAL_SPREAD
     most: float = MOST_NOISE
+
+    def unit_of(self, key: str) -> str:
+        """The unit of one of its settings; what is a share of something else has its own."""
+        return SHARES.get(key, self.unit)
 
 
 FLOWS = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
@@ -39,8 +46,8 @@ KNOBS = (  # in the order in which they are sought: what moves the path most com
         "GPS velocity noise", ("gps_velocity_white_m_s", "gps_velocity_white_down_m_s"), "m/s", (Sensor.GPS_VELOCITY,)
     ),
     Knob("flow noise", ("flow_sigma_rad_s", "flow_low_quality_sigma_rad_s"), "rad/s", FLOWS),
-    Knob("flow's lasting error", ("flow_lasting_rad_s", "flow_lasting_share"), "rad/s; share of the speed", FLOWS),
-    Knob("range noise", ("range_sigma_m", "range_relative_sigma"), "m; share of the range", (Sensor.RANGE,)),
+    Knob("flow's lasting error", ("flow_lasting_rad_s", "flow_lasting_share"), "rad/s", FLOWS),
+    Knob("range noise", ("range_sigma_m", "range_relative_sigma"), "m", (Sensor.RANGE,)),
     Knob("barometer noise", ("baro_sigma_m",), "m", (Sensor.BARO,)),
     Knob("magnetometer and heading noise", ("heading_noise_rad",), "rad", (Sensor.MAG, Sensor.YAW)),
     Knob("attitude noise", ("ins_tilt_white_rad",), "rad", (Sensor.ATTITUDE,)),

@@ -38,6 +38,7 @@ ALLOWED = {
     "navigation": GROUND | EQUATIONS,
     "replay": GROUND | EQUATIONS | {"navigation", "logs", "scoring"},
     "compare": GROUND | EQUATIONS | {"navigation", "logs", "replay", "scoring"},
+    "tuning": GROUND | EQUATIONS | {"navigation", "logs", "replay", "scoring", "compare"},
     "live": GROUND | EQUATIONS | {"mavlink", "logs", "navigation", "replay"},
     "campaign": GROUND | EQUATIONS | {"simulation", "navigation", "scoring"},
     "faults": GROUND | EQUATIONS | {"logs", "simulation", "campaign", "scoring", "navigation", "replay"},

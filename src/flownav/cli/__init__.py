@@ -21,6 +21,7 @@ from flownav.cli import paper as paper
 from flownav.cli import replay as replay
 from flownav.cli import report as report
 from flownav.cli import rig as rig
+from flownav.cli import tune as tune
 from flownav.cli import vehicle as vehicle
 from flownav.errors import FlownavError, InputError
 
@@ -36,6 +37,7 @@ for name, command, what in (
     ("fly", fly.command, "Fly a take-off or landing in closed loop, scored beside the paper."),
     ("replay", replay.command, "Fuse a recorded flight; measure the drift without GPS."),
     ("compare", compare.command, "Many logs, many settings, beside dead reckoning and the autopilot."),
+    ("tune", tune.command, "Propose settings from logs, judged on windows held out from the fit."),
     ("live", live.command, "Navigate a MAVLink vehicle in real time; send it the estimate."),
     ("info", info.command, "What a log holds: sensors, rates, gaps, signs, what it lacks."),
     ("identify", identify.command, "Identify a flow sensor from rig or flight logs; write its file."),

@@ -41,6 +41,7 @@ class ReplayOptions:
     flow_scale: tuple[float, float] = (1.0, 1.0)
     identified: IdentifiedFlow | None = None  # from a sensor file: its axes and latency (the navigator has the gains)
     flow_noise: FlowNoise = NO_STATED_NOISE  # and its law of noise, where that is to be used
+    flow_outages_s: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -84,14 +85,18 @@ def prepare(log: Log, options: ReplayOptions) -> Prepared:
 
 
 def withhold(log: Log, queue: EventQueue, options: ReplayOptions) -> EventQueue:
-    """The queue with what the options take away marked: GPS that arrives in [t0, t1) of an outage, and flow."""
+    """The queue with what the options take away marked: GPS and flow that arrive in [t0, t1) of an outage, and flow.
+
+    A flow reading of no data is none that could be withheld.
+    """
     withheld = queue.withheld.copy()
-    for sensor in GPS:
-        if sensor in log.streams:
-            rows = np.flatnonzero(queue.sensor == sensor)
-            arrival = log.streams[sensor].t_s[queue.row[rows]]
-            for t0, t1 in options.gps_outages_s:
-                withheld[rows[(arrival >= t0) & (arrival < t1)]] = 1.0
+    for sensors, outages in ((GPS, options.gps_outages_s), (FLOW, options.flow_outages_s)):
+        for sensor in sensors:
+            if outages and sensor in log.streams:
+                rows = np.flatnonzero((queue.sensor == sensor) & ((queue.quality > 0.0) | (sensors == GPS)))
+                arrival = log.streams[sensor].t_s[queue.row[rows]]
+                for t0, t1 in outages:
+                    withheld[rows[(arrival >= t0) & (arrival < t1)]] = 1.0
     if not options.use_flow:
         withheld[np.isin(queue.sensor, [int(sensor) for sensor in FLOW])] = 1.0
     return queue._replace(withheld=withheld)

@@ -190,6 +190,14 @@ def replay(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, *,
         return _run(log, options, settings, prepared, smoothed=smoothed)
 
 
+def replay_again(flown: Replay, options: ReplayOptions, settings: NavigatorSettingsFile) -> Replay:
+    """The same streams, prepared once, with other GPS and flow cuts and settings; other options stay as they were.
+
+    InputError where the filter never starts.
+    """
+    return _run(flown.log, options, settings, flown.prepared)
+
+
 def outage_table(
     log: Log,
     options: ReplayOptions,

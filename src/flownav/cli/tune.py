@@ -1,0 +1,113 @@
+"""`flownav tune`: settings of the filter proposed from logs, judged on windows held out from the fit."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from flownav.tuning.job import OfLog, Tuned
+
+
+def command(
+    logs: Annotated[
+        list[Path], typer.Argument(help="Logs: CSV folders, .ulg, .bin, .tlog, live .fnr.", show_default=False)
+    ],
+    settings: Annotated[
+        Path | None, typer.Option("--settings", help="TOML of filter settings to start from; the shipped where unsaid.")
+    ] = None,
+    sensor: Annotated[
+        Path | None, typer.Option("--sensor", help="A flow sensor file: its gains and latency correct the flow.")
+    ] = None,
+    out: Annotated[
+        Path, typer.Option("--out", help="The settings file, written only if the proposal is accepted.")
+    ] = Path("out/settings.toml"),
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Propose settings from logs: fitted on every other window of the flights, accepted only if the rest gain by it."""
+    from flownav.cli.compare import DEFAULT, settings_asked
+    from flownav.cli.output import progress, require_writable
+    from flownav.errors import InputError
+    from flownav.logs.open_log import open_flight
+    from flownav.navigation.settings import NavigatorSettingsFile
+    from flownav.parameter_files import load
+    from flownav.provenance import command_line
+    from flownav.tuning.job import runs_expected, tune
+    from flownav.tuning.settings_file import write_settings
+
+    if out.suffix != ".toml":
+        raise InputError(f"--out {out}: a settings file's name ends in .toml")
+    (start,) = settings_asked([DEFAULT if settings is None else str(settings)], sensor)
+    stated = None if settings is None else load(settings, NavigatorSettingsFile)
+    flights = [open_flight(path) for path in logs]
+    require_writable(out)
+    with progress("replays", runs_expected(flights)) as advance:
+        tuned = tune(logs, flights, start.options, start.numbers, advance)
+    if tuned.accepted:
+        write_settings(out, tuned, stated, command_line())
+    facts = _facts(tuned) | {"file": str(out) if tuned.accepted else None}
+    if as_json:
+        typer.echo(json.dumps(facts))
+    else:
+        _print(tuned, facts)
+
+
+def _facts(tuned: Tuned) -> dict[str, Any]:
+    """The JSON object, less the file."""
+    judgement = tuned.judgement
+    return {
+        "verdict": judgement.verdict,
+        "why": judgement.why,
+        "settings": [row._asdict() for row in tuned.proposed],
+        "gain_nats": None if judgement.total is None else judgement.total._asdict(),
+        "error_gain_nats": None if judgement.error is None else judgement.error._asdict(),
+        "logs": [_log_facts(log) for log in tuned.logs],
+        "runs": tuned.runs,
+    }
+
+
+def _log_facts(log: OfLog) -> dict[str, Any]:
+    from flownav.tuning.scores import UNITS
+
+    return {
+        "log": log.name,
+        "held_out_whole": log.split.whole,
+        "fit_windows": [list(window) for window in log.split.fit],
+        "held_out_windows": [list(window) for window in log.split.held],
+        "against": log.reference,
+        "unit": UNITS.get(log.reference or ""),
+        "gain_nats": log.gain,
+        "median_error": log.start_error,
+        "median_error_tuned": log.error,
+    }
+
+
+def _print(tuned: Tuned, facts: dict[str, Any]) -> None:
+    """The same figures for people."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from flownav.tuning.scores import UNITS
+    from flownav.tuning.settings_file import gain_words
+
+    console = Console(markup=False, highlight=False)
+    if tuned.proposed:
+        table = Table("setting", "was", "tuned", "95 % interval", title="Proposed")
+        for row in tuned.proposed:
+            table.add_row(row.key, f"{row.default:g}", f"{row.value:g}", f"{row.low:g} to {row.high:g}")
+        console.print(table)
+    table = Table("log", "windows", "against", "was", "tuned", title="Median error in the held-out windows")
+    for log in tuned.logs:
+        windows = f"{len(log.split.held)}, {'all held out' if log.split.whole else f'fit on {len(log.split.fit)}'}"
+        unit = UNITS.get(log.reference or "", "")
+        errors = (f"{value:.3f} {unit}" if value is not None else "-" for value in (log.start_error, log.error))
+        table.add_row(log.name, windows, log.reference or "-", *errors)
+    console.print(table)
+    judgement = tuned.judgement
+    figures = f": {gain_words(judgement.error)}" if judgement.error is not None else ""
+    console.print(f"{judgement.verdict.capitalize()}: {judgement.why}{figures}", soft_wrap=True)
+    if facts["file"] is not None:
+        console.print(f"Settings: {facts['file']}", soft_wrap=True)

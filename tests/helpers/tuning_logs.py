@@ -1,0 +1,48 @@
+"""Made logs with noise of known size, for the tuning's tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from replay_logs import log_of_flight, write_table
+
+IMU_HZ = 50.0
+
+
+def noisy_flight(
+    folder: Path, *, seed: int = 100, duration_s: float = 80.0, gyro: float = 0.0005, accel: float = 0.01,
+    flow_gain: float = 1.0, gps: bool = False, truth: bool = True,
+) -> Path:  # fmt: skip
+    """A flight without attitude; gyro [rad/s per root hertz] and accel [m/s2 per root hertz] are densities.
+
+    Flow, range, barometer and GPS have the white noise of the shipped settings. flow_gain: reported over true flow of
+    the velocity.
+    """
+    flown, draw = log_of_flight(duration_s, imu_hz=IMU_HZ), np.random.default_rng(seed)
+    tables = flown.tables
+    del tables["attitude"]
+    for axis in "xy":
+        turning = tables["flow"][f"gyro_{axis}_rad_s"]
+        seen = tables["flow"][f"flow_{axis}_rad_s"] - turning
+        tables["flow"][f"flow_{axis}_rad_s"] = turning + flow_gain * seen
+    sigmas = {
+        "imu": {"gyro_": gyro * IMU_HZ**0.5, "accel_": accel * IMU_HZ**0.5},
+        "flow": {"flow_": 0.05},
+        "range": {"range_m": np.hypot(0.05, 0.02 * tables["range"]["range_m"])},
+        "baro": {"alt_m": 1.0},
+        "gps": {"vel_": 0.4, "lat_deg": 0.4 / 111e3, "lon_deg": 0.4 / 76e3, "alt_m": 0.8},
+    }
+    for name, columns in sigmas.items():
+        for start, sigma in columns.items():
+            for column in [column for column in tables[name] if column.startswith(start)]:
+                tables[name][column] = tables[name][column] + sigma * draw.standard_normal(len(tables[name]["t_s"]))
+    if not gps:
+        del tables["gps"]
+    written = flown.write(folder)
+    if truth:
+        t_s = np.arange(0.0, duration_s - 0.5, 0.02)
+        north, east, down = (np.interp(t_s, flown.t_s, column) for column in flown.position.T)
+        write_table(written / "truth.csv", {"t_s": t_s, "x_m": north, "y_m": east, "z_m": down})
+    return written

@@ -198,7 +198,8 @@ def test_a_replay_is_told_by_its_outages(outdoor: Page) -> None:
     assert "36 to 60 s 0.87 1.63 this record" in outdoor.text
     assert "1 to 3 s 0.41 0.72 a replay of its own" in outdoor.text
     assert "median 0.64" in outdoor.text
-    assert "Flow no data 812" in outdoor.text
+    assert "Flow no data 406 812" in outdoor.text
+    assert "GPS position outage \N{EN DASH} 300" in outdoor.text  # a record from before readings were counted
     assert "gps-distance" in outdoor.figures()
     assert "position-error" not in outdoor.figures()
 

@@ -161,10 +161,7 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
         own = scores["autopilot"]
         console.print(f"The autopilot's own estimate ({own['name']}) {autopilot_errors(own)}")
     console.print(_sensors(scores))
-    rejected = Table("sensor", "reason", "rejected", title="Not fused")
-    for sensor, counts in scores["rejected"].items():
-        for reason, count in counts.items():
-            rejected.add_row(sensor, reason, str(count))
+    rejected = _rejected(scores)
     if rejected.row_count:
         console.print(rejected)
     for note in flown.prepared.notes:
@@ -188,6 +185,18 @@ def _sensors(scores: dict[str, Any]) -> Any:
         said = (str(judged["samples"]), _figure(judged["nis_per_dof"])) if judged else ("", "")
         words = verdict(judged["nis_per_dof"], white=judged["white"]) if judged else ""
         table.add_row(name, f"{span['t0']:.1f}, {span['t1']:.1f}" if span else "", *said, words)
+    return table
+
+
+def _rejected(scores: dict[str, Any]) -> Any:
+    """What was not fused and why, in readings and in their components (a row that the reader threw away counts as one)."""
+    from rich.table import Table
+
+    table = Table("sensor", "reason", "readings", "of", "components", title="Not fused")
+    for sensor, counted in scores["readings"].items():
+        offered, components = counted["offered"], scores["rejected"].get(sensor, {})
+        for reason, count in counted["rejected"].items():
+            table.add_row(sensor, reason, str(count), str(offered or ""), str(components.get(reason, "")))
     return table
 
 

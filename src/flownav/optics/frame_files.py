@@ -19,7 +19,7 @@ LARGEST_FRAMES_BYTES = 4_000_000_000
 
 
 def read_frames(paths: Sequence[Path]) -> NDArray[np.uint8]:
-    """Frames (n, height, width) of one folder of pictures (by name, 2 before 10), of pictures in order, or of one video.
+    """Frames (n, height, width) of a folder of pictures (by name, 2 before 10), of pictures in order, or of one video.
 
     InputError where there are none, where one cannot be read, or where they differ in size.
     """

@@ -243,12 +243,22 @@ def outage_rows(record: Record) -> list[tuple[str, str, str, str]]:
     return rows
 
 
-def rejected_rows(record: Record) -> list[tuple[str, str, str]]:
-    """Rejected readings as (sensor, reason, count), most first."""
-    counts = mapping(mapping(record.manifest.get("scores")).get("rejected"))
-    rows = [(sensor, reason, count) for sensor, reasons in counts.items() for reason, count in mapping(reasons).items()]
-    rows.sort(key=lambda row: -float(row[2]))
-    return [(SENSOR_TITLES.get(s, s.replace("_", " ")), r.replace("_", " "), f"{c:,}") for s, r, c in rows]
+def rejected_rows(record: Record) -> list[tuple[str, str, str, str]]:
+    """What was not fused, as (sensor, reason, readings, components), most components first.
+
+    Records from before readings were counted have components only.
+    """
+    scores = mapping(record.manifest.get("scores"))
+    readings_of = mapping(scores.get("readings"))
+    rows = []
+    for sensor, reasons in mapping(scores.get("rejected")).items():
+        whole = mapping(mapping(readings_of.get(sensor)).get("rejected"))
+        rows += [(sensor, reason, whole.get(reason), count) for reason, count in mapping(reasons).items()]
+    rows.sort(key=lambda row: -float(row[3]))
+    return [
+        (SENSOR_TITLES.get(s, s.replace("_", " ")), r.replace("_", " "), NONE if n is None else f"{n:,}", f"{c:,}")
+        for s, r, n, c in rows
+    ]
 
 
 def sensor_rows(record: Record) -> list[tuple[str, str, str, str, str]]:

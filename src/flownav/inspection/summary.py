@@ -15,6 +15,7 @@ from flownav.measurement import Array, Sensor, Stream
 from flownav.record import VELOCITY_BODY
 from flownav.replay.autopilot import autopilot_scores
 from flownav.replay.prepare import ReplayOptions, prepare
+from flownav.replay.readiness import obstacles
 from flownav.replay.sentinel import Finding, findings
 
 CLOCK_REASONS = {
@@ -42,6 +43,8 @@ def summarise(log: Log) -> dict[str, Any]:
         "checked": checked,
         "warnings": [finding.text for finding in found],
         "flow_is_wrong": any(finding.flow_is_wrong for finding in found),
+        "replayable": not obstacles(log),
+        "obstacles": obstacles(log),
         "absences": [absence._asdict() for absence in log.absences],
         "origin_lat_lon_deg_alt_m": None if log.origin_deg_m is None else list(log.origin_deg_m),
         "truth": None if log.truth is None else _track(log.truth["t_s"]),

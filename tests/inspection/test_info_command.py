@@ -102,6 +102,18 @@ def test_the_autopilots_error_against_truth_does_not_see_the_frames_yaw(flown):
     assert autopilot_errors(estimate, None, {})["horizontal_rms_m"] is None
 
 
+def test_a_log_that_does_not_move_has_no_yaw():
+    t_s = np.arange(0.0, 60.0, 0.1)
+    random = np.random.default_rng(2)
+    names = ("pos_n_m", "pos_e_m", "pos_d_m")
+    drift = np.cumsum(0.02 * random.standard_normal((600, 3)), axis=0)
+    estimate = {"t_s": t_s, **dict(zip(names, drift.T, strict=True))}
+    truth = {"t_s": t_s, **dict(zip(names, np.zeros((3, 600)), strict=True))}
+    errors = autopilot_errors(estimate, truth, {})
+    assert errors["against"] == "truth"
+    assert errors["yaw_rad"] is None
+
+
 def test_people_see_the_same(ulog):
     result = call(info.command, ulog)
     assert result.exception is None

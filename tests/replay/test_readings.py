@@ -48,7 +48,7 @@ def test_components_keep_the_readers_count_of_the_same_reason():
     class Flown:
         innovation = offers(*[(1.0, Sensor.GPS_POSITION, k, Reason.OUT_OF_RANGE) for k in range(3)])
 
-        class log:  # noqa: N801
+        class log:
             streams = gps({"out_of_range": 2})
 
     assert Replay.rejected(Flown()) == {"gps_position": {"out_of_range": 5}}

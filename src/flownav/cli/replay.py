@@ -148,13 +148,17 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
         console.print(f"Horizontal velocity against GPS: {scores['velocity_rms_m_s']:.3f} m/s rms")
     if "truth" in scores:
         truth = scores["truth"]
+        turned = "" if truth["yaw_rad"] is None else f", turned by {57.29578 * truth['yaw_rad']:.1f} deg"
         console.print(
-            f"Against truth (turned by {57.29578 * truth['yaw_rad']:.1f} deg): horizontal "
+            f"Against {truth['reference']}{turned}: horizontal "
             f"{truth['horizontal_rms_m']:.2f} m rms, {truth['horizontal_max_m']:.2f} m max; "
             f"velocity {truth['velocity_rms_m_s']:.3f} m/s rms"
         )
     if scores["end_drift_m"] is not None:
-        console.print(f"At the end of the flight, truth laid on it at take-off: {scores['end_drift_m']:.2f} m off")
+        console.print(
+            f"At the end of the flight, {scores['truth']['reference']} laid on it at take-off: "
+            f"{scores['end_drift_m']:.2f} m off"
+        )
     if "smoothed" in scores:
         console.print(f"Smoothed over the whole flight: {_smoothed_errors(scores['smoothed'])}")
     if scores.get("autopilot", {}).get("against"):
@@ -189,7 +193,7 @@ def _sensors(scores: dict[str, Any]) -> Any:
 
 
 def _rejected(scores: dict[str, Any]) -> Any:
-    """What was not fused and why, in readings and in their components (a row that the reader threw away counts as one)."""
+    """What was not fused and why, in readings and in components (a row that the reader threw away is one)."""
     from rich.table import Table
 
     table = Table("sensor", "reason", "readings", "of", "components", title="Not fused")
@@ -210,7 +214,8 @@ def _smoothed_errors(scores: dict[str, Any]) -> str:
     if scores["velocity_rms_m_s"] is not None:
         said.append(f"velocity against GPS {scores['velocity_rms_m_s']:.3f} m/s rms")
     if "truth" in scores:
-        said.append(f"against truth {scores['truth']['horizontal_rms_m']:.2f} m rms horizontally")
+        truth = scores["truth"]
+        said.append(f"against {truth['reference']} {truth['horizontal_rms_m']:.2f} m rms horizontally")
     return "; ".join(said) or "nothing to compare it with"
 
 

@@ -32,7 +32,10 @@ def absences_of(streams: Mapping[Sensor, Stream], **said: str) -> Iterator[Absen
     if flow is None and Sensor.FLOW_VELOCITY not in streams:
         yield Absence(said.get("flow_rate", "no optical flow"), "nothing but GPS holds the horizontal velocity")
     if flow is not None and Sensor.RANGE not in streams:
-        yield Absence(said.get("range", "no range"), "flow is fused on the height that the other sensors leave, which is uncertain")
+        yield Absence(
+            said.get("range", "no range"),
+            "flow is fused on the height that the other sensors leave, which is uncertain",
+        )
     if flow is not None and np.isnan(flow.value[:, 2:]).all():
         others = {Sensor.IMU: "the IMU", Sensor.ATTITUDE: "the turning of the attitude"}
         other = " or ".join(name for sensor, name in others.items() if sensor in streams)

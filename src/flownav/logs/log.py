@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 from flownav.measurement import EventQueue, Sensor, Stream
 from flownav.record import Table
 
-
 TRUTH_FILE, SIMULATOR, VISUAL_ODOMETRY = "truth.csv", "the simulator", "visual odometry"
 
 

@@ -104,6 +104,6 @@ def _flight_notes(flight: Flight) -> list[str]:
 def _check_needed(path: Path, streams: dict[Sensor, Stream]) -> None:
     if not streams:
         raise InputError(
-            f"{path}: no usable reading of any sensor; have the autopilot send ATTITUDE or HIGHRES_IMU at 20 Hz or more, "
-            "and GPS_RAW_INT or OPTICAL_FLOW_RAD"
+            f"{path}: no usable reading of any sensor; have the autopilot send ATTITUDE or HIGHRES_IMU at 20 Hz or "
+            "more, and GPS_RAW_INT or OPTICAL_FLOW_RAD"
         )

@@ -124,7 +124,7 @@ class Replay:
                 counts[sensor.name.lower()] = dict(Counter(stream.rejected) + Counter(found))
         return counts
 
-    def truth_scores(self) -> dict[str, float] | None:
+    def truth_scores(self) -> dict[str, Any] | None:
         """Errors against the log's truth, turned and shifted onto the estimate; None without one."""
         placed = self.truth_alignment
         if placed is None or self.log.truth is None:
@@ -134,7 +134,8 @@ class Replay:
         velocity = placed.turned(velocity_of(t_s, position))
         squares = np.sum(error[:, :2] ** 2, axis=1)
         return {
-            "yaw_rad": placed.yaw_rad,
+            "reference": self.log.truth_name,
+            "yaw_rad": placed.yaw_rad if placed.yaw_shown else None,
             "horizontal_rms_m": float(np.sqrt(squares.mean())),
             "horizontal_max_m": float(np.sqrt(squares.max())),
             "vertical_rms_m": float(np.sqrt(np.mean(error[:, 2] ** 2))),

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from flownav.errors import InputError
 from flownav.frames import GRAVITY_M_S2 as GRAVITY_M_S2
 from flownav.frames import rotation_from_quaternion
-from flownav.identification.usable import believed, beside
+from flownav.identification.usable import Ranges, believed, beside
 from flownav.logs.log import Log
 from flownav.logs.rates import attitude_at
 from flownav.measurement import Array, Sensor, Stream
@@ -56,10 +56,10 @@ class Flight:
     reference_velocity: Stream | None
     flow_limit_rad_s: float
     notes: tuple[str, ...]
-    reference_name: str  # in words
-    range_jumping: float
-    range_doubt: float
-    attitude_is_own: bool  # the navigator's, for want of one in the log
+    reference_name: str = ""  # in words
+    range_jumping: float = 0.0
+    range_doubt: float = 0.0
+    attitude_is_own: bool = False  # the navigator's, for want of one in the log
 
     def rotation(self, instants_s: Array) -> Array:
         """Body to earth, (n, 3, 3)."""
@@ -89,32 +89,21 @@ def flight(log: Log, reference: str = "auto") -> Flight:
     value, quality = prepared.queue.value[mine], prepared.queue.quality[mine]
     age_s = prepared.delays_s[sensor]
     t_s = prepared.queue.t_s[mine] + age_s
-    distance = log.streams[Sensor.RANGE]
-    ranges = believed(str(log.path), distance, flying_at(log, distance.t_s - distance.delay_s))
-    if ranges.jumping > MOST_JUMPING:
+    shared = (t_s >= reference_t_s[0]) & (t_s <= reference_t_s[-1])
+    if np.count_nonzero(shared) < LEAST_FLOW:
         raise InputError(
-            f"{log.path}: the range jumps in {ranges.jumping:.0%} of its steps in flight; a range that can be believed "
-            "is needed for the flow's scale and height"
+            f"{log.path}: the reference ({name}) covers {reference_t_s[0]:.1f} to {reference_t_s[-1]:.1f} s, where "
+            f"{np.count_nonzero(shared)} flow readings lie; at least {LEAST_FLOW} are needed, on one clock"
         )
+    ranges = _ranges(log)
     range_m, near = beside(ranges, t_s - age_s)
-    rate = value[:, :2]
-    if sensor == Sensor.FLOW_RATE:
-        velocity = np.column_stack([(value[:, 1] - value[:, 3]) * range_m, (value[:, 2] - value[:, 0]) * range_m])
-    else:
-        velocity, rate = value[:, :2], value[:, :2] / np.maximum(range_m, 0.1)[:, None]
-    good = (quality > 0) & np.isfinite(velocity).all(axis=1) & near & flying_at(log, t_s - age_s)
-    good &= np.any(velocity != 0.0, axis=1)
-    good &= np.concatenate([[True], np.diff(t_s) > 0.0])
+    velocity, rate = _velocity_and_rate(sensor, value, range_m)
+    good = shared & (quality > 0) & np.isfinite(velocity).all(axis=1) & near & flying_at(log, t_s - age_s)
+    good &= np.any(velocity != 0.0, axis=1) & np.concatenate([[True], np.diff(t_s) > 0.0])
     if np.count_nonzero(good) < LEAST_FLOW:
         raise InputError(
             f"{log.path}: {np.count_nonzero(good)} of {len(good)} flow readings are usable (in flight, quality above "
             f"0, a range near that can be believed, not exactly zero); at least {LEAST_FLOW} are needed"
-        )
-    good &= (t_s >= reference_t_s[0]) & (t_s <= reference_t_s[-1])
-    if np.count_nonzero(good) < LEAST_FLOW:
-        raise InputError(
-            f"{log.path}: the reference ({name}) covers {reference_t_s[0]:.1f} to {reference_t_s[-1]:.1f} s, where "
-            f"{np.count_nonzero(good)} flow readings are usable; at least {LEAST_FLOW} are needed, on one clock"
         )
     if not np.all(np.ptp(velocity[good], axis=0) > 0.0):
         raise InputError(f"{log.path}: the flow is constant; a flight that moves is needed")
@@ -124,6 +113,26 @@ def flight(log: Log, reference: str = "auto") -> Flight:
         float(np.quantile(np.abs(rate[good]), 0.999)), tuple(note for note in (*prepared.notes, found) if note), name,
         ranges.jumping, ranges.doubt, bool(found),
     )  # fmt: skip
+
+
+def _ranges(log: Log) -> Ranges:
+    """The ranges of the flight to go by. InputError where they jump most of the time, or are hardly any."""
+    distance = log.streams[Sensor.RANGE]
+    ranges = believed(str(log.path), distance, flying_at(log, distance.t_s - distance.delay_s))
+    if ranges.jumping > MOST_JUMPING:
+        raise InputError(
+            f"{log.path}: the range jumps in {ranges.jumping:.0%} of its steps in flight; a range that can be believed "
+            "is needed for the flow's scale and height"
+        )
+    return ranges
+
+
+def _velocity_and_rate(sensor: Sensor, value: Array, range_m: Array) -> tuple[Array, Array]:
+    """The sensor's velocity along body x and y (n, 2), and the flow that it saw [rad/s]; value as prepared."""
+    if sensor == Sensor.FLOW_RATE:
+        turned_off = [(value[:, 1] - value[:, 3]) * range_m, (value[:, 2] - value[:, 0]) * range_m]
+        return np.column_stack(turned_off), value[:, :2]
+    return value[:, :2], value[:, :2] / np.maximum(range_m, 0.1)[:, None]
 
 
 def _reference(log: Log, wanted: str) -> tuple[str, Array, Array]:

@@ -73,7 +73,7 @@ def beside(ranges: Ranges, t_s: Array) -> tuple[Array, Flags]:
 def spikes(range_m: Array) -> Flags:
     """Readings whose range is far from the median of those around: a sonar's echo of something else."""
     width = min(SPIKE_WINDOW, len(range_m) - 1 + len(range_m) % 2)
-    padded = np.pad(range_m, width // 2, mode="edge")
+    padded = np.pad(range_m, width // 2, mode="reflect")
     median = np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1)
     return np.asarray(np.abs(range_m - median) > SPIKE_SHARE * median + SPIKE_M)
 

@@ -11,6 +11,7 @@ from flownav.scoring.drift import flight_of
 
 ON_THE_GROUND = 20  # readings of a range that starts on the ground
 LIFTED_M = 0.3  # a sonar's noise and a landing gear's spring are less
+NEAR_M = 0.1  # the way from here up to where it is surely lifted is flight already
 
 Window = tuple[float, float]
 
@@ -28,9 +29,15 @@ def airborne_of(log: Log) -> Window | None:
     if Sensor.RANGE not in log.streams or len(log.streams[Sensor.RANGE]) < ON_THE_GROUND:
         return None
     distance = log.streams[Sensor.RANGE]
-    lifted = distance.value[:, 0] > np.median(distance.value[:ON_THE_GROUND, 0]) + LIFTED_M
-    away = np.flatnonzero(lifted)
-    return (float(distance.t_s[away[0]]), float(distance.t_s[away[-1]])) if len(away) else None
+    height_m = distance.value[:, 0] - np.median(distance.value[:ON_THE_GROUND, 0])
+    away = np.flatnonzero(height_m > LIFTED_M)
+    if not len(away):
+        return None
+    near = np.flatnonzero(height_m <= NEAR_M)
+    before, after = near[near < away[0]], near[near > away[-1]]
+    first = before[-1] + 1 if len(before) else away[0]
+    last = after[0] - 1 if len(after) else away[-1]
+    return float(distance.t_s[first]), float(distance.t_s[last])
 
 
 def flying_at(log: Log, t_s: Array) -> NDArray[np.bool_]:

@@ -22,7 +22,6 @@ from flownav.identification.experiment import Experiment, experiment
 from flownav.identification.findings import Findings, Noise, Response
 from flownav.identification.flight import Flight, flight
 from flownav.identification.height_law import (
-    combined,
     compare_schedules,
     fit_power_law,
     noise_by_height,
@@ -140,11 +139,12 @@ def _latency(flown: Flight, moved: Motion, against_reference: Interval) -> Inter
     """On the vehicle's clock: the better-known of the IMU's word and the reference's, whose delay is taken out.
 
     The IMU's word is of the log's attitude. Where that is an estimate, its errors pass for delays: then it is the
-    latency against the reference, whose delay is taken out or not, and the interval takes in both.
+    latency against the reference as that is stamped, and the interval takes in the delay that the IMU says it has.
     """
     if flown.attitude_is_own:
-        as_stamped = Interval(*(end - moved.reference_delay_s for end in against_reference))
-        return combined([against_reference, as_stamped])
+        delay_s, (value, low, high) = moved.reference_delay_s, against_reference
+        half = float(np.hypot(0.5 * (high - low), delay_s))
+        return Interval(value - delay_s, value - delay_s - half, value - delay_s + half)
     words = [tie.delay_s for tie in (moved.flow_tie,) if tie is not None and tie.holds]
     if moved.reference_tie is not None and moved.reference_tie.holds:
         own = moved.reference_tie.delay_s

@@ -38,6 +38,7 @@ from flownav.identification.reference_motion import (
     fast_flow,
     flow_likeness,
     motion,
+    velocity_response,
     with_flow,
 )
 from flownav.identification.sentinel import Axes, judge
@@ -74,7 +75,7 @@ def identify_flight(
     moved = motion(flown)
     _check_alike(flown, moved)
     age_s = _age(flown, moved)
-    raw = _velocity_response(flown, moved, age_s)
+    raw = velocity_response(flown, moved, age_s)
     axes = judge(raw, moved.yaw_known)
     put_right = flown.velocity_m_s @ axes.assignment  # assignment is orthogonal: its transpose undoes it
     if not axes.right:
@@ -154,14 +155,6 @@ def _latency(flown: Flight, moved: Motion, against_reference: Interval) -> Inter
 
 def _body_input(flown: Flight, moved: Motion, age_s: float) -> Array:
     return moved.in_body(flown, flown.t_s[flown.good] - age_s)[:, :2]
-
-
-def _velocity_response(flown: Flight, moved: Motion, age_s: float) -> Array:
-    """(2, 2) regression of flow on the reference's body velocity: enough for signs and axes."""
-    if not moved.yaw_known:
-        age_s = flown.age_s
-    design = np.column_stack([_body_input(flown, moved, age_s), np.ones(int(flown.good.sum()))])
-    return np.asarray(np.linalg.lstsq(design, flown.velocity_m_s[flown.good], rcond=None)[0][:2].T)
 
 
 def _scale(flown: Flight, moved: Motion, age_s: float, velocity: Array) -> tuple[Scale, displacement.Match | None]:

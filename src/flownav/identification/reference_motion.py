@@ -147,11 +147,14 @@ class Likeness(NamedTuple):
     mirrored: float
 
 
-def flow_likeness(flown: Flight, grid: Array, reference: Array) -> Likeness:
-    """How the flow's earth velocity and the reference's (n, 3) on the grid go together, at the best shift."""
+def flow_likeness(flown: Flight, grid: Array, reference: Array, velocity: Array | None = None) -> Likeness:
+    """How the flow's earth velocity and the reference's (n, 3) on the grid go together, at the best shift.
+
+    velocity (m, 2): the flow's with its axes put right, to use instead of the log's.
+    """
     t_s = flown.t_s[flown.good]
     seen = t_s - flown.age_s
-    level, flow = flown.rotation(seen)[:, :2, :2], flown.velocity_m_s[flown.good]
+    level, flow = flown.rotation(seen)[:, :2, :2], (flown.velocity_m_s if velocity is None else velocity)[flown.good]
     found = []
     for mirror in (1.0, -1.0):
         earth = np.einsum("nij,nj->ni", level, flow * np.array([1.0, mirror]))
@@ -164,6 +167,18 @@ def flow_likeness(flown: Flight, grid: Array, reference: Array) -> Likeness:
     straight = max((one for one in found if one[0] > 0.0), key=lambda one: abs(one[1]))
     mirrored = max(abs(one[1]) for one in found if one[0] < 0.0)
     return Likeness(float(np.angle(straight[1])), abs(straight[1]), straight[2], mirrored)
+
+
+def velocity_response(flown: Flight, moved: Motion, age_s: float) -> Array:
+    """(2, 2) regression of flow on the reference's body velocity: enough for signs and axes.
+
+    age_s: how old a flow reading is when it arrives; what the log says where the heading is not known.
+    """
+    if not moved.yaw_known:
+        age_s = flown.age_s
+    body = moved.in_body(flown, flown.t_s[flown.good] - age_s)[:, :2]
+    design = np.column_stack([body, np.ones(len(body))])
+    return np.asarray(np.linalg.lstsq(design, flown.velocity_m_s[flown.good], rcond=None)[0][:2].T)
 
 
 def with_flow(moved: Motion, flown: Flight, velocity: Array) -> Motion:

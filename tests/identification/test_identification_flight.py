@@ -229,7 +229,9 @@ def test_a_reference_at_another_time_is_refused(tmp_path):
         return f"{float(t_s) + 29.0:.4f},{rest}"
 
     folder = edited(written(tmp_path, duration_s=30.0, turned_rad=0.0), "truth", later)
-    with pytest.raises(InputError, match=r"the reference \(truth.csv\) covers 29.0 to 59.0 s, where \d+ flow readings lie"):
+    with pytest.raises(
+        InputError, match=r"the reference \(truth.csv\) covers 29.0 to 59.0 s, where \d+ flow readings lie"
+    ):
         identify_flight(folder, CANDIDATES)
 
 

@@ -20,9 +20,7 @@ def command(
     heights: Annotated[
         str | None, typer.Option(metavar="H[,H..]", help="Sensor's height [m]: one for all logs, or one each.")
     ] = None,
-    reference: Annotated[
-        str, typer.Option(help="auto; rig: velocity or encoder; flight: truth or gps.")
-    ] = "auto",
+    reference: Annotated[str, typer.Option(help="auto; rig: velocity or encoder; flight: truth or gps.")] = "auto",
     flow_instance: Annotated[
         int | None, typer.Option("--flow-instance", metavar="N", help="Which of a flight's several flow sensors.")
     ] = None,
@@ -179,8 +177,8 @@ def _print(findings: Findings, facts: dict[str, Any]) -> None:
         console.print(f"Speed: {law.verdict}; {_interval(law.per_m_s, 1.0, 3)} per m/s")
     noise = findings.noise.law
     console.print(
-        f"Error: {_interval(noise.sigma_m_s, 1.0, 3)} m/s at {noise.reference_m:.2f} m, growing with height to the power "
-        f"{_interval(noise.exponent, 1.0, 2)} from {noise.low_m:.2f} to {noise.high_m:.2f} m"
+        f"Error: {_interval(noise.sigma_m_s, 1.0, 3)} m/s at {noise.reference_m:.2f} m, growing with height to the "
+        f"power {_interval(noise.exponent, 1.0, 2)} from {noise.low_m:.2f} to {noise.high_m:.2f} m"
     )
     title = "Schedules of the variance (best first)"
     schedules = Table("variance by", "score", "within 2 sigma", "sigma low", "sigma high", title=title)

@@ -22,13 +22,14 @@ from flownav.logs.log import Log
 from flownav.logs.rates import attitude_at
 from flownav.measurement import Array, Sensor, Stream
 from flownav.replay.airborne import flying_at
-from flownav.replay.attitude import with_attitude
+from flownav.replay.attitude import turned_sensor, with_attitude
 from flownav.replay.prepare import ReplayOptions, prepare
 
 MOST_JUMPING = 0.6
 LEAST_FLOW = 200
 LONGEST_GAP_S = 0.5
 REFERENCES = ("truth", "gps")
+IMU_NAME = "the IMU"
 
 
 @dataclass(frozen=True)
@@ -74,17 +75,19 @@ class Flight:
         return [slice(a, b) for a, b in pairwise(edges)]
 
 
-def flight(log: Log, reference: str = "auto") -> Flight:
-    """A flight out of a log. InputError names what is missing: flow, range, attitude or a reference."""
+def flight(log: Log, reference: str = "auto", axes: Array | None = None) -> Flight:
+    """A flight out of a log; axes as `with_attitude`. InputError names what is missing: flow, range, a reference."""
     sensor = next((s for s in (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY) if s in log.streams), None)
     if sensor is None:
         raise InputError(f"{log.path}: no flow readings; a log with a flow sensor's is needed to identify it")
     if Sensor.RANGE not in log.streams:
         raise InputError(f"{log.path}: no range readings; a range is needed for the flow's scale and height")
     chosen, reference_t_s, reference_m = _reference(log, reference)
-    name = log.truth_name if chosen == "truth" else "GPS"
-    log, found = with_attitude(log)
-    prepared = prepare(log, ReplayOptions(gps_delay_s=0.0))
+    name = {"truth": log.truth_name, "gps": "GPS", "imu": IMU_NAME}[chosen]
+    log, found = with_attitude(log, axes)
+    turned = axes is not None and sensor == Sensor.FLOW_RATE and bool(np.isnan(log.streams[sensor].value[:, 2:]).all())
+    identified = turned_sensor(log, axes) if axes is not None and turned else None  # another's gyro: right it before
+    prepared = prepare(log, ReplayOptions(gps_delay_s=0.0, identified=identified))
     mine = prepared.queue.sensor == sensor
     value, quality = prepared.queue.value[mine], prepared.queue.quality[mine]
     age_s = prepared.delays_s[sensor]
@@ -98,6 +101,7 @@ def flight(log: Log, reference: str = "auto") -> Flight:
     ranges = _ranges(log)
     range_m, near = beside(ranges, t_s - age_s)
     velocity, rate = _velocity_and_rate(sensor, value, range_m)
+    velocity = velocity @ axes.T if axes is not None and turned else velocity  # back in the sensor's own axes
     good = shared & (quality > 0) & np.isfinite(velocity).all(axis=1) & near & flying_at(log, t_s - age_s)
     good &= np.any(velocity != 0.0, axis=1) & np.concatenate([[True], np.diff(t_s) > 0.0])
     if np.count_nonzero(good) < LEAST_FLOW:
@@ -136,8 +140,11 @@ def _velocity_and_rate(sensor: Sensor, value: Array, range_m: Array) -> tuple[Ar
 
 
 def _reference(log: Log, wanted: str) -> tuple[str, Array, Array]:
-    if wanted not in ("auto", *REFERENCES):
+    if wanted not in ("auto", "imu", *REFERENCES):
         raise InputError(f"--reference {wanted}: auto, truth (truth.csv) or gps (gps.csv) are possible for a flight")
+    if wanted == "imu" and Sensor.IMU in log.streams:
+        t_s = log.streams[Sensor.IMU].t_s
+        return "imu", t_s, np.zeros((len(t_s), 3))
     if wanted in ("auto", "truth") and log.truth is not None:
         columns = [np.asarray(log.truth[name], float) for name in ("pos_n_m", "pos_e_m", "pos_d_m")]
         return "truth", np.asarray(log.truth["t_s"], float), np.column_stack(columns)

@@ -1,7 +1,8 @@
 """Identification from a flight log: axes and scale from the track, latency and dynamics from motion, noise, quality.
 
 Scale. Against GPS, whose noise is the greater, the flow's track is matched to the reference's (`displacement`);
-against a truth, which is much cleaner than the flow, the flow's velocity is regressed on the reference's. Either way the noisy side stands on the left; the bias that the other side's noise leaves is computed and reported.
+against a truth, which is much cleaner than the flow, the flow's velocity is regressed on the reference's. Either way
+the noisy side stands on the left; the bias that the other side's noise leaves is computed and is in the interval.
 
 Latency. The age of a reading when it arrives, on the vehicle's clock: from the flow against the IMU, or against the
 reference, whose own delay the IMU gives; the better-known of the two.
@@ -20,7 +21,7 @@ from flownav.identification import displacement
 from flownav.identification.descent import Structure
 from flownav.identification.experiment import Experiment, experiment
 from flownav.identification.findings import Findings, Noise, Response
-from flownav.identification.flight import Flight, flight
+from flownav.identification.flight import Flight
 from flownav.identification.height_law import (
     compare_schedules,
     fit_power_law,
@@ -28,6 +29,7 @@ from flownav.identification.height_law import (
     tail,
     variance_by_quality,
 )
+from flownav.identification.judged import judged
 from flownav.identification.orders import choose, cross_validation
 from flownav.identification.output_error import fit
 from flownav.identification.quantities import Interval, latency
@@ -37,11 +39,9 @@ from flownav.identification.reference_motion import (
     fast_experiments,
     fast_flow,
     flow_likeness,
-    motion,
-    velocity_response,
     with_flow,
 )
-from flownav.identification.sentinel import Axes, judge
+from flownav.identification.sentinel import Axes
 from flownav.identification.speed import against_speed
 from flownav.identification.statistics import Z_95
 from flownav.logs.open_log import open_flight
@@ -71,12 +71,9 @@ def identify_flight(
 ) -> Findings:
     """Findings of one flight log. InputError names what is missing."""
     log = open_flight(path, flow_instance=flow_instance)
-    flown = flight(log, reference)
-    moved = motion(flown)
+    flown, moved, raw, axes = judged(log, reference)
     _check_alike(flown, moved)
     age_s = _age(flown, moved)
-    raw = velocity_response(flown, moved, age_s)
-    axes = judge(raw, moved.yaw_known)
     put_right = flown.velocity_m_s @ axes.assignment  # assignment is orthogonal: its transpose undoes it
     if not axes.right:
         moved = with_flow(moved, flown, put_right)
@@ -118,8 +115,8 @@ def _check_alike(flown: Flight, moved: Motion) -> None:
     if best < LEAST_LIKENESS:
         raise InputError(
             f"{flown.name}: the flow does not follow the reference ({flown.reference_name}; their velocities' "
-            f"correlation is {best:.2f}, {LEAST_LIKENESS:g} is needed): no scale can be told; `flownav info` shows range, "
-            "quality and clock"
+            f"correlation is {best:.2f}, {LEAST_LIKENESS:g} is needed): no scale can be told; `flownav info` shows "
+            "range, quality and clock"
         )
 
 

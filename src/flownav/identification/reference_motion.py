@@ -45,10 +45,14 @@ class Tie(NamedTuple):
     independent: float
 
     @property
+    def alike(self) -> bool:
+        """Whether the two saw the same motion, beyond chance: their angle is known."""
+        return bool(self.likeness >= SIGNIFICANT / np.sqrt(self.independent))
+
+    @property
     def holds(self) -> bool:
-        """Whether the two saw the same motion, beyond chance, and the delay is known."""
-        known = self.delay_s.high - self.delay_s.low <= WIDEST_DELAY_S
-        return known and self.likeness >= SIGNIFICANT / np.sqrt(self.independent)
+        """Whether they did and the delay is known."""
+        return self.alike and self.delay_s.high - self.delay_s.low <= WIDEST_DELAY_S
 
 
 @dataclass(frozen=True)
@@ -106,6 +110,8 @@ def motion(flown: Flight) -> Motion:
         return Motion(grid, _turned(reference, -yaw), yaw, yaw_known, 0.0, None, None, None)
     inertial = _inertial_velocity(flown, grid)
     fast = inertial - smoothed(inertial)
+    if flown.reference == "imu":
+        return with_flow(Motion(grid, fast, 0.0, True, 0.0, None, None, fast), flown, flown.velocity_m_s)
     tie = _tie(grid, fast, grid, (reference - smoothed(reference))[:, :2])
     yaw, yaw_known = _yaw(flown, grid, reference, tie)
     delay = tie.delay_s.value if tie.holds else 0.0
@@ -126,7 +132,7 @@ def _yaw(flown: Flight, grid: Array, reference: Array, tie: Tie | None) -> tuple
     if flown.reference == "gps":
         return 0.0, True
     alike = flow_likeness(flown, grid, reference)
-    if tie is None or not tie.holds:
+    if tie is None or not tie.alike:
         return (alike.turn_rad, False) if alike.likeness >= LEAST_ALIKE else (0.0, False)
     apart = (alike.turn_rad - tie.turn_rad + np.pi) % (2.0 * np.pi) - np.pi
     quarters = 0.5 * np.pi * np.round(apart / (0.5 * np.pi))

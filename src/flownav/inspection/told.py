@@ -37,7 +37,7 @@ def _of_range(log: Log) -> list[Finding]:
     largest = float(np.abs(np.diff(range_m)).max())
     return [
         Finding(
-            f"range jumps in {share:.0%} of its steps in flight, by up to {largest:.1f} m: velocities from flow and range "
-            f"are off by {doubt:.0%} or so"
+            f"range jumps in {share:.0%} of its steps in flight, by up to {largest:.1f} m: velocities from flow and "
+            f"range are off by {doubt:.0%} or so"
         )
     ]

@@ -70,8 +70,8 @@ class Findings:
     """Everything found.
 
     kind: "rig" or "flight"; reference: what the sensor was compared with; max_flow_rad_s: the fastest flow seen
-    while usable (99.9 %); heights_m: least and greatest; notes: one line each; details: further figures for JSON; scale_with_speed: None
-    where no law shows.
+    while usable (99.9 %); heights_m: least and greatest; notes: one line each; details: further figures for JSON;
+    scale_with_speed: None where no law shows.
     """
 
     kind: str

@@ -51,7 +51,7 @@ def complaint(*arguments) -> str:
 def test_json_holds_the_promised_keys_and_nothing_else_is_printed(folder):
     facts = answer(folder, "--gps-outage", "15:25", "--gps-outage", "30:38")
     assert set(facts) == {"duration_s", "outages", "velocity_rms_m_s", "end_drift_m", "consistency", "coverage",
-                          "rejected", "readings", "warnings", "record"}  # fmt: skip
+                          "rejected", "readings", "warnings", "record", "protection"}  # fmt: skip
     assert facts["warnings"] == []
     assert facts["duration_s"] == pytest.approx(39.98)
     assert [(o["t0"], o["t1"]) for o in facts["outages"]] == [(15.0, 25.0), (30.0, 38.0)]

@@ -32,7 +32,7 @@ ALLOWED = {
     "mavlink": GROUND,
     "logs": GROUND | {"mavlink"},
     "rig": GROUND | {"optics", "sensors"},
-    "inspection": GROUND | EQUATIONS | {"logs", "replay", "scoring"},
+    "inspection": GROUND | EQUATIONS | {"logs", "replay", "scoring", "identification"},
     "identification": GROUND | EQUATIONS | {"logs", "rig", "replay", "scoring"},
     "simulation": GROUND | EQUATIONS | {"navigation"},
     "navigation": GROUND | EQUATIONS,

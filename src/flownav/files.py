@@ -1,9 +1,10 @@
-"""Files and folders that appear whole or not at all."""
+"""Files and folders that appear whole or not at all, and the order in which a folder's are taken."""
 
 from __future__ import annotations
 
 import errno
 import os
+import re
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -41,3 +42,14 @@ def folder_written_whole(path: Path) -> Iterator[Path]:
         os.replace(temporary, path)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def natural_order(path: Path) -> tuple[list[tuple[bool, int, str]], ...]:
+    """A key to sort paths by: numbers in names by their value, so that test2 comes before test10."""
+    return tuple(_number_by_number(part) for part in path.parts)
+
+
+def _number_by_number(name: str) -> list[tuple[bool, int, str]]:
+    """A name's digits and what lies between, in turn; digits sort before all else, as they do in ASCII."""
+    parts = re.findall(r"\d+|\D+", name, re.ASCII)
+    return [(False, int(part), part) if part.isdecimal() else (True, 0, part) for part in parts]

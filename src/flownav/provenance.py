@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import flownav
+from flownav.files import natural_order
 
 LIBRARIES = ("numpy", "numba", "scipy", "pyarrow", "plotly")
 
@@ -40,7 +41,7 @@ def hash_of(file: Path) -> str:
 
 
 def _files(path: Path) -> list[Path]:
-    return sorted(f for f in path.iterdir() if f.is_file()) if path.is_dir() else [path]
+    return sorted((f for f in path.iterdir() if f.is_file()), key=natural_order) if path.is_dir() else [path]
 
 
 def _version(name: str) -> str | None:

@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flownav.compare.like_for_like import airborne_of, errors_of, reference_of, shared_by
+from flownav.compare.like_for_like import errors_of, reference_of, shared_by
 from flownav.compare.tracks import Track, of_table, says
 from flownav.frames import quaternion_from_euler
 from flownav.logs.log import Log
 from flownav.measurement import Sensor, Stream
+from flownav.replay.airborne import airborne_of
 from flownav.scoring.drift import Motion
 
 NONE = np.zeros(0)

@@ -222,6 +222,11 @@ def replay(duration_s: float = 849.0, seed: int = 2, autopilot: bool = True, flo
             "outage_median_rms_m": 0.64,
             "velocity_rms_m_s": 0.23,
             "rejected": {"flow_rate": {"no_data": 812, "innovation_gate": 31}, "gps_position": {"outage": 300}},
+            "readings": {
+                "flow_rate": {
+                    "offered": 5000, "fused": 4571, "in_part": 23, "rejected": {"no_data": 406, "innovation_gate": 27}
+                },
+            },
         },
     }  # fmt: skip
     return record

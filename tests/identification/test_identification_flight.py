@@ -151,7 +151,7 @@ def test_without_heading_or_imu_a_mirrored_sensor_still_shows(tmp_path):
     folder = written(tmp_path, turned_rad=0.8, signs=(-1, 1), without=("imu",), duration_s=60.0)
     found = identify_flight(folder, CANDIDATES)
     assert found.axes.verdict.startswith("mirrored")
-    assert any("heading is unknown" in note for note in found.notes)
+    assert any("heading is the one that fits the flow" in note for note in found.notes)
 
 
 def test_noise_in_proportion_to_range_is_found_to_grow_so(tmp_path):
@@ -189,7 +189,7 @@ def test_ranges_that_spike_or_stick_to_their_floor_are_left_out(tmp_path):
     [
         (("flow",), "no flow readings; a log with a flow sensor's is needed to identify it"),
         (("range",), "no range readings; a range is needed for the flow's scale and height"),
-        (("gps",), "no reference to identify against; truth.csv (motion capture) or gps.csv is needed"),
+        (("gps",), "no reference to identify against; a reference (truth.csv, gps.csv) is needed"),
     ],
 )
 def test_a_flight_that_lacks_something_says_what(tmp_path, without, message):
@@ -229,7 +229,9 @@ def test_a_reference_at_another_time_is_refused(tmp_path):
         return f"{float(t_s) + 29.0:.4f},{rest}"
 
     folder = edited(written(tmp_path, duration_s=30.0, turned_rad=0.0), "truth", later)
-    with pytest.raises(InputError, match=r"the reference \(truth\) covers 29.0 to 59.0 s, where \d+ flow readings"):
+    with pytest.raises(
+        InputError, match=r"the reference \(truth.csv\) covers 29.0 to 59.0 s, where \d+ flow readings lie"
+    ):
         identify_flight(folder, CANDIDATES)
 
 

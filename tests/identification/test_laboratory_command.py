@@ -193,5 +193,5 @@ def test_an_outdoor_flights_axes_are_right_and_its_gains_near_one(data_folder, t
 
 def test_a_motion_capture_flight_gives_a_positive_latency(data_folder, tmp_path):
     facts = identified(data_folder / "quad-px4flow-mocap", tmp_path)
-    assert facts["reference"] == "motion capture"
+    assert facts["reference"] == "truth.csv"
     assert facts["latency_s"]["low"] > 0.0

@@ -102,6 +102,81 @@ def test_the_autopilots_error_against_truth_does_not_see_the_frames_yaw(flown):
     assert autopilot_errors(estimate, None, {})["horizontal_rms_m"] is None
 
 
+def test_a_log_that_does_not_move_has_no_yaw():
+    t_s = np.arange(0.0, 60.0, 0.1)
+    random = np.random.default_rng(2)
+    names = ("pos_n_m", "pos_e_m", "pos_d_m")
+    drift = np.cumsum(0.02 * random.standard_normal((600, 3)), axis=0)
+    estimate = {"t_s": t_s, **dict(zip(names, drift.T, strict=True))}
+    truth = {"t_s": t_s, **dict(zip(names, np.zeros((3, 600)), strict=True))}
+    errors = autopilot_errors(estimate, truth, {})
+    assert errors["against"] == "truth"
+    assert errors["yaw_rad"] is None
+
+
+def test_the_verdict_stands_in_words(ulog):
+    facts = facts_of(ulog)
+    assert facts["verdict"].startswith("flow and GPS agree: lag 0.2")
+    assert facts["agreement"]["scale"] == pytest.approx(1.0, abs=0.02)
+    assert facts["agreement"]["correlation"] > 0.98
+    assert f"Verdict: {facts['verdict']}" in call(info.command, ulog).stdout
+
+
+def indoors(flown, folder, *, sign=1.0, sonar=False, truth=True):
+    """Flow, range and IMU alone, the flow without a gyro of its own."""
+    tables = {name: dict(flown.tables[name]) for name in ("imu", "flow", "range")}
+    flow, distance = tables["flow"], tables["range"]
+    for axis in "xy":
+        flow[f"flow_{axis}_rad_s"] = sign * flow[f"flow_{axis}_rad_s"]
+        del flow[f"gyro_{axis}_rad_s"]
+    if sonar:
+        echo = np.arange(len(distance["t_s"])) % 7 == 3
+        distance["range_m"] = np.where(echo, distance["range_m"] + 3.0, distance["range_m"])
+    if truth:
+        t_s = np.arange(0.0, 39.0, 0.02)
+        place = [np.interp(t_s, flown.t_s, column) for column in flown.position.T]
+        tables["truth"] = {"t_s": t_s, **dict(zip(("x_m", "y_m", "z_m"), place, strict=True))}
+    return replace(flown, tables=tables).write(folder)
+
+
+def test_an_imu_only_folder_is_replayable_and_its_flow_agrees(flown, tmp_path):
+    facts = facts_of(indoors(flown, tmp_path / "indoors"))
+    assert facts["replayable"] is True
+    assert facts["obstacles"] == facts["warnings"] == []
+    assert facts["verdict"].startswith("flow and truth.csv agree: lag ")
+    assert facts["agreement"]["own_attitude"] is True
+    instead = {absence["what"]: absence["instead"] for absence in facts["absences"]}
+    assert instead["no attitude"].startswith("it is found from the IMU")
+    assert instead["no gyro in the flow sensor"] == "rotation is taken out of the flow with the IMU"
+
+
+@pytest.mark.parametrize("truth", [True, False], ids=["truth", "IMU alone"])
+def test_inverted_flow_is_seen_without_gps_and_without_attitude(flown, tmp_path, truth):
+    facts = facts_of(indoors(flown, tmp_path / "indoors", sign=-1.0, truth=truth))
+    against = "truth.csv" if truth else "the IMU"
+    said = f"flow: signs of x and y are inverted (sensor turned by 180 deg), against {against}"
+    assert facts["warnings"] == [f"{said}; mend the log's flow columns"]
+    assert facts["flow_is_wrong"] is True
+    assert facts["verdict"].startswith(f"flow and {against} disagree: signs of x and y are inverted")
+    assert facts["agreement"]["scale"] == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_range_that_jumps_is_seen(flown, tmp_path):
+    facts = facts_of(indoors(flown, tmp_path / "indoors", sonar=True))
+    assert len(facts["warnings"]) == 1
+    assert facts["warnings"][0].startswith("range jumps in 28% of its steps in flight, by up to 3.")
+
+
+def test_a_slow_imu_alone_cannot_be_replayed_and_info_says_why(flown, tmp_path):
+    tables = {name: dict(flown.tables[name]) for name in ("imu", "flow", "range")}
+    tables["imu"] = {name: values[::10] for name, values in tables["imu"].items()}
+    facts = facts_of(replace(flown, tables=tables).write(tmp_path / "slow"))
+    assert facts["replayable"] is False
+    assert facts["obstacles"] == ["no attitude, and its IMU has 5.0 Hz: one of them is needed, an IMU of 20 Hz or more"]
+    shown = call(info.command, tmp_path / "slow").stdout
+    assert "Cannot be replayed: no attitude" in shown
+
+
 def test_people_see_the_same(ulog):
     result = call(info.command, ulog)
     assert result.exception is None
@@ -152,6 +227,9 @@ def test_without_gps_the_reference_tells_the_flows_sign(flown, tmp_path, sign):
     assert facts["flow_is_wrong"] is (sign < 0)
     text = "flow sign is inverted (both axes) against the reference; mend the log's flow columns"
     assert facts["warnings"] == ([text] if sign < 0 else [])
+    assert facts["agreement"]["against"] == "visual odometry"
+    identified = call(identify.command, tmp_path / "indoors.ulg", "--json")
+    assert json.loads(identified.stdout)["reference"] == "visual odometry"
 
 
 def test_a_log_that_cannot_be_replayed_is_shown_all_the_same(flown, tmp_path):
@@ -160,7 +238,11 @@ def test_a_log_that_cannot_be_replayed_is_shown_all_the_same(flown, tmp_path):
     path = writer.write(tmp_path / "part.ulg")
     facts = facts_of(path)
     assert [stream["sensor"] for stream in facts["streams"]] == ["imu", "flow_rate"]
-    assert facts["checked"].startswith("nothing: the log has no attitude")
+    assert facts["checked"].startswith("no two sensors: the log has no attitude")
+    assert facts["verdict"] == (
+        "flow is not compared with a reference: no range readings; a range is needed for the flow's scale and height"
+    )
+    assert facts["replayable"] is True  # IMU and flow are enough
     assert {"no GPS fix", "no range"} <= {absence["what"] for absence in facts["absences"]}
     writer.topics = [topic for topic in writer.topics if topic.name == "vehicle_optical_flow"]
     result = call(replay_command.command, writer.write(tmp_path / "flow.ulg"))

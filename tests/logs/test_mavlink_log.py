@@ -16,6 +16,7 @@ from flownav.errors import InputError
 from flownav.logs.absences import INSTEAD
 from flownav.logs.mavlink_flight import WANTED
 from flownav.logs.mavlink_log import read_tlog
+from flownav.logs.open_log import open_flight
 from flownav.logs.plausible import check_plausible
 from flownav.logs.rates import attitude_rates
 from flownav.mavlink.dialect import coder
@@ -323,10 +324,23 @@ def test_what_is_no_tlog(path, tmp_path):
 def test_what_a_log_must_hold(path):
     log = flight_log()
     everything = log.frames
-    log.frames = [f for f in everything if f[1][7] != 30]
-    assert "no ATTITUDE or ATTITUDE_QUATERNION; have the autopilot send one" in complaint(log.write(path))
+    log.frames = [f for f in everything if f[1][7] in (0, 49)]  # HEARTBEAT, GPS_GLOBAL_ORIGIN
+    assert "no usable reading of any sensor; have the autopilot send ATTITUDE" in complaint(log.write(path))
     log.frames = [f for f in everything if f[1][7] not in (24, 100)]
-    assert "neither a GPS fix (GPS_RAW_INT) nor flow" in complaint(log.write(path))
+    read = read_tlog(log.write(path))
+    assert Sensor.IMU in read.streams
+    with pytest.raises(InputError, match="lacks GPS or optical flow"):
+        open_flight(path)
+
+
+def test_a_log_without_attitude_has_its_imu_to_find_one(path):
+    log = flight_log()
+    log.frames = [f for f in log.frames if f[1][7] != 30]
+    read = open_flight(log.write(path))
+    assert Sensor.ATTITUDE not in read.streams
+    said = {absence.what: absence.instead for absence in read.absences}
+    assert said["no attitude (ATTITUDE_QUATERNION, ATTITUDE)"].startswith("it is found from the IMU")
+    assert set(read.autopilot) == {"t_s", "pos_n_m", "pos_e_m", "pos_d_m"}  # body velocity needs an attitude
 
 
 def test_without_pymavlink_the_extra_is_named(path, monkeypatch):

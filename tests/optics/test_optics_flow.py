@@ -115,6 +115,13 @@ def test_pictures_are_read_back_in_the_order_of_their_names(pictures: Path) -> N
     assert (read_frames(sorted(pictures.glob("*.png"))) == filmed(0.3, n=8)).all()
 
 
+def test_numbered_pictures_come_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    image = pytest.importorskip("PIL.Image")
+    for number in (1, 2, 10, 11):
+        image.fromarray(np.full((5, 6), number, np.uint8)).save(tmp_path / f"test{number}.png")
+    assert read_frames([tmp_path])[:, 0, 0].tolist() == [1, 2, 10, 11]
+
+
 def test_colour_and_sixteen_bit_pictures_become_grey(tmp_path: Path) -> None:
     image = pytest.importorskip("PIL.Image")
     image.fromarray(np.full((5, 6, 3), 90, np.uint8)).save(tmp_path / "a.png")

@@ -51,13 +51,16 @@ def complaint(*arguments) -> str:
 def test_json_holds_the_promised_keys_and_nothing_else_is_printed(folder):
     facts = answer(folder, "--gps-outage", "15:25", "--gps-outage", "30:38")
     assert set(facts) == {"duration_s", "outages", "velocity_rms_m_s", "end_drift_m", "consistency", "coverage",
-                          "rejected", "warnings", "record"}  # fmt: skip
+                          "rejected", "readings", "warnings", "record", "protection"}  # fmt: skip
     assert facts["warnings"] == []
     assert facts["duration_s"] == pytest.approx(39.98)
     assert [(o["t0"], o["t1"]) for o in facts["outages"]] == [(15.0, 25.0), (30.0, 38.0)]
     assert all(0 <= o["horizontal_rms_m"] <= o["horizontal_max_m"] < 0.02 for o in facts["outages"])
     assert facts["velocity_rms_m_s"] < 0.01
     assert facts["rejected"]["gps_position"]["outage"] == 3 * (50 + 40)
+    cut = facts["readings"]["gps_position"]
+    assert cut["rejected"]["outage"] == 50 + 40
+    assert cut["fused"] + cut["in_part"] <= cut["offered"] - 90
     assert facts["record"] == "out/garden.fnr"
     assert Record.load(Path(facts["record"])).manifest["command"][0] == "flownav"
 

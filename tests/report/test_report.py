@@ -19,7 +19,9 @@ from flownav.cli import report as report_command
 from flownav.errors import InputError
 from flownav.record import Record
 from flownav.report import content
+from flownav.report.figures_states import position
 from flownav.report.html import render, write_report
+from flownav.report.sensor_rows import sensor_rows
 from report_records import flight, replay
 
 
@@ -114,14 +116,14 @@ def test_sensors_are_judged_in_words_and_the_drift_at_the_end_is_told() -> None:
         "consistency": {"range": {"nis_per_dof": 2.5, "samples": 1234, "white": False}},
     }
     said = "optimistic: errors are larger than stated; coloured: errors last"
-    assert content.sensor_rows(record) == [
+    assert sensor_rows(record) == [
         ("Rangefinder", "1.0 to 31.2", "1,234", "2.50", said),
         ("IMU", "0.0 to 60.0", content.NONE, content.NONE, ""),
     ]
     page = render(record)
     assert "coloured: errors last" in page
     assert "0.417" in page
-    assert content.sensor_rows(Record()) == []
+    assert sensor_rows(Record()) == []
 
 
 def test_without_a_paper_table_the_scores_stand_alone() -> None:
@@ -152,6 +154,46 @@ def test_the_autopilots_own_errors_stand_beside_ours(against: str, said: str) ->
     assert f"The autopilot's own estimate (PX4 EKF2) is off by 0.41 m rms, 1.25 m at most, horizontally, {said}" in text
     record.manifest["scores"]["autopilot"] = {"name": "PX4 EKF2", "against": None}
     assert "The autopilot's own estimate (" not in Page(render(record)).text
+
+
+def test_odometry_is_not_called_truth() -> None:
+    record = flight()
+    record.manifest["truth_name"] = "visual odometry"
+    record.manifest["scores"] = {
+        "truth": {"horizontal_rms_m": 0.41, "horizontal_max_m": 1.25},
+        "end_drift_m": 0.3,
+        "max_position_error_m": 0.2,
+    }
+    text = Page(render(record)).text.replace("\N{NO-BREAK SPACE}", " ")
+    assert "Against the recorded visual odometry, an estimate itself, its position is off by 0.41 m" in text
+    assert "No truth: errors are shown against the visual odometry, which has errors of its own." in text
+    assert "horizontal, visual odometry laid on at take-off" in text
+    assert "the recorded truth" not in text
+    names = [trace.name for trace in position(record).figure.data]
+    assert "visual odometry" in names
+    assert "truth" not in names
+    record.manifest["truth_name"] = "the simulator"
+    assert "truth" in [trace.name for trace in position(record).figure.data]
+
+
+def test_flow_that_was_fused_without_a_range_is_not_called_absent() -> None:
+    record = replay(60.0)
+    t_s = record.tables["estimate"]["t_s"][::5]
+    zero = np.zeros(len(t_s))
+    names = ("flow_x_rad_s", "flow_y_rad_s", "gyro_x_rad_s", "gyro_y_rad_s")
+    record.tables.pop("flow_velocity", None)
+    record.tables.pop("range", None)
+    record.add("flow_rate", {"t_s": t_s, **dict.fromkeys(names, zero), "quality": zero + 200.0})
+    text = Page(render(record)).text
+    assert "No valid optical flow" not in text
+    assert "No range at the time of the flow: its readings are fused" in text
+    assert "Valid flow readings no valid readings" not in text
+
+
+def test_a_record_without_gps_and_truth_does_not_speak_of_errors_against_gps() -> None:
+    record = replay(60.0)
+    del record.tables["gps_position"]
+    assert "No truth: no error can be shown." in Page(render(record)).text
 
 
 @pytest.mark.parametrize(
@@ -198,7 +240,8 @@ def test_a_replay_is_told_by_its_outages(outdoor: Page) -> None:
     assert "36 to 60 s 0.87 1.63 this record" in outdoor.text
     assert "1 to 3 s 0.41 0.72 a replay of its own" in outdoor.text
     assert "median 0.64" in outdoor.text
-    assert "Flow no data 812" in outdoor.text
+    assert "Flow no data 406 812" in outdoor.text
+    assert "GPS position outage \N{EN DASH} 300" in outdoor.text  # a record from before readings were counted
     assert "gps-distance" in outdoor.figures()
     assert "position-error" not in outdoor.figures()
 

@@ -47,3 +47,14 @@ def test_noise_is_left_over_by_the_least_squares():
 def test_velocity_of_a_straight_path_is_its_slope_up_to_its_ends():
     t_s = np.arange(0.0, 2.0, 0.04)
     assert velocity_of(t_s, np.outer(t_s, (1.0, -2.0, 0.5))) == pytest.approx(np.tile((1.0, -2.0, 0.5), (len(t_s), 1)))
+
+
+def test_the_yaw_of_a_vehicle_that_stays_is_not_shown():
+    random = np.random.default_rng(5)
+    stays = 0.05 * random.standard_normal((200, 3))
+    wanders = np.cumsum(0.05 * random.standard_normal((200, 3)), axis=0)
+    assert not align(wanders, stays).yaw_shown
+    assert not align(stays, stays).yaw_shown
+    assert align(PATH, PATH).yaw_shown
+    unlike = PATH * np.array([[-1.0, 1.0, 1.0]]) + 30.0 * random.standard_normal(PATH.shape)
+    assert not align(unlike, PATH).yaw_shown

@@ -20,9 +20,7 @@ def command(
     heights: Annotated[
         str | None, typer.Option(metavar="H[,H..]", help="Sensor's height [m]: one for all logs, or one each.")
     ] = None,
-    reference: Annotated[
-        str, typer.Option(help="auto; rig: velocity or encoder; flight: truth (motion capture) or gps.")
-    ] = "auto",
+    reference: Annotated[str, typer.Option(help="auto; rig: velocity or encoder; flight: truth or gps.")] = "auto",
     flow_instance: Annotated[
         int | None, typer.Option("--flow-instance", metavar="N", help="Which of a flight's several flow sensors.")
     ] = None,
@@ -116,11 +114,20 @@ def _facts(findings: Findings) -> dict[str, Any]:
             "by_quality": [q._asdict() for q in findings.noise.quality],
             "schedules": [s._asdict() for s in findings.noise.schedules],
         },
+        "scale_with_speed": _speed(findings),
         "responses": [_response(response) for response in findings.responses],
         "notes": list(findings.notes),
         "details": findings.details,
     })  # fmt: skip
     return facts
+
+
+def _speed(findings: Findings) -> dict[str, Any] | None:
+    law = findings.scale_with_speed
+    if law is None:
+        return None
+    ends = {"per_m_s": law.per_m_s.as_dict(), "at_slow": law.at_slow.as_dict(), "at_fast": law.at_fast.as_dict()}
+    return {**ends, "slow_m_s": law.slow_m_s, "fast_m_s": law.fast_m_s, "matters": law.matters, "verdict": law.verdict}
 
 
 def _response(response: Any) -> dict[str, Any]:
@@ -165,10 +172,13 @@ def _print(findings: Findings, facts: dict[str, Any]) -> None:
     console.print(table)
     console.print(f"Axes: {findings.axes.verdict}")
     console.print(f"Excitation: {findings.excitation.verdict}")
-    law = findings.noise.law
+    law = findings.scale_with_speed
+    if law is not None:
+        console.print(f"Speed: {law.verdict}; {_interval(law.per_m_s, 1.0, 3)} per m/s")
+    noise = findings.noise.law
     console.print(
-        f"Error: {_interval(law.sigma_m_s, 1.0, 3)} m/s at {law.reference_m:.2f} m, growing with height to the power "
-        f"{_interval(law.exponent, 1.0, 2)} from {law.low_m:.2f} to {law.high_m:.2f} m"
+        f"Error: {_interval(noise.sigma_m_s, 1.0, 3)} m/s at {noise.reference_m:.2f} m, growing with height to the "
+        f"power {_interval(noise.exponent, 1.0, 2)} from {noise.low_m:.2f} to {noise.high_m:.2f} m"
     )
     title = "Schedules of the variance (best first)"
     schedules = Table("variance by", "score", "within 2 sigma", "sigma low", "sigma high", title=title)

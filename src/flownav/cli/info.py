@@ -42,6 +42,9 @@ def _print(facts: dict[str, Any]) -> None:
 
     console = Console(markup=False, highlight=False)
     console.print(f"{facts['log']}: {facts['end_s'] - facts['start_s']:.1f} s")
+    console.print(f"Verdict: {facts['verdict']}")
+    for obstacle in facts["obstacles"]:
+        console.print(f"Cannot be replayed: {obstacle}")
     streams = Table("sensor", "readings", "rate [Hz]", "from, to [s]", "gap [s]", "no data", "thrown away")
     for column in streams.columns[:4]:
         column.no_wrap = True

@@ -148,13 +148,17 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
         console.print(f"Horizontal velocity against GPS: {scores['velocity_rms_m_s']:.3f} m/s rms")
     if "truth" in scores:
         truth = scores["truth"]
+        turned = "" if truth["yaw_rad"] is None else f", turned by {57.29578 * truth['yaw_rad']:.1f} deg"
         console.print(
-            f"Against truth (turned by {57.29578 * truth['yaw_rad']:.1f} deg): horizontal "
+            f"Against {truth['reference']}{turned}: horizontal "
             f"{truth['horizontal_rms_m']:.2f} m rms, {truth['horizontal_max_m']:.2f} m max; "
             f"velocity {truth['velocity_rms_m_s']:.3f} m/s rms"
         )
     if scores["end_drift_m"] is not None:
-        console.print(f"At the end of the flight, truth laid on it at take-off: {scores['end_drift_m']:.2f} m off")
+        console.print(
+            f"At the end of the flight, {scores['truth']['reference']} laid on it at take-off: "
+            f"{scores['end_drift_m']:.2f} m off"
+        )
     if scores["protection"]:
         console.print(_protection(scores["protection"]))
     if "smoothed" in scores:
@@ -163,10 +167,7 @@ def _print(flown: Replay, scores: dict[str, Any]) -> None:
         own = scores["autopilot"]
         console.print(f"The autopilot's own estimate ({own['name']}) {autopilot_errors(own)}")
     console.print(_sensors(scores))
-    rejected = Table("sensor", "reason", "rejected", title="Not fused")
-    for sensor, counts in scores["rejected"].items():
-        for reason, count in counts.items():
-            rejected.add_row(sensor, reason, str(count))
+    rejected = _rejected(scores)
     if rejected.row_count:
         console.print(rejected)
     for note in flown.prepared.notes:
@@ -204,6 +205,18 @@ def _protection(found: dict[str, Any]) -> str:
     )
 
 
+def _rejected(scores: dict[str, Any]) -> Any:
+    """What was not fused and why, in readings and in components (a row that the reader threw away is one)."""
+    from rich.table import Table
+
+    table = Table("sensor", "reason", "readings", "of", "components", title="Not fused")
+    for sensor, counted in scores["readings"].items():
+        offered, components = counted["offered"], scores["rejected"].get(sensor, {})
+        for reason, count in counted["rejected"].items():
+            table.add_row(sensor, reason, str(count), str(offered or ""), str(components.get(reason, "")))
+    return table
+
+
 def _smoothed_errors(scores: dict[str, Any]) -> str:
     """The smoothed path's errors in words."""
     said = [
@@ -214,7 +227,8 @@ def _smoothed_errors(scores: dict[str, Any]) -> str:
     if scores["velocity_rms_m_s"] is not None:
         said.append(f"velocity against GPS {scores['velocity_rms_m_s']:.3f} m/s rms")
     if "truth" in scores:
-        said.append(f"against truth {scores['truth']['horizontal_rms_m']:.2f} m rms horizontally")
+        truth = scores["truth"]
+        said.append(f"against {truth['reference']} {truth['horizontal_rms_m']:.2f} m rms horizontally")
     return "; ".join(said) or "nothing to compare it with"
 
 

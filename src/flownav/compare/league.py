@@ -9,6 +9,7 @@ from flownav import __version__
 from flownav.compare.job import Setting, compare_log, windows_of
 from flownav.compare.rows import Row, markdown, names_of
 from flownav.errors import InputError
+from flownav.files import natural_order
 from flownav.logs.csv_folder import FILES
 from flownav.logs.open_log import log_kind, open_flight
 from flownav.replay.prepare import ReplayOptions
@@ -25,13 +26,13 @@ LeftOut = tuple[str, str]  # a log's name, and why it is not in the table
 
 
 def logs_in(folder: Path) -> list[Path]:
-    """Every folder of CSV files and every log file below, in order of their names.
+    """Every folder of CSV files and every log file below, in order of their names (2 before 10).
 
     InputError where the folder is missing or holds none.
     """
     if not folder.is_dir():
         raise InputError(f"{folder}: no such folder; set FLOWNAV_DATA to the folder of logs")
-    found = [path for path in sorted(folder.rglob("*")) if _is_folder_of_csv(path) or log_kind(path)]
+    found = [path for path in sorted(folder.rglob("*"), key=natural_order) if _is_folder_of_csv(path) or log_kind(path)]
     if not found:
         raise InputError(f"{folder}: holds no log; set FLOWNAV_DATA to the folder of logs")
     return found

@@ -14,11 +14,8 @@ from flownav.measurement import Array, Sensor
 from flownav.record import POSITION_NED
 from flownav.replay.judged import columns_of
 from flownav.scoring.alignment import Alignment, align, velocity_of
-from flownav.scoring.drift import flight_of
 
 LEAST_INSTANTS = 10
-ON_THE_GROUND = 20  # readings of a range that starts on the ground
-LIFTED_M = 0.3  # a sonar's noise and a landing gear's spring are less
 
 Flags = NDArray[np.bool_]
 Window = tuple[float, float]
@@ -55,24 +52,6 @@ def reference_of(log: Log, gps_delay_s: float) -> Reference | None:
         known = np.isfinite(speeds.value[:, :2]).all(axis=1)
         velocity_t_s, moving = speeds.t_s[known] - gps_delay_s, speeds.value[known, :2]
     return Reference("gps", position_t_s, fixes.value, velocity_t_s, moving)
-
-
-def airborne_of(log: Log) -> Window | None:
-    """From lift-off to touchdown [s], by who says so: the landed signal, the truth's height, the range; else None."""
-    if Sensor.LANDED in log.streams:
-        landed = log.streams[Sensor.LANDED]
-        flying = np.flatnonzero(landed.value[:, 0] < 0.5)
-        if len(flying):
-            last = flying[-1] + 1
-            return float(landed.t_s[flying[0]]), float(landed.t_s[last]) if last < len(landed) else log.span_s[1]
-    if log.truth is not None:
-        return flight_of(np.asarray(log.truth["t_s"], float), np.asarray(log.truth["pos_d_m"], float))
-    if Sensor.RANGE not in log.streams or len(log.streams[Sensor.RANGE]) < ON_THE_GROUND:
-        return None
-    distance = log.streams[Sensor.RANGE]
-    lifted = distance.value[:, 0] > np.median(distance.value[:ON_THE_GROUND, 0]) + LIFTED_M
-    away = np.flatnonzero(lifted)
-    return (float(distance.t_s[away[0]]), float(distance.t_s[away[-1]])) if len(away) else None
 
 
 def shared_by(tracks: Sequence[Track], instants_s: Array) -> tuple[Flags, list[bool]]:

@@ -16,6 +16,7 @@ from flownav.identification.orders import Choice
 from flownav.identification.output_error import Fit
 from flownav.identification.quantities import Excitation, Interval
 from flownav.identification.sentinel import Axes
+from flownav.identification.speed import SpeedLaw
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,8 @@ class Findings:
     """Everything found.
 
     kind: "rig" or "flight"; reference: what the sensor was compared with; max_flow_rad_s: the fastest flow seen
-    while usable (99.9 %); heights_m: least and greatest; notes: one line each; details: further figures for JSON.
+    while usable (99.9 %); heights_m: least and greatest; notes: one line each; details: further figures for JSON;
+    scale_with_speed: None where no law shows.
     """
 
     kind: str
@@ -84,6 +86,7 @@ class Findings:
     files: tuple[Path, ...]
     notes: tuple[str, ...] = ()
     details: dict[str, object] = field(default_factory=dict)
+    scale_with_speed: SpeedLaw | None = None
 
     @property
     def gain(self) -> Interval:

@@ -1,8 +1,8 @@
 """Identification from a flight log: axes and scale from the track, latency and dynamics from motion, noise, quality.
 
 Scale. Against GPS, whose noise is the greater, the flow's track is matched to the reference's (`displacement`);
-against motion capture, which is much cleaner than the flow, the flow's velocity is regressed on the reference's.
-Either way the noisy side stands on the left; the bias that the other side's noise leaves is computed and reported.
+against a truth, which is much cleaner than the flow, the flow's velocity is regressed on the reference's. Either way
+the noisy side stands on the left; the bias that the other side's noise leaves is computed and is in the interval.
 
 Latency. The age of a reading when it arrives, on the vehicle's clock: from the flow against the IMU, or against the
 reference, whose own delay the IMU gives; the better-known of the two.
@@ -21,7 +21,7 @@ from flownav.identification import displacement
 from flownav.identification.descent import Structure
 from flownav.identification.experiment import Experiment, experiment
 from flownav.identification.findings import Findings, Noise, Response
-from flownav.identification.flight import Flight, flight
+from flownav.identification.flight import Flight
 from flownav.identification.height_law import (
     compare_schedules,
     fit_power_law,
@@ -29,6 +29,7 @@ from flownav.identification.height_law import (
     tail,
     variance_by_quality,
 )
+from flownav.identification.judged import judged
 from flownav.identification.orders import choose, cross_validation
 from flownav.identification.output_error import fit
 from flownav.identification.quantities import Interval, latency
@@ -37,10 +38,11 @@ from flownav.identification.reference_motion import (
     difference,
     fast_experiments,
     fast_flow,
-    motion,
+    flow_likeness,
     with_flow,
 )
-from flownav.identification.sentinel import Axes, judge
+from flownav.identification.sentinel import Axes
+from flownav.identification.speed import against_speed
 from flownav.identification.statistics import Z_95
 from flownav.logs.open_log import open_flight
 from flownav.measurement import Array
@@ -48,6 +50,7 @@ from flownav.measurement import Array
 CLUSTER_S = 3.0
 FLIGHT_ORDERS = (Structure(0), Structure(1), Structure(2))
 WORST_BIAS = 0.02
+LEAST_LIKENESS = 0.4  # of flow and reference: less is the luck of a short flight
 CLEAR = 0.8  # likeness to the IMU from which it, and not the reference, shows the dynamics
 
 
@@ -68,11 +71,9 @@ def identify_flight(
 ) -> Findings:
     """Findings of one flight log. InputError names what is missing."""
     log = open_flight(path, flow_instance=flow_instance)
-    flown = flight(log, reference)
-    moved = motion(flown)
+    flown, moved, raw, axes = judged(log, reference)
+    _check_alike(flown, moved)
     age_s = _age(flown, moved)
-    raw = _velocity_response(flown, moved, age_s)
-    axes = judge(raw, moved.yaw_known)
     put_right = flown.velocity_m_s @ axes.assignment  # assignment is orthogonal: its transpose undoes it
     if not axes.right:
         moved = with_flow(moved, flown, put_right)
@@ -83,13 +84,16 @@ def identify_flight(
     responses = []
     for axis, members in enumerate(_dynamic_runs(flown, moved, put_right, runs)):
         choice = choose(members, structures)
-        lag = _latency(moved, latency(choice.best))
+        lag = _latency(flown, moved, latency(choice.best))
         held_out = cross_validation(members, choice.best)
-        responses.append(Response("xy"[axis], runs[0].height_m, scale.gains[axis], lag, choice, 1, held_out))
+        responses.append(Response("xy"[axis], runs[0].height_m, _doubted(scale, flown, axis), lag, choice, 1, held_out))
+    delay_s = float(np.mean([response.latency_s.value for response in responses]))
+    law = against_speed(flown, moved, put_right, delay_s)
+    told = [f"scale: {law.verdict}; the gains are of all speeds together"] if law is not None and law.matters else []
     ranges = flown.range_m[flown.good]
     return Findings(
         "flight",
-        {"truth": "motion capture", "gps": "GPS"}[flown.reference],
+        flown.reference_name,
         tuple(responses),
         axes,
         _noise(flown, put_right, [fit([run], Structure(0)).residuals[0] for run in runs]),
@@ -98,9 +102,29 @@ def identify_flight(
         flown.flow_limit_rad_s,
         int(flown.quality[flown.good].min()),
         tuple((path if path.is_dir() else path.parent) / name for name in log.inputs),
-        (*flown.notes, *_notes(flown, moved, scale, axes)),
+        (*flown.notes, *_notes(flown, moved, scale, axes), *told),
         _details(flown, moved, scale, axes, raw, track),
+        law,
     )
+
+
+def _check_alike(flown: Flight, moved: Motion) -> None:
+    """InputError where the flow does not follow the reference, straight or mirrored: there is nothing to identify."""
+    alike = flow_likeness(flown, moved.t_s, moved.velocity_m_s)
+    best = max(alike.likeness, alike.mirrored)
+    if best < LEAST_LIKENESS:
+        raise InputError(
+            f"{flown.name}: the flow does not follow the reference ({flown.reference_name}; their velocities' "
+            f"correlation is {best:.2f}, {LEAST_LIKENESS:g} is needed): no scale can be told; `flownav info` shows "
+            "range, quality and clock"
+        )
+
+
+def _doubted(scale: Scale, flown: Flight, axis: int) -> Interval:
+    """A gain's interval with what no length of log takes out: noise in the regressor, a range that jumps."""
+    value, low, high = scale.gains[axis]
+    doubt = np.hypot(scale.bias[axis], flown.range_doubt) * abs(value)
+    return Interval(value, value - float(np.hypot(value - low, doubt)), value + float(np.hypot(high - value, doubt)))
 
 
 def _age(flown: Flight, moved: Motion) -> float:
@@ -109,8 +133,16 @@ def _age(flown: Flight, moved: Motion) -> float:
     return tie.delay_s.value if tie is not None and tie.holds else flown.age_s
 
 
-def _latency(moved: Motion, against_reference: Interval) -> Interval:
-    """On the vehicle's clock: the better-known of the IMU's word and the reference's, whose delay is taken out."""
+def _latency(flown: Flight, moved: Motion, against_reference: Interval) -> Interval:
+    """On the vehicle's clock: the better-known of the IMU's word and the reference's, whose delay is taken out.
+
+    The IMU's word is of the log's attitude. Where that is an estimate, its errors pass for delays: then it is the
+    latency against the reference as that is stamped, and the interval takes in the delay that the IMU says it has.
+    """
+    if flown.attitude_is_own:
+        delay_s, (value, low, high) = moved.reference_delay_s, against_reference
+        half = float(np.hypot(0.5 * (high - low), delay_s))
+        return Interval(value - delay_s, value - delay_s - half, value - delay_s + half)
     words = [tie.delay_s for tie in (moved.flow_tie,) if tie is not None and tie.holds]
     if moved.reference_tie is not None and moved.reference_tie.holds:
         own = moved.reference_tie.delay_s
@@ -120,14 +152,6 @@ def _latency(moved: Motion, against_reference: Interval) -> Interval:
 
 def _body_input(flown: Flight, moved: Motion, age_s: float) -> Array:
     return moved.in_body(flown, flown.t_s[flown.good] - age_s)[:, :2]
-
-
-def _velocity_response(flown: Flight, moved: Motion, age_s: float) -> Array:
-    """(2, 2) regression of flow on the reference's body velocity: enough for signs and axes."""
-    if not moved.yaw_known:
-        age_s = flown.age_s
-    design = np.column_stack([_body_input(flown, moved, age_s), np.ones(int(flown.good.sum()))])
-    return np.asarray(np.linalg.lstsq(design, flown.velocity_m_s[flown.good], rcond=None)[0][:2].T)
 
 
 def _scale(flown: Flight, moved: Motion, age_s: float, velocity: Array) -> tuple[Scale, displacement.Match | None]:
@@ -230,8 +254,13 @@ def _notes(flown: Flight, moved: Motion, scale: Scale, axes: Axes) -> list[str]:
         notes.append(f"axes: {axes.verdict}; gains are of the axes put right")
     if max(scale.bias) > WORST_BIAS:
         notes.append(
-            f"scale: noise in the regressor may pull the gains by up to {max(scale.bias):.0%}; a longer or livelier "
-            "flight is needed"
+            f"scale: noise in the regressor may pull the gains by up to {max(scale.bias):.0%}, which is in their "
+            "intervals; a longer or livelier flight is needed"
+        )
+    if flown.range_doubt > WORST_BIAS:
+        notes.append(
+            f"range: it jumps in {flown.range_jumping:.0%} of its steps in flight, an error of {flown.range_doubt:.0%} "
+            "of every gain, which is in their intervals"
         )
     if flown.reference == "gps":
         notes.append("error: what is left of the GPS and attitude errors counts as the flow's; it is an upper bound")
@@ -240,7 +269,10 @@ def _notes(flown: Flight, moved: Motion, scale: Scale, axes: Axes) -> list[str]:
     elif not moved.flow_tie.holds and (moved.reference_tie is None or not moved.reference_tie.holds):
         notes.append("latency is against the reference and holds its delay: the IMU agrees with neither of them")
     if not moved.yaw_known:
-        notes.append("the reference's heading is unknown (no IMU): a sensor turned about its boresight does not show")
+        notes.append(
+            "the reference's heading is the one that fits the flow, for want of an IMU that agrees: a sensor turned "
+            "about its boresight does not show"
+        )
     return notes
 
 
@@ -256,6 +288,8 @@ def _details(
         "reference_yaw_deg": float(np.degrees(moved.yaw_rad)),
         "reference_delay_s": moved.reference_delay_s,
         "usable_share": float(flown.good.mean()),
+        "range_jumping_share": flown.range_jumping,
+        "range_doubt": flown.range_doubt,
     }
     if track is not None:
         sigma = float(np.sqrt(track.covariance[4, 4]))

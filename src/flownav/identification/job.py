@@ -34,7 +34,7 @@ def identify(
     for path in logs:
         if not path.exists():
             raise InputError(f"{path}: no such file or folder; identify takes rig logs and flight logs")
-    flights = [path for path in logs if (path / "attitude.csv").exists() or log_kind(path)]
+    flights = [path for path in logs if is_flight(path)]
     if flights and len(logs) > 1:
         raise InputError(f"{flights[0]}: a flight is identified alone; give rig logs together, flights one by one")
     if flights:
@@ -47,7 +47,7 @@ def identify(
         if not is_rig(path):
             raise InputError(
                 f"{path}: neither a rig log (rig.csv, run-001/rig.csv, a CSV file) nor a flight log (a folder with "
-                "attitude.csv, .ulg, .bin, .tlog)"
+                "attitude.csv or imu.csv, .ulg, .bin, .tlog)"
             )
     runs = [
         run
@@ -55,6 +55,11 @@ def identify(
         for run in read_runs(path, height_m, reference)
     ]
     return identify_rig(runs, structures)
+
+
+def is_flight(path: Path) -> bool:
+    """Whether a path holds a flight: a log file, or a folder of CSV files with an attitude or an IMU."""
+    return any((path / name).exists() for name in ("attitude.csv", "imu.csv")) or bool(log_kind(path))
 
 
 def parse_heights(text: str | None) -> list[float]:

@@ -19,6 +19,7 @@ from flownav.identification.flight import GRAVITY_M_S2, Flight
 from flownav.identification.output_error import fit
 from flownav.identification.quantities import Interval, latency
 from flownav.identification.statistics import Z_95
+from flownav.logs.rates import mean_over
 from flownav.measurement import Array
 
 GRID_S = 0.02
@@ -26,6 +27,9 @@ SPLIT_S = 1.0
 EDGE = 5.0  # of those are left out at either end
 HALF_SPAN_S = 0.1  # of the differences that make a reference's velocity
 SIGNIFICANT = 4.0  # standard errors of a correlation of nothing
+IMU_ERROR_RAD = 0.25  # of its word on the reference's heading
+LEAST_ALIKE = 0.5  # correlation of flow and reference from which the flow says the reference's heading
+ALIKE_S, ALIKE_LAGS_S = 0.5, (-0.2, 0.6, 0.02)
 WIDEST_DELAY_S = 0.3  # an interval wider than this says nothing
 
 
@@ -41,10 +45,14 @@ class Tie(NamedTuple):
     independent: float
 
     @property
+    def alike(self) -> bool:
+        """Whether the two saw the same motion, beyond chance: their angle is known."""
+        return bool(self.likeness >= SIGNIFICANT / np.sqrt(self.independent))
+
+    @property
     def holds(self) -> bool:
-        """Whether the two saw the same motion, beyond chance, and the delay is known."""
-        known = self.delay_s.high - self.delay_s.low <= WIDEST_DELAY_S
-        return known and self.likeness >= SIGNIFICANT / np.sqrt(self.independent)
+        """Whether they did and the delay is known."""
+        return self.alike and self.delay_s.high - self.delay_s.low <= WIDEST_DELAY_S
 
 
 @dataclass(frozen=True)
@@ -98,17 +106,85 @@ def motion(flown: Flight) -> Motion:
     grid = np.arange(t_s[0] - 2.0, t_s[-1] + 2.0, GRID_S)
     reference = reference_velocity(flown, grid)
     if flown.imu is None:
-        return Motion(grid, reference, 0.0, flown.reference == "gps", 0.0, None, None, None)
+        yaw, yaw_known = _yaw(flown, grid, reference, None)
+        return Motion(grid, _turned(reference, -yaw), yaw, yaw_known, 0.0, None, None, None)
     inertial = _inertial_velocity(flown, grid)
     fast = inertial - smoothed(inertial)
+    if flown.reference == "imu":
+        return with_flow(Motion(grid, fast, 0.0, True, 0.0, None, None, fast), flown, flown.velocity_m_s)
     tie = _tie(grid, fast, grid, (reference - smoothed(reference))[:, :2])
-    yaw = tie.turn_rad if tie.holds and flown.reference == "truth" else 0.0
+    yaw, yaw_known = _yaw(flown, grid, reference, tie)
     delay = tie.delay_s.value if tie.holds else 0.0
     earth = _turned(on_grid(grid, reference, grid + delay), -yaw)
     if flown.reference == "gps" and tie.holds:
         earth = smoothed(earth) + fast  # positions of a GPS receiver say nothing within a second
-    moved = Motion(grid, earth, yaw, tie.holds or flown.reference == "gps", delay, tie, None, fast)
+    moved = Motion(grid, earth, yaw, yaw_known, delay, tie, None, fast)
     return with_flow(moved, flown, flown.velocity_m_s)
+
+
+def _yaw(flown: Flight, grid: Array, reference: Array, tie: Tie | None) -> tuple[float, bool]:
+    """From the vehicle's north to the reference's [rad], and whether a sensor that is turned would show.
+
+    GPS has the attitude's north. Of any other reference the IMU says it, where it saw the same motion; where it did
+    not, or says more than IMU_ERROR_RAD else than the flow does (an accelerometer that lies), the flow says it: as it
+    is, or by whole quarter turns from the IMU's word.
+    """
+    if flown.reference == "gps":
+        return 0.0, True
+    alike = flow_likeness(flown, grid, reference)
+    if tie is None or not tie.alike:
+        return (alike.turn_rad, False) if alike.likeness >= LEAST_ALIKE else (0.0, False)
+    apart = (alike.turn_rad - tie.turn_rad + np.pi) % (2.0 * np.pi) - np.pi
+    quarters = 0.5 * np.pi * np.round(apart / (0.5 * np.pi))
+    if alike.likeness < LEAST_ALIKE or abs(apart - quarters) <= IMU_ERROR_RAD:
+        return tie.turn_rad, True
+    return float(alike.turn_rad - quarters), True
+
+
+class Likeness(NamedTuple):
+    """Flow against reference, both smoothed: the angle from one to the other, their correlation, the reference's lag.
+
+    mirrored: the correlation were the sensor's y the other way round.
+    """
+
+    turn_rad: float
+    likeness: float
+    lag_s: float
+    mirrored: float
+
+
+def flow_likeness(flown: Flight, grid: Array, reference: Array, velocity: Array | None = None) -> Likeness:
+    """How the flow's earth velocity and the reference's (n, 3) on the grid go together, at the best shift.
+
+    velocity (m, 2): the flow's with its axes put right, to use instead of the log's.
+    """
+    t_s = flown.t_s[flown.good]
+    seen = t_s - flown.age_s
+    level, flow = flown.rotation(seen)[:, :2, :2], (flown.velocity_m_s if velocity is None else velocity)[flown.good]
+    found = []
+    for mirror in (1.0, -1.0):
+        earth = np.einsum("nij,nj->ni", level, flow * np.array([1.0, mirror]))
+        mean = mean_over(t_s, earth, t_s - ALIKE_S / 2, t_s + ALIKE_S / 2)
+        signal = mean[:, 0] + 1j * mean[:, 1]
+        for lag in np.arange(*ALIKE_LAGS_S):
+            other = on_grid(grid, reference[:, :2], seen + lag) @ np.array([1.0, 1j])
+            size = float(np.sqrt(np.sum(np.abs(other) ** 2) * np.sum(np.abs(signal) ** 2)))
+            found.append((mirror, complex(np.sum(np.conj(signal) * other)) / max(size, 1e-12), float(lag)))
+    straight = max((one for one in found if one[0] > 0.0), key=lambda one: abs(one[1]))
+    mirrored = max(abs(one[1]) for one in found if one[0] < 0.0)
+    return Likeness(float(np.angle(straight[1])), abs(straight[1]), straight[2], mirrored)
+
+
+def velocity_response(flown: Flight, moved: Motion, age_s: float) -> Array:
+    """(2, 2) regression of flow on the reference's body velocity: enough for signs and axes.
+
+    age_s: how old a flow reading is when it arrives; what the log says where the heading is not known.
+    """
+    if not moved.yaw_known:
+        age_s = flown.age_s
+    body = moved.in_body(flown, flown.t_s[flown.good] - age_s)[:, :2]
+    design = np.column_stack([body, np.ones(len(body))])
+    return np.asarray(np.linalg.lstsq(design, flown.velocity_m_s[flown.good], rcond=None)[0][:2].T)
 
 
 def with_flow(moved: Motion, flown: Flight, velocity: Array) -> Motion:

@@ -20,6 +20,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from pydantic import ConfigDict
 
 from flownav.errors import InputError
+from flownav.files import natural_order
 from flownav.identification.experiment import Experiment, experiment
 from flownav.logs.csv_table import Column, CsvTable, read_csv_table
 from flownav.measurement import Array
@@ -84,7 +85,7 @@ def read_runs(path: Path, height_m: float | None = None, reference: str = "auto"
 
 
 def _run_folders(path: Path) -> list[Path]:
-    return sorted(file.parent for file in path.glob("*/rig.csv")) if path.is_dir() else []
+    return sorted((f.parent for f in path.glob("*/rig.csv")), key=natural_order) if path.is_dir() else []
 
 
 def _nearest(folder: Path, above: Path) -> Path:

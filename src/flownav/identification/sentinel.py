@@ -10,6 +10,14 @@ from flownav.measurement import Array
 
 CLEAR = 2.0  # the best assignment must explain this much more than the next
 
+# how a sensor's axes may lie, as sensor = axes @ vehicle
+ALL_AXES = tuple(
+    np.array([[x, 0.0], [0.0, y]]) if straight else np.array([[0.0, x], [y, 0.0]])
+    for straight in (True, False)
+    for x in (1.0, -1.0)
+    for y in (1.0, -1.0)
+)
+
 
 class Axes(NamedTuple):
     """The verdict. assignment (2, 2) of -1, 0, 1: sensor = assignment @ vehicle, as near as can be."""
@@ -37,22 +45,17 @@ def judge(response: Array, yaw_known: bool = True) -> Axes:
         mirrored = bool(np.linalg.det(unit) < 0.0)
         verdict = "mirrored: the axes are swapped, or the sign of one is inverted" if mirrored else "not mirrored"
         return Axes(np.diag([1.0, -1.0 if mirrored else 1.0]), f"{verdict} (heading unknown)", True, 0.0)
-    candidates = [
-        np.array([[sx, 0.0], [0.0, sy]]) if straight else np.array([[0.0, sx], [sy, 0.0]])
-        for straight in (True, False)
-        for sx in (1.0, -1.0)
-        for sy in (1.0, -1.0)
-    ]
-    scores = [float(np.sum(candidate * unit)) for candidate in candidates]
+    scores = [float(np.sum(candidate * unit)) for candidate in ALL_AXES]
     order = np.argsort(scores)[::-1]
-    best = candidates[order[0]]
+    best = ALL_AXES[order[0]]
     clear = scores[order[0]] > CLEAR * max(scores[order[1]], 0.0) or scores[order[0]] - scores[order[1]] > 0.5
     rest = best.T @ unit
     turned = float(np.degrees(np.arctan2(rest[1, 0] - rest[0, 1], rest[0, 0] + rest[1, 1])))
-    return Axes(best, _sentence(best) if clear else f"unclear; nearest: {_sentence(best)}", clear, turned)
+    return Axes(best, sentence(best) if clear else f"unclear; nearest: {sentence(best)}", clear, turned)
 
 
-def _sentence(assignment: Array) -> str:
+def sentence(assignment: Array) -> str:
+    """What is wrong with axes that lie so, in words."""
     swapped = assignment[0, 0] == 0.0
     inverted = [axis for axis, row in zip("xy", assignment, strict=True) if row.sum() < 0.0]
     parts = ["axes are swapped"] if swapped else []

@@ -8,6 +8,8 @@ import numpy as np
 
 from flownav.errors import InputError
 from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.identification.first_look import Look, first_look
+from flownav.inspection.told import told_of
 from flownav.logs.log import Log
 from flownav.logs.plausible import check_plausible
 from flownav.logs.rates import attitude_at
@@ -15,6 +17,7 @@ from flownav.measurement import Array, Sensor, Stream
 from flownav.record import VELOCITY_BODY
 from flownav.replay.autopilot import autopilot_scores
 from flownav.replay.prepare import ReplayOptions, prepare
+from flownav.replay.readiness import obstacles
 from flownav.replay.sentinel import Finding, findings
 
 CLOCK_REASONS = {
@@ -31,7 +34,9 @@ LIMITED = {"range_m": Sensor.RANGE, "flow_rad_s": Sensor.FLOW_RATE}
 def summarise(log: Log) -> dict[str, Any]:
     """What `flownav info --json` prints; None where a figure does not exist. Nothing here raises for a poor log."""
     start, end = log.span_s
+    look, why_not = _look(log)
     checked, found = _findings(log)
+    found += told_of(log, look, found)
     return {
         "log": log.path.name,
         "start_s": start,
@@ -39,9 +44,13 @@ def summarise(log: Log) -> dict[str, Any]:
         "streams": [_stream(stream) for stream in log.streams.values()],
         "clock": [line for stream in log.streams.values() for line in _clock_trouble(stream)],
         "limits": {name: _limit(log, name) for name in log.limits},
+        "verdict": why_not if look is None else look.verdict,
+        "agreement": None if look is None else look._asdict(),
         "checked": checked,
         "warnings": [finding.text for finding in found],
         "flow_is_wrong": any(finding.flow_is_wrong for finding in found),
+        "replayable": not obstacles(log),
+        "obstacles": obstacles(log),
         "absences": [absence._asdict() for absence in log.absences],
         "origin_lat_lon_deg_alt_m": None if log.origin_deg_m is None else list(log.origin_deg_m),
         "truth": None if log.truth is None else _track(log.truth["t_s"]),
@@ -49,6 +58,14 @@ def summarise(log: Log) -> dict[str, Any]:
         "notes": list(log.notes),
         "inputs": {name: {"sha256": digest} for name, digest in log.inputs.items()},
     }
+
+
+def _look(log: Log) -> tuple[Look | None, str]:
+    """Flow against the best reference; None with the reason where the log lacks what that takes."""
+    try:
+        return first_look(log), ""
+    except InputError as error:
+        return None, f"flow is not compared with a reference: {str(error).removeprefix(f'{log.path}: ')}"
 
 
 def _stream(stream: Stream) -> dict[str, Any]:
@@ -109,7 +126,7 @@ def _limit(log: Log, name: str) -> dict[str, Any]:
 def _findings(log: Log) -> tuple[str, list[Finding]]:
     """What was compared with what, and what came of it."""
     if Sensor.ATTITUDE not in log.streams:
-        return "nothing: the log has no attitude to compare the other sensors with", []
+        return "no two sensors: the log has no attitude to compare the others with", []
     found = []
     try:
         check_plausible(log.path, log.streams)
@@ -126,7 +143,7 @@ def _findings(log: Log) -> tuple[str, list[Finding]]:
         return f"{compared}; flow with GPS velocity", found + findings(streams, ())
     witness = _witness(log)
     if witness is None:
-        return f"{compared}; the flow's signs and axes are not told without a velocity to compare with", found
+        return compared, found
     said = findings({**streams, Sensor.GPS_VELOCITY: witness}, ())
     found += [finding._replace(text=finding.text.replace("GPS", "the reference")) for finding in said]
     return f"{compared}; flow with the reference's velocity", found

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from flownav.errors import InputError
-from flownav.logs.log import FedSegment, Log
+from flownav.logs.log import SIMULATOR, FedSegment, Log
 from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, Stream
 from flownav.provenance import hash_of
 from flownav.record import FED, FED_FIRST, Record
@@ -52,6 +52,7 @@ def read_live_record(path: Path, *, flow_instance: int | None = None) -> Log:
         (f"{KINDS[kind]} of {len(parts)} navigator{'s' * (len(parts) != 1)}: fed again as it was fed",),
         fed=parts,
         fed_settings=parameters,
+        truth_name=SIMULATOR,
     )
 
 

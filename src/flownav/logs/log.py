@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 from flownav.measurement import EventQueue, Sensor, Stream
 from flownav.record import Table
 
+TRUTH_FILE, SIMULATOR, VISUAL_ODOMETRY = "truth.csv", "the simulator", "visual odometry"
+
 
 class Absence(NamedTuple):
     """Something that a log lacks, and what the filter does instead: one line each."""
@@ -33,6 +35,7 @@ class Log:
     where the log does not say.
     origin_deg_m: latitude, longitude [deg] and altitude [m] of the local frame's origin; None without GPS.
     truth: an external reference, columns as record.TABLES["truth"]; its frame may be turned in yaw.
+    truth_name: where the reference comes from; of visual odometry it is an estimate itself, and no truth.
     heading_truth: the vehicle's heading in the truth's frame, columns t_s and yaw_rad, where it came apart from it.
     inputs: SHA-256 of each file read, by name. notes: what a reader would tell the user, one line each.
     autopilot: what the vehicle's own estimator said, columns as record.TABLES["autopilot"], and its name.
@@ -56,6 +59,7 @@ class Log:
     fed: tuple[FedSegment, ...] = ()
     fed_settings: dict[str, Any] = field(default_factory=dict)
     heading_truth: Table | None = None
+    truth_name: str = TRUTH_FILE
 
     @property
     def span_s(self) -> tuple[float, float]:

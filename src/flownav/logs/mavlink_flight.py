@@ -164,8 +164,11 @@ class Flight:
         if known.get("SENS_FLOW_MAXHGT", 0.0) > known.get("SENS_FLOW_MINHGT", 0.0) >= 0.0:
             self.limits["flow_height_m"] = (known.get("SENS_FLOW_MINHGT", 0.0), known["SENS_FLOW_MAXHGT"])
 
-    def autopilot(self, attitude: Stream) -> Table | None:
-        """The autopilot's own estimate: its local position, else its global one about the origin."""
+    def autopilot(self, attitude: Stream | None) -> Table | None:
+        """The autopilot's own estimate: its local position, else its global one about the origin.
+
+        Body velocity and attitude only where the log has an attitude.
+        """
         found = self.states["LOCAL_POSITION_NED"] or (self.states["GLOBAL_POSITION_INT"] if self.origin_deg_m else [])
         if not found:
             return None
@@ -173,7 +176,7 @@ class Flight:
         local = isinstance(states[0], LocalState)
         position = np.array([state.pos_ned_m for state in states]) if local else self._local(states)
         velocity = np.array([state.vel_ned_m_s for state in states])
-        return in_order(state_table(t_s, position, velocity, attitude_at(attitude, t_s)))
+        return in_order(state_table(t_s, position, velocity, None if attitude is None else attitude_at(attitude, t_s)))
 
     def truth(self) -> Table | None:
         """The simulator's truth about the log's origin (about its own first position without one)."""

@@ -8,12 +8,13 @@ from pathlib import Path
 
 from flownav.errors import InputError
 from flownav.logs.absences import absences_of
-from flownav.logs.log import Log
+from flownav.logs.log import SIMULATOR, Log
 from flownav.logs.mavlink_flight import STATES, Decoder, Flight, find_vehicle
 from flownav.mavlink.framing import Frame, tlog_frames
 from flownav.measurement import Sensor, Stream
 
 LACKING = {
+    "attitude": "no attitude (ATTITUDE_QUATERNION, ATTITUDE)",
     "imu": "no IMU (HIGHRES_IMU, SCALED_IMU; RAW_IMU of ArduPilot)",
     "range": "no range downwards (DISTANCE_SENSOR, RANGEFINDER)",
     "gps_position": "no GPS fix (GPS_RAW_INT)",
@@ -28,8 +29,8 @@ def read_tlog(path: Path, *, flow_instance: int | None = None) -> Log:
     The log's clock is the autopilot's time since boot [s]. flow_instance: the `sensor_id` of the flow sensor to
     take; without, the one with the most readings. Damaged bytes are skipped and counted in the notes, readings that
     cannot be are counted in `Stream.rejected`; signatures are not verified.
-    InputError, one line, where the file cannot be read, holds no MAVLink frame, no attitude, neither GPS nor flow,
-    or no flow sensor of that instance, and where pymavlink is not installed.
+    InputError, one line, where the file cannot be read, holds no MAVLink frame, no reading of any sensor, or no flow
+    sensor of that instance, and where pymavlink is not installed.
     """
     content = _content(path)
     damage: Counter[str] = Counter()
@@ -52,11 +53,12 @@ def read_tlog(path: Path, *, flow_instance: int | None = None) -> Log:
         truth,
         {path.name: hashlib.sha256(content).hexdigest()},
         (*choice, *_damage_notes(damage, frames), *_flight_notes(flight), *chosen),
-        flight.autopilot(streams[Sensor.ATTITUDE]),
+        flight.autopilot(streams.get(Sensor.ATTITUDE)),
         vehicle.name,
         flight.limits,
         tuple(absences_of(streams, **LACKING)),
         clock_start_s=0.0,
+        truth_name=SIMULATOR,
     )
 
 
@@ -100,9 +102,8 @@ def _flight_notes(flight: Flight) -> list[str]:
 
 
 def _check_needed(path: Path, streams: dict[Sensor, Stream]) -> None:
-    if Sensor.ATTITUDE not in streams:
-        raise InputError(f"{path}: no ATTITUDE or ATTITUDE_QUATERNION; have the autopilot send one at 20 Hz or more")
-    if not {Sensor.GPS_POSITION, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY} & set(streams):
+    if not streams:
         raise InputError(
-            f"{path}: neither a GPS fix (GPS_RAW_INT) nor flow (OPTICAL_FLOW, OPTICAL_FLOW_RAD); have one of them sent"
+            f"{path}: no usable reading of any sensor; have the autopilot send ATTITUDE or HIGHRES_IMU at 20 Hz or "
+            "more, and GPS_RAW_INT or OPTICAL_FLOW_RAD"
         )

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from flownav.errors import InputError
 from flownav.logs.absences import absences_of
-from flownav.logs.log import Absence, Log
+from flownav.logs.log import SIMULATOR, VISUAL_ODOMETRY, Absence, Log
 from flownav.logs.ulog_flow import FLOW_TOPICS, flow_stream, flow_topic, range_stream, reading_limits
 from flownav.logs.ulog_references import autopilot_estimate, pose_stream, truth_of
 from flownav.logs.ulog_sensors import (
@@ -123,6 +123,7 @@ def read_ulog(path: Path, *, flow_instance: int | None = None) -> Log:
         reading_limits(topics, flow),
         tuple(absences),
         clock_start_s=topics.start_s,
+        truth_name=VISUAL_ODOMETRY if truth_note else SIMULATOR,
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.errors import InputError
+from flownav.files import natural_order
 
 PICTURES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}
 VIDEOS = {".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v"}
@@ -18,12 +19,12 @@ LARGEST_FRAMES_BYTES = 4_000_000_000
 
 
 def read_frames(paths: Sequence[Path]) -> NDArray[np.uint8]:
-    """Frames (n, height, width) of one folder of pictures (by name), of pictures in order, or of one video.
+    """Frames (n, height, width) of a folder of pictures (by name, 2 before 10), of pictures in order, or of one video.
 
     InputError where there are none, where one cannot be read, or where they differ in size.
     """
     if len(paths) == 1 and paths[0].is_dir():
-        found = sorted(f for f in paths[0].iterdir() if f.suffix.lower() in PICTURES)
+        found = sorted((f for f in paths[0].iterdir() if f.suffix.lower() in PICTURES), key=natural_order)
         if not found:
             raise InputError(f"{paths[0]}: no pictures in it ({', '.join(sorted(PICTURES))})")
         return _stacked(found)

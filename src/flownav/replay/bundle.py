@@ -71,6 +71,7 @@ def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dic
         "kind": "replay",
         "log": log.path.name,
         **({} if log.clock_start_s is None else {"clock_start_s": log.clock_start_s}),
+        **({} if log.truth is None else {"truth_name": log.truth_name}),
         "filter": "landing",
         "duration_s": scores["duration_s"],
         "delays_s": {sensor.name.lower(): delay for sensor, delay in replay.prepared.delays_s.items() if delay},

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
-from flownav.measurement import Array, Sensor
+from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.flags import flagged, flags_of
 from flownav.navigation.tables import Written, estimate_table
 from flownav.navigation.tape import LEVELS_AT
@@ -18,6 +21,7 @@ from flownav.scoring.coverage import coverage_of
 from flownav.scoring.drift import Motion, drift_of, end_drift
 from flownav.scoring.protection import protection_of
 
+NO_REJECTION = (Reason.FUSED, Reason.DATUM)
 TESTED = (Reason.FUSED, Reason.INNOVATION_GATE)
 
 
@@ -31,6 +35,39 @@ def consistency_scores(innovation: Array) -> dict[str, dict[str, Any]]:
         if judged is not None:
             found[sensor.name.lower()] = judged._asdict()
     return found
+
+
+def reading_scores(innovation: Array, streams: Mapping[Sensor, Stream]) -> dict[str, dict[str, Any]]:
+    """By sensor, what became of whole readings, where `rejected` counts components; innovation (m, tape.OFFERS).
+
+    offered to the filter; fused: with every component, or with some of them (in_part); rejected: readings that lost
+    one component or more, by reason, with the rows that the reader threw away.
+    """
+    found = {}
+    for sensor, stream in streams.items():
+        offers = innovation[innovation[:, 1] == sensor]
+        reading, reason = _readings(offers), offers[:, 8].astype(int)
+        count = int(reading[-1]) + 1 if len(reading) else 0
+        components = np.bincount(reading, minlength=count)
+        fused = np.bincount(reading, weights=reason == Reason.FUSED, minlength=count)
+        lost = {r.label: len(np.unique(reading[reason == r])) for r in Reason if r not in NO_REJECTION}
+        rejected = dict(Counter(stream.rejected) + Counter(lost))
+        if count or rejected:
+            found[sensor.name.lower()] = {
+                "offered": count,
+                "fused": int(np.count_nonzero((fused == components) & (fused > 0))),
+                "in_part": int(np.count_nonzero((fused < components) & (fused > 0))),
+                "rejected": rejected,
+            }
+    return found
+
+
+def _readings(offers: Array) -> NDArray[np.int_]:
+    """The number of the reading that each component of one sensor belongs to: components of one count up."""
+    if not len(offers):
+        return np.zeros(0, int)
+    begins = (np.diff(offers[:, 0]) != 0.0) | (np.diff(offers[:, 2]) <= 0.0)
+    return np.concatenate([[0], np.cumsum(begins)]).astype(int)
 
 
 def coverage_scores(log: Log) -> dict[str, dict[str, float]]:

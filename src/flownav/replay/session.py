@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -24,11 +25,13 @@ from flownav.navigation.tape import new_tape
 from flownav.replay.autopilot import autopilot_scores
 from flownav.replay.fed import prepared_as_fed, run_as_fed
 from flownav.replay.judged import (
+    NO_REJECTION,
     consistency_scores,
     coverage_scores,
     end_drift_of,
     motion_of,
     protection_scores,
+    reading_scores,
 )
 from flownav.replay.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replay.sentinel import Finding, findings
@@ -36,7 +39,6 @@ from flownav.scoring.alignment import Alignment, align, velocity_of
 from flownav.scoring.coverage import silences
 from flownav.scoring.outage import OutageError, difference_at, horizontal_rms, outage_error
 
-NO_REJECTION = (Reason.FUSED, Reason.DATUM)
 HORIZONTAL = (*GPS, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 LONGEST_TABLE = 2000
 LEAST_WINDOW_S = 1e-6
@@ -112,17 +114,17 @@ class Replay:
         return _number(horizontal_rms(self.estimate[:, 0], self.estimate[:, 17:19], t_s, gps.value[known, :2]))
 
     def rejected(self) -> dict[str, dict[str, int]]:
-        """What was not fused, by sensor and reason: rows by the reader, components by the filter."""
-        counts = {s.name.lower(): dict(stream.rejected) for s, stream in self.log.streams.items() if stream.rejected}
+        """What was not fused, by sensor and reason: rows by the reader, components by the filter, added up."""
+        counts = {}
         sensors, reasons = self.innovation[:, 1].astype(int), self.innovation[:, 8].astype(int)
-        for sensor in self.log.streams:
+        for sensor, stream in self.log.streams.items():
             numbers = np.bincount(reasons[sensors == sensor], minlength=len(Reason))
             found = {r.label: int(numbers[r]) for r in Reason if numbers[r] and r not in NO_REJECTION}
-            if found:
-                counts.setdefault(sensor.name.lower(), {}).update(found)
+            if found or stream.rejected:
+                counts[sensor.name.lower()] = dict(Counter(stream.rejected) + Counter(found))
         return counts
 
-    def truth_scores(self) -> dict[str, float] | None:
+    def truth_scores(self) -> dict[str, Any] | None:
         """Errors against the log's truth, turned and shifted onto the estimate; None without one."""
         placed = self.truth_alignment
         if placed is None or self.log.truth is None:
@@ -132,7 +134,8 @@ class Replay:
         velocity = placed.turned(velocity_of(t_s, position))
         squares = np.sum(error[:, :2] ** 2, axis=1)
         return {
-            "yaw_rad": placed.yaw_rad,
+            "reference": self.log.truth_name,
+            "yaw_rad": placed.yaw_rad if placed.yaw_shown else None,
             "horizontal_rms_m": float(np.sqrt(squares.mean())),
             "horizontal_max_m": float(np.sqrt(squares.max())),
             "vertical_rms_m": float(np.sqrt(np.mean(error[:, 2] ** 2))),
@@ -154,6 +157,7 @@ class Replay:
             "consistency": consistency_scores(self.innovation),
             "coverage": coverage_scores(self.log),
             "rejected": self.rejected(),
+            "readings": reading_scores(self.innovation, self.log.streams),
             "warnings": [finding.text for finding in self.findings],
         }
         beside = {

@@ -15,9 +15,9 @@ import numpy as np
 
 from flownav.measurement import Sensor
 from flownav.record import Record
-from flownav.report.figures_filter import SENSOR_TITLES
 from flownav.report.series import (
     event_rows,
+    flow_readings,
     flow_velocity,
     has,
     mapping,
@@ -26,8 +26,8 @@ from flownav.report.series import (
     rms_m,
     scored_outages,
     start_end_s,
+    truth_name,
 )
-from flownav.scoring.consistency import verdict
 
 EVENTS_LISTED = 300
 NONE, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
@@ -120,14 +120,14 @@ def summary(record: Record) -> str:
     if truth:
         rms, largest = number(truth.get("horizontal_rms_m"), 2), number(truth.get("horizontal_max_m"), 2)
         said.append(
-            f"Against the recorded truth its position is off by {rms} m rms, {largest} m at most, horizontally."
+            f"Against {_reference(record)} its position is off by {rms} m rms, {largest} m at most, horizontally."
         )
     if scores.get("end_drift_m") is not None:
         said.append(f"Laid on each other at take-off, the two end {metres(scores['end_drift_m'])} m apart.")
     own = mapping(scores.get("autopilot"))
     if own.get("against"):
         rms, largest = number(own.get("horizontal_rms_m"), 2), number(own.get("horizontal_max_m"), 2)
-        against = "the recorded truth" if own["against"] == "truth" else "GPS, their mean difference taken out"
+        against = _reference(record) if own["against"] == "truth" else "GPS, their mean difference taken out"
         said.append(
             f"The autopilot's own estimate ({own.get('name')}) is off by {rms} m rms, "
             f"{largest} m at most, horizontally, against {against}."
@@ -137,13 +137,19 @@ def summary(record: Record) -> str:
     return UNIT_AFTER_NUMBER.sub("\\1\N{NO-BREAK SPACE}\\2", " ".join(said))
 
 
+def _reference(record: Record) -> str:
+    """What errors are taken against, in words: a truth, or an estimate that serves for want of one."""
+    name = truth_name(record)
+    return "the recorded truth" if name == "truth" else f"the recorded {name}, an estimate itself,"
+
+
 def tiles(record: Record) -> list[Tile]:
     """The headline figures that the record's scores and streams give."""
     scores, paper = mapping(record.manifest.get("scores")), mapping(record.manifest.get("paper"))
     found = []
     if scores.get("max_position_error_m") is not None:
         published = paper.get("max_position_error_m")
-        against = "what was flown on" if has(record, "flown") else "estimate against truth"
+        against = "what was flown on" if has(record, "flown") else f"estimate against {truth_name(record)}"
         note = f"paper {metres(published)} m" if published is not None else against
         found.append(Tile("Largest error of one axis", metres(scores["max_position_error_m"]), "m", note))
     touchdown = mapping(scores.get("touchdown"))
@@ -159,12 +165,11 @@ def tiles(record: Record) -> list[Tile]:
         found.append(Tile(name, number(worst.get("horizontal_rms_m"), 2), "m", when))
     truth = mapping(scores.get("truth"))
     if truth:
-        largest = f"at most {number(truth.get('horizontal_max_m'), 2)} m"
+        largest = f"at most {number(truth.get('horizontal_max_m'), 2)} m, against {truth_name(record)}"
         found.append(Tile("Horizontal error", number(truth.get("horizontal_rms_m"), 2), "m", f"rms, {largest}"))
     if scores.get("end_drift_m") is not None:
-        found.append(
-            Tile("Drift at the end", metres(scores["end_drift_m"]), "m", "horizontal, truth laid on at take-off")
-        )
+        laid = f"horizontal, {truth_name(record)} laid on at take-off"
+        found.append(Tile("Drift at the end", metres(scores["end_drift_m"]), "m", laid))
     if scores.get("velocity_rms_m_s") is not None:
         found.append(Tile("Velocity error", number(scores["velocity_rms_m_s"], 2), "m/s", "rms, against GPS"))
     share = flow_share(record)
@@ -177,7 +182,7 @@ def tiles(record: Record) -> list[Tile]:
 
 def flow_share(record: Record) -> float | None:
     """Share of the flight with valid flow readings, a gap not counted; None without readings."""
-    flow = flow_velocity(record)
+    flow = flow_readings(record)
     start, end = start_end_s(record)
     if flow is None or len(flow.t_s) < 2 or end <= start:
         return None
@@ -188,13 +193,19 @@ def flow_share(record: Record) -> float | None:
 def lacking(record: Record) -> list[str]:
     """What the record does not hold, in words, and what the report can therefore not show."""
     notes = []
+    gps = readings(record, Sensor.GPS_POSITION) is not None
     if not has(record, "truth"):
-        notes.append("No truth: errors are shown against GPS, which has errors of its own.")
+        errors = "errors are shown against GPS, which has errors of its own" if gps else "no error can be shown"
+        notes.append(f"No truth: {errors}.")
+    elif truth_name(record) != "truth":
+        notes.append(f"No truth: errors are shown against the {truth_name(record)}, which has errors of its own.")
     if not has(record, "estimate"):
         notes.append("No estimate: nothing was fused.")
-    if flow_velocity(record) is None:
+    if flow_readings(record) is None:
         notes.append("No valid optical flow: position and velocity rest on the other sensors.")
-    if readings(record, Sensor.GPS_POSITION) is None:
+    elif flow_velocity(record) is None:
+        notes.append("No range at the time of the flow: its readings are fused, but no velocity of theirs is drawn.")
+    if not gps:
         notes.append("No GPS positions.")
     if record.manifest.get("kind") != "fly" and not has(record, "autopilot"):
         notes.append("No estimate of an autopilot's own to compare with.")
@@ -240,30 +251,6 @@ def outage_rows(record: Record) -> list[tuple[str, str, str, str]]:
     for name, key in (("median", "outage_median_rms_m"), ("worst", "outage_worst_rms_m")):
         if scores.get(key) is not None:
             rows.append((name, number(scores[key], 2), "", ""))
-    return rows
-
-
-def rejected_rows(record: Record) -> list[tuple[str, str, str]]:
-    """Rejected readings as (sensor, reason, count), most first."""
-    counts = mapping(mapping(record.manifest.get("scores")).get("rejected"))
-    rows = [(sensor, reason, count) for sensor, reasons in counts.items() for reason, count in mapping(reasons).items()]
-    rows.sort(key=lambda row: -float(row[2]))
-    return [(SENSOR_TITLES.get(s, s.replace("_", " ")), r.replace("_", " "), f"{c:,}") for s, r, c in rows]
-
-
-def sensor_rows(record: Record) -> list[tuple[str, str, str, str, str]]:
-    """Sensors as (name, from and to in seconds, innovations tested, their mean square per component, verdict)."""
-    scores = mapping(record.manifest.get("scores"))
-    spans, judged = mapping(scores.get("coverage")), mapping(scores.get("consistency"))
-    rows = []
-    for name in dict.fromkeys([*spans, *judged]):
-        span, found = mapping(spans.get(name)), mapping(judged.get(name))
-        heard = f"{number(span.get('t0'), 1)} to {number(span.get('t1'), 1)}" if span else NONE
-        mean, tested, said = NONE, NONE, ""
-        if found:
-            mean, tested = number(found.get("nis_per_dof"), 2), f"{found.get('samples') or 0:,}"
-            said = verdict(float(found.get("nis_per_dof") or 0.0), white=bool(found.get("white")))
-        rows.append((SENSOR_TITLES.get(name, name.replace("_", " ")), heard, tested, mean, said))
     return rows
 
 

@@ -17,6 +17,7 @@ from flownav.report.series import (
     Window,
     difference,
     estimates,
+    flow_readings,
     flow_velocity,
     gps_velocity_body,
     has,
@@ -25,6 +26,7 @@ from flownav.report.series import (
     readings,
     start_end_s,
     track,
+    truth_name,
     worst_outage,
 )
 
@@ -80,7 +82,8 @@ def velocity(record: Record, view: View = VELOCITY) -> Panel:
         dots.insert(0, Source("gps", "GPS velocity", gps_velocity_body(record)))
     note = "Body axes: forward, right, down."
     if flow is None:
-        note += " The record holds no valid flow readings."
+        fused = flow_readings(record) is not None
+        note += f" The record holds no {'range for its' if fused else 'valid'} flow readings."
     elif np.isnan(flow.value[:, 2]).all():
         note += " The flow sensor does not measure w."
     return _states(record, VELOCITY_TITLES, dots, lines, view, note)
@@ -167,7 +170,7 @@ def _error(record: Record, columns: tuple[str, ...], titles: tuple[str, ...], ke
         reach = _reach(values, band)
         stack.within(row, reach)
         beyond = beyond or bool(np.abs(values).max(initial=0.0) > reach)
-        stack.line(row, "estimate", "estimate \N{MINUS SIGN} truth", error.t_s, values)
+        stack.line(row, "estimate", f"estimate \N{MINUS SIGN} {truth_name(record)}", error.t_s, values)
     figure = stack.figure(start_end_s(record), moments(record))
     caption = (
         "A consistent filter stays inside its band about 99.7 % of the time."
@@ -198,7 +201,7 @@ def flown_errors(record: Record) -> list[Panel]:
             return []
         stack, error = Stack(titles), difference(flown, truth)
         for row, values in enumerate(error.value.T, 1):
-            stack.line(row, "flown", "flown on \N{MINUS SIGN} truth", error.t_s, values)
+            stack.line(row, "flown", f"flown on \N{MINUS SIGN} {truth_name(record)}", error.t_s, values)
         figure, title = stack.figure(start_end_s(record), moments(record)), f"What was flown on: {what} error"
         caption = "Until the hand-over the vehicle stands, or is flown on the truth: no error, by definition."
         panels.append(Panel(f"flown-{what}-error", title, caption, f"{title} over time: {', '.join(titles)}.", figure))
@@ -215,7 +218,7 @@ def lift_off_transient(record: Record, lift_off: Moment) -> Panel:
     thrust = track(record, "truth", ("thrust_n",))
     stack = Stack(("w error (m/s)", "thrust (N)") if thrust else ("w error (m/s)",), row_height_px=190)
     error = difference(estimate, truth).within(window)
-    stack.line(1, "estimate", "estimate \N{MINUS SIGN} truth", error.t_s, error.value[:, 2])
+    stack.line(1, "estimate", f"estimate \N{MINUS SIGN} {truth_name(record)}", error.t_s, error.value[:, 2])
     if thrust:
         shown = thrust.within(window)
         stack.line(2, "truth", "rotor thrust", shown.t_s, shown.value[:, 0])

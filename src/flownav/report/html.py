@@ -12,7 +12,15 @@ from typing import Any
 
 from flownav.files import written_whole
 from flownav.record import Record
-from flownav.report import content, figures_filter, figures_path, figures_protection, figures_states, figures_vehicle
+from flownav.report import (
+    content,
+    figures_filter,
+    figures_path,
+    figures_protection,
+    figures_states,
+    figures_vehicle,
+    sensor_rows,
+)
 from flownav.report.panels import Panel, Section
 from flownav.report.series import DOT_POINTS, LINE_POINTS, has, mapping
 from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
@@ -89,8 +97,8 @@ def render(record: Record) -> str:
         scores=content.score_rows(record),
         flown=has(record, "flown"),
         outages=content.outage_rows(record),
-        sensors=content.sensor_rows(record),
-        rejected=content.rejected_rows(record),
+        sensors=sensor_rows.sensor_rows(record),
+        rejected=sensor_rows.rejected_rows(record),
         sections=shown,
         thinned=_thinned(record),
         line_points=LINE_POINTS,

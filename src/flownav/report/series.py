@@ -20,6 +20,7 @@ CROSS_POINTS = 250  # and the exceptional ones so many crosses
 
 ESTIMATES = (("autopilot", "autopilot"), ("smoothed", "smoothed"), ("flown", "flown on"), ("estimate", "estimate"),
              ("truth", "truth"))  # tables and what they are called  # fmt: skip
+TRUTHS = ("", "truth.csv", "the simulator")  # references that are one; any other is an estimate itself
 LIFT_OFF_KINDS = ("lift-off", "lift_off", "takeoff")
 TOUCHDOWN_KINDS = ("touchdown",)
 
@@ -91,8 +92,15 @@ def track(record: Record, table: str, columns: tuple[str, ...]) -> Track | None:
 
 def estimates(record: Record, columns: tuple[str, ...]) -> list[tuple[str, str, Track]]:
     """Everything that says these states, as (role, name, track), the truth last and so on top."""
-    found = [(role, name, track(record, role, columns)) for role, name in ESTIMATES]
+    names = dict(ESTIMATES) | {"truth": truth_name(record)}
+    found = [(role, name, track(record, role, columns)) for role, name in names.items()]
     return [(role, name, source) for role, name, source in found if source is not None]
+
+
+def truth_name(record: Record) -> str:
+    """What the record's reference is to be called: "truth", or what it is where it is none (visual odometry)."""
+    stated = str(record.manifest.get("truth_name") or "")
+    return "truth" if stated in TRUTHS else stated
 
 
 def readings(record: Record, sensor: Sensor) -> Track | None:
@@ -129,6 +137,12 @@ def difference(source: Track, reference: Track) -> Track:
     error = source.value - at(source.t_s, reference)
     known = ~np.isnan(error).all(axis=1)
     return Track(source.t_s[known], error[known])
+
+
+def flow_readings(record: Record) -> Track | None:
+    """The flow sensor's valid readings, be they velocities or angular rates."""
+    velocity = readings(record, Sensor.FLOW_VELOCITY)
+    return readings(record, Sensor.FLOW_RATE) if velocity is None else velocity
 
 
 def flow_velocity(record: Record) -> Track | None:

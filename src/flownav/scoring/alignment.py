@@ -9,13 +9,19 @@ import numpy as np
 from flownav.measurement import Array
 
 VELOCITY_SPAN_S = 0.1
+LEAST_SPREAD_M = 0.2  # rms about the middle, of both paths: of less, noise and drift make the angle
+LEAST_LIKENESS = 0.5
 
 
 class Alignment(NamedTuple):
-    """What takes the reference into the estimate's frame: first turned by yaw, then shifted."""
+    """What takes the reference into the estimate's frame: first turned by yaw, then shifted.
+
+    yaw_shown: whether the two paths move enough, and alike, to show the yaw; it is the best fit all the same.
+    """
 
     yaw_rad: float
     shift_ned_m: tuple[float, float, float]
+    yaw_shown: bool = True
 
     def turned(self, vectors_ned: Array) -> Array:
         """Vectors (n, 3) in the estimate's axes."""
@@ -39,7 +45,10 @@ def align(estimate_ned_m: Array, reference_ned_m: Array) -> Alignment:
     product = np.sum((theirs[:, 0] - 1j * theirs[:, 1]) * (ours[:, 0] + 1j * ours[:, 1]))
     turn = Alignment(float(np.angle(product)), (0.0, 0.0, 0.0))
     shift = mean_estimate - turn.turned(mean_reference[None, :])[0]
-    return Alignment(turn.yaw_rad, (float(shift[0]), float(shift[1]), float(shift[2])))
+    spread = [float(np.sqrt(np.mean(np.sum(path[:, :2] ** 2, axis=1)))) for path in (ours, theirs)]
+    likeness = abs(product) / max(len(ours) * spread[0] * spread[1], 1e-12)
+    shown = min(spread) >= LEAST_SPREAD_M and likeness >= LEAST_LIKENESS
+    return Alignment(turn.yaw_rad, (float(shift[0]), float(shift[1]), float(shift[2])), shown)
 
 
 def velocity_of(t_s: Array, position_m: Array) -> Array:

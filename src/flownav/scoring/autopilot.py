@@ -32,7 +32,8 @@ def autopilot_errors(estimate: Table, truth: Table | None, gps: Mapping[Sensor, 
         placed = align(reference[covered] + difference_at(t_s, position, reference_t_s, reference), reference[covered])
         error = difference_at(t_s, position, reference_t_s, placed.moved(reference))
         moving = placed.turned(velocity_of(reference_t_s, reference))
-        return _errors("truth", error, _rms(t_s, velocity, reference_t_s, moving), placed.yaw_rad)
+        yaw_rad = placed.yaw_rad if placed.yaw_shown else None
+        return _errors("truth", error, _rms(t_s, velocity, reference_t_s, moving), yaw_rad)
     if Sensor.GPS_POSITION not in gps:
         return _errors(None, np.zeros((0, 3)), np.nan, None)
     fixes = gps[Sensor.GPS_POSITION]

@@ -11,7 +11,7 @@ from flownav.logs.csv_table import CsvTable
 from flownav.logs.dataflash import reference, sensors
 from flownav.logs.dataflash.columns import DataFlash
 from flownav.logs.fixes import Origin
-from flownav.logs.log import Log
+from flownav.logs.log import SIMULATOR, Log
 from flownav.logs.plausible import check_plausible
 from flownav.measurement import Sensor, Stream
 from flownav.record import Table
@@ -57,6 +57,7 @@ def read_dataflash(path: Path, *, flow_instance: int | None = None) -> Log:
         reference.stated_limits(settings, sensors.rangefinder_instance(log)) if "RFND" in tables else {},
         tuple(absences_of(streams, flow_rate="no optical flow (OF)", range="no downward rangefinder (RFND)")),
         clock_start_s=float(start_s),
+        truth_name=SIMULATOR,
     )
 
 

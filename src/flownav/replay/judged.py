@@ -16,6 +16,7 @@ from flownav.navigation.flags import flagged, flags_of
 from flownav.navigation.tables import Written, estimate_table
 from flownav.navigation.tape import LEVELS_AT
 from flownav.record import POSITION_NED, QUATERNION, Table
+from flownav.replay.airborne import airborne_of
 from flownav.scoring.consistency import consistency_of
 from flownav.scoring.coverage import coverage_of
 from flownav.scoring.drift import Motion, drift_of, end_drift
@@ -81,14 +82,16 @@ def protection_scores(log: Log, written: Written) -> dict[str, Any] | None:
     drift = (
         None
         if log.truth is None
-        else drift_of(motion_of(estimate_table(rows)), truth_motion(log.truth, log.heading_truth))
+        else drift_of(motion_of(estimate_table(rows)), truth_motion(log.truth, log.heading_truth), airborne_of(log))
     )
     return protection_of(rows[:, 0], rows[:, LEVELS_AT:], flagged(rows[:, 0], flags_of(written.event)), drift)
 
 
 def end_drift_of(log: Log, estimate: Motion) -> float | None:
     """Where an estimate of this log's flight ended, off the log's truth [m]; None without one."""
-    return None if log.truth is None else end_drift(estimate, truth_motion(log.truth, log.heading_truth))
+    if log.truth is None:
+        return None
+    return end_drift(estimate, truth_motion(log.truth, log.heading_truth), airborne_of(log))
 
 
 def truth_motion(truth: Table, heading: Table | None) -> Motion:

@@ -44,13 +44,15 @@ class Drift(NamedTuple):
     vertical_m: Array
 
 
-def drift_of(estimate: Motion, truth: Motion) -> Drift | None:
+def drift_of(estimate: Motion, truth: Motion, flight_s: Window | None = None) -> Drift | None:
     """The error at the truth's instants of flight that both cover; None without such a flight.
+
+    flight_s: from when to when it flew; by the truth's height where nobody says.
 
     The truth is laid on the estimate at take-off, turned by the difference of headings there; without a heading of
     either by what fits the two paths best over the flight (least squares).
     """
-    flight = flight_of(truth.t_s, truth.position[:, 2])
+    flight = flight_s or flight_of(truth.t_s, truth.position[:, 2])
     if flight is None or not len(estimate.t_s):
         return None
     inside = (truth.t_s >= max(flight[0], estimate.t_s[0])) & (truth.t_s <= min(flight[1], estimate.t_s[-1]))
@@ -65,9 +67,9 @@ def drift_of(estimate: Motion, truth: Motion) -> Drift | None:
     return Drift(t_s, np.hypot(error[:, 0], error[:, 1]), abs(error[:, 2]))
 
 
-def end_drift(estimate: Motion, truth: Motion) -> float | None:
+def end_drift(estimate: Motion, truth: Motion, flight_s: Window | None = None) -> float | None:
     """Horizontal error [m] at the last instant of flight that both cover (`drift_of`); None without such a flight."""
-    found = drift_of(estimate, truth)
+    found = drift_of(estimate, truth, flight_s)
     return None if found is None else float(found.horizontal_m[-1])
 
 

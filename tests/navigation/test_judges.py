@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from flownav.navigation.attitude import heading_variance, judge_attitude, magnetic_heading
 from flownav.navigation.flow import View, judge_flow, turning_of
-from flownav.navigation.flow_noise import flow_variance, followed_agreement, lasting_doubt
+from flownav.navigation.flow_noise import alike, flow_variance, followed_agreement, lasting_doubt, wrong_since
 from flownav.navigation.gps import judge_gps, judge_rejections
 from flownav.navigation.height import Height, judge_baro, judge_range, range_variance, repeats
 from flownav.navigation.inertial import motion_between, said_by, sound
@@ -44,7 +45,7 @@ from flownav.navigation.vibration import followed_vibration, vibration_beyond, w
 NAN = math.nan
 FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
 TOLD = NavigatorSettingsFile().settings(FITTED)
-FRESH_FLOW = FlowMemory(-math.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+FRESH_FLOW = FlowMemory(-math.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -math.inf)
 SEEN = View(2.0, True, 1.0)
 
 
@@ -165,7 +166,7 @@ def test_the_turning_is_taken_from_the_imu_less_the_filters_bias_or_from_the_sen
 
 
 def test_the_bias_of_a_flow_sensors_gyro_is_followed_at_its_pace_and_not_where_it_has_no_data():
-    known = FlowMemory(1.0, 1.0, 0.1, 0.0, 1e6, 1.0, 0.0)
+    known = FlowMemory(1.0, 1.0, 0.1, 0.0, 1e6, 1.0, 0.0, 0.0, -math.inf)
     seen = reading(0.0, 0.0, 0.5, 0.0, 0.0, 0.0)
     _, _, m = turning_of(seen, 1.5, 0.0, 0.0, False, known, TOLD.flow)
     assert m.bias_x == pytest.approx(0.1 + (1.0 - math.exp(-0.5 / 10.0)) * 0.4)
@@ -173,20 +174,30 @@ def test_the_bias_of_a_flow_sensors_gyro_is_followed_at_its_pace_and_not_where_i
 
 
 def test_flow_that_agrees_is_not_doubted_and_flow_that_does_not_is_for_long():
-    m = FlowMemory(1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+    m = FlowMemory(1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -math.inf)
     assert followed_agreement(1.0, 1.1, m) == pytest.approx(1.0)
     assert followed_agreement(25.0, 1.1, m) == pytest.approx(1.0 + 0.05 * 24.0)
     assert followed_agreement(25.0, 9.0, m) == pytest.approx(1.0 + 0.5 * 24.0)
 
 
 def test_a_flow_is_doubted_above_one_ratio_and_trusted_below_a_smaller_one():
+    assert [lasting_doubt(0.0, ratio) for ratio in (1.0, 3.9, 4.1)] == [0.0, 0.0, 1.0]
+    assert [lasting_doubt(1.0, ratio) for ratio in (3.9, 2.1, 1.9)] == [1.0, 1.0, 0.0]
+
+
+def test_a_flow_that_is_wrong_in_the_same_way_is_so_until_it_has_agreed_for_5_s():
     never = -np.inf
-    assert [lasting_doubt(9.0, ratio, never, held=False) for ratio in (1.0, 3.9, 4.1)] == [never, never, 9.0]
-    assert [lasting_doubt(9.0, ratio, 8.0, held=False) for ratio in (3.9, 2.1, 1.9)] == [9.0, 9.0, never]
+    assert [wrong_since(9.0, likeness, never) for likeness in (3.9, 4.1)] == [never, 9.0]
+    assert [wrong_since(9.0, likeness, 8.0) for likeness in (1.1, 0.9)] == [9.0, 8.0]
+    assert [wrong_since(t_s, 0.0, 8.0) for t_s in (13.0, 13.1)] == [8.0, never]
 
 
-def test_where_gps_holds_the_velocity_a_doubt_lasts_5_s():
-    assert [lasting_doubt(t_s, 1.0, 8.0, held=True) for t_s in (9.0, 13.0, 13.1)] == [8.0, 8.0, -np.inf]
+def test_innovations_are_alike_where_they_are_wrong_in_the_same_way_and_not_where_they_are_noise():
+    assert alike(2.0, 3.0, 4.0) == 1.5
+    assert alike(-50.0, -50.0, 1.0) == 6.25
+    random = np.random.default_rng(4).normal(0.0, 10.0, 4000)
+    noise = [alike(now, before, 1.0) for before, now in pairwise(random.tolist())]
+    assert abs(np.mean(noise)) < 0.3
 
 
 # -- height --------------------------------------------------------------------------------------------------

@@ -154,7 +154,7 @@ def test_each_of_sixteen_lanes_is_what_it_is_alone(seed, fitted, without):
             assert state.tobytes() == on.work[STATE : QUATERNION + 4].tobytes()
             assert unpack(work, LANES, lane, STATES).tobytes() == unpack(on.work, (0,), 0, STATES).tobytes()
     if fitted.use_imu and not without:
-        assert len(seen) >= len(EVENT_NAMES) - 6, [EVENT_NAMES[k] for k in set(range(len(EVENT_NAMES))) - seen]
+        assert len(seen) >= len(EVENT_NAMES) - 7, [EVENT_NAMES[k] for k in set(range(len(EVENT_NAMES))) - seen]
 
 
 def plain(rows: np.ndarray) -> np.ndarray:

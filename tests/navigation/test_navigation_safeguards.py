@@ -10,7 +10,7 @@ from flownav.estimation.gating import Reason
 from flownav.estimation.states import IMU
 from flownav.measurement import EventQueue, Sensor, Stream, merge
 from flownav.navigation.memory import load_imu
-from flownav.navigation.tape import EVENT_NAMES, FAULT_CLEARED, FAULT_SUSPECTED, HEADING_FOUND
+from flownav.navigation.tape import COMPASS_REFUTED, EVENT_NAMES, FAULT_CLEARED, FAULT_SUSPECTED, HEADING_FOUND
 from navigation_streams import Flown, Navigated, circle, fly, navigate, still
 
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
@@ -291,6 +291,6 @@ def test_every_event_has_its_case(hover):
     for run in runs:
         seen.update(run.on.tape.events()[:, 1].astype(int).tolist())
     flow = {k for k, (source, _, _) in enumerate(EVENT_NAMES) if source == "flow"}  # tests/test_faults_navigator.py
-    heading = {int(HEADING_FOUND)}  # tests/replay/test_unknown_heading.py
+    heading = {int(HEADING_FOUND), int(COMPASS_REFUTED)}  # tests/replay/test_unknown_heading.py
     faults = {int(FAULT_SUSPECTED), int(FAULT_CLEARED)}  # tests/navigation/test_protection.py
     assert seen | flow | heading | faults == set(range(len(EVENT_NAMES)))

@@ -7,11 +7,12 @@ from dataclasses import replace as altered
 import numpy as np
 import pytest
 
+from flownav.estimation.gating import Reason
 from flownav.frames import rotation_from_quaternion
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.tape import HEADING_FOUND
+from flownav.navigation.tape import COMPASS_REFUTED, HEADING_FOUND
 from flownav.replay.prepare import ReplayOptions
 from flownav.replay.session import replay
 from replay_logs import log_of_flight
@@ -81,3 +82,46 @@ def test_a_flow_of_the_wrong_sign_finds_a_heading_half_a_turn_off(unheaded):
     run = replay(log, ReplayOptions(), NavigatorSettingsFile())
     (found,) = [event for event in run.written.event if event[1] == HEADING_FOUND]
     assert abs(abs(found[2] - FIRST_YAW_RAD) - np.pi) < 0.5
+
+
+# -- a compass that is wrong ------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def compassed(flight, tmp_path_factory):
+    log = read_csv_folder(flight.write(tmp_path_factory.mktemp("compassed") / "flight"))
+    return altered(log, streams={s: stream for s, stream in log.streams.items() if s != Sensor.ATTITUDE})
+
+
+def magnet_turned(log, by_rad: float):
+    """The log of a vehicle whose compass reads a heading that is less by this much."""
+    cosine, sine = np.cos(by_rad), np.sin(by_rad)
+    mag = log.streams[Sensor.MAG]
+    value = mag.value.copy()
+    value[:, :2] = value[:, :2] @ np.array([[cosine, sine], [-sine, cosine]])
+    return altered(log, streams={**log.streams, Sensor.MAG: altered(mag, value=value)})
+
+
+def heading_error(run, by_rad: float) -> np.ndarray:
+    error = yaw_of(run.estimate) - FIRST_YAW_RAD - YAW_RATE_RAD_S * run.estimate[:, 0] - by_rad
+    return np.degrees(np.abs((error + np.pi) % (2.0 * np.pi) - np.pi))
+
+
+@pytest.mark.parametrize("wrong_deg", [90.0, -90.0])
+def test_a_compass_that_is_90_deg_wrong_is_refuted_whatever_the_heading(compassed, flight, wrong_deg):
+    way_m = np.cumsum(np.hypot(*np.diff(flight.position[:, :2], axis=0, prepend=flight.position[:1, :2]).T))
+    for by_rad in np.radians(np.arange(0.0, 360.0, 10.0)):
+        log = magnet_turned(turned(compassed, float(by_rad)), np.radians(wrong_deg) - float(by_rad))
+        run = replay(log, ReplayOptions(), NavigatorSettingsFile())
+        events = run.written.event
+        (refuted,), (found,) = events[events[:, 1] == COMPASS_REFUTED], events[events[:, 1] == HEADING_FOUND]
+        assert refuted[0] < found[0]
+        assert np.interp(found[0], flight.t_s, way_m) < 3.5
+        assert heading_error(run, by_rad)[run.estimate[:, 0] > found[0] + 0.1].max() < 6.0
+        mag = run.innovation[run.innovation[:, 1] == Sensor.MAG]
+        assert (mag[mag[:, 0] > refuted[0], 8] == Reason.NO_HEADING).all()
+
+
+def test_one_that_is_right_is_not(compassed):
+    for by_rad in (0.0, 2.0, 4.0):
+        run = replay(magnet_turned(turned(compassed, by_rad), -by_rad), ReplayOptions(), NavigatorSettingsFile())
+        assert not (run.written.event[:, 1] == COMPASS_REFUTED).any()
+        assert heading_error(run, by_rad)[-100:].max() < 1.0

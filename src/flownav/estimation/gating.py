@@ -57,5 +57,5 @@ MESSAGES: dict[Reason, str] = {
     Reason.NEAR_GROUND: "The vehicle is nearer to the ground than the sensor can be trusted.",
     Reason.NOT_NEEDED: "Another source of the same kind serves; this one is only watched.",
     Reason.AHEAD: "The reading's time stamp lies ahead of the receiver's clock.",
-    Reason.NO_HEADING: "Flow needs a heading, which is being found from the course by GPS.",
+    Reason.NO_HEADING: "Flow needs a heading, which is being found from the course by GPS; or the compass was refuted.",
 }

@@ -13,6 +13,7 @@ from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import ATTITUDE, INNOVATION, MEASURED, QUATERNION
 from flownav.frames import quaternion_product, rotation_from_quaternion, to_earth
 from flownav.navigation.memory import (
+    COMPASS_OFF,
     OBSERVATION,
     load_bridge,
     load_heading,
@@ -25,7 +26,7 @@ from flownav.navigation.memory import (
 )
 from flownav.navigation.offers import conclude, put, usable_in_flight
 from flownav.navigation.packed import load_attitude_settings
-from flownav.navigation.reasons import FUSED, NOT_FINITE, SILENT
+from flownav.navigation.reasons import FUSED, NO_HEADING, NOT_FINITE, SILENT
 from flownav.navigation.records import BridgeMemory, HeadingMemory, ImuMemory, Reading
 from flownav.navigation.tape import Output
 from flownav.navigation.told import FROM_ATTITUDE, FROM_YAW, AttitudeSettings, Equipment
@@ -168,6 +169,8 @@ def put_heading(
     """One lane's heading with the variance that is stated, or modelled from how often it is read."""
     m = load_heading(work, lanes, lane)
     modelled = not np.isfinite(stated)
+    refuted = reason == FUSED and work[COMPASS_OFF * len(lanes) + lane] > 0.0
+    reason = NO_HEADING if refuted else reason
     put(work, lanes, lane, read_rad, heading_variance(t_s, m, s) if modelled else stated, reason)
     store_heading(work, lanes, lane, HeadingMemory(t_s if modelled and reason != SILENT else m.read_s, m.field_rad))
 

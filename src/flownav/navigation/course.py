@@ -63,10 +63,10 @@ def judge_course(m: CourseMemory) -> tuple[bool, float]:
 
 
 @procedure
-def note_flow_course(work: Work, lanes: Lanes, t_s: float, angular: bool) -> None:
-    """The flow reading at hand, whose turning and range stand in their rows."""
+def note_flow_course(work: Work, lanes: Lanes, t_s: float, angular: bool, sought: bool) -> None:
+    """The flow reading at hand, whose turning and range stand in their rows. sought: only where a heading is."""
     for lane in range(len(lanes)):
-        if work[SOUGHT * len(lanes) + lane] == 0.0:
+        if sought and work[SOUGHT * len(lanes) + lane] == 0.0:
             continue
         reading = load_reading(work, lanes, lane)
         range_m = work[LENS_RANGE * len(lanes) + lane]

@@ -31,11 +31,14 @@ from flownav.measurement import Sensor
 from flownav.navigation.flow_noise import (
     DOUBTED_RATIO,
     LONGEST_STEP_S,
+    alike,
     flow_variance,
     followed_agreement,
     followed_excess,
+    followed_likeness,
     lasting_doubt,
     lasting_walk,
+    wrong_since,
 )
 from flownav.navigation.height import MANY_STRAYS
 from flownav.navigation.lagged_flow import observe_lagged
@@ -110,7 +113,7 @@ def turning_of(
     share = larger(1.0 - np.exp(-step_s / s.flow_gyro_time_s), 1.0 / larger(count, 1.0)) if follows else 0.0
     bias_own_x = m.bias_x + share * (own_x - imu_x - m.bias_x) if follows else m.bias_x
     bias_own_y = m.bias_y + share * (own_y - imu_y - m.bias_y) if follows else m.bias_y
-    after = FlowMemory(m.taken_s, m.excess, bias_own_x, bias_own_y, count, m.ratio, m.doubted_s)
+    after = FlowMemory(m.taken_s, m.excess, bias_own_x, bias_own_y, count, m.ratio, m.doubted, m.likeness, m.wrong_s)
     x = imu_x if by_imu else own_x - bias_own_x
     y = imu_y if by_imu else own_y - bias_own_y
     return x, y, after
@@ -190,7 +193,7 @@ def look(work: Work, lanes: Lanes, t_s: float, angular: bool, gyro_is_imu: bool,
         headed = verdict != FUSED or work[SOUGHT * len(lanes) + lane] == 0.0
         work[TESTED * len(lanes) + lane] = verdict if headed else NO_HEADING
         held = t_s - work[GPS_FUSED * len(lanes) + lane] <= UNHELD_S
-        work[HELD_BACK * len(lanes) + lane] = 1.0 if held and np.isfinite(m.doubted_s) else 0.0
+        work[HELD_BACK * len(lanes) + lane] = 1.0 if held and np.isfinite(m.wrong_s) else 0.0
 
 
 @equation
@@ -264,9 +267,11 @@ def learn(work: Work, lanes: Lanes, t_s: float, angular: bool, component: int, s
             if angular or not np.isfinite(listed):
                 noise = work[NOISE * len(lanes) + lane]
                 excess = followed_excess(innovation, before, noise, t_s, m, s)
-            store_flow(
-                work, lanes, lane, FlowMemory(m.taken_s, excess, m.bias_x, m.bias_y, m.bias_count, ratio, m.doubted_s)
+            likeness = followed_likeness(alike(innovation, before, total), t_s, m)
+            after = FlowMemory(
+                m.taken_s, excess, m.bias_x, m.bias_y, m.bias_count, ratio, m.doubted, likeness, m.wrong_s
             )
+            store_flow(work, lanes, lane, after)
 
 
 @equation
@@ -297,8 +302,9 @@ def judge_agreement(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
         work[HELD_BACK * len(lanes) + lane] = 0.0
         if work[TESTED * len(lanes) + lane] == FUSED:
             m = load_flow(work, lanes, lane)
-            held = t_s - work[GPS_FUSED * len(lanes) + lane] <= UNHELD_S
-            last_s = lasting_doubt(t_s, m.ratio, m.doubted_s, held)
-            if np.isinf(last_s) != np.isinf(m.doubted_s):
-                write_event(lanes, lane, t_s, FLOW_TRUSTED if np.isinf(last_s) else FLOW_DOUBTED, m.ratio, o)
-            store_flow(work, lanes, lane, FlowMemory(t_s, m.excess, m.bias_x, m.bias_y, m.bias_count, m.ratio, last_s))
+            doubted = lasting_doubt(m.doubted, m.ratio)
+            if doubted != m.doubted:
+                write_event(lanes, lane, t_s, FLOW_DOUBTED if doubted > 0.0 else FLOW_TRUSTED, m.ratio, o)
+            wrong_s = wrong_since(t_s, m.likeness, m.wrong_s)
+            after = FlowMemory(t_s, m.excess, m.bias_x, m.bias_y, m.bias_count, m.ratio, doubted, m.likeness, wrong_s)
+            store_flow(work, lanes, lane, after)

@@ -46,6 +46,13 @@ def followed_agreement(square: float, t_s: float, m: FlowMemory) -> float:
 
 
 @equation
+def followed_likeness(product: float, t_s: float, m: FlowMemory) -> float:
+    """How alike innovations are, one after the other (`alike`), on average."""
+    share = smaller(larger(t_s - m.taken_s, 0.0) / AGREEMENT_S, 1.0)
+    return m.likeness + 0.5 * share * (product - m.likeness)
+
+
+@equation
 def followed_excess(
     innovation: float, before: float, noise: float, t_s: float, m: FlowMemory, s: FlowSettings
 ) -> float:
@@ -63,14 +70,29 @@ def followed_excess(
 
 
 @equation
-def lasting_doubt(t_s: float, ratio: float, doubted_s: float, held: bool) -> float:
-    """When a doubted flow last disagreed [s], -infinity for one that is trusted: doubted above one ratio, trusted again
-    below a smaller one, and where GPS holds the velocity (held) only after DOUBT_S: a flow of the wrong sign agrees
-    while the vehicle happens to stand.
+def lasting_doubt(doubted: float, ratio: float) -> float:
+    """Doubted above one ratio, trusted again below a smaller one."""
+    return 1.0 if ratio > DOUBTED_RATIO else (0.0 if ratio < TRUSTED_RATIO else doubted)
+
+
+@equation
+def alike(innovation: float, before: float, total: float) -> float:
+    """The product of two innovations of a component, one after the other, over their variance: 0 on average for noise
+    of any size, 1 and more for what is wrong in the same way. None counts as more than 2.5 standard deviations.
     """
-    disagrees = ratio > (DOUBTED_RATIO if np.isinf(doubted_s) else TRUSTED_RATIO)
-    last_s = t_s if disagrees else doubted_s
-    return last_s if (held and t_s - last_s <= DOUBT_S) or disagrees else -np.inf
+    limit = np.sqrt(LARGEST_CHANGE * total)
+    return clamp(innovation, -limit, limit) * clamp(before, -limit, limit) / total
+
+
+@equation
+def wrong_since(t_s: float, likeness: float, wrong_s: float) -> float:
+    """When a flow that is wrong in the same way again and again was so last [s], -infinity for one that is not.
+
+    It is believed again after DOUBT_S: a flow of the wrong sign agrees while the vehicle happens to stand.
+    """
+    wrong = likeness > (DOUBTED_RATIO if np.isinf(wrong_s) else 0.5 * TRUSTED_RATIO)
+    last_s = t_s if wrong else wrong_s
+    return last_s if t_s - last_s <= DOUBT_S else -np.inf
 
 
 @equation

@@ -24,6 +24,7 @@ from flownav.navigation.records import (
     ImuMemory,
     ImuWindow,
     NoiseMemory,
+    PushMemory,
     RangeMemory,
     Reading,
     RejectionMemory,
@@ -54,6 +55,8 @@ NOISE_FOLLOWED = _rows.take(8 * 3)  # `records.NoiseMemory` of range, barometer,
 WHITENESS = _rows.take(3 * len(WhitenessMemory._fields))  # forward, right, down
 ACCEL_FACTOR = _rows.take(3)  # how many times noisier than told the accelerometer is, by each of these
 COURSE = _rows.take(len(CourseMemory._fields))
+PUSH = _rows.take(len(PushMemory._fields))
+COMPASS_OFF = _rows.take(1)  # 1 once what is read as heading was found to be wrong
 BLIND = _rows.take(1)  # 1 where no range tells the height of the flow now: none lately, or a disputed one, or strays
 SOUGHT = _rows.take(1)  # 1 while a heading that no sensor reads is to be found
 GPS_FUSED = _rows.take(1)  # when GPS last told north or east [s]
@@ -103,6 +106,7 @@ load_flow, store_flow = lane_access(FlowMemory, FLOW)
 load_heading, store_heading = lane_access(HeadingMemory, HEADING)
 load_spike, store_spike = lane_access(SpikeMemory, SPIKE)
 load_course, store_course = lane_access(CourseMemory, COURSE)
+load_push, store_push = lane_access(PushMemory, PUSH)
 load_imu_window, store_imu_window = lane_access(ImuWindow, IMU_WINDOW)
 load_seen_window, store_seen_window = lane_access(SeenWindow, SEEN_WINDOW)
 load_bridge, store_bridge = lane_access(BridgeMemory, BRIDGE)
@@ -114,7 +118,7 @@ _FRESH: dict[int, tuple[float, ...]] = {
     IMU_HEARD: ImuMemory(-np.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     RANGE: RangeMemory(-np.inf, np.nan, np.nan, np.nan, 0.0, np.nan, 0.0),
     ECHO: EchoMemory(np.nan, 0.0, np.nan, 0.0, 0.0),
-    FLOW: FlowMemory(-np.inf, 1.0, 0.0, 0.0, 0.0, 1.0, -np.inf),
+    FLOW: FlowMemory(-np.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -np.inf),
     HEADING: HeadingMemory(-np.inf, np.nan),
     BRIDGE: BridgeMemory(*([np.nan] * len(BridgeMemory._fields))),
     SEEN_WINDOW: SeenWindow(1e9, -1.0, 0.0, 0.0, 0.0, 0.0),
@@ -130,6 +134,7 @@ _FRESH: dict[int, tuple[float, ...]] = {
     SHARE: (1.0,) * MOST_HYPOTHESES,
     DRIFT_SINCE: (-np.inf,),
     COURSE: CourseMemory(0.0, 0.0, 0.0, 0.0, 0.0, -np.inf, -np.inf, 0.0, 0.0),
+    PUSH: PushMemory(0.0, 0.0, 0.0, 0.0, -np.inf, 0.0, 0.0, 0.0, 0.0),
     GPS_FUSED: (-np.inf,),
     CLOCK: (-np.inf,),
     WRITTEN: (-np.inf,),

@@ -247,7 +247,7 @@ def mind_faults(work: Work, lanes: Lanes, t_s: float, dt_s: float, o: Output) ->
             set_lane(work, lanes, SUSPECTED, lane, 0.0)
             write_event(lanes, lane, t_s, FAULT_CLEARED, before - 1.0, o)
         unheld = t_s - of_lane(work, lanes, GPS_FUSED, lane) > UNHELD_S
-        if worst_flow > PUZZLING or (unheld and np.isfinite(load_flow(work, lanes, lane).doubted_s)):
+        if worst_flow > PUZZLING or (unheld and load_flow(work, lanes, lane).doubted > 0.0):
             set_lane(work, lanes, PUZZLED_AT, lane, t_s)
         if t_s - of_lane(work, lanes, PUZZLED_AT, lane) < HELD_S:
             work[LEFT_OVER * len(lanes) + lane] += 2.0 * dt_s * work[FLOW_SPEED * len(lanes) + lane]

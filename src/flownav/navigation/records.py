@@ -115,8 +115,8 @@ class GroundMemory(NamedTuple):
 
 class FlowMemory(NamedTuple):
     """taken_s: of the last tested flow; excess: how many times noisier than its model; bias of the sensor's own gyro
-    [rad/s] and from how many readings; ratio: mean of nu^2 over its variance; doubted_s: when that was
-    too large last, of a flow that is doubted; else -infinity.
+    [rad/s] and from how many readings; ratio: mean of nu^2 over its variance; doubted: 1 while that is too
+    large; likeness: mean of `flow_noise.alike`; wrong_s: when that was too large last; -infinity where it is not.
     """
 
     taken_s: float
@@ -125,7 +125,9 @@ class FlowMemory(NamedTuple):
     bias_y: float
     bias_count: float
     ratio: float
-    doubted_s: float
+    doubted: float
+    likeness: float
+    wrong_s: float
 
 
 class HeadingMemory(NamedTuple):
@@ -224,6 +226,22 @@ class CourseMemory(NamedTuple):
     flow_s: float
     north_m_s: float
     east_m_s: float
+
+
+class PushMemory(NamedTuple):
+    """What the accelerometer adds to the velocity in a block, north and east by the filter's own heading [m/s]; GPS
+    velocity at its start, and when that was [s]; sums over blocks as of `CourseMemory`, of changes of velocity [m2/s2].
+    """
+
+    push_n: float
+    push_e: float
+    v_n: float
+    v_e: float
+    since_s: float
+    along: float
+    across: float
+    gps: float
+    own: float
 
 
 class WhitenessMemory(NamedTuple):

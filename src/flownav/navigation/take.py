@@ -19,6 +19,7 @@ from flownav.estimation.motion import hold_still, predict
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, STATES
 from flownav.measurement import Sensor
 from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
+from flownav.navigation.compass import check_compass, note_push
 from flownav.navigation.course import find_heading, note_flow_course
 from flownav.navigation.flow import take_flow
 from flownav.navigation.gps import take_gps
@@ -115,8 +116,12 @@ def consider_datum(work: Work, lanes: Lanes, fitted: Equipment) -> None:
     """A heading that nothing refers to the earth is a datum: only the gyro moves it, and only rest tells its bias. One
     that is yet to be found from the course is one until then, and by it GPS would turn every push into tilt.
     """
-    if fitted.heading == NO_HEADING and not fitted.use_attitude:
-        sought = SOUGHT if np.isfinite(fitted.deadline_s) else 0
+    seeking = 0.0
+    for lane in range(len(lanes)):
+        seeking += work[SOUGHT * len(lanes) + lane]
+    datum = fitted.heading == NO_HEADING and not np.isfinite(fitted.deadline_s)
+    if (datum or seeking > 0.0) and not fitted.use_attitude:
+        sought = 0 if datum else SOUGHT
         consider(work, lanes, ATTITUDE + 2, sought)
         consider(work, lanes, GYRO_BIAS + 2, sought)
         if sought > 0:
@@ -133,12 +138,14 @@ def take(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p
     if sensor == Sensor.GPS_POSITION or sensor == Sensor.GPS_VELOCITY:
         catch_up_errors(work, lanes, t_s, p, o)
         take_gps(work, lanes, t_s, sensor, p, o)
-        if sensor == Sensor.GPS_VELOCITY and fitted.heading == NO_HEADING:
+        if sensor == Sensor.GPS_VELOCITY:
             find_heading(work, lanes, t_s, o)
+            if fitted.heading != NO_HEADING and fitted.use_imu:
+                check_compass(work, lanes, t_s, o)
     elif sensor == Sensor.FLOW_RATE or sensor == Sensor.FLOW_VELOCITY:
         take_flow(work, lanes, lagged(lanes), t_s, sensor, fitted.flow_gyro_is_imu, p, o)
-        if fitted.heading == NO_HEADING:
-            note_flow_course(work, lanes, t_s, sensor == Sensor.FLOW_RATE)
+        if fitted.heading == NO_HEADING or fitted.use_imu:
+            note_flow_course(work, lanes, t_s, sensor == Sensor.FLOW_RATE, fitted.heading == NO_HEADING)
     elif sensor == Sensor.RANGE:
         take_range(work, lanes, t_s, sensor, p, o)
     elif sensor == Sensor.BARO:
@@ -193,6 +200,7 @@ def advance(work: Work, lanes: Lanes, lag: bool | None, t_s: float, p: Work, o: 
         else:
             predict(work, lanes, STATES, dt_s, settings)
         steady_force(work, lanes, dt_s)
+        note_push(work, lanes, dt_s)
         propagate_walks(work, lanes, dt_s, settings)
         add_vibration_noise(work, lanes, dt_s, imu)
         if len(lanes) == 1:

@@ -55,7 +55,7 @@ EVENTS_A_READING = 4
 # each Python integer that it is called with.
 (START, GROUND_FOUND, GROUND_RESET, BARO_FOUND, GPS_RESET, DEAD_RECKONING, POSITION_INVALID, AIDED_AGAIN,
  RANGE_STUCK, PAD_FOUND, IMU_LOST, IMU_DOUBTED, FLOW_DOUBTED, FLOW_TRUSTED, STOOD,
- IMU_SPIKE, HEADING_FOUND, FAULT_SUSPECTED, FAULT_CLEARED) = np.arange(19)  # fmt: skip
+ IMU_SPIKE, HEADING_FOUND, FAULT_SUSPECTED, FAULT_CLEARED, COMPASS_REFUTED) = np.arange(20)  # fmt: skip
 EVENT_NAMES = (
     ("filter", "start", "at a GPS fix (1) or at the local origin (0)"),
     ("range", "datum", "ground level below the first range, down in the local frame [m]"),
@@ -76,6 +76,7 @@ EVENT_NAMES = (
     ("heading", "found", "from the course by GPS and flow: it was off by this much [rad]"),
     ("filter", "suspects", f"a fault that innovations tell of: {', '.join(f'{i} {n}' for i, n in enumerate(FAULTS))}"),
     ("filter", "cleared", "that fault is no more suspected"),
+    ("heading", "refuted", "flow and accelerometer contradict what is read as heading: it was off by this much [rad]"),
 )
 # kinds of journal entry, and where their numbers stand in it
 PREDICTED, CORRECTED, FORGOTTEN, NOTED, DECAYED = 0.0, 1.0, 2.0, 3.0, 4.0

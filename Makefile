@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-slow fuzz mutants league lint bench bench-once docs wheel wheel-test clean
+.PHONY: demo test test-slow fuzz mutants league integrity lint bench bench-once docs wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr
@@ -23,6 +23,9 @@ mutants: $(VENV)/.ready-test
 
 league: $(VENV)/.ready
 	$(BIN)/python tools/league.py $${FLOWNAV_DATA:-../shared/data} docs/league.md
+
+integrity: $(VENV)/.ready
+	$(BIN)/python tools/integrity.py docs/integrity.md
 
 lint: $(VENV)/.ready-lint
 	$(BIN)/ruff check .

@@ -41,7 +41,8 @@ class Navigated:
     """What a navigator made of a log.
 
     t_s (n,) increasing, the instants that the estimates describe; position_ned_m and sigma_ned_m (n, 3) in the log's
-    local frame, one standard deviation each; offers, events, flags in any order.
+    local frame, one standard deviation each; offers, events, flags in any order. levels_m (n, 2): protection levels,
+    horizontal and vertical; None where the navigator states none.
     """
 
     t_s: Array
@@ -50,6 +51,7 @@ class Navigated:
     offers: Offers
     events: tuple[Event, ...] = ()
     flags: tuple[Flag, ...] = ()
+    levels_m: Array | None = None
 
 
 Navigate = Callable[[Mapping[Sensor, Stream]], Navigated]

@@ -13,13 +13,13 @@ from flownav.estimation.gating import Reason
 from flownav.faults.arrival import as_fed, stamped_ahead
 from flownav.faults.navigated import Event, Navigate, Navigated, Offers
 from flownav.logs.log import Log
-from flownav.measurement import Array, Sensor, Stream
+from flownav.measurement import Array, EventQueue, Sensor, Stream
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.flags import flags_of
-from flownav.navigation.loop import run, start_navigator
+from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.settings_of import Told
 from flownav.navigation.tables import Written, written_on
-from flownav.navigation.tape import EVENT_NAMES, new_tape
+from flownav.navigation.tape import EVENT_NAMES, LEVELS_AT, new_tape
 from flownav.replay.prepare import Prepared, ReplayOptions, prepare
 from flownav.sensors.identified import IdentifiedFlow
 from flownav.simulation.assemble import Setup
@@ -32,11 +32,7 @@ def navigator_told(told: Told) -> Navigate:
 
     def navigate(streams: Mapping[Sensor, Stream]) -> Navigated:
         """Raises InputError where the filter never starts."""
-        aged = ReplayOptions(_gps_delay(streams), identified=_flow_as_it_is(streams))
-        prepared = prepare(Log(Path("faults"), dict(streams)), aged)
-        queue = as_fed(prepared.streams)
-        equipment = equipment_of(prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, told.settings)
-        running = start_navigator(equipment, told.settings, new_tape(queue), told.noise)
+        prepared, queue, running = started(streams, told)
         with announce_compilation("faults"):
             run(queue, running)
         written = written_on(running.tape)
@@ -45,6 +41,15 @@ def navigator_told(told: Told) -> Navigate:
         return navigated(written, prepared)
 
     return navigate
+
+
+def started(streams: Mapping[Sensor, Stream], told: Told) -> tuple[Prepared, EventQueue, Running]:
+    """The streams as they are fed, and a navigator that waits for them."""
+    aged = ReplayOptions(_gps_delay(streams), identified=_flow_as_it_is(streams))
+    prepared = prepare(Log(Path("faults"), dict(streams)), aged)
+    queue = as_fed(prepared.streams)
+    equipment = equipment_of(prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, told.settings)
+    return prepared, queue, start_navigator(equipment, told.settings, new_tape(queue), told.noise)
 
 
 def navigator_of(setup: Setup) -> Navigate:
@@ -80,6 +85,7 @@ def navigated(written: Written, prepared: Prepared) -> Navigated:
         offers_of(written.innovation, prepared),
         tuple(Event(t_s, *EVENT_NAMES[int(kind)][:2]) for t_s, kind, _ in written.event.tolist()),
         flags_of(written.event),
+        estimate[:, LEVELS_AT:],
     )
 
 

@@ -10,7 +10,17 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from flownav.errors import FlownavError
-from flownav.faults.integrity import CLEAN_SEEDS, FAULTY_SEEDS, FIRST_SEED, Judged, cost, fly, rows_of
+from flownav.faults.integrity import (
+    CLEAN_SEEDS,
+    FAULTY_SEEDS,
+    FIRST_SEED,
+    LONG_S,
+    LONG_SEEDS,
+    Judged,
+    cost,
+    fly,
+    rows_of,
+)
 from flownav.faults.integrity_page import placed, section
 from flownav.faults.navigator import navigator_told
 from flownav.faults.table import BASE, flight_at
@@ -28,8 +38,12 @@ def main(page: Path) -> None:
     fitted = assemble(load_scenario(BASE)).fitted
     assert fitted is not None
     faulty, clean = (range(FIRST_SEED, FIRST_SEED + count) for count in (FAULTY_SEEDS, CLEAN_SEEDS))
-    rows = rows_of(counted(fly(navigator_told(fitted.told), faulty, clean)))
-    found = section(rows, (clean[0], clean[-1]), cost(fitted.told, flight_at(1.5, 5.0, FIRST_SEED).streams))
+    lasting = range(FIRST_SEED, FIRST_SEED + LONG_SEEDS)
+    navigate = navigator_told(fitted.told)
+    rows = rows_of(counted(fly(navigate, faulty, clean)))
+    long = rows_of(counted(fly(navigate, lasting, (), durations_s=(LONG_S,))))
+    spent = cost(fitted.told, flight_at(1.5, 5.0, FIRST_SEED).streams)
+    found = section(rows, long, (clean[0], clean[-1]), spent)
     with written_whole(page) as temporary:
         temporary.write_text(placed(text, found, str(page)), encoding="utf-8", newline="\n")
     print(found)

@@ -23,6 +23,7 @@ UNIX_S = 1.8e9
 START_S = 5000.0  # of the test's clock
 STEP_S = 0.01
 GRAVITY = 9.80665
+METRES_A_DEGREE = 111_132.0
 
 
 def reading(sensor: Sensor, *value: float, variance: float = math.nan) -> Measurement:
@@ -40,6 +41,7 @@ class Hover:
     flow: bool = True
     imu: bool = True
     sigma_m: float = 0.5
+    north_m: float = 0.0  # by so much GPS is off
     noise: random.Random = field(default_factory=lambda: random.Random(4))
     steps: int = 0
 
@@ -68,9 +70,10 @@ class Hover:
             messages.append(say.distance_sensor(self.mav, time_us // 1000, seen, (0.1, 40.0)))
         if step % 20 == 0 and self.gps:
             velocity = reading(Sensor.GPS_VELOCITY, 0.05 * shake[3], 0.05 * shake[4], math.nan, variance=0.04)
+            place = (ORIGIN[0] + self.north_m / METRES_A_DEGREE, *ORIGIN[1:])
             messages.append(
                 say.gps_raw_int(
-                    self.mav, time_us, ORIGIN, velocity, horizontal_sigma_m=self.sigma_m, vertical_sigma_m=self.sigma_m
+                    self.mav, time_us, place, velocity, horizontal_sigma_m=self.sigma_m, vertical_sigma_m=self.sigma_m
                 )
             )
         return [bytes(message.pack(self.mav)) for message in messages]

@@ -7,15 +7,21 @@ from __future__ import annotations
 
 import math
 import random
+from io import StringIO
 
 import numpy as np
 import pytest
+from rich.console import Console
 
+from flownav.live.estimating import why_withheld
 from flownav.live.horizon import MOST_WAITING
+from flownav.live.loop import Latency
 from flownav.live.options import Limits, Options
+from flownav.live.screen import Screen
 from flownav.mavlink.dialect import coder
 from flownav.mavlink.position_messages import LOCAL_FRD
 from flownav.mavlink.signing import SignatureCheck
+from flownav.navigation.memory import PROTECTION
 from live_ends import HEIGHT_M, UNIX_S, Hover, Wire
 
 KEY = bytes(range(32))
@@ -278,6 +284,51 @@ def test_an_uncertain_estimate_is_not_sent(wires):
     wire = wires(limits=Limits(sigma_m=0.01)).fly(5.0)
     assert wire.session.reason == "uncertain"
     assert not wire.estimates()
+
+
+def shown(wire):
+    """What the screen says."""
+    console = Console(width=160, file=StringIO(), record=True)
+    console.print(Screen(wire.session, Latency(), "udp:1").look(wire.now_s))
+    return console.export_text()
+
+
+def test_while_a_fault_is_suspected_nothing_is_sent_and_the_screen_names_it(wires):
+    """GPS drifts north at 2 m/s; flow, IMU and the receiver's own velocity say that the vehicle hovers."""
+    wire, told = wires(), {}
+
+    def drift():
+        wire.vehicle.north_m += 0.02
+        if wire.session.reason == "fault_suspected" and not told:
+            told.update(t_s=wire.t_s, screen=shown(wire))
+
+    assert "protection levels: none yet" in shown(wire)
+    wire.fly(12.0)
+    assert "suspected" not in shown(wire)
+    wire.fly(12.0, beside=drift)
+    assert "suspected: GPS drift north" in told["screen"]
+    assert "withheld: innovations tell of a sensor that fails" in told["screen"]
+    assert 12.0 < told["t_s"] < 20.0
+    assert wire.estimates(told["t_s"] - 1.0)
+    assert not wire.estimates(told["t_s"] + 0.02)
+    assert wire.session.withheld["fault_suspected"] > 100
+
+
+def test_without_protection_nothing_is_sent(wires):
+    """A level that is above the limit, and one that is no number."""
+    wire = wires().fly(5.0)
+    on = wire.session.filtering.running
+    level_m, t_s = float(on.work[PROTECTION]), on.clock_s
+    assert f"protection levels: {level_m:.2f} m horizontal, {float(on.work[PROTECTION + 1]):.2f} m vertical" in shown(
+        wire
+    )
+    for limit_m, reason in ((1.01 * level_m, ""), (0.99 * level_m, "unprotected")):
+        assert why_withheld(on, t_s, t_s, Limits(protection_m=limit_m)) == reason
+    on.work[PROTECTION] = math.nan
+    assert why_withheld(on, t_s, t_s, Limits()) == "unprotected"
+    strict = wires(limits=Limits(protection_m=0.5 * level_m)).fly(5.0)
+    assert strict.session.reason == "unprotected"
+    assert not strict.estimates()
 
 
 def test_without_gps_the_flow_starts_it_and_nothing_is_sent_before(wires):

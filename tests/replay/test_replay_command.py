@@ -79,6 +79,32 @@ def test_every_sensor_says_when_it_spoke_and_whether_the_filter_knew_it(folder):
     assert facts["end_drift_m"] is None
 
 
+def test_protection_levels_are_told_with_the_share_of_errors_beyond_them(folder, hall):
+    for log, unsaid in ((folder, None), (hall, 0.0)):  # without and with a truth
+        found = answer(log)["protection"]
+        assert set(found) == {"horizontal_m", "vertical_m", "flagged_fraction", "exceeded_unsaid_fraction"}
+        for level in (found["horizontal_m"], found["vertical_m"]):
+            assert set(level) == {"median", "p95"}
+            assert 0.0 < level["median"] <= level["p95"] < 50.0
+        assert 0.0 <= found["flagged_fraction"] <= 1.0
+        assert found["exceeded_unsaid_fraction"] == unsaid
+        words = " ".join(call(log, "--no-report").stdout.split())
+        level = found["horizontal_m"]
+        assert f"Protection level, horizontal: {level['median']:.2f} m in the median, {level['p95']:.2f} m at" in words
+        assert ("the error is larger and nothing says so 0.00 % of the time" in words) == (unsaid is not None)
+
+
+def test_an_error_beyond_the_level_that_nothing_says_is_counted(hall):
+    """From 20 s of 40 s on the truth is 100 m away."""
+    lines = (hall / "truth.csv").read_text().splitlines()
+    rows = [line.split(",") for line in lines[1:]]
+    moved = [[t, str(float(x) + (100.0 if float(t) >= 20.0 else 0.0)), y, z] for t, x, y, z in rows]
+    (hall / "truth.csv").write_text("\n".join([lines[0], *map(",".join, moved)]) + "\n")
+    found = answer(hall)["protection"]
+    assert found["exceeded_unsaid_fraction"] > 0.3
+    assert found["flagged_fraction"] < 0.2
+
+
 @pytest.fixture
 def hall(tmp_path) -> Path:
     """The flight without GPS, with a truth of its own making: the replay's own path, turned by a radian and moved."""

@@ -26,6 +26,10 @@ def test_the_share_is_of_instants_that_are_beyond_and_not_flagged():
     assert exceeded_unsaid(T_S, LEVELS_M[:, 0], said, off) == 0.25
 
 
+def test_a_level_that_is_no_number_protects_from_nothing():
+    assert exceeded_unsaid(T_S, np.full(10, np.nan), QUIET, drift(0.0, 0.1)) == 1.0
+
+
 def test_the_newest_level_counts():
     rising = np.arange(10.0)
     assert exceeded_unsaid(T_S, rising, QUIET, drift(0.5, 0.5, 1.5)) == pytest.approx(1.0 / 3.0)

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 from flownav import __version__
 from flownav.errors import InputError
-from flownav.faults.integrity import Row
+from flownav.faults.integrity import LONG_S, SUSPECTS, TOGETHER, Row
+from flownav.faults.table import NO_FAULT
 
 BEGIN, END = "<!-- make integrity: begin -->", "<!-- make integrity: end -->"
 HEADINGS = (
-    "fault", "flights", "suspected [% of flights]", "warned [% of flights]", "warning stands [% of steps]",
+    "fault", "flights", "suspected [% of flights]", "warning stands [% of steps]",
     "above the level unsaid, horizontal [‰ of steps]", "vertical [‰]", "at most above [m]", "vertical [m]",
     "level / error, median", "vertical", "level, median [m]", "vertical [m]",
 )  # fmt: skip
@@ -22,13 +23,26 @@ def table(rows: Sequence[Row]) -> str:
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
-def section(rows: Sequence[Row], seeds: tuple[int, int], cost: float) -> str:
-    """The table with how it was made: seeds (first, last) of all flights; cost of following faults, as a factor."""
-    steps = sum(row.steps for row in rows if row.fault != "all faults")
+def section(rows: Sequence[Row], long: Sequence[Row], seeds: tuple[int, int], cost: float) -> str:
+    """The tables with how they were made.
+
+    rows: of faults as `flownav faults` has them; long: of such that last. seeds: first and last of all flights. cost:
+    the time of following faults, as a factor on the navigator's.
+    """
+    steps = sum(row.steps for row in rows if row.fault != TOGETHER)
     return (
         f"Printed by `make integrity` with flownav {__version__}, seeds {seeds[0]} to {seeds[1]}, {steps} steps. The "
-        f"navigator took {cost:.2f} times as long as without following faults.\n\n{table(rows)}"
+        f"navigator took {cost:.2f} times as long as without following faults.\n\n{table(rows)}\n"
+        + "".join(f"{alarms(row)}\n\n" for row in rows if row.fault == NO_FAULT)
+        + f"The same with faults that last {LONG_S:g} s (`silence` 5 s):\n\n{table(long)}"
     )
+
+
+def alarms(row: Row) -> str:
+    """The warnings of flights in which nothing failed."""
+    counted = {SUSPECTS: 0.0, **row.raised}
+    said = "; ".join(f"`{name}` in {round(share * row.flights)}" for name, share in counted.items())
+    return f"Warnings in the {row.flights} flights in which nothing fails: {said}."
 
 
 def placed(page: str, text: str, name: str) -> str:
@@ -41,7 +55,7 @@ def placed(page: str, text: str, name: str) -> str:
 
 
 def _cells(row: Row) -> tuple[str, ...]:
-    percent = [f"{100.0 * share:.1f}" for share in (row.suspected, row.warned, row.said)]
+    percent = [f"{100.0 * share:.1f}" for share in (row.raised.get(SUSPECTS, 0.0), row.said)]
     unsaid = [f"{1000.0 * share:.2f}" for share in row.unsaid]
     metres = [f"{value:.2f}" for value in (*row.beyond_m, *row.ratio, *row.level_m)]
     name = f"`{row.fault}`" if " " not in row.fault else f"**{row.fault}**"

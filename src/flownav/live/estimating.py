@@ -51,7 +51,7 @@ def why_withheld(on: Running | None, t_s: float, newest_s: float, limits: Limits
         return "dead_reckoning"
     if on.work[SUSPECTED] > 0.0:
         return "fault_suspected"
-    return "unprotected" if on.work[PROTECTION] > limits.protection_m else ""
+    return "" if on.work[PROTECTION] <= limits.protection_m else "unprotected"
 
 
 def estimate_of(on: Running, imu: Array, t_s: float, boot_s: float, resets: int) -> Estimate:

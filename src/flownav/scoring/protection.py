@@ -31,9 +31,12 @@ def protection_of(
 
 
 def exceeded_unsaid(t_s: Array, level_m: Array, flagged: NDArray[np.bool_], drift: Drift) -> float:
-    """The share of the truth's instants at which the error is above the newest level and no warning stands."""
+    """The share of the truth's instants at which the error is above the newest level and no warning stands.
+
+    A level that is no number protects from nothing.
+    """
     newest = np.clip(np.searchsorted(t_s, drift.t_s, side="right") - 1, 0, len(t_s) - 1)
-    return float(np.mean((drift.horizontal_m > level_m[newest]) & ~flagged[newest]))
+    return float(np.mean(~(drift.horizontal_m <= level_m[newest]) & ~flagged[newest]))
 
 
 def _summary(level_m: Array) -> dict[str, float]:

@@ -1,0 +1,281 @@
+"""Protection levels step by step in plain Python, on buffers that are filled by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flownav.compile import ONE_LANE
+from flownav.estimation.covariance import at
+from flownav.estimation.hypotheses import (
+    COUNT,
+    FLOW_AGE,
+    FLOW_REVERSED,
+    FLOW_SCALE,
+    FLOW_SWAPPED,
+    FORCE,
+    GPS_DRIFT,
+    HEADING_OFF,
+    RANGE_OFFSET,
+    Size,
+    effect_of,
+    fade,
+    push,
+    weigh,
+)
+from flownav.estimation.states import (
+    ACCEPTED,
+    CROSS,
+    HYPOTHESES,
+    INFORMATION,
+    INNOVATION,
+    INNOVATION_VARIANCE,
+    MIDDLE,
+    POSITION,
+    SCORE,
+    SHARE,
+    SIGNATURE,
+    STATE,
+    STATES,
+    VELOCITY,
+)
+from flownav.navigation.memory import (
+    DRIFT_SINCE,
+    FLOW_SPEED,
+    GPS_FUSED,
+    LEFT_OVER,
+    LENS_RANGE,
+    PROTECTION,
+    PUZZLED_AT,
+    SCALE_DOUBT,
+    SUSPECTED,
+    TURNED_BEFORE,
+    TURNING,
+    load_flow,
+    new_work,
+    store_flow,
+)
+from flownav.navigation.protection import (
+    CLEAR,
+    DRIFT_S,
+    HELD_S,
+    MEMORY_S,
+    SIGMAS,
+    SIGMAS_BESIDE,
+    SIZE_SIGMAS,
+    SUSPECT,
+    exclude,
+    largest_size,
+    levels,
+    mind_faults,
+    prior_sigma,
+    set_levels,
+    sign_drift,
+    sign_flow,
+)
+from flownav.navigation.records import FlowMemory
+from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, empty_tape, output_of, room_of
+
+
+@pytest.fixture
+def work():
+    return new_work(ONE_LANE)
+
+
+def put_effect(work, fault, north=0.0, east=0.0, down=0.0):
+    for i, value in enumerate((north, east, down)):
+        work[at(POSITION + i, STATES + fault)] = value
+
+
+def put_size(work, fault, size, sigma):
+    """What innovations told, so that with the prior a fault has this size and standard deviation."""
+    total = 1.0 / sigma**2
+    work[INFORMATION + fault] = total - 1.0 / prior_sigma(fault) ** 2
+    work[SCORE + fault] = total * size
+
+
+# -- effects and what innovations tell ---------------------------------------------------------------------------
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_force_that_is_read_too_large_slows_the_error_along_the_bodys_axis(work, axis):
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # nose east
+    work[MIDDLE : MIDDLE + 9] = turned.ravel()
+    push(work, ONE_LANE, STATES, 0.5)
+    found = [effect_of(work, ONE_LANE, STATES, FORCE + axis, VELOCITY + i, 0) for i in range(3)]
+    np.testing.assert_allclose(found, -0.5 * turned[:, axis])
+    still = new_work(ONE_LANE)
+    still[HYPOTHESES] = 0.0
+    push(still, ONE_LANE, STATES, 0.5)
+    assert not still[at(0, STATES) : at(0, STATES + COUNT)].any()
+
+
+def test_an_innovation_tells_of_a_fault_by_its_part_of_it(work):
+    work[ACCEPTED], work[INNOVATION], work[INNOVATION_VARIANCE] = 1.0, 0.3, 0.04
+    work[CROSS + STATES + HEADING_OFF], work[CROSS + STATES + FORCE] = 2.0, -1.0
+    work[SIGNATURE + HEADING_OFF], work[SHARE + HEADING_OFF] = 5.0, -1.0
+    weigh(work, ONE_LANE, STATES, 2.0)
+    assert work[INFORMATION + HEADING_OFF] == pytest.approx(4.0 / 0.08)
+    assert work[SCORE + HEADING_OFF] == pytest.approx(2.0 * 0.3 / 0.08)
+    assert work[SCORE + FORCE] == pytest.approx(-0.3 / 0.08)
+    assert (work[SIGNATURE + HEADING_OFF], work[SHARE + HEADING_OFF]) == (0.0, 1.0)
+    work[ACCEPTED] = 0.0
+    weigh(work, ONE_LANE, STATES, 2.0)
+    assert work[INFORMATION + HEADING_OFF] == pytest.approx(4.0 / 0.08)
+    fade(work, ONE_LANE, 0.5)
+    assert work[INFORMATION + HEADING_OFF] == pytest.approx(2.0 / 0.08)
+    assert work[SCORE + FORCE] == pytest.approx(-0.15 / 0.08)
+
+
+@pytest.mark.parametrize("angular", [True, False])
+def test_what_a_unit_of_each_fault_adds_to_a_flow(work, angular):
+    """2 m/s forward and 1 m/s to the right, 4 m up, turning by 0.1 rad/s about x."""
+    work[STATE + VELOCITY], work[STATE + VELOCITY + 1], work[LENS_RANGE] = 2.0, 1.0, 4.0
+    work[TURNED_BEFORE], work[TURNING] = 0.1, 0.2
+    read = (0.1 - 0.25, 0.5) if angular else (2.0, 1.0)
+    store_flow(work, ONE_LANE, 0, FlowMemory(9.9, 1.0, 0.0, 0.0, 0.0, 1.0, -np.inf))
+    for component in range(2):
+        own, other = read[component], read[1 - component]
+        sign_flow(work, ONE_LANE, 10.0, component, angular)
+        expected = {FLOW_SCALE: (own, 1.0), FLOW_SWAPPED: (other - own, -1.0), FLOW_REVERSED: (-2.0 * own, -1.0),
+                    FLOW_AGE: (-own / 0.1, 1.0), RANGE_OFFSET: (0.0, 1.0)}  # fmt: skip
+        for fault, (signature, share) in expected.items():
+            assert work[SIGNATURE + fault] == pytest.approx(signature), (component, fault)
+            assert work[SHARE + fault] == share
+    assert work[FLOW_SPEED] == pytest.approx(np.hypot(*read) * (4.0 if angular else 1.0))
+    assert work[TURNED_BEFORE] == 0.2
+    sign_flow(work, ONE_LANE, 10.0, 0, angular)
+    assert work[SIGNATURE + FLOW_AGE] == pytest.approx(0.0 if not angular else -0.1 / 0.1)  # of the turning alone
+    sign_flow(work, ONE_LANE, 20.0, 0, angular)
+    assert work[SIGNATURE + FLOW_AGE] == 0.0  # after a pause nothing is known of what was before
+
+
+def test_a_drift_grows_from_the_start_of_its_window(work):
+    work[DRIFT_SINCE] = 100.0
+    put_effect(work, GPS_DRIFT, north=1.0)
+    sign_drift(work, ONE_LANE, 107.0, 1)
+    assert [work[SIGNATURE + GPS_DRIFT + i] for i in range(3)] == [0.0, 7.0, 0.0]
+    sign_drift(work, ONE_LANE, 100.5 + DRIFT_S, 0)
+    assert work[SIGNATURE + GPS_DRIFT] == 0.0
+    assert work[DRIFT_SINCE] == 100.5 + DRIFT_S
+    assert effect_of(work, ONE_LANE, STATES, GPS_DRIFT, POSITION, 0) == 0.0
+
+
+# -- levels --------------------------------------------------------------------------------------------------------
+def test_the_size_that_is_left_possible():
+    assert largest_size(HEADING_OFF, Size(-0.1, 0.05, 4.0)) == pytest.approx(0.1 + SIZE_SIGMAS * 0.05)
+    assert largest_size(FLOW_REVERSED, Size(0.1, 0.05, 4.0)) == pytest.approx(0.1 + SIZE_SIGMAS * 0.05)
+    assert largest_size(FLOW_SWAPPED, Size(0.9, 0.5, 4.0)) == 1.0
+
+
+def test_the_level_is_the_largest_over_all_that_may_have_happened(work):
+    for i, variance in enumerate((4.0, 1.0, 9.0)):
+        work[at(POSITION + i, POSITION + i)] = variance
+    assert levels(work, ONE_LANE, 0) == pytest.approx((SIGMAS * 2.0, SIGMAS * 3.0))
+    put_effect(work, HEADING_OFF, 30.0, 40.0, -60.0)
+    put_size(work, HEADING_OFF, 0.02, 0.01)
+    most = 0.02 + SIZE_SIGMAS * 0.01
+    put_effect(work, RANGE_OFFSET, 1.0, 1.0, 1.0)
+    small = levels(work, ONE_LANE, 0)
+    assert small == pytest.approx((SIGMAS * 2.0, SIGMAS * 3.0))  # 2.1 m beside 2 sigma are less than 4 sigma
+    put_effect(work, HEADING_OFF, 300.0, -400.0, -600.0)
+    assert levels(work, ONE_LANE, 0) == pytest.approx(
+        (SIGMAS_BESIDE * 2.0 + 500.0 * most, SIGMAS_BESIDE * 3.0 + 600.0 * most)
+    )
+    work[HYPOTHESES] = 0.0
+    assert levels(work, ONE_LANE, 0) == pytest.approx((SIGMAS * 2.0, SIGMAS * 3.0))
+    work[LEFT_OVER] = 100.0
+    assert levels(work, ONE_LANE, 0).horizontal_m == pytest.approx(SIGMAS_BESIDE * 2.0 + 100.0)
+    work[LEFT_OVER] = 0.0
+    work[SCALE_DOUBT], work[STATE + POSITION], work[STATE + POSITION + 1] = 0.1, 60.0, 80.0
+    set_levels(work, ONE_LANE)
+    axes = np.linalg.eigvalsh([[4.0 + 36.0, 48.0], [48.0, 1.0 + 64.0]])
+    assert work[PROTECTION] == pytest.approx(SIGMAS * np.sqrt(axes[-1]))
+    assert work[PROTECTION + 1] == pytest.approx(SIGMAS * 3.0)
+
+
+def test_what_an_excluded_fault_may_have_done_is_remembered(work):
+    put_effect(work, FLOW_REVERSED, 3.0, 4.0)
+    work[LEFT_OVER] = 2.0
+    put_size(work, FLOW_REVERSED, 0.5, 0.2)
+    exclude(work, ONE_LANE, 0, FLOW_REVERSED)  # neither there nor excluded
+    assert work[LEFT_OVER] == 2.0
+    assert effect_of(work, ONE_LANE, STATES, FLOW_REVERSED, POSITION, 0) == 3.0
+    put_size(work, FLOW_REVERSED, 0.1, 0.02)
+    exclude(work, ONE_LANE, 0, FLOW_REVERSED)
+    assert work[LEFT_OVER] == pytest.approx(np.hypot(2.0, 5.0 * (0.1 + SIZE_SIGMAS * 0.02)))
+    assert effect_of(work, ONE_LANE, STATES, FLOW_REVERSED, POSITION, 0) == 0.0
+    assert work[INFORMATION + FLOW_REVERSED] == work[SCORE + FLOW_REVERSED] == 0.0
+
+
+# -- suspicions ------------------------------------------------------------------------------------------------------
+class Minded:
+    """A navigator's buffer whose faults are minded at instants of the test's own."""
+
+    def __init__(self, work):
+        self.work, self.tape = work, empty_tape(1, 1, 10)
+        tape = self.tape
+        self.output = output_of(
+            *(table.reshape(-1) for table in (tape.estimate, tape.innovation, tape.event)),
+            *(table.reshape(-1) for table in tape.journal), room_of(tape), tape.used,
+        )  # fmt: skip
+        work[GPS_FUSED] = np.inf
+
+    def at(self, t_s, dt_s=1e-9):
+        mind_faults(self.work, ONE_LANE, t_s, dt_s, self.output)
+        return self.tape.events().tolist()
+
+
+def evident(work, fault, size, evidence):
+    put_size(work, fault, size, abs(size) / np.sqrt(evidence))
+
+
+def test_a_suspicion_needs_evidence_and_a_size_and_lasts(work):
+    minded = Minded(work)
+    evident(work, HEADING_OFF, 0.3, SUSPECT - 1.0)
+    assert minded.at(50.0) == []
+    evident(work, HEADING_OFF, 0.1, SUSPECT + 50.0)  # what is no fault yet
+    assert minded.at(51.0) == []
+    evident(work, HEADING_OFF, 0.3, SUSPECT + 1.0)
+    raised = [52.0, float(FAULT_SUSPECTED), float(HEADING_OFF)]
+    assert minded.at(52.0) == [raised]
+    assert work[SUSPECTED] == HEADING_OFF + 1.0
+    evident(work, HEADING_OFF, 0.3, CLEAR - 1.0)
+    assert minded.at(51.9 + HELD_S) == [raised]
+    evident(work, HEADING_OFF, 0.3, CLEAR + 1.0)
+    assert minded.at(52.1 + HELD_S) == [raised]
+    evident(work, HEADING_OFF, 0.3, CLEAR - 1.0)
+    assert minded.at(52.2 + HELD_S) == [raised, [52.2 + HELD_S, float(FAULT_CLEARED), float(HEADING_OFF)]]
+    assert work[SUSPECTED] == 0.0
+
+
+def test_the_most_evident_fault_is_named(work):
+    minded = Minded(work)
+    evident(work, FLOW_SCALE, 1.0, SUSPECT + 1.0)
+    evident(work, RANGE_OFFSET, 1.0, SUSPECT + 9.0)
+    evident(work, HEADING_OFF, 1.0, SUSPECT + 2.0)
+    assert minded.at(1.0)[0][2] == RANGE_OFFSET
+
+
+def test_what_was_told_and_what_is_left_over_fade(work):
+    minded = Minded(work)
+    work[INFORMATION + HEADING_OFF], work[SCORE + HEADING_OFF], work[LEFT_OVER] = 10.0, 1.0, 8.0
+    minded.at(1.0, MEMORY_S)
+    assert work[INFORMATION + HEADING_OFF] == pytest.approx(10.0 / np.e)
+    assert work[SCORE + HEADING_OFF] == pytest.approx(1.0 / np.e)
+    assert work[LEFT_OVER] == pytest.approx(8.0 / np.e)
+
+
+@pytest.mark.parametrize(("evidence", "doubted", "unheld"), [(10.0, False, False), (0.5, True, True)])
+def test_while_a_reversed_flow_is_possible_what_is_left_over_grows_by_twice_the_way(work, evidence, doubted, unheld):
+    minded = Minded(work)
+    work[FLOW_SPEED] = 3.0
+    work[GPS_FUSED] = -np.inf if unheld else np.inf
+    if doubted:
+        store_flow(work, ONE_LANE, 0, load_flow(work, ONE_LANE, 0)._replace(doubted_s=1.0))
+    evident(work, FLOW_REVERSED, 0.3, evidence)
+    minded.at(5.0, 0.1)
+    assert work[PUZZLED_AT] == 5.0
+    assert work[LEFT_OVER] == pytest.approx(0.1 * 2.0 * 3.0)
+    quiet = Minded(new_work(ONE_LANE))
+    quiet.work[FLOW_SPEED] = 3.0
+    quiet.at(5.0, 0.1)
+    assert quiet.work[LEFT_OVER] == 0.0

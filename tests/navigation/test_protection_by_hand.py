@@ -73,7 +73,6 @@ from flownav.navigation.protection import (
     sign_drift,
     sign_flow,
 )
-from flownav.navigation.records import FlowMemory
 from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, empty_tape, output_of, room_of
 
 
@@ -131,7 +130,7 @@ def test_what_a_unit_of_each_fault_adds_to_a_flow(work, angular):
     work[STATE + VELOCITY], work[STATE + VELOCITY + 1], work[LENS_RANGE] = 2.0, 1.0, 4.0
     work[TURNED_BEFORE], work[TURNING] = 0.1, 0.2
     read = (0.1 - 0.25, 0.5) if angular else (2.0, 1.0)
-    store_flow(work, ONE_LANE, 0, FlowMemory(9.9, 1.0, 0.0, 0.0, 0.0, 1.0, -np.inf))
+    store_flow(work, ONE_LANE, 0, load_flow(work, ONE_LANE, 0)._replace(taken_s=9.9))
     for component in range(2):
         own, other = read[component], read[1 - component]
         sign_flow(work, ONE_LANE, 10.0, component, angular)
@@ -270,7 +269,7 @@ def test_while_a_reversed_flow_is_possible_what_is_left_over_grows_by_twice_the_
     work[FLOW_SPEED] = 3.0
     work[GPS_FUSED] = -np.inf if unheld else np.inf
     if doubted:
-        store_flow(work, ONE_LANE, 0, load_flow(work, ONE_LANE, 0)._replace(doubted_s=1.0))
+        store_flow(work, ONE_LANE, 0, load_flow(work, ONE_LANE, 0)._replace(doubted=1.0))
     evident(work, FLOW_REVERSED, 0.3, evidence)
     minded.at(5.0, 0.1)
     assert work[PUZZLED_AT] == 5.0

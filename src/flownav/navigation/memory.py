@@ -143,11 +143,16 @@ _FRESH: dict[int, tuple[float, ...]] = {
 }
 
 
-def new_work(lanes: Lanes) -> Array:
-    """The lane buffer of a navigator that has heard nothing, (WORK_ROWS * len(lanes),)."""
+def new_work(lanes: Lanes, *, faults: bool = True) -> Array:
+    """The lane buffer of a navigator that has heard nothing, (WORK_ROWS * len(lanes),).
+
+    faults: whether it follows what faults would do; that changes no bit of its estimate.
+    """
     work = np.zeros((WORK_ROWS, len(lanes)))
     for first, values in _FRESH.items():
         work[first : first + len(values)] = np.array(values)[:, None]
+    if not faults:
+        work[HYPOTHESES] = 0.0
     return work.ravel()
 
 

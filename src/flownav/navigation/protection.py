@@ -118,6 +118,8 @@ def sign_flow(work: Work, lanes: Lanes, t_s: float, component: int, angular: boo
     before, so that the gyro's noise, which is in the innovation too, does not pass for a fault (an instrumental
     variable: Young, Recursive Estimation and Time-Series Analysis, 2011, chapter 6).
     """
+    if work[HYPOTHESES * len(lanes)] == 0.0:
+        return
     for lane in range(len(lanes)):
         u, v, _ = to_body(
             rotation_of(work, lanes, lane),
@@ -199,6 +201,8 @@ def levels(work: Work, lanes: Lanes, lane: int) -> Levels:
 @procedure
 def set_levels(work: Work, lanes: Lanes) -> None:
     """PROTECTION: the levels of every lane at this instant."""
+    if work[HYPOTHESES * len(lanes)] == 0.0:
+        return
     for lane in range(len(lanes)):
         found = levels(work, lanes, lane)
         set_lane(work, lanes, PROTECTION, lane, found.horizontal_m)
@@ -225,6 +229,8 @@ def exclude(work: Work, lanes: Lanes, lane: int, fault: int) -> None:
 @procedure
 def mind_faults(work: Work, lanes: Lanes, t_s: float, dt_s: float, o: Output) -> None:
     """Say which fault is suspected, and when none is any more; what was told of them fades."""
+    if work[HYPOTHESES * len(lanes)] == 0.0:
+        return
     kept = np.exp(-dt_s / MEMORY_S)
     fade(work, lanes, kept)
     for lane in range(len(lanes)):

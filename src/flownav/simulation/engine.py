@@ -69,7 +69,7 @@ def fly_into(
 ) -> None:
     """Fly a block into its buffers. compiled False: in plain Python (tests; it is a thousand times slower)."""
     if len(b.nav):
-        b.nav[:] = new_work(lanes)
+        b.nav[:] = new_work(lanes, faults=len(b.tape.estimate) > 0)  # a campaign that writes nothing reads no levels
     b.tape.used[:] = 0
     room = np.array([*room_of(b.tape), len(b.fed)])
     told = flight, seed, first, lanes, b.work, b.nav

@@ -186,6 +186,11 @@ def test_the_level_is_the_largest_over_all_that_may_have_happened(work):
     work[LEFT_OVER] = 0.0
     work[SCALE_DOUBT], work[STATE + POSITION], work[STATE + POSITION + 1] = 0.1, 60.0, 80.0
     set_levels(work, ONE_LANE)
+    assert np.isnan(work[PROTECTION : PROTECTION + 2]).all()  # nothing is followed, nothing is stated
+    work[HYPOTHESES] = COUNT
+    for fault in (HEADING_OFF, RANGE_OFFSET):
+        put_effect(work, fault)
+    set_levels(work, ONE_LANE)
     axes = np.linalg.eigvalsh([[4.0 + 36.0, 48.0], [48.0, 1.0 + 64.0]])
     assert work[PROTECTION] == pytest.approx(SIGMAS * np.sqrt(axes[-1]))
     assert work[PROTECTION + 1] == pytest.approx(SIGMAS * 3.0)

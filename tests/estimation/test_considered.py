@@ -34,8 +34,9 @@ from flownav.estimation.states import (
     STATES,
 )
 from flownav.navigation.flow import consider_others
+from flownav.navigation.memory import SOUGHT, new_work
 from flownav.navigation.take import consider_datum
-from flownav.navigation.told import NO_HEADING, Equipment
+from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
 
 SEEDS = st.integers(0, 2**32 - 1)
 HEADING = ATTITUDE + 2
@@ -226,15 +227,21 @@ def test_correct_alone_considers_too():
 
 
 def test_a_flow_without_heading_considers_no_more_than_there_is_room_for():
-    ours = Filter()
-    consider_datum(ours.work, ONE_LANE, Equipment(True, False, NO_HEADING, False, -np.inf))
-    assert list(ours.rows(CONSIDERED, 5)) == [2, HEADING, 0, GYRO_BIAS + 2, 0]
-    consider_others(ours.work, ONE_LANE)
-    assert ours.work[CONSIDERED] < MOST_CONSIDERED
-    consider_none(ours.work, ONE_LANE)
-    consider_datum(ours.work, ONE_LANE, Equipment(True, False, NO_HEADING, False, 10.0))  # sought from the course
-    consider_others(ours.work, ONE_LANE)
-    assert ours.work[CONSIDERED] < MOST_CONSIDERED
-    consider_none(ours.work, ONE_LANE)
-    consider_datum(ours.work, ONE_LANE, Equipment(False, True, NO_HEADING, False, -np.inf))  # an attitude tells it
-    assert ours.work[CONSIDERED] == 0.0
+    work = new_work(ONE_LANE)
+    consider_datum(work, ONE_LANE, Equipment(True, False, NO_HEADING, False, -np.inf))
+    assert work[CONSIDERED : CONSIDERED + 5].tolist() == [2, HEADING, 0, GYRO_BIAS + 2, 0]
+    consider_others(work, ONE_LANE)
+    assert work[CONSIDERED] < MOST_CONSIDERED
+    consider_none(work, ONE_LANE)
+    for heading in (NO_HEADING, FROM_MAG):  # sought from the course, whatever was to tell it
+        consider_datum(work, ONE_LANE, Equipment(True, False, heading, False, 10.0))
+        assert work[CONSIDERED] == 0.0
+        work[SOUGHT] = 1.0
+        consider_datum(work, ONE_LANE, Equipment(True, False, heading, False, 10.0))
+        assert work[CONSIDERED : CONSIDERED + 3].tolist() == [9, HEADING, SOUGHT]
+        consider_others(work, ONE_LANE)
+        assert work[CONSIDERED] < MOST_CONSIDERED
+        consider_none(work, ONE_LANE)
+        work[SOUGHT] = 0.0
+    consider_datum(work, ONE_LANE, Equipment(False, True, NO_HEADING, False, -np.inf))  # an attitude tells it
+    assert work[CONSIDERED] == 0.0

@@ -109,15 +109,8 @@ def fade(work: Work, lanes: Lanes, factor: float) -> None:
 
 
 @procedure
-def begin_anew(work: Work, lanes: Lanes, n: int, fault: int) -> None:
-    """A fault that would begin now: it has done nothing yet, and nothing is known of it."""
-    for lane in range(len(lanes)):
-        begin_lane_anew(work, lanes, n, fault, lane)
-
-
-@procedure
 def begin_lane_anew(work: Work, lanes: Lanes, n: int, fault: int, lane: int) -> None:
-    """The same in one lane."""
+    """A fault that would begin now in this lane: it has done nothing yet, and nothing is known of it."""
     for i in range(n):
         work[at(i, n + fault) * len(lanes) + lane] = 0.0
     work[(INFORMATION + fault) * len(lanes) + lane] = 0.0

@@ -25,6 +25,7 @@ from flownav.measurement import Sensor
 from flownav.navigation.journal import reset_state
 from flownav.navigation.memory import (
     GPS_FUSED,
+    GPS_MOVED,
     LEVEL_RATIO,
     REASON,
     STEADY_FORCE,
@@ -179,4 +180,6 @@ def go_to_gps(
     state = STATE + (POSITION if position else VELOCITY) + axis
     before = work[state * len(lanes) + lane]
     work[state * len(lanes) + lane] = value
+    if position and axis < 2:  # whether GPS jumped or the filter was wrong, nobody knows
+        work[(GPS_MOVED + axis) * len(lanes) + lane] += value - before
     write_event(lanes, lane, t_s, GPS_RESET, value - before, o)

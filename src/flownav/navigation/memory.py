@@ -83,6 +83,7 @@ TURNED_BEFORE = _rows.take(2)  # TURNING at the reading before
 FLOW_SPEED = _rows.take(1)  # of both together, over the ground, turning and all [m/s]
 PUZZLED_AT = _rows.take(1)  # when innovations last hinted at a flow that is reversed or swapped [s]
 PROTECTION = _rows.take(2)  # levels at the last estimate, horizontal and vertical [m]
+GPS_MOVED = _rows.take(2)  # how far resets to GPS have moved the position, north and east, back and forth summed up [m]
 LEFT_OVER = _rows.take(1)  # how far off a fault may have put the position before it was excluded [m]
 SUSPECTED_AT = _rows.take(1)  # since when a fault is suspected [s]
 SUSPECTED = _rows.take(1)  # 0, or 1 and the number of the fault of `hypotheses` that is suspected

@@ -25,7 +25,6 @@ from flownav.estimation.hypotheses import (
     HEADING_OFF,
     RANGE_OFFSET,
     Size,
-    begin_anew,
     begin_lane_anew,
     effect_of,
     fade,
@@ -51,6 +50,7 @@ from flownav.navigation.memory import (
     FLOW_BEFORE,
     FLOW_SPEED,
     GPS_FUSED,
+    GPS_MOVED,
     LEFT_OVER,
     LENS_RANGE,
     PROTECTION,
@@ -151,15 +151,11 @@ def sign_flow(work: Work, lanes: Lanes, t_s: float, component: int, angular: boo
                 work[(TURNED_BEFORE + i) * len(lanes) + lane] = turned if np.isfinite(turned) else 0.0
 
 
-@procedure
-def sign_drift(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
-    """Of an axis of a GPS position: the time since the drift began."""
-    since_s = shared(work, lanes, DRIFT_SINCE)
-    if t_s - since_s > DRIFT_S:
-        share(work, lanes, DRIFT_SINCE, t_s)
-        for i in range(3):
-            begin_anew(work, lanes, states_of(lanes), GPS_DRIFT + i)
-    sign_all(work, lanes, GPS_DRIFT + axis, t_s - shared(work, lanes, DRIFT_SINCE))
+@equation
+def size_in(work: Work, lanes: Lanes, fault: int, lane: int) -> Size:
+    """What is known of a fault's size in a lane."""
+    information, score = work[(INFORMATION + fault) * len(lanes) + lane], work[(SCORE + fault) * len(lanes) + lane]
+    return size_of(information, score, prior_sigma(fault))
 
 
 @equation
@@ -167,6 +163,29 @@ def largest_size(fault: int, found: Size) -> float:
     """What its innovations leave possible of a fault; one that is there or is not has a size of 1."""
     size = abs(found.size) + SIZE_SIGMAS * found.sigma
     return size if fault < FLOW_SWAPPED else smaller(size, 1.0)
+
+
+@equation
+def leave_over(work: Work, lanes: Lanes, lane: int, fault: int) -> None:
+    """What a fault may have done to the position, before it is sought anew: root sum square with what was."""
+    north = effect_of(work, lanes, states_of(lanes), fault, POSITION, lane)
+    east = effect_of(work, lanes, states_of(lanes), fault, POSITION + 1, lane)
+    done_m = np.sqrt(north * north + east * east) * largest_size(fault, size_in(work, lanes, fault, lane))
+    before_m = of_lane(work, lanes, LEFT_OVER, lane)
+    set_lane(work, lanes, LEFT_OVER, lane, np.sqrt(before_m * before_m + done_m * done_m))
+
+
+@procedure
+def sign_drift(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
+    """Of an axis of a GPS position: the time since the drift began."""
+    since_s = shared(work, lanes, DRIFT_SINCE)
+    if t_s - since_s > DRIFT_S:
+        share(work, lanes, DRIFT_SINCE, t_s)
+        for i in range(3):
+            for lane in range(len(lanes)):
+                leave_over(work, lanes, lane, GPS_DRIFT + i)
+                begin_lane_anew(work, lanes, states_of(lanes), GPS_DRIFT + i, lane)
+    sign_all(work, lanes, GPS_DRIFT + axis, t_s - shared(work, lanes, DRIFT_SINCE))
 
 
 # -- levels and suspicions --------------------------------------------------------------------------------------
@@ -184,9 +203,7 @@ def levels(work: Work, lanes: Lanes, lane: int) -> Levels:
     down_m = np.sqrt(larger(variance_of(work, lanes, POSITION + 2, lane), 0.0))
     horizontal_m, vertical_m = SIGMAS * own_m, SIGMAS * down_m
     for k in range(int(work[HYPOTHESES * len(lanes)])):
-        found = size_of(
-            work[(INFORMATION + k) * len(lanes) + lane], work[(SCORE + k) * len(lanes) + lane], prior_sigma(k)
-        )
+        found = size_in(work, lanes, k, lane)
         largest = largest_size(k, found)
         north = effect_of(work, lanes, states_of(lanes), k, POSITION, lane)
         east = effect_of(work, lanes, states_of(lanes), k, POSITION + 1, lane)
@@ -194,7 +211,9 @@ def levels(work: Work, lanes: Lanes, lane: int) -> Levels:
         level_m = np.sqrt(north * north + east * east)
         horizontal_m = larger(horizontal_m, SIGMAS_BESIDE * own_m + level_m * largest)
         vertical_m = larger(vertical_m, SIGMAS_BESIDE * down_m + abs(down) * largest)
-    left_m = SIGMAS_BESIDE * own_m + work[LEFT_OVER * len(lanes) + lane]
+    north_m, east_m = work[GPS_MOVED * len(lanes) + lane], work[(GPS_MOVED + 1) * len(lanes) + lane]
+    moved_m = np.sqrt(north_m * north_m + east_m * east_m)
+    left_m = SIGMAS_BESIDE * own_m + work[LEFT_OVER * len(lanes) + lane] + moved_m
     return Levels(larger(horizontal_m, left_m), vertical_m)
 
 
@@ -214,15 +233,9 @@ def exclude(work: Work, lanes: Lanes, lane: int, fault: int) -> None:
     """A fault that is there or is not, and that innovations exclude since the instant from which it was sought: it is
     sought from now on. What it may have done until it was excluded, had it begun in between, is remembered.
     """
-    found = size_of(
-        work[(INFORMATION + fault) * len(lanes) + lane], work[(SCORE + fault) * len(lanes) + lane], prior_sigma(fault)
-    )
+    found = size_in(work, lanes, fault, lane)
     if 1.0 - found.size > EXCLUDED * found.sigma:
-        north = effect_of(work, lanes, states_of(lanes), fault, POSITION, lane)
-        east = effect_of(work, lanes, states_of(lanes), fault, POSITION + 1, lane)
-        done_m = np.sqrt(north * north + east * east) * largest_size(fault, found)
-        before_m = of_lane(work, lanes, LEFT_OVER, lane)
-        set_lane(work, lanes, LEFT_OVER, lane, np.sqrt(before_m * before_m + done_m * done_m))
+        leave_over(work, lanes, lane, fault)
         begin_lane_anew(work, lanes, states_of(lanes), fault, lane)
 
 
@@ -237,9 +250,7 @@ def mind_faults(work: Work, lanes: Lanes, t_s: float, dt_s: float, o: Output) ->
         work[LEFT_OVER * len(lanes) + lane] *= kept
         worst, which, worst_flow = 0.0, 0, 0.0
         for k in range(int(work[HYPOTHESES * len(lanes)])):
-            found = size_of(
-                work[(INFORMATION + k) * len(lanes) + lane], work[(SCORE + k) * len(lanes) + lane], prior_sigma(k)
-            )
+            found = size_in(work, lanes, k, lane)
             evidence = found.evidence if abs(found.size) > least_size(k) else 0.0
             which = k if evidence > worst else which
             worst = larger(worst, evidence)

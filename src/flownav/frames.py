@@ -5,12 +5,15 @@ Quaternions are Hamilton, body to earth, `(w, x, y, z)`. Euler angles are Z-Y-X 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from flownav.compile import equation
 
 GRAVITY_M_S2 = 9.80665  # standard gravity
 
+Scalar = Any  # a float, a complex number, or an array of them, element by element
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 Rotation = tuple[float, float, float, float, float, float, float, float, float]
@@ -90,5 +93,20 @@ def euler_from_quaternion(w: float, x: float, y: float, z: float) -> Vector:
     return (
         np.arctan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
         np.arcsin(min(1.0, max(-1.0, 2.0 * (w * y - x * z)))),
-        np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)),
+        heading_from_quaternion(w, x, y, z),
     )
+
+
+@equation
+def heading_from_quaternion(w: Scalar, x: Scalar, y: Scalar, z: Scalar) -> Scalar:
+    """Yaw [rad] of a unit quaternion."""
+    return np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+
+
+@equation
+def velocity_from_flow(flow_x: Scalar, flow_y: Scalar, range_m: Scalar) -> tuple[Scalar, Scalar]:
+    """Forward and right [m/s] by an angular flow [rad/s] less the vehicle's turning.
+
+    PX4's convention: flow_x = -v / r, flow_y = u / r.
+    """
+    return flow_y * range_m, -flow_x * range_m

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compare.tracks import Track
-from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.frames import heading_from_quaternion, rotation_from_quaternion, to_earth, velocity_from_flow
 from flownav.logs.rates import attitude_at
 from flownav.measurement import Array, Sensor, Stream
 from flownav.scoring.drift import Motion
@@ -43,8 +43,7 @@ def dead_reckoned(flow: Stream, distance: Stream | None, attitude: Stream) -> Tr
     velocity = np.where(np.isfinite(velocity), velocity, 0.0)
     position = np.column_stack([_summed(t_s, velocity), -range_m * upright])
     w, x, y, z = quaternion.T
-    heading = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
-    return Track(Motion(t_s, position, t_s, heading), velocity)
+    return Track(Motion(t_s, position, t_s, np.asarray(heading_from_quaternion(w, x, y, z))), velocity)
 
 
 def _known(distance: Stream | None) -> tuple[Array, Array] | None:
@@ -72,7 +71,7 @@ def _body_velocity(flow: Stream, range_m: Array) -> tuple[Array, Array]:
     if flow.sensor == Sensor.FLOW_VELOCITY:
         return flow.value[:, 0], flow.value[:, 1]
     flow_x, flow_y, gyro_x, gyro_y = flow.value[:, :4].T
-    return (flow_y - gyro_y) * range_m, -(flow_x - gyro_x) * range_m
+    return velocity_from_flow(flow_x - gyro_x, flow_y - gyro_y, range_m)
 
 
 def _summed(t_s: Array, velocity: Array) -> Array:

@@ -16,6 +16,7 @@ from flownav.export.stamps import Stamps, finite_rows, stamps
 from flownav.export.tables import is_text
 from flownav.export.trajectory import Trajectory
 from flownav.export.ulog_messages import Field, Stamped, Topic, logged
+from flownav.frames import heading_from_quaternion
 from flownav.record import POSITION_NED, VELOCITY_BODY, Record, Table
 
 US = 1e6
@@ -55,8 +56,7 @@ def position_topic(record: Record, path: Trajectory, name: str, shift_s: float) 
     ]
     if path.oriented:
         w, x, y, z = path.quaternion.T
-        heading = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
-        fields.append(Field("float", "heading", heading))
+        fields.append(Field("float", "heading", np.asarray(heading_from_quaternion(w, x, y, z))))
     if set(STD[:3]) <= table.keys():
         north, east, down = (np.asarray(table[name], float)[path.row] for name in STD[:3])
         fields += [Field("float", "eph", np.hypot(north, east)), Field("float", "epv", down)]

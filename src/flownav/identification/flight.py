@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flownav.errors import InputError
 from flownav.frames import GRAVITY_M_S2 as GRAVITY_M_S2
-from flownav.frames import rotation_from_quaternion
+from flownav.frames import rotation_from_quaternion, velocity_from_flow
 from flownav.identification.usable import Ranges, believed, beside
 from flownav.logs.log import Log
 from flownav.logs.rates import attitude_at
@@ -134,8 +134,8 @@ def _ranges(log: Log) -> Ranges:
 def _velocity_and_rate(sensor: Sensor, value: Array, range_m: Array) -> tuple[Array, Array]:
     """The sensor's velocity along body x and y (n, 2), and the flow that it saw [rad/s]; value as prepared."""
     if sensor == Sensor.FLOW_RATE:
-        turned_off = [(value[:, 1] - value[:, 3]) * range_m, (value[:, 2] - value[:, 0]) * range_m]
-        return np.column_stack(turned_off), value[:, :2]
+        flow_x, flow_y = (value[:, :2] - value[:, 2:4]).T
+        return np.column_stack(velocity_from_flow(flow_x, flow_y, range_m)), value[:, :2]
     return value[:, :2], value[:, :2] / np.maximum(range_m, 0.1)[:, None]
 
 

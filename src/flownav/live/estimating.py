@@ -9,6 +9,7 @@ import numpy as np
 from flownav.compile import ONE_LANE
 from flownav.estimation.covariance import unpack
 from flownav.estimation.states import ATTITUDE, GYRO_BIAS, POSITION, STATES, VELOCITY
+from flownav.frames import heading_from_quaternion
 from flownav.live.options import Limits
 from flownav.mavlink.outgoing import Estimate
 from flownav.measurement import Array
@@ -58,7 +59,7 @@ def estimate_of(on: Running, imu: Array, t_s: float, boot_s: float, resets: int)
     """The state carried on to t_s. imu (n, 7): readings later than the filter's clock. boot_s: t_s on their clock."""
     state = [float(value) for value in state_at(on.work, on.settings, imu, t_s)]
     covariance = unpack(on.work, ONE_LANE, 0, STATES)
-    pose, velocity = _covariances(on, covariance, max(t_s - on.clock_s, 0.0), _heading(state[6:10]))
+    pose, velocity = _covariances(on, covariance, max(t_s - on.clock_s, 0.0), heading_from_quaternion(*state[6:10]))
     if not on.told.equipment.use_imu:
         state[10:13] = [float("nan")] * 3
     return Estimate(
@@ -112,8 +113,3 @@ def _covariances(on: Running, covariance: Array, dt_s: float, heading_rad: float
     velocity[:3, :3] = block[VELOCITY : VELOCITY + 3, VELOCITY : VELOCITY + 3]
     velocity[3:, 3:] = covariance[GYRO_BIAS : GYRO_BIAS + 3, GYRO_BIAS : GYRO_BIAS + 3]
     return pose, velocity
-
-
-def _heading(quaternion: list[float]) -> float:
-    w, x, y, z = quaternion
-    return math.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))

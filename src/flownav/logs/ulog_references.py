@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.frames import rotation_from_quaternion, to_body
+from flownav.frames import heading_from_quaternion, rotation_from_quaternion, to_body
 from flownav.logs.rates import attitude_at
 from flownav.logs.states import state_table
 from flownav.logs.ulog_topics import Topic, Topics
@@ -146,7 +146,7 @@ def _heading_between(odometry: Topic, attitude: Stream | None) -> float:
 def _heading(quaternion: Array) -> NDArray[np.float64]:
     """Heading [rad] of quaternions (n, 4)."""
     w, x, y, z = quaternion.T
-    return np.asarray(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))
+    return np.asarray(heading_from_quaternion(w, x, y, z))
 
 
 def _with_heading(quaternion: Array, heading: Array) -> Array:

@@ -11,7 +11,7 @@ from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import ATTITUDE, INNOVATION, MEASURED, QUATERNION
-from flownav.frames import quaternion_product, rotation_from_quaternion, to_earth
+from flownav.frames import heading_from_quaternion, quaternion_product, rotation_from_quaternion, to_earth
 from flownav.navigation.memory import (
     COMPASS_OFF,
     OBSERVATION,
@@ -24,7 +24,7 @@ from flownav.navigation.memory import (
     store_heading,
     store_imu,
 )
-from flownav.navigation.offers import conclude, put, usable_in_flight
+from flownav.navigation.offers import conclude, is_heard, put, usable_in_flight
 from flownav.navigation.packed import load_attitude_settings
 from flownav.navigation.reasons import FUSED, NO_HEADING, NOT_FINITE, SILENT
 from flownav.navigation.records import BridgeMemory, HeadingMemory, ImuMemory, Reading
@@ -65,7 +65,7 @@ def take_attitude(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equ
             reason, size = judge_attitude(reading, started)
             w, x = reading.value_0 / size, reading.value_1 / size
             y, z = reading.value_2 / size, reading.value_3 / size
-            read = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+            read = heading_from_quaternion(w, x, y, z)
             put_heading(work, lanes, lane, t_s, read, np.nan, SILENT if reason != FUSED else reason, s)
         heading(work, lanes, 0)
         sign_all(work, lanes, HEADING_OFF, 1.0)
@@ -212,7 +212,7 @@ def take_yaw(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipmen
     for lane in range(len(lanes)):
         reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
         reason = usable_in_flight(reading, reading.value_0, 0.0, started)
-        heard = reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
+        heard = is_heard(reading)
         if started == 0.0 and heard and np.isfinite(reading.value_0) and fitted.heading == FROM_YAW:
             store_heading(work, lanes, lane, HeadingMemory(load_heading(work, lanes, lane).read_s, -reading.value_0))
         put_heading(work, lanes, lane, t_s, reading.value_0, reading.variance_0, reason, s)

@@ -13,10 +13,11 @@ import numpy as np
 from flownav.compile import equation, procedure, smaller
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, FORCE, STATE
-from flownav.navigation.course import LEAST_TRAVEL_M, judge_course, turn_heading, with_gps
+from flownav.navigation.course import LEAST_TRAVEL_M, judge_course, turn_between, turn_heading, with_gps
 from flownav.navigation.journal import reset_state
 from flownav.navigation.memory import (
     COMPASS_OFF,
+    PUSH,
     SOUGHT,
     load_course,
     load_push,
@@ -24,6 +25,7 @@ from flownav.navigation.memory import (
     store_course,
     store_push,
 )
+from flownav.navigation.offers import is_heard
 from flownav.navigation.records import CourseMemory, PushMemory, Reading
 from flownav.navigation.tape import COMPASS_REFUTED, Output, write_event
 
@@ -72,9 +74,8 @@ def faded(t_s: float, m: CourseMemory) -> CourseMemory:
 @equation
 def judge_push(m: PushMemory) -> tuple[bool, float]:
     """Whether the accelerometer says how the heading errs, and by how much: true less own [rad]."""
-    power = m.gps * m.own
-    likeness = np.sqrt((m.along * m.along + m.across * m.across) / power) if power > 0.0 else 0.0
-    return m.gps >= LEAST_PUSH_M_S * LEAST_PUSH_M_S and likeness >= LEAST_LIKENESS, np.arctan2(m.across, m.along)
+    likeness, error_rad = turn_between(m.along, m.across, m.gps * m.own)
+    return m.gps >= LEAST_PUSH_M_S * LEAST_PUSH_M_S and likeness >= LEAST_LIKENESS, error_rad
 
 
 @equation
@@ -89,11 +90,9 @@ def refuted(course: CourseMemory, push: PushMemory) -> tuple[bool, float]:
 @procedure
 def note_push(work: Work, lanes: Lanes, dt_s: float) -> None:
     """What the step that was just made adds to the velocity, by the filter's own heading."""
-    for lane in range(len(lanes)):
-        m = load_push(work, lanes, lane)
-        north = m.push_n + dt_s * work[FORCE * len(lanes) + lane]
-        east = m.push_e + dt_s * work[(FORCE + 1) * len(lanes) + lane]
-        store_push(work, lanes, lane, PushMemory(north, east, m.v_n, m.v_e, m.since_s, m.along, m.across, m.gps, m.own))
+    for i in range(2):
+        for lane in range(len(lanes)):
+            work[(PUSH + i) * len(lanes) + lane] += dt_s * work[(FORCE + i) * len(lanes) + lane]
 
 
 @procedure
@@ -101,8 +100,7 @@ def check_compass(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
     """At a GPS velocity: where both witnesses refute the compass, the heading is turned and the compass dismissed."""
     for lane in range(len(lanes)):
         reading = load_reading(work, lanes, lane)
-        heard = reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
-        heard = heard and bool(np.isfinite(reading.value_0 + reading.value_1))
+        heard = is_heard(reading) and bool(np.isfinite(reading.value_0 + reading.value_1))
         if not heard or work[COMPASS_OFF * len(lanes) + lane] > 0.0:
             continue
         course = with_gps(reading, t_s, faded(t_s, load_course(work, lanes, lane)))
@@ -125,3 +123,6 @@ def check_compass(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
                 CourseMemory(0.0, 0.0, 0.0, 0.0, LEAST_TRAVEL_M - ONCE_MORE_M, t_s, -np.inf, 0.0, 0.0),
             )
             write_event(lanes, lane, t_s, COMPASS_REFUTED, error_rad, o)
+
+
+assert PushMemory._fields[:2] == ("push_n", "push_e")

@@ -14,9 +14,10 @@ from flownav.compile import equation, procedure
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import ATTITUDE, QUATERNION
-from flownav.frames import quaternion_product
+from flownav.frames import quaternion_product, velocity_from_flow
 from flownav.navigation.journal import reset_state
 from flownav.navigation.memory import LENS_RANGE, SOUGHT, TURNING, load_course, load_reading, store_course
+from flownav.navigation.offers import is_heard
 from flownav.navigation.records import CourseMemory, Reading
 from flownav.navigation.tape import HEADING_FOUND, Output, write_event
 
@@ -55,11 +56,19 @@ def with_gps(reading: Reading, t_s: float, m: CourseMemory) -> CourseMemory:
 
 
 @equation
+def turn_between(along: float, across: float, power: float) -> tuple[float, float]:
+    """How alike two velocities are but for a turn (1: wholly), and that turn [rad], by the sums of v.w, v x w and the
+    product of those of their squares.
+    """
+    likeness = np.sqrt((along * along + across * across) / power) if power > 0.0 else 0.0
+    return likeness, np.arctan2(across, along)
+
+
+@equation
 def judge_course(m: CourseMemory) -> tuple[bool, float]:
     """Whether the way says how the heading errs, and by how much: true less own [rad]."""
-    power = m.gps * m.flow
-    likeness = np.sqrt((m.along * m.along + m.across * m.across) / power) if power > 0.0 else 0.0
-    return m.travel_m >= LEAST_TRAVEL_M and likeness >= LEAST_LIKENESS, np.arctan2(m.across, m.along)
+    likeness, error_rad = turn_between(m.along, m.across, m.gps * m.flow)
+    return m.travel_m >= LEAST_TRAVEL_M and likeness >= LEAST_LIKENESS, error_rad
 
 
 @procedure
@@ -72,11 +81,11 @@ def note_flow_course(work: Work, lanes: Lanes, t_s: float, angular: bool, sought
         range_m = work[LENS_RANGE * len(lanes) + lane]
         x = reading.value_0 - (work[TURNING * len(lanes) + lane] if angular else 0.0)
         y = reading.value_1 - (work[(TURNING + 1) * len(lanes) + lane] if angular else 0.0)
-        u, v = (y * range_m, -x * range_m) if angular else (x, y)
+        u, v = velocity_from_flow(x, y, range_m) if angular else (x, y)
         rotation = rotation_of(work, lanes, lane)
         level = np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
         cosine, sine = rotation[0] / level, rotation[3] / level
-        if reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0 and np.isfinite(u + v):
+        if is_heard(reading) and np.isfinite(u + v):
             after = with_flow(cosine * u - sine * v, sine * u + cosine * v, t_s, load_course(work, lanes, lane))
             store_course(work, lanes, lane, after)
 
@@ -87,7 +96,7 @@ def find_heading(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
     for lane in range(len(lanes)):
         reading = load_reading(work, lanes, lane)
         unknown = work[SOUGHT * len(lanes) + lane] > 0.0
-        heard = reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
+        heard = is_heard(reading)
         if not unknown or not heard or not np.isfinite(reading.value_0 + reading.value_1):
             continue
         m = with_gps(reading, t_s, load_course(work, lanes, lane))

@@ -44,14 +44,13 @@ from flownav.navigation.height import MANY_STRAYS
 from flownav.navigation.lagged_flow import observe_lagged
 from flownav.navigation.memory import (
     BLIND,
-    GPS_FUSED,
     INNOVATION_BEFORE,
     LENS_RANGE,
     REASON,
     SOUGHT,
     TESTED,
     TURNING,
-    UNHELD_S,
+    held_by_gps,
     load_echo,
     load_flow,
     load_ground,
@@ -192,7 +191,7 @@ def look(work: Work, lanes: Lanes, t_s: float, angular: bool, gyro_is_imu: bool,
         verdict = judge_flow(reading, angular, x, y, started, view, s)
         headed = verdict != FUSED or work[SOUGHT * len(lanes) + lane] == 0.0
         work[TESTED * len(lanes) + lane] = verdict if headed else NO_HEADING
-        held = t_s - work[GPS_FUSED * len(lanes) + lane] <= UNHELD_S
+        held = held_by_gps(work, lanes, lane, t_s)
         work[HELD_BACK * len(lanes) + lane] = 1.0 if held and np.isfinite(m.wrong_s) else 0.0
 
 
@@ -254,7 +253,7 @@ def learn(work: Work, lanes: Lanes, t_s: float, angular: bool, component: int, s
             innovation, total = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]
             square = smaller(innovation * innovation, s.gate_sigma * s.gate_sigma * total) / total
             ratio = followed_agreement(square, t_s, m)
-            unheld = t_s - work[GPS_FUSED * len(lanes) + lane] > UNHELD_S
+            unheld = not held_by_gps(work, lanes, lane, t_s)
             last = INNOVATION_BEFORE + component
             before = work[last * len(lanes) + lane]
             work[last * len(lanes) + lane] = innovation
@@ -286,7 +285,7 @@ def free_velocity(work: Work, lanes: Lanes, lane: int, innovation: float, angula
 def walk_alone(work: Work, lanes: Lanes, t_s: float, s: FlowSettings) -> None:
     """Where no GPS holds the position, it is less sure by what lasts of the flow's error since the reading before."""
     for lane in range(len(lanes)):
-        unheld = t_s - work[GPS_FUSED * len(lanes) + lane] > UNHELD_S
+        unheld = not held_by_gps(work, lanes, lane, t_s)
         step_s = smaller(t_s - load_flow(work, lanes, lane).taken_s, LONGEST_STEP_S)
         north, east = work[(STATE + VELOCITY) * len(lanes) + lane], work[(STATE + VELOCITY + 1) * len(lanes) + lane]
         walk = lasting_walk(work[LENS_RANGE * len(lanes) + lane], np.sqrt(north * north + east * east), s)

@@ -178,6 +178,12 @@ def of_lane(work: Work, lanes: Lanes, row: int, lane: int) -> float:
 
 
 @equation
+def held_by_gps(work: Work, lanes: Lanes, lane: int, t_s: float) -> bool:
+    """Whether GPS told the level velocity or place of a lane lately."""
+    return t_s - work[GPS_FUSED * len(lanes) + lane] <= UNHELD_S  # type: ignore[no-any-return]
+
+
+@equation
 def set_lane(work: Work, lanes: Lanes, row: int, lane: int, value: float) -> None:
     """Set one row's value in a lane."""
     work[row * len(lanes) + lane] = value

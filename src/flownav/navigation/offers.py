@@ -40,6 +40,12 @@ COLOR = 4.0  # so many readings after one another err alike
 
 # -- checks -----------------------------------------------------------------------------------------------
 @equation
+def is_heard(reading: Reading) -> bool:
+    """Whether a reading is there for one who only listens: it arrived, has data and is not withheld."""
+    return reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
+
+
+@equation
 def usable(reading: Reading, value: float, variance: float, started: float) -> int:
     """FUSED where a reading may be offered, or the reason why not; SILENT where there is none."""
     reason = FUSED if np.isfinite(value + variance) else NOT_FINITE

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import equation, larger, procedure, smaller
-from flownav.estimation.covariance import covariance_of, states_of, variance_of
+from flownav.estimation.covariance import covariance_of, states_of
 from flownav.estimation.hypotheses import (
     COUNT,
     FLOW_AGE,
@@ -49,7 +49,6 @@ from flownav.navigation.memory import (
     DRIFT_SINCE,
     FLOW_BEFORE,
     FLOW_SPEED,
-    GPS_FUSED,
     GPS_MOVED,
     LEFT_OVER,
     LENS_RANGE,
@@ -60,14 +59,14 @@ from flownav.navigation.memory import (
     SUSPECTED_AT,
     TURNED_BEFORE,
     TURNING,
-    UNHELD_S,
+    held_by_gps,
     load_flow,
     of_lane,
     set_lane,
     share,
     shared,
 )
-from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, Output, write_event
+from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, Output, position_variance, write_event
 
 SIGMAS = 4.0  # of the filter's own error, where nothing fails
 SIGMAS_BESIDE = 2.0  # of it, beside a fault
@@ -96,9 +95,7 @@ def prior_sigma(fault: int) -> float:
         return 0.05
     if fault == RANGE_OFFSET:
         return 0.1
-    if fault < HEADING_OFF:
-        return 0.2
-    if fault == HEADING_OFF:
+    if fault <= HEADING_OFF:  # GPS drift [m/s], and heading [rad]
         return 0.2
     return 0.1 if fault < FLOW_SWAPPED else 1.0
 
@@ -166,11 +163,18 @@ def largest_size(fault: int, found: Size) -> float:
 
 
 @equation
-def leave_over(work: Work, lanes: Lanes, lane: int, fault: int) -> None:
-    """What a fault may have done to the position, before it is sought anew: root sum square with what was."""
+def level_effect(work: Work, lanes: Lanes, fault: int, lane: int) -> float:
+    """How far one unit of a fault has moved the position horizontally [m]."""
     north = effect_of(work, lanes, states_of(lanes), fault, POSITION, lane)
     east = effect_of(work, lanes, states_of(lanes), fault, POSITION + 1, lane)
-    done_m = np.sqrt(north * north + east * east) * largest_size(fault, size_in(work, lanes, fault, lane))
+    moved_m: float = np.sqrt(north * north + east * east)
+    return moved_m
+
+
+@equation
+def leave_over(work: Work, lanes: Lanes, lane: int, fault: int) -> None:
+    """What a fault may have done to the position, before it is sought anew: root sum square with what was."""
+    done_m = level_effect(work, lanes, fault, lane) * largest_size(fault, size_in(work, lanes, fault, lane))
     before_m = of_lane(work, lanes, LEFT_OVER, lane)
     set_lane(work, lanes, LEFT_OVER, lane, np.sqrt(before_m * before_m + done_m * done_m))
 
@@ -196,20 +200,16 @@ def levels(work: Work, lanes: Lanes, lane: int) -> Levels:
     north_m = doubt * work[(STATE + POSITION) * len(lanes) + lane]
     east_m = doubt * work[(STATE + POSITION + 1) * len(lanes) + lane]
     own_m = larger_axis(
-        variance_of(work, lanes, POSITION, lane) + north_m * north_m,
-        variance_of(work, lanes, POSITION + 1, lane) + east_m * east_m,
+        position_variance(work, lanes, 0, lane),
+        position_variance(work, lanes, 1, lane),
         covariance_of(work, lanes, POSITION, POSITION + 1, lane) + north_m * east_m,
     )
-    down_m = np.sqrt(larger(variance_of(work, lanes, POSITION + 2, lane), 0.0))
+    down_m = np.sqrt(larger(position_variance(work, lanes, 2, lane), 0.0))
     horizontal_m, vertical_m = SIGMAS * own_m, SIGMAS * down_m
     for k in range(int(work[HYPOTHESES * len(lanes)])):
-        found = size_in(work, lanes, k, lane)
-        largest = largest_size(k, found)
-        north = effect_of(work, lanes, states_of(lanes), k, POSITION, lane)
-        east = effect_of(work, lanes, states_of(lanes), k, POSITION + 1, lane)
+        largest = largest_size(k, size_in(work, lanes, k, lane))
         down = effect_of(work, lanes, states_of(lanes), k, POSITION + 2, lane)
-        level_m = np.sqrt(north * north + east * east)
-        horizontal_m = larger(horizontal_m, SIGMAS_BESIDE * own_m + level_m * largest)
+        horizontal_m = larger(horizontal_m, SIGMAS_BESIDE * own_m + level_effect(work, lanes, k, lane) * largest)
         vertical_m = larger(vertical_m, SIGMAS_BESIDE * down_m + abs(down) * largest)
     north_m, east_m = work[GPS_MOVED * len(lanes) + lane], work[(GPS_MOVED + 1) * len(lanes) + lane]
     moved_m = np.sqrt(north_m * north_m + east_m * east_m)
@@ -263,7 +263,7 @@ def mind_faults(work: Work, lanes: Lanes, t_s: float, dt_s: float, o: Output) ->
         elif before > 0.0 and worst < CLEAR and t_s - of_lane(work, lanes, SUSPECTED_AT, lane) > HELD_S:
             set_lane(work, lanes, SUSPECTED, lane, 0.0)
             write_event(lanes, lane, t_s, FAULT_CLEARED, before - 1.0, o)
-        unheld = t_s - of_lane(work, lanes, GPS_FUSED, lane) > UNHELD_S
+        unheld = not held_by_gps(work, lanes, lane, t_s)
         if worst_flow > PUZZLING or (unheld and load_flow(work, lanes, lane).doubted > 0.0):
             set_lane(work, lanes, PUZZLED_AT, lane, t_s)
         if t_s - of_lane(work, lanes, PUZZLED_AT, lane) < HELD_S:

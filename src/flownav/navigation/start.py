@@ -26,6 +26,7 @@ from flownav.navigation.memory import (
     store_imu,
     store_start,
 )
+from flownav.navigation.offers import is_heard
 from flownav.navigation.packed import START_SIGMA, load_filter_settings, load_flow_settings
 from flownav.navigation.records import AidMemory, Reading, StartMemory
 from flownav.navigation.tape import START, Output, write_event
@@ -103,8 +104,7 @@ def try_start(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipme
     for lane in range(len(lanes)):
         m, reading = load_start(work, lanes, lane), load_reading(work, lanes, lane)
         if m.started == 0.0 and (np.isfinite(m.attitude_s) or m.readings >= LEAST_LEVELLING):
-            heard = reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
-            heard = heard and bool(np.isfinite(reading.value_0))
+            heard = is_heard(reading) and bool(np.isfinite(reading.value_0))
             at_fix = heard and position and bool(np.isfinite(reading.value_0 + reading.value_1 + reading.value_2))
             at_origin = heard and other and t_s >= fitted.deadline_s
             if at_fix or at_origin:

@@ -29,7 +29,7 @@ from flownav.navigation.memory import (
     store_imu_window,
     store_seen_window,
 )
-from flownav.navigation.offers import fuse_offered, put
+from flownav.navigation.offers import fuse_offered, is_heard, put
 from flownav.navigation.packed import load_place_settings
 from flownav.navigation.reasons import FUSED, SILENT
 from flownav.navigation.records import ImuWindow, Reading, SeenWindow
@@ -129,8 +129,7 @@ def watch_range(work: Work, lanes: Lanes) -> None:
     """And a range, whatever the filter makes of it; many sensors say 0 for nothing."""
     for lane in range(len(lanes)):
         reading = load_reading(work, lanes, lane)
-        heard = reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
-        if heard and reading.value_0 > 0.0 and np.isfinite(reading.value_0):
+        if is_heard(reading) and reading.value_0 > 0.0 and np.isfinite(reading.value_0):
             store_seen_window(work, lanes, lane, with_range(reading.value_0, load_seen_window(work, lanes, lane)))
 
 
@@ -140,8 +139,7 @@ def watch_gps_velocity(work: Work, lanes: Lanes) -> None:
     for lane in range(len(lanes)):
         reading, m = load_reading(work, lanes, lane), load_seen_window(work, lanes, lane)
         speed_m_s = np.sqrt(reading.value_0**2 + reading.value_1**2)
-        heard = reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
-        if heard and np.isfinite(speed_m_s):
+        if is_heard(reading) and np.isfinite(speed_m_s):
             fastest = larger(m.gps_m_s, speed_m_s)
             after = SeenWindow(m.range_low_m, m.range_high_m, m.flow_u_m_s, m.flow_v_m_s, m.flows, fastest)
             store_seen_window(work, lanes, lane, after)
@@ -156,8 +154,7 @@ def watch_flow(work: Work, lanes: Lanes, angular: bool) -> None:
         y = reading.value_1 - (work[(TURNING + 1) * len(lanes) + lane] if angular else 0.0)
         ranged = m.range_high_m if m.range_high_m >= 0.0 else work[LENS_RANGE * len(lanes) + lane]
         per = ranged if angular else 1.0
-        heard = reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
-        if heard and np.isfinite(x + y):
+        if is_heard(reading) and np.isfinite(x + y):
             after = SeenWindow(
                 m.range_low_m, m.range_high_m, m.flow_u_m_s + x * per, m.flow_v_m_s + y * per, m.flows + 1.0, m.gps_m_s
             )

@@ -15,9 +15,8 @@ from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE, NOISE
 from flownav.navigation.memory import (
     ACCEL_FACTOR,
-    GPS_FUSED,
     REASON,
-    UNHELD_S,
+    held_by_gps,
     load_echo,
     load_noise,
     load_whiteness,
@@ -66,7 +65,7 @@ def watch_whiteness(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
     for lane in range(len(lanes)):
         reason = work[REASON * len(lanes) + lane]
         strays = axis == 2 and load_echo(work, lanes, lane).stray > STRAYS
-        held = t_s - work[GPS_FUSED * len(lanes) + lane] <= UNHELD_S  # then a flow that is refused is what is wrong
+        held = held_by_gps(work, lanes, lane, t_s)  # then a flow that is refused is what is wrong
         refused = reason == INNOVATION_GATE and axis < 2 and not held  # a refused echo is as alike as a wrong height
         if strays or not (reason == FUSED or refused):
             continue

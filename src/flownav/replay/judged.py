@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.estimation.gating import Reason
+from flownav.frames import heading_from_quaternion
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.flags import flagged, flags_of
@@ -108,7 +109,7 @@ def motion_of(table: Table) -> Motion:
     if not set(QUATERNION) <= table.keys():
         return Motion(t_s, position, np.zeros(0), np.zeros(0))
     w, x, y, z = columns_of(table, QUATERNION).T
-    heading = np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+    heading = np.asarray(heading_from_quaternion(w, x, y, z))
     known = np.isfinite(heading)
     return Motion(t_s, position, t_s[known], heading[known])
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.frames import rotation_from_quaternion
+from flownav.frames import rotation_from_quaternion, velocity_from_flow
 from flownav.logs.rates import attitude_at, mean_over
 from flownav.measurement import COLUMNS, Array, Sensor, Stream
 
@@ -232,7 +232,7 @@ def _velocity(reading: Matrix, flow: Stream, streams: dict[Sensor, Stream], cour
     first, second = np.array(reading, float) @ value[:, :2].T
     if flow.sensor == Sensor.FLOW_RATE:
         range_m = np.interp(t_s, *_ranges(streams))
-        first, second = (second - value[:, 3]) * range_m, (value[:, 2] - first) * range_m
+        first, second = velocity_from_flow(first - value[:, 2], second - value[:, 3], range_m)
     rotation = rotation_from_quaternion(*attitude_at(streams[Sensor.ATTITUDE], t_s).T)
     third = -(rotation[6] * first + rotation[7] * second) / rotation[8]
     north = rotation[0] * first + rotation[1] * second + rotation[2] * third

@@ -156,9 +156,13 @@ def flow_velocity(record: Record) -> Track | None:
     flow, distance = readings(record, Sensor.FLOW_RATE), readings(record, Sensor.RANGE)
     if flow is None or distance is None:
         return None
+    from flownav.frames import velocity_from_flow
+
     range_m = at(flow.t_s, distance)[:, 0]
     flow_x, flow_y, gyro_x, gyro_y = flow.value.T
-    body = np.column_stack([(flow_y - gyro_y) * range_m, -(flow_x - gyro_x) * range_m, np.full(len(range_m), np.nan)])
+    body = np.column_stack(
+        [*velocity_from_flow(flow_x - gyro_x, flow_y - gyro_y, range_m), np.full(len(range_m), np.nan)]
+    )
     known = ~np.isnan(body[:, 0])
     return Track(flow.t_s[known], body[known]) if known.any() else None
 

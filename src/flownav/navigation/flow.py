@@ -32,10 +32,13 @@ from flownav.navigation.flow_noise import (
     DOUBTED_RATIO,
     LONGEST_STEP_S,
     alike,
+    blind_variance,
+    blindness,
     flow_variance,
     followed_agreement,
     followed_excess,
     followed_likeness,
+    followed_quality,
     lasting_doubt,
     lasting_walk,
     wrong_since,
@@ -112,7 +115,9 @@ def turning_of(
     share = larger(1.0 - np.exp(-step_s / s.flow_gyro_time_s), 1.0 / larger(count, 1.0)) if follows else 0.0
     bias_own_x = m.bias_x + share * (own_x - imu_x - m.bias_x) if follows else m.bias_x
     bias_own_y = m.bias_y + share * (own_y - imu_y - m.bias_y) if follows else m.bias_y
-    after = FlowMemory(m.taken_s, m.excess, bias_own_x, bias_own_y, count, m.ratio, m.doubted, m.likeness, m.wrong_s)
+    after = FlowMemory(
+        m.taken_s, m.excess, bias_own_x, bias_own_y, count, m.ratio, m.doubted, m.likeness, m.wrong_s, m.usual
+    )
     x = imu_x if by_imu else own_x - bias_own_x
     y = imu_y if by_imu else own_y - bias_own_y
     return x, y, after
@@ -148,7 +153,7 @@ def take_flow(
     consider_others(work, lanes)
     watch_flow(work, lanes, angular)
     for component in range(2 if angular or lag is not None else 3):
-        offer_component(work, lanes, component, angular, s)
+        offer_component(work, lanes, t_s, component, angular, s)
         if lag is not None:
             observe_lagged(work, lanes, component, angular, s)
         elif angular:
@@ -217,7 +222,7 @@ def height_variance(work: Work, lanes: Lanes, lane: int) -> float:
 
 
 @procedure
-def offer_component(work: Work, lanes: Lanes, component: int, angular: bool, s: FlowSettings) -> None:
+def offer_component(work: Work, lanes: Lanes, t_s: float, component: int, angular: bool, s: FlowSettings) -> None:
     """One component without turning and gain error, with its variance. A down velocity that no sensor has is NaN."""
     for lane in range(len(lanes)):
         reading, m = load_reading(work, lanes, lane), load_flow(work, lanes, lane)
@@ -233,7 +238,8 @@ def offer_component(work: Work, lanes: Lanes, component: int, angular: bool, s: 
             reading.variance_1 if component == 1 else reading.variance_2
         )  # fmt: skip
         stated = np.nan if angular else listed
-        model = m.excess * per_speed * flow_variance(range_m, speed, reading.quality, angular, s)
+        noise = m.excess * flow_variance(range_m, speed, reading.quality, angular, s)
+        model = per_speed * (noise + blind_variance(range_m, reading.quality, m.usual, t_s - m.taken_s, s))
         reason = int(work[TESTED * len(lanes) + lane])
         absent = component == 2 and not np.isfinite(raw)
         put(work, lanes, lane, observation, stated if np.isfinite(stated) else model, SILENT if absent else reason)
@@ -263,12 +269,13 @@ def learn(work: Work, lanes: Lanes, t_s: float, angular: bool, component: int, s
                 reading.variance_1 if component == 1 else reading.variance_2
             )  # fmt: skip
             excess = m.excess
-            if angular or not np.isfinite(listed):
+            blind = blindness(reading.quality, m.usual) > 0.0
+            if not blind and (angular or not np.isfinite(listed)):
                 noise = work[NOISE * len(lanes) + lane]
                 excess = followed_excess(innovation, before, noise, t_s, m, s)
             likeness = followed_likeness(alike(innovation, before, total), t_s, m)
             after = FlowMemory(
-                m.taken_s, excess, m.bias_x, m.bias_y, m.bias_count, ratio, m.doubted, likeness, m.wrong_s
+                m.taken_s, excess, m.bias_x, m.bias_y, m.bias_count, ratio, m.doubted, likeness, m.wrong_s, m.usual
             )
             store_flow(work, lanes, lane, after)
 
@@ -305,5 +312,8 @@ def judge_agreement(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
             if doubted != m.doubted:
                 write_event(lanes, lane, t_s, FLOW_DOUBTED if doubted > 0.0 else FLOW_TRUSTED, m.ratio, o)
             wrong_s = wrong_since(t_s, m.likeness, m.wrong_s)
-            after = FlowMemory(t_s, m.excess, m.bias_x, m.bias_y, m.bias_count, m.ratio, doubted, m.likeness, wrong_s)
+            usual = followed_quality(load_reading(work, lanes, lane).quality, t_s - m.taken_s, m.usual)
+            after = FlowMemory(
+                t_s, m.excess, m.bias_x, m.bias_y, m.bias_count, m.ratio, doubted, m.likeness, wrong_s, usual
+            )
             store_flow(work, lanes, lane, after)

@@ -226,7 +226,8 @@ def learn_standing(work: Work, lanes: Lanes, s: PlaceSettings, o: Output) -> Non
     for axis in range(3):
         for lane in range(len(lanes)):
             does, started = work[STANDS * len(lanes) + lane], load_start(work, lanes, lane).started
-            least = TOUCHING_SIGMA_M_S if touches(work, lanes, lane) else SHAKEN_SIGMA_M_S
+            level = axis < 2 and touches(work, lanes, lane)  # a range that is stuck in descent looks like standing
+            least = TOUCHING_SIGMA_M_S if level else SHAKEN_SIGMA_M_S
             sigma = s.still_sigma_m_s if does == RESTS else least
             stands = started > 0.0 and does > MOVES
             if stands and does == RESTS:

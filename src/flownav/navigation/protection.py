@@ -90,7 +90,7 @@ class Levels(NamedTuple):
 def prior_sigma(fault: int) -> float:
     """What sizes such a fault has, in its unit."""
     if fault == FLOW_SCALE:
-        return 0.4
+        return 0.3
     if fault == FLOW_AGE:
         return 0.05
     if fault == RANGE_OFFSET:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flownav.navigation.attitude import heading_variance, judge_attitude, magnetic_heading
-from flownav.navigation.flow import View, judge_flow, turning_of
+from flownav.navigation.flow_judge import View, judge_flow, turning_of
 from flownav.navigation.flow_noise import alike, flow_variance, followed_agreement, lasting_doubt, wrong_since
 from flownav.navigation.gps import judge_gps, judge_rejections
 from flownav.navigation.height import Height, judge_baro, judge_range, range_variance, repeats

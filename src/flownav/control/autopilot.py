@@ -24,15 +24,20 @@ class AutopilotGains(NamedTuple):
     horizontal_speed_limit_m_s: float = 1.5
     velocity_gain: float = 1.1  # [1/s] acceleration per velocity error
     velocity_integral: float = 0.25  # [1/s2]
+    gust_share: float = 0.0  # of the acceleration that the disturbance observer sees, what is answered with tilt
+    gust_decay: float = 0.0  # of the observer's low-pass over one period of the outer loop
     tilt_limit: float = 0.20  # sine of the tilt against trim
     height_gain: float = 0.9  # [1/s]
     climb_limit_m_s: float = 1.5
     collective_gain: float = 0.010  # [rad/(m/s)]
     collective_integral: float = 0.008  # [rad/m]
     collective_limit_rad: float = 0.06  # about trim
-    attitude_gain: float = 0.14  # [rad cyclic / tilt error]
-    attitude_integral: float = 0.10  # [rad/s]
-    rate_damping: float = 0.012  # [rad/(rad/s)]
+    pitch_gain: float = 0.14  # [rad cyclic / tilt error]
+    pitch_integral: float = 0.10  # [rad/s]
+    pitch_damping: float = 0.012  # [rad/(rad/s)]
+    roll_gain: float = 0.14
+    roll_integral: float = 0.10
+    roll_damping: float = 0.012
     cyclic_limit_rad: float = 0.12
     heading_gain: float = 1.5  # [1/s]
     yaw_rate_gain: float = 0.05  # [rad/(rad/s)]
@@ -61,6 +66,8 @@ class AutopilotState(NamedTuple):
 
     accel_forward: float  # [m/s2]
     accel_right: float  # [m/s2]
+    gust_forward: float  # acceleration that the tilt does not explain [m/s2]
+    gust_right: float  # [m/s2]
     collective: float  # [rad]
     lon: float  # [rad]
     lat: float  # [rad]
@@ -73,7 +80,7 @@ class AutopilotState(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """What the outer loop flies on: position NED [m], velocity body FRD [m/s]."""
+    """What the outer loop flies on: position NED [m], velocity and measured specific force body FRD [m/s, m/s2]."""
 
     pos_n: float
     pos_e: float
@@ -81,13 +88,16 @@ class Estimate(NamedTuple):
     u: float
     v: float
     w: float
+    force_x: float
+    force_y: float
+    force_z: float
 
 
 @equation
 def grounded(gains: AutopilotGains) -> AutopilotState:
     """The state of an autopilot on the ground at idle."""
     return AutopilotState(
-        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gains.pitch_trim_sine, gains.roll_trim_sine, gains.idle_collective_rad, 0.0, 0.0
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gains.pitch_trim_sine, gains.roll_trim_sine, gains.idle_collective_rad, 0.0, 0.0
     )
 
 
@@ -95,7 +105,7 @@ def grounded(gains: AutopilotGains) -> AutopilotState:
 def hovering(gains: AutopilotGains) -> AutopilotState:
     """The state of an autopilot in trimmed hover."""
     return AutopilotState(
-        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gains.pitch_trim_sine, gains.roll_trim_sine, gains.collective_trim_rad, 1.0, 0.0
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gains.pitch_trim_sine, gains.roll_trim_sine, gains.collective_trim_rad, 1.0, 0.0
     )
 
 
@@ -124,6 +134,8 @@ def landing_logic(
     return AutopilotState(
         accel_forward=state.accel_forward,
         accel_right=state.accel_right,
+        gust_forward=state.gust_forward,
+        gust_right=state.gust_right,
         collective=state.collective,
         lon=state.lon,
         lat=state.lat,
@@ -146,6 +158,30 @@ def descent_limit(reference: Reference, estimate: Estimate, gains: AutopilotGain
     aligning = (far or fast) and height < gains.align_height_m and height > gains.commit_height_m
     slow = gains.land_speed_m_s if height < gains.land_height_m else gains.climb_limit_m_s + reference.vel_d
     return 0.0 if aligning else slow
+
+
+@equation
+def along_heading(rotation: Rotation, n: float, e: float) -> tuple[float, float]:
+    """A horizontal vector, forward along the heading and to its right."""
+    level = 1.0 / np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
+    cos_heading, sin_heading = rotation[0] * level, rotation[3] * level
+    return cos_heading * n + sin_heading * e, cos_heading * e - sin_heading * n
+
+
+@equation
+def unexplained_acceleration(estimate: Estimate, rotation: Rotation, gains: AutopilotGains) -> tuple[float, float]:
+    """What the accelerometer feels, forward and to the right [m/s2], less what the tilt against trim gives.
+
+    A gust's push and a wind's drag: felt at once, where the velocity shows them only later.
+    """
+    x, y, z = estimate.force_x, estimate.force_y, estimate.force_z
+    forward, right = along_heading(
+        rotation,
+        rotation[0] * x + rotation[1] * y + rotation[2] * z,
+        rotation[3] * x + rotation[4] * y + rotation[5] * z,
+    )
+    pitch, roll = -rotation[6] - gains.pitch_trim_sine, rotation[7] - gains.roll_trim_sine
+    return forward + GRAVITY_M_S2 * pitch, right - GRAVITY_M_S2 * roll
 
 
 @equation
@@ -172,14 +208,14 @@ def outer_loop(
     est_n = rotation[0] * estimate.u + rotation[1] * estimate.v + rotation[2] * estimate.w
     est_e = rotation[3] * estimate.u + rotation[4] * estimate.v + rotation[5] * estimate.w
     est_d = rotation[6] * estimate.u + rotation[7] * estimate.v + rotation[8] * estimate.w
-    level = 1.0 / np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
-    cos_heading, sin_heading = rotation[0] * level, rotation[3] * level
-    error_forward = cos_heading * (vel_n - est_n) + sin_heading * (vel_e - est_e)
-    error_right = cos_heading * (vel_e - est_e) - sin_heading * (vel_n - est_n)
+    error_forward, error_right = along_heading(rotation, vel_n - est_n, vel_e - est_e)
     error_down = vel_d - est_d
 
-    accel_forward = gains.velocity_gain * error_forward + state.accel_forward
-    accel_right = gains.velocity_gain * error_right + state.accel_right
+    felt_forward, felt_right = unexplained_acceleration(estimate, rotation, gains)
+    gust_forward = felt_forward + gains.gust_decay * (state.gust_forward - felt_forward)
+    gust_right = felt_right + gains.gust_decay * (state.gust_right - felt_right)
+    accel_forward = gains.velocity_gain * error_forward + state.accel_forward - gains.gust_share * gust_forward
+    accel_right = gains.velocity_gain * error_right + state.accel_right - gains.gust_share * gust_right
     tilt_accel = GRAVITY_M_S2 * gains.tilt_limit
     collective = -gains.collective_gain * error_down + state.collective
     flying = state.flying > 0.0
@@ -198,6 +234,8 @@ def outer_loop(
     return AutopilotState(
         accel_forward=forward if flying else 0.0,
         accel_right=right if flying else 0.0,
+        gust_forward=gust_forward if flying else 0.0,
+        gust_right=gust_right if flying else 0.0,
         collective=heave if flying else 0.0,
         lon=state.lon,
         lat=state.lat,
@@ -221,16 +259,18 @@ def inner_loop(
     error_rate_yaw = -gains.heading_gain * rotation[3] * level - r  # sin(heading)
     flying = state.flying > 0.0
 
-    lon = gains.attitude_gain * error_pitch - gains.rate_damping * q + state.lon
-    lat = gains.attitude_gain * error_roll - gains.rate_damping * p + state.lat
+    lon = gains.pitch_gain * error_pitch - gains.pitch_damping * q + state.lon
+    lat = gains.roll_gain * error_roll - gains.roll_damping * p + state.lat
     pedal = gains.yaw_rate_gain * error_rate_yaw + state.pedal
     limit = gains.cyclic_limit_rad
-    next_lon = integrate(state.lon, error_pitch, gains.attitude_integral, dt, lon, limit)
-    next_lat = integrate(state.lat, error_roll, gains.attitude_integral, dt, lat, limit)
+    next_lon = integrate(state.lon, error_pitch, gains.pitch_integral, dt, lon, limit)
+    next_lat = integrate(state.lat, error_roll, gains.roll_integral, dt, lat, limit)
     next_pedal = integrate(state.pedal, error_rate_yaw, gains.yaw_rate_integral, dt, pedal, gains.pedal_limit_rad)
     after = AutopilotState(
         accel_forward=state.accel_forward,
         accel_right=state.accel_right,
+        gust_forward=state.gust_forward,
+        gust_right=state.gust_right,
         collective=state.collective,
         lon=next_lon if flying else 0.0,
         lat=next_lat if flying else 0.0,

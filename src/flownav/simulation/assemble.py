@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from flownav.control.autopilot import AutopilotGains
+from flownav.control.design import gains_for
 from flownav.control.guidance import path_through
 from flownav.errors import InputError
 from flownav.estimation.discretise import discretised
@@ -28,11 +29,6 @@ from flownav.vehicle.state import Controls, HelicopterState
 from flownav.vehicle.trim import Trim, parked, trim
 
 NEVER_S = 1e9
-# closed-loop bandwidths that the gains give, whatever the vehicle [rad/s]
-HEAVE_RAD_S = 2.9
-ATTITUDE_RAD_S = 5.4
-YAW_RATE_RAD_S = 14.0
-
 
 @dataclass(frozen=True)
 class Setup:
@@ -97,41 +93,19 @@ def assemble(scenario: Scenario) -> Setup:
 
 
 def _gains(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> AutopilotGains:
-    """The vehicle's gains with what the scenario says of position, velocity and the last metres."""
+    """The vehicle's gains, what the scenario says of them, and the last metres."""
     section = scenario.autopilot
     precision = {} if section.precision is None else section.precision.model_dump()
-    return gains_for(vehicle, hover, math.radians(section.idle_collective_deg))._replace(
-        position_gain=section.position_gain_1_s,
-        velocity_gain=section.velocity_gain_1_s,
-        velocity_integral=section.velocity_integral_1_s2,
+    given = {
+        "position_gain": section.position_gain_1_s,
+        "velocity_gain": section.velocity_gain_1_s,
+        "velocity_integral": section.velocity_integral_1_s2,
+    }
+    feels = scenario.filter.name == "landing"  # the paper's sensors have no accelerometer
+    return gains_for(vehicle, hover, math.radians(section.idle_collective_deg), feels_gusts=feels)._replace(
         pad_pos_d_m=-vehicle.cg_above_skid_m,
+        **{name: value for name, value in given.items() if value is not None},
         **precision,
-    )
-
-
-def gains_for(vehicle: VehicleParameters, hover: Trim, idle_collective_rad: float) -> AutopilotGains:
-    """Gains that give every vehicle the same bandwidths, from its control powers at frozen inflow."""
-    heave_per_collective = vehicle.main_thrust_slope_n_s_m * vehicle.main_tip_speed_m_s * (2.0 / 3.0) / vehicle.mass_kg
-    side_per_pedal = vehicle.tail_thrust_slope_n_s_m * vehicle.tail_tip_speed_m_s * (2.0 / 3.0)
-    yaw_per_pedal = side_per_pedal * vehicle.tail_behind_cg_m / vehicle.inertia_zz_kg_m2
-    collective_gain = HEAVE_RAD_S / heave_per_collective
-    attitude_gain = ATTITUDE_RAD_S / vehicle.flap_rate_1_s
-    yaw_gain = YAW_RATE_RAD_S / yaw_per_pedal
-    return AutopilotGains(
-        collective_gain=collective_gain,
-        collective_integral=0.8 * collective_gain,
-        attitude_gain=attitude_gain,
-        attitude_integral=0.7 * attitude_gain,
-        rate_damping=0.085 * attitude_gain,
-        yaw_rate_gain=yaw_gain,
-        yaw_rate_integral=2.0 * yaw_gain,
-        collective_trim_rad=hover.collective_rad,
-        pedal_trim_rad=hover.pedal_rad,
-        lon_trim_rad=hover.lon,
-        lat_trim_rad=hover.lat,
-        pitch_trim_sine=math.sin(hover.pitch_rad),
-        roll_trim_sine=math.sin(hover.roll_rad) * math.cos(hover.pitch_rad),
-        idle_collective_rad=idle_collective_rad,
     )
 
 

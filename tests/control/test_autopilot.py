@@ -14,7 +14,7 @@ from flownav.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_qu
 
 GAINS = AutopilotGains()
 LEVEL = rotation_from_quaternion(1.0, 0.0, 0.0, 0.0)
-HERE = Estimate(0.0, 0.0, -3.0, 0.0, 0.0, 0.0)
+HERE = Estimate(0.0, 0.0, -3.0, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2)
 HOLD = Reference(0.0, 0.0, -3.0, 0.0, 0.0, 0.0)
 PATH = path_through([(0.0, 0.0, 0.0, -3.0), (10.0, 0.0, 0.0, -3.0), (20.0, 2.0, 0.0, 0.0)])
 
@@ -113,8 +113,8 @@ def test_what_it_does_turns_with_the_heading(yaw, ahead, aside, u, v):
 def test_the_tilt_commanded_is_the_one_whose_weight_gives_the_acceleration():
     for error in (0.1, -0.4):
         moving = flown(HOLD._replace(vel_n=error, vel_e=error))
-        assert -moving.pitch_sine * GRAVITY_M_S2 == pytest.approx(GAINS.velocity_gain * error)
-        assert moving.roll_sine * GRAVITY_M_S2 == pytest.approx(GAINS.velocity_gain * error)
+        assert -moving.pitch_sine * GRAVITY_M_S2 == pytest.approx(GAINS.forward_gain * error)
+        assert moving.roll_sine * GRAVITY_M_S2 == pytest.approx(GAINS.forward_gain * error)
 
 
 def test_a_target_far_above_or_below_is_approached_at_the_climb_limit():
@@ -152,8 +152,8 @@ DOWN = Reference(0.0, 0.0, 0.0, 0.0, 0.0, 0.3)
 
 def allowed(height, off_n=0.0, off_e=0.0, u=0.0, v=0.0):
     """How fast it may descend with the skids so high over the pad, so far beside its middle."""
-    estimate = Estimate(off_n, off_e, PRECISE.pad_pos_d_m - height, u, v, 0.0)
-    return autopilot.descent_limit(DOWN, estimate, PRECISE)
+    estimate = Estimate(off_n, off_e, PRECISE.pad_pos_d_m - height, u, v, 0.0, 0.0, 0.0, -GRAVITY_M_S2)
+    return autopilot.descent_limit(-off_n, -off_e, DOWN, estimate, PRECISE)
 
 
 def test_near_the_pad_the_descent_is_slow_and_above_it_the_references():
@@ -177,7 +177,7 @@ def test_over_the_pads_middle_it_goes_on_unless_it_is_fast(off_n, off_e):
 
 
 def test_the_limit_holds_in_the_loop():
-    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0)
+    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2)
     over = beside._replace(pos_n=0.0)
     waiting = outer_loop(hovering(PRECISE), DOWN, beside, LEVEL, PRECISE, 0.02)
     going = outer_loop(hovering(PRECISE), DOWN, over, LEVEL, PRECISE, 0.02)

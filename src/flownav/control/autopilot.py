@@ -22,10 +22,13 @@ class AutopilotGains(NamedTuple):
 
     position_gain: float = 0.5  # [1/s] velocity per position error
     horizontal_speed_limit_m_s: float = 1.5
-    velocity_gain: float = 1.1  # [1/s] acceleration per velocity error
-    velocity_integral: float = 0.25  # [1/s2]
+    forward_gain: float = 1.1  # [1/s] acceleration per velocity error
+    forward_integral: float = 0.25  # [1/s2]
+    right_gain: float = 1.1  # [1/s]
+    right_integral: float = 0.25  # [1/s2]
     gust_share: float = 0.0  # of the acceleration that the disturbance observer sees, what is answered with tilt
-    gust_decay: float = 0.0  # of the observer's low-pass over one period of the outer loop
+    gust_decay_forward: float = 0.0  # of the observer's low-pass over one period of the outer loop
+    gust_decay_right: float = 0.0
     tilt_limit: float = 0.20  # sine of the tilt against trim
     height_gain: float = 0.9  # [1/s]
     climb_limit_m_s: float = 1.5
@@ -50,9 +53,11 @@ class AutopilotGains(NamedTuple):
     pitch_trim_sine: float = 0.0
     roll_trim_sine: float = 0.0
     idle_collective_rad: float = 0.0
-    spool_rate_rad_s: float = 0.10  # how fast the collective goes down to idle after touchdown
+    pedal_per_collective: float = 0.0  # what holds the heading against the main rotor's torque, about trim
+    spool_rate_rad_s: float = 0.20  # how fast the collective goes down to idle after touchdown
     # the last metres of a precision landing: nothing of it where the limits are as here
     pad_pos_d_m: float = 0.0  # of the reference point when the skids touch
+    skids_below_cg_m: float = 0.0  # it is their middle that is brought over the pad
     land_height_m: float = 0.0  # below it the descent is held to land_speed_m_s
     land_speed_m_s: float = 1e9
     align_height_m: float = 0.0  # below it, down to commit_height_m, no descent while farther than align_radius_m
@@ -149,15 +154,35 @@ def landing_logic(
 
 
 @equation
-def descent_limit(reference: Reference, estimate: Estimate, gains: AutopilotGains) -> float:
-    """How fast the vehicle may descend [m/s]: slowly near the pad, and at first only when it is above its middle."""
+def skids_beside(rotation: Rotation, gains: AutopilotGains) -> tuple[float, float]:
+    """How far the middle of the skids hangs north and east of the centre of gravity in trimmed hover [m].
+
+    A helicopter hovers with a roll against its tail rotor and stands level: what touches the ground first, and where it
+    comes to rest, is the skids.
+    """
+    forward = gains.skids_below_cg_m * gains.pitch_trim_sine
+    left = gains.skids_below_cg_m * gains.roll_trim_sine
+    level = 1.0 / np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
+    cos_heading, sin_heading = rotation[0] * level, rotation[3] * level
+    return cos_heading * forward + sin_heading * left, sin_heading * forward - cos_heading * left
+
+
+@equation
+def descent_limit(
+    off_n: float, off_e: float, reference: Reference, estimate: Estimate, gains: AutopilotGains
+) -> float:
+    """How fast the vehicle may descend [m/s]: slowly near the pad, and at first only when it is above its middle.
+
+    Where it is not, it climbs back to the height of the gate and waits there: gusts would else sink it to the commit.
+    off_n, off_e: how far the reference lies from the middle of the skids [m].
+    """
     height = gains.pad_pos_d_m - estimate.pos_d
-    off_n, off_e = reference.pos_n - estimate.pos_n, reference.pos_e - estimate.pos_e
     far = off_n * off_n + off_e * off_e > gains.align_radius_m * gains.align_radius_m
     fast = estimate.u * estimate.u + estimate.v * estimate.v > gains.align_speed_m_s * gains.align_speed_m_s
     aligning = (far or fast) and height < gains.align_height_m and height > gains.commit_height_m
     slow = gains.land_speed_m_s if height < gains.land_height_m else gains.climb_limit_m_s + reference.vel_d
-    return 0.0 if aligning else slow
+    back = clamp(gains.height_gain * (height - gains.align_height_m), -gains.land_speed_m_s, 0.0)
+    return back if aligning else slow
 
 
 @equation
@@ -194,15 +219,16 @@ def outer_loop(
     dt: float,
 ) -> AutopilotState:
     """Position and velocity errors to tilt and collective commands (50 Hz)."""
-    vel_n = gains.position_gain * (reference.pos_n - estimate.pos_n)
-    vel_e = gains.position_gain * (reference.pos_e - estimate.pos_e)
+    skids_n, skids_e = skids_beside(rotation, gains)
+    off_n, off_e = reference.pos_n - estimate.pos_n - skids_n, reference.pos_e - estimate.pos_e - skids_e
+    vel_n, vel_e = gains.position_gain * off_n, gains.position_gain * off_e
     speed_limit = gains.horizontal_speed_limit_m_s
     vel_n = reference.vel_n + clamp(vel_n, -speed_limit, speed_limit)
     vel_e = reference.vel_e + clamp(vel_e, -speed_limit, speed_limit)
     climb_limit = gains.climb_limit_m_s
     vel_d = reference.vel_d + clamp(gains.height_gain * (reference.pos_d - estimate.pos_d), -climb_limit, climb_limit)
 
-    vel_d = smaller(vel_d, descent_limit(reference, estimate, gains))
+    vel_d = smaller(vel_d, descent_limit(off_n, off_e, reference, estimate, gains))
 
     # errors along the heading and across it; the body velocity in the earth frame first
     est_n = rotation[0] * estimate.u + rotation[1] * estimate.v + rotation[2] * estimate.w
@@ -212,16 +238,16 @@ def outer_loop(
     error_down = vel_d - est_d
 
     felt_forward, felt_right = unexplained_acceleration(estimate, rotation, gains)
-    gust_forward = felt_forward + gains.gust_decay * (state.gust_forward - felt_forward)
-    gust_right = felt_right + gains.gust_decay * (state.gust_right - felt_right)
-    accel_forward = gains.velocity_gain * error_forward + state.accel_forward - gains.gust_share * gust_forward
-    accel_right = gains.velocity_gain * error_right + state.accel_right - gains.gust_share * gust_right
+    gust_forward = felt_forward + gains.gust_decay_forward * (state.gust_forward - felt_forward)
+    gust_right = felt_right + gains.gust_decay_right * (state.gust_right - felt_right)
+    accel_forward = gains.forward_gain * error_forward + state.accel_forward - gains.gust_share * gust_forward
+    accel_right = gains.right_gain * error_right + state.accel_right - gains.gust_share * gust_right
     tilt_accel = GRAVITY_M_S2 * gains.tilt_limit
     collective = -gains.collective_gain * error_down + state.collective
     flying = state.flying > 0.0
 
-    forward = integrate(state.accel_forward, error_forward, gains.velocity_integral, dt, accel_forward, tilt_accel)
-    right = integrate(state.accel_right, error_right, gains.velocity_integral, dt, accel_right, tilt_accel)
+    forward = integrate(state.accel_forward, error_forward, gains.forward_integral, dt, accel_forward, tilt_accel)
+    right = integrate(state.accel_right, error_right, gains.right_integral, dt, accel_right, tilt_accel)
     heave = integrate(
         state.collective, error_down, -gains.collective_integral, dt, collective, gains.collective_limit_rad
     )
@@ -262,6 +288,7 @@ def inner_loop(
     lon = gains.pitch_gain * error_pitch - gains.pitch_damping * q + state.lon
     lat = gains.roll_gain * error_roll - gains.roll_damping * p + state.lat
     pedal = gains.yaw_rate_gain * error_rate_yaw + state.pedal
+    torque = gains.pedal_per_collective * (state.collective_command - gains.collective_trim_rad)
     limit = gains.cyclic_limit_rad
     next_lon = integrate(state.lon, error_pitch, gains.pitch_integral, dt, lon, limit)
     next_lat = integrate(state.lat, error_roll, gains.roll_integral, dt, lat, limit)
@@ -286,5 +313,5 @@ def inner_loop(
         gains.lon_trim_rad + (clamp(lon, -limit, limit) if flying else 0.0),
         gains.lat_trim_rad + (clamp(lat, -limit, limit) if flying else 0.0),
         state.collective_command,
-        gains.pedal_trim_rad + (clamp(pedal, -gains.pedal_limit_rad, gains.pedal_limit_rad) if flying else 0.0),
+        gains.pedal_trim_rad + torque + (clamp(pedal, -gains.pedal_limit_rad, gains.pedal_limit_rad) if flying else 0.0),
     )

@@ -12,19 +12,26 @@ import math
 
 from flownav.control.autopilot import AutopilotGains
 from flownav.control.loops import OUTER_S
+from flownav.vehicle.feasibility import hover_induced_velocity, hover_pitch
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.trim import Trim
 
 # attitude: a steady cyclic turns the body at 1/τ_f of it per second, τ_f the flapping's time constant
-PITCH_RAD_S, PITCH_INTEGRAL_1_S, PITCH_LEAD_S = 4.12, 0.89, 0.216
-ROLL_RAD_S, ROLL_INTEGRAL_1_S, ROLL_LEAD_S = 4.39, 1.12, 0.110
+PITCH_RAD_S, PITCH_INTEGRAL_1_S, PITCH_LEAD_S = 5.69, 0.668, 0.1535
+ROLL_RAD_S, ROLL_INTEGRAL_1_S, ROLL_LEAD_S = 6.42, 0.647, 0.0700
 # heave: acceleration per collective; yaw: angular acceleration per pedal, both with the inflow frozen
 HEAVE_RAD_S, HEAVE_INTEGRAL_1_S, HEIGHT_1_S = 9.3, 1.57, 1.7
 YAW_RATE_RAD_S, YAW_RATE_INTEGRAL_1_S, HEADING_1_S = 8.6, 1.67, 1.0
 # position and velocity, with gusts felt by the accelerometer and without
-FELT = {"position_gain": 0.45, "velocity_gain": 0.65, "velocity_integral": 0.03, "gust_share": 1.0}
-UNFELT = {"position_gain": 0.3, "velocity_gain": 0.8, "velocity_integral": 0.05, "gust_share": 0.0}
-GUST_S = 0.13  # the disturbance observer's low-pass
+FELT = {
+    "position_gain": 0.36, "forward_gain": 0.94, "forward_integral": 0.18, "right_gain": 1.40, "right_integral": 0.36,
+    "gust_share": 1.0,
+}  # fmt: skip
+UNFELT = {
+    "position_gain": 0.25, "forward_gain": 0.6, "forward_integral": 0.05, "right_gain": 0.9, "right_integral": 0.1,
+    "gust_share": 0.0,
+}  # fmt: skip
+GUST_FORWARD_S, GUST_RIGHT_S = 0.275, 0.19  # the disturbance observer's low-pass
 
 
 def gains_for(
@@ -38,7 +45,8 @@ def gains_for(
     pitch, roll = PITCH_RAD_S / vehicle.flap_rate_1_s, ROLL_RAD_S / vehicle.flap_rate_1_s
     return AutopilotGains(
         **(FELT if feels_gusts else UNFELT),
-        gust_decay=math.exp(-OUTER_S / GUST_S),
+        gust_decay_forward=math.exp(-OUTER_S / GUST_FORWARD_S),
+        gust_decay_right=math.exp(-OUTER_S / GUST_RIGHT_S),
         height_gain=HEIGHT_1_S,
         collective_gain=collective,
         collective_integral=HEAVE_INTEGRAL_1_S * collective,
@@ -58,4 +66,17 @@ def gains_for(
         pitch_trim_sine=math.sin(hover.pitch_rad),
         roll_trim_sine=math.sin(hover.roll_rad) * math.cos(hover.pitch_rad),
         idle_collective_rad=idle_collective_rad,
+        pedal_per_collective=_pedal_per_collective(vehicle, hover),
+        pad_pos_d_m=-vehicle.cg_above_skid_m,
+        skids_below_cg_m=vehicle.cg_above_skid_m,
     )
+
+
+def _pedal_per_collective(vehicle: VehicleParameters, hover: Trim) -> float:
+    """Between hover and blades without lift, where the tail rotor holds the profile torque alone."""
+    side = vehicle.main_profile_torque_n_m / vehicle.tail_behind_cg_m / vehicle.tail_fin_blockage
+    slope = vehicle.tail_thrust_slope_n_s_m
+    pitch = hover_pitch(
+        side, hover_induced_velocity(side, slope, vehicle.tail_inflow_speed_m_s), slope, vehicle.tail_tip_speed_m_s
+    )
+    return (hover.pedal_rad - pitch) / hover.collective_rad

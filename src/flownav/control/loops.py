@@ -109,18 +109,22 @@ def _laws(w: Array, g: AutopilotGains, timing: Timing) -> dict[str, dict[str, An
         "roll": g.roll_gain + g.roll_integral * fast,
     }
     heading = g.yaw_rate_gain + g.yaw_rate_integral * fast
-    accelerate = (g.velocity_gain + g.velocity_integral * slow) / GRAVITY_M_S2
+    forward = (g.forward_gain + g.forward_integral * slow) / GRAVITY_M_S2
+    right = (g.right_gain + g.right_integral * slow) / GRAVITY_M_S2
     # the disturbance observer: what is felt over an outer period, less what the tilt explains, low-passed
-    felt = g.gust_share * (1.0 - g.gust_decay) / (1.0 - g.gust_decay * np.exp(-1j * w * timing.outer_s)) * outer * late
-    gust = 1j * w * felt / GRAVITY_M_S2
+    ahead, aside = (
+        g.gust_share * (1.0 - decay) / (1.0 - decay * np.exp(-1j * w * timing.outer_s)) * outer * late
+        for decay in (g.gust_decay_forward, g.gust_decay_right)
+    )
+    per_velocity = 1j * w / GRAVITY_M_S2
     lift = g.collective_gain + g.collective_integral * slow
     return {
         "lon": {"pitch": -inner * tilt["pitch"], "pitch_command": outer * tilt["pitch"], "q": -inner * g.pitch_damping},
         "lat": {"roll": -inner * tilt["roll"], "roll_command": outer * tilt["roll"], "p": -inner * g.roll_damping},
-        "ped": {"heading": -inner * heading * g.heading_gain, "r": -inner * heading},
+        "ped": {"heading": -inner * heading * g.heading_gain, "r": -inner * heading, "col": g.pedal_per_collective},
         "col": {"vel_d_command": -outer * lift, "vel_d": outer * lift * late},
-        "pitch_command": {"vel_n_command": -accelerate, "vel_n": accelerate * late + gust, "pitch": felt},
-        "roll_command": {"vel_e_command": accelerate, "vel_e": -accelerate * late - gust, "roll": felt},
+        "pitch_command": {"vel_n_command": -forward, "vel_n": forward * late + per_velocity * ahead, "pitch": ahead},
+        "roll_command": {"vel_e_command": right, "vel_e": -right * late - per_velocity * aside, "roll": aside},
         "vel_n_command": {"pos_n": -late * g.position_gain},
         "vel_e_command": {"pos_e": -late * g.position_gain},
         "vel_d_command": {"pos_d": -late * g.height_gain},

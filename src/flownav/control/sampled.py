@@ -79,11 +79,14 @@ def _outer_map(g: AutopilotGains, timing: Timing, factor: Mapping[str, float], r
     down = -factor["vel_d_command"] * g.height_gain * said["pos_d"] - said["vel_d"]
     found = np.eye(rows.count)
     accel = {}
-    for axis, name in (("n", "forward"), ("e", "right")):
-        gust = g.gust_decay * rows.of[f"gust_{name}"] + (1.0 - g.gust_decay) * said[f"felt_{axis}"]
-        accel[axis] = g.velocity_gain * error[axis] + rows.of[f"{name}_sum"] - g.gust_share * gust
+    for axis, name, gain, integral, decay in (
+        ("n", "forward", g.forward_gain, g.forward_integral, g.gust_decay_forward),
+        ("e", "right", g.right_gain, g.right_integral, g.gust_decay_right),
+    ):  # fmt: skip
+        gust = decay * rows.of[f"gust_{name}"] + (1.0 - decay) * said[f"felt_{axis}"]
+        accel[axis] = gain * error[axis] + rows.of[f"{name}_sum"] - g.gust_share * gust
         found[rows.place[f"gust_{name}"]] = gust
-        found[rows.place[f"{name}_sum"]] = rows.of[f"{name}_sum"] + g.velocity_integral * timing.outer_s * error[axis]
+        found[rows.place[f"{name}_sum"]] = rows.of[f"{name}_sum"] + integral * timing.outer_s * error[axis]
         found[rows.place[f"before_{axis}"]] = rows.seen[f"vel_{axis}"]
         found[rows.place[f"tilt_before_{axis}"]] = tilt[axis]
     found[rows.place["pitch_command"]] = -factor["pitch_command"] * accel["n"] / GRAVITY_M_S2
@@ -109,7 +112,7 @@ def _inner_map(
         "lon": factor["lon"] * (g.pitch_gain * pitch - g.pitch_damping * rate["q"] + of["lon_sum"]),
         "lat": factor["lat"] * (g.roll_gain * roll - g.roll_damping * rate["p"] + of["lat_sum"]),
         "col": of["col"],
-        "ped": factor["ped"] * (g.yaw_rate_gain * yaw + of["ped_sum"]),
+        "ped": factor["ped"] * (g.yaw_rate_gain * yaw + of["ped_sum"] + g.pedal_per_collective * of["col"]),
     }
     n, m = plant.b.shape
     step = expm(np.block([[plant.a, plant.b], [np.zeros((m, n + m))]]) * timing.inner_s)[:n]

@@ -56,7 +56,8 @@ def assemble(scenario: Scenario) -> Setup:
     sensor_file = Path(scenario.flow_sensor) if scenario.flow_sensor else None
     vehicle, sensor, paper = load_vehicle(vehicle_file), load_sensor(sensor_file), load_paper_model()
     hover = trim(vehicle)
-    plan = _plan(scenario, vehicle, hover)
+    gains = _gains(scenario, vehicle, hover)
+    plan = _plan(scenario, vehicle, hover, gains)
     carried = fitted(scenario, sensor, vehicle, plan.epochs) if scenario.filter.name == "landing" else None
     flight = Flight(
         plan=plan,
@@ -64,7 +65,7 @@ def assemble(scenario: Scenario) -> Setup:
         sensors=_sensors(scenario, sensor, vehicle),
         wind=scenario.wind.parameters(),
         path=_path(scenario, vehicle),
-        gains=_gains(scenario, vehicle, hover),
+        gains=gains,
         paper=_paper_filter(paper) if scenario.filter.name == "paper" else None,
         onboard=carried.onboard if carried else None,
         table=timetable_of(carried.schedule) if carried else None,
@@ -98,25 +99,26 @@ def _gains(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> Autop
     precision = {} if section.precision is None else section.precision.model_dump()
     given = {
         "position_gain": section.position_gain_1_s,
-        "velocity_gain": section.velocity_gain_1_s,
-        "velocity_integral": section.velocity_integral_1_s2,
+        "forward_gain": section.velocity_gain_1_s,
+        "right_gain": section.velocity_gain_1_s,
+        "forward_integral": section.velocity_integral_1_s2,
+        "right_integral": section.velocity_integral_1_s2,
     }
     feels = scenario.filter.name == "landing"  # the paper's sensors have no accelerometer
     return gains_for(vehicle, hover, math.radians(section.idle_collective_deg), feels_gusts=feels)._replace(
-        pad_pos_d_m=-vehicle.cg_above_skid_m,
         **{name: value for name, value in given.items() if value is not None},
         **precision,
     )
 
 
-def _plan(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> FlightPlan:
+def _plan(scenario: Scenario, vehicle: VehicleParameters, hover: Trim, gains: AutopilotGains) -> FlightPlan:
     """What the loop is asked to do."""
     section = scenario.flight
     linear = scenario.truth == "linear"
     on_ground = section.start == "ground" and not linear
     return FlightPlan(
         epochs=round(section.duration_s / EPOCH_S) + 1,
-        start=_start(scenario, vehicle, hover, on_ground, linear),
+        start=_start(scenario, vehicle, hover, gains, on_ground, linear),
         starts_on_ground=on_ground,
         takeoff_at_s=0.0 if linear else section.takeoff_at_s,
         may_land_after_s=NEVER_S if linear or section.may_land_after_s is None else section.may_land_after_s,
@@ -139,14 +141,15 @@ def start_of(scenario: Scenario) -> str:
 
 
 def _start(
-    scenario: Scenario, vehicle: VehicleParameters, hover: Trim, on_ground: bool, linear: bool
+    scenario: Scenario, vehicle: VehicleParameters, hover: Trim, gains: AutopilotGains, on_ground: bool, linear: bool
 ) -> HelicopterState:
     """The vehicle's first state: parked, in trimmed hover, or level for the linear truth."""
     first = scenario.flight.path[0]
     pos_d = -first.height_m - vehicle.cg_above_skid_m
     if on_ground:
-        idle = math.radians(scenario.autopilot.idle_collective_deg)
-        state = parked(vehicle, Controls(hover.lon, hover.lat, idle, hover.pedal_rad))
+        idle = gains.idle_collective_rad
+        pedal = hover.pedal_rad + gains.pedal_per_collective * (idle - hover.collective_rad)
+        state = parked(vehicle, Controls(hover.lon, hover.lat, idle, pedal))
         return state._replace(pos_n=first.north_m, pos_e=first.east_m)
     state = hover.state._replace(pos_n=first.north_m, pos_e=first.east_m, pos_d=pos_d)
     return state._replace(qw=1.0, qx=0.0, qy=0.0, qz=0.0) if linear else state

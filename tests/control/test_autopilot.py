@@ -145,15 +145,15 @@ def test_a_nose_to_the_right_is_brought_back_to_north():
 # -- the last metres of a precision landing -----------------------------------------------------------------
 PRECISE = GAINS._replace(
     pad_pos_d_m=-0.2, land_height_m=1.0, land_speed_m_s=0.25, align_height_m=1.6, align_radius_m=0.15,
-    align_speed_m_s=0.2, commit_height_m=0.4,
+    align_speed_m_s=0.2, align_patience_s=10.0, commit_height_m=0.4,
 )  # fmt: skip
 DOWN = Reference(0.0, 0.0, 0.0, 0.0, 0.0, 0.3)
 
 
-def allowed(height, off_n=0.0, off_e=0.0, u=0.0, v=0.0):
+def allowed(height, off_n=0.0, off_e=0.0, u=0.0, v=0.0, waited=0.0):
     """How fast it may descend with the skids so high over the pad, so far beside its middle."""
-    estimate = Estimate(off_n, off_e, PRECISE.pad_pos_d_m - height, u, v, 0.0, 0.0, 0.0, -GRAVITY_M_S2)
-    return autopilot.descent_limit(-off_n, -off_e, DOWN, estimate, PRECISE)
+    waiting = autopilot.misaligned(-off_n, -off_e, u, v, height, waited, PRECISE)
+    return autopilot.descent_limit(waiting, height, DOWN.vel_d, PRECISE)
 
 
 def test_near_the_pad_the_descent_is_slow_and_above_it_the_references():
@@ -163,8 +163,8 @@ def test_near_the_pad_the_descent_is_slow_and_above_it_the_references():
 
 @pytest.mark.parametrize(("off_n", "off_e"), [(0.16, 0.0), (-0.16, 0.0), (0.0, -0.16), (0.11, -0.11)])
 def test_beside_the_pads_middle_it_waits_before_the_last_half_metre_and_then_goes_on(off_n, off_e):
-    assert allowed(1.5, off_n, off_e) == 0.0
-    assert allowed(0.5, off_n, off_e) == 0.0
+    assert allowed(1.59999, off_n, off_e) == pytest.approx(0.0, abs=1e-4)
+    assert allowed(0.5, off_n, off_e) == -PRECISE.land_speed_m_s  # back up to the gate
     assert allowed(0.3, off_n, off_e) == PRECISE.land_speed_m_s
     assert allowed(1.7, off_n, off_e) > 1.0
 
@@ -172,8 +172,29 @@ def test_beside_the_pads_middle_it_waits_before_the_last_half_metre_and_then_goe
 @pytest.mark.parametrize(("off_n", "off_e"), [(0.1, 0.1), (-0.1, -0.1), (0.14, 0.0)])
 def test_over_the_pads_middle_it_goes_on_unless_it_is_fast(off_n, off_e):
     assert allowed(1.2, off_n, off_e) > 0.0
-    assert allowed(1.2, off_n, off_e, u=-0.15, v=0.15) == 0.0
-    assert allowed(1.2, off_n, off_e, u=0.1, v=-0.1) > 0.0
+    assert allowed(1.2, off_n, off_e, u=-0.15, v=0.15) < 0.0
+
+
+def test_what_counts_is_where_the_skids_will_touch():
+    assert allowed(1.2, 0.3, 0.0, u=-0.19) > 0.0  # beside the middle, and on the way to it
+    assert allowed(1.2, 0.1, 0.0, u=0.19) < 0.0  # above it, and on the way off
+    assert allowed(1.2, 0.0, -0.3, v=0.19) > 0.0
+    assert allowed(0.42, 0.1, 0.0, u=0.02) > 0.0
+
+
+def test_patience_widens_the_gate():
+    assert allowed(1.2, 0.25) < 0.0
+    assert allowed(1.2, 0.25, waited=5.0) < 0.0
+    assert allowed(1.2, 0.25, waited=8.0) > 0.0
+    assert allowed(1.2, 0.0, u=0.0, v=0.3, waited=12.0) > 0.0
+
+
+def test_waiting_at_the_gate_is_counted():
+    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2)
+    state = outer_loop(hovering(PRECISE), DOWN, beside, LEVEL, PRECISE, 0.02)
+    assert state.waited_s == pytest.approx(0.02)
+    state = outer_loop(state, DOWN, beside._replace(pos_n=0.0), LEVEL, PRECISE, 0.02)
+    assert state.waited_s == pytest.approx(0.02)
 
 
 def test_the_limit_holds_in_the_loop():
@@ -181,5 +202,5 @@ def test_the_limit_holds_in_the_loop():
     over = beside._replace(pos_n=0.0)
     waiting = outer_loop(hovering(PRECISE), DOWN, beside, LEVEL, PRECISE, 0.02)
     going = outer_loop(hovering(PRECISE), DOWN, over, LEVEL, PRECISE, 0.02)
-    assert waiting.collective_command == pytest.approx(PRECISE.collective_trim_rad)
+    assert waiting.collective_command > PRECISE.collective_trim_rad
     assert going.collective_command < PRECISE.collective_trim_rad

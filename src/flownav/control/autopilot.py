@@ -17,6 +17,9 @@ from flownav.control.guidance import Reference
 from flownav.frames import GRAVITY_M_S2, Rotation
 
 
+FORESEEN_S = 1.0  # how far ahead the last metre's gate looks
+
+
 class AutopilotGains(NamedTuple):
     """Gains and limits, SI; trims of the vehicle that is flown."""
 
@@ -63,6 +66,7 @@ class AutopilotGains(NamedTuple):
     align_height_m: float = 0.0  # below it, down to commit_height_m, no descent while farther than align_radius_m
     align_radius_m: float = 1e9
     align_speed_m_s: float = 1e9  # nor while faster than this over the ground
+    align_patience_s: float = 1e9  # both double after so long a wait
     commit_height_m: float = 0.0
 
 
@@ -82,6 +86,7 @@ class AutopilotState(NamedTuple):
     collective_command: float  # [rad]
     flying: float  # 1.0 in flight, 0.0 on the skids
     contact_time_s: float  # how long the skids have carried weight
+    waited_s: float  # at the gate of the last metre
 
 
 class Estimate(NamedTuple):
@@ -102,7 +107,8 @@ class Estimate(NamedTuple):
 def grounded(gains: AutopilotGains) -> AutopilotState:
     """The state of an autopilot on the ground at idle."""
     return AutopilotState(
-        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gains.pitch_trim_sine, gains.roll_trim_sine, gains.idle_collective_rad, 0.0, 0.0
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gains.pitch_trim_sine, gains.roll_trim_sine, gains.idle_collective_rad, 0.0, 0.0,
+        0.0,
     )
 
 
@@ -110,7 +116,8 @@ def grounded(gains: AutopilotGains) -> AutopilotState:
 def hovering(gains: AutopilotGains) -> AutopilotState:
     """The state of an autopilot in trimmed hover."""
     return AutopilotState(
-        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gains.pitch_trim_sine, gains.roll_trim_sine, gains.collective_trim_rad, 1.0, 0.0
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gains.pitch_trim_sine, gains.roll_trim_sine, gains.collective_trim_rad, 1.0, 0.0,
+        0.0,
     )
 
 
@@ -150,6 +157,7 @@ def landing_logic(
         collective_command=state.collective_command,
         flying=flying,
         contact_time_s=contact_time,
+        waited_s=state.waited_s,
     )
 
 
@@ -168,21 +176,33 @@ def skids_beside(rotation: Rotation, gains: AutopilotGains) -> tuple[float, floa
 
 
 @equation
-def descent_limit(
-    off_n: float, off_e: float, reference: Reference, estimate: Estimate, gains: AutopilotGains
-) -> float:
-    """How fast the vehicle may descend [m/s]: slowly near the pad, and at first only when it is above its middle.
+def misaligned(
+    off_n: float, off_e: float, vel_n: float, vel_e: float, height_m: float, waited_s: float, gains: AutopilotGains
+) -> bool:
+    """Whether the last metre's gate is shut: the skids would not touch near enough to the pad's middle.
 
-    Where it is not, it climbs back to the height of the gate and waits there: gusts would else sink it to the commit.
-    off_n, off_e: how far the reference lies from the middle of the skids [m].
+    off_n, off_e: from the middle of the skids to the reference [m]; vel_n, vel_e: over the ground [m/s]; height_m: of
+    the skids. What counts is where the skids will be when they touch, a second ahead at most. What is near enough grows
+    with the time waited, for no wind lets a vehicle wait for ever.
     """
-    height = gains.pad_pos_d_m - estimate.pos_d
-    far = off_n * off_n + off_e * off_e > gains.align_radius_m * gains.align_radius_m
-    fast = estimate.u * estimate.u + estimate.v * estimate.v > gains.align_speed_m_s * gains.align_speed_m_s
-    aligning = (far or fast) and height < gains.align_height_m and height > gains.commit_height_m
-    slow = gains.land_speed_m_s if height < gains.land_height_m else gains.climb_limit_m_s + reference.vel_d
-    back = clamp(gains.height_gain * (height - gains.align_height_m), -gains.land_speed_m_s, 0.0)
-    return back if aligning else slow
+    until_s = smaller(height_m / gains.land_speed_m_s, FORESEEN_S)
+    beside_n, beside_e = off_n - until_s * vel_n, off_e - until_s * vel_e
+    patience = 1.0 + waited_s / gains.align_patience_s
+    radius, speed = gains.align_radius_m * patience, gains.align_speed_m_s * patience
+    far = beside_n * beside_n + beside_e * beside_e > radius * radius
+    fast = vel_n * vel_n + vel_e * vel_e > speed * speed
+    return (far or fast) and height_m < gains.align_height_m and height_m > gains.commit_height_m
+
+
+@equation
+def descent_limit(waiting: bool, height_m: float, vel_d: float, gains: AutopilotGains) -> float:
+    """How fast the vehicle may descend [m/s]: slowly near the pad, and not at all while it waits at the gate.
+
+    It climbs back to the height of the gate and waits there: gusts would else sink it through. vel_d: the reference's.
+    """
+    slow = gains.land_speed_m_s if height_m < gains.land_height_m else gains.climb_limit_m_s + vel_d
+    back = clamp(gains.height_gain * (height_m - gains.align_height_m), -gains.land_speed_m_s, 0.0)
+    return back if waiting else slow
 
 
 @equation
@@ -228,12 +248,14 @@ def outer_loop(
     climb_limit = gains.climb_limit_m_s
     vel_d = reference.vel_d + clamp(gains.height_gain * (reference.pos_d - estimate.pos_d), -climb_limit, climb_limit)
 
-    vel_d = smaller(vel_d, descent_limit(off_n, off_e, reference, estimate, gains))
-
-    # errors along the heading and across it; the body velocity in the earth frame first
+    # the body velocity in the earth frame
     est_n = rotation[0] * estimate.u + rotation[1] * estimate.v + rotation[2] * estimate.w
     est_e = rotation[3] * estimate.u + rotation[4] * estimate.v + rotation[5] * estimate.w
     est_d = rotation[6] * estimate.u + rotation[7] * estimate.v + rotation[8] * estimate.w
+    height_m = gains.pad_pos_d_m - estimate.pos_d
+    waiting = misaligned(off_n, off_e, est_n, est_e, height_m, state.waited_s, gains)
+    vel_d = smaller(vel_d, descent_limit(waiting, height_m, reference.vel_d, gains))
+
     error_forward, error_right = along_heading(rotation, vel_n - est_n, vel_e - est_e)
     error_down = vel_d - est_d
 
@@ -271,6 +293,7 @@ def outer_loop(
         collective_command=in_flight if flying else on_ground,
         flying=state.flying,
         contact_time_s=state.contact_time_s,
+        waited_s=state.waited_s + dt if waiting else state.waited_s,
     )
 
 
@@ -307,6 +330,7 @@ def inner_loop(
         collective_command=state.collective_command,
         flying=state.flying,
         contact_time_s=state.contact_time_s,
+        waited_s=state.waited_s,
     )
     return (
         after,

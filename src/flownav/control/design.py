@@ -28,7 +28,7 @@ FELT = {
     "gust_share": 1.0,
 }  # fmt: skip
 UNFELT = {
-    "position_gain": 0.25, "forward_gain": 0.6, "forward_integral": 0.05, "right_gain": 0.9, "right_integral": 0.1,
+    "position_gain": 0.50, "forward_gain": 0.65, "forward_integral": 0.05, "right_gain": 1.03, "right_integral": 0.14,
     "gust_share": 0.0,
 }  # fmt: skip
 GUST_FORWARD_S, GUST_RIGHT_S = 0.275, 0.19  # the disturbance observer's low-pass

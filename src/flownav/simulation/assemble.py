@@ -11,7 +11,7 @@ import numpy as np
 
 from flownav.control.autopilot import AutopilotGains
 from flownav.control.design import gains_for
-from flownav.control.guidance import path_through
+from flownav.control.guidance import path_through, rounded
 from flownav.errors import InputError
 from flownav.estimation.discretise import discretised
 from flownav.estimation.paper_filter import PaperModel
@@ -29,6 +29,7 @@ from flownav.vehicle.state import Controls, HelicopterState
 from flownav.vehicle.trim import Trim, parked, trim
 
 NEVER_S = 1e9
+CORNER_S = 1.5  # a corner of the path is flown at constant acceleration for so long
 
 @dataclass(frozen=True)
 class Setup:
@@ -158,12 +159,13 @@ def _start(
 def _path(scenario: Scenario, vehicle: VehicleParameters) -> Any:
     """The reference path of the centre of gravity. The linear truth has no ground: its path stops there."""
     lowest = 0.0 if scenario.truth == "linear" else -np.inf
-    return path_through(
+    straight = path_through(
         [
             (knot.t_s, knot.north_m, knot.east_m, -max(knot.height_m, lowest) - vehicle.cg_above_skid_m)
             for knot in scenario.flight.path
         ]
     )
+    return rounded(straight, CORNER_S)
 
 
 def _sensors(scenario: Scenario, sensor: FlowSensor, vehicle: VehicleParameters) -> SensorSuite:

@@ -7,8 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.control import autopilot
-from flownav.control.autopilot import AutopilotGains, Estimate, grounded, hovering, inner_loop, integrate, outer_loop
+from flownav.control import autopilot, gate
+from flownav.control.autopilot import Estimate, grounded, hovering, inner_loop, integrate, outer_loop
+from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Reference, path_through, reference_at
 from flownav.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion
 
@@ -152,8 +153,8 @@ DOWN = Reference(0.0, 0.0, 0.0, 0.0, 0.0, 0.3)
 
 def allowed(height, off_n=0.0, off_e=0.0, u=0.0, v=0.0, waited=0.0):
     """How fast it may descend with the skids so high over the pad, so far beside its middle."""
-    waiting = autopilot.misaligned(-off_n, -off_e, u, v, height, waited, PRECISE)
-    return autopilot.descent_limit(waiting, height, DOWN.vel_d, PRECISE)
+    waiting = gate.misaligned(-off_n, -off_e, u, v, height, waited, PRECISE)
+    return gate.descent_limit(waiting, height, DOWN.vel_d, PRECISE)
 
 
 def test_near_the_pad_the_descent_is_slow_and_above_it_the_references():

@@ -6,9 +6,9 @@ import control as ct
 import numpy as np
 import pytest
 
-from flownav.control.autopilot import AutopilotGains
 from flownav.control.box import LEAST_GAIN_DB, LEAST_PHASE_DEG, margins_of, margins_over_box
 from flownav.control.design import gains_for
+from flownav.control.gains import AutopilotGains
 from flownav.control.loops import CUTS, LOOPS, Timing, loop_gains
 from flownav.control.margins import margins
 from flownav.control.sampled import period_map, spectral_radius

@@ -14,7 +14,7 @@ from flownav.errors import VerdictError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from flownav.control.box import Box, LoopMargins
+    from flownav.control.box import Box
 
 
 def show_margins(file: Path | None, *, as_json: bool) -> None:
@@ -27,28 +27,24 @@ def show_margins(file: Path | None, *, as_json: bool) -> None:
     else:
         from rich.console import Console
 
+        from flownav.vehicle.corners import CROSSED
+
         console = Console()
         console.print(table(box))
-        console.print(f"{len({row.corner for row in box.rows})} corners; signs as in `--json`", highlight=False)
+        count = len({row.corner for row in box.rows})
+        console.print(f"{count} corners; signs: {', '.join(CROSSED)}", highlight=False)
     short = sorted({row.loop for row in box.rows if short_of_margin(row)})
     if short:
         raise VerdictError(f"less than {LEAST_PHASE_DEG:g} deg or {LEAST_GAIN_DB:g} dB at a corner: {', '.join(short)}")
     if box.cannot_hover:
-        raise VerdictError(f"{len(box.cannot_hover)} corners of the box cannot hover: {'; '.join(box.cannot_hover[:3])}")
+        raise VerdictError(
+            f"{len(box.cannot_hover)} corners of the box cannot hover: {'; '.join(box.cannot_hover[:3])}"
+        )
 
 
 def facts(box: Box) -> dict[str, Any]:
     """Margins as JSON; null where no phase, gain or delay takes the loop to its edge."""
-    rows = [
-        {
-            "loop": row.loop,
-            "corner": row.corner,
-            "phase_deg": _finite(row.margins.phase_deg),
-            "gain_db": _finite(row.margins.gain_db),
-            "delay_s": _finite(row.margins.delay_s),
-        }
-        for row in box.rows
-    ]
+    rows = [{"loop": row.loop, "corner": row.corner, **row.margins.finite()} for row in box.rows]
     return {"margins": rows, "cannot_hover": list(box.cannot_hover)}
 
 
@@ -58,18 +54,18 @@ def table(box: Box) -> Table:
     from rich.table import Table
 
     found = Table(
-        title="Margins of each loop, the others closed: the vehicle as told | the least over its uncertainty box",
+        title="Margins of each loop, the others closed: as told, and the least over the box",
         title_justify="left",
         box=boxes.SIMPLE_HEAD,
     )
     found.add_column("loop")
-    for name in ("phase, deg", "gain, dB", "delay, ms", "| phase", "gain", "delay", "corner of the least phase"):
-        found.add_column(name, justify="left" if name.startswith("corner") else "right")
+    for name in ("phase, deg", "gain, dB", "delay, ms", "least phase", "gain", "delay", "at"):
+        found.add_column(name, justify="left" if name == "at" else "right")
     for loop in dict.fromkeys(row.loop for row in box.rows):
         rows = [row for row in box.rows if row.loop == loop]
         worst = min(rows, key=lambda row: row.margins.phase_deg)
         least = [min(row.margins[i] for row in rows) for i in range(3)]
-        found.add_row(loop, *_figures(rows[0].margins), *_figures(least), _short(worst))
+        found.add_row(loop, *_figures(rows[0].margins), *_figures(least), _short(worst.corner))
     return found
 
 
@@ -82,9 +78,13 @@ def _figure(value: float, form: str = ".1f") -> str:
     return f"{value:{form}}" if math.isfinite(value) else "any"
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _short(corner: str) -> str:
+    """`mass -, inertia +, ...` of the crossed groups as their signs alone; any other name as it is."""
+    from flownav.control.box import INFLOW_HELD
+    from flownav.vehicle.corners import CROSSED
 
-
-def _short(row: LoopMargins) -> str:
-    return row.corner
+    parts = corner.split(", ")
+    held = [parts.pop()] if parts[-1] == INFLOW_HELD else []
+    if [part[:-2] for part in parts] == list(CROSSED):
+        parts = [" ".join(part[-1] for part in parts)]
+    return ", ".join([*parts, *held])

@@ -13,61 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import clamp, equation, magnitude, smaller
+from flownav.control.gains import AutopilotGains
+from flownav.control.gate import descent_limit, misaligned, skids_beside
 from flownav.control.guidance import Reference
 from flownav.frames import GRAVITY_M_S2, Rotation
-
-
-FORESEEN_S = 1.0  # how far ahead the last metre's gate looks
-
-
-class AutopilotGains(NamedTuple):
-    """Gains and limits, SI; trims of the vehicle that is flown."""
-
-    position_gain: float = 0.5  # [1/s] velocity per position error
-    horizontal_speed_limit_m_s: float = 1.5
-    forward_gain: float = 1.1  # [1/s] acceleration per velocity error
-    forward_integral: float = 0.25  # [1/s2]
-    right_gain: float = 1.1  # [1/s]
-    right_integral: float = 0.25  # [1/s2]
-    gust_share: float = 0.0  # of the acceleration that the disturbance observer sees, what is answered with tilt
-    gust_decay_forward: float = 0.0  # of the observer's low-pass over one period of the outer loop
-    gust_decay_right: float = 0.0
-    tilt_limit: float = 0.20  # sine of the tilt against trim
-    height_gain: float = 0.9  # [1/s]
-    climb_limit_m_s: float = 1.5
-    collective_gain: float = 0.010  # [rad/(m/s)]
-    collective_integral: float = 0.008  # [rad/m]
-    collective_limit_rad: float = 0.06  # about trim
-    pitch_gain: float = 0.14  # [rad cyclic / tilt error]
-    pitch_integral: float = 0.10  # [rad/s]
-    pitch_damping: float = 0.012  # [rad/(rad/s)]
-    roll_gain: float = 0.14
-    roll_integral: float = 0.10
-    roll_damping: float = 0.012
-    cyclic_limit_rad: float = 0.12
-    heading_gain: float = 1.5  # [1/s]
-    yaw_rate_gain: float = 0.05  # [rad/(rad/s)]
-    yaw_rate_integral: float = 0.10  # [rad/rad]
-    pedal_limit_rad: float = 0.20
-    collective_trim_rad: float = 0.0732
-    pedal_trim_rad: float = 0.16
-    lon_trim_rad: float = 0.0
-    lat_trim_rad: float = 0.0
-    pitch_trim_sine: float = 0.0
-    roll_trim_sine: float = 0.0
-    idle_collective_rad: float = 0.0
-    pedal_per_collective: float = 0.0  # what holds the heading against the main rotor's torque, about trim
-    spool_rate_rad_s: float = 0.20  # how fast the collective goes down to idle after touchdown
-    # the last metres of a precision landing: nothing of it where the limits are as here
-    pad_pos_d_m: float = 0.0  # of the reference point when the skids touch
-    skids_below_cg_m: float = 0.0  # it is their middle that is brought over the pad
-    land_height_m: float = 0.0  # below it the descent is held to land_speed_m_s
-    land_speed_m_s: float = 1e9
-    align_height_m: float = 0.0  # below it, down to commit_height_m, no descent while farther than align_radius_m
-    align_radius_m: float = 1e9
-    align_speed_m_s: float = 1e9  # nor while faster than this over the ground
-    align_patience_s: float = 1e9  # both double after so long a wait
-    commit_height_m: float = 0.0
 
 
 class AutopilotState(NamedTuple):
@@ -107,7 +56,19 @@ class Estimate(NamedTuple):
 def grounded(gains: AutopilotGains) -> AutopilotState:
     """The state of an autopilot on the ground at idle."""
     return AutopilotState(
-        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gains.pitch_trim_sine, gains.roll_trim_sine, gains.idle_collective_rad, 0.0, 0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        gains.pitch_trim_sine,
+        gains.roll_trim_sine,
+        gains.idle_collective_rad,
+        0.0,
+        0.0,
         0.0,
     )
 
@@ -116,7 +77,19 @@ def grounded(gains: AutopilotGains) -> AutopilotState:
 def hovering(gains: AutopilotGains) -> AutopilotState:
     """The state of an autopilot in trimmed hover."""
     return AutopilotState(
-        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gains.pitch_trim_sine, gains.roll_trim_sine, gains.collective_trim_rad, 1.0, 0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        gains.pitch_trim_sine,
+        gains.roll_trim_sine,
+        gains.collective_trim_rad,
+        1.0,
+        0.0,
         0.0,
     )
 
@@ -159,50 +132,6 @@ def landing_logic(
         contact_time_s=contact_time,
         waited_s=state.waited_s,
     )
-
-
-@equation
-def skids_beside(rotation: Rotation, gains: AutopilotGains) -> tuple[float, float]:
-    """How far the middle of the skids hangs north and east of the centre of gravity in trimmed hover [m].
-
-    A helicopter hovers with a roll against its tail rotor and stands level: what touches the ground first, and where it
-    comes to rest, is the skids.
-    """
-    forward = gains.skids_below_cg_m * gains.pitch_trim_sine
-    left = gains.skids_below_cg_m * gains.roll_trim_sine
-    level = 1.0 / np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
-    cos_heading, sin_heading = rotation[0] * level, rotation[3] * level
-    return cos_heading * forward + sin_heading * left, sin_heading * forward - cos_heading * left
-
-
-@equation
-def misaligned(
-    off_n: float, off_e: float, vel_n: float, vel_e: float, height_m: float, waited_s: float, gains: AutopilotGains
-) -> bool:
-    """Whether the last metre's gate is shut: the skids would not touch near enough to the pad's middle.
-
-    off_n, off_e: from the middle of the skids to the reference [m]; vel_n, vel_e: over the ground [m/s]; height_m: of
-    the skids. What counts is where the skids will be when they touch, a second ahead at most. What is near enough grows
-    with the time waited, for no wind lets a vehicle wait for ever.
-    """
-    until_s = smaller(height_m / gains.land_speed_m_s, FORESEEN_S)
-    beside_n, beside_e = off_n - until_s * vel_n, off_e - until_s * vel_e
-    patience = 1.0 + waited_s / gains.align_patience_s
-    radius, speed = gains.align_radius_m * patience, gains.align_speed_m_s * patience
-    far = beside_n * beside_n + beside_e * beside_e > radius * radius
-    fast = vel_n * vel_n + vel_e * vel_e > speed * speed
-    return (far or fast) and height_m < gains.align_height_m and height_m > gains.commit_height_m
-
-
-@equation
-def descent_limit(waiting: bool, height_m: float, vel_d: float, gains: AutopilotGains) -> float:
-    """How fast the vehicle may descend [m/s]: slowly near the pad, and not at all while it waits at the gate.
-
-    It climbs back to the height of the gate and waits there: gusts would else sink it through. vel_d: the reference's.
-    """
-    slow = gains.land_speed_m_s if height_m < gains.land_height_m else gains.climb_limit_m_s + vel_d
-    back = clamp(gains.height_gain * (height_m - gains.align_height_m), -gains.land_speed_m_s, 0.0)
-    return back if waiting else slow
 
 
 @equation
@@ -337,5 +266,7 @@ def inner_loop(
         gains.lon_trim_rad + (clamp(lon, -limit, limit) if flying else 0.0),
         gains.lat_trim_rad + (clamp(lat, -limit, limit) if flying else 0.0),
         state.collective_command,
-        gains.pedal_trim_rad + torque + (clamp(pedal, -gains.pedal_limit_rad, gains.pedal_limit_rad) if flying else 0.0),
+        gains.pedal_trim_rad
+        + torque
+        + (clamp(pedal, -gains.pedal_limit_rad, gains.pedal_limit_rad) if flying else 0.0),
     )

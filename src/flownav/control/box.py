@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.control.autopilot import AutopilotGains
 from flownav.control.design import gains_for
+from flownav.control.gains import AutopilotGains
 from flownav.control.loops import LOOPS, loop_gains
 from flownav.control.margins import Margins, margins
 from flownav.control.sampled import spectral_radius

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 
-from flownav.control.autopilot import AutopilotGains
+from flownav.control.gains import AutopilotGains
 from flownav.control.loops import OUTER_S
 from flownav.vehicle.feasibility import hover_induced_velocity, hover_pitch
 from flownav.vehicle.parameters import VehicleParameters

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from flownav.compile import equation
 
-
 PIECES = 8
 LEFT_STRAIGHT = 0.9
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.control.autopilot import AutopilotGains
+from flownav.control.gains import AutopilotGains
 from flownav.frames import GRAVITY_M_S2
 from flownav.vehicle.plant import INPUTS, OUTPUTS, Complex
 

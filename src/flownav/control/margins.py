@@ -23,6 +23,10 @@ class Margins(NamedTuple):
     gain_db: float
     delay_s: float
 
+    def finite(self) -> dict[str, float | None]:
+        """By name, null where nothing takes the loop to its edge."""
+        return {name: value if np.isfinite(value) else None for name, value in self._asdict().items()}
+
 
 def margins(loop: Complex, omega_rad_s: Array) -> Margins:
     """The margins of L(jω) (n,) on a grid of frequencies fine enough to interpolate on."""

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from flownav.control.autopilot import AutopilotGains
+from flownav.control.gains import AutopilotGains
 from flownav.control.loops import FLOWN, SIGNALS, Timing
 from flownav.frames import GRAVITY_M_S2
 from flownav.vehicle.plant import INPUTS, OUTPUTS, LinearPlant

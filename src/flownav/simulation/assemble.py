@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from flownav.control.autopilot import AutopilotGains
+from flownav.control.box import margins_of
 from flownav.control.design import gains_for
+from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import path_through, rounded
 from flownav.errors import InputError
 from flownav.estimation.discretise import discretised
@@ -22,14 +23,17 @@ from flownav.simulation.plan import ATTITUDE_S, Flight, FlightPlan
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
+from flownav.vehicle.corners import NOMINAL
 from flownav.vehicle.loading import describe_vehicle, load_vehicle
 from flownav.vehicle.paper_model import ReducedModel, load_paper_model
 from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.plant import hover_plant
 from flownav.vehicle.state import Controls, HelicopterState
 from flownav.vehicle.trim import Trim, parked, trim
 
 NEVER_S = 1e9
 CORNER_S = 1.5  # a corner of the path is flown at constant acceleration for so long
+
 
 @dataclass(frozen=True)
 class Setup:
@@ -84,6 +88,10 @@ def assemble(scenario: Scenario) -> Setup:
         },
         "autopilot_gains": flight.gains._asdict(),
     }
+    if scenario.truth == "nonlinear":
+        parameters["autopilot_margins"] = {
+            row.loop: row.margins.finite() for row in margins_of(hover_plant(vehicle, hover), gains, NOMINAL)
+        }
     if carried:
         parameters["sensors"] = carried.sheets.model_dump(exclude={"flow_sensor"})
         parameters["filter"] = carried.told.settings.model_dump()

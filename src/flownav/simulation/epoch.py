@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from flownav.compile import equation, procedure
-from flownav.control.autopilot import AutopilotGains, AutopilotState, Estimate, inner_loop, landing_logic, outer_loop
+from flownav.control.autopilot import AutopilotState, Estimate, inner_loop, landing_logic, outer_loop
+from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Reference
 from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import GRAVITY_M_S2, Quaternion, Rotation, quaternion_product, rotation_from_quaternion

@@ -45,7 +45,7 @@ ALONE: Groups = {
 
 
 class Corner(NamedTuple):
-    """A vehicle at a corner of the box; name: `nominal`, or `mass +, inertia -, ...` for the groups that have a width."""
+    """A vehicle at a corner of the box; name: `nominal`, or `mass +, inertia -, ...` of the groups that are moved."""
 
     name: str
     vehicle: VehicleParameters

@@ -62,13 +62,28 @@ def hover_plant(vehicle: VehicleParameters, about: Trim, *, freeze_inflow: bool 
     return LinearPlant(into @ both[:, :count] @ out, into @ both[:, count:], seen @ out)
 
 
+def gust_input(vehicle: VehicleParameters, about: Trim) -> Array:
+    """What wind from the south and from the west (it blows north, east [m/s]) makes of the plant's states, (22, 2)."""
+
+    def rates(wind: Sequence[Any]) -> Sequence[Any]:
+        return helicopter.derivative(about.state, about.controls, wind[0], wind[1], 0.0, vehicle)
+
+    aside = np.array([BESIDE_HOVER_M_S, 0.0])
+    _, into = _small_rotation(np.array(about.state[ATTITUDE]))
+    return np.asarray(into @ (0.5 * (jacobian(rates, aside) + jacobian(rates, -aside))))
+
+
 def frequency_response(plant: LinearPlant, omega_rad_s: Array) -> Complex:
     """C·(jω - A)⁻¹·B at each frequency (n,): (n, outputs, inputs)."""
     resolvent = 1j * omega_rad_s[:, None, None] * np.eye(len(plant.a)) - plant.a
-    return np.asarray(plant.c @ np.linalg.solve(resolvent, np.broadcast_to(plant.b, (len(omega_rad_s), *plant.b.shape))))
+    return np.asarray(
+        plant.c @ np.linalg.solve(resolvent, np.broadcast_to(plant.b, (len(omega_rad_s), *plant.b.shape)))
+    )
 
 
-def _rates(state: HelicopterState, controls: Controls, held: Inflow | None, vehicle: VehicleParameters) -> HelicopterState:
+def _rates(
+    state: HelicopterState, controls: Controls, held: Inflow | None, vehicle: VehicleParameters
+) -> HelicopterState:
     if held is None:
         return helicopter.derivative(state, controls, 0.0, 0.0, 0.0, vehicle)
     rotation = helicopter.attitude(state)
@@ -97,4 +112,4 @@ def _small_rotation(quaternion: Array) -> tuple[Array, Array]:
     out[:first, :first] = np.eye(first)
     out[ATTITUDE, first : first + 3] = turned
     out[last:, first + 3 :] = np.eye(len(FIELDS) - last)
-    return out, np.linalg.pinv(out)
+    return out, np.asarray(np.linalg.pinv(out), float)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from flownav.control import autopilot, gate
 from flownav.control.autopilot import Estimate, grounded, hovering, inner_loop, integrate, outer_loop
 from flownav.control.gains import AutopilotGains
-from flownav.control.guidance import Reference, path_through, reference_at
+from flownav.control.guidance import Reference, path_through, reference_at, rounded
 from flownav.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion
 
 GAINS = AutopilotGains()
@@ -205,3 +205,72 @@ def test_the_limit_holds_in_the_loop():
     going = outer_loop(hovering(PRECISE), DOWN, over, LEVEL, PRECISE, 0.02)
     assert waiting.collective_command > PRECISE.collective_trim_rad
     assert going.collective_command < PRECISE.collective_trim_rad
+
+
+# -- gusts, torque, skids ---------------------------------------------------------------------------------------
+def felt(push_n=0.0, push_e=0.0, yaw=0.0, roll=0.0, pitch=0.0, **gains):
+    """The outer loop after a second of a push [m/s2] on a vehicle that hangs on its rotor; trim is level."""
+    rotation = rotation_from_quaternion(*quaternion_from_euler(roll, pitch, yaw))
+    earth = np.array([push_n, push_e, -GRAVITY_M_S2])
+    if roll or pitch:  # what accelerates it: the thrust, along its own axis
+        earth = np.reshape(rotation, (3, 3)) @ [0.0, 0.0, -GRAVITY_M_S2]
+    force = np.reshape(rotation, (3, 3)).T @ earth
+    told = GAINS._replace(gust_share=1.0, gust_decay_forward=0.9, gust_decay_right=0.9, forward_integral=0.0,
+                          right_integral=0.0, **gains)  # fmt: skip
+    state = hovering(told)
+    for _ in range(50):
+        estimate = HERE._replace(force_x=force[0], force_y=force[1], force_z=force[2])
+        state = outer_loop(state, HOLD, estimate, rotation, told, 0.02)
+    return state
+
+
+def test_a_push_is_answered_with_the_tilt_that_holds_against_it():
+    north, east = felt(push_n=0.3), felt(push_e=0.3)
+    assert north.pitch_sine == pytest.approx(0.3 / GRAVITY_M_S2, rel=0.01)  # nose up
+    assert east.roll_sine == pytest.approx(-0.3 / GRAVITY_M_S2, rel=0.01)  # to the left
+    assert felt(push_e=0.3, yaw=np.pi / 2).pitch_sine == pytest.approx(0.3 / GRAVITY_M_S2, rel=0.01)
+    assert (north.roll_sine, east.pitch_sine) == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
+@pytest.mark.parametrize(("roll", "pitch"), [(0.05, 0.0), (0.0, 0.05), (-0.03, 0.02)])
+def test_what_the_tilt_explains_is_no_gust(roll, pitch):
+    state = felt(roll=roll, pitch=pitch)
+    assert (state.gust_forward, state.gust_right) == pytest.approx((0.0, 0.0), abs=0.01)
+
+
+def test_less_collective_takes_less_pedal():
+    told = GAINS._replace(pedal_per_collective=2.0)
+    state = hovering(told)._replace(collective_command=told.collective_trim_rad - 0.01)
+    pedal = inner_loop(state, LEVEL, 0.0, 0.0, 0.0, told, 0.004)[4]
+    assert pedal == pytest.approx(told.pedal_trim_rad - 0.02)
+
+
+def test_the_skids_hang_opposite_to_the_roll_and_it_is_they_that_are_flown_to_the_pad():
+    told = GAINS._replace(skids_below_cg_m=0.2, roll_trim_sine=0.1, pitch_trim_sine=0.05)
+    assert gate.skids_beside(LEVEL, told) == pytest.approx((0.01, -0.02))
+    east = rotation_from_quaternion(*quaternion_from_euler(0.0, 0.0, np.pi / 2))
+    assert gate.skids_beside(east, told) == pytest.approx((0.02, 0.01))
+    rolled = rotation_from_quaternion(*quaternion_from_euler(0.1, 0.0, 0.0))  # what it says is where they are
+    assert 0.2 * rolled[5] == pytest.approx(gate.skids_beside(LEVEL, told)[1], rel=0.01)
+    over = HERE._replace(pos_n=-0.01, pos_e=0.02)
+    state = outer_loop(hovering(told), HOLD, over, LEVEL, told, 0.02)
+    assert (state.pitch_sine, state.roll_sine) == pytest.approx((0.05, 0.1))
+
+
+def test_a_rounded_corner_is_passed_at_constant_acceleration_and_the_legs_stay():
+    smooth = rounded(PATH, 2.0)
+    for t_s in (0.0, 5.0, 8.99, 11.01, 15.0, 20.0):
+        assert reference_at(smooth, t_s)[:3] == pytest.approx(reference_at(PATH, t_s)[:3], abs=1e-9)
+    for t_s in (9.25, 9.5, 10.0, 10.75):  # at its own knots
+        since = t_s - 9.0
+        assert reference_at(smooth, t_s).pos_d == pytest.approx(-3.0 + 0.5 * 0.15 * since**2, abs=1e-9)
+    speeds = [reference_at(smooth, t_s).vel_d for t_s in np.arange(8.9, 11.2, 0.05)]
+    assert np.diff(speeds).max() < 0.3 / 7
+    assert np.diff(speeds).min() >= -1e-9
+
+
+def test_short_legs_keep_a_tenth_of_themselves():
+    short = rounded(path_through([(0.0, 0, 0, 0), (1.0, 0, 0, -1.0), (2.0, 0, 0, -1.0), (9.0, 1, 0, -1.0)]), 5.0)
+    assert np.all(np.diff(short.t_s) > 0.0)
+    assert reference_at(short, 0.05).vel_d == pytest.approx(-1.0)
+    assert reference_at(short, 1.5)[:3] == pytest.approx((0.0, 0.0, -1.0))

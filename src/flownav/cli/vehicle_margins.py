@@ -58,8 +58,8 @@ def table(box: Box) -> Table:
         title_justify="left",
         box=boxes.SIMPLE_HEAD,
     )
-    found.add_column("loop")
-    for name in ("phase, deg", "gain, dB", "delay, ms", "least phase", "gain", "delay", "at"):
+    found.add_column("loop", no_wrap=True)
+    for name in ("phase, °", "gain, dB", "delay, ms", "least °", "dB", "ms", "at"):
         found.add_column(name, justify="left" if name == "at" else "right")
     for loop in dict.fromkeys(row.loop for row in box.rows):
         rows = [row for row in box.rows if row.loop == loop]

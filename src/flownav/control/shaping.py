@@ -155,7 +155,7 @@ def shape_in(gains: AutopilotGains, name: str) -> Shape:
     )  # fmt: skip
 
 
-def shaped(name: str, start: AutopilotGains, path: Path | None = None, *, rounds: int = 130) -> tuple[Shape, float]:
+def shaped(name: str, start: AutopilotGains, path: Path | None = None, *, rounds: int = 60) -> tuple[Shape, float]:
     """The best gains of an axis found in so many rounds, and their drift [m]. start: the other axes' gains."""
     axis = axis_of(name, path)
     best = [np.inf]

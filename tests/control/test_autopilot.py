@@ -15,7 +15,7 @@ from flownav.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_qu
 
 GAINS = AutopilotGains()
 LEVEL = rotation_from_quaternion(1.0, 0.0, 0.0, 0.0)
-HERE = Estimate(0.0, 0.0, -3.0, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2)
+HERE = Estimate(0.0, 0.0, -3.0, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2, 1.0)
 HOLD = Reference(0.0, 0.0, -3.0, 0.0, 0.0, 0.0)
 PATH = path_through([(0.0, 0.0, 0.0, -3.0), (10.0, 0.0, 0.0, -3.0), (20.0, 2.0, 0.0, 0.0)])
 
@@ -154,7 +154,7 @@ DOWN = Reference(0.0, 0.0, 0.0, 0.0, 0.0, 0.3)
 def allowed(height, off_n=0.0, off_e=0.0, u=0.0, v=0.0, waited=0.0):
     """How fast it may descend with the skids so high over the pad, so far beside its middle."""
     waiting = gate.misaligned(-off_n, -off_e, u, v, height, waited, PRECISE)
-    return gate.descent_limit(waiting, height, DOWN.vel_d, PRECISE)
+    return gate.descent_limit(waiting, PRECISE.align_height_m, height, DOWN.vel_d, PRECISE)
 
 
 def test_near_the_pad_the_descent_is_slow_and_above_it_the_references():
@@ -183,6 +183,19 @@ def test_what_counts_is_where_the_skids_will_touch():
     assert allowed(0.42, 0.1, 0.0, u=0.02) > 0.0
 
 
+def test_without_a_pad_it_waits_at_the_height_from_which_it_searches():
+    told = PRECISE._replace(search_height_m=2.0)
+    over = Estimate(0.0, 0.0, PRECISE.pad_pos_d_m - 1.9, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2, 0.0)
+
+    def collective(height, found):
+        at = over._replace(pos_d=PRECISE.pad_pos_d_m - height, pad_found=found)
+        return outer_loop(hovering(told), DOWN, at, LEVEL, told, 0.02).collective_command - told.collective_trim_rad
+
+    assert collective(1.9, 0.0) > 0.0
+    assert collective(1.9, 1.0) < 0.0
+    assert collective(2.1, 0.0) < 0.0
+
+
 def test_patience_widens_the_gate():
     assert allowed(1.2, 0.25) < 0.0
     assert allowed(1.2, 0.25, waited=5.0) < 0.0
@@ -191,7 +204,7 @@ def test_patience_widens_the_gate():
 
 
 def test_waiting_at_the_gate_is_counted():
-    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2)
+    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2, 1.0)
     state = outer_loop(hovering(PRECISE), DOWN, beside, LEVEL, PRECISE, 0.02)
     assert state.waited_s == pytest.approx(0.02)
     state = outer_loop(state, DOWN, beside._replace(pos_n=0.0), LEVEL, PRECISE, 0.02)
@@ -199,7 +212,7 @@ def test_waiting_at_the_gate_is_counted():
 
 
 def test_the_limit_holds_in_the_loop():
-    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2)
+    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2, 1.0)
     over = beside._replace(pos_n=0.0)
     waiting = outer_loop(hovering(PRECISE), DOWN, beside, LEVEL, PRECISE, 0.02)
     going = outer_loop(hovering(PRECISE), DOWN, over, LEVEL, PRECISE, 0.02)

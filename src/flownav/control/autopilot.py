@@ -50,6 +50,7 @@ class Estimate(NamedTuple):
     force_x: float
     force_y: float
     force_z: float
+    pad_found: float  # 1 where the pad has been seen or stood upon
 
 
 @equation
@@ -183,7 +184,9 @@ def outer_loop(
     est_d = rotation[6] * estimate.u + rotation[7] * estimate.v + rotation[8] * estimate.w
     height_m = gains.pad_pos_d_m - estimate.pos_d
     waiting = misaligned(off_n, off_e, est_n, est_e, height_m, state.waited_s, gains)
-    vel_d = smaller(vel_d, descent_limit(waiting, height_m, reference.vel_d, gains))
+    searching = estimate.pad_found == 0.0 and height_m < gains.search_height_m
+    gate_m = gains.search_height_m if searching else gains.align_height_m
+    vel_d = smaller(vel_d, descent_limit(waiting or searching, gate_m, height_m, reference.vel_d, gains))
 
     error_forward, error_right = along_heading(rotation, vel_n - est_n, vel_e - est_e)
     error_down = vel_d - est_d

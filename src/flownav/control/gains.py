@@ -53,3 +53,4 @@ class AutopilotGains(NamedTuple):
     align_speed_m_s: float = 1e9  # nor while faster than this over the ground
     align_patience_s: float = 1e9  # both double after so long a wait
     commit_height_m: float = 0.0
+    search_height_m: float = 0.0  # no lower than this before the pad is found

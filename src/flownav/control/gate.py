@@ -45,11 +45,12 @@ def misaligned(
 
 
 @equation
-def descent_limit(waiting: bool, height_m: float, vel_d: float, gains: AutopilotGains) -> float:
+def descent_limit(waiting: bool, gate_m: float, height_m: float, vel_d: float, gains: AutopilotGains) -> float:
     """How fast the vehicle may descend [m/s]: slowly near the pad, and not at all while it waits at the gate.
 
-    It climbs back to the height of the gate and waits there: gusts would else sink it through. vel_d: the reference's.
+    It climbs back to the height of the gate, gate_m, and waits there: gusts would else sink it through. vel_d: the
+    reference's.
     """
     slow = gains.land_speed_m_s if height_m < gains.land_height_m else gains.climb_limit_m_s + vel_d
-    back = clamp(gains.height_gain * (height_m - gains.align_height_m), -gains.land_speed_m_s, 0.0)
+    back = clamp(gains.height_gain * (height_m - gate_m), -gains.land_speed_m_s, 0.0)
     return back if waiting else slow

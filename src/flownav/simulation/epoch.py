@@ -102,6 +102,7 @@ def command(
             estimate.force_x,
             estimate.force_y,
             estimate.force_z,
+            work[layout.PAD_FOUND * len(lanes) + lane],
         )
         if onboard is None:
             contact = work[layout.CONTACT * len(lanes) + lane]

@@ -183,8 +183,9 @@ def outer_loop(
     est_e = rotation[3] * estimate.u + rotation[4] * estimate.v + rotation[5] * estimate.w
     est_d = rotation[6] * estimate.u + rotation[7] * estimate.v + rotation[8] * estimate.w
     height_m = gains.pad_pos_d_m - estimate.pos_d
-    waiting = misaligned(off_n, off_e, est_n, est_e, height_m, state.waited_s, gains)
-    searching = estimate.pad_found == 0.0 and height_m < gains.search_height_m
+    found = estimate.pad_found > 0.0  # before, height_m is over where GPS puts the pad, metres from any ground
+    waiting = found and misaligned(off_n, off_e, est_n, est_e, height_m, state.waited_s, gains)
+    searching = not found and height_m < gains.search_height_m
     gate_m = gains.search_height_m if searching else gains.align_height_m
     vel_d = smaller(vel_d, descent_limit(waiting or searching, gate_m, height_m, reference.vel_d, gains))
 

@@ -17,9 +17,14 @@ from flownav.simulation.scenario import SHIPPED, Scenario, load_scenario
 
 SHORT, SOON, PAPERS = {"duration_s": 3.0}, {"handover_s": 1.0}, {"name": "paper"}
 STATES = (*POSITION_NED, *VELOCITY_BODY)
-TOUCHDOWN_S, OFF_M, SINK_M_S, CRASHED = (
+TOUCHDOWN_S, OFF_M, SINK_M_S, BROKEN = (
     SCORE_COLUMNS.index(name)
-    for name in ("touchdown.t_s", "touchdown.horizontal_error_m", "touchdown.sink_rate_m_s", "crashed")
+    for name in (
+        "touchdown.contact.t_s",
+        "touchdown.contact.distance_m",
+        "touchdown.contact.sink_rate_m_s",
+        "touchdown.broken",
+    )
 )
 
 
@@ -165,7 +170,7 @@ def test_the_papers_filter_has_its_largest_error_with_white_gps_and_metres_with_
 def test_a_storm_is_a_crash_and_not_a_landing():
     storm = setup("landing", filter=PAPERS, wind={"speed_20ft_m_s": 30.0}).flight
     scores = fly_many(storm, 1, 16)
-    assert scores[:, CRASHED].all()
+    assert scores[:, BROKEN].all()
     assert np.isnan(scores[:, TOUCHDOWN_S]).any()
 
 

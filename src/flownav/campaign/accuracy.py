@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from flownav.campaign.ablations import ablations
-from flownav.campaign.judged import BOUND_FLIGHTS, Judged, bound_of, fly_judged, touchdown_radius
+from flownav.campaign.judged import BOUND_FLIGHTS, Judged, bound_of, fly_judged
 from flownav.campaign.local import known_exactly
 from flownav.parameter_files import check
 from flownav.scoring.consistency import (
@@ -20,9 +20,10 @@ from flownav.scoring.consistency import (
     efficiency_by_height,
     inside_fraction,
     inside_steps,
-    percentile_with_interval,
 )
-from flownav.scoring.errors import CRASHED, MAX_POSITION_ERROR
+from flownav.scoring.errors import MAX_POSITION_ERROR, touchdown_rows
+from flownav.scoring.landings import REST_DISTANCE, crashed, radius, touchdown_of_flights
+from flownav.scoring.percentiles import percentile_with_interval
 from flownav.simulation.assemble import assemble
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario, load_scenario, with_filter
@@ -130,14 +131,13 @@ def _facts(judged: Judged) -> dict[str, Any]:
     assert judged.groups is not None
     axis = percentile_with_interval(judged.scores[:, MAX_POSITION_ERROR], SHARE)
     horizontal = percentile_with_interval(judged.largest_horizontal_m, SHARE)
-    touchdown = touchdown_radius(judged)
+    landings = touchdown_rows(judged.scores)
     return {
-        "crashed": int(judged.scores[:, CRASHED].sum()),
+        "crashed": int(crashed(landings).sum()),
+        "touchdown": touchdown_of_flights(landings),
         "p95_largest_axis_m": _finite(axis[0]),
         "p95_largest_horizontal_m": _finite(horizontal[0]),
         "p95_largest_horizontal_interval_m": [_finite(x) for x in horizontal[1:]],
-        "r95_m": _finite(touchdown[0]),
-        "r95_interval_m": [_finite(x) for x in touchdown[1:]],
         "rms_error": [_finite(x) for x in judged.flown.root_mean_square()],
         "rms_error_at_horizon": [_finite(x) for x in judged.sums.errors.root_mean_square()],
         "anees": anees(judged.sums),
@@ -158,13 +158,15 @@ def _targets(name: str, facts: dict[str, Any]) -> tuple[Target, ...]:
         gain = facts["papers_p95_largest_horizontal_m"] / _or_infinite(facts["p95_largest_horizontal_m"])
         better = Target("largest pad-relative error, the paper's filter over ours", gain, 4.0, at_least=True)
         return Target(CONSISTENCY, worst, 1.15), better, inside
-    return Target("touchdown R95 [m]", _or_infinite(facts["r95_m"]), 0.05), inside
+    return Target("touchdown R95 at rest [m]", _or_infinite(facts["touchdown"]["rest"]["r95_m"]), 0.05), inside
 
 
 def _cost(judged: Judged, whole: Judged) -> dict[str, Any]:
     """A variant's figures, and the errors of what it flew on over those of the whole navigator."""
     squares, wholes = judged.flown.root_mean_square() ** 2, whole.flown.root_mean_square() ** 2
     assert judged.sums is not None
+
+    landings = touchdown_rows(judged.scores)
 
     def ratio(states: slice) -> float:
         return float(np.sqrt(squares[states].sum() / wholes[states].sum()))
@@ -175,8 +177,8 @@ def _cost(judged: Judged, whole: Judged) -> dict[str, Any]:
         "vertical_rms_ratio": ratio(slice(2, 3)),
         "horizontal_speed_rms_ratio": ratio(slice(3, 5)),
         "anees": anees(judged.sums),
-        "r95_m": _finite(touchdown_radius(judged)[0]),
-        "crashed": int(judged.scores[:, CRASHED].sum()),
+        "rest_r95_m": radius(landings, REST_DISTANCE)["r95_m"],
+        "crashed": int(crashed(landings).sum()),
     }
 
 

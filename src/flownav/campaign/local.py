@@ -7,9 +7,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.record import POSITION_NED, VELOCITY_BODY, Record
+from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, score_block, scores_of_flight
 from flownav.scoring.paper_tables import published
+from flownav.scoring.touchdown import Limits, motion_of, touchdowns
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_blocks, fly_written
 from flownav.simulation.flight_record import record_of
@@ -25,13 +26,51 @@ def score_history(flight: Flight, history: Array) -> Array:
     """The scores of a block's flights, (lanes, len(SCORE_COLUMNS)); history (epochs, len(HISTORY), lanes)."""
     estimate = history[:, columns("estimate", (*POSITION_NED, *VELOCITY_BODY))]
     truth = history[:, columns("truth", (*POSITION_NED, *VELOCITY_BODY))]
-    sink_rate = history[:, column("truth", "sink_rate_m_s")]
-    on_ground = (history[:, column("truth", "contact_n")] > 0.0).astype(float)
-    t_s: Array = np.arange(len(history), dtype=np.float64) * EPOCH_S
-    counted = counted_steps(flight, history)
-    return score_block(
-        t_s, estimate, truth, sink_rate, on_ground, may_land_after_s=flight.plan.may_land_after_s, counted=counted
+    return score_block(estimate, truth, touchdown_history(flight, history), counted_steps(flight, history))
+
+
+def touchdown_history(flight: Flight, history: Array) -> Array:
+    """The touchdowns of a block's flights, (lanes, len(TOUCHDOWN_COLUMNS))."""
+    position = history[:, columns("truth", POSITION_NED)]
+    flown = position if flight.plan.fly_on_truth else history[:, columns("estimate", POSITION_NED)]
+    motion = motion_of(
+        position,
+        history[:, columns("truth", VELOCITY_BODY)],
+        history[:, columns("truth", QUATERNION)],
+        history[:, column("truth", "rate_r_rad_s")],
+        (history[:, column("truth", "contact_n")] > 0.0).astype(float),
+        flight.vehicle.cg_above_skid_m,
     )
+    t_s: Array = np.arange(len(history), dtype=np.float64) * EPOCH_S
+    error, seen = (flown - position)[:, :2], pad_to_be_seen(flight, t_s, motion.cg_height_m)
+    limits = Limits(**flight.limits._asdict())
+    return touchdowns(t_s, motion, error, seen, limits, flight.plan.may_land_after_s)
+
+
+def pad_to_be_seen(flight: Flight, t_s: Array, cg_height_m: Array) -> Array:
+    """Where the vehicle can still see its pad, or is still told where it is, (epochs, lanes) 0/1.
+
+    With a pad camera down to its least height; without one until the hand-over, and of the paper's filter until it last
+    notes its home.
+    """
+    onboard = flight.onboard
+    if onboard is not None and onboard.pad_clock.fitted:
+        lens_m = cg_height_m - onboard.pad_place.down_m
+        return np.asarray((lens_m >= onboard.pad.min_height_m) & (lens_m <= onboard.pad.max_height_m), float)
+    last_s = flight.plan.handover_s if onboard is not None else (home_epoch(flight) or 0) * EPOCH_S
+    return np.asarray(np.broadcast_to((t_s <= last_s)[:, None], cg_height_m.shape), float)
+
+
+def home_epoch(flight: Flight) -> int | None:
+    """The step at which the paper's filter last notes where its pad is.
+
+    None where it takes the filter's origin for it, and for the navigator, whose estimate is counted from there.
+    """
+    if flight.onboard is not None or not flight.plan.home_at_start:
+        return None
+    parked = flight.plan.starts_on_ground and flight.plan.takeoff_at_s > 0.0
+    last = int(np.ceil(flight.plan.takeoff_at_s / EPOCH_S)) - 1 if parked else 0
+    return min(last, flight.plan.epochs - 1)
 
 
 def counted_steps(flight: Flight, history: Array) -> Array:

@@ -61,7 +61,7 @@ def command(
 
 def markdown(made: list[Case]) -> str:
     """The tables as they are printed and as docs/accuracy.md has them."""
-    parts = [_targets(made), _known(made), _consistency(made), _by_height(made), _accuracy(made)]
+    parts = [_targets(made), _known(made), _consistency(made), _by_height(made), _accuracy(made), _touchdowns(made)]
     parts += [_ablations(case) for case in made if case.ablations]
     return "\n\n".join(parts) + "\n"
 
@@ -91,15 +91,36 @@ def _consistency(made: list[Case]) -> str:
 
 def _accuracy(made: list[Case]) -> str:
     rows = [
-        (case.name, *(_length(rms) for rms in case.facts["rms_error"]), _interval(case.facts, "p95_largest_horizontal"),
-         _interval(case.facts, "r95"), str(case.facts["crashed"]))
+        (case.name, *(_length(rms) for rms in case.facts["rms_error"]), _interval(case.facts, "p95_largest_horizontal"))
         for case in made
     ]  # fmt: skip
     heading = (
         "RMSE of what was flown on, in flight [m, m/s]",
         *STATES,
         "p95 of largest horizontal error [m] (95 % interval)",
-        "touchdown R95 [m] (95 % interval)",
+    )
+    return _table(heading, rows)
+
+
+def _touchdowns(made: list[Case]) -> str:
+    """Of the cases that land."""
+    rows = []
+    for case in made:
+        landing = case.facts["touchdown"]
+        if landing is not None:
+            rate, limited = landing["success"], landing["limited_by"]
+            success = f"{100.0 * rate['rate']:.1f} ({100.0 * rate['low']:.1f}-{100.0 * rate['high']:.1f})"
+            parts = (_length(limited[name]) for name in ("estimate_m", "guidance_m", "pad_m"))
+            ends = (_interval(landing[end], "r95") for end in ("contact", "rest"))
+            rows.append((case.name, *ends, *parts, success, str(case.facts["crashed"])))
+    heading = (
+        "touchdown",
+        "R95 at contact [m] (95 % interval)",
+        "R95 at rest [m] (95 % interval)",
+        "estimate, p95 [m]",
+        "guidance, p95 [m]",
+        "pad, p95 [m]",
+        "landed [%] (95 % interval)",
         "crashed",
     )
     return _table(heading, rows)
@@ -118,7 +139,7 @@ def _ablations(case: Case) -> str:
         ratios = (row["horizontal_rms_ratio"], row["vertical_rms_ratio"], row["horizontal_speed_rms_ratio"])
         return (
             _length(row["p95_largest_horizontal_m"]), *(f"{ratio:.2f}" for ratio in ratios), f"{row['anees']:.3g}",
-            _length(row["r95_m"]), str(row["crashed"]),
+            _length(row["rest_r95_m"]), str(row["crashed"]),
         )  # fmt: skip
 
     rows = [(lacking, *cells(row)) for lacking, row in case.ablations.items()]
@@ -129,7 +150,7 @@ def _ablations(case: Case) -> str:
         "vertical RMSE ratio",
         "horizontal speed RMSE ratio",
         "ANEES",
-        "touchdown R95 [m]",
+        "touchdown R95 at rest [m]",
         "crashed",
     )
     return _table(heading, rows)

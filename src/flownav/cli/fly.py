@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from flownav.simulation.scenario import Scenario
 
 
-OF_MANY_FLIGHTS = ("rmse_over_bound", "anees_inside_fraction", "r95_m", "r95_interval_m")
+OF_MANY_FLIGHTS = ("rmse_over_bound", "anees_inside_fraction")
 CRASHES_ALLOWED = 0.05  # of the flights, before the exit status says that the verdict is bad
 
 

@@ -21,9 +21,9 @@ from flownav.simulation.plan import ATTITUDE_S, Flight, FlightPlan
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
-from flownav.vehicle.loading import describe_vehicle, load_vehicle
+from flownav.vehicle.loading import describe_vehicle, read_vehicle
 from flownav.vehicle.paper_model import ReducedModel, load_paper_model
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import VehicleParameters, flatten, touchdown_limits
 from flownav.vehicle.state import Controls, HelicopterState
 from flownav.vehicle.trim import Trim, parked, trim
 
@@ -58,7 +58,8 @@ def assemble(scenario: Scenario) -> Setup:
         raise InputError(f'{scenario.name}: truth = "linear" has no forces for an IMU to feel; fly the "paper" filter')
     vehicle_file = Path(scenario.vehicle.file) if scenario.vehicle.file else None
     sensor_file = Path(scenario.flow_sensor) if scenario.flow_sensor else None
-    vehicle, sensor, paper = load_vehicle(vehicle_file), load_sensor(sensor_file), load_paper_model()
+    file, sensor, paper = read_vehicle(vehicle_file), load_sensor(sensor_file), load_paper_model()
+    vehicle = flatten(file)
     hover = trim(vehicle)
     plan = _plan(scenario, vehicle, hover)
     carried = fitted(scenario, sensor, vehicle, plan.epochs) if scenario.filter.name == "landing" else None
@@ -75,6 +76,7 @@ def assemble(scenario: Scenario) -> Setup:
         settings=carried.settings if carried else np.zeros(0),
         initial_variance=_initial_variance(scenario, paper),
         linear=_linear_truth(paper, hover) if scenario.truth == "linear" else None,
+        limits=touchdown_limits(file),
     )
     described = describe_vehicle(vehicle_file)
     parameters: dict[str, Any] = {

@@ -16,14 +16,16 @@ from flownav.estimation.discretise import discretised
 from flownav.estimation.paper_filter import PaperModel
 from flownav.measurement import Sensor
 from flownav.sensors.datasheet import FlowSensor, load_sensor
+from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.fitting import Fitted, fitted, timetable_of
 from flownav.simulation.plan import ATTITUDE_S, Flight, FlightPlan
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
-from flownav.vehicle.loading import describe_vehicle, read_vehicle
+from flownav.vehicle.loading import VehicleDescription, describe_vehicle, read_vehicle
 from flownav.vehicle.paper_model import ReducedModel, load_paper_model
 from flownav.vehicle.parameters import VehicleParameters, flatten, touchdown_limits
+from flownav.vehicle.schema import VehicleFile
 from flownav.vehicle.state import Controls, HelicopterState
 from flownav.vehicle.trim import Trim, parked, trim
 
@@ -38,7 +40,8 @@ YAW_RATE_RAD_S = 14.0
 class Setup:
     """A scenario made ready: the numbers the kernel takes, and what reports say of them.
 
-    fitted: the sensors that feed the navigator, and what it is told; None where the paper's filter flies.
+    fitted: the sensors that feed the navigator, and what it is told; None where the paper's filter flies. file: the
+    vehicle's, as it is believed to be, and described: the same with its uncertainties.
     """
 
     scenario: Scenario
@@ -48,6 +51,12 @@ class Setup:
     trim: Trim
     inputs: tuple[Path, ...]
     parameters: dict[str, Any]
+    file: VehicleFile
+    described: VehicleDescription
+
+    def ensemble(self) -> Ensemble:
+        """The flights of this scenario with truths of their own. InputError where its dispersion cannot be."""
+        return Ensemble(self.scenario, self.flight, self.file, self.described, self.sensor, self.fitted)
 
 
 def assemble(scenario: Scenario) -> Setup:
@@ -95,7 +104,7 @@ def assemble(scenario: Scenario) -> Setup:
         parameters["gps_delay_s"] = float(carried.ages_s[Sensor.GPS_POSITION])
         parameters["horizon_s"] = carried.schedule.horizon_s
     inputs = tuple(path for path in (vehicle_file, sensor_file) if path)
-    return Setup(scenario, sensor, flight, carried, hover, inputs, parameters)
+    return Setup(scenario, sensor, flight, carried, hover, inputs, parameters, file, described)
 
 
 def _gains(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> AutopilotGains:
@@ -156,7 +165,7 @@ def _plan(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> Flight
         draws=Draws(
             paper=scenario.filter.name == "paper",
             gps_drift=scenario.filter.name == "paper" and scenario.gps.model != "white",
-            wind=scenario.wind.speed_20ft_m_s > 0.0,
+            wind=scenario.wind.speed_20ft_m_s > 0.0 or scenario.dispersion.raises_wind(),
         ),
     )
 

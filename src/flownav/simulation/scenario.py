@@ -16,6 +16,7 @@ from flownav.errors import InputError
 from flownav.parameter_files import Number, ParameterModel, load, shipped
 from flownav.sensors.datasheet import FlowSettings
 from flownav.sensors.settings import GpsInsSettings, PadFixSettings, RangefinderSettings
+from flownav.simulation.dispersion import DispersionSection
 from flownav.simulation.wind import WindSettings
 
 SHIPPED = ("takeoff", "landing", "gusty", "pad_return", "approach")
@@ -151,6 +152,7 @@ class Scenario(ParameterModel):
     wind: WindSettings = WindSettings()
     filter: FilterSection = FilterSection()
     autopilot: AutopilotSection = AutopilotSection()
+    dispersion: DispersionSection = DispersionSection()
 
 
 def load_scenario(name: str) -> Scenario:
@@ -165,6 +167,7 @@ def load_scenario(name: str) -> Scenario:
         update={
             "vehicle": scenario.vehicle.model_copy(update={"file": _beside(path, scenario.vehicle.file)}),
             "flow_sensor": _beside(path, scenario.flow_sensor),
+            "dispersion": scenario.dispersion.model_copy(update={"file": _beside(path, scenario.dispersion.file)}),
             "sensors": scenario.sensors.model_copy(
                 update={
                     name: _beside(path, getattr(scenario.sensors, name))

@@ -201,7 +201,7 @@ def test_a_crash_is_status_1_with_the_record_written(tmp_path):
 def test_one_flight_of_a_seed_can_be_flown_again(tmp_path):
     many = json.loads(run("fly", short(tmp_path), "--json", "--flights", 3, "--no-report", cwd=tmp_path).stdout)
     index = Record.load(tmp_path / many["record"]).manifest["flight"]
-    again = run("fly", short(tmp_path), "--json", "--flight", index, "--no-report", cwd=tmp_path)
+    again = run("fly", short(tmp_path), "--json", "--flight", index, "--ensemble", "--no-report", cwd=tmp_path)
     assert json.loads(again.stdout)["max_position_error_m"] == many["max_position_error_m"]["median"]
 
 

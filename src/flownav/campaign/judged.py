@@ -29,6 +29,7 @@ from flownav.scoring.consistency import (
 )
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_blocks
+from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.history import column, columns
 from flownav.simulation.plan import Flight
 
@@ -74,10 +75,11 @@ def fly_judged(
     seed: int,
     flights: int,
     *,
+    ensemble: Ensemble | None = None,
     threads: int | None = None,
     on_progress: Callable[[int], object] = lambda flown: None,
 ) -> Judged:
-    """Fly flights 0 to `flights - 1` and judge them; memory grows by a row of scores a flight."""
+    """Fly flights 0 to `flights - 1`, matched or of an ensemble, and judge them; memory grows by a row a flight."""
     home = home_epoch(flight)
 
     def judge(history: Array) -> tuple[Array, Array, ErrorSums, ConsistencySums | None]:
@@ -93,7 +95,7 @@ def fly_judged(
     total: ConsistencySums | None = None
     group: ConsistencySums | None = None
     flown_on: ErrorSums | None = None
-    for flown, (scores, horizontal, errors, sums) in fly_blocks(flight, seed, 0, flights, judge, threads):
+    for flown, (scores, horizontal, errors, sums) in fly_blocks(flight, seed, 0, flights, judge, threads, ensemble):
         rows.append(scores)
         largest.append(horizontal)
         flown_on = errors if flown_on is None else flown_on + errors

@@ -13,6 +13,7 @@ from flownav.scoring.paper_tables import published
 from flownav.scoring.touchdown import Limits, motion_of, touchdowns
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_blocks, fly_written
+from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.flight_record import record_of
 from flownav.simulation.history import column, columns
 from flownav.simulation.plan import Flight
@@ -92,13 +93,18 @@ def fly_many(
     flights: int,
     *,
     first: int = 0,
+    ensemble: Ensemble | None = None,
     threads: int | None = None,
     on_progress: Callable[[int], None] = lambda flown: None,
 ) -> Array:
-    """The scores of flights `first` to `first + flights - 1`, (flights, len(SCORE_COLUMNS))."""
+    """The scores of flights `first` to `first + flights - 1`, (flights, len(SCORE_COLUMNS)); matched or drawn."""
     scores = np.empty((flights, len(SCORE_COLUMNS)))
     done = 0
-    for flown, block in fly_blocks(flight, seed, first, flights, lambda h: score_history(flight, h), threads):
+
+    def judge(history: Array) -> Array:
+        return score_history(flight, history)
+
+    for flown, block in fly_blocks(flight, seed, first, flights, judge, threads, ensemble):
         scores[done : done + flown] = block
         done += flown
         on_progress(flown)
@@ -115,10 +121,13 @@ def known_exactly(scenario: Scenario) -> str:
     return f"nothing, but it is flown on the truth for its first {held_s:g} s"
 
 
-def fly_recorded(setup: Setup, seed: int, index: int = 0) -> Record:
-    """One flight as a scored Record."""
-    flown = fly_written(setup.flight, seed, index)
+def fly_recorded(setup: Setup, seed: int, index: int = 0, ensemble: Ensemble | None = None) -> Record:
+    """One flight as a scored Record; of an ensemble with the numbers that were drawn for it."""
+    flown = fly_written(setup.flight, seed, index, ensemble=ensemble)
     record = record_of(setup, flown, seed, index)
+    record.manifest["truth_model"] = "matched" if ensemble is None else "ensemble"
+    if ensemble is not None:
+        record.manifest["drawn"] = {name: values[0] for name, values in ensemble.values(seed, index, 1).items()}
     record.manifest["scores"] = scores_of_flight(score_history(setup.flight, flown.history)[0])
     record.manifest["paper"] = published(setup.scenario.paper_table)
     if setup.fitted is not None:

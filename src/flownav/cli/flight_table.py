@@ -20,7 +20,8 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
     plant = "" if facts["truth"] == "nonlinear" else ", linear truth"
     flown_on = "" if facts["feedback"] == "estimate" else ", flown on the truth"
     flies = "the paper's filter" if facts["filter"] == "paper" else "the navigator"
-    title = f"{facts['scenario']}: {flies}, {facts['gps']} GPS{plant}{flown_on}, seed {facts['seed']}"
+    told = ", the truth drawn" if facts["truth_model"] == "ensemble" else ", the truth as told"
+    title = f"{facts['scenario']}: {flies}, {facts['gps']} GPS{plant}{flown_on}{told}, seed {facts['seed']}"
     table = Table(
         title=title + (f", {facts['flights']} flights: median (5-95 %)" if many else ""), title_justify="left"
     )

@@ -16,6 +16,7 @@ from flownav.estimation.discretise import discretised
 from flownav.estimation.paper_filter import PaperModel
 from flownav.measurement import Sensor
 from flownav.sensors.datasheet import FlowSensor, load_sensor
+from flownav.simulation.dispersion import Distribution, raises_wind
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.fitting import Fitted, fitted, timetable_of
 from flownav.simulation.plan import ATTITUDE_S, Flight, FlightPlan
@@ -41,7 +42,8 @@ class Setup:
     """A scenario made ready: the numbers the kernel takes, and what reports say of them.
 
     fitted: the sensors that feed the navigator, and what it is told; None where the paper's filter flies. file: the
-    vehicle's, as it is believed to be, and described: the same with its uncertainties.
+    vehicle's, as it is believed to be, and described: the same with its uncertainties. dispersion: what an ensemble
+    draws.
     """
 
     scenario: Scenario
@@ -53,10 +55,12 @@ class Setup:
     parameters: dict[str, Any]
     file: VehicleFile
     described: VehicleDescription
+    dispersion: dict[str, Distribution]
 
     def ensemble(self) -> Ensemble:
         """The flights of this scenario with truths of their own. InputError where its dispersion cannot be."""
-        return Ensemble(self.scenario, self.flight, self.file, self.described, self.sensor, self.fitted)
+        sheets = self.fitted.sheets if self.fitted else None
+        return Ensemble(self.scenario, self.flight, self.file, self.described, self.sensor, sheets, self.dispersion)
 
 
 def assemble(scenario: Scenario) -> Setup:
@@ -70,7 +74,8 @@ def assemble(scenario: Scenario) -> Setup:
     file, sensor, paper = read_vehicle(vehicle_file), load_sensor(sensor_file), load_paper_model()
     vehicle = flatten(file)
     hover = trim(vehicle)
-    plan = _plan(scenario, vehicle, hover)
+    dispersion = scenario.dispersion.entries()
+    plan = _plan(scenario, vehicle, hover, dispersion)
     carried = fitted(scenario, sensor, vehicle, plan.epochs) if scenario.filter.name == "landing" else None
     flight = Flight(
         plan=plan,
@@ -104,7 +109,7 @@ def assemble(scenario: Scenario) -> Setup:
         parameters["gps_delay_s"] = float(carried.ages_s[Sensor.GPS_POSITION])
         parameters["horizon_s"] = carried.schedule.horizon_s
     inputs = tuple(path for path in (vehicle_file, sensor_file) if path)
-    return Setup(scenario, sensor, flight, carried, hover, inputs, parameters, file, described)
+    return Setup(scenario, sensor, flight, carried, hover, inputs, parameters, file, described, dispersion)
 
 
 def _gains(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> AutopilotGains:
@@ -146,7 +151,9 @@ def gains_for(vehicle: VehicleParameters, hover: Trim, idle_collective_rad: floa
     )
 
 
-def _plan(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> FlightPlan:
+def _plan(
+    scenario: Scenario, vehicle: VehicleParameters, hover: Trim, dispersion: dict[str, Distribution]
+) -> FlightPlan:
     """What the loop is asked to do."""
     section = scenario.flight
     linear = scenario.truth == "linear"
@@ -165,7 +172,7 @@ def _plan(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> Flight
         draws=Draws(
             paper=scenario.filter.name == "paper",
             gps_drift=scenario.filter.name == "paper" and scenario.gps.model != "white",
-            wind=scenario.wind.speed_20ft_m_s > 0.0 or scenario.dispersion.raises_wind(),
+            wind=scenario.wind.speed_20ft_m_s > 0.0 or raises_wind(dispersion),
         ),
     )
 

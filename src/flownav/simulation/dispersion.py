@@ -20,7 +20,7 @@ from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from flownav.parameter_files import Number, ParameterModel, load, shipped
 from flownav.simulation.noise import threefry
@@ -94,11 +94,6 @@ class DispersionSection(ParameterModel):
         path = Path(self.file) if self.file else shipped(SHIPPED_DISPERSION)
         return {**load(path, DispersionFile).dispersion.parameters, **self.parameters}
 
-    def raises_wind(self) -> bool:
-        """Whether a flight may have wind where the scenario has none."""
-        entry = self.entries().get("wind.speed_20ft_m_s")
-        return entry is not None and entry.mode != "factor"
-
 
 class DispersionFile(ParameterModel):
     """A file of such entries, for many scenarios."""
@@ -108,6 +103,13 @@ class DispersionFile(ParameterModel):
     provenance: str
     dispersion: DispersionSection
 
+    @field_validator("dispersion")
+    @classmethod
+    def _is_whole(cls, section: DispersionSection) -> DispersionSection:
+        if section.file is not None:
+            raise ValueError("file: a dispersion file names no other one")
+        return section
+
 
 def _entries(table: Mapping[str, Any], above: str) -> Iterator[tuple[str, Any]]:
     """Every entry of nested tables by its dotted name."""
@@ -116,6 +118,12 @@ def _entries(table: Mapping[str, Any], above: str) -> Iterator[tuple[str, Any]]:
             yield from _entries(value, f"{above}{key}.")
         else:
             yield f"{above}{key}", value
+
+
+def raises_wind(entries: Mapping[str, Distribution]) -> bool:
+    """Whether a flight may have wind where the scenario has none."""
+    entry = entries.get("wind.speed_20ft_m_s")
+    return entry is not None and entry.mode != "factor"
 
 
 def uniforms(seed: int, flights: Sequence[int], name: str) -> Array:

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from flownav.errors import InputError
 from flownav.parameter_files import ParameterModel, check
 from flownav.sensors.datasheet import FlowSensor
+from flownav.sensors.sheets import SensorSheets
 from flownav.simulation.dispersion import Distribution, drawn, uniforms
-from flownav.simulation.fitting import Fitted, onboard_of
+from flownav.simulation.fitting import onboard_of
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.truth import PARTS, PUNCTUAL, Lateness, Truth
@@ -50,23 +51,23 @@ def believed(flight: Flight) -> Truth:
 class Ensemble:
     """What differs from flight to flight of one scenario, ready to be drawn. InputError where an entry cannot be.
 
-    `entries` by dotted names; file and described: the vehicle's, as it is believed to be. fitted: None where the
-    paper's filter flies, whose sensors are not dispersed but for the flow sensor's file.
+    file and described: the vehicle's, as it is believed to be; sheets: its sensors', None where the paper's filter
+    flies, of whose sensors only the flow sensor's file is dispersed; dispersion: entries by dotted name.
     """
 
     def __init__(
         self, scenario: Scenario, flight: Flight, file: VehicleFile, described: VehicleDescription, sensor: FlowSensor,
-        fitted: Fitted | None,
+        sheets: SensorSheets | None, dispersion: Mapping[str, Distribution],
     ) -> None:  # fmt: skip
-        self.scenario, self.flight, self.fitted = scenario, flight, fitted
+        self.scenario, self.flight, self.sheets = scenario, flight, sheets
         self.models: dict[str, Any] = {"vehicle": file, "wind": scenario.wind, "flow_sensor": sensor}
-        if fitted is not None:
-            sheets = {name: getattr(fitted.sheets, name) for name in SHEETS if name != "flow_sensor"}
-            self.models |= {name: sheet for name, sheet in sheets.items() if sheet is not None}
+        if sheets is not None:
+            fitted = {name: getattr(sheets, name) for name in SHEETS if name != "flow_sensor"}
+            self.models |= {name: sheet for name, sheet in fitted.items() if sheet is not None}
         self.contents = {name: model.model_dump() for name, model in self.models.items()}
         self.base = believed(flight)
         self.reach = {f"vehicle.{entry.key}": entry.uncertainty for entry in described.entries}
-        self.entries = {name: one for name, one in scenario.dispersion.entries().items() if self._carried(name)}
+        self.entries = {name: one for name, one in dispersion.items() if self._carried(name)}
         self.frozen = {name: self._checked(name, one) for name, one in self.entries.items()}
         self._chunk = lru_cache(maxsize=16)(self._drawn)
 
@@ -116,8 +117,8 @@ class Ensemble:
             found["wind"] = models["wind"].parameters()
         if "flow_sensor" in touched:
             found["flow"] = self.scenario.flow.parameters(models["flow_sensor"])
-        if self.fitted is not None:
-            sheets = self.fitted.sheets.model_copy(update={name: models[name] for name in touched if name in SHEETS})
+        if self.sheets is not None:
+            sheets = self.sheets.model_copy(update={name: models[name] for name in touched if name in SHEETS})
             onboard = onboard_of(self.scenario, sheets, found.get("flow", self.flight.sensors.flow), vehicle)
             found |= {part: getattr(onboard, part) for part in SENSORS} | {"camera_flow": onboard.flow}
             found["late"] = self._lateness(touched)

@@ -157,9 +157,7 @@ class Scenario(ParameterModel):
 
 def load_scenario(name: str) -> Scenario:
     """A shipped scenario by name, or a file. InputError where neither exists or the file is wrong."""
-    if name in SHIPPED:
-        return load(shipped(f"{name}.toml"), Scenario)
-    path = Path(name)
+    path = shipped(f"{name}.toml") if name in SHIPPED else Path(name)
     if not path.suffix and not path.exists():
         raise InputError(f"{name}: no such scenario; shipped: {', '.join(SHIPPED)}, or give a TOML file")
     scenario = load(path, Scenario)

@@ -103,6 +103,58 @@ def test_many_flights_turn_every_number_into_median_and_percentiles(tmp_path):
     )
 
 
+def landing_at_once(tmp_path):
+    """From 0.5 m down at once, so that a few seconds hold a whole landing."""
+    path = short(tmp_path, duration="12.0")
+    text = path.read_text(encoding="utf-8").replace("may_land_after_s = 10.0", "may_land_after_s = 1.0")
+    text = text.replace("{ t_s = 0.0, height_m = 3.0 }", "{ t_s = 0.0, height_m = 0.5 }")
+    text = text.replace("{ t_s = 10.0, height_m = 3.0 }", "{ t_s = 2.0, height_m = 0.5 }")
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_the_touchdown_of_one_flight_is_its_values_and_of_many_radius_interval_success_and_what_limits_it(tmp_path):
+    path = landing_at_once(tmp_path)
+    one = json.loads(run("fly", path, "--json", "--no-report", cwd=tmp_path).stdout)
+    assert one["truth_model"] == "matched"
+    landing = one["touchdown"]
+    assert landing["success"] is True
+    assert 0.0 < landing["contact"]["distance_m"] < 3.0
+    assert abs(landing["contact"]["distance_m"] - landing["rest"]["distance_m"]) <= landing["rest"]["slide_m"]
+    assert set(landing["limited_by"]) == {"estimate_m", "guidance_m", "pad_m"}
+    done = run("fly", path, "--json", "--no-report", "--flights", 20, cwd=tmp_path)
+    many = json.loads(done.stdout)
+    assert many["truth_model"] == "ensemble"
+    landings = many["touchdown"]
+    for end in ("contact", "rest"):
+        assert {"r95_m", "r95_interval_m"} <= set(landings[end])
+    assert set(landings["limited_by"]) == {"estimate_m", "guidance_m", "pad_m"}
+    success = landings["success"]
+    assert success["rate"] == many["landed"] / 20
+    assert 0.0 <= success["low"] <= success["rate"] <= success["high"] <= 1.0
+    assert "r95_m" not in many
+    record = Record.load(tmp_path / many["record"])
+    assert record.manifest["truth_model"] == "ensemble"
+    assert record.manifest["drawn"]["vehicle.body.mass_kg"] != 7.9
+    shown = run("fly", path, "--no-report", "--flights", 4, "--matched", cwd=tmp_path).stdout
+    assert "the truth as told" in shown
+    assert "touchdown, at rest" in shown
+    assert "landed  4 of 4 flights, 100.0 % (95 % interval 39.8..100.0 %)" in shown
+
+
+def test_matched_and_ensemble_differ_and_each_is_itself_again(tmp_path):
+    path = short(tmp_path)
+    flown = {
+        (model, again): json.loads(run("fly", path, "--json", "--no-report", model, cwd=tmp_path).stdout)
+        for model in ("--matched", "--ensemble")
+        for again in (1, 2)
+    }
+    for model in ("--matched", "--ensemble"):
+        assert flown[model, 1] == flown[model, 2]
+        assert flown[model, 1]["truth_model"] == model.removeprefix("--")
+    assert flown["--matched", 1]["states"] != flown["--ensemble", 1]["states"]
+
+
 def test_a_seed_gives_the_same_flight_again(tmp_path):
     first, again = (run("fly", short(tmp_path), "--json", "--no-report", cwd=tmp_path).stdout for _ in range(2))
     assert first == again

@@ -27,7 +27,7 @@ from flownav.simulation.noise import threefry
 
 Array = NDArray[np.float64]
 
-SHIPPED_DISPERSION = "dispersion.toml"
+SHIPPED, SHIPPED_FILE = "shipped", "dispersion.toml"
 DISPERSION_STEP = 1 << 41  # of the noise counter: beyond every step of a flight and of its start
 
 
@@ -74,10 +74,10 @@ class Distribution(ParameterModel):
 class DispersionSection(ParameterModel):
     """A scenario's `[dispersion]`. file: the entries that hold where the scenario names none of its own.
 
-    The shipped file unless named. Entries may be nested tables, as TOML's dotted keys are.
+    "shipped" is the file that ships with flownav. Entries may be nested tables, as TOML's dotted keys are.
     """
 
-    file: str | None = None
+    file: str = SHIPPED
     parameters: dict[str, Distribution] = Field(default_factory=dict)
 
     @model_validator(mode="before")
@@ -91,7 +91,7 @@ class DispersionSection(ParameterModel):
 
     def entries(self) -> dict[str, Distribution]:
         """The file's, and the scenario's own above them. InputError where the file is wrong."""
-        path = Path(self.file) if self.file else shipped(SHIPPED_DISPERSION)
+        path = shipped(SHIPPED_FILE) if self.file == SHIPPED else Path(self.file)
         return {**load(path, DispersionFile).dispersion.parameters, **self.parameters}
 
 
@@ -106,7 +106,7 @@ class DispersionFile(ParameterModel):
     @field_validator("dispersion")
     @classmethod
     def _is_whole(cls, section: DispersionSection) -> DispersionSection:
-        if section.file is not None:
+        if "file" in section.model_fields_set:
             raise ValueError("file: a dispersion file names no other one")
         return section
 

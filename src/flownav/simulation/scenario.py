@@ -16,6 +16,7 @@ from flownav.errors import InputError
 from flownav.parameter_files import Number, ParameterModel, load, shipped
 from flownav.sensors.datasheet import FlowSettings
 from flownav.sensors.settings import GpsInsSettings, PadFixSettings, RangefinderSettings
+from flownav.simulation.dispersion import SHIPPED as SHIPPED_DISPERSION
 from flownav.simulation.dispersion import DispersionSection
 from flownav.simulation.wind import WindSettings
 
@@ -157,7 +158,9 @@ class Scenario(ParameterModel):
 
 def load_scenario(name: str) -> Scenario:
     """A shipped scenario by name, or a file. InputError where neither exists or the file is wrong."""
-    path = shipped(f"{name}.toml") if name in SHIPPED else Path(name)
+    if name in SHIPPED:
+        return load(shipped(f"{name}.toml"), Scenario)
+    path = Path(name)
     if not path.suffix and not path.exists():
         raise InputError(f"{name}: no such scenario; shipped: {', '.join(SHIPPED)}, or give a TOML file")
     scenario = load(path, Scenario)
@@ -165,7 +168,7 @@ def load_scenario(name: str) -> Scenario:
         update={
             "vehicle": scenario.vehicle.model_copy(update={"file": _beside(path, scenario.vehicle.file)}),
             "flow_sensor": _beside(path, scenario.flow_sensor),
-            "dispersion": scenario.dispersion.model_copy(update={"file": _beside(path, scenario.dispersion.file)}),
+            "dispersion": _dispersion_beside(path, scenario.dispersion),
             "sensors": scenario.sensors.model_copy(
                 update={
                     name: _beside(path, getattr(scenario.sensors, name))
@@ -180,6 +183,13 @@ def load_scenario(name: str) -> Scenario:
 def with_filter(scenario: Scenario, name: Literal["paper", "landing"]) -> Scenario:
     """The scenario flown with another filter."""
     return scenario.model_copy(update={"filter": scenario.filter.model_copy(update={"name": name})})
+
+
+def _dispersion_beside(scenario: Path, section: DispersionSection) -> DispersionSection:
+    """A dispersion file that a scenario names is looked for beside the scenario, too; the shipped one is not."""
+    if section.file == SHIPPED_DISPERSION:
+        return section
+    return section.model_copy(update={"file": str(scenario.parent / section.file)})
 
 
 def _beside(scenario: Path, file: str | None) -> str | None:

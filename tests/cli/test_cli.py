@@ -135,7 +135,7 @@ def test_the_touchdown_of_one_flight_is_its_values_and_of_many_radius_interval_s
     assert "r95_m" not in many
     record = Record.load(tmp_path / many["record"])
     assert record.manifest["truth_model"] == "ensemble"
-    assert record.manifest["drawn"]["vehicle.body.mass_kg"] != 7.9
+    assert record.manifest["parameters"]["drawn"]["vehicle.body.mass_kg"] != 7.9
     shown = run("fly", path, "--no-report", "--flights", 4, "--matched", cwd=tmp_path).stdout
     assert "the truth as told" in shown
     assert "touchdown, at rest" in shown

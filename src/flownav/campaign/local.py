@@ -127,7 +127,8 @@ def fly_recorded(setup: Setup, seed: int, index: int = 0, ensemble: Ensemble | N
     record = record_of(setup, flown, seed, index)
     record.manifest["truth_model"] = "matched" if ensemble is None else "ensemble"
     if ensemble is not None:
-        record.manifest["drawn"] = {name: values[0] for name, values in ensemble.values(seed, index, 1).items()}
+        drawn = {name: values[0] for name, values in ensemble.values(seed, index, 1).items()}
+        record.manifest["parameters"] = {**record.manifest["parameters"], "drawn": drawn}
     record.manifest["scores"] = scores_of_flight(score_history(setup.flight, flown.history)[0])
     record.manifest["paper"] = published(setup.scenario.paper_table)
     if setup.fitted is not None:

@@ -206,6 +206,8 @@ def test_the_radius_of_many_counts_crashes_and_what_never_came_to_rest_as_infini
     assert (many["rest"]["r95_m"], many["rest"]["r95_interval_m"][1]) == (None, None)
     crashes = touchdown_of_flights(rows(np.arange(1.0, 101.0), crashed=range(3)))
     assert crashes["rest"]["r95_m"] == 98.0
+    assert many["unfinished"] == {"never touched": 0, "never at rest": 6}
+    assert crashes["unfinished"] == {"never touched": 0, "never at rest": 0}
     assert crashes["broken"] == {"sink rate": 3, "lateral speed": 3}
     low, high = crashes["contact"]["r95_interval_m"]
     assert low < 98.0
@@ -226,5 +228,6 @@ def test_flights_that_were_to_land_and_did_not_are_failures_and_not_unsaid():
     never = row_of(landing(on_ground=np.zeros((EPOCHS, 1))))[None, :]
     many = touchdown_of_flights(np.repeat(never, 5, axis=0))
     assert many["success"]["rate"] == 0.0
+    assert many["unfinished"] == {"never touched": 5, "never at rest": 0}
     assert many["contact"]["r95_m"] is None
     assert many["limited_by"] == {"estimate_m": None, "guidance_m": None, "pad_m": None}

@@ -126,8 +126,9 @@ def _touchdowns(made: list[Case], truth_model: str) -> str:
             success = f"{100.0 * rate['rate']:.1f} ({100.0 * rate['low']:.1f}-{100.0 * rate['high']:.1f})"
             parts = (_length(limited[name]) for name in ("estimate_m", "guidance_m", "pad_m"))
             ends = (_interval(landing[end], "r95") for end in ("contact", "rest"))
-            broken = ", ".join(f"{what} {count}" for what, count in landing["broken"].items()) or "-"
-            rows.append((case.name, *ends, *parts, success, broken))
+            failed = {**landing["unfinished"], **landing["broken"]}
+            why = ", ".join(f"{what} {count}" for what, count in failed.items() if count) or "-"
+            rows.append((case.name, *ends, *parts, success, why))
     heading = (
         f"{truth_model}: touchdown",
         "R95 at contact [m] (95 % interval)",
@@ -136,7 +137,7 @@ def _touchdowns(made: list[Case], truth_model: str) -> str:
         "guidance, p95 [m]",
         "pad, p95 [m]",
         "landed [%] (95 % interval)",
-        "crashes by",
+        "not landed by",
     )
     return _table(heading, rows)
 

@@ -67,7 +67,7 @@ def _show(title: str, rows: list[dict[str, Any]]) -> None:
     from rich.table import Table
 
     directions = sorted({row["from_direction_deg"] for row in rows})
-    table = Table(title=f"landed [%], {title}", title_justify="left")
+    table = Table()
     table.add_column("wind at 20 ft")
     for direction in directions:
         table.add_column(f"from {direction:g} deg", justify="right")
@@ -76,4 +76,5 @@ def _show(title: str, rows: list[dict[str, Any]]) -> None:
         table.add_row(f"{speed:g} m/s", *(f"{100.0 * ring[direction]:.0f}" for direction in directions))
     console = Console()
     console.width = max(console.width, len(title) + 16, 20 + 15 * len(directions))
+    console.print(f"landed [%], {title}", highlight=False, markup=False)
     console.print(table)

@@ -99,6 +99,9 @@ def touchdown_lines(landing: dict[str, Any], landed: int | None, flights: int) -
         f"landed  {landed} of {flights} flights, {100.0 * rate['rate']:.1f} % "
         f"(95 % interval {100.0 * rate['low']:.1f}..{100.0 * rate['high']:.1f} %)"
     )
+    late = [f"{name} {count}" for name, count in landing["unfinished"].items() if count]
+    if late:
+        said.append("not landed in time  " + ", ".join(late))
     if landing["broken"]:
         said.append("crashes by  " + ", ".join(f"{name} {count}" for name, count in landing["broken"].items()))
     return said

@@ -66,7 +66,15 @@ def touchdown_of_flights(rows: Array) -> dict[str, Any] | None:
         "success": success(rows),
         "limited_by": limits,
         "broken": dict(broken),
+        "unfinished": unfinished(rows),
     }
+
+
+def unfinished(rows: Array) -> dict[str, int]:
+    """How many flights broke nothing and yet did not land: the flight ended before they touched, or came to rest."""
+    whole = (rows[:, EXPECTED] > 0.0) & ~crashed(rows)
+    touched, rests = np.isfinite(rows[:, CONTACT_DISTANCE]), np.isfinite(rows[:, REST_DISTANCE])
+    return {"never touched": int((whole & ~touched).sum()), "never at rest": int((whole & touched & ~rests).sum())}
 
 
 def radius(rows: Array, distance: int) -> dict[str, Any]:

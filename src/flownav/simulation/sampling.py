@@ -158,13 +158,8 @@ def read_baro(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot
             load_baro_normals(work, lanes, lane), baro_as_is(work, lanes, lane),
         )  # fmt: skip
         store_baro(work, lanes, lane, after)
-        put_slot(
-            work,
-            lanes,
-            slot,
-            lane,
-            reading_of(read.alt_m, 0.0, 0.0, np.nan, np.nan, np.nan, read.quality, read.arrived),
-        )
+        altitude = reading_of(read.alt_m, 0.0, 0.0, np.nan, np.nan, np.nan, read.quality, read.arrived)
+        put_slot(work, lanes, slot, lane, altitude)
 
 
 @procedure

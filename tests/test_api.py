@@ -25,7 +25,7 @@ EQUATIONS = {"vehicle", "sensors", "control", "estimation", "optics"}
 ALLOWED = {
     "vehicle": GROUND,
     "sensors": GROUND,
-    "control": GROUND,
+    "control": GROUND | {"vehicle"},
     "estimation": GROUND,
     "optics": GROUND,
     "scoring": GROUND,

@@ -7,14 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.control import autopilot
-from flownav.control.autopilot import AutopilotGains, Estimate, grounded, hovering, inner_loop, integrate, outer_loop
-from flownav.control.guidance import Reference, path_through, reference_at
+from flownav.control import autopilot, gate
+from flownav.control.autopilot import Estimate, grounded, hovering, inner_loop, integrate, outer_loop
+from flownav.control.gains import AutopilotGains
+from flownav.control.guidance import Reference, path_through, reference_at, rounded
 from flownav.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion
 
 GAINS = AutopilotGains()
 LEVEL = rotation_from_quaternion(1.0, 0.0, 0.0, 0.0)
-HERE = Estimate(0.0, 0.0, -3.0, 0.0, 0.0, 0.0)
+HERE = Estimate(0.0, 0.0, -3.0, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2, 1.0)
 HOLD = Reference(0.0, 0.0, -3.0, 0.0, 0.0, 0.0)
 PATH = path_through([(0.0, 0.0, 0.0, -3.0), (10.0, 0.0, 0.0, -3.0), (20.0, 2.0, 0.0, 0.0)])
 
@@ -113,8 +114,8 @@ def test_what_it_does_turns_with_the_heading(yaw, ahead, aside, u, v):
 def test_the_tilt_commanded_is_the_one_whose_weight_gives_the_acceleration():
     for error in (0.1, -0.4):
         moving = flown(HOLD._replace(vel_n=error, vel_e=error))
-        assert -moving.pitch_sine * GRAVITY_M_S2 == pytest.approx(GAINS.velocity_gain * error)
-        assert moving.roll_sine * GRAVITY_M_S2 == pytest.approx(GAINS.velocity_gain * error)
+        assert -moving.pitch_sine * GRAVITY_M_S2 == pytest.approx(GAINS.forward_gain * error)
+        assert moving.roll_sine * GRAVITY_M_S2 == pytest.approx(GAINS.forward_gain * error)
 
 
 def test_a_target_far_above_or_below_is_approached_at_the_climb_limit():
@@ -145,15 +146,15 @@ def test_a_nose_to_the_right_is_brought_back_to_north():
 # -- the last metres of a precision landing -----------------------------------------------------------------
 PRECISE = GAINS._replace(
     pad_pos_d_m=-0.2, land_height_m=1.0, land_speed_m_s=0.25, align_height_m=1.6, align_radius_m=0.15,
-    align_speed_m_s=0.2, commit_height_m=0.4,
+    align_speed_m_s=0.2, align_patience_s=10.0, commit_height_m=0.4,
 )  # fmt: skip
 DOWN = Reference(0.0, 0.0, 0.0, 0.0, 0.0, 0.3)
 
 
-def allowed(height, off_n=0.0, off_e=0.0, u=0.0, v=0.0):
+def allowed(height, off_n=0.0, off_e=0.0, u=0.0, v=0.0, waited=0.0):
     """How fast it may descend with the skids so high over the pad, so far beside its middle."""
-    estimate = Estimate(off_n, off_e, PRECISE.pad_pos_d_m - height, u, v, 0.0)
-    return autopilot.descent_limit(DOWN, estimate, PRECISE)
+    waiting = gate.misaligned(-off_n, -off_e, u, v, height, waited, PRECISE)
+    return gate.descent_limit(waiting, PRECISE.align_height_m, height, DOWN.vel_d, PRECISE)
 
 
 def test_near_the_pad_the_descent_is_slow_and_above_it_the_references():
@@ -163,8 +164,8 @@ def test_near_the_pad_the_descent_is_slow_and_above_it_the_references():
 
 @pytest.mark.parametrize(("off_n", "off_e"), [(0.16, 0.0), (-0.16, 0.0), (0.0, -0.16), (0.11, -0.11)])
 def test_beside_the_pads_middle_it_waits_before_the_last_half_metre_and_then_goes_on(off_n, off_e):
-    assert allowed(1.5, off_n, off_e) == 0.0
-    assert allowed(0.5, off_n, off_e) == 0.0
+    assert allowed(1.59999, off_n, off_e) == pytest.approx(0.0, abs=1e-4)
+    assert allowed(0.5, off_n, off_e) == -PRECISE.land_speed_m_s  # back up to the gate
     assert allowed(0.3, off_n, off_e) == PRECISE.land_speed_m_s
     assert allowed(1.7, off_n, off_e) > 1.0
 
@@ -172,14 +173,117 @@ def test_beside_the_pads_middle_it_waits_before_the_last_half_metre_and_then_goe
 @pytest.mark.parametrize(("off_n", "off_e"), [(0.1, 0.1), (-0.1, -0.1), (0.14, 0.0)])
 def test_over_the_pads_middle_it_goes_on_unless_it_is_fast(off_n, off_e):
     assert allowed(1.2, off_n, off_e) > 0.0
-    assert allowed(1.2, off_n, off_e, u=-0.15, v=0.15) == 0.0
-    assert allowed(1.2, off_n, off_e, u=0.1, v=-0.1) > 0.0
+    assert allowed(1.2, off_n, off_e, u=-0.15, v=0.15) < 0.0
+
+
+def test_what_counts_is_where_the_skids_will_touch():
+    assert allowed(1.2, 0.3, 0.0, u=-0.19) > 0.0  # beside the middle, and on the way to it
+    assert allowed(1.2, 0.1, 0.0, u=0.19) < 0.0  # above it, and on the way off
+    assert allowed(1.2, 0.0, -0.3, v=0.19) > 0.0
+    assert allowed(0.42, 0.1, 0.0, u=0.02) > 0.0
+
+
+def test_without_a_pad_it_waits_at_the_height_from_which_it_searches():
+    told = PRECISE._replace(search_height_m=2.0)
+    over = Estimate(0.0, 0.0, PRECISE.pad_pos_d_m - 1.9, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2, 0.0)
+
+    def collective(height, found):
+        at = over._replace(pos_d=PRECISE.pad_pos_d_m - height, pad_found=found)
+        return outer_loop(hovering(told), DOWN, at, LEVEL, told, 0.02).collective_command - told.collective_trim_rad
+
+    assert collective(1.9, 0.0) > 0.0
+    assert collective(1.9, 1.0) < 0.0
+    assert collective(2.1, 0.0) < 0.0
+
+
+def test_patience_widens_the_gate():
+    assert allowed(1.2, 0.25) < 0.0
+    assert allowed(1.2, 0.25, waited=5.0) < 0.0
+    assert allowed(1.2, 0.25, waited=8.0) > 0.0
+    assert allowed(1.2, 0.0, u=0.0, v=0.3, waited=12.0) > 0.0
+
+
+def test_waiting_at_the_gate_is_counted():
+    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2, 1.0)
+    state = outer_loop(hovering(PRECISE), DOWN, beside, LEVEL, PRECISE, 0.02)
+    assert state.waited_s == pytest.approx(0.02)
+    state = outer_loop(state, DOWN, beside._replace(pos_n=0.0), LEVEL, PRECISE, 0.02)
+    assert state.waited_s == pytest.approx(0.02)
 
 
 def test_the_limit_holds_in_the_loop():
-    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0)
+    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2, 1.0)
     over = beside._replace(pos_n=0.0)
     waiting = outer_loop(hovering(PRECISE), DOWN, beside, LEVEL, PRECISE, 0.02)
     going = outer_loop(hovering(PRECISE), DOWN, over, LEVEL, PRECISE, 0.02)
-    assert waiting.collective_command == pytest.approx(PRECISE.collective_trim_rad)
+    assert waiting.collective_command > PRECISE.collective_trim_rad
     assert going.collective_command < PRECISE.collective_trim_rad
+
+
+# -- gusts, torque, skids ---------------------------------------------------------------------------------------
+def felt(push_n=0.0, push_e=0.0, yaw=0.0, roll=0.0, pitch=0.0, **gains):
+    """The outer loop after a second of a push [m/s2] on a vehicle that hangs on its rotor; trim is level."""
+    rotation = rotation_from_quaternion(*quaternion_from_euler(roll, pitch, yaw))
+    earth = np.array([push_n, push_e, -GRAVITY_M_S2])
+    if roll or pitch:  # what accelerates it: the thrust, along its own axis
+        earth = np.reshape(rotation, (3, 3)) @ [0.0, 0.0, -GRAVITY_M_S2]
+    force = np.reshape(rotation, (3, 3)).T @ earth
+    told = GAINS._replace(gust_share=1.0, gust_decay_forward=0.9, gust_decay_right=0.9, forward_integral=0.0,
+                          right_integral=0.0, **gains)  # fmt: skip
+    state = hovering(told)
+    for _ in range(50):
+        estimate = HERE._replace(force_x=force[0], force_y=force[1], force_z=force[2])
+        state = outer_loop(state, HOLD, estimate, rotation, told, 0.02)
+    return state
+
+
+def test_a_push_is_answered_with_the_tilt_that_holds_against_it():
+    north, east = felt(push_n=0.3), felt(push_e=0.3)
+    assert north.pitch_sine == pytest.approx(0.3 / GRAVITY_M_S2, rel=0.01)  # nose up
+    assert east.roll_sine == pytest.approx(-0.3 / GRAVITY_M_S2, rel=0.01)  # to the left
+    assert felt(push_e=0.3, yaw=np.pi / 2).pitch_sine == pytest.approx(0.3 / GRAVITY_M_S2, rel=0.01)
+    assert (north.roll_sine, east.pitch_sine) == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
+@pytest.mark.parametrize(("roll", "pitch"), [(0.05, 0.0), (0.0, 0.05), (-0.03, 0.02)])
+def test_what_the_tilt_explains_is_no_gust(roll, pitch):
+    state = felt(roll=roll, pitch=pitch)
+    assert (state.gust_forward, state.gust_right) == pytest.approx((0.0, 0.0), abs=0.01)
+
+
+def test_less_collective_takes_less_pedal():
+    told = GAINS._replace(pedal_per_collective=2.0)
+    state = hovering(told)._replace(collective_command=told.collective_trim_rad - 0.01)
+    pedal = inner_loop(state, LEVEL, 0.0, 0.0, 0.0, told, 0.004)[4]
+    assert pedal == pytest.approx(told.pedal_trim_rad - 0.02)
+
+
+def test_the_skids_hang_opposite_to_the_roll_and_it_is_they_that_are_flown_to_the_pad():
+    told = GAINS._replace(skids_below_cg_m=0.2, roll_trim_sine=0.1, pitch_trim_sine=0.05)
+    assert gate.skids_beside(LEVEL, told) == pytest.approx((0.01, -0.02))
+    east = rotation_from_quaternion(*quaternion_from_euler(0.0, 0.0, np.pi / 2))
+    assert gate.skids_beside(east, told) == pytest.approx((0.02, 0.01))
+    rolled = rotation_from_quaternion(*quaternion_from_euler(0.1, 0.0, 0.0))  # what it says is where they are
+    assert 0.2 * rolled[5] == pytest.approx(gate.skids_beside(LEVEL, told)[1], rel=0.01)
+    over = HERE._replace(pos_n=-0.01, pos_e=0.02)
+    state = outer_loop(hovering(told), HOLD, over, LEVEL, told, 0.02)
+    assert (state.pitch_sine, state.roll_sine) == pytest.approx((0.05, 0.1))
+
+
+def test_a_rounded_corner_is_passed_at_constant_acceleration_and_the_legs_stay():
+    smooth = rounded(PATH, 2.0)
+    for t_s in (0.0, 5.0, 8.99, 11.01, 15.0, 20.0):
+        assert reference_at(smooth, t_s)[:3] == pytest.approx(reference_at(PATH, t_s)[:3], abs=1e-9)
+    for t_s in (9.25, 9.5, 10.0, 10.75):  # at its own knots
+        since = t_s - 9.0
+        assert reference_at(smooth, t_s).pos_d == pytest.approx(-3.0 + 0.5 * 0.15 * since**2, abs=1e-9)
+    speeds = [reference_at(smooth, t_s).vel_d for t_s in np.arange(8.9, 11.2, 0.05)]
+    assert np.diff(speeds).max() < 0.3 / 7
+    assert np.diff(speeds).min() >= -1e-9
+
+
+def test_short_legs_keep_a_tenth_of_themselves():
+    short = rounded(path_through([(0.0, 0, 0, 0), (1.0, 0, 0, -1.0), (2.0, 0, 0, -1.0), (9.0, 1, 0, -1.0)]), 5.0)
+    assert np.all(np.diff(short.t_s) > 0.0)
+    assert reference_at(short, 0.05).vel_d == pytest.approx(-1.0)
+    assert reference_at(short, 1.5)[:3] == pytest.approx((0.0, 0.0, -1.0))

@@ -16,7 +16,7 @@ from filters import Filter, N, filter_at, filters, innovation_gradient, product,
 from flownav.compile import ONE_LANE
 from flownav.estimation import laws
 from flownav.estimation.law import Observation
-from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading
+from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading, level
 from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow, lagged_flow_rate, lens_range_of
 from flownav.estimation.laws.geometry import LEAST_RANGE_M
 from flownav.estimation.laws.gps import gps_position, gps_velocity
@@ -103,6 +103,7 @@ CASES = {
     "pressure altitude": Case(baro_altitude),
     "attitude": Case(attitude, AXES, prepare=read_own_attitude),
     "negative attitude": Case(bridged_attitude, AXES, prepare=read_negative_attitude),
+    "level": Case(level, CHANNELS),
     "heading": Case(heading, complex_step=False),  # arctan2 takes no complex number
     "pad": Case(pad_fix, AXES, LENS, read_own_pad),
     "position": Case(position_itself, AXES),

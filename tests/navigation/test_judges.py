@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flownav.navigation.attitude import heading_variance, judge_attitude, magnetic_heading
-from flownav.navigation.flow import View, judge_flow, turning_of
+from flownav.navigation.flow_judge import View, judge_flow, turning_of
 from flownav.navigation.flow_noise import alike, flow_variance, followed_agreement, lasting_doubt, wrong_since
 from flownav.navigation.gps import judge_gps, judge_rejections
 from flownav.navigation.height import Height, judge_baro, judge_range, range_variance, repeats
@@ -45,7 +45,7 @@ from flownav.navigation.vibration import followed_vibration, vibration_beyond, w
 NAN = math.nan
 FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
 TOLD = NavigatorSettingsFile().settings(FITTED)
-FRESH_FLOW = FlowMemory(-math.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -math.inf)
+FRESH_FLOW = FlowMemory(-math.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -math.inf, 0.0)
 SEEN = View(2.0, True, 1.0)
 
 
@@ -166,7 +166,7 @@ def test_the_turning_is_taken_from_the_imu_less_the_filters_bias_or_from_the_sen
 
 
 def test_the_bias_of_a_flow_sensors_gyro_is_followed_at_its_pace_and_not_where_it_has_no_data():
-    known = FlowMemory(1.0, 1.0, 0.1, 0.0, 1e6, 1.0, 0.0, 0.0, -math.inf)
+    known = FlowMemory(1.0, 1.0, 0.1, 0.0, 1e6, 1.0, 0.0, 0.0, -math.inf, 0.0)
     seen = reading(0.0, 0.0, 0.5, 0.0, 0.0, 0.0)
     _, _, m = turning_of(seen, 1.5, 0.0, 0.0, False, known, TOLD.flow)
     assert m.bias_x == pytest.approx(0.1 + (1.0 - math.exp(-0.5 / 10.0)) * 0.4)
@@ -174,7 +174,7 @@ def test_the_bias_of_a_flow_sensors_gyro_is_followed_at_its_pace_and_not_where_i
 
 
 def test_flow_that_agrees_is_not_doubted_and_flow_that_does_not_is_for_long():
-    m = FlowMemory(1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -math.inf)
+    m = FlowMemory(1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -math.inf, 0.0)
     assert followed_agreement(1.0, 1.1, m) == pytest.approx(1.0)
     assert followed_agreement(25.0, 1.1, m) == pytest.approx(1.0 + 0.05 * 24.0)
     assert followed_agreement(25.0, 9.0, m) == pytest.approx(1.0 + 0.5 * 24.0)

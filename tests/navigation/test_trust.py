@@ -190,7 +190,7 @@ def test_what_is_fused_teaches_its_noise_and_a_stray_or_what_is_refused_does_not
 
 
 # -- the flow's ----------------------------------------------------------------------------------------------
-FLOW = FlowMemory(1.0, 4.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -math.inf)
+FLOW = FlowMemory(1.0, 4.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -math.inf, 0.0)
 SHARE = 0.5 * 0.1 / 10.0
 
 

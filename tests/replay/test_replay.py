@@ -378,7 +378,7 @@ def test_the_record_holds_the_whole_replay_and_loads_again(log, tmp_path):
     told = Replay(altered(log, clock_start_s=81.5), run.options, run.settings, run.prepared, run.written)
     assert to_record(told, scores, []).manifest["clock_start_s"] == 81.5
     table = record.tables["innovation"]
-    assert set(table["sensor"]) == {"gps_position", "gps_velocity", "flow_rate", "range", "baro", "mag"}
+    assert set(table["sensor"]) == {"attitude", "gps_position", "gps_velocity", "flow_rate", "range", "baro", "mag"}
     fused = table["fused"]
     assert set(table["reason"][fused]) == {"fused"}
     assert "fused" not in table["reason"][~fused]

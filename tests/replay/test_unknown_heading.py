@@ -47,7 +47,7 @@ def yaw_of(estimate: np.ndarray) -> np.ndarray:
     return np.arctan2(rotation[3], rotation[0])
 
 
-def test_all_of_36_headings_are_found_within_3_m_and_1_deg(unheaded, flight):
+def test_all_of_36_headings_are_found_within_3_m_and_2_deg(unheaded, flight):
     way_m = np.cumsum(np.hypot(*np.diff(flight.position[:, :2], axis=0, prepend=flight.position[:1, :2]).T))
     for by_rad in np.radians(np.arange(0.0, 360.0, 10.0)):
         run = replay(turned(unheaded, float(by_rad)), ReplayOptions(), NavigatorSettingsFile())
@@ -56,7 +56,7 @@ def test_all_of_36_headings_are_found_within_3_m_and_1_deg(unheaded, flight):
         t_s = run.estimate[:, 0]
         error = yaw_of(run.estimate) - FIRST_YAW_RAD - YAW_RATE_RAD_S * t_s - by_rad
         error = np.abs((error + np.pi) % (2.0 * np.pi) - np.pi)
-        assert np.degrees(error[t_s > found[0] + 0.1].max()) < 1.0
+        assert np.degrees(error[t_s > found[0] + 0.1].max()) < 2.0
         cosine, sine = np.cos(by_rad), np.sin(by_rad)
         north, east = (np.interp(t_s, flight.t_s, column) for column in flight.position[:, :2].T)
         off_m = np.hypot(

@@ -10,7 +10,9 @@ import typer
 from typer.testing import CliRunner
 
 from flownav.cli.vehicle import command
-from flownav.errors import InputError
+from flownav.errors import InputError, VerdictError
+from flownav.parameter_files import shipped
+from flownav.vehicle.loading import SHIPPED_VEHICLE
 from flownav.vehicle.paper_model import load_paper_model
 from vehicle_files import X_CELL
 
@@ -62,3 +64,34 @@ def test_a_bad_file_is_an_input_error_and_prints_nothing(tmp_path):
     result = run(str(tmp_path / "none.toml"), "--json")
     assert isinstance(result.exception, InputError)
     assert result.stdout == ""
+
+
+def test_margins_are_a_row_a_loop_and_corner():
+    result = run("--margins", "--json")
+    assert result.exit_code == 0
+    facts = json.loads(result.stdout)
+    first = facts["margins"][0]
+    assert set(first) == {"loop", "corner", "phase_deg", "gain_db", "delay_s"}
+    assert first["corner"] == "nominal"
+    loops = {row["loop"] for row in facts["margins"]}
+    assert {"roll", "pitch", "yaw", "heave", "velocity forward", "position right", "roll rate"} <= loops
+    assert len(facts["margins"]) == len(loops) * len({row["corner"] for row in facts["margins"]})
+    assert facts["cannot_hover"] == []
+
+
+def test_margins_as_a_table_name_the_least_of_each_loop():
+    text = run("--margins").stdout
+    for part in ("velocity forward", "least °", "82 corners", "flapping stiffness"):
+        assert part in text
+
+
+def test_a_vehicle_without_margins_is_a_bad_verdict(tmp_path):
+    """Blades that can hardly be turned: their servos lag behind what the gains ask of them."""
+    path = tmp_path / "slow.toml"
+    text = shipped(SHIPPED_VEHICLE).read_text(encoding="utf-8")
+    assert text.count('value = 50.0, uncertainty = "36..60"') == 2
+    path.write_text(text.replace('value = 50.0, uncertainty = "36..60"', "value = 12.0"), encoding="utf-8")
+    result = run("--margins", "--json", str(path))
+    assert isinstance(result.exception, VerdictError)
+    assert "less than 45 deg or 6 dB at a corner" in str(result.exception)
+    assert min(row["phase_deg"] for row in json.loads(result.stdout)["margins"] if row["phase_deg"] is not None) < 45.0

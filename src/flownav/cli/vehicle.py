@@ -22,9 +22,17 @@ if TYPE_CHECKING:
 
 def command(
     file: Annotated[Path | None, typer.Argument(help="A vehicle file; the shipped Maxi Joker 3 without one.")] = None,
+    margins: Annotated[
+        bool, typer.Option("--margins", help="Of the autopilot's loops, over the vehicle's uncertainty box.")
+    ] = False,
     json_output: Annotated[bool, typer.Option("--json", help="One JSON object, SI and radians.")] = False,
 ) -> None:
     """Trim, power, linear models with inflow frozen and re-solved beside the paper's, and ground effect."""
+    if margins:
+        from flownav.cli.vehicle_margins import show_margins
+
+        show_margins(file, as_json=json_output)
+        return
     from flownav.vehicle.sheet import as_json, vehicle_sheet
 
     sheet = vehicle_sheet(file)

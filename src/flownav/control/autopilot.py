@@ -13,47 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import clamp, equation, magnitude, smaller
+from flownav.control.gains import AutopilotGains
+from flownav.control.gate import descent_limit, misaligned, skids_beside
 from flownav.control.guidance import Reference
 from flownav.frames import GRAVITY_M_S2, Rotation
-
-
-class AutopilotGains(NamedTuple):
-    """Gains and limits, SI; trims of the vehicle that is flown."""
-
-    position_gain: float = 0.5  # [1/s] velocity per position error
-    horizontal_speed_limit_m_s: float = 1.5
-    velocity_gain: float = 1.1  # [1/s] acceleration per velocity error
-    velocity_integral: float = 0.25  # [1/s2]
-    tilt_limit: float = 0.20  # sine of the tilt against trim
-    height_gain: float = 0.9  # [1/s]
-    climb_limit_m_s: float = 1.5
-    collective_gain: float = 0.010  # [rad/(m/s)]
-    collective_integral: float = 0.008  # [rad/m]
-    collective_limit_rad: float = 0.06  # about trim
-    attitude_gain: float = 0.14  # [rad cyclic / tilt error]
-    attitude_integral: float = 0.10  # [rad/s]
-    rate_damping: float = 0.012  # [rad/(rad/s)]
-    cyclic_limit_rad: float = 0.12
-    heading_gain: float = 1.5  # [1/s]
-    yaw_rate_gain: float = 0.05  # [rad/(rad/s)]
-    yaw_rate_integral: float = 0.10  # [rad/rad]
-    pedal_limit_rad: float = 0.20
-    collective_trim_rad: float = 0.0732
-    pedal_trim_rad: float = 0.16
-    lon_trim_rad: float = 0.0
-    lat_trim_rad: float = 0.0
-    pitch_trim_sine: float = 0.0
-    roll_trim_sine: float = 0.0
-    idle_collective_rad: float = 0.0
-    spool_rate_rad_s: float = 0.10  # how fast the collective goes down to idle after touchdown
-    # the last metres of a precision landing: nothing of it where the limits are as here
-    pad_pos_d_m: float = 0.0  # of the reference point when the skids touch
-    land_height_m: float = 0.0  # below it the descent is held to land_speed_m_s
-    land_speed_m_s: float = 1e9
-    align_height_m: float = 0.0  # below it, down to commit_height_m, no descent while farther than align_radius_m
-    align_radius_m: float = 1e9
-    align_speed_m_s: float = 1e9  # nor while faster than this over the ground
-    commit_height_m: float = 0.0
 
 
 class AutopilotState(NamedTuple):
@@ -61,6 +24,8 @@ class AutopilotState(NamedTuple):
 
     accel_forward: float  # [m/s2]
     accel_right: float  # [m/s2]
+    gust_forward: float  # acceleration that the tilt does not explain [m/s2]
+    gust_right: float  # [m/s2]
     collective: float  # [rad]
     lon: float  # [rad]
     lat: float  # [rad]
@@ -70,10 +35,11 @@ class AutopilotState(NamedTuple):
     collective_command: float  # [rad]
     flying: float  # 1.0 in flight, 0.0 on the skids
     contact_time_s: float  # how long the skids have carried weight
+    waited_s: float  # at the gate of the last metre
 
 
 class Estimate(NamedTuple):
-    """What the outer loop flies on: position NED [m], velocity body FRD [m/s]."""
+    """What the outer loop flies on: position NED [m], velocity and measured specific force body FRD [m/s, m/s2]."""
 
     pos_n: float
     pos_e: float
@@ -81,13 +47,30 @@ class Estimate(NamedTuple):
     u: float
     v: float
     w: float
+    force_x: float
+    force_y: float
+    force_z: float
+    pad_found: float  # 1 where the pad has been seen or stood upon
 
 
 @equation
 def grounded(gains: AutopilotGains) -> AutopilotState:
     """The state of an autopilot on the ground at idle."""
     return AutopilotState(
-        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gains.pitch_trim_sine, gains.roll_trim_sine, gains.idle_collective_rad, 0.0, 0.0
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        gains.pitch_trim_sine,
+        gains.roll_trim_sine,
+        gains.idle_collective_rad,
+        0.0,
+        0.0,
+        0.0,
     )
 
 
@@ -95,7 +78,20 @@ def grounded(gains: AutopilotGains) -> AutopilotState:
 def hovering(gains: AutopilotGains) -> AutopilotState:
     """The state of an autopilot in trimmed hover."""
     return AutopilotState(
-        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, gains.pitch_trim_sine, gains.roll_trim_sine, gains.collective_trim_rad, 1.0, 0.0
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        gains.pitch_trim_sine,
+        gains.roll_trim_sine,
+        gains.collective_trim_rad,
+        1.0,
+        0.0,
+        0.0,
     )
 
 
@@ -124,6 +120,8 @@ def landing_logic(
     return AutopilotState(
         accel_forward=state.accel_forward,
         accel_right=state.accel_right,
+        gust_forward=state.gust_forward,
+        gust_right=state.gust_right,
         collective=state.collective,
         lon=state.lon,
         lat=state.lat,
@@ -133,19 +131,32 @@ def landing_logic(
         collective_command=state.collective_command,
         flying=flying,
         contact_time_s=contact_time,
+        waited_s=state.waited_s,
     )
 
 
 @equation
-def descent_limit(reference: Reference, estimate: Estimate, gains: AutopilotGains) -> float:
-    """How fast the vehicle may descend [m/s]: slowly near the pad, and at first only when it is above its middle."""
-    height = gains.pad_pos_d_m - estimate.pos_d
-    off_n, off_e = reference.pos_n - estimate.pos_n, reference.pos_e - estimate.pos_e
-    far = off_n * off_n + off_e * off_e > gains.align_radius_m * gains.align_radius_m
-    fast = estimate.u * estimate.u + estimate.v * estimate.v > gains.align_speed_m_s * gains.align_speed_m_s
-    aligning = (far or fast) and height < gains.align_height_m and height > gains.commit_height_m
-    slow = gains.land_speed_m_s if height < gains.land_height_m else gains.climb_limit_m_s + reference.vel_d
-    return 0.0 if aligning else slow
+def along_heading(rotation: Rotation, n: float, e: float) -> tuple[float, float]:
+    """A horizontal vector, forward along the heading and to its right."""
+    level = 1.0 / np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
+    cos_heading, sin_heading = rotation[0] * level, rotation[3] * level
+    return cos_heading * n + sin_heading * e, cos_heading * e - sin_heading * n
+
+
+@equation
+def unexplained_acceleration(estimate: Estimate, rotation: Rotation, gains: AutopilotGains) -> tuple[float, float]:
+    """What the accelerometer feels, forward and to the right [m/s2], less what the tilt against trim gives.
+
+    A gust's push and a wind's drag: felt at once, where the velocity shows them only later.
+    """
+    x, y, z = estimate.force_x, estimate.force_y, estimate.force_z
+    forward, right = along_heading(
+        rotation,
+        rotation[0] * x + rotation[1] * y + rotation[2] * z,
+        rotation[3] * x + rotation[4] * y + rotation[5] * z,
+    )
+    pitch, roll = -rotation[6] - gains.pitch_trim_sine, rotation[7] - gains.roll_trim_sine
+    return forward + GRAVITY_M_S2 * pitch, right - GRAVITY_M_S2 * roll
 
 
 @equation
@@ -158,34 +169,39 @@ def outer_loop(
     dt: float,
 ) -> AutopilotState:
     """Position and velocity errors to tilt and collective commands (50 Hz)."""
-    vel_n = gains.position_gain * (reference.pos_n - estimate.pos_n)
-    vel_e = gains.position_gain * (reference.pos_e - estimate.pos_e)
+    skids_n, skids_e = skids_beside(rotation, gains)
+    off_n, off_e = reference.pos_n - estimate.pos_n - skids_n, reference.pos_e - estimate.pos_e - skids_e
+    vel_n, vel_e = gains.position_gain * off_n, gains.position_gain * off_e
     speed_limit = gains.horizontal_speed_limit_m_s
     vel_n = reference.vel_n + clamp(vel_n, -speed_limit, speed_limit)
     vel_e = reference.vel_e + clamp(vel_e, -speed_limit, speed_limit)
     climb_limit = gains.climb_limit_m_s
     vel_d = reference.vel_d + clamp(gains.height_gain * (reference.pos_d - estimate.pos_d), -climb_limit, climb_limit)
 
-    vel_d = smaller(vel_d, descent_limit(reference, estimate, gains))
-
-    # errors along the heading and across it; the body velocity in the earth frame first
+    # the body velocity in the earth frame
     est_n = rotation[0] * estimate.u + rotation[1] * estimate.v + rotation[2] * estimate.w
     est_e = rotation[3] * estimate.u + rotation[4] * estimate.v + rotation[5] * estimate.w
     est_d = rotation[6] * estimate.u + rotation[7] * estimate.v + rotation[8] * estimate.w
-    level = 1.0 / np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
-    cos_heading, sin_heading = rotation[0] * level, rotation[3] * level
-    error_forward = cos_heading * (vel_n - est_n) + sin_heading * (vel_e - est_e)
-    error_right = cos_heading * (vel_e - est_e) - sin_heading * (vel_n - est_n)
+    height_m = gains.pad_pos_d_m - estimate.pos_d
+    waiting = misaligned(off_n, off_e, est_n, est_e, height_m, state.waited_s, gains)
+    searching = estimate.pad_found == 0.0 and height_m < gains.search_height_m
+    gate_m = gains.search_height_m if searching else gains.align_height_m
+    vel_d = smaller(vel_d, descent_limit(waiting or searching, gate_m, height_m, reference.vel_d, gains))
+
+    error_forward, error_right = along_heading(rotation, vel_n - est_n, vel_e - est_e)
     error_down = vel_d - est_d
 
-    accel_forward = gains.velocity_gain * error_forward + state.accel_forward
-    accel_right = gains.velocity_gain * error_right + state.accel_right
+    felt_forward, felt_right = unexplained_acceleration(estimate, rotation, gains)
+    gust_forward = felt_forward + gains.gust_decay_forward * (state.gust_forward - felt_forward)
+    gust_right = felt_right + gains.gust_decay_right * (state.gust_right - felt_right)
+    accel_forward = gains.forward_gain * error_forward + state.accel_forward - gains.gust_share * gust_forward
+    accel_right = gains.right_gain * error_right + state.accel_right - gains.gust_share * gust_right
     tilt_accel = GRAVITY_M_S2 * gains.tilt_limit
     collective = -gains.collective_gain * error_down + state.collective
     flying = state.flying > 0.0
 
-    forward = integrate(state.accel_forward, error_forward, gains.velocity_integral, dt, accel_forward, tilt_accel)
-    right = integrate(state.accel_right, error_right, gains.velocity_integral, dt, accel_right, tilt_accel)
+    forward = integrate(state.accel_forward, error_forward, gains.forward_integral, dt, accel_forward, tilt_accel)
+    right = integrate(state.accel_right, error_right, gains.right_integral, dt, accel_right, tilt_accel)
     heave = integrate(
         state.collective, error_down, -gains.collective_integral, dt, collective, gains.collective_limit_rad
     )
@@ -198,6 +214,8 @@ def outer_loop(
     return AutopilotState(
         accel_forward=forward if flying else 0.0,
         accel_right=right if flying else 0.0,
+        gust_forward=gust_forward if flying else 0.0,
+        gust_right=gust_right if flying else 0.0,
         collective=heave if flying else 0.0,
         lon=state.lon,
         lat=state.lat,
@@ -207,6 +225,7 @@ def outer_loop(
         collective_command=in_flight if flying else on_ground,
         flying=state.flying,
         contact_time_s=state.contact_time_s,
+        waited_s=state.waited_s + dt if waiting else state.waited_s,
     )
 
 
@@ -221,16 +240,19 @@ def inner_loop(
     error_rate_yaw = -gains.heading_gain * rotation[3] * level - r  # sin(heading)
     flying = state.flying > 0.0
 
-    lon = gains.attitude_gain * error_pitch - gains.rate_damping * q + state.lon
-    lat = gains.attitude_gain * error_roll - gains.rate_damping * p + state.lat
+    lon = gains.pitch_gain * error_pitch - gains.pitch_damping * q + state.lon
+    lat = gains.roll_gain * error_roll - gains.roll_damping * p + state.lat
     pedal = gains.yaw_rate_gain * error_rate_yaw + state.pedal
+    torque = gains.pedal_per_collective * (state.collective_command - gains.collective_trim_rad)
     limit = gains.cyclic_limit_rad
-    next_lon = integrate(state.lon, error_pitch, gains.attitude_integral, dt, lon, limit)
-    next_lat = integrate(state.lat, error_roll, gains.attitude_integral, dt, lat, limit)
+    next_lon = integrate(state.lon, error_pitch, gains.pitch_integral, dt, lon, limit)
+    next_lat = integrate(state.lat, error_roll, gains.roll_integral, dt, lat, limit)
     next_pedal = integrate(state.pedal, error_rate_yaw, gains.yaw_rate_integral, dt, pedal, gains.pedal_limit_rad)
     after = AutopilotState(
         accel_forward=state.accel_forward,
         accel_right=state.accel_right,
+        gust_forward=state.gust_forward,
+        gust_right=state.gust_right,
         collective=state.collective,
         lon=next_lon if flying else 0.0,
         lat=next_lat if flying else 0.0,
@@ -240,11 +262,14 @@ def inner_loop(
         collective_command=state.collective_command,
         flying=state.flying,
         contact_time_s=state.contact_time_s,
+        waited_s=state.waited_s,
     )
     return (
         after,
         gains.lon_trim_rad + (clamp(lon, -limit, limit) if flying else 0.0),
         gains.lat_trim_rad + (clamp(lat, -limit, limit) if flying else 0.0),
         state.collective_command,
-        gains.pedal_trim_rad + (clamp(pedal, -gains.pedal_limit_rad, gains.pedal_limit_rad) if flying else 0.0),
+        gains.pedal_trim_rad
+        + torque
+        + (clamp(pedal, -gains.pedal_limit_rad, gains.pedal_limit_rad) if flying else 0.0),
     )

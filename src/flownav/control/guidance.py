@@ -1,8 +1,9 @@
 """Guidance: where the helicopter is told to be, as a path of knots in the local NED frame.
 
 The path is relative to the pad: position (0, 0, 0) is the ground at the pad's centre, so `down` is minus
-the height of the skids. Between knots the reference moves in straight lines at constant speed; a landing
-keeps descending past the ground until the skids report contact.
+the height of the skids. Between knots the reference moves in straight lines at constant speed, and through a knot at
+constant acceleration: a corner that no vehicle can fly is one that it overshoots. A landing keeps descending past the
+ground until the skids report contact.
 """
 
 from __future__ import annotations
@@ -13,6 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.compile import equation
+
+PIECES = 8
+LEFT_STRAIGHT = 0.9
 
 
 class Path(NamedTuple):
@@ -64,3 +68,23 @@ def path_through(knots: list[tuple[float, float, float, float]]) -> Path:
     if len(table) < 2 or not np.all(np.diff(table[:, 0]) > 0.0):
         raise ValueError("a path needs two or more knots with strictly increasing times")
     return Path(np.ascontiguousarray(table[:, 0]), np.ascontiguousarray(table[:, 1:]))
+
+
+def rounded(path: Path, blend_s: float) -> Path:
+    """The path with every inner knot passed at constant acceleration over `blend_s`, in PIECES straight pieces.
+
+    A leg is left for its corners nine tenths of its time at most. It is what averaging the path over that time gives:
+    ahead of the corner by half of it, behind by as much, and on the legs between as before.
+    """
+    t, position = path.t_s, path.position_ned_m
+    slopes = np.diff(position, axis=0) / np.diff(t)[:, None]
+    times, places = [t[:1]], [position[:1]]
+    for k in range(1, len(t) - 1):
+        span = min(blend_s, LEFT_STRAIGHT * (t[k] - t[k - 1]), LEFT_STRAIGHT * (t[k + 1] - t[k]))
+        before = np.linspace(-0.5 * span, 0.5 * span, PIECES + 1)[:, None]
+        bend = (slopes[k] - slopes[k - 1]) * (before + 0.5 * span) ** 2 / (2.0 * span)
+        times.append(t[k] + before[:, 0])
+        places.append(position[k] + slopes[k - 1] * before + bend)
+    times.append(t[-1:])
+    places.append(position[-1:])
+    return Path(np.ascontiguousarray(np.concatenate(times)), np.ascontiguousarray(np.concatenate(places)))

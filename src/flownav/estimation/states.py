@@ -46,7 +46,7 @@ STATE_NAMES = (
 
 MOST_OBSERVED = 12  # states that one observation reads
 MOST_SOURCES = 15  # and one transition
-MOST_CONSIDERED = 18  # states that a correction may leave as they are
+MOST_CONSIDERED = STATES  # states that a correction may leave as they are
 MOST_HYPOTHESES = 11  # faults whose effects on the state are followed (`hypotheses`)
 COLUMNS = STATES_WITH_LAG + MOST_HYPOTHESES
 

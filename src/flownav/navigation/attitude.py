@@ -5,21 +5,27 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import equation, larger, procedure
-from flownav.estimation.covariance import variance_of
+from flownav.estimation.covariance import consider, consider_none, variance_of
 from flownav.estimation.hypotheses import HEADING_OFF, sign_all
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading
+from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading, level
+from flownav.estimation.laws.geometry import component
 from flownav.estimation.motion import rotation_of
-from flownav.estimation.states import ATTITUDE, INNOVATION, MEASURED, QUATERNION
+from flownav.estimation.states import ATTITUDE, FLOW_LAG, GYRO_BIAS, INNOVATION, INS_ERROR, MEASURED, QUATERNION
 from flownav.frames import heading_from_quaternion, quaternion_product, rotation_from_quaternion, to_earth
 from flownav.navigation.memory import (
+    AIDED,
     COMPASS_OFF,
+    LEVEL_READ,
     OBSERVATION,
+    load_aid,
     load_bridge,
     load_heading,
     load_imu,
     load_reading,
     load_start,
+    share,
+    shared,
     store_bridge,
     store_heading,
     store_imu,
@@ -70,6 +76,55 @@ def take_attitude(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equ
         heading(work, lanes, 0)
         sign_all(work, lanes, HEADING_OFF, 1.0)
         conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
+    take_level(work, lanes, t_s, sensor, s, o)
+
+
+@procedure
+def take_level(work: Work, lanes: Lanes, t_s: float, sensor: int, s: AttitudeSettings, o: Output) -> None:
+    """Where an external attitude puts down, beside an IMU. While something horizontal aids the filter, it tells the
+    reading's slow error and nothing else; where nothing does it is taken.
+    """
+    if t_s - shared(work, lanes, LEVEL_READ) < s.ins_tilt_time_s:
+        return
+    share(work, lanes, LEVEL_READ, t_s)
+    consider_aided(work, lanes)
+    for axis in range(2):
+        put_level(work, lanes, axis, s.ins_tilt_white_rad * s.ins_tilt_white_rad)
+        level(work, lanes, axis)
+        for lane in range(len(lanes)):
+            work[OBSERVATION * len(lanes) + lane] = work[INNOVATION * len(lanes) + lane]
+        conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
+
+
+@equation
+def consider_aided(work: Work, lanes: Lanes) -> None:
+    """An aided filter knows its motion better than the autopilot's attitude does; and down tells no heading."""
+    for lane in range(len(lanes)):
+        work[AIDED * len(lanes) + lane] = 1.0 if load_aid(work, lanes, lane).flag < 2.0 else 0.0
+    consider_none(work, lanes)
+    for state in range(FLOW_LAG):
+        heads = state == ATTITUDE + 2 or state == GYRO_BIAS + 2 or state == INS_ERROR + 2
+        if state != INS_ERROR and state != INS_ERROR + 1:
+            consider(work, lanes, state, 0 if heads else AIDED)
+
+
+@equation
+def put_level(work: Work, lanes: Lanes, axis: int, variance: float) -> None:
+    """Down by the quaternion that was read, along a body axis, in the lanes where it is one; the others are silent."""
+    for lane in range(len(lanes)):
+        reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
+        reason, size = judge_attitude(reading, started)
+        w, x = reading.value_0 / size, reading.value_1 / size
+        y, z = reading.value_2 / size, reading.value_3 / size
+        rotation = rotation_from_quaternion(w, x, y, z)
+        put(
+            work,
+            lanes,
+            lane,
+            component((rotation[6], rotation[7], 0.0), axis),
+            variance,
+            SILENT if reason != FUSED else reason,
+        )
 
 
 @equation

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from flownav.compile import equation, larger, procedure, smaller
@@ -28,14 +26,18 @@ from flownav.estimation.states import (
     VELOCITY,
 )
 from flownav.measurement import Sensor
+from flownav.navigation.flow_judge import View, judge_flow, turning_of
 from flownav.navigation.flow_noise import (
     DOUBTED_RATIO,
     LONGEST_STEP_S,
     alike,
+    blind_variance,
+    blindness,
     flow_variance,
     followed_agreement,
     followed_excess,
     followed_likeness,
+    followed_quality,
     lasting_doubt,
     lasting_walk,
     wrong_since,
@@ -60,77 +62,23 @@ from flownav.navigation.memory import (
     set_lane,
     store_flow,
 )
-from flownav.navigation.offers import conclude, note_aid, put, usable_in_flight
+from flownav.navigation.offers import conclude, note_aid, put
 from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.protection import sign_flow
 from flownav.navigation.reasons import (
     FUSED,
     INNOVATION_GATE,
-    NEAR_GROUND,
     NO_HEADING,
-    NO_HEIGHT,
-    OUT_OF_RANGE,
     SILENT,
-    TILTED,
 )
-from flownav.navigation.records import FlowMemory, Reading
+from flownav.navigation.records import FlowMemory
 from flownav.navigation.still import watch_flow
 from flownav.navigation.tape import FLOW_DOUBTED, FLOW_TRUSTED, Output, write_event
 from flownav.navigation.told import FlowSettings
 from flownav.navigation.trust import watch_whiteness
 
-NEAR_LIMIT = 0.98  # a sensor that has reached its limit reads the limit, whatever the flow
 LARGEST_SPREAD = 0.5  # of the height over the ground, of which flow makes no speed
 UNKNOWN_RANGE_M = 2.0
-
-
-class View(NamedTuple):
-    """The ground that the lens sees: the range along the boresight by the filter, whether that is well known, R_33."""
-
-    range_m: float
-    known: bool
-    upright: float
-
-
-# -- pure laws ----------------------------------------------------------------------------------------------
-@equation
-def turning_of(
-    reading: Reading, t_s: float, bias_x: float, bias_y: float, gyro_is_imu: bool, m: FlowMemory, s: FlowSettings
-) -> tuple[float, float, FlowMemory]:
-    """The turning that the flow saw [rad/s]: its own gyro less its bias, or the vehicle's IMU over the exposure.
-
-    bias_x, bias_y: the filter's gyro bias, which the IMU's mean has. A sensor's own gyro is followed against the IMU,
-    but not where it has no data: it may say zero then for its gyro too.
-    """
-    imu_x, imu_y = reading.value_4 - bias_x, reading.value_5 - bias_y
-    own_x, own_y = reading.value_2, reading.value_3
-    imu_here = bool(np.isfinite(imu_x + imu_y))
-    by_imu = gyro_is_imu and imu_here
-    follows = imu_here and not by_imu and bool(np.isfinite(own_x + own_y)) and reading.quality != 0.0
-    count = m.bias_count + 1.0 if follows else m.bias_count
-    step_s = smaller(larger(t_s - m.taken_s, 0.0), LONGEST_STEP_S)
-    share = larger(1.0 - np.exp(-step_s / s.flow_gyro_time_s), 1.0 / larger(count, 1.0)) if follows else 0.0
-    bias_own_x = m.bias_x + share * (own_x - imu_x - m.bias_x) if follows else m.bias_x
-    bias_own_y = m.bias_y + share * (own_y - imu_y - m.bias_y) if follows else m.bias_y
-    after = FlowMemory(m.taken_s, m.excess, bias_own_x, bias_own_y, count, m.ratio, m.doubted, m.likeness, m.wrong_s)
-    x = imu_x if by_imu else own_x - bias_own_x
-    y = imu_y if by_imu else own_y - bias_own_y
-    return x, y, after
-
-
-@equation
-def judge_flow(
-    reading: Reading, angular: bool, turning_x: float, turning_y: float, started: float, view: View, s: FlowSettings
-) -> int:
-    """The verdict on a flow reading as a whole."""
-    turning = turning_x + turning_y if angular else 0.0
-    reason = usable_in_flight(reading, reading.value_0 + reading.value_1 + turning, 0.0, started)
-    reason = NO_HEIGHT if reason == FUSED and angular and not view.known else reason
-    fast = angular and larger(abs(reading.value_0), abs(reading.value_1)) >= NEAR_LIMIT * s.flow_limit_rad_s
-    reason = OUT_OF_RANGE if reason == FUSED and fast else reason
-    reason = TILTED if reason == FUSED and view.upright < np.cos(s.tilt_limit_rad) else reason
-    near = view.known and view.range_m * view.upright <= s.flow_min_height_m  # `lens_range_of` is at least 0.05
-    return NEAR_GROUND if reason == FUSED and near else reason
 
 
 # -- on lanes -----------------------------------------------------------------------------------------------
@@ -148,7 +96,7 @@ def take_flow(
     consider_others(work, lanes)
     watch_flow(work, lanes, angular)
     for component in range(2 if angular or lag is not None else 3):
-        offer_component(work, lanes, component, angular, s)
+        offer_component(work, lanes, t_s, component, angular, s)
         if lag is not None:
             observe_lagged(work, lanes, component, angular, s)
         elif angular:
@@ -217,7 +165,7 @@ def height_variance(work: Work, lanes: Lanes, lane: int) -> float:
 
 
 @procedure
-def offer_component(work: Work, lanes: Lanes, component: int, angular: bool, s: FlowSettings) -> None:
+def offer_component(work: Work, lanes: Lanes, t_s: float, component: int, angular: bool, s: FlowSettings) -> None:
     """One component without turning and gain error, with its variance. A down velocity that no sensor has is NaN."""
     for lane in range(len(lanes)):
         reading, m = load_reading(work, lanes, lane), load_flow(work, lanes, lane)
@@ -233,7 +181,8 @@ def offer_component(work: Work, lanes: Lanes, component: int, angular: bool, s: 
             reading.variance_1 if component == 1 else reading.variance_2
         )  # fmt: skip
         stated = np.nan if angular else listed
-        model = m.excess * per_speed * flow_variance(range_m, speed, reading.quality, angular, s)
+        noise = m.excess * flow_variance(range_m, speed, reading.quality, angular, s)
+        model = per_speed * (noise + blind_variance(range_m, reading.quality, m.usual, t_s - m.taken_s, s))
         reason = int(work[TESTED * len(lanes) + lane])
         absent = component == 2 and not np.isfinite(raw)
         put(work, lanes, lane, observation, stated if np.isfinite(stated) else model, SILENT if absent else reason)
@@ -263,12 +212,13 @@ def learn(work: Work, lanes: Lanes, t_s: float, angular: bool, component: int, s
                 reading.variance_1 if component == 1 else reading.variance_2
             )  # fmt: skip
             excess = m.excess
-            if angular or not np.isfinite(listed):
+            blind = blindness(reading.quality, m.usual) > 0.0
+            if not blind and (angular or not np.isfinite(listed)):
                 noise = work[NOISE * len(lanes) + lane]
                 excess = followed_excess(innovation, before, noise, t_s, m, s)
             likeness = followed_likeness(alike(innovation, before, total), t_s, m)
             after = FlowMemory(
-                m.taken_s, excess, m.bias_x, m.bias_y, m.bias_count, ratio, m.doubted, likeness, m.wrong_s
+                m.taken_s, excess, m.bias_x, m.bias_y, m.bias_count, ratio, m.doubted, likeness, m.wrong_s, m.usual
             )
             store_flow(work, lanes, lane, after)
 
@@ -305,5 +255,8 @@ def judge_agreement(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
             if doubted != m.doubted:
                 write_event(lanes, lane, t_s, FLOW_DOUBTED if doubted > 0.0 else FLOW_TRUSTED, m.ratio, o)
             wrong_s = wrong_since(t_s, m.likeness, m.wrong_s)
-            after = FlowMemory(t_s, m.excess, m.bias_x, m.bias_y, m.bias_count, m.ratio, doubted, m.likeness, wrong_s)
+            usual = followed_quality(load_reading(work, lanes, lane).quality, t_s - m.taken_s, m.usual)
+            after = FlowMemory(
+                t_s, m.excess, m.bias_x, m.bias_y, m.bias_count, m.ratio, doubted, m.likeness, wrong_s, usual
+            )
             store_flow(work, lanes, lane, after)

@@ -17,6 +17,8 @@ DOUBTED_RATIO, TRUSTED_RATIO = 4.0, 2.0  # on average 1
 DOUBT_S = 5.0
 LONGEST_STEP_S = 1.0
 FULL_QUALITY = 255.0
+LEAST_STEP_S = 1e-3
+BETTER_S, WORSE_S = 1.0, 30.0
 
 
 @equation
@@ -33,6 +35,30 @@ def flow_variance(range_m: float, speed_m_s: float, quality: float, angular: boo
     spread = range_variance(range_m, s.range_sigma_m, s.range_relative_sigma) / (range_m * range_m)
     scaled = 0.0 if angular else speed_m_s * speed_m_s * spread
     return (stated * stated if s.noise.stated > 0.0 else modelled) + scaled
+
+
+@equation
+def blindness(quality: float, usual: float) -> float:
+    """0 for a sensor that sees at least half as well as it usually does, 1 for one that sees nothing."""
+    return larger(0.0, 1.0 - quality / (0.5 * larger(usual, 1.0)))
+
+
+@equation
+def blind_variance(range_m: float, quality: float, usual: float, step_s: float, s: FlowSettings) -> float:
+    """What is added where a sensor sees less than half as well as it usually does [m2/s2].
+
+    Ground without texture is read as ground that stands still, however often it is read: such an error lasts, and does
+    not average out as noise does.
+    """
+    blind = s.flow_low_quality_sigma_rad_s * blindness(quality, usual) * range_m
+    return blind * blind * larger(1.0, s.flow_low_quality_s / larger(step_s, LEAST_STEP_S))
+
+
+@equation
+def followed_quality(quality: float, step_s: float, usual: float) -> float:
+    """How well a sensor usually sees, by its own scale: better quality is followed soon, worse slowly."""
+    time_s = BETTER_S if quality > usual else WORSE_S
+    return usual + smaller(larger(step_s, 0.0) / time_s, 1.0) * (quality - usual)
 
 
 @equation

@@ -57,6 +57,7 @@ ACCEL_FACTOR = _rows.take(3)  # how many times noisier than told the acceleromet
 COURSE = _rows.take(len(CourseMemory._fields))
 PUSH = _rows.take(len(PushMemory._fields))
 COMPASS_OFF = _rows.take(1)  # 1 once what is read as heading was found to be wrong
+AIDED = _rows.take(1)  # 1 where something horizontal was fused lately, at an external attitude
 BLIND = _rows.take(1)  # 1 where no range tells the height of the flow now: none lately, or a disputed one, or strays
 SOUGHT = _rows.take(1)  # 1 while a heading that no sensor reads is to be found
 GPS_FUSED = _rows.take(1)  # when GPS last told north or east [s]
@@ -93,6 +94,7 @@ WRITTEN = _rows.take(1)  # the last estimate's [s]
 ERRORS_CLOCK = _rows.take(1)  # the instant that the Gauss-Markov errors have reached [s]
 STILL_CLOCK = _rows.take(1)  # the end of the last window [s]
 DRIFT_SINCE = _rows.take(1)  # from when a drift of GPS is sought [s]
+LEVEL_READ = _rows.take(1)  # when an external attitude was last taken for level [s]
 LAST = _rows.take(max(Sensor) + 1)  # of each sensor, the newest instant [s]
 WORK_ROWS = _rows.next
 
@@ -119,7 +121,7 @@ _FRESH: dict[int, tuple[float, ...]] = {
     IMU_HEARD: ImuMemory(-np.inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     RANGE: RangeMemory(-np.inf, np.nan, np.nan, np.nan, 0.0, np.nan, 0.0),
     ECHO: EchoMemory(np.nan, 0.0, np.nan, 0.0, 0.0),
-    FLOW: FlowMemory(-np.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -np.inf),
+    FLOW: FlowMemory(-np.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -np.inf, 0.0),
     HEADING: HeadingMemory(-np.inf, np.nan),
     BRIDGE: BridgeMemory(*([np.nan] * len(BridgeMemory._fields))),
     SEEN_WINDOW: SeenWindow(1e9, -1.0, 0.0, 0.0, 0.0, 0.0),
@@ -140,6 +142,7 @@ _FRESH: dict[int, tuple[float, ...]] = {
     CLOCK: (-np.inf,),
     WRITTEN: (-np.inf,),
     ERRORS_CLOCK: (-np.inf,),
+    LEVEL_READ: (-np.inf,),
     LAST: (-np.inf,) * (max(Sensor) + 1),
 }
 

@@ -116,7 +116,8 @@ class GroundMemory(NamedTuple):
 class FlowMemory(NamedTuple):
     """taken_s: of the last tested flow; excess: how many times noisier than its model; bias of the sensor's own gyro
     [rad/s] and from how many readings; ratio: mean of nu^2 over its variance; doubted: 1 while that is too
-    large; likeness: mean of `flow_noise.alike`; wrong_s: when that was too large last; -infinity where it is not.
+    large; likeness: mean of `flow_noise.alike`; wrong_s: when that was too large last; -infinity where it is not;
+    usual: the quality that it usually has.
     """
 
     taken_s: float
@@ -128,6 +129,7 @@ class FlowMemory(NamedTuple):
     doubted: float
     likeness: float
     wrong_s: float
+    usual: float
 
 
 class HeadingMemory(NamedTuple):
@@ -187,7 +189,9 @@ class ImuWindow(NamedTuple):
     sum_x: float
     sum_y: float
     sum_z: float
-    gyro_square: float
+    square_p: float
+    square_q: float
+    square_r: float
     accel_square: float
 
 

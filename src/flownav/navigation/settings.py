@@ -69,7 +69,9 @@ class NavigatorSettingsFile(ParameterModel):
     )
     vibration_bias_share: Number = Field(3.0, ge=0, le=20, description="and widens its limit by this share")
     accel_bias_sigma_m_s2: Number = Field(0.2, gt=0, le=5, description="accelerometer bias at the start: 20 mg")
-    gyro_bias_sigma_rad_s: Number = Field(0.02, gt=0, le=0.5, description="gyro bias at the start: 1 deg/s")
+    gyro_bias_sigma_rad_s: Number = Field(
+        0.01, gt=0, le=0.5, description="gyro bias at the start, as its autopilot calibrated it: 0.6 deg/s"
+    )
     coasting_accel_m_s2_rt_hz: Number = Field(
         3.0, gt=0, le=100, description="without an IMU: manoeuvres of 0.3 g that last 0.5 s"
     )
@@ -98,6 +100,9 @@ class NavigatorSettingsFile(ParameterModel):
     ins_tilt_sigma_rad: Number = Field(0.01, ge=0, le=1, description="an autopilot's tilt error, 0.6 deg")
     ins_tilt_tau_s: Number = Field(30.0, gt=0, le=1e6, description="follows the manoeuvres")
     ins_tilt_white_rad: Number = Field(0.01, gt=0, le=1, description="time alignment of such an attitude")
+    ins_tilt_time_s: Number = Field(
+        0.5, ge=0, le=1e4, description="which lasts: beside an IMU it is read no oftener than this"
+    )
     ins_heading_sigma_rad: Number = Field(0.15, ge=0, le=3.2, description="a compass with its declination: 9 deg")
     ins_heading_tau_s: Number = Field(3e4, gt=0, le=1e6, description="constant over a flight")
     compass_sigma_rad: Number = Field(
@@ -115,6 +120,9 @@ class NavigatorSettingsFile(ParameterModel):
         0.05, gt=0, le=5, description="flow at full quality; pixel quantisation and gyro mismatch of a 10-50 Hz sensor"
     )
     flow_low_quality_sigma_rad_s: Number = Field(0.5, gt=0, le=10, description="flow as its quality goes to 0")
+    flow_low_quality_s: Number = Field(
+        2.0, ge=0, le=100, description="and for how long such a reading errs alike: no texture reads as standing still"
+    )
     flow_floor_m_s: Number = Field(0.03, gt=0, le=5, description="body velocity near the ground, whatever the range")
     flow_min_height_m: Number = Field(
         0.05, ge=0, le=100, description="no flow nearer to the ground, where a lens is out of focus"

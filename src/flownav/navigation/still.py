@@ -2,7 +2,8 @@
 
 With its motors off an IMU is quieter than in any flight, and its gyro then reads nothing but its bias. With them
 running it is not, but a vehicle whose range reads what it reads on the ground, and does not change, while the flow
-shows no motion, has no velocity worth the name. Nothing is taught above the height of contact.
+shows no motion, has no velocity worth the name; nor does it turn much, so that the mean of its gyro is the bias to
+within SHAKEN_TURN_RAD_S and what its shaking leaves in a mean. Nothing is taught above the height of contact.
 """
 
 from __future__ import annotations
@@ -10,9 +11,11 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import equation, larger, procedure, smaller
-from flownav.estimation.covariance import consider_none
+from flownav.estimation.covariance import add_noise_lane, consider_none, variance_of
 from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.laws.geometry import component
 from flownav.estimation.laws.still import gyro_at_rest, velocity_itself
+from flownav.estimation.states import ACCEL_BIAS, STATE, VELOCITY
 from flownav.navigation.inertial import sound
 from flownav.navigation.memory import (
     CONTACT,
@@ -44,8 +47,9 @@ STEADY_RANGE_M = 0.03
 CONTACT_M = 0.35  # a range on the ground, where none was seen there yet
 RESTING_FLOW_M_S, SHAKEN_FLOW_M_S = 0.3, 0.1
 RESTING_GPS_M_S = 1.0
-SHAKEN_SIGMA_M_S = 0.1
+SHAKEN_SIGMA_M_S, TOUCHING_SIGMA_M_S = 0.1, 0.03
 GYRO_FLOOR_RAD_S = 3e-4
+SHAKEN_TURN_RAD_S = 0.003  # on skids that give, in gusts
 MOVES, SHAKEN, RESTS = 0.0, 1.0, 2.0  # what a vehicle does: it moves, stands with its motors on, or off
 
 
@@ -61,17 +65,26 @@ def with_imu(r: Reading, m: ImuWindow) -> ImuWindow:
     return ImuWindow(
         m.readings + 1.0, p0, q0, r0, x0, y0, z0, m.sum_p + p, m.sum_q + q, m.sum_r + r_,
         m.sum_x + x, m.sum_y + y, m.sum_z + z,
-        m.gyro_square + p * p + q * q + r_ * r_, m.accel_square + x * x + y * y + z * z,
+        m.square_p + p * p, m.square_q + q * q, m.square_r + r_ * r_, m.accel_square + x * x + y * y + z * z,
     )  # fmt: skip
+
+
+@equation
+def turning_of(m: ImuWindow, axis: int) -> tuple[float, float]:
+    """Mean [rad/s] and variance [(rad/s)^2] of the turning about one body axis over a window."""
+    n = larger(m.readings, 1.0)
+    first = component((m.first_p, m.first_q, m.first_r), axis)
+    mean = component((m.sum_p, m.sum_q, m.sum_r), axis) / n
+    return first + mean, larger(component((m.square_p, m.square_q, m.square_r), axis) / n - mean * mean, 0.0)
 
 
 @equation
 def spreads(m: ImuWindow) -> tuple[float, float]:
     """Rms of the turning [rad/s] and of the specific force [m/s2] about their means over a window, all axes."""
     n = larger(m.readings, 1.0)
-    gyro = m.gyro_square / n - (m.sum_p**2 + m.sum_q**2 + m.sum_r**2) / (n * n)
+    gyro = turning_of(m, 0)[1] + turning_of(m, 1)[1] + turning_of(m, 2)[1]
     accel = m.accel_square / n - (m.sum_x**2 + m.sum_y**2 + m.sum_z**2) / (n * n)
-    return np.sqrt(larger(gyro, 0.0)), np.sqrt(larger(accel, 0.0))
+    return np.sqrt(gyro), np.sqrt(larger(accel, 0.0))
 
 
 @equation
@@ -89,10 +102,9 @@ def judge_standing(gyro: ImuWindow, seen: SeenWindow, contact_m: float) -> float
     contact_m: the range when it rested before; NaN where that is not known.
     """
     turning, shaking = spreads(gyro)
-    n = larger(gyro.readings, 1.0)
-    turn = np.sqrt((gyro.first_p + gyro.sum_p / n) ** 2 + (gyro.first_q + gyro.sum_q / n) ** 2
-                   + (gyro.first_r + gyro.sum_r / n) ** 2)  # fmt: skip
-    enough = gyro.readings >= LEAST_READINGS and turn < RESTING_TURN_RAD_S
+    turn = np.sqrt(turning_of(gyro, 0)[0] ** 2 + turning_of(gyro, 1)[0] ** 2 + turning_of(gyro, 2)[0] ** 2)
+    left = 3.0 * turning / np.sqrt(larger(gyro.readings, 1.0))  # of shaking in a mean, at most
+    enough = gyro.readings >= LEAST_READINGS and turn < RESTING_TURN_RAD_S + left
     ranged = seen.range_high_m >= 0.0
     touching = seen.range_high_m <= larger(CONTACT_M, contact_m + STEADY_RANGE_M if np.isfinite(contact_m) else 0.0)
     steady = seen.range_high_m - seen.range_low_m <= STEADY_RANGE_M
@@ -110,7 +122,10 @@ def judge_standing(gyro: ImuWindow, seen: SeenWindow, contact_m: float) -> float
 def open_windows(work: Work, lanes: Lanes, lane: int) -> None:
     """Nothing has been read in the windows of a lane."""
     store_imu_window(
-        work, lanes, lane, ImuWindow(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        work,
+        lanes,
+        lane,
+        ImuWindow(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     )
     store_seen_window(work, lanes, lane, SeenWindow(1e9, -1.0, 0.0, 0.0, 0.0, 0.0))
 
@@ -177,7 +192,7 @@ def stand_still(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> Non
         if load_start(work, lanes, lane).started > 0.0 and (does > MOVES) != (before > MOVES):
             write_event(lanes, lane, t_s, STOOD, does, o)
         work[STANDS * len(lanes) + lane] = does
-        if does == RESTS and seen.range_high_m >= 0.0:
+        if seen.range_high_m >= 0.0 and (does == RESTS or (does == SHAKEN and not contact_m <= seen.range_high_m)):
             work[CONTACT * len(lanes) + lane] = seen.range_high_m
         any_stands = any_stands or does > MOVES
     if any_stands:
@@ -186,14 +201,38 @@ def stand_still(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> Non
         open_windows(work, lanes, lane)
 
 
+@equation
+def touches(work: Work, lanes: Lanes, lane: int) -> bool:
+    """Whether a vehicle whose motors run has the ground below it: its range is the lowest that was seen."""
+    seen = load_seen_window(work, lanes, lane)
+    shaken: bool = work[STANDS * len(lanes) + lane] == SHAKEN
+    return shaken and seen.range_high_m <= work[CONTACT * len(lanes) + lane] + STEADY_RANGE_M
+
+
+@equation
+def free_resting(work: Work, lanes: Lanes, axis: int, lane: int, gate_sigma: float, variance: float) -> None:
+    """A velocity that the gate would not let go at rest is what is wrong, and so is the accelerometer that made it."""
+    speed_m_s = work[(STATE + VELOCITY + axis) * len(lanes) + lane]
+    known = variance_of(work, lanes, VELOCITY + axis, lane) + variance
+    if speed_m_s * speed_m_s > 0.5 * gate_sigma * gate_sigma * known:
+        add_noise_lane(work, lanes, VELOCITY + axis, lane, speed_m_s * speed_m_s)
+        for i in range(3):
+            add_noise_lane(work, lanes, ACCEL_BIAS + i, lane, (speed_m_s / WINDOW_S) ** 2)
+
+
 @procedure
 def learn_standing(work: Work, lanes: Lanes, s: PlaceSettings, o: Output) -> None:
-    """No velocity; of one that rests, the gyro's bias."""
+    """No velocity, and the gyro's bias: of one whose motors run only where it touches the ground for certain."""
     for axis in range(3):
         for lane in range(len(lanes)):
             does, started = work[STANDS * len(lanes) + lane], load_start(work, lanes, lane).started
-            sigma = s.still_sigma_m_s if does == RESTS else SHAKEN_SIGMA_M_S
-            put(work, lanes, lane, 0.0, sigma * sigma, FUSED if started > 0.0 and does > MOVES else SILENT)
+            level = axis < 2 and touches(work, lanes, lane)  # a range that is stuck in descent looks like standing
+            least = TOUCHING_SIGMA_M_S if level else SHAKEN_SIGMA_M_S
+            sigma = s.still_sigma_m_s if does == RESTS else least
+            stands = started > 0.0 and does > MOVES
+            if stands and does == RESTS:
+                free_resting(work, lanes, axis, lane, s.gate_sigma, sigma * sigma)
+            put(work, lanes, lane, 0.0, sigma * sigma, FUSED if stands else SILENT)
         velocity_itself(work, lanes, axis)
         fuse_offered(work, lanes, s.gate_sigma, o)
     consider_none(work, lanes)
@@ -201,11 +240,9 @@ def learn_standing(work: Work, lanes: Lanes, s: PlaceSettings, o: Output) -> Non
         for lane in range(len(lanes)):
             does, started = work[STANDS * len(lanes) + lane], load_start(work, lanes, lane).started
             m = load_imu_window(work, lanes, lane)
-            n = larger(m.readings, 1.0)
-            first = m.first_p if axis == 0 else (m.first_q if axis == 1 else m.first_r)
-            total = m.sum_p if axis == 0 else (m.sum_q if axis == 1 else m.sum_r)
-            spread, _ = spreads(m)
-            variance = spread * spread / n + GYRO_FLOOR_RAD_S * GYRO_FLOOR_RAD_S
-            put(work, lanes, lane, first + total / n, variance, FUSED if started > 0.0 and does == RESTS else SILENT)
+            mean, square = turning_of(m, axis)
+            least = GYRO_FLOOR_RAD_S if does == RESTS else SHAKEN_TURN_RAD_S
+            teaches = started > 0.0 and (does == RESTS or touches(work, lanes, lane))
+            put(work, lanes, lane, mean, square / larger(m.readings, 1.0) + least * least, FUSED if teaches else SILENT)
         gyro_at_rest(work, lanes, axis)
         fuse_offered(work, lanes, s.gate_sigma, o)

@@ -47,7 +47,7 @@ ESTIMATE_COLUMNS = LEVELS_AT + 2
 EVENT_COLUMNS = 3
 ESTIMATE_PERIOD_S = 0.02
 COMPONENTS = {Sensor.GPS_POSITION: 3, Sensor.GPS_VELOCITY: 3, Sensor.FLOW_RATE: 2, Sensor.FLOW_VELOCITY: 3,
-              Sensor.RANGE: 1, Sensor.BARO: 1, Sensor.MAG: 1, Sensor.YAW: 1, Sensor.ATTITUDE: 3, Sensor.POSE: 3,
+              Sensor.RANGE: 1, Sensor.BARO: 1, Sensor.MAG: 1, Sensor.YAW: 1, Sensor.ATTITUDE: 6, Sensor.POSE: 3,
               Sensor.PAD: 3, Sensor.LANDED: 3}  # fmt: skip
 EVENTS_A_READING = 4
 

@@ -61,6 +61,7 @@ class FlowSettings(NamedTuple):
     flow_gain_y: float
     flow_sigma_rad_s: float
     flow_low_quality_sigma_rad_s: float
+    flow_low_quality_s: float
     flow_floor_m_s: float
     flow_min_height_m: float
     flow_limit_rad_s: float
@@ -110,6 +111,7 @@ class AttitudeSettings(NamedTuple):
     """An external attitude, a compass, an external heading."""
 
     ins_tilt_white_rad: float
+    ins_tilt_time_s: float
     heading_noise_rad: float
     heading_time_s: float
     gate_sigma: float

@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from flownav.control.autopilot import AutopilotGains
-from flownav.control.guidance import path_through
+from flownav.control.box import margins_of
+from flownav.control.design import gains_for
+from flownav.control.gains import AutopilotGains
+from flownav.control.guidance import path_through, rounded
 from flownav.errors import InputError
 from flownav.estimation.discretise import discretised
 from flownav.estimation.paper_filter import PaperModel
@@ -23,18 +25,17 @@ from flownav.simulation.plan import ATTITUDE_S, Flight, FlightPlan
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
+from flownav.vehicle.corners import NOMINAL
 from flownav.vehicle.loading import VehicleDescription, describe_vehicle, read_vehicle
 from flownav.vehicle.paper_model import ReducedModel, load_paper_model
 from flownav.vehicle.parameters import VehicleParameters, flatten, touchdown_limits
+from flownav.vehicle.plant import hover_plant
 from flownav.vehicle.schema import VehicleFile
 from flownav.vehicle.state import Controls, HelicopterState
 from flownav.vehicle.trim import Trim, parked, trim
 
 NEVER_S = 1e9
-# closed-loop bandwidths that the gains give, whatever the vehicle [rad/s]
-HEAVE_RAD_S = 2.9
-ATTITUDE_RAD_S = 5.4
-YAW_RATE_RAD_S = 14.0
+CORNER_S = 1.5  # a corner of the path is flown at constant acceleration for so long
 
 
 @dataclass(frozen=True)
@@ -74,8 +75,9 @@ def assemble(scenario: Scenario) -> Setup:
     file, sensor, paper = read_vehicle(vehicle_file), load_sensor(sensor_file), load_paper_model()
     vehicle = flatten(file)
     hover = trim(vehicle)
+    gains = _gains(scenario, vehicle, hover)
     dispersion = scenario.dispersion.entries()
-    plan = _plan(scenario, vehicle, hover, dispersion)
+    plan = _plan(scenario, vehicle, hover, gains, dispersion)
     carried = fitted(scenario, sensor, vehicle, plan.epochs) if scenario.filter.name == "landing" else None
     flight = Flight(
         plan=plan,
@@ -83,7 +85,7 @@ def assemble(scenario: Scenario) -> Setup:
         sensors=_sensors(scenario, sensor, vehicle),
         wind=scenario.wind.parameters(),
         path=_path(scenario, vehicle),
-        gains=_gains(scenario, vehicle, hover),
+        gains=gains,
         paper=_paper_filter(paper) if scenario.filter.name == "paper" else None,
         onboard=carried.onboard if carried else None,
         table=timetable_of(carried.schedule) if carried else None,
@@ -102,6 +104,10 @@ def assemble(scenario: Scenario) -> Setup:
         },
         "autopilot_gains": flight.gains._asdict(),
     }
+    if scenario.truth == "nonlinear":
+        parameters["autopilot_margins"] = {
+            row.loop: row.margins.finite() for row in margins_of(hover_plant(vehicle, hover), gains, NOMINAL)
+        }
     if carried:
         parameters["sensors"] = carried.sheets.model_dump(exclude={"flow_sensor"})
         parameters["filter"] = carried.told.settings.model_dump()
@@ -113,54 +119,34 @@ def assemble(scenario: Scenario) -> Setup:
 
 
 def _gains(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> AutopilotGains:
-    """The vehicle's gains with what the scenario says of position, velocity and the last metres."""
+    """The vehicle's gains, what the scenario says of them, and the last metres."""
     section = scenario.autopilot
     precision = {} if section.precision is None else section.precision.model_dump()
-    return gains_for(vehicle, hover, math.radians(section.idle_collective_deg))._replace(
-        position_gain=section.position_gain_1_s,
-        velocity_gain=section.velocity_gain_1_s,
-        velocity_integral=section.velocity_integral_1_s2,
-        pad_pos_d_m=-vehicle.cg_above_skid_m,
+    given = {
+        "position_gain": section.position_gain_1_s,
+        "forward_gain": section.velocity_gain_1_s,
+        "right_gain": section.velocity_gain_1_s,
+        "forward_integral": section.velocity_integral_1_s2,
+        "right_integral": section.velocity_integral_1_s2,
+    }
+    feels = scenario.filter.name == "landing"  # the paper's sensors have no accelerometer
+    return gains_for(vehicle, hover, math.radians(section.idle_collective_deg), feels_gusts=feels)._replace(
+        **{name: value for name, value in given.items() if value is not None},
         **precision,
     )
 
 
-def gains_for(vehicle: VehicleParameters, hover: Trim, idle_collective_rad: float) -> AutopilotGains:
-    """Gains that give every vehicle the same bandwidths, from its control powers at frozen inflow."""
-    heave_per_collective = vehicle.main_thrust_slope_n_s_m * vehicle.main_tip_speed_m_s * (2.0 / 3.0) / vehicle.mass_kg
-    side_per_pedal = vehicle.tail_thrust_slope_n_s_m * vehicle.tail_tip_speed_m_s * (2.0 / 3.0)
-    yaw_per_pedal = side_per_pedal * vehicle.tail_behind_cg_m / vehicle.inertia_zz_kg_m2
-    collective_gain = HEAVE_RAD_S / heave_per_collective
-    attitude_gain = ATTITUDE_RAD_S / vehicle.flap_rate_1_s
-    yaw_gain = YAW_RATE_RAD_S / yaw_per_pedal
-    return AutopilotGains(
-        collective_gain=collective_gain,
-        collective_integral=0.8 * collective_gain,
-        attitude_gain=attitude_gain,
-        attitude_integral=0.7 * attitude_gain,
-        rate_damping=0.085 * attitude_gain,
-        yaw_rate_gain=yaw_gain,
-        yaw_rate_integral=2.0 * yaw_gain,
-        collective_trim_rad=hover.collective_rad,
-        pedal_trim_rad=hover.pedal_rad,
-        lon_trim_rad=hover.lon,
-        lat_trim_rad=hover.lat,
-        pitch_trim_sine=math.sin(hover.pitch_rad),
-        roll_trim_sine=math.sin(hover.roll_rad) * math.cos(hover.pitch_rad),
-        idle_collective_rad=idle_collective_rad,
-    )
-
-
 def _plan(
-    scenario: Scenario, vehicle: VehicleParameters, hover: Trim, dispersion: dict[str, Distribution]
-) -> FlightPlan:
+    scenario: Scenario, vehicle: VehicleParameters, hover: Trim, gains: AutopilotGains,
+    dispersion: dict[str, Distribution],
+) -> FlightPlan:  # fmt: skip
     """What the loop is asked to do."""
     section = scenario.flight
     linear = scenario.truth == "linear"
     on_ground = section.start == "ground" and not linear
     return FlightPlan(
         epochs=round(section.duration_s / EPOCH_S) + 1,
-        start=_start(scenario, vehicle, hover, on_ground, linear),
+        start=_start(scenario, vehicle, hover, gains, on_ground, linear),
         starts_on_ground=on_ground,
         takeoff_at_s=0.0 if linear else section.takeoff_at_s,
         may_land_after_s=NEVER_S if linear or section.may_land_after_s is None else section.may_land_after_s,
@@ -183,14 +169,15 @@ def start_of(scenario: Scenario) -> str:
 
 
 def _start(
-    scenario: Scenario, vehicle: VehicleParameters, hover: Trim, on_ground: bool, linear: bool
+    scenario: Scenario, vehicle: VehicleParameters, hover: Trim, gains: AutopilotGains, on_ground: bool, linear: bool
 ) -> HelicopterState:
     """The vehicle's first state: parked, in trimmed hover, or level for the linear truth."""
     first = scenario.flight.path[0]
     pos_d = -first.height_m - vehicle.cg_above_skid_m
     if on_ground:
-        idle = math.radians(scenario.autopilot.idle_collective_deg)
-        state = parked(vehicle, Controls(hover.lon, hover.lat, idle, hover.pedal_rad))
+        idle = gains.idle_collective_rad
+        pedal = hover.pedal_rad + gains.pedal_per_collective * (idle - hover.collective_rad)
+        state = parked(vehicle, Controls(hover.lon, hover.lat, idle, pedal))
         return state._replace(pos_n=first.north_m, pos_e=first.east_m)
     state = hover.state._replace(pos_n=first.north_m, pos_e=first.east_m, pos_d=pos_d)
     return state._replace(qw=1.0, qx=0.0, qy=0.0, qz=0.0) if linear else state
@@ -199,12 +186,13 @@ def _start(
 def _path(scenario: Scenario, vehicle: VehicleParameters) -> Any:
     """The reference path of the centre of gravity. The linear truth has no ground: its path stops there."""
     lowest = 0.0 if scenario.truth == "linear" else -np.inf
-    return path_through(
+    straight = path_through(
         [
             (knot.t_s, knot.north_m, knot.east_m, -max(knot.height_m, lowest) - vehicle.cg_above_skid_m)
             for knot in scenario.flight.path
         ]
     )
+    return rounded(straight, CORNER_S)
 
 
 def _sensors(scenario: Scenario, sensor: FlowSensor, vehicle: VehicleParameters) -> SensorSuite:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from flownav.compile import equation, procedure
-from flownav.control.autopilot import AutopilotGains, AutopilotState, Estimate, inner_loop, landing_logic, outer_loop
+from flownav.control.autopilot import AutopilotState, Estimate, inner_loop, landing_logic, outer_loop
+from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Reference
 from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import GRAVITY_M_S2, Quaternion, Rotation, quaternion_product, rotation_from_quaternion
@@ -33,6 +34,7 @@ from flownav.simulation.navigating import Timetable, keep_inertial
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import ATTITUDE_S, ATTITUDE_STEPS, CONTACT_SHARE, PHYSICS_S, PHYSICS_STEPS, Flight
 from flownav.simulation.plant import LinearTruth, linear_step, observe_plant, runge_kutta_step
+from flownav.simulation.ring import FIELDS, FIRST
 from flownav.simulation.sampling import read_inertial
 from flownav.simulation.sensing import EPOCH_S, lens_height, true_imu
 from flownav.simulation.wind import step_wind
@@ -52,8 +54,12 @@ def blow(work: Work, lanes: Lanes) -> None:
 
 @equation
 def estimate_for_autopilot(work: Work, lanes: Lanes, flight: Flight) -> None:
-    """What the outer loop flies on: the filter's estimate or the truth."""
+    """What the outer loop flies on: the filter's estimate or the truth, and the force that the IMU felt."""
     source = layout.HELICOPTER if flight.plan.fly_on_truth else layout.ESTIMATED
+    for component in range(3):
+        for lane in range(len(lanes)):
+            value = work[(layout.FELT + component) * len(lanes) + lane]
+            work[(layout.ESTIMATE + 6 + component) * len(lanes) + lane] = value
     for component in range(6):
         for lane in range(len(lanes)):
             value = work[(source + component) * len(lanes) + lane]
@@ -97,6 +103,10 @@ def command(
             estimate.u,
             estimate.v,
             estimate.w,
+            estimate.force_x,
+            estimate.force_y,
+            estimate.force_z,
+            work[layout.PAD_FOUND * len(lanes) + lane],
         )
         if onboard is None:
             contact = work[layout.CONTACT * len(lanes) + lane]
@@ -226,3 +236,14 @@ def advance_sensing(
             slot = (taken + part) % table.slots
             read_inertial(work, lanes, seed, first, epoch, part, slot, onboard)
             keep_inertial(work, lanes, slot, heard + part, period_s, table)
+            feel(work, lanes, slot, part, ATTITUDE_STEPS * PHYSICS_STEPS // onboard.inertial_steps)
+
+
+@equation
+def feel(work: Work, lanes: Lanes, slot: int, part: int, parts: int) -> None:
+    """Take the accelerometer's reading in a slot, the `part`-th of `parts` of this epoch, into their mean."""
+    for i in range(3):
+        for lane in range(len(lanes)):
+            before = work[(layout.FELT + i) * len(lanes) + lane] if part > 0 else 0.0
+            reading = work[(FIRST + slot * FIELDS + 3 + i) * len(lanes) + lane]
+            work[(layout.FELT + i) * len(lanes) + lane] = before + reading / parts

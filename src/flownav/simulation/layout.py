@@ -97,6 +97,8 @@ SKID = _rows.take(len(SkidSwitchState._fields))
 SKID_NORMALS = _rows.take(len(SkidSwitchNormals._fields))
 DRAWN = _rows.take(30)  # normals of a unit or of a start
 TRUE_IMU = _rows.take(len(ImuReading._fields))  # means over the last inertial period
+PAD_FOUND = _rows.take(1)  # 1 once the navigator knows where the pad is
+FELT = _rows.take(3)  # specific force that the IMU read, body FRD, mean over the last epoch [m/s2]
 EXPOSED = _rows.take(5)  # since the last flow: sums of the true rate (3) and of what the gyro read about x and y
 LANDED = _rows.take(1)  # what the skid switch says
 # what the vehicle makes of the navigator: carried on to now

@@ -210,6 +210,7 @@ def find_place(work: Work, nav: Work, lanes: Lanes, lane: int) -> None:
     """PLACE by the pad's camera and by the range, where they have told."""
     known = nav[PAD_KNOWN * len(lanes) + lane] > 0.0
     grounded = load_ground(nav, lanes, lane).known > 0.0
+    put(work, lanes, lane, layout.PAD_FOUND, 1.0 if known else 0.0)
     row = layout.PLACE
     north, east = work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane]
     down = work[(row + 2) * len(lanes) + lane]

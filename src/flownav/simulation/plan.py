@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.control.autopilot import AutopilotGains
+from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Path
 from flownav.estimation.paper_filter import PaperModel
 from flownav.simulation.navigating import Timetable

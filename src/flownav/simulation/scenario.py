@@ -96,7 +96,9 @@ class PrecisionSection(ParameterModel):
     align_height_m: Number = Field(0.6, gt=0.0, le=100.0)
     align_radius_m: Number = Field(0.03, gt=0.0, le=100.0)
     align_speed_m_s: Number = Field(1.0, gt=0.0, le=100.0)
+    align_patience_s: Number = Field(30.0, gt=0.0, le=3600.0)
     commit_height_m: Number = Field(0.3, ge=0.0, le=100.0)
+    search_height_m: Number = Field(0.0, ge=0.0, le=100.0)
 
 
 class SensorsSection(ParameterModel):
@@ -118,7 +120,8 @@ class SensorsSection(ParameterModel):
 
 
 class AutopilotSection(ParameterModel):
-    """What the autopilot flies on, where it takes the pad to be, and the collective on the skids.
+    """What the autopilot flies on, where it takes the pad to be, its gains where the vehicle's do not serve, and the
+    collective on the skids.
 
     home: "start" puts the pad where the estimate first puts the start of the path (a vehicle that returns to where
     it was), "origin" at the filter's origin (a vehicle that comes from elsewhere).
@@ -126,9 +129,9 @@ class AutopilotSection(ParameterModel):
 
     feedback: Literal["estimate", "truth"] = "estimate"
     home: Literal["start", "origin"] = "start"
-    position_gain_1_s: Number = Field(0.5, gt=0.0, le=5.0)
-    velocity_gain_1_s: Number = Field(1.1, gt=0.0, le=10.0)
-    velocity_integral_1_s2: Number = Field(0.25, ge=0.0, le=10.0)
+    position_gain_1_s: Number | None = Field(None, gt=0.0, le=5.0)
+    velocity_gain_1_s: Number | None = Field(None, gt=0.0, le=10.0)
+    velocity_integral_1_s2: Number | None = Field(None, ge=0.0, le=10.0)
     precision: PrecisionSection | None = None
     idle_collective_deg: Number = Field(0.0, ge=-10.0, le=10.0)
 

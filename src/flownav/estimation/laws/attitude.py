@@ -53,6 +53,34 @@ def attitude(
     return component(turn, axis) - error, OnAttitude(1.0, by_roll, by_pitch, by_heading)
 
 
+class OnLevel(NamedTuple):
+    """The Jacobian of the direction of down."""
+
+    tilt_n: float
+    tilt_e: float
+    ins_roll: float
+    ins_pitch: float
+
+
+@law
+def level(
+    axis: int, ins_roll: float, ins_pitch: float, qw: float, qx: float, qy: float, qz: float
+) -> tuple[float, OnLevel]:
+    """Where an external attitude puts down, body forward (axis 0) and right (1): d = R' e_d - e x R' e_d.
+
+    Its heading has no part in it. e = (e_roll, e_pitch, 0), small angles; R' (e_d - theta x e_d) for a true
+    R = (I + [theta]x) R_filter.
+    """
+    rotation = rotation_from_quaternion(qw, qx, qy, qz)
+    forward, right, down = rotation[6], rotation[7], rotation[8]
+    by_n, by_e = rotation[5], -rotation[2]  # what tilting does to the third
+    if axis == 0:
+        return forward - down * ins_pitch, OnLevel(
+            rotation[3] - by_n * ins_pitch, -rotation[0] - by_e * ins_pitch, 0.0, -down
+        )
+    return right + down * ins_roll, OnLevel(rotation[4] + by_n * ins_roll, -rotation[1] + by_e * ins_roll, down, 0.0)
+
+
 class OnOwnAttitude(NamedTuple):
     """The Jacobian of an attitude without errors of its own."""
 

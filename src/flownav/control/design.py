@@ -1,0 +1,82 @@
+"""The autopilot's gains from a vehicle's control powers.
+
+The shape of each loop is the outcome of a search (`control.shaping`): of all gains whose loops keep their margins at
+every corner of the shipped vehicle's uncertainty box, those with the least error of position in turbulence. Here it
+stands in units that the control powers take out, so that another vehicle gets loops of the same bandwidth; whether they
+hold on it is what `flownav vehicle FILE --margins` says.
+"""
+
+from __future__ import annotations
+
+import math
+
+from flownav.control.gains import AutopilotGains
+from flownav.control.loops import OUTER_S
+from flownav.vehicle.feasibility import hover_induced_velocity, hover_pitch
+from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.trim import Trim
+
+# attitude: a steady cyclic turns the body at 1/τ_f of it per second, τ_f the flapping's time constant
+PITCH_RAD_S, PITCH_INTEGRAL_1_S, PITCH_LEAD_S = 5.69, 0.668, 0.1535
+ROLL_RAD_S, ROLL_INTEGRAL_1_S, ROLL_LEAD_S = 6.42, 0.647, 0.0700
+# heave: acceleration per collective; yaw: angular acceleration per pedal, both with the inflow frozen
+HEAVE_RAD_S, HEAVE_INTEGRAL_1_S, HEIGHT_1_S = 9.3, 1.57, 1.7
+YAW_RATE_RAD_S, YAW_RATE_INTEGRAL_1_S, HEADING_1_S = 8.6, 1.67, 1.0
+# position and velocity, with gusts felt by the accelerometer and without
+FELT = {
+    "position_gain": 0.36, "forward_gain": 0.94, "forward_integral": 0.18, "right_gain": 1.40, "right_integral": 0.36,
+    "gust_share": 1.0,
+}  # fmt: skip
+UNFELT = {
+    "position_gain": 0.50, "forward_gain": 0.65, "forward_integral": 0.05, "right_gain": 1.03, "right_integral": 0.14,
+    "gust_share": 0.0,
+}  # fmt: skip
+GUST_FORWARD_S, GUST_RIGHT_S = 0.275, 0.19  # the disturbance observer's low-pass
+
+
+def gains_for(
+    vehicle: VehicleParameters, hover: Trim, idle_collective_rad: float, *, feels_gusts: bool = True
+) -> AutopilotGains:
+    """The gains for a vehicle and its trim. feels_gusts: an accelerometer tells of gusts (see `unexplained`)."""
+    heave_per_collective = vehicle.main_thrust_slope_n_s_m * vehicle.main_tip_speed_m_s * (2.0 / 3.0) / vehicle.mass_kg
+    side_per_pedal = vehicle.tail_thrust_slope_n_s_m * vehicle.tail_tip_speed_m_s * (2.0 / 3.0)
+    yaw_per_pedal = side_per_pedal * vehicle.tail_behind_cg_m / vehicle.inertia_zz_kg_m2
+    collective, yaw = HEAVE_RAD_S / heave_per_collective, YAW_RATE_RAD_S / yaw_per_pedal
+    pitch, roll = PITCH_RAD_S / vehicle.flap_rate_1_s, ROLL_RAD_S / vehicle.flap_rate_1_s
+    return AutopilotGains(
+        **(FELT if feels_gusts else UNFELT),
+        gust_decay_forward=math.exp(-OUTER_S / GUST_FORWARD_S),
+        gust_decay_right=math.exp(-OUTER_S / GUST_RIGHT_S),
+        height_gain=HEIGHT_1_S,
+        collective_gain=collective,
+        collective_integral=HEAVE_INTEGRAL_1_S * collective,
+        pitch_gain=pitch,
+        pitch_integral=PITCH_INTEGRAL_1_S * pitch,
+        pitch_damping=PITCH_LEAD_S * pitch,
+        roll_gain=roll,
+        roll_integral=ROLL_INTEGRAL_1_S * roll,
+        roll_damping=ROLL_LEAD_S * roll,
+        heading_gain=HEADING_1_S,
+        yaw_rate_gain=yaw,
+        yaw_rate_integral=YAW_RATE_INTEGRAL_1_S * yaw,
+        collective_trim_rad=hover.collective_rad,
+        pedal_trim_rad=hover.pedal_rad,
+        lon_trim_rad=hover.lon,
+        lat_trim_rad=hover.lat,
+        pitch_trim_sine=math.sin(hover.pitch_rad),
+        roll_trim_sine=math.sin(hover.roll_rad) * math.cos(hover.pitch_rad),
+        idle_collective_rad=idle_collective_rad,
+        pedal_per_collective=_pedal_per_collective(vehicle, hover),
+        pad_pos_d_m=-vehicle.cg_above_skid_m,
+        skids_below_cg_m=vehicle.cg_above_skid_m,
+    )
+
+
+def _pedal_per_collective(vehicle: VehicleParameters, hover: Trim) -> float:
+    """Between hover and blades without lift, where the tail rotor holds the profile torque alone."""
+    side = vehicle.main_profile_torque_n_m / vehicle.tail_behind_cg_m / vehicle.tail_fin_blockage
+    slope = vehicle.tail_thrust_slope_n_s_m
+    pitch = hover_pitch(
+        side, hover_induced_velocity(side, slope, vehicle.tail_inflow_speed_m_s), slope, vehicle.tail_tip_speed_m_s
+    )
+    return (hover.pedal_rad - pitch) / hover.collective_rad

@@ -186,7 +186,9 @@ def test_the_command_says_every_target_and_writes_what_it_prints(tmp_path):
     assert done.exception is None or isinstance(done.exception, VerdictError)
     assert done.stdout.strip() == out.read_text(encoding="utf-8").strip()
     assert "takeoff without" in done.stdout
-    assert "RMSE over the bound of the filter's own model, at the horizon" in done.stdout
+    for truth_model in ("matched", "ensemble"):
+        assert f"{truth_model}: RMSE over the bound of the filter's own model, at the horizon" in done.stdout
+        assert f"| {truth_model}: touchdown " in done.stdout
     assert "| takeoff  | where it stands until take-off at 10 s " in done.stdout
     assert "| pad fix " in done.stdout
     for line in done.stdout.splitlines():
@@ -198,35 +200,43 @@ def test_json_has_every_figure_and_the_exit_status_follows_the_targets():
     facts = json.loads(done.stdout)
     (case,) = facts["cases"]
     assert (case["case"], case["flights"], case["ablations"]) == ("landing", 32, {})
-    assert set(case["rmse_over_bound"]) == set("xyzuvw")
-    assert all(0.3 < ratio < 5.0 for ratio in case["rmse_over_bound"].values())
-    assert 0.03 < case["p95_largest_axis_m"] < 0.5
+    for truth_model in ("matched", "ensemble"):
+        facts = case[truth_model]
+        assert set(facts["rmse_over_bound"]) == set("xyzuvw")
+        assert all(0.1 < ratio < 10.0 for ratio in facts["rmse_over_bound"].values())
+        assert 0.03 < facts["p95_largest_axis_m"] < 1.0
+        assert 0.0 < facts["touchdown"]["success"]["rate"] <= 1.0
+    assert {target["truth_model"] for target in case["targets"]} == {"matched", "ensemble"}
+    assert case["matched"]["p95_largest_axis_m"] != case["ensemble"]["p95_largest_axis_m"]
     assert case["known_exactly"] == "where it hovers for its first 5 s, flown on the truth"
     missed = [target for target in case["targets"] if not target["kept"]]
     assert bool(missed) == isinstance(done.exception, VerdictError)
     for target in missed:
-        assert f"landing: {target['what']}" in str(done.exception)
+        assert f"landing: {target['truth_model']}: {target['what']}" in str(done.exception)
 
 
 def test_a_target_is_kept_on_its_side_and_not_by_nan():
-    assert Target("x", 1.0, 1.0).kept
-    assert not Target("x", 1.01, 1.0).kept
-    assert Target("x", 1.0, 1.0, at_least=True).kept
-    assert not Target("x", 0.99, 1.0, at_least=True).kept
-    assert not Target("x", np.nan, 1.0).kept
-    assert not Target("x", np.nan, 1.0, at_least=True).kept
-    assert Target("error [m]", 0.5, 0.4).sentence() == "error [m] 0.500, at most 0.4"
+    assert Target("matched", "x", 1.0, 1.0).kept
+    assert not Target("matched", "x", 1.01, 1.0).kept
+    assert Target("matched", "x", 1.0, 1.0, at_least=True).kept
+    assert not Target("matched", "x", 0.99, 1.0, at_least=True).kept
+    assert not Target("matched", "x", np.nan, 1.0).kept
+    assert not Target("matched", "x", np.nan, 1.0, at_least=True).kept
+    assert Target("ensemble", "error [m]", 0.5, 0.4).sentence() == "ensemble: error [m] 0.500, at most 0.4"
 
 
 def test_the_progress_bar_knows_how_many_flights_there_are():
-    assert flights_of(("pad_return",), 100, 10) == 200 + 10 * 7
-    assert flights_of(CASES, 10, 0) == 50
+    assert flights_of(("pad_return",), 100, 10) == 300 + 10 * 7
+    assert flights_of(CASES, 10, 0) == 110
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--cases", "landing,hover"), "--cases hover: no such case; known: takeoff, landing, pad_return, approach"),
+        (
+            ("--cases", "landing,hover"),
+            "--cases hover: no such case; known: takeoff, landing, pad_return, approach, approach_8_m_s",
+        ),
         (("--cases", ""), "--cases (empty): no such case"),
         (("--flights", 0), "--flights 0: must be from 1 to"),
         (("--ablations", -1), "--ablations -1: must be from 0 to"),

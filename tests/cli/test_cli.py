@@ -63,7 +63,7 @@ def test_fly_json_has_every_key_and_its_record_is_there(tmp_path):
     assert list(facts["states"]) == list("xyzuvw")
     assert all(set(entry) == NUMBER_KEYS for entry in facts["states"].values())
     assert facts["touchdown"] is None
-    assert [facts[key] for key in ("rmse_over_bound", "anees_inside_fraction", "r95_m")] == [None, None, None]
+    assert [facts[key] for key in ("rmse_over_bound", "anees_inside_fraction")] == [None, None]
     assert facts["known_exactly"] == "where it hovers for its first 0.5 s, flown on the truth"
     record = Record.load(tmp_path / "f.fnr")
     handed = record.tables["truth"]["t_s"] >= 0.5
@@ -96,11 +96,63 @@ def test_many_flights_turn_every_number_into_median_and_percentiles(tmp_path):
     assert 0 <= facts["paper_percentile"]["max_position_error_m"] <= 100
     assert all(0.1 < facts["rmse_over_bound"][state] < 10.0 for state in "xyzuvw")
     assert 0.0 <= facts["anees_inside_fraction"] <= 1.0
-    assert (facts["r95_m"], facts["r95_interval_m"]) == (None, [None, None])  # 2 s: none lands
+    assert facts["touchdown"] is None  # 2 s: none lands
     record = Record.load(tmp_path / facts["record"])
     assert record.manifest["scores"]["max_position_error_m"] == pytest.approx(
         facts["max_position_error_m"]["median"], rel=0.2
     )
+
+
+def landing_at_once(tmp_path):
+    """From 0.5 m down at once, so that a few seconds hold a whole landing."""
+    path = short(tmp_path, duration="12.0")
+    text = path.read_text(encoding="utf-8").replace("may_land_after_s = 10.0", "may_land_after_s = 1.0")
+    text = text.replace("{ t_s = 0.0, height_m = 3.0 }", "{ t_s = 0.0, height_m = 0.5 }")
+    text = text.replace("{ t_s = 10.0, height_m = 3.0 }", "{ t_s = 2.0, height_m = 0.5 }")
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_the_touchdown_of_one_flight_is_its_values_and_of_many_radius_interval_success_and_what_limits_it(tmp_path):
+    path = landing_at_once(tmp_path)
+    one = json.loads(run("fly", path, "--json", "--no-report", cwd=tmp_path).stdout)
+    assert one["truth_model"] == "matched"
+    landing = one["touchdown"]
+    assert landing["success"] is True
+    assert 0.0 < landing["contact"]["distance_m"] < 3.0
+    assert abs(landing["contact"]["distance_m"] - landing["rest"]["distance_m"]) <= landing["rest"]["slide_m"]
+    assert set(landing["limited_by"]) == {"estimate_m", "guidance_m", "pad_m"}
+    done = run("fly", path, "--json", "--no-report", "--flights", 20, cwd=tmp_path)
+    many = json.loads(done.stdout)
+    assert many["truth_model"] == "ensemble"
+    landings = many["touchdown"]
+    for end in ("contact", "rest"):
+        assert {"r95_m", "r95_interval_m"} <= set(landings[end])
+    assert set(landings["limited_by"]) == {"estimate_m", "guidance_m", "pad_m"}
+    success = landings["success"]
+    assert success["rate"] == many["landed"] / 20
+    assert 0.0 <= success["low"] <= success["rate"] <= success["high"] <= 1.0
+    assert "r95_m" not in many
+    record = Record.load(tmp_path / many["record"])
+    assert record.manifest["truth_model"] == "ensemble"
+    assert record.manifest["parameters"]["drawn"]["vehicle.body.mass_kg"] != 7.9
+    shown = run("fly", path, "--no-report", "--flights", 4, "--matched", cwd=tmp_path).stdout
+    assert "the truth as told" in shown
+    assert "touchdown, at rest" in shown
+    assert "landed  4 of 4 flights, 100.0 % (95 % interval 39.8..100.0 %)" in shown
+
+
+def test_matched_and_ensemble_differ_and_each_is_itself_again(tmp_path):
+    path = short(tmp_path)
+    flown = {
+        (model, again): json.loads(run("fly", path, "--json", "--no-report", model, cwd=tmp_path).stdout)
+        for model in ("--matched", "--ensemble")
+        for again in (1, 2)
+    }
+    for model in ("--matched", "--ensemble"):
+        assert flown[model, 1] == flown[model, 2]
+        assert flown[model, 1]["truth_model"] == model.removeprefix("--")
+    assert flown["--matched", 1]["states"] != flown["--ensemble", 1]["states"]
 
 
 def test_a_seed_gives_the_same_flight_again(tmp_path):
@@ -201,7 +253,7 @@ def test_a_crash_is_status_1_with_the_record_written(tmp_path):
 def test_one_flight_of_a_seed_can_be_flown_again(tmp_path):
     many = json.loads(run("fly", short(tmp_path), "--json", "--flights", 3, "--no-report", cwd=tmp_path).stdout)
     index = Record.load(tmp_path / many["record"]).manifest["flight"]
-    again = run("fly", short(tmp_path), "--json", "--flight", index, "--no-report", cwd=tmp_path)
+    again = run("fly", short(tmp_path), "--json", "--flight", index, "--ensemble", "--no-report", cwd=tmp_path)
     assert json.loads(again.stdout)["max_position_error_m"] == many["max_position_error_m"]["median"]
 
 

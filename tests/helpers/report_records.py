@@ -130,6 +130,18 @@ def _innovations(
     return table
 
 
+def _touchdown(t_s: float) -> dict[str, Any]:
+    """A landing as `scoring.landings.touchdown_of_flight` has it."""
+    return {
+        "contact": {"t_s": t_s, "north_m": 0.05, "east_m": 0.0663, "distance_m": 0.083, "sink_rate_m_s": 0.294,
+                    "lateral_speed_m_s": 0.05, "tilt_deg": 5.6, "yaw_rate_deg_s": 1.2},
+        "rest": {"t_s": t_s + 0.8, "north_m": 0.05, "east_m": 0.091, "distance_m": 0.104, "tilt_deg": 0.2,
+                 "slide_m": 0.025},
+        "limited_by": {"estimate_m": 0.012, "guidance_m": 0.081, "pad_m": 0.003},
+        "success": True, "broken": [],
+    }  # fmt: skip
+
+
 def _manifest(
     scenario: str, seed: int, position_error: np.ndarray, velocity_error: np.ndarray, touchdown_s: float | None
 ) -> dict[str, Any]:
@@ -155,7 +167,7 @@ def _manifest(
                        for name, e in zip(STATES, errors, strict=True)},
             "max_position_error_m": float(np.abs(position_error).max()),
             "touchdown": None if touchdown_s is None else
-                         {"t_s": touchdown_s, "horizontal_error_m": 0.083, "sink_rate_m_s": 0.294},
+                         _touchdown(touchdown_s),
         },
     }  # fmt: skip
 

@@ -85,7 +85,7 @@ def test_moments_come_from_the_truth() -> None:
 
 def test_the_scored_touchdown_stands_before_any_other() -> None:
     record = flight("landing")
-    record.manifest["scores"]["touchdown"]["t_s"] = 19.5
+    record.manifest["scores"]["touchdown"]["contact"]["t_s"] = 19.5
     assert moments(record) == [Moment(19.5, "touchdown")]
     record.manifest["scores"]["touchdown"] = None
     assert moments(record) == []
@@ -95,7 +95,7 @@ def test_a_bounce_after_touchdown_is_no_lift_off() -> None:
     record = Record()
     t_s = np.arange(6.0)
     record.add("truth", {"t_s": t_s, "on_ground": np.array([0, 0, 1, 0, 1, 1])})
-    record.manifest["scores"] = {"touchdown": {"t_s": 2.0}}
+    record.manifest["scores"] = {"touchdown": {"contact": {"t_s": 2.0}}}
     assert moments(record) == [Moment(2.0, "touchdown")]
 
 

@@ -25,10 +25,10 @@ from flownav.scoring.consistency import (
     is_white,
     lag_one,
     largest_horizontal_error,
-    percentile_with_interval,
     steps_in_flight,
     verdict,
 )
+from flownav.scoring.percentiles import percentile_with_interval
 
 
 @pytest.mark.parametrize("flights", [1, 10, 1000])

@@ -8,8 +8,10 @@ import pytest
 from flownav.campaign.local import counted_steps, fly_many, fly_recorded, score_history
 from flownav.parameter_files import check, shipped
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
-from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS
+from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, touchdown_rows
+from flownav.scoring.landings import column_of, succeeded
 from flownav.scoring.paper_tables import published
+from flownav.scoring.touchdown import names_of
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_blocks, fly_one
 from flownav.simulation.history import column, columns
@@ -17,9 +19,14 @@ from flownav.simulation.scenario import SHIPPED, Scenario, load_scenario
 
 SHORT, SOON, PAPERS = {"duration_s": 3.0}, {"handover_s": 1.0}, {"name": "paper"}
 STATES = (*POSITION_NED, *VELOCITY_BODY)
-TOUCHDOWN_S, OFF_M, SINK_M_S, CRASHED = (
+TOUCHDOWN_S, OFF_M, SINK_M_S, BROKEN = (
     SCORE_COLUMNS.index(name)
-    for name in ("touchdown.t_s", "touchdown.horizontal_error_m", "touchdown.sink_rate_m_s", "crashed")
+    for name in (
+        "touchdown.contact.t_s",
+        "touchdown.contact.distance_m",
+        "touchdown.contact.sink_rate_m_s",
+        "touchdown.broken",
+    )
 )
 
 
@@ -166,10 +173,20 @@ def test_the_papers_filter_has_its_largest_error_with_white_gps_and_metres_with_
 def test_a_storm_is_a_crash_and_not_a_landing():
     storm = setup("landing", filter=PAPERS, wind={"speed_20ft_m_s": 30.0}).flight
     scores = fly_many(storm, 1, 16)
-    assert scores[:, CRASHED].mean() > 0.9
+    assert (scores[:, BROKEN] > 0.0).mean() > 0.9
     assert np.isnan(scores[:, TOUCHDOWN_S]).any()
-    landed = np.isfinite(scores[:, TOUCHDOWN_S]) & (scores[:, CRASHED] == 0.0)
+    landed = np.isfinite(scores[:, TOUCHDOWN_S]) & (scores[:, BROKEN] == 0.0)
     assert not (landed & (scores[:, OFF_M] < 1.0)).any()
+
+
+def test_a_rollover_after_a_soft_contact_is_a_crash():
+    """In 22 m/s some flights touch down below the limit of sink rate, slide and roll over; none of them has landed."""
+    storm = setup("landing", filter=PAPERS, wind={"speed_20ft_m_s": 22.0}).flight
+    landings = touchdown_rows(fly_many(storm, 1, 64))
+    rolled = landings[np.array(["rolled over" in names_of(bits) for bits in landings[:, -1]])]
+    soft = rolled[:, column_of("contact", "sink_rate_m_s")] < storm.limits.max_sink_rate_m_s
+    assert soft.any()
+    assert not succeeded(rolled).any()
 
 
 def test_linear_truth_reproduces_the_papers_own_experiment():

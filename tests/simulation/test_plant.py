@@ -8,10 +8,12 @@ import pytest
 from flownav.compile import LANES, kernel
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
+from flownav.simulation.ensemble import believed
 from flownav.simulation.layout import store_controls, store_helicopter
 from flownav.simulation.plan import PHYSICS_S
 from flownav.simulation.plant import linear_step, runge_kutta_step
 from flownav.simulation.scenario import Scenario, load_scenario
+from flownav.simulation.truth import packed_truth
 from flownav.vehicle import helicopter
 from flownav.vehicle.state import Controls, HelicopterState
 
@@ -23,8 +25,8 @@ def put(work, lanes, lane, state, controls):
 
 
 @kernel
-def step(work, lanes, vehicle, dt):
-    runge_kutta_step(work, lanes, vehicle, dt)
+def step(work, lanes, dt):
+    runge_kutta_step(work, lanes, dt)
 
 
 @kernel
@@ -53,13 +55,35 @@ def states_about_hover(flight, count):
 def test_refining_the_inflow_between_stages_is_solving_it_in_each(flight):
     """At 16 moving, turning states, some on their skids, a step differs by less than 1e-8."""
     work = np.zeros(layout.ROWS * len(LANES))
+    work[: layout.AS_IS_END * len(LANES)] = packed_truth([believed(flight)] * len(LANES))
     pairs = list(states_about_hover(flight, len(LANES)))
     for lane, (state, controls) in enumerate(pairs):
         put(work, LANES, lane, state, controls)
-    step(work, LANES, flight.vehicle, PHYSICS_S)
+    step(work, LANES, PHYSICS_S)
     rows = work.reshape(-1, len(LANES))[layout.HELICOPTER : layout.HELICOPTER + 23]
     for lane, (state, controls) in enumerate(pairs):
         exact = helicopter.step(state, controls, 0.0, 0.0, 0.0, PHYSICS_S, flight.vehicle)
+        assert rows[:, lane] == pytest.approx(np.array(exact, float), rel=1e-8, abs=1e-8)
+
+
+def test_each_lane_flies_the_vehicle_of_its_own_rows(flight):
+    """Sixteen vehicles of sixteen masses, inertias and servos side by side, each as its own step has it."""
+    work = np.zeros(layout.ROWS * len(LANES))
+    vehicles = [
+        flight.vehicle._replace(
+            mass_kg=7.0 + 0.1 * lane, inertia_xx_kg_m2=0.15 + 0.01 * lane, cyclic_frequency_rad_s=36.0 + lane
+        )
+        for lane in range(len(LANES))
+    ]
+    truth = believed(flight)
+    work[: layout.AS_IS_END * len(LANES)] = packed_truth([truth._replace(vehicle=vehicle) for vehicle in vehicles])
+    pairs = list(states_about_hover(flight, len(LANES)))
+    for lane, (state, controls) in enumerate(pairs):
+        put(work, LANES, lane, state, controls)
+    step(work, LANES, PHYSICS_S)
+    rows = work.reshape(-1, len(LANES))[layout.HELICOPTER : layout.HELICOPTER + 23]
+    for lane, (state, controls) in enumerate(pairs):
+        exact = helicopter.step(state, controls, 0.0, 0.0, 0.0, PHYSICS_S, vehicles[lane])
         assert rows[:, lane] == pytest.approx(np.array(exact, float), rel=1e-8, abs=1e-8)
 
 

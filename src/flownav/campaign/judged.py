@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaign.local import counted_steps, score_history
+from flownav.campaign.local import counted_steps, home_epoch, score_history
 from flownav.record import POSITION_NED, VELOCITY_BODY
 from flownav.scoring.consistency import (
     GROUP_FLIGHTS,
@@ -26,23 +26,19 @@ from flownav.scoring.consistency import (
     inside_fraction,
     inside_steps,
     largest_horizontal_error,
-    percentile_with_interval,
 )
-from flownav.scoring.errors import CRASHED, SCORE_COLUMNS
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_blocks
+from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.history import column, columns
 from flownav.simulation.plan import Flight
-from flownav.simulation.sensing import EPOCH_S
 
 Array = NDArray[np.float64]
 
 STATES = (*POSITION_NED, *VELOCITY_BODY)
 STD = tuple(f"std_{name}" for name in STATES)
 HORIZON = tuple(f"error_{name}" for name in STATES)
-TOUCHDOWN_ERROR = SCORE_COLUMNS.index("touchdown.horizontal_error_m")
 BOUND_FLIGHTS = 64  # the covariance hardly differs from flight to flight
-R_SHARE = 0.95
 
 
 @dataclass(frozen=True)
@@ -79,10 +75,11 @@ def fly_judged(
     seed: int,
     flights: int,
     *,
+    ensemble: Ensemble | None = None,
     threads: int | None = None,
     on_progress: Callable[[int], object] = lambda flown: None,
 ) -> Judged:
-    """Fly flights 0 to `flights - 1` and judge them; memory grows by a row of scores a flight."""
+    """Fly flights 0 to `flights - 1`, matched or of an ensemble, and judge them; memory grows by a row a flight."""
     home = home_epoch(flight)
 
     def judge(history: Array) -> tuple[Array, Array, ErrorSums, ConsistencySums | None]:
@@ -98,7 +95,7 @@ def fly_judged(
     total: ConsistencySums | None = None
     group: ConsistencySums | None = None
     flown_on: ErrorSums | None = None
-    for flown, (scores, horizontal, errors, sums) in fly_blocks(flight, seed, 0, flights, judge, threads):
+    for flown, (scores, horizontal, errors, sums) in fly_blocks(flight, seed, 0, flights, judge, threads, ensemble):
         rows.append(scores)
         largest.append(horizontal)
         flown_on = errors if flown_on is None else flown_on + errors
@@ -156,37 +153,15 @@ def bound_of(setup: Setup, seed: int, flights: int, *, threads: int | None = Non
     return Bound(variance / flights, total)
 
 
-def home_epoch(flight: Flight) -> int | None:
-    """The step at which the paper's filter last notes where its pad is.
-
-    None where it takes the filter's origin for it, and for the navigator, whose estimate is counted from there.
-    """
-    if flight.onboard is not None or not flight.plan.home_at_start:
-        return None
-    parked = flight.plan.starts_on_ground and flight.plan.takeoff_at_s > 0.0
-    last = int(np.ceil(flight.plan.takeoff_at_s / EPOCH_S)) - 1 if parked else 0
-    return min(last, flight.plan.epochs - 1)
-
-
 def consistency_facts(judged: Judged, bound: Bound) -> dict[str, Any]:
-    """What `flownav fly` says of many flights of the navigator; null where no flight landed or flew."""
+    """What `flownav fly` says of many flights of the navigator; null where no flight flew."""
     assert judged.groups is not None
     assert judged.sums is not None
     inside = inside_fraction(judged.groups)
-    low, high = touchdown_radius(judged)[1:]
     return {
         "rmse_over_bound": {s: _finite(ratio) for s, ratio in efficiency(judged.sums.errors, bound.sums).items()},
         "anees_inside_fraction": _finite(inside),
-        "r95_m": _finite(touchdown_radius(judged)[0]),
-        "r95_interval_m": [_finite(low), _finite(high)],
     }
-
-
-def touchdown_radius(judged: Judged) -> tuple[float, float, float]:
-    """R95 of the touchdown and its 95 % interval [m]; a flight that crashed or never landed is infinitely far off."""
-    missed = judged.scores[:, TOUCHDOWN_ERROR]
-    away = np.where(np.isnan(missed) | (judged.scores[:, CRASHED] > 0.0), np.inf, missed)
-    return percentile_with_interval(away, R_SHARE)
 
 
 def _finite(number: float) -> float | None:

@@ -7,11 +7,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.record import POSITION_NED, VELOCITY_BODY, Record
+from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, score_block, scores_of_flight
 from flownav.scoring.paper_tables import published
+from flownav.scoring.touchdown import Limits, motion_of, touchdowns
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_blocks, fly_written
+from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.flight_record import record_of
 from flownav.simulation.history import column, columns
 from flownav.simulation.plan import Flight
@@ -25,13 +27,51 @@ def score_history(flight: Flight, history: Array) -> Array:
     """The scores of a block's flights, (lanes, len(SCORE_COLUMNS)); history (epochs, len(HISTORY), lanes)."""
     estimate = history[:, columns("estimate", (*POSITION_NED, *VELOCITY_BODY))]
     truth = history[:, columns("truth", (*POSITION_NED, *VELOCITY_BODY))]
-    sink_rate = history[:, column("truth", "sink_rate_m_s")]
-    on_ground = (history[:, column("truth", "contact_n")] > 0.0).astype(float)
-    t_s: Array = np.arange(len(history), dtype=np.float64) * EPOCH_S
-    counted = counted_steps(flight, history)
-    return score_block(
-        t_s, estimate, truth, sink_rate, on_ground, may_land_after_s=flight.plan.may_land_after_s, counted=counted
+    return score_block(estimate, truth, touchdown_history(flight, history), counted_steps(flight, history))
+
+
+def touchdown_history(flight: Flight, history: Array) -> Array:
+    """The touchdowns of a block's flights, (lanes, len(TOUCHDOWN_COLUMNS))."""
+    position = history[:, columns("truth", POSITION_NED)]
+    flown = position if flight.plan.fly_on_truth else history[:, columns("estimate", POSITION_NED)]
+    motion = motion_of(
+        position,
+        history[:, columns("truth", VELOCITY_BODY)],
+        history[:, columns("truth", QUATERNION)],
+        history[:, column("truth", "rate_r_rad_s")],
+        (history[:, column("truth", "contact_n")] > 0.0).astype(float),
+        flight.vehicle.cg_above_skid_m,
     )
+    t_s: Array = np.arange(len(history), dtype=np.float64) * EPOCH_S
+    error, seen = (flown - position)[:, :2], pad_to_be_seen(flight, t_s, motion.cg_height_m)
+    limits = Limits(**flight.limits._asdict())
+    return touchdowns(t_s, motion, error, seen, limits, flight.plan.may_land_after_s)
+
+
+def pad_to_be_seen(flight: Flight, t_s: Array, cg_height_m: Array) -> Array:
+    """Where the vehicle can still see its pad, or is still told where it is, (epochs, lanes) 0/1.
+
+    With a pad camera down to its least height; without one until the hand-over, and of the paper's filter until it last
+    notes its home.
+    """
+    onboard = flight.onboard
+    if onboard is not None and onboard.pad_clock.fitted:
+        lens_m = cg_height_m - onboard.pad_place.down_m
+        return np.asarray((lens_m >= onboard.pad.min_height_m) & (lens_m <= onboard.pad.max_height_m), float)
+    last_s = flight.plan.handover_s if onboard is not None else (home_epoch(flight) or 0) * EPOCH_S
+    return np.asarray(np.broadcast_to((t_s <= last_s)[:, None], cg_height_m.shape), float)
+
+
+def home_epoch(flight: Flight) -> int | None:
+    """The step at which the paper's filter last notes where its pad is.
+
+    None where it takes the filter's origin for it, and for the navigator, whose estimate is counted from there.
+    """
+    if flight.onboard is not None or not flight.plan.home_at_start:
+        return None
+    parked = flight.plan.starts_on_ground and flight.plan.takeoff_at_s > 0.0
+    last = int(np.ceil(flight.plan.takeoff_at_s / EPOCH_S)) - 1 if parked else 0
+    return min(last, flight.plan.epochs - 1)
 
 
 def counted_steps(flight: Flight, history: Array) -> Array:
@@ -53,13 +93,18 @@ def fly_many(
     flights: int,
     *,
     first: int = 0,
+    ensemble: Ensemble | None = None,
     threads: int | None = None,
     on_progress: Callable[[int], None] = lambda flown: None,
 ) -> Array:
-    """The scores of flights `first` to `first + flights - 1`, (flights, len(SCORE_COLUMNS))."""
+    """The scores of flights `first` to `first + flights - 1`, (flights, len(SCORE_COLUMNS)); matched or drawn."""
     scores = np.empty((flights, len(SCORE_COLUMNS)))
     done = 0
-    for flown, block in fly_blocks(flight, seed, first, flights, lambda h: score_history(flight, h), threads):
+
+    def judge(history: Array) -> Array:
+        return score_history(flight, history)
+
+    for flown, block in fly_blocks(flight, seed, first, flights, judge, threads, ensemble):
         scores[done : done + flown] = block
         done += flown
         on_progress(flown)
@@ -76,10 +121,14 @@ def known_exactly(scenario: Scenario) -> str:
     return f"nothing, but it is flown on the truth for its first {held_s:g} s"
 
 
-def fly_recorded(setup: Setup, seed: int, index: int = 0) -> Record:
-    """One flight as a scored Record."""
-    flown = fly_written(setup.flight, seed, index)
+def fly_recorded(setup: Setup, seed: int, index: int = 0, ensemble: Ensemble | None = None) -> Record:
+    """One flight as a scored Record; of an ensemble with the numbers that were drawn for it."""
+    flown = fly_written(setup.flight, seed, index, ensemble=ensemble)
     record = record_of(setup, flown, seed, index)
+    record.manifest["truth_model"] = "matched" if ensemble is None else "ensemble"
+    if ensemble is not None:
+        drawn = {name: values[0] for name, values in ensemble.values(seed, index, 1).items()}
+        record.manifest["parameters"] = {**record.manifest["parameters"], "drawn": drawn}
     record.manifest["scores"] = scores_of_flight(score_history(setup.flight, flown.history)[0])
     record.manifest["paper"] = published(setup.scenario.paper_table)
     if setup.fitted is not None:

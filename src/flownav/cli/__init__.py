@@ -9,6 +9,7 @@ import typer
 from flownav.cli import accuracy as accuracy
 from flownav.cli import bench as bench
 from flownav.cli import compare as compare
+from flownav.cli import envelope as envelope
 from flownav.cli import export as export
 from flownav.cli import faults as faults
 from flownav.cli import flow as flow
@@ -46,6 +47,7 @@ for name, command, what in (
     ("pad", pad.command, "Find the landing pad in a frame; measure how well, by height."),
     ("paper", paper.command, "Every table of the paper, published and reproduced side by side."),
     ("accuracy", accuracy.command, "The landing filter against its targets, and what its pieces are worth."),
+    ("envelope", envelope.command, "How surely a scenario lands, by the wind's speed and direction."),
     ("faults", faults.command, "Let sensors fail on a landing: when it is noticed, what it costs."),
     ("vehicle", vehicle.command, "Trim, power, linear models and ground effect of a helicopter."),
     ("report", report.command, "Write a record's report as one HTML page."),

@@ -13,20 +13,21 @@ if TYPE_CHECKING:
     from flownav.campaign.accuracy import Case
 
 STATES = ("x", "y", "z", "u", "v", "w")
+TRUTH_MODELS = ("matched", "ensemble")
 BOUND = "RMSE over the bound of the filter's own model"
 
 
 def command(
     flights: Annotated[int, typer.Option(help="Flights of each case.")] = 1000,
     cases: Annotated[
-        str, typer.Option(help="Cases, with commas: takeoff, landing, pad_return, approach; or all.")
+        str, typer.Option(help="Cases, with commas: takeoff, landing, pad_return, approach, approach_8_m_s; or all.")
     ] = "all",
     ablations: Annotated[int, typer.Option(help="Flights of each variant that lacks a piece; 0 for none.")] = 100,
     seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
     out: Annotated[Path | None, typer.Option(help="Write the tables as Markdown, too.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
-    """Hold the navigator against its targets: accuracy, consistency with its own model, what its pieces are worth."""
+    """Hold the navigator against its targets, matched and as an ensemble; what its pieces are worth, matched."""
     from flownav.campaign.accuracy import CASES, flights_of, run_case
     from flownav.cli.output import progress, require_between, require_writable
     from flownav.errors import InputError, VerdictError
@@ -61,46 +62,82 @@ def command(
 
 def markdown(made: list[Case]) -> str:
     """The tables as they are printed and as docs/accuracy.md has them."""
-    parts = [_targets(made), _known(made), _consistency(made), _by_height(made), _accuracy(made)]
+    parts = [_targets(made), _known(made)]
+    parts += [table(made, model) for table in (_accuracy, _touchdowns, _consistency) for model in TRUTH_MODELS]
+    parts += [_by_height(made)]
     parts += [_ablations(case) for case in made if case.ablations]
     return "\n\n".join(parts) + "\n"
 
 
 def _targets(made: list[Case]) -> str:
     rows = [
-        (case.name, target.what, f"{target.value:.3f}", f"{'>=' if target.at_least else '<='} {target.limit:g}",
-         "kept" if target.kept else "MISSED")
+        (case.name, target.truth_model, target.what, f"{target.value:.3f}",
+         f"{'>=' if target.at_least else '<='} {target.limit:g}", "kept" if target.kept else "MISSED")
         for case in made for target in case.targets
     ]  # fmt: skip
-    return _table(("case", "figure", "measured", "target", ""), rows)
+    return _table(("case", "truth", "figure", "measured", "target", ""), rows)
 
 
 def _known(made: list[Case]) -> str:
     return _table(("case", "what the vehicle knows exactly"), [(case.name, case.known) for case in made])
 
 
-def _consistency(made: list[Case]) -> str:
-    rows = [
-        (case.name, *(_ratio(case.facts["rmse_over_bound"][state]) for state in STATES),
-         f"{case.facts['anees']:.3f}", f"{case.facts['anees_inside_fraction_of_all_flights']:.3f}")
-        for case in made
-    ]  # fmt: skip
-    heading = (f"{BOUND}, at the horizon", *STATES, "ANEES", "steps with the ANEES of all flights in its band")
+def _consistency(made: list[Case], truth_model: str) -> str:
+    rows = []
+    for case in made:
+        facts = getattr(case, truth_model)
+        ratios = (_ratio(facts["rmse_over_bound"][state]) for state in STATES)
+        shares = (facts["anees"], facts["anees_inside_fraction"], facts["anees_inside_fraction_of_all_flights"])
+        rows.append((case.name, *ratios, *(f"{share:.3f}" for share in shares)))
+    heading = (
+        f"{truth_model}: {BOUND}, at the horizon",
+        *STATES,
+        "ANEES",
+        "steps with the ANEES of 96 flights in its band",
+        "of all flights",
+    )
     return _table(heading, rows)
 
 
-def _accuracy(made: list[Case]) -> str:
-    rows = [
-        (case.name, *(_length(rms) for rms in case.facts["rms_error"]), _interval(case.facts, "p95_largest_horizontal"),
-         _interval(case.facts, "r95"), str(case.facts["crashed"]))
-        for case in made
-    ]  # fmt: skip
+def _accuracy(made: list[Case], truth_model: str) -> str:
+    rows = []
+    for case in made:
+        facts = getattr(case, truth_model)
+        errors = (_length(rms) for rms in facts["rms_error"])
+        axis = _length(facts["p95_largest_axis_m"])
+        rows.append((case.name, *errors, axis, _interval(facts, "p95_largest_horizontal"), str(facts["crashed"])))
     heading = (
-        "RMSE of what was flown on, in flight [m, m/s]",
+        f"{truth_model}: RMSE of what was flown on, in flight [m, m/s]",
         *STATES,
+        "p95 of largest error of one axis [m]",
         "p95 of largest horizontal error [m] (95 % interval)",
-        "touchdown R95 [m] (95 % interval)",
         "crashed",
+    )
+    return _table(heading, rows)
+
+
+def _touchdowns(made: list[Case], truth_model: str) -> str:
+    """Of the cases that land."""
+    rows = []
+    for case in made:
+        landing = getattr(case, truth_model)["touchdown"]
+        if landing is not None:
+            rate, limited = landing["success"], landing["limited_by"]
+            success = f"{100.0 * rate['rate']:.1f} ({100.0 * rate['low']:.1f}-{100.0 * rate['high']:.1f})"
+            parts = (_length(limited[name]) for name in ("estimate_m", "guidance_m", "pad_m"))
+            ends = (_interval(landing[end], "r95") for end in ("contact", "rest"))
+            failed = {**landing["unfinished"], **landing["broken"]}
+            why = ", ".join(f"{what} {count}" for what, count in failed.items() if count) or "-"
+            rows.append((case.name, *ends, *parts, success, why))
+    heading = (
+        f"{truth_model}: touchdown",
+        "R95 at contact [m] (95 % interval)",
+        "R95 at rest [m] (95 % interval)",
+        "estimate, p95 [m]",
+        "guidance, p95 [m]",
+        "pad, p95 [m]",
+        "landed [%] (95 % interval)",
+        "not landed by",
     )
     return _table(heading, rows)
 
@@ -108,9 +145,9 @@ def _accuracy(made: list[Case]) -> str:
 def _by_height(made: list[Case]) -> str:
     rows = [
         (case.name, band, *(_ratio(ratios[state]) for state in STATES))
-        for case in made for band, ratios in case.facts["rmse_over_bound_by_height"].items()
+        for case in made for band, ratios in case.matched["rmse_over_bound_by_height"].items()
     ]  # fmt: skip
-    return _table((BOUND, "height of the skids", *STATES), rows)
+    return _table((f"matched: {BOUND}", "height of the skids", *STATES), rows)
 
 
 def _ablations(case: Case) -> str:
@@ -118,7 +155,7 @@ def _ablations(case: Case) -> str:
         ratios = (row["horizontal_rms_ratio"], row["vertical_rms_ratio"], row["horizontal_speed_rms_ratio"])
         return (
             _length(row["p95_largest_horizontal_m"]), *(f"{ratio:.2f}" for ratio in ratios), f"{row['anees']:.3g}",
-            _length(row["r95_m"]), str(row["crashed"]),
+            _length(row["rest_r95_m"]), str(row["crashed"]),
         )  # fmt: skip
 
     rows = [(lacking, *cells(row)) for lacking, row in case.ablations.items()]
@@ -129,7 +166,7 @@ def _ablations(case: Case) -> str:
         "vertical RMSE ratio",
         "horizontal speed RMSE ratio",
         "ANEES",
-        "touchdown R95 [m]",
+        "touchdown R95 at rest [m]",
         "crashed",
     )
     return _table(heading, rows)

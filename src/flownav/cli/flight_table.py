@@ -20,7 +20,8 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
     plant = "" if facts["truth"] == "nonlinear" else ", linear truth"
     flown_on = "" if facts["feedback"] == "estimate" else ", flown on the truth"
     flies = "the paper's filter" if facts["filter"] == "paper" else "the navigator"
-    title = f"{facts['scenario']}: {flies}, {facts['gps']} GPS{plant}{flown_on}, seed {facts['seed']}"
+    told = ", the truth drawn" if facts["truth_model"] == "ensemble" else ", the truth as told"
+    title = f"{facts['scenario']}: {flies}, {facts['gps']} GPS{plant}{flown_on}{told}, seed {facts['seed']}"
     table = Table(
         title=title + (f", {facts['flights']} flights: median (5-95 %)" if many else ""), title_justify="left"
     )
@@ -54,29 +55,65 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
 
 
 def _show_touchdown(console: Console, facts: dict[str, Any]) -> None:
+    """Contact, rest, success, what limits them, and what was broken."""
     landing = facts["touchdown"]
     if landing is None:
         return
-    landed = f"   {facts['landed']} of {facts['flights']} flights landed" if "landed" in facts else ""
-    if facts["crashed"] is not False and facts["crashed"]:
-        landed += f"   crashed: {int(facts['crashed'])}"
-    console.print(
-        f"touchdown  {_cell(landing['horizontal_error_m'], 3)} m from the pad's centre, "
-        f"{_cell(landing['sink_rate_m_s'], 3)} m/s, at {_cell(landing['t_s'], 2)} s{landed}",
-        highlight=False,
+    for line in touchdown_lines(landing, facts.get("landed"), facts["flights"]):
+        console.print(line, highlight=False)
+
+
+def touchdown_lines(landing: dict[str, Any], landed: int | None, flights: int) -> list[str]:
+    """The touchdown of one flight or of many, a sentence a line."""
+    said = []
+    for name, group in (("contact", landing["contact"]), ("at rest", landing["rest"])):
+        if group is None or group["distance_m"] is None:
+            continue
+        parts = [f"{_cell(group['distance_m'], 3)} m from the pad's centre, at {_cell(group['t_s'], 2)} s"]
+        parts += [
+            f"{words} {_cell(group[key], 3)} {unit}"
+            for key, words, unit in (
+                ("sink_rate_m_s", "sinking at", "m/s"),
+                ("lateral_speed_m_s", "drifting at", "m/s"),
+                ("slide_m", "slid", "m"),
+                ("tilt_deg", "tilted", "deg"),
+                ("yaw_rate_deg_s", "turning at", "deg/s"),
+            )
+            if key in group
+        ]
+        said.append(f"touchdown, {name}  {', '.join(parts)}")
+        if group.get("r95_m") is not None:
+            low, high = (_or_dash(end, 3) for end in group["r95_interval_m"])
+            said.append(f"touchdown R95, {name}  {group['r95_m']:.3f} m (95 % interval {low}..{high})")
+    limited = landing["limited_by"]
+    if limited is not None:
+        which = "" if landed is None else "95 % of the flights within: "
+        parts = [f"{name} {_or_dash(limited[f'{name}_m'], 3)} m" for name in ("estimate", "guidance", "pad")]
+        said.append(f"limited by  {which}{', '.join(parts)}")
+    if landed is None:
+        broken = landing["broken"]
+        verdict = f"crashed: {', '.join(broken)}" if broken else "landed" if landing["success"] else "not at rest"
+        return [*said, f"verdict  {verdict}"]
+    rate = landing["success"]
+    said.append(
+        f"landed  {landed} of {flights} flights, {100.0 * rate['rate']:.1f} % "
+        f"(95 % interval {100.0 * rate['low']:.1f}..{100.0 * rate['high']:.1f} %)"
     )
+    late = [f"{name} {count}" for name, count in landing["unfinished"].items() if count]
+    if late:
+        said.append("not landed in time  " + ", ".join(late))
+    if landing["broken"]:
+        said.append("crashes by  " + ", ".join(f"{name} {count}" for name, count in landing["broken"].items()))
+    return said
 
 
 def _show_consistency(console: Console, facts: dict[str, Any]) -> None:
-    """How consistent the navigator is with its own model, and the touchdown radius, of many flights."""
+    """How consistent the navigator is with its own model, of many flights."""
     ratios = ", ".join(f"{state} {_or_dash(ratio)}" for state, ratio in facts["rmse_over_bound"].items())
     console.print(f"RMSE over the bound of the filter's own model, in flight  {ratios}", highlight=False)
     inside = facts["anees_inside_fraction"]
     if inside is not None:
         console.print(f"ANEES inside its 95 % band  on {100.0 * inside:.1f} % of the steps in flight", highlight=False)
-    if facts["r95_m"] is not None:
-        low, high = (_or_dash(end, 3) for end in facts["r95_interval_m"])
-        console.print(f"touchdown R95  {facts['r95_m']:.3f} m (95 % interval {low}..{high})", highlight=False)
 
 
 def _or_dash(number: float | None, digits: int = 2) -> str:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from flownav.faults.navigated import Navigated
 from flownav.measurement import Array, Sensor, Stream
 from flownav.record import POSITION_NED, Table
-from flownav.scoring.errors import first_contact
+from flownav.scoring.touchdown import first_contact
 
 SIGMAS = 3.0
 AS_GOOD_AS_WITHOUT_M = 0.1
@@ -184,9 +184,8 @@ def moved(run: Navigated, without: Navigated, window_s: tuple[float, float]) -> 
 
 def touchdown_error(course: Course, truth: Table) -> float | None:
     """Horizontal error at the first ground contact of a flight; None where it does not land."""
-    position = np.column_stack([truth[name] for name in POSITION_NED])[:, :, None]
-    on_ground = truth["on_ground"][:, None]
-    contact_s = first_contact(truth["t_s"], position, np.zeros_like(on_ground), on_ground)[0, 0]
+    contact = first_contact(np.asarray(truth["on_ground"], float)[:, None])[0]
+    contact_s = float(truth["t_s"][contact]) if contact >= 0 else np.inf
     if not len(course.t_s) or not course.t_s[0] <= contact_s <= course.t_s[-1]:
         return None
     north, east = (np.interp(contact_s, course.t_s, course.error_ned_m[:, axis]) for axis in range(2))

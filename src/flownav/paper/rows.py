@@ -11,7 +11,7 @@ from flownav.paper.findings import FIT_TOLERANCE
 from flownav.paper.laboratory import Laboratory, Run, delay_s
 from flownav.paper.published import HEIGHTS_M, RELATION_FITS
 from flownav.paper.reproduction import Reproduction
-from flownav.report.content import number
+from flownav.report.figure_words import number
 from flownav.report.panels import listed
 from flownav.rig.excitation import DAMPING_1_S
 from flownav.rig.pendulum import largest_speed

@@ -13,7 +13,7 @@ from flownav.paper.flights import Flights
 from flownav.paper.published import HEIGHTS_M, RELATION_FITS
 from flownav.paper.reproduction import Reproduction
 from flownav.paper.rows import TableRow
-from flownav.report.content import Tile, number
+from flownav.report.figure_words import Tile, number
 from flownav.report.panels import listed
 from flownav.scoring.errors import STATES
 
@@ -153,8 +153,8 @@ def _touchdown(flown: Flights) -> str:
         f"Largest position error {_range(largest, 3)} m; the paper's {flown.published['max_position_error_m']:.4f} m "
         f"lies at percentile {percentile:.0f} of our flights."
     )
-    if landed:
-        said += f" Touchdown {_range(landed['horizontal_error_m'], 3)} m from the pad's centre."
+    if landed and landed["contact"]["distance_m"]:
+        said += f" Touchdown {_range(landed['contact']['distance_m'], 3)} m from the pad's centre."
     return said
 
 
@@ -184,11 +184,12 @@ def own_systems(of: Reproduction) -> list[tuple[str, str, str]]:
             largest = scores["max_position_error_m"]
             what = "largest difference between estimate and truth on one axis"
             rows.append((f"Here: {name}, {gps}", _centimetres(largest), what))
-            if scores["touchdown"]:
+            landed = scores["touchdown"]
+            if landed and landed["contact"]["distance_m"]:
                 what = (
                     "distance of simulated touchdowns from the pad's centre; the autopilot notes the pad at the start"
                 )
-                rows.append((f"Here: {name}, {gps}", _centimetres(scores["touchdown"]["horizontal_error_m"]), what))
+                rows.append((f"Here: {name}, {gps}", _centimetres(landed["contact"]["distance_m"]), what))
     return rows
 
 

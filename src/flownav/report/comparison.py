@@ -8,7 +8,7 @@ from typing import Any
 
 from flownav import __version__
 from flownav.files import written_whole
-from flownav.report.content import number
+from flownav.report.figure_words import number
 from flownav.report.html import HERE
 from flownav.report.style import FONT, PALETTE
 

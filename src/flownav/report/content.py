@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 import shlex
 from collections.abc import Iterator, Mapping
@@ -15,6 +14,8 @@ import numpy as np
 
 from flownav.measurement import Sensor
 from flownav.record import Record
+from flownav.report.figure_words import NONE, Tile, metres, number
+from flownav.report.landing import landing_sentences, landing_tiles
 from flownav.report.series import (
     event_rows,
     flow_readings,
@@ -30,7 +31,6 @@ from flownav.report.series import (
 )
 
 EVENTS_LISTED = 300
-NONE, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
 UNIT_AFTER_NUMBER = re.compile(r"(\d) (m/s|m|s)\b")
 STATES = {"x": ("north", "m"), "y": ("east", "m"), "z": ("down", "m"),
           "u": ("forward", "m/s"), "v": ("right", "m/s"), "w": ("down", "m/s")}  # fmt: skip
@@ -39,29 +39,6 @@ KINDS = {
     "replay": "A recorded flight of {}, fused again.",
     "live": "A live flight of {}.",
 }
-
-
-@dataclass(frozen=True)
-class Tile:
-    """A large figure of the headline."""
-
-    label: str
-    value: str
-    unit: str = ""
-    note: str = ""
-
-
-def number(value: Any, digits: int = 4) -> str:
-    """A number with a true minus sign and fixed decimals; a dash where there is none."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-        return NONE
-    return f"{value:.{digits}f}".replace("-", MINUS)
-
-
-def metres(value: Any) -> str:
-    """A length with as many decimals as it deserves."""
-    size = abs(value) if isinstance(value, (int, float)) else 0.0
-    return number(value, 3 if size < 1 else 2 if size < 100 else 0)
 
 
 def title(record: Record) -> str:
@@ -81,7 +58,8 @@ def duration_s(record: Record) -> float:
 def facts(record: Record) -> list[tuple[str, str]]:
     """The line under the heading: filter, GPS model, plant, seed, length."""
     manifest = record.manifest
-    named = {"Filter": "filter", "GPS model": "gps", "Plant": "truth", "Feedback": "feedback", "Seed": "seed",
+    named = {"Filter": "filter", "GPS model": "gps", "Plant": "truth", "Truth": "truth_model",
+             "Feedback": "feedback", "Seed": "seed",
              "Flight": "flight"}  # fmt: skip
     shown = [(name, str(manifest[key])) for name, key in named.items() if manifest.get(key) is not None]
     return [*shown, ("Length", f"{duration_s(record):.1f} s")]
@@ -100,13 +78,7 @@ def summary(record: Record) -> str:
         said.append(f"{ever} off by more than {metres(largest)} m{beside}.")
     if manifest.get("known_exactly"):
         said.append(f"What the vehicle knew exactly: {manifest['known_exactly']}.")
-    touchdown = mapping(scores.get("touchdown"))
-    if touchdown:
-        said.append(
-            f"It touched down after {number(touchdown.get('t_s'), 1)} s, "
-            f"{metres(touchdown.get('horizontal_error_m'))} m from the pad's centre, "
-            f"sinking at {number(touchdown.get('sink_rate_m_s'), 2)} m/s."
-        )
+    said += landing_sentences(mapping(scores.get("touchdown")))
     cut = scored_outages(record)
     if cut:
         worst = max(cut, key=rms_m)
@@ -152,11 +124,7 @@ def tiles(record: Record) -> list[Tile]:
         against = "what was flown on" if has(record, "flown") else f"estimate against {truth_name(record)}"
         note = f"paper {metres(published)} m" if published is not None else against
         found.append(Tile("Largest error of one axis", metres(scores["max_position_error_m"]), "m", note))
-    touchdown = mapping(scores.get("touchdown"))
-    if touchdown:
-        when = f"at {number(touchdown.get('t_s'), 1)} s"
-        found.append(Tile("Touchdown off centre", metres(touchdown.get("horizontal_error_m")), "m", when))
-        found.append(Tile("Touchdown sink rate", number(touchdown.get("sink_rate_m_s"), 2), "m/s", when))
+    found += landing_tiles(mapping(scores.get("touchdown")))
     cut = scored_outages(record)
     if cut:
         worst = max(cut, key=rms_m)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flownav.record import Record
-from flownav.report.content import NONE, number
+from flownav.report.figure_words import NONE, number
 from flownav.report.figures_filter import SENSOR_TITLES
 from flownav.report.series import mapping
 from flownav.scoring.consistency import verdict

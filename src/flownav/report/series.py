@@ -204,7 +204,7 @@ def moments(record: Record) -> list[Moment]:
     found = _ground_contacts(record)
     if "touchdown" in scores:
         found.pop("touchdown", None)
-        t_s = mapping(scores["touchdown"]).get("t_s")
+        t_s = mapping(mapping(scores["touchdown"]).get("contact")).get("t_s")
         if isinstance(t_s, (int, float)):
             found["touchdown"] = float(t_s)
     if found.get("lift-off", 0.0) > found.get("touchdown", np.inf):

@@ -205,7 +205,7 @@ def band_name(band: int) -> str:
     return f"above {low:g} m" if high == np.inf else f"{low:g}-{high:g} m"
 
 
-# -- largest errors and touchdown -------------------------------------------------------------------------
+# -- largest errors -------------------------------------------------------------------------
 def largest_horizontal_error(estimate: Array, truth: Array, home: int | None, counted: Array) -> Array:
     """Largest horizontal position error of each flight [m], (lanes,); estimate and truth (epochs, >= 2, lanes).
 
@@ -217,29 +217,6 @@ def largest_horizontal_error(estimate: Array, truth: Array, home: int | None, co
     relative = error if home is None else error - error[home]
     away = np.where(counted > 0.0, np.sqrt((relative**2).sum(axis=1)), -1.0).max(axis=0)
     return np.asarray(np.where(away >= 0.0, away, np.nan))
-
-
-def percentile_with_interval(values: Array, share: float, confidence: float = 0.95) -> tuple[float, float, float]:
-    """The smallest value that this share of the values does not exceed, and its confidence interval.
-
-    The interval is between order statistics, whatever the distribution (David and Nagaraja, Order Statistics, 2003,
-    section 7.1); infinite where there are too few values for an upper end. Infinite values count as large ones.
-    ValueError without a value.
-    """
-    from scipy.special import bdtr
-
-    count = len(values)
-    if count == 0:
-        raise ValueError("no values")
-    ordered = np.append(np.sort(values), np.inf)
-    tail = 0.5 * (1.0 - confidence)
-    below = bdtr(
-        np.arange(count, dtype=float), count, share
-    )  # probability that at most k values lie below the quantile
-    low = int(np.searchsorted(below, tail, side="left"))  # binomial quantiles
-    high = int(np.searchsorted(below, 1.0 - tail, side="left"))
-    place = max(int(np.ceil(share * count - 1e-9)) - 1, 0)
-    return float(ordered[place]), float(ordered[max(low - 1, 0)]), float(ordered[min(high, count)])
 
 
 def _root(squares: Array, steps: Array) -> Array:

@@ -7,6 +7,7 @@ sensor of the paper, with the 28 models of its Table 1.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -91,15 +92,21 @@ class Noise(ParameterModel):
 
     def fit(self) -> NoiseFit:
         """The law as the equations evaluate it, without its floor. ValueError as `fit_noise_law`."""
-        if self.law == "constant":
-            return constant_noise(self.sigma_m_s or 0.0, self.min_height_m, self.max_height_m)
-        return fit_noise_law(self.curve(), self.min_height_m, self.max_height_m)
+        return _fitted(self)
 
     def curve(self) -> Law:
         """The law that varies with height: heights [m] to standard deviations [m/s]."""
         if self.law == "accuracy":
             return accuracy_law(self.accuracy, self.reference_height_m, self.signal_sigma_m_s or 0.0)
         return power_law(self.sigma_m_s or 0.0, self.reference_height_m, self.exponent)
+
+
+@lru_cache(maxsize=64)
+def _fitted(noise: Noise) -> NoiseFit:
+    """The law's fit, which many flights of one sensor share."""
+    if noise.law == "constant":
+        return constant_noise(noise.sigma_m_s or 0.0, noise.min_height_m, noise.max_height_m)
+    return fit_noise_law(noise.curve(), noise.min_height_m, noise.max_height_m)
 
 
 class Limits(ParameterModel):

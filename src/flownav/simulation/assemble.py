@@ -18,16 +18,19 @@ from flownav.estimation.discretise import discretised
 from flownav.estimation.paper_filter import PaperModel
 from flownav.measurement import Sensor
 from flownav.sensors.datasheet import FlowSensor, load_sensor
+from flownav.simulation.dispersion import Distribution, raises_wind
+from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.fitting import Fitted, fitted, timetable_of
 from flownav.simulation.plan import ATTITUDE_S, Flight, FlightPlan
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
 from flownav.vehicle.corners import NOMINAL
-from flownav.vehicle.loading import describe_vehicle, load_vehicle
+from flownav.vehicle.loading import VehicleDescription, describe_vehicle, read_vehicle
 from flownav.vehicle.paper_model import ReducedModel, load_paper_model
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import VehicleParameters, flatten, touchdown_limits
 from flownav.vehicle.plant import hover_plant
+from flownav.vehicle.schema import VehicleFile
 from flownav.vehicle.state import Controls, HelicopterState
 from flownav.vehicle.trim import Trim, parked, trim
 
@@ -39,7 +42,9 @@ CORNER_S = 1.5  # a corner of the path is flown at constant acceleration for so 
 class Setup:
     """A scenario made ready: the numbers the kernel takes, and what reports say of them.
 
-    fitted: the sensors that feed the navigator, and what it is told; None where the paper's filter flies.
+    fitted: the sensors that feed the navigator, and what it is told; None where the paper's filter flies. file: the
+    vehicle's, as it is believed to be, and described: the same with its uncertainties. dispersion: what an ensemble
+    draws.
     """
 
     scenario: Scenario
@@ -49,6 +54,14 @@ class Setup:
     trim: Trim
     inputs: tuple[Path, ...]
     parameters: dict[str, Any]
+    file: VehicleFile
+    described: VehicleDescription
+    dispersion: dict[str, Distribution]
+
+    def ensemble(self) -> Ensemble:
+        """The flights of this scenario with truths of their own. InputError where its dispersion cannot be."""
+        sheets = self.fitted.sheets if self.fitted else None
+        return Ensemble(self.scenario, self.flight, self.file, self.described, self.sensor, sheets, self.dispersion)
 
 
 def assemble(scenario: Scenario) -> Setup:
@@ -59,10 +72,12 @@ def assemble(scenario: Scenario) -> Setup:
         raise InputError(f'{scenario.name}: truth = "linear" has no forces for an IMU to feel; fly the "paper" filter')
     vehicle_file = Path(scenario.vehicle.file) if scenario.vehicle.file else None
     sensor_file = Path(scenario.flow_sensor) if scenario.flow_sensor else None
-    vehicle, sensor, paper = load_vehicle(vehicle_file), load_sensor(sensor_file), load_paper_model()
+    file, sensor, paper = read_vehicle(vehicle_file), load_sensor(sensor_file), load_paper_model()
+    vehicle = flatten(file)
     hover = trim(vehicle)
     gains = _gains(scenario, vehicle, hover)
-    plan = _plan(scenario, vehicle, hover, gains)
+    dispersion = scenario.dispersion.entries()
+    plan = _plan(scenario, vehicle, hover, gains, dispersion)
     carried = fitted(scenario, sensor, vehicle, plan.epochs) if scenario.filter.name == "landing" else None
     flight = Flight(
         plan=plan,
@@ -77,6 +92,7 @@ def assemble(scenario: Scenario) -> Setup:
         settings=carried.settings if carried else np.zeros(0),
         initial_variance=_initial_variance(scenario, paper),
         linear=_linear_truth(paper, hover) if scenario.truth == "linear" else None,
+        limits=touchdown_limits(file),
     )
     described = describe_vehicle(vehicle_file)
     parameters: dict[str, Any] = {
@@ -99,7 +115,7 @@ def assemble(scenario: Scenario) -> Setup:
         parameters["gps_delay_s"] = float(carried.ages_s[Sensor.GPS_POSITION])
         parameters["horizon_s"] = carried.schedule.horizon_s
     inputs = tuple(path for path in (vehicle_file, sensor_file) if path)
-    return Setup(scenario, sensor, flight, carried, hover, inputs, parameters)
+    return Setup(scenario, sensor, flight, carried, hover, inputs, parameters, file, described, dispersion)
 
 
 def _gains(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> AutopilotGains:
@@ -120,7 +136,10 @@ def _gains(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> Autop
     )
 
 
-def _plan(scenario: Scenario, vehicle: VehicleParameters, hover: Trim, gains: AutopilotGains) -> FlightPlan:
+def _plan(
+    scenario: Scenario, vehicle: VehicleParameters, hover: Trim, gains: AutopilotGains,
+    dispersion: dict[str, Distribution],
+) -> FlightPlan:  # fmt: skip
     """What the loop is asked to do."""
     section = scenario.flight
     linear = scenario.truth == "linear"
@@ -139,7 +158,7 @@ def _plan(scenario: Scenario, vehicle: VehicleParameters, hover: Trim, gains: Au
         draws=Draws(
             paper=scenario.filter.name == "paper",
             gps_drift=scenario.filter.name == "paper" and scenario.gps.model != "white",
-            wind=scenario.wind.speed_20ft_m_s > 0.0,
+            wind=scenario.wind.speed_20ft_m_s > 0.0 or raises_wind(dispersion),
         ),
     )
 

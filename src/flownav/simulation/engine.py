@@ -19,11 +19,13 @@ from flownav.navigation.take import navigator_unit
 from flownav.navigation.tape import COMPONENTS, Tape, empty_tape, room_of
 from flownav.navigation.told import carries_lag
 from flownav.simulation import layout
+from flownav.simulation.ensemble import Ensemble, believed
 from flownav.simulation.flight import fly_block
 from flownav.simulation.history import HISTORY
 from flownav.simulation.navigating import first_inertial, kept_inertials
 from flownav.simulation.plan import PHYSICS_S, Flight
 from flownav.simulation.ring import FIELDS
+from flownav.simulation.truth import packed_truth
 
 Array = NDArray[np.float64]
 Result = TypeVar("Result")
@@ -65,14 +67,19 @@ def buffers_of(flight: Flight, lanes: tuple[int, ...], epochs: int, *, written: 
 
 
 def fly_into(
-    flight: Flight, seed: int, first: int, lanes: tuple[int, ...], b: Buffers, *, compiled: bool = True
-) -> None:
-    """Fly a block into its buffers. compiled False: in plain Python (tests; it is a thousand times slower)."""
+    flight: Flight, seed: int, first: int, lanes: tuple[int, ...], b: Buffers, ensemble: Ensemble | None = None, *,
+    compiled: bool = True,
+) -> None:  # fmt: skip
+    """Fly a block into its buffers, each lane as the flight's sheets say, or as the ensemble draws it.
+
+    compiled False: in plain Python (tests; it is a thousand times slower). InputError as `Ensemble.truths`.
+    """
+    truths = [believed(flight)] * len(lanes) if ensemble is None else ensemble.truths(seed, first, len(lanes))
     if len(b.nav):
         b.nav[:] = new_work(lanes, faults=len(b.tape.estimate) > 0)  # a campaign that writes nothing reads no levels
     b.tape.used[:] = 0
     room = np.array([*room_of(b.tape), len(b.fed)])
-    told = flight, seed, first, lanes, b.work, b.nav
+    told = flight, packed_truth(truths), seed, first, lanes, b.work, b.nav
     written = (
         b.tape.estimate.reshape(-1), b.tape.innovation.reshape(-1), b.tape.event.reshape(-1), b.fed.reshape(-1), room,
         b.tape.used, b.history,
@@ -87,25 +94,28 @@ def fly_into(
     fly(*told, take, *written)
 
 
-def fly_written(flight: Flight, seed: int, first: int = 0, lanes: tuple[int, ...] = ONE_LANE) -> Flown:
+def fly_written(
+    flight: Flight, seed: int, first: int = 0, lanes: tuple[int, ...] = ONE_LANE, ensemble: Ensemble | None = None
+) -> Flown:
     """A block of `len(lanes)` flights from number `first` on, with everything that the navigator was fed and wrote."""
     buffers = buffers_of(flight, lanes, flight.plan.epochs, written=True)
     with announce_compilation("single-flight" if len(lanes) == 1 else "batch"):
-        fly_into(flight, seed, first, lanes, buffers)
+        fly_into(flight, seed, first, lanes, buffers, ensemble)
     return Flown(buffers.history, buffers.tape, buffers.fed)
 
 
-def fly_one(flight: Flight, seed: int, index: int = 0) -> Array:
+def fly_one(flight: Flight, seed: int, index: int = 0, ensemble: Ensemble | None = None) -> Array:
     """The history of flight `index` of a campaign, (epochs, len(HISTORY), 1): the same bytes as in any batch."""
     buffers = buffers_of(flight, ONE_LANE, flight.plan.epochs, written=False)
     with announce_compilation("single-flight"):
-        fly_into(flight, seed, index, ONE_LANE, buffers)
+        fly_into(flight, seed, index, ONE_LANE, buffers, ensemble)
     return buffers.history
 
 
 def fly_blocks(
-    flight: Flight, seed: int, first: int, flights: int, judge: Callable[[Array], Result], threads: int | None = None
-) -> Iterator[tuple[int, Result]]:
+    flight: Flight, seed: int, first: int, flights: int, judge: Callable[[Array], Result], threads: int | None = None,
+    ensemble: Ensemble | None = None,
+) -> Iterator[tuple[int, Result]]:  # fmt: skip
     """Fly `flights` flights from number `first` on; yields (flights in the block, judge(its history)) in order.
 
     `judge` takes a block's history (epochs, len(HISTORY), flights in the block), which is overwritten afterwards:
@@ -116,7 +126,7 @@ def fly_blocks(
     def fly(start: int) -> tuple[int, Result]:
         if not hasattr(own, "buffers"):
             own.buffers = buffers_of(flight, LANES, flight.plan.epochs, written=False)
-        fly_into(flight, seed, first + start, LANES, own.buffers)
+        fly_into(flight, seed, first + start, LANES, own.buffers, ensemble)
         left = min(len(LANES), flights - start)
         return left, judge(own.buffers.history[:, :, :left])
 

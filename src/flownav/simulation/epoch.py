@@ -13,6 +13,7 @@ from flownav.sensors.gps_ins import attitude_with_error
 from flownav.sensors.rangefinder import slant_range
 from flownav.simulation import layout
 from flownav.simulation.layout import (
+    flow_as_is,
     load_autopilot,
     load_estimate,
     load_flow,
@@ -26,6 +27,8 @@ from flownav.simulation.layout import (
     store_flow,
     store_true_imu,
     store_wind,
+    vehicle_as_is,
+    wind_as_is,
 )
 from flownav.simulation.navigating import Timetable, keep_inertial
 from flownav.simulation.onboard import Onboard
@@ -34,16 +37,17 @@ from flownav.simulation.plant import LinearTruth, linear_step, observe_plant, ru
 from flownav.simulation.ring import FIELDS, FIRST
 from flownav.simulation.sampling import read_inertial
 from flownav.simulation.sensing import EPOCH_S, lens_height, true_imu
-from flownav.simulation.wind import WindParameters, step_wind
+from flownav.simulation.wind import step_wind
 from flownav.vehicle.state import Controls
 
 
 @equation
-def blow(work: Work, lanes: Lanes, wind: WindParameters) -> None:
+def blow(work: Work, lanes: Lanes) -> None:
     """The wind of this epoch."""
     for lane in range(len(lanes)):
         height = -work[(layout.HELICOPTER + 2) * len(lanes) + lane]
-        after, air = step_wind(load_wind(work, lanes, lane), height, load_wind_normals(work, lanes, lane), wind)
+        wind, normals = wind_as_is(work, lanes, lane), load_wind_normals(work, lanes, lane)
+        after, air = step_wind(load_wind(work, lanes, lane), height, normals, wind)
         store_wind(work, lanes, lane, after)
         store_air(work, lanes, lane, air)
 
@@ -189,9 +193,9 @@ def follow_flow(work: Work, lanes: Lanes, flight: Flight) -> None:
         state = load_helicopter(work, lanes, lane)
         cosine = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)[8]
         distance = slant_range(lens_height(state, cosine, flight.sensors.lens_below_cg_m), cosine)
-        thrust = work[layout.THRUST * len(lanes) + lane] / flight.vehicle.mass_kg
-        before = load_flow(work, lanes, lane)
-        after = step_flow(before, state.u, state.v, state.w, distance, thrust, flight.sensors.flow)
+        thrust = work[layout.THRUST * len(lanes) + lane] / vehicle_as_is(work, lanes, lane).mass_kg
+        before, flow = load_flow(work, lanes, lane), flow_as_is(work, lanes, lane)
+        after = step_flow(before, state.u, state.v, state.w, distance, thrust, flow)
         store_flow(work, lanes, lane, after)
 
 
@@ -203,8 +207,8 @@ def advance(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None
         follow_flow(work, lanes, flight)
         if linear is None:
             for _ in range(PHYSICS_STEPS):
-                runge_kutta_step(work, lanes, flight.vehicle, PHYSICS_S)
-            observe_plant(work, lanes, flight.vehicle)
+                runge_kutta_step(work, lanes, PHYSICS_S)
+            observe_plant(work, lanes)
         else:
             linear_step(work, lanes, linear)
 
@@ -220,12 +224,13 @@ def advance_sensing(
         if step % PHYSICS_STEPS == 0:
             steer(work, lanes, flight, None, onboard)
             follow_flow(work, lanes, flight)
-        runge_kutta_step(work, lanes, flight.vehicle, PHYSICS_S)
+        runge_kutta_step(work, lanes, PHYSICS_S)
         if (step + 1) % PHYSICS_STEPS == 0:
-            observe_plant(work, lanes, flight.vehicle)
+            observe_plant(work, lanes)
         if (step + 1) % onboard.inertial_steps == 0:
             for lane in range(len(lanes)):
-                truth = true_imu(work, lanes, lane, period_s, flight.vehicle.gravity_m_s2)
+                gravity_m_s2 = vehicle_as_is(work, lanes, lane).gravity_m_s2
+                truth = true_imu(work, lanes, lane, period_s, gravity_m_s2)
                 store_true_imu(work, lanes, lane, truth)
             part = (step + 1) // onboard.inertial_steps - 1
             slot = (taken + part) % table.slots

@@ -14,6 +14,7 @@ from flownav.navigation.told import FROM_MAG, Equipment
 from flownav.sensors.barometer_sheet import load_barometer_sheet
 from flownav.sensors.beam import LEVEL
 from flownav.sensors.datasheet import FlowSensor
+from flownav.sensors.flow import FlowParameters
 from flownav.sensors.flow_camera_sheet import load_flow_camera_sheet
 from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet, load_gps_receiver_sheet
 from flownav.sensors.identified import needs_lag_states
@@ -56,7 +57,7 @@ class Fitted(NamedTuple):
 def fitted(scenario: Scenario, flow_sensor: FlowSensor, vehicle: VehicleParameters, epochs: int) -> Fitted:
     """The vehicle's sensors as a scenario wants them. InputError as the sheets' loaders say."""
     sheets = sheets_of(scenario, flow_sensor, vehicle)
-    onboard = onboard_of(scenario, sheets, flow_sensor, vehicle)
+    onboard = onboard_of(scenario, sheets, scenario.flow.parameters(flow_sensor), vehicle)
     timing = timing_of(sheets, flow_sensor)
     schedule = schedule_of(epochs, onboard, timing)
     rotor_hz = vehicle.main_speed_rad_s / (2.0 * math.pi)
@@ -183,9 +184,7 @@ def pad_sheet(scenario: Scenario, sheet: PadCameraSheet, lens_down_m: float) -> 
 
 
 # -- equations' parameters --------------------------------------------------------------------------------------
-def onboard_of(
-    scenario: Scenario, sheets: SensorSheets, flow_sensor: FlowSensor, vehicle: VehicleParameters
-) -> Onboard:
+def onboard_of(scenario: Scenario, sheets: SensorSheets, flow: FlowParameters, vehicle: VehicleParameters) -> Onboard:
     """Coefficients, clocks and places."""
     receiver, camera, ranger = sheets.gps_receiver, sheets.flow_camera, sheets.range_sensor
     baro, mag, pad, skid = sheets.barometer, sheets.magnetometer, sheets.pad_camera, sheets.skid_switch
@@ -202,7 +201,7 @@ def onboard_of(
         receiver=receiver.parameters(),
         receiver_clock=clock_of(receiver, 1),
         receiver_offers_velocity=0 if scenario.gps.model == "white" else 1,
-        flow=scenario.flow.parameters(flow_sensor)._replace(sonar_floor_m=0.0),
+        flow=flow._replace(sonar_floor_m=0.0),
         camera=camera.parameters(),
         camera_clock=clock_of(camera, 1),
         camera_place=place_of(camera.lens),

@@ -15,6 +15,7 @@ from flownav.control.autopilot import grounded, hovering
 from flownav.control.guidance import reference_at
 from flownav.estimation.kalman import Lanes, Work
 from flownav.navigation.tape import Output, output_of
+from flownav.simulation import layout
 from flownav.simulation.epoch import (
     advance,
     advance_sensing,
@@ -26,7 +27,7 @@ from flownav.simulation.epoch import (
 )
 from flownav.simulation.filtering import run_filter, start_filter
 from flownav.simulation.history import write_history
-from flownav.simulation.layout import load_wind_normals, store_autopilot, store_helicopter, store_wind
+from flownav.simulation.layout import load_wind_normals, store_autopilot, store_helicopter, store_wind, wind_as_is
 from flownav.simulation.navigating import (
     Timetable,
     carry_ahead,
@@ -51,11 +52,12 @@ def start_block(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight,
     draw_epoch(work, lanes, seed, first, START_STEP, flight.plan.draws)
     for lane in range(len(lanes)):
         store_helicopter(work, lanes, lane, flight.plan.start)
-        store_wind(work, lanes, lane, start_wind(load_wind_normals(work, lanes, lane), flight.wind))
+        gusts = start_wind(load_wind_normals(work, lanes, lane), wind_as_is(work, lanes, lane))
+        store_wind(work, lanes, lane, gusts)
         autopilot = grounded(flight.gains) if flight.plan.starts_on_ground else hovering(flight.gains)
         store_autopilot(work, lanes, lane, autopilot)
-    observe_plant(work, lanes, flight.vehicle)
-    start_sensors(work, lanes, flight.sensors, flight.vehicle.mass_kg, flight.vehicle.gravity_m_s2)
+    observe_plant(work, lanes)
+    start_sensors(work, lanes, flight.sensors)
     if onboard is not None:
         start_onboard(work, lanes, seed, first, START_STEP + 4, onboard)
 
@@ -67,7 +69,7 @@ def fly_on_paper(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight
         t_s = epoch * EPOCH_S
         reference = reference_at(flight.path, t_s)
         draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
-        blow(work, lanes, flight.wind)
+        blow(work, lanes)
         sense(work, lanes, epoch, flight.sensors)
         if epoch == 0:
             start_filter(work, lanes, flight.initial_variance, flight.plan.start_known)
@@ -94,7 +96,7 @@ def fly_navigated(
         t_s = epoch * EPOCH_S
         reference = reference_at(flight.path, t_s)
         draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
-        blow(work, lanes, flight.wind)
+        blow(work, lanes)
         taken = sample(work, lanes, seed, first, epoch, table.slots, taken, onboard)
         note_truth(work, lanes, epoch, table)
         following = feed_due(work, nav, lanes, epoch, following, take, settings, o, fed, table)
@@ -127,17 +129,19 @@ def fly(
 
 @kernel
 def fly_block(
-    flight: Flight, seed: int, first: int, lanes: Lanes, work: NDArray[np.float64], nav: NDArray[np.float64],
-    take: int, estimate: NDArray[np.float64], innovation: NDArray[np.float64], event: NDArray[np.float64],
-    fed: NDArray[np.float64], room: NDArray[np.int64], used: NDArray[np.int64], history: NDArray[np.float64],
+    flight: Flight, truth: NDArray[np.float64], seed: int, first: int, lanes: Lanes, work: NDArray[np.float64],
+    nav: NDArray[np.float64], take: int, estimate: NDArray[np.float64], innovation: NDArray[np.float64],
+    event: NDArray[np.float64], fed: NDArray[np.float64], room: NDArray[np.int64], used: NDArray[np.int64],
+    history: NDArray[np.float64],
 ) -> None:  # fmt: skip
     """Fly `len(lanes)` flights, numbers `first` and up, of a campaign `seed`.
 
-    work (rows of `engine.buffers_of`, times lanes) is scratch, zeroed here; nav: a navigator that has heard nothing
-    (`navigation.memory.new_work`), taken at the address `take`; its tape and what it is fed flattened; history (epochs,
-    len(HISTORY), len(lanes)) is filled.
+    truth: `truth.packed_truth` of the lanes. work (rows of `engine.buffers_of`, times lanes) is scratch, zeroed here;
+    nav: a navigator that has heard nothing (`navigation.memory.new_work`), taken at the address `take`; its tape and
+    what it is fed flattened; history (epochs, len(HISTORY), len(lanes)) is filled.
     """
     work[:] = 0.0
+    work[layout.AS_IS_BEGIN * len(lanes) : layout.AS_IS_END * len(lanes)] = truth
     o = output_of(estimate, innovation, event, NOTHING, NOTHING, NOTHING, room, used)
     fly(
         pointer(work), pointer(nav), lanes, seed, first, flight, flight.onboard, flight.table, take,

@@ -23,10 +23,15 @@ from flownav.sensors.pad_camera import PadCameraNormals, PadCameraUnit
 from flownav.sensors.range_sensor import RangeSensorNormals, RangeSensorState, RangeSensorUnit
 from flownav.sensors.rangefinder import RangefinderState
 from flownav.sensors.skid_switch import SkidSwitchNormals, SkidSwitchState, SkidSwitchUnit
+from flownav.simulation.truth import PARTS
 from flownav.simulation.wind import WindNormals, WindState, WindVelocity
 from flownav.vehicle.state import Controls, HelicopterState, Inflow
 
 _rows = Rows()
+
+# what this flight's vehicle, wind and sensors are (`simulation.truth`)
+AS_IS = {part: _rows.take(len(kind._fields)) for part, kind in PARTS.items()}
+AS_IS_BEGIN, AS_IS_END = AS_IS["vehicle"], _rows.next
 
 # the plant
 HELICOPTER = _rows.take(len(HelicopterState._fields))
@@ -155,3 +160,16 @@ load_skid, store_skid = lane_access(SkidSwitchState, SKID)
 load_skid_normals, _ = lane_access(SkidSwitchNormals, SKID_NORMALS)
 load_estimate, store_estimate = lane_access(Estimate, ESTIMATE)
 load_autopilot, store_autopilot = lane_access(AutopilotState, AUTOPILOT)
+vehicle_as_is, _ = lane_access(PARTS["vehicle"], AS_IS["vehicle"])
+wind_as_is, _ = lane_access(PARTS["wind"], AS_IS["wind"])
+flow_as_is, _ = lane_access(PARTS["flow"], AS_IS["flow"])
+late_as_is, _ = lane_access(PARTS["late"], AS_IS["late"])
+inertial_as_is, _ = lane_access(PARTS["inertial"], AS_IS["inertial"])
+receiver_as_is, _ = lane_access(PARTS["receiver"], AS_IS["receiver"])
+camera_flow_as_is, _ = lane_access(PARTS["camera_flow"], AS_IS["camera_flow"])
+camera_as_is, _ = lane_access(PARTS["camera"], AS_IS["camera"])
+ranger_as_is, _ = lane_access(PARTS["ranger"], AS_IS["ranger"])
+baro_as_is, _ = lane_access(PARTS["baro"], AS_IS["baro"])
+mag_as_is, _ = lane_access(PARTS["mag"], AS_IS["mag"])
+pad_as_is, _ = lane_access(PARTS["pad"], AS_IS["pad"])
+skid_as_is, _ = lane_access(PARTS["skid"], AS_IS["skid"])

@@ -74,12 +74,26 @@ class Onboard(NamedTuple):
 
 
 @equation
-def receiver_truth(state: HelicopterState) -> GpsReceiverTruth:
-    """How the vehicle moves, as its GPS receiver feels it."""
+def earlier(state: HelicopterState, late_s: float) -> HelicopterState:
+    """The state with the position that it had `late_s` ago, at the velocity of now: what a late reading shows."""
+    rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
+    vel_n, vel_e, vel_d = to_earth(rotation, state.u, state.v, state.w)
+    return HelicopterState(
+        state.pos_n - late_s * vel_n,
+        state.pos_e - late_s * vel_e,
+        state.pos_d - late_s * vel_d,
+        *state[3:],
+    )
+
+
+@equation
+def receiver_truth(state: HelicopterState, late_s: float) -> GpsReceiverTruth:
+    """How the vehicle moves, as its GPS receiver feels it; late_s: how much older its fixes are than it says."""
     rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
     vel_n, vel_e, vel_d = to_earth(rotation, state.u, state.v, state.w)
     return GpsReceiverTruth(
-        state.pos_n, state.pos_e, state.pos_d, vel_n, vel_e, vel_d, state.p, state.q, state.r
+        state.pos_n - late_s * vel_n, state.pos_e - late_s * vel_e, state.pos_d - late_s * vel_d, vel_n, vel_e, vel_d,
+        state.p, state.q, state.r,
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from flownav.simulation.onboard import Onboard
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
 from flownav.simulation.wind import WindParameters
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import TouchdownLimits, VehicleParameters
 from flownav.vehicle.state import HelicopterState
 
 ATTITUDE_STEPS = 5  # 250 Hz within an epoch
@@ -46,7 +46,7 @@ class FlightPlan(NamedTuple):
 class Flight(NamedTuple):
     """Everything constant over a flight: the paper's filter, or the navigator's sensors and their timetable.
 
-    linear: only for that truth.
+    linear: only for that truth. limits: what its touchdown is judged by.
     """
 
     plan: FlightPlan
@@ -61,3 +61,4 @@ class Flight(NamedTuple):
     settings: NDArray[np.float64]  # the navigator's, packed; of no length where the paper's filter flies
     initial_variance: NDArray[np.float64]
     linear: LinearTruth | None
+    limits: TouchdownLimits

@@ -21,6 +21,7 @@ from flownav.simulation.layout import (
     store_inflow,
     store_stage,
     store_sum,
+    vehicle_as_is,
 )
 from flownav.vehicle.airframe import AirMotion, tail_sideslip
 from flownav.vehicle.helicopter import (
@@ -50,14 +51,14 @@ class LinearTruth(NamedTuple):
 
 
 @equation
-def runge_kutta_step(work: Work, lanes: Lanes, vehicle: VehicleParameters, dt: float) -> None:
+def runge_kutta_step(work: Work, lanes: Lanes, dt: float) -> None:
     """One classical fourth-order step of every lane's helicopter; controls and wind held over the step.
 
     The inflow is solved in full at the first stage; the other stages, half a step away, refine it with one
     Halley step each. The state differs by about 1e-9 from solving anew (tests/test_plant.py: `helicopter.step`).
     """
     for lane in range(len(lanes)):
-        state = load_helicopter(work, lanes, lane)
+        state, vehicle = load_helicopter(work, lanes, lane), vehicle_as_is(work, lanes, lane)
         store_sum(work, lanes, lane, state)
         air = moving_air(work, lanes, lane, state)
         induced = inflow(air, blade_angles(state, vehicle), vehicle)
@@ -67,7 +68,7 @@ def runge_kutta_step(work: Work, lanes: Lanes, vehicle: VehicleParameters, dt: f
         weight = dt / 3.0 if stage < 2 else dt / 6.0
         reach = 0.5 * dt if stage < 1 else dt
         for lane in range(len(lanes)):
-            state = load_stage(work, lanes, lane)
+            state, vehicle = load_stage(work, lanes, lane), vehicle_as_is(work, lanes, lane)
             air = moving_air(work, lanes, lane, state)
             guess = load_inflow(work, lanes, lane)
             induced = refined_inflow(guess, air, blade_angles(state, vehicle), vehicle)
@@ -134,10 +135,10 @@ def linear_step(work: Work, lanes: Lanes, model: LinearTruth) -> None:
 
 
 @equation
-def observe_plant(work: Work, lanes: Lanes, vehicle: VehicleParameters) -> None:
+def observe_plant(work: Work, lanes: Lanes) -> None:
     """Thrust and skid load of the present state."""
     for lane in range(len(lanes)):
-        air = load_air(work, lanes, lane)
+        air, vehicle = load_air(work, lanes, lane), vehicle_as_is(work, lanes, lane)
         seen = outputs(load_helicopter(work, lanes, lane), air.wind_n_m_s, air.wind_e_m_s, air.wind_d_m_s, vehicle)
         work[layout.THRUST * len(lanes) + lane] = seen.thrust_n
         work[layout.CONTACT * len(lanes) + lane] = seen.contact_force_n

@@ -30,6 +30,11 @@ from flownav.simulation.draws import (
     draw,
 )
 from flownav.simulation.layout import (
+    baro_as_is,
+    camera_as_is,
+    camera_flow_as_is,
+    inertial_as_is,
+    late_as_is,
     load_autopilot,
     load_baro,
     load_baro_normals,
@@ -56,6 +61,11 @@ from flownav.simulation.layout import (
     load_skid_normals,
     load_skid_unit,
     load_true_imu,
+    mag_as_is,
+    pad_as_is,
+    ranger_as_is,
+    receiver_as_is,
+    skid_as_is,
     store_baro,
     store_camera,
     store_inertial,
@@ -72,6 +82,7 @@ from flownav.simulation.onboard import (
     Onboard,
     baro_truth,
     beam_of,
+    earlier,
     place_of,
     receiver_truth,
 )
@@ -121,8 +132,9 @@ def read_receiver(
         state = load_helicopter(work, lanes, lane)
         rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
         after, fix = step_gps_receiver(
-            load_receiver(work, lanes, lane), load_receiver_unit(work, lanes, lane), receiver_truth(state), rotation,
-            load_receiver_normals(work, lanes, lane), s.receiver,
+            load_receiver(work, lanes, lane), load_receiver_unit(work, lanes, lane), 
+            receiver_truth(state, late_as_is(work, lanes, lane).receiver_s), rotation,
+            load_receiver_normals(work, lanes, lane), receiver_as_is(work, lanes, lane),
         )  # fmt: skip
         store_receiver(work, lanes, lane, after)
         level, down = fix.horizontal_variance_m2, fix.vertical_variance_m2
@@ -143,16 +155,11 @@ def read_baro(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot
     for lane in range(len(lanes)):
         after, read = step_barometer(
             load_baro(work, lanes, lane), load_baro_unit(work, lanes, lane), baro_truth(work, lanes, lane, s),
-            load_baro_normals(work, lanes, lane), s.baro,
+            load_baro_normals(work, lanes, lane), baro_as_is(work, lanes, lane),
         )  # fmt: skip
         store_baro(work, lanes, lane, after)
-        put_slot(
-            work,
-            lanes,
-            slot,
-            lane,
-            reading_of(read.alt_m, 0.0, 0.0, np.nan, np.nan, np.nan, read.quality, read.arrived),
-        )
+        altitude = reading_of(read.alt_m, 0.0, 0.0, np.nan, np.nan, np.nan, read.quality, read.arrived)
+        put_slot(work, lanes, slot, lane, altitude)
 
 
 @procedure
@@ -163,7 +170,8 @@ def read_mag(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot:
         state = load_helicopter(work, lanes, lane)
         rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
         power_w, normals = work[layout.POWER * len(lanes) + lane], load_mag_normals(work, lanes, lane)
-        read = read_magnetometer(load_mag_unit(work, lanes, lane), rotation, power_w, normals, s.mag)
+        unit, sensor = load_mag_unit(work, lanes, lane), mag_as_is(work, lanes, lane)
+        read = read_magnetometer(unit, rotation, power_w, normals, sensor)
         x, y, z = read.mag_x_gauss, read.mag_y_gauss, read.mag_z_gauss
         put_slot(work, lanes, slot, lane, reading_of(x, y, z, np.nan, np.nan, np.nan, read.quality, read.arrived))
 
@@ -173,10 +181,11 @@ def read_range(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slo
     """A distance along the boresight."""
     draw(work, lanes, layout.RANGE_NORMALS, 6, seed, flight, epoch, RANGE_CHANNEL)
     for lane in range(len(lanes)):
-        hit = beam_of(load_helicopter(work, lanes, lane), s.range_place, s.ground)
+        seen = earlier(load_helicopter(work, lanes, lane), late_as_is(work, lanes, lane).range_s)
+        hit = beam_of(seen, s.range_place, s.ground)
         after, read = step_range_sensor(
             load_ranger(work, lanes, lane), load_range_unit(work, lanes, lane), hit,
-            load_range_normals(work, lanes, lane), s.ranger,
+            load_range_normals(work, lanes, lane), ranger_as_is(work, lanes, lane),
         )  # fmt: skip
         store_ranger(work, lanes, lane, after)
         distance = reading_of(read.range_m, 0.0, 0.0, np.nan, np.nan, np.nan, read.quality, read.arrived)
@@ -190,20 +199,22 @@ def read_camera(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, sl
     share = s.inertial_steps * PHYSICS_PERIOD_S / (s.camera_clock.every * EPOCH_S)  # of the exposure, an IMU period
     for lane in range(len(lanes)):
         state, flow = load_helicopter(work, lanes, lane), load_flow(work, lanes, lane)
+        sensor, late_s = camera_flow_as_is(work, lanes, lane), late_as_is(work, lanes, lane).flow_s
         rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
         hit = beam_of(state, s.camera_place, s.ground)
         north, east, down = place_of(state, s.camera_place)
-        on_pad = pad_texture(north, east, -down, rotation, s.pad_half_size_m, s.flow)
+        on_pad = pad_texture(north, east, -down, rotation, s.pad_half_size_m, sensor)
         row = layout.EXPOSED
         truth = FlowCameraTruth(
-            s.flow.gain * flow.u1, s.flow.gain * flow.v1, s.flow.gain * flow.w1,
+            sensor.gain * (flow.u1 - late_s * flow.u2), sensor.gain * (flow.v1 - late_s * flow.v2),
+            sensor.gain * (flow.w1 - late_s * flow.w2),
             share * work[row * len(lanes) + lane], share * work[(row + 1) * len(lanes) + lane],
             share * work[(row + 2) * len(lanes) + lane],
             hit.distance_m, -down, rotation[8], 1.0 if s.texture_everywhere > 0.5 else on_pad,
         )  # fmt: skip
         after, read = step_flow_camera(
             load_camera(work, lanes, lane), load_camera_unit(work, lanes, lane), truth,
-            load_camera_normals(work, lanes, lane), s.flow, s.camera,
+            load_camera_normals(work, lanes, lane), sensor, camera_as_is(work, lanes, lane),
         )  # fmt: skip
         store_camera(work, lanes, lane, after)
         reading = Reading(
@@ -221,14 +232,14 @@ def read_pad(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot:
     """A fix of the pad."""
     draw(work, lanes, layout.PAD_NORMALS, 8, seed, flight, epoch, PAD_CHANNEL)
     for lane in range(len(lanes)):
-        state = load_helicopter(work, lanes, lane)
+        state = earlier(load_helicopter(work, lanes, lane), late_as_is(work, lanes, lane).pad_s)
         rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
         north, east, down = place_of(state, s.pad_place)
         speed = np.sqrt(state.u * state.u + state.v * state.v)
         image_rate = speed / (-down if -down > LEAST_HEIGHT_M else LEAST_HEIGHT_M)
         fix = read_pad_camera(
             load_pad_unit(work, lanes, lane), north, east, down, rotation, image_rate,
-            load_pad_normals(work, lanes, lane), s.pad,
+            load_pad_normals(work, lanes, lane), pad_as_is(work, lanes, lane),
         )  # fmt: skip
         reading = reading_of(
             fix.tan_forward, fix.tan_right, fix.distance_m, fix.forward_variance, fix.right_variance,
@@ -245,7 +256,7 @@ def read_skid(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot
         load_n = work[layout.CONTACT * len(lanes) + lane]
         after, read = step_skid_switch(
             load_skid(work, lanes, lane), load_skid_unit(work, lanes, lane), load_n,
-            load_skid_normals(work, lanes, lane), s.skid,
+            load_skid_normals(work, lanes, lane), skid_as_is(work, lanes, lane),
         )  # fmt: skip
         store_skid(work, lanes, lane, after)
         work[layout.LANDED * len(lanes) + lane] = read.landed
@@ -272,7 +283,7 @@ def read_inertial(
         truth = load_true_imu(work, lanes, lane)
         after, read = step_inertial(
             load_inertial(work, lanes, lane), load_inertial_unit(work, lanes, lane), truth,
-            load_inertial_normals(work, lanes, lane), s.inertial,
+            load_inertial_normals(work, lanes, lane), inertial_as_is(work, lanes, lane),
         )  # fmt: skip
         store_inertial(work, lanes, lane, after)
         reading = Reading(

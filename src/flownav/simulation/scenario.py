@@ -16,6 +16,8 @@ from flownav.errors import InputError
 from flownav.parameter_files import Number, ParameterModel, load, shipped
 from flownav.sensors.datasheet import FlowSettings
 from flownav.sensors.settings import GpsInsSettings, PadFixSettings, RangefinderSettings
+from flownav.simulation.dispersion import SHIPPED as SHIPPED_DISPERSION
+from flownav.simulation.dispersion import DispersionSection
 from flownav.simulation.wind import WindSettings
 
 SHIPPED = ("takeoff", "landing", "gusty", "pad_return", "approach")
@@ -154,6 +156,7 @@ class Scenario(ParameterModel):
     wind: WindSettings = WindSettings()
     filter: FilterSection = FilterSection()
     autopilot: AutopilotSection = AutopilotSection()
+    dispersion: DispersionSection = DispersionSection()
 
 
 def load_scenario(name: str) -> Scenario:
@@ -168,6 +171,7 @@ def load_scenario(name: str) -> Scenario:
         update={
             "vehicle": scenario.vehicle.model_copy(update={"file": _beside(path, scenario.vehicle.file)}),
             "flow_sensor": _beside(path, scenario.flow_sensor),
+            "dispersion": _dispersion_beside(path, scenario.dispersion),
             "sensors": scenario.sensors.model_copy(
                 update={
                     name: _beside(path, getattr(scenario.sensors, name))
@@ -182,6 +186,13 @@ def load_scenario(name: str) -> Scenario:
 def with_filter(scenario: Scenario, name: Literal["paper", "landing"]) -> Scenario:
     """The scenario flown with another filter."""
     return scenario.model_copy(update={"filter": scenario.filter.model_copy(update={"name": name})})
+
+
+def _dispersion_beside(scenario: Path, section: DispersionSection) -> DispersionSection:
+    """A dispersion file that a scenario names is looked for beside the scenario, too; the shipped one is not."""
+    if section.file == SHIPPED_DISPERSION:
+        return section
+    return section.model_copy(update={"file": str(scenario.parent / section.file)})
 
 
 def _beside(scenario: Path, file: str | None) -> str | None:

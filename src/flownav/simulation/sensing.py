@@ -22,6 +22,7 @@ from flownav.sensors.imu import ImuReading
 from flownav.sensors.rangefinder import RangefinderParameters, start_rangefinder, step_rangefinder
 from flownav.simulation import layout
 from flownav.simulation.layout import (
+    flow_as_is,
     load_flow,
     load_gps,
     load_gps_errors,
@@ -34,6 +35,7 @@ from flownav.simulation.layout import (
     store_gps_errors,
     store_gps_held,
     store_rangefinder,
+    vehicle_as_is,
 )
 from flownav.simulation.noise import normal_pair
 from flownav.vehicle.helicopter import HelicopterState
@@ -136,7 +138,7 @@ def true_imu(work: Work, lanes: Lanes, lane: int, period_s: float, gravity_m_s2:
 
 
 @equation
-def start_sensors(work: Work, lanes: Lanes, suite: SensorSuite, mass_kg: float, gravity_m_s2: float) -> None:
+def start_sensors(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
     """Every sensor settled on the first state; error processes drawn from their stationary distributions."""
     for lane in range(len(lanes)):
         state = load_helicopter(work, lanes, lane)
@@ -154,8 +156,9 @@ def start_sensors(work: Work, lanes: Lanes, suite: SensorSuite, mass_kg: float, 
         cosine = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)[8]
         height = lens_height(state, cosine, suite.lens_below_cg_m)
         store_rangefinder(work, lanes, lane, start_rangefinder(height, cosine, suite.rangefinder))
-        thrust = work[layout.THRUST * len(lanes) + lane] / mass_kg
-        store_flow(work, lanes, lane, start_flow(state.u, state.v, state.w, thrust, suite.flow))
+        thrust = work[layout.THRUST * len(lanes) + lane] / vehicle_as_is(work, lanes, lane).mass_kg
+        flow = start_flow(state.u, state.v, state.w, thrust, flow_as_is(work, lanes, lane))
+        store_flow(work, lanes, lane, flow)
 
 
 @equation
@@ -197,9 +200,10 @@ def read_flow_sensor(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
         lens_n = state.pos_n + rotation[2] * suite.lens_below_cg_m
         lens_e = state.pos_e + rotation[5] * suite.lens_below_cg_m
         flow_x, flow_y = angular_flow(state.u, state.v, state.p, state.q, distance)
+        sensor = flow_as_is(work, lanes, lane)
         flow = engage_flow(
             load_flow(work, lanes, lane), lens_n, lens_e, height, rotation, flow_x, flow_y,
-            suite.pad_half_size_m, suite.flow,
+            suite.pad_half_size_m, sensor,
         )  # fmt: skip
         store_flow(work, lanes, lane, flow)
         row = layout.FLOW_NORMALS
@@ -210,7 +214,7 @@ def read_flow_sensor(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
             work[row * len(lanes) + lane],
             work[(row + 1) * len(lanes) + lane],
             work[(row + 2) * len(lanes) + lane],
-            suite.flow,
+            sensor,
         )
         work[layout.FLOW_READING * len(lanes) + lane] = reading.vel_u_m_s
         work[(layout.FLOW_READING + 1) * len(lanes) + lane] = reading.vel_v_m_s

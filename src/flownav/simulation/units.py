@@ -26,8 +26,16 @@ from flownav.simulation.draws import (
     draw,
 )
 from flownav.simulation.layout import (
+    baro_as_is,
+    camera_as_is,
+    inertial_as_is,
     load_baro_unit,
     load_helicopter,
+    mag_as_is,
+    pad_as_is,
+    ranger_as_is,
+    receiver_as_is,
+    skid_as_is,
     store_baro,
     store_baro_unit,
     store_camera,
@@ -73,10 +81,17 @@ def start_inertials(work: Work, lanes: Lanes, seed: int, flight: int, step: int,
     """The inertial units."""
     draw(work, lanes, layout.DRAWN, 28, seed, flight, step, INERTIAL_START)
     for lane in range(len(lanes)):
-        store_inertial_unit(work, lanes, lane, draw_inertial(drawn_inertial_unit(work, lanes, lane), s.inertial))
+        store_inertial_unit(
+            work, lanes, lane, draw_inertial(drawn_inertial_unit(work, lanes, lane), inertial_as_is(work, lanes, lane))
+        )
     draw(work, lanes, layout.DRAWN, 10, seed, flight, step + 1, INERTIAL_START)
     for lane in range(len(lanes)):
-        store_inertial(work, lanes, lane, start_inertial(drawn_inertial_start(work, lanes, lane), s.inertial))
+        store_inertial(
+            work,
+            lanes,
+            lane,
+            start_inertial(drawn_inertial_start(work, lanes, lane), inertial_as_is(work, lanes, lane)),
+        )
 
 
 @procedure
@@ -84,13 +99,23 @@ def start_receivers(work: Work, lanes: Lanes, seed: int, flight: int, step: int,
     """The GPS receivers."""
     draw(work, lanes, layout.DRAWN, 4, seed, flight, step, RECEIVER_START)
     for lane in range(len(lanes)):
-        store_receiver_unit(work, lanes, lane, draw_gps_receiver(drawn_receiver_unit(work, lanes, lane), s.receiver))
+        store_receiver_unit(
+            work,
+            lanes,
+            lane,
+            draw_gps_receiver(drawn_receiver_unit(work, lanes, lane), receiver_as_is(work, lanes, lane)),
+        )
     draw(work, lanes, layout.DRAWN, 10, seed, flight, step + 1, RECEIVER_START)
     for lane in range(len(lanes)):
         state = load_helicopter(work, lanes, lane)
         rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
         normals = drawn_receiver_start(work, lanes, lane)
-        store_receiver(work, lanes, lane, start_gps_receiver(receiver_truth(state), rotation, normals, s.receiver))
+        store_receiver(
+            work,
+            lanes,
+            lane,
+            start_gps_receiver(receiver_truth(state, 0.0), rotation, normals, receiver_as_is(work, lanes, lane)),
+        )
 
 
 @procedure
@@ -98,10 +123,14 @@ def start_cameras(work: Work, lanes: Lanes, seed: int, flight: int, step: int, s
     """The flow cameras."""
     draw(work, lanes, layout.DRAWN, 10, seed, flight, step, CAMERA_START)
     for lane in range(len(lanes)):
-        store_camera_unit(work, lanes, lane, draw_flow_camera(drawn_camera_unit(work, lanes, lane), s.camera))
+        store_camera_unit(
+            work, lanes, lane, draw_flow_camera(drawn_camera_unit(work, lanes, lane), camera_as_is(work, lanes, lane))
+        )
     draw(work, lanes, layout.DRAWN, 2, seed, flight, step + 1, CAMERA_START)
     for lane in range(len(lanes)):
-        store_camera(work, lanes, lane, start_flow_camera(drawn_camera_start(work, lanes, lane), s.camera))
+        store_camera(
+            work, lanes, lane, start_flow_camera(drawn_camera_start(work, lanes, lane), camera_as_is(work, lanes, lane))
+        )
 
 
 @procedure
@@ -109,24 +138,39 @@ def start_rest(work: Work, lanes: Lanes, seed: int, flight: int, step: int, s: O
     """Rangefinders, barometers, magnetometers, pad cameras and skid switches."""
     draw(work, lanes, layout.DRAWN, 2, seed, flight, step, RANGE_START)
     for lane in range(len(lanes)):
-        store_range_unit(work, lanes, lane, draw_range_sensor(drawn_range_unit(work, lanes, lane), s.ranger))
+        store_range_unit(
+            work, lanes, lane, draw_range_sensor(drawn_range_unit(work, lanes, lane), ranger_as_is(work, lanes, lane))
+        )
         hit = beam_of(load_helicopter(work, lanes, lane), s.range_place, s.ground)
-        store_ranger(work, lanes, lane, start_range_sensor(hit, s.ranger))
+        store_ranger(work, lanes, lane, start_range_sensor(hit, ranger_as_is(work, lanes, lane)))
     draw(work, lanes, layout.DRAWN, 4, seed, flight, step, BARO_START)
     for lane in range(len(lanes)):
-        store_baro_unit(work, lanes, lane, draw_barometer(drawn_baro_unit(work, lanes, lane), s.baro))
+        store_baro_unit(
+            work, lanes, lane, draw_barometer(drawn_baro_unit(work, lanes, lane), baro_as_is(work, lanes, lane))
+        )
     draw(work, lanes, layout.DRAWN, 2, seed, flight, step + 1, BARO_START)
     for lane in range(len(lanes)):
         truth, unit = baro_truth(work, lanes, lane, s), load_baro_unit(work, lanes, lane)
-        store_baro(work, lanes, lane, start_barometer(truth, unit, drawn_baro_start(work, lanes, lane), s.baro))
+        store_baro(
+            work,
+            lanes,
+            lane,
+            start_barometer(truth, unit, drawn_baro_start(work, lanes, lane), baro_as_is(work, lanes, lane)),
+        )
     draw(work, lanes, layout.DRAWN, 16, seed, flight, step, MAG_START)
     for lane in range(len(lanes)):
-        store_mag_unit(work, lanes, lane, draw_magnetometer(drawn_mag_unit(work, lanes, lane), s.mag))
+        store_mag_unit(
+            work, lanes, lane, draw_magnetometer(drawn_mag_unit(work, lanes, lane), mag_as_is(work, lanes, lane))
+        )
     draw(work, lanes, layout.DRAWN, 4, seed, flight, step, PAD_START)
     for lane in range(len(lanes)):
-        store_pad_unit(work, lanes, lane, draw_pad_camera(drawn_pad_unit(work, lanes, lane), s.pad))
+        store_pad_unit(
+            work, lanes, lane, draw_pad_camera(drawn_pad_unit(work, lanes, lane), pad_as_is(work, lanes, lane))
+        )
     draw(work, lanes, layout.DRAWN, 2, seed, flight, step, SKID_START)
     for lane in range(len(lanes)):
-        store_skid_unit(work, lanes, lane, draw_skid_switch(drawn_skid_unit(work, lanes, lane), s.skid))
+        store_skid_unit(
+            work, lanes, lane, draw_skid_switch(drawn_skid_unit(work, lanes, lane), skid_as_is(work, lanes, lane))
+        )
         load_n = work[layout.CONTACT * len(lanes) + lane]
-        store_skid(work, lanes, lane, start_skid_switch(load_n, s.skid))
+        store_skid(work, lanes, lane, start_skid_switch(load_n, skid_as_is(work, lanes, lane)))

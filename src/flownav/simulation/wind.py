@@ -37,6 +37,7 @@ ROUGHNESS_M = 0.15 * FOOT_M
 REFERENCE_SPEED_HEIGHT_M = 20.0 * FOOT_M
 LOWEST_HEIGHT_M = 0.5
 SQRT3 = 1.7320508075688772
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 
 class WindParameters(NamedTuple):
@@ -179,9 +180,8 @@ def _second_order(sigma_m_s: float, tau_s: float) -> tuple[float, float, float, 
     """
     d = PERIOD_S / tau_s
     shrink = math.exp(-d)
-    nodes, weights = np.polynomial.legendre.leggauss(24)
-    x = 0.5 * d * (nodes + 1.0)
-    density = 0.5 * d * weights * np.exp(-2.0 * x)
+    x = 0.5 * d * (NODES + 1.0)
+    density = 0.5 * d * WEIGHTS * np.exp(-2.0 * x)
     d11 = math.sqrt(float(np.sum(density * x * x)))
     d21 = float(np.sum(density * x * (1.0 - x))) / d11
     d22 = math.sqrt(float(np.sum(density * (1.0 - x) ** 2)) - d21 * d21)

@@ -36,10 +36,15 @@ def load_vehicle(path: Path | None = None) -> VehicleParameters:
     InputError names the file, the key and what is allowed: an unknown or missing key, a value out of range, a
     helicopter that cannot be (inertia, skids) or that cannot hold a hover.
     """
+    return flatten(read_vehicle(path))
+
+
+def read_vehicle(path: Path | None = None) -> VehicleFile:
+    """A vehicle file as it stands, checked. InputError as `load_vehicle`."""
     path = path or shipped(SHIPPED_VEHICLE)
-    vehicle = flatten(check(read_toml(path), VehicleFile, str(path)))
-    require_feasible(vehicle, str(path))
-    return vehicle
+    file = check(read_toml(path), VehicleFile, str(path))
+    require_feasible(flatten(file), str(path))
+    return file
 
 
 def describe_vehicle(path: Path | None = None) -> VehicleDescription:

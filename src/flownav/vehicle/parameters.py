@@ -85,6 +85,21 @@ class VehicleParameters(NamedTuple):
     shaft_power_limit_w: float
 
 
+class TouchdownLimits(NamedTuple):
+    """What the vehicle stands when it touches the ground, as the file has it."""
+
+    max_sink_rate_m_s: float
+    max_lateral_speed_m_s: float
+    max_tilt_deg: float
+    max_yaw_rate_deg_s: float
+    max_slide_m: float
+
+
+def touchdown_limits(file: VehicleFile) -> TouchdownLimits:
+    """The limits of a checked file."""
+    return TouchdownLimits(**file.touchdown.model_dump())
+
+
 def flatten(file: VehicleFile) -> VehicleParameters:
     """The checked file as the flat bundle, angles in radians, rotor constants derived."""
     air, body, main, tail = file.environment, file.body, file.main_rotor, file.tail_rotor

@@ -114,6 +114,19 @@ class Drive(ParameterModel):
     shaft_power_limit_w: Number = Field(gt=10.0, lt=1e6)
 
 
+class Touchdown(ParameterModel):
+    """What the vehicle stands when it touches the ground; beyond any of these it counts as crashed.
+
+    Where a file says nothing, the limits are those of a helicopter of the Maxi Joker's size (its file derives them).
+    """
+
+    max_sink_rate_m_s: Number = Field(2.0, gt=0.0, lt=20.0)
+    max_lateral_speed_m_s: Number = Field(0.6, gt=0.0, lt=20.0)
+    max_tilt_deg: Number = Field(15.0, gt=0.0, le=30.0)
+    max_yaw_rate_deg_s: Number = Field(45.0, gt=0.0, lt=720.0)
+    max_slide_m: Number = Field(0.3, gt=0.0, lt=20.0)
+
+
 class VehicleFile(ParameterModel):
     """A vehicle file, schema 1."""
 
@@ -131,3 +144,4 @@ class VehicleFile(ParameterModel):
     collective: Actuator
     pedal: Actuator
     drive: Drive
+    touchdown: Touchdown = Touchdown()

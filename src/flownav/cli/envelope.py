@@ -1,0 +1,80 @@
+"""`flownav envelope`: how surely a scenario lands, over the wind's speed and direction."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+
+def command(
+    scenario: Annotated[str, typer.Argument(help="What lands: landing, gusty, pad_return, approach, a file.")],
+    speeds: Annotated[str, typer.Option(help="Wind speeds at 20 ft [m/s], with commas.")] = "2,4,6,8,10",
+    directions: Annotated[int, typer.Option(help="How many directions the wind blows from, from north on.")] = 8,
+    flights: Annotated[int, typer.Option(help="Flights of each speed and direction.")] = 32,
+    seed: Annotated[int, typer.Option(help="The campaign's noise.")] = 1,
+    ensemble: Annotated[
+        bool, typer.Option("--ensemble/--matched", help="Draw each flight's vehicle and sensors, or fly what is told.")
+    ] = True,
+    out: Annotated[Path | None, typer.Option(help="The page; out/SCENARIO_envelope.html where unsaid.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Fly a scenario in winds of many speeds and directions: a table and a polar map of the share that landed."""
+    from flownav.campaign.envelope import directions_deg, fly_envelope
+    from flownav.cli.output import progress, require_between, require_writable
+    from flownav.errors import InputError
+    from flownav.report.envelope import write_envelope
+    from flownav.simulation.scenario import load_scenario
+
+    require_between("--flights", flights, 1, 1_000_000)
+    require_between("--directions", directions, 1, 360)
+    require_between("--seed", seed, 0, 2**63 - 1)
+    try:
+        chosen_speeds = sorted({float(speed) for speed in speeds.split(",")})
+    except ValueError:
+        raise InputError(f"--speeds {speeds}: numbers with commas are needed, such as 2,4,8") from None
+    for speed in chosen_speeds:
+        require_between("--speeds", speed, 0.1, 30.0)
+    chosen = load_scenario(scenario)
+    last_s = chosen.flight.may_land_after_s
+    if last_s is None or last_s >= chosen.flight.duration_s or chosen.truth == "linear":
+        raise InputError(f"{chosen.name}: it never lands; give a scenario with a may_land_after_s before its end")
+    page = out or Path("out") / f"{chosen.name}_envelope.html"
+    require_writable(page)
+    with progress(f"Flying {chosen.name}", flights * directions * len(chosen_speeds)) as advance:
+        rows = fly_envelope(
+            chosen, chosen_speeds, directions_deg(directions), seed, flights, dispersed=ensemble, on_progress=advance
+        )
+    model = "ensemble" if ensemble else "matched"
+    title = f"{chosen.name}, {model}, {flights} flights a field, seed {seed}"
+    try:
+        write_envelope(title, rows, page)
+    except OSError as error:
+        raise InputError(f"{page}: cannot be written ({error.strerror}); give another --out") from error
+    if as_json:
+        facts: dict[str, Any] = {"scenario": chosen.name, "truth_model": model, "flights": flights, "seed": seed}
+        typer.echo(json.dumps(facts | {"cells": rows, "out": str(page)}))
+        return
+    _show(title, rows)
+    typer.echo(f"page  {page}")
+
+
+def _show(title: str, rows: list[dict[str, Any]]) -> None:
+    """Landed [%] by speed (rows) and direction (columns)."""
+    from rich.console import Console
+    from rich.table import Table
+
+    directions = sorted({row["from_direction_deg"] for row in rows})
+    table = Table()
+    table.add_column("wind at 20 ft")
+    for direction in directions:
+        table.add_column(f"from {direction:g} deg", justify="right")
+    for speed in sorted({row["speed_20ft_m_s"] for row in rows}):
+        ring = {row["from_direction_deg"]: row["success"]["rate"] for row in rows if row["speed_20ft_m_s"] == speed}
+        table.add_row(f"{speed:g} m/s", *(f"{100.0 * ring[direction]:.0f}" for direction in directions))
+    console = Console()
+    console.width = max(console.width, len(title) + 16, 20 + 15 * len(directions))
+    console.print(f"landed [%], {title}", highlight=False, markup=False)
+    console.print(table)

@@ -1,0 +1,51 @@
+"""The touchdown of a flight in the headline of its report: where it touched and stood, and what that was limited by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flownav.report.figure_words import Tile, metres, number
+from flownav.report.series import mapping
+
+
+def landing_sentences(landing: Mapping[str, Any]) -> list[str]:
+    """Of `scores.touchdown` as one flight has it; empty where it touched nothing."""
+    contact, rest, limited = (mapping(landing.get(name)) for name in ("contact", "rest", "limited_by"))
+    said = []
+    if contact:
+        said.append(
+            f"It touched down after {number(contact.get('t_s'), 1)} s, {metres(contact.get('distance_m'))} m from the "
+            f"pad's centre, sinking at {number(contact.get('sink_rate_m_s'), 2)} m/s and drifting at "
+            f"{number(contact.get('lateral_speed_m_s'), 2)} m/s."
+        )
+    if limited:
+        said.append(
+            f"Of that its estimate was off by {metres(limited.get('estimate_m'))} m, its guidance by "
+            f"{metres(limited.get('guidance_m'))} m and the pad's place by {metres(limited.get('pad_m'))} m."
+        )
+    if rest:
+        said.append(
+            f"It came to rest {metres(rest.get('distance_m'))} m from the centre, {metres(rest.get('slide_m'))} m from "
+            "where it touched."
+        )
+    if landing.get("broken"):
+        said.append(f"It crashed: {', '.join(landing['broken'])}.")
+    return said
+
+
+def landing_tiles(landing: Mapping[str, Any]) -> list[Tile]:
+    """The same as headline figures."""
+    contact, rest, limited = (mapping(landing.get(name)) for name in ("contact", "rest", "limited_by"))
+    found = []
+    if contact:
+        when = f"at {number(contact.get('t_s'), 1)} s"
+        parts = ", ".join(f"{name} {metres(limited.get(f'{name}_m'))}" for name in ("estimate", "guidance", "pad"))
+        found.append(Tile("Touchdown off centre", metres(contact.get("distance_m")), "m", f"{when}; {parts}"))
+        found.append(Tile("Touchdown sink rate", number(contact.get("sink_rate_m_s"), 2), "m/s", when))
+    if rest:
+        slid = f"slid {metres(rest.get('slide_m'))} m"
+        found.append(Tile("At rest off centre", metres(rest.get("distance_m")), "m", slid))
+    if landing.get("broken"):
+        found.append(Tile("Crashed", "yes", "", ", ".join(landing["broken"])))
+    return found

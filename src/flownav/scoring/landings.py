@@ -1,0 +1,109 @@
+"""Touchdowns as `flownav fly`, `flownav accuracy` and the report say them: of one flight, and of many.
+
+Of many flights R95 is the radius about the pad's centre that 95 % of all flights that were to land do not exceed; one
+that crashed, never touched or never came to rest is infinitely far off. What limits the touchdown is the 95th
+percentile of each part's length over the flights that touched.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.scoring.percentiles import percentile_with_interval, spread
+from flownav.scoring.touchdown import CONTACT, LIMITED_BY, REST, TOUCHDOWN_COLUMNS, names_of
+
+Array = NDArray[np.float64]
+
+R_SHARE = 0.95
+CONFIDENCE = 0.95
+EXPECTED, BROKEN = TOUCHDOWN_COLUMNS.index("expected"), TOUCHDOWN_COLUMNS.index("broken")
+
+
+def column_of(group: str, name: str) -> int:
+    """The place of one figure in a row."""
+    return TOUCHDOWN_COLUMNS.index(f"{group}.{name}")
+
+
+CONTACT_DISTANCE, REST_DISTANCE = column_of("contact", "distance_m"), column_of("rest", "distance_m")
+
+
+def crashed(rows: Array) -> NDArray[np.bool_]:
+    """Which flights crashed; rows (flights, len(TOUCHDOWN_COLUMNS))."""
+    return np.asarray(rows[:, BROKEN] > 0.0)
+
+
+def succeeded(rows: Array) -> NDArray[np.bool_]:
+    """Which flights that were to land came to rest on the ground with no limit broken."""
+    return np.asarray((rows[:, EXPECTED] > 0.0) & np.isfinite(rows[:, REST_DISTANCE]) & ~crashed(rows))
+
+
+def touchdown_of_flight(row: Array) -> dict[str, Any] | None:
+    """The values of one flight; None where it touched nothing and broke nothing."""
+    broken = names_of(row[BROKEN])
+    if not np.isfinite(row[CONTACT_DISTANCE]) and not broken:
+        return None
+    said: dict[str, Any] = {
+        group: _or_none({name: _finite(row[column_of(group, name)]) for name in names})
+        for group, names in (("contact", CONTACT), ("rest", REST), ("limited_by", LIMITED_BY))
+    }
+    return said | {"success": bool(succeeded(row[None, :])[0]), "broken": broken}
+
+
+def touchdown_of_flights(rows: Array) -> dict[str, Any] | None:
+    """Radius, spread and success of many flights; None where none was to land and none touched or broke anything."""
+    touched = np.isfinite(rows[:, CONTACT_DISTANCE])
+    if not (rows[:, EXPECTED] > 0.0).any() and not (touched | crashed(rows)).any():
+        return None
+    broken = Counter(name for bits in rows[:, BROKEN] for name in names_of(bits))
+    limits = {name: _largest(rows[touched, column_of("limited_by", name)]) for name in LIMITED_BY}
+    return {
+        "contact": radius(rows, CONTACT_DISTANCE) | _spreads(rows, "contact", CONTACT),
+        "rest": radius(rows, REST_DISTANCE) | _spreads(rows, "rest", REST),
+        "success": success(rows),
+        "limited_by": limits,
+        "broken": dict(broken),
+        "unfinished": unfinished(rows),
+    }
+
+
+def unfinished(rows: Array) -> dict[str, int]:
+    """How many flights broke nothing and yet did not land: the flight ended before they touched, or came to rest."""
+    whole = (rows[:, EXPECTED] > 0.0) & ~crashed(rows)
+    touched, rests = np.isfinite(rows[:, CONTACT_DISTANCE]), np.isfinite(rows[:, REST_DISTANCE])
+    return {"never touched": int((whole & ~touched).sum()), "never at rest": int((whole & touched & ~rests).sum())}
+
+
+def radius(rows: Array, distance: int) -> dict[str, Any]:
+    """R95 and its 95 % interval [m]; null where it is infinite."""
+    away = np.where(np.isfinite(rows[:, distance]) & ~crashed(rows), rows[:, distance], np.inf)
+    value, low, high = percentile_with_interval(away, R_SHARE)
+    return {"r95_m": _finite(value), "r95_interval_m": [_finite(low), _finite(high)]}
+
+
+def success(rows: Array) -> dict[str, float]:
+    """Share of the flights that landed, and its 95 % interval after Clopper and Pearson (Biometrika 26, 1934)."""
+    from scipy.stats import binomtest
+
+    landed = int(succeeded(rows).sum())
+    interval = binomtest(landed, len(rows)).proportion_ci(CONFIDENCE, method="exact")
+    return {"rate": landed / len(rows), "low": float(interval.low), "high": float(interval.high)}
+
+
+def _spreads(rows: Array, group: str, names: tuple[str, ...]) -> dict[str, Any]:
+    return {name: spread(rows[:, column_of(group, name)]) for name in names}
+
+
+def _largest(values: Array) -> float | None:
+    return _finite(percentile_with_interval(values, R_SHARE)[0]) if len(values) else None
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _or_none(values: dict[str, float | None]) -> dict[str, float | None] | None:
+    return None if all(value is None for value in values.values()) else values

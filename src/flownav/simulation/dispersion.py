@@ -1,0 +1,143 @@
+"""What of the truth differs from flight to flight: the `[dispersion]` of a scenario, and its draws.
+
+Each entry names a number of the vehicle's file, of a sensor's datasheet or of the scenario's wind, and the distribution
+that it is drawn from, by SciPy's name with SciPy's parameters:
+
+    vehicle.body.mass_kg = { distribution = "truncnorm", a = -2, b = 2, scale = 0.5, mode = "uncertainty" }
+    wind.from_direction_deg = { distribution = "uniform", loc = 0, scale = 360 }
+
+`mode` says what is done with the draw: it is the value, a factor on what the datasheet says, an offset to it, or a
+multiple of the uncertainty that the file states beside the value (0.6, or "60..150": then of the side that it is on).
+Units are those of the number's own name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Literal
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ConfigDict, Field, field_validator, model_validator
+
+from flownav.parameter_files import Number, ParameterModel, load, shipped
+from flownav.simulation.noise import threefry
+
+Array = NDArray[np.float64]
+
+SHIPPED, SHIPPED_FILE = "shipped", "dispersion.toml"
+DISPERSION_STEP = 1 << 41  # of the noise counter: beyond every step of a flight and of its start
+
+
+class Distribution(ParameterModel):
+    """A continuous distribution of scipy.stats; what is not named here are its shape parameters."""
+
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+
+    distribution: str
+    loc: Number = 0.0
+    scale: Number = Field(1.0, gt=0.0)
+    mode: Literal["value", "factor", "offset", "uncertainty"] = "value"
+    source: str = ""
+
+    @model_validator(mode="after")
+    def _shapes_are_numbers(self) -> Distribution:
+        for name, value in self.shapes.items():
+            if isinstance(value, bool) or not isinstance(value, (int, float)):
+                raise ValueError(f"{name} = {value!r}: a shape parameter is a number")
+        return self
+
+    @property
+    def shapes(self) -> dict[str, float]:
+        """The shape parameters by SciPy's names."""
+        return dict(self.model_extra or {})
+
+    def frozen(self) -> Any:
+        """SciPy's distribution with these parameters. ValueError where there is none such."""
+        from scipy import stats
+
+        family = getattr(stats, self.distribution, None)
+        if not isinstance(family, stats.rv_continuous):
+            raise ValueError(f'distribution = "{self.distribution}": no continuous distribution of scipy.stats')
+        wanted = [name.strip() for name in (family.shapes or "").split(",") if name.strip()]
+        if sorted(wanted) != sorted(self.shapes):
+            named = ", ".join(wanted) or "none"
+            raise ValueError(f'distribution = "{self.distribution}" has the shape parameters {named}')
+        found = family(**self.shapes, loc=self.loc, scale=self.scale)
+        if not np.isfinite(found.ppf(0.5)):
+            raise ValueError(f'distribution = "{self.distribution}" cannot be with {self.shapes or "this scale"}')
+        return found
+
+
+class DispersionSection(ParameterModel):
+    """A scenario's `[dispersion]`. file: the entries that hold where the scenario names none of its own.
+
+    "shipped" is the file that ships with flownav. Entries may be nested tables, as TOML's dotted keys are.
+    """
+
+    file: str = SHIPPED
+    parameters: dict[str, Distribution] = Field(default_factory=dict)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _flattened(cls, given: Any) -> Any:
+        if not isinstance(given, Mapping) or isinstance(given.get("parameters"), Mapping):
+            return given
+        file = {"file": given["file"]} if "file" in given else {}
+        entries = {name: table for name, table in given.items() if name != "file"}
+        return file | {"parameters": dict(_entries(entries, ""))}
+
+    def entries(self) -> dict[str, Distribution]:
+        """The file's, and the scenario's own above them. InputError where the file is wrong."""
+        path = shipped(SHIPPED_FILE) if self.file == SHIPPED else Path(self.file)
+        return {**load(path, DispersionFile).dispersion.parameters, **self.parameters}
+
+
+class DispersionFile(ParameterModel):
+    """A file of such entries, for many scenarios."""
+
+    schema_version: Literal[1]
+    name: str
+    provenance: str
+    dispersion: DispersionSection
+
+    @field_validator("dispersion")
+    @classmethod
+    def _is_whole(cls, section: DispersionSection) -> DispersionSection:
+        if "file" in section.model_fields_set:
+            raise ValueError("file: a dispersion file names no other one")
+        return section
+
+
+def _entries(table: Mapping[str, Any], above: str) -> Iterator[tuple[str, Any]]:
+    """Every entry of nested tables by its dotted name."""
+    for key, value in table.items():
+        if isinstance(value, Mapping) and "distribution" not in value:
+            yield from _entries(value, f"{above}{key}.")
+        else:
+            yield f"{above}{key}", value
+
+
+def raises_wind(entries: Mapping[str, Distribution]) -> bool:
+    """Whether a flight may have wind where the scenario has none."""
+    entry = entries.get("wind.speed_20ft_m_s")
+    return entry is not None and entry.mode != "factor"
+
+
+def uniforms(seed: int, flights: Sequence[int], name: str) -> Array:
+    """One number in (0, 1) of each flight, by the noise counter: of (seed, flight, name) and nothing else."""
+    index = np.asarray(flights, np.uint64)
+    step = np.full_like(index, DISPERSION_STEP + crc32(name.encode()))
+    word, _ = threefry(index, step * np.uint64(256), np.full_like(index, seed), np.zeros_like(index))
+    return np.asarray(((word >> np.uint64(11)).astype(float) + 0.5) * 2.0**-53)
+
+
+def drawn(mode: str, draw: float, believed: float, below: float, above: float) -> float:
+    """The true value; below and above: how far the uncertainty reaches on either side of what is believed."""
+    if mode == "value":
+        return draw
+    if mode == "factor":
+        return draw * believed
+    return believed + (draw if mode == "offset" else draw * (above if draw > 0.0 else below))

@@ -1,0 +1,198 @@
+"""An ensemble: flights each with a truth of its own, drawn from the scenario's dispersion, that nobody told the filter.
+
+The navigator's settings, its timetable and the autopilot's gains stay those of the datasheets. A truth is a function of
+(seed, flight) alone, so that a flight is the same by itself, in any batch and on any lane.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.errors import InputError
+from flownav.parameter_files import ParameterModel, check
+from flownav.sensors.datasheet import FlowSensor
+from flownav.sensors.sheets import SensorSheets
+from flownav.simulation.dispersion import Distribution, drawn, uniforms
+from flownav.simulation.fitting import onboard_of
+from flownav.simulation.plan import Flight
+from flownav.simulation.scenario import Scenario
+from flownav.simulation.truth import PARTS, PUNCTUAL, Lateness, Truth
+from flownav.vehicle.loading import VehicleDescription
+from flownav.vehicle.parameters import flatten
+from flownav.vehicle.schema import VehicleFile
+
+Array = NDArray[np.float64]
+
+SENSORS = ("inertial", "receiver", "camera", "ranger", "baro", "mag", "pad", "skid")
+LATE = {"gps_receiver": "receiver_s", "flow_camera": "flow_s", "range_sensor": "range_s", "pad_camera": "pad_s"}
+SHEETS = ("inertial", "gps_receiver", "flow_camera", "flow_sensor", "range_sensor", "barometer", "magnetometer",
+          "magnetic_field", "pad_camera", "skid_switch")  # fmt: skip
+# these are the timetable's, the scenario's or the judge's, one for all flights
+SHARED = ("rate_hz", "jitter_s", "exposure_s", "lens", "optics", "touchdown", "gravity_m_s2", "cg_above_skid_m")
+
+TOGETHER = 64  # flights whose numbers are drawn together
+
+
+def believed(flight: Flight) -> Truth:
+    """The truth of a flight that is what its datasheets say; the sensors that it has not are zeros."""
+    onboard = flight.onboard
+    if onboard is None:
+        sensors = {part: PARTS[part](*([0.0] * len(PARTS[part]._fields))) for part in (*SENSORS, "camera_flow")}
+    else:
+        sensors = {part: getattr(onboard, part) for part in SENSORS} | {"camera_flow": onboard.flow}
+    return Truth(vehicle=flight.vehicle, wind=flight.wind, flow=flight.sensors.flow, late=PUNCTUAL, **sensors)
+
+
+class Ensemble:
+    """What differs from flight to flight of one scenario, ready to be drawn. InputError where an entry cannot be.
+
+    file and described: the vehicle's, as it is believed to be; sheets: its sensors', None where the paper's filter
+    flies, of whose sensors only the flow sensor's file is dispersed; dispersion: entries by dotted name.
+    """
+
+    def __init__(
+        self, scenario: Scenario, flight: Flight, file: VehicleFile, described: VehicleDescription, sensor: FlowSensor,
+        sheets: SensorSheets | None, dispersion: Mapping[str, Distribution],
+    ) -> None:  # fmt: skip
+        self.scenario, self.flight, self.sheets = scenario, flight, sheets
+        self.models: dict[str, Any] = {"vehicle": file, "wind": scenario.wind, "flow_sensor": sensor}
+        if sheets is not None:
+            fitted = {name: getattr(sheets, name) for name in SHEETS if name != "flow_sensor"}
+            self.models |= {name: sheet for name, sheet in fitted.items() if sheet is not None}
+        self.contents = {name: model.model_dump() for name, model in self.models.items()}
+        self.base = believed(flight)
+        self.reach = {f"vehicle.{entry.key}": entry.uncertainty for entry in described.entries}
+        self.entries = {name: one for name, one in dispersion.items() if self._carried(name)}
+        self.frozen = {name: self._checked(name, one) for name, one in self.entries.items()}
+        self._chunk = lru_cache(maxsize=16)(self._drawn)
+
+    def truths(self, seed: int, first: int, count: int) -> list[Truth]:
+        """The truths of flights `first` to `first + count - 1`. InputError where a draw is not possible."""
+        values = self.values(seed, first, count)
+        return [self._truth(first + k, {name: column[k] for name, column in values.items()}) for k in range(count)]
+
+    def values(self, seed: int, first: int, count: int) -> dict[str, list[float]]:
+        """The dispersed numbers of the same flights, by dotted name, in the units of their names."""
+        numbers = range(first // TOGETHER, (first + count - 1) // TOGETHER + 1)
+        chunks = [self._chunk(seed, number) for number in numbers]
+        skipped = first - numbers[0] * TOGETHER
+        return {
+            name: np.concatenate([chunk[name] for chunk in chunks])[skipped : skipped + count].tolist()
+            for name in self.entries
+        }
+
+    def _drawn(self, seed: int, number: int) -> dict[str, Array]:
+        """The numbers of TOGETHER flights, the `number`-th such lot: SciPy takes as long for one as for all of them.
+
+        A flight stands at the same place of the same lot whoever asks for it, and so has the same bits.
+        """
+        flights = range(number * TOGETHER, (number + 1) * TOGETHER)
+        found = {}
+        for name, entry in self.entries.items():
+            draws, told = self.frozen[name].ppf(uniforms(seed, flights, name)), self._believed(name)
+            below, above = self._reach(name, told) if entry.mode == "uncertainty" else (0.0, 0.0)
+            found[name] = np.array([drawn(entry.mode, float(draw), told, below, above) for draw in draws])
+        return found
+
+    def _truth(self, flight: int, values: Mapping[str, float]) -> Truth:
+        """One flight's truth: what the drawn numbers touch is built anew, the rest is what is believed."""
+        touched: dict[str, dict[str, float]] = {}
+        for name, value in values.items():
+            source, _, key = name.partition(".")
+            touched.setdefault(source, {})[key] = value
+        models: dict[str, Any] = dict(self.models)
+        for source, numbers in touched.items():
+            where = f"{self.scenario.name}: dispersion, flight {flight}: {source}"
+            models[source] = _with(self.models[source], numbers, where)
+        found: dict[str, Any] = {}
+        vehicle: Any = self.flight.vehicle
+        if "vehicle" in touched:
+            vehicle = found["vehicle"] = flatten(models["vehicle"])
+        if "wind" in touched:
+            found["wind"] = models["wind"].parameters()
+        if "flow_sensor" in touched:
+            found["flow"] = self.scenario.flow.parameters(models["flow_sensor"])
+        if self.sheets is not None:
+            sheets = self.sheets.model_copy(update={name: models[name] for name in touched if name in SHEETS})
+            onboard = onboard_of(self.scenario, sheets, found.get("flow", self.flight.sensors.flow), vehicle)
+            found |= {part: getattr(onboard, part) for part in SENSORS} | {"camera_flow": onboard.flow}
+            found["late"] = self._lateness(touched)
+        return self.base._replace(**found)
+
+    def _lateness(self, touched: Mapping[str, Mapping[str, float]]) -> Lateness:
+        """How much older than stated each sensor's readings are."""
+        late = {
+            field: touched[sheet]["latency_s"] - float(self.contents[sheet]["latency_s"])
+            for sheet, field in LATE.items()
+            if "latency_s" in touched.get(sheet, {})
+        }
+        return PUNCTUAL._replace(**late)
+
+    def _carried(self, name: str) -> bool:
+        """Whether the scenario's vehicle has what an entry is of; a known sensor that it has not is passed over."""
+        source = name.partition(".")[0]
+        if source in self.models:
+            return True
+        if source in SHEETS:
+            return False
+        known = ", ".join(("vehicle", "wind", *SHEETS))
+        raise self._wrong(name, f"no such source; known: {known}")
+
+    def _checked(self, name: str, entry: Distribution) -> Any:
+        """SciPy's distribution of an entry that names a number which may differ."""
+        source, _, key = name.partition(".")
+        parts = key.split(".")
+        if any(part in SHARED for part in parts) or (key == "latency_s" and source not in LATE):
+            raise self._wrong(name, "is the same for all flights of a scenario")
+        told = self._believed(name)
+        if entry.mode == "uncertainty":
+            self._reach(name, told)
+        try:
+            return entry.frozen()
+        except ValueError as error:
+            raise self._wrong(name, str(error)) from None
+
+    def _believed(self, name: str) -> float:
+        """What the datasheet says of a number."""
+        source, _, key = name.partition(".")
+        inside: Any = self.contents[source]
+        for part in key.split("."):
+            if not isinstance(inside, dict) or part not in inside:
+                known = ", ".join(inside) if isinstance(inside, dict) else "nothing"
+                raise self._wrong(name, f"no such number; known there: {known}")
+            inside = inside[part]
+        if isinstance(inside, bool) or not isinstance(inside, (int, float)):
+            raise self._wrong(name, "is no number of the datasheet")
+        return float(inside)
+
+    def _reach(self, name: str, told: float) -> tuple[float, float]:
+        """How far below and above its value the uncertainty that the vehicle's file states reaches."""
+        stated = self.reach.get(name, "")
+        if not stated:
+            raise self._wrong(name, 'mode = "uncertainty": the vehicle\'s file states none there')
+        low, between, high = stated.partition("..")
+        try:
+            return (told - float(low), float(high) - told) if between else (float(stated), float(stated))
+        except ValueError:
+            raise self._wrong(name, f'its uncertainty "{stated}" is neither a number nor low..high') from None
+
+    def _wrong(self, name: str, what: str) -> InputError:
+        return InputError(f"{self.scenario.name}: dispersion.{name}: {what}")
+
+
+def _with(model: ParameterModel, numbers: Mapping[str, float], where: str) -> Any:
+    """A datasheet with other numbers at dotted keys; only the tables that they stand in are checked anew."""
+    own = {key: value for key, value in numbers.items() if "." not in key}
+    inner: dict[str, dict[str, float]] = {}
+    for key, value in numbers.items():
+        table, dot, rest = key.partition(".")
+        if dot:
+            inner.setdefault(table, {})[rest] = value
+    tables = {table: _with(getattr(model, table), given, f"{where}.{table}") for table, given in inner.items()}
+    changed = model.model_copy(update=tables)
+    return check(dict(changed) | own, type(model), where) if own else changed

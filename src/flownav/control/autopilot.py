@@ -185,7 +185,7 @@ def outer_loop(
     height_m = gains.pad_pos_d_m - estimate.pos_d
     found = estimate.pad_found > 0.0  # before, height_m is over where GPS puts the pad, metres from any ground
     waiting = found and misaligned(off_n, off_e, est_n, est_e, height_m, state.waited_s, gains)
-    searching = not found and height_m < gains.search_height_m
+    searching = not found and gains.search_height_m > 0.0 and height_m < gains.search_height_m
     gate_m = gains.search_height_m if searching else gains.align_height_m
     vel_d = smaller(vel_d, descent_limit(waiting or searching, gate_m, height_m, reference.vel_d, gains))
 

@@ -11,7 +11,16 @@ from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading, level
 from flownav.estimation.laws.geometry import component
 from flownav.estimation.motion import rotation_of
-from flownav.estimation.states import ATTITUDE, FLOW_LAG, GYRO_BIAS, INNOVATION, INS_ERROR, MEASURED, QUATERNION
+from flownav.estimation.states import (
+    ATTITUDE,
+    CONSIDERS,
+    FLOW_LAG,
+    GYRO_BIAS,
+    INNOVATION,
+    INS_ERROR,
+    MEASURED,
+    QUATERNION,
+)
 from flownav.frames import heading_from_quaternion, quaternion_product, rotation_from_quaternion, to_earth
 from flownav.navigation.memory import (
     AIDED,
@@ -84,7 +93,8 @@ def take_level(work: Work, lanes: Lanes, t_s: float, sensor: int, s: AttitudeSet
     """Where an external attitude puts down, beside an IMU. While something horizontal aids the filter, it tells the
     reading's slow error and nothing else; where nothing does it is taken.
     """
-    if t_s - shared(work, lanes, LEVEL_READ) < s.ins_tilt_time_s:
+    smoothing = work[CONSIDERS * len(lanes)] == 0.0  # no state is merely considered then: it would move them all
+    if smoothing or t_s - shared(work, lanes, LEVEL_READ) < s.ins_tilt_time_s:
         return
     share(work, lanes, LEVEL_READ, t_s)
     consider_aided(work, lanes)

@@ -5,9 +5,14 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import hypothesis
 import pytest
 
 from places import SHARED
+
+# a loaded machine draws slowly, and says nothing of the test by that
+hypothesis.settings.register_profile("flownav", suppress_health_check=[hypothesis.HealthCheck.too_slow])
+hypothesis.settings.load_profile("flownav")
 
 
 def _folder(variable: str, name: str) -> Path:

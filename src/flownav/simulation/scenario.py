@@ -96,7 +96,7 @@ class PrecisionSection(ParameterModel):
     align_height_m: Number = Field(0.6, gt=0.0, le=100.0)
     align_radius_m: Number = Field(0.03, gt=0.0, le=100.0)
     align_speed_m_s: Number = Field(1.0, gt=0.0, le=100.0)
-    align_patience_s: Number = Field(30.0, gt=0.0, le=3600.0)
+    align_patience_s: Number = Field(15.0, gt=0.0, le=3600.0)
     commit_height_m: Number = Field(0.3, ge=0.0, le=100.0)
     search_height_m: Number = Field(0.0, ge=0.0, le=100.0)
 

@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from browsing import CHROMIUM, QUIET, SOFTWARE_GL, Visit
 from flownav.cli import paper as paper_command
 from flownav.errors import InputError, VerdictError
-from flownav.paper import findings, laboratory, published
+from flownav.paper import figures_flight, findings, laboratory, published
 from flownav.paper.laboratory import Configuration
 from flownav.paper.published import HEIGHTS_M, ErrorRow
 from flownav.paper.reproduction import reproduce
@@ -294,6 +294,29 @@ def test_verdicts_on_flights_follow_the_numbers() -> None:
     near = {"median": 0.27, "p05": 0.2, "p95": 0.3}
     assert findings.of_flights(replace(flown, honest=flown.honest | {"max_position_error_m": near}))[2].agrees
     assert not findings.of_flights(flown)[2].agrees
+
+
+def test_an_agreement_that_was_put_in_is_called_circular() -> None:
+    (flown,) = reproduce((5,), 1, 16).flights
+    largest, states, honest = findings.of_flights(flown)
+    assert largest.agrees
+    assert largest.verdict == "agrees, circular"
+    assert "back-solved from the x of Table 5: 0.0653 m" in largest.here
+    assert largest.as_json()["circular"] == largest.circular
+    assert states.verdict == honest.verdict == "differs"
+    noisier = replace(flown, white_noise_m=0.6)  # the noise that the words name follows what was flown
+    assert "0.6 m are back-solved" in findings.circular(noisier)
+
+
+def test_the_caption_of_figure_28_says_where_the_transient_comes_from() -> None:
+    (flown,) = reproduce((5,), 1, 16).flights
+    assert flown.lift_off is not None
+    assert 0.3 < flown.lift_off.unshaken_m_s < flown.lift_off.shaken_m_s < 0.8
+    (figure,) = (panel for panel in figures_flight.panels(flown) if panel.key == "figure-28")
+    assert f"{flown.lift_off.unshaken_m_s:.3f} m/s in the same flight" in figure.caption
+    assert f"{100.0 * flown.lift_off.unshaken_m_s / flown.lift_off.shaken_m_s:.0f} % of the transient" in figure.caption
+    (landing,) = reproduce((6,), 1, 16).flights
+    assert landing.lift_off is None
 
 
 def test_the_selected_model_is_the_one_whose_frequency_the_text_gives() -> None:

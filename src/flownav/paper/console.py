@@ -23,9 +23,7 @@ def show(of: Reproduction, page: str) -> None:
     claims = Table("claim", "the paper", "here", "verdict", title="Claims put to the test", title_justify="left")
     for finding in of.findings:
         style = "" if finding.agrees else "bold"
-        claims.add_row(
-            finding.topic, finding.paper, finding.here, "agrees" if finding.agrees else "differs", style=style
-        )
+        claims.add_row(finding.topic, finding.paper, finding.here, finding.verdict, style=style)
     console.print(claims)
     console.print(f"page  {page}", soft_wrap=True)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flownav.paper.flights import Flights
+from flownav.paper.flights import Flights, LiftOff
 from flownav.report import figures_filter, figures_states
 from flownav.report.figures_states import View
 from flownav.report.panels import Panel
@@ -36,8 +36,20 @@ def panels(flights: Flights) -> list[Panel]:
     lift_off = next((moment for moment in moments(record) if moment.name == "lift-off"), None)
     if flights.table == 5 and lift_off is not None:
         transient = figures_states.lift_off_transient(record, lift_off)
-        found.append(replace(transient, key="figure-28", title="Figure 28: thrust and vertical velocity at lift-off"))
+        title = "Figure 28: thrust and vertical velocity at lift-off"
+        found.append(replace(transient, key="figure-28", title=title, caption=lift_off_caption(flights.lift_off)))
     if flights.table == 6:
         radius = figures_filter.radius_of_uncertainty(record)
         found.append(replace(radius, key="figure-31", title="Figure 31: reduction of the radius of uncertainty"))
     return found
+
+
+def lift_off_caption(of: LiftOff | None) -> str:
+    """Where the transient comes from: the paper says the sensor's shake."""
+    if of is None:
+        return "The error in w about lift-off."
+    return (
+        f"The largest error in w about lift-off is {of.shaken_m_s:.3f} m/s, and {of.unshaken_m_s:.3f} m/s in the same "
+        f"flight with a sensor that does not shake: {100.0 * of.frozen_inflow_share:.0f} % of the transient is the "
+        "filter's own model, whose printed B_red keeps the inflow frozen, and not the shake that the paper explains it by."
+    )

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from flownav.campaign.local import fly_many, median_flight, score_history
 from flownav.compile import LANES
 from flownav.measurement import Array
 from flownav.parameter_files import check
-from flownav.record import Record
+from flownav.record import VELOCITY_BODY, Record
+from flownav.report.series import difference, moments, track
 from flownav.scoring.errors import STATES, scores_of_flight, scores_of_flights
 from flownav.scoring.paper_tables import percentile_of_paper, published
 from flownav.simulation.assemble import Setup, assemble
@@ -20,11 +23,27 @@ from flownav.simulation.scenario import Scenario, load_scenario, with_filter
 
 SCENARIOS = {5: "takeoff", 6: "landing"}
 HONEST_GPS = "midg"
+LIFT_OFF_REACH_S = (-1.0, 3.0)  # about lift-off: where its transient is
+
+
+class LiftOff(NamedTuple):
+    """Largest error in w about lift-off [m/s] of one take-off: as it is flown, and with a sensor that does not shake."""
+
+    shaken_m_s: float
+    unshaken_m_s: float
+
+    @property
+    def frozen_inflow_share(self) -> float:
+        """What the sensor's shake has no part in: the frozen inflow of B_red."""
+        return self.unshaken_m_s / self.shaken_m_s
 
 
 @dataclass(frozen=True)
 class Flights:
-    """Flights of one scenario beside its table. honest: the scores with a receiver of 2 m CEP."""
+    """Flights of one scenario beside its table. honest: the scores with a receiver of 2 m CEP.
+
+    white_noise_m: standard deviation of an axis of the GPS noise flown; lift_off: of a take-off's recorded flight.
+    """
 
     table: int
     scenario: str
@@ -34,6 +53,8 @@ class Flights:
     percentile: dict[str, Any]
     honest: dict[str, Any]
     record: Record
+    white_noise_m: float
+    lift_off: LiftOff | None = None
 
     def as_json(self) -> dict[str, Any]:
         """The table's rows: published and reproduced, each state, and where the paper lies among our flights."""
@@ -56,6 +77,7 @@ class Flights:
             "max_position_error_with_2_m_cep_m": self.honest["max_position_error_m"],
             "touchdown_reproduced": self.scores["touchdown"],
             "touchdown_with_2_m_cep": self.honest["touchdown"],
+            "lift_off": None if self.lift_off is None else self.lift_off._asdict(),
         }
 
 
@@ -67,8 +89,11 @@ def fly_table(
     scenario = with_filter(load_scenario(name), "paper")
     setup = assemble(scenario)
     rows = _flown(setup.flight, seed, flights, on_progress)
-    honest = assemble(_with_gps(scenario, HONEST_GPS))
-    record = _recorded(setup, seed, median_flight(rows), table)
+    honest = assemble(_with(scenario, "gps", {"model": HONEST_GPS}))
+    median = median_flight(rows)
+    record = _recorded(setup, seed, median, table)
+    still = scenario.flow.model_dump(exclude_unset=True) | {"shake": False}
+    unshaken = _recorded(assemble(_with(scenario, "flow", still)), seed, median, table)
     printed = published(table)
     assert printed is not None
     return Flights(
@@ -80,6 +105,8 @@ def fly_table(
         percentile_of_paper(rows, printed),
         scores_of_flights(_flown(honest.flight, seed, flights, on_progress)),
         record,
+        float(scenario.gps.white_sigma_m),
+        _lift_off(record, unshaken),
     )
 
 
@@ -96,6 +123,25 @@ def _recorded(setup: Setup, seed: int, index: int, table: int) -> Record:
     return record
 
 
-def _with_gps(scenario: Scenario, model: str) -> Scenario:
-    entries = scenario.model_dump(exclude_unset=True) | {"gps": {"model": model}}
-    return check(entries, Scenario, f"{scenario.name} with {model} GPS")
+def _with(scenario: Scenario, table: str, values: dict[str, Any]) -> Scenario:
+    """The scenario with another table."""
+    entries = scenario.model_dump(exclude_unset=True)
+    return check(entries | {table: values}, Scenario, f"{scenario.name} with another [{table}]")
+
+
+def _lift_off(shaken: Record, unshaken: Record) -> LiftOff | None:
+    """Of two records of the same flight; None where nothing lifts off."""
+    moment = next((moment for moment in moments(shaken) if moment.name == "lift-off"), None)
+    if moment is None:
+        return None
+    return LiftOff(*(_largest_w_error(record, moment.t_s) for record in (shaken, unshaken)))
+
+
+def _largest_w_error(record: Record, lift_off_s: float) -> float:
+    """Largest absolute error in w about lift-off [m/s]."""
+    estimate, truth = track(record, "estimate", VELOCITY_BODY), track(record, "truth", VELOCITY_BODY)
+    assert estimate is not None
+    assert truth is not None
+    before_s, after_s = LIFT_OFF_REACH_S
+    error = difference(estimate, truth).within((lift_off_s + before_s, lift_off_s + after_s))
+    return float(np.nanmax(np.abs(error.value[:, 2])))

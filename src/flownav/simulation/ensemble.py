@@ -108,7 +108,7 @@ class Ensemble:
         models: dict[str, Any] = dict(self.models)
         for source, numbers in touched.items():
             where = f"{self.scenario.name}: dispersion, flight {flight}: {source}"
-            models[source] = _with(self.models[source], numbers, where)
+            models[source] = with_numbers(self.models[source], numbers, where)
         found: dict[str, Any] = {}
         vehicle: Any = self.flight.vehicle
         if "vehicle" in touched:
@@ -185,7 +185,7 @@ class Ensemble:
         return InputError(f"{self.scenario.name}: dispersion.{name}: {what}")
 
 
-def _with(model: ParameterModel, numbers: Mapping[str, float], where: str) -> Any:
+def with_numbers(model: ParameterModel, numbers: Mapping[str, float], where: str) -> Any:
     """A datasheet with other numbers at dotted keys; only the tables that they stand in are checked anew."""
     own = {key: value for key, value in numbers.items() if "." not in key}
     inner: dict[str, dict[str, float]] = {}
@@ -193,6 +193,6 @@ def _with(model: ParameterModel, numbers: Mapping[str, float], where: str) -> An
         table, dot, rest = key.partition(".")
         if dot:
             inner.setdefault(table, {})[rest] = value
-    tables = {table: _with(getattr(model, table), given, f"{where}.{table}") for table, given in inner.items()}
+    tables = {table: with_numbers(getattr(model, table), given, f"{where}.{table}") for table, given in inner.items()}
     changed = model.model_copy(update=tables)
     return check(dict(changed) | own, type(model), where) if own else changed

@@ -1,0 +1,1 @@
+"""The simulator held against recorded flights: the same path, the same navigator, simulated sensors."""

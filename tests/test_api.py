@@ -42,6 +42,7 @@ ALLOWED = {
     "live": GROUND | EQUATIONS | {"mavlink", "logs", "navigation", "replay"},
     "campaign": GROUND | EQUATIONS | {"simulation", "navigation", "scoring"},
     "faults": GROUND | EQUATIONS | {"logs", "simulation", "campaign", "scoring", "navigation", "replay"},
+    "validation": GROUND | EQUATIONS | {"navigation", "simulation", "logs", "replay", "scoring"},
     "report": GROUND | {"scoring"},
     "export": GROUND,
     "paper": GROUND | EQUATIONS | {"simulation", "campaign", "scoring", "rig", "identification", "report"},

@@ -23,6 +23,7 @@ from flownav.cli import replay as replay
 from flownav.cli import report as report
 from flownav.cli import rig as rig
 from flownav.cli import tune as tune
+from flownav.cli import validate as validate
 from flownav.cli import vehicle as vehicle
 from flownav.errors import FlownavError, InputError
 
@@ -49,6 +50,7 @@ for name, command, what in (
     ("accuracy", accuracy.command, "The landing filter against its targets, and what its pieces are worth."),
     ("envelope", envelope.command, "How surely a scenario lands, by the wind's speed and direction."),
     ("faults", faults.command, "Let sensors fail on a landing: when it is noticed, what it costs."),
+    ("validate", validate.command, "Hold the simulator against recorded flights, figure beside figure."),
     ("vehicle", vehicle.command, "Trim, power, linear models and ground effect of a helicopter."),
     ("report", report.command, "Write a record's report as one HTML page."),
     ("export", export.command, "Write a record as MCAP, TUM, EuRoC, Parquet, CSV or ULog."),

@@ -25,7 +25,7 @@ OUTLIER_M = 0.3  # of a range from the smoothed height
 LEAST_HIGH_S = 10.0
 BAROMETER_S = 60.0  # slower errors cannot be told from the smoothed altitude's own
 LATEST_FLOW_S, FLOW_STEP_S = 0.4, 0.01  # lags of the flow that are tried
-LEAST_SPEED_ROWS = 100
+LEAST_ROWS = 100  # of flow in flight
 SLOW_SHARE = 0.1  # of the Nyquist frequency: below it white noise has a tenth of its power
 SEGMENT = 256
 BANDS_HZ = {"0.5_5_hz": (0.5, 5.0), "above_5_hz": (5.0, None)}
@@ -54,11 +54,11 @@ class Smoothed:
 
 
 class FlowFit(NamedTuple):
-    """What of the flow is the velocity: gain, lag [s]; and what is not: robust deviation [m/s], lag-one correlation."""
+    """What of the flow is the velocity: gain, lag [s]; and what is not: robust deviation [rad/s], lag-one correlation."""
 
     gain: float
     lag_s: float
-    noise_m_s: float
+    noise_rad_s: float
     noise_lag_one: float
 
 
@@ -122,27 +122,26 @@ def flow_figures(flown: Replay, smoothed: Smoothed) -> dict[str, float]:
     known = seen & np.isfinite(turned).all(axis=1)
     blind = float(np.mean(stream.quality[airborne] <= 0.0)) if airborne.any() else float("nan")
     slant_m = height_m / smoothed.tilt_cosine(stream.t_s)
-    measured = np.column_stack([turned[:, 1], -turned[:, 0]]) * slant_m[:, None]
-    fit = fit_flow(stream.t_s[known], measured[known], smoothed)
+    ahead = np.column_stack([turned[:, 1], -turned[:, 0]])
+    fit = fit_flow(stream.t_s[known], ahead[known], slant_m[known], smoothed)
     return {
         "flow_gain": fit.gain,
         "flow_lag_s": fit.lag_s,
-        "flow_noise_m_s": fit.noise_m_s,
+        "flow_noise_rad_s": fit.noise_rad_s,
         "flow_noise_lag_one": fit.noise_lag_one,
         "flow_blind_share": blind,
     }
 
 
-def fit_flow(t_s: Array, measured_m_s: Array, smoothed: Smoothed) -> FlowFit:
-    """Metric flow (n, 2), forward and right, as gain times the velocity of `lag` ago: the lag that leaves least."""
-    if len(t_s) < LEAST_SPEED_ROWS:
-        return FlowFit(*[float("nan")] * 4)
-    best = FlowFit(*[float("nan")] * 4)
-    least = np.inf
+def fit_flow(t_s: Array, ahead_rad_s: Array, slant_m: Array, smoothed: Smoothed) -> FlowFit:
+    """Flow (n, 2), forward and right, as gain times the velocity of `lag` ago over the slant: the lag that leaves least."""
+    best, least = FlowFit(*[float("nan")] * 4), np.inf
+    if len(t_s) < LEAST_ROWS:
+        return best
     for lag_s in np.arange(0.0, LATEST_FLOW_S, FLOW_STEP_S):
-        velocity = smoothed.velocity_frd(t_s - lag_s)[:, :2]
-        gain = float(np.sum(velocity * measured_m_s) / np.sum(velocity**2))
-        left = measured_m_s - gain * velocity
+        expected = smoothed.velocity_frd(t_s - lag_s)[:, :2] / slant_m[:, None]
+        gain = float(np.sum(expected * ahead_rad_s) / np.sum(expected**2))
+        left = ahead_rad_s - gain * expected
         size = float(np.mean(np.abs(left)))
         if size < least:
             coloured = float(np.mean([lag_one(column) for column in left.T]))

@@ -22,6 +22,7 @@ from flownav.validation.path import path_of
 from flownav.validation.sensed import simulated_log
 
 NEEDED = (Sensor.GPS_POSITION, Sensor.FLOW_RATE, Sensor.IMU)
+DECIDES = ("outage_median_m", "outage_worst_m")
 NEITHER = ("flow_gain", "flow_lag_s")  # larger is not worse
 LESS_IS_WORSE = ("_white",)
 WITH_SIGN = ("_lag_one",)  # of which the size counts
@@ -39,6 +40,11 @@ class Row:
     simulated: float | None
     low: float | None
     high: float | None
+
+    @property
+    def decides(self) -> bool:
+        """Whether the acceptance rests on this figure: the drift with flow does."""
+        return self.figure in DECIDES
 
     @property
     def verdict(self) -> str:
@@ -70,7 +76,10 @@ def replays_of(flights: ValidationFile, seeds: int) -> int:
 
 
 def validate(
-    folder: Path, flights: ValidationFile, seed: int, count: int,
+    folder: Path,
+    flights: ValidationFile,
+    seed: int,
+    count: int,
     on_progress: Callable[[int], None] = lambda done: None,
 ) -> list[Row]:
     """The rows of every log, `count` simulated flights each. on_progress: called with how many replays are done.
@@ -85,7 +94,12 @@ def validate(
 
 
 def validate_log(
-    name: str, log: Log, windows: list[Window], vehicle: AssumedVehicle, seed: int, count: int,
+    name: str,
+    log: Log,
+    windows: list[Window],
+    vehicle: AssumedVehicle,
+    seed: int,
+    count: int,
     on_progress: Callable[[int], None] = lambda done: None,
 ) -> list[Row]:
     """A log's rows. InputError as `validate`."""
@@ -98,7 +112,10 @@ def validate_log(
     for number in range(count):
         again = simulated_log(log, path, Flight(seed, number), vehicle)
         simulated.append(measured(again, windows, on_progress)[1])
-    return [row_of(name, figure, value, [other.get(figure, np.nan) for other in simulated]) for figure, value in flown.items()]
+    return [
+        row_of(name, figure, value, [other.get(figure, np.nan) for other in simulated])
+        for figure, value in flown.items()
+    ]
 
 
 def measured(log: Log, windows: list[Window], on_progress: Callable[[int], None]) -> tuple[Replay, dict[str, float]]:

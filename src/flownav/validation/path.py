@@ -112,7 +112,9 @@ def path_of(flown: Replay, vehicle: AssumedVehicle) -> FlownPath:
     rows = flown.smoothed[np.concatenate([np.diff(flown.smoothed[:, 0]) > 0.0, [True]])]
     start, end = float(rows[0, 0]), float(rows[-1, 0])
     if end - start < LEAST_FLIGHT_S:
-        raise InputError(f"{flown.log.path}: {end - start:.0f} s are too short; {LEAST_FLIGHT_S:g} s of flight are needed")
+        raise InputError(
+            f"{flown.log.path}: {end - start:.0f} s are too short; {LEAST_FLIGHT_S:g} s of flight are needed"
+        )
     ned = rows[:, 1:4].copy()
     ned[:, 2] = np.minimum(ned[:, 2] - ground_of(rows), -LEAST_HEIGHT_M)
     heading = np.unwrap(Rotation.from_quat(rows[:, [8, 9, 10, 7]]).as_euler("ZYX")[:, 0])

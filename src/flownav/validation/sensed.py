@@ -306,5 +306,7 @@ def field_of(log: Log) -> MagneticField:
     earth = Rotation.from_quat(attitude.value[nearest][:, [1, 2, 3, 0]]).apply(compass.value)
     level, down = float(np.median(np.hypot(earth[:, 0], earth[:, 1]))), float(np.median(earth[:, 2]))
     return MagneticField(
-        strength_gauss=math.hypot(level, down), declination_deg=east_deg, inclination_deg=math.degrees(math.atan2(down, level))
+        strength_gauss=math.hypot(level, down),
+        declination_deg=east_deg,
+        inclination_deg=math.degrees(math.atan2(down, level)),
     )

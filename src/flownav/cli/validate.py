@@ -1,0 +1,88 @@
+"""`flownav validate`: recorded flights flown again with simulated sensors, figure beside figure."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from flownav.validation.job import Row
+
+MOST_FLIGHTS = 1000
+WIDE = 130  # columns that the table takes
+
+
+def command(
+    data: Annotated[Path, typer.Option(envvar="FLOWNAV_DATA", help="The folder that holds the logs.")] = Path(
+        "../shared/data"
+    ),
+    flights_file: Annotated[
+        Path | None,
+        typer.Option("--file", help="Which logs and outages (TOML); the three outdoor flights if left out."),
+    ] = None,
+    flights: Annotated[int, typer.Option(help="Simulated flights of each log.")] = 8,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same table.")] = 1,
+    out: Annotated[Path | None, typer.Option(help="Write the page (Markdown) to this file.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Hold the simulator against recorded flights: outage drift, innovations, noise, as flown and as simulated."""
+    from flownav.cli.output import progress, require_between, require_writable
+    from flownav.errors import InputError, VerdictError
+    from flownav.validation.flights import load_flights
+    from flownav.validation.job import replays_of, validate
+    from flownav.validation.page import page
+
+    require_between("--flights", flights, 1, MOST_FLIGHTS)
+    require_between("--seed", seed, 0, 2**63 - 1)
+    if out is not None:
+        require_writable(out)
+    if not data.is_dir():
+        raise InputError(f"{data}: no such folder; give the folder of logs by --data or FLOWNAV_DATA")
+    recorded = load_flights(flights_file)
+    with progress("Validating", replays_of(recorded, flights)) as advance:
+        rows = validate(data, recorded, seed, flights, advance)
+    if out is not None:
+        from flownav.files import written_whole
+
+        with written_whole(out) as temporary:
+            text = page(rows, seed, flights, recorded.vehicle.path_bandwidth_hz)
+            temporary.write_text(text, encoding="utf-8", newline="\n")
+    if as_json:
+        facts = {"seed": seed, "flights": flights, "rows": [row.as_json() for row in rows]}
+        typer.echo(json.dumps(facts))
+    else:
+        _show(rows)
+    kind = [row for row in rows if row.decides and row.verdict == "too kind"]
+    if kind:
+        raise VerdictError(
+            "; ".join(f"{row.log}: {row.figure} {row.flown:.2f}, simulated {row.high:.2f} at most" for row in kind)
+        )
+
+
+def _show(rows: list[Row]) -> None:
+    """The rows for people."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from flownav.validation.words import TOO_KIND, number, said, verdicts, widened
+
+    table = Table(title="Recorded flights, and the same paths with simulated sensors", title_justify="left")
+    for name in ("log", "figure"):
+        table.add_column(name, no_wrap=True)
+    for name in ("flown", "simulated", "least", "largest"):
+        table.add_column(name, justify="right")
+    table.add_column("the simulator is", no_wrap=True)
+    for row in rows:
+        cells = [number(value) for value in (row.flown, row.simulated, row.low, row.high)]
+        table.add_row(row.log, row.figure, *cells, row.verdict, style="bold" if row.verdict == TOO_KIND else "")
+    console = Console(highlight=False, markup=False)
+    console.width = max(console.width, WIDE)
+    console.print(table)
+    console.print(verdicts(rows))
+    for sentence in said(rows, TOO_KIND):
+        console.print(f"Too kind: {sentence}")
+    for name, drawn, source in widened():
+        console.print(f"Widened: {name}: {drawn} ({source})")

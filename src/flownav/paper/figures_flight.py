@@ -51,5 +51,5 @@ def lift_off_caption(of: LiftOff | None) -> str:
     return (
         f"The largest error in w about lift-off is {of.shaken_m_s:.3f} m/s, and {of.unshaken_m_s:.3f} m/s in the same "
         f"flight with a sensor that does not shake: {100.0 * of.frozen_inflow_share:.0f} % of the transient is the "
-        "filter's own model, whose printed B_red keeps the inflow frozen, and not the shake that the paper explains it by."
+        "filter's own model, whose printed B_red keeps the inflow frozen, not the shake that the paper explains it by."
     )

@@ -27,7 +27,7 @@ LIFT_OFF_REACH_S = (-1.0, 3.0)  # about lift-off: where its transient is
 
 
 class LiftOff(NamedTuple):
-    """Largest error in w about lift-off [m/s] of one take-off: as it is flown, and with a sensor that does not shake."""
+    """Largest error in w about lift-off [m/s] of one take-off: as flown, and with a sensor that does not shake."""
 
     shaken_m_s: float
     unshaken_m_s: float

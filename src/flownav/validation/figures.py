@@ -6,12 +6,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import butter, sosfiltfilt, welch
 from scipy.spatial.transform import Rotation
 
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
+from flownav.navigation.tape import EVENT_NAMES
 from flownav.replay.judged import TESTED
 from flownav.replay.session import Replay
 from flownav.scoring.consistency import consistency_of, lag_one
@@ -54,7 +56,7 @@ class Smoothed:
 
 
 class FlowFit(NamedTuple):
-    """What of the flow is the velocity: gain, lag [s]; and what is not: robust deviation [rad/s], lag-one correlation."""
+    """What of the flow is the velocity: gain, lag [s]; and what is not: robust deviation [rad/s], its colour."""
 
     gain: float
     lag_s: float
@@ -68,6 +70,7 @@ def figures_of(flown: Replay) -> dict[str, float]:
     smoothed = Smoothed(flown.smoothed)
     return {
         **innovation_figures(flown),
+        **event_figures(flown),
         **flow_figures(flown, smoothed),
         **range_figures(flown.log, smoothed),
         **barometer_figures(flown.log, smoothed),
@@ -99,6 +102,12 @@ def _mean(values: list[float]) -> float:
     """Of those that are known; NaN without one."""
     known = [value for value in values if np.isfinite(value)]
     return float(np.mean(known)) if known else float("nan")
+
+
+def event_figures(flown: Replay) -> dict[str, float]:
+    """How often the navigator called its heading refuted."""
+    kinds = [EVENT_NAMES[int(kind)][:2] for kind in flown.written.event[:, 1] if int(kind) < len(EVENT_NAMES)]
+    return {"heading_refuted_times": float(kinds.count(("heading", "refuted")))}
 
 
 def slow_share(values: Array) -> float:
@@ -134,7 +143,7 @@ def flow_figures(flown: Replay, smoothed: Smoothed) -> dict[str, float]:
 
 
 def fit_flow(t_s: Array, ahead_rad_s: Array, slant_m: Array, smoothed: Smoothed) -> FlowFit:
-    """Flow (n, 2), forward and right, as gain times the velocity of `lag` ago over the slant: the lag that leaves least."""
+    """Flow (n, 2), forward and right, as gain times the velocity of `lag` ago over the slant; the best such lag."""
     best, least = FlowFit(*[float("nan")] * 4), np.inf
     if len(t_s) < LEAST_ROWS:
         return best
@@ -203,7 +212,7 @@ def barometer_figures(log: Log, smoothed: Smoothed) -> dict[str, float]:
     return {"baro_error_m": float(np.std(quick)), "baro_error_lasts_s": -step_s / np.log(kept) if kept > 0.0 else 0.0}
 
 
-def run_length(flags: Array) -> float:
+def run_length(flags: NDArray[np.bool_]) -> float:
     """Mean length of the runs of true in (n,) flags, readings; 0 without one."""
     starts = np.count_nonzero(np.diff(np.concatenate([[False], flags]).astype(int)) == 1)
     return float(np.count_nonzero(flags) / starts) if starts else 0.0

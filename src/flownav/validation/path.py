@@ -99,10 +99,10 @@ class FlownPath(NamedTuple):
 def upright(force: Array, heading_rad: Array) -> Rotation:
     """Attitudes whose body z is against `force` (n, 3) NED and whose x has the heading (n,)."""
     down = -force / np.linalg.norm(force, axis=1, keepdims=True)
-    ahead = np.column_stack([np.cos(heading_rad), np.sin(heading_rad), np.zeros_like(heading_rad)])
-    right = np.cross(down, ahead)
-    right /= np.linalg.norm(right, axis=1, keepdims=True)
-    return Rotation.from_matrix(np.stack([np.cross(right, down), right, down], axis=2))
+    beside = np.column_stack([-np.sin(heading_rad), np.cos(heading_rad), np.zeros_like(heading_rad)])
+    ahead = np.cross(beside, down)
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True)
+    return Rotation.from_matrix(np.stack([ahead, np.cross(down, ahead), down], axis=2))
 
 
 def path_of(flown: Replay, vehicle: AssumedVehicle) -> FlownPath:

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
 
+from flownav.frames import Rotation as Matrix
 from flownav.frames import rotation_from_quaternion
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor, Stream
@@ -291,7 +292,7 @@ def _once(scene: Scene, name: str, count: int) -> list[float]:
     return drawn
 
 
-def rotations_of(attitude: Rotation) -> list[tuple[float, ...]]:
+def rotations_of(attitude: Rotation) -> list[Matrix]:
     """R_EB of each attitude as the equations take it."""
     return [rotation_from_quaternion(w, x, y, z) for x, y, z, w in attitude.as_quat().tolist()]
 

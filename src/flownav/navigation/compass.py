@@ -30,7 +30,7 @@ from flownav.navigation.records import CourseMemory, PushMemory, Reading
 from flownav.navigation.tape import COMPASS_REFUTED, Output, write_event
 
 BLOCK_S = 0.8  # over which a change of GPS velocity is more than its noise
-LARGE_RAD = 0.5
+LARGE_RAD = 0.8  # 46 degrees; less the deviation and the gate deal with, and less may be either witness
 ALIKE_RAD = 0.6  # between the two witnesses
 LEAST_PUSH_M_S = 0.6  # root sum square of the changes of velocity
 LEAST_LIKENESS = 0.6

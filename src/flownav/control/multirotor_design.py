@@ -1,0 +1,86 @@
+"""A multirotor's gains from its control powers: the shape of each loop in units that the control powers take out.
+
+The horizontal axes' shape is the outcome of the search that shaped the helicopter's (`control.shaping`), on the shipped
+450 mm quad; both axes have the same. A share of the rotors' thrust gives the body an angular acceleration, where a
+cyclic gives it a rate: `attitude` and `lead` are of a second-order loop.
+"""
+
+from __future__ import annotations
+
+import math
+
+from flownav.control.gains import AutopilotGains
+from flownav.control.loops import OUTER_S
+from flownav.vehicle.multirotor_parameters import MultirotorParameters, full_thrust
+from flownav.vehicle.multirotor_trim import MultirotorTrim
+
+ATTITUDE_1_S2, ATTITUDE_INTEGRAL_1_S, LEAD_S = 70.0, 0.5, 0.14
+HEAVE_RAD_S, HEAVE_INTEGRAL_1_S, HEIGHT_1_S = 5.0, 1.2, 1.2
+YAW_RATE_RAD_S, YAW_RATE_INTEGRAL_1_S, HEADING_1_S = 4.0, 1.0, 1.0
+FELT = {"position_gain": 0.5, "velocity": 1.5, "integral": 0.4, "gust_share": 1.0}
+UNFELT = {"position_gain": 0.5, "velocity": 1.5, "integral": 0.25, "gust_share": 0.0}
+GUST_S = 0.25  # the disturbance observer's low-pass
+CLIMB_LIMIT_SHARE = 0.25  # of the full thrust, about trim
+TILT_LIMIT_SHARE = 0.3
+YAW_LIMIT_SHARE = 0.15
+SPOOL_S = 1.0  # from hover to idle after touchdown
+
+
+def multirotor_gains(
+    vehicle: MultirotorParameters, hover: MultirotorTrim, *, feels_gusts: bool = True
+) -> AutopilotGains:
+    """The gains for a multirotor and its trim; its controls are shares (`motors`), where a blade's are angles."""
+    roll, pitch, yaw, heave = control_powers(vehicle, hover)
+    shape = FELT if feels_gusts else UNFELT
+    by_roll, by_pitch = ATTITUDE_1_S2 / roll, ATTITUDE_1_S2 / pitch
+    by_yaw, by_heave = YAW_RATE_RAD_S / yaw, HEAVE_RAD_S / heave
+    decay = math.exp(-OUTER_S / GUST_S)
+    return AutopilotGains(
+        position_gain=shape["position_gain"],
+        forward_gain=shape["velocity"],
+        right_gain=shape["velocity"],
+        forward_integral=shape["integral"],
+        right_integral=shape["integral"],
+        gust_share=shape["gust_share"],
+        gust_decay_forward=decay,
+        gust_decay_right=decay,
+        height_gain=HEIGHT_1_S,
+        collective_gain=by_heave,
+        collective_integral=HEAVE_INTEGRAL_1_S * by_heave,
+        collective_limit_rad=CLIMB_LIMIT_SHARE,
+        pitch_gain=by_pitch,
+        pitch_integral=ATTITUDE_INTEGRAL_1_S * by_pitch,
+        pitch_damping=LEAD_S * by_pitch,
+        roll_gain=by_roll,
+        roll_integral=ATTITUDE_INTEGRAL_1_S * by_roll,
+        roll_damping=LEAD_S * by_roll,
+        cyclic_limit_rad=TILT_LIMIT_SHARE,
+        heading_gain=HEADING_1_S,
+        yaw_rate_gain=by_yaw,
+        yaw_rate_integral=YAW_RATE_INTEGRAL_1_S * by_yaw,
+        pedal_limit_rad=YAW_LIMIT_SHARE,
+        collective_trim_rad=hover.controls.col,
+        pedal_trim_rad=hover.controls.ped,
+        lon_trim_rad=hover.controls.lon,
+        lat_trim_rad=hover.controls.lat,
+        pitch_trim_sine=math.sin(hover.pitch_rad),
+        roll_trim_sine=math.sin(hover.roll_rad) * math.cos(hover.pitch_rad),
+        idle_collective_rad=vehicle.idle_share,
+        spool_rate_rad_s=hover.controls.col / SPOOL_S,
+        pad_pos_d_m=-vehicle.cg_above_skid_m,
+        skids_below_cg_m=vehicle.cg_above_skid_m,
+    )
+
+
+def control_powers(vehicle: MultirotorParameters, hover: MultirotorTrim) -> tuple[float, float, float, float]:
+    """Angular accelerations by lat, lon, ped [rad/s2] and the acceleration by col [m/s2], of one share, in hover."""
+    force = full_thrust(vehicle) * (hover.voltage_v / vehicle.full_v) ** 2
+    count, arm = vehicle.rotor_count, 1.0 / vehicle.per_arm_1_m
+    moment = force * 0.5 * count * arm  # Σx² = Σy² = count·arm²/2, and a rotor's share is lat·y/arm
+    torque = force * count * vehicle.torque_n_m_s2 / vehicle.thrust_n_s2
+    return (
+        moment / vehicle.inertia_xx_kg_m2,
+        moment / vehicle.inertia_yy_kg_m2,
+        torque / vehicle.inertia_zz_kg_m2,
+        force * count / vehicle.mass_kg,
+    )

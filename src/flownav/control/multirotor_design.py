@@ -1,7 +1,7 @@
 """A multirotor's gains from its control powers: the shape of each loop in units that the control powers take out.
 
-The horizontal axes' shape is the outcome of the search that shaped the helicopter's (`control.shaping`), on the shipped
-450 mm quad; both axes have the same. A share of the rotors' thrust gives the body an angular acceleration, where a
+The horizontal axes' shape is where the helicopter's search (`control.shaping`) ended on the shipped
+450 mm quad, its integrators slowed until the loops keep 45 degrees with the inflow held, too; both axes have the same. A share of the rotors' thrust gives the body an angular acceleration, where a
 cyclic gives it a rate: `attitude` and `lead` are of a second-order loop.
 """
 
@@ -14,12 +14,12 @@ from flownav.control.loops import OUTER_S
 from flownav.vehicle.multirotor_parameters import MultirotorParameters, full_thrust
 from flownav.vehicle.multirotor_trim import MultirotorTrim
 
-ATTITUDE_1_S2, ATTITUDE_INTEGRAL_1_S, LEAD_S = 70.0, 0.5, 0.14
-HEAVE_RAD_S, HEAVE_INTEGRAL_1_S, HEIGHT_1_S = 5.0, 1.2, 1.2
-YAW_RATE_RAD_S, YAW_RATE_INTEGRAL_1_S, HEADING_1_S = 4.0, 1.0, 1.0
-FELT = {"position_gain": 0.5, "velocity": 1.5, "integral": 0.4, "gust_share": 1.0}
-UNFELT = {"position_gain": 0.5, "velocity": 1.5, "integral": 0.25, "gust_share": 0.0}
-GUST_S = 0.25  # the disturbance observer's low-pass
+ATTITUDE_1_S2, ATTITUDE_INTEGRAL_1_S, LEAD_S = 46.0, 0.45, 0.234
+POSITION_1_S, VELOCITY_1_S, VELOCITY_INTEGRAL_1_S2 = 0.50, 1.20, 0.12
+# heave and yaw: the fastest of such shape that keep the margins at every corner
+HEAVE_RAD_S, HEAVE_INTEGRAL_1_S, HEIGHT_1_S = 4.5, 0.9, 1.2
+YAW_RATE_RAD_S, YAW_RATE_INTEGRAL_1_S, HEADING_1_S = 6.0, 1.2, 1.5
+GUST_S = 0.109  # the disturbance observer's low-pass
 CLIMB_LIMIT_SHARE = 0.25  # of the full thrust, about trim
 TILT_LIMIT_SHARE = 0.3
 YAW_LIMIT_SHARE = 0.15
@@ -31,17 +31,16 @@ def multirotor_gains(
 ) -> AutopilotGains:
     """The gains for a multirotor and its trim; its controls are shares (`motors`), where a blade's are angles."""
     roll, pitch, yaw, heave = control_powers(vehicle, hover)
-    shape = FELT if feels_gusts else UNFELT
     by_roll, by_pitch = ATTITUDE_1_S2 / roll, ATTITUDE_1_S2 / pitch
     by_yaw, by_heave = YAW_RATE_RAD_S / yaw, HEAVE_RAD_S / heave
     decay = math.exp(-OUTER_S / GUST_S)
     return AutopilotGains(
-        position_gain=shape["position_gain"],
-        forward_gain=shape["velocity"],
-        right_gain=shape["velocity"],
-        forward_integral=shape["integral"],
-        right_integral=shape["integral"],
-        gust_share=shape["gust_share"],
+        position_gain=POSITION_1_S,
+        forward_gain=VELOCITY_1_S,
+        right_gain=VELOCITY_1_S,
+        forward_integral=VELOCITY_INTEGRAL_1_S2,
+        right_integral=VELOCITY_INTEGRAL_1_S2,
+        gust_share=1.0 if feels_gusts else 0.0,
         gust_decay_forward=decay,
         gust_decay_right=decay,
         height_gain=HEIGHT_1_S,

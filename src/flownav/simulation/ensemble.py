@@ -34,7 +34,17 @@ LATE = {"gps_receiver": "receiver_s", "flow_camera": "flow_s", "range_sensor": "
 SHEETS = ("inertial", "gps_receiver", "flow_camera", "flow_sensor", "range_sensor", "barometer", "magnetometer",
           "magnetic_field", "pad_camera", "skid_switch")  # fmt: skip
 # these are the timetable's, the scenario's or the judge's, one for all flights
-SHARED = ("rate_hz", "jitter_s", "exposure_s", "lens", "optics", "touchdown", "gravity_m_s2", "cg_above_skid_m")
+SHARED = (
+    "rate_hz",
+    "jitter_s",
+    "exposure_s",
+    "lens",
+    "optics",
+    "touchdown",
+    "gravity_m_s2",
+    "cg_above_skid_m",
+    "rotor_count",
+)
 
 # tables that one kind of vehicle has and another has not
 OF_A_KIND = set(VehicleFile.model_fields) ^ set(MultirotorFile.model_fields)

@@ -84,10 +84,10 @@ def is_hexa(vehicle: MultirotorParameters) -> bool:
 def settled(pos_d_m: float, vel_body_m_s: Vector, roll: float, pitch: float, speeds: list[Any]) -> MultirotorState:
     """A state over the origin, heading north, without rates, on a full battery."""
     u, v, w = vel_body_m_s
-    one, two, three, four, five, six = [*speeds, *[0.0] * (6 - len(speeds))]
+    six = speeds + [0.0] * (6 - len(speeds))
     qw, qx, qy, qz = quaternion_from_euler(roll, pitch, 0.0)
     return MultirotorState(
-        0.0, 0.0, pos_d_m, u, v, w, qw, qx, qy, qz, 0.0, 0.0, 0.0, one, two, three, four, five, six, 0.0
+        0.0, 0.0, pos_d_m, u, v, w, qw, qx, qy, qz, 0.0, 0.0, 0.0, six[0], six[1], six[2], six[3], six[4], six[5], 0.0
     )  # fmt: skip
 
 

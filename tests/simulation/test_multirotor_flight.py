@@ -93,7 +93,8 @@ def test_the_papers_filter_and_truth_are_a_helicopters():
 
 def test_a_scenario_names_its_vehicle_in_a_word(tmp_path):
     file = tmp_path / "mine.toml"
-    text = 'schema_version = 1\nname = "mine"\nvehicle = "quad-450"\n[flight]\nstart = "hover"\npath = [{t_s = 0, height_m = 3}, {t_s = 9, height_m = 3}]\n'
+    path = "[{t_s = 0, height_m = 3}, {t_s = 9, height_m = 3}]"
+    text = f'schema_version = 1\nname = "mine"\nvehicle = "quad-450"\n[flight]\nstart = "hover"\npath = {path}\n'
     file.write_text(text, encoding="utf-8")
     assert load_scenario(str(file)).vehicle.file == QUAD
     assert assemble(load_scenario(str(file))).flight.rotors == (0, 0, 0, 0)

@@ -82,10 +82,10 @@ def _figure(value: float, form: str = ".1f") -> str:
 def _short(corner: str) -> str:
     """`mass -, inertia +, ...` of the crossed groups as their signs alone; any other name as it is."""
     from flownav.control.box import INFLOW_HELD
-    from flownav.vehicle.corners import CROSSED
+    from flownav.vehicle.corners import CROSSED, MULTIROTOR_CROSSED
 
     parts = corner.split(", ")
     held = [parts.pop()] if parts[-1] == INFLOW_HELD else []
-    if [part[:-2] for part in parts] == list(CROSSED):
+    if [part[:-2] for part in parts] in (list(CROSSED), list(MULTIROTOR_CROSSED)):
         parts = [" ".join(part[-1] for part in parts)]
     return ", ".join([*parts, *held])

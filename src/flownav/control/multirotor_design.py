@@ -1,8 +1,8 @@
 """A multirotor's gains from its control powers: the shape of each loop in units that the control powers take out.
 
-The horizontal axes' shape is where the helicopter's search (`control.shaping`) ended on the shipped
-450 mm quad, its integrators slowed until the loops keep 45 degrees with the inflow held, too; both axes have the same. A share of the rotors' thrust gives the body an angular acceleration, where a
-cyclic gives it a rate: `attitude` and `lead` are of a second-order loop.
+The shape of the horizontal axes is where the search for the least drift (`control.shaping`'s measure and margins) ended
+on the shipped 450 mm quad, its integrators slowed until the loops keep 45 degrees with the inflow held, too; both axes
+have the same. A share of the rotors' thrust gives the body an angular acceleration, where a cyclic gives it a rate.
 """
 
 from __future__ import annotations

@@ -7,11 +7,12 @@ import pytest
 
 from flownav.compile import LANES, kernel
 from flownav.errors import InputError
+from flownav.record import POSITION_NED
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_blocks, fly_one
 from flownav.simulation.ensemble import believed
-from flownav.simulation.history import column
+from flownav.simulation.history import column, columns
 from flownav.simulation.scenario import load_scenario, with_filter, with_vehicle
 from flownav.simulation.truth import packed_truth
 from flownav.simulation.vehicles import step_vehicle
@@ -56,7 +57,7 @@ def test_it_flies_the_shipped_scenarios_to_their_end(name):
     flight = flown_by_quad(name).flight
     history = fly_one(flight, 2, 0)[:, :, 0]
     end = {axis: history[-1, column("truth", f"pos_{axis}_m")] for axis in "ned"}
-    assert np.isfinite(history).all()
+    assert np.isfinite(history[:, columns("truth", POSITION_NED)]).all()
     tilt_cosine = 1.0 - 2.0 * (history[:, column("truth", "qx")] ** 2 + history[:, column("truth", "qy")] ** 2)
     assert np.degrees(np.arccos(tilt_cosine.min())) < 30.0
     assert np.hypot(end["n"], end["e"]) < 2.0

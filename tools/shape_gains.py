@@ -11,14 +11,14 @@ from pathlib import Path
 from flownav.control.design import gains_for
 from flownav.control.shaping import AXES, Shape, axis_of, drift_m, least_margins, shape_in, shaped
 from flownav.errors import FlownavError
+from flownav.vehicle.kinds import hover_of
 from flownav.vehicle.loading import load_vehicle
-from flownav.vehicle.trim import trim
 
 
 def main(path: Path | None) -> None:
     """Both axes: gains, drift and least margins, as designed and as found."""
     vehicle = load_vehicle(path)
-    gains = gains_for(vehicle, trim(vehicle), 0.0)
+    gains = gains_for(vehicle, hover_of(vehicle), 0.0)
     print(f"{'':16}" + "".join(f"{name:>24}" for name in Shape._fields) + "   drift, m   phase, deg   gain, dB")
     for name in AXES:
         axis = axis_of(name, path)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import control as ct
 import numpy as np
 import pytest
 
-from flownav.control.box import LEAST_GAIN_DB, LEAST_PHASE_DEG, margins_of, margins_over_box
+from flownav.control.box import LEAST_GAIN_DB, LEAST_PHASE_DEG, margins_of, margins_over_box, short_of_margin
 from flownav.control.design import gains_for
 from flownav.control.gains import AutopilotGains
 from flownav.control.loops import CUTS, LOOPS, Timing, loop_gains
@@ -195,3 +197,10 @@ def test_a_shape_goes_into_the_gains_and_comes_out_again():
     shape = Shape(0.1, 0.02, 0.03, 1.0, 0.4, 0.2, 0.3)
     for name in ("forward", "right"):
         assert shape_in(with_shape(GAINS, shape, name), name) == pytest.approx(shape)
+
+
+def test_a_quadrotor_keeps_its_margins_at_every_corner():
+    box = margins_over_box(Path("quad-450"))
+    assert not box.cannot_hover
+    assert [(row.loop, row.corner, row.margins) for row in box.rows if short_of_margin(row)] == []
+    assert len({row.corner for row in box.rows}) > 80

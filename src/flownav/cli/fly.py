@@ -32,6 +32,7 @@ def command(
     feedback: Annotated[str | None, typer.Option(help="What the autopilot flies on: estimate or truth.")] = None,
     truth: Annotated[str | None, typer.Option(help="The plant: nonlinear, or the paper's linear model.")] = None,
     sensor: Annotated[str | None, typer.Option(help="A flow sensor file (TOML).")] = None,
+    vehicle: Annotated[str | None, typer.Option(help="A vehicle: maxi-joker-3, quad-450, or a file (TOML).")] = None,
     ensemble: Annotated[
         bool | None,
         typer.Option(
@@ -64,7 +65,7 @@ def command(
     require_between("--speed", speed, 0.01, 100.0)
     if flight is not None and flights > 1:
         raise InputError("--flight names one flight, --flights many; give one of the two")
-    chosen = _overridden(load_scenario(scenario), gps, filter_name, feedback, truth, sensor)
+    chosen = _overridden(load_scenario(scenario), gps, filter_name, feedback, truth, sensor, vehicle)
     setup = assemble(chosen)
     dispersed = flights > 1 if ensemble is None else ensemble
     truths = setup.ensemble() if dispersed else None
@@ -137,6 +138,7 @@ def _overridden(
     feedback: str | None,
     truth: str | None,
     sensor: str | None,
+    vehicle: str | None,
 ) -> Scenario:
     """The scenario with the command line's choices in place of its own, checked anew."""
     from flownav.parameter_files import check
@@ -153,4 +155,6 @@ def _overridden(
         entries["truth"] = truth
     if sensor is not None:
         entries["flow_sensor"] = sensor
+    if vehicle is not None:
+        entries["vehicle"] = entries.get("vehicle", {}) | {"file": vehicle}
     return check(entries, Scenario, "command line")

@@ -1,4 +1,4 @@
-"""`flownav vehicle`: what a helicopter is in hover, and how it compares with the paper's linear model."""
+"""`flownav vehicle`: what a vehicle is in hover, and how a helicopter compares with the paper's linear model."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from rich.table import Table
 
+    from flownav.vehicle.multirotor_sheet import MultirotorSheet
     from flownav.vehicle.sheet import VehicleSheet
 
     Array = NDArray[np.float64]
 
 
 def command(
-    file: Annotated[Path | None, typer.Argument(help="A vehicle file; the shipped Maxi Joker 3 without one.")] = None,
+    file: Annotated[Path | None, typer.Argument(help="A file, or quad-450; the Maxi Joker 3 without one.")] = None,
     margins: Annotated[
         bool, typer.Option("--margins", help="Of the autopilot's loops, over the vehicle's uncertainty box.")
     ] = False,
@@ -33,9 +34,13 @@ def command(
 
         show_margins(file, as_json=json_output)
         return
+    from flownav.vehicle.multirotor_sheet import MultirotorSheet
     from flownav.vehicle.sheet import as_json, vehicle_sheet
 
     sheet = vehicle_sheet(file)
+    if isinstance(sheet, MultirotorSheet):
+        show_multirotor(sheet, json_output=json_output)
+        return
     if json_output:
         typer.echo(json.dumps(as_json(sheet)))
         return
@@ -45,6 +50,21 @@ def command(
     console.print(f"[bold]{sheet.name}[/bold]: hover in still air, out of ground effect", highlight=False)
     for table in tables(sheet):
         console.print(table)
+
+
+def show_multirotor(sheet: MultirotorSheet, *, json_output: bool) -> None:
+    """Hover, forward flight and ground effect of a multirotor."""
+    from flownav.vehicle.multirotor_sheet import facts_of, rows_of
+
+    if json_output:
+        typer.echo(json.dumps(facts_of(sheet)))
+        return
+    from rich.console import Console
+
+    table = _table(f"{sheet.name}: still air, full battery", ("", "left"), ("value", "right"))
+    for row in rows_of(sheet):
+        table.add_row(*row)
+    Console().print(table)
 
 
 def tables(sheet: VehicleSheet) -> Iterable[Table]:

@@ -27,12 +27,13 @@ def show_margins(file: Path | None, *, as_json: bool) -> None:
     else:
         from rich.console import Console
 
-        from flownav.vehicle.corners import CROSSED
+        from flownav.vehicle.corners import groups_of
+        from flownav.vehicle.loading import read_vehicle
 
         console = Console()
         console.print(table(box))
         count = len({row.corner for row in box.rows})
-        console.print(f"{count} corners; signs: {', '.join(CROSSED)}", highlight=False)
+        console.print(f"{count} corners; signs: {', '.join(groups_of(read_vehicle(file))[0])}", highlight=False)
     short = sorted({row.loop for row in box.rows if short_of_margin(row)})
     if short:
         raise VerdictError(f"less than {LEAST_PHASE_DEG:g} deg or {LEAST_GAIN_DB:g} dB at a corner: {', '.join(short)}")
@@ -81,10 +82,10 @@ def _figure(value: float, form: str = ".1f") -> str:
 def _short(corner: str) -> str:
     """`mass -, inertia +, ...` of the crossed groups as their signs alone; any other name as it is."""
     from flownav.control.box import INFLOW_HELD
-    from flownav.vehicle.corners import CROSSED
+    from flownav.vehicle.corners import CROSSED, MULTIROTOR_CROSSED
 
     parts = corner.split(", ")
     held = [parts.pop()] if parts[-1] == INFLOW_HELD else []
-    if [part[:-2] for part in parts] == list(CROSSED):
+    if [part[:-2] for part in parts] in (list(CROSSED), list(MULTIROTOR_CROSSED)):
         parts = [" ".join(part[-1] for part in parts)]
     return ", ".join([*parts, *held])

@@ -15,10 +15,9 @@ from flownav.control.margins import Margins, margins
 from flownav.control.sampled import spectral_radius
 from flownav.errors import InputError
 from flownav.vehicle.corners import corners
+from flownav.vehicle.kinds import AnyVehicle, hover_of
 from flownav.vehicle.loading import load_vehicle
-from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.plant import LinearPlant, frequency_response, hover_plant
-from flownav.vehicle.trim import trim
 
 LEAST_PHASE_DEG = 45.0
 LEAST_GAIN_DB = 6.0
@@ -48,7 +47,7 @@ def margins_over_box(path: Path | None = None, *, feels_gusts: bool = True) -> B
     as `load_vehicle` and, for the vehicle as told, `trim`.
     """
     told = load_vehicle(path)
-    gains = gains_for(told, trim(told), 0.0, feels_gusts=feels_gusts)
+    gains = gains_for(told, hover_of(told), 0.0, feels_gusts=feels_gusts)
     rows: list[LoopMargins] = []
     lost: list[str] = []
     for corner in corners(path):
@@ -77,7 +76,7 @@ def short_of_margin(row: LoopMargins) -> bool:
     return row.margins.phase_deg < LEAST_PHASE_DEG or row.margins.gain_db < LEAST_GAIN_DB
 
 
-def _plants(name: str, vehicle: VehicleParameters) -> Iterator[tuple[str, LinearPlant]]:
-    about = trim(vehicle)
+def _plants(name: str, vehicle: AnyVehicle) -> Iterator[tuple[str, LinearPlant]]:
+    about = hover_of(vehicle)
     for held in (False, True):
         yield f"{name}, {INFLOW_HELD}" if held else name, hover_plant(vehicle, about, freeze_inflow=held)

@@ -12,7 +12,11 @@ import math
 
 from flownav.control.gains import AutopilotGains
 from flownav.control.loops import OUTER_S
+from flownav.control.multirotor_design import multirotor_gains
 from flownav.vehicle.feasibility import hover_induced_velocity, hover_pitch
+from flownav.vehicle.kinds import AnyTrim, AnyVehicle
+from flownav.vehicle.multirotor_parameters import MultirotorParameters
+from flownav.vehicle.multirotor_trim import MultirotorTrim
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.trim import Trim
 
@@ -35,9 +39,24 @@ GUST_FORWARD_S, GUST_RIGHT_S = 0.275, 0.19  # the disturbance observer's low-pas
 
 
 def gains_for(
+    vehicle: AnyVehicle, hover: AnyTrim, idle_collective_rad: float, *, feels_gusts: bool = True
+) -> AutopilotGains:
+    """The gains for a vehicle of either kind and its trim.
+
+    idle_collective_rad: of a helicopter; a multirotor's file states its own idle. feels_gusts: an accelerometer tells
+    of gusts (see `unexplained_acceleration`).
+    """
+    if isinstance(vehicle, MultirotorParameters) and isinstance(hover, MultirotorTrim):
+        return multirotor_gains(vehicle, hover, feels_gusts=feels_gusts)
+    if isinstance(vehicle, VehicleParameters) and isinstance(hover, Trim):
+        return helicopter_gains(vehicle, hover, idle_collective_rad, feels_gusts=feels_gusts)
+    raise TypeError("the trim is of another kind of vehicle")
+
+
+def helicopter_gains(
     vehicle: VehicleParameters, hover: Trim, idle_collective_rad: float, *, feels_gusts: bool = True
 ) -> AutopilotGains:
-    """The gains for a vehicle and its trim. feels_gusts: an accelerometer tells of gusts (see `unexplained`)."""
+    """The gains for a helicopter and its trim."""
     heave_per_collective = vehicle.main_thrust_slope_n_s_m * vehicle.main_tip_speed_m_s * (2.0 / 3.0) / vehicle.mass_kg
     side_per_pedal = vehicle.tail_thrust_slope_n_s_m * vehicle.tail_tip_speed_m_s * (2.0 / 3.0)
     yaw_per_pedal = side_per_pedal * vehicle.tail_behind_cg_m / vehicle.inertia_zz_kg_m2

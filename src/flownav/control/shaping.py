@@ -24,8 +24,8 @@ from flownav.control.margins import margins
 from flownav.control.sampled import spectral_radius
 from flownav.frames import GRAVITY_M_S2
 from flownav.vehicle.corners import corners
+from flownav.vehicle.kinds import hover_of
 from flownav.vehicle.plant import INPUTS, OUTPUTS, Complex, LinearPlant, frequency_response, gust_input, hover_plant
-from flownav.vehicle.trim import trim
 
 Array = NDArray[np.float64]
 
@@ -72,7 +72,7 @@ def axis_of(name: str, path: Path | None = None) -> Axis:
     rows = [OUTPUTS.index(output) for output in seen]
     plants, cyclics, gusts = [], [], []
     for corner in corners(path):
-        about = trim(corner.vehicle)
+        about = hover_of(corner.vehicle)
         plant = hover_plant(corner.vehicle, about)
         blown = plant._replace(b=gust_input(corner.vehicle, about)[:, [0 if name == "forward" else 1]])
         plants.append(plant)
@@ -163,9 +163,9 @@ def shaped(name: str, start: AutopilotGains, path: Path | None = None, *, rounds
     def objective(logarithms: Sequence[float]) -> float:
         shape = Shape(*np.exp(logarithms))
         phase, gain = least_margins(shape, axis)
-        short = 0.2 * max(LEAST_PHASE_DEG + RESERVE_DEG - phase, 0.0) + 1.5 * max(
+        short = max(LEAST_PHASE_DEG + RESERVE_DEG - phase, 0.0) + 5.0 * max(
             LEAST_GAIN_DB + RESERVE_DB - gain, 0.0
-        )
+        )  # a degree outweighs any drift
         worth = float(np.log(drift_m(shape, axis))) + short
         if worth < best[0]:  # only what would be the best needs to be stable
             gains = with_shape(start, shape, name)

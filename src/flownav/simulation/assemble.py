@@ -26,13 +26,15 @@ from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
 from flownav.vehicle.corners import NOMINAL
-from flownav.vehicle.loading import VehicleDescription, describe_vehicle, read_vehicle
+from flownav.vehicle.kinds import AnyFile, AnyState, AnyTrim, AnyVehicle, flattened, hover_of, rotors_of
+from flownav.vehicle.loading import VehicleDescription, describe_vehicle, read_vehicle, vehicle_file
+from flownav.vehicle.multirotor_parameters import MultirotorParameters
+from flownav.vehicle.multirotor_trim import parked_multirotor
 from flownav.vehicle.paper_model import ReducedModel, load_paper_model
-from flownav.vehicle.parameters import VehicleParameters, flatten, touchdown_limits
+from flownav.vehicle.parameters import touchdown_limits
 from flownav.vehicle.plant import hover_plant
-from flownav.vehicle.schema import VehicleFile
-from flownav.vehicle.state import Controls, HelicopterState
-from flownav.vehicle.trim import Trim, parked, trim
+from flownav.vehicle.state import Controls
+from flownav.vehicle.trim import Trim, parked
 
 NEVER_S = 1e9
 CORNER_S = 1.5  # a corner of the path is flown at constant acceleration for so long
@@ -51,10 +53,10 @@ class Setup:
     sensor: FlowSensor
     flight: Flight
     fitted: Fitted | None
-    trim: Trim
+    trim: AnyTrim
     inputs: tuple[Path, ...]
     parameters: dict[str, Any]
-    file: VehicleFile
+    file: AnyFile
     described: VehicleDescription
     dispersion: dict[str, Distribution]
 
@@ -70,11 +72,12 @@ def assemble(scenario: Scenario) -> Setup:
         raise InputError(f'{scenario.name}: truth = "linear" has no air to move; remove [wind], or fly "nonlinear"')
     if scenario.truth == "linear" and scenario.filter.name != "paper":
         raise InputError(f'{scenario.name}: truth = "linear" has no forces for an IMU to feel; fly the "paper" filter')
-    vehicle_file = Path(scenario.vehicle.file) if scenario.vehicle.file else None
+    own_file = vehicle_file(Path(scenario.vehicle.file)) if scenario.vehicle.file else None
     sensor_file = Path(scenario.flow_sensor) if scenario.flow_sensor else None
-    file, sensor, paper = read_vehicle(vehicle_file), load_sensor(sensor_file), load_paper_model()
-    vehicle = flatten(file)
-    hover = trim(vehicle)
+    file, sensor, paper = read_vehicle(own_file), load_sensor(sensor_file), load_paper_model()
+    vehicle = flattened(file)
+    _require_paper_helicopter(scenario, vehicle)
+    hover = hover_of(vehicle)
     gains = _gains(scenario, vehicle, hover)
     dispersion = scenario.dispersion.entries()
     plan = _plan(scenario, vehicle, hover, gains, dispersion)
@@ -82,6 +85,7 @@ def assemble(scenario: Scenario) -> Setup:
     flight = Flight(
         plan=plan,
         vehicle=vehicle,
+        rotors=rotors_of(vehicle),
         sensors=_sensors(scenario, sensor, vehicle),
         wind=scenario.wind.parameters(),
         path=_path(scenario, vehicle),
@@ -91,10 +95,10 @@ def assemble(scenario: Scenario) -> Setup:
         table=timetable_of(carried.schedule) if carried else None,
         settings=carried.settings if carried else np.zeros(0),
         initial_variance=_initial_variance(scenario, paper),
-        linear=_linear_truth(paper, hover) if scenario.truth == "linear" else None,
+        linear=_linear_truth(paper, hover) if scenario.truth == "linear" and isinstance(hover, Trim) else None,
         limits=touchdown_limits(file),
     )
-    described = describe_vehicle(vehicle_file)
+    described = describe_vehicle(own_file)
     parameters: dict[str, Any] = {
         "scenario": scenario.model_dump(),
         "flow_sensor": sensor.model_dump(exclude={"identified_models"}),
@@ -114,11 +118,20 @@ def assemble(scenario: Scenario) -> Setup:
         parameters["flow_noise"] = carried.told.noise._asdict()
         parameters["gps_delay_s"] = float(carried.ages_s[Sensor.GPS_POSITION])
         parameters["horizon_s"] = carried.schedule.horizon_s
-    inputs = tuple(path for path in (vehicle_file, sensor_file) if path)
+    inputs = tuple(path for path in (own_file, sensor_file) if path)
     return Setup(scenario, sensor, flight, carried, hover, inputs, parameters, file, described, dispersion)
 
 
-def _gains(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> AutopilotGains:
+def _require_paper_helicopter(scenario: Scenario, vehicle: AnyVehicle) -> None:
+    """The paper's filter and its linear truth are the model of its helicopter. InputError for another kind."""
+    if isinstance(vehicle, MultirotorParameters) and (scenario.filter.name == "paper" or scenario.truth == "linear"):
+        raise InputError(
+            f"{scenario.name}: the paper's filter and linear truth are a helicopter's; fly a multirotor with "
+            'filter.name = "landing" and truth = "nonlinear"'
+        )
+
+
+def _gains(scenario: Scenario, vehicle: AnyVehicle, hover: AnyTrim) -> AutopilotGains:
     """The vehicle's gains, what the scenario says of them, and the last metres."""
     section = scenario.autopilot
     precision = {} if section.precision is None else section.precision.model_dump()
@@ -137,7 +150,7 @@ def _gains(scenario: Scenario, vehicle: VehicleParameters, hover: Trim) -> Autop
 
 
 def _plan(
-    scenario: Scenario, vehicle: VehicleParameters, hover: Trim, gains: AutopilotGains,
+    scenario: Scenario, vehicle: AnyVehicle, hover: AnyTrim, gains: AutopilotGains,
     dispersion: dict[str, Distribution],
 ) -> FlightPlan:  # fmt: skip
     """What the loop is asked to do."""
@@ -169,21 +182,29 @@ def start_of(scenario: Scenario) -> str:
 
 
 def _start(
-    scenario: Scenario, vehicle: VehicleParameters, hover: Trim, gains: AutopilotGains, on_ground: bool, linear: bool
-) -> HelicopterState:
+    scenario: Scenario, vehicle: AnyVehicle, hover: AnyTrim, gains: AutopilotGains, on_ground: bool, linear: bool
+) -> AnyState:
     """The vehicle's first state: parked, in trimmed hover, or level for the linear truth."""
     first = scenario.flight.path[0]
     pos_d = -first.height_m - vehicle.cg_above_skid_m
     if on_ground:
-        idle = gains.idle_collective_rad
-        pedal = hover.pedal_rad + gains.pedal_per_collective * (idle - hover.collective_rad)
-        state = parked(vehicle, Controls(hover.lon, hover.lat, idle, pedal))
+        state = _parked(vehicle, hover, gains)
         return state._replace(pos_n=first.north_m, pos_e=first.east_m)
     state = hover.state._replace(pos_n=first.north_m, pos_e=first.east_m, pos_d=pos_d)
     return state._replace(qw=1.0, qx=0.0, qy=0.0, qz=0.0) if linear else state
 
 
-def _path(scenario: Scenario, vehicle: VehicleParameters) -> Any:
+def _parked(vehicle: AnyVehicle, hover: AnyTrim, gains: AutopilotGains) -> AnyState:
+    """At rest on the ground, rotors idling."""
+    if isinstance(vehicle, MultirotorParameters):
+        return parked_multirotor(vehicle)
+    assert isinstance(hover, Trim)
+    idle = gains.idle_collective_rad
+    pedal = hover.pedal_rad + gains.pedal_per_collective * (idle - hover.collective_rad)
+    return parked(vehicle, Controls(hover.lon, hover.lat, idle, pedal))
+
+
+def _path(scenario: Scenario, vehicle: AnyVehicle) -> Any:
     """The reference path of the centre of gravity. The linear truth has no ground: its path stops there."""
     lowest = 0.0 if scenario.truth == "linear" else -np.inf
     straight = path_through(
@@ -195,7 +216,7 @@ def _path(scenario: Scenario, vehicle: VehicleParameters) -> Any:
     return rounded(straight, CORNER_S)
 
 
-def _sensors(scenario: Scenario, sensor: FlowSensor, vehicle: VehicleParameters) -> SensorSuite:
+def _sensors(scenario: Scenario, sensor: FlowSensor, vehicle: AnyVehicle) -> SensorSuite:
     """Every sensor's coefficients."""
     return SensorSuite(
         gps=scenario.gps.parameters(),

@@ -22,8 +22,9 @@ from flownav.simulation.fitting import onboard_of
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.truth import PARTS, PUNCTUAL, Lateness, Truth
+from flownav.vehicle.kinds import AnyFile, flattened
 from flownav.vehicle.loading import VehicleDescription
-from flownav.vehicle.parameters import flatten
+from flownav.vehicle.multirotor_schema import MultirotorFile
 from flownav.vehicle.schema import VehicleFile
 
 Array = NDArray[np.float64]
@@ -33,7 +34,20 @@ LATE = {"gps_receiver": "receiver_s", "flow_camera": "flow_s", "range_sensor": "
 SHEETS = ("inertial", "gps_receiver", "flow_camera", "flow_sensor", "range_sensor", "barometer", "magnetometer",
           "magnetic_field", "pad_camera", "skid_switch")  # fmt: skip
 # these are the timetable's, the scenario's or the judge's, one for all flights
-SHARED = ("rate_hz", "jitter_s", "exposure_s", "lens", "optics", "touchdown", "gravity_m_s2", "cg_above_skid_m")
+SHARED = (
+    "rate_hz",
+    "jitter_s",
+    "exposure_s",
+    "lens",
+    "optics",
+    "touchdown",
+    "gravity_m_s2",
+    "cg_above_skid_m",
+    "rotor_count",
+)
+
+# tables that one kind of vehicle has and another has not
+OF_A_KIND = set(VehicleFile.model_fields) ^ set(MultirotorFile.model_fields)
 
 TOGETHER = 64  # flights whose numbers are drawn together
 
@@ -56,7 +70,7 @@ class Ensemble:
     """
 
     def __init__(
-        self, scenario: Scenario, flight: Flight, file: VehicleFile, described: VehicleDescription, sensor: FlowSensor,
+        self, scenario: Scenario, flight: Flight, file: AnyFile, described: VehicleDescription, sensor: FlowSensor,
         sheets: SensorSheets | None, dispersion: Mapping[str, Distribution],
     ) -> None:  # fmt: skip
         self.scenario, self.flight, self.sheets = scenario, flight, sheets
@@ -112,7 +126,7 @@ class Ensemble:
         found: dict[str, Any] = {}
         vehicle: Any = self.flight.vehicle
         if "vehicle" in touched:
-            vehicle = found["vehicle"] = flatten(models["vehicle"])
+            vehicle = found["vehicle"] = flattened(models["vehicle"])
         if "wind" in touched:
             found["wind"] = models["wind"].parameters()
         if "flow_sensor" in touched:
@@ -134,8 +148,10 @@ class Ensemble:
         return PUNCTUAL._replace(**late)
 
     def _carried(self, name: str) -> bool:
-        """Whether the scenario's vehicle has what an entry is of; a known sensor that it has not is passed over."""
+        """Whether the vehicle has what an entry is of; what another kind has, or a known sensor, is passed over."""
         source = name.partition(".")[0]
+        if source == "vehicle" and name.split(".")[1] in OF_A_KIND - set(self.contents["vehicle"]):
+            return False
         if source in self.models:
             return True
         if source in SHEETS:

@@ -33,10 +33,11 @@ from flownav.simulation.layout import (
 from flownav.simulation.navigating import Timetable, keep_inertial
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import ATTITUDE_S, ATTITUDE_STEPS, CONTACT_SHARE, PHYSICS_S, PHYSICS_STEPS, Flight
-from flownav.simulation.plant import LinearTruth, linear_step, observe_plant, runge_kutta_step
+from flownav.simulation.plant import LinearTruth, linear_step
 from flownav.simulation.ring import FIELDS, FIRST
 from flownav.simulation.sampling import read_inertial
 from flownav.simulation.sensing import EPOCH_S, lens_height, true_imu
+from flownav.simulation.vehicles import observe_vehicle, step_vehicle
 from flownav.simulation.wind import step_wind
 from flownav.vehicle.state import Controls
 
@@ -207,8 +208,8 @@ def advance(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None
         follow_flow(work, lanes, flight)
         if linear is None:
             for _ in range(PHYSICS_STEPS):
-                runge_kutta_step(work, lanes, PHYSICS_S)
-            observe_plant(work, lanes)
+                step_vehicle(work, lanes, PHYSICS_S, flight.rotors)
+            observe_vehicle(work, lanes, flight.rotors)
         else:
             linear_step(work, lanes, linear)
 
@@ -224,9 +225,9 @@ def advance_sensing(
         if step % PHYSICS_STEPS == 0:
             steer(work, lanes, flight, None, onboard)
             follow_flow(work, lanes, flight)
-        runge_kutta_step(work, lanes, PHYSICS_S)
+        step_vehicle(work, lanes, PHYSICS_S, flight.rotors)
         if (step + 1) % PHYSICS_STEPS == 0:
-            observe_plant(work, lanes)
+            observe_vehicle(work, lanes, flight.rotors)
         if (step + 1) % onboard.inertial_steps == 0:
             for lane in range(len(lanes)):
                 gravity_m_s2 = vehicle_as_is(work, lanes, lane).gravity_m_s2

@@ -29,7 +29,7 @@ from flownav.simulation.navigating import Timetable
 from flownav.simulation.onboard import EPOCH_S, PHYSICS_PERIOD_S, Clock, Onboard, Place
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.schedule import Schedule, Timing, schedule_of
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.kinds import AnyVehicle, rotor_facts
 
 Sheet = TypeVar("Sheet", bound=SensorSheet)
 BLADES = 2.0  # of the main rotor
@@ -54,13 +54,13 @@ class Fitted(NamedTuple):
     ages_s: Array
 
 
-def fitted(scenario: Scenario, flow_sensor: FlowSensor, vehicle: VehicleParameters, epochs: int) -> Fitted:
+def fitted(scenario: Scenario, flow_sensor: FlowSensor, vehicle: AnyVehicle, epochs: int) -> Fitted:
     """The vehicle's sensors as a scenario wants them. InputError as the sheets' loaders say."""
     sheets = sheets_of(scenario, flow_sensor, vehicle)
     onboard = onboard_of(scenario, sheets, scenario.flow.parameters(flow_sensor), vehicle)
     timing = timing_of(sheets, flow_sensor)
     schedule = schedule_of(epochs, onboard, timing)
-    rotor_hz = vehicle.main_speed_rad_s / (2.0 * math.pi)
+    rotor_hz = rotor_facts(vehicle).speed_rad_s / (2.0 * math.pi)
     told = settings_of(flow_sensor, sheets, flow_noise_stated=True, rotor_hz=(rotor_hz, BLADES * rotor_hz))
     declination_rad = math.radians(sheets.magnetic_field.declination_deg)
     equipment = Equipment(True, False, FROM_MAG, True, START_WAIT_S, declination_rad)
@@ -101,7 +101,7 @@ def refitted(
 
 
 # -- datasheets -----------------------------------------------------------------------------------------------
-def sheets_of(scenario: Scenario, flow_sensor: FlowSensor, vehicle: VehicleParameters) -> SensorSheets:
+def sheets_of(scenario: Scenario, flow_sensor: FlowSensor, vehicle: AnyVehicle) -> SensorSheets:
     """Every sheet, the scenario's own figures above the files', at rates that the simulator's clock has."""
     files = scenario.sensors
     lens_down_m = vehicle.cg_above_skid_m - scenario.vehicle.lens_above_skid_m
@@ -184,7 +184,7 @@ def pad_sheet(scenario: Scenario, sheet: PadCameraSheet, lens_down_m: float) -> 
 
 
 # -- equations' parameters --------------------------------------------------------------------------------------
-def onboard_of(scenario: Scenario, sheets: SensorSheets, flow: FlowParameters, vehicle: VehicleParameters) -> Onboard:
+def onboard_of(scenario: Scenario, sheets: SensorSheets, flow: FlowParameters, vehicle: AnyVehicle) -> Onboard:
     """Coefficients, clocks and places."""
     receiver, camera, ranger = sheets.gps_receiver, sheets.flow_camera, sheets.range_sensor
     baro, mag, pad, skid = sheets.barometer, sheets.magnetometer, sheets.pad_camera, sheets.skid_switch
@@ -195,8 +195,9 @@ def onboard_of(scenario: Scenario, sheets: SensorSheets, flow: FlowParameters, v
     assert mag is not None
     assert skid is not None
     pad_camera = pad if pad is not None else load_pad_camera_sheet()
+    rotor = rotor_facts(vehicle)
     return Onboard(
-        inertial=sheets.inertial.parameters(vehicle.main_speed_rad_s, BLADES),
+        inertial=sheets.inertial.parameters(rotor.speed_rad_s, BLADES),
         inertial_steps=round(1.0 / (float(sheets.inertial.rate_hz) * PHYSICS_PERIOD_S)),
         receiver=receiver.parameters(),
         receiver_clock=clock_of(receiver, 1),
@@ -208,7 +209,7 @@ def onboard_of(scenario: Scenario, sheets: SensorSheets, flow: FlowParameters, v
         ranger=ranger.parameters(),
         range_clock=clock_of(ranger, 2),
         range_place=place_of(ranger.lens),
-        baro=baro.parameters(vehicle.main_radius_m, vehicle.air_density_kg_m3),
+        baro=baro.parameters(rotor.radius_m, vehicle.air_density_kg_m3),
         baro_clock=clock_of(baro, 1),
         mag=mag.parameters(sheets.magnetic_field),
         mag_clock=clock_of(mag, 0),
@@ -218,7 +219,7 @@ def onboard_of(scenario: Scenario, sheets: SensorSheets, flow: FlowParameters, v
         skid=skid.parameters(vehicle.mass_kg * vehicle.gravity_m_s2),
         skid_clock=clock_of(skid, 0),
         ground=LEVEL,
-        rotor_above_cg_m=vehicle.hub_above_cg_m,
+        rotor_above_cg_m=rotor.above_cg_m,
         texture_everywhere=1.0 if scenario.sensors.texture == "everywhere" else 0.0,
         pad_half_size_m=0.5 * scenario.pad.size_m,
     )

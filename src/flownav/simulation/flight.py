@@ -27,7 +27,7 @@ from flownav.simulation.epoch import (
 )
 from flownav.simulation.filtering import run_filter, start_filter
 from flownav.simulation.history import write_history
-from flownav.simulation.layout import load_wind_normals, store_autopilot, store_helicopter, store_wind, wind_as_is
+from flownav.simulation.layout import load_wind_normals, store_autopilot, store_wind, wind_as_is
 from flownav.simulation.navigating import (
     Timetable,
     carry_ahead,
@@ -39,10 +39,10 @@ from flownav.simulation.navigating import (
 )
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import ATTITUDE_STEPS, NOTHING, PHYSICS_S, PHYSICS_STEPS, START_STEP, Flight
-from flownav.simulation.plant import observe_plant
 from flownav.simulation.sampling import sample
 from flownav.simulation.sensing import EPOCH_S, draw_epoch, sense, start_sensors
 from flownav.simulation.units import start_onboard
+from flownav.simulation.vehicles import observe_vehicle, place
 from flownav.simulation.wind import start_wind
 
 
@@ -51,12 +51,12 @@ def start_block(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight,
     """Vehicle, wind, sensors and autopilot before the first epoch."""
     draw_epoch(work, lanes, seed, first, START_STEP, flight.plan.draws)
     for lane in range(len(lanes)):
-        store_helicopter(work, lanes, lane, flight.plan.start)
+        place(work, lanes, lane, flight.plan.start)
         gusts = start_wind(load_wind_normals(work, lanes, lane), wind_as_is(work, lanes, lane))
         store_wind(work, lanes, lane, gusts)
         autopilot = grounded(flight.gains) if flight.plan.starts_on_ground else hovering(flight.gains)
         store_autopilot(work, lanes, lane, autopilot)
-    observe_plant(work, lanes)
+    observe_vehicle(work, lanes, flight.rotors)
     start_sensors(work, lanes, flight.sensors)
     if onboard is not None:
         start_onboard(work, lanes, seed, first, START_STEP + 4, onboard)

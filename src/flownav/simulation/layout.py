@@ -23,18 +23,20 @@ from flownav.sensors.pad_camera import PadCameraNormals, PadCameraUnit
 from flownav.sensors.range_sensor import RangeSensorNormals, RangeSensorState, RangeSensorUnit
 from flownav.sensors.rangefinder import RangefinderState
 from flownav.sensors.skid_switch import SkidSwitchNormals, SkidSwitchState, SkidSwitchUnit
-from flownav.simulation.truth import PARTS
+from flownav.simulation.truth import PARTS, SIZES
 from flownav.simulation.wind import WindNormals, WindState, WindVelocity
+from flownav.vehicle.multirotor_parameters import MultirotorParameters
+from flownav.vehicle.multirotor_state import MultirotorState, Six
 from flownav.vehicle.state import Controls, HelicopterState, Inflow
 
 _rows = Rows()
 
 # what this flight's vehicle, wind and sensors are (`simulation.truth`)
-AS_IS = {part: _rows.take(len(kind._fields)) for part, kind in PARTS.items()}
+AS_IS = {part: _rows.take(SIZES[part]) for part in PARTS}
 AS_IS_BEGIN, AS_IS_END = AS_IS["vehicle"], _rows.next
 
 # the plant
-HELICOPTER = _rows.take(len(HelicopterState._fields))
+HELICOPTER = _rows.take(len(HelicopterState._fields))  # or the multirotor, whose first fields are the same
 STAGE = _rows.take(len(HelicopterState._fields))  # the state of a Runge-Kutta stage
 SUM = _rows.take(len(HelicopterState._fields))  # the weighted sum of stage rates
 INFLOW = _rows.take(len(Inflow._fields))
@@ -124,6 +126,9 @@ ROWS = _rows.next
 load_helicopter, store_helicopter = lane_access(HelicopterState, HELICOPTER)
 load_stage, store_stage = lane_access(HelicopterState, STAGE)
 load_sum, store_sum = lane_access(HelicopterState, SUM)
+load_multirotor, store_multirotor = lane_access(MultirotorState, HELICOPTER)
+load_multirotor_stage, store_multirotor_stage = lane_access(MultirotorState, STAGE)
+load_shares, store_shares = lane_access(Six, SUM)  # of thrust, as the mixer asks for
 load_inflow, store_inflow = lane_access(Inflow, INFLOW)
 load_controls, store_controls = lane_access(Controls, CONTROLS)
 load_wind, store_wind = lane_access(WindState, WIND)
@@ -160,7 +165,8 @@ load_skid, store_skid = lane_access(SkidSwitchState, SKID)
 load_skid_normals, _ = lane_access(SkidSwitchNormals, SKID_NORMALS)
 load_estimate, store_estimate = lane_access(Estimate, ESTIMATE)
 load_autopilot, store_autopilot = lane_access(AutopilotState, AUTOPILOT)
-vehicle_as_is, _ = lane_access(PARTS["vehicle"], AS_IS["vehicle"])
+vehicle_as_is, _ = lane_access(PARTS["vehicle"], AS_IS["vehicle"])  # of a multirotor its first fields only
+multirotor_as_is, _ = lane_access(MultirotorParameters, AS_IS["vehicle"])
 wind_as_is, _ = lane_access(PARTS["wind"], AS_IS["wind"])
 flow_as_is, _ = lane_access(PARTS["flow"], AS_IS["flow"])
 late_as_is, _ = lane_access(PARTS["late"], AS_IS["late"])

@@ -15,8 +15,8 @@ from flownav.simulation.onboard import Onboard
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
 from flownav.simulation.wind import WindParameters
-from flownav.vehicle.parameters import TouchdownLimits, VehicleParameters
-from flownav.vehicle.state import HelicopterState
+from flownav.vehicle.kinds import AnyState, AnyVehicle
+from flownav.vehicle.parameters import TouchdownLimits
 
 ATTITUDE_STEPS = 5  # 250 Hz within an epoch
 PHYSICS_STEPS = 2  # 500 Hz within an attitude step
@@ -31,7 +31,7 @@ class FlightPlan(NamedTuple):
     """What a scenario asks of the loop, as numbers the kernel takes."""
 
     epochs: int
-    start: HelicopterState
+    start: AnyState
     starts_on_ground: bool
     takeoff_at_s: float
     may_land_after_s: float
@@ -50,7 +50,8 @@ class Flight(NamedTuple):
     """
 
     plan: FlightPlan
-    vehicle: VehicleParameters
+    vehicle: AnyVehicle
+    rotors: tuple[int, ...] | None  # a multirotor's; None: a helicopter
     sensors: SensorSuite
     wind: WindParameters
     path: Path

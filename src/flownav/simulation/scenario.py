@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
@@ -19,6 +19,7 @@ from flownav.sensors.settings import GpsInsSettings, PadFixSettings, Rangefinder
 from flownav.simulation.dispersion import SHIPPED as SHIPPED_DISPERSION
 from flownav.simulation.dispersion import DispersionSection
 from flownav.simulation.wind import WindSettings
+from flownav.vehicle.loading import SHIPPED_NAMES
 
 SHIPPED = ("takeoff", "landing", "gusty", "pad_return", "approach")
 
@@ -71,7 +72,10 @@ class PadSection(ParameterModel):
 
 
 class VehicleSection(ParameterModel):
-    """The vehicle file; the shipped Maxi Joker 3 unless named."""
+    """The vehicle file, or a shipped vehicle's name; the shipped Maxi Joker 3 unless named.
+
+    In a scenario `vehicle = "quad-450"` is short for this section with that file.
+    """
 
     file: str | None = None
     lens_above_skid_m: Number = Field(0.10, ge=0.0, le=2.0)
@@ -158,6 +162,11 @@ class Scenario(ParameterModel):
     autopilot: AutopilotSection = AutopilotSection()
     dispersion: DispersionSection = DispersionSection()
 
+    @field_validator("vehicle", mode="before")
+    @classmethod
+    def _named(cls, given: Any) -> Any:
+        return {"file": given} if isinstance(given, str) else given
+
 
 def load_scenario(name: str) -> Scenario:
     """A shipped scenario by name, or a file. InputError where neither exists or the file is wrong."""
@@ -183,6 +192,11 @@ def load_scenario(name: str) -> Scenario:
     )
 
 
+def with_vehicle(scenario: Scenario, vehicle: str) -> Scenario:
+    """The scenario flown by another vehicle: a shipped one's name, or a file."""
+    return scenario.model_copy(update={"vehicle": scenario.vehicle.model_copy(update={"file": vehicle})})
+
+
 def with_filter(scenario: Scenario, name: Literal["paper", "landing"]) -> Scenario:
     """The scenario flown with another filter."""
     return scenario.model_copy(update={"filter": scenario.filter.model_copy(update={"name": name})})
@@ -196,5 +210,5 @@ def _dispersion_beside(scenario: Path, section: DispersionSection) -> Dispersion
 
 
 def _beside(scenario: Path, file: str | None) -> str | None:
-    """A file that a scenario names is looked for beside the scenario."""
-    return None if file is None else str(scenario.parent / file)
+    """A file that a scenario names is looked for beside the scenario; a shipped vehicle is not."""
+    return file if file is None or file in SHIPPED_NAMES else str(scenario.parent / file)

@@ -22,6 +22,8 @@ from flownav.sensors.pad_camera import PadCameraParameters
 from flownav.sensors.range_sensor import RangeSensorParameters
 from flownav.sensors.skid_switch import SkidSwitchParameters
 from flownav.simulation.wind import WindParameters
+from flownav.vehicle.kinds import AnyVehicle
+from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.parameters import VehicleParameters
 
 Array = NDArray[np.float64]
@@ -42,7 +44,7 @@ PUNCTUAL = Lateness(0.0, 0.0, 0.0, 0.0)
 class Truth(NamedTuple):
     """Every number that may differ from flight to flight; `flow` is the paper's metric sensor, `camera_flow` ours."""
 
-    vehicle: VehicleParameters
+    vehicle: AnyVehicle
     wind: WindParameters
     flow: FlowParameters
     late: Lateness
@@ -57,13 +59,18 @@ class Truth(NamedTuple):
     skid: SkidSwitchParameters
 
 
-PARTS: dict[str, Any] = get_type_hints(Truth)
-TRUTH_ROWS = sum(len(part._fields) for part in PARTS.values())
+PARTS: dict[str, Any] = get_type_hints(Truth) | {"vehicle": VehicleParameters}
+LARGEST_VEHICLE = max(len(VehicleParameters._fields), len(MultirotorParameters._fields))
+SIZES = {part: len(kind._fields) for part, kind in PARTS.items()} | {"vehicle": LARGEST_VEHICLE}
+TRUTH_ROWS = sum(SIZES.values())
 
 
 def packed_truth(truths: Sequence[Truth]) -> Array:
     """The truths of a block's lanes as its buffer takes them, (TRUTH_ROWS, lanes) flattened."""
-    columns = [[number for part in truth for number in part] for truth in truths]
+    columns = [
+        [*truth.vehicle, *[0.0] * (LARGEST_VEHICLE - len(truth.vehicle)), *(x for part in truth[1:] for x in part)]
+        for truth in truths
+    ]
     rows = np.array(columns, np.float64).T
     if rows.shape[0] != TRUTH_ROWS:
         raise ValueError(f"a truth has {TRUTH_ROWS} numbers, not {rows.shape[0]}")

@@ -12,6 +12,7 @@ import numpy as np
 
 from flownav.compile import equation, magnitude
 from flownav.frames import Vector
+from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.rotor import cosine_of_tilt, sine_of_tilt
 
@@ -76,7 +77,7 @@ def tail_plane_force(induced: float, air: AirMotion, vehicle: VehicleParameters)
 
 
 @equation
-def fuselage_drag(induced: float, air: AirMotion, vehicle: VehicleParameters) -> Vector:
+def fuselage_drag(induced: float, air: AirMotion, vehicle: VehicleParameters | MultirotorParameters) -> Vector:
     """Drag of the fuselage in the airspeed and the main rotor's wake [N]; it acts at the centre of gravity."""
     w = air.w - induced
     speed = np.sqrt(air.u * air.u + air.v * air.v + w * w)

@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from flownav.errors import InputError
-from flownav.parameter_files import check, read_toml, shipped
-from flownav.vehicle.loading import SHIPPED_VEHICLE
-from flownav.vehicle.parameters import VehicleParameters, flatten
-from flownav.vehicle.schema import VehicleFile
+from flownav.parameter_files import read_toml
+from flownav.vehicle.kinds import AnyVehicle, flattened
+from flownav.vehicle.loading import read_kind, vehicle_file
+from flownav.vehicle.multirotor_schema import MultirotorFile
 
 NOMINAL = "nominal"
 Groups = dict[str, tuple[str, ...]]
@@ -44,11 +44,37 @@ ALONE: Groups = {
 }
 
 
+# of a multirotor
+MULTIROTOR_CROSSED: Groups = {
+    "mass": ("body.mass_kg",),
+    "inertia": ("body.inertia_xx_kg_m2", "body.inertia_yy_kg_m2", "body.inertia_zz_kg_m2"),
+    "thrust": ("propeller.thrust_coefficient", "motor.full_speed_rad_s"),
+    "drag": (
+        "propeller.inplane_drag_n_s2_m_rad", "propeller.flap_response", "propeller.hub_stiffness_n_m_rad",
+        "propeller.lift_slope_per_rad", "fuselage.area_x_m2", "fuselage.area_y_m2", "fuselage.area_z_m2",
+    ),
+    "motors": ("motor.time_constant_s",),
+}  # fmt: skip
+MULTIROTOR_ALONE: Groups = {
+    "rotor inertia": ("propeller.inertia_kg_m2",),
+    "torque": ("propeller.power_coefficient",),
+    "air density": ("environment.air_density_kg_m3",),
+    "battery": ("battery.resistance_ohm",),
+    "rotors' height": ("frame.rotors_above_cg_m",),
+}
+
+
 class Corner(NamedTuple):
     """A vehicle at a corner of the box; name: `nominal`, or `mass +, inertia -, ...` of the groups that are moved."""
 
     name: str
-    vehicle: VehicleParameters
+    vehicle: AnyVehicle
+
+
+def groups_of(file: Any) -> tuple[Groups, Groups]:
+    """What is crossed and what is moved alone of a file's kind."""
+    multirotor = isinstance(file, MultirotorFile)
+    return (MULTIROTOR_CROSSED, MULTIROTOR_ALONE) if multirotor else (CROSSED, ALONE)
 
 
 def corners(path: Path | None = None) -> Iterator[Corner]:
@@ -56,11 +82,13 @@ def corners(path: Path | None = None) -> Iterator[Corner]:
 
     InputError where the file does not fit its schema, or an uncertainty is no number and no `"from..to"`.
     """
-    path = path or shipped(SHIPPED_VEHICLE)
+    path = vehicle_file(path)
     contents = read_toml(path)
-    yield Corner(NOMINAL, flatten(check(contents, VehicleFile, str(path))))
-    crossed = {name: keys for name, keys in CROSSED.items() if _is_wide(contents, keys, path)}
-    alone = {name: keys for name, keys in ALONE.items() if _is_wide(contents, keys, path)}
+    told = read_kind(contents, str(path))
+    yield Corner(NOMINAL, flattened(told))
+    crossed, alone = (
+        {name: keys for name, keys in groups.items() if _is_wide(contents, keys, path)} for groups in groups_of(told)
+    )
     combined = list(product((-1, 1), repeat=len(crossed))) if crossed else []
     for groups, signs in [(crossed, signs) for signs in combined] + [
         ({name: keys}, (sign,)) for name, keys in alone.items() for sign in (-1, 1)
@@ -70,7 +98,7 @@ def corners(path: Path | None = None) -> Iterator[Corner]:
             for key in keys:
                 moved = _moved(moved, key, sign, path)
         name = ", ".join(f"{group} {'+' if sign > 0 else '-'}" for group, sign in zip(groups, signs, strict=True))
-        yield Corner(name, flatten(check(moved, VehicleFile, f"{path}, corner {name}")))
+        yield Corner(name, flattened(read_kind(moved, f"{path}, corner {name}")))
 
 
 def _is_wide(contents: dict[str, Any], keys: tuple[str, ...], path: Path) -> bool:

@@ -1,4 +1,4 @@
-"""Loading a vehicle file: checked, made flat, and refused where no such helicopter could hover."""
+"""Loading a vehicle file of either kind: checked, made flat, and refused where no such vehicle could hover."""
 
 from __future__ import annotations
 
@@ -6,11 +6,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from flownav.parameter_files import check, read_toml, shipped
-from flownav.vehicle.feasibility import require_feasible
-from flownav.vehicle.parameters import VehicleParameters, flatten
-from flownav.vehicle.schema import VehicleFile
+from flownav.vehicle.kinds import AnyFile, AnyVehicle, flattened, require_flyable, schema_of
 
 SHIPPED_VEHICLE = "maxi_joker_3.toml"
+SHIPPED_NAMES = {"maxi-joker-3": SHIPPED_VEHICLE, "quad-450": "quad_450.toml"}
 
 
 class Entry(NamedTuple):
@@ -30,20 +29,33 @@ class VehicleDescription(NamedTuple):
     entries: tuple[Entry, ...]
 
 
-def load_vehicle(path: Path | None = None) -> VehicleParameters:
-    """The parameters in a vehicle file, the shipped Maxi Joker 3 where `path` is None.
+def vehicle_file(path: Path | None = None) -> Path:
+    """Where a vehicle's file is: a path, a shipped vehicle's name (`quad-450`), the Maxi Joker 3 where it is None."""
+    name = "maxi-joker-3" if path is None else str(path)
+    return shipped(SHIPPED_NAMES[name]) if name in SHIPPED_NAMES else Path(name)
+
+
+def load_vehicle(path: Path | None = None) -> AnyVehicle:
+    """The parameters in a vehicle file or of a shipped vehicle (see `vehicle_file`).
 
     InputError names the file, the key and what is allowed: an unknown or missing key, a value out of range, a
-    helicopter that cannot be (inertia, skids) or that cannot hold a hover.
+    vehicle that cannot be (inertia, skids) or that cannot hold a hover.
     """
-    return flatten(read_vehicle(path))
+    return flattened(read_vehicle(path))
 
 
-def read_vehicle(path: Path | None = None) -> VehicleFile:
+def read_vehicle(path: Path | None = None) -> AnyFile:
     """A vehicle file as it stands, checked. InputError as `load_vehicle`."""
-    path = path or shipped(SHIPPED_VEHICLE)
-    file = check(read_toml(path), VehicleFile, str(path))
-    require_feasible(flatten(file), str(path))
+    path = vehicle_file(path)
+    file = read_kind(read_toml(path), str(path))
+    require_flyable(flattened(file), str(path))
+    return file
+
+
+def read_kind(contents: dict[str, Any], where: str) -> AnyFile:
+    """A file's contents checked by the schema of their kind. InputError names the file and the key."""
+    schema: Any = schema_of(contents, where)
+    file: AnyFile = check(contents, schema, where)
     return file
 
 
@@ -52,9 +64,9 @@ def describe_vehicle(path: Path | None = None) -> VehicleDescription:
 
     InputError where the file does not fit its schema.
     """
-    path = path or shipped(SHIPPED_VEHICLE)
+    path = vehicle_file(path)
     contents = read_toml(path)
-    file = check(contents, VehicleFile, str(path))
+    file = read_kind(contents, str(path))
     tables = {key: table for key, table in contents.items() if isinstance(table, dict)}
     entries = [_entry(f"{table}.{key}", value) for table, rows in tables.items() for key, value in rows.items()]
     return VehicleDescription(file.name, path, tuple(entries))

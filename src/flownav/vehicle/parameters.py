@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from flownav.vehicle.multirotor_schema import MultirotorFile
 from flownav.vehicle.schema import Actuator, VehicleFile
 
 
@@ -95,7 +96,7 @@ class TouchdownLimits(NamedTuple):
     max_slide_m: float
 
 
-def touchdown_limits(file: VehicleFile) -> TouchdownLimits:
+def touchdown_limits(file: VehicleFile | MultirotorFile) -> TouchdownLimits:
     """The limits of a checked file."""
     return TouchdownLimits(**file.touchdown.model_dump())
 

@@ -1,24 +1,26 @@
-"""The whole helicopter as a linear plant about hover: what its controller sees, with exact derivatives.
+"""The whole vehicle as a linear plant about hover: what its controller sees, with exact derivatives.
 
-Unlike the reduced model of `linearize`, nothing is held: attitude, body rates, flapping and the servos are states.
+Unlike the reduced model of `linearize`, nothing is held: attitude, body rates, flapping and the servos, or the
+rotors' speeds, are states.
 The attitude is a small rotation about the body axes, so that the plant has no state for a quaternion's length.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.frames import to_earth
-from flownav.vehicle import helicopter
+from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.vehicle import helicopter, multirotor
 from flownav.vehicle.complex_step import jacobian
+from flownav.vehicle.kinds import AnyState, AnyTrim, AnyVehicle
 from flownav.vehicle.linearize import BESIDE_HOVER_M_S
-from flownav.vehicle.parameters import VehicleParameters
-from flownav.vehicle.state import Controls, HelicopterState, Inflow
-from flownav.vehicle.trim import Trim
+from flownav.vehicle.multirotor_parameters import MultirotorParameters, with_inflow_held
+from flownav.vehicle.multirotor_trim import is_hexa
+from flownav.vehicle.state import Controls, HelicopterState
 
 FIELDS = HelicopterState._fields
 ATTITUDE = slice(FIELDS.index("qw"), FIELDS.index("qw") + 4)
@@ -32,45 +34,49 @@ Complex = NDArray[np.complex128]
 
 
 class LinearPlant(NamedTuple):
-    """ẋ = A·x + B·u, y = C·x about hover: A (22, 22), B (22, 4), C (12, 22); u in INPUTS, y in OUTPUTS, SI, radians."""
+    """ẋ = A·x + B·u, y = C·x about hover: A (n, n), B (n, 4), C (12, n); u in INPUTS, y in OUTPUTS, SI, radians.
+
+    n is 22 of a helicopter, 16 of a quad and 18 of a hexa, whose controls are shares of thrust (`motors`).
+    """
 
     a: Array
     b: Array
     c: Array
 
 
-def hover_plant(vehicle: VehicleParameters, about: Trim, *, freeze_inflow: bool = False) -> LinearPlant:
+def hover_plant(vehicle: AnyVehicle, about: AnyTrim, *, freeze_inflow: bool = False) -> LinearPlant:
     """The plant about a trim in still air, heading north.
 
     freeze_inflow: the induced velocities keep their trim values, the plant of the first 50 ms; else they are in
     balance at once, the plant of all that is slower. A rotor is between the two.
     """
-    trim = about.state
-    air = helicopter.air_motion(trim, helicopter.attitude(trim), 0.0, 0.0, 0.0)
-    held = helicopter.inflow(air, helicopter.blade_angles(trim, vehicle), vehicle) if freeze_inflow else None
-    count = len(FIELDS)
+    rates = _rates(vehicle, about, freeze_inflow=freeze_inflow)
+    trim, kind = np.array([float(x) for x in about.state]), type(about.state)
+    count = len(trim)
 
-    def rates(point: Sequence[Any]) -> Sequence[Any]:
-        return _rates(HelicopterState(*point[:count]), Controls(*point[count:]), held, vehicle)
+    def displaced(point: Sequence[Any]) -> Sequence[Any]:
+        return rates(kind(*point[:count]), Controls(*point[count:]), 0.0, 0.0)
 
     here = np.array([*trim, *about.controls])
     aside = np.zeros(len(here))
     aside[FIELDS.index("u")] = BESIDE_HOVER_M_S  # the fins' lift has a kink in hover (see linearize)
-    both = 0.5 * (jacobian(rates, here + aside) + jacobian(rates, here - aside))
-    seen = jacobian(lambda point: _outputs(HelicopterState(*point)), np.array(trim))
-    out, into = _small_rotation(np.array(trim[ATTITUDE]))
+    both = 0.5 * (jacobian(displaced, here + aside) + jacobian(displaced, here - aside))
+    seen = jacobian(lambda point: _outputs(kind(*point)), trim)
+    out, into = _small_rotation(trim[ATTITUDE], _kept(vehicle, count), count)
     return LinearPlant(into @ both[:, :count] @ out, into @ both[:, count:], seen @ out)
 
 
-def gust_input(vehicle: VehicleParameters, about: Trim) -> Array:
-    """What wind from the south and from the west (it blows north, east [m/s]) makes of the plant's states, (22, 2)."""
-
-    def rates(wind: Sequence[Any]) -> Sequence[Any]:
-        return helicopter.derivative(about.state, about.controls, wind[0], wind[1], 0.0, vehicle)
-
+def gust_input(vehicle: AnyVehicle, about: AnyTrim) -> Array:
+    """What wind from the south and from the west (it blows north, east [m/s]) makes of the plant's states, (n, 2)."""
+    rates = _rates(vehicle, about, freeze_inflow=False)
     aside = np.array([BESIDE_HOVER_M_S, 0.0])
-    _, into = _small_rotation(np.array(about.state[ATTITUDE]))
-    return np.asarray(into @ (0.5 * (jacobian(rates, aside) + jacobian(rates, -aside))))
+
+    def blown(wind: Sequence[Any]) -> Sequence[Any]:
+        return rates(about.state, about.controls, wind[0], wind[1])
+
+    count = len(about.state)
+    _, into = _small_rotation(np.array(about.state[ATTITUDE]), _kept(vehicle, count), count)
+    return np.asarray(into @ (0.5 * (jacobian(blown, aside) + jacobian(blown, -aside))))
 
 
 def frequency_response(plant: LinearPlant, omega_rad_s: Array) -> Complex:
@@ -81,18 +87,35 @@ def frequency_response(plant: LinearPlant, omega_rad_s: Array) -> Complex:
     )
 
 
-def _rates(
-    state: HelicopterState, controls: Controls, held: Inflow | None, vehicle: VehicleParameters
-) -> HelicopterState:
-    if held is None:
-        return helicopter.derivative(state, controls, 0.0, 0.0, 0.0, vehicle)
-    rotation = helicopter.attitude(state)
-    air = helicopter.air_motion(state, rotation, 0.0, 0.0, 0.0)
-    return helicopter.derivative_at_inflow(state, controls, air, rotation, held, vehicle)
+def _rates(vehicle: AnyVehicle, about: AnyTrim, *, freeze_inflow: bool) -> Callable[..., Sequence[Any]]:
+    """The rates of a state under controls and wind north, east [m/s], of either kind of vehicle."""
+    if isinstance(vehicle, MultirotorParameters):
+        flown = with_inflow_held(vehicle) if freeze_inflow else vehicle
+        hexa = is_hexa(vehicle)
+        return lambda state, controls, n, e: multirotor.derivative(state, controls, n, e, 0.0, hexa, flown)
+    if not freeze_inflow:
+        return lambda state, controls, n, e: helicopter.derivative(state, controls, n, e, 0.0, vehicle)
+    trim: Any = about.state
+    air = helicopter.air_motion(trim, helicopter.attitude(trim), 0.0, 0.0, 0.0)
+    held = helicopter.inflow(air, helicopter.blade_angles(trim, vehicle), vehicle)
+
+    def with_inflow(state: HelicopterState, controls: Controls, n: float, e: float) -> HelicopterState:
+        rotation = helicopter.attitude(state)
+        moving = helicopter.air_motion(state, rotation, n, e, 0.0)
+        return helicopter.derivative_at_inflow(state, controls, moving, rotation, held, vehicle)
+
+    return with_inflow
 
 
-def _outputs(state: HelicopterState) -> tuple[Any, ...]:
-    rotation = helicopter.attitude(state)
+def _kept(vehicle: AnyVehicle, count: int) -> list[int]:
+    """Which fields of the state move about hover: not the rotors that a quad has not, nor the battery's charge."""
+    if not isinstance(vehicle, MultirotorParameters):
+        return list(range(count))
+    return list(range(FIELDS.index("r") + 1 + int(vehicle.rotor_count)))
+
+
+def _outputs(state: AnyState) -> tuple[Any, ...]:
+    rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
     velocity = to_earth(rotation, state.u, state.v, state.w)
     heading = rotation[3] / np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
     return (
@@ -100,16 +123,18 @@ def _outputs(state: HelicopterState) -> tuple[Any, ...]:
     )  # fmt: skip
 
 
-def _small_rotation(quaternion: Array) -> tuple[Array, Array]:
-    """From 22 states to the 23 of HelicopterState about a trim, (23, 22), and back, (22, 23).
+def _small_rotation(quaternion: Array, kept: list[int], count: int) -> tuple[Array, Array]:
+    """From the plant's n states to the `count` of the vehicle's about a trim, (count, n), and back, (n, count).
 
-    q = q0 ⊗ (1, δ/2): a rotation δ (3,) about the body axes stands for the quaternion's four components.
+    q = q0 ⊗ (1, δ/2): a rotation δ (3,) about the body axes stands for the quaternion's four components. What is not
+    `kept` stays as in trim.
     """
     w, x, y, z = quaternion
     turned = 0.5 * np.array([[-x, -y, -z], [w, -z, y], [z, w, -x], [-y, x, w]])
     first, last = ATTITUDE.start, ATTITUDE.stop
-    out = np.zeros((len(FIELDS), len(FIELDS) - 1))
+    behind = [field for field in kept if field >= last]
+    out = np.zeros((count, first + 3 + len(behind)))
     out[:first, :first] = np.eye(first)
     out[ATTITUDE, first : first + 3] = turned
-    out[last:, first + 3 :] = np.eye(len(FIELDS) - last)
+    out[behind, range(first + 3, first + 3 + len(behind))] = 1.0
     return out, np.asarray(np.linalg.pinv(out), float)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from flownav.compile import equation
 from flownav.frames import Vector
+from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.parameters import VehicleParameters
 
 
@@ -21,7 +22,7 @@ def linear_acceleration(velocity: Vector, rates: Vector, force: Vector, mass_kg:
 
 
 @equation
-def angular_acceleration(rates: Vector, moment: Vector, vehicle: VehicleParameters) -> Vector:
+def angular_acceleration(rates: Vector, moment: Vector, vehicle: VehicleParameters | MultirotorParameters) -> Vector:
     """Rate of the body rates [rad/s2] (equations 2-4); moment [N m] about the centre of gravity."""
     p, q, r = rates
     jx, jy, jz = vehicle.inertia_xx_kg_m2, vehicle.inertia_yy_kg_m2, vehicle.inertia_zz_kg_m2

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from flownav.vehicle import ground_effect
 from flownav.vehicle.linearize import INPUTS, STATES, LinearModel, eigenvalues, reduced_model
 from flownav.vehicle.loading import describe_vehicle, load_vehicle
+from flownav.vehicle.multirotor_parameters import MultirotorParameters
+from flownav.vehicle.multirotor_sheet import MultirotorSheet, multirotor_sheet
 from flownav.vehicle.paper_model import ReducedModel, load_paper_model
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.trim import Trim, trim
@@ -32,12 +34,19 @@ class VehicleSheet(NamedTuple):
     ground_effect: tuple[tuple[float, float], ...]
 
 
-def vehicle_sheet(path: Path | None = None) -> VehicleSheet:
+def vehicle_sheet(path: Path | None = None) -> VehicleSheet | MultirotorSheet:
     """The sheet of a vehicle file, the shipped one where `path` is None. InputError as `load_vehicle` and `trim`."""
     vehicle = load_vehicle(path)
+    if isinstance(vehicle, MultirotorParameters):
+        return multirotor_sheet(describe_vehicle(path).name, vehicle)
+    return helicopter_sheet(describe_vehicle(path).name, vehicle)
+
+
+def helicopter_sheet(name: str, vehicle: VehicleParameters) -> VehicleSheet:
+    """The sheet of a helicopter."""
     hover = trim(vehicle)
     return VehicleSheet(
-        name=describe_vehicle(path).name,
+        name=name,
         vehicle=vehicle,
         trim=hover,
         frozen=reduced_model(vehicle, hover, freeze_inflow=True),

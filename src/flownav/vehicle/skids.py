@@ -18,7 +18,10 @@ import numpy as np
 from flownav.compile import clamp, equation, larger, smaller
 from flownav.frames import Vector
 from flownav.vehicle.airframe import Wrench
+from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.parameters import VehicleParameters
+
+OnFeet = VehicleParameters | MultirotorParameters
 
 DAMPING_DEPTH_M = 0.002
 STICK_TIME_S = 0.010
@@ -33,7 +36,7 @@ class Support(NamedTuple):
 
 
 @equation
-def foot_force(depth: float, sink: float, vehicle: VehicleParameters) -> float:
+def foot_force(depth: float, sink: float, vehicle: OnFeet) -> float:
     """Normal force of one foot [N], `depth` below the ground [m] and sinking at `sink` [m/s]; never negative."""
     pressed = larger(depth, 0.0)
     damping = vehicle.skid_damping_n_s_m * smaller(pressed * (1.0 / DAMPING_DEPTH_M), 1.0)
@@ -41,7 +44,7 @@ def foot_force(depth: float, sink: float, vehicle: VehicleParameters) -> float:
 
 
 @equation
-def support(pos_d: float, down: Vector, velocity: Vector, rates: Vector, vehicle: VehicleParameters) -> Support:
+def support(pos_d: float, down: Vector, velocity: Vector, rates: Vector, vehicle: OnFeet) -> Support:
     """The normal forces of the four feet at (±half_length, ±half_track, cg_above_skid), body axes.
 
     A foot at r is pos_d + down·r deep and sinks at down·(velocity + rates × r).
@@ -62,7 +65,7 @@ def support(pos_d: float, down: Vector, velocity: Vector, rates: Vector, vehicle
 
 
 @equation
-def with_support(free: Wrench, feet: Support, down: Vector, vehicle: VehicleParameters) -> Wrench:
+def with_support(free: Wrench, feet: Support, down: Vector, vehicle: OnFeet) -> Wrench:
     """The free wrench and the feet's normal forces, which act upwards: -N·down at the feet."""
     z = feet.normal_n * vehicle.cg_above_skid_m
     return Wrench(
@@ -76,7 +79,7 @@ def with_support(free: Wrench, feet: Support, down: Vector, vehicle: VehiclePara
 
 
 @equation
-def with_friction(free: Wrench, feet: Support, velocity: Vector, rates: Vector, vehicle: VehicleParameters) -> Wrench:
+def with_friction(free: Wrench, feet: Support, velocity: Vector, rates: Vector, vehicle: OnFeet) -> Wrench:
     """The free wrench, which holds all other forces, and the dry friction under the skids."""
     z = vehicle.cg_above_skid_m
     per_mass, per_jx, per_jy = 1.0 / vehicle.mass_kg, 1.0 / vehicle.inertia_xx_kg_m2, 1.0 / vehicle.inertia_yy_kg_m2

@@ -1,0 +1,56 @@
+"""The multirotor on lanes: the midpoint rule, two evaluations a step, for its motors are slower than servos."""
+
+from __future__ import annotations
+
+from flownav.compile import equation
+from flownav.estimation.kalman import Lanes, Work
+from flownav.simulation import layout
+from flownav.simulation.layout import (
+    load_air,
+    load_controls,
+    load_multirotor,
+    load_multirotor_stage,
+    load_shares,
+    multirotor_as_is,
+    store_multirotor,
+    store_multirotor_stage,
+    store_shares,
+)
+from flownav.vehicle.motors import mixed
+from flownav.vehicle.multirotor import derivative_at_shares, outputs
+from flownav.vehicle.multirotor_state import moved, of_unit_attitude
+
+
+@equation
+def midpoint_step(work: Work, lanes: Lanes, dt: float, rotors: tuple[int, ...]) -> None:
+    """One step of every lane's multirotor; controls and wind held over the step (`multirotor.step`)."""
+    hexa = len(rotors) > 4
+    for lane in range(len(lanes)):
+        state, vehicle, wind = (
+            load_multirotor(work, lanes, lane),
+            multirotor_as_is(work, lanes, lane),
+            load_air(work, lanes, lane),
+        )
+        shares = mixed(load_controls(work, lanes, lane), hexa, vehicle)
+        store_shares(work, lanes, lane, shares)
+        rate = derivative_at_shares(state, shares, wind.wind_n_m_s, wind.wind_e_m_s, wind.wind_d_m_s, hexa, vehicle)
+        store_multirotor_stage(work, lanes, lane, moved(state, rate, 0.5 * dt))
+    for lane in range(len(lanes)):
+        state, vehicle = load_multirotor_stage(work, lanes, lane), multirotor_as_is(work, lanes, lane)
+        wind, shares = load_air(work, lanes, lane), load_shares(work, lanes, lane)
+        rate = derivative_at_shares(state, shares, wind.wind_n_m_s, wind.wind_e_m_s, wind.wind_d_m_s, hexa, vehicle)
+        before = load_multirotor(work, lanes, lane)
+        store_multirotor(work, lanes, lane, of_unit_attitude(moved(before, rate, dt)))
+
+
+@equation
+def observe_multirotor(work: Work, lanes: Lanes, rotors: tuple[int, ...]) -> None:
+    """Thrust, load of the feet and power of the present state."""
+    hexa = len(rotors) > 4
+    for lane in range(len(lanes)):
+        air, vehicle = load_air(work, lanes, lane), multirotor_as_is(work, lanes, lane)
+        state = load_multirotor(work, lanes, lane)
+        seen = outputs(state, air.wind_n_m_s, air.wind_e_m_s, air.wind_d_m_s, hexa, vehicle)
+        work[layout.THRUST * len(lanes) + lane] = seen.thrust_n
+        work[layout.CONTACT * len(lanes) + lane] = seen.contact_force_n
+        work[layout.POWER * len(lanes) + lane] = seen.power_w

@@ -1,0 +1,201 @@
+"""A multirotor as one set of differential equations: the four blocks put together (the helicopter's: `helicopter`).
+
+Straight-line scalar equations, so that lanes vectorise: 20 states in, 20 rates out. Whether there are six rotors is
+known when a kernel is compiled; four leave the work of the other two out.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flownav.compile import equation
+from flownav.frames import Rotation, Vector, quaternion_rate, rotation_from_quaternion, to_body, to_earth
+from flownav.vehicle.airframe import AirMotion, Wrench, fuselage_drag
+from flownav.vehicle.motors import battery_voltage, mixed, shaft_power, speed_rate, told_speed
+from flownav.vehicle.multirotor_parameters import MultirotorParameters
+from flownav.vehicle.multirotor_state import MultirotorState, Six, moved, of_unit_attitude, speeds_of, total_of
+from flownav.vehicle.propeller import propeller_load
+from flownav.vehicle.rigid_body import angular_acceleration, linear_acceleration
+from flownav.vehicle.skids import support, with_friction, with_support
+from flownav.vehicle.state import Controls, Outputs
+
+
+class RotorLoads(NamedTuple):
+    """All rotors' loads on the body: thrust, drag per airspeed, hub moment per airspeed; moments; torque of the air."""
+
+    thrust_n: float
+    drag_n_s_m: float
+    hub_n_s: float
+    roll_n_m: float
+    pitch_n_m: float
+    yaw_n_m: float  # of torques, which turn against each rotor's sense
+
+
+NO_LOADS = RotorLoads(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@equation
+def attitude(state: MultirotorState) -> Rotation:
+    """R_EB of the state."""
+    return rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
+
+
+@equation
+def air_motion(state: MultirotorState, rotation: Rotation, wind_n: float, wind_e: float, wind_d: float) -> AirMotion:
+    """Motion through the air; wind in earth NED [m/s], where the air goes."""
+    wind = to_body(rotation, wind_n, wind_e, wind_d)
+    return AirMotion(state.u - wind[0], state.v - wind[1], state.w - wind[2], state.p, state.q, state.r)
+
+
+@equation
+def with_rotor(
+    loads: RotorLoads, speed: float, x_m: float, y_m: float, sense: float, inplane_sq: float, horizontal_sq: float,
+    pos_d_m: float, down: Vector, air: AirMotion, vehicle: MultirotorParameters,
+) -> RotorLoads:  # fmt: skip
+    """The loads and one rotor's at a place; sense 1: it turns to the left. Each has its own air and its own ground."""
+    axial = air.w + air.p * y_m - air.q * x_m
+    height = vehicle.rotors_above_cg_m * down[2] - pos_d_m - down[0] * x_m - down[1] * y_m
+    one = propeller_load(speed, inplane_sq, axial, horizontal_sq, height, vehicle)
+    return RotorLoads(
+        loads.thrust_n + one.thrust_n,
+        loads.drag_n_s_m + one.drag_n_s_m,
+        loads.hub_n_s + one.hub_n_s,
+        loads.roll_n_m - y_m * one.thrust_n,
+        loads.pitch_n_m + x_m * one.thrust_n,
+        loads.yaw_n_m + sense * one.torque_n_m,
+    )
+
+
+@equation
+def rotor_loads(
+    speeds: Six, pos_d_m: float, down: Vector, air: AirMotion, hexa: bool, vehicle: MultirotorParameters
+) -> RotorLoads:
+    """All rotors' loads."""
+    inplane_sq = air.u * air.u + air.v * air.v
+    sinking = air.u * down[0] + air.v * down[1] + air.w * down[2]
+    horizontal_sq = inplane_sq + air.w * air.w - sinking * sinking
+    x = vehicle
+    loads = NO_LOADS
+    loads = with_rotor(loads, speeds.one, x.x_1_m, x.y_1_m, 1.0, inplane_sq, horizontal_sq, pos_d_m, down, air, x)
+    loads = with_rotor(loads, speeds.two, x.x_2_m, x.y_2_m, -1.0, inplane_sq, horizontal_sq, pos_d_m, down, air, x)
+    loads = with_rotor(loads, speeds.three, x.x_3_m, x.y_3_m, 1.0, inplane_sq, horizontal_sq, pos_d_m, down, air, x)
+    loads = with_rotor(loads, speeds.four, x.x_4_m, x.y_4_m, -1.0, inplane_sq, horizontal_sq, pos_d_m, down, air, x)
+    if hexa:
+        loads = with_rotor(loads, speeds.five, x.x_5_m, x.y_5_m, 1.0, inplane_sq, horizontal_sq, pos_d_m, down, air, x)
+        loads = with_rotor(loads, speeds.six, x.x_6_m, x.y_6_m, -1.0, inplane_sq, horizontal_sq, pos_d_m, down, air, x)
+    return loads
+
+
+@equation
+def free_wrench(
+    loads: RotorLoads, turning: float, spinning_up: float, down: Vector, air: AirMotion, vehicle: MultirotorParameters
+) -> Wrench:
+    """All forces and moments but the ground's (block 3).
+
+    turning: Σ of the speeds of the rotors that turn left less those that turn right [rad/s]: they are gyroscopes;
+    spinning_up: its rate [rad/s2], whose reaction turns the body.
+    """
+    x, y = -loads.drag_n_s_m * air.u, -loads.drag_n_s_m * air.v
+    drag = fuselage_drag(0.0, air, vehicle)
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    spin = vehicle.rotor_inertia_kg_m2 * turning
+    return Wrench(
+        x + drag[0] + weight * down[0],
+        y + drag[1] + weight * down[1],
+        drag[2] + weight * down[2] - loads.thrust_n,
+        loads.roll_n_m - loads.hub_n_s * air.v + vehicle.rotors_above_cg_m * y + spin * air.q,
+        loads.pitch_n_m + loads.hub_n_s * air.u - vehicle.rotors_above_cg_m * x - spin * air.p,
+        loads.yaw_n_m + vehicle.rotor_inertia_kg_m2 * spinning_up,
+    )
+
+
+@equation
+def to_the_left(x: Six) -> float:
+    """Σ over the rotors that turn left less Σ over those that turn right."""
+    return ((x.one - x.two) + (x.three - x.four)) + (x.five - x.six)
+
+
+@equation
+def total_power(speeds: Six, vehicle: MultirotorParameters) -> float:
+    """Shaft power of all rotors [W]."""
+    return (
+        (shaft_power(speeds.one, vehicle) + shaft_power(speeds.two, vehicle))
+        + (shaft_power(speeds.three, vehicle) + shaft_power(speeds.four, vehicle))
+    ) + (shaft_power(speeds.five, vehicle) + shaft_power(speeds.six, vehicle))
+
+
+@equation
+def derivative_at_shares(
+    state: MultirotorState, shares: Six, wind_n: float, wind_e: float, wind_d: float, hexa: bool,
+    vehicle: MultirotorParameters,
+) -> MultirotorState:  # fmt: skip
+    """The rates of the state while the mixer asks each rotor for a share of its full thrust."""
+    rotation = attitude(state)
+    down = (rotation[6], rotation[7], rotation[8])
+    velocity, rates = (state.u, state.v, state.w), (state.p, state.q, state.r)
+    air = air_motion(state, rotation, wind_n, wind_e, wind_d)
+    speeds = speeds_of(state)
+    power = total_power(speeds, vehicle)
+    voltage = battery_voltage(power, state.used, vehicle)
+    spins = Six(
+        speed_rate(speeds.one, told_speed(shares.one, voltage, vehicle), vehicle),
+        speed_rate(speeds.two, told_speed(shares.two, voltage, vehicle), vehicle),
+        speed_rate(speeds.three, told_speed(shares.three, voltage, vehicle), vehicle),
+        speed_rate(speeds.four, told_speed(shares.four, voltage, vehicle), vehicle),
+        speed_rate(speeds.five, told_speed(shares.five, voltage, vehicle), vehicle) if hexa else 0.0,
+        speed_rate(speeds.six, told_speed(shares.six, voltage, vehicle), vehicle) if hexa else 0.0,
+    )
+    loads = rotor_loads(speeds, state.pos_d, down, air, hexa, vehicle)
+    free = free_wrench(loads, to_the_left(speeds), to_the_left(spins), down, air, vehicle)
+    feet = support(state.pos_d, down, velocity, rates, vehicle)
+    total = with_friction(with_support(free, feet, down, vehicle), feet, velocity, rates, vehicle)
+    return MultirotorState(
+        *to_earth(rotation, state.u, state.v, state.w),
+        *linear_acceleration(velocity, rates, (total.x, total.y, total.z), vehicle.mass_kg),
+        *quaternion_rate(state.qw, state.qx, state.qy, state.qz, state.p, state.q, state.r),
+        *angular_acceleration(rates, (total.l, total.m, total.n), vehicle),
+        spins.one,
+        spins.two,
+        spins.three,
+        spins.four,
+        spins.five,
+        spins.six,
+        power / (vehicle.efficiency * voltage),
+    )
+
+
+@equation
+def derivative(
+    state: MultirotorState, controls: Controls, wind_n: float, wind_e: float, wind_d: float, hexa: bool,
+    vehicle: MultirotorParameters,
+) -> MultirotorState:  # fmt: skip
+    """The rates of the state; wind in earth NED [m/s]."""
+    return derivative_at_shares(state, mixed(controls, hexa, vehicle), wind_n, wind_e, wind_d, hexa, vehicle)
+
+
+@equation
+def outputs(
+    state: MultirotorState, wind_n: float, wind_e: float, wind_d: float, hexa: bool, vehicle: MultirotorParameters
+) -> Outputs:
+    """What the state implies: all rotors' thrust in ground effect, torque on the body, shaft power; feet's force."""
+    rotation = attitude(state)
+    down = (rotation[6], rotation[7], rotation[8])
+    air = air_motion(state, rotation, wind_n, wind_e, wind_d)
+    speeds = speeds_of(state)
+    loads = rotor_loads(speeds, state.pos_d, down, air, hexa, vehicle)
+    feet = support(state.pos_d, down, (state.u, state.v, state.w), (state.p, state.q, state.r), vehicle)
+    induced = vehicle.hover_inflow_m * total_of(speeds) / vehicle.rotor_count
+    return Outputs(loads.thrust_n, loads.yaw_n_m, total_power(speeds, vehicle), induced, feet.normal_n)
+
+
+@equation
+def step(
+    state: MultirotorState, controls: Controls, wind_n: float, wind_e: float, wind_d: float, dt: float, hexa: bool,
+    vehicle: MultirotorParameters,
+) -> MultirotorState:  # fmt: skip
+    """The state `dt` seconds later by the midpoint rule, controls and wind held."""
+    shares = mixed(controls, hexa, vehicle)
+    first = derivative_at_shares(state, shares, wind_n, wind_e, wind_d, hexa, vehicle)
+    middle = moved(state, first, 0.5 * dt)
+    second = derivative_at_shares(middle, shares, wind_n, wind_e, wind_d, hexa, vehicle)
+    return of_unit_attitude(moved(state, second, dt))

@@ -1,0 +1,118 @@
+"""A multirotor's state, what its motors are told and what follows, as bundles of scalars."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import equation
+from flownav.vehicle.state import settled
+
+
+class MultirotorState(NamedTuple):
+    """A multirotor's state; of its rates where a function says so (then every unit is per second).
+
+    The first thirteen are those of `state.HelicopterState`, in its order: the sensors look at these alone. speed_1..6:
+    the rotors', clockwise from the front right [rad/s], a quad's last two are zero. used: charge taken from the full
+    battery [A s].
+    """
+
+    pos_n: float
+    pos_e: float
+    pos_d: float
+    u: float
+    v: float
+    w: float
+    qw: float
+    qx: float
+    qy: float
+    qz: float
+    p: float
+    q: float
+    r: float
+    speed_1: float
+    speed_2: float
+    speed_3: float
+    speed_4: float
+    speed_5: float
+    speed_6: float
+    used: float
+
+
+class Six(NamedTuple):
+    """A number for each rotor; a quad's last two are zero."""
+
+    one: float
+    two: float
+    three: float
+    four: float
+    five: float
+    six: float
+
+
+@equation
+def speeds_of(state: MultirotorState) -> Six:
+    """The rotors' speeds [rad/s]."""
+    return Six(state.speed_1, state.speed_2, state.speed_3, state.speed_4, state.speed_5, state.speed_6)
+
+
+@equation
+def total_of(x: Six) -> float:
+    """The sum over the rotors."""
+    return ((x.one + x.two) + (x.three + x.four)) + (x.five + x.six)
+
+
+@equation
+def moved(state: MultirotorState, rate: MultirotorState, dt: float) -> MultirotorState:
+    """state + rate·dt, component by component."""
+    return MultirotorState(
+        state.pos_n + rate.pos_n * dt,
+        state.pos_e + rate.pos_e * dt,
+        state.pos_d + rate.pos_d * dt,
+        state.u + rate.u * dt,
+        state.v + rate.v * dt,
+        state.w + rate.w * dt,
+        state.qw + rate.qw * dt,
+        state.qx + rate.qx * dt,
+        state.qy + rate.qy * dt,
+        state.qz + rate.qz * dt,
+        state.p + rate.p * dt,
+        state.q + rate.q * dt,
+        state.r + rate.r * dt,
+        state.speed_1 + rate.speed_1 * dt,
+        state.speed_2 + rate.speed_2 * dt,
+        state.speed_3 + rate.speed_3 * dt,
+        state.speed_4 + rate.speed_4 * dt,
+        state.speed_5 + rate.speed_5 * dt,
+        state.speed_6 + rate.speed_6 * dt,
+        state.used + rate.used * dt,
+    )
+
+
+@equation
+def of_unit_attitude(state: MultirotorState) -> MultirotorState:
+    """The state with its quaternion brought back to unit length and its dying motions brought to rest."""
+    scale = 1.0 / np.sqrt(state.qw * state.qw + state.qx * state.qx + state.qy * state.qy + state.qz * state.qz)
+    return MultirotorState(
+        state.pos_n,
+        state.pos_e,
+        state.pos_d,
+        settled(state.u),
+        settled(state.v),
+        settled(state.w),
+        state.qw * scale,
+        state.qx * scale,
+        state.qy * scale,
+        state.qz * scale,
+        settled(state.p),
+        settled(state.q),
+        settled(state.r),
+        state.speed_1,
+        state.speed_2,
+        state.speed_3,
+        state.speed_4,
+        state.speed_5,
+        state.speed_6,
+        state.used,
+    )

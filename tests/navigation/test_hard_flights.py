@@ -12,6 +12,7 @@ from flownav.estimation.states import FLOW_SCALE, GYRO_BIAS
 from flownav.measurement import EventQueue, Sensor, merge
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import run, start_navigator
+from flownav.navigation.memory import CONTACT
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.still import MOVES, RESTS, SHAKEN
 from flownav.navigation.tape import new_tape
@@ -219,3 +220,14 @@ def test_the_scales_doubt_covers_a_lens_that_scales_wrongly():
     off = np.abs(run_.error[:, 0] - run_.error[0, 0])
     assert off[-1] > 2.0
     assert np.all(off < 2.0 * run_.estimate[:, 11])
+
+
+def test_a_hover_that_a_low_range_takes_for_the_ground_teaches_no_gyro_and_holds_no_velocity():
+    """0.3 m up, where a sonar reads its least: steady, and a flow of swapped axes shows little motion."""
+    flown = noisy(fly(lambda t: np.column_stack([0.05 * t, 0.0 * t, 0.0 * t - 0.3]), 20.0).only(*OWN))
+    imu = flown.streams[Sensor.IMU]
+    shaking = np.random.default_rng(9).normal(0.0, 1.0, imu.value.shape) * ([0.05] * 3 + [0.5] * 3)
+    found = navigate(flown.changed(Sensor.IMU, value=imu.value + shaking))
+    assert SHAKEN in found.events("filter", "standing")[:, 1]
+    assert np.isnan(found.on.work[CONTACT])
+    assert found.sigma(GYRO_BIAS + 2) > 5e-3

@@ -59,7 +59,6 @@ from flownav.navigation.protection import (
     CLEAR,
     DRIFT_S,
     HELD_S,
-    LEFT_S,
     MEMORY_S,
     SIGMAS,
     SIGMAS_BESIDE,
@@ -266,7 +265,7 @@ def test_what_was_told_and_what_is_left_over_fade(work):
     minded.at(1.0, MEMORY_S)
     assert work[INFORMATION + HEADING_OFF] == pytest.approx(10.0 / np.e)
     assert work[SCORE + HEADING_OFF] == pytest.approx(1.0 / np.e)
-    assert work[LEFT_OVER] == pytest.approx(8.0 * np.exp(-MEMORY_S / LEFT_S))
+    assert work[LEFT_OVER] == pytest.approx(8.0 / np.e)
 
 
 @pytest.mark.parametrize(("evidence", "doubted", "unheld"), [(10.0, False, False), (0.5, True, True)])

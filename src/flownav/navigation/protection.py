@@ -72,7 +72,6 @@ SIGMAS = 4.0  # of the filter's own error, where nothing fails
 SIGMAS_BESIDE = 2.0  # of it, beside a fault
 SIZE_SIGMAS = 2.2  # of a fault's size
 MEMORY_S = 20.0  # of what was told of faults
-LEFT_S = 35.0  # what a fault left behind goes as slowly as GPS corrects it
 EXCLUDED = 8.0  # standard deviations from a fault that is there or is not
 PUZZLING = 9.0  # evidence for a fault that is there or is not, after which it may be there for long
 DRIFT_S = 20.0  # a drift of GPS is sought from the start of such a window
@@ -248,7 +247,7 @@ def mind_faults(work: Work, lanes: Lanes, t_s: float, dt_s: float, o: Output) ->
     kept = np.exp(-dt_s / MEMORY_S)
     fade(work, lanes, kept)
     for lane in range(len(lanes)):
-        work[LEFT_OVER * len(lanes) + lane] *= np.exp(-dt_s / LEFT_S)
+        work[LEFT_OVER * len(lanes) + lane] *= kept
         worst, which, worst_flow = 0.0, 0, 0.0
         for k in range(int(work[HYPOTHESES * len(lanes)])):
             found = size_in(work, lanes, k, lane)

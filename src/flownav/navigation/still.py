@@ -44,6 +44,7 @@ LEAST_READINGS = 5.0
 QUIET_GYRO_RAD_S, QUIET_ACCEL_M_S2 = 0.01, 0.12  # rms of all axes about the mean; in flight it is twice as much
 RESTING_TURN_RAD_S = 0.04  # 2 deg/s: the bias of a gyro that its autopilot calibrated is smaller, turning is larger
 STEADY_RANGE_M = 0.03
+NEAR_M = 0.15  # nobody hovers so low and steady: what a range reads on the ground, though the motors run
 CONTACT_M = 0.35  # a range on the ground, where none was seen there yet
 RESTING_FLOW_M_S, SHAKEN_FLOW_M_S = 0.3, 0.1
 RESTING_GPS_M_S = 1.0
@@ -192,7 +193,8 @@ def stand_still(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> Non
         if load_start(work, lanes, lane).started > 0.0 and (does > MOVES) != (before > MOVES):
             write_event(lanes, lane, t_s, STOOD, does, o)
         work[STANDS * len(lanes) + lane] = does
-        if seen.range_high_m >= 0.0 and (does == RESTS or (does == SHAKEN and not contact_m <= seen.range_high_m)):
+        lower = does == SHAKEN and seen.range_high_m < NEAR_M and not contact_m <= seen.range_high_m
+        if seen.range_high_m >= 0.0 and (does == RESTS or lower):
             work[CONTACT * len(lanes) + lane] = seen.range_high_m
         any_stands = any_stands or does > MOVES
     if any_stands:

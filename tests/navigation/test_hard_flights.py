@@ -78,7 +78,7 @@ def test_one_whose_motors_run_meanwhile_is_known_to_stand_and_learns_the_gyro_s_
     assert np.abs(shaken.yaw_error).max() < math.radians(6.0)  # 20 with the bias left in
     learnt = shaken.column(GYRO_BIAS, 3)
     assert learnt[np.searchsorted(shaken.t_s, STANDS_S)] == pytest.approx([0.004, -0.003, 0.01], abs=4e-3)
-    assert 1e-3 < shaken.sigma(GYRO_BIAS + 2) < 3e-3
+    assert 2.15e-3 < shaken.sigma(GYRO_BIAS + 2) < 3e-3
     standing = (shaken.t_s > 2.0) & (shaken.t_s < STANDS_S)
     assert np.abs(shaken.velocity_error[standing]).max() < 0.1
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple, TypeVar, cast
 
@@ -20,6 +20,7 @@ from flownav.navigation.tape import COMPONENTS, Tape, empty_tape, room_of
 from flownav.navigation.told import carries_lag
 from flownav.simulation import layout
 from flownav.simulation.ensemble import Ensemble, believed
+from flownav.simulation.fault import SensorFault
 from flownav.simulation.flight import fly_block
 from flownav.simulation.history import HISTORY
 from flownav.simulation.navigating import first_inertial, kept_inertials
@@ -68,13 +69,16 @@ def buffers_of(flight: Flight, lanes: tuple[int, ...], epochs: int, *, written: 
 
 def fly_into(
     flight: Flight, seed: int, first: int, lanes: tuple[int, ...], b: Buffers, ensemble: Ensemble | None = None, *,
-    compiled: bool = True,
+    faults: Sequence[SensorFault] | None = None, compiled: bool = True,
 ) -> None:  # fmt: skip
     """Fly a block into its buffers, each lane as the flight's sheets say, or as the ensemble draws it.
 
+    faults: of each lane's sensors, for a flight that `fails`.
     compiled False: in plain Python (tests; it is a thousand times slower). InputError as `Ensemble.truths`.
     """
     truths = [believed(flight)] * len(lanes) if ensemble is None else ensemble.truths(seed, first, len(lanes))
+    if faults is not None:
+        truths = [truth._replace(fault=fault) for truth, fault in zip(truths, faults, strict=True)]
     if len(b.nav):
         followed = len(b.tape.estimate) > 0 or flight.plan.minds_faults  # nobody else reads levels or suspicions
         b.nav[:] = new_work(lanes, faults=followed)
@@ -96,12 +100,13 @@ def fly_into(
 
 
 def fly_written(
-    flight: Flight, seed: int, first: int = 0, lanes: tuple[int, ...] = ONE_LANE, ensemble: Ensemble | None = None
-) -> Flown:
+    flight: Flight, seed: int, first: int = 0, lanes: tuple[int, ...] = ONE_LANE, ensemble: Ensemble | None = None,
+    faults: Sequence[SensorFault] | None = None,
+) -> Flown:  # fmt: skip
     """A block of `len(lanes)` flights from number `first` on, with everything that the navigator was fed and wrote."""
     buffers = buffers_of(flight, lanes, flight.plan.epochs, written=True)
     with announce_compilation("single-flight" if len(lanes) == 1 else "batch"):
-        fly_into(flight, seed, first, lanes, buffers, ensemble)
+        fly_into(flight, seed, first, lanes, buffers, ensemble, faults=faults)
     return Flown(buffers.history, buffers.tape, buffers.fed)
 
 

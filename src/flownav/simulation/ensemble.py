@@ -18,6 +18,7 @@ from flownav.parameter_files import ParameterModel, check
 from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.sheets import SensorSheets
 from flownav.simulation.dispersion import Distribution, drawn, uniforms
+from flownav.simulation.fault import SOUND
 from flownav.simulation.fitting import onboard_of
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
@@ -59,7 +60,9 @@ def believed(flight: Flight) -> Truth:
         sensors = {part: PARTS[part](*([0.0] * len(PARTS[part]._fields))) for part in (*SENSORS, "camera_flow")}
     else:
         sensors = {part: getattr(onboard, part) for part in SENSORS} | {"camera_flow": onboard.flow}
-    return Truth(vehicle=flight.vehicle, wind=flight.wind, flow=flight.sensors.flow, late=PUNCTUAL, **sensors)
+    return Truth(
+        vehicle=flight.vehicle, wind=flight.wind, flow=flight.sensors.flow, late=PUNCTUAL, fault=SOUND, **sensors
+    )
 
 
 class Ensemble:

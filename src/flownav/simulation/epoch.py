@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from flownav.compile import equation, procedure
 from flownav.control.autopilot import AutopilotState, Estimate, inner_loop, landing_logic, outer_loop
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Reference
 from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import GRAVITY_M_S2, Quaternion, Rotation, quaternion_product, rotation_from_quaternion
+from flownav.measurement import Sensor
 from flownav.sensors.flow import step_flow
 from flownav.sensors.gps_ins import attitude_with_error
 from flownav.sensors.rangefinder import slant_range
 from flownav.simulation import layout
+from flownav.simulation.failing import strike
 from flownav.simulation.layout import (
     flow_as_is,
     load_autopilot,
@@ -219,7 +223,7 @@ def advance(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None
 @procedure
 def advance_sensing(
     work: Work, lanes: Lanes, seed: int, first: int, epoch: int, taken: int, heard: int, flight: Flight,
-    onboard: Onboard, table: Timetable,
+    onboard: Onboard, table: Timetable, fails: bool | None,
 ) -> None:  # fmt: skip
     """From one epoch to the next, with an inertial reading at the end of each of its periods."""
     period_s = onboard.inertial_steps * PHYSICS_S
@@ -238,15 +242,23 @@ def advance_sensing(
             part = (step + 1) // onboard.inertial_steps - 1
             slot = (taken + part) % table.slots
             read_inertial(work, lanes, seed, first, epoch, part, slot, onboard)
+            if fails is not None:
+                t_s = epoch * EPOCH_S + (step + 1) * PHYSICS_S
+                strike(work, lanes, seed, first, epoch, t_s, slot, Sensor.IMU, 8 + part, 0)
             keep_inertial(work, lanes, slot, heard + part, period_s, table)
             feel(work, lanes, slot, part, ATTITUDE_STEPS * PHYSICS_STEPS // onboard.inertial_steps)
 
 
 @equation
 def feel(work: Work, lanes: Lanes, slot: int, part: int, parts: int) -> None:
-    """Take the accelerometer's reading in a slot, the `part`-th of `parts` of this epoch, into their mean."""
+    """Take the accelerometer's reading in a slot, the `part`-th of `parts` of this epoch, into their mean.
+
+    One that reads nothing leaves what it read last.
+    """
     for i in range(3):
         for lane in range(len(lanes)):
             before = work[(layout.FELT + i) * len(lanes) + lane] if part > 0 else 0.0
             reading = work[(FIRST + slot * FIELDS + 3 + i) * len(lanes) + lane]
-            work[(layout.FELT + i) * len(lanes) + lane] = before + reading / parts
+            last = reading if np.isfinite(reading) else work[(layout.LAST_FELT + i) * len(lanes) + lane]
+            work[(layout.LAST_FELT + i) * len(lanes) + lane] = last
+            work[(layout.FELT + i) * len(lanes) + lane] = before + last / parts

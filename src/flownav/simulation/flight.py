@@ -98,7 +98,7 @@ def fly_navigated(
         reference = reference_at(flight.path, t_s)
         draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
         blow(work, lanes)
-        taken = sample(work, lanes, seed, first, epoch, table.slots, taken, onboard)
+        taken = sample(work, lanes, seed, first, epoch, table.slots, taken, onboard, flight.fails)
         note_truth(work, lanes, epoch, table)
         following = feed_due(work, nav, lanes, epoch, following, take, settings, o, fed, table)
         carry_ahead(work, nav, lanes, heard, ahead if heard >= ahead else heard, period_s, table)
@@ -111,7 +111,7 @@ def fly_navigated(
         estimate_for_autopilot(work, lanes, flight)
         command(work, lanes, t_s, reference, flight, onboard)
         write_history(work, lanes, epoch, reference, history)
-        advance_sensing(work, lanes, seed, first, epoch, taken, heard, flight, onboard, table)
+        advance_sensing(work, lanes, seed, first, epoch, taken, heard, flight, onboard, table, flight.fails)
         taken += parts
         heard += parts
 

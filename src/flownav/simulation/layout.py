@@ -12,6 +12,7 @@ from flownav.control.go_around import Knowledge
 from flownav.estimation.kalman import kalman_row_count, kalman_rows
 from flownav.estimation.paper_filter import INPUTS, STATES
 from flownav.estimation.states import Rows
+from flownav.navigation.records import Reading
 from flownav.sensors.barometer import BarometerNormals, BarometerState, BarometerUnit
 from flownav.sensors.flow import FlowState
 from flownav.sensors.flow_camera import FlowCameraNormals, FlowCameraState, FlowCameraUnit
@@ -103,6 +104,11 @@ TRUE_IMU = _rows.take(len(ImuReading._fields))  # means over the last inertial p
 KNOWN = _rows.take(len(Knowledge._fields))  # what the vehicle knows of its landing
 FELT = _rows.take(3)  # specific force that the IMU read, body FRD, mean over the last epoch [m/s2]
 EXPOSED = _rows.take(5)  # since the last flow: sums of the true rate (3) and of what the gyro read about x and y
+LAST_FELT = _rows.take(3)  # the last that the accelerometer read
+FAULT_NORMALS = _rows.take(6)
+FAULT_HELD = _rows.take(1)  # the range before a fault [m]
+EARLIER_READINGS = 8
+FAULT_EARLIER = _rows.take(len(Reading._fields) * EARLIER_READINGS)  # the last readings of flow
 LANDED = _rows.take(1)  # what the skid switch says
 # what the vehicle makes of the navigator: carried on to now
 PLACE = _rows.take(3)  # of the pad in the navigator's frame, as far as the vehicle knows it [m]
@@ -180,4 +186,5 @@ ranger_as_is, _ = lane_access(PARTS["ranger"], AS_IS["ranger"])
 baro_as_is, _ = lane_access(PARTS["baro"], AS_IS["baro"])
 mag_as_is, _ = lane_access(PARTS["mag"], AS_IS["mag"])
 pad_as_is, _ = lane_access(PARTS["pad"], AS_IS["pad"])
+fault_as_is, _ = lane_access(PARTS["fault"], AS_IS["fault"])
 skid_as_is, _ = lane_access(PARTS["skid"], AS_IS["skid"])

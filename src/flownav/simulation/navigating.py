@@ -18,7 +18,7 @@ from flownav.estimation.covariance import covariance_of, variance_of
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import GROUND, PAD, POSITION, QUATERNION, STATE, VELOCITY
 from flownav.frames import quaternion_product, rotation_from_quaternion, to_body, to_earth
-from flownav.navigation.ahead import carried, state_of
+from flownav.navigation.ahead import carried, coasted, state_of
 from flownav.navigation.memory import PAD_KNOWN, READING, SUSPECTED, load_ground, load_start
 from flownav.navigation.tape import Output, body_velocity_variance
 from flownav.simulation import layout
@@ -193,7 +193,8 @@ def carry_ahead(work: Work, nav: Work, lanes: Lanes, heard: int, ahead: int, per
                 work[(row + 3) * len(lanes) + lane], work[(row + 4) * len(lanes) + lane],
                 work[(row + 5) * len(lanes) + lane],
             )  # fmt: skip
-            c = carried(c, between, period_s)
+            heard_it = np.isfinite(between[0] + between[3])
+            c = carried(c, between, period_s) if heard_it else coasted(c, period_s)
         find_place(work, nav, lanes, lane)
         u, v, w = to_body(rotation_from_quaternion(c.qw, c.qx, c.qy, c.qz), c.vel_n, c.vel_e, c.vel_d)
         said = (c.pos_n, c.pos_e, c.pos_d, u, v, w)

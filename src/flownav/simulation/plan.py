@@ -64,3 +64,4 @@ class Flight(NamedTuple):
     initial_variance: NDArray[np.float64]
     linear: LinearTruth | None
     limits: TouchdownLimits
+    fails: bool | None = None  # its sensors may fail, each lane's as its truth has it; None: the code is not compiled

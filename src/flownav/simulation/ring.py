@@ -27,7 +27,12 @@ def work_rows(slots: int) -> int:
 @equation
 def put_slot(work: Work, lanes: Lanes, slot: int, lane: int, reading: Reading) -> None:
     """One lane's reading into a slot."""
-    row = FIRST + slot * FIELDS
+    store_row(work, lanes, FIRST + slot * FIELDS, lane, reading)
+
+
+@equation
+def store_row(work: Work, lanes: Lanes, row: int, lane: int, reading: Reading) -> None:
+    """One lane's reading into rows from `row` on."""
     work[row * len(lanes) + lane] = reading.value_0
     work[(row + 1) * len(lanes) + lane] = reading.value_1
     work[(row + 2) * len(lanes) + lane] = reading.value_2
@@ -40,6 +45,17 @@ def put_slot(work: Work, lanes: Lanes, slot: int, lane: int, reading: Reading) -
     work[(row + 9) * len(lanes) + lane] = reading.quality
     work[(row + 10) * len(lanes) + lane] = reading.arrived
     work[(row + 11) * len(lanes) + lane] = reading.withheld
+
+
+@equation
+def reading_at(work: Work, lanes: Lanes, row: int, lane: int) -> Reading:
+    """One lane's reading of the rows from `row` on."""
+    return Reading(
+        work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane], work[(row + 2) * len(lanes) + lane],
+        work[(row + 3) * len(lanes) + lane], work[(row + 4) * len(lanes) + lane], work[(row + 5) * len(lanes) + lane],
+        work[(row + 6) * len(lanes) + lane], work[(row + 7) * len(lanes) + lane], work[(row + 8) * len(lanes) + lane],
+        work[(row + 9) * len(lanes) + lane], work[(row + 10) * len(lanes) + lane], work[(row + 11) * len(lanes) + lane],
+    )  # fmt: skip
 
 
 @equation

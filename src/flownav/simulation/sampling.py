@@ -9,6 +9,7 @@ from flownav.control.autopilot import AutopilotState
 from flownav.control.go_around import Knowledge
 from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import rotation_from_quaternion
+from flownav.measurement import Sensor
 from flownav.navigation.records import Reading
 from flownav.sensors.barometer import step_barometer
 from flownav.sensors.flow_camera import FlowCameraTruth, pad_texture, step_flow_camera
@@ -30,6 +31,7 @@ from flownav.simulation.draws import (
     SKID_CHANNEL,
     draw,
 )
+from flownav.simulation.failing import strike
 from flownav.simulation.layout import (
     baro_as_is,
     camera_as_is,
@@ -101,30 +103,57 @@ def due(clock: Clock, epoch: int) -> bool:
 
 
 @procedure
-def sample(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slots: int, taken: int, s: Onboard) -> int:
+def sample(
+    work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slots: int, taken: int, s: Onboard, fails: bool | None
+) -> int:
     """Every sensor whose clock says so, but the inertial one, in the order of `schedule`; how many were taken."""
     if due(s.receiver_clock, epoch):
         read_receiver(work, lanes, seed, flight, epoch, slots, taken, s)
+        if fails is not None:
+            strike_one(work, lanes, seed, flight, epoch, taken % slots, Sensor.GPS_POSITION, 0, s.receiver_clock)
+            if s.receiver_offers_velocity > 0:
+                following = (taken + 1) % slots
+                strike_one(work, lanes, seed, flight, epoch, following, Sensor.GPS_VELOCITY, 1, s.receiver_clock)
         taken += 2 if s.receiver_offers_velocity > 0 else 1
     if due(s.baro_clock, epoch):
         read_baro(work, lanes, seed, flight, epoch, taken % slots, s)
+        if fails is not None:
+            strike_one(work, lanes, seed, flight, epoch, taken % slots, Sensor.BARO, 2, s.baro_clock)
         taken += 1
     if due(s.mag_clock, epoch):
         read_mag(work, lanes, seed, flight, epoch, taken % slots, s)
+        if fails is not None:
+            strike_one(work, lanes, seed, flight, epoch, taken % slots, Sensor.MAG, 3, s.mag_clock)
         taken += 1
     if due(s.range_clock, epoch):
         read_range(work, lanes, seed, flight, epoch, taken % slots, s)
+        if fails is not None:
+            strike_one(work, lanes, seed, flight, epoch, taken % slots, Sensor.RANGE, 4, s.range_clock)
         taken += 1
     if due(s.camera_clock, epoch):
         read_camera(work, lanes, seed, flight, epoch, taken % slots, s)
+        if fails is not None:
+            strike_one(work, lanes, seed, flight, epoch, taken % slots, Sensor.FLOW_RATE, 5, s.camera_clock)
         taken += 1
     if due(s.pad_clock, epoch):
         read_pad(work, lanes, seed, flight, epoch, taken % slots, s)
+        if fails is not None:
+            strike_one(work, lanes, seed, flight, epoch, taken % slots, Sensor.PAD, 6, s.pad_clock)
         taken += 1
     if due(s.skid_clock, epoch):
         read_skid(work, lanes, seed, flight, epoch, taken % slots, s)
+        if fails is not None:
+            strike_one(work, lanes, seed, flight, epoch, taken % slots, Sensor.LANDED, 7, s.skid_clock)
         taken += 1
     return taken
+
+
+@equation
+def strike_one(
+    work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot: int, sensor: int, channel: int, clock: Clock
+) -> None:
+    """A reading that was just taken as each lane's fault has it."""
+    strike(work, lanes, seed, flight, epoch, epoch * EPOCH_S, slot, sensor, channel, epoch // clock.every)
 
 
 @procedure

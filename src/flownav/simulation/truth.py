@@ -21,6 +21,7 @@ from flownav.sensors.magnetometer import MagnetometerParameters
 from flownav.sensors.pad_camera import PadCameraParameters
 from flownav.sensors.range_sensor import RangeSensorParameters
 from flownav.sensors.skid_switch import SkidSwitchParameters
+from flownav.simulation.fault import SensorFault
 from flownav.simulation.wind import WindParameters
 from flownav.vehicle.kinds import AnyVehicle
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
@@ -57,6 +58,7 @@ class Truth(NamedTuple):
     mag: MagnetometerParameters
     pad: PadCameraParameters
     skid: SkidSwitchParameters
+    fault: SensorFault
 
 
 PARTS: dict[str, Any] = get_type_hints(Truth) | {"vehicle": VehicleParameters}

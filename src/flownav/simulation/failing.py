@@ -1,0 +1,122 @@
+"""Sensors that fail in flight: a reading on its way from its sensor becomes what a failed one would have said.
+
+A fault is part of a flight's truth, which nobody is told: each lane has its own. It strikes the readings that are taken
+in [begins_s, ends_s); the sizes are those of `faults.catalogue`, whose injectors do the same to a log, and tests hold
+the two together.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import equation, lane_access, procedure
+from flownav.estimation.kalman import Lanes, Work
+from flownav.measurement import Sensor
+from flownav.navigation.records import Reading
+from flownav.simulation import layout
+from flownav.simulation.draws import FAULT_CHANNEL, draw
+from flownav.simulation.fault import SensorFault
+from flownav.simulation.layout import fault_as_is
+from flownav.simulation.ring import FIELDS, FIRST, put_slot, reading_at, store_row
+
+SQRT_2 = math.sqrt(2.0)
+
+
+class FaultNormals(NamedTuple):
+    """Standard normals of one reading."""
+
+    first: float
+    second: float
+    third: float
+    fourth: float
+    fifth: float
+    sixth: float
+
+
+load_normals, _ = lane_access(FaultNormals, layout.FAULT_NORMALS)
+
+
+@equation
+def even(normal: float) -> float:
+    """What is even between 0 and 1, of a standard normal: its distribution function."""
+    return 0.5 * (1.0 + math.erf(normal / SQRT_2))
+
+
+@equation
+def strikes(sensor: int, fault: SensorFault) -> bool:
+    """Whether a fault is one of this sensor's."""
+    if sensor == Sensor.IMU:
+        return fault.inertial > 0.0
+    if sensor == Sensor.GPS_POSITION:
+        return fault.position > 0.0
+    if sensor == Sensor.GPS_VELOCITY:
+        return fault.velocity > 0.0
+    if sensor == Sensor.FLOW_RATE:
+        return fault.flow > 0.0
+    if sensor == Sensor.RANGE:
+        return fault.range > 0.0
+    return fault.others > 0.0
+
+
+@equation
+def failed(read: Reading, earlier: Reading, held: float, since_s: float, n: FaultNormals, f: SensorFault) -> Reading:
+    """What a failed sensor says instead of `read`, so long after the fault began.
+
+    earlier: its reading `f.late_readings` before; held: its first value before the fault.
+    """
+    said = earlier if f.late_readings > 0.0 else read
+    x = f.m_xx * said.value_0 + f.m_xy * said.value_1 + f.bias_0 + f.drift_0 * since_s + f.noise_first * n.first
+    y = f.m_yx * said.value_0 + f.m_yy * said.value_1 + f.bias_1 + f.drift_1 * since_s + f.noise_first * n.second
+    x = f.even_to * (2.0 * even(n.first) - 1.0) if f.even_to > 0.0 else x
+    y = f.even_to * (2.0 * even(n.second) - 1.0) if f.even_to > 0.0 else y
+    spike = f.spike_share > 0.0 and even(n.third) < f.spike_share
+    x = f.spike_low + (f.spike_high - f.spike_low) * even(n.fourth) if spike else x
+    x = held if f.held > 0.0 else (f.always if np.isfinite(f.always) else x)
+    blank = f.lost > 0.0 or (f.blank_s > 0.0 and since_s % f.blank_every_s < f.blank_s)
+    gone = np.nan if blank else 0.0
+    return Reading(
+        x + gone,
+        y + gone,
+        said.value_2 + f.bias_2 + gone,
+        said.value_3 + f.bias_3 + f.noise_last * n.fourth + gone,
+        said.value_4 + f.bias_4 + f.noise_last * n.fifth + gone,
+        said.value_5 + f.bias_5 + f.noise_last * n.sixth + gone,
+        read.variance_0,
+        read.variance_1,
+        read.variance_2,
+        f.quality if np.isfinite(f.quality) else read.quality,
+        0.0 if f.lost > 0.0 else read.arrived,
+        read.withheld,
+    )
+
+
+@procedure
+def strike(
+    work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, t_s: float, slot: int, sensor: int, channel: int,
+    count: int,
+) -> None:  # fmt: skip
+    """The reading in a slot as each lane's fault has it. channel: of its noise; count: the reading's number."""
+    draw(work, lanes, layout.FAULT_NORMALS, 6, seed, flight, epoch, FAULT_CHANNEL + 3 * channel)
+    for lane in range(len(lanes)):
+        fault, read = fault_as_is(work, lanes, lane), reading_at(work, lanes, FIRST + slot * FIELDS, lane)
+        struck, on = strikes(sensor, fault), t_s >= fault.begins_s and t_s < fault.ends_s
+        earlier = read
+        if sensor == Sensor.FLOW_RATE:
+            earlier = remember(work, lanes, lane, read, count, int(fault.late_readings))
+        row = layout.FAULT_HELD
+        if sensor == Sensor.RANGE and t_s < fault.begins_s and read.arrived > 0.0:
+            work[row * len(lanes) + lane] = read.value_0
+        held = work[row * len(lanes) + lane]
+        after = failed(read, earlier, held, t_s - fault.begins_s, load_normals(work, lanes, lane), fault)
+        put_slot(work, lanes, slot, lane, after if struck and on else read)
+
+
+@equation
+def remember(work: Work, lanes: Lanes, lane: int, read: Reading, count: int, late: int) -> Reading:
+    """Keep a reading among the last of its sensor; the one of so many before."""
+    kept = layout.FAULT_EARLIER + FIELDS * (count % layout.EARLIER_READINGS)
+    store_row(work, lanes, kept, lane, read)
+    return reading_at(work, lanes, layout.FAULT_EARLIER + FIELDS * ((count - late) % layout.EARLIER_READINGS), lane)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, procedure
-from flownav.estimation.covariance import expect, states_of
+from flownav.compile import equation, larger, procedure, smaller
+from flownav.estimation.covariance import covariance_of, expect, states_of, variance_of
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.gps import gps_position, gps_velocity
+from flownav.estimation.laws.still import pad_below
 from flownav.estimation.states import (
     FORCE,
     GPS_FAST,
@@ -17,6 +18,7 @@ from flownav.estimation.states import (
     INNOVATION_VARIANCE,
     NOISE,
     OFFERED,
+    PAD,
     POSITION,
     STATE,
     VELOCITY,
@@ -27,23 +29,29 @@ from flownav.navigation.memory import (
     GPS_FUSED,
     GPS_MOVED,
     LEVEL_RATIO,
+    PAD_BESIDE,
+    PAD_KNOWN,
     REASON,
     STEADY_FORCE,
+    load_flow,
     load_reading,
     load_rejection,
     load_start,
     store_rejection,
 )
-from flownav.navigation.offers import conclude, note_aid, note_height, put, usable
+from flownav.navigation.offers import conclude, fuse_offered, note_aid, note_height, put, usable
 from flownav.navigation.packed import load_gps_settings
 from flownav.navigation.protection import sign_drift
-from flownav.navigation.reasons import FUSED, INNOVATION_GATE
+from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT
 from flownav.navigation.records import Reading, RejectionMemory
 from flownav.navigation.tape import GPS_RESET, Output, write_event
 from flownav.navigation.told import GpsSettings
 from flownav.navigation.trust import OF_GPS, follow_noise, scale_noise
 
 LEAST_REJECTIONS = 5
+DOUBTED_RESET_S = 1.0
+UNKNOWN_PAD_M = 100.0
+LEAST_PAD_VARIANCE_M2 = 1e-6
 
 
 @equation
@@ -67,11 +75,17 @@ def judge_gps(
 
 
 @equation
-def judge_rejections(refused: bool, t_s: float, m: RejectionMemory, s: GpsSettings) -> tuple[bool, RejectionMemory]:
-    """Whether GPS has been refused for a state so often and so long that the filter is wrong, and the count."""
+def judge_rejections(
+    refused: bool, doubted: bool, t_s: float, m: RejectionMemory, s: GpsSettings
+) -> tuple[bool, RejectionMemory]:
+    """Whether GPS has been refused for a state so often and so long that the filter is wrong, and the count.
+
+    doubted: the flow, which else would hold the filter, is doubted too. Then it takes no longer than DOUBTED_RESET_S.
+    """
     since_s = m.since_s if m.times > 0.0 else t_s
     count = m.times + 1.0
-    reset = refused and count >= LEAST_REJECTIONS and t_s - since_s >= s.gps_reset_s
+    patience_s = smaller(s.gps_reset_s, DOUBTED_RESET_S) if doubted else s.gps_reset_s
+    reset = refused and count >= LEAST_REJECTIONS and t_s - since_s >= patience_s
     return reset, RejectionMemory(count if refused and not reset else 0.0, since_s)
 
 
@@ -143,17 +157,51 @@ def mind_rejections(work: Work, lanes: Lanes, t_s: float, axis: int, position: b
     An axis that is refused for the other's sake alone does not count.
     """
     place = axis if position else 3 + axis
+    moved = False
     for lane in range(len(lanes)):
         ratio = work[INNOVATION * len(lanes) + lane] ** 2
         ratio /= s.gate_sigma * s.gate_sigma * work[INNOVATION_VARIANCE * len(lanes) + lane]
         refused = work[REASON * len(lanes) + lane] == INNOVATION_GATE and ratio > 1.0
         heard = load_reading(work, lanes, lane).arrived > 0.0
         memory = load_rejection(work, lanes, place, lane)
-        reset, after = judge_rejections(refused, t_s, memory, s)
+        flow = load_flow(work, lanes, lane)
+        doubted = flow.doubted > 0.0 or np.isfinite(flow.wrong_s)
+        reset, after = judge_rejections(refused, doubted or not position, t_s, memory, s)
         if heard:
             store_rejection(work, lanes, place, lane, after)
+        work[PAD_BESIDE * len(lanes) + lane] = np.nan
         if heard and reset:
+            if position and not doubted and work[PAD_KNOWN * len(lanes) + lane] > 0.0:
+                note_pad(work, lanes, lane, axis)
+                moved = True
             go_to_gps(work, lanes, lane, t_s, axis, position, s, o)
+    if moved:
+        take_pad_along(work, lanes, axis, s, o)
+
+
+@equation
+def note_pad(work: Work, lanes: Lanes, lane: int, axis: int) -> None:
+    """PAD_BESIDE: where the pad is from the vehicle along an axis, and the variance of that."""
+    beside = work[(STATE + PAD + axis) * len(lanes) + lane] - work[(STATE + POSITION + axis) * len(lanes) + lane]
+    both = variance_of(work, lanes, POSITION + axis, lane) + variance_of(work, lanes, PAD + axis, lane)
+    variance = both - 2.0 * covariance_of(work, lanes, PAD + axis, POSITION + axis, lane)
+    work[PAD_BESIDE * len(lanes) + lane] = beside
+    work[(PAD_BESIDE + 1) * len(lanes) + lane] = larger(variance, LEAST_PAD_VARIANCE_M2)
+
+
+@procedure
+def take_pad_along(work: Work, lanes: Lanes, axis: int, s: GpsSettings, o: Output) -> None:
+    """Where the position went to GPS, the pad goes along: flow, which nobody doubts, tells how far it is from there."""
+    for lane in range(len(lanes)):
+        beside, pad = work[PAD_BESIDE * len(lanes) + lane], STATE + PAD + axis
+        goes = np.isfinite(beside)
+        if goes:
+            work[pad * len(lanes) + lane] = work[(STATE + POSITION + axis) * len(lanes) + lane] + beside
+            reset_state(work, lanes, lane, PAD + axis, UNKNOWN_PAD_M * UNKNOWN_PAD_M, o)
+        variance = work[(PAD_BESIDE + 1) * len(lanes) + lane]
+        put(work, lanes, lane, beside if goes else 0.0, variance if goes else 1.0, FUSED if goes else SILENT)
+    pad_below(work, lanes, axis)
+    fuse_offered(work, lanes, s.gate_sigma, o)
 
 
 @procedure

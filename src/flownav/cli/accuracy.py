@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flownav.cli.output import VehicleOption
+
 if TYPE_CHECKING:
     from flownav.campaign.accuracy import Case
 
@@ -23,6 +25,7 @@ def command(
         str, typer.Option(help="Cases, with commas: takeoff, landing, pad_return, approach, approach_8_m_s; or all.")
     ] = "all",
     ablations: Annotated[int, typer.Option(help="Flights of each variant that lacks a piece; 0 for none.")] = 100,
+    vehicle: VehicleOption = None,
     seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
     out: Annotated[Path | None, typer.Option(help="Write the tables as Markdown, too.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
@@ -41,8 +44,8 @@ def command(
             raise InputError(f"--cases {name or '(empty)'}: no such case; known: {', '.join(CASES)}, or all")
     if out:
         require_writable(out)
-    with progress("Flying", flights_of(chosen, flights, ablations)) as advance:
-        made = [run_case(name, seed, flights, ablations, advance) for name in chosen]
+    with progress("Flying", flights_of(chosen, flights, ablations, vehicle)) as advance:
+        made = [run_case(name, seed, flights, ablations, advance, vehicle) for name in chosen]
     text = markdown(made)
     if out:
         from flownav.files import written_whole

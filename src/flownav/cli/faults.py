@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flownav.cli.output import VehicleOption
 from flownav.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ def command(
     faults: Annotated[str | None, typer.Option(help="Which faults, with commas between; all where unsaid.")] = None,
     heights: Annotated[str, typer.Option(help="Skids above the pad in hover [m], with commas between.")] = "0.5,1.5,3",
     durations: Annotated[str, typer.Option(help="How long a fault lasts [s], with commas between.")] = "2,5",
+    vehicle: VehicleOption = None,
     seed: Annotated[int, typer.Option(help="The noise of flights and faults; the same seed gives the same table.")] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
@@ -35,21 +37,21 @@ def command(
     heights_m = _numbers("--heights", heights, *HEIGHTS_M)
     durations_s = _numbers("--durations", durations, *DURATIONS_S)
     with progress("Failing sensors", runs(chosen, heights_m, durations_s)) as advance:
-        rows = fault_table(navigator(), chosen, heights_m, durations_s, seed, advance)
+        rows = fault_table(navigator(vehicle), chosen, heights_m, durations_s, seed, advance, vehicle)
     if as_json:
-        facts = {"seed": seed, "heights_m": heights_m, "durations_s": durations_s}
+        facts = {"vehicle": vehicle, "seed": seed, "heights_m": heights_m, "durations_s": durations_s}
         typer.echo(json.dumps(facts | {"rows": [row.entry() for row in rows]}))
     else:
-        _show(rows, seed)
+        _show(rows, f"Failing sensors on a landing{f', {vehicle}' if vehicle else ''}, seed {seed}")
 
 
-def navigator() -> Navigate:
+def navigator(vehicle: str | None = None) -> Navigate:
     """The navigator on trial, told what the datasheets of the vehicle's sensors state."""
     from flownav.faults.navigator import navigator_of
     from flownav.faults.table import scenario_at
     from flownav.simulation.assemble import assemble
 
-    return navigator_of(assemble(scenario_at(1.0, 1.0)))
+    return navigator_of(assemble(scenario_at(1.0, 1.0, vehicle)))
 
 
 def _words(option: str, text: str) -> list[str]:
@@ -73,12 +75,12 @@ def _numbers(option: str, text: str, low: float, high: float) -> list[float]:
     return numbers
 
 
-def _show(rows: list[Row], seed: int) -> None:
+def _show(rows: list[Row], title: str) -> None:
     """The rows for people."""
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title=f"Failing sensors on a landing, seed {seed}", title_justify="left")
+    table = Table(title=title, title_justify="left")
     table.add_column("fault", no_wrap=True)
     columns = (
         "height m",

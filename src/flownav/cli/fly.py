@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flownav.cli.output import VehicleOption
 from flownav.errors import InputError, VerdictError
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def command(
     feedback: Annotated[str | None, typer.Option(help="What the autopilot flies on: estimate or truth.")] = None,
     truth: Annotated[str | None, typer.Option(help="The plant: nonlinear, or the paper's linear model.")] = None,
     sensor: Annotated[str | None, typer.Option(help="A flow sensor file (TOML).")] = None,
-    vehicle: Annotated[str | None, typer.Option(help="A vehicle: maxi-joker-3, quad-450, or a file (TOML).")] = None,
+    vehicle: VehicleOption = None,
     ensemble: Annotated[
         bool | None,
         typer.Option(

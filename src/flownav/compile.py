@@ -18,7 +18,7 @@ number of threads.
 from __future__ import annotations
 
 from flownav.compiling.beside import compile_beside
-from flownav.compiling.bundles import FlatAccess, flat_access, lane_access, write_function
+from flownav.compiling.bundles import FlatAccess, flat_access, lane_access, replacing, stepping, write_function
 from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
 from flownav.compiling.progress import announce_compilation
@@ -48,7 +48,9 @@ __all__ = [
     "magnitude",
     "pointer",
     "procedure",
+    "replacing",
     "smaller",
+    "stepping",
     "unit",
     "write_function",
 ]

@@ -50,6 +50,13 @@ def to_body(rotation: Rotation, x: float, y: float, z: float) -> Vector:
 
 
 @equation
+def heading_cosine_sine(rotation: Rotation) -> tuple[Scalar, Scalar]:
+    """Cosine and sine of the heading of body-to-earth `rotation`; not for a nose straight up or down."""
+    level = 1.0 / np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
+    return rotation[0] * level, rotation[3] * level
+
+
+@equation
 def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
     """Hamilton product a b of quaternions `(w, x, y, z)`."""
     aw, ax, ay, az = a

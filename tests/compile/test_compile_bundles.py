@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from flownav.compile import equation, flat_access, kernel, lane_access, pointer
+from flownav.compile import equation, flat_access, kernel, lane_access, pointer, replacing, stepping
 
 
 class Wheel(NamedTuple):
@@ -86,3 +86,40 @@ def test_a_part_of_a_bundle_is_a_bundle():
     out = np.zeros(1)
     spun(pack(CART), out)
     assert out[0] == 2.0
+
+
+class Point(NamedTuple):
+    x: float
+    y: float
+    z: float
+
+
+moved_across = replacing(Point, "z", "x")
+stepped = stepping(Point)
+
+
+@kernel
+def changed(values, dt):
+    """A point replaced and stepped in a kernel."""
+    start = Point(values[0], values[1], values[2])
+    after = stepped(moved_across(start, x=5.0, z=7.0), start, dt)
+    values[0], values[1], values[2] = after.x, after.y, after.z
+
+
+def test_fields_are_replaced_by_name_and_the_others_kept():
+    assert moved_across(Point(1.0, 2.0, 3.0), x=5.0, z=7.0) == Point(5.0, 2.0, 7.0)
+    with pytest.raises(TypeError, match="x"):
+        moved_across(Point(1.0, 2.0, 3.0), z=7.0)
+    with pytest.raises(ValueError, match="Point has no speed, w"):
+        replacing(Point, "w", "x", "speed")
+
+
+def test_a_step_adds_a_rate_to_every_field():
+    assert stepped(Point(1.0, 2.0, 3.0), Point(10.0, 20.0, 30.0), 0.5) == Point(6.0, 12.0, 18.0)
+    assert stepped(Point(1.0, 2.0, 3.0), Point(1j, 0.0, 0.0), 2.0).x == 1.0 + 2j
+
+
+def test_kernels_replace_and_step_alike():
+    values = np.array([1.0, 2.0, 3.0])
+    changed(values, 0.5)
+    assert values.tolist() == [5.5, 3.0, 8.5]

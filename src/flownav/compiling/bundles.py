@@ -1,4 +1,4 @@
-"""Named tuples kept in flat buffers: code that loads and stores them, written out field by field.
+"""Named tuples in kernels and flat buffers: code that loads, stores and changes them, written out field by field.
 
 LLVM vectorises straight-line code only, so the functions are generated, not looped.
 """
@@ -8,7 +8,7 @@ from __future__ import annotations
 import hashlib
 import linecache
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
+from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,30 @@ def lane_access(bundle: type, row: int) -> tuple[Callable[..., Any], Callable[..
     load = write_function("load", f"def load(work, lanes, lane):\n    return bundle({loads})\n", scope)
     store = write_function("store", f"def store(work, lanes, lane, value):\n{stores}\n", scope)
     return equation(load), equation(store)
+
+
+Bundle = TypeVar("Bundle", bound=tuple[Any, ...])
+
+
+def replacing(bundle: type[Bundle], *names: str) -> Callable[..., Bundle]:
+    """`replaced(value, **named)`: a named tuple with these fields anew, all of them; the others as they are.
+
+    `NamedTuple._replace` does not compile. ValueError where the bundle has no such field.
+    """
+    fields: tuple[str, ...] = bundle._fields  # type: ignore[attr-defined]
+    if strange := set(names) - set(fields):
+        raise ValueError(f"{bundle.__name__} has no {', '.join(sorted(strange))}")
+    values = ", ".join(name if name in names else f"value.{name}" for name in fields)
+    source = f"def replaced(value, {', '.join(names)}):\n    return bundle({values})\n"
+    return equation(write_function("replaced", source, {"bundle": bundle}))
+
+
+def stepping(bundle: type[Bundle]) -> Callable[[Bundle, Bundle, float], Bundle]:
+    """`stepped(state, rate, dt)`: state + rate·dt, component by component."""
+    fields: tuple[str, ...] = bundle._fields  # type: ignore[attr-defined]
+    sums = ", ".join(f"state.{name} + rate.{name} * dt" for name in fields)
+    source = f"def stepped(state, rate, dt):\n    return bundle({sums})\n"
+    return equation(write_function("stepped", source, {"bundle": bundle}))
 
 
 class FlatAccess(NamedTuple):

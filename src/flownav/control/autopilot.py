@@ -10,13 +10,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from flownav.compile import clamp, equation, magnitude, smaller
+from flownav.compile import clamp, equation, magnitude, replacing, smaller
 from flownav.control.gains import AutopilotGains
 from flownav.control.gate import descent_limit, misaligned, skids_beside
 from flownav.control.guidance import Reference
-from flownav.frames import GRAVITY_M_S2, Rotation
+from flownav.frames import GRAVITY_M_S2, Rotation, heading_cosine_sine, to_earth
 
 
 class AutopilotState(NamedTuple):
@@ -38,6 +36,15 @@ class AutopilotState(NamedTuple):
     waited_s: float  # at the gate of the last metre
 
 
+with_contact = replacing(AutopilotState, "flying", "contact_time_s")
+with_outer_loop = replacing(
+    AutopilotState,
+    "accel_forward", "accel_right", "gust_forward", "gust_right", "collective",
+    "pitch_sine", "roll_sine", "collective_command", "waited_s",
+)  # fmt: skip
+with_inner_loop = replacing(AutopilotState, "lon", "lat", "pedal")
+
+
 class Estimate(NamedTuple):
     """What the outer loop flies on: position NED [m], velocity and measured specific force body FRD [m/s, m/s2]."""
 
@@ -54,45 +61,24 @@ class Estimate(NamedTuple):
 
 
 @equation
+def at_rest(gains: AutopilotGains, collective_command: float, flying: float) -> AutopilotState:
+    """Nothing integrated yet, the tilt of trimmed hover."""
+    return AutopilotState(
+        0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
+        gains.pitch_trim_sine, gains.roll_trim_sine, collective_command, flying, 0.0, 0.0,
+    )  # fmt: skip
+
+
+@equation
 def grounded(gains: AutopilotGains) -> AutopilotState:
     """The state of an autopilot on the ground at idle."""
-    return AutopilotState(
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        gains.pitch_trim_sine,
-        gains.roll_trim_sine,
-        gains.idle_collective_rad,
-        0.0,
-        0.0,
-        0.0,
-    )
+    return at_rest(gains, gains.idle_collective_rad, 0.0)
 
 
 @equation
 def hovering(gains: AutopilotGains) -> AutopilotState:
     """The state of an autopilot in trimmed hover."""
-    return AutopilotState(
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        gains.pitch_trim_sine,
-        gains.roll_trim_sine,
-        gains.collective_trim_rad,
-        1.0,
-        0.0,
-        0.0,
-    )
+    return at_rest(gains, gains.collective_trim_rad, 1.0)
 
 
 @equation
@@ -117,29 +103,13 @@ def landing_logic(
     landed = contact_time > 0.1
     grounded_for_good = may_land > 0.0 and state.flying == 0.0
     flying = 0.0 if (landed or grounded_for_good) else may_fly
-    return AutopilotState(
-        accel_forward=state.accel_forward,
-        accel_right=state.accel_right,
-        gust_forward=state.gust_forward,
-        gust_right=state.gust_right,
-        collective=state.collective,
-        lon=state.lon,
-        lat=state.lat,
-        pedal=state.pedal,
-        pitch_sine=state.pitch_sine,
-        roll_sine=state.roll_sine,
-        collective_command=state.collective_command,
-        flying=flying,
-        contact_time_s=contact_time,
-        waited_s=state.waited_s,
-    )
+    return with_contact(state, flying=flying, contact_time_s=contact_time)
 
 
 @equation
 def along_heading(rotation: Rotation, n: float, e: float) -> tuple[float, float]:
     """A horizontal vector, forward along the heading and to its right."""
-    level = 1.0 / np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
-    cos_heading, sin_heading = rotation[0] * level, rotation[3] * level
+    cos_heading, sin_heading = heading_cosine_sine(rotation)
     return cos_heading * n + sin_heading * e, cos_heading * e - sin_heading * n
 
 
@@ -149,12 +119,8 @@ def unexplained_acceleration(estimate: Estimate, rotation: Rotation, gains: Auto
 
     A gust's push and a wind's drag: felt at once, where the velocity shows them only later.
     """
-    x, y, z = estimate.force_x, estimate.force_y, estimate.force_z
-    forward, right = along_heading(
-        rotation,
-        rotation[0] * x + rotation[1] * y + rotation[2] * z,
-        rotation[3] * x + rotation[4] * y + rotation[5] * z,
-    )
+    force_n, force_e, _ = to_earth(rotation, estimate.force_x, estimate.force_y, estimate.force_z)
+    forward, right = along_heading(rotation, force_n, force_e)
     pitch, roll = -rotation[6] - gains.pitch_trim_sine, rotation[7] - gains.roll_trim_sine
     return forward + GRAVITY_M_S2 * pitch, right - GRAVITY_M_S2 * roll
 
@@ -178,10 +144,7 @@ def outer_loop(
     climb_limit = gains.climb_limit_m_s
     vel_d = reference.vel_d + clamp(gains.height_gain * (reference.pos_d - estimate.pos_d), -climb_limit, climb_limit)
 
-    # the body velocity in the earth frame
-    est_n = rotation[0] * estimate.u + rotation[1] * estimate.v + rotation[2] * estimate.w
-    est_e = rotation[3] * estimate.u + rotation[4] * estimate.v + rotation[5] * estimate.w
-    est_d = rotation[6] * estimate.u + rotation[7] * estimate.v + rotation[8] * estimate.w
+    est_n, est_e, est_d = to_earth(rotation, estimate.u, estimate.v, estimate.w)
     height_m = gains.pad_pos_d_m - estimate.pos_d
     found = estimate.pad_found > 0.0  # before, height_m is over where GPS puts the pad, metres from any ground
     waiting = found and misaligned(off_n, off_e, est_n, est_e, height_m, state.waited_s, gains)
@@ -212,20 +175,16 @@ def outer_loop(
     limit = gains.tilt_limit
     pitch = -clamp(accel_forward / GRAVITY_M_S2, -limit, limit) if flying else 0.0
     roll = clamp(accel_right / GRAVITY_M_S2, -limit, limit) if flying else 0.0
-    return AutopilotState(
+    return with_outer_loop(
+        state,
         accel_forward=forward if flying else 0.0,
         accel_right=right if flying else 0.0,
         gust_forward=gust_forward if flying else 0.0,
         gust_right=gust_right if flying else 0.0,
         collective=heave if flying else 0.0,
-        lon=state.lon,
-        lat=state.lat,
-        pedal=state.pedal,
         pitch_sine=gains.pitch_trim_sine + pitch,
         roll_sine=gains.roll_trim_sine + roll,
         collective_command=in_flight if flying else on_ground,
-        flying=state.flying,
-        contact_time_s=state.contact_time_s,
         waited_s=state.waited_s + dt if waiting else state.waited_s,
     )
 
@@ -237,8 +196,8 @@ def inner_loop(
     """Tilt, rates and heading (held at north) to blade angles lon, lat, col, ped [rad] (250 Hz)."""
     error_pitch = state.pitch_sine + rotation[6]  # sin(pitch) = -R_31
     error_roll = state.roll_sine - rotation[7]  # sin(roll) cos(pitch) = R_32
-    level = 1.0 / np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
-    error_rate_yaw = -gains.heading_gain * rotation[3] * level - r  # sin(heading)
+    _, sin_heading = heading_cosine_sine(rotation)
+    error_rate_yaw = -gains.heading_gain * sin_heading - r
     flying = state.flying > 0.0
 
     lon = gains.pitch_gain * error_pitch - gains.pitch_damping * q + state.lon
@@ -249,21 +208,11 @@ def inner_loop(
     next_lon = integrate(state.lon, error_pitch, gains.pitch_integral, dt, lon, limit)
     next_lat = integrate(state.lat, error_roll, gains.roll_integral, dt, lat, limit)
     next_pedal = integrate(state.pedal, error_rate_yaw, gains.yaw_rate_integral, dt, pedal, gains.pedal_limit_rad)
-    after = AutopilotState(
-        accel_forward=state.accel_forward,
-        accel_right=state.accel_right,
-        gust_forward=state.gust_forward,
-        gust_right=state.gust_right,
-        collective=state.collective,
+    after = with_inner_loop(
+        state,
         lon=next_lon if flying else 0.0,
         lat=next_lat if flying else 0.0,
         pedal=next_pedal if flying else 0.0,
-        pitch_sine=state.pitch_sine,
-        roll_sine=state.roll_sine,
-        collective_command=state.collective_command,
-        flying=state.flying,
-        contact_time_s=state.contact_time_s,
-        waited_s=state.waited_s,
     )
     return (
         after,

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from flownav.compile import clamp, equation, smaller
 from flownav.control.gains import AutopilotGains
-from flownav.frames import Rotation
+from flownav.frames import Rotation, heading_cosine_sine
 
 FORESEEN_S = 1.0  # how far ahead the last metre's gate looks
 
@@ -20,8 +18,7 @@ def skids_beside(rotation: Rotation, gains: AutopilotGains) -> tuple[float, floa
     """
     forward = gains.skids_below_cg_m * gains.pitch_trim_sine
     left = gains.skids_below_cg_m * gains.roll_trim_sine
-    level = 1.0 / np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
-    cos_heading, sin_heading = rotation[0] * level, rotation[3] * level
+    cos_heading, sin_heading = heading_cosine_sine(rotation)
     return cos_heading * forward + sin_heading * left, sin_heading * forward - cos_heading * left
 
 

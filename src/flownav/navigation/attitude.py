@@ -127,14 +127,8 @@ def put_level(work: Work, lanes: Lanes, axis: int, variance: float) -> None:
         w, x = reading.value_0 / size, reading.value_1 / size
         y, z = reading.value_2 / size, reading.value_3 / size
         rotation = rotation_from_quaternion(w, x, y, z)
-        put(
-            work,
-            lanes,
-            lane,
-            component((rotation[6], rotation[7], 0.0), axis),
-            variance,
-            SILENT if reason != FUSED else reason,
-        )
+        down = component((rotation[6], rotation[7], 0.0), axis)
+        put(work, lanes, lane, down, variance, SILENT if reason != FUSED else reason)
 
 
 @equation

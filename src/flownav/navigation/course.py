@@ -14,7 +14,7 @@ from flownav.compile import equation, procedure
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import ATTITUDE, QUATERNION
-from flownav.frames import quaternion_product, velocity_from_flow
+from flownav.frames import heading_cosine_sine, quaternion_product, velocity_from_flow
 from flownav.navigation.journal import reset_state
 from flownav.navigation.memory import LENS_RANGE, SOUGHT, TURNING, load_course, load_reading, store_course
 from flownav.navigation.offers import is_heard
@@ -83,8 +83,7 @@ def note_flow_course(work: Work, lanes: Lanes, t_s: float, angular: bool, sought
         y = reading.value_1 - (work[(TURNING + 1) * len(lanes) + lane] if angular else 0.0)
         u, v = velocity_from_flow(x, y, range_m) if angular else (x, y)
         rotation = rotation_of(work, lanes, lane)
-        level = np.sqrt(rotation[0] * rotation[0] + rotation[3] * rotation[3])
-        cosine, sine = rotation[0] / level, rotation[3] / level
+        cosine, sine = heading_cosine_sine(rotation)
         if is_heard(reading) and np.isfinite(u + v):
             after = with_flow(cosine * u - sine * v, sine * u + cosine * v, t_s, load_course(work, lanes, lane))
             store_course(work, lanes, lane, after)

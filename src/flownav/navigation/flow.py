@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, larger, procedure, smaller
+from flownav.compile import equation, larger, procedure, replacing, smaller
 from flownav.estimation.covariance import add_noise_lane, consider, covariance_of, variance_of
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.flow import body_velocity, flow_rate, lens_range_of
@@ -79,6 +79,9 @@ from flownav.navigation.trust import watch_whiteness
 
 LARGEST_SPREAD = 0.5  # of the height over the ground, of which flow makes no speed
 UNKNOWN_RANGE_M = 2.0
+
+with_agreement = replacing(FlowMemory, "excess", "ratio", "likeness")
+with_verdict = replacing(FlowMemory, "taken_s", "doubted", "wrong_s", "usual")
 
 
 # -- on lanes -----------------------------------------------------------------------------------------------
@@ -217,10 +220,7 @@ def learn(work: Work, lanes: Lanes, t_s: float, angular: bool, component: int, s
                 noise = work[NOISE * len(lanes) + lane]
                 excess = followed_excess(innovation, before, noise, t_s, m, s)
             likeness = followed_likeness(alike(innovation, before, total), t_s, m)
-            after = FlowMemory(
-                m.taken_s, excess, m.bias_x, m.bias_y, m.bias_count, ratio, m.doubted, likeness, m.wrong_s, m.usual
-            )
-            store_flow(work, lanes, lane, after)
+            store_flow(work, lanes, lane, with_agreement(m, excess=excess, ratio=ratio, likeness=likeness))
 
 
 @equation
@@ -256,7 +256,5 @@ def judge_agreement(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
                 write_event(lanes, lane, t_s, FLOW_DOUBTED if doubted > 0.0 else FLOW_TRUSTED, m.ratio, o)
             wrong_s = wrong_since(t_s, m.likeness, m.wrong_s)
             usual = followed_quality(load_reading(work, lanes, lane).quality, t_s - m.taken_s, m.usual)
-            after = FlowMemory(
-                t_s, m.excess, m.bias_x, m.bias_y, m.bias_count, m.ratio, doubted, m.likeness, wrong_s, usual
-            )
+            after = with_verdict(m, taken_s=t_s, doubted=doubted, wrong_s=wrong_s, usual=usual)
             store_flow(work, lanes, lane, after)

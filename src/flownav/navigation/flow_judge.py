@@ -6,12 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, larger, smaller
+from flownav.compile import equation, larger, replacing, smaller
 from flownav.navigation.flow_noise import LONGEST_STEP_S
 from flownav.navigation.offers import usable_in_flight
 from flownav.navigation.reasons import FUSED, NEAR_GROUND, NO_HEIGHT, OUT_OF_RANGE, TILTED
 from flownav.navigation.records import FlowMemory, Reading
 from flownav.navigation.told import FlowSettings
+
+with_gyro = replacing(FlowMemory, "bias_x", "bias_y", "bias_count")
 
 NEAR_LIMIT = 0.98  # a sensor that has reached its limit reads the limit, whatever the flow
 
@@ -43,9 +45,7 @@ def turning_of(
     share = larger(1.0 - np.exp(-step_s / s.flow_gyro_time_s), 1.0 / larger(count, 1.0)) if follows else 0.0
     bias_own_x = m.bias_x + share * (own_x - imu_x - m.bias_x) if follows else m.bias_x
     bias_own_y = m.bias_y + share * (own_y - imu_y - m.bias_y) if follows else m.bias_y
-    after = FlowMemory(
-        m.taken_s, m.excess, bias_own_x, bias_own_y, count, m.ratio, m.doubted, m.likeness, m.wrong_s, m.usual
-    )
+    after = with_gyro(m, bias_x=bias_own_x, bias_y=bias_own_y, bias_count=count)
     x = imu_x if by_imu else own_x - bias_own_x
     y = imu_y if by_imu else own_y - bias_own_y
     return x, y, after

@@ -122,12 +122,8 @@ def judge_standing(gyro: ImuWindow, seen: SeenWindow, contact_m: float) -> float
 @procedure
 def open_windows(work: Work, lanes: Lanes, lane: int) -> None:
     """Nothing has been read in the windows of a lane."""
-    store_imu_window(
-        work,
-        lanes,
-        lane,
-        ImuWindow(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-    )
+    nothing = ImuWindow(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    store_imu_window(work, lanes, lane, nothing)
     store_seen_window(work, lanes, lane, SeenWindow(1e9, -1.0, 0.0, 0.0, 0.0, 0.0))
 
 

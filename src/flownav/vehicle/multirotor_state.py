@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation
+from flownav.compile import equation, stepping
 from flownav.vehicle.state import settled
 
 
@@ -63,31 +63,7 @@ def total_of(x: Six) -> float:
     return ((x.one + x.two) + (x.three + x.four)) + (x.five + x.six)
 
 
-@equation
-def moved(state: MultirotorState, rate: MultirotorState, dt: float) -> MultirotorState:
-    """state + rate·dt, component by component."""
-    return MultirotorState(
-        state.pos_n + rate.pos_n * dt,
-        state.pos_e + rate.pos_e * dt,
-        state.pos_d + rate.pos_d * dt,
-        state.u + rate.u * dt,
-        state.v + rate.v * dt,
-        state.w + rate.w * dt,
-        state.qw + rate.qw * dt,
-        state.qx + rate.qx * dt,
-        state.qy + rate.qy * dt,
-        state.qz + rate.qz * dt,
-        state.p + rate.p * dt,
-        state.q + rate.q * dt,
-        state.r + rate.r * dt,
-        state.speed_1 + rate.speed_1 * dt,
-        state.speed_2 + rate.speed_2 * dt,
-        state.speed_3 + rate.speed_3 * dt,
-        state.speed_4 + rate.speed_4 * dt,
-        state.speed_5 + rate.speed_5 * dt,
-        state.speed_6 + rate.speed_6 * dt,
-        state.used + rate.used * dt,
-    )
+moved = stepping(MultirotorState)  # state + rate·dt
 
 
 @equation

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, magnitude
+from flownav.compile import equation, magnitude, stepping
 
 
 class HelicopterState(NamedTuple):
@@ -68,34 +68,7 @@ class Outputs(NamedTuple):
     contact_force_n: float
 
 
-@equation
-def add_scaled(state: HelicopterState, rate: HelicopterState, dt: float) -> HelicopterState:
-    """state + rate·dt, component by component."""
-    return HelicopterState(
-        state.pos_n + rate.pos_n * dt,
-        state.pos_e + rate.pos_e * dt,
-        state.pos_d + rate.pos_d * dt,
-        state.u + rate.u * dt,
-        state.v + rate.v * dt,
-        state.w + rate.w * dt,
-        state.qw + rate.qw * dt,
-        state.qx + rate.qx * dt,
-        state.qy + rate.qy * dt,
-        state.qz + rate.qz * dt,
-        state.p + rate.p * dt,
-        state.q + rate.q * dt,
-        state.r + rate.r * dt,
-        state.a1 + rate.a1 * dt,
-        state.b1 + rate.b1 * dt,
-        state.lon + rate.lon * dt,
-        state.lat + rate.lat * dt,
-        state.col + rate.col * dt,
-        state.ped + rate.ped * dt,
-        state.lon_rate + rate.lon_rate * dt,
-        state.lat_rate + rate.lat_rate * dt,
-        state.col_rate + rate.col_rate * dt,
-        state.ped_rate + rate.ped_rate * dt,
-    )
+add_scaled = stepping(HelicopterState)  # state + rate·dt
 
 
 NEGLIGIBLE = 1e-100  # what decays below it is zero: arithmetic on subnormal numbers is a hundred times slower

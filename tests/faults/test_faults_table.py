@@ -126,7 +126,7 @@ def test_the_flight_hovers_while_the_fault_lasts_and_lands_after_it(height_m):
 # -- the command ---------------------------------------------------------------------------------------------
 @pytest.fixture
 def command(monkeypatch):
-    monkeypatch.setattr(faults_command, "navigator", lambda: follow_gps)
+    monkeypatch.setattr(faults_command, "navigator", lambda vehicle: follow_gps)
     app = typer.Typer()
     app.command()(faults_command.command)
     return lambda *arguments: CliRunner().invoke(app, list(arguments))

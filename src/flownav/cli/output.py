@@ -15,7 +15,9 @@ from flownav.errors import InputError
 if TYPE_CHECKING:
     from flownav.record import Record
 
-VehicleOption = Annotated[str | None, typer.Option(help="A vehicle: maxi-joker-3, quad-450, hexa-550, or a file (TOML).")]
+VehicleOption = Annotated[
+    str | None, typer.Option(help="A vehicle: maxi-joker-3, quad-450, hexa-550, or a file (TOML).")
+]
 
 
 @contextmanager

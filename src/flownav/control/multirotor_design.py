@@ -1,9 +1,9 @@
 """A multirotor's gains from its control powers: the shape of each loop in units that the control powers take out.
 
 The shape of the horizontal axes is where a local search for the least drift (`control.shaping`'s measure and margins)
-ended on the shipped 450 mm quad, its gains then lowered by hand until the loops keep 45 degrees with the inflow held,
-too; both axes have the same. A share of the rotors' thrust gives the body an angular acceleration, where a cyclic gives
-it a rate.
+ended on the shipped 450 mm quad, its gains then lowered by hand until the loops of both shipped multirotors keep 45
+degrees with the inflow held, too; both axes have the same. A share of the rotors' thrust gives the body an angular
+acceleration, where a cyclic gives it a rate.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaign.local import counted_steps, home_epoch, score_history
+from flownav.campaign.local import counted_steps, home_epoch, score_history, takeoff_history
 from flownav.record import POSITION_NED, VELOCITY_BODY
 from flownav.scoring.consistency import (
     GROUP_FLIGHTS,
@@ -49,7 +49,8 @@ class Judged:
     takes its pad to be; flown: errors in flight of what was flown on; sums: of the navigator at its horizon; groups:
     steps inside the band, and steps, of each GROUP_FLIGHTS flights one after the other (of all where there are fewer;
     a remainder is left out).
-    The last two are None for a filter that states no consistency.
+    These two are None for a filter that states no consistency. takeoffs: (flights, len(TAKEOFF_COLUMNS)), None of
+    flights that start in the air.
     """
 
     scores: Array
@@ -57,6 +58,7 @@ class Judged:
     flown: ErrorSums
     sums: ConsistencySums | None
     groups: tuple[tuple[int, int], ...] | None
+    takeoffs: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -82,21 +84,24 @@ def fly_judged(
     """Fly flights 0 to `flights - 1`, matched or of an ensemble, and judge them; memory grows by a row a flight."""
     home = home_epoch(flight)
 
-    def judge(history: Array) -> tuple[Array, Array, ErrorSums, ConsistencySums | None]:
+    def judge(history: Array) -> tuple[Array, Array, ErrorSums, ConsistencySums | None, Array | None]:
         estimate = history[:, columns("estimate", STATES)]
         truth = history[:, columns("truth", STATES)]
         counted = counted_steps(flight, history)
         in_flight = counted * (1.0 - _on_ground(history))
         largest = largest_horizontal_error(estimate, truth, home, in_flight * _from(home, len(history)))
         flown = error_sums((estimate - truth) ** 2, _skid_height(flight, history), in_flight)
-        return score_history(flight, history), largest, flown, _at_horizon(flight, history)
+        up = takeoff_history(flight, history)
+        return score_history(flight, history), largest, flown, _at_horizon(flight, history), up
 
-    rows, largest, groups = [], [], []
+    rows, largest, groups, ups = [], [], [], []
     total: ConsistencySums | None = None
     group: ConsistencySums | None = None
     flown_on: ErrorSums | None = None
-    for flown, (scores, horizontal, errors, sums) in fly_blocks(flight, seed, 0, flights, judge, threads, ensemble):
+    for flown, (scores, horizontal, errors, sums, up) in fly_blocks(flight, seed, 0, flights, judge, threads, ensemble):
         rows.append(scores)
+        if up is not None:
+            ups.append(up)
         largest.append(horizontal)
         flown_on = errors if flown_on is None else flown_on + errors
         if sums is not None:
@@ -108,7 +113,8 @@ def fly_judged(
         on_progress(flown)
     assert flown_on is not None
     in_groups = None if total is None else tuple(groups) or (inside_steps(total),)
-    return Judged(np.concatenate(rows), np.concatenate(largest), flown_on, total, in_groups)
+    every = np.concatenate(ups) if ups else None
+    return Judged(np.concatenate(rows), np.concatenate(largest), flown_on, total, in_groups, every)
 
 
 def _from(step: int | None, epochs: int) -> Array:

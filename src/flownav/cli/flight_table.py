@@ -43,6 +43,8 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
     if "known_exactly" in facts:
         console.print("errors are those of what was flown on, in flight after the hand-over", highlight=False)
         console.print(f"known exactly  {facts['known_exactly']}", highlight=False)
+    if facts.get("takeoff"):
+        console.print(takeoff_line(facts["takeoff"], facts["flights"]), highlight=False)
     _show_touchdown(console, facts)
     if facts.get("rmse_over_bound"):
         _show_consistency(console, facts)
@@ -61,6 +63,16 @@ def _show_touchdown(console: Console, facts: dict[str, Any]) -> None:
         return
     for line in touchdown_lines(landing, facts.get("landed"), facts["flights"]):
         console.print(line, highlight=False)
+
+
+def takeoff_line(takeoff: dict[str, Any], flights: int) -> str:
+    """How far a take-off, or many, passed the commanded height, and how long there was no flow."""
+    over, blind = takeoff["over_commanded_m"], takeoff["without_flow_s"]
+    line = f"take-off  {_cell(over, 3)} m over the commanded height, {_cell(blind, 2)} s without flow above half of it"
+    if flights == 1:
+        return line
+    worst = f"worst {over['worst']:.3f} m and {blind['worst']:.2f} s"
+    return f"{line}; {worst}; flow lost in {takeoff['lost_flow']} of {flights} flights"
 
 
 def touchdown_lines(landing: dict[str, Any], landed: int | None, flights: int) -> list[str]:

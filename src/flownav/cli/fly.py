@@ -57,6 +57,7 @@ def command(
     from flownav.cli.output import progress, require_between, require_writable, save
     from flownav.scoring.errors import scores_of_flights
     from flownav.scoring.paper_tables import percentile_of_paper, published
+    from flownav.scoring.takeoffs import takeoff_of_flights
     from flownav.simulation.assemble import assemble
     from flownav.simulation.scenario import load_scenario
 
@@ -97,6 +98,8 @@ def command(
     if setup.fitted is not None:
         facts["known_exactly"] = known_exactly(chosen)
         facts |= dict.fromkeys(OF_MANY_FLIGHTS) if flights == 1 else {}
+    if flights > 1:
+        scores["takeoff"] = None if judged.takeoffs is None else takeoff_of_flights(judged.takeoffs)
     facts |= scores | save(record, record_path, report=report)
     if percentiles:
         facts["paper_percentile"] = percentiles

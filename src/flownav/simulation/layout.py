@@ -56,6 +56,7 @@ GPS = _rows.take(len(NavSolution._fields))  # the reading
 FLOW = _rows.take(len(FlowState._fields))
 RANGEFINDER = _rows.take(len(RangefinderState._fields))
 FLOW_READING = _rows.take(4)  # u, v, w [m/s], and whether the sensor is engaged
+SEES_FLOW = FLOW_READING + 3  # of the navigator's camera: whether its last reading says anything
 FLOW_SIGMA = _rows.take(1)  # of the published flow velocity [m/s]
 RANGE = _rows.take(2)  # the latest reading [m] and whether it is valid
 

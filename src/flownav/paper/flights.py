@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from flownav.campaign.local import fly_many, median_flight, score_history
 from flownav.compile import LANES
 from flownav.measurement import Array
+from flownav.paper.lift_off import LiftOff, lift_offs
 from flownav.parameter_files import check
-from flownav.record import VELOCITY_BODY, Record
-from flownav.report.series import difference, moments, track
+from flownav.record import Record
 from flownav.scoring.errors import STATES, scores_of_flight, scores_of_flights
 from flownav.scoring.paper_tables import percentile_of_paper, published
 from flownav.simulation.assemble import Setup, assemble
@@ -23,26 +21,13 @@ from flownav.simulation.scenario import Scenario, load_scenario, with_filter
 
 SCENARIOS = {5: "takeoff", 6: "landing"}
 HONEST_GPS = "midg"
-LIFT_OFF_REACH_S = (-1.0, 3.0)  # about lift-off: where its transient is
-
-
-class LiftOff(NamedTuple):
-    """Largest error in w about lift-off [m/s] of one take-off: as flown, and with a sensor that does not shake."""
-
-    shaken_m_s: float
-    unshaken_m_s: float
-
-    @property
-    def frozen_inflow_share(self) -> float:
-        """What the sensor's shake has no part in: the frozen inflow of B_red."""
-        return self.unshaken_m_s / self.shaken_m_s
 
 
 @dataclass(frozen=True)
 class Flights:
     """Flights of one scenario beside its table. honest: the scores with a receiver of 2 m CEP.
 
-    white_noise_m: standard deviation of an axis of the GPS noise flown; lift_off: of a take-off's recorded flight.
+    white_noise_m: standard deviation of an axis of the GPS noise flown; lift_off: of take-offs.
     """
 
     table: int
@@ -77,7 +62,7 @@ class Flights:
             "max_position_error_with_2_m_cep_m": self.honest["max_position_error_m"],
             "touchdown_reproduced": self.scores["touchdown"],
             "touchdown_with_2_m_cep": self.honest["touchdown"],
-            "lift_off": None if self.lift_off is None else self.lift_off._asdict(),
+            "lift_off": None if self.lift_off is None else self.lift_off.as_json(),
         }
 
 
@@ -93,7 +78,7 @@ def fly_table(
     median = median_flight(rows)
     record = _recorded(setup, seed, median, table)
     still = scenario.flow.model_dump(exclude_unset=True) | {"shake": False}
-    unshaken = _recorded(assemble(_with(scenario, "flow", still)), seed, median, table)
+    unshaken = assemble(_with(scenario, "flow", still)).flight
     printed = published(table)
     assert printed is not None
     return Flights(
@@ -106,7 +91,7 @@ def fly_table(
         scores_of_flights(_flown(honest.flight, seed, flights, on_progress)),
         record,
         float(scenario.gps.white_sigma_m),
-        _lift_off(record, unshaken),
+        lift_offs(setup.flight, unshaken, seed, flights),
     )
 
 
@@ -127,21 +112,3 @@ def _with(scenario: Scenario, table: str, values: dict[str, Any]) -> Scenario:
     """The scenario with another table."""
     entries = scenario.model_dump(exclude_unset=True)
     return check(entries | {table: values}, Scenario, f"{scenario.name} with another [{table}]")
-
-
-def _lift_off(shaken: Record, unshaken: Record) -> LiftOff | None:
-    """Of two records of the same flight; None where nothing lifts off."""
-    moment = next((moment for moment in moments(shaken) if moment.name == "lift-off"), None)
-    if moment is None:
-        return None
-    return LiftOff(*(_largest_w_error(record, moment.t_s) for record in (shaken, unshaken)))
-
-
-def _largest_w_error(record: Record, lift_off_s: float) -> float:
-    """Largest absolute error in w about lift-off [m/s]."""
-    estimate, truth = track(record, "estimate", VELOCITY_BODY), track(record, "truth", VELOCITY_BODY)
-    assert estimate is not None
-    assert truth is not None
-    before_s, after_s = LIFT_OFF_REACH_S
-    error = difference(estimate, truth).within((lift_off_s + before_s, lift_off_s + after_s))
-    return float(np.nanmax(np.abs(error.value[:, 2])))

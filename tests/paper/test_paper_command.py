@@ -87,6 +87,19 @@ def test_the_json_has_every_table_with_every_key(whole: Outcome) -> None:
             assert 0.0 <= entry["std_error_percentile"] <= 100.0
 
 
+def test_the_rigs_errors_of_gyro_and_sonar_are_flown_too(whole: Outcome) -> None:
+    for table in ("table5", "table6"):
+        as_is, leaking = whole.facts[table], whole.facts[table]["with_errors_of_the_rig"]
+        assert leaking["rotation_leak"] == pytest.approx(0.128, abs=0.001)
+        assert leaking["sonar_lag_s"] == pytest.approx(0.1)
+        for state in "uv":
+            ours, theirs = (rows[state]["std_error" + end]["median"] for rows, end in
+                            ((as_is["states"], "_reproduced"), (leaking["states"], "")))  # fmt: skip
+            assert theirs != ours
+            assert 0.8 * ours < theirs < 3.0 * ours
+    assert "of the rotation left in the velocity" in whole.page.read_text(encoding="utf-8").replace("\u00a0", " ")
+
+
 def test_every_published_figure_is_the_papers(whole: Outcome, paper_folder: Path) -> None:
     def table(name: str) -> list[dict[str, str]]:
         with (paper_folder / name).open(encoding="utf-8") as file:

@@ -20,6 +20,8 @@ def show(of: Reproduction, page: str) -> None:
     console.width = max(console.width, WIDEST)
     for table in _tables(of):
         console.print(table)
+    for flown in of.flights:
+        console.print(f"{flown.scenario}: {words.leaking(flown)}")
     claims = Table("claim", "the paper", "here", "verdict", title="Claims put to the test", title_justify="left")
     for finding in of.findings:
         style = "" if finding.agrees else "bold"

@@ -9,9 +9,11 @@ from typing import Any
 from flownav.campaign.local import fly_many, median_flight, score_history
 from flownav.compile import LANES
 from flownav.measurement import Array
+from flownav.optics.firmware import EARLY_GYRO_SCALE
 from flownav.paper.lift_off import LiftOff, lift_offs
 from flownav.parameter_files import check
 from flownav.record import Record
+from flownav.rig.instruments import SONAR_ECHO_S, SONAR_PERIOD_S
 from flownav.scoring.errors import STATES, scores_of_flight, scores_of_flights
 from flownav.scoring.paper_tables import percentile_of_paper, published
 from flownav.simulation.assemble import Setup, assemble
@@ -21,11 +23,13 @@ from flownav.simulation.scenario import Scenario, load_scenario, with_filter
 
 SCENARIOS = {5: "takeoff", 6: "landing"}
 HONEST_GPS = "midg"
+# what the rig's sensor has: rotation that its gyro leaves, and a sonar that is an echo and half a period old
+RIG_ERRORS = {"rotation_leak": 1.0 - EARLY_GYRO_SCALE, "sonar_lag_s": SONAR_ECHO_S + 0.5 * SONAR_PERIOD_S}
 
 
 @dataclass(frozen=True)
 class Flights:
-    """Flights of one scenario beside its table. honest: the scores with a receiver of 2 m CEP.
+    """Flights of one scenario beside its table. honest: scores with a receiver of 2 m CEP; leaking: with RIG_ERRORS.
 
     white_noise_m: standard deviation of an axis of the GPS noise flown; lift_off: of take-offs.
     """
@@ -37,6 +41,7 @@ class Flights:
     scores: dict[str, Any]
     percentile: dict[str, Any]
     honest: dict[str, Any]
+    leaking: dict[str, Any]
     record: Record
     white_noise_m: float
     lift_off: LiftOff | None = None
@@ -60,6 +65,8 @@ class Flights:
             "max_position_error_reproduced_m": self.scores["max_position_error_m"],
             "max_position_error_percentile": self.percentile["max_position_error_m"],
             "max_position_error_with_2_m_cep_m": self.honest["max_position_error_m"],
+            "with_errors_of_the_rig": RIG_ERRORS
+            | {name: self.leaking[name] for name in ("states", "max_position_error_m")},
             "touchdown_reproduced": self.scores["touchdown"],
             "touchdown_with_2_m_cep": self.honest["touchdown"],
             "lift_off": None if self.lift_off is None else self.lift_off.as_json(),
@@ -69,7 +76,8 @@ class Flights:
 def fly_table(
     table: int, seed: int, flights: int, on_progress: Callable[[int], object] = lambda flown: None
 ) -> Flights:
-    """Table 5 or 6, the paper's filter: `flights` flights with its GPS noise, as many with 2 m CEP, one recorded."""
+    """Table 5 or 6, the paper's filter: `flights` flights with its GPS noise, as many with 2 m CEP, as many with
+    a sensor that errs as the rig's does, one recorded."""
     name = SCENARIOS[table]
     scenario = with_filter(load_scenario(name), "paper")
     setup = assemble(scenario)
@@ -77,8 +85,9 @@ def fly_table(
     honest = assemble(_with(scenario, "gps", {"model": HONEST_GPS}))
     median = median_flight(rows)
     record = _recorded(setup, seed, median, table)
-    still = scenario.flow.model_dump(exclude_unset=True) | {"shake": False}
-    unshaken = assemble(_with(scenario, "flow", still)).flight
+    flow = scenario.flow.model_dump(exclude_unset=True)
+    unshaken = assemble(_with(scenario, "flow", flow | {"shake": False})).flight
+    leaking = assemble(_with(scenario, "flow", flow | RIG_ERRORS)).flight
     printed = published(table)
     assert printed is not None
     return Flights(
@@ -89,6 +98,7 @@ def fly_table(
         scores_of_flights(rows),
         percentile_of_paper(rows, printed),
         scores_of_flights(_flown(honest.flight, seed, flights, on_progress)),
+        scores_of_flights(_flown(leaking, seed, flights, on_progress)),
         record,
         float(scenario.gps.white_sigma_m),
         lift_offs(setup.flight, unshaken, seed, flights),

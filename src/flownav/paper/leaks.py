@@ -26,8 +26,9 @@ def leak_sentences(laboratory: Laboratory | None) -> str:
     return kept_together(
         "A rod turns the sensor as it moves it, and what the gyro does not take off of the turning reads as velocity. "
         f"The gyro of this firmware shows {100.0 * (1.0 - EARLY_GYRO_SCALE):.1f} % too little, which on a rod of "
-        f"length l at a height h adds h/l times as much: {', '.join(f'{share:.0f}' for share in left)} % of the velocity at "
-        f"the four heights. Gains are {gains(as_is)}, with an exact gyro {gains(found[EXACT])}. Where flow and gyro "
+        "length l at a height h adds h/l times as much: "
+        f"{', '.join(f'{share:.0f}' for share in left)} % of the velocity "
+        f"at the four heights. Gains are {gains(as_is)}, with an exact gyro {gains(found[EXACT])}. Where flow and gyro "
         f"are of two instants, the leak is in the delay: it is {delays(as_is)}, with the flow 20 ms the older "
         f"{delays(older)} ({trend(older)}; the paper's grows), with the gyro the older {delays(younger)} "
         f"({trend(younger)}). How late the sonar is moves the gain by {moved:.3f} at most: so small a swing hardly "

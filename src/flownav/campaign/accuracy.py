@@ -21,6 +21,7 @@ from flownav.scoring.consistency import (
     efficiency_by_height,
     inside_fraction,
     inside_steps,
+    over_stated,
 )
 from flownav.scoring.errors import MAX_POSITION_ERROR, touchdown_rows
 from flownav.scoring.landings import REST_DISTANCE, crashed, radius, touchdown_of_flights
@@ -166,6 +167,7 @@ def _facts(judged: Judged, bound: ErrorSums) -> dict[str, Any]:
         "anees": anees(judged.sums),
         "anees_inside_fraction": inside_fraction(judged.groups),
         "anees_inside_fraction_of_all_flights": inside_fraction([inside_steps(judged.sums)]),
+        "error_over_stated": over_stated(judged.sums),
         "rmse_over_bound": efficiency(judged.sums.errors, bound),
         "rmse_over_bound_by_height": efficiency_by_height(judged.sums.errors, bound),
     }

@@ -26,6 +26,7 @@ from flownav.scoring.consistency import (
     inside_fraction,
     inside_steps,
     largest_horizontal_error,
+    over_stated,
 )
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_blocks
@@ -128,8 +129,9 @@ def _at_horizon(flight: Flight, history: Array) -> ConsistencySums | None:
         return None
     behind = flight.table.horizon_epochs
     error, nees = history[behind:, columns("horizon", HORIZON)], history[behind:, column("estimate", "nees")]
+    sigma = history[behind:, columns("estimate", STD)]
     then = history[: len(history) - behind]
-    return consistency_of_block(error, nees, _skid_height(flight, then), _on_ground(then))
+    return consistency_of_block(error, sigma, nees, _skid_height(flight, then), _on_ground(then))
 
 
 def bound_of(setup: Setup, seed: int, flights: int, *, threads: int | None = None) -> Bound:
@@ -167,6 +169,7 @@ def consistency_facts(judged: Judged, bound: Bound) -> dict[str, Any]:
     return {
         "rmse_over_bound": {s: _finite(ratio) for s, ratio in efficiency(judged.sums.errors, bound.sums).items()},
         "anees_inside_fraction": _finite(inside),
+        "error_over_stated": {s: _finite(ratio) for s, ratio in over_stated(judged.sums).items()},
     }
 
 

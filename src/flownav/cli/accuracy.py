@@ -67,7 +67,7 @@ def markdown(made: list[Case]) -> str:
     """The tables as they are printed and as docs/accuracy.md has them."""
     parts = [_targets(made), _known(made)]
     parts += [table(made, model) for table in (_accuracy, _touchdowns, _consistency) for model in TRUTH_MODELS]
-    parts += [_by_height(made)]
+    parts += [_over_stated(made), _by_height(made)]
     parts += [_ablations(case) for case in made if case.ablations]
     return "\n\n".join(parts) + "\n"
 
@@ -143,6 +143,15 @@ def _touchdowns(made: list[Case], truth_model: str) -> str:
         "not landed by",
     )
     return _table(heading, rows)
+
+
+def _over_stated(made: list[Case]) -> str:
+    """Which state's error is larger or smaller than the navigator says."""
+    rows = [
+        (case.name, model, *(_ratio(getattr(case, model)["error_over_stated"][state]) for state in STATES))
+        for case in made for model in TRUTH_MODELS
+    ]  # fmt: skip
+    return _table(("RMS of the error over what is stated of it, at the horizon", "truth", *STATES), rows)
 
 
 def _by_height(made: list[Case]) -> str:

@@ -123,6 +123,8 @@ def _show_consistency(console: Console, facts: dict[str, Any]) -> None:
     """How consistent the navigator is with its own model, of many flights."""
     ratios = ", ".join(f"{state} {_or_dash(ratio)}" for state, ratio in facts["rmse_over_bound"].items())
     console.print(f"RMSE over the bound of the filter's own model, in flight  {ratios}", highlight=False)
+    stated = ", ".join(f"{state} {_or_dash(ratio)}" for state, ratio in facts["error_over_stated"].items())
+    console.print(f"RMS of the error over what is stated of it  {stated}", highlight=False)
     inside = facts["anees_inside_fraction"]
     if inside is not None:
         console.print(f"ANEES inside its 95 % band  on {100.0 * inside:.1f} % of the steps in flight", highlight=False)

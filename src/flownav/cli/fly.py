@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from flownav.simulation.scenario import Scenario
 
 
-OF_MANY_FLIGHTS = ("rmse_over_bound", "anees_inside_fraction")
+OF_MANY_FLIGHTS = ("rmse_over_bound", "anees_inside_fraction", "error_over_stated")
 CRASHES_ALLOWED = 0.05  # of the flights, before the exit status says that the verdict is bad
 
 

@@ -44,7 +44,8 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
         console.print("errors are those of what was flown on, in flight after the hand-over", highlight=False)
         console.print(f"known exactly  {facts['known_exactly']}", highlight=False)
     if facts.get("takeoff"):
-        console.print(takeoff_line(facts["takeoff"], facts["flights"]), highlight=False)
+        for line in takeoff_lines(facts["takeoff"], facts["flights"]):
+            console.print(line, highlight=False)
     _show_touchdown(console, facts)
     if facts.get("rmse_over_bound"):
         _show_consistency(console, facts)
@@ -65,14 +66,19 @@ def _show_touchdown(console: Console, facts: dict[str, Any]) -> None:
         console.print(line, highlight=False)
 
 
-def takeoff_line(takeoff: dict[str, Any], flights: int) -> str:
+def takeoff_lines(takeoff: dict[str, Any], flights: int) -> list[str]:
     """How far a take-off, or many, passed the commanded height, and how long there was no flow."""
     over, blind = takeoff["over_commanded_m"], takeoff["without_flow_s"]
-    line = f"take-off  {_cell(over, 3)} m over the commanded height, {_cell(blind, 2)} s without flow above half of it"
+    said = [
+        f"take-off  {_cell(over, 3)} m over the commanded height",
+        f"without flow above half of it  {_cell(blind, 2)} s",
+    ]
     if flights == 1:
-        return line
-    worst = f"worst {over['worst']:.3f} m and {blind['worst']:.2f} s"
-    return f"{line}; {worst}; flow lost in {takeoff['lost_flow']} of {flights} flights"
+        return said
+    return [
+        f"{said[0]}, worst {over['worst']:.3f} m",
+        f"{said[1]}, worst {blind['worst']:.2f} s, in {takeoff['lost_flow']} of {flights} flights",
+    ]
 
 
 def touchdown_lines(landing: dict[str, Any], landed: int | None, flights: int) -> list[str]:

@@ -141,9 +141,9 @@ def vehicles(flights: int) -> list[Figure]:
                 ("rest", parts.rest_s, "sensors, wind, autopilot, history"),
             )
         ]
-    whole_s, mine = times[KINDS[0]].whole_s, times[KINDS[1]]
-    bound = whole_s / (mine.whole_s - mine.plant_s)
-    note = f"{KINDS[0]}'s time over {KINDS[1]}'s less its plant's"
+    shared_s = times[KINDS[1]].whole_s - times[KINDS[1]].plant_s
+    bound = 1.0 + times[KINDS[0]].plant_s / shared_s
+    note = f"{KINDS[0]}'s plant on top of what {KINDS[1]} spends on all else"
     return [*figures, Figure("the rate's ratio if the quad's plant cost nothing", bound, "x", None, True, note)]
 
 

@@ -228,6 +228,17 @@ def test_a_target_is_kept_on_its_side_and_not_by_nan():
 def test_the_progress_bar_knows_how_many_flights_there_are():
     assert flights_of(("pad_return",), 100, 10) == 300 + 10 * 7
     assert flights_of(CASES, 10, 0) == 110
+    assert flights_of(("pad_return",), 100, 10, "quad-450") == 200 + 10 * 7
+
+
+def test_a_multirotor_flies_the_cases_and_is_not_held_against_the_papers_filter():
+    done = run("--flights", 16, "--cases", "pad_return", "--ablations", 0, "--vehicle", "quad-450", "--json")
+    (case,) = json.loads(done.stdout)["cases"]
+    assert case["vehicle"] == "450 mm quadrotor, 10-inch propellers"
+    assert "papers_p95_largest_horizontal_m" not in case["matched"]
+    assert not any("paper" in target["what"] for target in case["targets"])
+    assert case["ensemble"]["touchdown"]["success"]["rate"] > 0.5
+    assert scenario_of("pad_return", "quad-450").wind == scenario_of("pad_return").wind
 
 
 @pytest.mark.parametrize(
@@ -238,6 +249,7 @@ def test_the_progress_bar_knows_how_many_flights_there_are():
             "--cases hover: no such case; known: takeoff, landing, pad_return, approach, approach_8_m_s",
         ),
         (("--cases", ""), "--cases (empty): no such case"),
+        (("--vehicle", "kite.toml"), "kite.toml"),
         (("--flights", 0), "--flights 0: must be from 1 to"),
         (("--ablations", -1), "--ablations -1: must be from 0 to"),
         (("--seed", -1), "--seed -1: must be from 0 to"),

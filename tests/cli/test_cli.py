@@ -95,6 +95,7 @@ def test_many_flights_turn_every_number_into_median_and_percentiles(tmp_path):
             assert number["p05"] <= number["median"] <= number["p95"]
     assert 0 <= facts["paper_percentile"]["max_position_error_m"] <= 100
     assert all(0.1 < facts["rmse_over_bound"][state] < 10.0 for state in "xyzuvw")
+    assert all(0.1 < facts["error_over_stated"][state] < 10.0 for state in "xyzuvw")
     assert 0.0 <= facts["anees_inside_fraction"] <= 1.0
     assert facts["touchdown"] is None  # 2 s: none lands
     record = Record.load(tmp_path / facts["record"])

@@ -199,8 +199,9 @@ def test_a_shape_goes_into_the_gains_and_comes_out_again():
         assert shape_in(with_shape(GAINS, shape, name), name) == pytest.approx(shape)
 
 
-def test_a_quadrotor_keeps_its_margins_at_every_corner():
-    box = margins_over_box(Path("quad-450"))
+@pytest.mark.parametrize("name", ["quad-450", "hexa-550"])
+def test_a_multirotor_keeps_its_margins_at_every_corner(name):
+    box = margins_over_box(Path(name))
     assert not box.cannot_hover
     assert [(row.loop, row.corner, row.margins) for row in box.rows if short_of_margin(row)] == []
     assert len({row.corner for row in box.rows}) > 80

@@ -101,6 +101,16 @@ def test_every_fault_can_be_flown_at_once_and_counts_its_rows():
         json.dumps(row.entry(), allow_nan=False)
 
 
+def test_another_vehicle_flies_the_same_path_and_feels_its_own_forces():
+    own, quad = flight_at(1.5, 1.0, seed=1), flight_at(1.5, 1.0, seed=1, vehicle="quad-450")
+    hover = window_start(1.5)
+    for log in (own, quad):
+        row = np.searchsorted(log.truth["t_s"], hover)
+        assert log.truth["pos_d_m"][0] - log.truth["pos_d_m"][row] == pytest.approx(1.5, abs=0.2)
+    standing = [-log.truth["pos_d_m"][0] for log in (own, quad)]
+    assert abs(standing[0] - standing[1]) > 0.01  # its centre of gravity stands at another height
+
+
 @pytest.mark.parametrize("height_m", [0.5, 3.0])
 def test_the_flight_hovers_while_the_fault_lasts_and_lands_after_it(height_m):
     log = flight_at(height_m, 5.0, seed=1)
@@ -116,10 +126,10 @@ def test_the_flight_hovers_while_the_fault_lasts_and_lands_after_it(height_m):
 # -- the command ---------------------------------------------------------------------------------------------
 @pytest.fixture
 def command(monkeypatch):
-    monkeypatch.setattr(faults_command, "navigator", lambda: follow_gps)
+    monkeypatch.setattr(faults_command, "navigator", lambda vehicle: follow_gps)
     app = typer.Typer()
     app.command()(faults_command.command)
-    return lambda *arguments: CliRunner().invoke(app, list(arguments))
+    return lambda *arguments: CliRunner().invoke(app, ["--offline", *arguments])
 
 
 def test_json_is_one_object_with_a_row_for_each(command):

@@ -61,6 +61,18 @@ def sent(quality: list[int], firmware, flow: list[float] | None = None):  # type
     return messages(times, pixels, np.array(quality), still, (range_m, range_m), 666.67, firmware, 0.07)
 
 
+def test_what_is_late_is_read_of_an_earlier_time() -> None:
+    frames = np.arange(1.0, 9.0, 0.02)
+    ramp = 0.05 * T
+    now, before = (gyro_at(frames, T, ramp, np.random.default_rng(1), late_s) for late_s in (0.0, 0.1))
+    assert np.median(now - before) == pytest.approx(0.005, abs=2e-4)
+    after = gyro_at(frames, T, ramp, np.random.default_rng(1), -0.1)
+    assert np.median(after - now) == pytest.approx(0.005, abs=2e-4)
+    climb = 0.5 + 0.1 * T
+    raw, older = (sonar_at(frames, T, climb, OLD, np.random.default_rng(1), late_s)[0] for late_s in (0.0, 0.3))
+    assert np.median(raw - older) == pytest.approx(0.03, abs=1e-3)
+
+
 def test_a_message_is_the_mean_of_the_valid_frames_since_the_last() -> None:
     speed = 1.0 / 666.67 / 0.004 * 0.8
     log = sent([200, 200, 0, 200, 0, 0], OLD, [-1.0, -2.0, -9.0, -1.0, -9.0, -9.0])

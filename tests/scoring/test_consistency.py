@@ -25,6 +25,7 @@ from flownav.scoring.consistency import (
     is_white,
     lag_one,
     largest_horizontal_error,
+    over_stated,
     steps_in_flight,
     verdict,
 )
@@ -41,7 +42,7 @@ def drawn(flights, epochs, scale=1.0, seed=1):
     """A block of independent errors whose filter states a unit covariance; `scale` makes it over-confident."""
     error = scale * np.random.default_rng(seed).standard_normal((epochs, 6, flights))
     zeros = np.zeros((epochs, flights))
-    return consistency_of_block(error, (error**2).sum(axis=1), zeros + 2.0, zeros)
+    return consistency_of_block(error, np.ones_like(error), (error**2).sum(axis=1), zeros + 2.0, zeros)
 
 
 def test_a_consistent_filter_is_inside_the_band_on_95_percent_of_the_steps():
@@ -57,16 +58,25 @@ def test_a_modest_and_an_overconfident_filter_are_outside(scale):
     assert anees(sums) == pytest.approx(scale**2, rel=0.02)
 
 
+def test_which_state_is_stated_too_modestly_is_told():
+    draw = np.random.default_rng(2)
+    error, zeros = draw.standard_normal((400, 6, 50)), np.zeros((400, 50))
+    sigma = np.ones_like(error)
+    sigma[:, 2], sigma[:, 5] = 2.0, 0.5
+    sums = consistency_of_block(error, sigma, (error**2).sum(axis=1), zeros + 2.0, zeros)
+    assert list(over_stated(sums).values()) == pytest.approx([1.0, 1.0, 0.5, 1.0, 1.0, 2.0], rel=0.02)
+
+
 def test_steps_on_the_ground_are_left_out():
     error = np.full((4, 6, 10), 100.0)
     nees = np.array([[600.0], [6.0], [6.0], [600.0]]) * np.ones((4, 10))
     on_ground = np.zeros((4, 10))
     on_ground[0], on_ground[2, 0], on_ground[3, :2] = 1.0, 1.0, 1.0  # all, one and two of ten flights
-    sums = consistency_of_block(error, nees, np.ones((4, 10)), on_ground)
+    sums = consistency_of_block(error, np.ones_like(error), nees, np.ones((4, 10)), on_ground)
     assert list(steps_in_flight(sums)) == [False, True, True, False]
     assert inside_steps(sums) == (2, 2)
     assert sums.errors.steps.sum() == 10 + 9 + 8
-    grounded = ConsistencySums(10, sums.nees, sums.running, np.zeros(4), sums.errors)
+    grounded = ConsistencySums(10, sums.nees, sums.running, np.zeros(4), sums.errors, sums.over_stated)
     assert np.isnan(inside_fraction([inside_steps(grounded)]))
     assert inside_fraction([(1, 2), (2, 4), (3, 3), (0, 0)]) == pytest.approx(6 / 9)
     assert np.isnan(anees(grounded))
@@ -76,11 +86,12 @@ def test_steps_count_from_when_every_filter_runs():
     nees = np.full((4, 10), 6.0)
     nees[0], nees[1, 3] = np.nan, np.nan  # none has started; one has not
     error = np.where(np.isnan(nees)[:, None], np.nan, np.full((4, 6, 10), 2.0))
-    sums = consistency_of_block(error, nees, np.ones((4, 10)), np.zeros((4, 10)))
+    sums = consistency_of_block(error, 0.5 * error, nees, np.ones((4, 10)), np.zeros((4, 10)))
     assert list(sums.running) == [0, 9, 10, 10]
     assert list(steps_in_flight(sums)) == [False, False, True, True]
     assert sums.errors.steps.sum() == 9 + 10 + 10
     assert sums.errors.root_mean_square() == pytest.approx(np.full(6, 2.0))
+    assert over_stated(sums) == pytest.approx(dict.fromkeys("xyzuvw", 2.0))
     assert anees(sums) == pytest.approx(1.0)
 
 
@@ -89,19 +100,20 @@ def test_steps_count_from_when_every_filter_runs():
 def test_sums_of_blocks_are_the_sums_of_all(seed, left, right):
     draw = np.random.default_rng(seed)
     count = left + right
-    error = draw.standard_normal((9, 6, count))
+    error, sigma = draw.standard_normal((9, 6, count)), draw.uniform(0.5, 2.0, (9, 6, count))
     nees, height = draw.uniform(0.0, 12.0, (2, 9, count))
     on_ground = draw.integers(0, 2, (9, count)).astype(float)
     parts = [
-        consistency_of_block(error[..., s], nees[:, s], height[:, s], on_ground[:, s])
+        consistency_of_block(error[..., s], sigma[..., s], nees[:, s], height[:, s], on_ground[:, s])
         for s in (slice(0, left), slice(left, None))
     ]
-    whole, both = consistency_of_block(error, nees, height, on_ground), parts[0] + parts[1]
+    whole, both = consistency_of_block(error, sigma, nees, height, on_ground), parts[0] + parts[1]
     assert both.flights == whole.flights == count
     for name in ("nees", "running", "airborne"):
         assert getattr(both, name) == pytest.approx(getattr(whole, name))
     assert both.errors.squares == pytest.approx(whole.errors.squares)
     assert both.errors.steps == pytest.approx(whole.errors.steps)
+    assert both.over_stated.squares == pytest.approx(whole.over_stated.squares)
 
 
 def test_errors_fall_into_their_height_bands():

@@ -16,6 +16,7 @@ from flownav.sensors.flow import (
     FlowParameters,
     FlowState,
     flow_noise_sigma,
+    misread,
     read_flow,
     sonar_overscale,
     start_flow,
@@ -235,3 +236,16 @@ def test_angular_flow_has_px4s_signs() -> None:
     assert angular_flow(1.0, 0.0, 0.0, 0.0, 2.0) == (0.0, 0.5)  # forward: positive about y
     assert angular_flow(0.0, 1.0, 0.0, 0.0, 2.0) == (-0.5, 0.0)  # right: negative about x
     assert angular_flow(0.0, 0.0, 0.3, -0.2, 2.0) == (0.3, -0.2)  # turning: the body rates themselves
+
+
+def test_a_gyro_that_shows_too_little_lets_rotation_read_as_velocity():
+    leaking = parameters(rotation_leak=0.128)
+    assert misread(1.0, 2.0, 0.0, 0.3, 0.5, 2.0, leaking) == pytest.approx((1.0 + 0.128, 2.0 - 0.0768))
+    assert misread(1.0, 2.0, 0.4, 0.3, 0.5, 2.0, parameters()) == (1.0, 2.0)
+
+
+def test_an_old_range_scales_by_the_height_that_was():
+    late = parameters(sonar_lag_s=0.1)
+    assert misread(1.0, -2.0, 0.5, 0.0, 0.0, 1.0, late) == pytest.approx((1.05, -2.1))  # it descends
+    assert misread(1.0, -2.0, -0.5, 0.0, 0.0, 1.0, late) == pytest.approx((0.95, -1.9))
+    assert misread(1.0, 0.0, -20.0, 0.0, 0.0, 1.0, late)[0] >= 0.0

@@ -5,9 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flownav.campaign.local import fly_many
 from flownav.compile import LANES, kernel
 from flownav.errors import InputError
 from flownav.record import POSITION_NED
+from flownav.scoring.errors import touchdown_rows
+from flownav.scoring.landings import crashed, succeeded
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_blocks, fly_one
@@ -19,11 +22,16 @@ from flownav.simulation.vehicles import step_vehicle
 from flownav.vehicle import multirotor
 from flownav.vehicle.state import Controls
 
-QUAD = "quad-450"
+QUAD, HEXA = "quad-450", "hexa-550"
+FLOWN = 96
+
+
+def flown_by(vehicle, name):
+    return assemble(with_vehicle(load_scenario(name), vehicle))
 
 
 def flown_by_quad(name):
-    return assemble(with_vehicle(load_scenario(name), QUAD))
+    return flown_by(QUAD, name)
 
 
 @kernel
@@ -31,15 +39,16 @@ def step(work, lanes, dt, rotors):
     step_vehicle(work, lanes, dt, rotors)
 
 
-def test_a_step_on_lanes_is_the_multirotors_own():
-    flight = flown_by_quad("landing").flight
+@pytest.mark.parametrize(("vehicle", "rotors"), [(QUAD, 4), (HEXA, 6)])
+def test_a_step_on_lanes_is_the_multirotors_own(vehicle, rotors):
+    flight = flown_by(vehicle, "landing").flight
     count = len(LANES)
     work = np.zeros(layout.ROWS * count)
     work[layout.AS_IS_BEGIN * count : layout.AS_IS_END * count] = packed_truth([believed(flight)] * count)
     rows = work.reshape(-1, count)
     generator = np.random.default_rng(1)
     state = np.array(flight.plan.start)[:, None] + generator.normal(size=(20, count)) * np.array(
-        [1, 1, 0.3, 1, 1, 1, 0.02, 0.02, 0.02, 0.02, 0.5, 0.5, 0.5, 30, 30, 30, 30, 0, 0, 0]
+        [1, 1, 0.3, 1, 1, 1, *[0.02] * 4, *[0.5] * 3, *[30] * rotors, *[0] * (6 - rotors), 0]
     ).reshape(-1, 1)
     controls = np.array([0.02, -0.03, 0.4, 0.05])[:, None] * generator.uniform(0.5, 1.5, (4, count))
     rows[layout.HELICOPTER : layout.HELICOPTER + 20] = state
@@ -48,7 +57,7 @@ def test_a_step_on_lanes_is_the_multirotors_own():
     for lane in range(count):
         before = type(flight.plan.start)(*(float(x) for x in state[:, lane]))
         told = Controls(*(float(x) for x in controls[:, lane]))
-        after = multirotor.step(before, told, 0.0, 0.0, 0.0, 0.002, False, flight.vehicle)
+        after = multirotor.step(before, told, 0.0, 0.0, 0.0, 0.002, rotors == 6, flight.vehicle)
         assert rows[layout.HELICOPTER : layout.HELICOPTER + 20, lane] == pytest.approx(np.array(after), abs=1e-9)
 
 
@@ -77,6 +86,15 @@ def test_an_ensembles_flight_is_the_same_alone_and_in_a_batch():
     alone = fly_one(setup.flight, 7, 2, truths)[:, :, 0]
     (_, batch), *_ = fly_blocks(setup.flight, 7, 0, 3, lambda history: history[:, :, 2].copy(), ensemble=truths)
     assert alone.tobytes() == batch.tobytes()
+
+
+@pytest.mark.slow  # minutes of compiling
+@pytest.mark.parametrize("name", ["landing", "pad_return"])
+def test_a_hexarotor_lands_with_every_vehicle_of_its_ensemble(name):
+    setup = flown_by(HEXA, name)
+    landings = touchdown_rows(fly_many(setup.flight, 1, FLOWN, ensemble=setup.ensemble()))
+    assert succeeded(landings).sum() == FLOWN
+    assert crashed(landings).sum() == 0
 
 
 def test_helicopter_entries_of_the_dispersion_are_passed_over_and_the_other_way_round():

@@ -14,9 +14,10 @@ from scipy.optimize import brentq
 from flownav.errors import InputError
 from flownav.parameter_files import read_toml
 from flownav.vehicle import multirotor
+from flownav.vehicle.ground_effect import multiplier
 from flownav.vehicle.kinds import flattened
 from flownav.vehicle.loading import load_vehicle, read_kind, vehicle_file
-from flownav.vehicle.motors import battery_voltage, mixed, told_speed
+from flownav.vehicle.motors import battery_voltage, mixed, root_of_share, told_speed
 from flownav.vehicle.multirotor_parameters import (
     MultirotorParameters,
     full_thrust,
@@ -27,7 +28,7 @@ from flownav.vehicle.multirotor_parameters import (
 from flownav.vehicle.multirotor_state import MultirotorState
 from flownav.vehicle.multirotor_trim import parked_multirotor, settled, trim_multirotor
 from flownav.vehicle.parameters import VehicleParameters
-from flownav.vehicle.propeller import free_thrust, propeller_load
+from flownav.vehicle.propeller import propeller_load
 from flownav.vehicle.state import Controls, HelicopterState
 
 NAME = Path("quad-450")
@@ -43,7 +44,7 @@ def changed(**tables) -> MultirotorParameters:
     return flattened(read_kind(contents, "changed"))  # type: ignore[return-value]
 
 
-HEXA = changed(frame={"rotor_count": 6, "arm_m": 0.29}, body={"mass_kg": 2.0, "inertia_zz_kg_m2": 0.024})
+HEXA: MultirotorParameters = load_vehicle(Path("hexa-550"))  # type: ignore[assignment]
 VEHICLES = pytest.mark.parametrize("vehicle", [QUAD, HEXA], ids=["quad", "hexa"])
 
 
@@ -88,7 +89,7 @@ def test_each_control_moves_what_its_name_says():
 def test_a_motor_follows_its_command_as_a_first_order_lag():
     vehicle = QUAD._replace(resistance_ohm=0.0)  # else the voltage sags as it speeds up
     start = settled(-HIGH_M, (0.0, 0.0, 0.0), 0.0, 0.0, [300.0] * 4)
-    told = told_speed(0.5, battery_voltage(0.0, 0.0, vehicle), vehicle)
+    told = told_speed(root_of_share(0.5), battery_voltage(0.0, 0.0, vehicle), vehicle)
     state, dt = start, 0.0005
     for _ in range(100):
         state = multirotor.step(state, Controls(0.0, 0.0, 0.5, 0.0), 0.0, 0.0, 0.0, dt, False, vehicle)
@@ -148,10 +149,26 @@ def test_axial_damping_and_translational_lift_are_momentum_theory_s():
         return slope * (free - v)
 
     for inplane, axial in ((0.0, 0.5), (0.0, -0.5), (2.0, 0.0), (4.0, 0.0), (8.0, 0.0), (3.0, -0.5)):
-        ours = free_thrust(speed, inplane**2, axial, QUAD)
+        ours = propeller_load(speed, inplane**2, axial, 0.0, HIGH_M, QUAD).thrust_n
         assert ours == pytest.approx(thrust(inplane, axial), rel=0.03), (inplane, axial)
-    held = free_thrust(speed, 0.0, 0.1, with_inflow_held(QUAD)) - hover
-    assert held == pytest.approx(slope * 0.1, rel=1e-9)
+    held = propeller_load(speed, 0.0, 0.1, 0.0, HIGH_M, with_inflow_held(QUAD)).thrust_n - hover
+    assert held == pytest.approx(slope * 0.1, rel=1e-6)
+
+
+@given(st.floats(0.0, 900.0), st.floats(0.0, 200.0), st.floats(-5.0, 5.0), st.floats(0.01, 30.0))
+def test_a_propellers_three_quotients_are_those_of_its_formulas(speed, inplane_sq, axial, height_m):
+    load = propeller_load(speed, inplane_sq, axial, inplane_sq, height_m, QUAD)
+    twice_sq = 4.0 * (QUAD.hover_inflow_m * speed) ** 2 + 1e-9
+    lifted = QUAD.inplane_n_s2_m2 * inplane_sq / (1.0 + inplane_sq / twice_sq)
+    free = QUAD.thrust_n_s2 * speed**2 + QUAD.axial_n_s2_m * speed * axial + lifted
+    near_ground = multiplier(height_m, math.sqrt(inplane_sq), QUAD.hover_inflow_m * speed, QUAD.radius_m)
+    tilt = QUAD.flap_back_m / (QUAD.radius_m**2 * max(speed, 1.0))
+    assert load.thrust_n == pytest.approx(near_ground * free, rel=1e-9, abs=1e-9)
+    assert load.drag_n_s_m == pytest.approx(
+        QUAD.inplane_drag_n_s2_m * speed + near_ground * free * tilt, rel=1e-9, abs=1e-9
+    )
+    assert load.hub_n_s == pytest.approx(QUAD.hub_stiffness_n_m_rad * tilt, rel=1e-9)
+    assert load.torque_n_m == pytest.approx(QUAD.torque_n_m_s2 * speed**2)
 
 
 @pytest.mark.parametrize(("ratio", "expected"), [(0.5, 4.0 / 3.0), (1.0, 16.0 / 15.0), (2.0, 64.0 / 63.0)])

@@ -14,12 +14,12 @@ from typing import Any, Literal
 
 import numpy as np
 
+from flownav.benchmark.timing import REPEATS, best_of
 from flownav.compile import LANES, ONE_LANE
 from flownav.estimation.paper_filter import PaperModel
 from flownav.simulation.engine import fly_blocks, fly_one
 from flownav.simulation.plan import Flight
 
-REPEATS = 5
 PART_STEPS, PART_ROUNDS = 1000, 50
 NAVIGATORS_SHARE = 4  # the navigator's batch is so many times smaller
 
@@ -52,6 +52,7 @@ def measure_all(flights: int) -> Iterator[list[Figure]]:
     yield single_flights(paper, navigated)
     yield batches(paper, navigated, flights)
     yield lanes_against_scalar(paper, navigated)
+    yield vehicles(flights)
     yield filter_parts()
     yield [filter_step(), *filter_against_filterpy()]
     yield list(replay_of_recorded_flight())
@@ -60,18 +61,7 @@ def measure_all(flights: int) -> Iterator[list[Figure]]:
     yield [memory_of_many_flights()]
 
 
-MEASUREMENTS = 9
-
-
-def best_of(work: Callable[[], object], repeats: int = REPEATS) -> float:
-    """The shortest of several wall times [s]; the first call, which may compile, is not counted."""
-    work()
-    times = []
-    for _ in range(repeats):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return min(times)
+MEASUREMENTS = 10
 
 
 def _landing(name: Literal["paper", "landing"]) -> Flight:
@@ -103,16 +93,11 @@ def single_flights(paper: Flight, navigated: Flight) -> list[Figure]:
 
 def batches(paper: Flight, navigated: Flight, flights: int) -> list[Figure]:
     """Flights a second with scores, on every core: with the paper's filter, with the navigator, and their ratio."""
-    from flownav.campaign.local import fly_many
-
-    cores = os.cpu_count() or 1
-
-    def rate_of(flight: Flight, count: int) -> float:
-        return count / best_of(lambda: fly_many(flight, 1, count, threads=cores), 2)
+    from flownav.benchmark.vehicles import CORES, rate_of
 
     fewer = max(len(LANES), flights // NAVIGATORS_SHARE)
     papers, navigators = rate_of(paper, flights), rate_of(navigated, fewer)
-    what, on = "flights a second, scored", f"flights, {cores} threads"
+    what, on = "flights a second, scored", f"flights, {CORES} threads"
     return [
         Figure(f"{what}, the paper's filter", papers, "1/s", 500.0, True, f"{flights} {on}"),
         Figure(f"{what}, the navigator", navigators, "1/s", None, True, f"{fewer} {on}"),
@@ -132,6 +117,34 @@ def lanes_against_scalar(paper: Flight, navigated: Flight) -> list[Figure]:
         Figure(f"{what}, the paper's filter", ratio_of(paper), "x", 4.0, True),
         Figure(f"{what}, the navigator", ratio_of(navigated), "x", None, True),
     ]
+
+
+def vehicles(flights: int) -> list[Figure]:
+    """The quad's rate over the helicopter's, both on the navigator, and what a block of either spends its time on."""
+    from flownav.benchmark.vehicles import KINDS, landing_of, parts_of, rate_of
+
+    fewer = max(len(LANES), flights // NAVIGATORS_SHARE)
+    helicopter, quad = (rate_of(landing_of(name), fewer) for name in KINDS)
+    times = {name: parts_of(landing_of(name)) for name in KINDS}
+    figures = [
+        Figure("flights a second, scored, quad-450", quad, "1/s", None, True, f"{fewer} flights, on the navigator"),
+        Figure("quad-450's rate over maxi-joker-3's", quad / helicopter, "x", 2.0, True, "the same run"),
+    ]
+    for name, parts in times.items():
+        what = f"{len(LANES)} flights on one core, {name}"
+        figures.append(Figure(what, 1e3 * parts.whole_s, "ms", None, False))
+        figures += [
+            Figure(f"{what}: {part}", 1e3 * seconds, "ms", None, False, note)
+            for part, seconds, note in (
+                ("plant", parts.plant_s, ""),
+                ("navigator", parts.navigator_s, "what is saved when nobody takes the readings"),
+                ("rest", parts.rest_s, "sensors, wind, autopilot, history"),
+            )
+        ]
+    shared_s = times[KINDS[1]].whole_s - times[KINDS[1]].plant_s
+    bound = 1.0 + times[KINDS[0]].plant_s / shared_s
+    note = f"{KINDS[0]}'s plant on top of what {KINDS[1]} spends on all else"
+    return [*figures, Figure("the rate's ratio if the quad's plant cost nothing", bound, "x", None, True, note)]
 
 
 # -- the filters' steps --------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaign.local import counted_steps, home_epoch, score_history
+from flownav.campaign.local import counted_steps, home_epoch, score_history, takeoff_history
 from flownav.record import POSITION_NED, VELOCITY_BODY
 from flownav.scoring.consistency import (
     GROUP_FLIGHTS,
@@ -26,6 +26,7 @@ from flownav.scoring.consistency import (
     inside_fraction,
     inside_steps,
     largest_horizontal_error,
+    over_stated,
 )
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_blocks
@@ -49,7 +50,8 @@ class Judged:
     takes its pad to be; flown: errors in flight of what was flown on; sums: of the navigator at its horizon; groups:
     steps inside the band, and steps, of each GROUP_FLIGHTS flights one after the other (of all where there are fewer;
     a remainder is left out).
-    The last two are None for a filter that states no consistency.
+    These two are None for a filter that states no consistency. takeoffs: (flights, len(TAKEOFF_COLUMNS)), None of
+    flights that start in the air.
     """
 
     scores: Array
@@ -57,6 +59,7 @@ class Judged:
     flown: ErrorSums
     sums: ConsistencySums | None
     groups: tuple[tuple[int, int], ...] | None
+    takeoffs: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -82,21 +85,24 @@ def fly_judged(
     """Fly flights 0 to `flights - 1`, matched or of an ensemble, and judge them; memory grows by a row a flight."""
     home = home_epoch(flight)
 
-    def judge(history: Array) -> tuple[Array, Array, ErrorSums, ConsistencySums | None]:
+    def judge(history: Array) -> tuple[Array, Array, ErrorSums, ConsistencySums | None, Array | None]:
         estimate = history[:, columns("estimate", STATES)]
         truth = history[:, columns("truth", STATES)]
         counted = counted_steps(flight, history)
         in_flight = counted * (1.0 - _on_ground(history))
         largest = largest_horizontal_error(estimate, truth, home, in_flight * _from(home, len(history)))
         flown = error_sums((estimate - truth) ** 2, _skid_height(flight, history), in_flight)
-        return score_history(flight, history), largest, flown, _at_horizon(flight, history)
+        up = takeoff_history(flight, history)
+        return score_history(flight, history), largest, flown, _at_horizon(flight, history), up
 
-    rows, largest, groups = [], [], []
+    rows, largest, groups, ups = [], [], [], []
     total: ConsistencySums | None = None
     group: ConsistencySums | None = None
     flown_on: ErrorSums | None = None
-    for flown, (scores, horizontal, errors, sums) in fly_blocks(flight, seed, 0, flights, judge, threads, ensemble):
+    for flown, (scores, horizontal, errors, sums, up) in fly_blocks(flight, seed, 0, flights, judge, threads, ensemble):
         rows.append(scores)
+        if up is not None:
+            ups.append(up)
         largest.append(horizontal)
         flown_on = errors if flown_on is None else flown_on + errors
         if sums is not None:
@@ -108,7 +114,8 @@ def fly_judged(
         on_progress(flown)
     assert flown_on is not None
     in_groups = None if total is None else tuple(groups) or (inside_steps(total),)
-    return Judged(np.concatenate(rows), np.concatenate(largest), flown_on, total, in_groups)
+    every = np.concatenate(ups) if ups else None
+    return Judged(np.concatenate(rows), np.concatenate(largest), flown_on, total, in_groups, every)
 
 
 def _from(step: int | None, epochs: int) -> Array:
@@ -122,8 +129,9 @@ def _at_horizon(flight: Flight, history: Array) -> ConsistencySums | None:
         return None
     behind = flight.table.horizon_epochs
     error, nees = history[behind:, columns("horizon", HORIZON)], history[behind:, column("estimate", "nees")]
+    sigma = history[behind:, columns("estimate", STD)]
     then = history[: len(history) - behind]
-    return consistency_of_block(error, nees, _skid_height(flight, then), _on_ground(then))
+    return consistency_of_block(error, sigma, nees, _skid_height(flight, then), _on_ground(then))
 
 
 def bound_of(setup: Setup, seed: int, flights: int, *, threads: int | None = None) -> Bound:
@@ -161,6 +169,7 @@ def consistency_facts(judged: Judged, bound: Bound) -> dict[str, Any]:
     return {
         "rmse_over_bound": {s: _finite(ratio) for s, ratio in efficiency(judged.sums.errors, bound.sums).items()},
         "anees_inside_fraction": _finite(inside),
+        "error_over_stated": {s: _finite(ratio) for s, ratio in over_stated(judged.sums).items()},
     }
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, score_block, scores_of_flight
 from flownav.scoring.paper_tables import published
+from flownav.scoring.takeoffs import takeoff_of_flight, takeoffs
 from flownav.scoring.touchdown import Limits, motion_of, touchdowns
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_blocks, fly_written
@@ -60,6 +61,16 @@ def pad_to_be_seen(flight: Flight, t_s: Array, cg_height_m: Array) -> Array:
         return np.asarray((lens_m >= onboard.pad.min_height_m) & (lens_m <= onboard.pad.max_height_m), float)
     last_s = flight.plan.handover_s if onboard is not None else (home_epoch(flight) or 0) * EPOCH_S
     return np.asarray(np.broadcast_to((t_s <= last_s)[:, None], cg_height_m.shape), float)
+
+
+def takeoff_history(flight: Flight, history: Array) -> Array | None:
+    """The take-offs of a block's flights, (lanes, len(TAKEOFF_COLUMNS)); None of flights that start in the air."""
+    if not flight.plan.starts_on_ground:
+        return None
+    above = flight.vehicle.cg_above_skid_m
+    height_m = -history[:, column("truth", "pos_d_m")] - above
+    commanded_m = -history[:, column("command", "pos_d_ref_m")] - above
+    return takeoffs(height_m, commanded_m, history[:, column("flow", "engaged")], EPOCH_S)
 
 
 def home_epoch(flight: Flight) -> int | None:
@@ -129,7 +140,9 @@ def fly_recorded(setup: Setup, seed: int, index: int = 0, ensemble: Ensemble | N
     if ensemble is not None:
         drawn = {name: values[0] for name, values in ensemble.values(seed, index, 1).items()}
         record.manifest["parameters"] = {**record.manifest["parameters"], "drawn": drawn}
+    up = takeoff_history(setup.flight, flown.history)
     record.manifest["scores"] = scores_of_flight(score_history(setup.flight, flown.history)[0])
+    record.manifest["scores"]["takeoff"] = None if up is None else takeoff_of_flight(up[0])
     record.manifest["paper"] = published(setup.scenario.paper_table)
     if setup.fitted is not None:
         record.manifest["known_exactly"] = known_exactly(setup.scenario)

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flownav.cli.output import VehicleOption
+
 if TYPE_CHECKING:
     from flownav.campaign.accuracy import Case
 
@@ -23,6 +25,7 @@ def command(
         str, typer.Option(help="Cases, with commas: takeoff, landing, pad_return, approach, approach_8_m_s; or all.")
     ] = "all",
     ablations: Annotated[int, typer.Option(help="Flights of each variant that lacks a piece; 0 for none.")] = 100,
+    vehicle: VehicleOption = None,
     seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
     out: Annotated[Path | None, typer.Option(help="Write the tables as Markdown, too.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
@@ -41,8 +44,8 @@ def command(
             raise InputError(f"--cases {name or '(empty)'}: no such case; known: {', '.join(CASES)}, or all")
     if out:
         require_writable(out)
-    with progress("Flying", flights_of(chosen, flights, ablations)) as advance:
-        made = [run_case(name, seed, flights, ablations, advance) for name in chosen]
+    with progress("Flying", flights_of(chosen, flights, ablations, vehicle)) as advance:
+        made = [run_case(name, seed, flights, ablations, advance, vehicle) for name in chosen]
     text = markdown(made)
     if out:
         from flownav.files import written_whole
@@ -64,7 +67,7 @@ def markdown(made: list[Case]) -> str:
     """The tables as they are printed and as docs/accuracy.md has them."""
     parts = [_targets(made), _known(made)]
     parts += [table(made, model) for table in (_accuracy, _touchdowns, _consistency) for model in TRUTH_MODELS]
-    parts += [_by_height(made)]
+    parts += [_over_stated(made), _by_height(made)]
     parts += [_ablations(case) for case in made if case.ablations]
     return "\n\n".join(parts) + "\n"
 
@@ -140,6 +143,15 @@ def _touchdowns(made: list[Case], truth_model: str) -> str:
         "not landed by",
     )
     return _table(heading, rows)
+
+
+def _over_stated(made: list[Case]) -> str:
+    """Which state's error is larger or smaller than the navigator says."""
+    rows = [
+        (case.name, model, *(_ratio(getattr(case, model)["error_over_stated"][state]) for state in STATES))
+        for case in made for model in TRUTH_MODELS
+    ]  # fmt: skip
+    return _table(("RMS of the error over what is stated of it, at the horizon", "truth", *STATES), rows)
 
 
 def _by_height(made: list[Case]) -> str:

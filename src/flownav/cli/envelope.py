@@ -8,11 +8,14 @@ from typing import Annotated, Any
 
 import typer
 
+from flownav.cli.output import VehicleOption
+
 
 def command(
     scenario: Annotated[str, typer.Argument(help="What lands: landing, gusty, pad_return, approach, a file.")],
     speeds: Annotated[str, typer.Option(help="Wind speeds at 20 ft [m/s], with commas.")] = "2,4,6,8,10",
     directions: Annotated[int, typer.Option(help="How many directions the wind blows from, from north on.")] = 8,
+    vehicle: VehicleOption = None,
     flights: Annotated[int, typer.Option(help="Flights of each speed and direction.")] = 32,
     seed: Annotated[int, typer.Option(help="The campaign's noise.")] = 1,
     ensemble: Annotated[
@@ -26,7 +29,7 @@ def command(
     from flownav.cli.output import progress, require_between, require_writable
     from flownav.errors import InputError
     from flownav.report.envelope import write_envelope
-    from flownav.simulation.scenario import load_scenario
+    from flownav.simulation.scenario import load_scenario, with_vehicle
 
     require_between("--flights", flights, 1, 1_000_000)
     require_between("--directions", directions, 1, 360)
@@ -37,7 +40,7 @@ def command(
         raise InputError(f"--speeds {speeds}: numbers with commas are needed, such as 2,4,8") from None
     for speed in chosen_speeds:
         require_between("--speeds", speed, 0.1, 30.0)
-    chosen = load_scenario(scenario)
+    chosen = with_vehicle(load_scenario(scenario), vehicle)
     last_s = chosen.flight.may_land_after_s
     if last_s is None or last_s >= chosen.flight.duration_s or chosen.truth == "linear":
         raise InputError(f"{chosen.name}: it never lands; give a scenario with a may_land_after_s before its end")
@@ -48,13 +51,15 @@ def command(
             chosen, chosen_speeds, directions_deg(directions), seed, flights, dispersed=ensemble, on_progress=advance
         )
     model = "ensemble" if ensemble else "matched"
-    title = f"{chosen.name}, {model}, {flights} flights a field, seed {seed}"
+    named = f", {vehicle}" if vehicle else ""
+    title = f"{chosen.name}{named}, {model}, {flights} flights a field, seed {seed}"
     try:
         write_envelope(title, rows, page)
     except OSError as error:
         raise InputError(f"{page}: cannot be written ({error.strerror}); give another --out") from error
     if as_json:
-        facts: dict[str, Any] = {"scenario": chosen.name, "truth_model": model, "flights": flights, "seed": seed}
+        facts: dict[str, Any] = {"scenario": chosen.name, "vehicle": vehicle, "truth_model": model}
+        facts |= {"flights": flights, "seed": seed}
         typer.echo(json.dumps(facts | {"cells": rows, "out": str(page)}))
         return
     _show(title, rows)

@@ -43,6 +43,9 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
     if "known_exactly" in facts:
         console.print("errors are those of what was flown on, in flight after the hand-over", highlight=False)
         console.print(f"known exactly  {facts['known_exactly']}", highlight=False)
+    if facts.get("takeoff"):
+        for line in takeoff_lines(facts["takeoff"], facts["flights"]):
+            console.print(line, highlight=False)
     _show_touchdown(console, facts)
     if facts.get("rmse_over_bound"):
         _show_consistency(console, facts)
@@ -61,6 +64,21 @@ def _show_touchdown(console: Console, facts: dict[str, Any]) -> None:
         return
     for line in touchdown_lines(landing, facts.get("landed"), facts["flights"]):
         console.print(line, highlight=False)
+
+
+def takeoff_lines(takeoff: dict[str, Any], flights: int) -> list[str]:
+    """How far a take-off, or many, passed the commanded height, and how long there was no flow."""
+    over, blind = takeoff["over_commanded_m"], takeoff["without_flow_s"]
+    said = [
+        f"take-off  {_cell(over, 3)} m over the commanded height",
+        f"without flow above half of it  {_cell(blind, 2)} s",
+    ]
+    if flights == 1:
+        return said
+    return [
+        f"{said[0]}, worst {over['worst']:.3f} m",
+        f"{said[1]}, worst {blind['worst']:.2f} s, in {takeoff['lost_flow']} of {flights} flights",
+    ]
 
 
 def touchdown_lines(landing: dict[str, Any], landed: int | None, flights: int) -> list[str]:
@@ -115,6 +133,8 @@ def _show_consistency(console: Console, facts: dict[str, Any]) -> None:
     """How consistent the navigator is with its own model, of many flights."""
     ratios = ", ".join(f"{state} {_or_dash(ratio)}" for state, ratio in facts["rmse_over_bound"].items())
     console.print(f"RMSE over the bound of the filter's own model, in flight  {ratios}", highlight=False)
+    stated = ", ".join(f"{state} {_or_dash(ratio)}" for state, ratio in facts["error_over_stated"].items())
+    console.print(f"RMS of the error over what is stated of it  {stated}", highlight=False)
     inside = facts["anees_inside_fraction"]
     if inside is not None:
         console.print(f"ANEES inside its 95 % band  on {100.0 * inside:.1f} % of the steps in flight", highlight=False)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flownav.cli.output import VehicleOption
 from flownav.errors import InputError, VerdictError
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from flownav.simulation.scenario import Scenario
 
 
-OF_MANY_FLIGHTS = ("rmse_over_bound", "anees_inside_fraction")
+OF_MANY_FLIGHTS = ("rmse_over_bound", "anees_inside_fraction", "error_over_stated")
 CRASHES_ALLOWED = 0.05  # of the flights, before the exit status says that the verdict is bad
 
 
@@ -32,7 +33,7 @@ def command(
     feedback: Annotated[str | None, typer.Option(help="What the autopilot flies on: estimate or truth.")] = None,
     truth: Annotated[str | None, typer.Option(help="The plant: nonlinear, or the paper's linear model.")] = None,
     sensor: Annotated[str | None, typer.Option(help="A flow sensor file (TOML).")] = None,
-    vehicle: Annotated[str | None, typer.Option(help="A vehicle: maxi-joker-3, quad-450, or a file (TOML).")] = None,
+    vehicle: VehicleOption = None,
     ensemble: Annotated[
         bool | None,
         typer.Option(
@@ -56,6 +57,7 @@ def command(
     from flownav.cli.output import progress, require_between, require_writable, save
     from flownav.scoring.errors import scores_of_flights
     from flownav.scoring.paper_tables import percentile_of_paper, published
+    from flownav.scoring.takeoffs import takeoff_of_flights
     from flownav.simulation.assemble import assemble
     from flownav.simulation.scenario import load_scenario
 
@@ -96,6 +98,8 @@ def command(
     if setup.fitted is not None:
         facts["known_exactly"] = known_exactly(chosen)
         facts |= dict.fromkeys(OF_MANY_FLIGHTS) if flights == 1 else {}
+    if flights > 1:
+        scores["takeoff"] = None if judged.takeoffs is None else takeoff_of_flights(judged.takeoffs)
     facts |= scores | save(record, record_path, report=report)
     if percentiles:
         facts["paper_percentile"] = percentiles

@@ -6,12 +6,18 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from flownav.errors import InputError
 
 if TYPE_CHECKING:
     from flownav.record import Record
+
+VehicleOption = Annotated[
+    str | None, typer.Option(help="A vehicle: maxi-joker-3, quad-450, hexa-550, or a file (TOML).")
+]
 
 
 @contextmanager

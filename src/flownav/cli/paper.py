@@ -62,7 +62,7 @@ def _reproduced(tables: tuple[int, ...], seed: int, flights: int) -> Reproductio
         with announce_compilation("rig and identification"), progress("Swinging", rig_runs(1 in tables)) as advance:
             made = reproduce(on_rig, seed, flights, on_run=advance)
     if flown:
-        with progress("Flying", 2 * flights * len(flown)) as advance:
+        with progress("Flying", 3 * flights * len(flown)) as advance:
             in_air = reproduce(flown, seed, flights, on_flight=advance)
             made = in_air if made is None else made.with_flights(in_air)
     assert made is not None

@@ -32,6 +32,10 @@ def command(
     start_angle: Annotated[float, typer.Option(help="Amplitude of the swing [rad].")] = 0.0912,
     refocus: Annotated[float, typer.Option(help="1: lens focused at each height; 0: left at 0.6 m.")] = 1.0,
     chain_delay: Annotated[float, typer.Option(help="Serial and logging chain [s].")] = 0.07,
+    gyro_late: Annotated[
+        float, typer.Option(help="How much older the gyro is than the flow [s]; below 0 the flow is older.")
+    ] = 0.0,
+    sonar_late: Annotated[float, typer.Option(help="From the sonar's trigger to its reading [s].")] = 0.05,
     seed: Annotated[int, typer.Option(help="The same seed gives the same logs.")] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
@@ -57,6 +61,8 @@ def command(
         along=along,
         refocus=refocus,
         chain_delay_s=chain_delay,
+        gyro_late_s=gyro_late,
+        sonar_late_s=sonar_late,
         runs=runs,
         seed=seed,
     )

@@ -22,7 +22,9 @@ if TYPE_CHECKING:
 
 
 def command(
-    file: Annotated[Path | None, typer.Argument(help="A file, or quad-450; the Maxi Joker 3 without one.")] = None,
+    file: Annotated[
+        Path | None, typer.Argument(help="A file, quad-450 or hexa-550; the Maxi Joker 3 without one.")
+    ] = None,
     margins: Annotated[
         bool, typer.Option("--margins", help="Of the autopilot's loops, over the vehicle's uncertainty box.")
     ] = False,

@@ -29,7 +29,7 @@ from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.engine import Flown, fly_written
 from flownav.simulation.fault import SOUND, SensorFault
 from flownav.simulation.history import column, columns
-from flownav.simulation.scenario import Scenario, load_scenario
+from flownav.simulation.scenario import Scenario, load_scenario, with_vehicle
 from flownav.simulation.sensing import EPOCH_S
 
 HEIGHTS_M = (0.5, 1.5, 3.0)
@@ -105,7 +105,10 @@ def flown_table(
     matched: bool = False,
     on_progress: Callable[[int], None] = lambda done: None,
 ) -> list[Row]:
-    """Fly every fault at every height for every duration. Rows by height, without a fault first; on_progress(1) each."""
+    """Fly every fault at every height for every duration: rows by height, without a fault first.
+
+    matched: vehicle and sensors as their datasheets say; else each flight has a truth of its own.
+    """
     rows = []
     for height_m in heights_m:
         setup = assemble(scenario_flown(height_m, vehicle))
@@ -129,7 +132,7 @@ def scenario_flown(height_m: float, vehicle: str | None = None) -> Scenario:
     """Up from the pad at 1 m/s, 15 s of hover, down at 0.3 m/s, with time for a go-around; flown on the estimate."""
     hover_s, land_s = TAKEOFF_S + height_m / CLIMB_M_S, window_start(height_m) + DESCENDS_AFTER_S
     down_s = land_s + height_m / SINK_M_S + RESTING_S
-    entries = load_scenario(BASE).model_dump(exclude_unset=True)
+    entries = with_vehicle(load_scenario(BASE), vehicle).model_dump(exclude_unset=True)
     entries["name"] = f"faults_{height_m:g}_m"
     entries["description"] = f"Take-off, hover at {height_m:g} m, landing on the same pad, go-arounds"
     entries["flight"] = {
@@ -146,8 +149,6 @@ def scenario_flown(height_m: float, vehicle: str | None = None) -> Scenario:
         ],
     }
     entries["autopilot"] = AUTOPILOT
-    if vehicle is not None:
-        entries["vehicle"] = {"file": vehicle}
     return check(entries, Scenario, "faults")
 
 

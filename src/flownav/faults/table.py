@@ -17,7 +17,7 @@ from flownav.measurement import Sensor, Stream
 from flownav.parameter_files import check
 from flownav.record import POSITION_NED
 from flownav.simulation.assemble import assemble
-from flownav.simulation.scenario import Scenario, load_scenario
+from flownav.simulation.scenario import Scenario, load_scenario, with_vehicle
 
 HEIGHTS_M = (0.5, 1.5, 3.0)
 DURATIONS_S = (2.0, 5.0)
@@ -50,12 +50,16 @@ def fault_table(
     durations_s: Sequence[float] = DURATIONS_S,
     seed: int = 1,
     on_progress: Callable[[int], None] = lambda done: None,
+    vehicle: str | None = None,
 ) -> list[Row]:
-    """Fly, inject, navigate, score. Rows by height, without a fault first; `on_progress` is called with 1 for each."""
+    """Fly, inject, navigate, score. Rows by height, without a fault first; `on_progress` is called with 1 for each.
+
+    vehicle: another one than `BASE` has (`with_vehicle`).
+    """
     rows = []
     for height_m in heights_m:
         longest_s = longest(faults, durations_s)
-        log = flight_at(height_m, longest_s, seed)
+        log = flight_at(height_m, longest_s, seed, vehicle)
         without = navigate(log.streams)
         truth = log.truth or {}
         hover_s = window_start(height_m)
@@ -95,12 +99,12 @@ def window_start(height_m: float) -> float:
     return TAKEOFF_S + height_m / CLIMB_M_S + SETTLING_S
 
 
-def flight_at(height_m: float, longest_s: float, seed: int) -> Log:
+def flight_at(height_m: float, longest_s: float, seed: int, vehicle: str | None = None) -> Log:
     """The log of one flight that hovers at a height for as long as any fault takes, and then lands.
 
     With one POSE: a vehicle on its pad is told where it stands, so that errors are not those of the GPS's frame.
     """
-    setup = assemble(scenario_at(height_m, longest_s))
+    setup = assemble(scenario_at(height_m, longest_s, vehicle))
     log = log_of(fly_recorded(setup, seed), setup)
     assert log.truth is not None
     row = int(np.searchsorted(log.truth["t_s"], PLACED_S))
@@ -110,7 +114,7 @@ def flight_at(height_m: float, longest_s: float, seed: int) -> Log:
     return log
 
 
-def scenario_at(height_m: float, longest_s: float) -> Scenario:
+def scenario_at(height_m: float, longest_s: float, vehicle: str | None = None) -> Scenario:
     """Up from the pad at 1 m/s, hover, down at 0.3 m/s, and 5 s on the pad; flown on the truth.
 
     So that a fault in the streams changes nothing of the flight. InputError where the height cannot be flown.
@@ -119,7 +123,7 @@ def scenario_at(height_m: float, longest_s: float) -> Scenario:
     land_s = window_start(height_m) + longest_s + AFTER_S
     duration_s = land_s + height_m / SINK_M_S + RESTING_S
     below_m = SINK_M_S * RESTING_S  # on past the ground until the skids carry weight
-    entries = load_scenario(BASE).model_dump(exclude_unset=True)
+    entries = with_vehicle(load_scenario(BASE), vehicle).model_dump(exclude_unset=True)
     entries["name"] = f"hover_{height_m:g}_m"
     entries["description"] = f"Take-off, hover at {height_m:g} m, landing on the same pad, flown on the truth"
     entries["flight"] = {

@@ -20,6 +20,8 @@ def show(of: Reproduction, page: str) -> None:
     console.width = max(console.width, WIDEST)
     for table in _tables(of):
         console.print(table)
+    for flown in of.flights:
+        console.print(f"{flown.scenario}: {words.leaking(flown)}")
     claims = Table("claim", "the paper", "here", "verdict", title="Claims put to the test", title_justify="left")
     for finding in of.findings:
         style = "" if finding.agrees else "bold"
@@ -45,6 +47,9 @@ def _tables(of: Reproduction) -> list[Table]:
         ]
         at = [f"{height:.1f} m" for height in HEIGHTS_M]
         found.append(_grouped("Rig set up otherwise: fit %", "configuration", at, [rows.Group("", [paper, *set_ups])]))
+        instruments = [rows.TableRow(f"{name}: {what}", cells) for name, what, cells in rows.instrument_rows(of)]
+        title = "Gyro and sonar otherwise: gain, delay, fit"
+        found.append(_grouped(title, "one run a height", at, [rows.Group("", instruments)]))
         orders = ["gain, delay", "1", "2", "3", "4"]
         found.append(_grouped("Order of the model: fit %", "runs", orders, [rows.Group("", rows.order_rows(of))]))
     six = ["mean m/s", "here", "paper's here", "std m/s", "here", "paper's here"]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flownav.paper.flights import Flights, LiftOff
+from flownav.paper.flights import Flights
+from flownav.paper.lift_off import LiftOff
 from flownav.report import figures_filter, figures_states
 from flownav.report.figures_states import View
 from flownav.report.panels import Panel
 from flownav.report.series import moments
+from flownav.scoring.percentiles import spread
 
 ZOOM_S = (10.0, 20.0)
 # of each table: figures of position, velocity, velocity zoomed, position error, velocity error
@@ -48,8 +50,14 @@ def lift_off_caption(of: LiftOff | None) -> str:
     """Where the transient comes from: the paper says the sensor's shake."""
     if of is None:
         return "The error in w about lift-off."
+    shaken, unshaken, share = (spread(of_all) for of_all in (of.shaken_m_s, of.unshaken_m_s, of.frozen_inflow_share))
+    if shaken is None or unshaken is None or share is None:
+        return "The error in w about lift-off."
     return (
-        f"The largest error in w about lift-off is {of.shaken_m_s:.3f} m/s, and {of.unshaken_m_s:.3f} m/s in the same "
-        f"flight with a sensor that does not shake: {100.0 * of.frozen_inflow_share:.0f} % of the transient is the "
-        "filter's own model, whose printed B_red keeps the inflow frozen, not the shake that the paper explains it by."
+        f"The largest error in w about lift-off is {shaken['median']:.3f} m/s, median of {len(of.shaken_m_s)} "
+        f"take-offs, and {unshaken['median']:.3f} m/s in the same flights with a sensor that does not shake: "
+        f"{100.0 * share['median']:.0f} % of the transient ({100.0 * share['p05']:.0f} to {100.0 * share['p95']:.0f} % "
+        "from flight to flight) is the filter's own model, whose printed B_red keeps the inflow frozen, not the shake "
+        "that the paper explains it by. Single flights differ, since the shake may add to the transient or take from "
+        "it; the two sizes depend on how the collective moves at lift-off, so on the autopilot's gains and path."
     )

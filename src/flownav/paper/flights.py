@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from flownav.campaign.local import fly_many, median_flight, score_history
 from flownav.compile import LANES
 from flownav.measurement import Array
+from flownav.optics.firmware import EARLY_GYRO_SCALE
+from flownav.paper.lift_off import LiftOff, lift_offs
 from flownav.parameter_files import check
-from flownav.record import VELOCITY_BODY, Record
-from flownav.report.series import difference, moments, track
+from flownav.record import Record
+from flownav.rig.instruments import SONAR_ECHO_S, SONAR_PERIOD_S
 from flownav.scoring.errors import STATES, scores_of_flight, scores_of_flights
 from flownav.scoring.paper_tables import percentile_of_paper, published
 from flownav.simulation.assemble import Setup, assemble
@@ -23,26 +23,15 @@ from flownav.simulation.scenario import Scenario, load_scenario, with_filter
 
 SCENARIOS = {5: "takeoff", 6: "landing"}
 HONEST_GPS = "midg"
-LIFT_OFF_REACH_S = (-1.0, 3.0)  # about lift-off: where its transient is
-
-
-class LiftOff(NamedTuple):
-    """Largest error in w about lift-off [m/s] of one take-off: as flown, and with a sensor that does not shake."""
-
-    shaken_m_s: float
-    unshaken_m_s: float
-
-    @property
-    def frozen_inflow_share(self) -> float:
-        """What the sensor's shake has no part in: the frozen inflow of B_red."""
-        return self.unshaken_m_s / self.shaken_m_s
+# what the rig's sensor has: rotation that its gyro leaves, and a sonar that is an echo and half a period old
+RIG_ERRORS = {"rotation_leak": 1.0 - EARLY_GYRO_SCALE, "sonar_lag_s": SONAR_ECHO_S + 0.5 * SONAR_PERIOD_S}
 
 
 @dataclass(frozen=True)
 class Flights:
-    """Flights of one scenario beside its table. honest: the scores with a receiver of 2 m CEP.
+    """Flights of one scenario beside its table. honest: scores with a receiver of 2 m CEP; leaking: with RIG_ERRORS.
 
-    white_noise_m: standard deviation of an axis of the GPS noise flown; lift_off: of a take-off's recorded flight.
+    white_noise_m: standard deviation of an axis of the GPS noise flown; lift_off: of take-offs.
     """
 
     table: int
@@ -52,6 +41,7 @@ class Flights:
     scores: dict[str, Any]
     percentile: dict[str, Any]
     honest: dict[str, Any]
+    leaking: dict[str, Any]
     record: Record
     white_noise_m: float
     lift_off: LiftOff | None = None
@@ -75,16 +65,19 @@ class Flights:
             "max_position_error_reproduced_m": self.scores["max_position_error_m"],
             "max_position_error_percentile": self.percentile["max_position_error_m"],
             "max_position_error_with_2_m_cep_m": self.honest["max_position_error_m"],
+            "with_errors_of_the_rig": RIG_ERRORS
+            | {name: self.leaking[name] for name in ("states", "max_position_error_m")},
             "touchdown_reproduced": self.scores["touchdown"],
             "touchdown_with_2_m_cep": self.honest["touchdown"],
-            "lift_off": None if self.lift_off is None else self.lift_off._asdict(),
+            "lift_off": None if self.lift_off is None else self.lift_off.as_json(),
         }
 
 
 def fly_table(
     table: int, seed: int, flights: int, on_progress: Callable[[int], object] = lambda flown: None
 ) -> Flights:
-    """Table 5 or 6, the paper's filter: `flights` flights with its GPS noise, as many with 2 m CEP, one recorded."""
+    """Table 5 or 6, the paper's filter: `flights` flights with its GPS noise, as many with 2 m CEP, as many with
+    a sensor that errs as the rig's does, one recorded."""
     name = SCENARIOS[table]
     scenario = with_filter(load_scenario(name), "paper")
     setup = assemble(scenario)
@@ -92,8 +85,9 @@ def fly_table(
     honest = assemble(_with(scenario, "gps", {"model": HONEST_GPS}))
     median = median_flight(rows)
     record = _recorded(setup, seed, median, table)
-    still = scenario.flow.model_dump(exclude_unset=True) | {"shake": False}
-    unshaken = _recorded(assemble(_with(scenario, "flow", still)), seed, median, table)
+    flow = scenario.flow.model_dump(exclude_unset=True)
+    unshaken = assemble(_with(scenario, "flow", flow | {"shake": False})).flight
+    leaking = assemble(_with(scenario, "flow", flow | RIG_ERRORS)).flight
     printed = published(table)
     assert printed is not None
     return Flights(
@@ -104,9 +98,10 @@ def fly_table(
         scores_of_flights(rows),
         percentile_of_paper(rows, printed),
         scores_of_flights(_flown(honest.flight, seed, flights, on_progress)),
+        scores_of_flights(_flown(leaking, seed, flights, on_progress)),
         record,
         float(scenario.gps.white_sigma_m),
-        _lift_off(record, unshaken),
+        lift_offs(setup.flight, unshaken, seed, flights),
     )
 
 
@@ -127,21 +122,3 @@ def _with(scenario: Scenario, table: str, values: dict[str, Any]) -> Scenario:
     """The scenario with another table."""
     entries = scenario.model_dump(exclude_unset=True)
     return check(entries | {table: values}, Scenario, f"{scenario.name} with another [{table}]")
-
-
-def _lift_off(shaken: Record, unshaken: Record) -> LiftOff | None:
-    """Of two records of the same flight; None where nothing lifts off."""
-    moment = next((moment for moment in moments(shaken) if moment.name == "lift-off"), None)
-    if moment is None:
-        return None
-    return LiftOff(*(_largest_w_error(record, moment.t_s) for record in (shaken, unshaken)))
-
-
-def _largest_w_error(record: Record, lift_off_s: float) -> float:
-    """Largest absolute error in w about lift-off [m/s]."""
-    estimate, truth = track(record, "estimate", VELOCITY_BODY), track(record, "truth", VELOCITY_BODY)
-    assert estimate is not None
-    assert truth is not None
-    before_s, after_s = LIFT_OFF_REACH_S
-    error = difference(estimate, truth).within((lift_off_s + before_s, lift_off_s + after_s))
-    return float(np.nanmax(np.abs(error.value[:, 2])))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -74,15 +75,26 @@ class OrderTest:
     unseen: dict[int, float]
 
 
+class Identified(NamedTuple):
+    """What one run with another set-up is identified as: fit [%], gain a/c, delay b/c [s]."""
+
+    fit_percent: float
+    gain: float
+    delay_s: float
+
+
 @dataclass(frozen=True)
 class Laboratory:
-    """The rig's runs, height by height, and the tests made with them. others: mean fit [%] by height."""
+    """The rig's runs, height by height, and the tests made with them. others: mean fit [%] by height; instruments: one
+    run a height with another gyro or sonar.
+    """
 
     fixed: Configuration
     runs: tuple[Run, ...]
     others: tuple[tuple[Configuration, dict[float, float]], ...] = ()
     orders: tuple[OrderTest, ...] = ()
     lights: tuple[RigLog, ...] = ()
+    instruments: tuple[tuple[Configuration, dict[float, Identified]], ...] = ()
 
     def at(self, height_m: float) -> list[Run]:
         """The runs of a height, model 1 to 7."""
@@ -114,9 +126,24 @@ def configurations(seed: int) -> tuple[Configuration, ...]:
     )
 
 
+def otherwise_instrumented(seed: int) -> tuple[Configuration, ...]:
+    """The fixed set-up with a gyro or a sonar that errs less, or more: what their errors do to what is identified."""
+    one = RigSettings(runs=OTHER_RUNS, seed=seed)
+    exact = "2013-09,-gyro-scale"
+    late = "what PX4's estimator takes flow for where nobody says (EKF2_OF_DELAY)"
+    echo = "an echo and a median of three more: one period of the sonar, as firmware 2014-12 has"
+    return (
+        Configuration("exact gyro scale", "no rotation leaks but by time", replace(one, firmware=exact)),
+        Configuration("flow 20 ms older", f"than the gyro: {late}", replace(one, gyro_late_s=-0.020)),
+        Configuration("gyro 20 ms older", "than the flow", replace(one, gyro_late_s=0.020)),
+        Configuration("sonar at once", "no lag of the range that scales the flow", replace(one, sonar_late_s=0.0)),
+        Configuration("sonar 150 ms late", echo, replace(one, sonar_late_s=0.150)),
+    )
+
+
 def rig_runs(whole: bool) -> int:
     """How many runs `swing` makes, for a progress bar."""
-    tested = len(configurations(1)) - 1
+    tested = len(configurations(1)) - 1 + len(otherwise_instrumented(1))
     return len(HEIGHTS_M) * (MODELS + (OTHER_RUNS * tested + 1 if whole else 0)) + (len(LIGHTS) if whole else 0)
 
 
@@ -128,13 +155,17 @@ def swing(seed: int, whole: bool = True, on_run: Callable[[int], object] = lambd
     if not whole:
         return Laboratory(fixed, runs)
     others = tuple((other, _mean_fits(run_campaign(other.settings, HEIGHTS_M, on_run))) for other in beside)
+    instruments = tuple(
+        (other, _as_identified(run_campaign(other.settings, HEIGHTS_M, on_run)))
+        for other in otherwise_instrumented(seed)
+    )
     chirp = replace(fixed.settings, excitation="chirp", runs=1)
     swept = list(_identified(run_campaign(chirp, HEIGHTS_M, on_run), orders))
     tests = [_order_test("swing", [run for run in runs if run.height_m == height]) for height in HEIGHTS_M]
     tests += [_order_test("chirp", [run]) for run in swept]
     one = replace(fixed.settings, runs=1)
     lights = [log for light in LIGHTS for log in run_campaign(replace(one, light=light), HEIGHTS_M[:1], on_run)]
-    return Laboratory(fixed, runs, others, tuple(tests), tuple(lights))
+    return Laboratory(fixed, runs, others, tuple(tests), tuple(lights), instruments)
 
 
 def _experiment(log: RigLog) -> Experiment:
@@ -154,6 +185,15 @@ def _mean_fits(logs: Iterable[RigLog]) -> dict[float, float]:
     for run in _identified(logs, (2,)):
         fits.setdefault(run.height_m, []).append(run.fits[2].fit_percent)
     return {height: float(np.mean(values)) for height, values in fits.items()}
+
+
+def _as_identified(logs: Iterable[RigLog]) -> dict[float, Identified]:
+    return {run.height_m: identified(run) for run in _identified(logs, (2,))}
+
+
+def identified(run: Run) -> Identified:
+    """Of a run's second-order model."""
+    return Identified(run.fits[2].fit_percent, run.fits[2].point.gain, delay_s(run))
 
 
 def _order_test(kind: str, runs: list[Run]) -> OrderTest:

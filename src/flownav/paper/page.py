@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from flownav.files import written_whole
-from flownav.paper import figures_flight, figures_rig, figures_tables, published, rows, words
+from flownav.paper import figures_flight, figures_rig, figures_tables, leaks, published, rows, words
 from flownav.paper.findings import FIT_TOLERANCE, LARGEST_TOLERANCE, SAME_SPREAD, Finding
 from flownav.paper.reproduction import Reproduction
 from flownav.provenance import command_line, provenance
@@ -71,6 +71,8 @@ def render(of: Reproduction) -> str:
         model_groups=rows.model_groups(of),
         identifiable=rows.identifiable(of.laboratory) if of.laboratory else "",
         configurations=rows.configurations(of),
+        instrument_rows=rows.instrument_rows(of),
+        rotation_leak=leaks.leak_sentences(of.laboratory),
         set_up=rows.set_up(of),
         order_rows=rows.order_rows(of),
         error_groups=rows.error_groups(of),

@@ -68,6 +68,15 @@ class Reproduction:
             facts["configurations"] = [
                 {"name": other.name, "description": other.words, "fit_by_height": _keyed(fits)} for other, fits in every
             ]
+        if self.laboratory is not None and self.laboratory.instruments:
+            facts["instruments"] = [
+                {
+                    "name": other.name,
+                    "description": other.words,
+                    "by_height": {f"{height:g}": found._asdict() for height, found in by_height.items()},
+                }
+                for other, by_height in self.laboratory.instruments
+            ]
         facts["findings"] = [finding.as_json() for finding in self.findings]
         facts["seed"] = self.seed
         return facts

@@ -8,7 +8,7 @@ import numpy as np
 
 from flownav.paper import published
 from flownav.paper.findings import FIT_TOLERANCE
-from flownav.paper.laboratory import Laboratory, Run, delay_s
+from flownav.paper.laboratory import Identified, Laboratory, Run, delay_s, identified
 from flownav.paper.published import HEIGHTS_M, RELATION_FITS
 from flownav.paper.reproduction import Reproduction
 from flownav.report.figure_words import number
@@ -87,6 +87,24 @@ def configurations(of: Reproduction) -> list[tuple[str, str, list[tuple[str, boo
         (c.name, c.words, [(number(fits[h], 1), abs(fits[h] - RELATION_FITS[h]) <= FIT_TOLERANCE) for h in HEIGHTS_M])
         for c, fits in every
     ]
+
+
+def instrument_rows(of: Reproduction) -> list[tuple[str, str, list[str]]]:
+    """What errors of gyro and sonar do to what is identified: name, words, gain, delay and fit by height.
+
+    The first is the fixed configuration's first run of each height.
+    """
+    laboratory = of.laboratory
+    if laboratory is None or not laboratory.instruments:
+        return []
+    as_is = {height: identified(laboratory.at(height)[0]) for height in HEIGHTS_M}
+    every = [(laboratory.fixed.name, "as it is", as_is)]
+    every += [(other.name, other.words, found) for other, found in laboratory.instruments]
+    return [(name, words, [_identified_cell(found[height]) for height in HEIGHTS_M]) for name, words, found in every]
+
+
+def _identified_cell(found: Identified) -> str:
+    return f"{number(found.gain, 2)}, {number(1e3 * found.delay_s, 0)} ms, {number(found.fit_percent, 0)} %"
 
 
 def set_up(of: Reproduction) -> list[tuple[str, str, str]]:

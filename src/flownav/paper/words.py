@@ -9,7 +9,7 @@ import numpy as np
 
 from flownav.paper import published
 from flownav.paper.findings import FIT_TOLERANCE
-from flownav.paper.flights import Flights
+from flownav.paper.flights import RIG_ERRORS, Flights
 from flownav.paper.published import HEIGHTS_M, RELATION_FITS
 from flownav.paper.reproduction import Reproduction
 from flownav.paper.rows import TableRow
@@ -121,6 +121,7 @@ class FlightTable(NamedTuple):
     flights: int
     rows: list[TableRow]
     touchdown: str
+    leaking: str
 
 
 def flight_tables(of: Reproduction) -> list[FlightTable]:
@@ -143,6 +144,23 @@ def _flight_table(flown: Flights) -> FlightTable:
         flown.flights,
         rows,
         _touchdown(flown),
+        leaking(flown),
+    )
+
+
+def leaking(flown: Flights) -> str:
+    """What a sensor that errs as the rig's does makes of the table."""
+    largest = (of["max_position_error_m"]["median"] for of in (flown.scores, flown.leaking))
+    spreads = [
+        f"{state} {flown.scores['states'][state]['std_error']['median']:.3f} to "
+        f"{flown.leaking['states'][state]['std_error']['median']:.3f}"
+        for state in ("x", "y", "u", "v")
+    ]
+    return kept_together(
+        f"With the rig's errors of gyro and sonar ({100.0 * RIG_ERRORS['rotation_leak']:.1f} % of the rotation left in "
+        f"the velocity, a range {1e3 * RIG_ERRORS['sonar_lag_s']:.0f} ms old) the largest position error goes from "
+        "{:.3f} to {:.3f} m".format(*largest)
+        + f", and the standard deviations from {', '.join(spreads)}, in m and m/s."
     )
 
 

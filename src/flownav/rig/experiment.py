@@ -14,7 +14,7 @@ from flownav.optics.pad import pad_named
 from flownav.rig.encoder import SAMPLE_S, angle_and_rate, counts_of
 from flownav.rig.excitation import EXCITATIONS, move, rod_length
 from flownav.rig.film import Rod, film_swing
-from flownav.rig.instruments import Messages, gyro_at, messages, sonar_at
+from flownav.rig.instruments import SONAR_ECHO_S, Messages, gyro_at, messages, sonar_at
 from flownav.rig.pendulum import sensor_place, sensor_velocity
 
 Array = NDArray[np.float64]
@@ -36,6 +36,8 @@ class RigSettings:
     along: str = "x"
     refocus: float = 1.0
     chain_delay_s: float = 0.070
+    gyro_late_s: float = 0.0
+    sonar_late_s: float = SONAR_ECHO_S
     runs: int = 1
     seed: int = 1
     camera: Camera = field(default_factory=Camera)
@@ -72,6 +74,8 @@ def check(settings: RigSettings) -> None:
         ("duration", s.duration_s, 3.0, 3600.0),
         ("refocus", s.refocus, 0.0, 1.0),
         ("chain delay", s.chain_delay_s, 0.0, 1.0),
+        ("gyro late", s.gyro_late_s, -0.2, 0.2),
+        ("sonar late", s.sonar_late_s, 0.0, 1.0),
         ("runs", s.runs, 1, 999),
     ):
         if not low <= value <= high:
@@ -128,9 +132,9 @@ def _flow_messages(
     rod = Rod(length_m, s.height_m, s.along == "x", float(rng.uniform(0.0, 1.0)))
     noise_seed = int(rng.integers(2**31))
     flow, quality = film_swing(opened, closed, rod, pad, camera, exposure, firmware, noise_seed)
-    turning = gyro_at(frames_s[1:], time_s, rate, rng)
+    turning = gyro_at(frames_s[1:], time_s, rate, rng, s.gyro_late_s)
     none = np.zeros_like(turning)
     rates = np.stack([none, turning, none] if s.along == "x" else [-turning, none, none], axis=1)
     height = np.asarray(sensor_place(angle, length_m, s.height_m)[1])  # type: ignore[arg-type]  # an array passes
-    ranges = sonar_at(frames_s[1:], time_s, height, firmware, rng)
+    ranges = sonar_at(frames_s[1:], time_s, height, firmware, rng, s.sonar_late_s)
     return messages(frames_s, flow, quality, rates, ranges, camera.nominal_focal_px, firmware, s.chain_delay_s)

@@ -52,13 +52,17 @@ def _without_mean(values, weight, result):  # type: ignore[no-untyped-def]
         result[k] = values[k] - mean
 
 
-def gyro_at(times_s: Array, motion_s: Array, rate_rad_s: Array, rng: np.random.Generator) -> Array:
-    """The gyro's rate at the frames' times [rad/s]: 30 Hz low-pass at 760 Hz, noise, running mean taken out."""
+def gyro_at(times_s: Array, motion_s: Array, rate_rad_s: Array, rng: np.random.Generator, late_s: float = 0.0) -> Array:
+    """The gyro's rate at the frames' times [rad/s]: 30 Hz low-pass at 760 Hz, noise, running mean taken out.
+
+    late_s: how much older than those times it is; below 0 the flow is the older one. What the rod turns between the
+    two instants leaks into the velocity.
+    """
     samples_s = np.arange(motion_s[0], motion_s[-1], GYRO_SAMPLE_S)
     weight = 1.0 - np.exp(-2.0 * np.pi * GYRO_BANDWIDTH_HZ * GYRO_SAMPLE_S)
     smooth = np.empty_like(samples_s)
     _low_passed(np.interp(samples_s, motion_s, rate_rad_s), weight, smooth)
-    latest = np.clip(np.searchsorted(samples_s, times_s, "right") - 1, 0, None)
+    latest = np.clip(np.searchsorted(samples_s, times_s - late_s, "right") - 1, 0, None)
     read = smooth[latest] + GYRO_NOISE_RAD_S * rng.standard_normal(len(times_s))
     result = np.empty_like(read)
     _without_mean(read, GYRO_OFFSET_WEIGHT, result)
@@ -66,11 +70,13 @@ def gyro_at(times_s: Array, motion_s: Array, rate_rad_s: Array, rng: np.random.G
 
 
 def sonar_at(
-    times_s: Array, motion_s: Array, height_m: Array, firmware: Firmware, rng: np.random.Generator
-) -> tuple[Array, Array]:
+    times_s: Array, motion_s: Array, height_m: Array, firmware: Firmware, rng: np.random.Generator,
+    late_s: float = SONAR_ECHO_S,
+) -> tuple[Array, Array]:  # fmt: skip
     """The sonar's range as the firmware holds it at the frames' times [m]: raw, and through its filter (4.3).
 
-    A wide beam returns the nearest echo, so the range is the height, whatever the tilt of the rod.
+    A wide beam returns the nearest echo, so the range is the height, whatever the tilt of the rod. late_s: from the
+    trigger to the reading, the scale of every velocity meanwhile being that of an earlier height.
     """
     triggers_s = np.arange(motion_s[0], motion_s[-1], SONAR_PERIOD_S)
     echo_m = np.interp(triggers_s, motion_s, height_m) + SONAR_NOISE_M * rng.standard_normal(len(triggers_s))
@@ -81,7 +87,7 @@ def sonar_at(
     for k, range_m in enumerate(used_m):
         state = smooth_range(state, float(range_m)) if k else state
         smooth_m[k] = state.range_m
-    latest = np.clip(np.searchsorted(triggers_s + SONAR_ECHO_S, times_s, "right") - 1, 0, None)
+    latest = np.clip(np.searchsorted(triggers_s + late_s, times_s, "right") - 1, 0, None)
     return raw_m[latest], smooth_m[latest]
 
 

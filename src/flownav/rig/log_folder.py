@@ -86,6 +86,8 @@ def _set_up(log: RigLog, command: str) -> str:
         "start_angle_rad": s.start_angle_rad,
         "duration_s": s.duration_s,
         "refocus": s.refocus,
+        "gyro_late_s": s.gyro_late_s,
+        "sonar_late_s": s.sonar_late_s,
         "flownav": made["flownav"],
         "written_utc": made["written_utc"],
     }

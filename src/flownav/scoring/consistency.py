@@ -55,7 +55,7 @@ class ErrorSums:
 @dataclass(frozen=True)
 class ConsistencySums:
     """Sums over flights at each step, (epochs,): normalised errors squared, flights whose filter runs, and of these
-    the flights without skid contact.
+    the flights without skid contact. errors: of the states; over_stated: the same over what is stated of each.
     """
 
     flights: int
@@ -63,6 +63,7 @@ class ConsistencySums:
     running: Array
     airborne: Array
     errors: ErrorSums
+    over_stated: ErrorSums
 
     def __add__(self, other: ConsistencySums) -> ConsistencySums:
         return ConsistencySums(
@@ -71,6 +72,7 @@ class ConsistencySums:
             self.running + other.running,
             self.airborne + other.airborne,
             self.errors + other.errors,
+            self.over_stated + other.over_stated,
         )
 
 
@@ -86,13 +88,22 @@ def error_sums(squares: Array, height_m: Array, airborne: Array) -> ErrorSums:
     return ErrorSums(sums, steps)
 
 
-def consistency_of_block(error: Array, nees: Array, height_m: Array, on_ground: Array) -> ConsistencySums:
-    """Sums of one block: error (epochs, 6, lanes), the others (epochs, lanes); NaN where the filter has not started."""
+def consistency_of_block(error: Array, sigma: Array, nees: Array, height_m: Array, on_ground: Array) -> ConsistencySums:
+    """Sums of one block: error and its stated sigma (epochs, 6, lanes), the others (epochs, lanes); NaN where the
+    filter has not started.
+    """
     running = np.isfinite(nees)
     airborne = running * (1.0 - on_ground)
-    errors = error_sums(np.where(running[:, None], error, 0.0) ** 2, height_m, airborne)
-    nees = np.where(running, nees, 0.0)
-    return ConsistencySums(nees.shape[1], nees.sum(axis=1), running.sum(axis=1), airborne.sum(axis=1), errors)
+    known = np.where(running[:, None], error, 0.0)
+    over = known / np.where(running[:, None], sigma, 1.0)
+    return ConsistencySums(
+        nees.shape[1],
+        np.where(running, nees, 0.0).sum(axis=1),
+        running.sum(axis=1),
+        airborne.sum(axis=1),
+        error_sums(known**2, height_m, airborne),
+        error_sums(over**2, height_m, airborne),
+    )
 
 
 # -- one flight, by its innovations -----------------------------------------------------------------------
@@ -186,6 +197,14 @@ def efficiency(errors: ErrorSums, bound: ErrorSums) -> dict[str, float]:
     """RMS error over the root of the mean bound, of each state: 1 is what a filter does whose model is the truth."""
     ratio = errors.root_mean_square() / bound.root_mean_square()
     return dict(zip(STATES, map(float, ratio), strict=True))
+
+
+def over_stated(sums: ConsistencySums) -> dict[str, float]:
+    """Root mean square of each state's error over what is stated of it: 1 is as stated, below 1 the error is smaller.
+
+    The NEES weighs all states at once; this tells which of them it is.
+    """
+    return dict(zip(STATES, map(float, sums.over_stated.root_mean_square()), strict=True))
 
 
 def efficiency_by_height(errors: ErrorSums, bound: ErrorSums) -> dict[str, dict[str, float]]:

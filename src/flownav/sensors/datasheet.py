@@ -269,6 +269,8 @@ class FlowSettings(ParameterModel):
 
     vertical: Literal["synthetic", "sonar"] = "synthetic"
     sonar_overscale: bool = True
+    sonar_lag_s: Number = Field(0.0, ge=0.0, le=1.0)
+    rotation_leak: Number = Field(0.0, ge=-1.0, le=1.0)
     shake: bool = True
     shake_frequency_hz: Number = Field(4.0, gt=0.0, le=100.0)
     shake_damping_ratio: Number = Field(0.1, gt=0.0, le=2.0)
@@ -301,6 +303,8 @@ class FlowSettings(ParameterModel):
             shake_vertical=1.0 if self.shake else 0.0,
             shake_horizontal=self.shake_horizontal_fraction if self.shake else 0.0,
             sonar_floor_m=sensor.sonar_floor_m if self.sonar_overscale else 0.0,
+            sonar_lag_s=self.sonar_lag_s,
+            rotation_leak=self.rotation_leak,
             vertical_from_sonar=1.0 if self.vertical == "sonar" else 0.0,
             noise_low_m=noise.low_m, noise_high_m=noise.high_m,
             noise_centre=noise.centre, noise_scale=noise.scale,

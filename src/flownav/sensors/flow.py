@@ -6,6 +6,8 @@ standard deviation that grows with height. What else happens on a real vehicle i
 
 - the sonar cannot report less than its floor (0.30 m), and the sensor multiplies flow by the sonar's range, so
   below the floor its velocity is too large by floor/range (MaxBotix, HRLV-MaxSonar-EZ datasheet);
+- the sonar's range is old, so the scale is wrong while the height changes, and what the sensor's own gyro does not
+  show of a rotation reads as velocity (`misread`; the rig has both, docs/rig.md);
 - changes of rotor thrust shake the sensor on its elastic mount (figure 28): a mode xi'' + 2 zeta w xi' + w^2 xi
   = T/m whose velocity xi' adds to what the sensor sees, ahead of the lag;
 - PX4FLOW measures no vertical velocity (finding 10): the third channel is either declared `synthetic` (the same
@@ -55,6 +57,8 @@ class FlowParameters(NamedTuple):
     shake_horizontal: float  # and each horizontal channel
     # range and the vertical channel
     sonar_floor_m: float  # 0: no over-scaling near the ground
+    sonar_lag_s: float  # how old the range is that the sensor multiplies its flow by; 0: of this instant
+    rotation_leak: float  # share of the rotation that the sensor's gyro leaves in the flow
     vertical_from_sonar: float  # 1: third channel from the sonar; 0: synthetic
     # sigma = polynomial in s = (h^(1/4) - centre) * scale, h held to the identified heights
     noise_low_m: float
@@ -128,6 +132,21 @@ def sonar_overscale(range_m: float, p: FlowParameters) -> float:
     """Velocity reported over velocity: sonar range over true range, 1 above the sonar's floor."""
     true_range_m = larger(range_m, SMALLEST_RANGE_M)
     return larger(true_range_m, p.sonar_floor_m) / true_range_m
+
+
+@equation
+def misread(
+    vel_u_m_s: float, vel_v_m_s: float, vel_w_m_s: float, rate_p_rad_s: float, rate_q_rad_s: float, range_m: float,
+    p: FlowParameters,
+) -> tuple[float, float]:  # fmt: skip
+    """Horizontal velocity as a sensor sees it that multiplies by an old range and takes off too little rotation.
+
+    Flow less the gyro's share of the rate, times the range: v/r·r_old + leak·ω·r, about y forward, about x to the left.
+    """
+    true_range_m = larger(range_m, SMALLEST_RANGE_M)
+    scale = larger(range_m + p.sonar_lag_s * vel_w_m_s, SMALLEST_RANGE_M) / true_range_m
+    left = p.rotation_leak * range_m
+    return vel_u_m_s * scale + left * rate_q_rad_s, vel_v_m_s * scale - left * rate_p_rad_s
 
 
 @equation

@@ -11,7 +11,7 @@ from flownav.control.guidance import Reference
 from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import GRAVITY_M_S2, Quaternion, Rotation, quaternion_product, rotation_from_quaternion
 from flownav.measurement import Sensor
-from flownav.sensors.flow import step_flow
+from flownav.sensors.flow import misread, step_flow
 from flownav.sensors.gps_ins import attitude_with_error
 from flownav.sensors.rangefinder import slant_range
 from flownav.simulation import layout
@@ -202,7 +202,8 @@ def follow_flow(work: Work, lanes: Lanes, flight: Flight) -> None:
         distance = slant_range(lens_height(state, cosine, flight.sensors.lens_below_cg_m), cosine)
         thrust = work[layout.THRUST * len(lanes) + lane] / vehicle_as_is(work, lanes, lane).mass_kg
         before, flow = load_flow(work, lanes, lane), flow_as_is(work, lanes, lane)
-        after = step_flow(before, state.u, state.v, state.w, distance, thrust, flow)
+        seen_u, seen_v = misread(state.u, state.v, state.w, state.p, state.q, distance, flow)
+        after = step_flow(before, seen_u, seen_v, state.w, distance, thrust, flow)
         store_flow(work, lanes, lane, after)
 
 

@@ -202,7 +202,7 @@ def onboard_of(scenario: Scenario, sheets: SensorSheets, flow: FlowParameters, v
         receiver=receiver.parameters(),
         receiver_clock=clock_of(receiver, 1),
         receiver_offers_velocity=0 if scenario.gps.model == "white" else 1,
-        flow=flow._replace(sonar_floor_m=0.0),
+        flow=flow._replace(sonar_floor_m=0.0, sonar_lag_s=0.0, rotation_leak=0.0),
         camera=camera.parameters(),
         camera_clock=clock_of(camera, 1),
         camera_place=place_of(camera.lens),

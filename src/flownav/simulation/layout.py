@@ -58,6 +58,7 @@ GPS = _rows.take(len(NavSolution._fields))  # the reading
 FLOW = _rows.take(len(FlowState._fields))
 RANGEFINDER = _rows.take(len(RangefinderState._fields))
 FLOW_READING = _rows.take(4)  # u, v, w [m/s], and whether the sensor is engaged
+SEES_FLOW = FLOW_READING + 3  # of the navigator's camera: whether its last reading says anything
 FLOW_SIGMA = _rows.take(1)  # of the published flow velocity [m/s]
 RANGE = _rows.take(2)  # the latest reading [m] and whether it is valid
 
@@ -135,7 +136,7 @@ load_stage, store_stage = lane_access(HelicopterState, STAGE)
 load_sum, store_sum = lane_access(HelicopterState, SUM)
 load_multirotor, store_multirotor = lane_access(MultirotorState, HELICOPTER)
 load_multirotor_stage, store_multirotor_stage = lane_access(MultirotorState, STAGE)
-load_shares, store_shares = lane_access(Six, SUM)  # of thrust, as the mixer asks for
+load_roots, store_roots = lane_access(Six, SUM)  # of the shares of thrust that the mixer asks for
 load_inflow, store_inflow = lane_access(Inflow, INFLOW)
 load_controls, store_controls = lane_access(Controls, CONTROLS)
 load_wind, store_wind = lane_access(WindState, WIND)

@@ -10,14 +10,14 @@ from flownav.simulation.layout import (
     load_controls,
     load_multirotor,
     load_multirotor_stage,
-    load_shares,
+    load_roots,
     multirotor_as_is,
     store_multirotor,
     store_multirotor_stage,
-    store_shares,
+    store_roots,
 )
-from flownav.vehicle.motors import mixed
-from flownav.vehicle.multirotor import derivative_at_shares, outputs
+from flownav.vehicle.motors import mixed, roots_of_shares
+from flownav.vehicle.multirotor import derivative_at_roots, outputs
 from flownav.vehicle.multirotor_state import moved, of_unit_attitude
 
 
@@ -31,14 +31,14 @@ def midpoint_step(work: Work, lanes: Lanes, dt: float, rotors: tuple[int, ...]) 
             multirotor_as_is(work, lanes, lane),
             load_air(work, lanes, lane),
         )
-        shares = mixed(load_controls(work, lanes, lane), hexa, vehicle)
-        store_shares(work, lanes, lane, shares)
-        rate = derivative_at_shares(state, shares, wind.wind_n_m_s, wind.wind_e_m_s, wind.wind_d_m_s, hexa, vehicle)
+        roots = roots_of_shares(mixed(load_controls(work, lanes, lane), hexa, vehicle), hexa)
+        store_roots(work, lanes, lane, roots)
+        rate = derivative_at_roots(state, roots, wind.wind_n_m_s, wind.wind_e_m_s, wind.wind_d_m_s, hexa, vehicle)
         store_multirotor_stage(work, lanes, lane, moved(state, rate, 0.5 * dt))
     for lane in range(len(lanes)):
         state, vehicle = load_multirotor_stage(work, lanes, lane), multirotor_as_is(work, lanes, lane)
-        wind, shares = load_air(work, lanes, lane), load_shares(work, lanes, lane)
-        rate = derivative_at_shares(state, shares, wind.wind_n_m_s, wind.wind_e_m_s, wind.wind_d_m_s, hexa, vehicle)
+        wind, roots = load_air(work, lanes, lane), load_roots(work, lanes, lane)
+        rate = derivative_at_roots(state, roots, wind.wind_n_m_s, wind.wind_e_m_s, wind.wind_d_m_s, hexa, vehicle)
         before = load_multirotor(work, lanes, lane)
         store_multirotor(work, lanes, lane, of_unit_attitude(moved(before, rate, dt)))
 

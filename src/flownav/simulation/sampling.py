@@ -257,6 +257,7 @@ def read_camera(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, sl
             np.nan, np.nan, np.nan, read.quality, read.arrived, 0.0,
         )  # fmt: skip
         put_slot(work, lanes, slot, lane, reading)
+        work[layout.SEES_FLOW * len(lanes) + lane] = 1.0 if read.quality > 0.0 else 0.0
         for i in range(5):
             work[(row + i) * len(lanes) + lane] = 0.0
 

@@ -214,8 +214,10 @@ def load_scenario(name: str) -> Scenario:
     )
 
 
-def with_vehicle(scenario: Scenario, vehicle: str) -> Scenario:
-    """The scenario flown by another vehicle: a shipped one's name, or a file."""
+def with_vehicle(scenario: Scenario, vehicle: str | None) -> Scenario:
+    """The scenario flown by another vehicle: a shipped one's name, or a file; None leaves the scenario's own."""
+    if vehicle is None:
+        return scenario
     return scenario.model_copy(update={"vehicle": scenario.vehicle.model_copy(update={"file": vehicle})})
 
 

@@ -8,12 +8,19 @@ LOWEST_INDUCED_SQ = 0.3**2  # [m2/s2]
 
 
 @equation
-def multiplier_of_squares(hub_height_m: float, airspeed_sq: float, induced_m_s: float, radius_m: float) -> float:
-    """`multiplier` with the square of the horizontal airspeed [m2/s2], which the physics has at hand."""
+def source_and_image(
+    hub_height_m: float, airspeed_sq: float, induced_m_s: float, radius_m: float
+) -> tuple[float, float]:
+    """The multiplier is the first over the first less the second; airspeed_sq: horizontal, squared [m2/s2]."""
     height = larger(hub_height_m, 0.5 * radius_m)
     induced_sq = larger(induced_m_s * induced_m_s, LOWEST_INDUCED_SQ)
-    image = radius_m * radius_m * induced_sq
-    free = 16.0 * (height * height) * (induced_sq + airspeed_sq)
+    return 16.0 * (height * height) * (induced_sq + airspeed_sq), radius_m * radius_m * induced_sq
+
+
+@equation
+def multiplier_of_squares(hub_height_m: float, airspeed_sq: float, induced_m_s: float, radius_m: float) -> float:
+    """`multiplier` with the square of the horizontal airspeed [m2/s2], which the physics has at hand."""
+    free, image = source_and_image(hub_height_m, airspeed_sq, induced_m_s, radius_m)
     return free / (free - image)
 
 

@@ -9,7 +9,7 @@ from flownav.parameter_files import check, read_toml, shipped
 from flownav.vehicle.kinds import AnyFile, AnyVehicle, flattened, require_flyable, schema_of
 
 SHIPPED_VEHICLE = "maxi_joker_3.toml"
-SHIPPED_NAMES = {"maxi-joker-3": SHIPPED_VEHICLE, "quad-450": "quad_450.toml"}
+SHIPPED_NAMES = {"maxi-joker-3": SHIPPED_VEHICLE, "quad-450": "quad_450.toml", "hexa-550": "hexa_550.toml"}
 
 
 class Entry(NamedTuple):

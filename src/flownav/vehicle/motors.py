@@ -82,10 +82,29 @@ def battery_voltage(power_w: float, used_as: float, vehicle: MultirotorParameter
 
 
 @equation
-def told_speed(share: float, voltage_v: float, vehicle: MultirotorParameters) -> float:
-    """The speed that a share of the full thrust asks for [rad/s]; it falls with the battery's voltage."""
-    full: float = vehicle.full_speed_rad_s * voltage_v * (1.0 / vehicle.full_v)
+def root_of_share(share: float) -> float:
+    """What a share of the full thrust is as a share of the full speed."""
     root: float = np.sqrt(larger(share, LEAST_SHARE))
+    return root
+
+
+@equation
+def roots_of_shares(x: Six, hexa: bool) -> Six:
+    """Of each rotor: the mixer's shares hold for a step, and so do their roots."""
+    return Six(
+        root_of_share(x.one),
+        root_of_share(x.two),
+        root_of_share(x.three),
+        root_of_share(x.four),
+        root_of_share(x.five) if hexa else 0.0,
+        root_of_share(x.six) if hexa else 0.0,
+    )
+
+
+@equation
+def told_speed(root: float, voltage_v: float, vehicle: MultirotorParameters) -> float:
+    """The speed that the root of a share asks for [rad/s]; it falls with the battery's voltage."""
+    full: float = vehicle.full_speed_rad_s * voltage_v * (1.0 / vehicle.full_v)
     return full * root
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from flownav.compile import equation
 from flownav.frames import Rotation, Vector, quaternion_rate, rotation_from_quaternion, to_body, to_earth
 from flownav.vehicle.airframe import AirMotion, Wrench, fuselage_drag
-from flownav.vehicle.motors import battery_voltage, mixed, shaft_power, speed_rate, told_speed
+from flownav.vehicle.motors import battery_voltage, mixed, roots_of_shares, shaft_power, speed_rate, told_speed
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.multirotor_state import MultirotorState, Six, moved, of_unit_attitude, speeds_of, total_of
 from flownav.vehicle.propeller import propeller_load
@@ -125,11 +125,11 @@ def total_power(speeds: Six, vehicle: MultirotorParameters) -> float:
 
 
 @equation
-def derivative_at_shares(
-    state: MultirotorState, shares: Six, wind_n: float, wind_e: float, wind_d: float, hexa: bool,
+def derivative_at_roots(
+    state: MultirotorState, roots: Six, wind_n: float, wind_e: float, wind_d: float, hexa: bool,
     vehicle: MultirotorParameters,
 ) -> MultirotorState:  # fmt: skip
-    """The rates of the state while the mixer asks each rotor for a share of its full thrust."""
+    """The rates of the state while the mixer asks each rotor for a share of its full thrust; `roots_of_shares`."""
     rotation = attitude(state)
     down = (rotation[6], rotation[7], rotation[8])
     velocity, rates = (state.u, state.v, state.w), (state.p, state.q, state.r)
@@ -138,12 +138,12 @@ def derivative_at_shares(
     power = total_power(speeds, vehicle)
     voltage = battery_voltage(power, state.used, vehicle)
     spins = Six(
-        speed_rate(speeds.one, told_speed(shares.one, voltage, vehicle), vehicle),
-        speed_rate(speeds.two, told_speed(shares.two, voltage, vehicle), vehicle),
-        speed_rate(speeds.three, told_speed(shares.three, voltage, vehicle), vehicle),
-        speed_rate(speeds.four, told_speed(shares.four, voltage, vehicle), vehicle),
-        speed_rate(speeds.five, told_speed(shares.five, voltage, vehicle), vehicle) if hexa else 0.0,
-        speed_rate(speeds.six, told_speed(shares.six, voltage, vehicle), vehicle) if hexa else 0.0,
+        speed_rate(speeds.one, told_speed(roots.one, voltage, vehicle), vehicle),
+        speed_rate(speeds.two, told_speed(roots.two, voltage, vehicle), vehicle),
+        speed_rate(speeds.three, told_speed(roots.three, voltage, vehicle), vehicle),
+        speed_rate(speeds.four, told_speed(roots.four, voltage, vehicle), vehicle),
+        speed_rate(speeds.five, told_speed(roots.five, voltage, vehicle), vehicle) if hexa else 0.0,
+        speed_rate(speeds.six, told_speed(roots.six, voltage, vehicle), vehicle) if hexa else 0.0,
     )
     loads = rotor_loads(speeds, state.pos_d, down, air, hexa, vehicle)
     free = free_wrench(loads, to_the_left(speeds), to_the_left(spins), down, air, vehicle)
@@ -170,7 +170,8 @@ def derivative(
     vehicle: MultirotorParameters,
 ) -> MultirotorState:  # fmt: skip
     """The rates of the state; wind in earth NED [m/s]."""
-    return derivative_at_shares(state, mixed(controls, hexa, vehicle), wind_n, wind_e, wind_d, hexa, vehicle)
+    roots = roots_of_shares(mixed(controls, hexa, vehicle), hexa)
+    return derivative_at_roots(state, roots, wind_n, wind_e, wind_d, hexa, vehicle)
 
 
 @equation
@@ -194,8 +195,8 @@ def step(
     vehicle: MultirotorParameters,
 ) -> MultirotorState:  # fmt: skip
     """The state `dt` seconds later by the midpoint rule, controls and wind held."""
-    shares = mixed(controls, hexa, vehicle)
-    first = derivative_at_shares(state, shares, wind_n, wind_e, wind_d, hexa, vehicle)
+    roots = roots_of_shares(mixed(controls, hexa, vehicle), hexa)
+    first = derivative_at_roots(state, roots, wind_n, wind_e, wind_d, hexa, vehicle)
     middle = moved(state, first, 0.5 * dt)
-    second = derivative_at_shares(middle, shares, wind_n, wind_e, wind_d, hexa, vehicle)
+    second = derivative_at_roots(middle, roots, wind_n, wind_e, wind_d, hexa, vehicle)
     return of_unit_attitude(moved(state, second, dt))

@@ -13,7 +13,10 @@ HEIGHTS_OVER_R = (1.5, 2.0, 3.0, 4.0, 8.0)
 
 
 class MultirotorSheet(NamedTuple):
-    """Hover out of ground effect; (airspeed, trim) pairs; (height of the rotors over R, share of full thrust) pairs."""
+    """Hover out of ground effect; (airspeed, trim) pairs; (height of the rotors over R, share of full thrust) pairs.
+
+    The last has no height at which the feet would carry weight.
+    """
 
     name: str
     vehicle: MultirotorParameters
@@ -34,6 +37,7 @@ def multirotor_sheet(name: str, vehicle: MultirotorParameters) -> MultirotorShee
         near_ground=tuple(
             (ratio, trim_multirotor(vehicle, height_m=ratio * vehicle.radius_m - above).controls.col)
             for ratio in HEIGHTS_OVER_R
+            if ratio * vehicle.radius_m - above > vehicle.cg_above_skid_m
         ),
     )
 

@@ -1,0 +1,55 @@
+"""What a flight's time is spent on: the parts are parts of the whole, and each is the work that it says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flownav.benchmark.measures import vehicles
+from flownav.benchmark.vehicles import LANES, fly_untaken, landing_of, parts_of, plant_after
+from flownav.estimation.states import FILTER_ROWS
+from flownav.simulation.engine import buffers_of
+from flownav.simulation.history import column
+from flownav.vehicle import multirotor
+from flownav.vehicle.state import Controls
+
+
+@pytest.fixture(scope="module")
+def quad():
+    flight = landing_of("quad-450")
+    return flight._replace(plan=flight.plan._replace(epochs=100))
+
+
+def test_the_plant_alone_takes_a_flights_steps(quad):
+    hover, gains = quad.plan.start, quad.gains
+    controls = Controls(gains.lon_trim_rad, gains.lat_trim_rad, gains.collective_trim_rad, gains.pedal_trim_rad)
+    state = hover
+    for _ in range(100 * 10):
+        state = multirotor.step(state, controls, 0.0, 0.0, 0.0, 0.002, False, quad.vehicle)
+    assert plant_after(quad) == pytest.approx(np.tile(np.array(state)[:, None], len(LANES)), abs=1e-9)
+
+
+def test_readings_that_nobody_takes_leave_the_navigator_where_it_was(quad):
+    buffers = buffers_of(quad, LANES, quad.plan.epochs, written=False)
+    fly_untaken(quad._replace(plan=quad.plan._replace(fly_on_truth=True)), buffers)
+    truth = buffers.history[:, column("truth", "pos_d_m")]
+    assert np.ptp(truth) < 0.5
+    assert np.isfinite(truth).all()
+    heard_nothing = buffers.nav[len(LANES) : FILTER_ROWS * len(LANES)]
+    assert not heard_nothing.any()
+    assert buffers.nav[len(LANES) - 1] > 1.0  # but the readings were offered, each with its instant
+
+
+def test_the_parts_are_parts_of_the_whole(quad):
+    parts = parts_of(quad)
+    assert 0.0 < parts.plant_s < parts.whole_s
+    assert 0.0 < parts.navigator_s < parts.whole_s
+    assert parts.rest_s == parts.whole_s - parts.plant_s - parts.navigator_s
+
+
+def test_the_bench_holds_the_quad_against_the_helicopter():
+    figures = {figure.name: figure for figure in vehicles(16)}
+    ratio = figures["quad-450's rate over maxi-joker-3's"]
+    assert (ratio.asked, ratio.unit) == (2.0, "x")
+    assert ratio.value > 0.3
+    assert figures["16 flights on one core, quad-450"].value > figures["16 flights on one core, quad-450: plant"].value

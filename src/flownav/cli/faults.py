@@ -146,7 +146,7 @@ def _show_flown(rows: list[FlownRow], title: str) -> None:
         "crashed",
         "off m",
     )
-    shown = []
+    shown: list[tuple[str, ...]] = []
     for row in rows:
         said, faulty = row.entry(), row.duration_s > 0.0
         off = said["off_pad_m"]
@@ -159,7 +159,7 @@ def _show_flown(rows: list[FlownRow], title: str) -> None:
     _print(title, columns, shown)
     _note(
         "noticed: more refusals in a second than before, or said. said: the navigator warns; in so many flights, "
-        "median time after the fault began. unsaid: largest horizontal error before that. landed: also after a go-around. "
+        "median time after the fault began. unsaid: largest horizontal error before that. landed: also after a climb. "
         "around: aloft at the end. off: the pad, at rest; median (worst)."
     )
 
@@ -183,7 +183,7 @@ def _show(rows: list[Row], title: str) -> None:
         "touchdown m",
         "unsaid s",
     )
-    shown = []
+    shown: list[tuple[str, ...]] = []
     for row in rows:
         noticed, moved, largest, back, fused, touchdown, unsaid = row.scores
         faulty = row.duration_s > 0.0

@@ -9,12 +9,13 @@ from flownav.compile import LANES, kernel
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
 from flownav.simulation.ensemble import believed
-from flownav.simulation.layout import store_controls, store_helicopter
+from flownav.simulation.layout import store_around, store_controls, store_helicopter
 from flownav.simulation.plan import PHYSICS_S
 from flownav.simulation.plant import linear_step, runge_kutta_step
 from flownav.simulation.scenario import Scenario, load_scenario
 from flownav.simulation.truth import packed_truth
 from flownav.vehicle import helicopter
+from flownav.vehicle.around import CALM
 from flownav.vehicle.state import Controls, HelicopterState
 
 
@@ -22,6 +23,7 @@ from flownav.vehicle.state import Controls, HelicopterState
 def put(work, lanes, lane, state, controls):
     store_helicopter(work, lanes, lane, state)
     store_controls(work, lanes, lane, controls)
+    store_around(work, lanes, lane, CALM)
 
 
 @kernel
@@ -43,9 +45,9 @@ def states_about_hover(flight, count):
     """States and controls about hover, near the ground and high, moving and turning, one a lane."""
     generator = np.random.default_rng(4)
     scale = HelicopterState(1, 1, 1, 2, 2, 1, 0.05, 0.05, 0.05, 0.05, 0.4, 0.4, 0.4, 0.02, 0.02, 0.02, 0.02, 0.02, 0.05,
-                            0.2, 0.2, 0.2, 0.2)  # fmt: skip
+                            0.2, 0.2, 0.2, 0.2, 0.5, 3.0, 200.0)  # fmt: skip
     for k in range(count):
-        moved = np.array(flight.plan.start) + np.array(scale) * generator.standard_normal(23)
+        moved = np.array(flight.plan.start) + np.array(scale) * generator.standard_normal(26)
         moved[2] = -0.23 - 0.2 * k
         moved[6:10] /= np.linalg.norm(moved[6:10])
         controls = np.array([0.0, 0.0, flight.gains.collective_trim_rad, flight.gains.pedal_trim_rad])
@@ -60,9 +62,9 @@ def test_refining_the_inflow_between_stages_is_solving_it_in_each(flight):
     for lane, (state, controls) in enumerate(pairs):
         put(work, LANES, lane, state, controls)
     step(work, LANES, PHYSICS_S)
-    rows = work.reshape(-1, len(LANES))[layout.HELICOPTER : layout.HELICOPTER + 23]
+    rows = work.reshape(-1, len(LANES))[layout.HELICOPTER : layout.HELICOPTER + 26]
     for lane, (state, controls) in enumerate(pairs):
-        exact = helicopter.step(state, controls, 0.0, 0.0, 0.0, PHYSICS_S, flight.vehicle)
+        exact = helicopter.step(state, controls, CALM, PHYSICS_S, flight.vehicle)
         assert rows[:, lane] == pytest.approx(np.array(exact, float), rel=1e-8, abs=1e-8)
 
 
@@ -81,9 +83,9 @@ def test_each_lane_flies_the_vehicle_of_its_own_rows(flight):
     for lane, (state, controls) in enumerate(pairs):
         put(work, LANES, lane, state, controls)
     step(work, LANES, PHYSICS_S)
-    rows = work.reshape(-1, len(LANES))[layout.HELICOPTER : layout.HELICOPTER + 23]
+    rows = work.reshape(-1, len(LANES))[layout.HELICOPTER : layout.HELICOPTER + 26]
     for lane, (state, controls) in enumerate(pairs):
-        exact = helicopter.step(state, controls, 0.0, 0.0, 0.0, PHYSICS_S, vehicles[lane])
+        exact = helicopter.step(state, controls, CALM, PHYSICS_S, vehicles[lane])
         assert rows[:, lane] == pytest.approx(np.array(exact, float), rel=1e-8, abs=1e-8)
 
 

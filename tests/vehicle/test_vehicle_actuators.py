@@ -10,7 +10,7 @@ from flownav.vehicle import actuators
 from flownav.vehicle.actuators import Servo
 
 acceleration = actuators.acceleration
-SERVO = Servo(50.0, 0.7, 1.2, -0.14, 0.14)
+SERVO = Servo(50.0, 0.7, 1.2, -0.14, 0.14, 0.0)
 
 
 def respond(command, servo=SERVO, until=0.5, start=(0.0, 0.0)):
@@ -52,3 +52,14 @@ def test_the_blade_never_passes_the_stop():
     assert actuators.blade_angle(0.15, SERVO) == 0.14
     assert actuators.blade_angle(-0.15, SERVO) == -0.14
     assert actuators.blade_angle(0.05, SERVO) == 0.05
+
+
+def test_slop_leaves_an_error_within_its_band_and_answers_the_rest():
+    slack = SERVO._replace(dead_band_rad=0.002)
+    assert acceleration(0.01, 0.0, 0.0119, slack) == 0.0
+    assert acceleration(0.01, 0.0, 0.0081, slack) == 0.0
+    assert acceleration(0.01, 0.0, 0.0121, slack) == pytest.approx(acceleration(0.01, 0.0, 0.0101, SERVO))
+    _, (position, _) = respond(0.05, slack, until=1.0)
+    assert position[-1] == pytest.approx(0.048, abs=1e-4)
+    _, (back, _) = respond(0.04, slack, until=1.0, start=(position[-1], 0.0))
+    assert back[-1] == pytest.approx(0.042, abs=1e-4)  # it stops on the other side: play

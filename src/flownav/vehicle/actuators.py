@@ -8,13 +8,14 @@ from flownav.compile import clamp, equation
 
 
 class Servo(NamedTuple):
-    """A servo's constants: natural frequency [rad/s], damping ratio, rate limit [rad/s], travel [rad]."""
+    """A servo's constants: natural frequency [rad/s], damping ratio, rate limit [rad/s], travel, dead band [rad]."""
 
     frequency_rad_s: float
     damping_ratio: float
     rate_limit_rad_s: float
     min_rad: float
     max_rad: float
+    dead_band_rad: float
 
 
 @equation
@@ -23,12 +24,14 @@ def acceleration(position: float, rate: float, command: float, servo: Servo) -> 
 
     y'' = ω²(clip(u) - y) - 2ζω·y', written as a rate loop about a position loop,
     y'' = 2ζω·(clip(ω/(2ζ)·(clip(u) - y)) - y'), so that the rate limit holds without a stop in the equation:
-    a rate within the limit stays within it.
+    a rate within the limit stays within it. Slop of servo and linkage is a dead band: an error is answered but for
+    its first `dead_band_rad`, either way.
     """
-    target = clamp(command, servo.min_rad, servo.max_rad)
+    error = clamp(command, servo.min_rad, servo.max_rad) - position
+    answered = error - clamp(error, -servo.dead_band_rad, servo.dead_band_rad)
     position_gain = servo.frequency_rad_s / (2.0 * servo.damping_ratio)
     rate_gain = 2.0 * servo.damping_ratio * servo.frequency_rad_s
-    demanded = clamp(position_gain * (target - position), -servo.rate_limit_rad_s, servo.rate_limit_rad_s)
+    demanded = clamp(position_gain * answered, -servo.rate_limit_rad_s, servo.rate_limit_rad_s)
     return rate_gain * (demanded - rate)
 
 

@@ -59,7 +59,6 @@ def test_slop_leaves_an_error_within_its_band_and_answers_the_rest():
     assert acceleration(0.01, 0.0, 0.0119, slack) == 0.0
     assert acceleration(0.01, 0.0, 0.0081, slack) == 0.0
     assert acceleration(0.01, 0.0, 0.0121, slack) == pytest.approx(acceleration(0.01, 0.0, 0.0101, SERVO))
-    _, (position, _) = respond(0.05, slack, until=1.0)
-    assert position[-1] == pytest.approx(0.048, abs=1e-4)
-    _, (back, _) = respond(0.04, slack, until=1.0, start=(position[-1], 0.0))
-    assert back[-1] == pytest.approx(0.042, abs=1e-4)  # it stops on the other side: play
+    ends = [respond(0.05, slack, until=1.0, start=(start, 0.0))[1][0][-1] for start in (0.04, 0.06)]
+    assert np.abs(np.array(ends) - 0.05).max() <= 0.002
+    assert abs(ends[1] - ends[0]) > 0.001  # where it stops depends on where it comes from: play

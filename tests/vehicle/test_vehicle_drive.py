@@ -45,7 +45,9 @@ def test_inflow_follows_with_the_time_constant_of_its_mass():
     assert mass == pytest.approx(8.0 / 3.0 * 1.225 * 0.89**3, rel=1e-3)
     disc = slope / VEHICLE.main_inflow_speed_m_s
     rates = [
-        helicopter.derivative(HOVER.state._replace(inflow=HOVER.state.inflow + by), HOVER.controls, CALM, VEHICLE).inflow
+        helicopter.derivative(
+            HOVER.state._replace(inflow=HOVER.state.inflow + by), HOVER.controls, CALM, VEHICLE
+        ).inflow
         for by in (1e-4, -1e-4)
     ]
     expected = -(slope + 2.0 * disc * HOVER.state.inflow) / mass

@@ -104,7 +104,7 @@ def test_off_the_ground_nothing_touches():
     assert outputs(state, CALM, VEHICLE).contact_force_n == 0.0
     stiff = VEHICLE._replace(skid_stiffness_n_m=3e5, skid_friction_coefficient=1.0)
     rate = helicopter.derivative
-    assert rate(state, IDLE, 0.0, 0.0, 0.0, stiff) == rate(state, IDLE, CALM, VEHICLE)
+    assert rate(state, IDLE, CALM, stiff) == rate(state, IDLE, CALM, VEHICLE)
 
 
 def test_controls_that_will_not_stay_parked_are_refused():

@@ -145,6 +145,9 @@ def step_wind(state: WindState, height_m: float, n: WindNormals, p: WindParamete
     down2 = p.down_f21 * state.down1 + p.down_f22 * state.down2
     across2 = across2 + (p.across_d21 * n.across1 + p.across_d22 * n.across2)
     down2 = down2 + (p.down_d21 * n.down1 + p.down_d22 * n.down2)
+    # the means over the period: what is quicker than the slow gusts has neither lead nor lag
+    across = 0.5 * ((state.across1 + across1) + SQRT3 * (state.across2 + across2))
+    down = 0.5 * ((state.down1 + down1) + SQRT3 * (state.down2 + down2))
     after = WindState(
         along=gauss_markov(state.along, p.along_decay, p.along_drive, n.along),
         across1=across1,
@@ -152,8 +155,8 @@ def step_wind(state: WindState, height_m: float, n: WindNormals, p: WindParamete
         down1=down1,
         down2=down2,
         roll=gauss_markov(state.roll, p.roll_decay, p.roll_drive, n.roll),
-        across_slow=state.across_slow + p.across_follow * (across1 + SQRT3 * across2 - state.across_slow),
-        down_slow=state.down_slow + p.down_follow * (down1 + SQRT3 * down2 - state.down_slow),
+        across_slow=state.across_slow + p.across_follow * (across - state.across_slow),
+        down_slow=state.down_slow + p.down_follow * (down - state.down_slow),
     )
     return after, wind_velocity(after, height_m, p)
 

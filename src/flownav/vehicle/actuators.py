@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flownav.compile import clamp, equation
+from flownav.vehicle.parameters import VehicleParameters
 
 
 class Servo(NamedTuple):
@@ -16,6 +17,45 @@ class Servo(NamedTuple):
     min_rad: float
     max_rad: float
     dead_band_rad: float
+
+
+@equation
+def cyclic_servo(vehicle: VehicleParameters) -> Servo:
+    """The servo of both cyclic channels."""
+    return Servo(
+        vehicle.cyclic_frequency_rad_s,
+        vehicle.cyclic_damping_ratio,
+        vehicle.cyclic_rate_limit_rad_s,
+        vehicle.cyclic_min_rad,
+        vehicle.cyclic_max_rad,
+        vehicle.cyclic_dead_band_rad,
+    )
+
+
+@equation
+def collective_servo(vehicle: VehicleParameters) -> Servo:
+    """The servo of the collective."""
+    return Servo(
+        vehicle.collective_frequency_rad_s,
+        vehicle.collective_damping_ratio,
+        vehicle.collective_rate_limit_rad_s,
+        vehicle.collective_min_rad,
+        vehicle.collective_max_rad,
+        vehicle.collective_dead_band_rad,
+    )
+
+
+@equation
+def pedal_servo(vehicle: VehicleParameters) -> Servo:
+    """The servo of the tail rotor's pitch."""
+    return Servo(
+        vehicle.pedal_frequency_rad_s,
+        vehicle.pedal_damping_ratio,
+        vehicle.pedal_rate_limit_rad_s,
+        vehicle.pedal_min_rad,
+        vehicle.pedal_max_rad,
+        vehicle.pedal_dead_band_rad,
+    )
 
 
 @equation

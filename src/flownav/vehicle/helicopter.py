@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from flownav.compile import equation
 from flownav.frames import Rotation, Vector, quaternion_rate, rotation_from_quaternion, to_body, to_earth
-from flownav.vehicle.actuators import Servo, acceleration, blade_angle
+from flownav.vehicle.actuators import acceleration, blade_angle, collective_servo, cyclic_servo, pedal_servo
 from flownav.vehicle.airframe import (
     AirMotion,
     Wrench,
@@ -53,45 +53,6 @@ __all__ = [
     "step",
     "tail_power",
 ]
-
-
-@equation
-def cyclic_servo(vehicle: VehicleParameters) -> Servo:
-    """The servo of both cyclic channels."""
-    return Servo(
-        vehicle.cyclic_frequency_rad_s,
-        vehicle.cyclic_damping_ratio,
-        vehicle.cyclic_rate_limit_rad_s,
-        vehicle.cyclic_min_rad,
-        vehicle.cyclic_max_rad,
-        vehicle.cyclic_dead_band_rad,
-    )
-
-
-@equation
-def collective_servo(vehicle: VehicleParameters) -> Servo:
-    """The servo of the collective."""
-    return Servo(
-        vehicle.collective_frequency_rad_s,
-        vehicle.collective_damping_ratio,
-        vehicle.collective_rate_limit_rad_s,
-        vehicle.collective_min_rad,
-        vehicle.collective_max_rad,
-        vehicle.collective_dead_band_rad,
-    )
-
-
-@equation
-def pedal_servo(vehicle: VehicleParameters) -> Servo:
-    """The servo of the tail rotor's pitch."""
-    return Servo(
-        vehicle.pedal_frequency_rad_s,
-        vehicle.pedal_damping_ratio,
-        vehicle.pedal_rate_limit_rad_s,
-        vehicle.pedal_min_rad,
-        vehicle.pedal_max_rad,
-        vehicle.pedal_dead_band_rad,
-    )
 
 
 @equation

@@ -2,10 +2,10 @@
 
 In a wind the ground vortex is drawn in and costs lift, most where the wind is about 0.7 of the induced velocity v_i
 (Curtiss, Sun, Putman and Hanker 1984: recirculation below about 0.5 v_i, a ground vortex under the disc up to about
-1.2 v_i; Ganesh and Komerath 2006: both unsteady). Here that is air which moves: down by `LOSS`·v_i at most, and
-unsteady by `UNSTEADY`·v_i down and, over the disc's radius, from side to side. Both fade with the square of the hub's
-height, to nothing at one rotor diameter. The sizes are assumed: 2 % of lift, and 2 % of lift at random, on the Maxi
-Joker's skids; nobody measured them on a vehicle of its size.
+1.2 v_i; Ganesh and Komerath 2006: both unsteady). Here that is air which moves: down by `loss`·v_i at most, and
+unsteady by `unsteady`·v_i down and, over the disc's radius, from side to side. Both fade with the square of the hub's
+height, to nothing at one rotor diameter. The sizes are assumed: 1 % of lift, and 1 % at random, on the Maxi Joker's
+skids; nobody measured them on a vehicle of its size.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The surroundings on lanes: each lane has its own ground, wind at its own height, and what its feet and rotors find."""
+"""The surroundings on lanes: each lane has its own ground, its own wind, and what its feet and rotors find."""
 
 from __future__ import annotations
 

@@ -10,18 +10,20 @@ from hypothesis import strategies as st
 from flownav.control import autopilot, gate
 from flownav.control.autopilot import Estimate, grounded, hovering, inner_loop, integrate, outer_loop
 from flownav.control.gains import AutopilotGains
+from flownav.control.go_around import Knowledge
 from flownav.control.guidance import Reference, path_through, reference_at, rounded
 from flownav.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion
 
 GAINS = AutopilotGains()
 LEVEL = rotation_from_quaternion(1.0, 0.0, 0.0, 0.0)
-HERE = Estimate(0.0, 0.0, -3.0, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2, 1.0)
+HERE = Estimate(0.0, 0.0, -3.0, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2)
+KNOWN = Knowledge(pad_found=1.0, ground_found=1.0, pad_unseen_s=0.0, sigma_m=0.0, doubted=0.0)
 HOLD = Reference(0.0, 0.0, -3.0, 0.0, 0.0, 0.0)
 PATH = path_through([(0.0, 0.0, 0.0, -3.0), (10.0, 0.0, 0.0, -3.0), (20.0, 2.0, 0.0, 0.0)])
 
 
 def flown(reference=HOLD, estimate=HERE, rotation=LEVEL, state=None):
-    return outer_loop(state or hovering(GAINS), reference, estimate, rotation, GAINS, 0.02)
+    return outer_loop(state or hovering(GAINS), reference, estimate, KNOWN, rotation, GAINS, 1.0, 0.02)
 
 
 def test_between_knots_the_reference_moves_in_a_straight_line_at_constant_speed():
@@ -106,8 +108,9 @@ def test_what_it_does_turns_with_the_heading(yaw, ahead, aside, u, v):
     turned = rotation_from_quaternion(*quaternion_from_euler(0.0, 0.0, yaw))
     estimate = HERE._replace(u=u, v=v)
     north, east = np.cos(yaw) * ahead - np.sin(yaw) * aside, np.sin(yaw) * ahead + np.cos(yaw) * aside
-    one = outer_loop(hovering(limits), HOLD._replace(pos_n=ahead, pos_e=aside), estimate, LEVEL, limits, 0.02)
-    other = outer_loop(hovering(limits), HOLD._replace(pos_n=north, pos_e=east), estimate, turned, limits, 0.02)
+    near, far = HOLD._replace(pos_n=ahead, pos_e=aside), HOLD._replace(pos_n=north, pos_e=east)
+    one = outer_loop(hovering(limits), near, estimate, KNOWN, LEVEL, limits, 1.0, 0.02)
+    other = outer_loop(hovering(limits), far, estimate, KNOWN, turned, limits, 1.0, 0.02)
     assert np.array(other) == pytest.approx(np.array(one), abs=1e-12)
 
 
@@ -185,15 +188,31 @@ def test_what_counts_is_where_the_skids_will_touch():
 
 def test_without_a_pad_it_waits_at_the_height_from_which_it_searches():
     told = PRECISE._replace(search_height_m=2.0)
-    over = Estimate(0.0, 0.0, PRECISE.pad_pos_d_m - 1.9, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2, 0.0)
 
     def collective(height, found):
-        at = over._replace(pos_d=PRECISE.pad_pos_d_m - height, pad_found=found)
-        return outer_loop(hovering(told), DOWN, at, LEVEL, told, 0.02).collective_command - told.collective_trim_rad
+        at, known = HERE._replace(pos_d=PRECISE.pad_pos_d_m - height), KNOWN._replace(pad_found=found)
+        after = outer_loop(hovering(told), DOWN, at, known, LEVEL, told, 1.0, 0.02)
+        assert (after.waited_s > 0.0) == (found == 0.0 and height < 2.3)
+        return after.collective_command - told.collective_trim_rad
 
     assert collective(1.9, 0.0) > 0.0
     assert collective(1.9, 1.0) < 0.0
-    assert collective(2.1, 0.0) < 0.0
+    assert collective(2.4, 0.0) < 0.0
+
+
+def test_going_around_it_climbs_and_comes_down_again():
+    told = PRECISE._replace(go_around_height_m=3.0, landing_sigma_m=0.5, doubt_s=0.0, clear_s=0.1)
+    low, high = (HERE._replace(pos_d=PRECISE.pad_pos_d_m - height) for height in (0.9, 3.0))
+    unsure = KNOWN._replace(sigma_m=1.0)
+    away = outer_loop(hovering(told), DOWN, low, unsure, LEVEL, told, 1.0, 0.02)
+    assert (away.away, away.go_arounds) == (1.0, 1.0)
+    assert away.collective_command > told.collective_trim_rad
+    assert outer_loop(hovering(told), DOWN, low, unsure, LEVEL, told, 0.0, 0.02).away == 0.0  # it may not land yet
+    state = away
+    for _ in range(7):
+        state = outer_loop(state, DOWN, high, KNOWN, LEVEL, told, 1.0, 0.02)
+    assert (state.away, state.go_arounds) == (0.0, 1.0)
+    assert state.collective_command < away.collective_command
 
 
 def test_patience_widens_the_gate():
@@ -204,18 +223,18 @@ def test_patience_widens_the_gate():
 
 
 def test_waiting_at_the_gate_is_counted():
-    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2, 1.0)
-    state = outer_loop(hovering(PRECISE), DOWN, beside, LEVEL, PRECISE, 0.02)
+    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2)
+    state = outer_loop(hovering(PRECISE), DOWN, beside, KNOWN, LEVEL, PRECISE, 1.0, 0.02)
     assert state.waited_s == pytest.approx(0.02)
-    state = outer_loop(state, DOWN, beside._replace(pos_n=0.0), LEVEL, PRECISE, 0.02)
+    state = outer_loop(state, DOWN, beside._replace(pos_n=0.0), KNOWN, LEVEL, PRECISE, 1.0, 0.02)
     assert state.waited_s == pytest.approx(0.02)
 
 
 def test_the_limit_holds_in_the_loop():
-    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2, 1.0)
+    beside = Estimate(0.5, 0.0, PRECISE.pad_pos_d_m - 1.2, 0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2)
     over = beside._replace(pos_n=0.0)
-    waiting = outer_loop(hovering(PRECISE), DOWN, beside, LEVEL, PRECISE, 0.02)
-    going = outer_loop(hovering(PRECISE), DOWN, over, LEVEL, PRECISE, 0.02)
+    waiting = outer_loop(hovering(PRECISE), DOWN, beside, KNOWN, LEVEL, PRECISE, 1.0, 0.02)
+    going = outer_loop(hovering(PRECISE), DOWN, over, KNOWN, LEVEL, PRECISE, 1.0, 0.02)
     assert waiting.collective_command > PRECISE.collective_trim_rad
     assert going.collective_command < PRECISE.collective_trim_rad
 
@@ -233,7 +252,7 @@ def felt(push_n=0.0, push_e=0.0, yaw=0.0, roll=0.0, pitch=0.0, **gains):
     state = hovering(told)
     for _ in range(50):
         estimate = HERE._replace(force_x=force[0], force_y=force[1], force_z=force[2])
-        state = outer_loop(state, HOLD, estimate, rotation, told, 0.02)
+        state = outer_loop(state, HOLD, estimate, KNOWN, rotation, told, 1.0, 0.02)
     return state
 
 
@@ -266,7 +285,7 @@ def test_the_skids_hang_opposite_to_the_roll_and_it_is_they_that_are_flown_to_th
     rolled = rotation_from_quaternion(*quaternion_from_euler(0.1, 0.0, 0.0))  # what it says is where they are
     assert 0.2 * rolled[5] == pytest.approx(gate.skids_beside(LEVEL, told)[1], rel=0.01)
     over = HERE._replace(pos_n=-0.01, pos_e=0.02)
-    state = outer_loop(hovering(told), HOLD, over, LEVEL, told, 0.02)
+    state = outer_loop(hovering(told), HOLD, over, KNOWN, LEVEL, told, 1.0, 0.02)
     assert (state.pitch_sine, state.roll_sine) == pytest.approx((0.05, 0.1))
 
 

@@ -33,7 +33,7 @@ def test_statistics_of_a_known_error():
 
 def test_a_flight_of_which_nothing_counts_has_null_scores():
     zeros, nothing = np.zeros((50, 6, 2)), np.full((2, len(TOUCHDOWN_COLUMNS)), np.nan)
-    nothing[:, -2:] = 0.0
+    nothing[:, TOUCHDOWN_COLUMNS.index("expected") :] = 0.0
     counted = np.zeros((50, 2))
     counted[:, 1] = 1.0
     rows = score_block(zeros, zeros, nothing, counted)

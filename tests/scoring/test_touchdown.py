@@ -42,11 +42,13 @@ def landing(**changed):
     return Motion(**{name: np.asarray(changed.get(name, values), float) for name, values in flown.items()})
 
 
-def row_of(motion, error=None, seen=None, may_land_after_s=0.0, limits=LIMITS):
+def row_of(motion, error=None, seen=None, may_land_after_s=0.0, limits=LIMITS, away=None):
     """One lane's row."""
     error = np.zeros((EPOCHS, 2, 1)) if error is None else error
     seen = np.zeros((EPOCHS, 1)) if seen is None else seen
-    return touchdowns(T_S, motion, error, seen, limits, may_land_after_s)[0]
+    return touchdowns(
+        T_S, motion, error, seen, np.zeros((EPOCHS, 1)) if away is None else away, limits, may_land_after_s
+    )[0]
 
 
 def flight(motion, **options):

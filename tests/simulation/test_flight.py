@@ -11,7 +11,7 @@ from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, touchdown_rows
 from flownav.scoring.landings import column_of, succeeded
 from flownav.scoring.paper_tables import published
-from flownav.scoring.touchdown import names_of
+from flownav.scoring.touchdown import TOUCHDOWN_COLUMNS, names_of
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_blocks, fly_one
 from flownav.simulation.history import column, columns
@@ -183,7 +183,9 @@ def test_a_rollover_after_a_soft_contact_is_a_crash():
     """In 22 m/s some flights touch down below the limit of sink rate, slide and roll over; none of them has landed."""
     storm = setup("landing", filter=PAPERS, wind={"speed_20ft_m_s": 22.0}).flight
     landings = touchdown_rows(fly_many(storm, 1, 64))
-    rolled = landings[np.array(["rolled over" in names_of(bits) for bits in landings[:, -1]])]
+    rolled = landings[
+        np.array(["rolled over" in names_of(bits) for bits in landings[:, TOUCHDOWN_COLUMNS.index("broken")]])
+    ]
     soft = rolled[:, column_of("contact", "sink_rate_m_s")] < storm.limits.max_sink_rate_m_s
     assert soft.any()
     assert not succeeded(rolled).any()

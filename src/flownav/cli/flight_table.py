@@ -92,8 +92,9 @@ def touchdown_lines(landing: dict[str, Any], landed: int | None, flights: int) -
         said.append(f"limited by  {which}{', '.join(parts)}")
     if landed is None:
         broken = landing["broken"]
-        verdict = f"crashed: {', '.join(broken)}" if broken else "landed" if landing["success"] else "not at rest"
-        return [*said, f"verdict  {verdict}"]
+        verdict = f"crashed: {', '.join(broken)}" if broken else landing["verdict"].replace("unfinished", "not at rest")
+        around = f", after {landing['go_arounds']} go-around(s)" if landing["go_arounds"] else ""
+        return [*said, f"verdict  {verdict}{around}"]
     rate = landing["success"]
     said.append(
         f"landed  {landed} of {flights} flights, {100.0 * rate['rate']:.1f} % "
@@ -102,6 +103,9 @@ def touchdown_lines(landing: dict[str, Any], landed: int | None, flights: int) -
     late = [f"{name} {count}" for name, count in landing["unfinished"].items() if count]
     if late:
         said.append("not landed in time  " + ", ".join(late))
+    if landing["went_around"]["flights"]:
+        around = landing["went_around"]
+        said.append(f"went around  {around['flights']}, of which {around['landed']} landed after all")
     if landing["broken"]:
         said.append("crashes by  " + ", ".join(f"{name} {count}" for name, count in landing["broken"].items()))
     return said

@@ -54,3 +54,16 @@ class AutopilotGains(NamedTuple):
     align_patience_s: float = 1e9  # both double after so long a wait
     commit_height_m: float = 0.0
     search_height_m: float = 0.0  # no lower than this before the pad is found
+    # going around: never where the height is 0
+    go_around_height_m: float = 0.0
+    go_arounds_most: float = 2.0
+    pad_view_m: float = 1e9  # from here up to search_height_m the camera should see the pad
+    pad_lost_s: float = 1e9
+    landing_sigma_m: float = 1e9  # of the position over the pad
+    doubt_s: float = 1e9  # of doubt
+    align_wait_s: float = 1e9  # at the shut gate
+    search_wait_s: float = 1e9
+    search_radius_m: float = 0.0  # of the circle on which it looks for the pad
+    drift_radius_m: float = 1e9  # below commit_height_m
+    drift_speed_m_s: float = 1e9
+    clear_s: float = 3.0  # so long all must be well before it comes down again

@@ -65,6 +65,7 @@ STANDS = _rows.take(1)  # what the vehicle did in the last window: `still.MOVES`
 CONTACT = _rows.take(1)  # the range when it rested last [m]; NaN where it has not
 BARO_KNOWN = _rows.take(1)
 PAD_KNOWN = _rows.take(1)  # 0 no, or how: STOOD_ON, LEFT, SEEN of `place`
+PAD_STRAYS = _rows.take(1)  # fixes of a pad in a row that were refused
 # what becomes of the component that is offered
 REASON = _rows.take(1)
 OBSERVATION = _rows.take(1)

@@ -12,15 +12,25 @@ from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import MEASURED, PAD, POSITION, STATE
 from flownav.frames import to_earth
 from flownav.navigation.journal import reset_state
-from flownav.navigation.memory import OBSERVATION, PAD_KNOWN, load_aid, load_reading, load_start, store_aid
+from flownav.navigation.memory import (
+    OBSERVATION,
+    PAD_KNOWN,
+    PAD_STRAYS,
+    REASON,
+    load_aid,
+    load_reading,
+    load_start,
+    store_aid,
+)
 from flownav.navigation.offers import conclude, fuse_offered, note_aid, note_height, put, usable, usable_in_flight
 from flownav.navigation.packed import load_place_settings
-from flownav.navigation.reasons import FUSED, OUT_OF_RANGE, SILENT
+from flownav.navigation.reasons import FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT
 from flownav.navigation.records import AidMemory, Reading
 from flownav.navigation.tape import PAD_FOUND, Output, write_event
 from flownav.navigation.told import PlaceSettings
 
 LEAST_PAD_DISTANCE_M = 0.05
+MANY_STRAYS = 6.0  # refused components of fixes, none fused between
 UNKNOWN_M = 100.0
 ON_GROUND = 0.5
 STANDING_SIGMA_M = 0.005
@@ -96,6 +106,23 @@ def take_pad(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
         conclude(work, lanes, t_s, sensor, component, s.gate_sigma, o)
         note_height(work, lanes, t_s)
         note_aid(work, lanes, t_s, o)
+        if component < 2:
+            count_strays(work, lanes, component)
+
+
+@equation
+def count_strays(work: Work, lanes: Lanes, component: int) -> None:
+    """A pad that the camera sees elsewhere, fix after fix, is not where it was first seen: the next fix finds it anew.
+
+    The first fix may have been of something else, and its place, once believed, would refuse all true ones.
+    """
+    for lane in range(len(lanes)):
+        reason, strays = work[REASON * len(lanes) + lane], work[PAD_STRAYS * len(lanes) + lane]
+        fused = reason == FUSED and component == 1
+        strays = strays + 1.0 if reason == INNOVATION_GATE else (0.0 if fused else strays)
+        astray = strays >= MANY_STRAYS
+        work[PAD_STRAYS * len(lanes) + lane] = 0.0 if astray else strays
+        work[PAD_KNOWN * len(lanes) + lane] = LEFT if astray else work[PAD_KNOWN * len(lanes) + lane]
 
 
 @procedure

@@ -20,7 +20,9 @@ Array = NDArray[np.float64]
 
 R_SHARE = 0.95
 CONFIDENCE = 0.95
-EXPECTED, BROKEN = TOUCHDOWN_COLUMNS.index("expected"), TOUCHDOWN_COLUMNS.index("broken")
+EXPECTED, BROKEN, GO_AROUNDS, ALOFT = (
+    TOUCHDOWN_COLUMNS.index(name) for name in ("expected", "broken", "go_arounds", "aloft")
+)
 
 
 def column_of(group: str, name: str) -> int:
@@ -42,15 +44,16 @@ def succeeded(rows: Array) -> NDArray[np.bool_]:
 
 
 def touchdown_of_flight(row: Array) -> dict[str, Any] | None:
-    """The values of one flight; None where it touched nothing and broke nothing."""
+    """The values of one flight; None where it touched nothing, broke nothing and did not go around."""
     broken = names_of(row[BROKEN])
-    if not np.isfinite(row[CONTACT_DISTANCE]) and not broken:
+    if not np.isfinite(row[CONTACT_DISTANCE]) and not broken and not row[ALOFT]:
         return None
     said: dict[str, Any] = {
         group: _or_none({name: _finite(row[column_of(group, name)]) for name in names})
         for group, names in (("contact", CONTACT), ("rest", REST), ("limited_by", LIMITED_BY))
     }
-    return said | {"success": bool(succeeded(row[None, :])[0]), "broken": broken}
+    landed, times = bool(succeeded(row[None, :])[0]), int(row[GO_AROUNDS])
+    return said | {"success": landed, "broken": broken, "go_arounds": times, "verdict": verdict_of(row)}
 
 
 def touchdown_of_flights(rows: Array) -> dict[str, Any] | None:
@@ -67,7 +70,24 @@ def touchdown_of_flights(rows: Array) -> dict[str, Any] | None:
         "limited_by": limits,
         "broken": dict(broken),
         "unfinished": unfinished(rows),
+        "went_around": went_around(rows),
+        "verdicts": dict(Counter(verdict_of(row) for row in rows)),
     }
+
+
+def verdict_of(row: Array) -> str:
+    """What became of a flight: landed, crashed, went around (and is aloft at the end), or none of these."""
+    if row[BROKEN] > 0.0:
+        return "crashed"
+    if succeeded(row[None, :])[0]:
+        return "landed"
+    return "went around" if row[ALOFT] > 0.0 else "unfinished"
+
+
+def went_around(rows: Array) -> dict[str, int]:
+    """How many flights broke a landing off at least once, and how many of these landed after all."""
+    around = rows[:, GO_AROUNDS] > 0.0
+    return {"flights": int(around.sum()), "landed": int((around & succeeded(rows)).sum())}
 
 
 def unfinished(rows: Array) -> dict[str, int]:

@@ -52,13 +52,16 @@ BROKEN = (
     "below the ground",
 )
 
-# one flight's touchdown as a row; expected 1: the flight was to land. broken: bits of BROKEN
+# one flight's touchdown as a row; expected 1: the flight was to land. broken: bits of BROKEN. go_arounds: how often it
+# broke its landing off; aloft 1: its last landing was broken off, and it is aloft at the end
 TOUCHDOWN_COLUMNS = (
     *(f"contact.{name}" for name in CONTACT),
     *(f"rest.{name}" for name in REST),
     *(f"limited_by.{name}" for name in LIMITED_BY),
     "expected",
     "broken",
+    "go_arounds",
+    "aloft",
 )
 
 
@@ -131,12 +134,14 @@ def rest_epoch(motion: Motion) -> NDArray[np.int64]:
 
 
 def touchdowns(
-    t_s: Array, motion: Motion, flown_error: Array, pad_seen: Array, limits: Limits, may_land_after_s: float
-) -> Array:
+    t_s: Array, motion: Motion, flown_error: Array, pad_seen: Array, away: Array, limits: Limits,
+    may_land_after_s: float,
+) -> Array:  # fmt: skip
     """Rows of TOUCHDOWN_COLUMNS, (lanes, len(TOUCHDOWN_COLUMNS)); what did not happen is NaN.
 
     flown_error (epochs, 2, lanes): position that was flown on less the truth; pad_seen (epochs, lanes) 0/1: the pad's
-    place was to be seen or noted. A contact before `may_land_after_s` is a crash and no touchdown.
+    place was to be seen or noted; away (epochs, lanes) 0/1: the vehicle goes around. A contact before
+    `may_land_after_s` is a crash and no touchdown.
     """
     lane = np.arange(motion.on_ground.shape[1])
     contact = first_contact(motion.on_ground)
@@ -173,6 +178,8 @@ def touchdowns(
     found = {name: np.where(touched, values, np.nan) for name, values in columns.items()}
     found |= {name: np.where(rest >= 0, values, np.nan) for name, values in at_rest.items()}
     found["expected"] = np.full(len(lane), float(may_land_after_s < t_s[-1]))
+    found["go_arounds"] = (np.diff(away, axis=0) > 0.0).sum(axis=0).astype(float)
+    found["aloft"] = np.where(touched, 0.0, (found["go_arounds"] > 0.0).astype(float))
     found["broken"] = broken(motion, found, np.where(touched, slide, 0.0), contact, early, limits)
     return np.column_stack([found[name] for name in TOUCHDOWN_COLUMNS])
 

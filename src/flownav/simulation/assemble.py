@@ -38,6 +38,7 @@ from flownav.vehicle.state import Controls
 from flownav.vehicle.trim import Trim, parked
 
 NEVER_S = 1e9
+GO_AROUND = {"height_m": "go_around_height_m", "most": "go_arounds_most"}
 CORNER_S = 1.5  # a corner of the path is flown at constant acceleration for so long
 
 
@@ -140,6 +141,7 @@ def _gains(scenario: Scenario, vehicle: AnyVehicle, hover: AnyTrim) -> Autopilot
     """The vehicle's gains, what the scenario says of them, and the last metres."""
     section = scenario.autopilot
     precision = {} if section.precision is None else section.precision.model_dump()
+    around = {} if section.go_around is None else section.go_around.model_dump()
     given = {
         "position_gain": section.position_gain_1_s,
         "forward_gain": section.velocity_gain_1_s,
@@ -151,6 +153,7 @@ def _gains(scenario: Scenario, vehicle: AnyVehicle, hover: AnyTrim) -> Autopilot
     return gains_for(vehicle, hover, math.radians(section.idle_collective_deg), feels_gusts=feels)._replace(
         **{name: value for name, value in given.items() if value is not None},
         **precision,
+        **{GO_AROUND.get(name, name): value for name, value in around.items()},
     )
 
 
@@ -170,6 +173,7 @@ def _plan(
         may_land_after_s=NEVER_S if linear or section.may_land_after_s is None else section.may_land_after_s,
         fly_on_truth=scenario.autopilot.feedback == "truth",
         along_truth=False,
+        minds_faults=scenario.autopilot.go_around is not None,
         home_at_start=scenario.autopilot.home == "start",
         start_known=start_of(scenario) == "known",
         handover_s=section.takeoff_at_s if on_ground else float(scenario.filter.handover_s),

@@ -76,7 +76,8 @@ def fly_into(
     """
     truths = [believed(flight)] * len(lanes) if ensemble is None else ensemble.truths(seed, first, len(lanes))
     if len(b.nav):
-        b.nav[:] = new_work(lanes, faults=len(b.tape.estimate) > 0)  # a campaign that writes nothing reads no levels
+        followed = len(b.tape.estimate) > 0 or flight.plan.minds_faults  # nobody else reads levels or suspicions
+        b.nav[:] = new_work(lanes, faults=followed)
     b.tape.used[:] = 0
     room = np.array([*room_of(b.tape), len(b.fed)])
     told = flight, packed_truth(truths), seed, first, lanes, b.work, b.nav

@@ -21,6 +21,7 @@ from flownav.simulation.layout import (
     load_flow,
     load_gps_errors,
     load_helicopter,
+    load_known,
     store_autopilot,
     store_controls,
     store_flow,
@@ -92,14 +93,15 @@ def command(
             estimate.force_x,
             estimate.force_y,
             estimate.force_z,
-            work[layout.PAD_FOUND * len(lanes) + lane],
         )
         if onboard is None:
             contact = work[layout.CONTACT * len(lanes) + lane]
         else:  # the skid switch is all that the autopilot knows of its skids
             contact = 2.0 * threshold * work[layout.LANDED * len(lanes) + lane]
         state = landing_logic(load_autopilot(work, lanes, lane), contact, threshold, may_fly, may_land, EPOCH_S)
-        store_autopilot(work, lanes, lane, outer_loop(state, reference, relative, rotation, gains, EPOCH_S))
+        known = load_known(work, lanes, lane)
+        after = outer_loop(state, reference, relative, known, rotation, gains, may_land, EPOCH_S)
+        store_autopilot(work, lanes, lane, after)
 
 
 @equation

@@ -33,6 +33,7 @@ from flownav.simulation.navigating import (
     compare_at_horizon,
     feed_due,
     hand_to_autopilot,
+    note_knowledge,
     note_truth,
     put_on_truth,
 )
@@ -109,6 +110,7 @@ def fly_navigated(
         compare_at_horizon(work, nav, lanes, epoch, table)
         if flight.plan.along_truth:
             put_on_truth(work, nav, lanes, epoch, table)
+        note_knowledge(work, nav, lanes)
         waiting = t_s < flight.plan.handover_s
         hand_to_autopilot(work, nav, lanes, waiting, flight.plan.home_at_start, reference)
         estimate_for_autopilot(work, lanes, flight)

@@ -38,6 +38,7 @@ _COMPUTED = (
     ("command", "pos_e_ref_m"),
     ("command", "pos_d_ref_m"),
     ("autopilot", "flying"),
+    ("autopilot", "away"),
     ("truth", "sink_rate_m_s"),
     ("truth", "ground_m"),
 )
@@ -74,9 +75,11 @@ def write_history(work: Work, lanes: Lanes, epoch: int, reference: Reference, hi
         history[epoch, COPIED + 6, lane] = reference.pos_n
         history[epoch, COPIED + 7, lane] = reference.pos_e
         history[epoch, COPIED + 8, lane] = reference.pos_d
-        history[epoch, COPIED + 9, lane] = load_autopilot(work, lanes, lane).flying
+        autopilot = load_autopilot(work, lanes, lane)
+        history[epoch, COPIED + 9, lane] = autopilot.flying
+        history[epoch, COPIED + 10, lane] = autopilot.away
         state = load_helicopter(work, lanes, lane)
         rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
-        history[epoch, COPIED + 10, lane] = to_earth(rotation, state.u, state.v, state.w)[2]
+        history[epoch, COPIED + 11, lane] = to_earth(rotation, state.u, state.v, state.w)[2]
         below = ground_height(state.pos_n, state.pos_e, ground_as_is(work, lanes, lane))
-        history[epoch, COPIED + 11, lane] = below
+        history[epoch, COPIED + 12, lane] = below

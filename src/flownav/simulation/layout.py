@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from flownav.compile import lane_access
 from flownav.control.autopilot import AutopilotState, Estimate
+from flownav.control.go_around import Knowledge
 from flownav.estimation.kalman import kalman_row_count, kalman_rows
 from flownav.estimation.paper_filter import INPUTS, STATES
 from flownav.estimation.states import Rows
@@ -103,7 +104,7 @@ SKID = _rows.take(len(SkidSwitchState._fields))
 SKID_NORMALS = _rows.take(len(SkidSwitchNormals._fields))
 DRAWN = _rows.take(30)  # normals of a unit or of a start
 TRUE_IMU = _rows.take(len(ImuReading._fields))  # means over the last inertial period
-PAD_FOUND = _rows.take(1)  # 1 once the navigator knows where the pad is
+KNOWN = _rows.take(len(Knowledge._fields))  # what the vehicle knows of its landing
 FELT = _rows.take(3)  # specific force that the IMU read, body FRD, mean over the last epoch [m/s2]
 EXPOSED = _rows.take(5)  # since the last flow: sums of the true rate (3) and of what the gyro read about x and y
 LANDED = _rows.take(1)  # what the skid switch says
@@ -169,6 +170,7 @@ load_pad_normals, _ = lane_access(PadCameraNormals, PAD_NORMALS)
 load_skid_unit, store_skid_unit = lane_access(SkidSwitchUnit, SKID_UNIT)
 load_skid, store_skid = lane_access(SkidSwitchState, SKID)
 load_skid_normals, _ = lane_access(SkidSwitchNormals, SKID_NORMALS)
+load_known, store_known = lane_access(Knowledge, KNOWN)
 load_estimate, store_estimate = lane_access(Estimate, ESTIMATE)
 load_autopilot, store_autopilot = lane_access(AutopilotState, AUTOPILOT)
 vehicle_as_is, _ = lane_access(PARTS["vehicle"], AS_IS["vehicle"])  # of a multirotor its first fields only

@@ -11,17 +11,18 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, invoke, procedure
+from flownav.compile import equation, invoke, larger, procedure
+from flownav.control.go_around import Knowledge
 from flownav.control.guidance import Reference
 from flownav.estimation.covariance import covariance_of, variance_of
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import GROUND, PAD, POSITION, QUATERNION, STATE, VELOCITY
 from flownav.frames import quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.navigation.ahead import carried, state_of
-from flownav.navigation.memory import PAD_KNOWN, READING, load_ground, load_start
+from flownav.navigation.memory import PAD_KNOWN, READING, SUSPECTED, load_ground, load_start
 from flownav.navigation.tape import Output, body_velocity_variance
 from flownav.simulation import layout
-from flownav.simulation.layout import load_helicopter
+from flownav.simulation.layout import load_helicopter, load_known, store_known
 from flownav.simulation.ring import FIELDS, FIRST, hand_over
 
 EPOCH_S = 0.02
@@ -210,13 +211,32 @@ def find_place(work: Work, nav: Work, lanes: Lanes, lane: int) -> None:
     """PLACE by the pad's camera and by the range, where they have told."""
     known = nav[PAD_KNOWN * len(lanes) + lane] > 0.0
     grounded = load_ground(nav, lanes, lane).known > 0.0
-    put(work, lanes, lane, layout.PAD_FOUND, 1.0 if known else 0.0)
     row = layout.PLACE
     north, east = work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane]
     down = work[(row + 2) * len(lanes) + lane]
     put(work, lanes, lane, row, nav[(STATE + PAD) * len(lanes) + lane] if known else north)
     put(work, lanes, lane, row + 1, nav[(STATE + PAD + 1) * len(lanes) + lane] if known else east)
     put(work, lanes, lane, row + 2, nav[(STATE + GROUND) * len(lanes) + lane] if grounded else down)
+
+
+@procedure
+def note_knowledge(work: Work, nav: Work, lanes: Lanes) -> None:
+    """What the vehicle knows of its landing, by its navigator and its camera, an epoch later."""
+    for lane in range(len(lanes)):
+        found, suspects = nav[PAD_KNOWN * len(lanes) + lane] > 0.0, nav[SUSPECTED * len(lanes) + lane] > 0.0
+        sigma_m = np.sqrt(larger(over_pad(nav, lanes, lane, 0, found), over_pad(nav, lanes, lane, 1, found)))
+        unseen_s = load_known(work, lanes, lane).pad_unseen_s + EPOCH_S
+        grounded = load_ground(nav, lanes, lane).known
+        now = Knowledge(1.0 if found else 0.0, grounded, unseen_s, sigma_m, 1.0 if suspects else 0.0)
+        store_known(work, lanes, lane, now)
+
+
+@equation
+def over_pad(nav: Work, lanes: Lanes, lane: int, axis: int, found: bool) -> float:
+    """Variance of the position over the pad along north (0) or east (1); over the filter's origin before."""
+    own = variance_of(nav, lanes, POSITION + axis, lane)
+    pad = variance_of(nav, lanes, PAD + axis, lane) - 2.0 * covariance_of(nav, lanes, POSITION + axis, PAD + axis, lane)
+    return larger(own + pad, 0.0) if found else own
 
 
 @equation

@@ -39,6 +39,7 @@ class FlightPlan(NamedTuple):
     may_land_after_s: float
     fly_on_truth: bool
     along_truth: bool  # the navigator's Jacobians are taken on the truth: its covariance is the bound
+    minds_faults: bool  # a suspected fault is a reason to go around: the navigator follows what faults would do
     home_at_start: bool  # the pad is where the estimate first puts the start, else at the filter's origin
     start_known: bool  # the paper's filter starts at the true position, else at the first GPS reading
     handover_s: float  # until then the vehicle is flown on the truth, where it does not stand on its skids

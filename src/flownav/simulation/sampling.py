@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, procedure
+from flownav.compile import equation, procedure, replacing
 from flownav.control.autopilot import AutopilotState
+from flownav.control.go_around import Knowledge
 from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import rotation_from_quaternion
 from flownav.navigation.records import Reading
@@ -49,6 +50,7 @@ from flownav.simulation.layout import (
     load_inertial,
     load_inertial_normals,
     load_inertial_unit,
+    load_known,
     load_mag_normals,
     load_mag_unit,
     load_pad_normals,
@@ -71,6 +73,7 @@ from flownav.simulation.layout import (
     store_baro,
     store_camera,
     store_inertial,
+    store_known,
     store_ranger,
     store_receiver,
     store_skid,
@@ -89,6 +92,8 @@ from flownav.simulation.onboard import (
     receiver_truth,
 )
 from flownav.simulation.ring import put_slot, reading_of
+
+with_unseen = replacing(Knowledge, "pad_unseen_s")
 
 
 @equation
@@ -250,6 +255,9 @@ def read_pad(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot:
             fix.distance_variance_m2, fix.quality, fix.arrived,
         )  # fmt: skip
         put_slot(work, lanes, slot, lane, reading)
+        known = load_known(work, lanes, lane)
+        unseen_s = 0.0 if fix.arrived > 0.0 else known.pad_unseen_s
+        store_known(work, lanes, lane, with_unseen(known, pad_unseen_s=unseen_s))
 
 
 @procedure

@@ -107,6 +107,27 @@ class PrecisionSection(ParameterModel):
     search_height_m: Number = Field(0.0, ge=0.0, le=100.0)
 
 
+class GoAroundSection(ParameterModel):
+    """When a landing is broken off, and to what height the vehicle then climbs over the pad.
+
+    pad_view_m: from this height of the skids up to search_height_m the camera should see the pad; drift: below
+    commit_height_m.
+    """
+
+    height_m: Number = Field(5.0, gt=0.0, le=100.0)
+    most: Number = Field(2.0, ge=0.0, le=100.0)
+    pad_view_m: Number = Field(0.5, ge=0.0, le=100.0)
+    pad_lost_s: Number = Field(2.0, gt=0.0, le=3600.0)
+    landing_sigma_m: Number = Field(0.5, gt=0.0, le=100.0)
+    doubt_s: Number = Field(2.0, ge=0.0, le=3600.0)
+    align_wait_s: Number = Field(30.0, gt=0.0, le=3600.0)
+    search_wait_s: Number = Field(30.0, gt=0.0, le=3600.0)
+    search_radius_m: Number = Field(3.0, ge=0.0, le=100.0)
+    drift_radius_m: Number = Field(0.5, gt=0.0, le=100.0)
+    drift_speed_m_s: Number = Field(0.6, gt=0.0, le=100.0)
+    clear_s: Number = Field(3.0, ge=0.0, le=3600.0)
+
+
 class EventSection(ParameterModel):
     """Something that happens to the vehicle, whoever flies it. "engine cut": from then on the motor gives nothing."""
 
@@ -146,6 +167,7 @@ class AutopilotSection(ParameterModel):
     velocity_gain_1_s: Number | None = Field(None, gt=0.0, le=10.0)
     velocity_integral_1_s2: Number | None = Field(None, ge=0.0, le=10.0)
     precision: PrecisionSection | None = None
+    go_around: GoAroundSection | None = None
     idle_collective_deg: Number = Field(0.0, ge=-10.0, le=10.0)
 
 

@@ -1,0 +1,134 @@
+"""Going around: when a landing is broken off, and when the vehicle comes down again.
+
+A landing goes on while the vehicle knows where its pad is and is over it. It is broken off, and the vehicle climbs over
+where it takes the pad to be, when the camera loses the pad from a height from which it should be seen, or has not found
+it after a search; when the navigator no longer knows its place well enough, or suspects a fault of its sensors out of
+the pad's sight; when the last metre's gate stays shut; and, below the gate, when it drifts. Aloft it waits until all is
+well, and comes down again. The number of times is limited: then it lands with what it has, as no battery lasts for
+ever. A pad that the camera must show it never lands without: it looks for it until the flight ends.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import clamp, equation, larger, smaller
+from flownav.control.gains import AutopilotGains
+
+REACHED_M = 0.5  # of the height to which it climbs, and beside the pad
+SEARCH_M_S = 0.8
+SEARCH_MARGIN_M = 0.3  # above the height of the search
+SEEN_S = 1.0  # a pad that was seen so lately is in sight
+
+
+class Knowledge(NamedTuple):
+    """What a landing vehicle knows beside where it is.
+
+    pad_found: 1 where the pad has been seen or stood upon; ground_found: 1 where a range tells the height over the
+    ground, which else is that of GPS, metres off; pad_unseen_s: since the camera last saw the pad; sigma_m: of the
+    position over the pad, along its worse horizontal axis; doubted: 1 where the navigator suspects a fault.
+    """
+
+    pad_found: float
+    ground_found: float
+    pad_unseen_s: float
+    sigma_m: float
+    doubted: float
+
+
+class GoAround(NamedTuple):
+    """away: 1 while the vehicle climbs or waits aloft; times: how often it went around.
+
+    since_s: for how long it has been in doubt, or, aloft, for how long all is well.
+    """
+
+    away: float
+    times: float
+    since_s: float
+
+
+@equation
+def seeks(known: Knowledge, away: float, height_m: float, gains: AutopilotGains) -> bool:
+    """So low over the ground a vehicle that has not found its pad looks for it and goes no lower; one that has lost it
+    and went around does, too.
+    """
+    low = known.ground_found > 0.0 and height_m < gains.search_height_m + SEARCH_MARGIN_M
+    blind = known.pad_found == 0.0 or (away > 0.0 and unseen(known, gains))
+    return blind and gains.search_height_m > 0.0 and low
+
+
+@equation
+def search_offset(searched_s: float, gains: AutopilotGains) -> tuple[float, float]:
+    """North and east of where the pad was thought to be, after so long a search [m]: out, then round."""
+    radius = smaller(SEARCH_M_S * searched_s, gains.search_radius_m)
+    turned = SEARCH_M_S * searched_s / larger(gains.search_radius_m, SEARCH_MARGIN_M)
+    return radius * np.cos(turned), radius * np.sin(turned)
+
+
+@equation
+def lost_pad(known: Knowledge, height_m: float, gains: AutopilotGains) -> bool:
+    """A camera should see the pad from this height and has not for too long."""
+    in_view = height_m > gains.pad_view_m and height_m < gains.search_height_m
+    return in_view and known.pad_found > 0.0 and unseen(known, gains)
+
+
+@equation
+def unseen(known: Knowledge, gains: AutopilotGains) -> bool:
+    """The camera, if there is one, has not seen the pad for too long."""
+    return known.pad_unseen_s > gains.pad_lost_s
+
+
+@equation
+def unsure(known: Knowledge, gains: AutopilotGains) -> bool:
+    """The navigator does not know its place over the pad well enough, or suspects a fault out of the pad's sight.
+
+    In sight of the pad no sensor that fails can lead it away from there.
+    """
+    doubtful = (known.doubted > 0.0 and unseen(known, gains)) or known.sigma_m > gains.landing_sigma_m
+    return known.pad_found > 0.0 and doubtful
+
+
+@equation
+def adrift(known: Knowledge, beside_m2: float, speed_m2_s2: float, height_m: float, gains: AutopilotGains) -> bool:
+    """Below the gate, over a pad that it knows: too far from its middle, or too fast over the ground; both squared."""
+    radius, speed = gains.drift_radius_m, gains.drift_speed_m_s
+    off = beside_m2 > radius * radius or speed_m2_s2 > speed * speed
+    return known.pad_found > 0.0 and height_m < gains.commit_height_m and off
+
+
+@equation
+def mind_landing(
+    before: GoAround, known: Knowledge, beside_m2: float, speed_m2_s2: float, height_m: float, waited_s: float,
+    landing: bool, gains: AutopilotGains, dt: float,
+) -> GoAround:  # fmt: skip
+    """One period of the outer loop further.
+
+    beside_m2: distance of the skids' middle from the pad's, squared [m2]; speed_m2_s2: over the ground, squared;
+    height_m: of the skids; waited_s: at the gate, or in search; landing: flies, may land, no weight on the skids.
+    """
+    in_doubt_s = before.since_s + dt if before.away == 0.0 and unsure(known, gains) else 0.0
+    settling = height_m > gains.commit_height_m and height_m < gains.land_height_m
+    shut = waited_s > (gains.align_wait_s if known.pad_found > 0.0 else gains.search_wait_s)
+    broken = settling and (lost_pad(known, height_m, gains) or in_doubt_s > gains.doubt_s or shut)
+    broken = broken or adrift(known, beside_m2, speed_m2_s2, height_m, gains)
+    may = landing and gains.go_around_height_m > 0.0 and before.times < gains.go_arounds_most
+    goes = before.away == 0.0 and may and broken
+
+    level = height_m - gains.go_around_height_m
+    over = level > -REACHED_M and level < REACHED_M and beside_m2 < REACHED_M * REACHED_M
+    seen = gains.search_height_m == 0.0 or (known.pad_found > 0.0 and known.pad_unseen_s < SEEN_S)
+    well = before.away > 0.0 and over and seen and not unsure(known, gains)
+    well_s = before.since_s + dt if well else 0.0
+    returns = well_s > gains.clear_s
+    away = 1.0 if goes or (before.away > 0.0 and landing and not returns) else 0.0
+    return GoAround(away, before.times + 1.0 if goes else before.times, in_doubt_s if away == 0.0 else well_s)
+
+
+@equation
+def climb_out(height_m: float, gains: AutopilotGains) -> float:
+    """Velocity down that brings the vehicle to the height at which it waits [m/s]."""
+    return clamp(
+        gains.height_gain * (height_m - gains.go_around_height_m), -gains.climb_limit_m_s, gains.climb_limit_m_s
+    )

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from flownav.campaign.local import score_history
+from flownav.compile import LANES
 from flownav.errors import InputError
 from flownav.parameter_files import check
 from flownav.scoring.errors import SCORE_COLUMNS
 from flownav.scoring.touchdown import names_of
 from flownav.simulation.assemble import assemble
-from flownav.simulation.engine import fly_blocks
+from flownav.simulation.engine import fly_blocks, fly_written
+from flownav.simulation.flight_record import record_of
 from flownav.simulation.history import column
 from flownav.simulation.scenario import Scenario, load_scenario, with_filter
 
@@ -85,6 +87,16 @@ def test_an_engine_cut_in_hover_is_a_crash_that_says_so():
     assert (scores["touchdown.contact.sink_rate_m_s"] > 2.0).all()
     assert all("sink rate" in names_of(bits) for bits in scores["touchdown.broken"])
     assert np.isfinite(history[:, column("truth", "pos_d_m")]).all()
+
+
+def test_a_record_says_when_the_engine_was_cut():
+    entries = load_scenario("landing").model_dump(exclude_unset=True)
+    setup = assemble(check(entries | {"event": [{"at_s": 12.005, "kind": "engine cut"}]}, Scenario, "cut"))
+    record = record_of(setup, fly_written(setup.flight, 1, 0, LANES), 1, 3, lane=3)
+    events = record.tables["events"]
+    at = list(events["kind"]).index("engine cut")
+    assert events["t_s"][at] == pytest.approx(12.02)
+    assert events["value"][at] == pytest.approx(2.6, abs=0.4)  # half a metre below 3 m, and the skids' 0.22
 
 
 def test_a_cut_after_the_landing_breaks_nothing():

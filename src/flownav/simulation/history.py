@@ -81,5 +81,5 @@ def write_history(work: Work, lanes: Lanes, epoch: int, reference: Reference, hi
         state = load_helicopter(work, lanes, lane)
         rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
         history[epoch, COPIED + 11, lane] = to_earth(rotation, state.u, state.v, state.w)[2]
-        below = ground_height(state.pos_n, state.pos_e, ground_as_is(work, lanes, lane))
-        history[epoch, COPIED + 12, lane] = below
+        ground_m = ground_height(state.pos_n, state.pos_e, ground_as_is(work, lanes, lane))
+        history[epoch, COPIED + 12, lane] = ground_m

@@ -80,16 +80,16 @@ def recirculated(
 ) -> WindVelocity:
     """The wind, and what comes back of a rotor's wake at a height of its hub over the ground, while it gives thrust."""
     near = clamp(1.0 - hub_height_m / p.diameter_m, 0.0, 1.0)
-    induced: float = near * near * np.sqrt(larger(thrust_n, 0.0) * p.per_mass_flow_m_kg)
+    induced: float = np.sqrt(larger(thrust_n, 0.0) * p.per_mass_flow_m_kg)
     speed = np.sqrt(wind.wind_n_m_s * wind.wind_n_m_s + wind.wind_e_m_s * wind.wind_e_m_s)
-    full = np.sqrt(larger(thrust_n, 0.0) * p.per_mass_flow_m_kg)
-    ratio = speed / (WORST_WIND * larger(full, STILL_M_S))
+    ratio = speed / (WORST_WIND * larger(induced, STILL_M_S))
     worst = 2.0 * ratio / (1.0 + ratio * ratio)
-    aside = p.unsteady * induced * 2.0 / p.diameter_m
+    back = near * near * induced
+    aside = p.unsteady * back * 2.0 / p.diameter_m
     return WindVelocity(
         wind.wind_n_m_s,
         wind.wind_e_m_s,
-        wind.wind_d_m_s + induced * (p.loss * worst + p.unsteady * state.down),
+        wind.wind_d_m_s + back * (p.loss * worst + p.unsteady * state.down),
         wind.turn_n_rad_s + aside * state.roll,
         wind.turn_e_rad_s + aside * state.pitch,
         wind.turn_d_rad_s,

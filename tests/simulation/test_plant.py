@@ -14,6 +14,7 @@ from flownav.simulation.plan import PHYSICS_S
 from flownav.simulation.plant import linear_step, runge_kutta_step
 from flownav.simulation.scenario import Scenario, load_scenario
 from flownav.simulation.truth import packed_truth
+from flownav.simulation.vehicles import place
 from flownav.vehicle import helicopter
 from flownav.vehicle.around import CALM
 from flownav.vehicle.state import Controls, HelicopterState
@@ -24,6 +25,12 @@ def put(work, lanes, lane, state, controls):
     store_helicopter(work, lanes, lane, state)
     store_controls(work, lanes, lane, controls)
     store_around(work, lanes, lane, CALM)
+
+
+@kernel
+def begin(work, lanes, state, rotors):
+    for lane in range(len(lanes)):
+        place(work, lanes, lane, state, rotors)
 
 
 @kernel
@@ -87,6 +94,23 @@ def test_each_lane_flies_the_vehicle_of_its_own_rows(flight):
     for lane, (state, controls) in enumerate(pairs):
         exact = helicopter.step(state, controls, CALM, PHYSICS_S, vehicles[lane])
         assert rows[:, lane] == pytest.approx(np.array(exact, float), rel=1e-8, abs=1e-8)
+
+
+def test_a_helicopter_starts_with_its_own_rotor_speed_and_a_quad_as_it_is_told(flight):
+    work = np.zeros(layout.ROWS * len(LANES))
+    speeds = 150.0 + np.arange(len(LANES))
+    truths = [
+        believed(flight)._replace(vehicle=flight.vehicle._replace(main_speed_rad_s=float(speed))) for speed in speeds
+    ]
+    work[: layout.AS_IS_END * len(LANES)] = packed_truth(truths)
+    begin(work, LANES, flight.plan.start, None)
+    rows = work.reshape(-1, len(LANES))
+    at = HelicopterState._fields.index("speed")
+    assert (rows[layout.HELICOPTER + at] == speeds).all()
+    others = [i for i in range(len(HelicopterState._fields)) if i != at]
+    assert (np.array(flight.plan.start)[others] == rows[layout.HELICOPTER + np.array(others)].T).all()
+    begin(work, LANES, flight.plan.start, (0, 0, 0, 0))
+    assert (rows[layout.HELICOPTER + at] == flight.plan.start.speed).all()
 
 
 def test_linear_truth_is_the_matrix_equation():

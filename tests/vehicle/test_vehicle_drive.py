@@ -41,9 +41,10 @@ def test_in_trim_nothing_of_the_rotor_changes():
 
 def test_inflow_follows_with_the_time_constant_of_its_mass():
     """dv'/dv = -(thrust slope + 2·2ρA·v)/m_a: Carpenter and Fridovich's lag, and the blades' own answer."""
-    slope, mass = VEHICLE.main_thrust_slope_n_s_m, VEHICLE.main_inflow_mass_kg
+    slope, mass = VEHICLE.main_thrust_slope_n_s_m, 1.0 / VEHICLE.per_inflow_mass_1_kg
     assert mass == pytest.approx(8.0 / 3.0 * 1.225 * 0.89**3, rel=1e-3)
     disc = slope / VEHICLE.main_inflow_speed_m_s
+    assert VEHICLE.main_disc_kg_m == pytest.approx(disc)
     rates = [
         helicopter.derivative(
             HOVER.state._replace(inflow=HOVER.state.inflow + by), HOVER.controls, CALM, VEHICLE

@@ -24,6 +24,7 @@ def without_air(**changes):
     nothing = dict.fromkeys(
         (
             "main_thrust_slope_n_s_m",
+            "main_disc_kg_m",
             "main_profile_torque_n_m",
             "main_inplane_drag_n_s_m",
             "hub_stiffness_n_m_rad",

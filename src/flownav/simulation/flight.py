@@ -51,7 +51,7 @@ def start_block(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight,
     """Vehicle, surroundings, sensors and autopilot before the first epoch."""
     draw_epoch(work, lanes, seed, first, START_STEP, flight.plan.draws)
     for lane in range(len(lanes)):
-        place(work, lanes, lane, flight.plan.start)
+        place(work, lanes, lane, flight.plan.start, flight.rotors)
         autopilot = grounded(flight.gains) if flight.plan.starts_on_ground else hovering(flight.gains)
         store_autopilot(work, lanes, lane, autopilot)
     start_surroundings(work, lanes, seed, first, START_STEP, flight.rotors, flight.plan.draws.recirculation)

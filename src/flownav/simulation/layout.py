@@ -40,6 +40,7 @@ AS_IS_BEGIN, AS_IS_END = AS_IS["vehicle"], _rows.next
 
 # the plant
 HELICOPTER = _rows.take(len(HelicopterState._fields))  # or the multirotor, whose first fields are the same
+ROTOR_SPEED = HELICOPTER + HelicopterState._fields.index("speed")
 STAGE = _rows.take(len(HelicopterState._fields))  # the state of a Runge-Kutta stage
 SUM = _rows.take(len(HelicopterState._fields))  # the weighted sum of stage rates
 INFLOW = _rows.take(len(Inflow._fields))

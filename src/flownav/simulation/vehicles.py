@@ -5,6 +5,7 @@ from __future__ import annotations
 from flownav.compile import equation
 from flownav.estimation.kalman import Lanes, Work
 from flownav.simulation import layout
+from flownav.simulation.layout import vehicle_as_is
 from flownav.simulation.multirotor_plant import midpoint_step, observe_multirotor
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plant import balanced_step, observe_balanced, observe_plant, runge_kutta_step
@@ -12,10 +13,12 @@ from flownav.vehicle.kinds import AnyState
 
 
 @equation
-def place(work: Work, lanes: Lanes, lane: int, state: AnyState) -> None:
-    """Put the vehicle of a lane where it starts."""
+def place(work: Work, lanes: Lanes, lane: int, state: AnyState, rotors: tuple[int, ...] | None) -> None:
+    """Put the vehicle of a lane where it starts; a helicopter's rotor has its own governed speed."""
     for field in range(len(state)):
         work[(layout.HELICOPTER + field) * len(lanes) + lane] = state[field]
+    if rotors is None:
+        work[layout.ROTOR_SPEED * len(lanes) + lane] = vehicle_as_is(work, lanes, lane).main_speed_rad_s
 
 
 @equation

@@ -18,7 +18,7 @@ import numpy as np
 from flownav.compile import clamp, equation
 from flownav.vehicle.airframe import AirMotion
 from flownav.vehicle.parameters import VehicleParameters
-from flownav.vehicle.rotor import main_rotor, speed_ratio
+from flownav.vehicle.rotor import speed_ratio
 from flownav.vehicle.state import HelicopterState, RotorLoads
 
 
@@ -47,11 +47,9 @@ def shaft_power(state: HelicopterState, engine: float, vehicle: VehicleParameter
 @equation
 def inflow_rate(state: HelicopterState, air: AirMotion, lift_n: float, vehicle: VehicleParameters) -> float:
     """v' of the main rotor [m/s2] while its blades carry `lift_n`."""
-    rotor = main_rotor(vehicle, speed_ratio(state.speed, vehicle))
     through = state.inflow - air.w
     resultant: float = np.sqrt(air.u * air.u + air.v * air.v + through * through + 1e-12)
-    disc = rotor.thrust_slope_n_s_m / rotor.inflow_speed_m_s  # 2ρA·η_w
-    return (lift_n - disc * state.inflow * resultant) * (1.0 / vehicle.main_inflow_mass_kg)
+    return (lift_n - vehicle.main_disc_kg_m * state.inflow * resultant) * vehicle.per_inflow_mass_1_kg
 
 
 @equation
@@ -60,12 +58,11 @@ def turning_of(
 ) -> Turning:
     """How the main rotor changes under its loads."""
     ratio = speed_ratio(state.speed, vehicle)
-    taken = loads.torque_n_m + vehicle.tail_speed_rad_s / vehicle.main_speed_rad_s * loads.tail_torque_n_m
+    taken = loads.torque_n_m + vehicle.tail_gear * loads.tail_torque_n_m
     slow = vehicle.main_speed_rad_s - state.speed
     asked = vehicle.governor_w_s_rad * slow + state.governed
-    spin = (shaft_power(state, engine, vehicle) / (vehicle.main_speed_rad_s * ratio) - taken) * (
-        1.0 / vehicle.rotor_inertia_kg_m2
-    )
+    given = shaft_power(state, engine, vehicle) * (1.0 / (vehicle.main_speed_rad_s * ratio))
+    spin = (given - taken) * vehicle.per_rotor_inertia_1_kg_m2
     beyond = asked - clamp(asked, 0.0, vehicle.shaft_power_limit_w)  # where the integral would wind up
     governed = vehicle.governor_integral_w_rad * slow if (beyond * slow).real <= 0.0 else 0.0
     return Turning(

@@ -37,7 +37,7 @@ class Rotor(NamedTuple):
 @equation
 def speed_ratio(speed_rad_s: float, vehicle: VehicleParameters) -> float:
     """The main rotor's speed over what its governor keeps; a rotor that all but stands has a twentieth."""
-    return larger(speed_rad_s * (1.0 / vehicle.main_speed_rad_s), SLOWEST)
+    return larger(speed_rad_s * vehicle.per_main_speed_s_rad, SLOWEST)
 
 
 @equation

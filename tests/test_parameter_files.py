@@ -54,7 +54,7 @@ def changed(key, value):
 def test_the_shipped_vehicle_has_provenance_for_every_number():
     described = describe_vehicle()
     assert described.name.startswith("Maxi Joker 3")
-    assert len(described.entries) == 66
+    assert len(described.entries) == 73
     assert all(entry.source for entry in described.entries)
     unstated = {entry.key for entry in described.entries if not entry.uncertainty}
     assert unstated == {"environment.gravity_m_s2", "main_rotor.blade_count", "tail_rotor.blade_count"}

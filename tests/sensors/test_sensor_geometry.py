@@ -115,3 +115,18 @@ def test_without_a_time_constant_there_is_no_lag() -> None:
 def test_an_impossible_lag_is_refused(tau_s: float, period_s: float) -> None:
     with pytest.raises(ValueError, match="a time constant >= 0 and a period > 0 are needed"):
         lag_weights(tau_s, period_s)
+
+
+def test_a_beam_on_a_rough_surface_has_its_height_where_it_meets_the_plane() -> None:
+    rough = Ground(0.05, -0.02, 0.0, 0.0, 0.0, 1.0, 0.0, 0.01, 3.0, 0.7)
+    smooth = rough._replace(rough_m=0.0)
+    turn = Turn.from_euler("ZYX", [0.4, 0.1, -0.2])
+    down = turn.as_matrix()[:, 2]
+    heights = []
+    for north in np.linspace(-1.0, 1.0, 40):
+        flat, hit = (beam_distance(north, 0.3, 2.0, rows(turn), one).distance_m for one in (smooth, rough))
+        at = np.array([north, 0.3, -2.0]) + flat * down
+        risen = ground_height(at[0], at[1], rough) - ground_height(at[0], at[1], smooth)
+        assert (flat - hit) * (down[2] + 0.05 * down[0] - 0.02 * down[1]) == pytest.approx(risen, abs=1e-12)
+        heights.append(risen)
+    assert 0.004 < np.std(heights) < 0.02

@@ -20,6 +20,7 @@ from flownav.simulation.scenario import load_scenario, with_filter, with_vehicle
 from flownav.simulation.truth import packed_truth
 from flownav.simulation.vehicles import step_vehicle
 from flownav.vehicle import multirotor
+from flownav.vehicle.around import CALM
 from flownav.vehicle.state import Controls
 
 QUAD, HEXA = "quad-450", "hexa-550"
@@ -36,7 +37,7 @@ def flown_by_quad(name):
 
 @kernel
 def step(work, lanes, dt, rotors):
-    step_vehicle(work, lanes, dt, rotors)
+    step_vehicle(work, lanes, dt, rotors, None)
 
 
 @pytest.mark.parametrize(("vehicle", "rotors"), [(QUAD, 4), (HEXA, 6)])
@@ -51,13 +52,14 @@ def test_a_step_on_lanes_is_the_multirotors_own(vehicle, rotors):
         [1, 1, 0.3, 1, 1, 1, *[0.02] * 4, *[0.5] * 3, *[30] * rotors, *[0] * (6 - rotors), 0]
     ).reshape(-1, 1)
     controls = np.array([0.02, -0.03, 0.4, 0.05])[:, None] * generator.uniform(0.5, 1.5, (4, count))
+    rows[layout.AROUND : layout.AROUND + len(CALM)] = np.array(CALM)[:, None]
     rows[layout.HELICOPTER : layout.HELICOPTER + 20] = state
     rows[layout.CONTROLS : layout.CONTROLS + 4] = controls
     step(work, LANES, 0.002, flight.rotors)
     for lane in range(count):
         before = type(flight.plan.start)(*(float(x) for x in state[:, lane]))
         told = Controls(*(float(x) for x in controls[:, lane]))
-        after = multirotor.step(before, told, 0.0, 0.0, 0.0, 0.002, rotors == 6, flight.vehicle)
+        after = multirotor.step(before, told, CALM, 0.002, rotors == 6, flight.vehicle)
         assert rows[layout.HELICOPTER : layout.HELICOPTER + 20, lane] == pytest.approx(np.array(after), abs=1e-9)
 
 

@@ -25,11 +25,11 @@ from flownav.simulation.wind import (
 )
 
 start, step, velocity = start_wind, step_wind, wind_velocity
-CALM = WindState(0.0, 0.0, 0.0, 0.0, 0.0)
+CALM = WindState(*[0.0] * len(WindState._fields))
 
 
 def normals(draw: np.random.Generator, count: int) -> WindNormals:
-    return WindNormals(*draw.standard_normal((5, count)))
+    return WindNormals(*draw.standard_normal((6, count)))
 
 
 # -- scales ----------------------------------------------------------------------------------------------
@@ -50,23 +50,45 @@ def test_at_20_feet_the_wind_has_its_stated_speed_and_below_it_the_logarithmic_p
     p = WindSettings(speed_20ft_m_s=6.0, gusts=False).parameters()
     assert velocity(CALM, 6.096, p).wind_n_m_s == pytest.approx(-6.0)  # from the north: towards the south
     assert velocity(CALM, 3.0, p).wind_n_m_s == pytest.approx(-6.0 * math.log(3.0 / 0.04572) / math.log(20.0 / 0.15))
-    assert velocity(CALM, 0.0, p) == velocity(CALM, 0.5, p)
-    assert 2.5 < -velocity(CALM, 0.5, p).wind_n_m_s < 3.5
+    assert velocity(CALM, 0.0457, p) == velocity(CALM, 0.0, p) == velocity(CALM, -1.0, p) == (0.0,) * 6
+    assert -velocity(CALM, 0.22, p).wind_n_m_s == pytest.approx(6.0 * math.log(0.22 / 0.04572) / math.log(20.0 / 0.15))
+
+
+def test_a_smoother_ground_has_more_wind_at_the_skids() -> None:
+    settings = [WindSettings(speed_20ft_m_s=6.0, gusts=False, roughness_m=z0) for z0 in (0.1, 0.03, 0.005)]
+    low = [-velocity(CALM, 0.3, one.parameters()).wind_n_m_s for one in settings]
+    assert low == pytest.approx([6.0 * math.log(0.3 / z0) / math.log(6.096 / z0) for z0 in (0.1, 0.03, 0.005)])
+    assert low == sorted(low)
+
+
+def test_gusts_come_down_to_the_ground_with_the_wind_and_stay_above_the_reference_height() -> None:
+    p = WindSettings(speed_20ft_m_s=6.0).parameters()
+    gust = CALM._replace(along=-1.0, down1=0.5, roll=0.1)
+
+    def share(height: float) -> list[float]:
+        steady, whole = np.array(velocity(CALM, height, p)), np.array(velocity(gust, height, p))
+        return list((whole - steady)[[0, 2, 3]] / np.array([1.0, 0.5, -0.1]))
+
+    low = math.log(0.5 / 0.04572) / math.log(3.0 / 0.04572)
+    assert share(0.5) == pytest.approx([low] * 3)
+    assert share(3.0) == pytest.approx([1.0] * 3)
+    assert share(10.0) == pytest.approx([1.0] * 3)
+    assert share(0.04) == [0.0] * 3
 
 
 @pytest.mark.parametrize(("direction", "north", "east"), [(0, -1, 0), (90, 0, -1), (225, 0.5**0.5, 0.5**0.5)])
 def test_the_direction_is_where_it_blows_from(direction: float, north: float, east: float) -> None:
     p = WindSettings(speed_20ft_m_s=4.0, from_direction_deg=direction, gusts=False).parameters()
-    np.testing.assert_allclose(velocity(CALM, 6.096, p), (4.0 * north, 4.0 * east, 0.0), atol=1e-12)
+    np.testing.assert_allclose(velocity(CALM, 6.096, p), (4.0 * north, 4.0 * east, 0.0, 0.0, 0.0, 0.0), atol=1e-12)
 
 
 def test_gusts_act_along_the_wind_to_its_right_and_down() -> None:
     p = WindSettings(speed_20ft_m_s=4.0, from_direction_deg=270.0).parameters()  # blows east, its right is south
-    steady = np.array(velocity(CALM, 3.0, p))
-    np.testing.assert_allclose(velocity(CALM._replace(along=1.0), 3.0, p) - steady, (0, 1, 0), atol=1e-12)
-    np.testing.assert_allclose(velocity(CALM._replace(across1=1.0), 3.0, p) - steady, (-1, 0, 0), atol=1e-12)
-    np.testing.assert_allclose(velocity(CALM._replace(across2=1.0), 3.0, p) - steady, (-SQRT3, 0, 0), atol=1e-12)
-    np.testing.assert_allclose(velocity(CALM._replace(down1=1.0), 3.0, p) - steady, (0, 0, 1), atol=1e-12)
+    steady = np.array(velocity(CALM, 3.0, p)[:3])
+    np.testing.assert_allclose(velocity(CALM._replace(along=1.0), 3.0, p)[:3] - steady, (0, 1, 0), atol=1e-12)
+    np.testing.assert_allclose(velocity(CALM._replace(across1=1.0), 3.0, p)[:3] - steady, (-1, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(velocity(CALM._replace(across2=1.0), 3.0, p)[:3] - steady, (-SQRT3, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(velocity(CALM._replace(down1=1.0), 3.0, p)[:3] - steady, (0, 0, 1), atol=1e-12)
 
 
 @pytest.mark.parametrize("direction", [0.0, 90.0, 200.0, -90.0])
@@ -158,6 +180,54 @@ def test_without_gusts_the_wind_is_steady() -> None:
         state, wind = step(state, 2.0, normals(draw, 20), p)
         np.testing.assert_allclose(np.array(wind.wind_n_m_s), velocity(CALM, 2.0, p).wind_n_m_s, atol=1e-15)
         assert np.all(wind.wind_d_m_s == 0.0)
+
+
+# -- gradients -------------------------------------------------------------------------------------------
+def test_gradients_turn_about_the_wind_across_it_and_down() -> None:
+    p = WindSettings(speed_20ft_m_s=4.0, from_direction_deg=270.0).parameters(2.0)  # blows east, its right is south
+    turn = np.array(velocity(CALM._replace(roll=0.1), 3.0, p)[3:])
+    np.testing.assert_allclose(turn, (0.0, 0.1, 0.0), atol=1e-15)
+    rising = CALM._replace(down1=0.3, down_slow=0.1)  # w grows upstream of what has passed: it is greater there
+    np.testing.assert_allclose(velocity(rising, 3.0, p)[3:], (-math.pi / 8.0 * 0.2, 0.0, 0.0), atol=1e-15)
+    aside = CALM._replace(across1=0.3, across_slow=0.1)
+    np.testing.assert_allclose(velocity(aside, 3.0, p)[3:], (0.0, 0.0, -math.pi / 6.0 * 0.2), atol=1e-15)
+
+
+def test_the_gradients_have_the_specifications_spectra() -> None:
+    """p by its own spectrum; q and r as derivatives of w and v, cut off where the vehicle averages over them."""
+    span, speed = 1.78, 8.0
+    p, draw = WindSettings(speed_20ft_m_s=speed, from_direction_deg=180.0).parameters(span), np.random.default_rng(15)
+    series, samples = 300, 2048
+    state = start(normals(draw, series), p)
+    found = np.empty((3, samples, series))
+    for k in range(samples):
+        state, wind = step(state, 3.0, normals(draw, series), p)  # from the south: its axes are the earth's
+        found[:, k] = wind.turn_n_rad_s, wind.turn_e_rad_s, wind.turn_d_rad_s
+    window = np.hanning(samples)[:, None]
+    power = np.abs(np.fft.rfft(found * window, axis=1)) ** 2
+    density = 2.0 * PERIOD_S * power.mean(axis=2) / np.sum(window**2)  # one-sided, (rad/s)^2/Hz
+    frequency = np.fft.rfftfreq(samples, PERIOD_S)
+    carried, omega = velocity(CALM, 3.0, p).wind_n_m_s, 2.0 * math.pi * frequency
+    scales = dryden_scales(speed, 3.0)
+    low = 1.0 + (4.0 * span * omega / (math.pi * carried)) ** 2
+    broad = (math.pi * 3.0 / (4.0 * span)) ** (1.0 / 3.0)
+    rolled = scales.sigma_down_m_s**2 / (carried * 3.0) * 0.8 * broad / low * 2.0 * math.pi
+
+    def dryden(sigma: float, length: float) -> np.ndarray:
+        x = (omega * length / carried) ** 2
+        return sigma**2 * 2.0 * length / carried * (1.0 + 3.0 * x) / (1.0 + x) ** 2
+
+    pitched = (omega / carried) ** 2 / low * dryden(scales.sigma_down_m_s, 3.0)
+    narrow = 1.0 + (3.0 * span * omega / (math.pi * carried)) ** 2
+    yawed = (omega / carried) ** 2 / narrow * dryden(scales.sigma_along_m_s, scales.length_along_m)
+    band = (frequency > 0.1) & (frequency < 1.0)
+    for measured, expected in zip(density, (rolled, pitched, yawed), strict=True):
+        assert np.mean(measured[band] / expected[band]) == pytest.approx(1.0, abs=0.06)
+
+
+def test_a_wider_vehicle_feels_less_of_the_gradients() -> None:
+    sigma = [WindSettings(speed_20ft_m_s=4.0).parameters(span).roll_sigma_rad_s for span in (0.7, 1.78, 12.0)]
+    assert sigma[0] > 1.5 * sigma[1] > 5.0 * sigma[2]
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 from flownav.errors import InputError
 from flownav.parameter_files import read_toml
 from flownav.vehicle import multirotor
+from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.ground_effect import multiplier
 from flownav.vehicle.kinds import flattened
 from flownav.vehicle.loading import load_vehicle, read_kind, vehicle_file
@@ -49,7 +50,7 @@ VEHICLES = pytest.mark.parametrize("vehicle", [QUAD, HEXA], ids=["quad", "hexa"]
 
 
 def rates(state, controls, vehicle=QUAD, wind=(0.0, 0.0, 0.0)):
-    return multirotor.derivative(state, controls, *wind, vehicle.rotor_count > 4, vehicle)
+    return multirotor.derivative(state, controls, in_wind(*wind), vehicle.rotor_count > 4, vehicle)
 
 
 @VEHICLES
@@ -79,7 +80,7 @@ def test_each_control_moves_what_its_name_says():
         controls = hover.controls._replace(**{name: getattr(hover.controls, name) + 0.02})
         state = hover.state
         for _ in range(round(settle / 0.002)):
-            state = multirotor.step(state, controls, 0.0, 0.0, 0.0, 0.002, False, QUAD)
+            state = multirotor.step(state, controls, CALM, 0.002, False, QUAD)
         moved = getattr(state, channel)
         assert (moved < -0.01) if channel == "w" else (moved > 0.01), name
         others = {"p", "q", "r"} - {channel}
@@ -92,7 +93,7 @@ def test_a_motor_follows_its_command_as_a_first_order_lag():
     told = told_speed(root_of_share(0.5), battery_voltage(0.0, 0.0, vehicle), vehicle)
     state, dt = start, 0.0005
     for _ in range(100):
-        state = multirotor.step(state, Controls(0.0, 0.0, 0.5, 0.0), 0.0, 0.0, 0.0, dt, False, vehicle)
+        state = multirotor.step(state, Controls(0.0, 0.0, 0.5, 0.0), CALM, dt, False, vehicle)
     expected = told + (300.0 - told) * math.exp(-0.05 / 0.035)
     assert state.speed_1 == pytest.approx(expected, rel=1e-4)
 
@@ -203,7 +204,7 @@ def test_in_free_space_angular_momentum_is_kept():
 
     before = momentum(state)
     for _ in range(2000):
-        state = multirotor.step(state, Controls(0.0, 0.0, 0.3, 0.05), 0.0, 0.0, 0.0, 0.0005, False, vacuum)
+        state = multirotor.step(state, Controls(0.0, 0.0, 0.3, 0.05), CALM, 0.0005, False, vacuum)
     assert abs(state.speed_1 - state.speed_2) > 30.0  # the pedal has spun them apart
     assert momentum(state) == pytest.approx(before, abs=2e-6)
 
@@ -219,7 +220,7 @@ def test_a_parked_multirotor_stays():
     state = parked_multirotor(QUAD)
     start = state
     for _ in range(500):
-        state = multirotor.step(state, Controls(0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.002, False, QUAD)
+        state = multirotor.step(state, Controls(0.0, 0.0, 0.0, 0.0), CALM, 0.002, False, QUAD)
     assert np.abs(np.array(state) - np.array(start))[:13].max() < 1e-6
 
 
@@ -230,7 +231,7 @@ def test_the_midpoint_rule_has_converged_at_two_milliseconds():
     def flown(dt):
         state = hover.state
         for _ in range(round(0.4 / dt)):
-            state = multirotor.step(state, controls, 1.0, -2.0, 0.2, dt, False, QUAD)
+            state = multirotor.step(state, controls, in_wind(1.0, -2.0, 0.2), dt, False, QUAD)
         return np.array(state)
 
     fine = flown(0.0005)

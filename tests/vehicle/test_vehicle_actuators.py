@@ -10,7 +10,7 @@ from flownav.vehicle import actuators
 from flownav.vehicle.actuators import Servo
 
 acceleration = actuators.acceleration
-SERVO = Servo(50.0, 0.7, 1.2, -0.14, 0.14)
+SERVO = Servo(50.0, 0.7, 1.2, -0.14, 0.14, 0.0)
 
 
 def respond(command, servo=SERVO, until=0.5, start=(0.0, 0.0)):
@@ -52,3 +52,13 @@ def test_the_blade_never_passes_the_stop():
     assert actuators.blade_angle(0.15, SERVO) == 0.14
     assert actuators.blade_angle(-0.15, SERVO) == -0.14
     assert actuators.blade_angle(0.05, SERVO) == 0.05
+
+
+def test_slop_leaves_an_error_within_its_band_and_answers_the_rest():
+    slack = SERVO._replace(dead_band_rad=0.002)
+    assert acceleration(0.01, 0.0, 0.0119, slack) == 0.0
+    assert acceleration(0.01, 0.0, 0.0081, slack) == 0.0
+    assert acceleration(0.01, 0.0, 0.0121, slack) == pytest.approx(acceleration(0.01, 0.0, 0.0101, SERVO))
+    ends = [respond(0.05, slack, until=1.0, start=(start, 0.0))[1][0][-1] for start in (0.04, 0.06)]
+    assert np.abs(np.array(ends) - 0.05).max() <= 0.002
+    assert abs(ends[1] - ends[0]) > 0.001  # where it stops depends on where it comes from: play

@@ -44,8 +44,8 @@ def test_the_tail_plane_is_pushed_down_by_the_wake_and_lifts_with_speed():
 
 def test_the_main_rotor_tilts_its_thrust_drags_its_blades_and_bends_its_hub():
     thrust, torque, a1, b1 = 77.0, 8.5, 0.03, -0.02
-    wrench = airframe.main_rotor_wrench(thrust, torque, a1, b1, AIR, VEHICLE)
-    drag = VEHICLE.main_inplane_drag_n_s_m
+    wrench = airframe.main_rotor_wrench(thrust, torque, a1, b1, AIR, 0.9, VEHICLE)
+    drag = 0.9 * VEHICLE.main_inplane_drag_n_s_m
     x, y = -thrust * np.sin(a1) - drag * AIR.u, thrust * np.sin(b1) - drag * AIR.v
     assert wrench.x == pytest.approx(x)
     assert wrench.y == pytest.approx(y)

@@ -7,6 +7,7 @@ import pytest
 
 from flownav.frames import quaternion_from_euler, rotation_from_quaternion, to_body
 from flownav.vehicle import ground_effect
+from flownav.vehicle.around import CALM
 from flownav.vehicle.helicopter import outputs
 from flownav.vehicle.loading import load_vehicle
 from flownav.vehicle.trim import trim
@@ -46,9 +47,9 @@ def test_an_unloaded_rotor_near_the_ground_stays_finite():
 def test_the_height_that_counts_is_the_hubs():
     vehicle = load_vehicle()
     hover = trim(vehicle)
-    free = outputs(hover.state, 0.0, 0.0, 0.0, vehicle)
+    free = outputs(hover.state, CALM, vehicle)
     level = hover.state._replace(qw=1.0, qx=0.0, qy=0.0, qz=0.0)
-    near = outputs(level._replace(pos_d=-(R - vehicle.hub_above_cg_m)), 0.0, 0.0, 0.0, vehicle)
+    near = outputs(level._replace(pos_d=-(R - vehicle.hub_above_cg_m)), CALM, vehicle)
     assert near.thrust_n / free.thrust_n == pytest.approx(1.0667, abs=5e-5)
     assert near.torque_n_m == pytest.approx(free.torque_n_m)
 
@@ -62,8 +63,8 @@ def test_the_airspeed_that_counts_is_along_the_ground_however_the_body_is_tilted
     for north, east, down in ((4.0, -3.0, 0.0), (0.0, 0.0, 1.5), (2.0, 1.0, -1.0)):
         u, v, w = to_body(rotation, north, east, down)
         moving = turned._replace(u=u, v=v, w=w)
-        free = outputs(moving._replace(pos_d=-1e6), 0.0, 0.0, 0.0, vehicle)
-        near = outputs(moving._replace(pos_d=-0.7), 0.0, 0.0, 0.0, vehicle)
+        free = outputs(moving._replace(pos_d=-1e6), CALM, vehicle)
+        near = outputs(moving._replace(pos_d=-0.7), CALM, vehicle)
         hub = 0.7 + vehicle.hub_above_cg_m * rotation[8]
         expected = multiplier(hub, np.hypot(north, east), near.induced_velocity_m_s, vehicle.main_radius_m)
         assert near.thrust_n / free.thrust_n == pytest.approx(expected, rel=1e-9)

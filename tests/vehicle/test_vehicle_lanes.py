@@ -7,6 +7,7 @@ import numpy as np
 
 from flownav.compile import LANES, ONE_LANE, lane_access
 from flownav.vehicle import helicopter
+from flownav.vehicle.around import in_wind
 from flownav.vehicle.helicopter import add_scaled, derivative, normalised
 from flownav.vehicle.loading import load_vehicle
 from flownav.vehicle.state import Controls, HelicopterState
@@ -17,6 +18,7 @@ load, store = lane_access(HelicopterState, 0)
 load_controls, _ = lane_access(Controls, FIELDS)
 VEHICLE = load_vehicle()
 HOVER = trim(VEHICLE, height_m=3.0)
+WIND = in_wind(1.0, -2.0, 0.2)
 
 
 @numba.njit(error_model="numpy")
@@ -25,7 +27,7 @@ def march(work, lanes, vehicle, dt, count):
     for _ in range(count):
         for lane in range(len(lanes)):
             state = load(work, lanes, lane)
-            rate = derivative(state, load_controls(work, lanes, lane), 1.0, -2.0, 0.2, vehicle)
+            rate = derivative(state, load_controls(work, lanes, lane), WIND, vehicle)
             store(work, lanes, lane, normalised(add_scaled(state, rate, dt)))
 
 
@@ -61,6 +63,6 @@ def test_the_compiled_helicopter_is_the_plain_one():
     compiled = flown(ONE_LANE, [(state, controls)], 100)[0]
     now = HelicopterState(*state)
     for _ in range(100):
-        rate = helicopter.derivative(now, Controls(*controls), 1.0, -2.0, 0.2, VEHICLE)
+        rate = helicopter.derivative(now, Controls(*controls), WIND, VEHICLE)
         now = normalised(add_scaled(now, rate, 1e-3))
     assert np.allclose(compiled, now, rtol=1e-12, atol=1e-14)

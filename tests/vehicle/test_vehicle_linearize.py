@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from flownav.vehicle import helicopter
+from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.complex_step import jacobian, solve
 from flownav.vehicle.linearize import INPUTS, STATES, eigenvalues, reduced_model
 from flownav.vehicle.loading import load_vehicle
@@ -18,7 +19,7 @@ HOVER = trim(VEHICLE)
 FROZEN = reduced_model(VEHICLE, HOVER, freeze_inflow=True)
 SOLVED = reduced_model(VEHICLE, HOVER, freeze_inflow=False)
 PAPER = load_paper_model()
-derivative = helicopter.derivative
+derivative = helicopter.derivative_in_balance
 
 
 def entry(matrix, row, column):
@@ -71,7 +72,7 @@ def test_the_quasi_steady_model_is_the_slope_of_the_derivative():
             if name in INPUTS:
                 controls = controls._replace(**{name: getattr(controls, name) + sign * step})
             state = state._replace(**{name: getattr(state, name) + sign * step})
-            rate = derivative(state, controls, 0.0, 0.0, 0.0, VEHICLE)
+            rate = derivative(state, controls, CALM, VEHICLE)
             ends.append(np.array([rate.pos_n, rate.pos_e, rate.pos_d, rate.u, rate.v, rate.w]))
         assert column == pytest.approx((ends[0] - ends[1]) / (2 * step), abs=2e-3), name
 
@@ -81,7 +82,7 @@ def test_complex_step_agrees_with_central_differences_on_all_states():
     point = np.array(hover.state)
 
     def rates(values):
-        return derivative(HelicopterState(*values), hover.controls, 0.5, -0.5, 0.1, VEHICLE)
+        return derivative(HelicopterState(*values), hover.controls, in_wind(0.5, -0.5, 0.1), VEHICLE)
 
     exact = jacobian(rates, point)
     for i in range(len(point)):
@@ -95,7 +96,7 @@ def test_complex_step_also_holds_on_the_ground():
     start = HOVER.state._replace(pos_d=-VEHICLE.cg_above_skid_m + 0.005, u=0.02, v=0.01, w=0.05, p=0.1)
 
     def rates(values):
-        return derivative(HelicopterState(*values), Controls(0.0, 0.0, 0.01, 0.1), 0.0, 0.0, 0.0, VEHICLE)
+        return derivative(HelicopterState(*values), Controls(0.0, 0.0, 0.01, 0.1), CALM, VEHICLE)
 
     point = np.array(start)
     exact = jacobian(rates, point)

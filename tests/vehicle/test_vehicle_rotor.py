@@ -14,8 +14,8 @@ from flownav.vehicle import rotor as equations
 from flownav.vehicle.loading import load_vehicle
 
 VEHICLE = load_vehicle()
-MAIN = equations.main_rotor(VEHICLE)
-TAIL = equations.tail_rotor(VEHICLE)
+MAIN = equations.main_rotor(VEHICLE, 1.0)
+TAIL = equations.tail_rotor(VEHICLE, 1.0)
 induced_velocity = equations.induced_velocity
 thrust = equations.thrust
 torque = equations.torque

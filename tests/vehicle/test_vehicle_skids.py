@@ -8,6 +8,7 @@ import pytest
 from flownav.errors import InputError
 from flownav.frames import quaternion_from_euler
 from flownav.vehicle import helicopter, skids
+from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.loading import load_vehicle
 from flownav.vehicle.state import Controls
 from flownav.vehicle.trim import parked, trim
@@ -24,8 +25,8 @@ def march(state, controls, seconds, dt=0.002, wind=(0.0, 0.0, 0.0)):
     """The last state and every contact force on the way."""
     forces = []
     for _ in range(round(seconds / dt)):
-        state = step(state, controls, *wind, dt, VEHICLE)
-        forces.append(outputs(state, *wind, VEHICLE).contact_force_n)
+        state = step(state, controls, in_wind(*wind), dt, VEHICLE)
+        forces.append(outputs(state, in_wind(*wind), VEHICLE).contact_force_n)
     return state, np.array(forces)
 
 
@@ -38,9 +39,9 @@ def above_ground(height, roll=0.0, **changes):
 def test_at_rest_the_feet_carry_what_the_rotor_does_not():
     for collective in (0.0, 0.01, 0.02):
         state = parked(VEHICLE, IDLE._replace(col=collective))
-        out = outputs(state, 0.0, 0.0, 0.0, VEHICLE)
+        out = outputs(state, CALM, VEHICLE)
         assert out.contact_force_n + out.thrust_n == pytest.approx(WEIGHT, rel=2e-3)
-    assert outputs(parked(VEHICLE, IDLE), 0.0, 0.0, 0.0, VEHICLE).contact_force_n == pytest.approx(WEIGHT, rel=1e-3)
+    assert outputs(parked(VEHICLE, IDLE), CALM, VEHICLE).contact_force_n == pytest.approx(WEIGHT, rel=1e-3)
 
 
 def test_parked_is_the_stance_less_the_springs_sag():
@@ -91,7 +92,7 @@ def test_the_contact_force_begins_without_a_jump_and_never_pulls():
 
 def test_sliding_is_braked_by_mu_g_and_then_stops():
     start = parked(VEHICLE, IDLE)._replace(u=1.0)
-    rate = helicopter.derivative(start, IDLE, 0.0, 0.0, 0.0, VEHICLE)
+    rate = helicopter.derivative(start, IDLE, CALM, VEHICLE)
     assert rate.u == pytest.approx(-VEHICLE.skid_friction_coefficient * VEHICLE.gravity_m_s2, rel=0.05)
     end, _ = march(start, IDLE, 1.5)
     assert np.hypot(end.u, end.v) < 1e-3
@@ -100,10 +101,10 @@ def test_sliding_is_braked_by_mu_g_and_then_stops():
 
 def test_off_the_ground_nothing_touches():
     state = above_ground(0.001)
-    assert outputs(state, 0.0, 0.0, 0.0, VEHICLE).contact_force_n == 0.0
+    assert outputs(state, CALM, VEHICLE).contact_force_n == 0.0
     stiff = VEHICLE._replace(skid_stiffness_n_m=3e5, skid_friction_coefficient=1.0)
     rate = helicopter.derivative
-    assert rate(state, IDLE, 0.0, 0.0, 0.0, stiff) == rate(state, IDLE, 0.0, 0.0, 0.0, VEHICLE)
+    assert rate(state, IDLE, CALM, stiff) == rate(state, IDLE, CALM, VEHICLE)
 
 
 def test_controls_that_will_not_stay_parked_are_refused():

@@ -21,10 +21,13 @@ from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import Buffers, buffers_of, fly_into
 from flownav.simulation.ensemble import believed
 from flownav.simulation.flight import fly_block
+from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import ATTITUDE_STEPS, PHYSICS_S, PHYSICS_STEPS, Flight
 from flownav.simulation.scenario import load_scenario, with_vehicle
 from flownav.simulation.truth import packed_truth
 from flownav.simulation.vehicles import observe_vehicle, step_vehicle
+from flownav.vehicle.around import CALM
+from flownav.vehicle.parameters import VehicleParameters
 
 KINDS = ("maxi-joker-3", "quad-450")
 ROUNDS = 5
@@ -96,13 +99,15 @@ def fly_untaken(flight: Flight, b: Buffers) -> None:
 
 
 @kernel
-def step_plants(buffer: NDArray[np.float64], lanes: Lanes, steps: int, rotors: tuple[int, ...] | None) -> None:
+def step_plants(
+    buffer: NDArray[np.float64], lanes: Lanes, steps: int, rotors: tuple[int, ...] | None, onboard: Onboard | None
+) -> None:
     """So many steps of physics, observed as a flight observes them; the lanes' vehicles and controls stand in rows."""
     work = pointer(buffer)
     for step in range(steps):
-        step_vehicle(work, lanes, PHYSICS_S, rotors)
+        step_vehicle(work, lanes, PHYSICS_S, rotors, onboard)
         if (step + 1) % PHYSICS_STEPS == 0:
-            observe_vehicle(work, lanes, rotors)
+            observe_vehicle(work, lanes, rotors, onboard)
 
 
 def plant_after(flight: Flight) -> NDArray[np.float64]:
@@ -112,7 +117,10 @@ def plant_after(flight: Flight) -> NDArray[np.float64]:
     rows[layout.AS_IS_BEGIN : layout.AS_IS_END] = packed_truth([believed(flight)] * len(LANES)).reshape(-1, len(LANES))
     start, gains = flight.plan.start, flight.gains
     rows[layout.HELICOPTER : layout.HELICOPTER + len(start)] = np.array(start)[:, None]
+    if isinstance(flight.vehicle, VehicleParameters):
+        rows[layout.ROTOR_SPEED] = flight.vehicle.main_speed_rad_s
+    rows[layout.AROUND : layout.AROUND + len(CALM)] = np.array(CALM)[:, None]
     controls = gains.lon_trim_rad, gains.lat_trim_rad, gains.collective_trim_rad, gains.pedal_trim_rad
     rows[layout.CONTROLS : layout.CONTROLS + len(controls)] = np.array(controls)[:, None]
-    step_plants(work, LANES, flight.plan.epochs * ATTITUDE_STEPS * PHYSICS_STEPS, flight.rotors)
+    step_plants(work, LANES, flight.plan.epochs * ATTITUDE_STEPS * PHYSICS_STEPS, flight.rotors, flight.onboard)
     return rows[layout.HELICOPTER : layout.HELICOPTER + len(start)]

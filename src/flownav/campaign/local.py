@@ -45,6 +45,7 @@ def touchdown_history(flight: Flight, history: Array) -> Array:
     )
     t_s: Array = np.arange(len(history), dtype=np.float64) * EPOCH_S
     error, seen = (flown - position)[:, :2], pad_to_be_seen(flight, t_s, motion.cg_height_m)
+    motion = motion._replace(cg_height_m=motion.cg_height_m - history[:, column("truth", "ground_m")])
     limits, away = Limits(**flight.limits._asdict()), history[:, column("autopilot", "away")]
     return touchdowns(t_s, motion, error, seen, away, limits, flight.plan.may_land_after_s)
 

@@ -19,14 +19,15 @@ from flownav.estimation.paper_filter import PaperModel
 from flownav.measurement import Sensor
 from flownav.sensors.datasheet import FlowSensor, load_sensor
 from flownav.simulation.dispersion import Distribution, raises_wind
-from flownav.simulation.ensemble import Ensemble
+from flownav.simulation.ensemble import Ensemble, flown, recirculation_of
 from flownav.simulation.fitting import Fitted, fitted, timetable_of
+from flownav.simulation.ground import GroundSettings
 from flownav.simulation.plan import ATTITUDE_S, Flight, FlightPlan
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
 from flownav.vehicle.corners import NOMINAL
-from flownav.vehicle.kinds import AnyFile, AnyState, AnyTrim, AnyVehicle, flattened, hover_of, rotors_of
+from flownav.vehicle.kinds import AnyFile, AnyState, AnyTrim, AnyVehicle, disc_of, hover_of, rotors_of
 from flownav.vehicle.loading import VehicleDescription, describe_vehicle, read_vehicle, vehicle_file
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.multirotor_trim import parked_multirotor
@@ -71,12 +72,14 @@ def assemble(scenario: Scenario) -> Setup:
     """Read, check, trim and discretise everything a scenario names. InputError as the loaders say."""
     if scenario.truth == "linear" and scenario.wind.speed_20ft_m_s > 0.0:
         raise InputError(f'{scenario.name}: truth = "linear" has no air to move; remove [wind], or fly "nonlinear"')
+    if scenario.truth == "linear" and (scenario.ground != GroundSettings() or scenario.event):
+        raise InputError(f'{scenario.name}: truth = "linear" has no ground and no engine; remove [ground], [[event]]')
     if scenario.truth == "linear" and scenario.filter.name != "paper":
         raise InputError(f'{scenario.name}: truth = "linear" has no forces for an IMU to feel; fly the "paper" filter')
     own_file = vehicle_file(Path(scenario.vehicle.file)) if scenario.vehicle.file else None
     sensor_file = Path(scenario.flow_sensor) if scenario.flow_sensor else None
     file, sensor, paper = read_vehicle(own_file), load_sensor(sensor_file), load_paper_model()
-    vehicle = flattened(file)
+    vehicle = flown(scenario, file)
     _require_paper_helicopter(scenario, vehicle)
     hover = hover_of(vehicle)
     gains = _gains(scenario, vehicle, hover)
@@ -88,7 +91,9 @@ def assemble(scenario: Scenario) -> Setup:
         vehicle=vehicle,
         rotors=rotors_of(vehicle),
         sensors=_sensors(scenario, sensor, vehicle),
-        wind=scenario.wind.parameters(),
+        wind=scenario.wind.parameters(disc_of(vehicle).span_m),
+        ground=scenario.ground.parameters(),
+        recirculation=recirculation_of(scenario, scenario.recirculation, vehicle),
         path=_path(scenario, vehicle),
         gains=gains,
         paper=_paper_filter(paper) if scenario.filter.name == "paper" else None,
@@ -172,10 +177,12 @@ def _plan(
         home_at_start=scenario.autopilot.home == "start",
         start_known=start_of(scenario) == "known",
         handover_s=section.takeoff_at_s if on_ground else float(scenario.filter.handover_s),
+        engine_cut_s=min((event.at_s for event in scenario.event), default=NEVER_S),
         draws=Draws(
             paper=scenario.filter.name == "paper",
             gps_drift=scenario.filter.name == "paper" and scenario.gps.model != "white",
             wind=scenario.wind.speed_20ft_m_s > 0.0 or raises_wind(dispersion),
+            recirculation=scenario.filter.name != "paper",
         ),
     )
 

@@ -7,6 +7,7 @@ from flownav.estimation.kalman import Lanes, Work
 from flownav.simulation.noise import normal_pair
 
 # channels of the noise counter, pairs of normals; below 40 lie those of wind and of the paper's sensors
+RECIRCULATION_CHANNEL = 36
 INERTIAL_CHANNEL, RECEIVER_CHANNEL, CAMERA_CHANNEL, RANGE_CHANNEL = 40, 110, 120, 130
 BARO_CHANNEL, MAG_CHANNEL, PAD_CHANNEL, SKID_CHANNEL = 136, 138, 142, 148
 FAULT_CHANNEL = 150

@@ -21,15 +21,17 @@ from flownav.simulation.dispersion import Distribution, drawn, uniforms
 from flownav.simulation.fault import SOUND
 from flownav.simulation.fitting import onboard_of
 from flownav.simulation.plan import Flight
+from flownav.simulation.recirculation import RecirculationParameters, RecirculationSettings
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.truth import PARTS, PUNCTUAL, Lateness, Truth
-from flownav.vehicle.kinds import AnyFile, flattened
+from flownav.vehicle.kinds import AnyFile, AnyVehicle, as_the_paper_has_it, disc_of, flattened
 from flownav.vehicle.loading import VehicleDescription
 from flownav.vehicle.multirotor_schema import MultirotorFile
 from flownav.vehicle.schema import VehicleFile
 
 Array = NDArray[np.float64]
 
+WORLD = ("vehicle", "wind", "ground", "recirculation")
 SENSORS = ("inertial", "receiver", "camera", "ranger", "baro", "mag", "pad", "skid")
 LATE = {"gps_receiver": "receiver_s", "flow_camera": "flow_s", "range_sensor": "range_s", "pad_camera": "pad_s"}
 SHEETS = ("inertial", "gps_receiver", "flow_camera", "flow_sensor", "range_sensor", "barometer", "magnetometer",
@@ -61,8 +63,25 @@ def believed(flight: Flight) -> Truth:
     else:
         sensors = {part: getattr(onboard, part) for part in SENSORS} | {"camera_flow": onboard.flow}
     return Truth(
-        vehicle=flight.vehicle, wind=flight.wind, flow=flight.sensors.flow, late=PUNCTUAL, fault=SOUND, **sensors
-    )
+        vehicle=flight.vehicle, wind=flight.wind, ground=flight.ground, recirculation=flight.recirculation,
+        flow=flight.sensors.flow, late=PUNCTUAL, fault=SOUND, **sensors,
+    )  # fmt: skip
+
+
+def flown(scenario: Scenario, file: AnyFile) -> AnyVehicle:
+    """The vehicle of a checked file as this scenario flies it: the paper's filter flies the paper's helicopter."""
+    vehicle = flattened(file)
+    return as_the_paper_has_it(vehicle) if scenario.filter.name == "paper" else vehicle
+
+
+def recirculation_of(
+    scenario: Scenario, settings: RecirculationSettings, vehicle: AnyVehicle
+) -> RecirculationParameters:
+    """A rotor's own wake near the ground; the paper's model has none."""
+    disc = disc_of(vehicle)
+    if scenario.filter.name == "paper":
+        settings = RecirculationSettings(loss=0.0, unsteady=0.0)
+    return settings.parameters(disc.diameter_m, disc.above_cg_m, vehicle.air_density_kg_m3, disc.induced_m_s)
 
 
 class Ensemble:
@@ -77,7 +96,10 @@ class Ensemble:
         sheets: SensorSheets | None, dispersion: Mapping[str, Distribution],
     ) -> None:  # fmt: skip
         self.scenario, self.flight, self.sheets = scenario, flight, sheets
-        self.models: dict[str, Any] = {"vehicle": file, "wind": scenario.wind, "flow_sensor": sensor}
+        self.models: dict[str, Any] = {
+            "vehicle": file, "wind": scenario.wind, "ground": scenario.ground, "flow_sensor": sensor,
+            "recirculation": scenario.recirculation,
+        }  # fmt: skip
         if sheets is not None:
             fitted = {name: getattr(sheets, name) for name in SHEETS if name != "flow_sensor"}
             self.models |= {name: sheet for name, sheet in fitted.items() if sheet is not None}
@@ -129,9 +151,13 @@ class Ensemble:
         found: dict[str, Any] = {}
         vehicle: Any = self.flight.vehicle
         if "vehicle" in touched:
-            vehicle = found["vehicle"] = flattened(models["vehicle"])
+            vehicle = found["vehicle"] = flown(self.scenario, models["vehicle"])
         if "wind" in touched:
-            found["wind"] = models["wind"].parameters()
+            found["wind"] = models["wind"].parameters(disc_of(vehicle).span_m)
+        if "ground" in touched:
+            found["ground"] = models["ground"].parameters()
+        if "vehicle" in touched or "recirculation" in touched:
+            found["recirculation"] = recirculation_of(self.scenario, models["recirculation"], vehicle)
         if "flow_sensor" in touched:
             found["flow"] = self.scenario.flow.parameters(models["flow_sensor"])
         if self.sheets is not None:
@@ -159,7 +185,7 @@ class Ensemble:
             return True
         if source in SHEETS:
             return False
-        known = ", ".join(("vehicle", "wind", *SHEETS))
+        known = ", ".join((*WORLD, *SHEETS))
         raise self._wrong(name, f"no such source; known: {known}")
 
     def _checked(self, name: str, entry: Distribution) -> Any:

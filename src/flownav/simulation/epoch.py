@@ -1,4 +1,4 @@
-"""The parts of one epoch of the closed loop: wind, what is flown on, the outer and the attitude loop, the plant."""
+"""The parts of one epoch of the closed loop: what is flown on, the outer and the attitude loop, the plant."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from flownav.control.guidance import Reference
 from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import GRAVITY_M_S2, Quaternion, Rotation, quaternion_product, rotation_from_quaternion
 from flownav.measurement import Sensor
+from flownav.sensors.beam import ground_height
 from flownav.sensors.flow import misread, step_flow
 from flownav.sensors.gps_ins import attitude_with_error
 from flownav.sensors.rangefinder import slant_range
@@ -18,22 +19,18 @@ from flownav.simulation import layout
 from flownav.simulation.failing import strike
 from flownav.simulation.layout import (
     flow_as_is,
+    ground_as_is,
     load_autopilot,
     load_estimate,
     load_flow,
     load_gps_errors,
     load_helicopter,
     load_known,
-    load_wind,
-    load_wind_normals,
-    store_air,
     store_autopilot,
     store_controls,
     store_flow,
     store_true_imu,
-    store_wind,
     vehicle_as_is,
-    wind_as_is,
 )
 from flownav.simulation.navigating import Timetable, keep_inertial
 from flownav.simulation.onboard import Onboard
@@ -43,19 +40,7 @@ from flownav.simulation.ring import FIELDS, FIRST
 from flownav.simulation.sampling import read_inertial
 from flownav.simulation.sensing import EPOCH_S, lens_height, true_imu
 from flownav.simulation.vehicles import observe_vehicle, step_vehicle
-from flownav.simulation.wind import step_wind
 from flownav.vehicle.state import Controls
-
-
-@equation
-def blow(work: Work, lanes: Lanes) -> None:
-    """The wind of this epoch."""
-    for lane in range(len(lanes)):
-        height = -work[(layout.HELICOPTER + 2) * len(lanes) + lane]
-        wind, normals = wind_as_is(work, lanes, lane), load_wind_normals(work, lanes, lane)
-        after, air = step_wind(load_wind(work, lanes, lane), height, normals, wind)
-        store_wind(work, lanes, lane, after)
-        store_air(work, lanes, lane, air)
 
 
 @equation
@@ -199,7 +184,9 @@ def follow_flow(work: Work, lanes: Lanes, flight: Flight) -> None:
     for lane in range(len(lanes)):
         state = load_helicopter(work, lanes, lane)
         cosine = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)[8]
-        distance = slant_range(lens_height(state, cosine, flight.sensors.lens_below_cg_m), cosine)
+        over = lens_height(state, cosine, flight.sensors.lens_below_cg_m)
+        over -= ground_height(state.pos_n, state.pos_e, ground_as_is(work, lanes, lane))
+        distance = slant_range(over, cosine)
         thrust = work[layout.THRUST * len(lanes) + lane] / vehicle_as_is(work, lanes, lane).mass_kg
         before, flow = load_flow(work, lanes, lane), flow_as_is(work, lanes, lane)
         seen_u, seen_v = misread(state.u, state.v, state.w, state.p, state.q, distance, flow)
@@ -215,8 +202,8 @@ def advance(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None
         follow_flow(work, lanes, flight)
         if linear is None:
             for _ in range(PHYSICS_STEPS):
-                step_vehicle(work, lanes, PHYSICS_S, flight.rotors)
-            observe_vehicle(work, lanes, flight.rotors)
+                step_vehicle(work, lanes, PHYSICS_S, flight.rotors, None)
+            observe_vehicle(work, lanes, flight.rotors, None)
         else:
             linear_step(work, lanes, linear)
 
@@ -232,9 +219,9 @@ def advance_sensing(
         if step % PHYSICS_STEPS == 0:
             steer(work, lanes, flight, None, onboard)
             follow_flow(work, lanes, flight)
-        step_vehicle(work, lanes, PHYSICS_S, flight.rotors)
+        step_vehicle(work, lanes, PHYSICS_S, flight.rotors, onboard)
         if (step + 1) % PHYSICS_STEPS == 0:
-            observe_vehicle(work, lanes, flight.rotors)
+            observe_vehicle(work, lanes, flight.rotors, onboard)
         if (step + 1) % onboard.inertial_steps == 0:
             for lane in range(len(lanes)):
                 gravity_m_s2 = vehicle_as_is(work, lanes, lane).gravity_m_s2

@@ -12,7 +12,6 @@ from flownav.navigation.packed import pack
 from flownav.navigation.settings_of import Told, settings_of
 from flownav.navigation.told import FROM_MAG, Equipment
 from flownav.sensors.barometer_sheet import load_barometer_sheet
-from flownav.sensors.beam import LEVEL
 from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.flow import FlowParameters
 from flownav.sensors.flow_camera_sheet import load_flow_camera_sheet
@@ -221,7 +220,6 @@ def onboard_of(scenario: Scenario, sheets: SensorSheets, flow: FlowParameters, v
         pad_seen=np.zeros(0),
         skid=skid.parameters(vehicle.mass_kg * vehicle.gravity_m_s2),
         skid_clock=clock_of(skid, 0),
-        ground=LEVEL,
         rotor_above_cg_m=rotor.above_cg_m,
         texture_everywhere=1.0 if scenario.sensors.texture == "everywhere" else 0.0,
         pad_half_size_m=0.5 * scenario.pad.size_m,

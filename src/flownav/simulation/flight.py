@@ -19,7 +19,6 @@ from flownav.simulation import layout
 from flownav.simulation.epoch import (
     advance,
     advance_sensing,
-    blow,
     command,
     estimate_for_autopilot,
     note_home,
@@ -27,7 +26,7 @@ from flownav.simulation.epoch import (
 )
 from flownav.simulation.filtering import run_filter, start_filter
 from flownav.simulation.history import write_history
-from flownav.simulation.layout import load_wind_normals, store_autopilot, store_wind, wind_as_is
+from flownav.simulation.layout import store_autopilot
 from flownav.simulation.navigating import (
     Timetable,
     carry_ahead,
@@ -42,25 +41,31 @@ from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import ATTITUDE_STEPS, NOTHING, PHYSICS_S, PHYSICS_STEPS, START_STEP, Flight
 from flownav.simulation.sampling import sample
 from flownav.simulation.sensing import EPOCH_S, draw_epoch, sense, start_sensors
+from flownav.simulation.surroundings import start_surroundings, surround
 from flownav.simulation.units import start_onboard
 from flownav.simulation.vehicles import observe_vehicle, place
-from flownav.simulation.wind import start_wind
 
 
 @equation
 def start_block(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight, onboard: Onboard | None) -> None:
-    """Vehicle, wind, sensors and autopilot before the first epoch."""
+    """Vehicle, surroundings, sensors and autopilot before the first epoch."""
     draw_epoch(work, lanes, seed, first, START_STEP, flight.plan.draws)
     for lane in range(len(lanes)):
-        place(work, lanes, lane, flight.plan.start)
-        gusts = start_wind(load_wind_normals(work, lanes, lane), wind_as_is(work, lanes, lane))
-        store_wind(work, lanes, lane, gusts)
+        place(work, lanes, lane, flight.plan.start, flight.rotors)
         autopilot = grounded(flight.gains) if flight.plan.starts_on_ground else hovering(flight.gains)
         store_autopilot(work, lanes, lane, autopilot)
-    observe_vehicle(work, lanes, flight.rotors)
+    start_surroundings(work, lanes, seed, first, START_STEP, flight.rotors, flight.plan.draws.recirculation)
+    observe_vehicle(work, lanes, flight.rotors, onboard)
     start_sensors(work, lanes, flight.sensors)
     if onboard is not None:
         start_onboard(work, lanes, seed, first, START_STEP + 4, onboard)
+
+
+@equation
+def surround_now(work: Work, lanes: Lanes, seed: int, first: int, epoch: int, t_s: float, flight: Flight) -> None:
+    """Air, ground and engine of this epoch."""
+    engine = 0.0 if t_s >= flight.plan.engine_cut_s else 1.0
+    surround(work, lanes, seed, first, epoch, flight.rotors, flight.plan.draws.recirculation, engine)
 
 
 @equation
@@ -70,7 +75,7 @@ def fly_on_paper(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight
         t_s = epoch * EPOCH_S
         reference = reference_at(flight.path, t_s)
         draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
-        blow(work, lanes)
+        surround_now(work, lanes, seed, first, epoch, t_s, flight)
         sense(work, lanes, epoch, flight.sensors)
         if epoch == 0:
             start_filter(work, lanes, flight.initial_variance, flight.plan.start_known)
@@ -97,7 +102,7 @@ def fly_navigated(
         t_s = epoch * EPOCH_S
         reference = reference_at(flight.path, t_s)
         draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
-        blow(work, lanes)
+        surround_now(work, lanes, seed, first, epoch, t_s, flight)
         taken = sample(work, lanes, seed, first, epoch, table.slots, taken, onboard, flight.fails)
         note_truth(work, lanes, epoch, table)
         following = feed_due(work, nav, lanes, epoch, following, take, settings, o, fed, table)

@@ -49,8 +49,20 @@ def record_of(setup: Setup, flown: Flown, seed: int, index: int, lane: int = 0) 
         running = np.isfinite(history["estimate", "nees"])
         then_s = t_s[running] - setup.fitted.schedule.horizon_s
         record.add("consistency", {"t_s": then_s, "nees": history["estimate", "nees"][running]})
+    happened = [*happened, *_engine_cut(t_s, history, setup.flight.plan.engine_cut_s)]
     record.add("events", _events(t_s, history, happened, by_sensor=setup.fitted is None))
     return record
+
+
+def _engine_cut(
+    t_s: Array, history: dict[tuple[str, str], Array], cut_s: float
+) -> list[tuple[float, str, str, str, float]]:
+    """The event of an engine that gives nothing any more, if the flight got so far."""
+    after = np.flatnonzero(t_s >= cut_s)
+    if not len(after):
+        return []
+    height_m = -float(history["truth", "pos_d_m"][after[0]])
+    return [(float(t_s[after[0]]), "vehicle", "engine cut", "centre of gravity above the pad [m]", height_m)]
 
 
 def _manifest(setup: Setup, seed: int, index: int, duration_s: float) -> dict[str, Any]:

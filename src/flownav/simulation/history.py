@@ -11,8 +11,9 @@ from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.paper_filter import STATES
 from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY
+from flownav.sensors.beam import ground_height
 from flownav.simulation import layout
-from flownav.simulation.layout import load_autopilot, load_helicopter
+from flownav.simulation.layout import ground_as_is, load_autopilot, load_helicopter
 
 # columns and the rows of the lane buffer that they copy
 _COPIED: tuple[tuple[str, tuple[str, ...], int], ...] = (
@@ -39,6 +40,7 @@ _COMPUTED = (
     ("autopilot", "flying"),
     ("autopilot", "away"),
     ("truth", "sink_rate_m_s"),
+    ("truth", "ground_m"),
 )
 HISTORY: tuple[tuple[str, str], ...] = (
     *((table, name) for table, names, _ in _COPIED for name in names),
@@ -79,3 +81,5 @@ def write_history(work: Work, lanes: Lanes, epoch: int, reference: Reference, hi
         state = load_helicopter(work, lanes, lane)
         rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
         history[epoch, COPIED + 11, lane] = to_earth(rotation, state.u, state.v, state.w)[2]
+        ground_m = ground_height(state.pos_n, state.pos_e, ground_as_is(work, lanes, lane))
+        history[epoch, COPIED + 12, lane] = ground_m

@@ -25,8 +25,10 @@ from flownav.sensors.pad_camera import PadCameraNormals, PadCameraUnit
 from flownav.sensors.range_sensor import RangeSensorNormals, RangeSensorState, RangeSensorUnit
 from flownav.sensors.rangefinder import RangefinderState
 from flownav.sensors.skid_switch import SkidSwitchNormals, SkidSwitchState, SkidSwitchUnit
+from flownav.simulation.recirculation import RecirculationState
 from flownav.simulation.truth import PARTS, SIZES
-from flownav.simulation.wind import WindNormals, WindState, WindVelocity
+from flownav.simulation.wind import WindNormals, WindState
+from flownav.vehicle.around import Around
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.multirotor_state import MultirotorState, Six
 from flownav.vehicle.state import Controls, HelicopterState, Inflow
@@ -39,12 +41,15 @@ AS_IS_BEGIN, AS_IS_END = AS_IS["vehicle"], _rows.next
 
 # the plant
 HELICOPTER = _rows.take(len(HelicopterState._fields))  # or the multirotor, whose first fields are the same
+ROTOR_SPEED = HELICOPTER + HelicopterState._fields.index("speed")
 STAGE = _rows.take(len(HelicopterState._fields))  # the state of a Runge-Kutta stage
 SUM = _rows.take(len(HelicopterState._fields))  # the weighted sum of stage rates
 INFLOW = _rows.take(len(Inflow._fields))
 CONTROLS = _rows.take(len(Controls._fields))
 WIND = _rows.take(len(WindState._fields))
-AIR = _rows.take(len(WindVelocity._fields))
+AROUND = _rows.take(len(Around._fields))
+RECIRCULATION = _rows.take(len(RecirculationState._fields))
+RECIRCULATION_NORMALS = _rows.take(len(RecirculationState._fields) + len(RecirculationState._fields) % 2)
 THRUST = _rows.take(1)  # main rotor thrust [N]
 CONTACT = _rows.take(1)  # total skid load [N]
 POWER = _rows.take(1)  # of the main rotor [W]
@@ -140,7 +145,9 @@ load_roots, store_roots = lane_access(Six, SUM)  # of the shares of thrust that 
 load_inflow, store_inflow = lane_access(Inflow, INFLOW)
 load_controls, store_controls = lane_access(Controls, CONTROLS)
 load_wind, store_wind = lane_access(WindState, WIND)
-load_air, store_air = lane_access(WindVelocity, AIR)
+load_around, store_around = lane_access(Around, AROUND)
+load_recirculation, store_recirculation = lane_access(RecirculationState, RECIRCULATION)
+load_recirculation_normals, _ = lane_access(RecirculationState, RECIRCULATION_NORMALS)
 load_gps_errors, store_gps_errors = lane_access(GpsInsErrors, GPS_ERRORS)
 load_gps_held, store_gps_held = lane_access(NavSolution, GPS_HELD)
 load_gps, store_gps = lane_access(NavSolution, GPS)
@@ -177,6 +184,8 @@ load_autopilot, store_autopilot = lane_access(AutopilotState, AUTOPILOT)
 vehicle_as_is, _ = lane_access(PARTS["vehicle"], AS_IS["vehicle"])  # of a multirotor its first fields only
 multirotor_as_is, _ = lane_access(MultirotorParameters, AS_IS["vehicle"])
 wind_as_is, _ = lane_access(PARTS["wind"], AS_IS["wind"])
+ground_as_is, _ = lane_access(PARTS["ground"], AS_IS["ground"])
+recirculation_as_is, _ = lane_access(PARTS["recirculation"], AS_IS["recirculation"])
 flow_as_is, _ = lane_access(PARTS["flow"], AS_IS["flow"])
 late_as_is, _ = lane_access(PARTS["late"], AS_IS["late"])
 inertial_as_is, _ = lane_access(PARTS["inertial"], AS_IS["inertial"])

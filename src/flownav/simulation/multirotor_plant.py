@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from flownav.compile import equation
 from flownav.estimation.kalman import Lanes, Work
-from flownav.simulation import layout
 from flownav.simulation.layout import (
-    load_air,
+    load_around,
     load_controls,
     load_multirotor,
     load_multirotor_stage,
@@ -16,6 +15,7 @@ from flownav.simulation.layout import (
     store_multirotor_stage,
     store_roots,
 )
+from flownav.simulation.plant import note_outputs
 from flownav.vehicle.motors import mixed, roots_of_shares
 from flownav.vehicle.multirotor import derivative_at_roots, outputs
 from flownav.vehicle.multirotor_state import moved, of_unit_attitude
@@ -23,22 +23,18 @@ from flownav.vehicle.multirotor_state import moved, of_unit_attitude
 
 @equation
 def midpoint_step(work: Work, lanes: Lanes, dt: float, rotors: tuple[int, ...]) -> None:
-    """One step of every lane's multirotor; controls and wind held over the step (`multirotor.step`)."""
+    """One step of every lane's multirotor; controls and surroundings held over the step (`multirotor.step`)."""
     hexa = len(rotors) > 4
     for lane in range(len(lanes)):
-        state, vehicle, wind = (
-            load_multirotor(work, lanes, lane),
-            multirotor_as_is(work, lanes, lane),
-            load_air(work, lanes, lane),
-        )
+        state, vehicle = load_multirotor(work, lanes, lane), multirotor_as_is(work, lanes, lane)
         roots = roots_of_shares(mixed(load_controls(work, lanes, lane), hexa, vehicle), hexa)
         store_roots(work, lanes, lane, roots)
-        rate = derivative_at_roots(state, roots, wind.wind_n_m_s, wind.wind_e_m_s, wind.wind_d_m_s, hexa, vehicle)
+        rate = derivative_at_roots(state, roots, load_around(work, lanes, lane), hexa, vehicle)
         store_multirotor_stage(work, lanes, lane, moved(state, rate, 0.5 * dt))
     for lane in range(len(lanes)):
         state, vehicle = load_multirotor_stage(work, lanes, lane), multirotor_as_is(work, lanes, lane)
-        wind, roots = load_air(work, lanes, lane), load_roots(work, lanes, lane)
-        rate = derivative_at_roots(state, roots, wind.wind_n_m_s, wind.wind_e_m_s, wind.wind_d_m_s, hexa, vehicle)
+        roots = load_roots(work, lanes, lane)
+        rate = derivative_at_roots(state, roots, load_around(work, lanes, lane), hexa, vehicle)
         before = load_multirotor(work, lanes, lane)
         store_multirotor(work, lanes, lane, of_unit_attitude(moved(before, rate, dt)))
 
@@ -48,9 +44,5 @@ def observe_multirotor(work: Work, lanes: Lanes, rotors: tuple[int, ...]) -> Non
     """Thrust, load of the feet and power of the present state."""
     hexa = len(rotors) > 4
     for lane in range(len(lanes)):
-        air, vehicle = load_air(work, lanes, lane), multirotor_as_is(work, lanes, lane)
-        state = load_multirotor(work, lanes, lane)
-        seen = outputs(state, air.wind_n_m_s, air.wind_e_m_s, air.wind_d_m_s, hexa, vehicle)
-        work[layout.THRUST * len(lanes) + lane] = seen.thrust_n
-        work[layout.CONTACT * len(lanes) + lane] = seen.contact_force_n
-        work[layout.POWER * len(lanes) + lane] = seen.power_w
+        around, vehicle = load_around(work, lanes, lane), multirotor_as_is(work, lanes, lane)
+        note_outputs(work, lanes, lane, outputs(load_multirotor(work, lanes, lane), around, hexa, vehicle))

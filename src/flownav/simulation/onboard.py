@@ -11,7 +11,7 @@ from flownav.compile import equation
 from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.sensors.barometer import BarometerParameters, BarometerTruth
-from flownav.sensors.beam import BeamHit, Ground, beam_distance
+from flownav.sensors.beam import BeamHit, Ground, beam_distance, ground_height
 from flownav.sensors.flow import FlowParameters
 from flownav.sensors.flow_camera import FlowCameraParameters
 from flownav.sensors.gps_receiver import GpsReceiverParameters, GpsReceiverTruth
@@ -21,7 +21,7 @@ from flownav.sensors.pad_camera import PadCameraParameters
 from flownav.sensors.range_sensor import RangeSensorParameters
 from flownav.sensors.skid_switch import SkidSwitchParameters
 from flownav.simulation import layout
-from flownav.simulation.layout import load_helicopter
+from flownav.simulation.layout import ground_as_is, load_helicopter
 from flownav.vehicle.state import HelicopterState
 
 EPOCH_S = 0.02
@@ -48,7 +48,7 @@ class Place(NamedTuple):
 
 
 class Onboard(NamedTuple):
-    """Every sensor's coefficients, clock and place, and the ground that they look at."""
+    """Every sensor's coefficients, clock and place."""
 
     inertial: InertialParameters
     inertial_steps: int  # physics steps an inertial period
@@ -72,7 +72,6 @@ class Onboard(NamedTuple):
     pad_seen: NDArray[np.float64]  # what was seen in rendered frames, rows of PAD_SEEN flattened; empty: by the model
     skid: SkidSwitchParameters
     skid_clock: Clock
-    ground: Ground
     rotor_above_cg_m: float
     texture_everywhere: float  # 0: only the pad has texture
     pad_half_size_m: float
@@ -120,6 +119,7 @@ def beam_of(state: HelicopterState, place: Place, ground: Ground) -> BeamHit:
 
 @equation
 def baro_truth(work: Work, lanes: Lanes, lane: int, s: Onboard) -> BarometerTruth:
-    """Altitude, height of the rotor, and its thrust."""
+    """Altitude, height of the rotor over the ground, and its thrust."""
     state = load_helicopter(work, lanes, lane)
-    return BarometerTruth(-state.pos_d, s.rotor_above_cg_m - state.pos_d, work[layout.THRUST * len(lanes) + lane])
+    over = s.rotor_above_cg_m - state.pos_d - ground_height(state.pos_n, state.pos_e, ground_as_is(work, lanes, lane))
+    return BarometerTruth(-state.pos_d, over, work[layout.THRUST * len(lanes) + lane])

@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Path
 from flownav.estimation.paper_filter import PaperModel
+from flownav.sensors.beam import Ground
 from flownav.simulation.navigating import Timetable
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plant import LinearTruth
+from flownav.simulation.recirculation import RecirculationParameters
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
 from flownav.simulation.wind import WindParameters
 from flownav.vehicle.kinds import AnyState, AnyVehicle
@@ -41,6 +43,7 @@ class FlightPlan(NamedTuple):
     home_at_start: bool  # the pad is where the estimate first puts the start, else at the filter's origin
     start_known: bool  # the paper's filter starts at the true position, else at the first GPS reading
     handover_s: float  # until then the vehicle is flown on the truth, where it does not stand on its skids
+    engine_cut_s: float  # from then on the engine gives nothing
     draws: Draws
 
 
@@ -55,6 +58,8 @@ class Flight(NamedTuple):
     rotors: tuple[int, ...] | None  # a multirotor's; None: a helicopter
     sensors: SensorSuite
     wind: WindParameters
+    ground: Ground
+    recirculation: RecirculationParameters
     path: Path
     gains: AutopilotGains
     paper: PaperModel | None

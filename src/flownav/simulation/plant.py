@@ -1,4 +1,4 @@
-"""The plant on lanes: Runge-Kutta steps of the nonlinear helicopter, or the paper's linear truth."""
+"""The plant on lanes: Runge-Kutta steps of the helicopter, of the paper's helicopter, or the paper's linear truth."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flownav.compile import equation
 from flownav.estimation.kalman import Lanes, Work
 from flownav.simulation import layout
 from flownav.simulation.layout import (
-    load_air,
+    load_around,
     load_controls,
     load_helicopter,
     load_inflow,
@@ -29,13 +29,16 @@ from flownav.vehicle.helicopter import (
     attitude,
     blade_angles,
     derivative_at_inflow,
+    derivative_at_tail,
     inflow,
     outputs,
+    outputs_at_inflow,
+    tail_inflow,
     tail_inplane_sq,
 )
 from flownav.vehicle.parameters import VehicleParameters
-from flownav.vehicle.rotor import main_rotor, refine_induced_velocity, tail_rotor, thrustless_inflow
-from flownav.vehicle.state import Controls, HelicopterState, Inflow, add_scaled, normalised
+from flownav.vehicle.rotor import main_rotor, refine_induced_velocity, speed_ratio, tail_rotor, thrustless_inflow
+from flownav.vehicle.state import Controls, HelicopterState, Inflow, Outputs, add_scaled, normalised
 
 
 class LinearTruth(NamedTuple):
@@ -52,70 +55,105 @@ class LinearTruth(NamedTuple):
 
 @equation
 def runge_kutta_step(work: Work, lanes: Lanes, dt: float) -> None:
-    """One classical fourth-order step of every lane's helicopter; controls and wind held over the step.
+    """One classical fourth-order step of every lane's helicopter; controls and surroundings held over the step.
 
-    The inflow is solved in full at the first stage; the other stages, half a step away, refine it with one
+    The tail rotor's inflow is solved in full at the first stage; the other stages, half a step away, refine it with one
     Halley step each. The state differs by about 1e-9 from solving anew (tests/test_plant.py: `helicopter.step`).
     """
     for lane in range(len(lanes)):
         state, vehicle = load_helicopter(work, lanes, lane), vehicle_as_is(work, lanes, lane)
         store_sum(work, lanes, lane, state)
         air = moving_air(work, lanes, lane, state)
-        induced = inflow(air, blade_angles(state, vehicle), vehicle)
-        store_inflow(work, lanes, lane, induced)
-        add_stage(work, lanes, lane, state, air, induced, dt / 6.0, 0.5 * dt, vehicle)
+        tail_m_s = tail_inflow(air, blade_angles(state, vehicle), speed_ratio(state.speed, vehicle), vehicle)
+        add_turning_stage(work, lanes, lane, state, air, tail_m_s, dt / 6.0, 0.5 * dt, vehicle)
     for stage in range(3):
         weight = dt / 3.0 if stage < 2 else dt / 6.0
         reach = 0.5 * dt if stage < 1 else dt
         for lane in range(len(lanes)):
             state, vehicle = load_stage(work, lanes, lane), vehicle_as_is(work, lanes, lane)
-            air = moving_air(work, lanes, lane, state)
-            guess = load_inflow(work, lanes, lane)
-            induced = refined_inflow(guess, air, blade_angles(state, vehicle), vehicle)
-            store_inflow(work, lanes, lane, induced)
-            add_stage(work, lanes, lane, state, air, induced, weight, reach, vehicle)
+            air, guess = moving_air(work, lanes, lane, state), load_inflow(work, lanes, lane)
+            tail_m_s = refined_tail_inflow(guess.tail, state, air, blade_angles(state, vehicle), vehicle)
+            add_turning_stage(work, lanes, lane, state, air, tail_m_s, weight, reach, vehicle)
     for lane in range(len(lanes)):
         store_helicopter(work, lanes, lane, normalised(load_sum(work, lanes, lane)))
 
 
 @equation
-def moving_air(work: Work, lanes: Lanes, lane: int, state: HelicopterState) -> AirMotion:
-    """Motion of a state through this lane's air."""
-    wind = load_air(work, lanes, lane)
-    return air_motion(state, attitude(state), wind.wind_n_m_s, wind.wind_e_m_s, wind.wind_d_m_s)
-
-
-@equation
-def add_stage(
-    work: Work,
-    lanes: Lanes,
-    lane: int,
-    state: HelicopterState,
-    air: AirMotion,
-    induced: Inflow,
-    weight: float,
-    reach: float,
-    vehicle: VehicleParameters,
-) -> None:
+def add_turning_stage(
+    work: Work, lanes: Lanes, lane: int, state: HelicopterState, air: AirMotion, tail_m_s: float, weight: float,
+    reach: float, vehicle: VehicleParameters,
+) -> None:  # fmt: skip
     """A stage's rate into the weighted sum, and the next stage's state `reach` from the step's start."""
-    controls = load_controls(work, lanes, lane)
-    rate = derivative_at_inflow(state, controls, air, attitude(state), induced, vehicle)
+    store_inflow(work, lanes, lane, Inflow(0.0, tail_m_s))
+    controls, around = load_controls(work, lanes, lane), load_around(work, lanes, lane)
+    rate = derivative_at_tail(state, controls, air, attitude(state), tail_m_s, around, vehicle)
     store_sum(work, lanes, lane, add_scaled(load_sum(work, lanes, lane), rate, weight))
     store_stage(work, lanes, lane, add_scaled(load_helicopter(work, lanes, lane), rate, reach))
 
 
 @equation
-def refined_inflow(guess: Inflow, air: AirMotion, blades: Controls, vehicle: VehicleParameters) -> Inflow:
+def balanced_step(work: Work, lanes: Lanes, dt: float) -> None:
+    """The same of the paper's helicopter: inflow in balance at once, rotor speed constant."""
+    for lane in range(len(lanes)):
+        state, vehicle = load_helicopter(work, lanes, lane), vehicle_as_is(work, lanes, lane)
+        store_sum(work, lanes, lane, state)
+        air = moving_air(work, lanes, lane, state)
+        induced = inflow(air, blade_angles(state, vehicle), 1.0, vehicle)
+        add_balanced_stage(work, lanes, lane, state, air, induced, dt / 6.0, 0.5 * dt, vehicle)
+    for stage in range(3):
+        weight = dt / 3.0 if stage < 2 else dt / 6.0
+        reach = 0.5 * dt if stage < 1 else dt
+        for lane in range(len(lanes)):
+            state, vehicle = load_stage(work, lanes, lane), vehicle_as_is(work, lanes, lane)
+            air, guess = moving_air(work, lanes, lane, state), load_inflow(work, lanes, lane)
+            induced = refined_inflow(guess, state, air, blade_angles(state, vehicle), vehicle)
+            add_balanced_stage(work, lanes, lane, state, air, induced, weight, reach, vehicle)
+    for lane in range(len(lanes)):
+        store_helicopter(work, lanes, lane, normalised(load_sum(work, lanes, lane)))
+
+
+@equation
+def add_balanced_stage(
+    work: Work, lanes: Lanes, lane: int, state: HelicopterState, air: AirMotion, induced: Inflow, weight: float,
+    reach: float, vehicle: VehicleParameters,
+) -> None:  # fmt: skip
+    """As `add_turning_stage`, at given induced velocities."""
+    store_inflow(work, lanes, lane, induced)
+    controls, around = load_controls(work, lanes, lane), load_around(work, lanes, lane)
+    rate = derivative_at_inflow(state, controls, air, attitude(state), induced, around, vehicle)
+    store_sum(work, lanes, lane, add_scaled(load_sum(work, lanes, lane), rate, weight))
+    store_stage(work, lanes, lane, add_scaled(load_helicopter(work, lanes, lane), rate, reach))
+
+
+@equation
+def moving_air(work: Work, lanes: Lanes, lane: int, state: HelicopterState) -> AirMotion:
+    """Motion of a state through this lane's air."""
+    return air_motion(state, attitude(state), load_around(work, lanes, lane))
+
+
+@equation
+def refined_inflow(
+    guess: Inflow, state: HelicopterState, air: AirMotion, blades: Controls, vehicle: VehicleParameters
+) -> Inflow:
     """Both rotors' induced velocities, one Halley step on from those of a neighbouring state."""
-    main, tail = main_rotor(vehicle), tail_rotor(vehicle)
-    main_inplane, tail_inplane = air.u * air.u + air.v * air.v, tail_inplane_sq(air, vehicle)
-    sideslip = tail_sideslip(air, vehicle)
-    main_free = thrustless_inflow(blades.col, main_inplane, air.w, main)
-    tail_free = thrustless_inflow(blades.ped, tail_inplane, sideslip, tail)
+    main = main_rotor(vehicle, 1.0)
+    inplane_sq = air.u * air.u + air.v * air.v
+    free = thrustless_inflow(blades.col, inplane_sq, air.w, main)
     return Inflow(
-        refine_induced_velocity(guess.main, main_free, main_inplane, air.w, main),
-        refine_induced_velocity(guess.tail, tail_free, tail_inplane, sideslip, tail),
+        refine_induced_velocity(guess.main, free, inplane_sq, air.w, main),
+        refined_tail_inflow(guess.tail, state, air, blades, vehicle),
     )
+
+
+@equation
+def refined_tail_inflow(
+    guess: float, state: HelicopterState, air: AirMotion, blades: Controls, vehicle: VehicleParameters
+) -> float:
+    """The tail rotor's induced velocity, one Halley step on from that of a neighbouring state."""
+    tail = tail_rotor(vehicle, speed_ratio(state.speed, vehicle))
+    inplane_sq, sideslip = tail_inplane_sq(air, vehicle), tail_sideslip(air, vehicle)
+    free = thrustless_inflow(blades.ped, inplane_sq, sideslip, tail)
+    return refine_induced_velocity(guess, free, inplane_sq, sideslip, tail)
 
 
 @equation
@@ -136,10 +174,25 @@ def linear_step(work: Work, lanes: Lanes, model: LinearTruth) -> None:
 
 @equation
 def observe_plant(work: Work, lanes: Lanes) -> None:
-    """Thrust and skid load of the present state."""
+    """Thrust, skid load and power of the present state."""
     for lane in range(len(lanes)):
-        air, vehicle = load_air(work, lanes, lane), vehicle_as_is(work, lanes, lane)
-        seen = outputs(load_helicopter(work, lanes, lane), air.wind_n_m_s, air.wind_e_m_s, air.wind_d_m_s, vehicle)
-        work[layout.THRUST * len(lanes) + lane] = seen.thrust_n
-        work[layout.CONTACT * len(lanes) + lane] = seen.contact_force_n
-        work[layout.POWER * len(lanes) + lane] = seen.power_w
+        around, vehicle = load_around(work, lanes, lane), vehicle_as_is(work, lanes, lane)
+        note_outputs(work, lanes, lane, outputs(load_helicopter(work, lanes, lane), around, vehicle))
+
+
+@equation
+def observe_balanced(work: Work, lanes: Lanes) -> None:
+    """The same of the paper's helicopter."""
+    for lane in range(len(lanes)):
+        around, vehicle = load_around(work, lanes, lane), vehicle_as_is(work, lanes, lane)
+        state = load_helicopter(work, lanes, lane)
+        induced = inflow(moving_air(work, lanes, lane, state), blade_angles(state, vehicle), 1.0, vehicle)
+        note_outputs(work, lanes, lane, outputs_at_inflow(state, induced, around, vehicle))
+
+
+@equation
+def note_outputs(work: Work, lanes: Lanes, lane: int, seen: Outputs) -> None:
+    """What sensors and scores read of the plant."""
+    work[layout.THRUST * len(lanes) + lane] = seen.thrust_n
+    work[layout.CONTACT * len(lanes) + lane] = seen.contact_force_n
+    work[layout.POWER * len(lanes) + lane] = seen.power_w

@@ -13,6 +13,7 @@ from flownav.measurement import Sensor
 from flownav.navigation.records import Reading
 from flownav.optics.shutter import image_rate_rad_s
 from flownav.sensors.barometer import step_barometer
+from flownav.sensors.beam import ground_height
 from flownav.sensors.flow_camera import FlowCameraTruth, pad_texture, step_flow_camera
 from flownav.sensors.gps_receiver import step_gps_receiver
 from flownav.sensors.inertial import step_inertial
@@ -37,6 +38,7 @@ from flownav.simulation.layout import (
     baro_as_is,
     camera_as_is,
     camera_flow_as_is,
+    ground_as_is,
     inertial_as_is,
     late_as_is,
     load_autopilot,
@@ -218,7 +220,7 @@ def read_range(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slo
     draw(work, lanes, layout.RANGE_NORMALS, 6, seed, flight, epoch, RANGE_CHANNEL)
     for lane in range(len(lanes)):
         seen = earlier(load_helicopter(work, lanes, lane), late_as_is(work, lanes, lane).range_s)
-        hit = beam_of(seen, s.range_place, s.ground)
+        hit = beam_of(seen, s.range_place, ground_as_is(work, lanes, lane))
         after, read = step_range_sensor(
             load_ranger(work, lanes, lane), load_range_unit(work, lanes, lane), hit,
             load_range_normals(work, lanes, lane), ranger_as_is(work, lanes, lane),
@@ -237,16 +239,18 @@ def read_camera(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, sl
         state, flow = load_helicopter(work, lanes, lane), load_flow(work, lanes, lane)
         sensor, late_s = camera_flow_as_is(work, lanes, lane), late_as_is(work, lanes, lane).flow_s
         rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
-        hit = beam_of(state, s.camera_place, s.ground)
+        ground = ground_as_is(work, lanes, lane)
+        hit = beam_of(state, s.camera_place, ground)
         north, east, down = place_of(state, s.camera_place)
-        on_pad = pad_texture(north, east, -down, rotation, s.pad_half_size_m, sensor)
+        height_m = -down - ground_height(north, east, ground)
+        on_pad = pad_texture(north, east, height_m, rotation, s.pad_half_size_m, sensor)
         row = layout.EXPOSED
         truth = FlowCameraTruth(
             sensor.gain * (flow.u1 - late_s * flow.u2), sensor.gain * (flow.v1 - late_s * flow.v2),
             sensor.gain * (flow.w1 - late_s * flow.w2),
             share * work[row * len(lanes) + lane], share * work[(row + 1) * len(lanes) + lane],
             share * work[(row + 2) * len(lanes) + lane],
-            hit.distance_m, -down, rotation[8], 1.0 if s.texture_everywhere > 0.5 else on_pad,
+            hit.distance_m, height_m, rotation[8], 1.0 if s.texture_everywhere > 0.5 else on_pad,
         )  # fmt: skip
         after, read = step_flow_camera(
             load_camera(work, lanes, lane), load_camera_unit(work, lanes, lane), truth,

@@ -18,6 +18,8 @@ from flownav.sensors.datasheet import FlowSettings
 from flownav.sensors.settings import GpsInsSettings, PadFixSettings, RangefinderSettings
 from flownav.simulation.dispersion import SHIPPED as SHIPPED_DISPERSION
 from flownav.simulation.dispersion import DispersionSection
+from flownav.simulation.ground import GroundSettings
+from flownav.simulation.recirculation import RecirculationSettings
 from flownav.simulation.wind import WindSettings
 from flownav.vehicle.loading import SHIPPED_NAMES
 
@@ -126,6 +128,13 @@ class GoAroundSection(ParameterModel):
     clear_s: Number = Field(3.0, ge=0.0, le=3600.0)
 
 
+class EventSection(ParameterModel):
+    """Something that happens to the vehicle, whoever flies it. "engine cut": from then on the motor gives nothing."""
+
+    at_s: Number = Field(ge=0.0, le=3600.0)
+    kind: Literal["engine cut"]
+
+
 class SensorsSection(ParameterModel):
     """The datasheets of what the vehicle carries for its navigator; the shipped ones unless named.
 
@@ -181,6 +190,9 @@ class Scenario(ParameterModel):
     sensors: SensorsSection = SensorsSection()
     pad_fix: PadFixSettings | None = None
     wind: WindSettings = WindSettings()
+    ground: GroundSettings = GroundSettings()
+    recirculation: RecirculationSettings = RecirculationSettings()
+    event: tuple[EventSection, ...] = ()
     filter: FilterSection = FilterSection()
     autopilot: AutopilotSection = AutopilotSection()
     dispersion: DispersionSection = DispersionSection()

@@ -61,6 +61,7 @@ class Draws(NamedTuple):
     paper: bool  # the paper's GPS/INS, flow and sonar fly
     gps_drift: bool  # everything of the GPS/INS but the position's jitter
     wind: bool
+    recirculation: bool
 
 
 @equation

@@ -1,4 +1,4 @@
-"""What a flight's vehicle, wind and sensors are, as against what its navigator and autopilot believe them to be.
+"""What a flight's vehicle, wind, ground and sensors are, as against what navigator and autopilot believe.
 
 Each flight has a `Truth` of its own, which lies in its lane's rows of the buffer. Where nothing is dispersed
 (*matched*) it is what the datasheets say; of an *ensemble* it is drawn flight by flight (`simulation.ensemble`).
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.sensors.barometer import BarometerParameters
+from flownav.sensors.beam import Ground
 from flownav.sensors.flow import FlowParameters
 from flownav.sensors.flow_camera import FlowCameraParameters
 from flownav.sensors.gps_receiver import GpsReceiverParameters
@@ -22,6 +23,7 @@ from flownav.sensors.pad_camera import PadCameraParameters
 from flownav.sensors.range_sensor import RangeSensorParameters
 from flownav.sensors.skid_switch import SkidSwitchParameters
 from flownav.simulation.fault import SensorFault
+from flownav.simulation.recirculation import RecirculationParameters
 from flownav.simulation.wind import WindParameters
 from flownav.vehicle.kinds import AnyVehicle
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
@@ -47,6 +49,8 @@ class Truth(NamedTuple):
 
     vehicle: AnyVehicle
     wind: WindParameters
+    ground: Ground
+    recirculation: RecirculationParameters
     flow: FlowParameters
     late: Lateness
     inertial: InertialParameters

@@ -28,6 +28,7 @@ from flownav.simulation.draws import (
 from flownav.simulation.layout import (
     baro_as_is,
     camera_as_is,
+    ground_as_is,
     inertial_as_is,
     load_baro_unit,
     load_helicopter,
@@ -141,7 +142,7 @@ def start_rest(work: Work, lanes: Lanes, seed: int, flight: int, step: int, s: O
         store_range_unit(
             work, lanes, lane, draw_range_sensor(drawn_range_unit(work, lanes, lane), ranger_as_is(work, lanes, lane))
         )
-        hit = beam_of(load_helicopter(work, lanes, lane), s.range_place, s.ground)
+        hit = beam_of(load_helicopter(work, lanes, lane), s.range_place, ground_as_is(work, lanes, lane))
         store_ranger(work, lanes, lane, start_range_sensor(hit, ranger_as_is(work, lanes, lane)))
     draw(work, lanes, layout.DRAWN, 4, seed, flight, step, BARO_START)
     for lane in range(len(lanes)):

@@ -9,11 +9,20 @@ With h in feet and W20 the wind speed at 20 ft:
     H_u(s) = sigma_u sqrt(2 T_u/pi) / (1 + T_u s)
     H_w(s) = sigma_w sqrt(T_w/pi) (1 + sqrt(3) T_w s) / (1 + T_w s)^2,   H_v alike,   T = L/V
 
-h is held at 0.5 m and above. The steady speed follows the vehicle's height. Two simplifications, stated: the gusts'
-scales and intensities are those of one reference height (powers stay out of the flight loop; near the ground L_w
-would shrink with h), and the frozen gust field is carried past the vehicle at the reference height's steady speed,
-V, since a vehicle that takes off and lands moves slowly over the ground. Gust axes: along the wind, to its right,
-down.
+Both come down to nothing at the ground: the steady speed is that of the vehicle's own height, by the logarithmic law
+down to its roughness length z0, and below the reference height the gusts shrink as it does, so that the turbulence's
+intensity sigma_u/V stays (the specification's sigma does not know the ground). z0 is a setting; the specification's
+is 0.15 ft. Two simplifications, stated: the gusts' scales are those of the reference height (near the ground L_w would
+shrink with h, and quicker gusts push less), and the frozen gust field is carried past the vehicle at the reference
+height's steady speed, V, since a vehicle that takes off and lands moves slowly over the ground. Gust axes: along the
+wind, to its right, down.
+
+A vehicle of width b feels the field's gradients as if the air turned (MIL-F-8785C's angular gusts):
+
+    H_p(s) = sigma_w sqrt(0.8/V) (pi/4b)^(1/6) / (L_w^(1/3) (1 + 4b s/(pi V)))
+    q = (s/V) w / (1 + 4b s/(pi V)),   r = -(s/V) v / (1 + 3b s/(pi V))
+
+with the signs of a field that is carried along the wind: w = w0 + p y - q x, v = v0 + r x.
 
 The processes are sampled exactly (variance and autocorrelation) at 50 Hz. Without wind every output is +0.
 """
@@ -26,7 +35,7 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from flownav.compile import equation, larger
+from flownav.compile import equation, larger, smaller
 from flownav.parameter_files import Number, ParameterModel
 from flownav.sensors.gauss_markov import gauss_markov, gauss_markov_coefficients
 from flownav.simulation.noise import log_of_unit
@@ -34,6 +43,7 @@ from flownav.simulation.noise import log_of_unit
 PERIOD_S = 0.02
 FOOT_M = 0.3048
 ROUGHNESS_M = 0.15 * FOOT_M
+SPAN_M = 1.0  # of a vehicle of which nothing is said
 REFERENCE_SPEED_HEIGHT_M = 20.0 * FOOT_M
 LOWEST_HEIGHT_M = 0.5
 SQRT3 = 1.7320508075688772
@@ -66,16 +76,32 @@ class WindParameters(NamedTuple):
     down_d11: float
     down_d21: float
     down_d22: float
+    roughness_m: float
+    per_reference: float  # 1/ln(reference height/z0)
+    # gradients: standard deviation of the roll [rad/s], its filter; how fast slow gusts follow; 1/m of what is quicker
+    roll_sigma_rad_s: float
+    roll_decay: float
+    roll_drive: float
+    down_follow: float
+    pitch_1_m: float
+    across_follow: float
+    yaw_1_m: float
 
 
 class WindState(NamedTuple):
-    """The gust along the wind, and the filters' states across and down [m/s]; gust = s1 + sqrt(3) s2."""
+    """The gust along the wind, and the filters' states across and down [m/s]; gust = s1 + sqrt(3) s2.
+
+    roll: of the air about the wind [rad/s]; slow: the gusts across and down without what is smaller than the vehicle.
+    """
 
     along: float
     across1: float
     across2: float
     down1: float
     down2: float
+    roll: float
+    across_slow: float
+    down_slow: float
 
 
 class WindNormals(NamedTuple):
@@ -86,14 +112,18 @@ class WindNormals(NamedTuple):
     across2: float
     down1: float
     down2: float
+    roll: float
 
 
 class WindVelocity(NamedTuple):
-    """Velocity of the air over the ground, NED."""
+    """Velocity of the air over the ground, NED, and its gradients as a rotation of the air."""
 
     wind_n_m_s: float
     wind_e_m_s: float
     wind_d_m_s: float
+    turn_n_rad_s: float
+    turn_e_rad_s: float
+    turn_d_rad_s: float
 
 
 @equation
@@ -101,8 +131,9 @@ def start_wind(n: WindNormals, p: WindParameters) -> WindState:
     """Stationary gusts: both states of a second-order filter have the variance sigma^2/4 and are independent."""
     across, down = 0.5 * p.across_sigma_m_s, 0.5 * p.down_sigma_m_s
     return WindState(
-        p.along_sigma_m_s * n.along, across * n.across1, across * n.across2, down * n.down1, down * n.down2
-    )
+        p.along_sigma_m_s * n.along, across * n.across1, across * n.across2, down * n.down1, down * n.down2,
+        p.roll_sigma_rad_s * n.roll, across * (n.across1 + SQRT3 * n.across2), down * (n.down1 + SQRT3 * n.down2),
+    )  # fmt: skip
 
 
 @equation
@@ -112,32 +143,46 @@ def step_wind(state: WindState, height_m: float, n: WindNormals, p: WindParamete
     across2 = p.across_f21 * state.across1 + p.across_f22 * state.across2
     down1 = p.down_f11 * state.down1 + p.down_f12 * state.down2 + p.down_d11 * n.down1
     down2 = p.down_f21 * state.down1 + p.down_f22 * state.down2
+    across2 = across2 + (p.across_d21 * n.across1 + p.across_d22 * n.across2)
+    down2 = down2 + (p.down_d21 * n.down1 + p.down_d22 * n.down2)
+    # the means over the period: what is quicker than the slow gusts has neither lead nor lag
+    across = 0.5 * ((state.across1 + across1) + SQRT3 * (state.across2 + across2))
+    down = 0.5 * ((state.down1 + down1) + SQRT3 * (state.down2 + down2))
     after = WindState(
         along=gauss_markov(state.along, p.along_decay, p.along_drive, n.along),
         across1=across1,
-        across2=across2 + (p.across_d21 * n.across1 + p.across_d22 * n.across2),
+        across2=across2,
         down1=down1,
-        down2=down2 + (p.down_d21 * n.down1 + p.down_d22 * n.down2),
+        down2=down2,
+        roll=gauss_markov(state.roll, p.roll_decay, p.roll_drive, n.roll),
+        across_slow=state.across_slow + p.across_follow * (across - state.across_slow),
+        down_slow=state.down_slow + p.down_follow * (down - state.down_slow),
     )
     return after, wind_velocity(after, height_m, p)
 
 
 @equation
-def steady_speed(height_m: float, p: WindParameters) -> float:
-    """The logarithmic profile, W20 ln(h/z0)/ln(20 ft/z0)."""
-    return p.steady_m_s * -log_of_unit(ROUGHNESS_M / larger(height_m, LOWEST_HEIGHT_M))
+def log_height(height_m: float, p: WindParameters) -> float:
+    """ln(h/z0), 0 at and below the roughness length."""
+    return -log_of_unit(p.roughness_m / larger(height_m, p.roughness_m))
 
 
 @equation
 def wind_velocity(state: WindState, height_m: float, p: WindParameters) -> WindVelocity:
-    """Steady wind and gusts, turned from the wind's axes to NED."""
-    along = steady_speed(height_m, p) + state.along
-    across = state.across1 + SQRT3 * state.across2
-    down = state.down1 + SQRT3 * state.down2
+    """Steady wind, gusts and their gradients at a height over the ground, turned from the wind's axes to NED."""
+    high = log_height(height_m, p)
+    share = smaller(high * p.per_reference, 1.0)  # of the reference height's gusts
+    across, down = state.across1 + SQRT3 * state.across2, state.down1 + SQRT3 * state.down2
+    along = p.steady_m_s * high + share * state.along
+    pitch, yaw = p.pitch_1_m * (down - state.down_slow), -p.yaw_1_m * (across - state.across_slow)
+    across = share * across
     return WindVelocity(
         0.0 + (p.toward_n * along - p.toward_e * across),
         0.0 + (p.toward_e * along + p.toward_n * across),
-        0.0 + down,
+        0.0 + share * down,
+        0.0 + share * (p.toward_n * state.roll - p.toward_e * pitch),
+        0.0 + share * (p.toward_e * state.roll + p.toward_n * pitch),
+        0.0 + share * yaw,
     )
 
 
@@ -189,19 +234,44 @@ def _second_order(sigma_m_s: float, tau_s: float) -> tuple[float, float, float, 
     return sigma_m_s, f11, f12, f21, f22, sigma_m_s * d11, sigma_m_s * d21, sigma_m_s * d22
 
 
+def _gradients(
+    sigma_down_m_s: float, length_down_m: float, span_m: float, carried_m_s: float
+) -> tuple[float, float, float, float, float, float, float]:
+    """Of the roll sigma, decay and drive; of pitch and yaw how fast the slow gusts follow, and 1/m of the rest.
+
+    The variance of p is its spectrum's integral, sigma_w^2 0.8 (pi L_w/4b)^(1/3) pi^2/(8 L_w b).
+    """
+    broad = (math.pi * length_down_m / (4.0 * span_m)) ** (1.0 / 3.0)
+    sigma = sigma_down_m_s * math.sqrt(0.1 * math.pi**2 * broad / (length_down_m * span_m))
+    tau_s = 4.0 * span_m / (math.pi * carried_m_s)
+    return (
+        *_first_order(sigma, tau_s),
+        -math.expm1(-PERIOD_S / tau_s),
+        math.pi / (4.0 * span_m),
+        -math.expm1(-PERIOD_S / (0.75 * tau_s)),
+        math.pi / (3.0 * span_m),
+    )
+
+
 class WindSettings(ParameterModel):
-    """A scenario's wind; off by default. The direction is where it blows from, clockwise from north."""
+    """A scenario's wind; off by default. The direction is where it blows from, clockwise from north.
+
+    roughness_m: z0 of the ground that the wind comes over, from .0005 (water) over .005 (concrete, mown grass) and .03
+    (a meadow) to .1 (low crops), after Davenport and Wieringa.
+    """
 
     speed_20ft_m_s: Number = Field(0.0, ge=0.0, le=30.0)
     from_direction_deg: Number = Field(0.0, ge=-360.0, le=360.0)
     gusts: bool = True
     reference_height_m: Number = Field(3.0, ge=LOWEST_HEIGHT_M, le=300.0)
+    roughness_m: Number = Field(ROUGHNESS_M, ge=1e-4, le=0.4)
 
-    def parameters(self) -> WindParameters:
-        """Coefficients at 50 Hz; all velocities are exactly zero where the speed is."""
+    def parameters(self, span_m: float = SPAN_M) -> WindParameters:
+        """Coefficients at 50 Hz for a vehicle so wide; all velocities are exactly zero where the speed is."""
         scales = dryden_scales(self.speed_20ft_m_s, self.reference_height_m)
-        profile_m_s = self.speed_20ft_m_s / math.log(REFERENCE_SPEED_HEIGHT_M / ROUGHNESS_M)
-        carried_m_s = profile_m_s * math.log(self.reference_height_m / ROUGHNESS_M)
+        profile_m_s = self.speed_20ft_m_s / math.log(REFERENCE_SPEED_HEIGHT_M / self.roughness_m)
+        reference = math.log(self.reference_height_m / self.roughness_m)
+        carried_m_s = profile_m_s * reference
         # without wind the gusts have no amplitude and any time constant serves
         tau_along_s = scales.length_along_m / (carried_m_s or 1.0)
         tau_down_s = scales.length_down_m / (carried_m_s or 1.0)
@@ -215,4 +285,7 @@ class WindSettings(ParameterModel):
             *_first_order(horizontal, tau_along_s),
             *_second_order(horizontal, tau_along_s),
             *_second_order(vertical, tau_down_s),
+            self.roughness_m,
+            1.0 / reference,
+            *_gradients(vertical, scales.length_down_m, span_m, carried_m_s or 1.0),
         )

@@ -47,11 +47,15 @@ def tail_sideslip(air: AirMotion, vehicle: VehicleParameters) -> float:
 
 @equation
 def main_rotor_wrench(
-    thrust: float, torque: float, a1: float, b1: float, air: AirMotion, vehicle: VehicleParameters
+    thrust: float, torque: float, a1: float, b1: float, air: AirMotion, ratio: float, vehicle: VehicleParameters
 ) -> Wrench:
-    """Tilted thrust, in-plane blade drag (H-force) and hub stiffness; a1 > 0 tilts the disc back, b1 > 0 right."""
-    x = -thrust * sine_of_tilt(a1) - vehicle.main_inplane_drag_n_s_m * air.u
-    y = thrust * sine_of_tilt(b1) - vehicle.main_inplane_drag_n_s_m * air.v
+    """Tilted thrust, in-plane blade drag (H-force) and hub stiffness; a1 > 0 tilts the disc back, b1 > 0 right.
+
+    ratio: `rotor.speed_ratio`.
+    """
+    drag = vehicle.main_inplane_drag_n_s_m * ratio
+    x = -thrust * sine_of_tilt(a1) - drag * air.u
+    y = thrust * sine_of_tilt(b1) - drag * air.v
     z = -thrust * cosine_of_tilt(a1) * cosine_of_tilt(b1)
     roll = vehicle.hub_stiffness_n_m_rad * b1 + vehicle.hub_above_cg_m * y
     pitch = vehicle.hub_stiffness_n_m_rad * a1 - vehicle.hub_above_cg_m * x

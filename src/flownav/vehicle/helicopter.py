@@ -1,13 +1,14 @@
 """The helicopter as one set of differential equations: the four blocks put together.
 
-Straight-line scalar equations, so that lanes vectorise: 23 states in, 23 rates out.
+Straight-line scalar equations, so that lanes vectorise: 26 states in, 26 rates out. `derivative` is the helicopter as
+it flies; in `derivative_in_balance`, the paper's, the rotor keeps its speed and its inflow is in balance at once.
 """
 
 from __future__ import annotations
 
 from flownav.compile import equation
 from flownav.frames import Rotation, Vector, quaternion_rate, rotation_from_quaternion, to_body, to_earth
-from flownav.vehicle.actuators import Servo, acceleration, blade_angle
+from flownav.vehicle.actuators import acceleration, blade_angle, collective_servo, cyclic_servo, pedal_servo
 from flownav.vehicle.airframe import (
     AirMotion,
     Wrench,
@@ -18,12 +19,22 @@ from flownav.vehicle.airframe import (
     tail_side_force,
     tail_sideslip,
 )
+from flownav.vehicle.around import Around, below_plane, plane_normal
+from flownav.vehicle.drive import Turning, held_turning, turning_of
 from flownav.vehicle.ground_effect import multiplier_of_squares
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.rigid_body import angular_acceleration, linear_acceleration
-from flownav.vehicle.rotor import blowback, induced_velocity, main_rotor, tail_rotor, thrust, torque
+from flownav.vehicle.rotor import (
+    blowback,
+    induced_velocity,
+    main_rotor,
+    speed_ratio,
+    tail_rotor,
+    thrust,
+    torque,
+)
 from flownav.vehicle.skids import support, with_friction, with_support
-from flownav.vehicle.state import Controls, HelicopterState, Inflow, Outputs, add_scaled, normalised
+from flownav.vehicle.state import Controls, HelicopterState, Inflow, Outputs, RotorLoads, add_scaled, normalised
 
 __all__ = [
     "Controls",
@@ -33,48 +44,15 @@ __all__ = [
     "add_scaled",
     "derivative",
     "derivative_at_inflow",
+    "derivative_in_balance",
     "inflow",
+    "inflow_of",
     "normalised",
     "outputs",
+    "outputs_at_inflow",
     "step",
     "tail_power",
 ]
-
-
-@equation
-def cyclic_servo(vehicle: VehicleParameters) -> Servo:
-    """The servo of both cyclic channels."""
-    return Servo(
-        vehicle.cyclic_frequency_rad_s,
-        vehicle.cyclic_damping_ratio,
-        vehicle.cyclic_rate_limit_rad_s,
-        vehicle.cyclic_min_rad,
-        vehicle.cyclic_max_rad,
-    )
-
-
-@equation
-def collective_servo(vehicle: VehicleParameters) -> Servo:
-    """The servo of the collective."""
-    return Servo(
-        vehicle.collective_frequency_rad_s,
-        vehicle.collective_damping_ratio,
-        vehicle.collective_rate_limit_rad_s,
-        vehicle.collective_min_rad,
-        vehicle.collective_max_rad,
-    )
-
-
-@equation
-def pedal_servo(vehicle: VehicleParameters) -> Servo:
-    """The servo of the tail rotor's pitch."""
-    return Servo(
-        vehicle.pedal_frequency_rad_s,
-        vehicle.pedal_damping_ratio,
-        vehicle.pedal_rate_limit_rad_s,
-        vehicle.pedal_min_rad,
-        vehicle.pedal_max_rad,
-    )
 
 
 @equation
@@ -96,10 +74,14 @@ def attitude(state: HelicopterState) -> Rotation:
 
 
 @equation
-def air_motion(state: HelicopterState, rotation: Rotation, wind_n: float, wind_e: float, wind_d: float) -> AirMotion:
-    """Motion through the air; wind in earth NED [m/s], where the air goes."""
-    wind = to_body(rotation, wind_n, wind_e, wind_d)
-    return AirMotion(state.u - wind[0], state.v - wind[1], state.w - wind[2], state.p, state.q, state.r)
+def air_motion(state: HelicopterState, rotation: Rotation, around: Around) -> AirMotion:
+    """Motion through the air; a gradient of the air's velocity is a rotation that is not the vehicle's own."""
+    wind = to_body(rotation, around.wind_n_m_s, around.wind_e_m_s, around.wind_d_m_s)
+    turn = to_body(rotation, around.turn_n_rad_s, around.turn_e_rad_s, around.turn_d_rad_s)
+    return AirMotion(
+        state.u - wind[0], state.v - wind[1], state.w - wind[2],
+        state.p - turn[0], state.q - turn[1], state.r - turn[2],
+    )  # fmt: skip
 
 
 @equation
@@ -110,102 +92,108 @@ def tail_inplane_sq(air: AirMotion, vehicle: VehicleParameters) -> float:
 
 
 @equation
-def inflow(air: AirMotion, blades: Controls, vehicle: VehicleParameters) -> Inflow:
-    """Both rotors' induced velocities, in balance with the present motion (quasi-steady)."""
+def inflow(air: AirMotion, blades: Controls, ratio: float, vehicle: VehicleParameters) -> Inflow:
+    """Both rotors' induced velocities, in balance with the present motion (quasi-steady); ratio: `speed_ratio`."""
     return Inflow(
-        induced_velocity(blades.col, air.u * air.u + air.v * air.v, air.w, main_rotor(vehicle)),
-        induced_velocity(blades.ped, tail_inplane_sq(air, vehicle), tail_sideslip(air, vehicle), tail_rotor(vehicle)),
+        induced_velocity(blades.col, air.u * air.u + air.v * air.v, air.w, main_rotor(vehicle, ratio)),
+        tail_inflow(air, blades, ratio, vehicle),
     )
 
 
 @equation
-def main_rotor_load(
-    state: HelicopterState,
-    down: Vector,
-    air: AirMotion,
-    blades: Controls,
-    induced: Inflow,
-    vehicle: VehicleParameters,
-) -> tuple[float, float]:
-    """Main rotor thrust in ground effect [N] and torque [N m].
+def tail_inflow(air: AirMotion, blades: Controls, ratio: float, vehicle: VehicleParameters) -> float:
+    """The tail rotor's induced velocity, in balance with the present motion: it lags by 10 ms only."""
+    inplane_sq, sideslip = tail_inplane_sq(air, vehicle), tail_sideslip(air, vehicle)
+    return induced_velocity(blades.ped, inplane_sq, sideslip, tail_rotor(vehicle, ratio))
 
-    Ground effect multiplies the thrust at constant power (equation 11), so the torque is that of free air.
-    """
-    rotor = main_rotor(vehicle)
+
+@equation
+def inflow_of(state: HelicopterState, around: Around, vehicle: VehicleParameters) -> Inflow:
+    """Both rotors' induced velocities as they are: the main rotor's is a state."""
+    air, ratio = air_motion(state, attitude(state), around), speed_ratio(state.speed, vehicle)
+    return Inflow(state.inflow, tail_inflow(air, blade_angles(state, vehicle), ratio, vehicle))
+
+
+@equation
+def rotor_loads(
+    state: HelicopterState, air: AirMotion, blades: Controls, induced: Inflow, vehicle: VehicleParameters
+) -> RotorLoads:
+    """Thrust out of ground effect and torque of both rotors."""
+    ratio = speed_ratio(state.speed, vehicle)
+    main, tail = main_rotor(vehicle, ratio), tail_rotor(vehicle, ratio)
     inplane_sq = air.u * air.u + air.v * air.v
-    free = thrust(blades.col, inplane_sq, air.w, induced.main, rotor)
+    tail_sq, sideslip = tail_inplane_sq(air, vehicle), tail_sideslip(air, vehicle)
+    lift = thrust(blades.col, inplane_sq, air.w, induced.main, main)
+    aside = thrust(blades.ped, tail_sq, sideslip, induced.tail, tail)
+    return RotorLoads(
+        lift,
+        torque(lift, inplane_sq, air.w, induced.main, main),
+        aside,
+        torque(aside, tail_sq, sideslip, induced.tail, tail),
+    )
+
+
+@equation
+def near_ground(
+    state: HelicopterState, down: Vector, air: AirMotion, induced_m_s: float, around: Around, vehicle: VehicleParameters
+) -> float:
+    """The main rotor's thrust in ground effect over that in free air, at constant power (equation 11)."""
     sinking = air.u * down[0] + air.v * down[1] + air.w * down[2]
-    horizontal_sq = inplane_sq + air.w * air.w - sinking * sinking
-    hub_height = vehicle.hub_above_cg_m * down[2] - state.pos_d
-    near_ground = multiplier_of_squares(hub_height, horizontal_sq, induced.main, vehicle.main_radius_m)
-    return near_ground * free, torque(free, inplane_sq, air.w, induced.main, rotor)
+    horizontal_sq = air.u * air.u + air.v * air.v + air.w * air.w - sinking * sinking
+    below = below_plane(state.pos_n, state.pos_e, state.pos_d, around)
+    hub_height = vehicle.hub_above_cg_m * down[2] - below - around.rotor_1_m
+    return multiplier_of_squares(hub_height, horizontal_sq, induced_m_s, vehicle.main_radius_m)
 
 
 @equation
 def forces_and_moments(
-    state: HelicopterState,
-    down: Vector,
-    air: AirMotion,
-    blades: Controls,
-    induced: Inflow,
-    vehicle: VehicleParameters,
-) -> Wrench:
+    state: HelicopterState, rotation: Rotation, air: AirMotion, loads: RotorLoads, turning: Turning, induced: Inflow,
+    around: Around, vehicle: VehicleParameters,
+) -> Wrench:  # fmt: skip
     """All forces and moments about the centre of gravity (block 3), the ground's last: friction answers the rest."""
-    lift, drag_torque = main_rotor_load(state, down, air, blades, induced, vehicle)
-    tail_thrust = thrust(
-        blades.ped, tail_inplane_sq(air, vehicle), tail_sideslip(air, vehicle), induced.tail, tail_rotor(vehicle)
-    )
+    down = (rotation[6], rotation[7], rotation[8])
+    lift = near_ground(state, down, air, induced.main, around, vehicle) * loads.lift_n
+    ratio = speed_ratio(state.speed, vehicle)
     free = flight_wrench(
-        main_rotor_wrench(lift, drag_torque, state.a1, state.b1, air, vehicle),
-        tail_side_force(tail_thrust, induced.tail, air, vehicle),
+        main_rotor_wrench(lift, turning.torque_n_m, state.a1, state.b1, air, ratio, vehicle),
+        tail_side_force(loads.tail_n, induced.tail, air, vehicle),
         tail_plane_force(induced.main, air, vehicle),
         fuselage_drag(induced.main, air, vehicle),
         down,
         vehicle,
     )
-    velocity, rates = (state.u, state.v, state.w), (state.p, state.q, state.r)
-    feet = support(state.pos_d, down, velocity, rates, vehicle)
-    return with_friction(with_support(free, feet, down, vehicle), feet, velocity, rates, vehicle)
+    velocity, rates, normal = (state.u, state.v, state.w), (state.p, state.q, state.r), plane_normal(rotation, around)
+    feet = support(below_plane(state.pos_n, state.pos_e, state.pos_d, around), normal, velocity, rates, around, vehicle)
+    return with_friction(with_support(free, feet, normal, vehicle), feet, velocity, rates, vehicle)
 
 
 @equation
-def derivative_at_inflow(
-    state: HelicopterState,
-    controls: Controls,
-    air: AirMotion,
-    rotation: Rotation,
-    induced: Inflow,
-    vehicle: VehicleParameters,
-) -> HelicopterState:
-    """The rates of the state at given induced velocities (held ones give the paper's frozen-inflow model)."""
-    down = (rotation[6], rotation[7], rotation[8])
+def rates_of(
+    state: HelicopterState, controls: Controls, air: AirMotion, rotation: Rotation, blades: Controls,
+    loads: RotorLoads, turning: Turning, induced: Inflow, around: Around, vehicle: VehicleParameters,
+) -> HelicopterState:  # fmt: skip
+    """The rates of the state while the rotors carry these loads and the main rotor changes as `turning` says.
+
+    A gradient of the gusts acts on the blades as cyclic does: p_g/Ω tilts the disc back, q_g/Ω to the left.
+    """
     velocity, rates = (state.u, state.v, state.w), (state.p, state.q, state.r)
-    blades = blade_angles(state, vehicle)
-    total = forces_and_moments(state, down, air, blades, induced, vehicle)
-    pos_rate = to_earth(rotation, state.u, state.v, state.w)
-    accel = linear_acceleration(velocity, rates, (total.x, total.y, total.z), vehicle.mass_kg)
-    spin = angular_acceleration(rates, (total.l, total.m, total.n), vehicle)
-    turn = quaternion_rate(state.qw, state.qx, state.qy, state.qz, state.p, state.q, state.r)
-    # first-order flapping: the disc follows the cyclic, blows back from the airspeed and lags the body's rates
+    total = forces_and_moments(state, rotation, air, loads, turning, induced, around, vehicle)
+    main = main_rotor(vehicle, speed_ratio(state.speed, vehicle))
     tilt = vehicle.flap_response * blowback(
-        blades.col,
-        air.u * air.u + air.v * air.v,
-        air.w,
-        induced.main,
-        vehicle.main_lift_solidity,
-        vehicle.main_tip_speed_m_s,
+        blades.col, air.u * air.u + air.v * air.v, air.w, induced.main, vehicle.main_lift_solidity, main.tip_speed_m_s
     )
-    per_tip = 1.0 / vehicle.main_tip_speed_m_s
-    a1_rate = vehicle.flap_rate_1_s * (blades.lon + tilt * air.u * per_tip - state.a1) - state.q
-    b1_rate = vehicle.flap_rate_1_s * (blades.lat - tilt * air.v * per_tip - state.b1) - state.p
+    per_tip, per_turn = 1.0 / main.tip_speed_m_s, 1.0 / main.speed_rad_s
+    back = blades.lon + tilt * air.u * per_tip + (state.p - air.p) * per_turn
+    right = blades.lat - tilt * air.v * per_tip - (state.q - air.q) * per_turn
+    flap_rate = vehicle.flap_rate_1_s * speed_ratio(state.speed, vehicle)
     cyclic = cyclic_servo(vehicle)
     return HelicopterState(
-        *pos_rate,
-        *accel,
-        *turn,
-        *spin,
-        a1_rate,
-        b1_rate,
+        *to_earth(rotation, state.u, state.v, state.w),
+        *linear_acceleration(velocity, rates, (total.x, total.y, total.z), vehicle.mass_kg),
+        *quaternion_rate(state.qw, state.qx, state.qy, state.qz, state.p, state.q, state.r),
+        *angular_acceleration(rates, (total.l, total.m, total.n), vehicle),
+        flap_rate * (back - state.a1) - state.q,
+        flap_rate * (right - state.b1) - state.p,
         state.lon_rate,
         state.lat_rate,
         state.col_rate,
@@ -214,67 +202,93 @@ def derivative_at_inflow(
         acceleration(state.lat, state.lat_rate, controls.lat, cyclic),
         acceleration(state.col, state.col_rate, controls.col, collective_servo(vehicle)),
         acceleration(state.ped, state.ped_rate, controls.ped, pedal_servo(vehicle)),
+        turning.inflow_m_s2,
+        turning.speed_rad_s2,
+        turning.governed_w_s,
     )
 
 
 @equation
-def derivative(
-    state: HelicopterState,
-    controls: Controls,
-    wind_n: float,
-    wind_e: float,
-    wind_d: float,
+def derivative_at_inflow(
+    state: HelicopterState, controls: Controls, air: AirMotion, rotation: Rotation, induced: Inflow, around: Around,
     vehicle: VehicleParameters,
-) -> HelicopterState:
-    """The rates of the state, paper equations 1-11; wind in earth NED [m/s]; inflow re-solved at every call."""
-    rotation = attitude(state)
-    air = air_motion(state, rotation, wind_n, wind_e, wind_d)
-    induced = inflow(air, blade_angles(state, vehicle), vehicle)
-    return derivative_at_inflow(state, controls, air, rotation, induced, vehicle)
-
-
-@equation
-def outputs(state: HelicopterState, wind_n: float, wind_e: float, wind_d: float, vehicle: VehicleParameters) -> Outputs:
-    """What the state implies (see Outputs); wind in earth NED [m/s]."""
-    rotation = attitude(state)
-    down = (rotation[6], rotation[7], rotation[8])
-    air = air_motion(state, rotation, wind_n, wind_e, wind_d)
+) -> HelicopterState:  # fmt: skip
+    """The rates at given induced velocities while the rotor keeps its speed (held ones: the paper's frozen inflow)."""
     blades = blade_angles(state, vehicle)
-    induced = inflow(air, blades, vehicle)
-    lift, drag_torque = main_rotor_load(state, down, air, blades, induced, vehicle)
-    feet = support(state.pos_d, down, (state.u, state.v, state.w), (state.p, state.q, state.r), vehicle)
-    return Outputs(lift, drag_torque, drag_torque * vehicle.main_speed_rad_s, induced.main, feet.normal_n)
+    loads = rotor_loads(state, air, blades, induced, vehicle)
+    return rates_of(state, controls, air, rotation, blades, loads, held_turning(loads), induced, around, vehicle)
 
 
 @equation
-def tail_power(
-    state: HelicopterState, wind_n: float, wind_e: float, wind_d: float, vehicle: VehicleParameters
-) -> float:
-    """Shaft power of the tail rotor [W]; wind in earth NED [m/s]."""
+def derivative_in_balance(
+    state: HelicopterState, controls: Controls, around: Around, vehicle: VehicleParameters
+) -> HelicopterState:
+    """The rates of the paper's helicopter, its equations 1-11: inflow re-solved at every call, rotor speed constant."""
     rotation = attitude(state)
-    air = air_motion(state, rotation, wind_n, wind_e, wind_d)
-    rotor = tail_rotor(vehicle)
-    pitch = blade_angles(state, vehicle).ped
-    inplane_sq, sideslip = tail_inplane_sq(air, vehicle), tail_sideslip(air, vehicle)
-    induced = induced_velocity(pitch, inplane_sq, sideslip, rotor)
-    load = thrust(pitch, inplane_sq, sideslip, induced, rotor)
-    return torque(load, inplane_sq, sideslip, induced, rotor) * rotor.speed_rad_s
+    air = air_motion(state, rotation, around)
+    induced = inflow(air, blade_angles(state, vehicle), speed_ratio(state.speed, vehicle), vehicle)
+    return derivative_at_inflow(state, controls, air, rotation, induced, around, vehicle)
+
+
+@equation
+def derivative_at_tail(
+    state: HelicopterState, controls: Controls, air: AirMotion, rotation: Rotation, tail_m_s: float, around: Around,
+    vehicle: VehicleParameters,
+) -> HelicopterState:  # fmt: skip
+    """The rates of the state at the tail rotor's induced velocity."""
+    blades, induced = blade_angles(state, vehicle), Inflow(state.inflow, tail_m_s)
+    loads = rotor_loads(state, air, blades, induced, vehicle)
+    turning = turning_of(state, air, loads, around.engine, vehicle)
+    return rates_of(state, controls, air, rotation, blades, loads, turning, induced, around, vehicle)
+
+
+@equation
+def derivative(
+    state: HelicopterState, controls: Controls, around: Around, vehicle: VehicleParameters
+) -> HelicopterState:
+    """The rates of the state: inflow lags, the rotor's speed droops, the governor answers up to the power limit."""
+    rotation = attitude(state)
+    air = air_motion(state, rotation, around)
+    tail_m_s = tail_inflow(air, blade_angles(state, vehicle), speed_ratio(state.speed, vehicle), vehicle)
+    return derivative_at_tail(state, controls, air, rotation, tail_m_s, around, vehicle)
+
+
+@equation
+def outputs(state: HelicopterState, around: Around, vehicle: VehicleParameters) -> Outputs:
+    """What the state implies (see Outputs)."""
+    return outputs_at_inflow(state, inflow_of(state, around, vehicle), around, vehicle)
+
+
+@equation
+def outputs_at_inflow(state: HelicopterState, induced: Inflow, around: Around, vehicle: VehicleParameters) -> Outputs:
+    """What the state implies at given induced velocities."""
+    rotation = attitude(state)
+    air = air_motion(state, rotation, around)
+    loads = rotor_loads(state, air, blade_angles(state, vehicle), induced, vehicle)
+    down, normal = (rotation[6], rotation[7], rotation[8]), plane_normal(rotation, around)
+    lift = near_ground(state, down, air, induced.main, around, vehicle) * loads.lift_n
+    velocity, rates = (state.u, state.v, state.w), (state.p, state.q, state.r)
+    feet = support(below_plane(state.pos_n, state.pos_e, state.pos_d, around), normal, velocity, rates, around, vehicle)
+    power = loads.torque_n_m * main_rotor(vehicle, speed_ratio(state.speed, vehicle)).speed_rad_s
+    return Outputs(lift, loads.torque_n_m, power, induced.main, feet.normal_n)
+
+
+@equation
+def tail_power(state: HelicopterState, around: Around, vehicle: VehicleParameters) -> float:
+    """Shaft power of the tail rotor [W]."""
+    air = air_motion(state, attitude(state), around)
+    loads = rotor_loads(state, air, blade_angles(state, vehicle), inflow_of(state, around, vehicle), vehicle)
+    return loads.tail_torque_n_m * tail_rotor(vehicle, speed_ratio(state.speed, vehicle)).speed_rad_s
 
 
 @equation
 def step(
-    state: HelicopterState,
-    controls: Controls,
-    wind_n: float,
-    wind_e: float,
-    wind_d: float,
-    dt: float,
-    vehicle: VehicleParameters,
+    state: HelicopterState, controls: Controls, around: Around, dt: float, vehicle: VehicleParameters
 ) -> HelicopterState:
-    """The state `dt` seconds later by the classical Runge-Kutta method, controls and wind held."""
-    first = derivative(state, controls, wind_n, wind_e, wind_d, vehicle)
-    second = derivative(add_scaled(state, first, 0.5 * dt), controls, wind_n, wind_e, wind_d, vehicle)
-    third = derivative(add_scaled(state, second, 0.5 * dt), controls, wind_n, wind_e, wind_d, vehicle)
-    fourth = derivative(add_scaled(state, third, dt), controls, wind_n, wind_e, wind_d, vehicle)
+    """The state `dt` seconds later by the classical Runge-Kutta method, controls and surroundings held."""
+    first = derivative(state, controls, around, vehicle)
+    second = derivative(add_scaled(state, first, 0.5 * dt), controls, around, vehicle)
+    third = derivative(add_scaled(state, second, 0.5 * dt), controls, around, vehicle)
+    fourth = derivative(add_scaled(state, third, dt), controls, around, vehicle)
     middle = add_scaled(add_scaled(state, first, dt / 6.0), second, dt / 3.0)
     return normalised(add_scaled(add_scaled(middle, third, dt / 3.0), fourth, dt / 6.0))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 from flownav.errors import InputError
-from flownav.vehicle.feasibility import require_feasible
+from flownav.vehicle.feasibility import hover_induced_velocity, require_feasible
 from flownav.vehicle.multirotor_parameters import (
     MultirotorParameters,
     flatten_multirotor,
@@ -15,7 +16,7 @@ from flownav.vehicle.multirotor_parameters import (
 from flownav.vehicle.multirotor_schema import KIND, MultirotorFile
 from flownav.vehicle.multirotor_state import MultirotorState
 from flownav.vehicle.multirotor_trim import MultirotorTrim, is_hexa, trim_multirotor
-from flownav.vehicle.parameters import VehicleParameters, flatten
+from flownav.vehicle.parameters import VehicleParameters, flatten, without_slop
 from flownav.vehicle.schema import VehicleFile
 from flownav.vehicle.state import HelicopterState
 from flownav.vehicle.trim import Trim, trim
@@ -32,6 +33,17 @@ class RotorFacts(NamedTuple):
     speed_rad_s: float
     radius_m: float
     above_cg_m: float
+
+
+class Disc(NamedTuple):
+    """The vehicle's width [m], the disc that its rotors have together: diameter [m], height over the centre of gravity
+    [m], induced velocity in hover [m/s].
+    """
+
+    span_m: float
+    diameter_m: float
+    above_cg_m: float
+    induced_m_s: float
 
 
 def schema_of(contents: dict[str, Any], where: str) -> type[VehicleFile] | type[MultirotorFile]:
@@ -74,3 +86,20 @@ def rotors_of(vehicle: AnyVehicle) -> tuple[int, ...] | None:
     if not isinstance(vehicle, MultirotorParameters):
         return None
     return (0,) * (6 if is_hexa(vehicle) else 4)
+
+
+def disc_of(vehicle: AnyVehicle) -> Disc:
+    """The air that a vehicle fills and moves."""
+    if isinstance(vehicle, MultirotorParameters):
+        together = 2.0 * vehicle.radius_m * math.sqrt(vehicle.rotor_count)
+        induced = vehicle.hover_inflow_m * hover_speed(vehicle)
+        return Disc(2.0 * (1.0 / vehicle.per_arm_1_m + vehicle.radius_m), together, vehicle.rotors_above_cg_m, induced)
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    induced = hover_induced_velocity(weight, vehicle.main_thrust_slope_n_s_m, vehicle.main_inflow_speed_m_s)
+    width = 2.0 * vehicle.main_radius_m
+    return Disc(width, width, vehicle.hub_above_cg_m, induced)
+
+
+def as_the_paper_has_it(vehicle: AnyVehicle) -> AnyVehicle:
+    """The vehicle without what the paper's model does not know: slop of the servos."""
+    return vehicle if isinstance(vehicle, MultirotorParameters) else without_slop(vehicle)

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.vehicle import helicopter
+from flownav.vehicle.around import CALM
 from flownav.vehicle.complex_step import jacobian
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.state import Controls, HelicopterState, Inflow
@@ -46,9 +47,10 @@ def reduced_model(vehicle: VehicleParameters, about: Trim, *, freeze_inflow: boo
     def rates(point: Sequence[Any]) -> Sequence[Any]:
         state, controls = _displaced(about, point)
         rotation = helicopter.attitude(state)
-        air = helicopter.air_motion(state, rotation, 0.0, 0.0, 0.0)
-        induced = helicopter.inflow(air, helicopter.blade_angles(state, vehicle), vehicle) if held is None else held
-        rate = helicopter.derivative_at_inflow(state, controls, air, rotation, induced, vehicle)
+        air = helicopter.air_motion(state, rotation, CALM)
+        blades = helicopter.blade_angles(state, vehicle)
+        induced = helicopter.inflow(air, blades, 1.0, vehicle) if held is None else held
+        rate = helicopter.derivative_at_inflow(state, controls, air, rotation, induced, CALM, vehicle)
         return (rate.pos_n, rate.pos_e, rate.pos_d, rate.u, rate.v, rate.w)
 
     trim = about.state
@@ -67,8 +69,8 @@ def _displaced(about: Trim, point: Sequence[Any]) -> tuple[HelicopterState, Cont
 
 
 def _inflow_at(state: HelicopterState, vehicle: VehicleParameters) -> Inflow:
-    air = helicopter.air_motion(state, helicopter.attitude(state), 0.0, 0.0, 0.0)
-    return helicopter.inflow(air, helicopter.blade_angles(state, vehicle), vehicle)
+    air = helicopter.air_motion(state, helicopter.attitude(state), CALM)
+    return helicopter.inflow(air, helicopter.blade_angles(state, vehicle), 1.0, vehicle)
 
 
 def eigenvalues(a: Array) -> NDArray[np.complex128]:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from flownav.compile import equation
 from flownav.frames import Rotation, Vector, quaternion_rate, rotation_from_quaternion, to_body, to_earth
 from flownav.vehicle.airframe import AirMotion, Wrench, fuselage_drag
+from flownav.vehicle.around import Around, below_plane, plane_normal
 from flownav.vehicle.motors import battery_voltage, mixed, roots_of_shares, shaft_power, speed_rate, told_speed
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.multirotor_state import MultirotorState, Six, moved, of_unit_attitude, speeds_of, total_of
@@ -41,20 +42,27 @@ def attitude(state: MultirotorState) -> Rotation:
 
 
 @equation
-def air_motion(state: MultirotorState, rotation: Rotation, wind_n: float, wind_e: float, wind_d: float) -> AirMotion:
-    """Motion through the air; wind in earth NED [m/s], where the air goes."""
-    wind = to_body(rotation, wind_n, wind_e, wind_d)
-    return AirMotion(state.u - wind[0], state.v - wind[1], state.w - wind[2], state.p, state.q, state.r)
+def air_motion(state: MultirotorState, rotation: Rotation, around: Around) -> AirMotion:
+    """Motion through the air; a gradient of the air's velocity is a rotation that is not the vehicle's own."""
+    wind = to_body(rotation, around.wind_n_m_s, around.wind_e_m_s, around.wind_d_m_s)
+    turn = to_body(rotation, around.turn_n_rad_s, around.turn_e_rad_s, around.turn_d_rad_s)
+    return AirMotion(
+        state.u - wind[0], state.v - wind[1], state.w - wind[2],
+        state.p - turn[0], state.q - turn[1], state.r - turn[2],
+    )  # fmt: skip
 
 
 @equation
 def with_rotor(
     loads: RotorLoads, speed: float, x_m: float, y_m: float, sense: float, inplane_sq: float, horizontal_sq: float,
-    pos_d_m: float, down: Vector, air: AirMotion, vehicle: MultirotorParameters,
+    ground_m: float, normal: Vector, air: AirMotion, vehicle: MultirotorParameters,
 ) -> RotorLoads:  # fmt: skip
-    """The loads and one rotor's at a place; sense 1: it turns to the left. Each has its own air and its own ground."""
+    """The loads and one rotor's at a place; sense 1: it turns to the left. Each has its own air and its own ground.
+
+    ground_m: of the ground under this rotor over the centre of gravity, normal to the ground's plane.
+    """
     axial = air.w + air.p * y_m - air.q * x_m
-    height = vehicle.rotors_above_cg_m * down[2] - pos_d_m - down[0] * x_m - down[1] * y_m
+    height = vehicle.rotors_above_cg_m * normal[2] - ground_m - normal[0] * x_m - normal[1] * y_m
     one = propeller_load(speed, inplane_sq, axial, horizontal_sq, height, vehicle)
     return RotorLoads(
         loads.thrust_n + one.thrust_n,
@@ -68,21 +76,24 @@ def with_rotor(
 
 @equation
 def rotor_loads(
-    speeds: Six, pos_d_m: float, down: Vector, air: AirMotion, hexa: bool, vehicle: MultirotorParameters
-) -> RotorLoads:
-    """All rotors' loads."""
+    speeds: Six, below_m: float, down: Vector, normal: Vector, air: AirMotion, hexa: bool, around: Around,
+    vehicle: MultirotorParameters,
+) -> RotorLoads:  # fmt: skip
+    """All rotors' loads; below_m: of the centre of gravity under the ground's plane."""
     inplane_sq = air.u * air.u + air.v * air.v
     sinking = air.u * down[0] + air.v * down[1] + air.w * down[2]
-    horizontal_sq = inplane_sq + air.w * air.w - sinking * sinking
-    x = vehicle
+    flat_sq = inplane_sq + air.w * air.w - sinking * sinking
+    x, a, c = vehicle, around, around.cosine
+    one, two, three, four = below_m + a.rotor_1_m, below_m + a.rotor_2_m, below_m + a.rotor_3_m, below_m + a.rotor_4_m
     loads = NO_LOADS
-    loads = with_rotor(loads, speeds.one, x.x_1_m, x.y_1_m, 1.0, inplane_sq, horizontal_sq, pos_d_m, down, air, x)
-    loads = with_rotor(loads, speeds.two, x.x_2_m, x.y_2_m, -1.0, inplane_sq, horizontal_sq, pos_d_m, down, air, x)
-    loads = with_rotor(loads, speeds.three, x.x_3_m, x.y_3_m, 1.0, inplane_sq, horizontal_sq, pos_d_m, down, air, x)
-    loads = with_rotor(loads, speeds.four, x.x_4_m, x.y_4_m, -1.0, inplane_sq, horizontal_sq, pos_d_m, down, air, x)
+    loads = with_rotor(loads, speeds.one, x.x_1_m, x.y_1_m, 1.0, inplane_sq, flat_sq, c * one, normal, air, x)
+    loads = with_rotor(loads, speeds.two, x.x_2_m, x.y_2_m, -1.0, inplane_sq, flat_sq, c * two, normal, air, x)
+    loads = with_rotor(loads, speeds.three, x.x_3_m, x.y_3_m, 1.0, inplane_sq, flat_sq, c * three, normal, air, x)
+    loads = with_rotor(loads, speeds.four, x.x_4_m, x.y_4_m, -1.0, inplane_sq, flat_sq, c * four, normal, air, x)
     if hexa:
-        loads = with_rotor(loads, speeds.five, x.x_5_m, x.y_5_m, 1.0, inplane_sq, horizontal_sq, pos_d_m, down, air, x)
-        loads = with_rotor(loads, speeds.six, x.x_6_m, x.y_6_m, -1.0, inplane_sq, horizontal_sq, pos_d_m, down, air, x)
+        five, six = below_m + a.rotor_5_m, below_m + a.rotor_6_m
+        loads = with_rotor(loads, speeds.five, x.x_5_m, x.y_5_m, 1.0, inplane_sq, flat_sq, c * five, normal, air, x)
+        loads = with_rotor(loads, speeds.six, x.x_6_m, x.y_6_m, -1.0, inplane_sq, flat_sq, c * six, normal, air, x)
     return loads
 
 
@@ -126,29 +137,34 @@ def total_power(speeds: Six, vehicle: MultirotorParameters) -> float:
 
 @equation
 def derivative_at_roots(
-    state: MultirotorState, roots: Six, wind_n: float, wind_e: float, wind_d: float, hexa: bool,
-    vehicle: MultirotorParameters,
-) -> MultirotorState:  # fmt: skip
-    """The rates of the state while the mixer asks each rotor for a share of its full thrust; `roots_of_shares`."""
+    state: MultirotorState, roots: Six, around: Around, hexa: bool, vehicle: MultirotorParameters
+) -> MultirotorState:
+    """The rates of the state while the mixer asks each rotor for a share of its full thrust; cut, the motors stop.
+
+    roots: `roots_of_shares`.
+    """
     rotation = attitude(state)
     down = (rotation[6], rotation[7], rotation[8])
     velocity, rates = (state.u, state.v, state.w), (state.p, state.q, state.r)
-    air = air_motion(state, rotation, wind_n, wind_e, wind_d)
+    air = air_motion(state, rotation, around)
     speeds = speeds_of(state)
     power = total_power(speeds, vehicle)
     voltage = battery_voltage(power, state.used, vehicle)
+    driving = voltage * around.engine
     spins = Six(
-        speed_rate(speeds.one, told_speed(roots.one, voltage, vehicle), vehicle),
-        speed_rate(speeds.two, told_speed(roots.two, voltage, vehicle), vehicle),
-        speed_rate(speeds.three, told_speed(roots.three, voltage, vehicle), vehicle),
-        speed_rate(speeds.four, told_speed(roots.four, voltage, vehicle), vehicle),
-        speed_rate(speeds.five, told_speed(roots.five, voltage, vehicle), vehicle) if hexa else 0.0,
-        speed_rate(speeds.six, told_speed(roots.six, voltage, vehicle), vehicle) if hexa else 0.0,
+        speed_rate(speeds.one, told_speed(roots.one, driving, vehicle), vehicle),
+        speed_rate(speeds.two, told_speed(roots.two, driving, vehicle), vehicle),
+        speed_rate(speeds.three, told_speed(roots.three, driving, vehicle), vehicle),
+        speed_rate(speeds.four, told_speed(roots.four, driving, vehicle), vehicle),
+        speed_rate(speeds.five, told_speed(roots.five, driving, vehicle), vehicle) if hexa else 0.0,
+        speed_rate(speeds.six, told_speed(roots.six, driving, vehicle), vehicle) if hexa else 0.0,
     )
-    loads = rotor_loads(speeds, state.pos_d, down, air, hexa, vehicle)
+    normal = plane_normal(rotation, around)
+    below = below_plane(state.pos_n, state.pos_e, state.pos_d, around)
+    loads = rotor_loads(speeds, below, down, normal, air, hexa, around, vehicle)
     free = free_wrench(loads, to_the_left(speeds), to_the_left(spins), down, air, vehicle)
-    feet = support(state.pos_d, down, velocity, rates, vehicle)
-    total = with_friction(with_support(free, feet, down, vehicle), feet, velocity, rates, vehicle)
+    feet = support(below, normal, velocity, rates, around, vehicle)
+    total = with_friction(with_support(free, feet, normal, vehicle), feet, velocity, rates, vehicle)
     return MultirotorState(
         *to_earth(rotation, state.u, state.v, state.w),
         *linear_acceleration(velocity, rates, (total.x, total.y, total.z), vehicle.mass_kg),
@@ -166,37 +182,34 @@ def derivative_at_roots(
 
 @equation
 def derivative(
-    state: MultirotorState, controls: Controls, wind_n: float, wind_e: float, wind_d: float, hexa: bool,
-    vehicle: MultirotorParameters,
-) -> MultirotorState:  # fmt: skip
-    """The rates of the state; wind in earth NED [m/s]."""
-    roots = roots_of_shares(mixed(controls, hexa, vehicle), hexa)
-    return derivative_at_roots(state, roots, wind_n, wind_e, wind_d, hexa, vehicle)
+    state: MultirotorState, controls: Controls, around: Around, hexa: bool, vehicle: MultirotorParameters
+) -> MultirotorState:
+    """The rates of the state."""
+    return derivative_at_roots(state, roots_of_shares(mixed(controls, hexa, vehicle), hexa), around, hexa, vehicle)
 
 
 @equation
-def outputs(
-    state: MultirotorState, wind_n: float, wind_e: float, wind_d: float, hexa: bool, vehicle: MultirotorParameters
-) -> Outputs:
+def outputs(state: MultirotorState, around: Around, hexa: bool, vehicle: MultirotorParameters) -> Outputs:
     """What the state implies: all rotors' thrust in ground effect, torque on the body, shaft power; feet's force."""
     rotation = attitude(state)
     down = (rotation[6], rotation[7], rotation[8])
-    air = air_motion(state, rotation, wind_n, wind_e, wind_d)
+    air = air_motion(state, rotation, around)
     speeds = speeds_of(state)
-    loads = rotor_loads(speeds, state.pos_d, down, air, hexa, vehicle)
-    feet = support(state.pos_d, down, (state.u, state.v, state.w), (state.p, state.q, state.r), vehicle)
+    normal = plane_normal(rotation, around)
+    below = below_plane(state.pos_n, state.pos_e, state.pos_d, around)
+    loads = rotor_loads(speeds, below, down, normal, air, hexa, around, vehicle)
+    feet = support(below, normal, (state.u, state.v, state.w), (state.p, state.q, state.r), around, vehicle)
     induced = vehicle.hover_inflow_m * total_of(speeds) / vehicle.rotor_count
     return Outputs(loads.thrust_n, loads.yaw_n_m, total_power(speeds, vehicle), induced, feet.normal_n)
 
 
 @equation
 def step(
-    state: MultirotorState, controls: Controls, wind_n: float, wind_e: float, wind_d: float, dt: float, hexa: bool,
-    vehicle: MultirotorParameters,
-) -> MultirotorState:  # fmt: skip
-    """The state `dt` seconds later by the midpoint rule, controls and wind held."""
+    state: MultirotorState, controls: Controls, around: Around, dt: float, hexa: bool, vehicle: MultirotorParameters
+) -> MultirotorState:
+    """The state `dt` seconds later by the midpoint rule, controls and surroundings held."""
     roots = roots_of_shares(mixed(controls, hexa, vehicle), hexa)
-    first = derivative_at_roots(state, roots, wind_n, wind_e, wind_d, hexa, vehicle)
+    first = derivative_at_roots(state, roots, around, hexa, vehicle)
     middle = moved(state, first, 0.5 * dt)
-    second = derivative_at_roots(middle, roots, wind_n, wind_e, wind_d, hexa, vehicle)
+    second = derivative_at_roots(middle, roots, around, hexa, vehicle)
     return of_unit_attitude(moved(state, second, dt))

@@ -14,6 +14,7 @@ import numpy as np
 from flownav.errors import InputError
 from flownav.frames import Vector, quaternion_from_euler
 from flownav.vehicle import multirotor
+from flownav.vehicle.around import CALM
 from flownav.vehicle.complex_step import solve, value
 from flownav.vehicle.motors import battery_voltage
 from flownav.vehicle.multirotor_parameters import MultirotorParameters, hover_speed
@@ -60,8 +61,8 @@ def trim_multirotor(
     wanted = f"trim at u, v, w = {vel_body_m_s[0]:g}, {vel_body_m_s[1]:g}, {vel_body_m_s[2]:g} m/s"
     found = solve(residual, start, 1e2 * TOLERANCE, f"{wanted}: the rotors do not allow it; ask for a slower flight")
     state, controls = flight([float(x) for x in found])
-    out = multirotor.outputs(state, 0.0, 0.0, 0.0, hexa, vehicle)
-    rate = multirotor.derivative(state, controls, 0.0, 0.0, 0.0, hexa, vehicle)
+    out = multirotor.outputs(state, CALM, hexa, vehicle)
+    rate = multirotor.derivative(state, controls, CALM, hexa, vehicle)
     return MultirotorTrim(
         roll_rad=float(found[4]),
         pitch_rad=float(found[5]),
@@ -98,7 +99,7 @@ def accelerations(rate: MultirotorState, count: int) -> tuple[Any, ...]:
 
 
 def _rate(state: MultirotorState, controls: Controls, hexa: bool, vehicle: MultirotorParameters) -> MultirotorState:
-    return multirotor.derivative(state, controls, 0.0, 0.0, 0.0, hexa, vehicle)
+    return multirotor.derivative(state, controls, CALM, hexa, vehicle)
 
 
 def parked_multirotor(vehicle: MultirotorParameters) -> MultirotorState:

@@ -8,6 +8,8 @@ from typing import NamedTuple
 from flownav.vehicle.multirotor_schema import MultirotorFile
 from flownav.vehicle.schema import Actuator, VehicleFile
 
+ROTOR_INERTIA = 1.15  # of all that turns with the main rotor, over that of its blades, where a file says none
+
 
 class VehicleParameters(NamedTuple):
     """A helicopter, SI units and radians; what is derived from the file says how.
@@ -34,12 +36,16 @@ class VehicleParameters(NamedTuple):
     main_profile_torque_n_m: float
     main_inplane_drag_n_s_m: float  # H-force per in-plane airspeed, ρ·b·c·R·ΩR·C_D0/4
     main_lift_solidity: float  # a·σ
+    main_disc_kg_m: float  # 2ρA·η_w
+    per_main_speed_s_rad: float  # 1/Ω; of what a kernel would divide by at every stage, the reciprocal
+    per_inflow_mass_1_kg: float  # of the air that the rotor drags along, factor·ρπR³
     hub_stiffness_n_m_rad: float
     hub_above_cg_m: float
     flap_rate_1_s: float  # 1/τ_f = γ·Ω/16, Lock number γ = ρ·a·c·R⁴/I_β
     flap_response: float  # K_μ, flapping per in-plane airspeed against the ideal rotor
     # tail rotor
     tail_speed_rad_s: float
+    tail_gear: float  # its speed over the main rotor's
     tail_tip_speed_m_s: float
     tail_inflow_speed_m_s: float
     tail_thrust_slope_n_s_m: float
@@ -72,18 +78,25 @@ class VehicleParameters(NamedTuple):
     cyclic_rate_limit_rad_s: float
     cyclic_min_rad: float
     cyclic_max_rad: float
+    cyclic_dead_band_rad: float
     collective_frequency_rad_s: float
     collective_damping_ratio: float
     collective_rate_limit_rad_s: float
     collective_min_rad: float
     collective_max_rad: float
+    collective_dead_band_rad: float
     pedal_frequency_rad_s: float
     pedal_damping_ratio: float
     pedal_rate_limit_rad_s: float
     pedal_min_rad: float
     pedal_max_rad: float
+    pedal_dead_band_rad: float
     # drive
     shaft_power_limit_w: float
+    rotor_inertia_kg_m2: float
+    per_rotor_inertia_1_kg_m2: float
+    governor_w_s_rad: float
+    governor_integral_w_rad: float
 
 
 class TouchdownLimits(NamedTuple):
@@ -113,6 +126,7 @@ def flatten(file: VehicleFile) -> VehicleParameters:
     main_solidity = main_area / (math.pi * main.radius_m**2)
     tail_solidity = tail_area / (math.pi * tail.radius_m**2)
     lock_number = rho * main.lift_slope_per_rad * main.chord_m * main.radius_m**4 / main.blade_flap_inertia_kg_m2
+    inertia = file.drive.rotor_inertia_kg_m2 or ROTOR_INERTIA * main.blade_count * main.blade_flap_inertia_kg_m2
     return VehicleParameters(
         gravity_m_s2=air.gravity_m_s2,
         air_density_kg_m3=rho,
@@ -129,11 +143,15 @@ def flatten(file: VehicleFile) -> VehicleParameters:
         main_profile_torque_n_m=rho * main_area * main.radius_m * main_tip**2 * main.profile_drag_coefficient / 8.0,
         main_inplane_drag_n_s_m=rho * main_area * main_tip * main.profile_drag_coefficient / 4.0,
         main_lift_solidity=main.lift_slope_per_rad * main_solidity,
+        main_disc_kg_m=2.0 * rho * math.pi * main.radius_m**2 * main.wake_efficiency,
+        per_main_speed_s_rad=1.0 / main.speed_rad_s,
+        per_inflow_mass_1_kg=1.0 / (main.inflow_mass_factor * rho * math.pi * main.radius_m**3),
         hub_stiffness_n_m_rad=main.hub_stiffness_n_m_rad,
         hub_above_cg_m=main.hub_above_cg_m,
         flap_rate_1_s=lock_number * main.speed_rad_s / 16.0,
         flap_response=main.flap_response,
         tail_speed_rad_s=tail_speed,
+        tail_gear=tail.gear_ratio,
         tail_tip_speed_m_s=tail_tip,
         tail_inflow_speed_m_s=tail.lift_slope_per_rad * tail_solidity * tail_tip / (8.0 * tail.wake_efficiency),
         tail_thrust_slope_n_s_m=rho * tail.lift_slope_per_rad * tail_area * tail_tip / 4.0,
@@ -162,7 +180,16 @@ def flatten(file: VehicleFile) -> VehicleParameters:
         **_actuator("collective", file.collective),
         **_actuator("pedal", file.pedal),
         shaft_power_limit_w=file.drive.shaft_power_limit_w,
+        rotor_inertia_kg_m2=inertia,
+        per_rotor_inertia_1_kg_m2=1.0 / inertia,
+        governor_w_s_rad=file.drive.governor_gain_s_rad * file.drive.shaft_power_limit_w,
+        governor_integral_w_rad=file.drive.governor_integral_1_rad * file.drive.shaft_power_limit_w,
     )
+
+
+def without_slop(vehicle: VehicleParameters) -> VehicleParameters:
+    """The vehicle whose servos answer every error: linear about a trim, and the paper's."""
+    return vehicle._replace(cyclic_dead_band_rad=0.0, collective_dead_band_rad=0.0, pedal_dead_band_rad=0.0)
 
 
 def _actuator(name: str, servo: Actuator) -> dict[str, float]:
@@ -173,4 +200,5 @@ def _actuator(name: str, servo: Actuator) -> dict[str, float]:
         f"{name}_rate_limit_rad_s": math.radians(servo.rate_limit_deg_s),
         f"{name}_min_rad": math.radians(servo.minimum_deg),
         f"{name}_max_rad": math.radians(servo.maximum_deg),
+        f"{name}_dead_band_rad": math.radians(servo.dead_band_deg),
     }

@@ -1,7 +1,9 @@
 """The whole vehicle as a linear plant about hover: what its controller sees, with exact derivatives.
 
-Unlike the reduced model of `linearize`, nothing is held: attitude, body rates, flapping and the servos, or the
-rotors' speeds, are states.
+Unlike the reduced model of `linearize`, little is held: attitude, body rates, flapping and the servos, or the rotors'
+speeds, are states. A helicopter's rotor keeps its speed in `hover_plant`, as a perfect governor would have it, and its
+inflow is held or in balance at once; in `rotor_plant` inflow, rotor speed and governor are states, too. Servos answer
+every error: slop has no derivative.
 The attitude is a small rotation about the body axes, so that the plant has no state for a quaternion's length.
 """
 
@@ -15,12 +17,15 @@ from numpy.typing import NDArray
 
 from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.vehicle import helicopter, multirotor
+from flownav.vehicle.around import CALM
 from flownav.vehicle.complex_step import jacobian
 from flownav.vehicle.kinds import AnyState, AnyTrim, AnyVehicle
 from flownav.vehicle.linearize import BESIDE_HOVER_M_S
 from flownav.vehicle.multirotor_parameters import MultirotorParameters, with_inflow_held
 from flownav.vehicle.multirotor_trim import is_hexa
+from flownav.vehicle.parameters import VehicleParameters, without_slop
 from flownav.vehicle.state import Controls, HelicopterState
+from flownav.vehicle.trim import Trim
 
 FIELDS = HelicopterState._fields
 ATTITUDE = slice(FIELDS.index("qw"), FIELDS.index("qw") + 4)
@@ -36,7 +41,8 @@ Complex = NDArray[np.complex128]
 class LinearPlant(NamedTuple):
     """ẋ = A·x + B·u, y = C·x about hover: A (n, n), B (n, 4), C (12, n); u in INPUTS, y in OUTPUTS, SI, radians.
 
-    n is 22 of a helicopter, 16 of a quad and 18 of a hexa, whose controls are shares of thrust (`motors`).
+    n is 22 of a helicopter (25 with its rotor), 16 of a quad and 18 of a hexa, whose controls are shares of thrust
+    (`motors`).
     """
 
     a: Array
@@ -50,7 +56,21 @@ def hover_plant(vehicle: AnyVehicle, about: AnyTrim, *, freeze_inflow: bool = Fa
     freeze_inflow: the induced velocities keep their trim values, the plant of the first 50 ms; else they are in
     balance at once, the plant of all that is slower. A rotor is between the two.
     """
-    rates = _rates(vehicle, about, freeze_inflow=freeze_inflow)
+    return _linear(_rates(vehicle, about, freeze_inflow=freeze_inflow), about, _kept(vehicle, len(about.state)))
+
+
+def rotor_plant(vehicle: VehicleParameters, about: Trim) -> LinearPlant:
+    """A helicopter's plant about a trim with the lag of its inflow, the droop of its rotor and its governor."""
+    stiff = without_slop(vehicle)
+
+    def rates(state: HelicopterState, controls: Controls, n: float, e: float) -> HelicopterState:
+        return helicopter.derivative(state, controls, CALM._replace(wind_n_m_s=n, wind_e_m_s=e), stiff)
+
+    return _linear(rates, about, list(range(len(about.state))))
+
+
+def _linear(rates: Callable[..., Sequence[Any]], about: AnyTrim, kept: list[int]) -> LinearPlant:
+    """A and B of rates of (state, controls, wind north, wind east) about a trim; the `kept` fields move."""
     trim, kind = np.array([float(x) for x in about.state]), type(about.state)
     count = len(trim)
 
@@ -62,7 +82,7 @@ def hover_plant(vehicle: AnyVehicle, about: AnyTrim, *, freeze_inflow: bool = Fa
     aside[FIELDS.index("u")] = BESIDE_HOVER_M_S  # the fins' lift has a kink in hover (see linearize)
     both = 0.5 * (jacobian(displaced, here + aside) + jacobian(displaced, here - aside))
     seen = jacobian(lambda point: _outputs(kind(*point)), trim)
-    out, into = _small_rotation(trim[ATTITUDE], _kept(vehicle, count), count)
+    out, into = _small_rotation(trim[ATTITUDE], kept, count)
     return LinearPlant(into @ both[:, :count] @ out, into @ both[:, count:], seen @ out)
 
 
@@ -92,25 +112,30 @@ def _rates(vehicle: AnyVehicle, about: AnyTrim, *, freeze_inflow: bool) -> Calla
     if isinstance(vehicle, MultirotorParameters):
         flown = with_inflow_held(vehicle) if freeze_inflow else vehicle
         hexa = is_hexa(vehicle)
-        return lambda state, controls, n, e: multirotor.derivative(state, controls, n, e, 0.0, hexa, flown)
-    if not freeze_inflow:
-        return lambda state, controls, n, e: helicopter.derivative(state, controls, n, e, 0.0, vehicle)
+        return lambda state, controls, n, e: multirotor.derivative(
+            state, controls, CALM._replace(wind_n_m_s=n, wind_e_m_s=e), hexa, flown
+        )
+    stiff = without_slop(vehicle)
     trim: Any = about.state
-    air = helicopter.air_motion(trim, helicopter.attitude(trim), 0.0, 0.0, 0.0)
-    held = helicopter.inflow(air, helicopter.blade_angles(trim, vehicle), vehicle)
+    held = helicopter.inflow_of(trim, CALM, stiff)
 
-    def with_inflow(state: HelicopterState, controls: Controls, n: float, e: float) -> HelicopterState:
+    def of_helicopter(state: HelicopterState, controls: Controls, n: float, e: float) -> HelicopterState:
+        around = CALM._replace(wind_n_m_s=n, wind_e_m_s=e)
+        if not freeze_inflow:
+            return helicopter.derivative_in_balance(state, controls, around, stiff)
         rotation = helicopter.attitude(state)
-        moving = helicopter.air_motion(state, rotation, n, e, 0.0)
-        return helicopter.derivative_at_inflow(state, controls, moving, rotation, held, vehicle)
+        moving = helicopter.air_motion(state, rotation, around)
+        return helicopter.derivative_at_inflow(state, controls, moving, rotation, held, around, stiff)
 
-    return with_inflow
+    return of_helicopter
 
 
 def _kept(vehicle: AnyVehicle, count: int) -> list[int]:
-    """Which fields of the state move about hover: not the rotors that a quad has not, nor the battery's charge."""
+    """Which fields of the state move about hover: not a helicopter's inflow and rotor speed, not the rotors that a quad
+    has not, nor the battery's charge.
+    """
     if not isinstance(vehicle, MultirotorParameters):
-        return list(range(count))
+        return list(range(FIELDS.index("inflow")))
     return list(range(FIELDS.index("r") + 1 + int(vehicle.rotor_count)))
 
 

@@ -5,7 +5,7 @@ thrust (main rotor: w_a, positive in descent; tail rotor: sideways velocity to t
 `inplane` velocity. Velocities are in m/s throughout; the reference's λ0 = v_i/ΩR, μ = V_inplane/ΩR, μ_z = axial/ΩR.
 
 Uniform inflow, no stall but a limit on thrust, no vortex ring: valid while descending slower than about half the
-induced velocity.
+induced velocity. The main rotor's inflow takes time (`drive`); here is where it goes.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from flownav.vehicle.parameters import VehicleParameters
 HYPOTENUSE = 2.0 * (2.0**0.5 - 1.0)  # (a² + b² + this·a·b)/(a + b) is √(a² + b²), within 1 %
 STILL_AIR_SQ = 1e-12  # [m2/s2] keeps a rotor in dead air from dividing by zero
 SMALLEST_SLOPE_SQ = 1e-30
+SLOWEST = 0.05  # of the governed speed
 
 
 class Rotor(NamedTuple):
@@ -34,28 +35,34 @@ class Rotor(NamedTuple):
 
 
 @equation
-def main_rotor(vehicle: VehicleParameters) -> Rotor:
-    """The main rotor of a vehicle."""
+def speed_ratio(speed_rad_s: float, vehicle: VehicleParameters) -> float:
+    """The main rotor's speed over what its governor keeps; a rotor that all but stands has a twentieth."""
+    return larger(speed_rad_s * vehicle.per_main_speed_s_rad, SLOWEST)
+
+
+@equation
+def main_rotor(vehicle: VehicleParameters, ratio: float) -> Rotor:
+    """The main rotor of a vehicle at a ratio of its governed speed."""
     return Rotor(
-        vehicle.main_speed_rad_s,
-        vehicle.main_tip_speed_m_s,
-        vehicle.main_inflow_speed_m_s,
-        vehicle.main_thrust_slope_n_s_m,
-        vehicle.main_thrust_limit_n,
-        vehicle.main_profile_torque_n_m,
+        vehicle.main_speed_rad_s * ratio,
+        vehicle.main_tip_speed_m_s * ratio,
+        vehicle.main_inflow_speed_m_s * ratio,
+        vehicle.main_thrust_slope_n_s_m * ratio,
+        vehicle.main_thrust_limit_n * (ratio * ratio),
+        vehicle.main_profile_torque_n_m * (ratio * ratio),
     )
 
 
 @equation
-def tail_rotor(vehicle: VehicleParameters) -> Rotor:
-    """The tail rotor of a vehicle."""
+def tail_rotor(vehicle: VehicleParameters, ratio: float) -> Rotor:
+    """The tail rotor of a vehicle, geared to the main rotor at a ratio of its governed speed."""
     return Rotor(
-        vehicle.tail_speed_rad_s,
-        vehicle.tail_tip_speed_m_s,
-        vehicle.tail_inflow_speed_m_s,
-        vehicle.tail_thrust_slope_n_s_m,
-        vehicle.tail_thrust_limit_n,
-        vehicle.tail_profile_torque_n_m,
+        vehicle.tail_speed_rad_s * ratio,
+        vehicle.tail_tip_speed_m_s * ratio,
+        vehicle.tail_inflow_speed_m_s * ratio,
+        vehicle.tail_thrust_slope_n_s_m * ratio,
+        vehicle.tail_thrust_limit_n * (ratio * ratio),
+        vehicle.tail_profile_torque_n_m * (ratio * ratio),
     )
 
 

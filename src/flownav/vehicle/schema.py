@@ -44,6 +44,7 @@ class MainRotor(ParameterModel):
     hub_stiffness_n_m_rad: Number = Field(ge=0.0, lt=1e5)
     hub_above_cg_m: Number = Field(gt=0.0, lt=3.0)
     flap_response: Number = Field(ge=0.0, le=1.5)
+    inflow_mass_factor: Number = Field(0.849, ge=0.2, le=2.0)
 
 
 class TailRotor(ParameterModel):
@@ -99,19 +100,27 @@ class Skids(ParameterModel):
 
 
 class Actuator(ParameterModel):
-    """A servo as seen at the blade: second order, with travel and rate limits."""
+    """A servo as seen at the blade: second order, with travel and rate limits, and a dead band."""
 
     frequency_rad_s: Number = Field(gt=2.0, lt=400.0)
     damping_ratio: Number = Field(gt=0.2, lt=2.0)
     rate_limit_deg_s: Number = Field(gt=5.0, lt=5000.0)
     minimum_deg: Number = Field(gt=-45.0, le=0.0)
     maximum_deg: Number = Field(gt=1.0, lt=45.0)
+    dead_band_deg: Number = Field(0.0, ge=0.0, lt=2.0)
 
 
 class Drive(ParameterModel):
-    """What the motor can give to both rotors."""
+    """What the motor can give to both rotors, what turns with them, and the governor that keeps their speed.
+
+    Gains are shares of the power limit, per rad/s that the main rotor is slow and per rad that it has fallen behind;
+    where a file says none they are Gavrilets' X-Cell's. rotor_inertia 0: from the blades'.
+    """
 
     shaft_power_limit_w: Number = Field(gt=10.0, lt=1e6)
+    rotor_inertia_kg_m2: Number = Field(0.0, ge=0.0, lt=1e4)
+    governor_gain_s_rad: Number = Field(0.01, gt=0.0, lt=10.0)
+    governor_integral_1_rad: Number = Field(0.02, ge=0.0, lt=10.0)
 
 
 class Touchdown(ParameterModel):

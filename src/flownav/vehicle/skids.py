@@ -1,4 +1,6 @@
-"""Skid contact with flat ground at down = 0: four unilateral sprung feet, and dry friction that really sticks.
+"""Skid contact with the ground: four unilateral sprung feet, and dry friction that really sticks.
+
+The ground is a plane, level or not, and what each foot finds over it (a step, a stone): `around.Around`.
 
 The feet push and never pull. Their damping comes in over the first 2 mm, so the force has no jump at touch.
 
@@ -18,6 +20,7 @@ import numpy as np
 from flownav.compile import clamp, equation, larger, smaller
 from flownav.frames import Vector
 from flownav.vehicle.airframe import Wrench
+from flownav.vehicle.around import Around
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.parameters import VehicleParameters
 
@@ -44,37 +47,43 @@ def foot_force(depth: float, sink: float, vehicle: OnFeet) -> float:
 
 
 @equation
-def support(pos_d: float, down: Vector, velocity: Vector, rates: Vector, vehicle: OnFeet) -> Support:
+def support(below: float, normal: Vector, velocity: Vector, rates: Vector, around: Around, vehicle: OnFeet) -> Support:
     """The normal forces of the four feet at (±half_length, ±half_track, cg_above_skid), body axes.
 
-    A foot at r is pos_d + down·r deep and sinks at down·(velocity + rates × r).
+    below: of the centre of gravity under the ground's plane [m] (`around.below_plane`), normal: into the ground, body
+    axes. A foot at r is below·cosine + normal·r deep, and what it finds over the plane; it sinks at
+    normal·(velocity + rates × r).
     """
     x, y, z = vehicle.skid_half_length_m, vehicle.skid_half_track_m, vehicle.cg_above_skid_m
     p, q, r = rates
-    depth = pos_d + down[2] * z
-    depth_x, depth_y = down[0] * x, down[1] * y
-    turn_x, turn_y = (down[1] * r - down[2] * q) * x, (down[2] * p - down[0] * r) * y
-    sink = down[0] * velocity[0] + down[1] * velocity[1] + down[2] * velocity[2] + (down[0] * q - down[1] * p) * z
-    front_right = foot_force(depth + depth_x + depth_y, sink + turn_x + turn_y, vehicle)
-    front_left = foot_force(depth + depth_x - depth_y, sink + turn_x - turn_y, vehicle)
-    rear_right = foot_force(depth - depth_x + depth_y, sink - turn_x + turn_y, vehicle)
-    rear_left = foot_force(depth - depth_x - depth_y, sink - turn_x - turn_y, vehicle)
+    level = around.cosine
+    depth = below * level + normal[2] * z
+    depth_x, depth_y = normal[0] * x, normal[1] * y
+    turn_x, turn_y = (normal[1] * r - normal[2] * q) * x, (normal[2] * p - normal[0] * r) * y
+    sink = (
+        normal[0] * velocity[0] + normal[1] * velocity[1] + normal[2] * velocity[2]
+        + (normal[0] * q - normal[1] * p) * z
+    )  # fmt: skip
+    front_right = foot_force(depth + depth_x + depth_y + level * around.foot_1_m, sink + turn_x + turn_y, vehicle)
+    front_left = foot_force(depth + depth_x - depth_y + level * around.foot_2_m, sink + turn_x - turn_y, vehicle)
+    rear_right = foot_force(depth - depth_x + depth_y + level * around.foot_3_m, sink - turn_x + turn_y, vehicle)
+    rear_left = foot_force(depth - depth_x - depth_y + level * around.foot_4_m, sink - turn_x - turn_y, vehicle)
     front, rear = front_right + front_left, rear_right + rear_left
     right, left = front_right + rear_right, front_left + rear_left
     return Support(front + rear, (front - rear) * x, (right - left) * y)
 
 
 @equation
-def with_support(free: Wrench, feet: Support, down: Vector, vehicle: OnFeet) -> Wrench:
-    """The free wrench and the feet's normal forces, which act upwards: -N·down at the feet."""
+def with_support(free: Wrench, feet: Support, normal: Vector, vehicle: OnFeet) -> Wrench:
+    """The free wrench and the feet's normal forces, which act out of the ground: -N·normal at the feet."""
     z = feet.normal_n * vehicle.cg_above_skid_m
     return Wrench(
-        free.x - feet.normal_n * down[0],
-        free.y - feet.normal_n * down[1],
-        free.z - feet.normal_n * down[2],
-        free.l + (z * down[1] - feet.right_n_m * down[2]),
-        free.m + (feet.forward_n_m * down[2] - z * down[0]),
-        free.n + (feet.right_n_m * down[0] - feet.forward_n_m * down[1]),
+        free.x - feet.normal_n * normal[0],
+        free.y - feet.normal_n * normal[1],
+        free.z - feet.normal_n * normal[2],
+        free.l + (z * normal[1] - feet.right_n_m * normal[2]),
+        free.m + (feet.forward_n_m * normal[2] - z * normal[0]),
+        free.n + (feet.right_n_m * normal[0] - feet.forward_n_m * normal[1]),
     )
 
 

@@ -12,9 +12,10 @@ from flownav.compile import equation, magnitude, stepping
 class HelicopterState(NamedTuple):
     """The helicopter's state; of its rates where a function says so (then every unit is per second).
 
-    pos: centre of gravity, earth NED [m], the ground at pos_d = 0. u, v, w: velocity, body FRD [m/s]. qw..qz:
+    pos: centre of gravity, earth NED [m], level ground at pos_d = 0. u, v, w: velocity, body FRD [m/s]. qw..qz:
     attitude, body to earth. p, q, r: body rates [rad/s]. a1, b1: flapping, back and right [rad]. lon, lat, col,
-    ped: servo positions, as blade angles [rad], and their rates [rad/s].
+    ped: servo positions, as blade angles [rad], and their rates [rad/s]. inflow: the main rotor's induced velocity
+    [m/s]. speed: of the main rotor [rad/s]; the tail rotor is geared to it. governed: the governor's integral [W].
     """
 
     pos_n: float
@@ -40,6 +41,9 @@ class HelicopterState(NamedTuple):
     lat_rate: float
     col_rate: float
     ped_rate: float
+    inflow: float
+    speed: float
+    governed: float
 
 
 class Controls(NamedTuple):
@@ -56,6 +60,15 @@ class Inflow(NamedTuple):
 
     main: float
     tail: float
+
+
+class RotorLoads(NamedTuple):
+    """Thrust out of ground effect [N] and torque [N m] of the main and the tail rotor."""
+
+    lift_n: float
+    torque_n_m: float
+    tail_n: float
+    tail_torque_n_m: float
 
 
 class Outputs(NamedTuple):
@@ -108,4 +121,7 @@ def normalised(state: HelicopterState) -> HelicopterState:
         settled(state.lat_rate),
         settled(state.col_rate),
         settled(state.ped_rate),
+        settled(state.inflow),
+        state.speed,
+        settled(state.governed),
     )

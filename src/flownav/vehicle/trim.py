@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from flownav.errors import InputError
 from flownav.frames import Vector, quaternion_from_euler
 from flownav.vehicle import helicopter
+from flownav.vehicle.around import CALM
 from flownav.vehicle.complex_step import solve, value
 from flownav.vehicle.feasibility import hover_induced_velocity, hover_pitch
 from flownav.vehicle.parameters import VehicleParameters
@@ -48,13 +49,28 @@ class Trim(NamedTuple):
 
 
 def settled_state(
-    pos_d_m: float, vel_body_m_s: Vector, roll: float, pitch: float, a1: float, b1: float, controls: Controls
-) -> HelicopterState:
-    """A state over the origin, heading north, without rates, its servos where the controls ask them to be."""
+    pos_d_m: float, vel_body_m_s: Vector, roll: float, pitch: float, a1: float, b1: float, controls: Controls,
+    vehicle: VehicleParameters,
+) -> HelicopterState:  # fmt: skip
+    """A state over the origin, heading north, without rates, its servos where the controls ask them to be.
+
+    The rotor has its governed speed; its inflow and what the governor gives are still to be found (`with_rotor`).
+    """
     u, v, w = vel_body_m_s
     qw, qx, qy, qz = quaternion_from_euler(roll, pitch, 0.0)
     still = (0.0, 0.0, 0.0)
-    return HelicopterState(0.0, 0.0, pos_d_m, u, v, w, qw, qx, qy, qz, *still, a1, b1, *controls, 0.0, *still)
+    rotor = (0.0, vehicle.main_speed_rad_s, 0.0)
+    return HelicopterState(0.0, 0.0, pos_d_m, u, v, w, qw, qx, qy, qz, *still, a1, b1, *controls, 0.0, *still, *rotor)
+
+
+def with_rotor(state: HelicopterState, vehicle: VehicleParameters) -> HelicopterState:
+    """The state whose main rotor's inflow is in balance, and whose governor gives what both rotors take; still air."""
+    air = helicopter.air_motion(state, helicopter.attitude(state), CALM)
+    blades = helicopter.blade_angles(state, vehicle)
+    induced = helicopter.inflow(air, blades, 1.0, vehicle)
+    loads = helicopter.rotor_loads(state, air, blades, induced, vehicle)
+    power = loads.torque_n_m * vehicle.main_speed_rad_s + loads.tail_torque_n_m * vehicle.tail_speed_rad_s
+    return state._replace(inflow=float(induced.main), governed=float(power))
 
 
 def accelerations(rate: HelicopterState) -> tuple[float, ...]:
@@ -62,11 +78,13 @@ def accelerations(rate: HelicopterState) -> tuple[float, ...]:
     return (rate.u, rate.v, rate.w, rate.p, rate.q, rate.r, rate.a1, rate.b1)
 
 
-def _flight(unknown: Sequence[Any], vel_body_m_s: Vector, pos_d_m: float) -> tuple[HelicopterState, Controls]:
+def _flight(
+    unknown: Sequence[Any], vel_body_m_s: Vector, pos_d_m: float, vehicle: VehicleParameters
+) -> tuple[HelicopterState, Controls]:
     """Unknowns collective, pedal, roll, pitch, a1, b1, lon, lat as state and controls."""
     col, ped, roll, pitch, a1, b1, lon, lat = unknown
     controls = Controls(lon, lat, col, ped)
-    return settled_state(pos_d_m, vel_body_m_s, roll, pitch, a1, b1, controls), controls
+    return settled_state(pos_d_m, vel_body_m_s, roll, pitch, a1, b1, controls, vehicle), controls
 
 
 def trim(vehicle: VehicleParameters, vel_body_m_s: Vector = HOVER, height_m: float = OUT_OF_GROUND_EFFECT_M) -> Trim:
@@ -76,14 +94,15 @@ def trim(vehicle: VehicleParameters, vel_body_m_s: Vector = HOVER, height_m: flo
     """
 
     def residual(unknown: Sequence[Any]) -> tuple[float, ...]:
-        state, controls = _flight(unknown, vel_body_m_s, -height_m)
-        return accelerations(helicopter.derivative(state, controls, 0.0, 0.0, 0.0, vehicle))
+        state, controls = _flight(unknown, vel_body_m_s, -height_m, vehicle)
+        return accelerations(helicopter.derivative_in_balance(state, controls, CALM, vehicle))
 
     wanted = f"trim at u, v, w = {vel_body_m_s[0]:g}, {vel_body_m_s[1]:g}, {vel_body_m_s[2]:g} m/s"
     failure = f"{wanted}: the controls' travel or the blades do not allow it; ask for a slower or higher flight"
     solution = [float(x) for x in solve(residual, _first_guess(vehicle), TOLERANCE, failure)]
-    state, controls = _flight(solution, vel_body_m_s, -height_m)
-    out = helicopter.outputs(state, 0.0, 0.0, 0.0, vehicle)
+    state, controls = _flight(solution, vel_body_m_s, -height_m, vehicle)
+    state = with_rotor(_as_floats(state), vehicle)
+    out = helicopter.outputs(state, CALM, vehicle)
     col, ped, roll, pitch, a1, b1, lon, lat = solution
     return Trim(
         collective_rad=col,
@@ -96,9 +115,9 @@ def trim(vehicle: VehicleParameters, vel_body_m_s: Vector = HOVER, height_m: flo
         lat=lat,
         induced_velocity_m_s=float(out.induced_velocity_m_s),
         power_w=float(out.power_w),
-        tail_power_w=float(helicopter.tail_power(state, 0.0, 0.0, 0.0, vehicle)),
+        tail_power_w=float(helicopter.tail_power(state, CALM, vehicle)),
         thrust_n=float(out.thrust_n),
-        state=_as_floats(state),
+        state=state,
         controls=controls,
     )
 
@@ -123,10 +142,10 @@ def parked(vehicle: VehicleParameters, controls: Controls) -> HelicopterState:
 
     def state_of(unknown: Sequence[Any]) -> HelicopterState:
         pos_d, roll, pitch, a1, b1 = unknown
-        return settled_state(pos_d, HOVER, roll, pitch, a1, b1, controls)
+        return settled_state(pos_d, HOVER, roll, pitch, a1, b1, controls, vehicle)
 
     def rate_of(unknown: Sequence[Any]) -> HelicopterState:
-        return helicopter.derivative(state_of(unknown), controls, 0.0, 0.0, 0.0, vehicle)
+        return helicopter.derivative_in_balance(state_of(unknown), controls, CALM, vehicle)
 
     def residual(unknown: Sequence[Any]) -> tuple[float, ...]:
         rate = rate_of(unknown)
@@ -136,7 +155,7 @@ def parked(vehicle: VehicleParameters, controls: Controls) -> HelicopterState:
     start = np.array([sag - vehicle.cg_above_skid_m, 0.0, 0.0, 0.0, 0.0])
     failure = "parked: with these controls it lifts, tips or slides on its skids; lower the collective or the pedal"
     solution = solve(residual, start, TOLERANCE, failure)
-    state = _as_floats(state_of([float(x) for x in solution]))
+    state = with_rotor(_as_floats(state_of([float(x) for x in solution])), vehicle)
     if np.abs(value(lambda x: accelerations(rate_of(x)), solution)).max() > SLIDING:
         raise InputError(failure)
     return state

@@ -1,0 +1,81 @@
+"""The ground of a scenario: level, sloping, with a step or a deck's edge, smooth or rough; the pad's centre is at 0."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from flownav.compile import clamp, equation, larger
+from flownav.parameter_files import Number, ParameterModel
+from flownav.sensors.beam import Ground
+
+WAVE_RMS = math.sqrt(8.0 / 15.0)  # of one wave of `beam.roughness`
+AREA_1, AREA_3 = 2.0 / math.pi, 0.5 - 2.0 / math.pi  # of a disc beyond a line: ± this·x ± this·x³, right within 0.01
+
+
+class GroundSettings(ParameterModel):
+    """A scenario's ground. Directions are clockwise from north.
+
+    slope_deg rises towards `uphill_deg`. Beyond the edge, a straight line through (edge_north_m, edge_east_m), on its
+    side towards `edge_toward_deg`, the ground is step_m higher; -1 beyond a deck's edge that is a metre high. The pad
+    lies before the edge. rough_rms_m: of the surface about its plane, in waves of about rough_length_m; rough_place_m
+    moves them, so that two flights need not find the same stone.
+    """
+
+    slope_deg: Number = Field(0.0, ge=0.0, le=20.0)
+    uphill_deg: Number = Field(0.0, ge=-360.0, le=360.0)
+    step_m: Number = Field(0.0, ge=-100.0, le=100.0)
+    edge_north_m: Number = Field(1.0, ge=-1000.0, le=1000.0)
+    edge_east_m: Number = Field(0.0, ge=-1000.0, le=1000.0)
+    edge_toward_deg: Number = Field(0.0, ge=-360.0, le=360.0)
+    rough_rms_m: Number = Field(0.0, ge=0.0, le=0.2)
+    rough_length_m: Number = Field(0.3, ge=0.02, le=100.0)
+    rough_place_m: Number = Field(0.0, ge=-1e4, le=1e4)
+
+    @model_validator(mode="after")
+    def _pad_lies_before_the_edge(self) -> GroundSettings:
+        toward = math.radians(self.edge_toward_deg)
+        if self.step_m and self.edge_north_m * math.cos(toward) + self.edge_east_m * math.sin(toward) < 0.0:
+            raise ValueError("the pad lies beyond the edge; turn edge_toward_deg by 180 and change the sign of step_m")
+        return self
+
+    def parameters(self) -> Ground:
+        """The ground in numbers."""
+        rise, uphill = math.tan(math.radians(self.slope_deg)), math.radians(self.uphill_deg)
+        toward = math.radians(self.edge_toward_deg)
+        return Ground(
+            slope_n=rise * math.cos(uphill),
+            slope_e=rise * math.sin(uphill),
+            step_m=self.step_m,
+            edge_n_m=self.edge_north_m,
+            edge_e_m=self.edge_east_m,
+            direction_n=math.cos(toward),
+            direction_e=math.sin(toward),
+            rough_m=self.rough_rms_m / (WAVE_RMS * math.sqrt(3.0)),
+            waves_1_m=1.0 / self.rough_length_m,
+            wave_place_m=self.rough_place_m,
+        )
+
+
+@equation
+def share_beyond(north_m: float, east_m: float, radius_m: float, ground: Ground) -> float:
+    """Which share of a disc about a place lies beyond the step's edge."""
+    g = ground
+    beyond = (north_m - g.edge_n_m) * g.direction_n + (east_m - g.edge_e_m) * g.direction_e
+    x = clamp(beyond / radius_m, -1.0, 1.0)
+    return 0.5 + x * (AREA_1 + AREA_3 * x * x)
+
+
+@equation
+def under_rotor(north_m: float, east_m: float, over_plane_m: float, radius_m: float, ground: Ground) -> float:
+    """The ground over its plane as the ground effect of a rotor's disc finds it [m].
+
+    Each part of the disc has the image of the ground below it: the image's strength, 1/z², is the mean over the disc,
+    and the rotor as high as that of ground that is level. over_plane_m: height of the hub over the plane.
+    """
+    share = share_beyond(north_m, east_m, radius_m, ground)
+    near, far = larger(over_plane_m, 0.5 * radius_m), larger(over_plane_m - ground.step_m, 0.5 * radius_m)
+    strength = (1.0 - share) / (near * near) + share / (far * far)
+    return over_plane_m - 1.0 / np.sqrt(strength) if ground.step_m * ground.step_m > 0.0 else 0.0

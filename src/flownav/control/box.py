@@ -17,12 +17,15 @@ from flownav.errors import InputError
 from flownav.vehicle.corners import corners
 from flownav.vehicle.kinds import AnyVehicle, hover_of
 from flownav.vehicle.loading import load_vehicle
-from flownav.vehicle.plant import LinearPlant, frequency_response, hover_plant
+from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.plant import LinearPlant, frequency_response, hover_plant, rotor_plant
+from flownav.vehicle.trim import Trim
 
 LEAST_PHASE_DEG = 45.0
 LEAST_GAIN_DB = 6.0
 FREQUENCIES_RAD_S = np.geomspace(0.02, 400.0, 400)
 INFLOW_HELD = "inflow held"
+ROTOR_FREE = "rotor free"
 
 
 class LoopMargins(NamedTuple):
@@ -43,8 +46,8 @@ class Box(NamedTuple):
 def margins_over_box(path: Path | None = None, *, feels_gusts: bool = True) -> Box:
     """The margins of a vehicle file's loops, nominal first; the shipped vehicle where `path` is None.
 
-    Each corner is judged twice: with the inflow in balance at once, and held. A rotor's is between the two. InputError
-    as `load_vehicle` and, for the vehicle as told, `trim`.
+    Each corner is judged with the inflow in balance at once, and held; a helicopter's also with its inflow's lag and a
+    rotor speed that droops. InputError as `load_vehicle` and, for the vehicle as told, `trim`.
     """
     told = load_vehicle(path)
     gains = gains_for(told, hover_of(told), 0.0, feels_gusts=feels_gusts)
@@ -80,3 +83,5 @@ def _plants(name: str, vehicle: AnyVehicle) -> Iterator[tuple[str, LinearPlant]]
     about = hover_of(vehicle)
     for held in (False, True):
         yield f"{name}, {INFLOW_HELD}" if held else name, hover_plant(vehicle, about, freeze_inflow=held)
+    if isinstance(vehicle, VehicleParameters) and isinstance(about, Trim):
+        yield f"{name}, {ROTOR_FREE}", rotor_plant(vehicle, about)

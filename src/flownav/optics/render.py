@@ -9,6 +9,7 @@ the whole. Stripes seen square on need no raster: `stripe_row` sums their harmon
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,14 +49,18 @@ def footprint(pose: Pose, focal_px: float) -> NDArray[np.float64]:
 def seen(pad: Pad, camera: Camera, pose: Pose) -> NDArray[np.float32]:
     """The pad's raster under the blur of lens, defocus and pixel as they are at the centre of this view."""
     ground = footprint(pose, effective_focal_px(camera))
+    return blurred(pad, camera, ground, ground_point(pose, 0.0, 0.0, 1.0)[2])
+
+
+def blurred(pad: Pad, camera: Camera, ground: NDArray[np.float64], distance_m: float) -> NDArray[np.float32]:
+    """The pad's raster under lens, defocus at a distance, and the pixel; `ground` (2, 2) [m/px] as `footprint` has it."""
     rows, columns = pad.reflectance.shape
     fy = np.fft.fftfreq(rows, pad.texel_m)[:, None]
     fx = np.fft.rfftfreq(columns, pad.texel_m)[None, :]
     u, v = ground[0, 0] * fx + ground[1, 0] * fy, ground[0, 1] * fx + ground[1, 1] * fy  # [cycles/px]
     radial = np.hypot(u, v)
     samples = np.linspace(0.0, float(radial.max()), RADIAL_SAMPLES)
-    depth_m = ground_point(pose, 0.0, 0.0, 1.0)[2]
-    lens = np.interp(radial, samples, lens_transfer(camera, samples, depth_m))
+    lens = np.interp(radial, samples, lens_transfer(camera, samples, distance_m))
     spectrum = np.fft.rfft2(pad.reflectance) * lens * box_transfer(u, 1.0) * box_transfer(v, 1.0)
     return np.fft.irfft2(spectrum, pad.reflectance.shape).astype(np.float32)
 
@@ -175,6 +180,7 @@ def between(a: Pose, b: Pose, part: float) -> Pose:
 
 
 # -- for Python ----------------------------------------------------------------------------------------------------
+@lru_cache(maxsize=4)
 def noise_bank(seed: int, width_px: int) -> NDArray[np.float32]:
     """Standard normals from which `digitise` takes its noise."""
     return np.random.default_rng([seed, 3]).standard_normal(NOISE_BANK + width_px, dtype=np.float32)

@@ -1,10 +1,15 @@
-"""A camera that finds the pad, with what goes wrong: boresight, missed fixes, false fixes, a wrong stated accuracy.
+"""A camera that finds the pad, with what goes wrong: bias, noise, missed and false fixes, a wrong stated accuracy.
 
 The fix is `pad_fix.read_pad`'s (tangents towards body forward and right, distance; MAVLink LANDING_TARGET) of a camera
-whose axes are turned against the body by small angles that are drawn once a flight. What the turned camera sees is
-reported as if it were not turned.
+whose axes are turned against the body by small angles that are drawn once a flight, and whose focal length is believed
+too long by a share that is drawn once a flight: tangents are smaller by that share and distances larger. What this
+camera sees is reported as if it were right.
 
-**Missed.** The detector finds the pad with a probability that falls with height and with how fast the image moves, a
+**Noise**, of angles and of the distance as a part of it, sigma^2 = floor^2 + (per_m h)^2 + (per_rad_s w)^2: h the
+height, w the rate at which the ground straight below passes (rows are exposed one after the other, and a frame has one
+time).
+
+**Missed.** What lies on the pad or shines hides it in a share of the frames, whatever the vehicle does. The detector finds the pad with a probability that falls with height and with how fast the image moves, a
 probit: it misses where a standard normal exceeds level - a h/h_max - b w/w_blur; the datasheet gives the three shares
 missed (low and slow; at the greatest height; at the image rate `blur_rad_s`) that fix level, a and b.
 
@@ -12,7 +17,8 @@ missed (low and slow; at the greatest height; at the image rate `blur_rad_s`) th
 distance; also where the pad is out of view, while the height is within the limits.
 
 **Stated.** Variances of the tangents at the reported place, sigma^2 L^2 (1 + tan^2) with L^2 = 1 + both squares (noise
-across the sight, projected on the image plane), and of the distance, times a factor that is wrong by a share.
+across the sight, projected on the image plane), and of the distance, by the noise that the *datasheet* tells of, which
+the camera's own may exceed, times a factor that is wrong by a share.
 """
 
 from __future__ import annotations
@@ -31,26 +37,38 @@ from flownav.sensors.pad_fix import PadFixNormals, PadFixParameters, read_pad
 class PadCameraParameters(NamedTuple):
     """Noise, limits and chances of one frame."""
 
-    angle_sigma_rad: float
-    distance_sigma: float  # of the distance
+    angle_floor_rad: float
+    angle_per_m: float
+    angle_per_rad_s: float
+    distance_floor: float  # of the distance
+    distance_per_m: float
+    distance_per_rad_s: float
     min_height_m: float
     max_height_m: float
-    half_view_tangent: float
+    half_view_forward_tangent: float
+    half_view_right_tangent: float
+    side_m: float  # of the mark
     boresight_rad: float  # standard deviation of each angle
+    scale: float  # standard deviation of the focal length's share
     stated_spread: float
     missed_above: float  # low and slow
     missed_by_height: float  # taken off the level at the greatest height
     missed_per_rad_s: float  # taken off per rad/s of image rate
+    hidden_above: float
     false_above: float
 
 
 class PadCameraUnit(NamedTuple):
-    """This flight: the camera's small angles [rad], factor of the stated deviations. As normals: one for each."""
+    """This flight: the camera's small angles [rad], factor of the stated deviations, how much too long the focal length
+    is believed to be, as a part of it. As normals: one for each.
+    """
 
     turned_x: float
     turned_y: float
     turned_z: float
     stated: float
+    longer: float
+    spare: float
 
 
 class PadCameraNormals(NamedTuple):
@@ -63,7 +81,7 @@ class PadCameraNormals(NamedTuple):
     false: float
     false_forward: float
     false_right: float
-    spare: float
+    hidden: float
 
 
 class PadCameraReading(NamedTuple):
@@ -87,7 +105,28 @@ def draw_pad_camera(n: PadCameraUnit, p: PadCameraParameters) -> PadCameraUnit:
         p.boresight_rad * n.turned_y,
         p.boresight_rad * n.turned_z,
         factor(p.stated_spread, n.stated),
+        p.scale * n.longer,
+        0.0,
     )
+
+
+@equation
+def noise_of(floor: float, per_m: float, per_rad_s: float, height_m: float, image_rate_rad_s: float) -> float:
+    """Standard deviation at a height and an image rate."""
+    by_height, by_rate = per_m * height_m, per_rad_s * image_rate_rad_s
+    return np.sqrt(floor * floor + by_height * by_height + by_rate * by_rate)
+
+
+@equation
+def angle_noise(p: PadCameraParameters, height_m: float, image_rate_rad_s: float) -> float:
+    """Of each angle [rad]."""
+    return noise_of(p.angle_floor_rad, p.angle_per_m, p.angle_per_rad_s, height_m, image_rate_rad_s)
+
+
+@equation
+def distance_noise(p: PadCameraParameters, height_m: float, image_rate_rad_s: float) -> float:
+    """Of the distance, as a part of it."""
+    return noise_of(p.distance_floor, p.distance_per_m, p.distance_per_rad_s, height_m, image_rate_rad_s)
 
 
 @equation
@@ -100,30 +139,38 @@ def read_pad_camera(
     image_rate_rad_s: float,
     n: PadCameraNormals,
     p: PadCameraParameters,
+    told: PadCameraParameters,
 ) -> PadCameraReading:
-    """One frame of a lens at (n, e, d) from the pad's centre, attitude R_EB; image_rate_rad_s: size of the flow."""
+    """One frame of a lens at (n, e, d) from the pad's centre, attitude R_EB; image_rate_rad_s: of the ground below.
+
+    p: the camera as it is; told: as its datasheet has it.
+    """
+    height_m = -lens_d_m
+    distance_sigma = distance_noise(p, height_m, image_rate_rad_s)
     fix = read_pad(
         lens_n_m, lens_e_m, lens_d_m,
         turned_rotation(rotation, unit.turned_x, unit.turned_y, unit.turned_z),
-        PadFixNormals(n.forward, n.right, n.distance, n.spare),
+        PadFixNormals(n.forward, n.right, n.distance, 0.0),
         PadFixParameters(
-            1.0, p.angle_sigma_rad, p.distance_sigma, p.min_height_m, p.max_height_m, p.half_view_tangent
+            1.0, angle_noise(p, height_m, image_rate_rad_s), distance_sigma, p.min_height_m, p.max_height_m,
+            p.half_view_forward_tangent, p.half_view_right_tangent, p.side_m,
         ),
     )  # fmt: skip
-    height_m = -lens_d_m
     level = p.missed_above - p.missed_by_height * (height_m / p.max_height_m) - p.missed_per_rad_s * image_rate_rad_s
-    found = (fix.valid > 0.5) & (n.missed <= level)
+    found = (fix.valid > 0.5) & (n.missed <= level) & (n.hidden <= p.hidden_above)
     in_height = (height_m >= p.min_height_m) & (height_m <= p.max_height_m)
     false = in_height & (n.false > p.false_above)
-    edge = p.half_view_tangent
-    wrong_forward = clamp(0.5 * edge * n.false_forward, -edge, edge)
-    wrong_right = clamp(0.5 * edge * n.false_right, -edge, edge)
+    ahead, aside = p.half_view_forward_tangent, p.half_view_right_tangent
+    wrong_forward = clamp(0.5 * ahead * n.false_forward, -ahead, ahead)
+    wrong_right = clamp(0.5 * aside * n.false_right, -aside, aside)
     wrong_sight = np.sqrt(1.0 + wrong_forward * wrong_forward + wrong_right * wrong_right)
-    wrong_m = larger(height_m, 0.0) * wrong_sight * (1.0 + p.distance_sigma * n.distance)
-    forward = wrong_forward if false else fix.tan_forward
-    right = wrong_right if false else fix.tan_right
-    distance_m = wrong_m if false else fix.distance_m
-    across, along = unit.stated * p.angle_sigma_rad, unit.stated * p.distance_sigma * distance_m
+    wrong_m = larger(height_m, 0.0) * wrong_sight * (1.0 + distance_sigma * n.distance)
+    shrunk = 1.0 - unit.longer
+    forward = wrong_forward if false else shrunk * fix.tan_forward
+    right = wrong_right if false else shrunk * fix.tan_right
+    distance_m = wrong_m if false else (1.0 + unit.longer) * fix.distance_m
+    across = unit.stated * angle_noise(told, height_m, image_rate_rad_s)
+    along = unit.stated * distance_noise(told, height_m, image_rate_rad_s) * distance_m
     spread = across * across * (1.0 + forward * forward + right * right)
     there = false | found
     return PadCameraReading(

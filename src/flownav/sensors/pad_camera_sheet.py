@@ -33,18 +33,43 @@ class Missed(ParameterModel):
         return value
 
 
+class AngleNoise(ParameterModel):
+    """Standard deviation of each angle: floor, per metre of height, per rad/s of image rate, added in squares."""
+
+    floor_mrad: Number = Field(gt=0.0, le=1000.0)
+    per_m_mrad: Number = Field(0.0, ge=0.0, le=1000.0)
+    per_rad_s_mrad: Number = Field(0.0, ge=0.0, le=1000.0)
+
+
+class DistanceNoise(ParameterModel):
+    """Standard deviation of the distance as a part of it, likewise."""
+
+    floor_percent: Number = Field(gt=0.0, le=100.0)
+    per_m_percent: Number = Field(0.0, ge=0.0, le=100.0)
+    per_rad_s_percent: Number = Field(0.0, ge=0.0, le=100.0)
+
+
 class PadCameraSheet(SensorSheet):
-    """A camera and its detector. `stated_spread`: the share by which the accuracies that it states are wrong."""
+    """A camera and its detector, as `flownav pad --out` writes it.
+
+    Half angles of view are forward and to the right (the same where only one is given); the mark of side `side_m` must
+    be whole in it. boresight_deg and scale_percent last a flight. hidden_share: of the frames, lost whatever the vehicle
+    does. stated_spread: the share by which the accuracies that it states are wrong.
+    """
 
     shipped_file: ClassVar[str] = "pad_camera.toml"
 
     rate_hz: Number = Field(ge=0.5, le=200.0)
-    angle_sigma_mrad: Number = Field(gt=0.0, le=1000.0)
-    distance_sigma_percent: Number = Field(gt=0.0, le=100.0)
+    angle: AngleNoise
+    distance: DistanceNoise
     min_height_m: Number = Field(ge=0.0, le=100.0)
     max_height_m: Number = Field(gt=0.0, le=100.0)
     half_view_deg: Number = Field(gt=0.0, lt=80.0)
+    half_view_right_deg: Number | None = Field(None, gt=0.0, lt=80.0)
+    side_m: Number = Field(0.0, ge=0.0, le=20.0)
     boresight_deg: Number = Field(ge=0.0, le=5.0)
+    scale_percent: Number = Field(0.0, ge=0.0, le=20.0)
+    hidden_share: Number = Field(0.0, ge=0.0, le=1.0)
     stated_spread: Number = Field(0.0, ge=0.0, le=2.0)
     missed: Missed
     false_share: Number = Field(0.0, ge=0.0, le=1.0)
@@ -57,20 +82,39 @@ class PadCameraSheet(SensorSheet):
             raise ValueError(f"more than min_height_m = {info.data['min_height_m']:g} is needed")
         return value
 
+    @property
+    def angle_sigma_mrad(self) -> float:
+        """Of each angle in a hover at 1 m."""
+        return math.hypot(self.angle.floor_mrad, self.angle.per_m_mrad)
+
+    @property
+    def distance_sigma_percent(self) -> float:
+        """Of the distance in a hover at 1 m."""
+        return math.hypot(self.distance.floor_percent, self.distance.per_m_percent)
+
     def parameters(self) -> PadCameraParameters:
         """Coefficients of one frame."""
         level = level_of(self.missed.share)
+        aside_deg = self.half_view_deg if self.half_view_right_deg is None else self.half_view_right_deg
         return PadCameraParameters(
-            angle_sigma_rad=1e-3 * self.angle_sigma_mrad,
-            distance_sigma=0.01 * self.distance_sigma_percent,
+            angle_floor_rad=1e-3 * self.angle.floor_mrad,
+            angle_per_m=1e-3 * self.angle.per_m_mrad,
+            angle_per_rad_s=1e-3 * self.angle.per_rad_s_mrad,
+            distance_floor=0.01 * self.distance.floor_percent,
+            distance_per_m=0.01 * self.distance.per_m_percent,
+            distance_per_rad_s=0.01 * self.distance.per_rad_s_percent,
             min_height_m=self.min_height_m,
             max_height_m=self.max_height_m,
-            half_view_tangent=math.tan(math.radians(self.half_view_deg)),
+            half_view_forward_tangent=math.tan(math.radians(self.half_view_deg)),
+            half_view_right_tangent=math.tan(math.radians(aside_deg)),
+            side_m=self.side_m,
             boresight_rad=math.radians(self.boresight_deg),
+            scale=0.01 * self.scale_percent,
             stated_spread=self.stated_spread,
             missed_above=level,
             missed_by_height=level - level_of(self.missed.share_at_max_height),
             missed_per_rad_s=(level - level_of(self.missed.share_at_blur)) / self.missed.blur_rad_s,
+            hidden_above=level_of(self.hidden_share),
             false_above=level_of(self.false_share),
         )
 

@@ -2,7 +2,8 @@
 
 The reading is what MAVLink LANDING_TARGET carries: tangents of the angles towards body forward and right, and the
 distance. The line of sight has white noise across it, the same both ways, and the distance a share of itself;
-readings are offered while the lens is between two heights and the centre within the view.
+readings are offered while the lens is between two heights and the pad's mark, whose sides lie north and east, is whole
+within a view that is so wide forward and so wide to the right.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ class PadFixParameters(NamedTuple):
     distance_sigma: float  # of the distance
     min_height_m: float
     max_height_m: float
-    half_view_tangent: float
+    half_view_forward_tangent: float
+    half_view_right_tangent: float
+    side_m: float  # of the mark that must be whole in view; 0: its centre suffices
 
 
 class PadFixNormals(NamedTuple):
@@ -56,7 +59,9 @@ def read_pad(
     forward, sideways = ahead / depth, right / depth
     distance = np.sqrt(ahead * ahead + right * right + depth * depth)
     in_height = (-lens_d_m >= p.min_height_m) & (-lens_d_m <= p.max_height_m)
-    in_view = larger(magnitude(forward), magnitude(sideways)) <= p.half_view_tangent
+    reach = 0.5 * p.side_m * (magnitude(rotation[0]) + magnitude(rotation[3])) / depth  # of the turned square
+    in_view = magnitude(forward) + reach <= p.half_view_forward_tangent
+    in_view = in_view & (magnitude(sideways) + reach <= p.half_view_right_tangent)
     seen = in_height & in_view & (p.fitted > 0.5)
     # noise across the sight: unit vectors (1, 0, -forward) and sight x that, of their lengths
     length, level = np.sqrt(forward * forward + sideways * sideways + 1.0), np.sqrt(1.0 + forward * forward)

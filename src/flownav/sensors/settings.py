@@ -17,7 +17,6 @@ from flownav.sensors import gps_ins, imu
 from flownav.sensors.gauss_markov import gauss_markov_coefficients
 from flownav.sensors.gps_ins import GpsInsParameters
 from flownav.sensors.imu import ImuParameters
-from flownav.sensors.pad_fix import PadFixParameters
 from flownav.sensors.quantisation import steps_per_unit
 from flownav.sensors.rangefinder import RangefinderParameters
 
@@ -191,13 +190,3 @@ class PadFixSettings(ParameterModel):
     min_height_m: Number = Field(0.3, ge=0.0, le=100.0)
     max_height_m: Number = Field(3.0, gt=0.0, le=100.0)
     half_view_deg: Number = Field(30.0, gt=0.0, lt=80.0)
-
-    def parameters(self) -> PadFixParameters:
-        """Coefficients of one reading."""
-        return PadFixParameters(
-            1.0, self.angle_sigma_rad, self.distance_sigma, self.min_height_m, self.max_height_m,
-            math.tan(math.radians(self.half_view_deg)),
-        )  # fmt: skip
-
-
-NO_PAD_FIX = PadFixParameters(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

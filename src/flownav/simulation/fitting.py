@@ -20,7 +20,7 @@ from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet, load_gps_receiv
 from flownav.sensors.identified import needs_lag_states
 from flownav.sensors.inertial_sheet import InertialSheet, load_inertial_sheet
 from flownav.sensors.magnetometer_sheet import MagneticField, load_magnetometer_sheet
-from flownav.sensors.pad_camera_sheet import PadCameraSheet, load_pad_camera_sheet
+from flownav.sensors.pad_camera_sheet import AngleNoise, DistanceNoise, PadCameraSheet, load_pad_camera_sheet
 from flownav.sensors.range_sensor_sheet import load_range_sensor_sheet
 from flownav.sensors.sheet import Lever, SensorSheet
 from flownav.sensors.sheets import SensorSheets
@@ -176,10 +176,12 @@ def pad_sheet(scenario: Scenario, sheet: PadCameraSheet, lens_down_m: float) -> 
     update: dict[str, object] = {
         name: getattr(fix, name) for name in ("min_height_m", "max_height_m", "half_view_deg") if name in stated
     }
+    if "half_view_deg" in stated:
+        update["half_view_right_deg"] = None
     if "angle_sigma_rad" in stated:
-        update["angle_sigma_mrad"] = 1e3 * fix.angle_sigma_rad
+        update["angle"] = AngleNoise(floor_mrad=1e3 * fix.angle_sigma_rad)
     if "distance_sigma" in stated:
-        update["distance_sigma_percent"] = 100.0 * fix.distance_sigma
+        update["distance"] = DistanceNoise(floor_percent=100.0 * fix.distance_sigma)
     return on_clock(sheet.model_copy(update=update | {"lens": at_height(sheet.lens, lens_down_m)}))
 
 

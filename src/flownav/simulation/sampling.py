@@ -10,6 +10,7 @@ from flownav.control.go_around import Knowledge
 from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import rotation_from_quaternion
 from flownav.navigation.records import Reading
+from flownav.optics.shutter import image_rate_rad_s
 from flownav.sensors.barometer import step_barometer
 from flownav.sensors.flow_camera import FlowCameraTruth, pad_texture, step_flow_camera
 from flownav.sensors.gps_receiver import step_gps_receiver
@@ -240,11 +241,11 @@ def read_pad(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot:
         state = earlier(load_helicopter(work, lanes, lane), late_as_is(work, lanes, lane).pad_s)
         rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
         north, east, down = place_of(state, s.pad_place)
-        speed = np.sqrt(state.u * state.u + state.v * state.v)
-        image_rate = speed / (-down if -down > LEAST_HEIGHT_M else LEAST_HEIGHT_M)
+        above = -down if -down > LEAST_HEIGHT_M else LEAST_HEIGHT_M
+        ahead, aside = image_rate_rad_s(state.u, state.v, state.p, state.q, above)
         fix = read_pad_camera(
-            load_pad_unit(work, lanes, lane), north, east, down, rotation, image_rate,
-            load_pad_normals(work, lanes, lane), pad_as_is(work, lanes, lane),
+            load_pad_unit(work, lanes, lane), north, east, down, rotation, np.sqrt(ahead * ahead + aside * aside),
+            load_pad_normals(work, lanes, lane), pad_as_is(work, lanes, lane), s.pad,
         )  # fmt: skip
         reading = reading_of(
             fix.tan_forward, fix.tan_right, fix.distance_m, fix.forward_variance, fix.right_variance,

@@ -162,7 +162,7 @@ def start_rest(work: Work, lanes: Lanes, seed: int, flight: int, step: int, s: O
         store_mag_unit(
             work, lanes, lane, draw_magnetometer(drawn_mag_unit(work, lanes, lane), mag_as_is(work, lanes, lane))
         )
-    draw(work, lanes, layout.DRAWN, 4, seed, flight, step, PAD_START)
+    draw(work, lanes, layout.DRAWN, 6, seed, flight, step, PAD_START)
     for lane in range(len(lanes)):
         store_pad_unit(
             work, lanes, lane, draw_pad_camera(drawn_pad_unit(work, lanes, lane), pad_as_is(work, lanes, lane))

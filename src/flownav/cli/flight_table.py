@@ -44,6 +44,8 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
         console.print("errors are those of what was flown on, in flight after the hand-over", highlight=False)
         console.print(f"known exactly  {facts['known_exactly']}", highlight=False)
     _show_touchdown(console, facts)
+    if "pad_frames" in facts:
+        _show_pad_frames(console, facts["pad_frames"])
     if facts.get("rmse_over_bound"):
         _show_consistency(console, facts)
     if "paper_percentile" in facts:
@@ -118,6 +120,28 @@ def _show_consistency(console: Console, facts: dict[str, Any]) -> None:
     inside = facts["anees_inside_fraction"]
     if inside is not None:
         console.print(f"ANEES inside its 95 % band  on {100.0 * inside:.1f} % of the steps in flight", highlight=False)
+
+
+def _show_pad_frames(console: Console, bands: list[dict[str, Any]]) -> None:
+    """What was seen in rendered frames, by height, beside what the pad camera's datasheet says of the same frames."""
+    table = Table(title="pad in rendered frames (its datasheet)", title_justify="left")
+    for name in ("height [m]", "frames", "in view", "found", "wrong", "angle rms [mrad]", "distance rms [%]"):
+        table.add_column(name, justify="right")
+    for row in bands:
+        found = f"{row['found']} ({row['expected_found']:.1f})"
+        angle, distance = (
+            f"{_scaled(row[said], scale)} ({_scaled(row[told], scale)})"
+            for said, told, scale in (
+                ("angle_rms_rad", "expected_angle_rad", 1e3), ("distance_rms", "expected_distance", 1e2)
+            )
+        )  # fmt: skip
+        counts = str(row["frames"]), str(row["in_view"]), found, str(row["wrong"])
+        table.add_row(f"{row['from_m']:g} to {row['to_m']:g}", *counts, angle, distance)
+    console.print(table)
+
+
+def _scaled(number: float | None, scale: float) -> str:
+    return _or_dash(None if number is None else scale * number)
 
 
 def _or_dash(number: float | None, digits: int = 2) -> str:

@@ -13,6 +13,7 @@ from flownav.errors import InputError, VerdictError
 if TYPE_CHECKING:
     from flownav.record import Record
     from flownav.simulation.assemble import Setup
+    from flownav.simulation.ensemble import Ensemble
     from flownav.simulation.scenario import Scenario
 
 
@@ -31,6 +32,9 @@ def command(
     filter_name: Annotated[str | None, typer.Option("--filter", help="Filter: landing or paper.")] = None,
     feedback: Annotated[str | None, typer.Option(help="What the autopilot flies on: estimate or truth.")] = None,
     truth: Annotated[str | None, typer.Option(help="The plant: nonlinear, or the paper's linear model.")] = None,
+    optics: Annotated[
+        str | None, typer.Option(help="The pad camera: model, or pixels (its frames are rendered; minutes a flight).")
+    ] = None,
     sensor: Annotated[str | None, typer.Option(help="A flow sensor file (TOML).")] = None,
     vehicle: Annotated[str | None, typer.Option(help="A vehicle: maxi-joker-3, quad-450, or a file (TOML).")] = None,
     ensemble: Annotated[
@@ -65,7 +69,7 @@ def command(
     require_between("--speed", speed, 0.01, 100.0)
     if flight is not None and flights > 1:
         raise InputError("--flight names one flight, --flights many; give one of the two")
-    chosen = _overridden(load_scenario(scenario), gps, filter_name, feedback, truth, sensor, vehicle)
+    chosen = _overridden(load_scenario(scenario), gps, filter_name, feedback, truth, optics, sensor, vehicle)
     setup = assemble(chosen)
     dispersed = flights > 1 if ensemble is None else ensemble
     truths = setup.ensemble() if dispersed else None
@@ -77,12 +81,15 @@ def command(
         "gps": chosen.gps.model,
         "truth": chosen.truth,
         "feedback": chosen.autopilot.feedback,
+        "optics": chosen.optics,
         "truth_model": "ensemble" if dispersed else "matched",
         "seed": seed,
         "flights": flights,
     }
     index, percentiles = flight or 0, None
-    if flights > 1:
+    if chosen.optics == "pixels":
+        record, rows, facts["pad_frames"] = _fly_pixels(setup, seed, index, flights, truths)
+    elif flights > 1:
         with progress(f"Flying {chosen.name}", flights) as advance:
             judged = fly_judged(setup.flight, seed, flights, ensemble=truths, on_progress=advance)
         rows = judged.scores
@@ -91,11 +98,12 @@ def command(
             facts |= consistency_facts(judged, bound_of(setup, seed, min(flights, BOUND_FLIGHTS)))
         table = published(chosen.paper_table)
         percentiles = percentile_of_paper(rows, table) if table else None
-    record = fly_recorded(setup, seed, index, truths)
+    if chosen.optics == "model":
+        record = fly_recorded(setup, seed, index, truths)
     scores = record.manifest["scores"] if flights == 1 else scores_of_flights(rows)
     if setup.fitted is not None:
         facts["known_exactly"] = known_exactly(chosen)
-        facts |= dict.fromkeys(OF_MANY_FLIGHTS) if flights == 1 else {}
+        facts |= dict.fromkeys(OF_MANY_FLIGHTS) if flights == 1 or chosen.optics == "pixels" else {}
     facts |= scores | save(record, record_path, report=report)
     if percentiles:
         facts["paper_percentile"] = percentiles
@@ -109,6 +117,30 @@ def command(
         show(facts, record.manifest["paper"], index)
     if int(facts["crashed"]) > CRASHES_ALLOWED * flights:
         raise VerdictError(f"{int(facts['crashed'])} of {flights} flights crashed (see `crashed` in docs/scenarios.md)")
+
+
+def _fly_pixels(
+    setup: Setup, seed: int, first: int, flights: int, truths: Ensemble | None
+) -> tuple[Record, Any, list[dict[str, Any]]]:
+    """Flights on rendered frames, one after the other: the first one's record, their scores, frames by height."""
+    import numpy as np
+
+    from flownav.campaign.local import fly_recorded, score_history
+    from flownav.campaign.pixels import agreement, fly_on_pixels
+    from flownav.cli.output import progress
+    from flownav.simulation.engine import fly_one
+
+    records, scores, frames = [], [], []
+    with progress("Flying on rendered frames", flights) as advance:
+        for index in range(first, first + flights):
+            seen, rendered = fly_on_pixels(setup, seed, index, truths)
+            records.append(fly_recorded(seen, seed, index, truths))
+            scores.append(score_history(seen.flight, fly_one(seen.flight, seed, index, truths))[0])
+            frames += rendered
+            advance(1)
+    assert setup.fitted is not None
+    assert setup.fitted.sheets.pad_camera is not None
+    return records[0], np.array(scores), agreement(frames, setup.fitted.sheets.pad_camera)
 
 
 def _tell(setup: Setup, record: Record, url: str, speed: float, key: Path | None) -> dict[str, Any]:
@@ -137,6 +169,7 @@ def _overridden(
     filter_name: str | None,
     feedback: str | None,
     truth: str | None,
+    optics: str | None,
     sensor: str | None,
     vehicle: str | None,
 ) -> Scenario:
@@ -153,6 +186,8 @@ def _overridden(
         entries.setdefault("autopilot", {})["feedback"] = feedback
     if truth is not None:
         entries["truth"] = truth
+    if optics is not None:
+        entries["optics"] = optics
     if sensor is not None:
         entries["flow_sensor"] = sensor
     if vehicle is not None:

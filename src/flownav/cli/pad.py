@@ -1,4 +1,4 @@
-"""`flownav pad`: the landing target, printed, measured in the laboratory, or found in a user's own pictures."""
+"""`flownav pad`: the landing target, printed, found in a user's own pictures, or measured in rendered frames."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ import typer
 if TYPE_CHECKING:
     from flownav.optics.pad_target import PadTarget
 
-HEIGHTS = "0.3,0.5,0.75,1,1.5,2,3,4,5"
+HEIGHTS = "0.15,0.175,0.2,0.3,0.5,1,2,3,4"
+SPEEDS = "0.1,0.5,1.5"
 
 
 def command(
@@ -28,15 +29,25 @@ def command(
     image_x: Annotated[
         float, typer.Option("--image-x-deg", help="Where the pictures' right is, clockwise from body forward.")
     ] = 0.0,
-    camera: Annotated[str, typer.Option(help="Measure with: wide (640x480, 60 degrees) or px4flow.")] = "wide",
+    camera: Annotated[str, typer.Option(help="Measure with: wide120, wide60 or px4flow.")] = "wide120",
     focus: Annotated[
         float | None, typer.Option(help="Where its lens is focused [m]; as built without it.", show_default=False)
     ] = None,
     heights: Annotated[str, typer.Option(help="Heights to measure at [m], with commas.")] = HEIGHTS,
-    count: Annotated[int, typer.Option("--frames", help="Frames a height.")] = 40,
+    speeds: Annotated[str, typer.Option(help="Speeds over the ground [m/s], with commas.")] = SPEEDS,
+    flights: Annotated[int, typer.Option(help="Cameras, each on a flight of its own.")] = 40,
+    count: Annotated[int, typer.Option("--frames", help="Frames a flight, height and speed.")] = 2,
     tilt: Annotated[float, typer.Option("--tilt-deg", help="Greatest tilt.")] = 15.0,
-    light: Annotated[str, typer.Option(help="low, normal or intense.")] = "normal",
-    seed: Annotated[int, typer.Option(help="Of ground, poses and noise.")] = 1,
+    mounting: Annotated[
+        float, typer.Option("--mounting-deg", help="How well it is mounted, for the datasheet.")
+    ] = 0.4,
+    seed: Annotated[int, typer.Option(help="Of cameras, light, ground, poses and noise.")] = 1,
+    out: Annotated[
+        Path | None, typer.Option(help="The datasheet to write (TOML), which `fly` reads.", show_default=False)
+    ] = None,
+    pictures: Annotated[
+        Path | None, typer.Option(help="A folder for one frame of each flight and height.", show_default=False)
+    ] = None,
     print_to: Annotated[
         Path | None, typer.Option("--print", help="Only write the target as a PNG of true size.", show_default=False)
     ] = None,
@@ -59,11 +70,21 @@ def command(
         require_between("--focal", focal, 1.0, 1e6)
         _show(_found(frames, target, focal, image_x), as_json, _print_found)
     else:
-        require_between("--frames", count, 2, 100_000)
+        from flownav.cli.output import require_writable
+
+        require_between("--frames", count, 1, 100_000)
+        require_between("--flights", flights, 2, 100_000)
         require_between("--tilt-deg", tilt, 0.0, 45.0)
+        require_between("--mounting-deg", mounting, 0.0, 5.0)
         if focus is not None:
             require_between("--focus", focus, 0.05, 1000.0)
-        _show(_measured(target, camera, focus, heights, count, tilt, light, seed), as_json, _print_measured)
+        if out is not None:
+            require_writable(out)
+        numbers = _numbers("--heights", heights, 0.05, 50.0), _numbers("--speeds", speeds, 0.0, 50.0)
+        facts = _measured(target, camera, focus, *numbers, flights, count, tilt, seed, pictures)
+        if out is not None:
+            facts["datasheet"] = _write_datasheet(out, facts, target, camera, focus, mounting)
+        _show(_plain(facts), as_json, _print_measured)
 
 
 def _show(facts: dict[str, Any], as_json: bool, printer: Any) -> None:
@@ -112,60 +133,85 @@ def _print_found(facts: dict[str, Any]) -> None:
     console.print(f"found in {facts['found']} of {facts['frames']} frames")
 
 
-# -- the laboratory ---------------------------------------------------------------------------------------------------
+# -- rendered frames --------------------------------------------------------------------------------------------------
 def _measured(
     target: PadTarget,
     camera_name: str,
     focus_m: float | None,
-    heights: str,
+    heights_m: list[float],
+    speeds_m_s: list[float],
+    flights: int,
     count: int,
     tilt_deg: float,
-    light: str,
     seed: int,
+    pictures: Path | None,
 ) -> dict[str, Any]:
     import math
 
     from flownav.cli.output import progress
     from flownav.compile import announce_compilation
-    from flownav.optics.camera import effective_focal_px
-    from flownav.optics.pad_noise import camera_named, measure_height, noise_law
+    from flownav.optics.pad_statistics import laws_of
+    from flownav.optics.pad_trial import camera_named, fly_cameras
 
-    camera = camera_named(camera_name, focus_m)
-    rows = []
-    heights_m = _heights(heights)
-    with announce_compilation("pad"), progress("heights", len(heights_m)) as advance:
-        for height_m in heights_m:
-            rows.append(
-                measure_height(
-                    target, camera, height_m, frames=count, tilt_rad=math.radians(tilt_deg), light=light, seed=seed
-                )
-            )
-            advance(1)
-    law = noise_law(rows)
+    trial = camera_named(camera_name, focus_m)
+    with announce_compilation("pad"), progress("flights", flights) as advance:
+        frames = fly_cameras(
+            trial, target, heights_m, speeds_m_s, flights, count, math.radians(tilt_deg), seed, advance, pictures
+        )
+    laws, cells = laws_of(frames)
     return {
         "target": target._asdict(),
-        "camera": {"name": camera_name, "focal_px": effective_focal_px(camera), "focus_m": camera.focus_m},
+        "camera": {"name": camera_name, "focal_m": trial.camera.focal_m, "focus_m": trial.camera.focus_m},
         "tilt_deg": tilt_deg,
-        "light": light,
         "seed": seed,
-        "heights": [
-            {k: None if isinstance(v, float) and math.isnan(v) else v for k, v in row._asdict().items()} for row in rows
-        ],
-        "noise": None if law is None else law._asdict(),
+        "flights": flights,
+        "cells": [cell._asdict() for cell in cells],
+        "laws": laws,
     }
 
 
-def _heights(text: str) -> list[float]:
+def _plain(facts: dict[str, Any]) -> dict[str, Any]:
+    """As JSON has it: NaN is null, laws are objects."""
+    import math
+
+    laws = facts["laws"]._asdict()
+    laws |= {name: laws[name]._asdict() for name in ("angle", "distance", "missed")}
+    cells = [{k: None if isinstance(v, float) and math.isnan(v) else v for k, v in c.items()} for c in facts["cells"]]
+    return facts | {"laws": laws, "cells": cells}
+
+
+def _write_datasheet(
+    out: Path, facts: dict[str, Any], target: PadTarget, camera_name: str, focus_m: float | None, mounting_deg: float
+) -> str:
+    from flownav.files import written_whole
+    from flownav.optics.pad_datasheet import datasheet
+    from flownav.optics.pad_trial import camera_named
+    from flownav.provenance import command_line
+    from flownav.sensors.pad_camera_sheet import load_pad_camera_sheet
+
+    assumed = load_pad_camera_sheet()
+    text = datasheet(
+        facts["laws"], camera_named(camera_name, focus_m), camera_name, target, mounting_deg, command_line(),
+        rate_hz=assumed.rate_hz, latency_s=assumed.latency_s, jitter_s=assumed.jitter_s,
+        lens_m=(assumed.lens.forward_m, assumed.lens.right_m, assumed.lens.down_m),
+    )  # fmt: skip
+    with written_whole(out) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+    load_pad_camera_sheet(out)
+    return str(out)
+
+
+def _numbers(option: str, text: str, low: float, high: float) -> list[float]:
     from flownav.cli.output import require_between
     from flownav.errors import InputError
 
     try:
-        heights = sorted(float(part) for part in text.split(","))
+        numbers = sorted({float(part) for part in text.split(",")})
     except ValueError:
-        raise InputError(f"--heights {text}: give numbers with commas, such as {HEIGHTS}") from None
-    for height_m in heights:
-        require_between("--heights", height_m, 0.05, 50.0)
-    return heights
+        raise InputError(f"{option} {text}: give numbers with commas, such as {HEIGHTS}") from None
+    for number in numbers:
+        require_between(option, number, low, high)
+    return numbers
 
 
 def _print_measured(facts: dict[str, Any]) -> None:
@@ -174,44 +220,44 @@ def _print_measured(facts: dict[str, Any]) -> None:
     from rich.table import Table
 
     console = Console(markup=False, highlight=False)
-    target, camera = facts["target"], facts["camera"]
+    target, camera, laws = facts["target"], facts["camera"], facts["laws"]
     console.print(
-        f"{target['pattern']} of {target['side_m']:g} m, tilt to {facts['tilt_deg']:g} deg, {facts['light']} light"
+        f"{target['pattern']} of {target['side_m']:g} m, tilt to {facts['tilt_deg']:g} deg; "
+        f"{facts['flights']} cameras {camera['name']}, {laws['frames']} frames"
     )
-    console.print(f"camera {camera['name']}: {camera['focal_px']:.1f} px, focused at {camera['focus_m']:g} m")
     table = Table(box=box.SIMPLE_HEAD)
-    for name in ("height", "in view", "found", "wrong", "angle", "bias", "distance", "bias", "heading"):
+    for name in ("height", "speed", "rate", "in view", "found", "wrong", "angle", "distance", "heading"):
         table.add_column(name, justify="right")
-    table.add_row("m", "", "", "", "urad", "urad", "ppm", "ppm", "mrad", style="dim")
-    for row in facts["heights"]:
+    table.add_row("m", "m/s", "rad/s", "", "", "", "mrad", "%", "mrad", style="dim")
+    for row in facts["cells"]:
         table.add_row(
-            f"{row['height_m']:g}",
-            f"{row['in_view']}/{row['frames']}",
-            str(row["found"]),
-            str(row["wrong"]),
-            *(
-                _figure(row[key], scale)
-                for key, scale in (
-                    ("angle_sigma_rad", 1e6),
-                    ("angle_bias_rad", 1e6),
-                    ("distance_sigma", 1e6),
-                    ("distance_bias", 1e6),
-                    ("heading_sigma_rad", 1e3),
-                )
-            ),
-        )
+            f"{row['height_m']:g}", f"{row['speed_m_s']:g}", f"{row['image_rate_rad_s']:.2f}",
+            f"{row['in_view']}/{row['frames']}", str(row["found"]), str(row["wrong"]),
+            _figure(row["angle_sigma_rad"], 1e3), _figure(row["distance_sigma"], 1e2),
+            _figure(row["heading_sigma_rad"], 1e3),
+        )  # fmt: skip
     console.print(table)
-    law = facts["noise"]
-    if law is None:
-        console.print("no height at which nine of ten frames with the whole pad in view give a fix")
-        return
-    console.print(
-        f"from {law['least_height_m']:g} to {law['greatest_height_m']:g} m: "
-        f"angle {law['angle_sigma_rad'] * 1e6:.1f} urad, "
-        f"distance {law['distance_relative_sigma'] * 1e6:.0f} ppm x (d/1 m)^{law['distance_exponent']:.2f}, "
-        f"missed {law['outage_probability'] * 100:.1f} %"
-    )
+    for line in _law_lines(laws):
+        console.print(line)
+    if "datasheet" in facts:
+        console.print(f"datasheet: {facts['datasheet']}")
+
+
+def _law_lines(laws: dict[str, Any]) -> list[str]:
+    angle, distance, missed = laws["angle"], laws["distance"], laws["missed"]
+    a, b = missed["hidden"]
+    return [
+        f"from {laws['min_height_m']:g} to {laws['max_height_m']:g} m; h the height [m], w the image rate [rad/s]",
+        f"angle [mrad]: {1e3 * angle['floor']:.2f}, {1e3 * angle['per_m']:.2f} h, {1e3 * angle['per_rad_s']:.2f} w, "
+        f"added in squares; between flights x exp(N(0, {angle['spread']:.2f}))",
+        f"distance [%]: {1e2 * distance['floor']:.2f}, {1e2 * distance['per_m']:.2f} h, "
+        f"{1e2 * distance['per_rad_s']:.2f} w; between flights x exp(N(0, {distance['spread']:.2f}))",
+        f"bias as long as a flight: {1e3 * laws['bias_rad']:.2f} mrad of each angle, scale {1e2 * laws['scale']:.2f} %",
+        f"missed: {100 * missed['share']:.1f} % low and slow, {100 * missed['share_at_max_height']:.1f} % at "
+        f"{laws['max_height_m']:g} m, {100 * missed['share_at_blur']:.1f} % at {missed['blur_rad_s']:.1f} rad/s; hidden "
+        f"{100 * a / (a + b):.1f} %, between flights Beta({a:.3f}, {b:.3f}); false {100 * laws['false_share']:.2f} %",
+    ]
 
 
 def _figure(value: float | None, scale: float) -> str:
-    return "-" if value is None else f"{value * scale:.1f}"
+    return "-" if value is None else f"{value * scale:.2f}"

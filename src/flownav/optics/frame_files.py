@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.errors import InputError
-from flownav.files import natural_order
+from flownav.files import natural_order, written_whole
 
 PICTURES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}
 VIDEOS = {".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v"}
@@ -87,3 +87,15 @@ def _video(path: Path) -> NDArray[np.uint8]:
     if not frames:
         raise InputError(f"{path}: no frames in it")
     return np.stack(frames)
+
+
+def save_picture(frame: NDArray[np.uint8], path: Path) -> None:
+    """Write a frame (height, width) as a PNG. InputError where it cannot be written."""
+    from PIL import Image
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with written_whole(path) as temporary:
+            Image.fromarray(frame).save(temporary, format="PNG")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another folder") from error

@@ -34,7 +34,7 @@ PASSES = 3
 
 
 class Cell(NamedTuple):
-    """The frames of one height and speed. in_view: with the whole square in them; found: of those; wrong: of all.
+    """The frames of one height and speed. in_view: with the whole board in them; found: of those; wrong: of all.
 
     Sigmas are of the found, each flight's own bias taken out; NaN where there are fewer than LEAST_FRAMES.
     """
@@ -239,8 +239,8 @@ def laws_of(frames: Sequence[TrialFrame]) -> tuple[PadLaws, list[Cell]]:
     biases, angle, distance, left = biases_and_laws(c)
     own = np.array(list(biases.values()))
     bias, scale = float(np.sqrt((own[:, :2] ** 2).mean())), float(np.sqrt((own[:, 2:] ** 2).mean()))
-    missed = missed_law(c, high)
-    laws = PadLaws(low, high, angle, distance, bias, scale, missed, false_share_of(c), len(frames), len(biases))
+    missed, flights = missed_law(c, high), len(np.unique(c["flight"]))
+    laws = PadLaws(low, high, angle, distance, bias, scale, missed, false_share_of(c), len(frames), flights)
     return laws, cells_of(frames, c, left)
 
 

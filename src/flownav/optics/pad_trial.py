@@ -7,7 +7,11 @@ drawn anew for every frame. The detector corrects the lens by what it believes o
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +19,7 @@ from numpy.typing import NDArray
 
 from flownav.errors import InputError
 from flownav.optics.camera import MEAN_REFLECTANCE, Camera, Exposure, effective_focal_px, exposed
+from flownav.optics.frame_files import save_picture
 from flownav.optics.lens import (
     PINHOLE_K1,
     PINHOLE_K2,
@@ -32,7 +37,7 @@ from flownav.optics.pad_fix import PadSearch, find_pad
 from flownav.optics.pad_target import GROUND_REFLECTANCE, PadTarget
 from flownav.optics.pad_truth import Truth, fix_error, is_wrong, truth_of
 from flownav.optics.projection import Pose, ground_point, pose_looking_down
-from flownav.optics.scene import Scene, drawn_scene
+from flownav.optics.scene import Scene, drawn_scene, in_shadow_of_vehicle
 from flownav.optics.shot import Ground, Optic, View, ground_at, shoot, view_of
 from flownav.optics.shutter import FlightMotion, image_rate_rad_s
 
@@ -102,7 +107,7 @@ class CameraFlight(NamedTuple):
 class TrialFrame(NamedTuple):
     """What came of one frame. error (4,): `pad_truth.fix_error`, NaN without a fix.
 
-    whole: the whole square is in the frame. image_rate_rad_s: of the ground straight below. tangents: of the centre,
+    whole: the whole board is in the frame. image_rate_rad_s: of the ground straight below. tangents: of the centre,
     as they are.
     """
 
@@ -142,8 +147,9 @@ def take_frame(
     flown: CameraFlight, land: Ground, pose: Pose, motion: FlightMotion, frame: int
 ) -> NDArray[np.uint8]:
     """The frame (height, width) as the sensor gives it."""
+    scene = in_shadow_of_vehicle(flown.scene, pose)
     return shoot(
-        flown.target, flown.optic, flown.view, land, flown.scene, pose, motion, flown.exposure, flown.seed, frame
+        flown.target, flown.optic, flown.view, land, scene, pose, motion, flown.exposure, flown.seed, frame
     )
 
 
@@ -158,11 +164,19 @@ def frames_at(
 ) -> Iterator[tuple[NDArray[np.uint8], Pose, FlightMotion]]:
     """Frames from one height at one speed over the ground in any direction, their poses and motions."""
     rng = np.random.default_rng([seed, flown.seed, round(1e3 * height_m), round(1e3 * speed_m_s)])
-    step = round(float(np.log(height_m) / np.log(SAME_GROUND)))
-    land = ground_at(SAME_GROUND**step, flown.optic.lens.focal_px, flown.seed % (1 << 16))
+    land = ground_below(flown, height_m)
     for k in range(count):
         pose, motion = drawn_pose(flown.optic, height_m, tilt_rad, rng), drawn_motion(speed_m_s, rng)
         yield take_frame(flown, land, pose, motion, (round(1e3 * height_m) << 12) + k), pose, motion
+
+
+def ground_below(flown: CameraFlight, height_m: float) -> Ground:
+    """The ground of this flight as it is seen from about this height."""
+    step = round(float(np.log(height_m) / np.log(SAME_GROUND)))
+    return _ground(SAME_GROUND**step, flown.optic.lens.focal_px, flown.seed % (1 << 16))
+
+
+_ground = lru_cache(maxsize=16)(ground_at)
 
 
 def drawn_pose(optic: Optic, height_m: float, tilt_rad: float, rng: np.random.Generator) -> Pose:
@@ -190,9 +204,9 @@ def rate_of(pose: Pose, motion: FlightMotion) -> float:
 
 
 def whole_in_view(optic: Optic, truth: Truth) -> bool:
-    """Whether all four corners are in the frame."""
+    """Whether all four corners of the board are in the frame."""
     half = 0.5 * np.array([optic.camera.width_px - 1.0, optic.camera.height_px - 1.0])
-    return bool((np.abs(pixels_of(optic.lens, truth.corner_rays)) < half).all())
+    return bool((np.abs(pixels_of(optic.lens, truth.board_rays)) < half).all())
 
 
 def tried(
@@ -208,3 +222,34 @@ def tried(
             flight, height_m, speed_m_s, rate_of(pose, motion), whole_in_view(flown.optic, truth),
             fix is not None and not wrong, wrong, reason, (truth.tan_forward, truth.tan_right), error,
         )  # fmt: skip
+
+
+def fly_cameras(
+    trial: TrialCamera, target: PadTarget, heights_m: Sequence[float], speeds_m_s: Sequence[float], flights: int,
+    count: int, tilt_rad: float, seed: int, on_progress: Callable[[int], None] = lambda done: None,
+    pictures: Path | None = None,
+) -> list[TrialFrame]:  # fmt: skip
+    """Every flight's frames at every height and speed; the same whatever the number of threads.
+
+    pictures: a folder that gets the first frame of each flight and height. InputError where it cannot be written.
+    """
+
+    def fly(flight: int) -> list[TrialFrame]:
+        flown = camera_flight(trial, target, seed, flight)
+        found = []
+        for height_m in heights_m:
+            if pictures is not None:
+                frame = next(frames_at(flown, height_m, speeds_m_s[0], 1, seed, tilt_rad))[0]
+                save_picture(frame, pictures / f"flight{flight}_{height_m:g}m.png")
+            for speed_m_s in speeds_m_s:
+                found += tried(flown, flight, height_m, speed_m_s, count, seed, tilt_rad)
+        return found
+
+    frames: list[TrialFrame] = []
+    fly_nothing = camera_flight(trial, target, seed, 0)
+    next(frames_at(fly_nothing, heights_m[-1], 0.0, 1, seed))  # kernels are compiled before there are threads
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for found in pool.map(fly, range(flights)):
+            frames += found
+            on_progress(1)
+    return frames

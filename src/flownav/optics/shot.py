@@ -148,7 +148,7 @@ def expose(  # type: ignore[no-untyped-def]
                             light = covers[k, 3]
                     for k in range(len(shadows)):
                         s = shadows[k]
-                        light *= lit(Shadow(s[0], s[1], s[2], s[3], s[4], s[5], s[6]), x_m, y_m)
+                        light *= lit(Shadow(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7]), x_m, y_m)
                     if gloss.strength > 0.0 and max(abs(x_m), abs(y_m)) < board_half_m:
                         ahead = then.r11 * x + then.r12 * y + then.r13
                         aside = then.r21 * x + then.r22 * y + then.r23

@@ -169,10 +169,25 @@ def read_pad_camera(
     forward = wrong_forward if false else shrunk * fix.tan_forward
     right = wrong_right if false else shrunk * fix.tan_right
     distance_m = wrong_m if false else (1.0 + unit.longer) * fix.distance_m
+    there = 1.0 if false | found else 0.0
+    return stated_fix(unit, forward, right, distance_m, there, height_m, image_rate_rad_s, told)
+
+
+@equation
+def stated_fix(
+    unit: PadCameraUnit,
+    forward: float,
+    right: float,
+    distance_m: float,
+    there: float,
+    height_m: float,
+    image_rate_rad_s: float,
+    told: PadCameraParameters,
+) -> PadCameraReading:
+    """A fix (there: 1 where there is one) with the accuracy that the camera states of it."""
     across = unit.stated * angle_noise(told, height_m, image_rate_rad_s)
     along = unit.stated * distance_noise(told, height_m, image_rate_rad_s) * distance_m
     spread = across * across * (1.0 + forward * forward + right * right)
-    there = false | found
     return PadCameraReading(
         forward,
         right,
@@ -180,6 +195,6 @@ def read_pad_camera(
         spread * (1.0 + forward * forward),
         spread * (1.0 + right * right),
         along * along,
-        255.0 if there else 0.0,
-        1.0 if there else 0.0,
+        255.0 * there,
+        there,
     )

@@ -54,12 +54,13 @@ class PadCameraSheet(SensorSheet):
 
     Half angles of view are forward and to the right (the same where only one is given); the mark of side `side_m` must
     be whole in it. boresight_deg and scale_percent last a flight. hidden_share: of the frames, lost whatever the vehicle
-    does. stated_spread: the share by which the accuracies that it states are wrong.
+    does. camera: by whose name `flownav pad` rendered its frames. stated_spread: the share by which the accuracies that it states are wrong.
     """
 
     shipped_file: ClassVar[str] = "pad_camera.toml"
 
     rate_hz: Number = Field(ge=0.5, le=200.0)
+    camera: str = ""
     angle: AngleNoise
     distance: DistanceNoise
     min_height_m: Number = Field(ge=0.0, le=100.0)

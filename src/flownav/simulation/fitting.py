@@ -218,6 +218,7 @@ def onboard_of(scenario: Scenario, sheets: SensorSheets, flow: FlowParameters, v
         pad=pad_camera.parameters(),
         pad_clock=clock_of(pad_camera, 3)._replace(fitted=0 if pad is None else 1),
         pad_place=place_of(pad_camera.lens),
+        pad_seen=np.zeros(0),
         skid=skid.parameters(vehicle.mass_kg * vehicle.gravity_m_s2),
         skid_clock=clock_of(skid, 0),
         ground=LEVEL,

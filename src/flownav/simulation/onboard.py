@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from flownav.compile import equation
 from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import rotation_from_quaternion, to_earth
@@ -24,6 +27,7 @@ from flownav.vehicle.state import HelicopterState
 EPOCH_S = 0.02
 PHYSICS_PERIOD_S = 0.002
 LEAST_HEIGHT_M = 0.1
+PAD_SEEN = 4  # tangents forward and right, distance [m], 1 a fix or 0 none
 SETTLED_S = 2.0  # the skids take the weight as the collective goes down
 
 
@@ -65,6 +69,7 @@ class Onboard(NamedTuple):
     pad: PadCameraParameters
     pad_clock: Clock
     pad_place: Place
+    pad_seen: NDArray[np.float64]  # what was seen in rendered frames, rows of PAD_SEEN flattened; empty: by the model
     skid: SkidSwitchParameters
     skid_clock: Clock
     ground: Ground

@@ -16,7 +16,7 @@ from flownav.sensors.flow_camera import FlowCameraTruth, pad_texture, step_flow_
 from flownav.sensors.gps_receiver import step_gps_receiver
 from flownav.sensors.inertial import step_inertial
 from flownav.sensors.magnetometer import read_magnetometer
-from flownav.sensors.pad_camera import read_pad_camera
+from flownav.sensors.pad_camera import read_pad_camera, stated_fix
 from flownav.sensors.range_sensor import step_range_sensor
 from flownav.sensors.skid_switch import step_skid_switch
 from flownav.simulation import layout
@@ -80,6 +80,7 @@ from flownav.simulation.layout import (
 from flownav.simulation.onboard import (
     EPOCH_S,
     LEAST_HEIGHT_M,
+    PAD_SEEN,
     PHYSICS_PERIOD_S,
     SETTLED_S,
     Clock,
@@ -235,7 +236,8 @@ def read_camera(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, sl
 
 @procedure
 def read_pad(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot: int, s: Onboard) -> None:
-    """A fix of the pad."""
+    """A fix of the pad: by the model, or what was seen in this frame where the flight's frames were rendered."""
+    seen = (epoch - s.pad_clock.first) // s.pad_clock.every * PAD_SEEN
     draw(work, lanes, layout.PAD_NORMALS, 8, seed, flight, epoch, PAD_CHANNEL)
     for lane in range(len(lanes)):
         state = earlier(load_helicopter(work, lanes, lane), late_as_is(work, lanes, lane).pad_s)
@@ -243,10 +245,16 @@ def read_pad(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot:
         north, east, down = place_of(state, s.pad_place)
         above = -down if -down > LEAST_HEIGHT_M else LEAST_HEIGHT_M
         ahead, aside = image_rate_rad_s(state.u, state.v, state.p, state.q, above)
+        rate = np.sqrt(ahead * ahead + aside * aside)
         fix = read_pad_camera(
-            load_pad_unit(work, lanes, lane), north, east, down, rotation, np.sqrt(ahead * ahead + aside * aside),
+            load_pad_unit(work, lanes, lane), north, east, down, rotation, rate,
             load_pad_normals(work, lanes, lane), pad_as_is(work, lanes, lane), s.pad,
         )  # fmt: skip
+        if seen + PAD_SEEN <= len(s.pad_seen):
+            fix = stated_fix(
+                load_pad_unit(work, lanes, lane), s.pad_seen[seen], s.pad_seen[seen + 1], s.pad_seen[seen + 2],
+                s.pad_seen[seen + 3], -down, rate, s.pad,
+            )  # fmt: skip
         reading = reading_of(
             fix.tan_forward, fix.tan_right, fix.distance_m, fix.forward_variance, fix.right_variance,
             fix.distance_variance_m2, fix.quality, fix.arrived,

@@ -170,6 +170,7 @@ class Scenario(ParameterModel):
     description: str = ""
     paper_table: Literal[5, 6] | None = None  # the published table that the flight's errors are set beside
     truth: Literal["nonlinear", "linear"] = "nonlinear"
+    optics: Literal["model", "pixels"] = "model"  # of the pad camera, for `flownav fly`
     flight: FlightSection
     pad: PadSection = PadSection()
     vehicle: VehicleSection = VehicleSection()

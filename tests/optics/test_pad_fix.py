@@ -16,11 +16,10 @@ from typer.testing import CliRunner
 from flownav.cli import pad as pad_command
 from flownav.errors import InputError
 from flownav.measurement import COLUMNS, Sensor
-from flownav.optics import pad_fix, pad_noise
+from flownav.optics import pad_fix
 from flownav.optics.camera import Camera, effective_focal_px
 from flownav.optics.pad import Pad
 from flownav.optics.pad_fix import PadSearch, find_pad
-from flownav.optics.pad_noise import PadFixNoise, fix_error, measure_height, noise_law, truth_of
 from flownav.optics.pad_target import (
     CODES_36H11,
     PadTarget,
@@ -31,6 +30,7 @@ from flownav.optics.pad_target import (
     picture_cells,
     print_target,
 )
+from flownav.optics.pad_truth import fix_error, is_wrong, truth_of
 from flownav.optics.plane_pose import homography, plane_pose
 from flownav.optics.projection import Pose, pose_looking_down
 from flownav.optics.render import film
@@ -44,6 +44,11 @@ TAG = PadTarget(0.2, "tag", 3)
 def shot(target: PadTarget, pose: Pose, camera: Camera = SMALL, seed: int = 1) -> np.ndarray:
     pad = laid_out(target, 2.0 * pose.height_m + 0.3, pose.height_m / effective_focal_px(camera) / 2.0, seed)
     return film(pad, [pose], camera=camera, seed=seed)[0]
+
+
+def corners_of(pose: Pose, target: PadTarget = TAG) -> np.ndarray:
+    """The square's corners (4, 2) as SMALL has them, column and row."""
+    return truth_of(pose, target).corner_rays * FOCAL + 0.5 * np.array([SMALL.width_px - 1.0, SMALL.height_px - 1.0])
 
 
 def found(search: PadSearch) -> pad_fix.PadFix:
@@ -135,9 +140,8 @@ TILT = st.floats(-0.5, 0.5)
 @given(TILT, TILT, st.floats(-3.1, 3.1), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(0.3, 5.0))
 def test_a_pose_is_recovered_from_its_projection(roll, pitch, yaw, x, y, height) -> None:  # type: ignore[no-untyped-def]
     pose = pose_looking_down(x * height, y * height, height, roll_rad=roll, pitch_rad=pitch, yaw_rad=yaw)
-    truth = truth_of(pose, TAG, SMALL)
-    middle = np.array([SMALL.width_px - 1.0, SMALL.height_px - 1.0]) / 2.0
-    solved = plane_pose(corners_m(TAG), (truth.corners_px - middle) / FOCAL)
+    truth = truth_of(pose, TAG)
+    solved = plane_pose(corners_m(TAG), truth.corner_rays)
     assert solved is not None
     place = solved.place_m
     assert np.linalg.norm(place) == pytest.approx(truth.distance_m, rel=1e-6)
@@ -157,7 +161,7 @@ def test_the_pose_is_no_worse_than_opencvs_with_noise_on_the_corners(seed: int) 
         pitch_rad=rng.uniform(-0.25, 0.25),
         yaw_rad=2.0,
     )
-    tangents = (truth_of(pose, TAG, SMALL).corners_px - [99.5, 74.5] + rng.normal(0.0, 0.1, (4, 2))) / FOCAL
+    tangents = truth_of(pose, TAG).corner_rays + rng.normal(0.0, 0.1, (4, 2)) / FOCAL
     solved = plane_pose(corners_m(TAG), tangents)
     assert solved is not None
     figure = np.column_stack([corners_m(TAG), np.zeros(4)])
@@ -185,10 +189,9 @@ def test_points_on_a_line_have_no_map_and_no_pose() -> None:
 @pytest.mark.parametrize("yaw", [0.0, 0.4, 1.6, 3.0, -1.2, -2.5])
 def test_a_clean_frame_gives_the_projections_corners_to_a_fortieth_of_a_pixel(yaw: float) -> None:
     pose = pose_looking_down(0.05, -0.08, 0.8, roll_rad=0.12, pitch_rad=-0.1, yaw_rad=yaw)
-    truth = truth_of(pose, TAG, SMALL)
     fix = found(find_pad(shot(TAG, pose), TAG, FOCAL))
-    assert np.abs(fix.corners_px - truth.corners_px).max() < 0.04
-    error = fix_error(fix, truth)
+    assert np.abs(fix.corners_px - corners_of(pose)).max() < 0.04
+    error = fix_error(fix, truth_of(pose, TAG))
     assert np.abs(error[:2]).max() < 0.03 / FOCAL
     assert abs(error[2]) < 1e-3
     assert abs(error[3]) < 3e-3
@@ -202,7 +205,7 @@ def test_a_plain_pad_is_found_by_its_outline_and_looks_alike_after_half_a_turn(p
     target = PadTarget(0.3, pattern)
     pose = pose_looking_down(0.03, 0.02, 0.8, roll_rad=0.1, pitch_rad=-0.08, yaw_rad=0.5)
     first, second = (found(find_pad(shot(target, p), target, FOCAL)) for p in (pose, turned(pose)))
-    error = fix_error(first, truth_of(pose, target, SMALL))
+    error = fix_error(first, truth_of(pose, target))
     assert np.abs(error[:2]).max() < 0.15 / FOCAL
     assert abs(error[2]) < 5e-3
     assert abs(error[3]) < 0.02
@@ -232,7 +235,7 @@ def test_corners_agree_with_opencvs_refined_apriltag_corners() -> None:
     assert codes.ravel().tolist() == [TAG.code]
     ours = found(find_pad(frame, TAG, FOCAL)).corners_px
     theirs = np.roll(corners[0][0], -2, 0)  # OpenCV's pictures stand upside down
-    truth = truth_of(pose, TAG, SMALL).corners_px
+    truth = corners_of(pose)
     assert np.abs(ours - theirs).max() < 0.6
     assert np.abs(ours - truth).max() < np.abs(theirs - truth).max()
 
@@ -296,40 +299,24 @@ def test_black_and_saturated_frames_are_without_contrast(level: int) -> None:
     assert find_pad(np.full((90, 120), float(level)), TAG, FOCAL).reason == pad_fix.NO_FRAME
 
 
-# -- noise ------------------------------------------------------------------------------------------------------------
-def test_measured_noise_is_small_grows_with_height_and_repeats() -> None:
-    camera = SMALL._replace(read_noise_grey=1.4, photon_noise_grey=0.02)
-    near, far = (measure_height(TAG, camera, h, frames=20, seed=3) for h in (0.8, 1.5))
-    for row in (near, far):
-        assert row.wrong == 0
-        assert row.found == row.in_view
-        assert row.found > 10
-        assert row.angle_sigma_rad < 0.1 / FOCAL
-    assert near.distance_sigma < far.distance_sigma
-    assert measure_height(TAG, camera, 0.8, frames=20, seed=3) == near
+# -- errors -----------------------------------------------------------------------------------------------------------
+@given(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8), st.floats(-0.03, 0.03), st.floats(-0.03, 0.03))
+def test_an_error_is_the_angle_between_the_sights(x: float, y: float, off_x: float, off_y: float) -> None:
+    truth = truth_of(pose_looking_down(-x, -y, 1.0), TAG)
+    fix = pad_fix.PadFix(x + off_x, y + off_y, 1.1 * truth.distance_m, 0.1, np.zeros((4, 2)), True)
+    one, two = (np.array([*v, 1.0]) / np.linalg.norm([*v, 1.0]) for v in ((x, y), (x + off_x, y + off_y)))
+    error = fix_error(fix, truth)
+    assert np.hypot(*error[:2]) == pytest.approx(np.arcsin(np.linalg.norm(np.cross(one, two))), abs=2e-5)
+    assert error[2] == pytest.approx(0.1)
+    assert error[3] == pytest.approx(0.1)
+    assert (error[0] > 0) == (off_x > 0) or abs(off_x) < abs(off_y)
 
 
-def row(height: float, found: int, sigma: float, wrong: int = 0) -> pad_noise.HeightNoise:
-    return pad_noise.HeightNoise(height, 40, 30, found, wrong, 2e-5, 0.0, sigma, 0.0, 1e-3, {})
-
-
-def test_the_noise_law_is_the_power_law_of_its_rows_over_the_widest_range() -> None:
-    rows = [row(0.3, 3, 1e-3), *(row(h, 30, 1e-4 * h**1.5) for h in (0.5, 1.0, 2.0, 3.0)), row(5.0, 30, 1e-2, wrong=1)]
-    law = noise_law(rows)
-    assert law is not None
-    assert law == pytest.approx(PadFixNoise(2e-5, 1e-4, 1.5, 0.5, 3.0, 0.0))
-    assert noise_law(rows[:1]) is None
-    missed = noise_law([row(1.0, 27, 1e-4)])
-    assert missed is not None
-    assert missed.outage_probability == pytest.approx(0.1)
-
-
-@pytest.mark.slow
-def test_the_shipped_noise_is_what_the_wide_camera_shows() -> None:
-    measured = measure_height(PadTarget(), pad_noise.WIDE, 2.0, frames=40, seed=11)
-    law = PadFixNoise()
-    assert law.angle_sigma_rad == pytest.approx(measured.angle_sigma_rad, rel=1.0)
-    assert law.distance_relative_sigma * 2.0**law.distance_exponent == pytest.approx(measured.distance_sigma, rel=1.0)
+def test_a_fix_half_a_side_off_is_wrong() -> None:
+    truth = truth_of(pose_looking_down(height_m=2.0), TAG)
+    for off_m, wrong in ((0.09, False), (0.11, True)):
+        assert is_wrong(np.array([off_m / 2.0, 0.0, 0.0, 0.0]), truth, TAG) is wrong
+    assert is_wrong(np.array([0.0, 0.0, -0.11, 0.0]), truth, TAG)
 
 
 # -- the command -----------------------------------------------------------------------------------------------------
@@ -349,7 +336,7 @@ def test_the_command_finds_the_pad_in_pictures(tmp_path: Path) -> None:
     facts = run(tmp_path, "--focal", FOCAL, "--code", 3)
     assert (facts["frames"], facts["found"]) == (2, 1)
     first, second = facts["per_frame"]
-    assert first["distance_m"] == pytest.approx(truth_of(pose, TAG, SMALL).distance_m, rel=1e-3)
+    assert first["distance_m"] == pytest.approx(truth_of(pose, TAG).distance_m, rel=1e-3)
     assert second == {"frame": 1, "reason": pad_fix.TOO_DARK}
     right = run(tmp_path, "--focal", FOCAL, "--code", 3, "--image-x-deg", 90)["per_frame"][0]
     assert right["tan_right"] == pytest.approx(first["tan_forward"])
@@ -357,15 +344,7 @@ def test_the_command_finds_the_pad_in_pictures(tmp_path: Path) -> None:
         run(tmp_path)
 
 
-def test_the_command_measures_and_prints_a_table(tmp_path: Path) -> None:
-    app = typer.Typer()
-    app.command()(pad_command.command)
-    arguments = ("--camera", "px4flow", "--focus", "4", "--heights", "4,5", "--frames", "12", "--tilt-deg", "1")
-    facts = run(*arguments)
-    assert [r["height_m"] for r in facts["heights"]] == [4.0, 5.0]
-    assert all(r["wrong"] == 0 and r["frames"] == 12 for r in facts["heights"])
-    printed = CliRunner().invoke(app, list(arguments), catch_exceptions=False)
-    assert "camera px4flow: 669.3 px" in printed.stdout
+def test_the_command_prints_the_target(tmp_path: Path) -> None:
     assert run("--print", tmp_path / "pad.png")["picture"].endswith("pad.png")
     assert (tmp_path / "pad.png").is_file()
 
@@ -373,13 +352,15 @@ def test_the_command_measures_and_prints_a_table(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--camera", "nikon"), "known are wide, px4flow"),
+        (("--camera", "nikon"), "known are wide120, wide60, px4flow"),
         (("--heights", "low"), "numbers with commas"),
         (("--heights", "0"), "--heights 0"),
-        (("--frames", "1"), "--frames 1"),
+        (("--speeds", "fast"), "--speeds fast: give numbers"),
+        (("--frames", "0"), "--frames 0"),
+        (("--flights", "1"), "--flights 1"),
+        (("--mounting-deg", "9"), "--mounting-deg"),
         (("--tilt-deg", "60"), "--tilt-deg"),
         (("--focus", "0"), "--focus"),
-        (("--light", "dusk", "--heights", "1"), "light 'dusk'"),
     ],
 )
 def test_the_command_refuses_in_one_line(arguments: tuple[str, ...], message: str) -> None:

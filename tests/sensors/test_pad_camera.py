@@ -21,9 +21,28 @@ from flownav.sensors.pad_camera import (
 from flownav.sensors.pad_camera_sheet import PadCameraSheet, load_pad_camera_sheet
 from sensor_normals import draws, moved_by, silent
 
-SHEET = load_pad_camera_sheet()
+SHEET = check(
+    load_pad_camera_sheet().model_dump()
+    | {
+        "angle": {"floor_mrad": 5.0},
+        "distance": {"floor_percent": 2.0},
+        "min_height_m": 0.15,
+        "max_height_m": 3.0,
+        "half_view_deg": 60.0,
+        "half_view_right_deg": 60.0,
+        "side_m": 0.0,
+        "boresight_deg": 0.4,
+        "scale_percent": 0.5,
+        "hidden_share": 0.0,
+        "stated_spread": 0.3,
+        "false_share": 0.001,
+        "missed": {"share": 0.02, "share_at_max_height": 0.2, "share_at_blur": 0.5, "blur_rad_s": 2.0},
+    },
+    PadCameraSheet,
+    "test",
+)
 P = SHEET.parameters()
-PERFECT, QUIET = PadCameraUnit(0.0, 0.0, 0.0, 1.0), silent(PadCameraNormals)
+PERFECT, QUIET = PadCameraUnit(0.0, 0.0, 0.0, 1.0, 0.0, 0.0), silent(PadCameraNormals)
 TURN = Turn.from_euler("ZYX", [0.6, 0.1, -0.15])
 ROTATION = tuple(float(x) for x in TURN.as_matrix().ravel())
 LENS = np.array([0.4, -0.3, -2.0])
@@ -35,8 +54,9 @@ def read(
     lens: np.ndarray = LENS,
     rate: float = 0.0,
     p: PadCameraParameters = P,
+    told: PadCameraParameters | None = None,
 ) -> PadCameraReading:
-    return read_pad_camera(unit, *map(float, lens), ROTATION, rate, n, p)
+    return read_pad_camera(unit, *map(float, lens), ROTATION, rate, n, p, p if told is None else told)
 
 
 def test_a_perfect_camera_sees_where_the_pad_is() -> None:
@@ -49,12 +69,52 @@ def test_a_perfect_camera_sees_where_the_pad_is() -> None:
 def test_a_turned_camera_is_off_by_its_angles() -> None:
     angles = np.array([0.006, -0.009, 0.012])
     ahead, right, below = (TURN * Turn.from_rotvec(angles)).inv().apply(-LENS)
-    reading = read(unit=PadCameraUnit(*angles, 1.0))
+    reading = read(unit=PadCameraUnit(*angles, 1.0, 0.0, 0.0))
     assert reading[:2] == pytest.approx((ahead / below, right / below), abs=3e-4)
     assert abs(reading.tan_forward - read().tan_forward) > 0.005
-    assert draw_pad_camera(PadCameraUnit(1.0, -1.0, 2.0, 1.0), P) == pytest.approx(
-        (math.radians(0.4), -math.radians(0.4), math.radians(0.8), 1.3)
+    assert draw_pad_camera(PadCameraUnit(1.0, -1.0, 2.0, 1.0, 2.0, 9.0), P) == pytest.approx(
+        (math.radians(0.4), -math.radians(0.4), math.radians(0.8), 1.3, 0.01, 0.0)
     )
+
+
+def test_a_focal_length_believed_too_long_shows_smaller_tangents_and_longer_distances() -> None:
+    right, long = read(), read(unit=PERFECT._replace(longer=0.01))
+    assert long[:2] == pytest.approx((0.99 * right.tan_forward, 0.99 * right.tan_right))
+    assert long.distance_m == pytest.approx(1.01 * right.distance_m)
+
+
+LAW = P._replace(angle_floor_rad=1e-3, angle_per_m=5e-4, angle_per_rad_s=2e-3, distance_floor=3e-3,
+                 distance_per_m=4e-3, distance_per_rad_s=5e-3, false_above=1e3, missed_above=1e3)  # fmt: skip
+
+
+@pytest.mark.parametrize(("height", "rate"), [(0.5, 0.0), (2.5, 0.0), (0.5, 1.5)])
+def test_noise_grows_with_height_and_image_rate_and_is_stated_so(height: float, rate: float) -> None:
+    lens = np.array([0.0, 0.0, -height])
+    level = tuple(float(x) for x in np.eye(3).ravel())
+    readings = np.array(
+        [read_pad_camera(PERFECT, *map(float, lens), level, rate, n, LAW, LAW) for n in draws(PadCameraNormals, 6000, 3)]
+    )
+    across = math.sqrt(1e-3**2 + (5e-4 * height) ** 2 + (2e-3 * rate) ** 2)
+    along = math.sqrt(3e-3**2 + (4e-3 * height) ** 2 + (5e-3 * rate) ** 2)
+    np.testing.assert_allclose(readings[:, :2].std(0), across, rtol=0.04)
+    assert readings[:, 2].std() == pytest.approx(along * height, rel=0.04)
+    np.testing.assert_allclose(readings[:, 3:5].mean(0), across**2, rtol=0.01)
+    assert readings[:, 5].mean() == pytest.approx((along * height) ** 2, rel=0.02)
+
+
+def test_a_camera_that_is_worse_than_its_datasheet_states_the_datasheet() -> None:
+    worse = P._replace(angle_floor_rad=3.0 * P.angle_floor_rad, distance_floor=2.0 * P.distance_floor)
+    n = silent(PadCameraNormals, forward=1.0, distance=1.0)
+    assert read(n, p=worse, told=P)[3:6] == pytest.approx(read(n, p=P)[3:6], rel=0.05)
+    assert abs(read(n, p=worse).tan_forward - read().tan_forward) > 2.5 * abs(read(n).tan_forward - read().tan_forward)
+
+
+def test_what_hides_the_pad_does_so_at_any_height() -> None:
+    p = check(SHEET.model_dump() | {"hidden_share": 0.3}, PadCameraSheet, "hidden").parameters()
+    low = np.array([0.0, 0.0, -0.3])
+    there = [read(n, lens=low, p=p._replace(false_above=1e3)).arrived for n in draws(PadCameraNormals, 6000, 21)]
+    assert np.mean(there) == pytest.approx(0.7 * 0.98, abs=0.02)
+    assert SHEET.angle_sigma_mrad == 5.0
 
 
 def test_stated_variances_are_those_of_the_readings() -> None:
@@ -104,8 +164,8 @@ def test_false_fixes_come_anywhere_in_the_view_and_without_the_pad() -> None:
 def test_there_are_fixes_between_the_heights_and_within_the_view() -> None:
     for height, there in ((0.14, 0.0), (0.16, 1.0), (2.99, 1.0), (3.01, 0.0)):
         assert read(lens=np.array([0.0, 0.0, -height])).arrived == there
-    narrow = P._replace(half_view_tangent=0.17)
-    assert read(p=narrow).arrived == 0.0
+    for name in ("half_view_forward_tangent", "half_view_right_tangent"):
+        assert read(p=P._replace(**{name: 0.05})).arrived == 0.0
 
 
 def test_each_normal_moves_its_own_output_alone() -> None:
@@ -116,9 +176,9 @@ def test_each_normal_moves_its_own_output_alone() -> None:
     assert moved["right"] == {"tan_forward", "tan_right"}
     assert moved["distance"] == {"distance_m", "distance_variance_m2"}
     assert moved["missed"] == {"quality", "arrived"}
-    assert not moved["false"] | moved["false_forward"] | moved["false_right"] | moved["spare"]
+    assert not moved["false"] | moved["false_forward"] | moved["false_right"] | moved["hidden"]
     for name, fields in moved_by(PadCameraUnit, lambda n: draw_pad_camera(n, P)).items():
-        assert fields == {name}
+        assert fields == ({name} if name != "spare" else set())
 
 
 def test_what_the_datasheet_refuses() -> None:
@@ -130,6 +190,7 @@ def test_what_the_datasheet_refuses() -> None:
             {"missed": missed | {"share_at_max_height": 0.01}},
             "missed.share_at_max_height: at least share = 0.02 is needed",
         ),
+        ({"angle": {"floor_mrad": 0.0}}, "angle.floor_mrad: Input should be greater than 0"),
         ({"half_view_deg": 85}, "half_view_deg: Input should be less than 80"),
     ):
         with pytest.raises(InputError, match=f"^pad.toml: {message}"):

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from flownav.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
 from flownav.sensors.pad_fix import PadFixNormals, PadFixParameters, PadFixReading, read_pad
 
-CAMERA = PadFixParameters(1.0, 0.003, 0.02, 0.3, 3.0, math.tan(0.6))
+CAMERA = PadFixParameters(1.0, 0.003, 0.02, 0.3, 3.0, math.tan(0.6), math.tan(0.6), 0.0)
 SILENT = PadFixNormals(0.0, 0.0, 0.0, 0.0)
 LEVEL = rotation_from_quaternion(1.0, 0.0, 0.0, 0.0)
 
@@ -76,3 +76,17 @@ def test_the_distance_errs_by_a_share_of_itself() -> None:
 def test_it_is_seen_between_two_heights_and_within_the_view(lens: tuple[float, float, float], seen: float) -> None:
     assert read_pad(*lens, LEVEL, SILENT, CAMERA).valid == seen
     assert read_pad(*lens, LEVEL, SILENT, CAMERA._replace(fitted=0.0)).valid == 0.0
+
+
+@pytest.mark.parametrize(("turn", "reach"), [(0.0, 0.2), (math.pi / 4.0, 0.2 * math.sqrt(2.0)), (math.pi / 2.0, 0.2)])
+def test_a_mark_must_be_whole_in_a_view_that_is_narrower_to_the_right(turn: float, reach: float) -> None:
+    camera = CAMERA._replace(half_view_right_tangent=0.5, side_m=0.4)
+    rotation = rotation_from_quaternion(*quaternion_from_euler(0.0, 0.0, turn))
+
+    def seen(forward_m: float, right_m: float) -> float:
+        north, east, _ = to_earth(rotation, forward_m, right_m, 0.0)
+        return read_pad(-north, -east, -2.0, rotation, SILENT, camera).valid
+
+    ahead = 2.0 * math.tan(0.6) - reach
+    assert [seen(s * (ahead + d), 0.0) for s in (-1, 1) for d in (-0.01, 0.01)] == [1.0, 0.0, 1.0, 0.0]
+    assert [seen(0.0, s * (1.0 - reach + d)) for s in (-1, 1) for d in (-0.01, 0.01)] == [1.0, 0.0, 1.0, 0.0]

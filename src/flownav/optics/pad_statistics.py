@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.stats import norm
+from scipy.stats import binom, norm
 
 from flownav.errors import InputError
 from flownav.optics.pad_trial import TrialFrame
@@ -30,6 +30,7 @@ LEAST_SHARE = 0.5  # of the frames with the whole pad in view: heights that give
 LEAST_FRAMES = 5
 EASY_RATE_RAD_S = 0.75
 SHARE_FLOOR = 1e-3  # of missed frames: fewer than that nobody measures with some thousand frames
+UNLIKELY = 0.01
 PASSES = 3
 
 
@@ -171,16 +172,21 @@ def fitted_noise(left: Array, height_m: Array, rate_rad_s: Array, flights: Array
 
 # -- missed and false ------------------------------------------------------------------------------------------------
 def missed_law(c: dict[str, Array], max_height_m: float) -> MissedLaw:
-    """Hidden shares by flight from its easy frames, then the probit of greatest likelihood of the rest."""
+    """Hidden shares by flight from its easy frames, then the probit of greatest likelihood of the rest.
+
+    InputError where there are too few easy frames.
+    """
     used = (c["whole"] > 0.0) & (c["height_m"] <= max_height_m)
-    easy = used & (c["image_rate_rad_s"] < EASY_RATE_RAD_S) & (c["height_m"] <= 0.5 * max_height_m)
+    low_m = max(0.5 * max_height_m, float(np.median(c["height_m"][used])))
+    easy = used & (c["image_rate_rad_s"] < EASY_RATE_RAD_S) & (c["height_m"] <= low_m)
     missed = 1.0 - c["found"]
-    hidden = {f: missed[easy & (c["flight"] == f)] for f in np.unique(c["flight"][used])}
-    shares = np.array([m.mean() for m in hidden.values() if len(m) >= LEAST_FRAMES])
-    counts = np.array([len(m) for m in hidden.values() if len(m) >= LEAST_FRAMES])
-    if not len(shares):
-        raise InputError("pad: too few slow frames below half of the greatest height; give more --frames")
-    own = np.array([hidden[f].mean() if len(hidden[f]) >= LEAST_FRAMES else shares.mean() for f in c["flight"][used]])
+    flights = [f for f in np.unique(c["flight"][used]) if (easy & (c["flight"] == f)).sum() >= LEAST_FRAMES]
+    if not flights:
+        raise InputError("pad: too few slow frames below the middle of the heights; give more --frames")
+    counts = np.array([(easy & (c["flight"] == f)).sum() for f in flights])
+    shares = hidden_shares(np.array([missed[easy & (c["flight"] == f)].sum() for f in flights]), counts)
+    by_flight = dict(zip(flights, shares, strict=True))
+    own = np.array([by_flight.get(f, float(shares.mean())) for f in c["flight"][used]])
     h, w, lost = c["height_m"][used] / max_height_m, c["image_rate_rad_s"][used], missed[used]
 
     def probabilities(p: Array) -> Array:
@@ -198,6 +204,16 @@ def missed_law(c: dict[str, Array], max_height_m: float) -> MissedLaw:
         for x in (-best[0], np.exp(best[1]) - best[0], np.exp(best[2]) * blur - best[0])
     )
     return MissedLaw(share, far, fast, blur, beta_of(shares, counts))
+
+
+def hidden_shares(missed: Array, counts: Array) -> Array:
+    """What a flight misses of its easy frames beyond what the median flight does, as a part of the rest of them.
+
+    None where the median flight might miss as many by chance once in a hundred flights.
+    """
+    usual = float(np.median(missed / counts))
+    unlikely = binom.sf(missed - 1, counts, max(usual, 0.5 / counts.sum())) < UNLIKELY
+    return np.where(unlikely, (missed / counts - usual) / (1.0 - usual), 0.0)
 
 
 def beta_of(shares: Array, counts: Array) -> tuple[float, float]:

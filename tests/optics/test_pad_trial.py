@@ -46,7 +46,8 @@ def made(flights: int = 24, cases: int = 60, hidden: float = 0.0) -> list[TrialF
             speed = float(rng.choice([0.1, 1.0]))
             rate = float(speed / height * rng.uniform(0.8, 1.2))
             ray = rng.uniform(-0.6, 0.6, 2)
-            noise = sigma_of(NoiseLaw(3e-4, 1e-4, 1e-3, 0.0), np.array(height), np.array(rate)) * rng.standard_normal(2)
+            across = sigma_of(NoiseLaw(3e-4, 1e-4, 1e-3, 0.0), np.array(height), np.array(rate))
+            noise = across * rng.standard_normal(2)
             far = sigma_of(NoiseLaw(2e-3, 3e-3, 0.0, 0.0), np.array(height), np.array(rate)) * rng.standard_normal()
             error = np.array([*(bias - scale * ray / (1.0 + ray @ ray) + noise), scale + far, 0.0])
             found = bool(rng.standard_normal() < 2.0 - 1.5 * height / 4.0 - 0.2 * rate) and not blind
@@ -58,7 +59,7 @@ def made(flights: int = 24, cases: int = 60, hidden: float = 0.0) -> list[TrialF
     return frames
 
 
-# -- what is drawn ---------------------------------------------------------------------------------------------------
+# -- what is drawn -------------------------------------------------------------------------------------------
 def test_a_flight_repeats_and_another_has_another_camera() -> None:
     trial = camera_named("px4flow")
     one, again, other = (camera_flight(trial, PadTarget(0.03), 1, k) for k in (3, 3, 4))
@@ -95,7 +96,7 @@ def test_a_pose_is_drawn_with_the_pads_centre_near_the_frames_middle() -> None:
         assert np.hypot(motion.velocity_x_m_s, motion.velocity_y_m_s) == pytest.approx(0.5)
 
 
-# -- what statistics make of it -----------------------------------------------------------------------------------------
+# -- what statistics make of it ------------------------------------------------------------------------------
 def test_bias_and_noise_are_told_apart() -> None:
     laws, cells = laws_of(made())
     assert laws.bias_rad == pytest.approx(3e-3, rel=0.3)
@@ -156,7 +157,7 @@ def test_heights_at_which_most_are_missed_are_out_of_range() -> None:
         laws_of([f for f in made(3, 6) if f.height_m < 3.0])
 
 
-# -- the datasheet and the command ---------------------------------------------------------------------------------------
+# -- the datasheet and the command ---------------------------------------------------------------------------
 def test_the_datasheet_says_what_was_measured(tmp_path: Path) -> None:
     laws, _ = laws_of(made())
     text = datasheet(laws, CAMERAS["wide120"], "wide120", TAG, 0.4, "flownav pad", rate_hz=10.0, latency_s=0.08,

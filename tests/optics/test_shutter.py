@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.optics.projection import Pose, image_point, motion_field, pose_looking_down
-from flownav.optics.projection import CameraMotion
+from flownav.optics.projection import CameraMotion, Pose, image_point, motion_field, pose_looking_down
 from flownav.optics.shutter import FlightMotion, image_rate_rad_s, moved, part_time_s, row_time_s
 
 STILL = FlightMotion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -44,8 +43,9 @@ def test_the_image_rate_is_that_of_the_ground_below(turn: int) -> None:
 def test_a_point_moves_in_the_image_by_rate_times_time() -> None:
     pose: Pose = pose_looking_down(height_m=2.0)
     motion = STILL._replace(velocity_x_m_s=0.6, rate_y_rad_s=-0.1)
-    before, after = image_point(moved(pose, motion, -0.005), 0.0, 0.0, 312.0), image_point(
-        moved(pose, motion, 0.005), 0.0, 0.0, 312.0
+    before, after = (
+        image_point(moved(pose, motion, -0.005), 0.0, 0.0, 312.0),
+        image_point(moved(pose, motion, 0.005), 0.0, 0.0, 312.0),
     )
     rate = image_rate_rad_s(0.6, 0.0, 0.0, -0.1, 2.0)[0]
     assert after[0] - before[0] == pytest.approx(312.0 * rate * 0.01, rel=1e-3)

@@ -92,7 +92,10 @@ def test_noise_grows_with_height_and_image_rate_and_is_stated_so(height: float, 
     lens = np.array([0.0, 0.0, -height])
     level = tuple(float(x) for x in np.eye(3).ravel())
     readings = np.array(
-        [read_pad_camera(PERFECT, *map(float, lens), level, rate, n, LAW, LAW) for n in draws(PadCameraNormals, 6000, 3)]
+        [
+            read_pad_camera(PERFECT, *map(float, lens), level, rate, n, LAW, LAW)
+            for n in draws(PadCameraNormals, 6000, 3)
+        ]
     )
     across = math.sqrt(1e-3**2 + (5e-4 * height) ** 2 + (2e-3 * rate) ** 2)
     along = math.sqrt(3e-3**2 + (4e-3 * height) ** 2 + (5e-3 * rate) ** 2)

@@ -251,7 +251,7 @@ def step_lane(work, lanes, lane, suite):
     out_mag(work, lanes, lane, field)
     pad = read_pad_camera(
         unit_pad(work, lanes, lane), truth.pos_n_m, truth.pos_e_m, truth.pos_d_m, rotation, 0.3,
-        n_pad(work, lanes, lane), suite.pad,
+        n_pad(work, lanes, lane), suite.pad, suite.pad,
     )  # fmt: skip
     out_pad(work, lanes, lane, pad)
     skid, landed = step_skid_switch(

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,6 +50,7 @@ Array = NDArray[np.float64]
 
 LOWEST_LENS_M = 0.11  # below that a lens all but touches the pad: no frame is rendered
 ABOVE_RANGE = 1.5  # nor from higher than so many times the datasheet's greatest height
+FARTHEST_RAD = 1.3  # from the axis
 LOOK_AHEAD = 25  # frames that are flown on while there is nothing to render
 MOTION = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, *TABLES["truth"][10:13])
 
@@ -154,7 +156,7 @@ def _flown(setup: Setup, seen: Array, seed: int, index: int, ensemble: Ensemble 
 def frame_of(eye: Eye, motion: Array, t_s: float, number: int) -> tuple[PixelFrame, Array] | None:
     """The frame of this instant and the row of the table that it makes; None where none is rendered."""
     pose, moving = pose_of(eye, motion)
-    if not LOWEST_LENS_M < pose.height_m < eye.highest_m:
+    if not LOWEST_LENS_M < pose.height_m < eye.highest_m or not pad_ahead(pose):
         return None
     flown = eye.flown
     frame = take_frame(flown, ground_below(flown, pose.height_m), pose, moving, number)
@@ -169,6 +171,12 @@ def frame_of(eye: Eye, motion: Array, t_s: float, number: int) -> tuple[PixelFra
     wrong = is_wrong(error, truth, flown.target)
     seen = np.array([fix.tan_forward, fix.tan_right, fix.distance_m, 1.0])
     return PixelFrame(t_s, pose.height_m, rate, whole, not wrong, wrong, reason, error), seen
+
+
+def pad_ahead(pose: Pose) -> bool:
+    """Whether the pad lies near enough to the optical axis to be in any frame of a wide lens."""
+    x, y, z = np.array(pose[3:]).reshape(3, 3).T @ np.array([-pose.x_m, -pose.y_m, pose.height_m])
+    return bool(np.arctan2(np.hypot(x, y), z) < FARTHEST_RAD)
 
 
 def pose_of(eye: Eye, motion: Array, *, mounted: bool = True) -> tuple[Pose, FlightMotion]:
@@ -195,7 +203,7 @@ def agreement(frames: list[PixelFrame], sheet: PadCameraSheet) -> list[dict[str,
     """
     p = sheet.parameters()
     rows = []
-    for low, high in zip(BANDS_M, BANDS_M[1:], strict=False):
+    for low, high in pairwise(BANDS_M):
         own = [f for f in frames if low <= f.height_m < high]
         whole, found = [f for f in own if f.whole], [f for f in own if f.found]
         if not own:

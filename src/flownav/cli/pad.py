@@ -38,9 +38,7 @@ def command(
     flights: Annotated[int, typer.Option(help="Cameras, each on a flight of its own.")] = 40,
     count: Annotated[int, typer.Option("--frames", help="Frames a flight, height and speed.")] = 2,
     tilt: Annotated[float, typer.Option("--tilt-deg", help="Greatest tilt.")] = 15.0,
-    mounting: Annotated[
-        float, typer.Option("--mounting-deg", help="How well it is mounted, for the datasheet.")
-    ] = 0.4,
+    mounting: Annotated[float, typer.Option("--mounting-deg", help="How well it is mounted, for the datasheet.")] = 0.4,
     seed: Annotated[int, typer.Option(help="Of cameras, light, ground, poses and noise.")] = 1,
     out: Annotated[
         Path | None, typer.Option(help="The datasheet to write (TOML), which `fly` reads.", show_default=False)
@@ -252,10 +250,11 @@ def _law_lines(laws: dict[str, Any]) -> list[str]:
         f"added in squares; between flights x exp(N(0, {angle['spread']:.2f}))",
         f"distance [%]: {1e2 * distance['floor']:.2f}, {1e2 * distance['per_m']:.2f} h, "
         f"{1e2 * distance['per_rad_s']:.2f} w; between flights x exp(N(0, {distance['spread']:.2f}))",
-        f"bias as long as a flight: {1e3 * laws['bias_rad']:.2f} mrad of each angle, scale {1e2 * laws['scale']:.2f} %",
+        f"bias that lasts a flight: {1e3 * laws['bias_rad']:.2f} mrad of each angle, scale {1e2 * laws['scale']:.2f} %",
         f"missed: {100 * missed['share']:.1f} % low and slow, {100 * missed['share_at_max_height']:.1f} % at "
-        f"{laws['max_height_m']:g} m, {100 * missed['share_at_blur']:.1f} % at {missed['blur_rad_s']:.1f} rad/s; hidden "
-        f"{100 * a / (a + b):.1f} %, between flights Beta({a:.3f}, {b:.3f}); false {100 * laws['false_share']:.2f} %",
+        f"{laws['max_height_m']:g} m, {100 * missed['share_at_blur']:.1f} % at {missed['blur_rad_s']:.1f} rad/s",
+        f"hidden: {100 * a / (a + b):.1f} %, between flights Beta({a:.3f}, {b:.3f}); "
+        f"false: {100 * laws['false_share']:.2f} %",
     ]
 
 

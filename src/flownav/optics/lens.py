@@ -98,7 +98,7 @@ def believed(lens: Lens, wrong: Calibration, normals: ArrayLike) -> Lens:
 
 
 class Rectifier(NamedTuple):
-    """From a lens's frame to a pinhole's of `focal_px` on the axis: where each of its pixels lies, (2, rows, columns)."""
+    """From a lens's frame to a pinhole's of `focal_px`: where each of the latter's pixels lies, (2, rows, columns)."""
 
     focal_px: float
     row_column: Array

@@ -48,7 +48,8 @@ def datasheet(
         entry("half_view_right_deg", float(aside), "along its columns"),
         entry("side_m", BOARD_CELLS * target.cell_m, "of the target with its white ring, which must be whole in view"),
         entry(
-            "boresight_deg", math.hypot(mounting_deg, bias_deg),
+            "boresight_deg",
+            math.hypot(mounting_deg, bias_deg),
             f"mounting {mounting_deg:g} (assumed) and calibration {bias_deg:.2f} (measured), added in squares",
         ),
         entry("scale_percent", 100.0 * laws.scale, "what a calibration leaves of focal length and distortion"),

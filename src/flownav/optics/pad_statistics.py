@@ -13,7 +13,7 @@ whatever it does (what lies on the pad, glare), and of the rest those of a probi
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 LEAST_SHARE = 0.5  # of the frames with the whole pad in view: heights that give fewer fixes are out of range
 LEAST_FRAMES = 5
-EASY_RATE_RAD_S = 0.75
+EASY_RATE_RAD_S = 1.75
 SHARE_FLOOR = 1e-3  # of missed frames: fewer than that nobody measures with some thousand frames
 UNLIKELY = 0.01
 PASSES = 3
@@ -143,12 +143,17 @@ def _bias(c: dict[str, Array], own: NDArray[np.bool_], angle: NoiseLaw, distance
     left = error.copy()
     left[:, :2] -= (design @ found).reshape(2, -1).T
     left[:, 2] -= long
-    return FlightBias(*map(float, found), long), left
+    return FlightBias(float(found[0]), float(found[1]), float(found[2]), long), left
 
 
 def sigma_of(law: NoiseLaw, height_m: Array, rate_rad_s: Array) -> Array:
     """The law's standard deviation."""
     return np.asarray(np.sqrt(law.floor**2 + (law.per_m * height_m) ** 2 + (law.per_rad_s * rate_rad_s) ** 2))
+
+
+def _law(logs: Array) -> NoiseLaw:
+    floor, per_m, per_rad_s = (float(x) for x in np.exp(logs))
+    return NoiseLaw(floor, per_m, per_rad_s, 0.0)
 
 
 def fitted_noise(left: Array, height_m: Array, rate_rad_s: Array, flights: Array) -> NoiseLaw:
@@ -157,12 +162,12 @@ def fitted_noise(left: Array, height_m: Array, rate_rad_s: Array, flights: Array
     start = np.sqrt(np.median(square))
 
     def cost(log: Array) -> float:
-        variance = sigma_of(NoiseLaw(*np.exp(log), 0.0), height_m, rate_rad_s) ** 2
+        variance = sigma_of(_law(log), height_m, rate_rad_s) ** 2
         return float((np.log(variance) + square / variance).mean())
 
     guess = np.log([start, start / np.median(height_m), start / max(np.median(rate_rad_s), 1e-3)])
     best = minimize(cost, guess, method="Nelder-Mead", options={"maxiter": 4000, "xatol": 1e-4, "fatol": 1e-8})
-    law = NoiseLaw(*map(float, np.exp(best.x)), 0.0)
+    law = _law(best.x)
     ratio = square / sigma_of(law, height_m, rate_rad_s) ** 2
     own = [(np.log(ratio[flights == f].mean()) / 2.0, (flights == f).sum()) for f in np.unique(flights)]
     logs = np.array([log for log, n in own if n >= LEAST_FRAMES])
@@ -231,7 +236,7 @@ def false_share_of(c: dict[str, Array]) -> float:
     return float((c["wrong"].sum() + 1.0) / (len(c["wrong"]) + 2.0))
 
 
-# -- all together -------------------------------------------------------------------------------------------------------
+# -- all together -----------------------------------------------------------------------------------------------------
 def heights_in_range(c: dict[str, Array]) -> tuple[float, float]:
     """From the lowest to the highest height at which half of the slowest frames with the whole pad in view give a fix.
 
@@ -268,13 +273,26 @@ def cells_of(frames: Sequence[TrialFrame], c: dict[str, Array], left: Array) -> 
             own = (c["height_m"] == height_m) & (c["speed_m_s"] == speed_m_s)
             seen = own & (c["whole"] > 0.0)
             rest = left[own][np.isfinite(left[own]).all(1)]
-            rms: Callable[[Array], float] = lambda x: float(np.sqrt((x**2).mean()))  # noqa: E731
-            sigmas = [rms(rest[:, :2]), rms(rest[:, 2]), rms(rest[:, 3])] if len(rest) >= LEAST_FRAMES else [np.nan] * 3
+            told = len(rest) >= LEAST_FRAMES
+            angle, distance, heading = (_rms(rest[:, k]) if told else np.nan for k in (slice(0, 2), 2, 3))
             reasons = Counter(f.reason for f, k in zip(frames, own, strict=True) if k and not f.found)
             cells.append(
                 Cell(
-                    float(height_m), float(speed_m_s), float(np.median(c["image_rate_rad_s"][own])), int(own.sum()),
-                    int(seen.sum()), int(c["found"][seen].sum()), int(c["wrong"][own].sum()), *sigmas, dict(reasons),
-                )  # fmt: skip
+                    float(height_m),
+                    float(speed_m_s),
+                    float(np.median(c["image_rate_rad_s"][own])),
+                    int(own.sum()),
+                    int(seen.sum()),
+                    int(c["found"][seen].sum()),
+                    int(c["wrong"][own].sum()),
+                    angle,
+                    distance,
+                    heading,
+                    dict(reasons),
+                )
             )
     return cells
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt((values**2).mean()))

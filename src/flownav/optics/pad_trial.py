@@ -143,14 +143,10 @@ def camera_flight(trial: TrialCamera, target: PadTarget, seed: int, flight: int)
     )  # fmt: skip
 
 
-def take_frame(
-    flown: CameraFlight, land: Ground, pose: Pose, motion: FlightMotion, frame: int
-) -> NDArray[np.uint8]:
+def take_frame(flown: CameraFlight, land: Ground, pose: Pose, motion: FlightMotion, frame: int) -> NDArray[np.uint8]:
     """The frame (height, width) as the sensor gives it."""
     scene = in_shadow_of_vehicle(flown.scene, pose)
-    return shoot(
-        flown.target, flown.optic, flown.view, land, scene, pose, motion, flown.exposure, flown.seed, frame
-    )
+    return shoot(flown.target, flown.optic, flown.view, land, scene, pose, motion, flown.exposure, flown.seed, frame)
 
 
 def look(flown: CameraFlight, frame: NDArray[np.uint8], body_from_camera: Array | None = None) -> PadSearch:
@@ -185,7 +181,7 @@ def drawn_pose(optic: Optic, height_m: float, tilt_rad: float, rng: np.random.Ge
     turned = {"roll_rad": tilt * np.cos(way), "pitch_rad": tilt * np.sin(way), "yaw_rad": yaw}
     size = np.array([optic.camera.width_px, optic.camera.height_px])
     ray = rays_of(optic.lens, rng.uniform(-MIDDLE, MIDDLE, 2) * size)
-    x_m, y_m, _ = ground_point(pose_looking_down(0.0, 0.0, height_m, **turned), *map(float, ray), 1.0)
+    x_m, y_m, _ = ground_point(pose_looking_down(0.0, 0.0, height_m, **turned), float(ray[0]), float(ray[1]), 1.0)
     return pose_looking_down(-x_m, -y_m, height_m, **turned)
 
 
@@ -236,7 +232,7 @@ def fly_cameras(
 
     def fly(flight: int) -> list[TrialFrame]:
         flown = camera_flight(trial, target, seed, flight)
-        found = []
+        found: list[TrialFrame] = []
         for height_m in heights_m:
             if pictures is not None:
                 frame = next(frames_at(flown, height_m, speeds_m_s[0], 1, seed, tilt_rad))[0]

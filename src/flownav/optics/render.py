@@ -53,7 +53,7 @@ def seen(pad: Pad, camera: Camera, pose: Pose) -> NDArray[np.float32]:
 
 
 def blurred(pad: Pad, camera: Camera, ground: NDArray[np.float64], distance_m: float) -> NDArray[np.float32]:
-    """The pad's raster under lens, defocus at a distance, and the pixel; `ground` (2, 2) [m/px] as `footprint` has it."""
+    """The pad's raster under lens, defocus at a distance and pixel; `ground` (2, 2) [m/px] as `footprint` has it."""
     rows, columns = pad.reflectance.shape
     fy = np.fft.fftfreq(rows, pad.texel_m)[:, None]
     fx = np.fft.rfftfreq(columns, pad.texel_m)[None, :]

@@ -95,7 +95,8 @@ def mirrored(g: Gloss, x: float, y: float, z: float) -> float:
     size = np.sqrt(x * x + y * y + z * z)
     cosine = clamp((x * g.sun_x + y * g.sun_y - z * g.sun_z) / size, -1.0, 1.0)
     angle_squared = 2.0 * (1.0 - cosine)
-    return g.strength * np.exp(-0.5 * angle_squared / (g.width_rad * g.width_rad))
+    level: float = g.strength * np.exp(-0.5 * angle_squared / (g.width_rad * g.width_rad))
+    return level
 
 
 class Scene(NamedTuple):
@@ -144,9 +145,8 @@ def drawn_scene(rng: np.random.Generator, side_m: float, sunny: bool) -> Scene:
         way = rng.uniform(-np.pi, np.pi)
         width_m, from_m = np.exp(rng.uniform(np.log(0.3), np.log(10.0))), np.exp(rng.uniform(np.log(3.0), np.log(30.0)))
         place = rng.uniform(-1.0, 1.0, 2) * AROUND_M
-        along = np.cos(way), np.sin(way)
-        depth = rng.uniform(0.5, 0.85)
-        shadows.append(Shadow(*place, *along, 0.5 * width_m, FAR_M, penumbra_m(from_m), depth))
+        depth, edge_m = rng.uniform(0.5, 0.85), penumbra_m(from_m)
+        shadows.append(Shadow(place[0], place[1], np.cos(way), np.sin(way), 0.5 * width_m, FAR_M, edge_m, depth))
     covers = []
     if rng.uniform() < COVER_SHARE:
         for _ in range(rng.integers(1, 4)):

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from flownav.compile import clamp, equation, kernel
 from flownav.optics.camera import Camera, Exposure
-from flownav.optics.lens import Lens, field_angle_rad, illumination, pixel_grid, pixels_of, rays_of
+from flownav.optics.lens import Lens, illumination, pixel_grid, pixels_of, rays_of
 from flownav.optics.pad import Pad
 from flownav.optics.pad_target import BOARD_CELLS, GROUND_REFLECTANCE, PadTarget, ground, laid_out
 from flownav.optics.projection import Pose, ground_point
 from flownav.optics.render import blurred, digitise, noise_bank, sampled
-from flownav.optics.scene import Cover, Gloss, Scene, Shadow, covered, lit, mirrored
+from flownav.optics.scene import Cover, Scene, Shadow, covered, lit, mirrored
 from flownav.optics.shutter import FlightMotion, image_rate_rad_s, moved, part_time_s, row_time_s
 
 Array = NDArray[np.float64]
@@ -66,7 +66,7 @@ def ground_at(height_m: float, focal_px: float, seed: int) -> Ground:
     """Natural ground with marks, stones and tiles: rectangles of any grey, at the scale of a pixel straight below."""
     rng = np.random.default_rng([seed, 11])
     raster = ground(GROUND_TEXELS, seed)
-    row, column = np.indices(raster.shape)
+    row, column = np.meshgrid(*(np.arange(n, dtype=float) for n in raster.shape), indexing="ij")
     for _ in range(MARKS):
         middle, turn = rng.uniform(0.0, GROUND_TEXELS, 2), rng.uniform(0.0, np.pi)
         half = 0.5 * np.exp(rng.uniform(np.log(SMALLEST_MARK_PX), np.log(LARGEST_MARK_PX), 2))
@@ -97,7 +97,7 @@ def footprint_at(lens: Lens, pose: Pose, ray: Array) -> Array:
     columns = []
     for step in (np.array([0.5, 0.0]), np.array([0.0, 0.5])):
         ahead, behind = rays_of(lens, pixel + step), rays_of(lens, pixel - step)
-        one, two = ground_point(pose, *map(float, ahead), 1.0), ground_point(pose, *map(float, behind), 1.0)
+        one, two = (ground_point(pose, float(r[0]), float(r[1]), 1.0) for r in (ahead, behind))
         columns.append([one[0] - two[0], one[1] - two[1]])
     return np.array(columns).T
 
@@ -111,7 +111,7 @@ def blur_width_px(optic: Optic, pose: Pose, motion: FlightMotion, exposure_s: fl
 
 @equation
 def reflected(board, board_texel_m, board_reach_m, blend_m, land, land_texel_m, x_m, y_m, nearness):  # type: ignore[no-untyped-def]
-    """Reflectance of a place: the board's raster, beyond it the ground's; nearness 1 straight below, 0 at the horizon."""
+    """Reflectance of a place: the board's raster, beyond it the ground's; nearness 1 below, 0 at the horizon."""
     off = max(abs(x_m), abs(y_m))
     own = clamp((board_reach_m - off) / blend_m, 0.0, 1.0)
     level = 0.0

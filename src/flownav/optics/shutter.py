@@ -33,7 +33,7 @@ def row_time_s(row: float, rows: int, readout_s: float) -> float:
 
 @equation
 def part_time_s(part: int, parts: int, exposure_s: float) -> float:
-    """The middle of the `part`-th of as many equal parts of an exposure: what moves by w rad/s is w exposure_s f wide."""
+    """The middle of the `part`-th of equal parts of an exposure: what moves by w rad/s is w exposure_s f wide."""
     return ((part + 0.5) / parts - 0.5) * exposure_s
 
 

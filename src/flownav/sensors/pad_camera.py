@@ -9,8 +9,9 @@ camera sees is reported as if it were right.
 height, w the rate at which the ground straight below passes (rows are exposed one after the other, and a frame has one
 time).
 
-**Missed.** What lies on the pad or shines hides it in a share of the frames, whatever the vehicle does. The detector finds the pad with a probability that falls with height and with how fast the image moves, a
-probit: it misses where a standard normal exceeds level - a h/h_max - b w/w_blur; the datasheet gives the three shares
+**Missed.** What lies on the pad or shines hides it in a share of the frames, whatever the vehicle does. Otherwise the
+detector finds the pad with a probability that falls with height and with how fast the image moves, a probit: it misses
+where a standard normal exceeds level - a h/h_max - b w/w_blur; the datasheet gives the three shares
 missed (low and slow; at the greatest height; at the image rate `blur_rad_s`) that fix level, a and b.
 
 **False.** With a share of the frames something else is taken for the pad, anywhere in the view, at about the true
@@ -114,7 +115,8 @@ def draw_pad_camera(n: PadCameraUnit, p: PadCameraParameters) -> PadCameraUnit:
 def noise_of(floor: float, per_m: float, per_rad_s: float, height_m: float, image_rate_rad_s: float) -> float:
     """Standard deviation at a height and an image rate."""
     by_height, by_rate = per_m * height_m, per_rad_s * image_rate_rad_s
-    return np.sqrt(floor * floor + by_height * by_height + by_rate * by_rate)
+    sigma: float = np.sqrt(floor * floor + by_height * by_height + by_rate * by_rate)
+    return sigma
 
 
 @equation

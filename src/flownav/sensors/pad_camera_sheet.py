@@ -52,9 +52,10 @@ class DistanceNoise(ParameterModel):
 class PadCameraSheet(SensorSheet):
     """A camera and its detector, as `flownav pad --out` writes it.
 
-    Half angles of view are forward and to the right (the same where only one is given); the mark of side `side_m` must
-    be whole in it. boresight_deg and scale_percent last a flight. hidden_share: of the frames, lost whatever the vehicle
-    does. camera: by whose name `flownav pad` rendered its frames. stated_spread: the share by which the accuracies that it states are wrong.
+    camera: the name by which `flownav pad` renders its frames. Half angles of view are forward and to the right (the
+    same where only one is given); the mark of side `side_m` must be whole in it. boresight_deg and scale_percent last a
+    flight. hidden_share: of the frames, lost whatever the vehicle does. stated_spread: the share by which the
+    accuracies that it states are wrong.
     """
 
     shipped_file: ClassVar[str] = "pad_camera.toml"

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 HEIGHTS = "0.15,0.175,0.2,0.3,0.5,1,2,3,4"
 SPEEDS = "0.1,0.5,1.5"
+WIDE = 110  # columns of the table of what was measured
 
 
 def command(
@@ -35,7 +36,7 @@ def command(
     ] = None,
     heights: Annotated[str, typer.Option(help="Heights to measure at [m], with commas.")] = HEIGHTS,
     speeds: Annotated[str, typer.Option(help="Speeds over the ground [m/s], with commas.")] = SPEEDS,
-    flights: Annotated[int, typer.Option(help="Cameras, each on a flight of its own.")] = 40,
+    flights: Annotated[int, typer.Option(help="Cameras, each on a flight of its own.")] = 24,
     count: Annotated[int, typer.Option("--frames", help="Frames a flight, height and speed.")] = 2,
     tilt: Annotated[float, typer.Option("--tilt-deg", help="Greatest tilt.")] = 15.0,
     mounting: Annotated[float, typer.Option("--mounting-deg", help="How well it is mounted, for the datasheet.")] = 0.4,
@@ -218,6 +219,7 @@ def _print_measured(facts: dict[str, Any]) -> None:
     from rich.table import Table
 
     console = Console(markup=False, highlight=False)
+    console.width = max(console.width, WIDE)
     target, camera, laws = facts["target"], facts["camera"], facts["laws"]
     console.print(
         f"{target['pattern']} of {target['side_m']:g} m, tilt to {facts['tilt_deg']:g} deg; "

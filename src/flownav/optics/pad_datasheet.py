@@ -11,7 +11,7 @@ from flownav.optics.pad_statistics import PadLaws
 from flownav.optics.pad_target import BOARD_CELLS, PadTarget
 from flownav.optics.pad_trial import TrialCamera
 
-SMALLEST = 1e-6  # a figure below this is none
+SMALLEST = 1e-5  # a figure below this is none
 
 
 def datasheet(
@@ -29,7 +29,7 @@ def datasheet(
     bias_deg = math.degrees(laws.bias_rad)
 
     def entry(name: str, value: float, source: str) -> str:
-        return f'{name} = {{ value = {float(f"{max(value, SMALLEST):.4g}"):g}, source = "{source}" }}'
+        return f'{name} = {{ value = {value if abs(value) > SMALLEST else 0.0:.4g}, source = "{source}" }}'
 
     measured = f"measured in {laws.frames} frames of {laws.flights} cameras"
     lines = [

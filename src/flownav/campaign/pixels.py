@@ -22,7 +22,7 @@ from scipy.stats import norm
 from flownav.compile import announce_compilation
 from flownav.errors import InputError
 from flownav.measurement import Sensor
-from flownav.optics.pad_target import BOARD_CELLS, TAG_CELLS, PadTarget
+from flownav.optics.pad_target import BOARD_CELLS, NESTED_CELLS, TAG_CELLS, PadTarget
 from flownav.optics.pad_trial import (
     CameraFlight,
     camera_flight,
@@ -56,10 +56,14 @@ MOTION = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, *TABLES["truth"][10:13])
 
 
 class PixelFrame(NamedTuple):
-    """One rendered frame of a flight and what the detector made of it; error (4,) as `pad_truth.fix_error` or NaN."""
+    """One rendered frame of a flight and what the detector made of it; error (4,) as `pad_truth.fix_error` or NaN.
+
+    shown_m: the reach of the tag that the datasheet's detector uses there, for the inner's size; whole: it is in view.
+    """
 
     t_s: float
     height_m: float
+    shown_m: float
     image_rate_rad_s: float
     whole: bool
     found: bool
@@ -115,7 +119,7 @@ def eye_of(setup: Setup, seed: int, index: int, ensemble: Ensemble | None) -> Ey
         raise InputError(f"{setup.scenario.name}: optics = pixels needs a pad camera: [pad_fix], and the navigator")
     if not sheet.camera or sheet.side_m == 0.0:
         raise InputError(f"{sheet.name}: names no camera to render; measure one with flownav pad --out")
-    trial, target = camera_named(sheet.camera), PadTarget(sheet.side_m * TAG_CELLS / BOARD_CELLS)
+    trial, target = camera_named(sheet.camera), target_of(sheet)
     flown = camera_flight(trial, target, seed, index)
     rng = np.random.default_rng([seed, index, 31])
     turn = mounting_rad(sheet, flown) * rng.standard_normal(3)
@@ -123,8 +127,16 @@ def eye_of(setup: Setup, seed: int, index: int, ensemble: Ensemble | None) -> Ey
     place = setup.flight.onboard.pad_place if setup.flight.onboard is not None else (0.0, 0.0, 0.0)
     return Eye(
         flown, Rotation.from_rotvec(turn).as_matrix(), np.array(place), late.pad_s,
-        ABOVE_RANGE * float(sheet.max_height_m),
+        ABOVE_RANGE * float(sheet.max_height_m) * float(sheet.ratio),
     )  # fmt: skip
+
+
+def target_of(sheet: PadCameraSheet) -> PadTarget:
+    """The tag that a datasheet is of, nested where there is a larger one round it. InputError for another ratio."""
+    side_m = float(sheet.side_m) * TAG_CELLS / BOARD_CELLS
+    if sheet.ratio not in (1.0, NESTED_CELLS):
+        raise InputError(f"{sheet.name}: ratio = {sheet.ratio:g}; a tag to render has 1, a nested one {NESTED_CELLS}")
+    return PadTarget(side_m) if sheet.ratio == 1.0 else PadTarget(side_m * NESTED_CELLS, "nested")
 
 
 def mounting_rad(sheet: PadCameraSheet, flown: CameraFlight) -> float:
@@ -162,15 +174,30 @@ def frame_of(eye: Eye, motion: Array, t_s: float, number: int) -> tuple[PixelFra
     frame = take_frame(flown, ground_below(flown, pose.height_m), pose, moving, number)
     fix, reason = look(flown, frame)
     truth = truth_of(pose_of(eye, motion, mounted=False)[0], flown.target)
-    whole = whole_in_view(flown.optic, truth_of(pose, flown.target))
     rate = rate_of(pose, moving)
+    shown_m, whole = shown(eye, pose)
     if fix is None:
-        none = PixelFrame(t_s, pose.height_m, rate, whole, False, False, reason, np.full(4, np.nan))
+        none = PixelFrame(t_s, pose.height_m, shown_m, rate, whole, False, False, reason, np.full(4, np.nan))
         return none, np.zeros(PAD_SEEN)
     error = fix_error(fix, truth)
-    wrong = is_wrong(error, truth, flown.target)
-    seen = np.array([fix.tan_forward, fix.tan_right, fix.distance_m, 1.0])
-    return PixelFrame(t_s, pose.height_m, rate, whole, not wrong, wrong, reason, error), seen
+    wrong = is_wrong(error, truth, flown.target.inner)
+    ratio = fix.side_m / flown.target.inner.side_m
+    seen = np.array([fix.tan_forward, fix.tan_right, fix.distance_m, fix.distance_m**2 / pose.height_m / ratio])
+    return PixelFrame(t_s, pose.height_m, shown_m, rate, whole, not wrong, wrong, reason, error), seen
+
+
+def shown(eye: Eye, pose: Pose) -> tuple[float, bool]:
+    """The reach of the inner tag where it is whole in view and near enough, else the outer's, and whether it is whole."""
+    flown = eye.flown
+    inner = truth_of(pose, flown.target.inner)
+    if whole_in_view(flown.optic, inner) and inner.reach_m <= eye.highest_m / flown_ratio(eye) / ABOVE_RANGE:
+        return inner.reach_m, True
+    return inner.reach_m / flown_ratio(eye), whole_in_view(flown.optic, truth_of(pose, flown.target))
+
+
+def flown_ratio(eye: Eye) -> float:
+    """How much larger the outer tag is than the inner, 1 where there is none."""
+    return eye.flown.target.side_m / eye.flown.target.inner.side_m
 
 
 def pad_ahead(pose: Pose) -> bool:
@@ -192,7 +219,7 @@ def pose_of(eye: Eye, motion: Array, *, mounted: bool = True) -> tuple[Pose, Fli
 
 
 # -- held against the datasheet ---------------------------------------------------------------------------------------
-BANDS_M = (0.0, 0.3, 0.6, 1.2, 2.4, 10.0)
+BANDS_M = (0.0, 0.3, 0.6, 1.2, 2.4, 4.8, 100.0)
 
 
 def agreement(frames: list[PixelFrame], sheet: PadCameraSheet) -> list[dict[str, Any]]:
@@ -229,20 +256,20 @@ def agreement(frames: list[PixelFrame], sheet: PadCameraSheet) -> list[dict[str,
 
 def chance_of(p: PadCameraParameters, f: PixelFrame) -> float:
     """That the datasheet's detector finds the pad in this frame, in which the whole pad is."""
-    if not p.min_height_m <= f.height_m <= p.max_height_m:
+    if f.height_m < p.min_height_m or f.shown_m > p.max_height_m:
         return 0.0
-    level = p.missed_above - p.missed_by_height * f.height_m / p.max_height_m - p.missed_per_rad_s * f.image_rate_rad_s
+    level = p.missed_above - p.missed_by_height * f.shown_m / p.max_height_m - p.missed_per_rad_s * f.image_rate_rad_s
     return float(norm.cdf(level) * norm.cdf(p.hidden_above))
 
 
 def angle_of(p: PadCameraParameters, f: PixelFrame) -> float:
     """Noise and boresight of an angle [rad]."""
-    return float(np.hypot(angle_noise(p, f.height_m, f.image_rate_rad_s), p.boresight_rad))
+    return float(np.hypot(angle_noise(p, f.shown_m, f.image_rate_rad_s), p.boresight_rad))
 
 
 def distance_of(p: PadCameraParameters, f: PixelFrame) -> float:
     """Noise and scale of the distance."""
-    return float(np.hypot(distance_noise(p, f.height_m, f.image_rate_rad_s), p.scale))
+    return float(np.hypot(distance_noise(p, f.shown_m, f.image_rate_rad_s), p.scale))
 
 
 def _rms(values: Array) -> float | None:

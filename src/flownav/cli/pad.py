@@ -22,7 +22,7 @@ def command(
         typer.Argument(help="Your pictures: a folder, pictures, or one video. None: measure.", show_default=False),
     ] = None,
     side: Annotated[float, typer.Option(help="Side of the tag's black square, or of a plain pad [m].")] = 0.2,
-    pattern: Annotated[str, typer.Option(help="tag, checker or stripes.")] = "tag",
+    pattern: Annotated[str, typer.Option(help="tag, nested, checker or stripes.")] = "tag",
     code: Annotated[int, typer.Option(help="Which tag of AprilTag 36h11, 0 to 15.")] = 0,
     focal: Annotated[
         float | None, typer.Option(help="Focal length of your pictures [px], undistorted.", show_default=False)
@@ -152,7 +152,7 @@ def _measured(
     from flownav.optics.pad_statistics import laws_of
     from flownav.optics.pad_trial import camera_named, fly_cameras
 
-    trial = camera_named(camera_name, focus_m)
+    trial, target = camera_named(camera_name, focus_m), target.inner  # the outer is the same, five times as large
     with announce_compilation("pad"), progress("flights", flights) as advance:
         frames = fly_cameras(
             trial, target, heights_m, speeds_m_s, flights, count, math.radians(tilt_deg), seed, advance, pictures
@@ -247,14 +247,14 @@ def _law_lines(laws: dict[str, Any]) -> list[str]:
     angle, distance, missed = laws["angle"], laws["distance"], laws["missed"]
     a, b = missed["hidden"]
     return [
-        f"from {laws['min_height_m']:g} to {laws['max_height_m']:g} m; h the height [m], w the image rate [rad/s]",
-        f"angle [mrad]: {1e3 * angle['floor']:.2f}, {1e3 * angle['per_m']:.2f} h, {1e3 * angle['per_rad_s']:.2f} w, "
+        f"from {laws['min_height_m']:.3g} to {laws['max_height_m']:.3g} m; r the reach, distance^2/height [m], w the image rate [rad/s]",
+        f"angle [mrad]: {1e3 * angle['floor']:.2f}, {1e3 * angle['per_m']:.2f} r, {1e3 * angle['per_rad_s']:.2f} w, "
         f"added in squares; between flights x exp(N(0, {angle['spread']:.2f}))",
-        f"distance [%]: {1e2 * distance['floor']:.2f}, {1e2 * distance['per_m']:.2f} h, "
+        f"distance [%]: {1e2 * distance['floor']:.2f}, {1e2 * distance['per_m']:.2f} r, "
         f"{1e2 * distance['per_rad_s']:.2f} w; between flights x exp(N(0, {distance['spread']:.2f}))",
         f"bias that lasts a flight: {1e3 * laws['bias_rad']:.2f} mrad of each angle, scale {1e2 * laws['scale']:.2f} %",
         f"missed: {100 * missed['share']:.1f} % low and slow, {100 * missed['share_at_max_height']:.1f} % at "
-        f"{laws['max_height_m']:g} m, {100 * missed['share_at_blur']:.1f} % at {missed['blur_rad_s']:.1f} rad/s",
+        f"{laws['max_height_m']:.3g} m, {100 * missed['share_at_blur']:.1f} % at {missed['blur_rad_s']:.1f} rad/s",
         f"hidden: {100 * a / (a + b):.1f} %, between flights Beta({a:.3f}, {b:.3f}); "
         f"false: {100 * laws['false_share']:.2f} %",
     ]

@@ -8,7 +8,7 @@ import numpy as np
 
 from flownav.optics.lens import Lens, field_angle_rad
 from flownav.optics.pad_statistics import PadLaws
-from flownav.optics.pad_target import BOARD_CELLS, PadTarget
+from flownav.optics.pad_target import PadTarget
 from flownav.optics.pad_trial import TrialCamera
 
 SMALLEST = 1e-5  # a figure below this is none
@@ -43,10 +43,11 @@ def datasheet(
         entry("latency_s", latency_s, "assumed: exposure, detection and link"),
         entry("jitter_s", jitter_s, "assumed: detection takes longer over clutter"),
         entry("min_height_m", laws.min_height_m, "the lowest measured height at which half of whole pads are found"),
-        entry("max_height_m", laws.max_height_m, "the highest such"),
+        entry("max_height_m", laws.max_height_m, "the greatest distance^2/height at which half of them are found"),
         entry("half_view_deg", float(ahead), "of the lens, along its rows, which lie forward"),
         entry("half_view_right_deg", float(aside), "along its columns"),
-        entry("side_m", BOARD_CELLS * target.cell_m, "of the target with its white ring, which must be whole in view"),
+        entry("side_m", target.inner.board_m, "of the tag with its white ring, which must be whole in view"),
+        entry("ratio", target.side_m / target.inner.side_m, "of the tag round it; 1: there is none"),
         entry(
             "boresight_deg",
             math.hypot(mounting_deg, bias_deg),

@@ -45,6 +45,7 @@ CUT_PART = 0.25  # of the frame's height and width: a region this large at the e
 STRAIGHT_PX = 0.6
 WEAKEST_PART = {True: 0.25, False: 0.35}  # of the median contrast, along the sides of a tag and of a plain pad
 SQUARE_PART = 0.012  # of the side: the corners of a plain pad agree with a square to this
+MIDDLE = slice(TAG_CELLS // 2 - 1, TAG_CELLS // 2 + 1)
 CELL_SAMPLES = np.array([-0.22, 0.0, 0.22])
 
 
@@ -54,7 +55,8 @@ class PadFix(NamedTuple):
     `tan_forward`, `tan_right`: tangents of the angles from body down. `distance_m`: from lens to centre.
     `heading_rad`: of the top of the pad's picture from body forward, clockwise from above, -pi to pi; a plain pad
     looks alike after half a turn, so its heading is from -pi/2 to pi/2. `corners_px` (4, 2): column and row,
-    from the picture's top left clockwise. `coded`: the identity was read, not only an outline.
+    from the picture's top left clockwise. `coded`: the identity was read, not only an outline. `side_m`: of the square
+    that was found, of a nested tag the inner's or the outer's.
     """
 
     tan_forward: float
@@ -63,6 +65,7 @@ class PadFix(NamedTuple):
     heading_rad: float
     corners_px: Array
     coded: bool
+    side_m: float
 
 
 class PadSearch(NamedTuple):
@@ -78,9 +81,13 @@ def find_pad(
     """Look for a target in a frame (height, width) uint8; `focal_px` as effective, the image's middle on the axis.
 
     `body_from_camera` (3, 3) turns the camera frame into body FRD; without it the image's x is body forward and its
-    y body right. Never raises on a frame, whatever is in it; InputError where the target itself is none.
+    y body right. Of a nested tag the inner one is looked for first. Never raises on a frame, whatever is in it;
+    InputError where the target itself is none.
     """
-    checked(target)
+    if checked(target).pattern == "nested":
+        inner = find_pad(frame, target.inner, focal_px, body_from_camera)
+        if inner.fix is not None:
+            return inner
     grey = np.asarray(frame)
     if grey.ndim != 2 or grey.dtype != np.uint8 or min(grey.shape) < 2 * LEAST_SIDE_PX:
         return PadSearch(None, NO_FRAME)
@@ -97,7 +104,7 @@ def find_pad(
             reasons.append(reason)
             continue
         pose = _pose_of(corners, levels.shape, target, focal_px)
-        fix = None if pose is None else _fix(pose, corners, axes, target.coded)
+        fix = None if pose is None else _fix(pose, corners, axes, target)
         if fix is None:
             reasons.append(OTHER)
         else:
@@ -143,6 +150,9 @@ def _in_order(levels: Array, square: Square, target: PadTarget) -> Array | None:
     if cells is None:
         return None
     turned = [np.rot90(cells, turn) != wanted for turn in range(4)]
+    if target.pattern == "nested":
+        for wrong in turned:
+            wrong[MIDDLE, MIDDLE] = False  # where the inner tag is
     best = int(np.argmin([wrong.sum() for wrong in turned]))
     ring = int(turned[best].sum() - turned[best][1:-1, 1:-1].sum())
     code = int(turned[best][1:-1, 1:-1].sum())
@@ -180,14 +190,14 @@ def _pose_of(corners: Array, shape: tuple[int, ...], target: PadTarget, focal_px
     return pose if pose.rms * focal_px <= allowed_px else None
 
 
-def _fix(pose: PlanePose, corners: Array, axes: Array, coded: bool) -> PadFix | None:
+def _fix(pose: PlanePose, corners: Array, axes: Array, target: PadTarget) -> PadFix | None:
     """The fix in body axes; None where the pad is not below."""
     forward, right, down = axes @ pose.place_m
     if not down > 1e-6:
         return None
     top = axes @ pose.rotation[:, 0]
     heading = float(np.arctan2(top[1], top[0]))
-    if not coded:
+    if not target.coded:
         heading = (heading + 0.5 * np.pi) % np.pi - 0.5 * np.pi
     distance_m = float(np.linalg.norm(pose.place_m))
-    return PadFix(float(forward / down), float(right / down), distance_m, heading, corners, coded)
+    return PadFix(float(forward / down), float(right / down), distance_m, heading, corners, target.coded, target.side_m)

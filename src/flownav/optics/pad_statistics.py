@@ -3,11 +3,12 @@
 **Bias** lasts as long as a flight: of the boresight (two angles), of the scale of angles (a focal length that is
 believed too long shows them too small), of the distance. **Noise** is what is left within the flights,
 
-    sigma^2 = floor^2 + (per_m h)^2 + (per_rad_s w)^2,
+    sigma^2 = floor^2 + (per_m r)^2 + (per_rad_s w)^2,
 
-h the height and w the rate at which the ground straight below passes: the detector's own, what few pixels tell, and
-what moves while the rows are exposed one after the other. **Missed** are a share `hidden` of each flight's frames,
-whatever it does (what lies on the pad, glare), and of the rest those of a probit in h and w.
+r the reach (the distance squared over the height: from there a level pad looks as small straight above it) and w the
+rate at which the ground straight below passes: the detector's own, what few pixels tell, and what moves while the rows
+are exposed one after the other. **Missed** are a share `hidden` of each flight's frames,
+whatever it does (what lies on the pad, glare), and of the rest those of a probit in r and w.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ LEAST_FRAMES = 5
 EASY_RATE_RAD_S = 1.75
 SHARE_FLOOR = 1e-3  # of missed frames: fewer than that nobody measures with some thousand frames
 UNLIKELY = 0.01
+REACH_STEP = 1.2
 PASSES = 3
 
 
@@ -54,7 +56,7 @@ class Cell(NamedTuple):
 
 
 class NoiseLaw(NamedTuple):
-    """sigma^2 = floor^2 + (per_m h)^2 + (per_rad_s w)^2, and how it differs between flights (sigma of a logarithm)."""
+    """sigma^2 = floor^2 + (per_m r)^2 + (per_rad_s w)^2, and how it differs between flights (sigma of a logarithm)."""
 
     floor: float
     per_m: float
@@ -101,7 +103,7 @@ class FlightBias(NamedTuple):
 
 def columns_of(frames: Sequence[TrialFrame]) -> dict[str, Array]:
     """The frames as columns."""
-    names = ("flight", "height_m", "speed_m_s", "image_rate_rad_s", "whole", "found", "wrong")
+    names = ("flight", "height_m", "reach_m", "speed_m_s", "image_rate_rad_s", "whole", "found", "wrong")
     found = {name: np.array([getattr(f, name) for f in frames], float) for name in names}
     return found | {"tangents": np.array([f.tangents for f in frames]), "error": np.array([f.error for f in frames])}
 
@@ -124,7 +126,7 @@ def biases_and_laws(c: dict[str, Array]) -> tuple[dict[int, FlightBias], NoiseLa
         kept = np.isfinite(left).all(1)
         if kept.sum() < LEAST_FRAMES:
             raise InputError("pad: too few frames with a fix for a datasheet; give more --frames, or other --heights")
-        h, w, flights = c["height_m"][kept], c["image_rate_rad_s"][kept], c["flight"][kept]
+        h, w, flights = c["reach_m"][kept], c["image_rate_rad_s"][kept], c["flight"][kept]
         angle = fitted_noise(left[kept, :2], h, w, flights)
         distance = fitted_noise(left[kept, 2:3], h, w, flights)
     return biases, angle, distance, left
@@ -132,13 +134,13 @@ def biases_and_laws(c: dict[str, Array]) -> tuple[dict[int, FlightBias], NoiseLa
 
 def _bias(c: dict[str, Array], own: NDArray[np.bool_], angle: NoiseLaw, distance: NoiseLaw) -> tuple[FlightBias, Array]:
     error, tangents = c["error"][own], c["tangents"][own]
-    weight = 1.0 / sigma_of(angle, c["height_m"][own], c["image_rate_rad_s"][own])
+    weight = 1.0 / sigma_of(angle, c["reach_m"][own], c["image_rate_rad_s"][own])
     lever = -tangents / (1.0 + (tangents**2).sum(1, keepdims=True))  # by which a focal length too long shows less angle
     one, none = np.ones(len(error)), np.zeros(len(error))
     design = np.concatenate([np.column_stack([one, none, lever[:, 0]]), np.column_stack([none, one, lever[:, 1]])])
     seen, both = error[:, :2].T.ravel(), np.tile(weight, 2)
     found = np.linalg.lstsq(design * both[:, None], seen * both, rcond=None)[0]
-    far = 1.0 / sigma_of(distance, c["height_m"][own], c["image_rate_rad_s"][own]) ** 2
+    far = 1.0 / sigma_of(distance, c["reach_m"][own], c["image_rate_rad_s"][own]) ** 2
     long = float((far * error[:, 2]).sum() / far.sum())
     left = error.copy()
     left[:, :2] -= (design @ found).reshape(2, -1).T
@@ -146,9 +148,9 @@ def _bias(c: dict[str, Array], own: NDArray[np.bool_], angle: NoiseLaw, distance
     return FlightBias(float(found[0]), float(found[1]), float(found[2]), long), left
 
 
-def sigma_of(law: NoiseLaw, height_m: Array, rate_rad_s: Array) -> Array:
+def sigma_of(law: NoiseLaw, reach_m: Array, rate_rad_s: Array) -> Array:
     """The law's standard deviation."""
-    return np.asarray(np.sqrt(law.floor**2 + (law.per_m * height_m) ** 2 + (law.per_rad_s * rate_rad_s) ** 2))
+    return np.asarray(np.sqrt(law.floor**2 + (law.per_m * reach_m) ** 2 + (law.per_rad_s * rate_rad_s) ** 2))
 
 
 def _law(logs: Array) -> NoiseLaw:
@@ -156,19 +158,19 @@ def _law(logs: Array) -> NoiseLaw:
     return NoiseLaw(floor, per_m, per_rad_s, 0.0)
 
 
-def fitted_noise(left: Array, height_m: Array, rate_rad_s: Array, flights: Array) -> NoiseLaw:
-    """The law of greatest likelihood of residuals (n, k) at these heights and rates."""
+def fitted_noise(left: Array, reach_m: Array, rate_rad_s: Array, flights: Array) -> NoiseLaw:
+    """The law of greatest likelihood of residuals (n, k) at these reaches and rates."""
     square = (left**2).mean(1)
     start = np.sqrt(np.median(square))
 
     def cost(log: Array) -> float:
-        variance = sigma_of(_law(log), height_m, rate_rad_s) ** 2
+        variance = sigma_of(_law(log), reach_m, rate_rad_s) ** 2
         return float((np.log(variance) + square / variance).mean())
 
-    guess = np.log([start, start / np.median(height_m), start / max(np.median(rate_rad_s), 1e-3)])
+    guess = np.log([start, start / np.median(reach_m), start / max(np.median(rate_rad_s), 1e-3)])
     best = minimize(cost, guess, method="Nelder-Mead", options={"maxiter": 4000, "xatol": 1e-4, "fatol": 1e-8})
     law = _law(best.x)
-    ratio = square / sigma_of(law, height_m, rate_rad_s) ** 2
+    ratio = square / sigma_of(law, reach_m, rate_rad_s) ** 2
     own = [(np.log(ratio[flights == f].mean()) / 2.0, (flights == f).sum()) for f in np.unique(flights)]
     logs = np.array([log for log, n in own if n >= LEAST_FRAMES])
     chance = np.mean([0.5 / (n * left.shape[1]) for _, n in own if n >= LEAST_FRAMES])  # of a flight's few frames
@@ -181,9 +183,9 @@ def missed_law(c: dict[str, Array], max_height_m: float) -> MissedLaw:
 
     InputError where there are too few easy frames.
     """
-    used = (c["whole"] > 0.0) & (c["height_m"] <= max_height_m)
-    low_m = max(0.5 * max_height_m, float(np.median(c["height_m"][used])))
-    easy = used & (c["image_rate_rad_s"] < EASY_RATE_RAD_S) & (c["height_m"] <= low_m)
+    used = (c["whole"] > 0.0) & (c["reach_m"] <= max_height_m)
+    low_m = max(0.5 * max_height_m, float(np.median(c["reach_m"][used])))
+    easy = used & (c["image_rate_rad_s"] < EASY_RATE_RAD_S) & (c["reach_m"] <= low_m)
     missed = 1.0 - c["found"]
     flights = [f for f in np.unique(c["flight"][used]) if (easy & (c["flight"] == f)).sum() >= LEAST_FRAMES]
     if not flights:
@@ -192,7 +194,7 @@ def missed_law(c: dict[str, Array], max_height_m: float) -> MissedLaw:
     shares = hidden_shares(np.array([missed[easy & (c["flight"] == f)].sum() for f in flights]), counts)
     by_flight = dict(zip(flights, shares, strict=True))
     own = np.array([by_flight.get(f, float(shares.mean())) for f in c["flight"][used]])
-    h, w, lost = c["height_m"][used] / max_height_m, c["image_rate_rad_s"][used], missed[used]
+    h, w, lost = c["reach_m"][used] / max_height_m, c["image_rate_rad_s"][used], missed[used]
 
     def probabilities(p: Array) -> Array:
         return np.asarray(own + (1.0 - own) * norm.cdf(np.exp(p[1]) * h + np.exp(p[2]) * w - p[0]))
@@ -238,19 +240,21 @@ def false_share_of(c: dict[str, Array]) -> float:
 
 # -- all together -----------------------------------------------------------------------------------------------------
 def heights_in_range(c: dict[str, Array]) -> tuple[float, float]:
-    """From the lowest to the highest height at which half of the slowest frames with the whole pad in view give a fix.
+    """The lowest height and the greatest reach at which half of the slowest frames with the whole pad in view give a fix.
 
-    InputError where there is none.
+    Reaches are taken together in steps of a fifth. InputError where there is no such height.
     """
-    slow = c["speed_m_s"] == c["speed_m_s"].min()
-    good = []
-    for height_m in np.unique(c["height_m"]):
-        own = slow & (c["height_m"] == height_m) & (c["whole"] > 0.0)
-        if own.sum() >= LEAST_FRAMES and c["found"][own].mean() >= LEAST_SHARE:
-            good.append(float(height_m))
-    if not good:
+    slow = (c["speed_m_s"] == c["speed_m_s"].min()) & (c["whole"] > 0.0)
+    step = np.round(np.log(c["reach_m"]) / np.log(REACH_STEP))
+    low = [float(h) for h in np.unique(c["height_m"]) if _mostly_found(c, slow & (c["height_m"] == h))]
+    far = [float(REACH_STEP**k) for k in np.unique(step) if _mostly_found(c, slow & (step == k))]
+    if not low or not far:
         raise InputError("pad: no height at which half of the frames with the whole pad in view give a fix")
-    return good[0], good[-1]
+    return low[0], max(far[-1], low[-1])
+
+
+def _mostly_found(c: dict[str, Array], own: NDArray[np.bool_]) -> bool:
+    return bool(own.sum() >= LEAST_FRAMES and c["found"][own].mean() >= LEAST_SHARE)
 
 
 def laws_of(frames: Sequence[TrialFrame]) -> tuple[PadLaws, list[Cell]]:

@@ -1,6 +1,7 @@
 """Landing targets: a coded square that is told from everything else, or a plain pad known by its outline.
 
-Both are boards of 10x10 cells. A tag is an AprilTag of the family 36h11 (Olson 2011; the barcodes are free to use):
+Both are boards of 10x10 cells. A nested tag has a smaller one, a fifth as large and of the code before its own, in
+the place of its middle 2x2 cells, for when the outer no longer fits the frame. A tag is an AprilTag of the family 36h11 (Olson 2011; the barcodes are free to use):
 a white ring, a black ring, and 6x6 cells of code. A plain pad is 8x8 squares or 8 stripes within a white ring.
 Board axes: x towards the top of the printed picture, y to its right, z down; the origin is the board's centre.
 """
@@ -23,14 +24,18 @@ CODES_36H11 = (
     *(0x22B1DFEAD, 0x265AD0472, 0x34FE91B86, 0x3FF962CD5, 0x43A25329A, 0x474B4385F, 0x4E9D243E9, 0x5246149AE),
 )
 CODE_CELLS, TAG_CELLS, BOARD_CELLS = 6, 8, 10
-PATTERNS = ("tag", "checker", "stripes")
+PATTERNS = ("tag", "nested", "checker", "stripes")
+NESTED_CELLS = 5  # of the inner board in a cell of the outer, whose middle two by two cells it takes
 GROUND_REFLECTANCE, GROUND_SPREAD = 0.35, 0.08
 RASTER_BLOCK = 64  # rasters are a multiple of this many texels wide, which Fourier transforms like
 LARGEST_RASTER_TEXELS = 8192
 
 
 class PadTarget(NamedTuple):
-    """What lies on the ground: `side_m` is that of the black square of a tag, or of a plain pad's outline."""
+    """What lies on the ground: `side_m` is that of the black square of a tag, or of a plain pad's outline.
+
+    Of a nested tag `side_m` is the outer's, and `code` the inner's; the outer's is the next.
+    """
 
     side_m: float = 0.2
     pattern: str = "tag"
@@ -39,7 +44,18 @@ class PadTarget(NamedTuple):
     @property
     def coded(self) -> bool:
         """Whether the target tells its identity and which way it points."""
-        return self.pattern == "tag"
+        return self.pattern in ("tag", "nested")
+
+    @property
+    def inner(self) -> PadTarget:
+        """The tag in the middle of a nested one; any other target is its own."""
+        nested = self.pattern == "nested"
+        return PadTarget(self.side_m / NESTED_CELLS, "tag", self.code) if nested else self
+
+    @property
+    def board_m(self) -> float:
+        """Side of the board with its white ring [m]."""
+        return BOARD_CELLS * self.cell_m
 
     @property
     def cell_m(self) -> float:
@@ -53,8 +69,9 @@ def checked(target: PadTarget) -> PadTarget:
         raise InputError(f"target {target.pattern!r}: unknown; known are {', '.join(PATTERNS)}")
     if not 0.01 <= target.side_m <= 20.0:
         raise InputError(f"target: a side of {target.side_m:g} m; it must be from 0.01 to 20 m")
-    if not 0 <= target.code < len(CODES_36H11):
-        raise InputError(f"target: code {target.code}; it must be from 0 to {len(CODES_36H11) - 1}")
+    last = len(CODES_36H11) - (2 if target.pattern == "nested" else 1)
+    if not 0 <= target.code <= last:
+        raise InputError(f"target: code {target.code}; it must be from 0 to {last}")
     return target
 
 
@@ -66,14 +83,28 @@ def code_cells(code: int) -> NDArray[np.bool_]:
 
 
 def picture_cells(target: PadTarget) -> NDArray[np.bool_]:
-    """The 10x10 cells of the printed board, True where white. InputError where the target is unknown."""
+    """The 10x10 cells of the printed board, True where white; of a nested tag the outer's.
+
+    InputError where the target is unknown.
+    """
     cells = np.ones((BOARD_CELLS, BOARD_CELLS), bool)
     row, column = np.indices((TAG_CELLS, TAG_CELLS))
-    if checked(target).pattern == "tag":
-        cells[1:-1, 1:-1] = np.pad(code_cells(target.code), 1)
+    if checked(target).coded:
+        cells[1:-1, 1:-1] = np.pad(code_cells(target.code + (target.pattern == "nested")), 1)
     else:
         cells[1:-1, 1:-1] = (row + column if target.pattern == "checker" else column) % 2 == 1
     return cells
+
+
+def printed_cells(target: PadTarget) -> NDArray[np.bool_]:
+    """The cells of the whole picture, 10x10, or 50x50 of a nested tag."""
+    cells = picture_cells(target)
+    if target.pattern != "nested":
+        return cells
+    fine = np.repeat(np.repeat(cells, NESTED_CELLS, 0), NESTED_CELLS, 1)
+    middle = slice((len(fine) - BOARD_CELLS) // 2, (len(fine) + BOARD_CELLS) // 2)
+    fine[middle, middle] = picture_cells(target.inner)
+    return fine
 
 
 def corners_m(target: PadTarget) -> NDArray[np.float64]:
@@ -87,9 +118,10 @@ def laid_out(target: PadTarget, extent_m: float, finest_texel_m: float, seed: in
     Texels are `finest_texel_m` wide or less, whole parts of a cell, so that edges lie where they are said to.
     InputError where the raster would be too large.
     """
-    cells = picture_cells(target)
-    per_cell = max(int(np.ceil(target.cell_m / finest_texel_m)), 1)
-    texel_m = target.cell_m / per_cell
+    cells = printed_cells(target)
+    cell_m = target.board_m / len(cells)
+    per_cell = max(int(np.ceil(cell_m / finest_texel_m)), 1)
+    texel_m = cell_m / per_cell
     board = np.where(np.repeat(np.repeat(cells, per_cell, 0), per_cell, 1), WHITE, BLACK)[::-1].T  # rows y, columns x
     wanted = max(extent_m / texel_m, len(board) + 1.0)
     size = int(np.ceil(wanted / RASTER_BLOCK)) * RASTER_BLOCK
@@ -121,10 +153,11 @@ def print_target(target: PadTarget, path: Path, dots_per_inch: int = 300) -> Non
     """Write the board as a picture that prints at its true size. InputError where it cannot be written."""
     from PIL import Image
 
-    cells = picture_cells(target)
-    dots = max(round(target.cell_m / 0.0254 * dots_per_inch), 1)
-    printed_per_inch = dots * 0.0254 / target.cell_m  # so that a whole number of dots a cell keeps the size
-    if dots * BOARD_CELLS > LARGEST_RASTER_TEXELS * 4:
+    cells = printed_cells(target)
+    cell_m = target.board_m / len(cells)
+    dots = max(round(cell_m / 0.0254 * dots_per_inch), 1)
+    printed_per_inch = dots * 0.0254 / cell_m  # so that a whole number of dots a cell keeps the size
+    if dots * len(cells) > LARGEST_RASTER_TEXELS * 4:
         raise InputError(f"target of {target.side_m:g} m: too large a picture; print it in parts or smaller")
     picture = np.where(np.repeat(np.repeat(cells, dots, 0), dots, 1), 255, 0).astype(np.uint8)
     try:

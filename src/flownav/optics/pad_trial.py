@@ -107,12 +107,13 @@ class CameraFlight(NamedTuple):
 class TrialFrame(NamedTuple):
     """What came of one frame. error (4,): `pad_truth.fix_error`, NaN without a fix.
 
-    whole: the whole board is in the frame. image_rate_rad_s: of the ground straight below. tangents: of the centre,
+    reach_m: `pad_truth.Truth`. whole: the whole board is in the frame. image_rate_rad_s: of the ground straight below. tangents: of the centre,
     as they are.
     """
 
     flight: int
     height_m: float
+    reach_m: float
     speed_m_s: float
     image_rate_rad_s: float
     whole: bool
@@ -215,7 +216,7 @@ def tried(
         error = np.full(4, np.nan) if fix is None else fix_error(fix, truth)
         wrong = fix is not None and is_wrong(error, truth, flown.target)
         yield TrialFrame(
-            flight, height_m, speed_m_s, rate_of(pose, motion), whole_in_view(flown.optic, truth),
+            flight, height_m, truth.reach_m, speed_m_s, rate_of(pose, motion), whole_in_view(flown.optic, truth),
             fix is not None and not wrong, wrong, reason, (truth.tan_forward, truth.tan_right), error,
         )  # fmt: skip
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.optics.pad_fix import PadFix
-from flownav.optics.pad_target import BOARD_CELLS, PadTarget, corners_m
+from flownav.optics.pad_target import PadTarget, corners_m
 from flownav.optics.projection import Pose, image_point
 
 Array = NDArray[np.float64]
@@ -18,7 +18,8 @@ WRONG_CENTRE, WRONG_DISTANCE = 0.5, 0.1  # of the pad's side, of the distance: a
 
 class Truth(NamedTuple):
     """Tangents towards camera x and y, distance from the lens, heading, rays of the corners (4, 2) of the square that
-    is looked for and of the whole board, which a tag's white ring belongs to.
+    is looked for and of the whole board, which a tag's white ring belongs to; the height from which a level target looks
+    as small straight above it (`sensors.pad_camera.reach_of`).
     """
 
     tan_forward: float
@@ -27,19 +28,20 @@ class Truth(NamedTuple):
     heading_rad: float
     corner_rays: Array
     board_rays: Array
+    reach_m: float
 
 
 def truth_of(pose: Pose, target: PadTarget) -> Truth:
     """What a perfect fix says, camera axes taken as the body's."""
     rotation = np.array(pose[3:]).reshape(3, 3)
     forward, right, down = rotation.T @ np.array([-pose.x_m, -pose.y_m, pose.height_m])
-    wider = BOARD_CELLS * target.cell_m / target.side_m
+    wider = target.board_m / target.side_m
     corners, board = (
         np.array([image_point(pose, x, y, 1.0) for x, y in of]) for of in (corners_m(target), wider * corners_m(target))
     )
     distance_m = float(np.sqrt(forward**2 + right**2 + down**2))
     heading = float(np.arctan2(rotation[0, 1], rotation[0, 0]))
-    return Truth(float(forward / down), float(right / down), distance_m, heading, corners, board)
+    return Truth(float(forward / down), float(right / down), distance_m, heading, corners, board, distance_m**2 / pose.height_m)
 
 
 def fix_error(fix: PadFix, truth: Truth) -> Array:

@@ -16,7 +16,7 @@ from flownav.compile import clamp, equation, kernel
 from flownav.optics.camera import Camera, Exposure
 from flownav.optics.lens import Lens, illumination, pixel_grid, pixels_of, rays_of
 from flownav.optics.pad import Pad
-from flownav.optics.pad_target import BOARD_CELLS, GROUND_REFLECTANCE, PadTarget, ground, laid_out
+from flownav.optics.pad_target import GROUND_REFLECTANCE, PadTarget, ground, laid_out
 from flownav.optics.projection import Pose, ground_point
 from flownav.optics.render import blurred, digitise, noise_bank, sampled
 from flownav.optics.scene import Cover, Scene, Shadow, covered, lit, mirrored
@@ -29,6 +29,7 @@ HORIZON = 0.05  # rays lower than this below the horizon, as a part of their len
 BLEND_M = 0.15  # of the target's side: over which the board's raster gives way to the ground's
 LEAST_PARTS, MOST_PARTS = 2, 10  # of an exposure, half a pixel of motion each as far as that goes
 TEXELS_A_PIXEL = 1.5
+MOST_TEXELS = 2048  # along the board's raster
 GROUND_TEXELS = 1024
 MARKS, SMALLEST_MARK_PX, LARGEST_MARK_PX = 40, 4.0, 60.0
 
@@ -87,7 +88,8 @@ def board_seen(target: PadTarget, optic: Optic, pose: Pose, seed: int) -> Pad:
     ray = np.array([x / depth_m, y / depth_m])
     footprint = footprint_at(optic.lens, pose, ray)
     finest_m = float(np.linalg.svd(footprint)[1].min()) / TEXELS_A_PIXEL
-    pad = laid_out(target, (BOARD_CELLS * target.cell_m + 2.0 * BLEND_M * target.side_m) * 1.02, finest_m, seed)
+    extent_m = 1.02 * (target.board_m + 2.0 * BLEND_M * target.side_m)
+    pad = laid_out(target, extent_m, max(finest_m, extent_m / MOST_TEXELS), seed)
     return Pad(pad.name, blurred(pad, optic.camera, footprint, float(np.hypot(depth_m, np.hypot(x, y)))), pad.texel_m)
 
 
@@ -165,7 +167,7 @@ def shoot(
     blur_px = blur_width_px(optic, pose, motion, exposure.time_s)
     parts = int(np.clip(np.ceil(2.0 * blur_px), LEAST_PARTS, MOST_PARTS))
     image = np.zeros(view.falloff.shape, np.float32)
-    half_m, blend_m = 0.5 * BOARD_CELLS * target.cell_m, BLEND_M * target.side_m
+    half_m, blend_m = 0.5 * target.board_m, BLEND_M * target.side_m
     expose(
         board.reflectance, board.texel_m, half_m, blend_m, land.raster, land.texel_m, view.rays, view.falloff, pose,
         motion, exposure.time_s, optic.readout_s, scene.shadows, scene.covers, scene.gloss, parts, image,

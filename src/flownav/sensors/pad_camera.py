@@ -5,14 +5,17 @@ whose axes are turned against the body by small angles that are drawn once a fli
 too long by a share that is drawn once a flight: tangents are smaller by that share and distances larger. What this
 camera sees is reported as if it were right.
 
-**Noise**, of angles and of the distance as a part of it, sigma^2 = floor^2 + (per_m h)^2 + (per_rad_s w)^2: h the
-height, w the rate at which the ground straight below passes (rows are exposed one after the other, and a frame has one
-time).
+**Reach.** A level mark of side s looks s h/d^2 wide at least, h the height and d the distance: as from the height
+r = d^2/h straight above it. Where the mark has a larger one round it, `ratio` times as large, that one serves while it
+is whole in view and the inner is not, or is too far: as the inner one would at a reach of r/ratio.
+
+**Noise**, of angles and of the distance as a part of it, sigma^2 = floor^2 + (per_m r)^2 + (per_rad_s w)^2: w the rate
+at which the ground straight below passes (rows are exposed one after the other, and a frame has one time).
 
 **Missed.** What lies on the pad or shines hides it in a share of the frames, whatever the vehicle does. Otherwise the
-detector finds the pad with a probability that falls with height and with how fast the image moves, a probit: it misses
-where a standard normal exceeds level - a h/h_max - b w/w_blur; the datasheet gives the three shares
-missed (low and slow; at the greatest height; at the image rate `blur_rad_s`) that fix level, a and b.
+detector finds the pad with a probability that falls with its reach and with how fast the image moves, a probit: it
+misses where a standard normal exceeds level - a r/r_max - b w/w_blur; the datasheet gives the three shares missed (low
+and slow; at the greatest height; at the image rate `blur_rad_s`) that fix level, a and b.
 
 **False.** With a share of the frames something else is taken for the pad, anywhere in the view, at about the true
 distance; also where the pad is out of view, while the height is within the limits.
@@ -32,7 +35,7 @@ from flownav.compile import clamp, equation, larger
 from flownav.frames import Rotation
 from flownav.sensors.chance import factor
 from flownav.sensors.geometry import turned_rotation
-from flownav.sensors.pad_fix import PadFixNormals, PadFixParameters, read_pad
+from flownav.sensors.pad_fix import SMALLEST_DEPTH_M, PadFixNormals, PadFixParameters, read_pad
 
 
 class PadCameraParameters(NamedTuple):
@@ -49,6 +52,7 @@ class PadCameraParameters(NamedTuple):
     half_view_forward_tangent: float
     half_view_right_tangent: float
     side_m: float  # of the mark
+    ratio: float  # of the larger mark round it, 1: there is none
     boresight_rad: float  # standard deviation of each angle
     scale: float  # standard deviation of the focal length's share
     stated_spread: float
@@ -112,23 +116,45 @@ def draw_pad_camera(n: PadCameraUnit, p: PadCameraParameters) -> PadCameraUnit:
 
 
 @equation
-def noise_of(floor: float, per_m: float, per_rad_s: float, height_m: float, image_rate_rad_s: float) -> float:
-    """Standard deviation at a height and an image rate."""
-    by_height, by_rate = per_m * height_m, per_rad_s * image_rate_rad_s
-    sigma: float = np.sqrt(floor * floor + by_height * by_height + by_rate * by_rate)
+def noise_of(floor: float, per_m: float, per_rad_s: float, reach_m: float, image_rate_rad_s: float) -> float:
+    """Standard deviation at a reach and an image rate."""
+    by_reach, by_rate = per_m * reach_m, per_rad_s * image_rate_rad_s
+    sigma: float = np.sqrt(floor * floor + by_reach * by_reach + by_rate * by_rate)
     return sigma
 
 
 @equation
-def angle_noise(p: PadCameraParameters, height_m: float, image_rate_rad_s: float) -> float:
+def angle_noise(p: PadCameraParameters, reach_m: float, image_rate_rad_s: float) -> float:
     """Of each angle [rad]."""
-    return noise_of(p.angle_floor_rad, p.angle_per_m, p.angle_per_rad_s, height_m, image_rate_rad_s)
+    return noise_of(p.angle_floor_rad, p.angle_per_m, p.angle_per_rad_s, reach_m, image_rate_rad_s)
 
 
 @equation
-def distance_noise(p: PadCameraParameters, height_m: float, image_rate_rad_s: float) -> float:
+def distance_noise(p: PadCameraParameters, reach_m: float, image_rate_rad_s: float) -> float:
     """Of the distance, as a part of it."""
-    return noise_of(p.distance_floor, p.distance_per_m, p.distance_per_rad_s, height_m, image_rate_rad_s)
+    return noise_of(p.distance_floor, p.distance_per_m, p.distance_per_rad_s, reach_m, image_rate_rad_s)
+
+
+@equation
+def reach_of(north_m: float, east_m: float, height_m: float) -> float:
+    """From how high straight above it the mark would look as small as it does from here (north, east of it)."""
+    above = larger(height_m, SMALLEST_DEPTH_M)
+    return (north_m * north_m + east_m * east_m + above * above) / above
+
+
+@equation
+def inner_serves(
+    lens_n_m: float, lens_e_m: float, lens_d_m: float, rotation: Rotation, reach_m: float, p: PadCameraParameters
+) -> bool:
+    """Whether the mark itself is whole in view and near enough, else the larger one round it has to serve."""
+    seen = read_pad(
+        lens_n_m, lens_e_m, lens_d_m, rotation, PadFixNormals(0.0, 0.0, 0.0, 0.0),
+        PadFixParameters(
+            1.0, 0.0, 0.0, p.min_height_m, p.max_height_m, p.half_view_forward_tangent, p.half_view_right_tangent,
+            p.side_m,
+        ),
+    )  # fmt: skip
+    return (seen.valid > 0.5) & (reach_m <= p.max_height_m)
 
 
 @equation
@@ -148,19 +174,22 @@ def read_pad_camera(
     p: the camera as it is; told: as its datasheet has it.
     """
     height_m = -lens_d_m
-    distance_sigma = distance_noise(p, height_m, image_rate_rad_s)
+    reach_m = reach_of(lens_n_m, lens_e_m, height_m)
+    turned = turned_rotation(rotation, unit.turned_x, unit.turned_y, unit.turned_z)
+    inner_sees = inner_serves(lens_n_m, lens_e_m, lens_d_m, turned, reach_m, p)
+    size = 1.0 if inner_sees else p.ratio
+    shown_m = reach_m / size
+    distance_sigma = distance_noise(p, shown_m, image_rate_rad_s)
     fix = read_pad(
-        lens_n_m, lens_e_m, lens_d_m,
-        turned_rotation(rotation, unit.turned_x, unit.turned_y, unit.turned_z),
-        PadFixNormals(n.forward, n.right, n.distance, 0.0),
+        lens_n_m, lens_e_m, lens_d_m, turned, PadFixNormals(n.forward, n.right, n.distance, 0.0),
         PadFixParameters(
-            1.0, angle_noise(p, height_m, image_rate_rad_s), distance_sigma, p.min_height_m, p.max_height_m,
-            p.half_view_forward_tangent, p.half_view_right_tangent, p.side_m,
+            1.0, angle_noise(p, shown_m, image_rate_rad_s), distance_sigma, p.min_height_m * size,
+            p.max_height_m * size, p.half_view_forward_tangent, p.half_view_right_tangent, p.side_m * size,
         ),
     )  # fmt: skip
-    level = p.missed_above - p.missed_by_height * (height_m / p.max_height_m) - p.missed_per_rad_s * image_rate_rad_s
-    found = (fix.valid > 0.5) & (n.missed <= level) & (n.hidden <= p.hidden_above)
-    in_height = (height_m >= p.min_height_m) & (height_m <= p.max_height_m)
+    level = p.missed_above - p.missed_by_height * (shown_m / p.max_height_m) - p.missed_per_rad_s * image_rate_rad_s
+    found = (fix.valid > 0.5) & (shown_m <= p.max_height_m) & (n.missed <= level) & (n.hidden <= p.hidden_above)
+    in_height = (height_m >= p.min_height_m) & (height_m <= p.max_height_m * p.ratio)
     false = in_height & (n.false > p.false_above)
     ahead, aside = p.half_view_forward_tangent, p.half_view_right_tangent
     wrong_forward = clamp(0.5 * ahead * n.false_forward, -ahead, ahead)
@@ -172,7 +201,7 @@ def read_pad_camera(
     right = wrong_right if false else shrunk * fix.tan_right
     distance_m = wrong_m if false else (1.0 + unit.longer) * fix.distance_m
     there = 1.0 if false | found else 0.0
-    return stated_fix(unit, forward, right, distance_m, there, height_m, image_rate_rad_s, told)
+    return stated_fix(unit, forward, right, distance_m, there, shown_m, image_rate_rad_s, told)
 
 
 @equation
@@ -182,13 +211,13 @@ def stated_fix(
     right: float,
     distance_m: float,
     there: float,
-    height_m: float,
+    shown_m: float,
     image_rate_rad_s: float,
     told: PadCameraParameters,
 ) -> PadCameraReading:
-    """A fix (there: 1 where there is one) with the accuracy that the camera states of it."""
-    across = unit.stated * angle_noise(told, height_m, image_rate_rad_s)
-    along = unit.stated * distance_noise(told, height_m, image_rate_rad_s) * distance_m
+    """A fix (there: 1 where there is one) with the accuracy that the camera states of it; shown_m: the mark's reach."""
+    across = unit.stated * angle_noise(told, shown_m, image_rate_rad_s)
+    along = unit.stated * distance_noise(told, shown_m, image_rate_rad_s) * distance_m
     spread = across * across * (1.0 + forward * forward + right * right)
     return PadCameraReading(
         forward,

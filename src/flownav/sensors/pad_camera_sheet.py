@@ -53,7 +53,8 @@ class PadCameraSheet(SensorSheet):
     """A camera and its detector, as `flownav pad --out` writes it.
 
     camera: the name by which `flownav pad` renders its frames. Half angles of view are forward and to the right (the
-    same where only one is given); the mark of side `side_m` must be whole in it. boresight_deg and scale_percent last a
+    same where only one is given); the mark of side `side_m` must be whole in it, or one round it
+    that is `ratio` times as large. boresight_deg and scale_percent last a
     flight. hidden_share: of the frames, lost whatever the vehicle does. stated_spread: the share by which the
     accuracies that it states are wrong.
     """
@@ -69,6 +70,7 @@ class PadCameraSheet(SensorSheet):
     half_view_deg: Number = Field(gt=0.0, lt=80.0)
     half_view_right_deg: Number | None = Field(None, gt=0.0, lt=80.0)
     side_m: Number = Field(0.0, ge=0.0, le=20.0)
+    ratio: Number = Field(1.0, ge=1.0, le=20.0)
     boresight_deg: Number = Field(ge=0.0, le=5.0)
     scale_percent: Number = Field(0.0, ge=0.0, le=20.0)
     hidden_share: Number = Field(0.0, ge=0.0, le=1.0)
@@ -110,6 +112,7 @@ class PadCameraSheet(SensorSheet):
             half_view_forward_tangent=math.tan(math.radians(self.half_view_deg)),
             half_view_right_tangent=math.tan(math.radians(aside_deg)),
             side_m=self.side_m,
+            ratio=self.ratio,
             boresight_rad=math.radians(self.boresight_deg),
             scale=0.01 * self.scale_percent,
             stated_spread=self.stated_spread,

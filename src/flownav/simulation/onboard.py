@@ -27,7 +27,7 @@ from flownav.vehicle.state import HelicopterState
 EPOCH_S = 0.02
 PHYSICS_PERIOD_S = 0.002
 LEAST_HEIGHT_M = 0.1
-PAD_SEEN = 4  # tangents forward and right, distance [m], 1 a fix or 0 none
+PAD_SEEN = 4  # tangents forward and right, distance and reach of the mark that was found [m]; reach 0: none
 SETTLED_S = 2.0  # the skids take the weight as the collective goes down
 
 

@@ -251,9 +251,10 @@ def read_pad(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot:
             load_pad_normals(work, lanes, lane), pad_as_is(work, lanes, lane), s.pad,
         )  # fmt: skip
         if seen + PAD_SEEN <= len(s.pad_seen):
+            shown_m = s.pad_seen[seen + 3]
             fix = stated_fix(
                 load_pad_unit(work, lanes, lane), s.pad_seen[seen], s.pad_seen[seen + 1], s.pad_seen[seen + 2],
-                s.pad_seen[seen + 3], -down, rate, s.pad,
+                1.0 if shown_m > 0.0 else 0.0, shown_m, rate, s.pad,
             )  # fmt: skip
         reading = reading_of(
             fix.tan_forward, fix.tan_right, fix.distance_m, fix.forward_variance, fix.right_variance,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -57,7 +59,7 @@ def test_the_pad_is_found_in_most_frames(flown) -> None:
 
 def test_every_frame_of_the_flown_path_gives_what_the_flight_was_flown_on(flown) -> None:
     """The loop is closed exactly: rendering anew along the last flight changes nothing."""
-    chosen, seen, frames, history = flown
+    chosen, seen, _, history = flown
     clock, table = seen.flight.onboard.pad_clock, seen.flight.onboard.pad_seen.reshape(-1, PAD_SEEN)
     motion, eye = history[:, columns("truth", MOTION), 0], eye_of(chosen, 1, 0, None)
     rendered = 0
@@ -71,7 +73,7 @@ def test_every_frame_of_the_flown_path_gives_what_the_flight_was_flown_on(flown)
 
 
 def test_the_navigator_was_fed_what_was_seen_and_its_path_differs_from_the_models(flown) -> None:
-    chosen, seen, frames, history = flown
+    chosen, seen, _, history = flown
     record = fly_recorded(seen, 1)
     table = seen.flight.onboard.pad_seen.reshape(-1, PAD_SEEN)
     fed = record.tables["pad"]
@@ -96,7 +98,7 @@ def test_errors_are_as_large_as_the_datasheet_says(flown) -> None:
     assert band["distance_rms"] < 4.0 * band["expected_distance"]
     p = sheet.parameters()
     assert 0.5 < chance_of(p, frames[0]) < 1.0
-    assert chance_of(p, frames[0]._replace(height_m=9.0)) == 0.0
+    assert chance_of(p, frames[0]._replace(shown_m=9.0)) == 0.0
 
 
 def test_the_lens_is_where_the_model_has_it_and_turned_by_its_mounting(flown) -> None:
@@ -121,7 +123,5 @@ def test_what_has_no_frames_says_so() -> None:
     chosen = setup(flight=HOVER)
     sheet = chosen.fitted.sheets.pad_camera.model_copy(update={"camera": ""})
     without = chosen.fitted._replace(sheets=chosen.fitted.sheets.model_copy(update={"pad_camera": sheet}))
-    from dataclasses import replace
-
     with pytest.raises(InputError, match="names no camera to render"):
         fly_on_pixels(replace(chosen, fitted=without), 1)

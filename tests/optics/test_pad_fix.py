@@ -29,6 +29,7 @@ from flownav.optics.pad_target import (
     laid_out,
     picture_cells,
     print_target,
+    printed_cells,
 )
 from flownav.optics.pad_truth import fix_error, is_wrong, truth_of
 from flownav.optics.plane_pose import homography, plane_pose
@@ -102,7 +103,7 @@ def test_the_board_lies_centred_on_the_origin_at_its_true_size() -> None:
 @pytest.mark.parametrize(
     ("target", "message"),
     [
-        (PadTarget(0.2, "circle"), "unknown; known are tag, checker, stripes"),
+        (PadTarget(0.2, "circle"), "unknown; known are tag, nested, checker, stripes"),
         (PadTarget(0.0), "side of 0 m"),
         (PadTarget(0.2, "tag", 16), "code 16"),
     ],
@@ -299,11 +300,42 @@ def test_black_and_saturated_frames_are_without_contrast(level: int) -> None:
     assert find_pad(np.full((90, 120), float(level)), TAG, FOCAL).reason == pad_fix.NO_FRAME
 
 
+# -- a tag within a tag ------------------------------------------------------------------------------------------------
+NESTED = PadTarget(1.0, "nested", 3)
+
+
+def test_a_nested_tag_is_found_by_its_inner_one_and_from_afar_by_its_outer() -> None:
+    low = pose_looking_down(0.04, -0.03, 0.6, roll_rad=0.1, yaw_rad=0.7)
+    high = pose_looking_down(0.3, 0.4, 5.0, pitch_rad=0.1, yaw_rad=-2.0)
+    for pose, side_m in ((low, 0.2), (high, 1.0)):
+        fix = found(find_pad(shot(NESTED, pose), NESTED, FOCAL))
+        assert fix.side_m == side_m
+        error = fix_error(fix, truth_of(pose, NESTED))
+        assert np.hypot(*error[:2]) < 0.1 / FOCAL
+        assert abs(error[2]) < 0.02
+        assert abs(error[3]) < 0.02
+    assert find_pad(shot(NESTED, high), NESTED._replace(code=7), FOCAL).fix is None
+
+
+def test_a_nested_picture_holds_both_tags() -> None:
+    cells = printed_cells(NESTED)
+    assert cells.shape == (50, 50)
+    outer = cells[2::5, 2::5]
+    np.testing.assert_array_equal(outer[[0, 1, 2, 8, 9]], picture_cells(NESTED)[[0, 1, 2, 8, 9]])
+    np.testing.assert_array_equal(outer[1:-1, 1:-1][1:3, 1:-1], code_cells(4)[:2])
+    np.testing.assert_array_equal(cells[20:30, 20:30], picture_cells(PadTarget(0.2, "tag", 3)))
+    assert NESTED.inner == PadTarget(0.2, "tag", 3)
+    assert NESTED.board_m == pytest.approx(1.25)
+    assert TAG.inner == TAG
+    with pytest.raises(InputError, match="from 0 to 14"):
+        picture_cells(NESTED._replace(code=15))
+
+
 # -- errors -----------------------------------------------------------------------------------------------------------
 @given(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8), st.floats(-0.03, 0.03), st.floats(-0.03, 0.03))
 def test_an_error_is_the_angle_between_the_sights(x: float, y: float, off_x: float, off_y: float) -> None:
     truth = truth_of(pose_looking_down(-x, -y, 1.0), TAG)
-    fix = pad_fix.PadFix(x + off_x, y + off_y, 1.1 * truth.distance_m, 0.1, np.zeros((4, 2)), True)
+    fix = pad_fix.PadFix(x + off_x, y + off_y, 1.1 * truth.distance_m, 0.1, np.zeros((4, 2)), True, 0.2)
     one, two = (np.array([*v, 1.0]) / np.linalg.norm([*v, 1.0]) for v in ((x, y), (x + off_x, y + off_y)))
     error = fix_error(fix, truth)
     assert np.hypot(*error[:2]) == pytest.approx(np.arcsin(np.linalg.norm(np.cross(one, two))), abs=2e-5)

@@ -16,6 +16,7 @@ from flownav.sensors.pad_camera import (
     PadCameraReading,
     PadCameraUnit,
     draw_pad_camera,
+    reach_of,
     read_pad_camera,
 )
 from flownav.sensors.pad_camera_sheet import PadCameraSheet, load_pad_camera_sheet
@@ -31,6 +32,7 @@ SHEET = check(
         "half_view_deg": 60.0,
         "half_view_right_deg": 60.0,
         "side_m": 0.0,
+        "ratio": 1.0,
         "boresight_deg": 0.4,
         "scale_percent": 0.5,
         "hidden_share": 0.0,
@@ -103,6 +105,34 @@ def test_noise_grows_with_height_and_image_rate_and_is_stated_so(height: float, 
     assert readings[:, 2].std() == pytest.approx(along * height, rel=0.04)
     np.testing.assert_allclose(readings[:, 3:5].mean(0), across**2, rtol=0.01)
     assert readings[:, 5].mean() == pytest.approx((along * height) ** 2, rel=0.02)
+
+
+def test_a_mark_far_to_the_side_looks_as_small_as_from_its_reach_above() -> None:
+    assert reach_of(0.0, 0.0, 2.0) == 2.0
+    assert reach_of(2.0, 0.0, 2.0) == pytest.approx(4.0)
+    level = tuple(float(x) for x in np.eye(3).ravel())
+
+    def at(north: float, height: float, p: PadCameraParameters) -> PadCameraReading:
+        return read_pad_camera(PERFECT, north, 0.0, -height, level, 0.0, QUIET, p, p)
+
+    assert [at(x, 2.0, LAW).arrived for x in (1.40, 1.42)] == [1.0, 0.0]  # (4 + 2)/2 = 3 m
+    aside, above = at(1.3, 2.0, LAW), at(0.0, reach_of(1.3, 0.0, 2.0), LAW)
+    assert aside.distance_variance_m2 / aside.distance_m**2 == pytest.approx(
+        above.distance_variance_m2 / above.distance_m**2
+    )
+
+
+def test_a_larger_mark_round_it_serves_where_the_inner_does_not() -> None:
+    level = tuple(float(x) for x in np.eye(3).ravel())
+    nested = LAW._replace(side_m=0.25, ratio=5.0)
+
+    def at(height: float, p: PadCameraParameters) -> PadCameraReading:
+        return read_pad_camera(PERFECT, 0.0, 0.0, -height, level, 0.0, QUIET, p, p)
+
+    share = [at(h, nested).distance_variance_m2 / h**2 for h in (2.9, 3.1, 14.5)]
+    assert share[1] < 0.5 * share[0] == pytest.approx(0.5 * share[2])  # of the outer at 3.1 m as of the inner at 0.62
+    assert [at(h, nested).arrived for h in (0.16, 2.9, 14.9, 15.1)] == [1.0, 1.0, 1.0, 0.0]
+    assert [at(h, nested._replace(ratio=1.0)).arrived for h in (2.9, 3.1)] == [1.0, 0.0]
 
 
 def test_a_camera_that_is_worse_than_its_datasheet_states_the_datasheet() -> None:

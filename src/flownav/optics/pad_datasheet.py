@@ -31,12 +31,13 @@ def datasheet(
     def entry(name: str, value: float, source: str) -> str:
         return f'{name} = {{ value = {value if abs(value) > SMALLEST else 0.0:.4g}, source = "{source}" }}'
 
+    kind = "nested tag" if target.pattern == "nested" else target.pattern
     measured = f"measured in {laws.frames} frames of {laws.flights} cameras"
     lines = [
         "# A camera that looks down for a fiducial on the pad, as `flownav pad --out` measures it in rendered frames.",
         f"# {command}",
         "schema_version = 1",
-        f'name = "camera {camera_name} and a {target.pattern} of {target.side_m:g} m, {rate_hz:g} Hz"',
+        f'name = "camera {camera_name} and a {kind} of {target.side_m:g} m, {rate_hz:g} Hz"',
         f'provenance = "{measured} (docs/pad-target.md), but for what is marked as assumed"',
         f'camera = "{camera_name}"',
         entry("rate_hz", rate_hz, "assumed: LANDING_TARGET as detectors on small computers send it"),

@@ -250,7 +250,7 @@ def heights_in_range(c: dict[str, Array]) -> tuple[float, float]:
     far = [float(REACH_STEP**k) for k in np.unique(step) if _mostly_found(c, slow & (step == k))]
     if not low or not far:
         raise InputError("pad: no height at which half of the frames with the whole pad in view give a fix")
-    return low[0], max(far[-1], low[-1])
+    return low[0], far[-1]
 
 
 def _mostly_found(c: dict[str, Array], own: NDArray[np.bool_]) -> bool:

@@ -1,8 +1,9 @@
 """Landing targets: a coded square that is told from everything else, or a plain pad known by its outline.
 
-Both are boards of 10x10 cells. A nested tag has a smaller one, a fifth as large and of the code before its own, in
-the place of its middle 2x2 cells, for when the outer no longer fits the frame. A tag is an AprilTag of the family 36h11 (Olson 2011; the barcodes are free to use):
+Both are boards of 10x10 cells. A tag is an AprilTag of the family 36h11 (Olson 2011; the barcodes are free to use):
 a white ring, a black ring, and 6x6 cells of code. A plain pad is 8x8 squares or 8 stripes within a white ring.
+A nested tag has a smaller one, a fifth as large and of the code before its own, in the place of its middle 2x2 cells,
+for when the outer no longer fits the frame.
 Board axes: x towards the top of the printed picture, y to its right, z down; the origin is the board's centre.
 """
 

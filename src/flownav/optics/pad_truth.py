@@ -41,7 +41,9 @@ def truth_of(pose: Pose, target: PadTarget) -> Truth:
     )
     distance_m = float(np.sqrt(forward**2 + right**2 + down**2))
     heading = float(np.arctan2(rotation[0, 1], rotation[0, 0]))
-    return Truth(float(forward / down), float(right / down), distance_m, heading, corners, board, distance_m**2 / pose.height_m)
+    return Truth(
+        float(forward / down), float(right / down), distance_m, heading, corners, board, distance_m**2 / pose.height_m
+    )
 
 
 def fix_error(fix: PadFix, truth: Truth) -> Array:

@@ -305,7 +305,7 @@ NESTED = PadTarget(1.0, "nested", 3)
 
 
 def test_a_nested_tag_is_found_by_its_inner_one_and_from_afar_by_its_outer() -> None:
-    low = pose_looking_down(0.04, -0.03, 0.6, roll_rad=0.1, yaw_rad=0.7)
+    low = pose_looking_down(0.04, -0.03, 0.6, yaw_rad=0.7)
     high = pose_looking_down(0.3, 0.4, 5.0, pitch_rad=0.1, yaw_rad=-2.0)
     for pose, side_m in ((low, 0.2), (high, 1.0)):
         fix = found(find_pad(shot(NESTED, pose), NESTED, FOCAL))

@@ -153,7 +153,7 @@ def test_heights_at_which_most_are_missed_are_out_of_range() -> None:
     assert heights_in_range(columns_of(frames)) == (0.5, pytest.approx(2.0, rel=0.1))
     with pytest.raises(InputError, match="no height"):
         heights_in_range(columns_of([f._replace(found=False) for f in frames]))
-    with pytest.raises(InputError, match="too few"):
+    with pytest.raises(InputError, match=r"too few|no height"):
         laws_of([f for f in made(3, 6) if f.height_m < 3.0])
 
 

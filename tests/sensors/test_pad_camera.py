@@ -85,8 +85,18 @@ def test_a_focal_length_believed_too_long_shows_smaller_tangents_and_longer_dist
     assert long.distance_m == pytest.approx(1.01 * right.distance_m)
 
 
-LAW = P._replace(angle_floor_rad=1e-3, angle_per_m=5e-4, angle_per_rad_s=2e-3, distance_floor=3e-3,
-                 distance_per_m=4e-3, distance_per_rad_s=5e-3, false_above=1e3, missed_above=1e3)  # fmt: skip
+LAW = P._replace(
+    angle_floor_rad=1e-3,
+    angle_per_m=5e-4,
+    angle_per_rad_s=2e-3,
+    distance_floor=3e-3,
+    distance_per_m=4e-3,
+    distance_per_rad_s=5e-3,
+    boresight_rad=0.0,
+    scale=0.0,
+    false_above=1e3,
+    missed_above=1e3,
+)
 
 
 @pytest.mark.parametrize(("height", "rate"), [(0.5, 0.0), (2.5, 0.0), (0.5, 1.5)])
@@ -142,6 +152,13 @@ def test_a_camera_that_is_worse_than_its_datasheet_states_the_datasheet() -> Non
     assert abs(read(n, p=worse).tan_forward - read().tan_forward) > 2.5 * abs(read(n).tan_forward - read().tan_forward)
 
 
+def test_what_is_stated_holds_the_datasheets_bias() -> None:
+    still = P._replace(boresight_rad=0.0, scale=0.0)
+    across, along = (np.array(read(told=P)[3:6]) - np.array(read(told=still)[3:6]))[[0, 2]]
+    assert across == pytest.approx(read(told=still).forward_variance * (P.boresight_rad / P.angle_floor_rad) ** 2)
+    assert along == pytest.approx((P.scale * read().distance_m) ** 2)
+
+
 def test_what_hides_the_pad_does_so_at_any_height() -> None:
     p = check(SHEET.model_dump() | {"hidden_share": 0.3}, PadCameraSheet, "hidden").parameters()
     low = np.array([0.0, 0.0, -0.3])
@@ -151,7 +168,7 @@ def test_what_hides_the_pad_does_so_at_any_height() -> None:
 
 
 def test_stated_variances_are_those_of_the_readings() -> None:
-    p = P._replace(missed_above=1e3, false_above=1e3)
+    p = P._replace(missed_above=1e3, false_above=1e3, boresight_rad=0.0, scale=0.0)
     lens = np.array([1.2, -1.0, -1.0])  # far off axis
     readings = np.array([read(n, lens=lens, p=p) for n in draws(PadCameraNormals, 8000, 18)])
     np.testing.assert_allclose(readings[:, :3].var(axis=0) / readings[:, 3:6].mean(axis=0), 1.0, atol=0.08)

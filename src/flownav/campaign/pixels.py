@@ -187,7 +187,7 @@ def frame_of(eye: Eye, motion: Array, t_s: float, number: int) -> tuple[PixelFra
 
 
 def shown(eye: Eye, pose: Pose) -> tuple[float, bool]:
-    """The reach of the inner tag where it is whole in view and near enough, else the outer's, and whether it is whole."""
+    """The reach of the inner tag where it is whole in view and near, else the outer's, and whether it is whole."""
     flown = eye.flown
     inner = truth_of(pose, flown.target.inner)
     if whole_in_view(flown.optic, inner) and inner.reach_m <= eye.highest_m / flown_ratio(eye) / ABOVE_RANGE:

@@ -152,10 +152,10 @@ def _measured(
     from flownav.optics.pad_statistics import laws_of
     from flownav.optics.pad_trial import camera_named, fly_cameras
 
-    trial, target = camera_named(camera_name, focus_m), target.inner  # the outer is the same, five times as large
+    trial, shown = camera_named(camera_name, focus_m), target.inner  # the outer is the same tag, five times as large
     with announce_compilation("pad"), progress("flights", flights) as advance:
         frames = fly_cameras(
-            trial, target, heights_m, speeds_m_s, flights, count, math.radians(tilt_deg), seed, advance, pictures
+            trial, shown, heights_m, speeds_m_s, flights, count, math.radians(tilt_deg), seed, advance, pictures
         )
     laws, cells = laws_of(frames)
     return {
@@ -247,7 +247,8 @@ def _law_lines(laws: dict[str, Any]) -> list[str]:
     angle, distance, missed = laws["angle"], laws["distance"], laws["missed"]
     a, b = missed["hidden"]
     return [
-        f"from {laws['min_height_m']:.3g} to {laws['max_height_m']:.3g} m; r the reach, distance^2/height [m], w the image rate [rad/s]",
+        f"from {laws['min_height_m']:.3g} to {laws['max_height_m']:.3g} m; r the reach, distance^2/height [m], "
+        "w the image rate [rad/s]",
         f"angle [mrad]: {1e3 * angle['floor']:.2f}, {1e3 * angle['per_m']:.2f} r, {1e3 * angle['per_rad_s']:.2f} w, "
         f"added in squares; between flights x exp(N(0, {angle['spread']:.2f}))",
         f"distance [%]: {1e2 * distance['floor']:.2f}, {1e2 * distance['per_m']:.2f} r, "

@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 LEAST_SHARE = 0.5  # of the frames with the whole pad in view: heights that give fewer fixes are out of range
 LEAST_FRAMES = 5
-EASY_RATE_RAD_S = 1.75
+EASY_RATE_RAD_S, EASY_PART = 1.75, 0.75
 SHARE_FLOOR = 1e-3  # of missed frames: fewer than that nobody measures with some thousand frames
 UNLIKELY = 0.01
 REACH_STEP = 1.2
@@ -184,12 +184,12 @@ def missed_law(c: dict[str, Array], max_height_m: float) -> MissedLaw:
     InputError where there are too few easy frames.
     """
     used = (c["whole"] > 0.0) & (c["reach_m"] <= max_height_m)
-    low_m = max(0.5 * max_height_m, float(np.median(c["reach_m"][used])))
+    low_m = max(0.5 * max_height_m, float(np.quantile(c["reach_m"][used], EASY_PART)))
     easy = used & (c["image_rate_rad_s"] < EASY_RATE_RAD_S) & (c["reach_m"] <= low_m)
     missed = 1.0 - c["found"]
     flights = [f for f in np.unique(c["flight"][used]) if (easy & (c["flight"] == f)).sum() >= LEAST_FRAMES]
     if not flights:
-        raise InputError("pad: too few slow frames below the middle of the heights; give more --frames")
+        raise InputError("pad: too few slow frames from below; give more --frames")
     counts = np.array([(easy & (c["flight"] == f)).sum() for f in flights])
     shares = hidden_shares(np.array([missed[easy & (c["flight"] == f)].sum() for f in flights]), counts)
     by_flight = dict(zip(flights, shares, strict=True))
@@ -240,7 +240,7 @@ def false_share_of(c: dict[str, Array]) -> float:
 
 # -- all together -----------------------------------------------------------------------------------------------------
 def heights_in_range(c: dict[str, Array]) -> tuple[float, float]:
-    """The lowest height and the greatest reach at which half of the slowest frames with the whole pad in view give a fix.
+    """The lowest height and the greatest reach at which half of the slowest frames with the whole pad give a fix.
 
     Reaches are taken together in steps of a fifth. InputError where there is no such height.
     """

@@ -107,8 +107,8 @@ class CameraFlight(NamedTuple):
 class TrialFrame(NamedTuple):
     """What came of one frame. error (4,): `pad_truth.fix_error`, NaN without a fix.
 
-    reach_m: `pad_truth.Truth`. whole: the whole board is in the frame. image_rate_rad_s: of the ground straight below. tangents: of the centre,
-    as they are.
+    reach_m: `pad_truth.Truth`. whole: the whole board is in the frame. image_rate_rad_s: of the ground straight below.
+    tangents: of the centre, as they are.
     """
 
     flight: int

@@ -18,8 +18,8 @@ WRONG_CENTRE, WRONG_DISTANCE = 0.5, 0.1  # of the pad's side, of the distance: a
 
 class Truth(NamedTuple):
     """Tangents towards camera x and y, distance from the lens, heading, rays of the corners (4, 2) of the square that
-    is looked for and of the whole board, which a tag's white ring belongs to; the height from which a level target looks
-    as small straight above it (`sensors.pad_camera.reach_of`).
+    is looked for and of the whole board, which a tag's white ring belongs to; the height from which a level target
+    looks as small straight above it (`sensors.pad_camera.reach_of`).
     """
 
     tan_forward: float

@@ -21,8 +21,8 @@ and slow; at the greatest height; at the image rate `blur_rad_s`) that fix level
 distance; also where the pad is out of view, while the height is within the limits.
 
 **Stated.** Variances of the tangents at the reported place, sigma^2 L^2 (1 + tan^2) with L^2 = 1 + both squares (noise
-across the sight, projected on the image plane), and of the distance, by the noise that the *datasheet* tells of, which
-the camera's own may exceed, times a factor that is wrong by a share.
+across the sight, projected on the image plane), and of the distance, by noise, boresight and scale of the *datasheet*,
+which the camera's own may exceed, times a factor that is wrong by a share.
 """
 
 from __future__ import annotations
@@ -216,8 +216,9 @@ def stated_fix(
     told: PadCameraParameters,
 ) -> PadCameraReading:
     """A fix (there: 1 where there is one) with the accuracy that the camera states of it; shown_m: the mark's reach."""
-    across = unit.stated * angle_noise(told, shown_m, image_rate_rad_s)
-    along = unit.stated * distance_noise(told, shown_m, image_rate_rad_s) * distance_m
+    noise, far = angle_noise(told, shown_m, image_rate_rad_s), distance_noise(told, shown_m, image_rate_rad_s)
+    across = unit.stated * np.sqrt(noise * noise + told.boresight_rad * told.boresight_rad)
+    along = unit.stated * np.sqrt(far * far + told.scale * told.scale) * distance_m
     spread = across * across * (1.0 + forward * forward + right * right)
     return PadCameraReading(
         forward,

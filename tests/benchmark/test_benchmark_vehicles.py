@@ -11,6 +11,7 @@ from flownav.estimation.states import FILTER_ROWS
 from flownav.simulation.engine import buffers_of
 from flownav.simulation.history import column
 from flownav.vehicle import multirotor
+from flownav.vehicle.around import CALM
 from flownav.vehicle.state import Controls
 
 
@@ -25,7 +26,7 @@ def test_the_plant_alone_takes_a_flights_steps(quad):
     controls = Controls(gains.lon_trim_rad, gains.lat_trim_rad, gains.collective_trim_rad, gains.pedal_trim_rad)
     state = hover
     for _ in range(100 * 10):
-        state = multirotor.step(state, controls, 0.0, 0.0, 0.0, 0.002, False, quad.vehicle)
+        state = multirotor.step(state, controls, CALM, 0.002, False, quad.vehicle)
     assert plant_after(quad) == pytest.approx(np.tile(np.array(state)[:, None], len(LANES)), abs=1e-9)
 
 

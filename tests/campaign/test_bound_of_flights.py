@@ -65,7 +65,7 @@ def test_the_simulators_bound_of_the_height_is_that_of_the_vertical_channel_alon
     bound = bound_of(hover, 1, 16).variance
     alone = posterior_bound(*vertical_channel(hover, GPS_EVERY * len(bound)))[::GPS_EVERY]
     late = slice(150, None)
-    assert np.sqrt(bound[late, 2]) == pytest.approx(np.sqrt(alone[late, 0, 0]), rel=0.05)
+    assert np.sqrt(bound[late, 2]) == pytest.approx(np.sqrt(alone[late, 0, 0]), rel=0.07)
     speed = np.sqrt(bound[late, 5] / alone[late, 1, 1])
     assert speed[:100] == pytest.approx(1.0, abs=0.06)
     assert np.all(

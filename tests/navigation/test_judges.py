@@ -97,17 +97,23 @@ def test_a_fix_that_jumps_along_one_axis_is_refused_along_both_and_keeps_its_hei
 
 
 def test_gps_is_believed_once_it_was_refused_often_and_for_long():
+    m = RejectionMemory(0.0, 0.0)
+    for t_s in (10.0, 10.3, 10.6, 10.9):  # a second will do where flow is doubted, and five refusals
+        reset, m = judge_rejections(True, True, t_s, m, TOLD.gps)
+        assert not reset
+    assert judge_rejections(True, True, 11.2, m, TOLD.gps)[0]
+    assert not judge_rejections(True, False, 11.2, m, TOLD.gps)[0]
     m, times = RejectionMemory(0.0, 0.0), []
     for t_s in np.arange(10.0, 30.0, 0.5).tolist():
-        reset, m = judge_rejections(True, t_s, m, TOLD.gps)
+        reset, m = judge_rejections(True, False, t_s, m, TOLD.gps)
         times += [t_s] * reset
     assert times == [17.0, 24.5]  # 7 s each, and the count begins anew
     m = RejectionMemory(0.0, 0.0)
     for t_s in (10.0, 14.0, 17.5, 20.0):  # long, and not often
-        reset, m = judge_rejections(True, t_s, m, TOLD.gps)
+        reset, m = judge_rejections(True, False, t_s, m, TOLD.gps)
         assert not reset
-    assert judge_rejections(True, 21.0, m, TOLD.gps)[0]
-    assert judge_rejections(False, 21.0, m, TOLD.gps) == (False, RejectionMemory(0.0, 10.0))
+    assert judge_rejections(True, False, 21.0, m, TOLD.gps)[0]
+    assert judge_rejections(False, False, 21.0, m, TOLD.gps) == (False, RejectionMemory(0.0, 10.0))
 
 
 # -- flow ----------------------------------------------------------------------------------------------------

@@ -341,7 +341,7 @@ def test_an_error_is_the_angle_between_the_sights(x: float, y: float, off_x: flo
     assert np.hypot(*error[:2]) == pytest.approx(np.arcsin(np.linalg.norm(np.cross(one, two))), abs=2e-5)
     assert error[2] == pytest.approx(0.1)
     assert error[3] == pytest.approx(0.1)
-    assert (error[0] > 0) == (off_x > 0) or abs(off_x) < abs(off_y)
+    assert (error[0] > 0) == (off_x > 0) or abs(off_x) < abs(off_y) + 1e-9
 
 
 def test_a_fix_half_a_side_off_is_wrong() -> None:

@@ -196,7 +196,7 @@ def test_the_command_measures_prints_and_writes_a_datasheet(tmp_path: Path) -> N
     assert sheet.min_height_m == facts["laws"]["min_height_m"] == 4.0
     printed = CliRunner().invoke(app, arguments, catch_exceptions=False).stdout
     assert "4 cameras px4flow, 64 frames" in printed
-    assert "bias as long as a flight" in printed
+    assert "bias that lasts a flight" in printed
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ class Missed(ParameterModel):
 class AngleNoise(ParameterModel):
     """Standard deviation of each angle: floor, per metre of height, per rad/s of image rate, added in squares."""
 
-    floor_mrad: Number = Field(gt=0.0, le=1000.0)
+    floor_mrad: Number = Field(ge=0.0, le=1000.0)
     per_m_mrad: Number = Field(0.0, ge=0.0, le=1000.0)
     per_rad_s_mrad: Number = Field(0.0, ge=0.0, le=1000.0)
 
@@ -44,7 +44,7 @@ class AngleNoise(ParameterModel):
 class DistanceNoise(ParameterModel):
     """Standard deviation of the distance as a part of it, likewise."""
 
-    floor_percent: Number = Field(gt=0.0, le=100.0)
+    floor_percent: Number = Field(ge=0.0, le=100.0)
     per_m_percent: Number = Field(0.0, ge=0.0, le=100.0)
     per_rad_s_percent: Number = Field(0.0, ge=0.0, le=100.0)
 

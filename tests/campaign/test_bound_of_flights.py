@@ -68,9 +68,7 @@ def test_the_simulators_bound_of_the_height_is_that_of_the_vertical_channel_alon
     assert np.sqrt(bound[late, 2]) == pytest.approx(np.sqrt(alone[late, 0, 0]), rel=0.07)
     speed = np.sqrt(bound[late, 5] / alone[late, 1, 1])
     assert speed[:100] == pytest.approx(1.0, abs=0.08)
-    assert np.all(
-        (speed > 1.0) & (speed < 1.3)
-    )  # innovations that are alike for a while free the accelerometer's bias
+    assert np.all((speed > 1.0) & (speed < 1.3))  # innovations that are alike for a while free the accelerometer's bias
 
 
 def test_the_bound_is_the_navigators():

@@ -192,7 +192,7 @@ def test_without_a_pad_it_waits_at_the_height_from_which_it_searches():
     def collective(height, found):
         at, known = HERE._replace(pos_d=PRECISE.pad_pos_d_m - height), KNOWN._replace(pad_found=found)
         after = outer_loop(hovering(told), DOWN, at, known, LEVEL, told, 1.0, 0.02)
-        assert (after.waited_s > 0.0) == (found == 0.0 and height < 2.3)
+        assert (after.searched_s > 0.0) == (found == 0.0 and height < 2.3)
         return after.collective_command - told.collective_trim_rad
 
     assert collective(1.9, 0.0) > 0.0

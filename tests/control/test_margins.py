@@ -142,7 +142,7 @@ def test_every_loop_keeps_its_margins_at_every_corner_of_the_box(feels):
     box = margins_over_box(feels_gusts=feels)
     assert box.cannot_hover == ()
     corners = {row.corner for row in box.rows}
-    assert len(corners) == 2 * (1 + 2**5 + 2 * 4)
+    assert len(corners) == 3 * (1 + 2**5 + 2 * 4)
     assert len(box.rows) == len(corners) * len(LOOPS)
     least_phase = min(box.rows, key=lambda row: row.margins.phase_deg)
     least_gain = min(box.rows, key=lambda row: row.margins.gain_db)

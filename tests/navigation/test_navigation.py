@@ -144,13 +144,13 @@ def test_pad_fixes_pull_the_position_to_centimetres():
     assert run.reasons(Sensor.PAD) == {"fused": 870}
 
 
-@pytest.mark.parametrize("wrong_first", [1, 2])
-def test_a_pad_first_seen_where_there_is_none_is_found_where_it_is(wrong_first):
+@pytest.mark.parametrize(("wrong_first", "axis"), [(1, 0), (2, 0), (1, 1), (2, 1)])
+def test_a_pad_first_seen_where_there_is_none_is_found_where_it_is(wrong_first, axis):
     """The first fixes are of something else, 2 m beside; one stray later on moves nothing."""
     flown = fly(still, 30.0, 0.3)
     t_s = np.arange(1.0, 30.0, 0.1)
     fixes = np.column_stack([0 * t_s, 0 * t_s, 0 * t_s + 2.0])
-    fixes[:wrong_first, 0], fixes[200, 1] = 1.0, -1.0
+    fixes[:wrong_first, axis], fixes[200, 1] = 1.0, -1.0
     run = navigate(flown.added(Stream.of(Sensor.PAD, t_s, fixes, variance=np.full((len(t_s), 3), 1e-6))))
     late = run.t_s > 3.0
     from_pad = run.estimate[late, 1:4] - run.column(PAD, 3)[late]

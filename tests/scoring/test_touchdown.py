@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from flownav.scoring.landings import succeeded, success, touchdown_of_flight, touchdown_of_flights
+from flownav.scoring.landings import (
+    CONTACT_DISTANCE,
+    succeeded,
+    success,
+    touchdown_of_flight,
+    touchdown_of_flights,
+    verdict_of,
+)
 from flownav.scoring.touchdown import (
     TOUCHDOWN_COLUMNS,
     Limits,
@@ -49,6 +56,24 @@ def row_of(motion, error=None, seen=None, may_land_after_s=0.0, limits=LIMITS, a
     return touchdowns(
         T_S, motion, error, seen, np.zeros((EPOCHS, 1)) if away is None else away, limits, may_land_after_s
     )[0]
+
+
+def test_a_touch_that_a_go_around_follows_is_no_touchdown():
+    """It touches 0.2 m beside the pad for a moment, goes around, and lands on the pad's middle."""
+    touch = slice(FLYING // 2, FLYING // 2 + 3)
+    ground = np.where(np.arange(EPOCHS)[:, None] < FLYING, 0.0, 1.0)
+    ground[touch] = 1.0
+    place = np.zeros((EPOCHS, 2, 1))
+    place[: FLYING // 2 + 10, 0] = 0.2
+    away = np.zeros((EPOCHS, 1))
+    away[FLYING // 2 + 2 : FLYING - 30] = 1.0
+    row = row_of(landing(on_ground=ground, place_m=place), away=away)
+    assert verdict_of(row) == "landed"
+    assert row[CONTACT_DISTANCE] == pytest.approx(0.0)
+    assert row[TOUCHDOWN_COLUMNS.index("go_arounds")] == 1.0
+    aloft = np.where(np.arange(EPOCHS)[:, None] < FLYING, ground, 0.0)
+    assert verdict_of(row_of(landing(on_ground=aloft, place_m=place), away=away)) == "went around"
+    assert verdict_of(row_of(landing(on_ground=aloft, place_m=place))) != "went around"
 
 
 def flight(motion, **options):

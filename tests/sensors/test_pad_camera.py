@@ -240,7 +240,7 @@ def test_what_the_datasheet_refuses() -> None:
             {"missed": missed | {"share_at_max_height": 0.01}},
             "missed.share_at_max_height: at least share = 0.02 is needed",
         ),
-        ({"angle": {"floor_mrad": 0.0}}, "angle.floor_mrad: Input should be greater than 0"),
+        ({"angle": {"floor_mrad": -1.0}}, "angle.floor_mrad: Input should be greater than or equal to 0"),
         ({"half_view_deg": 85}, "half_view_deg: Input should be less than 80"),
     ):
         with pytest.raises(InputError, match=f"^pad.toml: {message}"):

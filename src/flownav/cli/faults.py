@@ -18,17 +18,20 @@ if TYPE_CHECKING:
 
 HEIGHTS_M = (0.3, 20.0)
 DURATIONS_S = (0.1, 60.0)
-FLIGHTS = (1, 100_000)
+FLIGHTS, DEFAULT_FLIGHTS = (1, 100_000), 16
 WIDE = 130  # columns that the table takes
 
 
 def command(
-    faults: Annotated[str | None, typer.Option(help="Which faults, with commas between; all unless given.")] = None,
+    faults: Annotated[
+        str | None,
+        typer.Option(help="Which faults, with commas between; all that can be flown unless given."),
+    ] = None,
     heights: Annotated[str, typer.Option(help="Skids above the pad in hover [m], with commas between.")] = "0.5,1.5,3",
     durations: Annotated[
         str | None, typer.Option(help="How long a fault lasts [s]; 5,20 unless given, 2,5 with --offline.")
     ] = None,
-    flights: Annotated[int, typer.Option(help="Flights of each row, each with a truth of its own.")] = 16,
+    flights: Annotated[int, typer.Option(help="Flights of each row, each with a truth of its own.")] = DEFAULT_FLIGHTS,
     matched: Annotated[bool, typer.Option("--matched", help="Vehicle and sensors as their datasheets say.")] = False,
     offline: Annotated[
         bool, typer.Option("--offline", help="Put the faults into the log of one flight that is flown on the truth.")
@@ -52,6 +55,8 @@ def command(
     lasting_s = _numbers("--durations", durations or ("2,5" if offline else "5,20"), *DURATIONS_S)
     facts: dict[str, Any] = {"vehicle": vehicle, "seed": seed, "heights_m": heights_m, "durations_s": lasting_s}
     name = f", {vehicle}" if vehicle else ""
+    if offline and (matched or flights != DEFAULT_FLIGHTS):
+        raise InputError("--flights, --matched: are of flights in the closed loop; leave them out with --offline")
     if offline:
         rows = _logged(chosen, heights_m, lasting_s, seed, vehicle)
         _say(
@@ -160,7 +165,7 @@ def _show_flown(rows: list[FlownRow], title: str) -> None:
     _note(
         "noticed: more refusals in a second than before, or said. said: the navigator warns; in so many flights, "
         "median time after the fault began. unsaid: largest horizontal error before that. landed: also after a climb. "
-        "around: aloft at the end. off: the pad, at rest; median (worst)."
+        "around: aloft at the end; the rest did not end in time. off: the pad, at rest; median (worst)."
     )
 
 

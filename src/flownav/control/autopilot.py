@@ -34,7 +34,8 @@ class AutopilotState(NamedTuple):
     collective_command: float  # [rad]
     flying: float  # 1.0 in flight, 0.0 on the skids
     contact_time_s: float  # how long the skids have carried weight
-    waited_s: float  # at the gate of the last metre, or in search of the pad
+    waited_s: float  # at the gate of the last metre; aloft
+    searched_s: float  # for the pad
     away: float  # 1.0 while it goes around
     go_arounds: float
     since_s: float  # for how long it is in doubt, or, aloft, all is well
@@ -44,7 +45,7 @@ with_contact = replacing(AutopilotState, "flying", "contact_time_s")
 with_outer_loop = replacing(
     AutopilotState,
     "accel_forward", "accel_right", "gust_forward", "gust_right", "collective",
-    "pitch_sine", "roll_sine", "collective_command", "waited_s", "away", "go_arounds", "since_s",
+    "pitch_sine", "roll_sine", "collective_command", "waited_s", "searched_s", "away", "go_arounds", "since_s",
 )  # fmt: skip
 with_inner_loop = replacing(AutopilotState, "lon", "lat", "pedal")
 
@@ -68,7 +69,7 @@ def at_rest(gains: AutopilotGains, collective_command: float, flying: float) -> 
     """Nothing integrated yet, the tilt of trimmed hover."""
     return AutopilotState(
         0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
-        gains.pitch_trim_sine, gains.roll_trim_sine, collective_command, flying, 0.0, 0.0, 0.0, 0.0, 0.0,
+        gains.pitch_trim_sine, gains.roll_trim_sine, collective_command, flying, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
     )  # fmt: skip
 
 
@@ -144,7 +145,7 @@ def outer_loop(
     off_n, off_e = reference.pos_n - estimate.pos_n - skids_n, reference.pos_e - estimate.pos_e - skids_e
     height_m = gains.pad_pos_d_m - estimate.pos_d
     looking = seeks(known, state.away, height_m, gains)
-    search_n, search_e = search_offset(state.waited_s, gains)
+    search_n, search_e = search_offset(state.searched_s, gains)
     off_n, off_e = off_n + (search_n if looking else 0.0), off_e + (search_e if looking else 0.0)
     vel_n, vel_e = gains.position_gain * off_n, gains.position_gain * off_e
     speed_limit = gains.horizontal_speed_limit_m_s
@@ -158,14 +159,14 @@ def outer_loop(
     off_m2, speed_m2_s2 = off_n * off_n + off_e * off_e, est_n * est_n + est_e * est_e
     around = mind_landing(
         GoAround(state.away, state.go_arounds, state.since_s), known, off_m2, speed_m2_s2, height_m, state.waited_s,
-        landing, gains, dt,
+        state.searched_s, landing, gains, dt,
     )  # fmt: skip
     away = around.away > 0.0
     waiting = known.pad_found > 0.0 and misaligned(off_n, off_e, est_n, est_e, height_m, state.waited_s, gains)
     gate_m = gains.search_height_m if looking else gains.align_height_m
     gated_d = smaller(vel_d, descent_limit(waiting or looking, gate_m, height_m, reference.vel_d, gains))
     vel_d = climb_out(height_m, gains) if away else gated_d
-    waited_s = state.waited_s + dt if waiting or looking else state.waited_s
+    waited_s = state.waited_s + dt if (waiting and landing) or away else state.waited_s
 
     error_forward, error_right = along_heading(rotation, vel_n - est_n, vel_e - est_e)
     error_down = vel_d - est_d
@@ -201,6 +202,7 @@ def outer_loop(
         roll_sine=gains.roll_trim_sine + roll,
         collective_command=in_flight if flying else on_ground,
         waited_s=waited_s if around.away == state.away else 0.0,
+        searched_s=state.searched_s + dt if looking else 0.0,
         away=around.away,
         go_arounds=around.times,
         since_s=around.since_s,

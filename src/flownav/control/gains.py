@@ -67,3 +67,4 @@ class AutopilotGains(NamedTuple):
     drift_radius_m: float = 1e9  # below commit_height_m
     drift_speed_m_s: float = 1e9
     clear_s: float = 3.0  # so long all must be well before it comes down again
+    aloft_most_s: float = 1e9  # and no longer than this does it wait for that, where no camera helps

@@ -4,8 +4,9 @@ A landing goes on while the vehicle knows where its pad is and is over it. It is
 where it takes the pad to be, when the camera loses the pad from a height from which it should be seen, or has not found
 it after a search; when the navigator no longer knows its place well enough, or suspects a fault of its sensors out of
 the pad's sight; when the last metre's gate stays shut; and, below the gate, when it drifts. Aloft it waits until all is
-well, and comes down again. The number of times is limited: then it lands with what it has, as no battery lasts for
-ever. A pad that the camera must show it never lands without: it looks for it until the flight ends.
+well, and comes down again; without a camera that could help it for so long only, as no battery lasts for ever, and so
+often only: then it lands with what it has. A vehicle that must find its pad with a camera never lands without having
+found it, over ground that its range knows.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from flownav.control.gains import AutopilotGains
 REACHED_M = 0.5  # of the height to which it climbs, and beside the pad
 SEARCH_M_S = 0.8
 SEARCH_MARGIN_M = 0.3  # above the height of the search
+TOUCHING_M = 0.02  # so low the skids may touch already
 SEEN_S = 1.0  # a pad that was seen so lately is in sight
 
 
@@ -54,7 +56,7 @@ def seeks(known: Knowledge, away: float, height_m: float, gains: AutopilotGains)
     """So low over the ground a vehicle that has not found its pad looks for it and goes no lower; one that has lost it
     and went around does, too.
     """
-    low = known.ground_found > 0.0 and height_m < gains.search_height_m + SEARCH_MARGIN_M
+    low = away > 0.0 or (known.ground_found > 0.0 and height_m < gains.search_height_m + SEARCH_MARGIN_M)
     blind = known.pad_found == 0.0 or (away > 0.0 and unseen(known, gains))
     return blind and gains.search_height_m > 0.0 and low
 
@@ -86,7 +88,7 @@ def unsure(known: Knowledge, gains: AutopilotGains) -> bool:
 
     In sight of the pad no sensor that fails can lead it away from there.
     """
-    doubtful = (known.doubted > 0.0 and unseen(known, gains)) or known.sigma_m > gains.landing_sigma_m
+    doubtful = (known.doubted > 0.0 and unseen(known, gains)) or not (known.sigma_m <= gains.landing_sigma_m)
     return known.pad_found > 0.0 and doubtful
 
 
@@ -95,22 +97,23 @@ def adrift(known: Knowledge, beside_m2: float, speed_m2_s2: float, height_m: flo
     """Below the gate, over a pad that it knows: too far from its middle, or too fast over the ground; both squared."""
     radius, speed = gains.drift_radius_m, gains.drift_speed_m_s
     off = beside_m2 > radius * radius or speed_m2_s2 > speed * speed
-    return known.pad_found > 0.0 and height_m < gains.commit_height_m and off
+    low = height_m < gains.commit_height_m and height_m > TOUCHING_M
+    return known.pad_found > 0.0 and low and off
 
 
 @equation
 def mind_landing(
     before: GoAround, known: Knowledge, beside_m2: float, speed_m2_s2: float, height_m: float, waited_s: float,
-    landing: bool, gains: AutopilotGains, dt: float,
+    searched_s: float, landing: bool, gains: AutopilotGains, dt: float,
 ) -> GoAround:  # fmt: skip
     """One period of the outer loop further.
 
     beside_m2: distance of the skids' middle from the pad's, squared [m2]; speed_m2_s2: over the ground, squared;
-    height_m: of the skids; waited_s: at the gate, or in search; landing: flies, may land, no weight on the skids.
+    height_m: of the skids; waited_s: at the gate, or aloft; landing: flies, may land, no weight on the skids.
     """
     in_doubt_s = before.since_s + dt if before.away == 0.0 and unsure(known, gains) else 0.0
     settling = height_m > gains.commit_height_m and height_m < gains.land_height_m
-    shut = waited_s > (gains.align_wait_s if known.pad_found > 0.0 else gains.search_wait_s)
+    shut = waited_s > gains.align_wait_s or searched_s > gains.search_wait_s
     broken = settling and (lost_pad(known, height_m, gains) or in_doubt_s > gains.doubt_s or shut)
     broken = broken or adrift(known, beside_m2, speed_m2_s2, height_m, gains)
     may = landing and gains.go_around_height_m > 0.0 and before.times < gains.go_arounds_most
@@ -120,8 +123,9 @@ def mind_landing(
     over = level > -REACHED_M and level < REACHED_M and beside_m2 < REACHED_M * REACHED_M
     seen = gains.search_height_m == 0.0 or (known.pad_found > 0.0 and known.pad_unseen_s < SEEN_S)
     well = before.away > 0.0 and over and seen and not unsure(known, gains)
-    well_s = before.since_s + dt if well else 0.0
-    returns = well_s > gains.clear_s
+    well_s = before.since_s + dt if well else larger(before.since_s - dt, 0.0)
+    tired = gains.search_height_m == 0.0 and waited_s > gains.aloft_most_s  # no camera can help it any more
+    returns = before.away > 0.0 and (well_s > gains.clear_s or tired)
     away = 1.0 if goes or (before.away > 0.0 and landing and not returns) else 0.0
     return GoAround(away, before.times + 1.0 if goes else before.times, in_doubt_s if away == 0.0 else well_s)
 

@@ -158,34 +158,41 @@ def _fly(
     """The scores of each flight."""
     ensemble = None if matched else setup.ensemble()
     flight = setup.flight._replace(fails=True)
+    assert setup.fitted is not None  # `BASE` flies on the navigator
+    assert flight.onboard is not None
+    horizon_s, period_s = setup.fitted.schedule.horizon_s, flight.onboard.camera_clock.every * EPOCH_S
     for first in range(0, flights, len(LANES)):
-        laws = [_law(fault, window_s, seed, first + lane) for lane in range(len(LANES))]
+        laws = [_law(fault, window_s, seed, first + lane, period_s) for lane in range(len(LANES))]
         flown = fly_written(flight, seed, first, LANES, ensemble, laws)
         landings = touchdown_history(flight, flown.history)
         for lane in range(min(len(LANES), flights - first)):
-            yield scores_of(flown, landings[lane], lane, fault.sensors if fault else (), window_s[0])
+            yield scores_of(flown, landings[lane], lane, fault.sensors if fault else (), window_s[0], horizon_s)
 
 
-def _law(fault: Fault | None, window_s: tuple[float, float], seed: int, number: int) -> SensorFault:
+def _law(
+    fault: Fault | None, window_s: tuple[float, float], seed: int, number: int, flow_period_s: float
+) -> SensorFault:
     """One flight's fault; a position moves off in a direction of its own."""
     if fault is None:
         return SOUND
     course_rad = float(np.random.default_rng([seed, number]).uniform(0.0, 2.0 * np.pi))
-    return law_of(fault, *window_s, course_rad)
+    return law_of(fault, *window_s, course_rad, flow_period_s)
 
 
 # -- one flight ---------------------------------------------------------------------------------------------
-def scores_of(flown: Flown, landing: Array, lane: int, sensors: tuple[Sensor, ...], t0_s: float) -> FlightScores:
-    """What one lane's flight did from t0 on; landing: its row of touchdowns."""
+def scores_of(
+    flown: Flown, landing: Array, lane: int, sensors: tuple[Sensor, ...], t0_s: float, horizon_s: float
+) -> FlightScores:
+    """What one lane's flight did from t0 on; landing: its row of touchdowns; horizon_s: of the navigator."""
     t_s = np.arange(len(flown.history)) * EPOCH_S
     error_m = flown_error(flown.history, lane)
-    down_s = float(landing[CONTACT_S]) if np.isfinite(landing[CONTACT_S]) else np.inf  # what is said later is no help
-    said = first_warning(flown.tape.events(lane), t0_s, down_s)
+    down_s = touched_s(flown.history, landing, lane, t0_s)  # what is said later is no help
+    said = first_warning(flown.tape.events(lane), t0_s, down_s, horizon_s)
     from_fault = (t_s >= t0_s) & np.isfinite(error_m)
     unsaid = from_fault & (t_s < (np.inf if said is None else said))
     off = float(landing[REST_DISTANCE])
     return FlightScores(
-        _since(first_refusals(flown.tape.offers(lane), sensors, (t0_s, down_s), said), t0_s),
+        _since(first_refusals(flown.tape.offers(lane), sensors, (t0_s, down_s), horizon_s, said), t0_s),
         _since(said, t0_s),
         float(error_m[from_fault].max(initial=0.0)),
         float(error_m[unsaid].max(initial=0.0)),
@@ -201,20 +208,28 @@ def flown_error(history: Array, lane: int) -> Array:
     return np.where(airborne, np.hypot(*(said - true).T), np.nan)
 
 
-def first_warning(events: Array, t0_s: float, t1_s: float) -> float | None:
-    """When the navigator first says that something is wrong, in [t0, t1); rows of its tape."""
-    times = [t_s for t_s, kind, _ in events.tolist() if t0_s <= t_s < t1_s and EVENT_NAMES[int(kind)][:2] in WARNINGS]
-    return min(times, default=None)
+def touched_s(history: Array, landing: Array, lane: int, t0_s: float) -> float:
+    """When the flight touched down, or else first touched anything from t0 on; infinite where it never did."""
+    if np.isfinite(landing[CONTACT_S]):
+        return float(landing[CONTACT_S])
+    touching = np.flatnonzero(history[:, column("truth", "contact_n"), lane] > 0.0) * EPOCH_S
+    return float(min(touching[touching >= t0_s], default=np.inf))
+
+
+def first_warning(events: Array, t0_s: float, t1_s: float, horizon_s: float) -> float | None:
+    """When the navigator first says that something is wrong, in [t0, t1); rows of its tape, a horizon behind."""
+    warnings = [t_s + horizon_s for t_s, kind, _ in events.tolist() if EVENT_NAMES[int(kind)][:2] in WARNINGS]
+    return min((t_s for t_s in warnings if t0_s <= t_s < t1_s), default=None)
 
 
 def first_refusals(
-    offers: Array, sensors: tuple[Sensor, ...], window_s: tuple[float, float], said_s: float | None
+    offers: Array, sensors: tuple[Sensor, ...], window_s: tuple[float, float], horizon_s: float, said_s: float | None
 ) -> float | None:
     """When more readings of the struck sensors than ever before in a second had been refused, or it was said."""
     t0_s, t1_s = window_s
     refused = np.isin(offers[:, 1], [int(sensor) for sensor in sensors]) & (offers[:, 8] != Reason.FUSED)
     refused &= offers[:, 8] != Reason.DATUM
-    times = offers[refused, 0]
+    times = offers[refused, 0] + horizon_s
     count = np.arange(len(times)) - np.searchsorted(times, times - WITHIN_S, side="right") + 1
     usual = count[times < t0_s].max(initial=0)
     after = times[(times >= t0_s) & (times < t1_s) & (count > usual)]

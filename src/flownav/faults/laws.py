@@ -13,8 +13,9 @@ from typing import Any
 from flownav.faults.catalogue import CEILING_M, DEGREE_S, FAULTS, FLOOR_M, TEXTURE_NOISE_RAD_S, TEXTURE_SHARE, Fault
 from flownav.measurement import Sensor
 from flownav.simulation.fault import SensorFault
+from flownav.simulation.layout import EARLIER_READINGS
 
-FLOW_PERIOD_S = 0.02  # of the flow camera: how many readings a delay is
+LATE_S, MOST_LATE = 0.1, EARLIER_READINGS - 1
 OF_SENSOR = {
     Sensor.IMU: "inertial",
     Sensor.GPS_POSITION: "position",
@@ -22,6 +23,7 @@ OF_SENSOR = {
     Sensor.FLOW_RATE: "flow",
     Sensor.RANGE: "range",
     Sensor.BARO: "others",
+    Sensor.LANDED: "skids",
 }
 LOW_TEXTURE = {"m_xx": TEXTURE_SHARE, "m_yy": TEXTURE_SHARE, "noise_first": TEXTURE_NOISE_RAD_S}
 DOES: dict[str, dict[str, float]] = {
@@ -34,7 +36,7 @@ DOES: dict[str, dict[str, float]] = {
     "flow_sign": {"m_xx": -1.0, "m_yy": -1.0},
     "flow_swapped": {"m_xx": 0.0, "m_xy": 1.0, "m_yx": 1.0, "m_yy": 0.0},
     "flow_scale": {"m_xx": 0.7, "m_yy": 0.7},
-    "flow_late": {"late_readings": 5.0},
+    "flow_late": {},
     "flow_clock": {"lost": 1.0},
     "low_texture": LOW_TEXTURE | {"quality": 40.0},
     "low_texture_unsaid": LOW_TEXTURE | {"quality": 255.0},
@@ -53,9 +55,12 @@ DOES: dict[str, dict[str, float]] = {
 NOT_FLOWN = tuple(name for name in FAULTS if name not in DOES)
 
 
-def law_of(fault: Fault, begins_s: float, ends_s: float, course_rad: float = 0.0) -> SensorFault:
+def law_of(
+    fault: Fault, begins_s: float, ends_s: float, course_rad: float = 0.0, flow_period_s: float = 0.02
+) -> SensorFault:
     """A fault from begins_s to ends_s; course_rad: the direction in which it moves a position.
 
+    flow_period_s: between two readings of flow, of which so many are kept as `flow_late` needs at up to 70 Hz.
     KeyError where it cannot be flown (`NOT_FLOWN`).
     """
     does: dict[str, Any] = dict(DOES[fault.name])
@@ -63,5 +68,7 @@ def law_of(fault: Fault, begins_s: float, ends_s: float, course_rad: float = 0.0
         for away in ("bias", "drift"):
             size = does.pop(f"{away}_0", 0.0)
             does |= {f"{away}_0": size * math.cos(course_rad), f"{away}_1": size * math.sin(course_rad)}
+    if fault.name == "flow_late":
+        does["late_readings"] = float(min(round(LATE_S / flow_period_s), MOST_LATE))
     struck = {name: 1.0 for sensor, name in OF_SENSOR.items() if sensor in fault.sensors}
     return SensorFault(begins_s=begins_s, ends_s=ends_s, **struck, **does)

@@ -49,7 +49,7 @@ from flownav.navigation.told import GpsSettings
 from flownav.navigation.trust import OF_GPS, follow_noise, scale_noise
 
 LEAST_REJECTIONS = 5
-DOUBTED_RESET_S = 1.0
+SOON_S = 1.0
 UNKNOWN_PAD_M = 100.0
 LEAST_PAD_VARIANCE_M2 = 1e-6
 
@@ -76,15 +76,15 @@ def judge_gps(
 
 @equation
 def judge_rejections(
-    refused: bool, doubted: bool, t_s: float, m: RejectionMemory, s: GpsSettings
+    refused: bool, soon: bool, t_s: float, m: RejectionMemory, s: GpsSettings
 ) -> tuple[bool, RejectionMemory]:
     """Whether GPS has been refused for a state so often and so long that the filter is wrong, and the count.
 
-    doubted: the flow, which else would hold the filter, is doubted too. Then it takes no longer than DOUBTED_RESET_S.
+    soon: it is a velocity, or the flow that else would hold the filter is doubted too. Then SOON_S is long enough.
     """
     since_s = m.since_s if m.times > 0.0 else t_s
     count = m.times + 1.0
-    patience_s = smaller(s.gps_reset_s, DOUBTED_RESET_S) if doubted else s.gps_reset_s
+    patience_s = smaller(s.gps_reset_s, SOON_S) if soon else s.gps_reset_s
     reset = refused and count >= LEAST_REJECTIONS and t_s - since_s >= patience_s
     return reset, RejectionMemory(count if refused and not reset else 0.0, since_s)
 

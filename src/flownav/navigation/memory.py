@@ -66,6 +66,7 @@ CONTACT = _rows.take(1)  # the range when it rested last [m]; NaN where it has n
 BARO_KNOWN = _rows.take(1)
 PAD_KNOWN = _rows.take(1)  # 0 no, or how: STOOD_ON, LEFT, SEEN of `place`
 PAD_BESIDE = _rows.take(2)  # where the pad was from the vehicle as that went to GPS, along an axis, and its variance
+ASTRAY = _rows.take(1)  # 1 where the first component of the fix at hand was refused
 PAD_STRAYS = _rows.take(1)  # fixes of a pad in a row that were refused
 # what becomes of the component that is offered
 REASON = _rows.take(1)

@@ -13,6 +13,7 @@ from flownav.estimation.states import MEASURED, PAD, POSITION, STATE
 from flownav.frames import to_earth
 from flownav.navigation.journal import reset_state
 from flownav.navigation.memory import (
+    ASTRAY,
     OBSERVATION,
     PAD_KNOWN,
     PAD_STRAYS,
@@ -30,7 +31,7 @@ from flownav.navigation.tape import PAD_FOUND, Output, write_event
 from flownav.navigation.told import PlaceSettings
 
 LEAST_PAD_DISTANCE_M = 0.05
-MANY_STRAYS = 6.0  # refused components of fixes, none fused between
+MANY_STRAYS = 6.0  # refused components of fixes, no whole fix fused between
 UNKNOWN_M = 100.0
 ON_GROUND = 0.5
 STANDING_SIGMA_M = 0.005
@@ -118,8 +119,9 @@ def count_strays(work: Work, lanes: Lanes, component: int) -> None:
     """
     for lane in range(len(lanes)):
         reason, strays = work[REASON * len(lanes) + lane], work[PAD_STRAYS * len(lanes) + lane]
-        fused = reason == FUSED and component == 1
-        strays = strays + 1.0 if reason == INNOVATION_GATE else (0.0 if fused else strays)
+        whole = component == 1 and reason == FUSED and work[ASTRAY * len(lanes) + lane] == 0.0
+        strays = strays + 1.0 if reason == INNOVATION_GATE else (0.0 if whole else strays)
+        work[ASTRAY * len(lanes) + lane] = 1.0 if component == 0 and reason == INNOVATION_GATE else 0.0
         astray = strays >= MANY_STRAYS
         work[PAD_STRAYS * len(lanes) + lane] = 0.0 if astray else strays
         work[PAD_KNOWN * len(lanes) + lane] = LEFT if astray else work[PAD_KNOWN * len(lanes) + lane]

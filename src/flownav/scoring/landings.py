@@ -91,8 +91,8 @@ def went_around(rows: Array) -> dict[str, int]:
 
 
 def unfinished(rows: Array) -> dict[str, int]:
-    """How many flights broke nothing and yet did not land: the flight ended before they touched, or came to rest."""
-    whole = (rows[:, EXPECTED] > 0.0) & ~crashed(rows)
+    """How many flights broke nothing, did not go around for good, and yet did not land: the time was too short."""
+    whole = (rows[:, EXPECTED] > 0.0) & ~crashed(rows) & ~(rows[:, ALOFT] > 0.0)
     touched, rests = np.isfinite(rows[:, CONTACT_DISTANCE]), np.isfinite(rows[:, REST_DISTANCE])
     return {"never touched": int((whole & ~touched).sum()), "never at rest": int((whole & touched & ~rests).sum())}
 

@@ -141,10 +141,10 @@ def touchdowns(
 
     flown_error (epochs, 2, lanes): position that was flown on less the truth; pad_seen (epochs, lanes) 0/1: the pad's
     place was to be seen or noted; away (epochs, lanes) 0/1: the vehicle goes around. A contact before
-    `may_land_after_s` is a crash and no touchdown.
+    `may_land_after_s` is a crash and no touchdown; so is none what a go-around follows.
     """
     lane = np.arange(motion.on_ground.shape[1])
-    contact = first_contact(motion.on_ground)
+    contact = first_contact(motion.on_ground * after_last(away))
     early = (contact >= 0) & (t_s[contact] < may_land_after_s)
     touched = (contact >= 0) & ~early
     at, before = np.maximum(contact, 0), np.maximum(contact - 1, 0)
@@ -182,6 +182,12 @@ def touchdowns(
     found["aloft"] = np.where(touched, 0.0, (found["go_arounds"] > 0.0).astype(float))
     found["broken"] = broken(motion, found, np.where(touched, slide, 0.0), contact, early, limits)
     return np.column_stack([found[name] for name in TOUCHDOWN_COLUMNS])
+
+
+def after_last(away: Array) -> Array:
+    """1 from the epoch after a lane last went around, and all along where it never did (epochs, lanes)."""
+    later = np.cumsum(away[::-1], axis=0)[::-1]
+    return np.asarray((later <= 0.0).astype(float))
 
 
 def last_seen(pad_seen: Array, contact: NDArray[np.int64]) -> NDArray[np.int64]:

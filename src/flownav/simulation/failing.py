@@ -58,6 +58,8 @@ def strikes(sensor: int, fault: SensorFault) -> bool:
         return fault.flow > 0.0
     if sensor == Sensor.RANGE:
         return fault.range > 0.0
+    if sensor == Sensor.LANDED:
+        return fault.skids > 0.0
     return fault.others > 0.0
 
 

@@ -41,7 +41,7 @@ from flownav.simulation.onboard import (
     earlier,
     place_of,
 )
-from flownav.simulation.ring import put_slot, reading_of
+from flownav.simulation.ring import FIELDS, FIRST, put_slot, reading_at, reading_of
 
 with_unseen = replacing(Knowledge, "pad_unseen_s")
 
@@ -73,8 +73,15 @@ def read_pad(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot:
             fix.distance_variance_m2, fix.quality, fix.arrived,
         )  # fmt: skip
         put_slot(work, lanes, slot, lane, reading)
+
+
+@equation
+def note_seen(work: Work, lanes: Lanes, slot: int) -> None:
+    """Whether the camera saw the pad in the frame that is in a slot now."""
+    for lane in range(len(lanes)):
+        arrived = reading_at(work, lanes, FIRST + slot * FIELDS, lane).arrived
         known = load_known(work, lanes, lane)
-        unseen_s = 0.0 if fix.arrived > 0.0 else known.pad_unseen_s
+        unseen_s = 0.0 if arrived > 0.0 else known.pad_unseen_s
         store_known(work, lanes, lane, with_unseen(known, pad_unseen_s=unseen_s))
 
 

@@ -225,7 +225,8 @@ def note_knowledge(work: Work, nav: Work, lanes: Lanes) -> None:
     """What the vehicle knows of its landing, by its navigator and its camera, an epoch later."""
     for lane in range(len(lanes)):
         found, suspects = nav[PAD_KNOWN * len(lanes) + lane] > 0.0, nav[SUSPECTED * len(lanes) + lane] > 0.0
-        sigma_m = np.sqrt(larger(over_pad(nav, lanes, lane, 0, found), over_pad(nav, lanes, lane, 1, found)))
+        north, east = over_pad(nav, lanes, lane, 0, found), over_pad(nav, lanes, lane, 1, found)
+        sigma_m = np.sqrt(larger(larger(north, east), 0.0)) if np.isfinite(north + east) else np.inf
         unseen_s = load_known(work, lanes, lane).pad_unseen_s + EPOCH_S
         grounded = load_ground(nav, lanes, lane).known
         now = Knowledge(1.0 if found else 0.0, grounded, unseen_s, sigma_m, 1.0 if suspects else 0.0)
@@ -237,7 +238,7 @@ def over_pad(nav: Work, lanes: Lanes, lane: int, axis: int, found: bool) -> floa
     """Variance of the position over the pad along north (0) or east (1); over the filter's origin before."""
     own = variance_of(nav, lanes, POSITION + axis, lane)
     pad = variance_of(nav, lanes, PAD + axis, lane) - 2.0 * covariance_of(nav, lanes, POSITION + axis, PAD + axis, lane)
-    return larger(own + pad, 0.0) if found else own
+    return own + pad if found else own
 
 
 @equation

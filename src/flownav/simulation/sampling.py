@@ -27,7 +27,7 @@ from flownav.simulation.draws import (
     draw,
 )
 from flownav.simulation.failing import strike
-from flownav.simulation.landing_sensors import read_pad, read_skid
+from flownav.simulation.landing_sensors import note_seen, read_pad, read_skid
 from flownav.simulation.layout import (
     baro_as_is,
     camera_as_is,
@@ -121,6 +121,7 @@ def sample(
         read_pad(work, lanes, seed, flight, epoch, taken % slots, s)
         if fails is not None:
             strike_one(work, lanes, seed, flight, epoch, taken % slots, Sensor.PAD, 6, s.pad_clock)
+        note_seen(work, lanes, taken % slots)
         taken += 1
     if due(s.skid_clock, epoch):
         read_skid(work, lanes, seed, flight, epoch, taken % slots, s)

@@ -114,7 +114,7 @@ class GoAroundSection(ParameterModel):
     commit_height_m.
     """
 
-    height_m: Number = Field(5.0, gt=0.0, le=100.0)
+    height_m: Number = Field(2.5, gt=0.0, le=100.0)
     most: Number = Field(2.0, ge=0.0, le=100.0)
     pad_view_m: Number = Field(0.5, ge=0.0, le=100.0)
     pad_lost_s: Number = Field(2.0, gt=0.0, le=3600.0)
@@ -126,6 +126,7 @@ class GoAroundSection(ParameterModel):
     drift_radius_m: Number = Field(0.5, gt=0.0, le=100.0)
     drift_speed_m_s: Number = Field(0.6, gt=0.0, le=100.0)
     clear_s: Number = Field(3.0, ge=0.0, le=3600.0)
+    aloft_most_s: Number = Field(20.0, gt=0.0, le=3600.0)
 
 
 class EventSection(ParameterModel):
@@ -168,6 +169,14 @@ class AutopilotSection(ParameterModel):
     velocity_integral_1_s2: Number | None = Field(None, ge=0.0, le=10.0)
     precision: PrecisionSection | None = None
     go_around: GoAroundSection | None = None
+
+    @field_validator("go_around")
+    @classmethod
+    def _with_a_landing(cls, value: GoAroundSection | None, info: ValidationInfo) -> GoAroundSection | None:
+        if value is not None and info.data.get("precision") is None:
+            raise ValueError("needs [autopilot.precision], the landing that is broken off")
+        return value
+
     idle_collective_deg: Number = Field(0.0, ge=-10.0, le=10.0)
 
 

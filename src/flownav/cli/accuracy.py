@@ -129,7 +129,8 @@ def _touchdowns(made: list[Case], truth_model: str) -> str:
             success = f"{100.0 * rate['rate']:.1f} ({100.0 * rate['low']:.1f}-{100.0 * rate['high']:.1f})"
             parts = (_length(limited[name]) for name in ("estimate_m", "guidance_m", "pad_m"))
             ends = (_interval(landing[end], "r95") for end in ("contact", "rest"))
-            failed = {**landing["unfinished"], **landing["broken"]}
+            aloft = {"went around": landing["verdicts"].get("went around", 0)}
+            failed = {**landing["unfinished"], **aloft, **landing["broken"]}
             why = ", ".join(f"{what} {count}" for what, count in failed.items() if count) or "-"
             rows.append((case.name, *ends, *parts, success, why))
     heading = (

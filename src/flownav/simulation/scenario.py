@@ -120,7 +120,7 @@ class GoAroundSection(ParameterModel):
     pad_lost_s: Number = Field(2.0, gt=0.0, le=3600.0)
     landing_sigma_m: Number = Field(0.5, gt=0.0, le=100.0)
     doubt_s: Number = Field(2.0, ge=0.0, le=3600.0)
-    align_wait_s: Number = Field(30.0, gt=0.0, le=3600.0)
+    align_wait_s: Number = Field(60.0, gt=0.0, le=3600.0)
     search_wait_s: Number = Field(30.0, gt=0.0, le=3600.0)
     search_radius_m: Number = Field(3.0, ge=0.0, le=100.0)
     drift_radius_m: Number = Field(0.5, gt=0.0, le=100.0)

@@ -104,7 +104,7 @@ class Recorder:
             "parameters": {
                 "filter": options.settings.model_dump(),
                 "gps_delay_s": options.gps_delay_s,
-                "horizon_s": options.horizon_s,
+                "horizon_s": options.least_horizon_s,
                 "flow_sensor": options.identified._asdict() if options.identified else None,
                 **({"flow_noise": options.flow_noise._asdict()} if options.flow_noise.stated else {}),
                 **({} if origin is None else {"origin_lat_lon_deg_alt_m": list(origin)}),

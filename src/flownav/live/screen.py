@@ -41,7 +41,10 @@ class Screen:
 
         session = self._session
         self._follow(now_s)
-        sensors = Table("sensor", "Hz", "age [s]", "innovation", "ratio", "", title=self._title(), title_justify="left")
+        lags_s = session.hearing.lags.by_sensor
+        sensors = Table(
+            "sensor", "Hz", "age [s]", "lag [s]", "innovation", "ratio", "", title=self._title(), title_justify="left"
+        )
         for sensor in sorted(session.readings):
             age_s = now_s - session.heard_s[sensor]
             found = [session.innovations[key] for key in sorted(session.innovations) if key[0] == sensor]
@@ -49,6 +52,7 @@ class Screen:
                 sensor.name.lower(),
                 f"{self._rates.get(sensor, 0.0):.0f}",
                 f"{age_s:.2f}",
+                f"{lags_s.get(sensor, 0.0):.2f}",
                 " ".join(_figure(innovation) for innovation, _, _ in found),
                 " ".join(_figure(ratio) for _, ratio, _ in found),
                 " ".join(dict.fromkeys(Reason(reason).label for _, _, reason in found if reason)),
@@ -57,7 +61,21 @@ class Screen:
         for name, values in self._strips.items():
             strips.add_row(name, strip(values), _figure(values[-1]))
         dropped = ", ".join(f"{name} {count}" for name, count in sorted(session.dropped.items())) or "nothing"
-        return Group(sensors, self._estimate(), self._protection(), strips, f"dropped: {dropped}", self._footing())
+        parts = [sensors, self._estimate(), self._protection(), strips, f"dropped: {dropped}", self._footing()]
+        return Group(*self._alarms(), *parts)
+
+    def _alarms(self) -> list[Any]:
+        """Sensors that are heard and not fused, above all else."""
+        from rich.text import Text
+
+        return [
+            Text(
+                f"ALARM: {sensor.name.lower()} is heard and has not been fused for "
+                f"{spell.until_s - spell.since_s:.0f} s ({spell.why})",
+                style="bold red",
+            )
+            for sensor, spell in sorted(self._session.alarms.items())
+        ]
 
     def _title(self) -> str:
         vehicle = self._session.reception.vehicle
@@ -95,7 +113,8 @@ class Screen:
         withheld = ", ".join(f"{name} {count}" for name, count in sorted(session.withheld.items()))
         refused = ", ".join(session.requests.refused)
         return (
-            f"sent {session.sent}; withheld: {withheld or 'none'}; resets {session.filtering.jumps}; "
+            f"horizon {session.hearing.horizon_s:.2f} s; sent {session.sent}; "
+            f"withheld: {withheld or 'none'}; resets {session.resets}; "
             f"latency p50 {p50:.2f} ms, p99 {p99:.2f} ms" + (f"; vehicle refuses {refused}" if refused else "")
         )
 

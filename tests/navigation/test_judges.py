@@ -229,22 +229,31 @@ def test_verdicts_on_a_range(range_m, upright, reason):
     assert judge_range(reading(range_m), 1.0, 1.0, height, False, range_memory(), TOLD.height)[0] == reason
 
 
-def test_a_range_that_repeats_itself_is_no_news_after_half_a_second():
-    height, m = Height(-2.0, 0.1, 1.0), range_memory()
-    reasons = []
-    for t_s in (10.0, 10.2, 10.4, 10.5, 10.6):
-        reason, _, m = judge_range(reading(2.0), t_s, 1.0, height, False, m, TOLD.height)
-        reasons.append(reason)
-    assert reasons == [FUSED, FUSED, FUSED, STUCK, STUCK]
-    assert (m.last_m, m.same_s, m.down_m) == (2.0, 10.0, -2.0)
-    reason, _, m = judge_range(reading(2.001), 10.7, 1.0, height, False, m, TOLD.height)
+def test_a_range_that_repeats_itself_weighs_ever_less_and_is_stuck_once_the_vehicle_has_moved():
+    """A still hover over a sensor of 1 cm, and one that sticks while the vehicle climbs by 0.12 m."""
+    for climb_m, verdicts in ((0.02, [FUSED] * 5), (0.12, [FUSED, FUSED, FUSED, STUCK, STUCK])):
+        m, reasons, variances = range_memory(), [], []
+        for t_s in (10.0, 10.2, 10.4, 10.5, 10.6):
+            height = Height(-2.0 if t_s == 10.0 else -2.0 - climb_m, 0.1, 1.0)
+            reason, variance, m = judge_range(reading(2.0), t_s, 1.0, height, False, m, TOLD.height)
+            reasons.append(reason)
+            variances.append(variance)
+        assert reasons == verdicts
+        fresh = 0.05**2 + 0.04**2
+        assert variances[0] == pytest.approx(fresh)
+        assert variances[2] == pytest.approx(fresh + 0.4**2)  # 1 m/s may have gone unseen
+        assert (m.last_m, m.same_s, m.down_m) == (2.0, 10.0, -2.0)
+    reason, variance, m = judge_range(reading(2.001), 10.7, 1.0, height, False, m, TOLD.height)
     assert (reason, m.same_s) == (FUSED, 10.7)
+    assert variance < 0.005
 
 
 def test_the_only_range_is_believed_until_the_height_travels():
     m = range_memory(last_m=2.0, same_s=10.0, down_m=-2.0)
     s = TOLD.height
-    assert repeats(11.0, m, Height(-2.0, 0.1, 1.0), False, s)
+    assert not repeats(11.0, m, Height(-2.09, 0.1, 1.0), False, s)
+    assert repeats(11.0, m, Height(-2.11, 0.1, 1.0), False, s)
+    assert not repeats(10.4, m, Height(-2.11, 0.1, 1.0), False, s)
     assert not repeats(11.0, m, Height(-2.0, 0.1, 1.0), True, s)
     assert not repeats(11.0, m, Height(-2.79, 0.1, 1.0), True, s)  # 5 x 0.1 m and three standard deviations of drift
     assert repeats(11.0, m, Height(-2.81, 0.1, 1.0), True, s)

@@ -57,6 +57,7 @@ ECHOES = 20.0  # ranges over which strays are counted
 STRAY_SHARE = 1.5  # some strays confirm each other
 STRAY_SPAN_M = 5.0
 MANY_STRAYS, FEW_STRAYS = 0.15, 0.02  # so many tell nothing of the ground's level, or of the accelerometer; so few none
+UNSEEN_M_S = 1.0  # a range that repeats itself may hide this climb or descent
 ALONE = 5.0  # times the travel, where nothing else tells the height
 
 
@@ -76,15 +77,26 @@ def range_variance(range_m: float, sigma_m: float, relative_sigma: float) -> flo
 
 
 @equation
+def repeated_variance(variance: float, lasting_s: float) -> float:
+    """Variance of a range [m2] that has been the same to the last digit for so long: what may have gone unseen.
+
+    A sensor of 1 cm that hovers repeats itself, and is right; one that sticks is wrong by what the vehicle has moved.
+    """
+    unseen_m = UNSEEN_M_S * lasting_s
+    return variance + unseen_m * unseen_m
+
+
+@equation
 def repeats(t_s: float, m: RangeMemory, height: Height, alone: bool, s: HeightSettings) -> bool:
-    """Whether the range has repeated one value to the last digit for long: no news, whatever the vehicle does.
+    """Whether the range has repeated one value to the last digit for long while the vehicle climbs or sinks.
 
     Where no barometer, GPS or pad has told the height lately, the range is all there is, and it is believed unless
     the height travels by more than the filter's own drift.
     """
     lasting_s = t_s - m.same_s
     travelled = abs(height.pos_d_m - m.down_m)
-    least = ALONE * s.range_stuck_travel_m + 3.0 * height.speed_sigma_m_s * lasting_s if alone else 0.0
+    drift = 3.0 * height.speed_sigma_m_s * lasting_s
+    least = ALONE * s.range_stuck_travel_m + drift if alone else s.range_stuck_travel_m
     return lasting_s >= s.range_stuck_s and travelled >= least
 
 
@@ -102,6 +114,7 @@ def judge_range(
     reason = TILTED if reason == FUSED and height.upright < np.cos(s.tilt_limit_rad) else reason
     news = range_m != m.last_m
     stuck = reason == FUSED and not news and repeats(t_s, m, height, alone, s)
+    variance = variance if news or alone else repeated_variance(variance, t_s - m.same_s)
     heard = reason == FUSED
     after = RangeMemory(
         m.taken_s,

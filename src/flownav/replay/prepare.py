@@ -29,6 +29,7 @@ OWN, IMU, TURNING = "sensor gyro", "imu gyro", "attitude"
 SIGNIFICANT = 3.0  # standard errors
 LEAST_FLOW_ROWS = 50
 SCALE_LIMITS = (0.1, 10.0)
+HELD_S = 0.5  # PX4 writes it once a second, ArduPilot when it changes
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,8 @@ def prepare(log: Log, options: ReplayOptions) -> Prepared:
             if options.identified is not None:
                 streams[sensor] = put_right(streams[sensor], options.identified)
             streams[sensor] = _exposed(_scaled(streams[sensor], options.flow_scale))
+    if Sensor.LANDED in streams:
+        streams[Sensor.LANDED] = held(streams[Sensor.LANDED], log.span_s[1])
     if Sensor.FLOW_RATE in streams:
         streams[Sensor.FLOW_RATE], chosen = _with_gyro(streams[Sensor.FLOW_RATE], streams)
         notes.append(chosen.note)
@@ -125,6 +128,26 @@ def check_windows(log: Log, windows: Iterable[tuple[float, float]], option: str)
             raise InputError(
                 f"{option}: {t0:g} to {t1:g} s is outside the log, which covers {start:.1f} to {end:.1f} s"
             )
+
+
+# -- on the ground -----------------------------------------------------------------------------------------
+def held(landed: Stream, end_s: float) -> Stream:
+    """Landed is a state until take-off: a log that tells the change alone says it again every HELD_S, up to its end.
+
+    Without it a vehicle that stands with its motors running, and has neither GPS nor flow there, runs away.
+    """
+    until = np.append(landed.t_s[1:], end_s)
+    on_ground = landed.value[:, 0] > 0.5
+    more = np.where(on_ground, np.maximum(np.ceil((until - landed.t_s) / HELD_S - 1.5), 0.0), 0.0).astype(int)
+    rows = np.repeat(np.arange(len(landed)), more + 1)
+    count = np.arange(len(rows)) - np.repeat(np.cumsum(more + 1) - (more + 1), more + 1)
+    return replace(
+        landed,
+        t_s=landed.t_s[rows] + HELD_S * count,
+        value=landed.value[rows],
+        variance=landed.variance[rows],
+        quality=landed.quality[rows],
+    )
 
 
 # -- flow --------------------------------------------------------------------------------------------------

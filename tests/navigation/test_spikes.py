@@ -1,17 +1,19 @@
-"""Inertial readings that no vehicle can follow do not arrive; those that the next confirms do."""
+"""Inertial readings that no vehicle can follow do not arrive, alone or in bursts; what lasts does."""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from flownav.measurement import Sensor
 from flownav.navigation.records import ImuMemory, Reading, SpikeMemory
-from flownav.navigation.spikes import judge_spike
+from flownav.navigation.spikes import BURST_S, MOST_DOUBT_M_S, doubt_of, judge_spike
 from flownav.navigation.tape import IMU_SPIKE
+from flownav.navigation.witnessed import Witness
 from navigation_streams import fly, navigate, still
 
 KEPT = ImuMemory(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -9.8, 0.0, 0.0, 0.0)
-CALM = SpikeMemory(0.0, 0.02, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, -9.8)
+CALM = SpikeMemory(0.0, 0.02, 0.2, 0.0, 0.0, 0.0, 0.0, 0.0, -9.8, 0.0)
 STEP_S = 0.004
 
 
@@ -33,17 +35,76 @@ def test_a_longer_step_and_a_shaken_vehicle_may_jump_further():
     assert not judge_spike(jump, 0.2, KEPT, CALM)[0]  # after a gap anything may be
 
 
-def test_what_the_next_reading_says_again_is_believed_and_three_in_a_row_are_the_most():
-    jump = reading((5.0, 0.0, 0.0))
-    spike, after = judge_spike(jump, STEP_S, KEPT, CALM)
-    assert spike
-    assert after.refused == 1.0
-    assert not judge_spike(jump, 2 * STEP_S, KEPT, after)[0]
-    memory, verdicts = CALM, []
-    for k, sign in enumerate((1.0, -1.0, 1.0, -1.0)):
-        spike, memory = judge_spike(reading((sign * 25.0, 0.0, 0.0)), (k + 1) * STEP_S, KEPT, memory)
+def judged(readings, period_s=STEP_S, memory=CALM):
+    """Verdicts on readings that follow the kept one at a period, as if all were refused."""
+    verdicts = []
+    for k, said in enumerate(readings):
+        spike, memory = judge_spike(said, (k + 1) * period_s, KEPT, memory)
         verdicts.append(spike)
-    assert verdicts == [True, True, True, False]
+    return verdicts, memory
+
+
+@pytest.mark.parametrize("period_s", [0.004, 0.01])
+def test_a_burst_is_refused_for_three_tenths_of_a_second_and_what_lasts_is_believed(period_s):
+    count = round(0.4 / period_s)
+    for said in (reading((5.0, 0.0, 0.0)), reading(accel=(40.0, 0.0, -9.8))):
+        verdicts, _ = judged([said] * count, period_s)
+        assert sum(verdicts) == pytest.approx(BURST_S / period_s, abs=1)
+        assert all(verdicts[: sum(verdicts)])
+
+
+def test_a_burst_of_noise_does_not_make_itself_usual_and_motors_that_start_do():
+    chance = np.random.default_rng(2)
+
+    def shaken(sigma_m_s2, count):
+        return [
+            reading(accel=tuple(np.array([0.0, 0.0, -9.8]) + chance.normal(0.0, sigma_m_s2, 3))) for _ in range(count)
+        ]
+
+    assert np.mean(judged(shaken(60.0, 20), 0.01)[0]) > 0.9
+    memory, refused = CALM, 0
+    kept, kept_s = KEPT, 0.0
+    for k, said in enumerate(shaken(8.0, 300)):
+        spike, memory = judge_spike(said, 0.01 * (k + 1) - kept_s, kept, memory)
+        refused += spike
+        if not spike:
+            kept, kept_s = (
+                KEPT._replace(accel_x=said.value_3, accel_y=said.value_4, accel_z=said.value_5),
+                0.01 * (k + 1),
+            )
+    assert refused < 30
+    assert memory.accel_m_s2 > 5.0
+
+
+def test_nothing_but_zeros_is_a_failed_imu_however_long():
+    zeros = reading((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    assert all(judged([zeros] * 500)[0])
+    assert not judge_spike(reading((0.0, 0.0, 0.0), (0.0, 0.0, -1e-3)), STEP_S, KEPT, CALM)[0]  # free fall
+
+
+def test_a_burst_leaves_a_doubt_of_what_it_would_have_done_and_a_lone_spike_none():
+    said = reading(accel=(40.0, 0.0, -9.8))
+    memory, variance = CALM, 0.0
+    for k in range(10):
+        step_s = 0.01 * (k + 1)
+        _, memory = judge_spike(said, step_s, KEPT, memory)
+        variance += doubt_of(said, step_s, KEPT, memory)
+        if k == 0:
+            assert variance == 0.0
+        if k == 1:
+            assert variance == pytest.approx((40.0 * 0.02) ** 2 - (40.0 * 0.01) ** 2)
+    assert variance == pytest.approx(MOST_DOUBT_M_S**2 - (40.0 * 0.01) ** 2)
+
+
+def test_the_witness_keeps_what_the_filter_keeps():
+    flown = fly(still, 4.0)
+    imu = np.column_stack([flown.streams[Sensor.IMU].t_s, flown.streams[Sensor.IMU].value])
+    imu[100, 1] += 25.0
+    imu[200:210, 4] += 60.0
+    whole, piecewise = Witness(), Witness()
+    kept = whole.keeps(imu)
+    assert np.flatnonzero(~kept).tolist() == [100, *range(200, 210)]
+    assert np.array_equal(kept, np.concatenate([piecewise.keeps(imu[k : k + 1]) for k in range(len(imu))]))
 
 
 def test_one_spike_of_10_ms_in_a_hover_moves_nothing():

@@ -16,6 +16,7 @@ from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.tables import written_on
 from flownav.navigation.tape import COMPONENTS, GPS_RESET, START, empty_tape
 from flownav.navigation.told import Equipment
+from flownav.navigation.witnessed import Witness
 from flownav.sensors.identified import UNTURNED, in_vehicle_axes
 
 BATCH = 128  # readings at a time
@@ -53,7 +54,8 @@ class Filtering:
         self._keeper = keeper
         self.running: Running | None = None
         self.jumps = 0
-        self._imu: deque[tuple[float, ...]] = deque(maxlen=KEPT_IMU)
+        self._imu: deque[tuple[float, ...]] = deque(maxlen=KEPT_IMU)  # without spikes
+        self._witness, self._row_of_imu = Witness(), np.zeros((1, 7))
         self._attitude: deque[tuple[float, ...]] = deque(maxlen=KEPT_ATTITUDES)
         most = max(COMPONENTS.values())
         self._tape = empty_tape(BATCH + 2, most * BATCH, 8 * BATCH + 8)
@@ -62,7 +64,9 @@ class Filtering:
         """A reading has arrived: IMU and attitude are kept for the flow's exposure and for the way from then to now."""
         reading = waiting.reading
         if reading.sensor == Sensor.IMU and (not self._imu or waiting.t_s > self._imu[-1][0]):
-            self._imu.append((waiting.t_s, *reading.value))
+            self._row_of_imu[0, 0], self._row_of_imu[0, 1:] = waiting.t_s, reading.value
+            if self._witness.keeps(self._row_of_imu)[0]:
+                self._imu.append((waiting.t_s, *reading.value))
         elif reading.sensor == Sensor.ATTITUDE and (not self._attitude or waiting.t_s > self._attitude[-1][0]):
             self._attitude.append((waiting.t_s, *reading.value))
 
@@ -86,6 +90,7 @@ class Filtering:
         self.running = None
         self.jumps += 1
         self._imu.clear()
+        self._witness = Witness()
         self._attitude.clear()
 
     def feed(self, released: list[Waiting]) -> Outcome:

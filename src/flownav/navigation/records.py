@@ -157,7 +157,7 @@ class BridgeMemory(NamedTuple):
 
 class SpikeMemory(NamedTuple):
     """How many inertial readings in a row were refused as spikes; the usual jump from one to the next, of gyro [rad/s]
-    and accelerometer [m/s2]; the newest reading, spike or not.
+    and accelerometer [m/s2]; the newest reading, spike or not; and the step in which the last jump was judged [s].
     """
 
     refused: float
@@ -169,6 +169,7 @@ class SpikeMemory(NamedTuple):
     accel_x: float
     accel_y: float
     accel_z: float
+    reach_s: float
 
 
 class ImuWindow(NamedTuple):

@@ -1,15 +1,18 @@
-"""Inertial readings that no vehicle can follow: a spike is as one that never came.
+"""Inertial readings that no vehicle can follow: a spike, or a burst of them, is as one that never came.
 
-A jump is a spike where it is larger than turning and shaking can make it from one reading to the next, unless what
-comes after it says the same: then the vehicle was hit, and the next readings tell.
+A jump is a spike where it is larger than turning and shaking can make it from one reading to the next. What stays away
+for longer than a burst lasts is believed: then the vehicle was hit, and by how much the velocity may have changed
+meanwhile is added to its doubt, so that flow and GPS find it anew. An IMU that reads nothing but zeros has failed.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, procedure, smaller
+from flownav.compile import equation, larger, procedure, smaller
+from flownav.estimation.covariance import add_noise_lane
 from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.states import VELOCITY
 from flownav.navigation.inertial import sound
 from flownav.navigation.memory import (
     READING,
@@ -23,11 +26,13 @@ from flownav.navigation.records import ImuMemory, Reading, SpikeMemory
 from flownav.navigation.tape import IMU_SPIKE, Output, write_event
 
 GYRO_JUMP_RAD_S, TURNING_RAD_S2 = 1.0, 100.0  # what a small vehicle does at once, and in the time between
-ACCEL_JUMP_M_S2, SHAKING_M_S3 = 20.0, 1000.0
+ACCEL_JUMP_M_S2, SHAKING_M_S3 = 10.0, 1000.0
 TIMES = 6.0  # the usual jump
 USUAL = 50.0  # readings over which that is followed
+SLOWER = 3.0  # times, in a burst: it must not make itself usual
 LONGEST_S = 0.1  # after a gap no jump is a spike
-MOST = 3.0  # in a row
+BURST_S = 0.3  # spikes that last longer are what happened
+MOST_DOUBT_M_S = 1.0  # what a burst that was none may have done to the velocity
 ARRIVED_AT = READING + Reading._fields.index("arrived")
 
 
@@ -39,26 +44,52 @@ def distance(x: float, y: float, z: float) -> float:
 
 
 @equation
+def is_dead(r: Reading) -> bool:
+    """Whether all six axes read 0 to the last digit, as no IMU does that is alive."""
+    turning = abs(r.value_0) + abs(r.value_1) + abs(r.value_2)
+    return turning + abs(r.value_3) + abs(r.value_4) + abs(r.value_5) == 0.0
+
+
+@equation
 def judge_spike(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -> tuple[bool, SpikeMemory]:
-    """Whether an inertial reading is a spike after the one that was kept, step_s before; and the memory of it."""
+    """Whether an inertial reading is a spike after the one that was kept, step_s before; and the memory of it.
+
+    In a burst a reading is held against what was kept before it, by the jump that was possible when it began. The usual
+    jump is that between neighbours, kept or not: motors that start shake every reading, a burst stands still.
+    """
     gyro = distance(reading.value_0 - m.gyro_x, reading.value_1 - m.gyro_y, reading.value_2 - m.gyro_z)
     accel = distance(reading.value_3 - m.accel_x, reading.value_4 - m.accel_y, reading.value_5 - m.accel_z)
-    most_gyro = GYRO_JUMP_RAD_S + TURNING_RAD_S2 * step_s + TIMES * s.gyro_rad_s
-    most_accel = ACCEL_JUMP_M_S2 + SHAKING_M_S3 * step_s + TIMES * s.accel_m_s2
+    burst = s.refused > 0.0 and step_s <= BURST_S
+    reach_s = s.reach_s if burst else step_s
+    most_gyro = GYRO_JUMP_RAD_S + TURNING_RAD_S2 * reach_s + TIMES * s.gyro_rad_s
+    most_accel = ACCEL_JUMP_M_S2 + SHAKING_M_S3 * reach_s + TIMES * s.accel_m_s2
     jumps = gyro > most_gyro or accel > most_accel
-    gyro_again = distance(reading.value_0 - s.gyro_x, reading.value_1 - s.gyro_y, reading.value_2 - s.gyro_z)
-    accel_again = distance(reading.value_3 - s.accel_x, reading.value_4 - s.accel_y, reading.value_5 - s.accel_z)
-    again = s.refused > 0.0 and gyro_again < 0.5 * most_gyro and accel_again < 0.5 * most_accel
-    comparable = step_s <= LONGEST_S
-    spike = jumps and comparable and not again and s.refused < MOST
-    gyro_usual = s.gyro_rad_s + (smaller(gyro, most_gyro) - s.gyro_rad_s) / USUAL
-    accel_usual = s.accel_m_s2 + (smaller(accel, most_accel) - s.accel_m_s2) / USUAL
+    comparable = burst or step_s <= LONGEST_S
+    spike = (jumps and comparable) or is_dead(reading)
+    gyro_next = distance(reading.value_0 - s.gyro_x, reading.value_1 - s.gyro_y, reading.value_2 - s.gyro_z)
+    accel_next = distance(reading.value_3 - s.accel_x, reading.value_4 - s.accel_y, reading.value_5 - s.accel_z)
+    share = 1.0 / (SLOWER * USUAL if spike else USUAL)
+    gyro_usual = s.gyro_rad_s + share * (smaller(gyro_next, most_gyro) - s.gyro_rad_s)
+    accel_usual = s.accel_m_s2 + share * (smaller(accel_next, most_accel) - s.accel_m_s2)
     return spike, SpikeMemory(
         s.refused + 1.0 if spike else 0.0,
-        gyro_usual if comparable and not spike else s.gyro_rad_s,
-        accel_usual if comparable and not spike else s.accel_m_s2,
+        gyro_usual if comparable else s.gyro_rad_s,
+        accel_usual if comparable else s.accel_m_s2,
         reading.value_0, reading.value_1, reading.value_2, reading.value_3, reading.value_4, reading.value_5,
+        reach_s,
     )  # fmt: skip
+
+
+@equation
+def doubt_of(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -> float:
+    """The velocity's variance [m2/s2] that one spike more of a burst adds, an axis; none for a spike that is alone.
+
+    In all that of what the readings say beyond the one that was kept, over the time since, up to MOST_DOUBT_M_S.
+    """
+    accel = distance(reading.value_3 - m.accel_x, reading.value_4 - m.accel_y, reading.value_5 - m.accel_z)
+    now_m_s = smaller(accel * step_s, MOST_DOUBT_M_S)
+    before_m_s = smaller(accel * larger(step_s - s.reach_s, 0.0), MOST_DOUBT_M_S)
+    return now_m_s * now_m_s - before_m_s * before_m_s if s.refused > 1.0 else 0.0
 
 
 @procedure
@@ -67,9 +98,12 @@ def drop_spikes(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
     for lane in range(len(lanes)):
         reading, m = load_reading(work, lanes, lane), load_imu(work, lanes, lane)
         if sound(reading) and np.isfinite(m.read_s) and load_start(work, lanes, lane).started > 0.0:
-            spike, after = judge_spike(reading, t_s - m.read_s, m, load_spike(work, lanes, lane))
+            step_s = t_s - m.read_s
+            spike, after = judge_spike(reading, step_s, m, load_spike(work, lanes, lane))
             store_spike(work, lanes, lane, after)
             if spike:
+                for i in range(3):
+                    add_noise_lane(work, lanes, VELOCITY + i, lane, doubt_of(reading, step_s, m, after))
                 work[ARRIVED_AT * len(lanes) + lane] = 0.0
                 if after.refused == 1.0:
                     write_event(

@@ -19,6 +19,7 @@ from flownav.logs.rates import attitude_rates, mean_over
 from flownav.measurement import Array, EventQueue, Sensor, Stream, merge
 from flownav.navigation.feed import imu_serves
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
+from flownav.navigation.witnessed import Witness
 from flownav.sensors.identified import IdentifiedFlow, in_vehicle_axes
 
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
@@ -214,7 +215,8 @@ def _exposure(flow: Stream) -> Array:
 def _imu_over(flow: Stream, streams: dict[Sensor, Stream], exposure_s: Array) -> Array:
     """Mean rates of the vehicle's IMU about x and y over each exposure, (n, 2) [rad/s]."""
     imu = streams[Sensor.IMU]
-    return mean_over(imu.t_s, imu.value[:, :3], flow.t_s - exposure_s, flow.t_s)[:, :2]
+    kept = Witness().keeps(np.column_stack([imu.t_s, imu.value]))
+    return mean_over(imu.t_s[kept], imu.value[kept, :3], flow.t_s - exposure_s, flow.t_s)[:, :2]
 
 
 def _gyro_candidates(flow: Stream, streams: dict[Sensor, Stream]) -> dict[str, Array]:

@@ -63,7 +63,7 @@ def test_latency_from_flow_to_estimate(tmp_path):
         os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
     warm_up()
     link, latency, options = open_link("udp:0"), Latency(), Options()
-    recorder = Recorder(tmp_path / "bench.fnr")
+    recorder = Recorder(tmp_path / "bench.fnr", options)
     session = Session(options, recorder, time.monotonic(), time.time())
     other = multiprocessing.get_context("spawn").Process(target=vehicle, args=(link.port, DURATION_S))
     other.start()
@@ -72,7 +72,7 @@ def test_latency_from_flow_to_estimate(tmp_path):
     def look(now_s: float) -> None:
         memory_kb.append(_resident_kb())
 
-    run_session(session, link, latency, lambda: not other.is_alive(), look)
+    run_session(session, link, latency, lambda: not other.is_alive(), [look])
     link.close()
     grown = memory_kb[-1] - memory_kb[len(memory_kb) // 10]
     print(f"\n{DURATION_S:g} s: {session.readings[Sensor.FLOW_RATE]} flow readings, {session.sent} estimates sent")
@@ -80,7 +80,7 @@ def test_latency_from_flow_to_estimate(tmp_path):
     for share in (0.5, 0.9, 0.99, 0.999, 1.0):
         print(f"latency p{100 * share:g}: {1e3 * latency.quantile_s(share):.3f} ms")
     print(f"memory: {grown} kB more than after a tenth of the time; at most {_peak_mb():.0f} MB", gc.get_stats()[2])
-    recorder.finish(options, session.origin_deg_m, {})
+    recorder.finish({})
     assert session.sent > 0.8 * FLOW_HZ * (DURATION_S - 5.0)
 
 

@@ -24,7 +24,7 @@ from flownav.live.link import open_link
 from flownav.live.loop import Latency, run_session, run_vehicle
 from flownav.live.options import Options
 from flownav.live.recorder import NoRecorder, Recorder
-from flownav.live.screen import Screen
+from flownav.live.screen import Screen, draw
 from flownav.live.session import Session
 from flownav.live.simulated import BOOT_S, ORIGIN_DEG_M, SimulatedVehicle
 from flownav.live.warm import warm_up
@@ -70,14 +70,14 @@ def flight(tmp_path_factory):
     setup = assemble(load_scenario("pad_return"))
     vehicle = SimulatedVehicle(log_of(fly_recorded(setup, 1), setup))
     told, ages_s = setup.fitted.told, setup.fitted.ages_s
-    path, recorder = (folder := tmp_path_factory.mktemp("live")) / "flight.fnr", Recorder(folder / "flight.fnr")
+    path = tmp_path_factory.mktemp("live") / "flight.fnr"
     options = Options(
         gps_delay_s=float(ages_s[Sensor.GPS_POSITION]),
         identified=IdentifiedFlow(1.0, 1.0, float(ages_s[Sensor.FLOW_RATE])),
         settings=told.settings,
         flow_noise=told.noise,
     )
-    link = open_link("udp:0")
+    link, recorder = open_link("udp:0"), Recorder(path, options)
     session = Session(options, recorder, time.monotonic(), time.time())
     latency, ended = Latency(), threading.Event()
     telling = threading.Thread(target=_tell, args=(vehicle, f"udpout:127.0.0.1:{link.port}", ended))
@@ -85,7 +85,7 @@ def flight(tmp_path_factory):
     run_session(session, link, latency, ended.is_set)
     telling.join()
     link.close()
-    recorder.finish(options, session.origin_deg_m, {})
+    recorder.finish({})
     return vehicle, session, latency, path
 
 
@@ -147,7 +147,7 @@ def test_the_screen_shows_rates_ages_and_the_estimate(flight):
     _, session, latency, _ = flight
     screen, console = Screen(session, latency, "udp:1"), Console(width=160, record=True, file=StringIO(), markup=False)
     for now_s in (0.0, 1.0):
-        console.print(screen.look(now_s))
+        console.print(draw(screen.view(now_s)))
     text = console.export_text()
     for word in ("flow_rate", "range", "position [m]", "±", "sent", "latency", "dropped"):
         assert word in text
@@ -155,13 +155,13 @@ def test_the_screen_shows_rates_ages_and_the_estimate(flight):
 
 def test_a_restart_in_the_record_is_replayed_too(tmp_path):
     path = tmp_path / "restart.fnr"
-    options, recorder = Options(), Recorder(path)
+    recorder = Recorder(path, options := Options())
     wire = Wire(Hover(), options, recorder)
     wire.fly(4.0)
     wire.vehicle.boot_s = 1.0 - wire.t_s  # it reboots
     wire.fly(4.0)
     wire.close()
-    recorder.finish(options, wire.session.origin_deg_m, {})
+    recorder.finish({})
     record = assert_same_bits(path)
     assert len(record.manifest["segments"]) == 2
     assert "restart" in record.tables["events"]["kind"]

@@ -17,7 +17,7 @@ from flownav.live.estimating import why_withheld
 from flownav.live.horizon import MOST_WAITING
 from flownav.live.loop import Latency
 from flownav.live.options import Limits, Options
-from flownav.live.screen import Screen
+from flownav.live.screen import Screen, draw
 from flownav.mavlink.dialect import coder
 from flownav.mavlink.position_messages import LOCAL_FRD
 from flownav.mavlink.signing import SignatureCheck
@@ -289,7 +289,7 @@ def test_an_uncertain_estimate_is_not_sent(wires):
 def shown(wire):
     """What the screen says."""
     console = Console(width=160, file=StringIO(), record=True)
-    console.print(Screen(wire.session, Latency(), "udp:1").look(wire.now_s))
+    console.print(draw(Screen(wire.session, Latency(), "udp:1").view(wire.now_s)))
     return console.export_text()
 
 

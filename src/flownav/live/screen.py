@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, NamedTuple
 
 from flownav.estimation.gating import Reason
 from flownav.estimation.hypotheses import NAMES
@@ -17,6 +17,8 @@ from flownav.navigation.memory import PROTECTION, SUSPECTED
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
+    from flownav.live.recorder import Recorder
+
 STRIP = 60  # columns of a strip of signals
 BARS = "▁▂▃▄▅▆▇█"
 SHOWN = {
@@ -24,40 +26,59 @@ SHOWN = {
 }  # fmt: skip
 
 
-class Screen:
-    """Keeps what the strips show; `rows` renders it."""
+class View(NamedTuple):
+    """What the screen shows at an instant, as text: taken between two readings, drawn whenever the terminal takes it.
 
-    def __init__(self, session: Session, latency: Latency, url: str) -> None:
+    alarms: what somebody must know now, above all else. sensors: rows of the table of sensors. estimate: rows of the
+    estimate. strips: name, bars and newest value. lines: below them.
+    """
+
+    title: str
+    alarms: list[str]
+    sensors: list[tuple[str, ...]]
+    estimate: list[tuple[str, ...]]
+    strips: list[tuple[str, str, str]]
+    lines: list[str]
+
+
+class Screen:
+    """Keeps what the strips show; `view` looks at the session, in its own thread and at once."""
+
+    def __init__(
+        self, session: Session, latency: Latency, url: str, recorder: Recorder | None = None, scheduling: str = ""
+    ) -> None:
         self._session, self._latency, self._url = session, latency, url
+        self._recorder, self._scheduling = recorder, scheduling
         self._strips: dict[str, deque[float]] = {}
         self._before: dict[Sensor, int] = {}
         self._at_s = float("nan")
         self._rates: dict[Sensor, float] = {}
 
-    def look(self, now_s: float) -> RenderableType:
-        """The screen at an instant of our clock."""
-        from rich.console import Group
-        from rich.table import Table
-
+    def view(self, now_s: float) -> View:
+        """What is to be shown at an instant of our clock."""
         session = self._session
         self._follow(now_s)
-        sensors = Table("sensor", "Hz", "age [s]", "innovation", "ratio", "", title=self._title(), title_justify="left")
-        for sensor in sorted(session.readings):
-            age_s = now_s - session.heard_s[sensor]
-            found = [session.innovations[key] for key in sorted(session.innovations) if key[0] == sensor]
-            sensors.add_row(
-                sensor.name.lower(),
-                f"{self._rates.get(sensor, 0.0):.0f}",
-                f"{age_s:.2f}",
-                " ".join(_figure(innovation) for innovation, _, _ in found),
-                " ".join(_figure(ratio) for _, ratio, _ in found),
-                " ".join(dict.fromkeys(Reason(reason).label for _, _, reason in found if reason)),
-            )
-        strips = Table.grid(padding=(0, 1))
-        for name, values in self._strips.items():
-            strips.add_row(name, strip(values), _figure(values[-1]))
         dropped = ", ".join(f"{name} {count}" for name, count in sorted(session.dropped.items())) or "nothing"
-        return Group(sensors, self._estimate(), self._protection(), strips, f"dropped: {dropped}", self._footing())
+        return View(
+            self._title(),
+            self._alarms(),
+            [self._sensor(sensor, now_s) for sensor in sorted(session.readings)],
+            self._estimate(),
+            [(name, strip(values), _figure(values[-1])) for name, values in self._strips.items()],
+            [self._protection(), f"dropped: {dropped}", self._footing(), self._running()],
+        )
+
+    def _sensor(self, sensor: Sensor, now_s: float) -> tuple[str, ...]:
+        session = self._session
+        found = [session.innovations[key] for key in sorted(session.innovations) if key[0] == sensor]
+        return (
+            sensor.name.lower(),
+            f"{self._rates.get(sensor, 0.0):.0f}",
+            f"{now_s - session.heard_s[sensor]:.2f}",
+            " ".join(_figure(innovation) for innovation, _, _ in found),
+            " ".join(_figure(ratio) for _, ratio, _ in found),
+            " ".join(dict.fromkeys(Reason(reason).label for _, _, reason in found if reason)),
+        )
 
     def _title(self) -> str:
         vehicle = self._session.reception.vehicle
@@ -65,19 +86,28 @@ class Screen:
         state = f"withheld: {WITHHELD[self._session.reason]}" if self._session.reason else "sending"
         return f"{self._url}  {who}  {state}"
 
-    def _estimate(self) -> Any:
-        from rich.table import Table
+    def _alarms(self) -> list[str]:
+        reason = self._recorder.reason if self._recorder is not None else ""
+        return [f"NOT RECORDING: {reason}"] if reason else []
 
-        table = Table("", "north", "east", "down")
+    def _running(self) -> str:
+        """What is kept of the session, and how its process is scheduled."""
+        recorder = self._recorder
+        kept = "not asked for" if recorder is None else f"{recorder.path}, {1e-6 * recorder.size:.1f} MB"
+        return f"recording: {kept}" + (f"; scheduling: {self._scheduling}" if self._scheduling else "")
+
+    def _estimate(self) -> list[tuple[str, ...]]:
         found = self._session.estimate
-        if found is not None and found.pose_covariance is not None and found.velocity_covariance is not None:
-            for name, values, covariance in (
-                ("position [m]", found.pos_ned_m, found.pose_covariance),
-                ("velocity [m/s]", found.vel_ned_m_s, found.velocity_covariance),
-            ):
-                spread = [3.0 * math.sqrt(max(float(covariance[i, i]), 0.0)) for i in range(3)]
-                table.add_row(name, *(f"{value:8.2f} ±{s:.2f}" for value, s in zip(values, spread, strict=True)))
-        return table
+        if found is None or found.pose_covariance is None or found.velocity_covariance is None:
+            return []
+        rows = []
+        for name, values, covariance in (
+            ("position [m]", found.pos_ned_m, found.pose_covariance),
+            ("velocity [m/s]", found.vel_ned_m_s, found.velocity_covariance),
+        ):
+            spread = [3.0 * math.sqrt(max(float(covariance[i, i]), 0.0)) for i in range(3)]
+            rows.append((name, *(f"{value:8.2f} ±{s:.2f}" for value, s in zip(values, spread, strict=True))))
+        return rows
 
     def _protection(self) -> str:
         """How far off the position may be, and which fault is suspected."""
@@ -111,6 +141,24 @@ class Screen:
             for place in places if reading else ():
                 values = self._strips.setdefault(COLUMNS[sensor][place], deque(maxlen=STRIP))
                 values.append(reading.value[place] if reading else float("nan"))
+
+
+def draw(view: View) -> RenderableType:
+    """A view laid out for a terminal. Takes milliseconds: not for the thread that flies."""
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    sensors = Table("sensor", "Hz", "age [s]", "innovation", "ratio", "", title=view.title, title_justify="left")
+    for row in view.sensors:
+        sensors.add_row(*row)
+    estimate = Table("", "north", "east", "down")
+    for row in view.estimate:
+        estimate.add_row(*row)
+    strips = Table.grid(padding=(0, 1))
+    for strip_row in view.strips:
+        strips.add_row(*strip_row)
+    return Group(*(Text(alarm, style="bold red") for alarm in view.alarms), sensors, estimate, strips, *view.lines)
 
 
 def strip(values: deque[float]) -> str:

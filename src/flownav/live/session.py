@@ -41,6 +41,9 @@ class Chronicle(Keeper, Protocol):
     def note(self, t_s: float, source: str, kind: str, detail: str, value: float = NAN) -> None:
         """A happening."""
 
+    def origin(self, t_s: float, origin_deg_m: tuple[float, float, float]) -> None:
+        """The local frame has another origin from now on."""
+
     def truth(self, t_s: float, state: TrueState) -> None:
         """What a simulator says is so."""
 
@@ -59,7 +62,7 @@ class Session:
         self.sources, self.horizon = Sources(), Horizon()
         self.filtering = Filtering(options, keeper)
         self.clock: VehicleClock | None = None
-        self.origin_deg_m: tuple[float, float, float] | None = None
+        self._origin_deg_m: tuple[float, float, float] | None = None
         self.counts: Counter[str] = Counter()
         self.withheld: Counter[str] = Counter()
         self.sent = 0
@@ -77,6 +80,17 @@ class Session:
         self._flow_s = NAN  # session time of the last flow reading
         self.due = False
         self._sent_s = self._second_s = float("-inf")
+
+    @property
+    def origin_deg_m(self) -> tuple[float, float, float] | None:
+        """Latitude, longitude [deg] and altitude [m] of the local frame's origin."""
+        return self._origin_deg_m
+
+    @origin_deg_m.setter
+    def origin_deg_m(self, origin_deg_m: tuple[float, float, float] | None) -> None:
+        self._origin_deg_m = origin_deg_m
+        if origin_deg_m is not None:
+            self.keeper.origin(self._newest_s, origin_deg_m)
 
     @property
     def dropped(self) -> dict[str, int]:

@@ -167,8 +167,8 @@ def _fill(record: Record, story: _Story, found: Recovered) -> None:
 
 def _events(story: _Story, found: Recovered) -> dict[str, Any]:
     events = happenings(story.rows["event"]) + story.notes
-    fed = story.rows["fed"]
-    last_s = max([float(fed[-1, 0])] if len(fed) else [0.0], default=0.0)
+    times_s = [*(event[0] for event in events), *story.rows["fed"][-1:, 0].tolist()]
+    last_s = max((t_s for t_s in times_s if t_s == t_s), default=0.0)
     lost = int((story.end or {}).get("notes_lost", 0))
     if lost:
         events.append((last_s, "live", "notes_lost", "happenings beyond these", float(lost)))

@@ -9,6 +9,7 @@ every block before the cut; after damage in the middle the next block is found b
 from __future__ import annotations
 
 import json
+import re
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
@@ -23,6 +24,7 @@ MAGIC = b"FNRJRNL1"
 SUFFIX = ".journal"
 MARK = b"\xf7\x9aBK"
 HEADER = struct.Struct("<4sIIII")
+MARKS = re.compile(re.escape(MARK))
 LENGTH = struct.Struct("<I")
 MOST_BYTES = 1 << 28  # of a payload
 DTYPE = np.dtype("<f8")
@@ -60,7 +62,7 @@ def block(number: int, said: Mapping[str, Any], rows: Mapping[str, Array] | None
 
 def blocks(data: memoryview) -> Iterator[Block | Damage]:
     """What a journal's bytes hold, in order. Takes time in proportion to them, whatever they are."""
-    place, bad = len(MAGIC), -1
+    place, bad, patience = len(MAGIC), -1, 4 * len(data)
     while place < len(data):
         length = _payload_length(data, place)
         end = place + HEADER.size + length
@@ -72,7 +74,8 @@ def blocks(data: memoryview) -> Iterator[Block | Damage]:
             yield found
             continue
         bad = place if bad < 0 else bad
-        place = _next_mark(data, place + 1) if length < 0 else end  # a header that holds tells where the next one is
+        patience -= max(length, 0)  # bytes that were summed up in vain
+        place = _next_mark(data, place + 1) if patience > 0 or length < 0 else end
     if bad >= 0:
         yield Damage(bad, len(data) - bad, True)
 
@@ -116,11 +119,6 @@ def _block_at(data: memoryview, place: int, length: int) -> Block | None:
 
 
 def _next_mark(data: memoryview, place: int) -> int:
-    """Where the next mark may stand; the end where there is none."""
-    step = 1 << 20
-    while place < len(data):
-        found = bytes(data[place : place + step + len(MARK) - 1]).find(MARK)
-        if found >= 0:
-            return place + found
-        place += step
-    return len(data)
+    """Where the next mark stands; the end where there is none."""
+    found = MARKS.search(data, place)
+    return found.start() if found else len(data)

@@ -5,9 +5,6 @@ from __future__ import annotations
 import gc
 import json
 import signal
-import socket
-import subprocess
-import sys
 import threading
 import time
 import tracemalloc
@@ -39,6 +36,7 @@ from flownav.sensors.identified import IdentifiedFlow
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 from live_ends import Hover, Wire
+from live_process import LiveProcess
 
 SPEED = 4.0
 
@@ -205,31 +203,11 @@ def test_memory_does_not_grow_with_the_session():
     assert after - before < 40e3  # 6 s bring 1500 messages
 
 
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 def test_ctrl_c_leaves_a_complete_record(tmp_path):
-    path, port = tmp_path / "live.fnr", free_port()
-    command = [sys.executable, "-m", "flownav", "live", f"udp:{port}", "--record", str(path), "--json"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    vehicle, link = Hover(), open_link(f"udpout:127.0.0.1:{port}")
-    try:
-        start = time.monotonic()
-        heard = 0
-        while time.monotonic() - start < 60.0 and heard < 30:
-            time.sleep(0.01)
-            for frame in vehicle.frames(time.monotonic() - start):
-                link.write(frame)
-            heard += sum(b"\xfd" in piece and piece[7] == 331 % 256 for piece, _ in link.read())
-        process.send_signal(signal.SIGINT)
-        output, errors = process.communicate(timeout=30)
-    finally:
-        process.kill()
-        link.close()
-    assert process.returncode == 0, errors
+    path = tmp_path / "live.fnr"
+    with LiveProcess(path, "--json") as live:
+        output, errors = live.fly(30).end(signal.SIGINT)
+    assert live.process.returncode == 0, errors
     facts = json.loads(output)
     assert facts["sent"] >= 30
     assert facts["record"] == str(path)

@@ -17,11 +17,12 @@ import pytest
 from flownav.campaign.local import fly_recorded
 from flownav.errors import InputError
 from flownav.faults.flight_log import log_of
+from flownav.live.display import draw
 from flownav.live.link import open_link
 from flownav.live.loop import Latency, run_session, run_vehicle
 from flownav.live.options import Options
 from flownav.live.recorder import NoRecorder, Recorder
-from flownav.live.screen import Screen, draw
+from flownav.live.screen import Screen
 from flownav.live.session import Session
 from flownav.live.simulated import BOOT_S, ORIGIN_DEG_M, SimulatedVehicle
 from flownav.live.warm import warm_up

@@ -263,7 +263,7 @@ def test_where_the_record_cannot_be_written_the_journal_stays(tmp_path, monkeypa
         patched.setattr(Record, "save", save)
         finished = recorder.finish({})
     assert finished.record is None
-    assert f"`flownav recover {recorder.journal}`" in finished.verdict()
+    assert f"`flownav recover {recorder.journal} --out FILE`" in finished.verdict()
     assert CliRunner().invoke(app, ["recover", str(recorder.journal)]).exit_code == 0
     assert_replays_to_the_bit(tmp_path / "flight.fnr")
 

@@ -13,11 +13,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from flownav.live.display import draw
 from flownav.live.estimating import why_withheld
 from flownav.live.horizon import MOST_WAITING
 from flownav.live.loop import Latency
 from flownav.live.options import Limits, Options
-from flownav.live.screen import Screen, draw
+from flownav.live.screen import Screen
 from flownav.mavlink.dialect import coder
 from flownav.mavlink.position_messages import LOCAL_FRD
 from flownav.mavlink.signing import SignatureCheck

@@ -79,7 +79,7 @@ def command(
 
     try:
         with stoppable() as asked:
-            with on_terminal(Screen(session, latency, url, recorder, scheduling), shown=shown) as display:
+            with on_terminal(Screen(session, latency, url, recorder, scheduling).view, shown=shown) as display:
                 shows = [display.show, *([told_every_second(recorder, facts_now)] if recorder is not None else [])]
                 run_session(session, link, latency, lambda: asked() or time.monotonic() >= end_s, shows)
             facts = facts_now()

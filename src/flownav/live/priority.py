@@ -13,7 +13,7 @@ SWITCH_S = 0.0005  # Python's own default is ten times this
 def run_before_others() -> str:
     """Ask for real-time scheduling, else for a higher priority; what was given, in words.
 
-    Threads made later inherit it: the journal's and the screen's must not be held up while they hold Python's lock.
+    Threads made later inherit it: the journal's must not be held up while it holds Python's lock.
     """
     sys.setswitchinterval(SWITCH_S)
     try:

@@ -56,7 +56,7 @@ class Finished(NamedTuple):
             return f"{self.record}: recorded in part only ({self.reason}); it holds what came before"
         return (
             f"{self.journal}: no record could be made of it ({self.reason}); "
-            f"`flownav recover {self.journal}` makes one once that is put right"
+            f"`flownav recover {self.journal} --out FILE` makes one where there is room"
         )
 
 

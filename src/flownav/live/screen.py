@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from flownav.estimation.gating import Reason
 from flownav.estimation.hypotheses import NAMES
+from flownav.live.display import View
 from flownav.live.estimating import WITHHELD
 from flownav.live.loop import Latency
 from flownav.live.session import Session
@@ -15,8 +16,6 @@ from flownav.measurement import COLUMNS, Sensor
 from flownav.navigation.memory import PROTECTION, SUSPECTED
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from flownav.live.recorder import Recorder
 
 STRIP = 60  # columns of a strip of signals
@@ -26,23 +25,8 @@ SHOWN = {
 }  # fmt: skip
 
 
-class View(NamedTuple):
-    """What the screen shows at an instant, as text: taken between two readings, drawn whenever the terminal takes it.
-
-    alarms: what somebody must know now, above all else. sensors: rows of the table of sensors. estimate: rows of the
-    estimate. strips: name, bars and newest value. lines: below them.
-    """
-
-    title: str
-    alarms: list[str]
-    sensors: list[tuple[str, ...]]
-    estimate: list[tuple[str, ...]]
-    strips: list[tuple[str, str, str]]
-    lines: list[str]
-
-
 class Screen:
-    """Keeps what the strips show; `view` looks at the session, in its own thread and at once."""
+    """Keeps what the strips show; `view` looks at the session, at once; drawing it is somebody else's (display.py)."""
 
     def __init__(
         self, session: Session, latency: Latency, url: str, recorder: Recorder | None = None, scheduling: str = ""
@@ -141,24 +125,6 @@ class Screen:
             for place in places if reading else ():
                 values = self._strips.setdefault(COLUMNS[sensor][place], deque(maxlen=STRIP))
                 values.append(reading.value[place] if reading else float("nan"))
-
-
-def draw(view: View) -> RenderableType:
-    """A view laid out for a terminal. Takes milliseconds: not for the thread that flies."""
-    from rich.console import Group
-    from rich.table import Table
-    from rich.text import Text
-
-    sensors = Table("sensor", "Hz", "age [s]", "innovation", "ratio", "", title=view.title, title_justify="left")
-    for row in view.sensors:
-        sensors.add_row(*row)
-    estimate = Table("", "north", "east", "down")
-    for row in view.estimate:
-        estimate.add_row(*row)
-    strips = Table.grid(padding=(0, 1))
-    for strip_row in view.strips:
-        strips.add_row(*strip_row)
-    return Group(*(Text(alarm, style="bold red") for alarm in view.alarms), sensors, estimate, strips, *view.lines)
 
 
 def strip(values: deque[float]) -> str:

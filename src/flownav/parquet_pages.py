@@ -1,57 +1,99 @@
-"""What the pages of a Parquet file state before any is decompressed, so that a small file does not become a large one.
+"""What a Parquet file says of its sizes, before any of it is decompressed, so that no small file becomes a large one.
 
-The footer's sizes are checked by whoever reads; here the pages' own headers are held against the footer (Thrift's
-compact protocol, apache/parquet-format PageHeader).
+Its footer and the headers of its pages are read here, and held against each other (Thrift's compact protocol,
+apache/parquet-format): pyarrow believes both, and ends the process at some footers that are damaged.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
-UNCOMPRESSED, COMPRESSED, DATA_PAGE, DATA_PAGE_V2 = 2, 3, 5, 8  # fields of PageHeader
+MAGIC = b"PAR1"
+MOST_FOOTER = 1 << 20
+ROWS, GROUPS = 3, 4  # fields of FileMetaData
+GROUP_COLUMNS, GROUP_ROWS = 1, 3  # of RowGroup
+OTHER_FILE, CHUNK = 1, 3  # of ColumnChunk
+GROWN, STORED, DATA_AT, DICTIONARY_AT = 6, 7, 9, 11  # of ColumnMetaData
+PAGE_GROWN, PAGE_STORED, DATA_PAGE, DATA_PAGE_V2 = 2, 3, 5, 8  # of PageHeader
 ENCODING = {DATA_PAGE: 2, DATA_PAGE_V2: 4}  # where a data page's header says its encoding
 DELTA_BYTE_ARRAY = 7  # each text a part of the one before: what it grows to stands nowhere
-DEEPEST = 8  # of structures in a page's header
+DEEPEST = 8  # of structures in one another
 TRUE, FALSE, BYTE, I16, I32, I64, DOUBLE, BINARY, LIST, SET, MAP, STRUCT = range(1, 13)
 
 
-def check_pages(data: bytes, metadata: Any) -> None:
-    """ValueError where a page would become larger than the footer (a pyarrow FileMetaData) says of its column."""
-    for group in range(metadata.num_row_groups):
-        row_group = metadata.row_group(group)
-        for place in range(row_group.num_columns):
-            _check_chunk(data, row_group.column(place))
+class Chunk(NamedTuple):
+    """A column's part of a group of rows: where it lies, its bytes, and how many they become."""
+
+    at: int
+    stored: int
+    grown: int
 
 
-def _check_chunk(data: bytes, chunk: Any) -> None:
-    at = chunk.data_page_offset
-    if chunk.has_dictionary_page and 0 < chunk.dictionary_page_offset < at:
-        at = chunk.dictionary_page_offset
-    end, left = at + chunk.total_compressed_size, chunk.total_uncompressed_size
+class Footer(NamedTuple):
+    """Rows of each group, and its columns."""
+
+    rows: list[int]
+    groups: list[list[Chunk]]
+
+
+def read_footer(data: bytes) -> Footer:
+    """What the footer says. ValueError where it is none, or its parts do not agree."""
+    length = int.from_bytes(data[-8:-4], "little")
+    if data[-4:] != MAGIC or length + 12 > len(data):
+        raise ValueError("not a Parquet file")
+    if length > MOST_FOOTER:
+        raise ValueError("its footer is too long")
+    said, _ = _structure(data[-8 - length : -8], 0, 0)
+    groups = said.get(GROUPS) or []
+    rows: list[int] = [_number(group, GROUP_ROWS) for group in groups]
+    if sum(rows) != _number(said, ROWS) or (any(rows) and 0 in rows):
+        raise ValueError("its parts do not have the rows that it says")
+    return Footer(rows, [[_chunk(column) for column in group.get(GROUP_COLUMNS) or []] for group in groups])
+
+
+def _chunk(column: dict[int, Any]) -> Chunk:
+    said = column.get(CHUNK)
+    if not isinstance(said, dict) or OTHER_FILE in column:
+        raise ValueError("a column lies elsewhere")
+    at, dictionary_at = _number(said, DATA_AT), said.get(DICTIONARY_AT)
+    if isinstance(dictionary_at, int) and 0 < dictionary_at < at:
+        at = dictionary_at
+    return Chunk(at, _number(said, STORED), _number(said, GROWN))
+
+
+def check_pages(data: bytes, footer: Footer) -> None:
+    """ValueError where a page would become larger than the footer says of its column."""
+    for group in footer.groups:
+        for chunk in group:
+            _check_chunk(data, chunk)
+
+
+def _check_chunk(data: bytes, chunk: Chunk) -> None:
+    at, end, left = chunk.at, chunk.at + chunk.stored, chunk.grown
     if not 0 < at <= end <= len(data):
-        raise ValueError(f"column {chunk.path_in_schema} lies outside its table")
+        raise ValueError("a column lies outside its table")
     while at < end:
         header, at = _structure(data, at, 0)
-        left -= _size(header, UNCOMPRESSED)
-        at += _size(header, COMPRESSED)
+        left -= _number(header, PAGE_GROWN)
+        at += _number(header, PAGE_STORED)
         if left < 0 or at > end:
-            raise ValueError(f"a page of column {chunk.path_in_schema} is larger than its table says")
+            raise ValueError("a page of a column is larger than its table says")
         for kind, field in ENCODING.items():
             if isinstance(header.get(kind), dict) and header[kind].get(field) == DELTA_BYTE_ARRAY:
-                raise ValueError(f"column {chunk.path_in_schema} is encoded as flownav writes none")
+                raise ValueError("a column is encoded as flownav writes none")
 
 
-def _size(header: dict[int, Any], field: int) -> int:
-    found = header.get(field)
-    if not isinstance(found, int) or found < 0:
-        raise ValueError("a page says no size")
+def _number(fields: dict[int, Any], field: int) -> int:
+    found = fields.get(field)
+    if not isinstance(found, int) or isinstance(found, bool) or found < 0:
+        raise ValueError("a size is missing, or negative")
     return found
 
 
 def _structure(data: bytes, at: int, depth: int) -> tuple[dict[int, Any], int]:
-    """A structure's fields by number, and where it ends; texts and lists are passed over, as None."""
+    """A structure's fields by number, and where it ends; texts and lists of other than structures are None."""
     if depth > DEEPEST:
-        raise ValueError("a page's header is too deep")
+        raise ValueError("what it says is nested too deep")
     fields: dict[int, Any] = {}
     number = 0
     while kind := _byte(data, at):
@@ -79,30 +121,29 @@ def _value(data: bytes, at: int, kind: int, depth: int) -> tuple[Any, int]:
         count, at = _varint(data, at)
         return None, at + count
     if kind in (LIST, SET):
-        return None, _past_list(data, at, depth)
+        return _list(data, at, depth)
     if kind == STRUCT:
         return _structure(data, at, depth + 1)
-    raise ValueError("a page's header is of an unknown kind")
+    raise ValueError("it says something of an unknown kind")
 
 
-def _past_list(data: bytes, at: int, depth: int) -> int:
+def _list(data: bytes, at: int, depth: int) -> tuple[list[Any] | None, int]:
+    found = []
     head = _byte(data, at)
     count, kind, at = head >> 4, head & 0x0F, at + 1
     if count == 15:
         count, at = _varint(data, at)
     for _ in range(count):
-        if kind in (TRUE, FALSE):  # in a list, a truth value is a byte
-            _byte(data, at)
-            at += 1
-        else:
-            _, at = _value(data, at, kind, depth + 1)
-            _byte(data, at - 1)
-    return at
+        value, at = _value(data, at, BYTE if kind in (TRUE, FALSE) else kind, depth + 1)  # a truth value is a byte here
+        _byte(data, at - 1)
+        if kind == STRUCT:
+            found.append(value)
+    return found if kind == STRUCT else None, at
 
 
 def _byte(data: bytes, at: int) -> int:
     if not 0 <= at < len(data):
-        raise ValueError("a page's header is cut off")
+        raise ValueError("what it says is cut off")
     return data[at]
 
 
@@ -114,7 +155,7 @@ def _varint(data: bytes, at: int) -> tuple[int, int]:
         value |= (byte & 0x7F) << shift
         if byte < 0x80:
             return value, at
-    raise ValueError("a number in a page's header is too long")
+    raise ValueError("a number in it is too long")
 
 
 def _signed(raw: int) -> int:

@@ -21,6 +21,7 @@ LONGEST_FILE = 330
 
 # rooms from the ground up; a room imports its own floor's neighbours named here and what lies below
 GROUND = {"errors", "files", "compile", "frames", "measurement", "record", "parameter_files", "provenance"}
+GROUND |= {"record_file", "parquet_pages"}
 EQUATIONS = {"vehicle", "sensors", "control", "estimation", "optics"}
 ALLOWED = {
     "vehicle": GROUND,

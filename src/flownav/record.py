@@ -6,9 +6,6 @@ code that wrote it. Table and column names carry frame and unit; `TABLES` is the
 
 from __future__ import annotations
 
-import io
-import json
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,9 +13,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from flownav.errors import InputError
-from flownav.files import written_whole
 
 SCHEMA_VERSION = 1
 
@@ -141,38 +135,13 @@ class Record:
 
     def save(self, path: Path) -> None:
         """Write the record as one file, whole or not at all (temporary name, then rename)."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        from flownav.record_file import save
 
-        with written_whole(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as bundle:
-            manifest = {"schema": SCHEMA_VERSION, **self.manifest}
-            bundle.writestr("manifest.json", json.dumps(manifest, indent=1, default=str))
-            for name, table in self.tables.items():
-                buffer = io.BytesIO()
-                pq.write_table(pa.table(table), buffer, compression="zstd")
-                bundle.writestr(f"{name}.parquet", buffer.getvalue())
+        save(self, path)
 
     @classmethod
     def load(cls, path: Path) -> Record:
         """Read a record. InputError where the file is missing, is no record, or is of a newer schema."""
-        import pyarrow.parquet as pq
+        from flownav.record_file import load
 
-        if not path.is_file():
-            raise InputError(f"{path}: no such record; `flownav fly landing` writes one")
-        try:
-            with zipfile.ZipFile(path) as bundle:
-                manifest = json.loads(bundle.read("manifest.json"))
-                tables = {
-                    Path(name).stem: {
-                        column: data.to_numpy(zero_copy_only=False)
-                        for column, data in zip(table.column_names, table.columns, strict=True)
-                    }
-                    for name in bundle.namelist()
-                    if name.endswith(".parquet")
-                    for table in [pq.read_table(io.BytesIO(bundle.read(name)))]
-                }
-        except (zipfile.BadZipFile, KeyError, ValueError, OSError) as error:
-            raise InputError(f"{path}: not a flownav record ({error}); write it again with fly or replay") from error
-        if manifest.get("schema", 0) > SCHEMA_VERSION:
-            raise InputError(f"{path}: record schema {manifest['schema']} is newer than this flownav; update flownav")
-        return cls(manifest, tables)
+        return load(path)

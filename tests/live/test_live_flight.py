@@ -5,9 +5,6 @@ from __future__ import annotations
 import gc
 import json
 import signal
-import socket
-import subprocess
-import sys
 import threading
 import time
 import tracemalloc
@@ -20,6 +17,7 @@ import pytest
 from flownav.campaign.local import fly_recorded
 from flownav.errors import InputError
 from flownav.faults.flight_log import log_of
+from flownav.live.display import draw
 from flownav.live.link import open_link
 from flownav.live.loop import Latency, run_session, run_vehicle
 from flownav.live.options import Options
@@ -39,6 +37,7 @@ from flownav.sensors.identified import IdentifiedFlow
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 from live_ends import Hover, Wire
+from live_process import LiveProcess
 
 SPEED = 4.0
 
@@ -70,14 +69,14 @@ def flight(tmp_path_factory):
     setup = assemble(load_scenario("pad_return"))
     vehicle = SimulatedVehicle(log_of(fly_recorded(setup, 1), setup))
     told, ages_s = setup.fitted.told, setup.fitted.ages_s
-    path, recorder = (folder := tmp_path_factory.mktemp("live")) / "flight.fnr", Recorder(folder / "flight.fnr")
+    path = tmp_path_factory.mktemp("live") / "flight.fnr"
     options = Options(
         gps_delay_s=float(ages_s[Sensor.GPS_POSITION]),
         identified=IdentifiedFlow(1.0, 1.0, float(ages_s[Sensor.FLOW_RATE])),
         settings=told.settings,
         flow_noise=told.noise,
     )
-    link = open_link("udp:0")
+    link, recorder = open_link("udp:0"), Recorder(path, options)
     session = Session(options, recorder, time.monotonic(), time.time())
     latency, ended = Latency(), threading.Event()
     telling = threading.Thread(target=_tell, args=(vehicle, f"udpout:127.0.0.1:{link.port}", ended))
@@ -85,7 +84,7 @@ def flight(tmp_path_factory):
     run_session(session, link, latency, ended.is_set)
     telling.join()
     link.close()
-    recorder.finish(options, session.origin_deg_m, {})
+    recorder.finish({})
     return vehicle, session, latency, path
 
 
@@ -147,7 +146,7 @@ def test_the_screen_shows_rates_ages_and_the_estimate(flight):
     _, session, latency, _ = flight
     screen, console = Screen(session, latency, "udp:1"), Console(width=160, record=True, file=StringIO(), markup=False)
     for now_s in (0.0, 1.0):
-        console.print(screen.look(now_s))
+        console.print(draw(screen.view(now_s)))
     text = console.export_text()
     for word in ("flow_rate", "range", "position [m]", "±", "sent", "latency", "dropped"):
         assert word in text
@@ -155,13 +154,13 @@ def test_the_screen_shows_rates_ages_and_the_estimate(flight):
 
 def test_a_restart_in_the_record_is_replayed_too(tmp_path):
     path = tmp_path / "restart.fnr"
-    options, recorder = Options(), Recorder(path)
+    recorder = Recorder(path, options := Options())
     wire = Wire(Hover(), options, recorder)
     wire.fly(4.0)
     wire.vehicle.boot_s = 1.0 - wire.t_s  # it reboots
     wire.fly(4.0)
     wire.close()
-    recorder.finish(options, wire.session.origin_deg_m, {})
+    recorder.finish({})
     record = assert_same_bits(path)
     assert len(record.manifest["segments"]) == 2
     assert "restart" in record.tables["events"]["kind"]
@@ -205,31 +204,11 @@ def test_memory_does_not_grow_with_the_session():
     assert after - before < 40e3  # 6 s bring 1500 messages
 
 
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
-
-
 def test_ctrl_c_leaves_a_complete_record(tmp_path):
-    path, port = tmp_path / "live.fnr", free_port()
-    command = [sys.executable, "-m", "flownav", "live", f"udp:{port}", "--record", str(path), "--json"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    vehicle, link = Hover(), open_link(f"udpout:127.0.0.1:{port}")
-    try:
-        start = time.monotonic()
-        heard = 0
-        while time.monotonic() - start < 60.0 and heard < 30:
-            time.sleep(0.01)
-            for frame in vehicle.frames(time.monotonic() - start):
-                link.write(frame)
-            heard += sum(b"\xfd" in piece and piece[7] == 331 % 256 for piece, _ in link.read())
-        process.send_signal(signal.SIGINT)
-        output, errors = process.communicate(timeout=30)
-    finally:
-        process.kill()
-        link.close()
-    assert process.returncode == 0, errors
+    path = tmp_path / "live.fnr"
+    with LiveProcess(path, "--json") as live:
+        output, errors = live.fly(30).end(signal.SIGINT)
+    assert live.process.returncode == 0, errors
     facts = json.loads(output)
     assert facts["sent"] >= 30
     assert facts["record"] == str(path)

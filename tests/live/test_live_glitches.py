@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import pytest
 
 from flownav.live.options import Options
+from flownav.live.recorder import NoRecorder
 from flownav.mavlink import sensors_outgoing as say
 from flownav.measurement import Sensor
 from flownav.navigation.tape import IMU_SPIKE
@@ -17,15 +16,10 @@ HIGHRES_IMU = 105
 BEGIN_S = 10.0
 
 
-class Flagged:
-    """A Chronicle that counts spikes."""
+class Flagged(NoRecorder):
+    """Counts spikes."""
 
     spikes = 0
-
-    def segment(self, equipment): ...
-    def fed(self, queue, arrival_s): ...
-    def note(self, t_s, source, kind, detail, value=math.nan): ...
-    def truth(self, t_s, state): ...
 
     def written(self, estimate, innovation, event):
         self.spikes += int(np.count_nonzero(event[:, 1] == IMU_SPIKE))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from flownav.live.options import Limits, Options
+from flownav.live.recorder import NoRecorder
 from flownav.mavlink.dialect import coder
 from flownav.measurement import Sensor
 from recorded_link import Arrival, arrivals, play
@@ -90,14 +91,9 @@ def test_the_square_is_flown_within_fifteen_centimetres(link, data_folder, shift
 def test_gps_later_than_the_longest_horizon_is_an_alarm_and_nothing_is_sent(link):
     notes = []
 
-    class Keeper:
+    class Keeper(NoRecorder):
         def note(self, t_s, source, kind, detail, value=float("nan")):
             notes.append((source, kind, detail))
-
-        def segment(self, equipment): ...
-        def fed(self, queue, arrival_s): ...
-        def written(self, estimate, innovation, event): ...
-        def truth(self, t_s, state): ...
 
     session, _ = play(delayed(link("square", 25.0), GPS_RAW_INT, 1.2), keeper=Keeper())
     assert set(session.alarms) == set(GPS)

@@ -15,6 +15,7 @@ from rich.console import Console
 
 from flownav.errors import InputError
 from flownav.live.answers import ODOMETRY_COMPONENT
+from flownav.live.display import draw
 from flownav.live.estimating import why_withheld
 from flownav.live.horizon import MOST_WAITING
 from flownav.live.loop import Latency
@@ -292,7 +293,7 @@ def test_an_uncertain_estimate_is_not_sent(wires):
 def shown(wire):
     """What the screen says."""
     console = Console(width=160, file=StringIO(), record=True)
-    console.print(Screen(wire.session, Latency(), "udp:1").look(wire.now_s))
+    console.print(draw(Screen(wire.session, Latency(), "udp:1").view(wire.now_s)))
     return console.export_text()
 
 

@@ -19,6 +19,7 @@ from flownav.cli import info as info
 from flownav.cli import live as live
 from flownav.cli import pad as pad
 from flownav.cli import paper as paper
+from flownav.cli import recover as recover
 from flownav.cli import replay as replay
 from flownav.cli import report as report
 from flownav.cli import rig as rig
@@ -41,6 +42,7 @@ for name, command, what in (
     ("compare", compare.command, "Many logs, many settings, beside dead reckoning and the autopilot."),
     ("tune", tune.command, "Propose settings from logs, judged on windows held out from the fit."),
     ("live", live.command, "Navigate a MAVLink vehicle in real time; send it the estimate."),
+    ("recover", recover.command, "Make the record of a live session that was killed."),
     ("info", info.command, "What a log holds: sensors, rates, gaps, signs, what it lacks."),
     ("identify", identify.command, "Identify a flow sensor from rig or flight logs; write its file."),
     ("rig", rig.command, "Swing a flow sensor over a pad beside an encoder, from pixels."),

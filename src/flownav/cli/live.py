@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -28,6 +29,9 @@ def command(
     ] = None,
     send: Annotated[str, typer.Option(help="odometry, vision, landing-target or none.")] = "odometry",
     record: Annotated[Path | None, typer.Option(help="The record to write; `flownav replay` reproduces it.")] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace a record that is there; else it is numbered.")
+    ] = False,
     signing_key: Annotated[Path | None, typer.Option(help="MAVLink 2 signing key: 32 bytes or 64 digits.")] = None,
     system: Annotated[int | None, typer.Option(help="Listen to this system only; the first autopilot's.")] = None,
     component: Annotated[int | None, typer.Option(help="Listen to this component only.")] = None,
@@ -56,12 +60,15 @@ def command(
     from dataclasses import replace
 
     from flownav.cli.output import require_between, require_writable
-    from flownav.errors import InputError
+    from flownav.errors import InputError, VerdictError
+    from flownav.live.display import on_terminal
     from flownav.live.link import open_link
     from flownav.live.loop import Latency, run_session, stoppable
     from flownav.live.options import SENDINGS, Limits
+    from flownav.live.priority import run_before_others
     from flownav.live.reception import accepted_by
-    from flownav.live.recorder import NoRecorder, Recorder
+    from flownav.live.recorder import NoRecorder, Recorder, told_every_second
+    from flownav.live.screen import Screen
     from flownav.live.session import Session
     from flownav.live.warm import warm_up
 
@@ -85,23 +92,46 @@ def command(
     )
     warm_up()
     link = open_link(url)
-    recorder = Recorder(record) if record is not None else NoRecorder()
+    shown = not as_json and sys.stdout.isatty()
+    recorder = Recorder(record, options, force=force, failed=_say_once(shown)) if record is not None else None
+    if recorder is not None and recorder.notice:
+        print(f"flownav: {recorder.notice}", file=sys.stderr)
+    scheduling = run_before_others()
     now_s, latency = time.monotonic(), Latency()
-    session = Session(options, recorder, now_s, time.time())
+    session = Session(options, recorder or NoRecorder(), now_s, time.time())
     end_s = float("inf") if duration is None else now_s + duration
+
+    def facts_now() -> dict[str, Any]:
+        own = _facts(session, latency, time.monotonic() - now_s)
+        return own | {"link": dict(link.counts), "scheduling": scheduling}
+
     try:
-        with stoppable() as asked, _screen(session, latency, url, show=not as_json) as show:
-            run_session(session, link, latency, lambda: asked() or time.monotonic() >= end_s, show)
+        with stoppable() as asked:
+            with on_terminal(Screen(session, latency, url, recorder, scheduling).view, shown=shown) as display:
+                shows = [display.show, *([told_every_second(recorder, facts_now)] if recorder is not None else [])]
+                run_session(session, link, latency, lambda: asked() or time.monotonic() >= end_s, shows)
+            facts = facts_now()
+            heard = session.reception.vehicle is not None
+            finished = recorder.finish(facts, heard=heard) if recorder is not None else None
+    except BaseException as error:
+        if recorder is not None:
+            recorder.leave()
+            print(
+                f"flownav: {recorder.journal} holds the session; `flownav recover {recorder.journal}`", file=sys.stderr
+            )
+        if isinstance(error, KeyboardInterrupt):
+            raise VerdictError(f"{url}: broken off") from error
+        raise
     finally:
         link.close()
-        facts = _facts(session, latency, time.monotonic() - now_s) | {"link": dict(link.counts)}
-        if isinstance(recorder, Recorder):
-            recorder.finish(options, session.origin_deg_m, facts)
-            facts["record"] = str(record)
-    if as_json:
-        typer.echo(json.dumps(facts))
-    else:
-        _print(facts)
+    if finished is not None:
+        facts |= finished.facts()
+    if not display.stuck:
+        _say(facts, as_json=as_json)
+    if not heard:
+        raise VerdictError(f"{url}: no autopilot was heard in {facts['duration_s']:.1f} s; see that it sends there")
+    if finished is not None and finished.reason:
+        raise VerdictError(finished.verdict())
 
 
 def _options(
@@ -135,20 +165,27 @@ def _options(
     )
 
 
-@contextmanager
-def _screen(session: Session, latency: Latency, url: str, *, show: bool) -> Iterator[Callable[[float], None]]:
-    """What is called with our clock four times a second; nothing is shown where nobody looks."""
-    if not show or not sys.stdout.isatty():
-        yield lambda now_s: None
-        return
-    from rich.console import Console
-    from rich.live import Live
+def _say_once(shown: bool) -> Callable[[str], None]:
+    """How a recording that stops is told where no screen shows it; from the thread that writes."""
 
-    from flownav.live.screen import Screen
+    def say(reason: str) -> None:
+        if not shown:
+            with suppress(OSError):
+                print(f"flownav: not recording any more: {reason}; the session goes on", file=sys.stderr, flush=True)
 
-    screen = Screen(session, latency, url)
-    with Live(console=Console(markup=False, highlight=False), auto_refresh=False, screen=True) as shown:
-        yield lambda now_s: shown.update(screen.look(now_s), refresh=True)
+    return say
+
+
+def _say(facts: dict[str, Any], *, as_json: bool) -> None:
+    """The figures of the session; nothing where nobody is there to read them any more."""
+    try:
+        if as_json:
+            typer.echo(json.dumps(facts))
+        else:
+            _print(facts)
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _facts(session: Session, latency: Latency, duration_s: float) -> dict[str, Any]:
@@ -200,5 +237,5 @@ def _print(facts: dict[str, Any]) -> None:
     if facts["latency_ms"]["p50"] is not None:
         figures = ", ".join(f"{name} {value:.2f} ms" for name, value in facts["latency_ms"].items())
         console.print(f"From a flow reading's arrival to the estimate's departure: {figures}")
-    if "record" in facts:
+    if facts.get("record"):
         console.print(f"Record: {facts['record']}", soft_wrap=True)

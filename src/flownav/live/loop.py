@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import gc
 import select
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import Self
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from flownav.live.simulated import SimulatedVehicle
 WAIT_S = 0.005
 SILENT_S = 3.0  # after so long without the vehicle anyone may speak on a UDP port
 SCREEN_S = 0.25
+COLLECT_S = 0.1
 EDGES_S = np.geomspace(1e-6, 10.0, 281)  # of the latency's histogram, 40 a decade
 
 
@@ -42,14 +45,44 @@ class Latency:
         return float(min(EDGES_S[min(place, len(EDGES_S) - 1)], self.longest_s))
 
 
+class Collector:
+    """Python's garbage collector by our own schedule: off while a session runs, but for the turns that it is given.
+
+    What the session itself makes is freed without it; the screen's and the libraries' cycles are not.
+    """
+
+    def __init__(self, now_s: float) -> None:
+        self._at_s = now_s
+        self._turns = 0
+
+    def __enter__(self) -> Self:
+        self._was_on = gc.isenabled()
+        gc.disable()
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        if self._was_on:
+            gc.enable()
+
+    def turn(self, now_s: float) -> None:
+        """Called when the estimate has been sent: the youngest ten times a second, the older seldom."""
+        if now_s - self._at_s >= COLLECT_S:
+            self._at_s = now_s
+            self._turns += 1
+            gc.collect(2 if self._turns % 300 == 0 else 1 if self._turns % 20 == 0 else 0)
+
+
 @contextmanager
 def stoppable() -> Iterator[Callable[[], bool]]:
-    """Whether Ctrl-C or a termination was asked for; a second one breaks off at once."""
+    """Whether Ctrl-C, a termination or the terminal's end was asked for; a second one breaks off at once.
+
+    But for a terminal that ends, which may say so twice.
+    """
     asked: list[int] = []
-    handled = (signal.SIGINT, signal.SIGTERM)
+    handled = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
     def note(number: int, frame: FrameType | None) -> None:
-        if asked:
+        if asked and number != signal.SIGHUP:
             raise KeyboardInterrupt
         asked.append(number)
 
@@ -66,34 +99,40 @@ def run_session(
     link: Link,
     latency: Latency,
     stop: Callable[[], bool],
-    show: Callable[[float], None] = lambda now_s: None,
+    shows: Iterable[Callable[[float], None]] = (),
     clock: Callable[[], float] = time.monotonic,
 ) -> None:
-    """Until `stop`: what arrives goes in as it arrives, what the session says goes out."""
+    """Until `stop`: what arrives goes in as it arrives, what the session says goes out.
+
+    shows: called with our clock four times a second, between two readings; none of them may wait for anything.
+    """
     shown_s = spoke_s = clock()
-    while not stop():
-        _wait(link)
-        for piece, sender in link.read():
+    with Collector(spoke_s) as collector:
+        while not stop():
+            _wait(link)
+            for piece, sender in link.read():
+                now_s = clock()
+                flow = session.due
+                if session.take(piece, now_s, whole=link.datagrams):
+                    link.believe(sender)
+                    spoke_s = now_s
+                if session.due and not flow:
+                    before = session.sent
+                    session.tick(clock())
+                    _send(session, link)
+                    if session.sent > before:
+                        latency.take(clock() - now_s)
             now_s = clock()
-            flow = session.due
-            if session.take(piece, now_s, whole=link.datagrams):
-                link.believe(sender)
+            session.tick(now_s)
+            _send(session, link)
+            if now_s - spoke_s > SILENT_S:
+                link.forget()
                 spoke_s = now_s
-            if session.due and not flow:
-                before = session.sent
-                session.tick(clock())
-                _send(session, link)
-                if session.sent > before:
-                    latency.take(clock() - now_s)
-        now_s = clock()
-        session.tick(now_s)
-        _send(session, link)
-        if now_s - spoke_s > SILENT_S:
-            link.forget()
-            spoke_s = now_s
-        if now_s - shown_s >= SCREEN_S:
-            shown_s = now_s
-            show(now_s)
+            if now_s - shown_s >= SCREEN_S:
+                shown_s = now_s
+                for show in shows:
+                    show(now_s)
+            collector.turn(now_s)
 
 
 def _send(session: Session, link: Link) -> None:

@@ -1,136 +1,173 @@
 """What a session leaves behind: everything the navigator was fed, as it was fed, and what it made of it.
 
-Rows go to files beside the record as they come, so that memory does not grow; `finish` makes the Record of them.
+While the session runs all of it goes to a journal beside the record (`logs/journal.py`), written by a thread of its
+own; `finish` makes the Record of the journal, and then removes that. A session that was killed leaves the journal, of
+which `flownav recover` makes the same Record. A journal that cannot be written ends the recording, not the session.
 """
 
 from __future__ import annotations
 
-import shutil
+import json
+import os
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from flownav.errors import InputError
+from flownav.live.journal_place import claim, free_name
 from flownav.live.options import Options
+from flownav.live.recovery import WIDTHS, recovered
+from flownav.live.writing import Writer
 from flownav.mavlink.state_messages import TrueState
-from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor
-from flownav.navigation.tables import estimate_table, fed_rows, fed_table, happenings, innovation_table, states_table
-from flownav.navigation.tape import ESTIMATE_COLUMNS, OFFER_COLUMNS
+from flownav.measurement import Array, EventQueue
+from flownav.navigation.tables import fed_rows
 from flownav.navigation.told import Equipment
 from flownav.provenance import command_line, provenance
-from flownav.record import FED, POSITION_NED, QUATERNION, VELOCITY_BODY, Record, Table
 
 NAN = float("nan")
-WIDTHS = {"fed": len(FED), "estimate": ESTIMATE_COLUMNS, "innovation": len(OFFER_COLUMNS), "event": 3, "truth": 14}
 MOST_NOTES = 100_000
+FACTS_S = 1.0
+
+
+class Finished(NamedTuple):
+    """What a recording came to: the record and the journal that remain, None where they do not.
+
+    reason: why the record is not whole, or not there; "" where all is well.
+    """
+
+    record: Path | None
+    journal: Path | None
+    reason: str
+
+    def facts(self) -> dict[str, Any]:
+        """As `--json` says it."""
+        return {
+            "record": str(self.record) if self.record else None,
+            "journal": str(self.journal) if self.journal else None,
+            "recording_stopped": self.reason or None,
+        }
+
+    def verdict(self) -> str:
+        """What a user must know where there is a reason."""
+        if self.record is not None:
+            return f"{self.record}: recorded in part only ({self.reason}); it holds what came before"
+        return (
+            f"{self.journal}: no record could be made of it ({self.reason}); "
+            f"`flownav recover {self.journal} --out FILE` makes one where there is room"
+        )
 
 
 class Recorder:
-    """A Chronicle that keeps all. OSError where its files cannot be written."""
+    """A Chronicle that keeps all. InputError where its journal cannot be begun; nothing is raised after that."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._folder = path.with_name(f".{path.name}.spool")
-        shutil.rmtree(self._folder, ignore_errors=True)
-        self._folder.mkdir(parents=True)
-        self._files: dict[str, BinaryIO] = {name: self._spool(name).open("wb") for name in WIDTHS}
-        self._segments: list[dict[str, Any]] = []
-        self._notes: list[tuple[float, str, str, str, float]] = []
-        self._notes_lost = 0
+    def __init__(
+        self, path: Path, options: Options, *, force: bool = False, failed: Callable[[str], None] = lambda reason: None
+    ) -> None:
+        place = claim(path, force=force)
+        self.path, self.journal, self.notice = place.record, place.journal, place.notice
+        self._force, self._file = force, place.file
+        self._segments, self._notes, self._notes_lost = 0, 0, 0
+        self._fed: Array | None = None
+        try:
+            self._writer = Writer(self._file, _head(options), failed)
+        except OSError as error:
+            os.close(self._file)
+            with suppress(OSError):
+                self.journal.unlink()
+            raise InputError(f"{path}: cannot be written ({error.strerror}); give another --record") from error
 
-    def _spool(self, name: str) -> Path:
-        return self._folder / name
+    @property
+    def reason(self) -> str:
+        """Why nothing is recorded any more; "" while all is."""
+        return self._writer.reason
+
+    @property
+    def size(self) -> int:
+        """Bytes that the journal has."""
+        return self._writer.written
 
     def segment(self, equipment: Equipment) -> None:
         """A navigator begins; what is fed from now on is fed to it."""
-        self._segments.append(equipment._asdict())
+        self._writer.say("segments", [self._segments, equipment._asdict()])
+        self._segments += 1
 
     def fed(self, queue: EventQueue, arrival_s: Array) -> None:
-        """A batch."""
-        self._files["fed"].write(fed_rows(queue, arrival_s, len(self._segments) - 1).tobytes())
+        """A batch; it is kept together with what comes of it."""
+        self._fed = fed_rows(queue, arrival_s, self._segments - 1)
 
     def written(self, estimate: Array, innovation: Array, event: Array) -> None:
         """What came of it."""
-        for name, rows in (("estimate", estimate), ("innovation", innovation), ("event", event)):
-            if len(rows):
-                self._files[name].write(np.ascontiguousarray(rows).tobytes())
+        rows = {"fed": self._fed, "estimate": estimate, "innovation": innovation, "event": event}
+        self._writer.take({name: values for name, values in rows.items() if values is not None and len(values)})
+        self._fed = None
 
     def note(self, t_s: float, source: str, kind: str, detail: str, value: float = NAN) -> None:
         """A happening; the first MOST_NOTES are kept."""
-        if len(self._notes) < MOST_NOTES:
-            self._notes.append((t_s, source, kind, detail, value))
+        if self._notes < MOST_NOTES:
+            self._notes += 1
+            self._writer.say("notes", [t_s, source, kind, detail, value])
         else:
             self._notes_lost += 1
 
+    def origin(self, t_s: float, origin_deg_m: tuple[float, float, float]) -> None:
+        """The local frame's origin from an instant on."""
+        self._writer.say("origins", [t_s, *origin_deg_m])
+
     def truth(self, t_s: float, state: TrueState) -> None:
-        """Position is geodetic until the origin is known, at the end."""
+        """Position stays geodetic until the record is made."""
         row = (t_s, *state.position_deg_m, *state.vel_ned_m_s, *state.quaternion, *state.rate_frd_rad_s)
-        self._files["truth"].write(np.array(row).tobytes())
+        self._writer.take({"truth": np.array([row])})
 
-    def _rows(self, name: str) -> Array:
-        self._files[name].close()
-        return np.fromfile(self._spool(name)).reshape(-1, WIDTHS[name])
+    def facts(self, facts: dict[str, Any]) -> None:
+        """The session's own figures so far."""
+        self._writer.say("facts", json.loads(json.dumps(facts, default=str)))  # they change while the thread writes
 
-    def finish(
-        self, options: Options, origin_deg_m: tuple[float, float, float] | None, facts: dict[str, Any]
-    ) -> Record:
-        """Write the record, whole, and remove what it was made of. `facts`: the session's own figures."""
-        fed, events = self._rows("fed"), self._rows("event")
-        record = Record(self._manifest(options, origin_deg_m, facts, fed))
-        estimate = self._rows("estimate")
-        record.add("estimate", estimate_table(estimate))
-        record.add("states", states_table(estimate))
-        record.add("fed", fed_table(fed))
-        for sensor in Sensor:
-            rows = fed[fed[:, FED.index("sensor")] == sensor]
-            if len(rows):
-                record.add(sensor.name.lower(), _readings(sensor, rows))
-        truth = self._rows("truth")
-        if len(truth) and origin_deg_m is not None:
-            record.add("truth", _truth(truth, origin_deg_m))
-        record.add("innovation", innovation_table(self._rows("innovation")))
-        record.add("events", self._events(events))
-        record.save(self.path)
-        shutil.rmtree(self._folder, ignore_errors=True)
-        return record
+    def finish(self, facts: dict[str, Any], *, heard: bool = True) -> Finished:
+        """Make the record, whole, and then remove the journal. `facts`: the session's own figures.
 
-    def _manifest(
-        self, options: Options, origin: tuple[float, float, float] | None, facts: dict[str, Any], fed: Array
-    ) -> dict[str, Any]:
-        return {
-            "kind": "live",
-            "filter": "landing",
-            "duration_s": float(fed[-1, 0] - fed[0, 0]) if len(fed) else 0.0,
-            "parameters": {
-                "filter": options.settings.model_dump(),
-                "gps_delay_s": options.gps_delay_s,
-                "horizon_s": options.least_horizon_s,
-                "flow_sensor": options.identified._asdict() if options.identified else None,
-                **({"flow_noise": options.flow_noise._asdict()} if options.flow_noise.stated else {}),
-                **({} if origin is None else {"origin_lat_lon_deg_alt_m": list(origin)}),
-            },
-            "segments": self._segments,
-            "live": facts,
-            "provenance": provenance(),
-            "command": command_line(),
-            "scores": {},
-        }
+        heard: a vehicle was heard; without one there is nothing to keep, and no record is made.
+        """
+        if self._fed is not None:
+            self._writer.take({"fed": self._fed})
+        self._writer.say("end", {"facts": facts, "notes_lost": self._notes_lost})
+        self._writer.close()
+        reason = self.reason
+        if self._writer.is_stuck:
+            return Finished(None, self.journal, reason)
+        try:
+            if not heard:
+                self._remove_journal()
+                return Finished(None, None, "")
+            path = self.path if self._force else free_name(self.path)
+            record = recovered(self.journal).record
+            record.manifest["live"] = {**facts, **({"recording_stopped": reason} if reason else {})}
+            record.save(path)
+            forced_to_disk(path)
+            self._remove_journal()
+            return Finished(path, None, reason)
+        except (OSError, ValueError, MemoryError, InputError) as error:
+            why = (error.strerror if isinstance(error, OSError) else "") or str(error)
+            return Finished(None, self.journal, reason or why)
+        finally:
+            self._let_go()
 
-    def _events(self, rows: Array) -> dict[str, Any]:
-        events = happenings(rows) + self._notes
-        if self._notes_lost:
-            events.append((events[-1][0], "live", "notes_lost", "happenings beyond these", float(self._notes_lost)))
-        events.sort(key=lambda event: event[0])
-        columns = list(zip(*events, strict=True)) or [()] * 5
-        kinds = (float, str, str, str, float)
-        names = ("t_s", "source", "kind", "detail", "value")
-        return {name: np.array(column, kind) for name, column, kind in zip(names, columns, kinds, strict=True)}
+    def leave(self) -> None:
+        """Write what waits and leave the journal as it is, for `flownav recover`."""
+        self._writer.close()
+        self._let_go()
 
-    def discard(self) -> None:
-        """Nothing came of it."""
-        for file in self._files.values():
-            file.close()
-        shutil.rmtree(self._folder, ignore_errors=True)
+    def _let_go(self) -> None:
+        """Whoever comes may have the journal now."""
+        if self._file >= 0 and not self._writer.is_stuck:
+            os.close(self._file)
+            self._file = -1
+
+    def _remove_journal(self) -> None:
+        """Still locked: nobody takes it for the journal of a killed run in between."""
+        self.journal.unlink(missing_ok=True)
 
 
 class NoRecorder:
@@ -148,26 +185,48 @@ class NoRecorder:
     def note(self, t_s: float, source: str, kind: str, detail: str, value: float = NAN) -> None:
         """Nothing."""
 
+    def origin(self, t_s: float, origin_deg_m: tuple[float, float, float]) -> None:
+        """Nothing."""
+
     def truth(self, t_s: float, state: TrueState) -> None:
         """Nothing."""
 
 
-def _readings(sensor: Sensor, rows: Array) -> Table:
-    """A sensor's own table: by arrival, as other records have it."""
-    first = FED.index("value_0")
-    columns = dict(zip(COLUMNS[sensor], rows[:, first : first + MAX_VALUES].T, strict=False))
-    return {"t_s": rows[:, FED.index("arrival_s")], **columns, "quality": rows[:, FED.index("quality")]}
+def told_every_second(recorder: Recorder, facts: Callable[[], dict[str, Any]]) -> Callable[[float], None]:
+    """What the loop calls with our clock: a killed session's record has the figures of its last second."""
+    at_s = [float("-inf")]
+
+    def tell(now_s: float) -> None:
+        if now_s - at_s[0] >= FACTS_S:
+            at_s[0] = now_s
+            recorder.facts(facts())
+
+    return tell
 
 
-def _truth(rows: Array, origin_deg_m: tuple[float, float, float]) -> Table:
-    """Position in the local frame, velocity in body axes."""
-    import pymap3d
+def forced_to_disk(path: Path) -> None:
+    """A file and its name in the folder are on the disk when this returns. OSError where they are not."""
+    for place in (path, path.parent):
+        file = os.open(place, os.O_RDONLY)
+        try:
+            os.fsync(file)
+        finally:
+            os.close(file)
 
-    from flownav.frames import rotation_from_quaternion, to_body
 
-    position = pymap3d.geodetic2ned(*rows[:, 1:4].T, *origin_deg_m)
-    rotation = rotation_from_quaternion(*rows[:, 7:11].T)
-    body = to_body(rotation, *rows[:, 4:7].T)
-    names = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, "rate_p_rad_s", "rate_q_rad_s", "rate_r_rad_s")
-    columns = (*position, *body, *rows[:, 7:11].T, *rows[:, 11:14].T)
-    return {"t_s": rows[:, 0], **dict(zip(names, map(np.asarray, columns), strict=True))}
+def _head(options: Options) -> dict[str, Any]:
+    """What the first block says: all that is known before anything is heard."""
+    return {
+        "journal": 1,
+        "columns": WIDTHS,
+        "parameters": {
+            "filter": options.settings.model_dump(),
+            "gps_delay_s": options.gps_delay_s,
+            "horizon_s": options.least_horizon_s,
+            "flow_sensor": options.identified._asdict() if options.identified else None,
+            **({"flow_noise": options.flow_noise._asdict()} if options.flow_noise.stated else {}),
+        },
+        "provenance": provenance(),
+        "command": command_line(),
+        "process": os.getpid(),
+    }

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flownav.estimation.gating import Reason
 from flownav.estimation.hypotheses import NAMES
+from flownav.live.display import View
 from flownav.live.estimating import WITHHELD
 from flownav.live.loop import Latency
 from flownav.live.session import Session
@@ -15,7 +16,7 @@ from flownav.measurement import COLUMNS, Sensor
 from flownav.navigation.memory import PROTECTION, SUSPECTED
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
+    from flownav.live.recorder import Recorder
 
 STRIP = 60  # columns of a strip of signals
 BARS = "▁▂▃▄▅▆▇█"
@@ -25,57 +26,44 @@ SHOWN = {
 
 
 class Screen:
-    """Keeps what the strips show; `rows` renders it."""
+    """Keeps what the strips show; `view` looks at the session, at once; drawing it is somebody else's (display.py)."""
 
-    def __init__(self, session: Session, latency: Latency, url: str) -> None:
+    def __init__(
+        self, session: Session, latency: Latency, url: str, recorder: Recorder | None = None, scheduling: str = ""
+    ) -> None:
         self._session, self._latency, self._url = session, latency, url
+        self._recorder, self._scheduling = recorder, scheduling
         self._strips: dict[str, deque[float]] = {}
         self._before: dict[Sensor, int] = {}
         self._at_s = float("nan")
         self._rates: dict[Sensor, float] = {}
 
-    def look(self, now_s: float) -> RenderableType:
-        """The screen at an instant of our clock."""
-        from rich.console import Group
-        from rich.table import Table
-
+    def view(self, now_s: float) -> View:
+        """What is to be shown at an instant of our clock."""
         session = self._session
         self._follow(now_s)
-        lags_s = session.hearing.lags.by_sensor
-        sensors = Table(
-            "sensor", "Hz", "age [s]", "lag [s]", "innovation", "ratio", "", title=self._title(), title_justify="left"
-        )
-        for sensor in sorted(session.readings):
-            age_s = now_s - session.heard_s[sensor]
-            found = [session.innovations[key] for key in sorted(session.innovations) if key[0] == sensor]
-            sensors.add_row(
-                sensor.name.lower(),
-                f"{self._rates.get(sensor, 0.0):.0f}",
-                f"{age_s:.2f}",
-                f"{lags_s.get(sensor, 0.0):.2f}",
-                " ".join(_figure(innovation) for innovation, _, _ in found),
-                " ".join(_figure(ratio) for _, ratio, _ in found),
-                " ".join(dict.fromkeys(Reason(reason).label for _, _, reason in found if reason)),
-            )
-        strips = Table.grid(padding=(0, 1))
-        for name, values in self._strips.items():
-            strips.add_row(name, strip(values), _figure(values[-1]))
         dropped = ", ".join(f"{name} {count}" for name, count in sorted(session.dropped.items())) or "nothing"
-        parts = [sensors, self._estimate(), self._protection(), strips, f"dropped: {dropped}", self._footing()]
-        return Group(*self._alarms(), *parts)
+        return View(
+            self._title(),
+            self._alarms(),
+            [self._sensor(sensor, now_s) for sensor in sorted(session.readings)],
+            self._estimate(),
+            [(name, strip(values), _figure(values[-1])) for name, values in self._strips.items()],
+            [self._protection(), f"dropped: {dropped}", self._footing(), self._running()],
+        )
 
-    def _alarms(self) -> list[Any]:
-        """Sensors that are heard and not fused, above all else."""
-        from rich.text import Text
-
-        return [
-            Text(
-                f"ALARM: {sensor.name.lower()} is heard and has not been fused for "
-                f"{spell.until_s - spell.since_s:.0f} s ({spell.why})",
-                style="bold red",
-            )
-            for sensor, spell in sorted(self._session.alarms.items())
-        ]
+    def _sensor(self, sensor: Sensor, now_s: float) -> tuple[str, ...]:
+        session = self._session
+        found = [session.innovations[key] for key in sorted(session.innovations) if key[0] == sensor]
+        return (
+            sensor.name.lower(),
+            f"{self._rates.get(sensor, 0.0):.0f}",
+            f"{now_s - session.heard_s[sensor]:.2f}",
+            f"{session.hearing.lags.by_sensor.get(sensor, 0.0):.2f}",
+            " ".join(_figure(innovation) for innovation, _, _ in found),
+            " ".join(_figure(ratio) for _, ratio, _ in found),
+            " ".join(dict.fromkeys(Reason(reason).label for _, _, reason in found if reason)),
+        )
 
     def _title(self) -> str:
         vehicle = self._session.reception.vehicle
@@ -83,19 +71,34 @@ class Screen:
         state = f"withheld: {WITHHELD[self._session.reason]}" if self._session.reason else "sending"
         return f"{self._url}  {who}  {state}"
 
-    def _estimate(self) -> Any:
-        from rich.table import Table
+    def _alarms(self) -> list[str]:
+        """What rests on less than it should: sensors that are heard and not fused, a record that is not written."""
+        reason = self._recorder.reason if self._recorder is not None else ""
+        unfused = [
+            f"ALARM: {sensor.name.lower()} is heard and has not been fused for "
+            f"{spell.until_s - spell.since_s:.0f} s ({spell.why})"
+            for sensor, spell in sorted(self._session.alarms.items())
+        ]
+        return [*unfused, *([f"NOT RECORDING: {reason}"] if reason else [])]
 
-        table = Table("", "north", "east", "down")
+    def _running(self) -> str:
+        """What is kept of the session, and how its process is scheduled."""
+        recorder = self._recorder
+        kept = "not asked for" if recorder is None else f"{recorder.path}, {1e-6 * recorder.size:.1f} MB"
+        return f"recording: {kept}" + (f"; scheduling: {self._scheduling}" if self._scheduling else "")
+
+    def _estimate(self) -> list[tuple[str, ...]]:
         found = self._session.estimate
-        if found is not None and found.pose_covariance is not None and found.velocity_covariance is not None:
-            for name, values, covariance in (
-                ("position [m]", found.pos_ned_m, found.pose_covariance),
-                ("velocity [m/s]", found.vel_ned_m_s, found.velocity_covariance),
-            ):
-                spread = [3.0 * math.sqrt(max(float(covariance[i, i]), 0.0)) for i in range(3)]
-                table.add_row(name, *(f"{value:8.2f} ±{s:.2f}" for value, s in zip(values, spread, strict=True)))
-        return table
+        if found is None or found.pose_covariance is None or found.velocity_covariance is None:
+            return []
+        rows = []
+        for name, values, covariance in (
+            ("position [m]", found.pos_ned_m, found.pose_covariance),
+            ("velocity [m/s]", found.vel_ned_m_s, found.velocity_covariance),
+        ):
+            spread = [3.0 * math.sqrt(max(float(covariance[i, i]), 0.0)) for i in range(3)]
+            rows.append((name, *(f"{value:8.2f} ±{s:.2f}" for value, s in zip(values, spread, strict=True))))
+        return rows
 
     def _protection(self) -> str:
         """How far off the position may be, and which fault is suspected."""

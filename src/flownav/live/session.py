@@ -39,6 +39,9 @@ class Chronicle(Keeper, Protocol):
     def note(self, t_s: float, source: str, kind: str, detail: str, value: float = NAN) -> None:
         """A happening."""
 
+    def origin(self, t_s: float, origin_deg_m: tuple[float, float, float]) -> None:
+        """The local frame has another origin from now on."""
+
     def truth(self, t_s: float, state: TrueState) -> None:
         """What a simulator says is so."""
 
@@ -177,7 +180,10 @@ class Session:
             self.keeper.note(t_s, "origin", "refused", f"{place[0]:.5f}, {place[1]:.5f}: the vehicle is not near it")
 
     def _measured(self, message: Message, clock: VehicleClock, vehicle: Vehicle, now_s: float) -> None:
+        known = self.origin_deg_m
         event = self.hearing.take(message, clock, vehicle, self._pose(), now_s, self.filtering.heard)
+        if self.origin_deg_m is not None and self.origin_deg_m != known:
+            self.keeper.origin(clock.now_s(now_s), self.origin_deg_m)
         if event == "clock_jump":
             self._restart(clock.now_s(now_s), event, NAN)
 

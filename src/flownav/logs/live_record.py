@@ -39,6 +39,7 @@ def read_live_record(path: Path, *, flow_instance: int | None = None) -> Log:
         parameters = dict(record.manifest["parameters"])
         if not len(fed):
             raise InputError(f"{path}: its navigator heard nothing that it could use")
+        _check(fed, len(segments))
         numbers = fed[:, FED.index("segment")].astype(int)
         parts = tuple(FedSegment(_floats(segments[i]), _queue(fed, numbers == i)) for i in range(len(segments)))
     except (KeyError, IndexError, TypeError, ValueError) as error:
@@ -61,6 +62,21 @@ def _fed_of(record: Record) -> Array:
     rows = record.matrix("fed", FED_FIRST)
     usual = {"withheld": np.zeros(len(rows)), "arrived": np.ones(len(rows))}
     return np.column_stack([rows, *(record.tables["fed"].get(name, usual[name]) for name in FED[len(FED_FIRST) :])])
+
+
+def _check(fed: Array, segments: int) -> None:
+    """ValueError where a row is none that a navigator was ever fed; it takes them as they stand."""
+    allowed = {
+        "sensor": np.array([float(sensor) for sensor in Sensor]),
+        "segment": np.arange(float(segments)),
+        "withheld": np.array([0.0, 1.0]),
+        "arrived": np.array([0.0, 1.0]),
+    }
+    for name, values in allowed.items():
+        if not np.isin(fed[:, FED.index(name)], values).all():
+            raise ValueError(f"in the table fed, a value of {name} that there is none")
+    if not np.isfinite(fed[:, [0, FED.index("arrival_s")]]).all():
+        raise ValueError("in the table fed, a reading without a time")
 
 
 def _floats(equipment: dict[str, Any]) -> dict[str, Any]:

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 from flownav.errors import InputError
+from flownav.logs.journal import MAGIC as JOURNAL_MAGIC
+from flownav.logs.journal import SUFFIX as JOURNAL_SUFFIX
 from flownav.logs.log import Log
 from flownav.measurement import Sensor
 
@@ -35,6 +37,11 @@ def open_log(path: Path, *, flow_instance: int | None = None) -> Log:
 
         return read_csv_folder(path)
     kind = log_kind(path)
+    journal = path if kind == "journal" else path.with_name(path.name + JOURNAL_SUFFIX)
+    if kind == "journal" or (not path.exists() and journal.exists()):
+        raise InputError(
+            f"{journal}: the journal of a session that did not end; `flownav recover {journal}` makes its record"
+        )
     if not kind:
         raise InputError(f"{path}: {'not a log that is known' if path.exists() else 'no such log'}; give {KNOWN}")
     return _reader(kind)(path, flow_instance=flow_instance)
@@ -72,7 +79,7 @@ def _reader(kind: str) -> Callable[..., Log]:
 
 
 def log_kind(path: Path) -> str:
-    """ "ulog", "dataflash", "tlog" or "record" by a file's first bytes and its suffix; "" for anything else.
+    """ "ulog", "dataflash", "tlog", "record" or "journal" by a file's first bytes and its suffix; "" for anything else.
 
     InputError where a file cannot be read.
     """
@@ -83,6 +90,8 @@ def log_kind(path: Path) -> str:
             head = file.read(LOOKED_AT_BYTES)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); see who may read it") from error
+    if head.startswith(JOURNAL_MAGIC):
+        return "journal"
     if head.startswith(ULOG_MAGIC) or path.suffix.lower() == ".ulg":
         return "ulog"
     if head.startswith(DATAFLASH_MAGIC) or (path.suffix.lower() == ".bin" and DATAFLASH_FORMAT in head):

@@ -1,0 +1,125 @@
+"""The thread that writes a session's journal: what is handed over is on the disk within a second, and nobody waits."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from flownav.logs.journal import block
+from flownav.measurement import Array
+
+WRITE_S = 0.2  # how often what has come is written
+SYNC_S = 0.5  # how often it is forced to the disk
+HEAD_EVERY_S = 60.0  # the head is written again, so that a damaged sector at the start does not cost the flight
+MOST_WAITING = 64 << 20  # bytes that may wait for a disk that does not answer
+LAST_WAIT_S = 30.0  # for the disk, at the end
+
+Rows = dict[str, Array]
+
+
+class Writer:
+    """Takes what is said and rows, at once; writes them in blocks. `reason` says why it stopped writing, "" until then.
+
+    failed: called once, in the writing thread, with that reason.
+    """
+
+    def __init__(self, file: int, head: dict[str, Any], failed: Callable[[str], None] = lambda reason: None) -> None:
+        self.reason = ""
+        self.written = 0  # bytes
+        self._file, self._head, self._failed = file, head, failed
+        self._said: deque[tuple[str, Any]] = deque()
+        self._rows: deque[Rows] = deque()
+        self._taken, self._done = 0, 0  # bytes of rows; each is counted up by one thread only
+        self._number = 0
+        self._ended = threading.Event()
+        self._put({"head": head}, {})  # OSError here is the caller's: nothing flies yet
+        os.fsync(file)
+        self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
+        self._thread.start()
+
+    def say(self, name: str, value: Any) -> None:
+        """One of the lists of a block (`segments`, `origins`, `notes`) has one more, or `facts` are these now."""
+        if not self.reason:
+            self._said.append((name, value))
+
+    def take(self, rows: Rows) -> None:
+        """Rows that belong together: they stand in one block or are lost together."""
+        if self.reason:
+            return
+        self._taken += sum(values.nbytes for values in rows.values())
+        if self._taken - self._done > MOST_WAITING:
+            self._stop("the disk does not keep up")
+            return
+        self._rows.append(rows)
+
+    def close(self) -> None:
+        """Write what still waits and stop. Waits for the disk, LAST_WAIT_S at most."""
+        self._ended.set()
+        self._thread.join(LAST_WAIT_S)
+        if self._thread.is_alive():
+            self._stop("the disk does not answer")
+
+    @property
+    def is_stuck(self) -> bool:
+        """Whether it still waits for the disk after `close`."""
+        return self._thread.is_alive()
+
+    # -- the thread -------------------------------------------------------------------------------------------
+    def _run(self) -> None:
+        synced_s = head_s = time.monotonic()
+        try:
+            while not self.reason:
+                ended = self._ended.wait(WRITE_S)
+                now_s = time.monotonic()
+                if now_s - head_s >= HEAD_EVERY_S:
+                    head_s = now_s
+                    self._put({"head": self._head}, {})
+                self._write()
+                if ended or now_s - synced_s >= SYNC_S:
+                    synced_s = now_s
+                    os.fsync(self._file)
+                if ended:
+                    return
+        except OSError as error:
+            self._stop(error.strerror or str(error))
+        except Exception as error:  # whatever it is, the flight goes on
+            self._stop(f"{type(error).__name__}: {error}")
+        finally:
+            if self.reason:
+                self._failed(self.reason)
+
+    def _write(self) -> None:
+        """One block of all that has come."""
+        said: dict[str, Any] = {}
+        for _ in range(len(self._said)):
+            name, value = self._said.popleft()
+            if name in ("facts", "end"):
+                said[name] = value
+            else:
+                said.setdefault(name, []).append(value)
+        taken = [self._rows.popleft() for _ in range(len(self._rows))]
+        names = dict.fromkeys(name for rows in taken for name in rows)
+        joined = {name: np.concatenate([rows[name] for rows in taken if name in rows]) for name in names}
+        if said or joined:
+            self._put(said, joined)
+        self._done += sum(values.nbytes for values in joined.values())
+
+    def _put(self, said: dict[str, Any], rows: Rows) -> None:
+        left = memoryview(block(self._number, said, rows))
+        self._number += 1
+        while left:
+            count = os.write(self._file, left)
+            self.written += count
+            left = left[count:]
+
+    def _stop(self, reason: str) -> None:
+        if not self.reason:
+            self.reason = reason
+            self._said.clear()
+            self._rows.clear()

@@ -50,6 +50,16 @@ def command(
         typer.Option(metavar="MESSAGE=SYSTEM.COMPONENT", help="Who else may tell a message; 0: any. May be repeated."),
     ] = None,
     duration: Annotated[float | None, typer.Option(help="End after so many seconds; Ctrl-C where unsaid.")] = None,
+    setup: Annotated[
+        bool,
+        typer.Option("--setup", help="Read the vehicle's parameters; say what must change for --send."),
+    ] = False,
+    write: Annotated[
+        bool, typer.Option("--write", help="With --setup: write what must change, never while armed.")
+    ] = False,
+    source_set: Annotated[
+        int | None, typer.Option(help="With --setup: ArduPilot's source set for flownav, 1 to 3; found where unsaid.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Navigate a vehicle that is connected by MAVLink: fuse its sensors, send the estimate, show and record it."""
@@ -75,6 +85,19 @@ def command(
     require_between("--send-protection", send_protection, 0.01, 1000.0)
     require_between("--unfused", unfused, 1.0, float("inf"))
     require_between("--duration", 1.0 if duration is None else duration, 0.1, 1e6)
+    require_between("--source-set", 1 if source_set is None else source_set, 1, 3)
+    if setup:
+        from flownav.cli.live_setup import run as run_setup
+        from flownav.mavlink.signing import load_key
+
+        if record is not None:
+            raise InputError("--record: --setup flies nothing; leave one of the two away")
+        key = load_key(signing_key) if signing_key else None
+        return run_setup(
+            url, send, write=write, source_set=source_set, system=system, component=component, key=key, as_json=as_json
+        )
+    if write or source_set is not None:
+        raise InputError("--write and --source-set go with --setup only")
     if record is not None:
         require_writable(record)
     limits = Limits(dead_reckoning_s=send_limit, sigma_m=send_sigma, protection_m=send_protection, unfused_s=unfused)

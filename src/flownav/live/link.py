@@ -10,8 +10,11 @@ from typing import Any, NamedTuple
 
 from flownav.errors import InputError
 
-FORMS = "udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:[HOST:]PORT or serial:DEVICE[:BAUD]"
-LOOPBACK = "127.0.0.1"
+FORMS = (
+    "udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:[HOST:]PORT or serial:DEVICE[:BAUD]; "
+    "an IPv6 address in brackets, udp:[::1]:14550"
+)
+LOOPBACK, LOOPBACK_6, EVERYWHERE_6 = "127.0.0.1", "::1", "::"
 DEFAULT_BAUD = 115200  # a bare PX4FLOW's
 MOST_BYTES = 65536
 MOST_READS = 64  # in a row, before the session has its turn
@@ -38,13 +41,30 @@ def parse_url(url: str) -> Address:
     elif kind in ("udp", "udpin", "udpout", "tcp", "tcpin"):
         host, _, port = rest.rpartition(":")
         listens = kind in ("udp", "udpin", "tcpin")
-        if port.isdecimal() and int(port) < 65536 and (host or listens):
+        bracketed = re.fullmatch(r"\[(?P<address>[0-9a-fA-F:.]+(?:%[\w.-]+)?)\]", host)
+        host = bracketed["address"] if bracketed and ":" in bracketed["address"] else host
+        whole = bool(bracketed) or not set(host) & set(":[]")
+        if port.isdecimal() and int(port) < 65536 and whole and (host or listens):
             return Address("udp" if kind == "udpin" else kind, host or LOOPBACK, int(port))
     raise InputError(f"{url}: no link; give {FORMS}")
 
 
-Sender = tuple[str, int] | None
+Sender = tuple[Any, ...] | None  # as the socket has it: two parts, or four of IPv6
 Piece = tuple[bytes, Sender]  # what arrived, and from whom
+
+
+def same_sender(one: Sender, other: Sender) -> bool:
+    """Whether two are the same address, port and, of IPv6, scope; an address may carry its zone's name or not."""
+    if one is None or other is None:
+        return one is other
+    return (one[0].partition("%")[0], one[1], one[3:]) == (other[0].partition("%")[0], other[1], other[3:])
+
+
+def resolved(host: str, port: int) -> tuple[socket.AddressFamily, tuple[Any, ...]]:
+    """The address of a host for datagrams, IPv4 where it has both. OSError where it has none."""
+    found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
+    family, _, _, _, address = min(found, key=lambda entry: entry[0] != socket.AF_INET)
+    return family, address
 
 
 class Link:
@@ -95,17 +115,20 @@ class UdpLink(Link):
 
     def __init__(self, address: Address) -> None:
         super().__init__()
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        family, found = resolved(address.host, address.number)
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._named: Sender = None
         with suppress(OSError):
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
         try:
             if address.kind == "udp":
-                self._socket.bind((address.host, address.number))
+                if found[0] == EVERYWHERE_6:  # and IPv4 with it
+                    self._socket.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
+                self._socket.bind(found)
             else:
-                self._named = (socket.gethostbyname(address.host), address.number)
-                self._socket.bind((LOOPBACK if self._named[0].startswith("127.") else "", 0))
+                self._named = found
+                self._socket.bind((_own_end(found[0]), 0))
         except OSError:
             self._socket.close()
             raise
@@ -135,7 +158,7 @@ class UdpLink(Link):
             except OSError:  # an earlier datagram of ours found nobody
                 self.counts["unreachable"] += 1
                 continue
-            if self._peer is not None and sender != self._peer:
+            if self._peer is not None and not same_sender(sender, self._peer):
                 self.counts["other_sender"] += 1
             else:
                 pieces.append((piece, sender))
@@ -155,6 +178,13 @@ class UdpLink(Link):
         self._socket.close()
 
 
+def _own_end(host: str) -> str:
+    """Where our end of a datagram link to a host is bound: on loopback where the host is."""
+    if ":" in host:
+        return LOOPBACK_6 if host == LOOPBACK_6 else EVERYWHERE_6
+    return LOOPBACK if host.startswith("127.") else ""
+
+
 class TcpLink(Link):
     """A connection that is made again when it breaks: by calling (tcp) or by waiting for a caller (tcpin)."""
 
@@ -166,7 +196,11 @@ class TcpLink(Link):
         self._unsent = b""
         self._tries = 0
         if address.kind == "tcpin":
-            self._server = socket.create_server((address.host, address.number), backlog=1)
+            family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
+            everywhere = address.host == EVERYWHERE_6 and socket.has_dualstack_ipv6()
+            self._server = socket.create_server(
+                (address.host, address.number), family=family, backlog=1, dualstack_ipv6=everywhere
+            )
             self._server.setblocking(False)
             self.port = int(self._server.getsockname()[1])
         else:

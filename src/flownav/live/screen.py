@@ -11,6 +11,7 @@ from flownav.estimation.hypotheses import NAMES
 from flownav.live.estimating import WITHHELD
 from flownav.live.loop import Latency
 from flownav.live.session import Session
+from flownav.mavlink.converted import OPTIONAL
 from flownav.measurement import COLUMNS, Sensor
 from flownav.navigation.memory import PROTECTION, SUSPECTED
 
@@ -42,12 +43,11 @@ class Screen:
         session = self._session
         self._follow(now_s)
         lags_s = session.hearing.lags.by_sensor
-        sensors = Table(
-            "sensor", "Hz", "age [s]", "lag [s]", "innovation", "ratio", "", title=self._title(), title_justify="left"
-        )
+        sensors = Table("sensor", "Hz", "age [s]", "lag [s]", "innovation", "ratio", "")
         for sensor in sorted(session.readings):
             age_s = now_s - session.heard_s[sensor]
-            found = [session.innovations[key] for key in sorted(session.innovations) if key[0] == sensor]
+            keys = [key for key in sorted(session.innovations) if key[0] == sensor and told(session, key)]
+            found = [session.innovations[key] for key in keys]
             sensors.add_row(
                 sensor.name.lower(),
                 f"{self._rates.get(sensor, 0.0):.0f}",
@@ -62,7 +62,7 @@ class Screen:
             strips.add_row(name, strip(values), _figure(values[-1]))
         dropped = ", ".join(f"{name} {count}" for name, count in sorted(session.dropped.items())) or "nothing"
         parts = [sensors, self._estimate(), self._protection(), strips, f"dropped: {dropped}", self._footing()]
-        return Group(*self._alarms(), *parts)
+        return Group(*self._alarms(), self._title(), *parts)
 
     def _alarms(self) -> list[Any]:
         """Sensors that are heard and not fused, above all else."""
@@ -130,6 +130,13 @@ class Screen:
             for place in places if reading else ():
                 values = self._strips.setdefault(COLUMNS[sensor][place], deque(maxlen=STRIP))
                 values.append(reading.value[place] if reading else float("nan"))
+
+
+def told(session: Session, key: tuple[int, int]) -> bool:
+    """Whether the newest reading of a sensor has the component: GPS over MAVLink has no vertical velocity to judge."""
+    sensor, component = Sensor(key[0]), key[1]
+    reading = session.latest.get(sensor)
+    return reading is None or component not in OPTIONAL.get(sensor, ()) or math.isfinite(reading.value[component])
 
 
 def strip(values: deque[float]) -> str:

@@ -44,7 +44,7 @@ class Talk:
     ) -> None:
         self._link, self._key, self.clock, self._wait = link, key, clock, wait
         self._unix_less_now_s = time.time() - clock()
-        self.reception = Reception(system, component, key, time.time())
+        self.reception = Reception(system, component, key, time.time(), accept=())
         self.mav: Any = coder(1, COMPANION)
         self._beat_s = self._armed_s = float("-inf")
         self._armed = False

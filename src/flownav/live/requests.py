@@ -53,13 +53,14 @@ class Requests:
         self.answers: Counter[str] = Counter()
         self.refused: list[str] = []
         self._streams: dict[str, _Stream] = {}
+        self._beside: dict[str, tuple[int, float]] = {}
         self._left: list[str] = []
         self._sent_s = self._spoke_s = float("-inf")
         self._tries = 0
 
     def begin(self, vehicle: Vehicle, now_s: float) -> None:
         """Ask for everything, from the first on: at the start and when the vehicle comes back."""
-        streams = STREAMS[vehicle.make == ARDUPILOT]
+        streams = STREAMS[vehicle.make == ARDUPILOT] | self._beside
         never = float("-inf")
         self._streams = {
             name: _Stream(number, rate, now_s, never, SILENT_S) for name, (number, rate) in streams.items()
@@ -68,6 +69,12 @@ class Requests:
         self._left = list(self._streams)
         self._sent_s, self._tries = never, 0
         self.refused = []
+
+    def ask_too(self, name: str, number: int, rate_hz: float, now_s: float) -> None:
+        """Ask for one more stream, from now on."""
+        self._beside[name] = number, rate_hz
+        self._streams[name] = _Stream(number, rate_hz, now_s, float("-inf"), SILENT_S)
+        self._left.append(name)
 
     def heard(self, name: str, now_s: float) -> None:
         """A message of the vehicle."""

@@ -18,6 +18,7 @@ from flownav.live.options import Options
 from flownav.live.reception import Reception, Vehicle
 from flownav.live.requests import Requests
 from flownav.live.serving import HORIZONTAL, Refused
+from flownav.live.simulator import Simulator
 from flownav.live.timing import VehicleClock
 from flownav.mavlink.converted import Pose
 from flownav.mavlink.dialect import Message
@@ -56,7 +57,7 @@ class Session:
         self.reception = Reception(
             options.system, options.component, options.key, unix_s, options.accept, ODOMETRY_COMPONENT
         )
-        self.answers, self.requests = Answers(options), Requests()
+        self.answers, self.requests, self.simulator = Answers(options), Requests(), Simulator()
         self.hearing, self.filtering = Hearing(options), Filtering(options, keeper)
         self.clock: VehicleClock | None = None
         self.withheld: Counter[str] = Counter()
@@ -143,6 +144,9 @@ class Session:
     def _told(self, message: Message, clock: VehicleClock, vehicle: Vehicle, now_s: float) -> None:
         """What the autopilot says that is no measurement."""
         name = message.msgname
+        truth = self.simulator.heard(message, vehicle)
+        if truth is not None:
+            self.requests.ask_too(*truth, now_s)
         if name == "TIMESYNC":
             self._timesync(message, clock, vehicle, now_s)
         elif name == "COMMAND_ACK":
@@ -205,8 +209,9 @@ class Session:
             self._send(self.answers.heartbeat(), now_s)
             self._send(self.answers.timesync(now_s), now_s)
         request = self.requests.due(self.answers.mav, self.reception.vehicle, now_s)
-        if request is not None:
-            self._send(request, now_s)
+        for question in (request, self.simulator.due(self.answers.mav, self.reception.vehicle, now_s)):
+            if question is not None:
+                self._send(question, now_s)
 
     def _feed(self, until_s: float) -> None:
         while released := self.hearing.horizon.release(until_s, BATCH):

@@ -8,7 +8,8 @@ import time
 import pytest
 
 from flownav.errors import InputError
-from flownav.live.link import Address, TcpLink, UdpLink, open_link, parse_url, same_sender
+from flownav.live.byte_links import TcpLink
+from flownav.live.link import Address, UdpLink, open_link, parse_url, same_sender
 
 
 def has_ipv6():

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
+    from flownav.live.link import Link
     from flownav.live.loop import Latency
     from flownav.live.options import Options
     from flownav.live.session import Session
@@ -50,6 +51,10 @@ def command(
         typer.Option(metavar="MESSAGE=SYSTEM.COMPONENT", help="Who else may tell a message; 0: any. May be repeated."),
     ] = None,
     duration: Annotated[float | None, typer.Option(help="End after so many seconds; Ctrl-C where unsaid.")] = None,
+    capacity: Annotated[
+        float | None,
+        typer.Option(metavar="BYTES/S", help="What the link carries each way; a serial port's by its baud rate."),
+    ] = None,
     setup: Annotated[
         bool,
         typer.Option("--setup", help="Read the vehicle's parameters; say what must change for --send."),
@@ -67,12 +72,13 @@ def command(
 
     from flownav.cli.output import require_between, require_writable
     from flownav.errors import InputError
-    from flownav.live.link import open_link
+    from flownav.live.link import open_link, parse_url
     from flownav.live.loop import Latency, run_session, stoppable
     from flownav.live.options import SENDINGS, Limits
     from flownav.live.reception import accepted_by
     from flownav.live.recorder import NoRecorder, Recorder
     from flownav.live.session import Session
+    from flownav.live.traffic import traffic_facts
     from flownav.live.warm import warm_up
 
     if send not in SENDINGS:
@@ -85,6 +91,7 @@ def command(
     require_between("--send-protection", send_protection, 0.01, 1000.0)
     require_between("--unfused", unfused, 1.0, float("inf"))
     require_between("--duration", 1.0 if duration is None else duration, 0.1, 1e6)
+    require_between("--capacity", 1000.0 if capacity is None else capacity, 500.0, 1e9)
     require_between("--source-set", 1 if source_set is None else source_set, 1, 3)
     if setup:
         from flownav.cli.live_setup import run as run_setup
@@ -105,19 +112,23 @@ def command(
         _options(send, system, component, signing_key, gps_delay, sensor, settings),
         limits=limits,
         accept=accepted_by(accept or []),
+        capacity_bytes_s=capacity or parse_url(url).capacity_bytes_s,
     )
     warm_up()
     link = open_link(url)
+    link.capacity_bytes_s = options.capacity_bytes_s
     recorder = Recorder(record) if record is not None else NoRecorder()
     now_s, latency = time.monotonic(), Latency()
     session = Session(options, recorder, now_s, time.time())
     end_s = float("inf") if duration is None else now_s + duration
     try:
-        with stoppable() as asked, _screen(session, latency, url, show=not as_json) as show:
+        with stoppable() as asked, _screen(session, latency, url, link, show=not as_json) as show:
             run_session(session, link, latency, lambda: asked() or time.monotonic() >= end_s, show)
     finally:
         link.close()
-        facts = _facts(session, latency, time.monotonic() - now_s) | {"link": dict(link.counts)}
+        lasted_s = time.monotonic() - now_s
+        facts = _facts(session, latency, lasted_s) | {"link": dict(link.counts)}
+        facts["traffic"] = traffic_facts(link, session, lasted_s)
         if isinstance(recorder, Recorder):
             recorder.finish(options, session.origin_deg_m, facts)
             facts["record"] = str(record)
@@ -159,7 +170,9 @@ def _options(
 
 
 @contextmanager
-def _screen(session: Session, latency: Latency, url: str, *, show: bool) -> Iterator[Callable[[float], None]]:
+def _screen(
+    session: Session, latency: Latency, url: str, link: Link, *, show: bool
+) -> Iterator[Callable[[float], None]]:
     """What is called with our clock four times a second; nothing is shown where nobody looks."""
     if not show or not sys.stdout.isatty():
         yield lambda now_s: None
@@ -169,7 +182,7 @@ def _screen(session: Session, latency: Latency, url: str, *, show: bool) -> Iter
 
     from flownav.live.screen import Screen
 
-    screen = Screen(session, latency, url)
+    screen = Screen(session, latency, url, link)
     with Live(console=Console(markup=False, highlight=False), auto_refresh=False, screen=True) as shown:
         yield lambda now_s: shown.update(screen.look(now_s), refresh=True)
 
@@ -209,6 +222,7 @@ def _print(facts: dict[str, Any]) -> None:
     from rich.console import Console
 
     from flownav.live.estimating import WITHHELD
+    from flownav.live.traffic import in_words
 
     console = Console(markup=False, highlight=False)
     vehicle = facts["vehicle"]
@@ -220,6 +234,7 @@ def _print(facts: dict[str, Any]) -> None:
         console.print(f"Withheld {count}: {WITHHELD[reason]}")
     for name, count in facts["dropped"].items():
         console.print(f"Dropped {count}: {name}")
+    console.print(in_words(facts["traffic"]))
     if facts["latency_ms"]["p50"] is not None:
         figures = ", ".join(f"{name} {value:.2f} ms" for name, value in facts["latency_ms"].items())
         console.print(f"From a flow reading's arrival to the estimate's departure: {figures}")

@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 from flownav.estimation.gating import Reason
 from flownav.estimation.hypotheses import NAMES
 from flownav.live.estimating import WITHHELD
+from flownav.live.link import Link
 from flownav.live.loop import Latency
 from flownav.live.session import Session
+from flownav.live.traffic import Traffic, in_words
 from flownav.mavlink.converted import OPTIONAL
 from flownav.measurement import COLUMNS, Sensor
 from flownav.navigation.memory import PROTECTION, SUSPECTED
@@ -28,8 +30,10 @@ SHOWN = {
 class Screen:
     """Keeps what the strips show; `rows` renders it."""
 
-    def __init__(self, session: Session, latency: Latency, url: str) -> None:
-        self._session, self._latency, self._url = session, latency, url
+    def __init__(self, session: Session, latency: Latency, url: str, link: Link | None = None) -> None:
+        self._session, self._latency, self._url, self._link = session, latency, url, link
+        self._traffic: Traffic | None = None
+        self._traffic_s, self._words = float("-inf"), ""
         self._strips: dict[str, deque[float]] = {}
         self._before: dict[Sensor, int] = {}
         self._at_s = float("nan")
@@ -61,7 +65,15 @@ class Screen:
         for name, values in self._strips.items():
             strips.add_row(name, strip(values), _figure(values[-1]))
         dropped = ", ".join(f"{name} {count}" for name, count in sorted(session.dropped.items())) or "nothing"
-        parts = [sensors, self._estimate(), self._protection(), strips, f"dropped: {dropped}", self._footing()]
+        parts = [
+            sensors,
+            self._estimate(),
+            self._protection(),
+            strips,
+            f"dropped: {dropped}",
+            self._line(now_s),
+            self._footing(),
+        ]
         return Group(*self._alarms(), self._title(), *parts)
 
     def _alarms(self) -> list[Any]:
@@ -76,6 +88,16 @@ class Screen:
             )
             for sensor, spell in sorted(self._session.alarms.items())
         ]
+
+    def _line(self, now_s: float) -> str:
+        """How full the link was in the last second, and what it keeps from being sent."""
+        if self._link is None:
+            return ""
+        if self._traffic is None:
+            self._traffic, self._traffic_s = Traffic(self._link, self._session, now_s), now_s
+        if now_s - self._traffic_s >= 1.0:
+            self._words, self._traffic_s = in_words(self._traffic.look(now_s)), now_s
+        return self._words
 
     def _title(self) -> str:
         vehicle = self._session.reception.vehicle

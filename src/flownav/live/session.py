@@ -15,6 +15,7 @@ from flownav.live.estimating import UNFUSED, WITHHELD, estimate_of, fault_of, wh
 from flownav.live.filtering import BATCH, Filtering, Keeper
 from flownav.live.hearing import Hearing
 from flownav.live.options import Options
+from flownav.live.rates import Rates
 from flownav.live.reception import Reception, Vehicle
 from flownav.live.requests import Requests
 from flownav.live.serving import HORIZONTAL, Refused
@@ -57,7 +58,8 @@ class Session:
         self.reception = Reception(
             options.system, options.component, options.key, unix_s, options.accept, ODOMETRY_COMPONENT
         )
-        self.answers, self.requests, self.simulator = Answers(options), Requests(), Simulator()
+        self.rates = Rates(options.capacity_bytes_s, options.send, signed=options.key is not None)
+        self.answers, self.requests, self.simulator = Answers(options), Requests(self.rates), Simulator()
         self.hearing, self.filtering = Hearing(options), Filtering(options, keeper)
         self.clock: VehicleClock | None = None
         self.withheld: Counter[str] = Counter()
@@ -126,6 +128,10 @@ class Session:
                 self._told(message, self.clock, vehicle, now_s)
             if message.msgname in CONVERTERS:
                 self._measured(message, self.clock, vehicle, now_s)
+        if self.rates.heard(len(piece), now_s) and self.reception.vehicle is not None and self.clock is not None:
+            self.requests.revise(self.reception.vehicle, now_s)
+            t_s = self.clock.now_s(now_s)
+            self.keeper.note(t_s, "link", "overfull", "streams are asked for at lower rates", self.rates.plan.bytes_s)
         return self.reception.received > before
 
     def _meet(self, vehicle: Vehicle, now_s: float) -> None:
@@ -146,7 +152,7 @@ class Session:
         name = message.msgname
         truth = self.simulator.heard(message, vehicle)
         if truth is not None:
-            self.requests.ask_too(*truth, now_s)
+            self.requests.revise(vehicle, now_s, {truth.name: (truth.number, truth.rate_hz)})
         if name == "TIMESYNC":
             self._timesync(message, clock, vehicle, now_s)
         elif name == "COMMAND_ACK":
@@ -201,7 +207,8 @@ class Session:
             self.filtering.begin(hearing.horizon.waiting(), hearing.gps_heard, self.origin_deg_m)
         if self.filtering.running is not None:
             self._feed(min(t_s, hearing.lags.newest_s) - hearing.horizon_s)
-        if self.due or now_s - self._sent_s >= SEND_EVERY_S:
+        since_s = now_s - self._sent_s
+        if (self.due or since_s >= SEND_EVERY_S) and since_s >= self.rates.estimate_every_s:
             hearing.flow_came, self._sent_s = False, now_s
             self._offer(t_s, now_s)
         if now_s - self._second_s >= SECOND:

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from flownav.live.rates import ARDUPILOT
 from flownav.live.reception import Vehicle
-from flownav.live.requests import ARDUPILOT
 from flownav.mavlink.dialect import Message
 from flownav.mavlink.parameters import name_of, request_read
 

@@ -10,7 +10,7 @@ from flownav.live.reception import Vehicle
 from flownav.live.setup.compare import Block, Row, blocks_of, rows_of, source_set
 from flownav.live.setup.exchange import Change, read, why_not, write
 from flownav.live.setup.knowledge import Knowledge, knowledge_of
-from flownav.live.setup.serial_port import over_uart, port_names, port_of
+from flownav.live.setup.serial_port import port_names, port_of
 from flownav.live.setup.talk import Talk
 from flownav.mavlink.parameters import Value
 
@@ -76,7 +76,7 @@ def check(
             f"the vehicle is neither ArduPilot nor PX4 (MAV_AUTOPILOT {vehicle.make}): its parameters are not known",
             vehicle=vehicle, armed=talk.armed, send=send,
         )  # fmt: skip
-    uart = over_uart(address)
+    uart = address.over_uart
     values = read(talk, known.names(send) + (port_names(known.serial_parameters) if uart else []))
     if not values:
         return Report(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.live.link import Address
 from flownav.live.setup.knowledge import Wanted
 from flownav.mavlink.parameters import Value
 
@@ -13,7 +12,6 @@ MAVLINK_PROTOCOLS = (1, 2)
 PX4_INSTANCES = range(3)
 PX4_PORTS = {101: "TEL1", 102: "TEL2", 103: "TEL3", 104: "TEL4", 6: "URT6", 201: "GPS1", 202: "GPS2"}  # MAV_n_CONFIG
 FAST = 460_800  # baud at which all that flownav asks for fits
-USB = ("ttyACM", "usbmodem", "COM")
 SLOW = "{} baud carry {} bytes/s each way: rates are reduced to fit (docs/live.md). Change both ends"
 SERIAL_SOURCE = "libraries/AP_SerialManager/AP_SerialManager.cpp (n_PROTOCOL, n_BAUD)"
 MAV_SOURCE = "src/modules/mavlink/module.yaml (MAV_${i}_RATE); docs serial_configuration"
@@ -24,11 +22,6 @@ class Port(NamedTuple):
 
     candidates: list[str]
     rows: list[Wanted]
-
-
-def over_uart(address: Address) -> bool:
-    """Whether the link is a serial port whose speed matters; USB's does not."""
-    return address.kind == "serial" and not any(word in address.host for word in USB)
 
 
 def port_names(family: str) -> list[str]:

@@ -121,7 +121,7 @@ def test_the_estimate_that_comes_back_follows_the_truth(flight):
 
 def test_the_simulated_vehicle_answers_what_it_is_asked(flight):
     vehicle, session, _, _ = flight
-    assert session.requests.answers["accepted"] == 5 + 1
+    assert session.requests.answers["accepted"] == 5 + 1 + 1  # streams, the state of the ground, the truth
     assert session.requests.refused == ["OPTICAL_FLOW", "SCALED_PRESSURE", "SYSTEM_TIME", "GPS_GLOBAL_ORIGIN"]
     assert vehicle.counts["HEARTBEAT"] >= 4
     assert vehicle.counts["TIMESYNC"] >= 4

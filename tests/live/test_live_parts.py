@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 
 from flownav.errors import InputError
 from flownav.estimation.states import POSITION, QUATERNION, STATE, VELOCITY
+from flownav.live.byte_links import SerialLink, TcpLink
 from flownav.live.estimating import estimate_of
 from flownav.live.filtering import Filtering
 from flownav.live.horizon import Horizon, Waiting
-from flownav.live.link import Address, SerialLink, TcpLink, open_link, parse_url
+from flownav.live.link import Address, open_link, parse_url
 from flownav.live.loop import Latency
 from flownav.live.options import Options
 from flownav.live.recorder import NoRecorder

@@ -52,3 +52,24 @@ def test_components_keep_the_readers_count_of_the_same_reason():
             streams = gps({"out_of_range": 2})
 
     assert Replay.rejected(Flown()) == {"gps_position": {"out_of_range": 5}}
+
+
+def test_a_vertical_velocity_that_gps_does_not_tell_is_no_rejection():
+    """GPS_RAW_INT has none: its NaN is nothing told. One in a component that must be there is a broken reading."""
+    velocity, position = Sensor.GPS_VELOCITY, Sensor.GPS_POSITION
+    rows = offers(
+        (1.0, velocity, 0, Reason.FUSED), (1.0, velocity, 1, Reason.FUSED), (1.0, velocity, 2, Reason.NOT_FINITE),
+        (2.0, velocity, 0, Reason.NOT_FINITE), (2.0, velocity, 1, Reason.FUSED), (2.0, velocity, 2, Reason.NOT_FINITE),
+        (1.0, position, 2, Reason.NOT_FINITE),
+    )  # fmt: skip
+    rows[[2, 3, 5, 6], 3] = np.nan
+    streams = {velocity: Stream.of(velocity, np.arange(2.0), np.zeros((2, 3))), **gps()}
+    found = reading_scores(rows, streams)
+    assert found["gps_velocity"] == {"offered": 2, "fused": 1, "in_part": 1, "rejected": {"not_finite": 1}}
+    assert found["gps_position"]["rejected"] == {"not_finite": 1}
+
+    class Flown:
+        innovation = rows
+        log = type("Log", (), {"streams": streams})
+
+    assert Replay.rejected(Flown) == {"gps_velocity": {"not_finite": 1}, "gps_position": {"not_finite": 1}}

@@ -54,6 +54,20 @@ def command(
         typer.Option(metavar="MESSAGE=SYSTEM.COMPONENT", help="Who else may tell a message; 0: any. May be repeated."),
     ] = None,
     duration: Annotated[float | None, typer.Option(help="End after so many seconds; Ctrl-C where unsaid.")] = None,
+    capacity: Annotated[
+        float | None,
+        typer.Option(metavar="BYTES/S", help="What the link carries each way; a serial port's by its baud rate."),
+    ] = None,
+    setup: Annotated[
+        bool,
+        typer.Option("--setup", help="Read the vehicle's parameters; say what must change for --send."),
+    ] = False,
+    write: Annotated[
+        bool, typer.Option("--write", help="With --setup: write what must change, never while armed.")
+    ] = False,
+    source_set: Annotated[
+        int | None, typer.Option(help="With --setup: ArduPilot's source set for flownav, 1 to 3; found where unsaid.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Navigate a vehicle that is connected by MAVLink: fuse its sensors, send the estimate, show and record it."""
@@ -62,7 +76,7 @@ def command(
     from flownav.cli.output import require_between, require_writable
     from flownav.errors import InputError, VerdictError
     from flownav.live.display import on_terminal
-    from flownav.live.link import open_link
+    from flownav.live.link import open_link, parse_url
     from flownav.live.loop import Latency, run_session, stoppable
     from flownav.live.options import SENDINGS, Limits
     from flownav.live.priority import run_before_others
@@ -70,6 +84,7 @@ def command(
     from flownav.live.recorder import NoRecorder, Recorder, told_every_second
     from flownav.live.screen import Screen
     from flownav.live.session import Session
+    from flownav.live.traffic import traffic_facts
     from flownav.live.warm import warm_up
 
     if send not in SENDINGS:
@@ -82,6 +97,20 @@ def command(
     require_between("--send-protection", send_protection, 0.01, 1000.0)
     require_between("--unfused", unfused, 1.0, float("inf"))
     require_between("--duration", 1.0 if duration is None else duration, 0.1, 1e6)
+    require_between("--capacity", 1000.0 if capacity is None else capacity, 500.0, 1e9)
+    require_between("--source-set", 1 if source_set is None else source_set, 1, 3)
+    if setup:
+        from flownav.cli.live_setup import run as run_setup
+        from flownav.mavlink.signing import load_key
+
+        if record is not None:
+            raise InputError("--record: --setup flies nothing; leave one of the two away")
+        key = load_key(signing_key) if signing_key else None
+        return run_setup(
+            url, send, write=write, source_set=source_set, system=system, component=component, key=key, as_json=as_json
+        )
+    if write or source_set is not None:
+        raise InputError("--write and --source-set go with --setup only")
     if record is not None:
         require_writable(record)
     limits = Limits(dead_reckoning_s=send_limit, sigma_m=send_sigma, protection_m=send_protection, unfused_s=unfused)
@@ -89,9 +118,11 @@ def command(
         _options(send, system, component, signing_key, gps_delay, sensor, settings),
         limits=limits,
         accept=accepted_by(accept or []),
+        capacity_bytes_s=capacity or parse_url(url).capacity_bytes_s,
     )
     warm_up()
     link = open_link(url)
+    link.capacity_bytes_s = options.capacity_bytes_s
     shown = not as_json and sys.stdout.isatty()
     recorder = Recorder(record, options, force=force, failed=_say_once(shown)) if record is not None else None
     if recorder is not None and recorder.notice:
@@ -102,12 +133,13 @@ def command(
     end_s = float("inf") if duration is None else now_s + duration
 
     def facts_now() -> dict[str, Any]:
-        own = _facts(session, latency, time.monotonic() - now_s)
+        lasted_s = time.monotonic() - now_s
+        own = _facts(session, latency, lasted_s) | {"traffic": traffic_facts(link, session, lasted_s)}
         return own | {"link": dict(link.counts), "scheduling": scheduling}
 
     try:
         with stoppable() as asked:
-            with on_terminal(Screen(session, latency, url, recorder, scheduling).view, shown=shown) as display:
+            with on_terminal(Screen(session, latency, url, recorder, scheduling, link).view, shown=shown) as display:
                 shows = [display.show, *([told_every_second(recorder, facts_now)] if recorder is not None else [])]
                 run_session(session, link, latency, lambda: asked() or time.monotonic() >= end_s, shows)
             facts = facts_now()
@@ -223,6 +255,7 @@ def _print(facts: dict[str, Any]) -> None:
     from rich.console import Console
 
     from flownav.live.estimating import WITHHELD
+    from flownav.live.traffic import in_words
 
     console = Console(markup=False, highlight=False)
     vehicle = facts["vehicle"]
@@ -234,6 +267,7 @@ def _print(facts: dict[str, Any]) -> None:
         console.print(f"Withheld {count}: {WITHHELD[reason]}")
     for name, count in facts["dropped"].items():
         console.print(f"Dropped {count}: {name}")
+    console.print(in_words(facts["traffic"]))
     if facts["latency_ms"]["p50"] is not None:
         figures = ", ".join(f"{name} {value:.2f} ms" for name, value in facts["latency_ms"].items())
         console.print(f"From a flow reading's arrival to the estimate's departure: {figures}")

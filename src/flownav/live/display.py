@@ -43,9 +43,7 @@ def draw(view: View) -> RenderableType:
     from rich.table import Table
     from rich.text import Text
 
-    sensors = Table(
-        "sensor", "Hz", "age [s]", "lag [s]", "innovation", "ratio", "", title=view.title, title_justify="left"
-    )
+    sensors = Table("sensor", "Hz", "age [s]", "lag [s]", "innovation", "ratio", "")
     for row in view.sensors:
         sensors.add_row(*row)
     estimate = Table("", "north", "east", "down")
@@ -54,7 +52,8 @@ def draw(view: View) -> RenderableType:
     strips = Table.grid(padding=(0, 1))
     for strip_row in view.strips:
         strips.add_row(*strip_row)
-    return Group(*(Text(alarm, style="bold red") for alarm in view.alarms), sensors, estimate, strips, *view.lines)
+    alarms = (Text(alarm, style="bold red") for alarm in view.alarms)
+    return Group(*alarms, view.title, sensors, estimate, strips, *view.lines)
 
 
 class Display:

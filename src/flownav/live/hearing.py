@@ -10,8 +10,8 @@ from flownav.live.horizon import Horizon, Waiting
 from flownav.live.lags import Lags
 from flownav.live.options import Options
 from flownav.live.origin import Origin
+from flownav.live.rates import ARDUPILOT
 from flownav.live.reception import Vehicle, sender_of
-from flownav.live.requests import ARDUPILOT
 from flownav.live.serving import LATE, Serving
 from flownav.live.sources import Source, Sources
 from flownav.live.timing import VehicleClock
@@ -45,6 +45,7 @@ class Hearing:
         self.latest: dict[Sensor, Measurement] = {}
         self.newest_s = self.since_s = NAN
         self.gps_heard = self.flow_came = False
+        self.flow_waited = 0  # flow readings that shared their estimate with a later one
         self._flow_s = NAN  # the vehicle's time of the last flow reading
         self._fixes: dict[Source, tuple[int, ...]] = {}
 
@@ -126,6 +127,7 @@ class Hearing:
         self.readings[reading.sensor] += 1
         self.heard_s[reading.sensor], self.latest[reading.sensor] = now_s, reading
         self.newest_s = reading.t_s if self.newest_s != self.newest_s else max(self.newest_s, reading.t_s)
+        self.flow_waited += self.flow_came and reading.sensor in FLOW
         self.flow_came = self.flow_came or reading.sensor in FLOW
         if reading.sensor == Sensor.LANDED:
             self.serving.landed(bool(reading.value[0]))

@@ -1,4 +1,4 @@
-"""Links to a vehicle: UDP, TCP and serial, none of which ever blocks. Loopback unless told otherwise."""
+"""Links to a vehicle: UDP, TCP and serial (byte_links), none of which ever blocks. Loopback unless told otherwise."""
 
 from __future__ import annotations
 
@@ -10,13 +10,16 @@ from typing import Any, NamedTuple
 
 from flownav.errors import InputError
 
-FORMS = "udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:[HOST:]PORT or serial:DEVICE[:BAUD]"
-LOOPBACK = "127.0.0.1"
+FORMS = (
+    "udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:[HOST:]PORT or serial:DEVICE[:BAUD]; "
+    "an IPv6 address in brackets, udp:[::1]:14550"
+)
+LOOPBACK, LOOPBACK_6, EVERYWHERE_6 = "127.0.0.1", "::1", "::"
 DEFAULT_BAUD = 115200  # a bare PX4FLOW's
 MOST_BYTES = 65536
 MOST_READS = 64  # in a row, before the session has its turn
-MOST_UNSENT = 1 << 18  # bytes that wait for a slow link
-RECONNECT_S = 1.0
+USB = ("ttyACM", "usbmodem", "COM")  # serial ports by name only: their baud rate is a formality
+BITS_A_BYTE = 10  # with start and stop bit
 
 
 class Address(NamedTuple):
@@ -25,6 +28,16 @@ class Address(NamedTuple):
     kind: str
     host: str
     number: int
+
+    @property
+    def over_uart(self) -> bool:
+        """Whether it is a serial line whose baud rate matters."""
+        return self.kind == "serial" and not any(word in self.host for word in USB)
+
+    @property
+    def capacity_bytes_s(self) -> float | None:
+        """What the line carries each way [bytes/s]; None where its address does not tell."""
+        return self.number / BITS_A_BYTE if self.over_uart else None
 
 
 def parse_url(url: str) -> Address:
@@ -38,22 +51,44 @@ def parse_url(url: str) -> Address:
     elif kind in ("udp", "udpin", "udpout", "tcp", "tcpin"):
         host, _, port = rest.rpartition(":")
         listens = kind in ("udp", "udpin", "tcpin")
-        if port.isdecimal() and int(port) < 65536 and (host or listens):
+        bracketed = re.fullmatch(r"\[(?P<address>[0-9a-fA-F:.]+(?:%[\w.-]+)?)\]", host)
+        host = bracketed["address"] if bracketed and ":" in bracketed["address"] else host
+        whole = bool(bracketed) or not set(host) & set(":[]")
+        if port.isdecimal() and int(port) < 65536 and whole and (host or listens):
             return Address("udp" if kind == "udpin" else kind, host or LOOPBACK, int(port))
     raise InputError(f"{url}: no link; give {FORMS}")
 
 
-Sender = tuple[str, int] | None
+Sender = tuple[Any, ...] | None  # as the socket has it: two parts, or four of IPv6
 Piece = tuple[bytes, Sender]  # what arrived, and from whom
 
 
+def same_sender(one: Sender, other: Sender) -> bool:
+    """Whether two are the same address, port and, of IPv6, scope; an address may carry its zone's name or not."""
+    if one is None or other is None:
+        return one is other
+    return (one[0].partition("%")[0], one[1], one[3:]) == (other[0].partition("%")[0], other[1], other[3:])
+
+
+def resolved(host: str, port: int) -> tuple[socket.AddressFamily, tuple[Any, ...]]:
+    """The address of a host for datagrams, IPv4 where it has both. OSError where it has none."""
+    found = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)
+    family, _, _, _, address = min(found, key=lambda entry: entry[0] != socket.AF_INET)
+    return family, address
+
+
 class Link:
-    """What a session is run over. counts: `not_sent`, `unreachable`, `other_sender`, `reconnected`."""
+    """What a session is run over. counts: `not_sent`, `replaced`, `unreachable`, `other_sender`, `reconnected`.
+
+    received, written: bytes so far. capacity_bytes_s: what it carries each way; None where that is not known.
+    """
 
     datagrams = False
 
-    def __init__(self) -> None:
+    def __init__(self, address: Address | None = None) -> None:
         self.counts: Counter[str] = Counter()
+        self.received = self.written = 0
+        self.capacity_bytes_s = address.capacity_bytes_s if address is not None else None
 
     def fileno(self) -> int:
         """For select; -1 while there is no connection."""
@@ -79,6 +114,8 @@ class Link:
 
 def open_link(url: str) -> Link:
     """InputError where the URL is wrong or the address cannot be had."""
+    from flownav.live.byte_links import SerialLink, TcpLink
+
     address = parse_url(url)
     try:
         if address.kind in ("udp", "udpout"):
@@ -94,18 +131,21 @@ class UdpLink(Link):
     datagrams = True
 
     def __init__(self, address: Address) -> None:
-        super().__init__()
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        super().__init__(address)
+        family, found = resolved(address.host, address.number)
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._named: Sender = None
         with suppress(OSError):
             self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
         try:
             if address.kind == "udp":
-                self._socket.bind((address.host, address.number))
+                if found[0] == EVERYWHERE_6:  # and IPv4 with it
+                    self._socket.setsockopt(socket.IPPROTO_IPV6, socket.IPV6_V6ONLY, 0)
+                self._socket.bind(found)
             else:
-                self._named = (socket.gethostbyname(address.host), address.number)
-                self._socket.bind((LOOPBACK if self._named[0].startswith("127.") else "", 0))
+                self._named = found
+                self._socket.bind((_own_end(found[0]), 0))
         except OSError:
             self._socket.close()
             raise
@@ -135,9 +175,10 @@ class UdpLink(Link):
             except OSError:  # an earlier datagram of ours found nobody
                 self.counts["unreachable"] += 1
                 continue
-            if self._peer is not None and sender != self._peer:
+            if self._peer is not None and not same_sender(sender, self._peer):
                 self.counts["other_sender"] += 1
             else:
+                self.received += len(piece)
                 pieces.append((piece, sender))
         return pieces
 
@@ -146,7 +187,7 @@ class UdpLink(Link):
         if self._peer is None:
             return
         try:
-            self._socket.sendto(frame, self._peer)
+            self.written += self._socket.sendto(frame, self._peer)
         except OSError:
             self.counts["not_sent"] += 1
 
@@ -155,137 +196,8 @@ class UdpLink(Link):
         self._socket.close()
 
 
-class TcpLink(Link):
-    """A connection that is made again when it breaks: by calling (tcp) or by waiting for a caller (tcpin)."""
-
-    def __init__(self, address: Address) -> None:
-        super().__init__()
-        self._address = address
-        self._server: socket.socket | None = None
-        self._connection: socket.socket | None = None
-        self._unsent = b""
-        self._tries = 0
-        if address.kind == "tcpin":
-            self._server = socket.create_server((address.host, address.number), backlog=1)
-            self._server.setblocking(False)
-            self.port = int(self._server.getsockname()[1])
-        else:
-            self._connection = self._called()
-
-    def _called(self) -> socket.socket:
-        connection = socket.create_connection((self._address.host, self._address.number), timeout=RECONNECT_S)
-        connection.setblocking(False)
-        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        return connection
-
-    def fileno(self) -> int:
-        """Of the connection, or of the server that waits for one."""
-        found = self._connection or self._server
-        return found.fileno() if found else -1
-
-    def read(self) -> list[Piece]:
-        """What has arrived; a broken connection is made again."""
-        if self._connection is None:
-            self._connect()
-            return []
-        try:
-            piece = self._connection.recv(MOST_BYTES)
-        except BlockingIOError:
-            return []
-        except OSError:
-            piece = b""
-        if not piece:
-            self._broken()
-        return [(piece, None)] if piece else []
-
-    def _connect(self) -> None:
-        try:
-            if self._server is not None:
-                self._connection, _ = self._server.accept()
-                self._connection.setblocking(False)
-            else:
-                self._tries += 1
-                if self._tries % 100 == 0:  # every half second
-                    self._connection = self._called()
-        except OSError:
-            return
-        if self._connection is not None:
-            self.counts["reconnected"] += 1
-
-    def _broken(self) -> None:
-        if self._connection is not None:
-            self._connection.close()
-        self._connection, self._unsent = None, b""
-
-    def write(self, frame: bytes) -> None:
-        """Send what the connection takes now; the rest waits, up to a limit."""
-        if self._connection is None or len(self._unsent) > MOST_UNSENT:
-            self.counts["not_sent"] += 1
-            return
-        self._unsent += frame
-        try:
-            self._unsent = self._unsent[self._connection.send(self._unsent) :]
-        except BlockingIOError:
-            return
-        except OSError:
-            self.counts["not_sent"] += 1
-            self._broken()
-
-    def close(self) -> None:
-        """Close connection and server."""
-        self._broken()
-        if self._server is not None:
-            self._server.close()
-
-
-class SerialLink(Link):
-    """A serial port that is opened again when its cable was pulled."""
-
-    def __init__(self, address: Address) -> None:
-        super().__init__()
-        self._address = address
-        self._tries = 0
-        self._port: Any = self._opened()
-
-    def _opened(self) -> Any:
-        try:
-            import serial
-        except ImportError as error:
-            raise InputError("a serial link needs pyserial; install it with `pip install 'flownav[live]'`") from error
-        return serial.Serial(self._address.host, self._address.number, timeout=0, write_timeout=0)
-
-    def fileno(self) -> int:
-        """Of the port."""
-        return int(self._port.fileno()) if self._port is not None else -1
-
-    def read(self) -> list[Piece]:
-        """What has arrived."""
-        if self._port is None:
-            self._tries += 1
-            if self._tries % 100 == 0:
-                with suppress(OSError):
-                    self._port = self._opened()
-                    self.counts["reconnected"] += 1
-            return []
-        try:
-            piece = bytes(self._port.read(MOST_BYTES))
-        except OSError:
-            self.close()
-            return []
-        return [(piece, None)] if piece else []
-
-    def write(self, frame: bytes) -> None:
-        """Send, or drop and count."""
-        try:
-            if self._port is not None and self._port.write(frame) == len(frame):
-                return
-        except OSError:
-            pass
-        self.counts["not_sent"] += 1
-
-    def close(self) -> None:
-        """Close the port."""
-        if self._port is not None:
-            with suppress(OSError):
-                self._port.close()
-        self._port = None
+def _own_end(host: str) -> str:
+    """Where our end of a datagram link to a host is bound: on loopback where the host is."""
+    if ":" in host:
+        return LOOPBACK_6 if host == LOOPBACK_6 else EVERYWHERE_6
+    return LOOPBACK if host.startswith("127.") else ""

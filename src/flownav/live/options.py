@@ -40,7 +40,7 @@ class Options:
     latency and axes; its gains are the settings'. margin_s: what the horizon waits beyond the largest delay that is
     stated: an IMU period and jitter. most_horizon_s: the longest that it waits for any stream. listen_s: how long the
     vehicle is listened to before it is decided which sensors serve. restart_s: a longer silence of the vehicle, or its
-    reboot, begins the navigation anew.
+    reboot, begins the navigation anew. capacity_bytes_s: what the link carries each way; None: more than is asked for.
     """
 
     send: Sending = "odometry"
@@ -57,6 +57,7 @@ class Options:
     most_horizon_s: float = 1.0
     listen_s: float = 2.0
     restart_s: float = 10.0
+    capacity_bytes_s: float | None = None
 
     @property
     def least_horizon_s(self) -> float:

@@ -5,30 +5,17 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any, NamedTuple
 
+from flownav.live.rates import Rates, Streams
 from flownav.live.reception import Vehicle
 from flownav.mavlink.dialect import Message
 
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 511, 512  # MAV_CMD
-ARDUPILOT = 3
 ACCEPTED, TEMPORARILY_REJECTED, IN_PROGRESS = 0, 1, 5  # MAV_RESULT
 ANSWER_S = 0.5
 TRIES = 3
 SILENT_S = 2.0  # a stream that has said nothing for so long is asked for again
 PERIODS = 5.0  # and for so many of its periods
 MOST_PATIENCE_S = 30.0  # a stream that has never come is asked for ever more seldom, down to this
-# message: id and rate [Hz]; the IMU moves the state, the others correct it
-COMMON = {
-    "ATTITUDE_QUATERNION": (31, 50),
-    "DISTANCE_SENSOR": (132, 25),
-    "GPS_RAW_INT": (24, 10),
-    "SCALED_PRESSURE": (29, 10),
-    "EXTENDED_SYS_STATE": (245, 5),
-    "SYSTEM_TIME": (2, 1),
-}
-STREAMS = {
-    True: {"RAW_IMU": (27, 100), "OPTICAL_FLOW": (100, 50), **COMMON},  # ArduPilot
-    False: {"HIGHRES_IMU": (105, 100), "OPTICAL_FLOW_RAD": (106, 250), "OPTICAL_FLOW": (100, 250), **COMMON},
-}
 ORIGIN, GLOBAL_ORIGIN = "GPS_GLOBAL_ORIGIN", 49  # told when it is asked for, and when it is set
 
 
@@ -49,8 +36,9 @@ class Requests:
     refused is not, except the origin, which an autopilot has none of before its first fix.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, rates: Rates) -> None:
         self.answers: Counter[str] = Counter()
+        self._rates = rates
         self.refused: list[str] = []
         self._streams: dict[str, _Stream] = {}
         self._left: list[str] = []
@@ -59,15 +47,26 @@ class Requests:
 
     def begin(self, vehicle: Vehicle, now_s: float) -> None:
         """Ask for everything, from the first on: at the start and when the vehicle comes back."""
-        streams = STREAMS[vehicle.make == ARDUPILOT]
         never = float("-inf")
         self._streams = {
-            name: _Stream(number, rate, now_s, never, SILENT_S) for name, (number, rate) in streams.items()
+            name: _Stream(number, rate, now_s, never, SILENT_S)
+            for name, (number, rate) in self._rates.begin(vehicle.make).items()
         }
         self._streams[ORIGIN] = _Stream(GLOBAL_ORIGIN, 0.0, now_s, never, SILENT_S)
         self._left = list(self._streams)
         self._sent_s, self._tries = never, 0
         self.refused = []
+
+    def revise(self, vehicle: Vehicle, now_s: float, beside: Streams | None = None) -> None:
+        """Ask for what the plan of the rates has otherwise now. beside: streams to ask for as well from now on."""
+        for name, (number, rate_hz) in self._rates.begin(vehicle.make, beside).items():
+            before = self._streams.get(name)
+            if name in self.refused or (before is not None and before.rate_hz == rate_hz):
+                continue
+            heard_s = before.heard_s if before is not None else float("-inf")
+            self._streams[name] = _Stream(number, rate_hz, now_s, heard_s, SILENT_S)
+            if name not in self._left:
+                self._left.append(name)
 
     def heard(self, name: str, now_s: float) -> None:
         """A message of the vehicle."""

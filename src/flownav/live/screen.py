@@ -10,8 +10,11 @@ from flownav.estimation.gating import Reason
 from flownav.estimation.hypotheses import NAMES
 from flownav.live.display import View
 from flownav.live.estimating import WITHHELD
+from flownav.live.link import Link
 from flownav.live.loop import Latency
 from flownav.live.session import Session
+from flownav.live.traffic import Traffic, in_words
+from flownav.mavlink.converted import OPTIONAL
 from flownav.measurement import COLUMNS, Sensor
 from flownav.navigation.memory import PROTECTION, SUSPECTED
 
@@ -29,10 +32,18 @@ class Screen:
     """Keeps what the strips show; `view` looks at the session, at once; drawing it is somebody else's (display.py)."""
 
     def __init__(
-        self, session: Session, latency: Latency, url: str, recorder: Recorder | None = None, scheduling: str = ""
+        self,
+        session: Session,
+        latency: Latency,
+        url: str,
+        recorder: Recorder | None = None,
+        scheduling: str = "",
+        link: Link | None = None,
     ) -> None:
-        self._session, self._latency, self._url = session, latency, url
+        self._session, self._latency, self._url, self._link = session, latency, url, link
         self._recorder, self._scheduling = recorder, scheduling
+        self._traffic: Traffic | None = None
+        self._traffic_s, self._words = float("-inf"), ""
         self._strips: dict[str, deque[float]] = {}
         self._before: dict[Sensor, int] = {}
         self._at_s = float("nan")
@@ -49,12 +60,13 @@ class Screen:
             [self._sensor(sensor, now_s) for sensor in sorted(session.readings)],
             self._estimate(),
             [(name, strip(values), _figure(values[-1])) for name, values in self._strips.items()],
-            [self._protection(), f"dropped: {dropped}", self._footing(), self._running()],
+            [self._protection(), f"dropped: {dropped}", self._line(now_s), self._footing(), self._running()],
         )
 
     def _sensor(self, sensor: Sensor, now_s: float) -> tuple[str, ...]:
         session = self._session
-        found = [session.innovations[key] for key in sorted(session.innovations) if key[0] == sensor]
+        keys = [key for key in sorted(session.innovations) if key[0] == sensor and told(session, key)]
+        found = [session.innovations[key] for key in keys]
         return (
             sensor.name.lower(),
             f"{self._rates.get(sensor, 0.0):.0f}",
@@ -64,6 +76,16 @@ class Screen:
             " ".join(_figure(ratio) for _, ratio, _ in found),
             " ".join(dict.fromkeys(Reason(reason).label for _, _, reason in found if reason)),
         )
+
+    def _line(self, now_s: float) -> str:
+        """How full the link was in the last second, and what it keeps from being sent."""
+        if self._link is None:
+            return ""
+        if self._traffic is None:
+            self._traffic, self._traffic_s = Traffic(self._link, self._session, now_s), now_s
+        if now_s - self._traffic_s >= 1.0:
+            self._words, self._traffic_s = in_words(self._traffic.look(now_s)), now_s
+        return self._words
 
     def _title(self) -> str:
         vehicle = self._session.reception.vehicle
@@ -133,6 +155,13 @@ class Screen:
             for place in places if reading else ():
                 values = self._strips.setdefault(COLUMNS[sensor][place], deque(maxlen=STRIP))
                 values.append(reading.value[place] if reading else float("nan"))
+
+
+def told(session: Session, key: tuple[int, int]) -> bool:
+    """Whether the newest reading of a sensor has the component: GPS over MAVLink has no vertical velocity to judge."""
+    sensor, component = Sensor(key[0]), key[1]
+    reading = session.latest.get(sensor)
+    return reading is None or component not in OPTIONAL.get(sensor, ()) or math.isfinite(reading.value[component])
 
 
 def strip(values: deque[float]) -> str:

@@ -15,9 +15,11 @@ from flownav.live.estimating import UNFUSED, WITHHELD, estimate_of, fault_of, wh
 from flownav.live.filtering import BATCH, Filtering, Keeper
 from flownav.live.hearing import Hearing
 from flownav.live.options import Options
+from flownav.live.rates import Rates
 from flownav.live.reception import Reception, Vehicle
 from flownav.live.requests import Requests
 from flownav.live.serving import HORIZONTAL, Refused
+from flownav.live.simulator import Simulator
 from flownav.live.timing import VehicleClock
 from flownav.mavlink.converted import Pose
 from flownav.mavlink.dialect import Message
@@ -59,7 +61,8 @@ class Session:
         self.reception = Reception(
             options.system, options.component, options.key, unix_s, options.accept, ODOMETRY_COMPONENT
         )
-        self.answers, self.requests = Answers(options), Requests()
+        self.rates = Rates(options.capacity_bytes_s, options.send, signed=options.key is not None)
+        self.answers, self.requests, self.simulator = Answers(options), Requests(self.rates), Simulator()
         self.hearing, self.filtering = Hearing(options), Filtering(options, keeper)
         self.clock: VehicleClock | None = None
         self.withheld: Counter[str] = Counter()
@@ -128,6 +131,10 @@ class Session:
                 self._told(message, self.clock, vehicle, now_s)
             if message.msgname in CONVERTERS:
                 self._measured(message, self.clock, vehicle, now_s)
+        if self.rates.heard(len(piece), now_s) and self.reception.vehicle is not None and self.clock is not None:
+            self.requests.revise(self.reception.vehicle, now_s)
+            t_s = self.clock.now_s(now_s)
+            self.keeper.note(t_s, "link", "overfull", "streams are asked for at lower rates", self.rates.plan.bytes_s)
         return self.reception.received > before
 
     def _meet(self, vehicle: Vehicle, now_s: float) -> None:
@@ -146,6 +153,9 @@ class Session:
     def _told(self, message: Message, clock: VehicleClock, vehicle: Vehicle, now_s: float) -> None:
         """What the autopilot says that is no measurement."""
         name = message.msgname
+        truth = self.simulator.heard(message, vehicle)
+        if truth is not None:
+            self.requests.revise(vehicle, now_s, {truth.name: (truth.number, truth.rate_hz)})
         if name == "TIMESYNC":
             self._timesync(message, clock, vehicle, now_s)
         elif name == "COMMAND_ACK":
@@ -203,7 +213,8 @@ class Session:
             self.filtering.begin(hearing.horizon.waiting(), hearing.gps_heard, self.origin_deg_m)
         if self.filtering.running is not None:
             self._feed(min(t_s, hearing.lags.newest_s) - hearing.horizon_s)
-        if self.due or now_s - self._sent_s >= SEND_EVERY_S:
+        since_s = now_s - self._sent_s
+        if (self.due or since_s >= SEND_EVERY_S) and since_s >= self.rates.estimate_every_s:
             hearing.flow_came, self._sent_s = False, now_s
             self._offer(t_s, now_s)
         if now_s - self._second_s >= SECOND:
@@ -211,8 +222,9 @@ class Session:
             self._send(self.answers.heartbeat(), now_s)
             self._send(self.answers.timesync(now_s), now_s)
         request = self.requests.due(self.answers.mav, self.reception.vehicle, now_s)
-        if request is not None:
-            self._send(request, now_s)
+        for question in (request, self.simulator.due(self.answers.mav, self.reception.vehicle, now_s)):
+            if question is not None:
+                self._send(question, now_s)
 
     def _feed(self, until_s: float) -> None:
         while released := self.hearing.horizon.release(until_s, BATCH):

@@ -82,6 +82,11 @@ class SimulatedVehicle:
         return due
 
     @property
+    def damage(self) -> Counter[str]:
+        """Frames that arrived damaged, by reason."""
+        return self._frames.damage
+
+    @property
     def finished(self) -> bool:
         """Whether all has been said."""
         return not self._due
@@ -109,9 +114,9 @@ class SimulatedVehicle:
         return frames
 
     def hear(self, piece: bytes, t_s: float) -> list[bytes]:
-        """What is answered to a datagram that arrives at a time of the flight."""
+        """What is answered to what arrives at a time of the flight, whole frames or pieces of them."""
         answers = []
-        for _, content in self._frames.feed(piece, whole=True):
+        for _, content in self._frames.feed(piece):
             message = self._coder.decode(bytearray(content))
             self.counts[message.msgname] += 1
             if message.msgname == "TIMESYNC":

@@ -25,6 +25,8 @@ from flownav.scoring.protection import protection_of
 
 NO_REJECTION = (Reason.FUSED, Reason.DATUM)
 TESTED = (Reason.FUSED, Reason.INNOVATION_GATE)
+# components that a sensor may leave out: a NaN here is nothing told, not a reading that is broken
+MAY_BE_LEFT_OUT = ((Sensor.GPS_VELOCITY, 2), (Sensor.FLOW_VELOCITY, 2), (Sensor.PAD, 2))
 
 
 def consistency_scores(innovation: Array) -> dict[str, dict[str, Any]]:
@@ -39,6 +41,15 @@ def consistency_scores(innovation: Array) -> dict[str, dict[str, Any]]:
     return found
 
 
+def told(innovation: Array) -> Array:
+    """The offered components without those that their sensor left out (MAVLink's GPS has no vertical velocity)."""
+    left_out = np.zeros(len(innovation), bool)
+    for sensor, component in MAY_BE_LEFT_OUT:
+        left_out |= (innovation[:, 1] == sensor) & (innovation[:, 2] == component)
+    left_out &= np.isnan(innovation[:, 3]) & (innovation[:, 8] == Reason.NOT_FINITE)
+    return np.asarray(innovation[~left_out])
+
+
 def reading_scores(innovation: Array, streams: Mapping[Sensor, Stream]) -> dict[str, dict[str, Any]]:
     """By sensor, what became of whole readings, where `rejected` counts components; innovation (m, tape.OFFERS).
 
@@ -46,6 +57,7 @@ def reading_scores(innovation: Array, streams: Mapping[Sensor, Stream]) -> dict[
     one component or more, by reason, with the rows that the reader threw away.
     """
     found = {}
+    innovation = told(innovation)
     for sensor, stream in streams.items():
         offers = innovation[innovation[:, 1] == sensor]
         reading, reason = _readings(offers), offers[:, 8].astype(int)

@@ -32,6 +32,7 @@ from flownav.replay.judged import (
     motion_of,
     protection_scores,
     reading_scores,
+    told,
 )
 from flownav.replay.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replay.sentinel import Finding, findings
@@ -116,7 +117,8 @@ class Replay:
     def rejected(self) -> dict[str, dict[str, int]]:
         """What was not fused, by sensor and reason: rows by the reader, components by the filter, added up."""
         counts = {}
-        sensors, reasons = self.innovation[:, 1].astype(int), self.innovation[:, 8].astype(int)
+        offered = told(self.innovation)
+        sensors, reasons = offered[:, 1].astype(int), offered[:, 8].astype(int)
         for sensor, stream in self.log.streams.items():
             numbers = np.bincount(reasons[sensors == sensor], minlength=len(Reason))
             found = {r.label: int(numbers[r]) for r in Reason if numbers[r] and r not in NO_REJECTION}

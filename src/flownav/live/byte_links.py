@@ -1,0 +1,187 @@
+"""Links that are streams of bytes: TCP and serial ports. What waits to be written is outgoing's."""
+
+from __future__ import annotations
+
+import os
+import socket
+import time
+from contextlib import suppress
+from typing import Any
+
+from flownav.errors import InputError
+from flownav.live.link import EVERYWHERE_6, MOST_BYTES, Address, Link, Piece
+from flownav.live.outgoing import Outgoing
+
+RECONNECT_S = 1.0
+
+
+class TcpLink(Link):
+    """A connection that is made again when it breaks: by calling (tcp) or by waiting for a caller (tcpin)."""
+
+    def __init__(self, address: Address) -> None:
+        super().__init__(address)
+        self._address = address
+        self._outgoing = Outgoing(self.counts)
+        self._server: socket.socket | None = None
+        self._connection: socket.socket | None = None
+        self._tries = 0
+        if address.kind == "tcpin":
+            family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
+            everywhere = address.host == EVERYWHERE_6 and socket.has_dualstack_ipv6()
+            self._server = socket.create_server(
+                (address.host, address.number), family=family, backlog=1, dualstack_ipv6=everywhere
+            )
+            self._server.setblocking(False)
+            self.port = int(self._server.getsockname()[1])
+        else:
+            self._connection = self._called()
+
+    def _called(self) -> socket.socket:
+        connection = socket.create_connection((self._address.host, self._address.number), timeout=RECONNECT_S)
+        connection.setblocking(False)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        return connection
+
+    def fileno(self) -> int:
+        """Of the connection, or of the server that waits for one."""
+        found = self._connection or self._server
+        return found.fileno() if found else -1
+
+    def read(self) -> list[Piece]:
+        """What has arrived; a broken connection is made again."""
+        if self._connection is None:
+            self._connect()
+            return []
+        self._flush()
+        if self._connection is None:
+            return []
+        try:
+            piece = self._connection.recv(MOST_BYTES)
+        except BlockingIOError:
+            return []
+        except OSError:
+            piece = b""
+        if not piece:
+            self._broken()
+        self.received += len(piece)
+        return [(piece, None)] if piece else []
+
+    def _connect(self) -> None:
+        try:
+            if self._server is not None:
+                self._connection, _ = self._server.accept()
+                self._connection.setblocking(False)
+            else:
+                self._tries += 1
+                if self._tries % 100 == 0:  # every half second
+                    self._connection = self._called()
+        except OSError:
+            return
+        if self._connection is not None:
+            self.counts["reconnected"] += 1
+
+    def _broken(self) -> None:
+        if self._connection is not None:
+            self._connection.close()
+        self._connection = None
+        self._outgoing.clear()
+
+    def write(self, frame: bytes) -> None:
+        """Send what the connection takes now; the rest waits."""
+        if self._connection is None:
+            self.counts["not_sent"] += 1
+            return
+        self._outgoing.put(frame)
+        self._flush()
+
+    def _flush(self) -> None:
+        try:
+            self.written += self._outgoing.flush(self._taken, time.monotonic())
+        except OSError:
+            self._broken()
+
+    def _taken(self, content: bytes) -> int:
+        assert self._connection is not None
+        try:
+            return self._connection.send(content)
+        except BlockingIOError:
+            return 0
+
+    def close(self) -> None:
+        """Close connection and server."""
+        self._broken()
+        if self._server is not None:
+            self._server.close()
+
+
+class SerialLink(Link):
+    """A serial port that is opened again when its cable was pulled.
+
+    What is written goes to the file and not through pyserial, whose write tries again for ever while the port is full.
+    """
+
+    def __init__(self, address: Address) -> None:
+        super().__init__(address)
+        self._address = address
+        self._outgoing = Outgoing(self.counts, address.capacity_bytes_s)
+        self._tries = 0
+        self._port: Any = self._opened()
+
+    def _opened(self) -> Any:
+        try:
+            import serial
+        except ImportError as error:
+            raise InputError("a serial link needs pyserial; install it with `pip install 'flownav[live]'`") from error
+        return serial.Serial(self._address.host, self._address.number, timeout=0, write_timeout=0)
+
+    def fileno(self) -> int:
+        """Of the port."""
+        return int(self._port.fileno()) if self._port is not None else -1
+
+    def read(self) -> list[Piece]:
+        """What has arrived."""
+        if self._port is None:
+            self._tries += 1
+            if self._tries % 100 == 0:
+                with suppress(OSError):
+                    self._port = self._opened()
+                    self.counts["reconnected"] += 1
+            return []
+        self._flush()
+        if self._port is None:
+            return []
+        try:
+            piece = bytes(self._port.read(MOST_BYTES))
+        except OSError:
+            self.close()
+            return []
+        self.received += len(piece)
+        return [(piece, None)] if piece else []
+
+    def write(self, frame: bytes) -> None:
+        """Send whole, when the line's pace allows it; or count it."""
+        if self._port is None:
+            self.counts["not_sent"] += 1
+            return
+        self._outgoing.put(frame)
+        self._flush()
+
+    def _flush(self) -> None:
+        try:
+            self.written += self._outgoing.flush(self._taken, time.monotonic())
+        except OSError:
+            self.close()
+
+    def _taken(self, content: bytes) -> int:
+        try:
+            return os.write(self._port.fileno(), content)
+        except BlockingIOError:
+            return 0
+
+    def close(self) -> None:
+        """Close the port."""
+        if self._port is not None:
+            with suppress(OSError):
+                self._port.close()
+        self._port = None
+        self._outgoing.clear()

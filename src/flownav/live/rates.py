@@ -1,0 +1,173 @@
+"""Which rates a link can carry: what the vehicle is asked for, and how often it is sent an estimate.
+
+A line that is asked for more than it carries does not say so: the autopilot's buffer fills, readings arrive later and
+later, and what does not fit is lost at random. So rates come down in the stated order until they fit, what the
+navigator rests on last: inertial readings, flow, range and GPS. A serial line carries a tenth of its baud rate in
+bytes.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+ARDUPILOT, PX4 = 3, 12  # MAV_AUTOPILOT
+PX4_LEAST_HZ = 30.0  # of estimates; EKF2 does not fuse fewer (docs/en/ros/external_position_estimation.md)
+# message: id and rate [Hz]; the IMU moves the state, the others correct it
+COMMON = {
+    "ATTITUDE_QUATERNION": (31, 50),
+    "DISTANCE_SENSOR": (132, 25),
+    "GPS_RAW_INT": (24, 10),
+    "SCALED_PRESSURE": (29, 10),
+    "EXTENDED_SYS_STATE": (245, 5),
+    "SYSTEM_TIME": (2, 1),
+}
+STREAMS = {
+    True: {"RAW_IMU": (27, 100), "OPTICAL_FLOW": (100, 50), **COMMON},  # ArduPilot
+    False: {"HIGHRES_IMU": (105, 100), "OPTICAL_FLOW_RAD": (106, 250), "OPTICAL_FLOW": (100, 250), **COMMON},
+}
+SHARE = 0.8  # of the line; the rest is for HEARTBEAT, TIMESYNC, texts, answers and what others ask of the vehicle
+OVERFULL = 0.95  # of the line: more arrives than was planned, and the autopilot's buffer fills
+LOOK_S = 5.0
+SIGNATURE = 13
+# bytes of a MAVLink 2 frame, as ArduPilot and PX4 fill them (zeros at a payload's end are not sent)
+FRAME = {
+    "RAW_IMU": 41, "HIGHRES_IMU": 75, "OPTICAL_FLOW": 46, "OPTICAL_FLOW_RAD": 56, "ATTITUDE_QUATERNION": 44,
+    "DISTANCE_SENSOR": 51, "GPS_RAW_INT": 64, "SCALED_PRESSURE": 28, "EXTENDED_SYS_STATE": 14, "SYSTEM_TIME": 24,
+    "SIM_STATE": 96, "HIL_STATE_QUATERNION": 76,
+}  # fmt: skip
+ESTIMATE = {"odometry": 244, "vision": 129 + 69, "landing-target": 72, "none": 0}
+ABSENT = {True: (), False: ("OPTICAL_FLOW",)}  # by ArduPilot or not: asked for in case, and takes no part of the line
+TRUTHS = ("SIM_STATE", "HIL_STATE_QUATERNION")
+# in this order: messages, and the rate that they come down to [Hz]
+STEPS: tuple[tuple[tuple[str, ...], float], ...] = (
+    (TRUTHS, 5),
+    (("SCALED_PRESSURE",), 5),
+    (("OPTICAL_FLOW_RAD", "OPTICAL_FLOW"), 100),
+    (("ATTITUDE_QUATERNION",), 25),
+    (("GPS_RAW_INT",), 5),
+    (("DISTANCE_SENSOR",), 15),
+    (("OPTICAL_FLOW_RAD", "OPTICAL_FLOW"), 50),
+    (TRUTHS, 1),
+    (("ATTITUDE_QUATERNION",), 10),
+    (("HIGHRES_IMU", "RAW_IMU"), 50),
+    (("OPTICAL_FLOW_RAD", "OPTICAL_FLOW"), 25),
+    (("SCALED_PRESSURE", "EXTENDED_SYS_STATE"), 2),
+    (("DISTANCE_SENSOR",), 10),
+    (("HIGHRES_IMU", "RAW_IMU"), 40),
+    (("OPTICAL_FLOW_RAD", "OPTICAL_FLOW"), 15),
+    (("ATTITUDE_QUATERNION",), 5),
+    (("HIGHRES_IMU", "RAW_IMU"), 33),  # below it the filter is reset by GPS (benchmarks/test_bench_serial.py)
+    (("OPTICAL_FLOW_RAD", "OPTICAL_FLOW"), 10),
+    (("DISTANCE_SENSOR",), 5),
+    (("HIGHRES_IMU", "RAW_IMU"), 25),
+)
+Streams = dict[str, tuple[int, float]]  # by message: its number and its rate [Hz]
+
+
+class Plan(NamedTuple):
+    """What a link can carry. bytes_s: what the streams take; estimate_hz: infinite where nothing limits it.
+
+    lacks: what it is too slow for, in words; "" where it carries the least that is needed.
+    """
+
+    streams: Streams
+    bytes_s: float
+    estimate_hz: float
+    lacks: str = ""
+
+
+def bytes_of(streams: Streams, *, ardupilot: bool, signed: bool = False) -> float:
+    """What streams take of a line [bytes/s]."""
+    extra = SIGNATURE if signed else 0
+    return sum(
+        rate_hz * (FRAME.get(name, 0) + extra)
+        for name, (_, rate_hz) in streams.items()
+        if name not in ABSENT[ardupilot]
+    )
+
+
+def plan(
+    make: int,
+    capacity_bytes_s: float | None,
+    send: str,
+    *,
+    signed: bool = False,
+    beside: Streams | None = None,
+    spare: float = 1.0,
+) -> Plan:
+    """Rates for a make (MAV_AUTOPILOT) over a link. beside: streams that are asked for as well (a simulator's truth).
+
+    spare: the part of the line's share that may be planned with; less where others fill it.
+    """
+    ardupilot = make == ARDUPILOT
+    wanted = STREAMS[ardupilot] | (beside or {})
+    if capacity_bytes_s is None:
+        return Plan(wanted, bytes_of(wanted, ardupilot=ardupilot, signed=signed), float("inf"))
+    most_bytes_s = SHARE * spare * capacity_bytes_s
+
+    def taken(steps: list[int]) -> tuple[Streams, float]:
+        streams = dict(wanted)
+        for names, rate_hz in (STEPS[step] for step in steps):
+            for name in streams.keys() & set(names):
+                streams[name] = streams[name][0], min(streams[name][1], rate_hz)
+        return streams, bytes_of(streams, ardupilot=ardupilot, signed=signed)
+
+    steps: list[int] = []
+    while taken(steps)[1] > most_bytes_s and len(steps) < len(STEPS):
+        steps.append(len(steps))
+    for step in reversed(steps):  # a step that a later one has made needless is taken back
+        fewer = [other for other in steps if other != step]
+        steps = fewer if taken(fewer)[1] <= most_bytes_s else steps
+    streams, bytes_s = taken(steps)
+    frame = ESTIMATE[send] + (SIGNATURE if signed else 0)
+    estimate_hz = SHARE * capacity_bytes_s / frame if ESTIMATE[send] else float("inf")
+    lacks = ["the least rates of the sensors"] if bytes_s > most_bytes_s else []
+    lacks += (
+        [f"the {PX4_LEAST_HZ:.0f} estimates/s that PX4 fuses"] if make == PX4 and estimate_hz < PX4_LEAST_HZ else []
+    )
+    return Plan(streams, bytes_s, estimate_hz, " and ".join(lacks))
+
+
+class Rates:
+    """The plan of one session, and whether what arrives keeps to it.
+
+    capacity_bytes_s: of the link, each way; None where nothing is known to limit it.
+    """
+
+    def __init__(self, capacity_bytes_s: float | None, send: str, *, signed: bool) -> None:
+        self.capacity_bytes_s = capacity_bytes_s
+        self._send, self._signed = send, signed
+        self._make = -1
+        self._beside: Streams = {}
+        self._spare = 1.0
+        self._bytes, self._since_s = 0, float("nan")
+        self.plan = Plan({}, 0.0, float("inf"))
+
+    def begin(self, make: int, beside: Streams | None = None) -> Streams:
+        """The streams to ask a vehicle for."""
+        self._make, self._beside = make, self._beside | (beside or {})
+        self.plan = plan(
+            make, self.capacity_bytes_s, self._send, signed=self._signed, beside=self._beside, spare=self._spare
+        )
+        return self.plan.streams
+
+    @property
+    def estimate_every_s(self) -> float:
+        """The least time from one estimate to the next."""
+        return 1.0 / self.plan.estimate_hz
+
+    def heard(self, size: int, now_s: float) -> bool:
+        """So many bytes arrived. True where the line has been overfull: the streams are to be asked for anew, lower."""
+        if self.capacity_bytes_s is None:
+            return False
+        if not now_s - self._since_s <= 2.0 * LOOK_S:
+            self._bytes, self._since_s = 0, now_s
+        self._bytes += size
+        if now_s - self._since_s < LOOK_S:
+            return False
+        filled = self._bytes / (now_s - self._since_s) / self.capacity_bytes_s
+        self._bytes, self._since_s = 0, now_s
+        if filled < OVERFULL or self._make < 0 or self._spare < 0.3:
+            return False
+        self._spare *= 0.8
+        return True

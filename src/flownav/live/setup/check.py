@@ -1,0 +1,164 @@
+"""`flownav live --setup`: meet the vehicle, read, compare, write where asked to, and say what is to be done."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from flownav.live.link import Address
+from flownav.live.reception import Vehicle
+from flownav.live.setup.compare import Block, Row, blocks_of, rows_of, source_set
+from flownav.live.setup.exchange import Change, read, why_not, write
+from flownav.live.setup.knowledge import Knowledge, knowledge_of
+from flownav.live.setup.serial_port import port_names, port_of
+from flownav.live.setup.talk import Talk
+from flownav.mavlink.parameters import Value
+
+MEET_S = 10.0
+ENABLING = ("VISO_TYPE", "PLND_ENABLED")  # ArduPilot shows the rest of the group once these are set
+
+
+@dataclass
+class Report:
+    """What was found. verdict: one sentence; fits: whether nothing must change; refused: why nothing was written."""
+
+    verdict: str
+    fits: bool = False
+    make: str = ""
+    vehicle: Vehicle | None = None
+    armed: bool | None = None
+    send: str = ""
+    source_set: int = 0
+    rows: list[Row] = field(default_factory=list)
+    blocks: list[Block] = field(default_factory=list)
+    port: str = ""
+    changes: list[Change] = field(default_factory=list)
+    refused: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    in_flight: list[str] = field(default_factory=list)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "verdict": self.verdict,
+            "fits": self.fits,
+            "make": self.make,
+            "vehicle": self.vehicle._asdict() if self.vehicle else None,
+            "armed": self.armed,
+            "send": self.send,
+            "source_set": self.source_set or None,
+            "parameters": [row.as_dict() for row in self.rows],
+            "blocks_arming": [block._asdict() for block in self.blocks],
+            "serial_port": self.port or None,
+            "changes": [{**change._asdict(), "done": change.done} for change in self.changes],
+            "refused": self.refused,
+            "notes": self.notes,
+            "in_flight": self.in_flight,
+        }
+
+
+def check(
+    talk: Talk,
+    address: Address,
+    send: str,
+    *,
+    writing: bool = False,
+    asked_set: int | None = None,
+    meet_s: float = MEET_S,
+) -> Report:
+    """The whole of `--setup` over a conversation. Nothing is written unless `writing`."""
+    vehicle = talk.meet(meet_s)
+    if vehicle is None:
+        return Report(_nobody(talk, meet_s), send=send)
+    known = knowledge_of(vehicle.make)
+    if known is None:
+        return Report(
+            f"the vehicle is neither ArduPilot nor PX4 (MAV_AUTOPILOT {vehicle.make}): its parameters are not known",
+            vehicle=vehicle, armed=talk.armed, send=send,
+        )  # fmt: skip
+    uart = address.over_uart
+    values = read(talk, known.names(send) + (port_names(known.serial_parameters) if uart else []))
+    if not values:
+        return Report(
+            f"the {known.name} vehicle is heard but answers no request for a parameter: a router or a signing key "
+            "between us may keep it from hearing us",
+            make=known.name, vehicle=vehicle, armed=talk.armed, send=send,
+        )  # fmt: skip
+    report = _compared(known, values, send, asked_set, address if uart else None)
+    report.vehicle, report.armed = vehicle, talk.armed
+    if writing:
+        _write(talk, report, values)
+        after = _compared(known, values, send, report.source_set or None, address if uart else None)
+        report.rows, report.blocks, report.fits, report.verdict = after.rows, after.blocks, after.fits, after.verdict
+        if rebooting := [row.name for row in after.rows if row.reboot and row.name in _written(report)]:
+            report.notes.insert(
+                0, f"Reboot the vehicle, then run this again: {', '.join(rebooting)} count from then on."
+            )
+            report.verdict += "; the vehicle must be rebooted"
+    return report
+
+
+def _compared(
+    known: Knowledge, values: dict[str, Value], send: str, asked_set: int | None, uart: Address | None
+) -> Report:
+    chosen = source_set(known, values, asked_set)
+    wanted = known.wanted(send, chosen)
+    port = ""
+    if uart is not None:
+        found = port_of(known.serial_parameters, values, uart.number)
+        wanted += found.rows
+        port = " or ".join(found.candidates) or f"none is set to MAVLink at {uart.number} baud"
+    rows, blocks = rows_of(wanted, values), blocks_of(known, values)
+    wrong = [row for row in rows if row.status in ("wrong", "absent")]
+    fits = not wrong and not blocks
+    notes = list(known.notes)
+    if any(row.name in ENABLING and row.status == "wrong" for row in rows):
+        notes.insert(0, f"What is absent may appear once {' or '.join(ENABLING)} is set: run this again then.")
+    unusual = sum(row.status == "unusual" for row in rows)
+    verdict = (
+        f"{known.name} fits `--send {send}`" + (f"; {unusual} values are not what is advised" if unusual else "")
+        if fits
+        else f"{len(wrong)} of {len(rows)} parameters must change" + (f"; {len(blocks)} block arming" if blocks else "")
+    )
+    in_flight = known.in_flight if send in ("odometry", "vision") else ()
+    return Report(
+        verdict, fits, known.name, send=send, source_set=chosen, rows=rows, blocks=blocks, port=port, notes=notes,
+        in_flight=[line.replace("{n}", str(chosen)) for line in in_flight],
+    )  # fmt: skip
+
+
+def _written(report: Report) -> set[str]:
+    return {change.name for change in report.changes if change.done}
+
+
+def _write(talk: Talk, report: Report, values: dict[str, Value]) -> None:
+    """Set what must change and has a value to set; values are those of the vehicle afterwards."""
+    for row in report.rows:
+        if row.status == "absent":
+            report.refused.append(f"{row.name}: the vehicle does not have it")
+        if row.status != "wrong":
+            continue
+        if row.set_to is None:
+            report.refused.append(f"{row.name}: you must choose ({row.wanted})")
+            continue
+        if refusal := why_not(talk):
+            report.refused.append(refusal)
+            return
+        outcome = write(talk, row.name, values[row.name], row.set_to)
+        if isinstance(outcome, str):
+            report.refused.append(outcome)
+            continue
+        report.changes.append(outcome)
+        if outcome.after is not None:
+            values[row.name] = Value(outcome.after, values[row.name].kind)
+
+
+def _nobody(talk: Talk, meet_s: float) -> str:
+    counts = talk.reception.counts
+    heard = ", ".join(f"{name} {count}" for name, count in sorted(counts.items()))
+    if heard:
+        return (
+            f"no autopilot's HEARTBEAT in {meet_s:.0f} s, though something is heard ({heard}): "
+            "see --system, --component, --signing-key and the baud rate"
+        )
+    return f"nothing was heard in {meet_s:.0f} s: check cable, port and baud rate, and where the vehicle sends to"

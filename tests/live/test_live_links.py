@@ -1,0 +1,119 @@
+"""Links by their address: IPv6 beside IPv4, whole frames on a slow line, and what is counted."""
+
+from __future__ import annotations
+
+import socket
+import time
+
+import pytest
+
+from flownav.errors import InputError
+from flownav.live.byte_links import TcpLink
+from flownav.live.link import Address, UdpLink, open_link, parse_url, same_sender
+
+
+def has_ipv6():
+    try:
+        with socket.socket(socket.AF_INET6, socket.SOCK_DGRAM) as probe:
+            probe.bind(("::1", 0))
+    except OSError:
+        return False
+    return True
+
+
+needs_ipv6 = pytest.mark.skipif(not has_ipv6(), reason="this machine has no IPv6")
+
+
+def until(what, seconds=3.0):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if found := what():
+            return found
+        time.sleep(0.002)
+    raise AssertionError("it never came")
+
+
+# -- IPv6 -------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("url", "address"),
+    [
+        ("udp:[::1]:14550", Address("udp", "::1", 14550)),
+        ("udpin:[::]:14550", Address("udp", "::", 14550)),
+        ("udpout:[2001:db8::7]:14550", Address("udpout", "2001:db8::7", 14550)),
+        ("udpout:[fe80::1%eth0]:14550", Address("udpout", "fe80::1%eth0", 14550)),
+        ("tcp://[::1]:5760", Address("tcp", "::1", 5760)),
+        ("tcpin:[::ffff:10.0.0.1]:5760", Address("tcpin", "::ffff:10.0.0.1", 5760)),
+    ],
+)
+def test_an_ipv6_address_stands_in_brackets(url, address):
+    assert parse_url(url) == address
+
+
+@pytest.mark.parametrize("url", ["udp:::1:14550", "udp:[::1]", "udpout:[host]:1", "tcp:[::1:5760", "tcp:[]:5760"])
+def test_what_is_half_an_address_is_one_line(url):
+    with pytest.raises(InputError, match=r"no link; give .* an IPv6 address in brackets"):
+        parse_url(url)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        (("::1", 5, 0, 0), ("::1", 5, 0, 0), True),
+        (("fe80::1", 5, 0, 2), ("fe80::1%eth0", 5, 0, 2), True),
+        (("fe80::1%eth0", 5, 0, 2), ("fe80::1%eth1", 5, 0, 3), False),
+        (("10.0.0.1", 5), ("10.0.0.1", 6), False),
+        (None, ("10.0.0.1", 5), False),
+    ],
+)
+def test_who_is_the_same_sender(one, other, same):
+    assert same_sender(one, other) is same
+
+
+@needs_ipv6
+@pytest.mark.parametrize("listening", ["udp:[::1]:0", "udp:[::]:0"])
+def test_datagrams_go_both_ways_over_ipv6_and_strangers_are_not_heard(listening):
+    ours = open_link(listening)
+    assert isinstance(ours, UdpLink)
+    theirs, stranger = (open_link(f"udpout:[::1]:{ours.port}") for _ in range(2))
+    theirs.write(b"there")
+    [(piece, sender)] = until(ours.read)
+    assert piece == b"there"
+    ours.believe(sender)
+    ours.write(b"back")
+    assert [found for found, _ in until(theirs.read)] == [b"back"]
+    stranger.write(b"I am the vehicle")
+    until(lambda: ours.read() or ours.counts["other_sender"])
+    assert ours.counts["other_sender"] == 1
+    for link in (ours, theirs, stranger):
+        link.close()
+
+
+@needs_ipv6
+def test_every_interface_of_ipv6_hears_ipv4_too():
+    ours = open_link("udp:[::]:0")
+    theirs = open_link(f"udpout:127.0.0.1:{ours.port}")
+    theirs.write(b"there")
+    [(piece, sender)] = until(ours.read)
+    assert piece == b"there"
+    ours.believe(sender)
+    ours.write(b"back")
+    assert [found for found, _ in until(theirs.read)] == [b"back"]
+    ours.close()
+    theirs.close()
+
+
+@needs_ipv6
+def test_tcp_connects_over_ipv6():
+    server = open_link("tcpin:[::1]:0")
+    assert isinstance(server, TcpLink)
+    caller = open_link(f"tcp:[::1]:{server.port}")
+    server.read()
+    caller.write(b"there")
+    assert until(server.read) == [(b"there", None)]
+    caller.close()
+    server.close()
+
+
+def test_a_host_that_is_none_is_one_line():
+    with pytest.raises(InputError, match="cannot be opened"):
+        open_link("udpout:nowhere.invalid:14550")

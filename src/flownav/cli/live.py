@@ -53,7 +53,7 @@ def command(
     require_between("--gps-delay", gps_delay, 0.0, 1.0)
     require_between("--duration", 1.0 if duration is None else duration, 0.1, 1e6)
     if record is not None:
-        require_writable(record)
+        require_writable(record, sensor, signing_key, settings)
     options = _options(send, system, component, signing_key, gps_delay, sensor, settings)
     warm_up()
     link = open_link(url)

@@ -133,11 +133,14 @@ class Record:
         """Columns of a table side by side, shape (n, len(columns)). KeyError where one is missing."""
         return np.column_stack([self.tables[table][name] for name in columns]).astype(float)
 
-    def save(self, path: Path) -> None:
-        """Write the record as one file, whole or not at all (temporary name, then rename)."""
+    def save(self, path: Path, *, replacing: bool = False) -> None:
+        """Write the record as one file, whole or not at all (temporary name, then rename).
+
+        replacing: whoever asks knows that what is there may go. InputError, unless replacing, where it must not.
+        """
         from flownav.record_file import save
 
-        save(self, path)
+        save(self, path, replacing=replacing)
 
     @classmethod
     def load(cls, path: Path) -> Record:

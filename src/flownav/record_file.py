@@ -10,16 +10,17 @@ from __future__ import annotations
 import io
 import json
 import re
+import time
 import zipfile
 import zlib
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from flownav.errors import InputError
-from flownav.files import written_whole
+from flownav.guard import an_input, written_whole
 from flownav.measurement import COLUMNS, Sensor
 from flownav.parquet_pages import check_pages, read_footer
 from flownav.record import SCHEMA_VERSION, TABLES, Column, Record, Table
@@ -34,6 +35,7 @@ MOST_BYTES = 8 << 30  # of all tables in memory
 ALWAYS_BYTES = 64 << 20  # whatever the file's size
 GROWTH = 32  # times the file's size; records of flights grow two- to threefold
 TEXTS = {"innovation": ("sensor", "component", "reason"), "events": ("source", "kind", "detail")}
+NUMBERED = {"innovation": ("component",)}  # texts that the paper's filter, whose components have no names, numbers
 WRONG = (
     zipfile.BadZipFile, zlib.error, KeyError, ValueError, TypeError, OSError, EOFError, MemoryError, RuntimeError,
     ArithmeticError, AttributeError, IndexError,
@@ -67,23 +69,28 @@ class Manifest(BaseModel):
     segments: list[dict[str, float | bool]] | None = None
 
 
-def save(record: Record, path: Path) -> None:
-    """Write a record as one file, whole or not at all (temporary name, then rename)."""
+def save(record: Record, path: Path, *, replacing: bool = False) -> None:
+    """Write a record as one file, whole or not at all; as `Record.save` says."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    with written_whole(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as bundle:
+    with (
+        written_whole(path, replacing=replacing) as temporary,
+        zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as bundle,
+    ):
         manifest = {"schema": SCHEMA_VERSION, **record.manifest}
         bundle.writestr(MANIFEST, json.dumps(manifest, indent=1, default=str))
         for name, table in record.tables.items():
-            buffer = io.BytesIO()
-            pq.write_table(pa.table(table), buffer, compression="zstd")
-            bundle.writestr(f"{name}.parquet", buffer.getvalue())
+            columns, entry = pa.table(table), zipfile.ZipInfo(f"{name}.parquet", time.localtime()[:6])
+            with bundle.open(entry, "w", force_zip64=columns.nbytes >= zipfile.ZIP64_LIMIT) as stream:
+                pq.write_table(columns, pa.PythonFile(_Told(stream), "w"), compression="zstd")
+            del columns
+            pa.default_memory_pool().release_unused()
 
 
 def load(path: Path) -> Record:
     """Read a record. InputError where it is missing, no record, of a newer schema, or would become too large."""
-    if not path.is_file():
+    if not an_input(path).is_file():
         raise InputError(f"{path}: no such record; `flownav fly landing` writes one")
     try:
         with _Bounded(path) as file, zipfile.ZipFile(file) as bundle:
@@ -184,7 +191,9 @@ def _check_columns(table: str, schema: Any) -> list[int]:
         text = pa.types.is_string(kind) or pa.types.is_large_string(kind)
         number = pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind)
         stated = field.name == "t_s" or field.name in known
-        if not (text or number) or (stated and text != (field.name in TEXTS.get(table, ()))):
+        numbered = field.name in NUMBERED.get(table, ())  # by some writers
+        wrong = stated and not numbered and text != (field.name in TEXTS.get(table, ()))
+        if not (text or number) or wrong:
             raise ValueError(f"column {field.name} of table {table} is of type {kind}")
         if text:
             texts.append(place)
@@ -217,3 +226,22 @@ def _column(name: str, column: Any) -> Column:
         words = np.array([*chunk.dictionary.to_pylist(), None], object)  # the last for what is not there
         parts.append(words[chunk.indices.fill_null(len(words) - 1).to_numpy(zero_copy_only=False)])
     return np.concatenate(parts)
+
+
+class _Told:
+    """A file within a zip as Arrow writes to it, which asks how far it has come."""
+
+    closed = False
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self._stream, self._written = stream, 0
+
+    def write(self, data: Any) -> int:
+        self._written += self._stream.write(data)
+        return len(data)
+
+    def tell(self) -> int:
+        return self._written
+
+    def flush(self) -> None:
+        pass

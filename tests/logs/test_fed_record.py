@@ -85,11 +85,11 @@ def test_what_does_not_say_it_is_refused_in_one_line(tmp_path, kind, without):
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [
-        ("sensor", 99.0, "sensor that there is none"),
-        ("sensor", np.nan, "sensor that there is none"),
-        ("segment", 1.0, "segment that there is none"),
-        ("segment", -1.0, "segment that there is none"),
-        ("arrived", 0.5, "arrived that there is none"),
+        ("sensor", 99.0, "of an unknown sensor"),
+        ("sensor", np.nan, "of an unknown sensor"),
+        ("segment", 1.0, "of an unknown sensor or navigator"),
+        ("segment", -1.0, "of an unknown sensor or navigator"),
+        ("arrived", 0.5, "withheld in part"),
         ("t_s", np.nan, "without a time"),
         ("arrival_s", np.inf, "without a time"),
     ],

@@ -30,12 +30,13 @@ def command(
     from flownav.errors import InputError
     from flownav.report.envelope import write_envelope
     from flownav.simulation.scenario import load_scenario, with_vehicle
+    from flownav.text import number
 
     require_between("--flights", flights, 1, 1_000_000)
     require_between("--directions", directions, 1, 360)
     require_between("--seed", seed, 0, 2**63 - 1)
     try:
-        chosen_speeds = sorted({float(speed) for speed in speeds.split(",")})
+        chosen_speeds = sorted({number(speed) for speed in speeds.split(",")})
     except ValueError:
         raise InputError(f"--speeds {speeds}: numbers with commas are needed, such as 2,4,8") from None
     for speed in chosen_speeds:
@@ -45,7 +46,7 @@ def command(
     if last_s is None or last_s >= chosen.flight.duration_s or chosen.truth == "linear":
         raise InputError(f"{chosen.name}: it never lands; give a scenario with a may_land_after_s before its end")
     page = out or Path("out") / f"{chosen.name}_envelope.html"
-    require_writable(page)
+    require_writable(page, scenario, vehicle)
     with progress(f"Flying {chosen.name}", flights * directions * len(chosen_speeds)) as advance:
         rows = fly_envelope(
             chosen, chosen_speeds, directions_deg(directions), seed, flights, dispersed=ensemble, on_progress=advance

@@ -112,7 +112,7 @@ def command(
     if write or source_set is not None:
         raise InputError("--write and --source-set go with --setup only")
     if record is not None:
-        require_writable(record)
+        require_writable(record, sensor, signing_key, settings)
     limits = Limits(dead_reckoning_s=send_limit, sigma_m=send_sigma, protection_m=send_protection, unfused_s=unfused)
     options = replace(
         _options(send, system, component, signing_key, gps_delay, sensor, settings),

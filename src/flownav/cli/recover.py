@@ -36,7 +36,7 @@ def command(
     path = asked if force else free_name(asked)
     found = recovered(journal)
     try:
-        found.record.save(path)
+        found.record.save(path, replacing=force)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
     facts = {

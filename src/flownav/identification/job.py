@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flownav.errors import InputError
+from flownav.guard import an_input
 from flownav.identification.descent import Structure
 from flownav.identification.findings import Findings
 from flownav.identification.flight_identification import identify_flight
@@ -15,6 +16,7 @@ from flownav.identification.orders import CANDIDATES
 from flownav.identification.rig_identification import identify_rig
 from flownav.identification.rig_log import assign_heights, is_rig, read_runs
 from flownav.logs.open_log import log_kind
+from flownav.text import number
 
 
 def identify(
@@ -32,7 +34,7 @@ def identify(
     if not logs:
         raise InputError("no log given; identify takes rig folders, rig CSV files or one flight log")
     for path in logs:
-        if not path.exists():
+        if not an_input(path).exists():
             raise InputError(f"{path}: no such file or folder; identify takes rig logs and flight logs")
     flights = [path for path in logs if is_flight(path)]
     if flights and len(logs) > 1:
@@ -65,7 +67,7 @@ def is_flight(path: Path) -> bool:
 def parse_heights(text: str | None) -> list[float]:
     """Metres of `--heights 0.6,0.8`. InputError where one is no number."""
     try:
-        return [float(part) for part in text.split(",")] if text else []
+        return [number(part) for part in text.split(",")] if text else []
     except ValueError:
         raise InputError(f"--heights {text}: numbers in metres, parted by commas, are needed") from None
 

@@ -144,7 +144,7 @@ class Recorder:
             path = self.path if self._force else free_name(self.path)
             record = recovered(self.journal).record
             record.manifest["live"] = {**facts, **({"recording_stopped": reason} if reason else {})}
-            record.save(path)
+            record.save(path, replacing=self._force)
             forced_to_disk(path)
             self._remove_journal()
             return Finished(path, None, reason)

@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 
 from flownav.errors import InputError
+from flownav.guard import an_input
 from flownav.logs.rows import LATE_SHARE, Rows, drop_duplicates, drop_strays, longest_ordered
 from flownav.measurement import Array
+from flownav.text import number
 
 WRONG_UNIT_SHARE = 0.1  # more rows than this outside the limits: the column is in another unit
 LONGEST_MEDIAN_STEP_S = 10.0
@@ -74,7 +76,7 @@ def _needs(columns: Sequence[Column]) -> str:
 
 def _content(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return an_input(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give a folder of CSV files") from error
 
@@ -132,7 +134,7 @@ def _header(path: Path, content: bytes) -> list[str]:
 
 def _number(text: str | None) -> float:
     try:
-        return float(text) if text is not None else np.nan
+        return number(text) if text is not None else np.nan
     except ValueError:
         return np.nan
 

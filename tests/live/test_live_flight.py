@@ -5,6 +5,8 @@ from __future__ import annotations
 import gc
 import json
 import signal
+import subprocess
+import sys
 import threading
 import time
 import tracemalloc
@@ -234,3 +236,37 @@ def test_mistakes_are_one_line(options, said):
     result = CliRunner().invoke(app, ["live", *options])
     assert isinstance(result.exception, InputError)
     assert said in str(result.exception)
+
+
+class LateGps(Hover):
+    """GPS stamps that are 1.5 s old when they come."""
+
+    def frames(self, t_s):
+        now_s, self.boot_s = self.boot_s, self.boot_s - 1.5
+        gps = [frame for frame in super().frames(t_s) if frame[7] | frame[8] << 8 == 24]
+        self.steps, self.boot_s = self.steps - 1, now_s
+        return [*(frame for frame in super().frames(t_s) if frame[7] | frame[8] << 8 != 24), *gps]
+
+
+def test_a_sensor_that_was_heard_and_hardly_fused_is_a_bad_verdict_of_the_replay(tmp_path):
+    path = tmp_path / "late.fnr"
+    options = Options()
+    recorder = Recorder(path, options)
+    wire = Wire(LateGps(), options, recorder).fly(25.0)
+    wire.close()
+    assert wire.session.reason == "unfused"
+    facts = {"dropped": wire.session.dropped}
+    recorder.finish(facts)
+    run = replayed(path)
+    said = [finding.text for finding in run.findings if finding.unfused]
+    assert len(said) == 2
+    assert said[0].startswith("gps_position was heard and hardly fused (")
+    result = subprocess.run(
+        [sys.executable, "-m", "flownav", "replay", str(path), "--out", str(tmp_path / "again.fnr"), "--report"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert result.returncode == 1
+    assert "hardly fused" in result.stderr
+    assert_same_bits(path)

@@ -38,7 +38,7 @@ def ardupilot(**changed):
     found = {"AHRS_EKF_TYPE": 3, "EK3_ENABLE": 1, "VISO_TYPE": 1, "EK3_SRC_OPTIONS": 0, "FLOW_TYPE": 5,
              "RNGFND1_TYPE": 10, "RNGFND1_ORIENT": 25, "VISO_POS_M_NSE": 0.2, "VISO_VEL_M_NSE": 0.3,
              "VISO_YAW_M_NSE": 0.2, "VISO_DELAY_MS": 10, "VISO_SCALE": 1.0, "VISO_ORIENT": 0, "VISO_POS_X": 0.0,
-             "VISO_POS_Y": 0.0, "VISO_POS_Z": 0.0, "VISO_QUAL_MIN": 0, "SERIAL1_PROTOCOL": 2, "SERIAL1_BAUD": 57,
+             "VISO_POS_Y": 0.0, "VISO_POS_Z": 0.0, "VISO_QUAL_MIN": 10, "SERIAL1_PROTOCOL": 2, "SERIAL1_BAUD": 57,
              "SERIAL2_PROTOCOL": 2, "SERIAL2_BAUD": 115, "PLND_ENABLED": 0}  # fmt: skip
     for n, values in ((1, SETS), (2, OURS), (3, {"POSXY": 0, "VELXY": 0, "POSZ": 1, "VELZ": 0, "YAW": 1})):
         found |= {f"EK3_SRC{n}_{what}": number for what, number in values.items()}

@@ -82,7 +82,7 @@ def command(
         typer.echo(json.dumps(scores))
     else:
         _print(flown, scores)
-    wrong = [finding.text for finding in flown.findings if finding.flow_is_wrong]
+    wrong = [finding.text for finding in flown.findings if finding.flow_is_wrong or finding.unfused]
     if wrong:
         raise VerdictError(f"{folder}: {wrong[0]}")
 

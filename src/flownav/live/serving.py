@@ -6,18 +6,10 @@ from typing import NamedTuple
 
 from flownav.estimation.gating import Reason
 from flownav.measurement import Array, Sensor
+from flownav.navigation.serving import HORIZONTAL, REFUSALS
 
-HORIZONTAL = (
-    Sensor.GPS_POSITION,
-    Sensor.GPS_VELOCITY,
-    Sensor.FLOW_RATE,
-    Sensor.FLOW_VELOCITY,
-    Sensor.POSE,
-)
 WATCHED = (*HORIZONTAL, Sensor.RANGE)
 DOWNWARD = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE)  # on the ground they need not serve
-# A reading that knows nothing, or that another serves for, is no alarm; these are.
-REFUSALS = (Reason.INNOVATION_GATE, Reason.NOT_FINITE, Reason.DUPLICATE, Reason.LATE, Reason.STUCK, Reason.AHEAD)
 LATE = Reason.LATE.label
 LEAST_READINGS = 10
 GONE_S = 2.0  # a sensor that has said nothing for so long is silent, which the screen shows otherwise

@@ -18,7 +18,7 @@ from flownav.live.options import Options
 from flownav.live.rates import Rates
 from flownav.live.reception import Reception, Vehicle
 from flownav.live.requests import Requests
-from flownav.live.serving import HORIZONTAL, Refused
+from flownav.live.serving import Refused
 from flownav.live.simulator import Simulator
 from flownav.live.timing import VehicleClock
 from flownav.mavlink.converted import Pose
@@ -27,6 +27,7 @@ from flownav.mavlink.messages import CONVERTERS
 from flownav.mavlink.outgoing import Estimate
 from flownav.mavlink.state_messages import TrueState, hil_state_quaternion, sim_state
 from flownav.measurement import Measurement, Sensor
+from flownav.navigation.serving import HORIZONTAL
 
 SECOND = 1.0
 SEND_EVERY_S = 0.02  # without flow; with it, an estimate for each of its readings

@@ -5,6 +5,7 @@ So that a replay is exact.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, 
 from flownav.provenance import hash_of
 from flownav.record import FED, FED_FIRST, Record
 
+LATE = "late"
 KINDS = {"live": "a live session", "fly": "a simulated flight"}
 
 
@@ -42,7 +44,7 @@ def read_live_record(path: Path, *, flow_instance: int | None = None) -> Log:
             raise InputError(f"{path}: its navigator heard nothing that it could use")
         _check_rows(path, fed, len(segments))
         numbers = fed[:, FED.index("segment")].astype(int)
-        streams = _streams(fed)
+        streams = _with_late(_streams(fed), record.manifest.get("live"))
         parts = tuple(FedSegment(_floats(segments[i]), _queue(fed, numbers == i)) for i in range(len(segments)))
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise InputError(f"{path}: not a whole record of kind {kind!r} ({error}); write it again") from error
@@ -129,4 +131,16 @@ def _streams(fed: Array) -> dict[Sensor, Stream]:
                 quality=rows[:, FED.index("quality")],
                 delay_s=float(np.median(arrival - rows[:, 0])),
             )
+    return streams
+
+
+def _with_late(streams: dict[Sensor, Stream], facts: Any) -> dict[Sensor, Stream]:
+    """What a live session's horizon left out as late, as rejections of the sensors, heard in time or never."""
+    dropped = facts.get("dropped") if isinstance(facts, dict) else None
+    for sensor in Sensor:
+        late = dropped.get(f"{sensor.name.lower()}: {LATE}") if isinstance(dropped, dict) else None
+        if isinstance(late, int) and late > 0:
+            none = np.zeros((0, len(COLUMNS[sensor])))
+            stream = streams.get(sensor) or Stream.of(sensor, np.zeros(0), none)
+            streams[sensor] = replace(stream, rejected={**stream.rejected, LATE: late})
     return streams

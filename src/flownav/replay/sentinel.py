@@ -60,11 +60,14 @@ TURNS = tuple(reading for reading in READINGS if reading[0][1] * reading[1][0] <
 
 
 class Finding(NamedTuple):
-    """What is wrong with a log, whether the flow itself is (a bad verdict), and how it is called."""
+    """What is wrong with a log, and how it is called. Two kinds are a bad verdict: the flow itself is wrong, or a
+    horizontal sensor was heard and never fused.
+    """
 
     text: str
     flow_is_wrong: bool = False
     label: str = "Warning"
+    unfused: bool = False
 
 
 class Course(NamedTuple):

@@ -36,6 +36,7 @@ from flownav.replay.judged import (
 )
 from flownav.replay.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replay.sentinel import Finding, findings
+from flownav.replay.unfused import unfused
 from flownav.scoring.alignment import Alignment, align, velocity_of
 from flownav.scoring.coverage import silences
 from flownav.scoring.outage import OutageError, difference_at, horizontal_rms, outage_error
@@ -76,6 +77,7 @@ class Replay:
             what = "horizontal was fused" if len(fused) else "was fused"
             text = f"nothing {what}: the path is dead reckoning on attitude and accelerometer alone"
             found.append(Finding(text, label="Note"))
+        found += unfused(self.innovation, self.log.streams)
         return found + [Finding(text) for text in silences(self.log.streams, self.log.span_s)]
 
     @cached_property

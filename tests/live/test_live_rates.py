@@ -85,6 +85,9 @@ def test_a_line_that_others_fill_is_asked_for_less():
             asked_again += 1
             assert bytes_of(rates.begin(ARDUPILOT), ardupilot=True) < before
     assert asked_again == 2
+    unsettled = Rates(11_520.0, "odometry", signed=False)
+    unsettled.begin(ARDUPILOT)
+    assert not any(unsettled.heard(1140, 0.1 * step, settled=False) for step in range(300))
     quiet = Rates(11_520.0, "odometry", signed=False)
     quiet.begin(ARDUPILOT)
     assert not any(quiet.heard(900, 0.1 * step) for step in range(300))

@@ -156,11 +156,14 @@ class Rates:
         """The least time from one estimate to the next."""
         return 1.0 / self.plan.estimate_hz
 
-    def heard(self, size: int, now_s: float) -> bool:
-        """So many bytes arrived. True where the line has been overfull: the streams are to be asked for anew, lower."""
+    def heard(self, size: int, now_s: float, *, settled: bool = True) -> bool:
+        """So many bytes arrived. True where the line has been overfull: the streams are to be asked for anew, lower.
+
+        settled: the vehicle has been asked for all that is planned; before, what arrives says nothing of the plan.
+        """
         if self.capacity_bytes_s is None:
             return False
-        if not now_s - self._since_s <= 2.0 * LOOK_S:
+        if not settled or not now_s - self._since_s <= 2.0 * LOOK_S:
             self._bytes, self._since_s = 0, now_s
         self._bytes += size
         if now_s - self._since_s < LOOK_S:

@@ -44,7 +44,7 @@ bench: $(VENV)/.ready-test
 
 bench-once: $(VENV)/.ready-test
 	$(BIN)/flownav bench --flights 16
-	FLOWNAV_LIVE_BENCH_S=$${FLOWNAV_LIVE_BENCH_S:-8} $(BIN)/python -m pytest benchmarks --benchmark-disable
+	FLOWNAV_LIVE_BENCH_S=$${FLOWNAV_LIVE_BENCH_S:-8} FLOWNAV_SERIAL_BENCH_S=$${FLOWNAV_SERIAL_BENCH_S:-8} $(BIN)/python -m pytest benchmarks --benchmark-disable
 
 docs: $(VENV)/.ready-docs
 	$(BIN)/zensical build --strict --config-file mkdocs.yml

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 import struct
+import time
 from collections import Counter, deque
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,6 +12,7 @@ from typing import Any
 from flownav.live.link import Link
 from flownav.mavlink.dialect import coder
 from flownav.mavlink.framing import StreamFrames
+from flownav.mavlink.signing import sign_outgoing
 
 ARDUPILOT, PX4 = 3, 12
 INT8, INT32, REAL32 = 2, 6, 9
@@ -40,6 +42,7 @@ class FakeAutopilot:
     gimbal: bool = False
     tells_unknown: bool = False
     stubborn: tuple[str, ...] = ()
+    key: bytes | None = None
     counts: Counter[str] = field(default_factory=Counter)
     noise: random.Random = field(default_factory=lambda: random.Random(7))
 
@@ -47,6 +50,8 @@ class FakeAutopilot:
         self.mav: Any = coder(1, 1)
         self.other: Any = coder(1, 154)
         self._frames, self._coder = StreamFrames(), coder()
+        if self.key is not None:
+            sign_outgoing(self.mav, self.key, time.time())
         self.kinds = {name: kind_of(number, self.make) for name, number in self.parameters.items()}
 
     def heartbeat(self) -> bytes:

@@ -1,7 +1,8 @@
 """A serial line of a baud rate: a pseudo-terminal whose far end is an autopilot's UART, paced each way.
 
 The UART takes a tenth of the baud rate in bytes each second and has a small buffer: a frame that does not fit into it
-is dropped whole, as autopilots do. What we write and it has not taken yet is the backlog.
+is dropped whole, as autopilots do. (Of a fast line the buffer is what goes out in 0.1 s: our thread that plays the
+autopilot is not always on time.) What we write and it has not taken yet is the backlog.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ class Uart(Link):
         self.device, self._port = os.ttyname(port), port
         os.set_blocking(self.master, False)
         self._pace_bytes_s = baud / 10
+        self._most = max(BUFFER_BYTES, int(0.1 * self._pace_bytes_s))
         self._out = b""
         self._may_read = self._may_write = 0.0
         self._at_s = time.monotonic()
@@ -70,7 +72,7 @@ class Uart(Link):
         return [(piece, None)] if piece else []
 
     def write(self, frame: bytes) -> None:
-        if len(self._out) + len(frame) > BUFFER_BYTES:
+        if len(self._out) + len(frame) > self._most:
             self.counts["not_sent"] += 1
             self.dropped_s.append(time.monotonic())
             return

@@ -214,6 +214,9 @@ def test_ctrl_c_leaves_a_complete_record(tmp_path):
     facts = json.loads(output)
     assert facts["sent"] >= 30
     assert facts["record"] == str(path)
+    assert facts["traffic"]["received_bytes_s"] > 0.0
+    assert facts["traffic"]["written_bytes_s"] > 0.0
+    assert facts["traffic"]["capacity_bytes_s"] is None
     assert_same_bits(path)
 
 
@@ -224,6 +227,7 @@ def test_ctrl_c_leaves_a_complete_record(tmp_path):
         (["udp:0", "--send", "everything"], "--send everything: one of odometry, vision, landing-target, none"),
         (["udp:0", "--system", "0"], "--system 0: must be from 1 to 255"),
         (["udp:0", "--duration", "0"], "--duration 0.0: must be from 0.1"),
+        (["udp:0", "--capacity", "10"], "--capacity 10.0: must be from 500.0"),
         (["udp:0", "--gps-delay", "2"], "--gps-delay 2.0: must be from 0.0 to 1.0"),
         (["udp:0", "--signing-key", "no.key"], "no.key: cannot be read"),
     ],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 import time
+from contextlib import suppress
 
 import pytest
 
@@ -112,6 +113,45 @@ def test_tcp_connects_over_ipv6():
     assert until(server.read) == [(b"there", None)]
     caller.close()
     server.close()
+
+
+def test_a_peer_that_is_gone_does_not_stop_us_and_is_found_again():
+    """A call that nobody answers waited for a second, twice every second."""
+    with socket.socket() as server:
+        server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        server.bind(("127.0.0.1", 0))
+        server.listen(0)
+        address = server.getsockname()
+        link = open_link(f"tcp:127.0.0.1:{address[1]}")
+        accepted, _ = server.accept()
+        crowd = []
+        for _ in range(3):  # fill what waits to be accepted: further calls are not answered at all
+            caller = socket.socket()
+            caller.setblocking(False)
+            caller.connect_ex(address)
+            crowd.append(caller)
+        accepted.close()
+        longest_s = 0.0
+        for _ in range(300):
+            before_s = time.monotonic()
+            link.read()
+            longest_s = max(longest_s, time.monotonic() - before_s)
+            time.sleep(0.005)
+        assert longest_s < 0.2
+        assert link.counts["reconnected"] == 0
+        server.settimeout(0.001)
+        waiting = []
+
+        def found():
+            link.read()
+            with suppress(TimeoutError):
+                waiting.append(server.accept()[0])
+            return link.counts["reconnected"]
+
+        assert until(found, 15.0) == 1
+        for end in (*crowd, *waiting):
+            end.close()
+        link.close()
 
 
 def test_a_host_that_is_none_is_one_line():

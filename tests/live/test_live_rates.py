@@ -31,7 +31,15 @@ def test_a_link_of_unknown_capacity_is_asked_for_everything():
         found = plan(make, None, "odometry")
         assert found.streams == STREAMS[make == ARDUPILOT]
         assert found.bytes_s == pytest.approx(ASKED_B_S[make])
-        assert found.estimate_hz == math.inf
+        assert found.estimate_hz == (math.inf if make == PX4 else pytest.approx(47.6, abs=0.1))
+
+
+def test_ardupilot_is_sent_none_that_it_would_drop():
+    """Of 60 a second it takes 30: one less than 20 ms after the last is dropped."""
+    assert 40.0 < plan(ARDUPILOT, 92_160, "odometry").estimate_hz < 50.0
+    assert 40.0 < plan(ARDUPILOT, None, "vision").estimate_hz < 50.0
+    assert plan(ARDUPILOT, None, "landing-target").estimate_hz == math.inf
+    assert plan(PX4, 92_160, "odometry").estimate_hz > 250.0
 
 
 @pytest.mark.parametrize("make", [ARDUPILOT, PX4])
@@ -85,6 +93,9 @@ def test_a_line_that_others_fill_is_asked_for_less():
             asked_again += 1
             assert bytes_of(rates.begin(ARDUPILOT), ardupilot=True) < before
     assert asked_again == 2
+    unsettled = Rates(11_520.0, "odometry", signed=False)
+    unsettled.begin(ARDUPILOT)
+    assert not any(unsettled.heard(1140, 0.1 * step, settled=False) for step in range(300))
     quiet = Rates(11_520.0, "odometry", signed=False)
     quiet.begin(ARDUPILOT)
     assert not any(quiet.heard(900, 0.1 * step) for step in range(300))

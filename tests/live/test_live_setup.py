@@ -26,7 +26,8 @@ from flownav.live.setup.knowledge import MAKES, knowledge_of
 from flownav.live.setup.serial_port import baud_of
 from flownav.live.setup.talk import Talk
 from flownav.mavlink.dialect import coder, dialect
-from flownav.mavlink.parameters import INTEGERS, Value, decoded, set_value
+from flownav.mavlink.parameters import INTEGERS, Value, decoded, name_of, set_value
+from recorded_link import frames_of
 
 UDP = parse_url("udp:14550")
 SETS = {"POSXY": 3, "VELXY": 3, "POSZ": 1, "VELZ": 3, "YAW": 1}
@@ -329,6 +330,31 @@ def test_a_vehicle_without_answers_is_a_verdict_and_soon():
     assert "answers no request for a parameter" in report.verdict
     assert not report.fits
     assert link.now_s - 100.0 < 10.0
+
+
+def test_a_signed_vehicle_is_read_with_the_key_and_one_that_does_not_sign_is_not_heard():
+    key = bytes(range(32))
+    for signs in (True, False):
+        link = FakeLink(FakeAutopilot(ARDUPILOT, ardupilot(), key=key if signs else None))
+        talk = Talk(link, key=key, clock=link.clock, wait=link.wait)
+        report = check(talk, UDP, "odometry")
+        assert report.fits == signs
+        assert signs or "something is heard (unsigned 1" in report.verdict
+
+
+def test_parameters_that_a_real_ardupilot_told(data_folder):
+    """ArduPilot's simulator, 4.6-dev: 8-bit and 32-bit integers and floats, all cast to float."""
+    told = {}
+    for _, frame in frames_of(data_folder / "ardupilot-live" / "square" / "from_vehicle.tlog"):
+        message = coder().decode(bytearray(frame)) if frame[7:10] == b"\x16\0\0" else None
+        if message is not None:
+            told[name_of(message)] = decoded(message, ARDUPILOT)
+        if "EK3_SRC2_VELXY" in told:
+            break
+    assert told["EK3_SRC1_POSXY"] == Value(3.0, 2)
+    assert told["EK3_SRC2_VELXY"] == Value(5.0, 2)
+    assert told["INS_GYR_ID"].number == 2752772
+    assert told["BARO1_GND_PRESS"] == Value(83670.52, 9)
 
 
 def test_another_make_is_a_verdict():

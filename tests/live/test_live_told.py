@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from io import StringIO
 
+import pytest
 from rich.console import Console
 
 from flownav.estimation.gating import Reason
 from flownav.live.display import draw
 from flownav.live.loop import Latency
+from flownav.live.options import Options
 from flownav.live.screen import Screen
+from flownav.mavlink.dialect import coder
 from flownav.measurement import Sensor
-from live_ends import Hover, Wire
+from live_ends import HEIGHT_M, Hover, Wire
 
 
 def shown(wire):
@@ -30,5 +34,40 @@ def test_gps_without_vertical_velocity_is_not_shown_as_not_finite():
         assert "not_finite" not in shown(wire)
         session.innovations[int(Sensor.GPS_VELOCITY), 0] = (float("nan"), float("nan"), int(Reason.NOT_FINITE))
         assert "not_finite" in shown(wire)  # one that must be there
+    finally:
+        wire.close()
+
+
+class Px4(Hover):
+    """The same, of PX4's make."""
+
+    def frames(self, t_s):
+        made = super().frames(t_s)
+        beat = self.mav.heartbeat_encode(4, 12, 128, 0, 4, 3)
+        return [bytes(beat.pack(self.mav)), *made[1:]] if self.steps % 100 == 1 else made
+
+
+@pytest.mark.parametrize(("vehicle", "frame"), [(Hover(), 12), (Px4(), 1)])
+def test_the_pad_is_told_in_the_frame_that_the_autopilot_takes(vehicle, frame):
+    """ArduPilot takes BODY_FRD, PX4 LOCAL_NED: it refuses a valid position in any other."""
+    wire = Wire(vehicle, Options(send="landing-target"))
+    mav = coder(1, 191)
+
+    def see():
+        time_us = round((wire.vehicle.boot_s + wire.t_s) * 1e6)
+        message = mav.landing_target_encode(time_us, 0, 12, 0.1, -0.2, HEIGHT_M, 0, 0)
+        wire.socket.send(bytes(message.pack(mav)))
+
+    try:
+        wire.fly(4.0)
+        wire.fly(3.0, beside=see)
+        last = [message for message in wire.heard if message.msgname == "LANDING_TARGET"][-1]
+        own = wire.session.estimate
+        assert last.frame == frame
+        assert last.position_valid == 1
+        seen = HEIGHT_M / math.sqrt(1.0 + math.tan(0.2) ** 2 + math.tan(0.1) ** 2)  # down
+        body = (math.tan(0.2) * seen, math.tan(0.1) * seen, seen)
+        expected = body if frame == 12 else tuple(a + b for a, b in zip(body, own.pos_ned_m, strict=True))
+        assert (last.x, last.y, last.z) == pytest.approx(expected, abs=0.2)  # it hovers level, looking north
     finally:
         wire.close()

@@ -73,3 +73,15 @@ def test_a_vertical_velocity_that_gps_does_not_tell_is_no_rejection():
         log = type("Log", (), {"streams": streams})
 
     assert Replay.rejected(Flown) == {"gps_velocity": {"not_finite": 1}, "gps_position": {"not_finite": 1}}
+
+
+def test_a_velocity_of_which_nothing_is_told_is_broken():
+    rows = offers(*[(1.0, Sensor.GPS_VELOCITY, k, Reason.NOT_FINITE) for k in range(3)])
+    rows[:, 3] = np.nan
+    streams = {Sensor.GPS_VELOCITY: Stream.of(Sensor.GPS_VELOCITY, np.arange(1.0), np.zeros((1, 3)))}
+
+    class Flown:
+        innovation = rows
+        log = type("Log", (), {"streams": streams})
+
+    assert Replay.rejected(Flown) == {"gps_velocity": {"not_finite": 3}}

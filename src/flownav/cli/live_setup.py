@@ -65,8 +65,9 @@ def _print(report: Report) -> None:
         console.print(f"{state}: {change.name} {change.before:g} -> {after}")
     for line in report.refused:
         console.print(f"Not written: {line}", soft_wrap=True)
-    for block in report.blocks:
-        console.print(f"Blocks arming: {block.name} {block.has:g}: '{block.says}'", soft_wrap=True)
+    for says in dict.fromkeys(block.says for block in report.blocks):
+        having = ", ".join(f"{block.name} {block.has:g}" for block in report.blocks if block.says == says)
+        console.print(f"Blocks arming: '{says}' ({having})", soft_wrap=True)
     for line in report.notes:
         console.print(line, soft_wrap=True)
     if report.in_flight:
@@ -82,7 +83,7 @@ def _table(report: Report) -> Any:
     table = Table("parameter", "has", "wanted", "", "reboot")
     for row in report.rows:
         has = "-" if row.has is None else f"{row.has:g}"
-        reboot = "yes" if row.reboot and row.set_to is not None else ""
+        reboot = "yes" if row.reboot and row.status in ("wrong", "unusual", "absent") else ""
         table.add_row(row.name, has, row.wanted, MARKS.get(row.status, row.status), reboot)
     return table
 

@@ -74,9 +74,11 @@ class Answers:
         if on.work[PAD_KNOWN] != SEEN:  # the place of take-off is not what a camera lands on
             return []
         pad = [float(value) for value in on.work[STATE + PAD : STATE + PAD + 3]]
-        north, east, down = (pad[i] + offset_ned_m[i] - estimate.pos_ned_m[i] for i in range(3))
+        place = pad[0] + offset_ned_m[0], pad[1] + offset_ned_m[1], pad[2] + offset_ned_m[2]
+        north, east, down = (place[i] - estimate.pos_ned_m[i] for i in range(3))
         x, y, z = to_body(rotation_from_quaternion(*estimate.quaternion), north, east, down)
         distance_m = math.sqrt(x * x + y * y + z * z)
         if not z > STEEPEST * distance_m:
             return []
-        return [landing_target(self._mav, estimate.time_us, x / z, y / z, distance_m)]
+        in_earth = place if vehicle.make == PX4 else None
+        return [landing_target(self._mav, estimate.time_us, x / z, y / z, distance_m, pad_ned_m=in_earth)]

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import os
+import select
 import socket
 import time
 from contextlib import suppress
@@ -12,11 +14,15 @@ from flownav.errors import InputError
 from flownav.live.link import EVERYWHERE_6, MOST_BYTES, Address, Link, Piece
 from flownav.live.outgoing import Outgoing
 
-RECONNECT_S = 1.0
+RECONNECT_S = 1.0  # for a call to be answered
+UNHEARD_MS = 5000  # a peer that acknowledges nothing for so long is gone
 
 
 class TcpLink(Link):
-    """A connection that is made again when it breaks: by calling (tcp) or by waiting for a caller (tcpin)."""
+    """A connection that is made again when it breaks: by calling (tcp) or by waiting for a caller (tcpin).
+
+    Only the first call waits, before anything flies: later ones go to the same address and never stop the session.
+    """
 
     def __init__(self, address: Address) -> None:
         super().__init__(address)
@@ -24,6 +30,8 @@ class TcpLink(Link):
         self._outgoing = Outgoing(self.counts)
         self._server: socket.socket | None = None
         self._connection: socket.socket | None = None
+        self._calling: socket.socket | None = None
+        self._called_s = 0.0
         self._tries = 0
         if address.kind == "tcpin":
             family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
@@ -34,12 +42,15 @@ class TcpLink(Link):
             self._server.setblocking(False)
             self.port = int(self._server.getsockname()[1])
         else:
-            self._connection = self._called()
+            found = socket.create_connection((address.host, address.number), timeout=RECONNECT_S)
+            self._peer = found.family, found.getpeername()
+            self._connection = self._made(found)
 
-    def _called(self) -> socket.socket:
-        connection = socket.create_connection((self._address.host, self._address.number), timeout=RECONNECT_S)
+    def _made(self, connection: socket.socket) -> socket.socket:
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        with suppress(OSError, AttributeError):  # Linux
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNHEARD_MS)
         return connection
 
     def fileno(self) -> int:
@@ -69,16 +80,41 @@ class TcpLink(Link):
     def _connect(self) -> None:
         try:
             if self._server is not None:
-                self._connection, _ = self._server.accept()
-                self._connection.setblocking(False)
+                self._connection = self._made(self._server.accept()[0])
+            elif self._calling is None:
+                self._call()
             else:
-                self._tries += 1
-                if self._tries % 100 == 0:  # every half second
-                    self._connection = self._called()
+                self._answered(self._calling)
         except OSError:
-            return
+            self._given_up()
         if self._connection is not None:
             self.counts["reconnected"] += 1
+
+    def _call(self) -> None:
+        """Begin to call, every half second."""
+        self._tries += 1
+        if self._tries % 100:
+            return
+        family, address = self._peer
+        self._calling, self._called_s = socket.socket(family, socket.SOCK_STREAM), time.monotonic()
+        self._calling.setblocking(False)
+        if self._calling.connect_ex(address) not in (0, errno.EINPROGRESS):
+            self._given_up()
+
+    def _answered(self, calling: socket.socket) -> None:
+        """Whether the call was answered by now."""
+        if select.select([], [calling], [], 0.0)[1]:
+            if calling.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR):
+                self._given_up()
+            else:
+                self._connection, self._calling = self._made(calling), None
+        elif time.monotonic() - self._called_s > RECONNECT_S:
+            self._given_up()
+
+    def _given_up(self) -> None:
+        if self._calling is not None:
+            self._calling.close()
+        self._calling = None
 
     def _broken(self) -> None:
         if self._connection is not None:
@@ -110,6 +146,7 @@ class TcpLink(Link):
     def close(self) -> None:
         """Close connection and server."""
         self._broken()
+        self._given_up()
         if self._server is not None:
             self._server.close()
 

@@ -11,6 +11,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 ARDUPILOT, PX4 = 3, 12  # MAV_AUTOPILOT
+# of estimates: EKF3 drops one whose stamp is less than 20 ms after the last's (AP_NavEKF3.h, extNavIntervalMin_ms), so
+# that 60 a second are 30
+ARDUPILOT_MOST_HZ = 1.0 / 0.021
 PX4_LEAST_HZ = 30.0  # of estimates; EKF2 does not fuse fewer (docs/en/ros/external_position_estimation.md)
 # message: id and rate [Hz]; the IMU moves the state, the others correct it
 COMMON = {
@@ -100,9 +103,10 @@ def plan(
     spare: the part of the line's share that may be planned with; less where others fill it.
     """
     ardupilot = make == ARDUPILOT
+    most_hz = ARDUPILOT_MOST_HZ if ardupilot and send in ("odometry", "vision") else float("inf")
     wanted = STREAMS[ardupilot] | (beside or {})
     if capacity_bytes_s is None:
-        return Plan(wanted, bytes_of(wanted, ardupilot=ardupilot, signed=signed), float("inf"))
+        return Plan(wanted, bytes_of(wanted, ardupilot=ardupilot, signed=signed), most_hz)
     most_bytes_s = SHARE * spare * capacity_bytes_s
 
     def taken(steps: list[int]) -> tuple[Streams, float]:
@@ -120,7 +124,7 @@ def plan(
         steps = fewer if taken(fewer)[1] <= most_bytes_s else steps
     streams, bytes_s = taken(steps)
     frame = ESTIMATE[send] + (SIGNATURE if signed else 0)
-    estimate_hz = SHARE * capacity_bytes_s / frame if ESTIMATE[send] else float("inf")
+    estimate_hz = min(SHARE * capacity_bytes_s / frame, most_hz) if ESTIMATE[send] else float("inf")
     lacks = ["the least rates of the sensors"] if bytes_s > most_bytes_s else []
     lacks += (
         [f"the {PX4_LEAST_HZ:.0f} estimates/s that PX4 fuses"] if make == PX4 and estimate_hz < PX4_LEAST_HZ else []
@@ -156,11 +160,14 @@ class Rates:
         """The least time from one estimate to the next."""
         return 1.0 / self.plan.estimate_hz
 
-    def heard(self, size: int, now_s: float) -> bool:
-        """So many bytes arrived. True where the line has been overfull: the streams are to be asked for anew, lower."""
+    def heard(self, size: int, now_s: float, *, settled: bool = True) -> bool:
+        """So many bytes arrived. True where the line has been overfull: the streams are to be asked for anew, lower.
+
+        settled: the vehicle has been asked for all that is planned; before, what arrives says nothing of the plan.
+        """
         if self.capacity_bytes_s is None:
             return False
-        if not now_s - self._since_s <= 2.0 * LOOK_S:
+        if not settled or not now_s - self._since_s <= 2.0 * LOOK_S:
             self._bytes, self._since_s = 0, now_s
         self._bytes += size
         if now_s - self._since_s < LOOK_S:

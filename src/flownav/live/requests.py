@@ -65,8 +65,13 @@ class Requests:
                 continue
             heard_s = before.heard_s if before is not None else float("-inf")
             self._streams[name] = _Stream(number, rate_hz, now_s, heard_s, SILENT_S)
-            if name not in self._left:
+            if name not in self._left[bool(self._tries) :]:  # one that is under way was asked for at the old rate
                 self._left.append(name)
+
+    @property
+    def settled(self) -> bool:
+        """Whether everything was asked for."""
+        return not self._left
 
     def heard(self, name: str, now_s: float) -> None:
         """A message of the vehicle."""

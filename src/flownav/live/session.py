@@ -132,7 +132,8 @@ class Session:
                 self._told(message, self.clock, vehicle, now_s)
             if message.msgname in CONVERTERS:
                 self._measured(message, self.clock, vehicle, now_s)
-        if self.rates.heard(len(piece), now_s) and self.reception.vehicle is not None and self.clock is not None:
+        overfull = self.rates.heard(len(piece), now_s, settled=self.requests.settled)
+        if overfull and self.reception.vehicle is not None and self.clock is not None:
             self.requests.revise(self.reception.vehicle, now_s)
             t_s = self.clock.now_s(now_s)
             self.keeper.note(t_s, "link", "overfull", "streams are asked for at lower rates", self.rates.plan.bytes_s)

@@ -13,7 +13,7 @@ import numpy as np
 
 from flownav.frames import Quaternion, Vector, euler_from_quaternion, rotation_from_quaternion, to_body
 from flownav.mavlink.dialect import Message
-from flownav.mavlink.position_messages import BODY_FRD, LOCAL_FRD
+from flownav.mavlink.position_messages import BODY_FRD, LOCAL_FRD, LOCAL_NED
 from flownav.measurement import Array
 
 NAN = float("nan")
@@ -97,26 +97,30 @@ def landing_target(
     distance_m: float,
     *,
     target: int = 0,
+    pad_ned_m: Vector | None = None,
 ) -> Message:
     """LANDING_TARGET (#149) from a sighting of the pad: angles and distance, and the position in BODY_FRD.
 
     tan_forward, tan_right: tangents of the angles from body down; distance along the line of sight [m], NaN where
     unknown: then it is sent as 0 and the position as not valid. angle_x is to the right, angle_y backwards.
+    pad_ned_m: the pad's place about the autopilot's origin, told in LOCAL_NED in place of the one in BODY_FRD.
+
+    Trap. ArduPilot takes BODY_FRD and no other frame, PX4 LOCAL_NED and no other: it refuses a valid position in
+    BODY_FRD with `landing target: unsupported coordinate frame` (mavlink_receiver.cpp, handle_message_landing_target).
     """
     known = math.isfinite(distance_m) and distance_m > 0.0
     down = distance_m / math.sqrt(1.0 + tan_forward**2 + tan_right**2) if known else 0.0
+    place = (tan_forward * down, tan_right * down, down) if pad_ned_m is None else pad_ned_m
     return mav.landing_target_encode(
         time_us,
         target,
-        BODY_FRD,
+        BODY_FRD if pad_ned_m is None else LOCAL_NED,
         math.atan(tan_right),
         math.atan(-tan_forward),
         distance_m if known else 0.0,
         0.0,
         0.0,
-        tan_forward * down,
-        tan_right * down,
-        down,
+        *place,
         [1.0, 0.0, 0.0, 0.0],
         0,
         int(known),

@@ -42,12 +42,18 @@ def consistency_scores(innovation: Array) -> dict[str, dict[str, Any]]:
 
 
 def told(innovation: Array) -> Array:
-    """The offered components without those that their sensor left out (MAVLink's GPS has no vertical velocity)."""
-    left_out = np.zeros(len(innovation), bool)
+    """The offered components without those that their sensor left out (MAVLink's GPS has no vertical velocity).
+
+    A component is left out where it is NaN and another of the same reading is not.
+    """
+    t_s, observed = innovation[:, 0], innovation[:, 3]
+    kept = np.ones(len(innovation), bool)
     for sensor, component in MAY_BE_LEFT_OUT:
-        left_out |= (innovation[:, 1] == sensor) & (innovation[:, 2] == component)
-    left_out &= np.isnan(innovation[:, 3]) & (innovation[:, 8] == Reason.NOT_FINITE)
-    return np.asarray(innovation[~left_out])
+        of_sensor = innovation[:, 1] == sensor
+        beside = np.isin(t_s, t_s[of_sensor & np.isfinite(observed)])
+        left_out = (innovation[:, 2] == component) & np.isnan(observed) & (innovation[:, 8] == Reason.NOT_FINITE)
+        kept &= ~(of_sensor & beside & left_out)
+    return np.asarray(innovation[kept])
 
 
 def reading_scores(innovation: Array, streams: Mapping[Sensor, Stream]) -> dict[str, dict[str, Any]]:

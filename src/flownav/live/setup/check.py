@@ -88,7 +88,7 @@ def check(
     report.vehicle, report.armed = vehicle, talk.armed
     if writing:
         _write(talk, report, values)
-        after = _compared(known, values, send, report.source_set or None, address if uart else None)
+        after = _compared(known, values, send, asked_set or report.source_set or None, address if uart else None)
         report.rows, report.blocks, report.fits, report.verdict = after.rows, after.blocks, after.fits, after.verdict
         if rebooting := [row.name for row in after.rows if row.reboot and row.name in _written(report)]:
             report.notes.insert(
@@ -102,6 +102,7 @@ def _compared(
     known: Knowledge, values: dict[str, Value], send: str, asked_set: int | None, uart: Address | None
 ) -> Report:
     chosen = source_set(known, values, asked_set)
+    by_estimate = send in ("odometry", "vision")
     wanted = known.wanted(send, chosen)
     port = ""
     if uart is not None:
@@ -111,18 +112,19 @@ def _compared(
     rows, blocks = rows_of(wanted, values), blocks_of(known, values)
     wrong = [row for row in rows if row.status in ("wrong", "absent")]
     fits = not wrong and not blocks
-    notes = list(known.notes)
+    notes = list(known.notes) if by_estimate else []
     if any(row.name in ENABLING and row.status == "wrong" for row in rows):
         notes.insert(0, f"What is absent may appear once {' or '.join(ENABLING)} is set: run this again then.")
     unusual = sum(row.status == "unusual" for row in rows)
     verdict = (
         f"{known.name} fits `--send {send}`" + (f"; {unusual} values are not what is advised" if unusual else "")
         if fits
-        else f"{len(wrong)} of {len(rows)} parameters must change" + (f"; {len(blocks)} block arming" if blocks else "")
+        else f"{len(wrong)} of {len(rows)} parameters must change" + ("; arming is blocked" if blocks else "")
     )
-    in_flight = known.in_flight if send in ("odometry", "vision") else ()
+    in_flight = known.in_flight if by_estimate else ()
     return Report(
-        verdict, fits, known.name, send=send, source_set=chosen, rows=rows, blocks=blocks, port=port, notes=notes,
+        verdict, fits, known.name, send=send, source_set=chosen if by_estimate else 0, rows=rows, blocks=blocks,
+        port=port, notes=notes,
         in_flight=[line.replace("{n}", str(chosen)) for line in in_flight],
     )  # fmt: skip
 

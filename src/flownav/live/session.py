@@ -221,9 +221,8 @@ class Session:
         listened = t_s - self._listening_s >= self.options.listen_s
         if self.filtering.running is None and listened and len(self.horizon):
             self.filtering.begin(self.horizon.waiting(), self._gps_heard, self.origin_deg_m)
-        if self.filtering.running is not None:
-            self._feed(t_s - self.options.horizon_s)
-        if self.due or now_s - self._sent_s >= SEND_EVERY_S:
+        behind = self.filtering.running is not None and self._feed(t_s - self.options.horizon_s)
+        if not behind and (self.due or now_s - self._sent_s >= SEND_EVERY_S):
             self.due, self._sent_s = False, now_s
             self._offer(t_s, now_s)
         if now_s - self._second_s >= SECOND:
@@ -234,13 +233,14 @@ class Session:
         if request is not None:
             self._send(request, now_s)
 
-    def _feed(self, until_s: float) -> None:
-        while released := self.horizon.release(until_s, BATCH):
+    def _feed(self, until_s: float) -> bool:
+        """A batch: what was listened to for seconds must not hold up what arrives now. True where more is due."""
+        released = self.horizon.release(until_s, BATCH)
+        if released:
             outcome = self.filtering.feed(released)
             for row in outcome.innovation.tolist():
                 self.innovations[int(row[1]), int(row[2])] = (row[5], row[7], int(row[8]))
-            if len(released) < BATCH:
-                return
+        return len(released) == BATCH
 
     def _offer(self, t_s: float, now_s: float) -> None:
         """Send the estimate of now, or say why not."""

@@ -15,6 +15,7 @@ import socket
 import struct
 import time
 from collections import deque
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -42,8 +43,9 @@ def vehicle(port: int, seconds: float) -> None:
     from flownav.mavlink import sensors_outgoing as say
     from live_ends import ORIGIN, Hover, reading
 
-    if PRIORITY:
-        run_before_others()  # a vehicle's sensors do not wait for our processes either
+    if PRIORITY:  # a vehicle's sensors do not wait for our processes, nor does the session wait for them
+        with suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, 0, -15)
     link, mav = open_link(f"udpout:127.0.0.1:{port}"), Hover().mav
     noise = Hover().noise
     start = time.monotonic()

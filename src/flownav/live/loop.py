@@ -130,7 +130,7 @@ def run_session(
                     link.believe(sender)
                     spoke_s = now_s
                 if session.due and not flow:
-                    flow_s = now_s
+                    flow_s = NAN if session.reason else now_s  # where nothing is sent, nothing waits
                     flow_s = tick()
             flow_s, now_s = tick(), clock()
             if now_s - spoke_s > SILENT_S:

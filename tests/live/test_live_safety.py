@@ -13,11 +13,14 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from flownav.errors import InputError
+from flownav.live.answers import ODOMETRY_COMPONENT
 from flownav.live.display import draw
 from flownav.live.estimating import why_withheld
 from flownav.live.horizon import MOST_WAITING
 from flownav.live.loop import Latency
 from flownav.live.options import Limits, Options
+from flownav.live.reception import BESIDE, Accepted, accepted_by, accepted_of
 from flownav.live.screen import Screen
 from flownav.mavlink.dialect import coder
 from flownav.mavlink.position_messages import LOCAL_FRD
@@ -139,8 +142,8 @@ def test_a_flood_is_dropped_and_counted_and_memory_stays(wires):
         stamp = ahead_us + 1_000_000 + k  # a second ahead: all would wait
         message = mav.highres_imu_encode(stamp, 0, 0, -9.8, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0x3F)
         wire.session.take(bytes(message.pack(mav)), wire.now_s, whole=True)
-        assert len(wire.session.horizon) <= MOST_WAITING
-    assert wire.session.dropped["horizon: overflow"] > MOST_WAITING // 2
+        assert len(wire.session.hearing.horizon) <= MOST_WAITING
+    assert wire.session.dropped["imu: overflow"] > MOST_WAITING // 2
     began = wire.t_s
     wire.fly(12.0)
     assert wire.session.reason == ""
@@ -260,7 +263,7 @@ def test_without_any_horizontal_aid_it_stops_and_says_why(wires):
     lost = wire.t_s
     wire.fly(7.0)
     assert wire.session.reason == "position_invalid"
-    assert not wire.estimates(lost + 5.5)
+    assert not wire.estimates(lost + 1.7)
     wire.vehicle.gps = wire.vehicle.flow = True
     wire.fly(2.0)
     assert wire.session.reason == ""
@@ -367,3 +370,127 @@ def test_the_pad_is_told_once_it_was_seen(wires):
     assert last.angle_y == pytest.approx(-0.2, abs=0.05)
     assert last.position_valid == 1
     assert coder().decode(bytearray(wire.frames[-1])).get_srcSystem() == 1
+
+
+CAMERA = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
+
+
+def sees_the_pad(wire, system, component):
+    """A camera's LANDING_TARGET, through the autopilot's link, under its own component."""
+    mav = coder(system, component)
+
+    def see():
+        time_us = round((wire.vehicle.boot_s + wire.t_s) * 1e6)
+        message = mav.landing_target_encode(time_us, 0, 12, 0.1, -0.2, HEIGHT_M, 0, 0)
+        wire.socket.send(bytes(message.pack(mav)))
+
+    return see
+
+
+def test_a_camera_with_a_component_of_its_own_is_heard(wires):
+    wire = wires(send="landing-target").fly(4.0)
+    wire.fly(3.0, beside=sees_the_pad(wire, 1, CAMERA))
+    assert wire.session.reason == ""
+    last = [message for message in wire.heard if message.msgname == "LANDING_TARGET"][-1]
+    assert last.angle_x == pytest.approx(0.1, abs=0.05)
+    assert "link: lost" not in wire.session.dropped  # its sequence is not the autopilot's
+
+
+def test_a_camera_of_another_system_is_heard_where_it_is_named(wires):
+    for accept, heard in (((), False), (accepted_by(["LANDING_TARGET=42.191"]), True)):
+        wire = wires(send="landing-target", **({"accept": accept} if accept else {})).fly(4.0)
+        wire.fly(2.0, beside=sees_the_pad(wire, 42, CAMERA))
+        assert (wire.session.reason == "") is heard
+        assert (wire.session.dropped.get("link: other_system", 0) > 100) is not heard
+
+
+def test_what_flownav_sent_itself_is_not_taken_when_it_comes_back(wires):
+    wire = wires(send="landing-target").fly(4.0)
+    wire.fly(2.0, beside=sees_the_pad(wire, 1, ODOMETRY_COMPONENT))
+    assert wire.session.reason == "no_pad"
+
+
+@pytest.mark.parametrize("text", ["", "LANDING_TARGET", "LANDING_TARGET=1", "LANDING_TARGET=1.256", "NO_SUCH=1.1"])
+def test_what_accepts_nothing_is_one_line(text):
+    with pytest.raises(InputError, match=f"--accept {text}: "):
+        accepted_of(text)
+
+
+def test_one_naming_replaces_what_is_accepted_of_that_message():
+    accepted = accepted_by(["LANDING_TARGET=0.191"])
+    assert accepted[0] == Accepted("LANDING_TARGET", None, CAMERA)
+    assert [entry.message for entry in accepted].count("LANDING_TARGET") == 1
+    assert {entry.message for entry in accepted} == {entry.message for entry in BESIDE}
+
+
+class Asked(Hover):
+    """Sends a stream only after it was asked for since its last boot, as ArduPilot does; HEARTBEAT comes always."""
+
+    def __post_init__(self):
+        super().__post_init__()
+        self.rates = set()
+
+    def frames(self, t_s):
+        return [f for f in super().frames(t_s) if (number := f[7] | f[8] << 8) == 0 or number in self.rates]
+
+
+def answering(wire):
+    """Commands are acknowledged, and TIMESYNC is answered; for `fly(beside=...)`."""
+    done = 0
+
+    def answer():
+        nonlocal done
+        mav = wire.vehicle.mav
+        for message in wire.heard[done:]:
+            if message.msgname == "COMMAND_LONG" and message.command == 511:
+                wire.vehicle.rates.add(int(message.param1))
+                wire.socket.send(bytes(mav.command_ack_encode(511, 0).pack(mav)))
+            elif message.msgname == "TIMESYNC" and not message.tc1:
+                boot_ns = round((wire.vehicle.boot_s + wire.t_s) * 1e9)
+                wire.socket.send(bytes(mav.timesync_encode(boot_ns, message.ts1).pack(mav)))
+        done = len(wire.heard)
+
+    return answer
+
+
+def test_a_vehicle_that_reboots_and_sends_nothing_unasked_is_back_within_a_few_seconds(wires):
+    wire = wires(Asked())
+    answer = answering(wire)
+    wire.fly(8.0, beside=answer)
+    assert wire.session.reason == ""
+    wire.vehicle.boot_s, wire.vehicle.rates = 1.0 - wire.t_s, set()
+    rebooted = wire.t_s
+    wire.fly(10.0, beside=answer)
+    back = min(
+        t_s for m, t_s in zip(wire.heard, wire.heard_s, strict=True) if m.msgname == "ODOMETRY" and t_s > rebooted + 1.0
+    )
+    assert back - rebooted < 3.0 + Options().listen_s + 1.0  # asked within 3 s, listened to, started
+    assert wire.session.reason == ""
+
+
+def test_one_stream_that_stops_is_asked_for_again(wires):
+    wire = wires(Asked())
+    answer = answering(wire)
+    wire.fly(5.0, beside=answer)
+    wire.vehicle.rates.discard(132)
+    stopped = wire.t_s
+    wire.fly(4.0, beside=answer)
+    asked = [t_s for m, t_s in zip(wire.heard, wire.heard_s, strict=True)
+             if m.msgname == "COMMAND_LONG" and m.param1 == 132 and t_s > stopped]  # fmt: skip
+    assert len(asked) == 1
+    assert asked[0] - stopped < 2.5
+    assert 132 in wire.vehicle.rates
+
+
+def test_quality_is_what_is_left_of_the_limits(wires):
+    wire = wires().fly(6.0)
+    sure = wire.estimates()[-1].quality
+    assert 50 < sure <= 100
+    strict = wires(limits=Limits(protection_m=1.2 * float(wire.session.filtering.running.work[PROTECTION]))).fly(6.0)
+    assert 1 <= strict.estimates()[-1].quality < 30
+    wire.vehicle.gps = wire.vehicle.flow = False
+    lost = wire.t_s
+    wire.fly(2.0)
+    coasting = [message.quality for message in wire.estimates(lost)]
+    assert coasting[-1] < 20 < sure
+    assert not wire.estimates(lost + Limits().dead_reckoning_s + 0.4)

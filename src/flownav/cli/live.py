@@ -37,17 +37,36 @@ def command(
     component: Annotated[int | None, typer.Option(help="Listen to this component only.")] = None,
     gps_delay: Annotated[float, typer.Option(metavar="S", help="How old a GPS reading is when it arrives.")] = 0.22,
     settings: Annotated[Path | None, typer.Option(help="TOML of filter settings (docs/landing-filter.md).")] = None,
+    send_limit: Annotated[
+        float, typer.Option(metavar="S", help="Send no longer than this without a horizontal aid (dead reckoning).")
+    ] = 1.2,
+    send_sigma: Annotated[
+        float, typer.Option(metavar="M", help="Send while one standard deviation of the position is below this.")
+    ] = 5.0,
+    send_protection: Annotated[
+        float, typer.Option(metavar="M", help="Send while the horizontal protection level is below this.")
+    ] = 20.0,
+    unfused: Annotated[
+        float, typer.Option(metavar="S", help="Withhold when a horizontal sensor is heard and not fused for so long.")
+    ] = 5.0,
+    accept: Annotated[
+        list[str] | None,
+        typer.Option(metavar="MESSAGE=SYSTEM.COMPONENT", help="Who else may tell a message; 0: any. May be repeated."),
+    ] = None,
     duration: Annotated[float | None, typer.Option(help="End after so many seconds; Ctrl-C where unsaid.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Navigate a vehicle that is connected by MAVLink: fuse its sensors, send the estimate, show and record it."""
+    from dataclasses import replace
+
     from flownav.cli.output import require_between, require_writable
     from flownav.errors import InputError, VerdictError
     from flownav.live.display import on_terminal
     from flownav.live.link import open_link
     from flownav.live.loop import Latency, run_session, stoppable
-    from flownav.live.options import SENDINGS
+    from flownav.live.options import SENDINGS, Limits
     from flownav.live.priority import run_before_others
+    from flownav.live.reception import accepted_by
     from flownav.live.recorder import NoRecorder, Recorder, told_every_second
     from flownav.live.screen import Screen
     from flownav.live.session import Session
@@ -58,10 +77,19 @@ def command(
     for option, number in (("--system", system), ("--component", component)):
         require_between(option, 1 if number is None else number, 1, 255)
     require_between("--gps-delay", gps_delay, 0.0, 1.0)
+    require_between("--send-limit", send_limit, 0.1, 60.0)
+    require_between("--send-sigma", send_sigma, 0.01, 1000.0)
+    require_between("--send-protection", send_protection, 0.01, 1000.0)
+    require_between("--unfused", unfused, 1.0, float("inf"))
     require_between("--duration", 1.0 if duration is None else duration, 0.1, 1e6)
     if record is not None:
         require_writable(record)
-    options = _options(send, system, component, signing_key, gps_delay, sensor, settings)
+    limits = Limits(dead_reckoning_s=send_limit, sigma_m=send_sigma, protection_m=send_protection, unfused_s=unfused)
+    options = replace(
+        _options(send, system, component, signing_key, gps_delay, sensor, settings),
+        limits=limits,
+        accept=accepted_by(accept or []),
+    )
     warm_up()
     link = open_link(url)
     shown = not as_json and sys.stdout.isatty()
@@ -170,9 +198,16 @@ def _facts(session: Session, latency: Latency, duration_s: float) -> dict[str, A
         "sent": session.sent,
         "withheld": dict(session.withheld),
         "readings": {sensor.name.lower(): count for sensor, count in sorted(session.readings.items())},
-        "sources": session.sources.names(),
+        "sources": session.hearing.sources.names(),
         "dropped": session.dropped,
-        "resets": session.filtering.jumps,
+        "resets": session.resets,
+        "alarms": {
+            sensor.name.lower(): {"unfused_s": spell.until_s - spell.since_s, "reason": spell.why}
+            for sensor, spell in sorted(session.alarms.items())
+        },
+        "horizon_s": session.hearing.horizon_s,
+        "lags_s": {sensor.name.lower(): lag_s for sensor, lag_s in sorted(session.hearing.lags.by_sensor.items())},
+        "origin": session.hearing.origin.as_facts(),
         "requests": dict(session.requests.answers),
         "refused": session.requests.refused,
         "timesync_round_trip_ms": 1e3 * best.round_trip_s if best else None,
@@ -193,6 +228,8 @@ def _print(facts: dict[str, Any]) -> None:
     vehicle = facts["vehicle"]
     who = f"system {vehicle['system']}, component {vehicle['component']}" if vehicle else "no vehicle was heard"
     console.print(f"{facts['duration_s']:.1f} s, {who}; {facts['sent']} estimates sent, {facts['resets']} resets")
+    for name, alarm in facts["alarms"].items():
+        console.print(f"ALARM: {name} was heard and not fused for {alarm['unfused_s']:.0f} s ({alarm['reason']})")
     for reason, count in facts["withheld"].items():
         console.print(f"Withheld {count}: {WITHHELD[reason]}")
     for name, count in facts["dropped"].items():

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from flownav.estimation.states import PAD, STATE
-from flownav.frames import rotation_from_quaternion, to_body
+from flownav.frames import Vector, rotation_from_quaternion, to_body
 from flownav.live.options import Options
 from flownav.live.reception import Vehicle
 from flownav.mavlink.dialect import Message, coder
@@ -59,8 +59,13 @@ class Answers:
         """PX4 and ArduPilot lay the stamps of what we send by this: they are of the vehicle's own clock."""
         return self._mav.timesync_encode(round(boot_s * 1e9), request.ts1)
 
-    def estimates(self, vehicle: Vehicle, estimate: Estimate, on: Running) -> list[Message]:
-        """The estimate as `--send` asks; none where the pad is asked for and not known."""
+    def estimates(
+        self, vehicle: Vehicle, estimate: Estimate, on: Running, offset_ned_m: Vector = (0.0, 0.0, 0.0)
+    ) -> list[Message]:
+        """The estimate as `--send` asks; none where the pad is asked for and not known.
+
+        offset_ned_m: of the navigator's origin, which the pad's place is about, in the estimate's frame.
+        """
         send = self._options.send
         if send == "odometry":
             return [odometry(self._mav, estimate, frame=LOCAL_NED if vehicle.make == PX4 else LOCAL_FRD)]
@@ -69,7 +74,7 @@ class Answers:
         if on.work[PAD_KNOWN] != SEEN:  # the place of take-off is not what a camera lands on
             return []
         pad = [float(value) for value in on.work[STATE + PAD : STATE + PAD + 3]]
-        north, east, down = (pad[i] - estimate.pos_ned_m[i] for i in range(3))
+        north, east, down = (pad[i] + offset_ned_m[i] - estimate.pos_ned_m[i] for i in range(3))
         x, y, z = to_body(rotation_from_quaternion(*estimate.quaternion), north, east, down)
         distance_m = math.sqrt(x * x + y * y + z * z)
         if not z > STEEPEST * distance_m:

@@ -43,7 +43,9 @@ def draw(view: View) -> RenderableType:
     from rich.table import Table
     from rich.text import Text
 
-    sensors = Table("sensor", "Hz", "age [s]", "innovation", "ratio", "", title=view.title, title_justify="left")
+    sensors = Table(
+        "sensor", "Hz", "age [s]", "lag [s]", "innovation", "ratio", "", title=view.title, title_justify="left"
+    )
     for row in view.sensors:
         sensors.add_row(*row)
     estimate = Table("", "north", "east", "down")

@@ -9,7 +9,7 @@ import numpy as np
 from flownav.compile import ONE_LANE
 from flownav.estimation.covariance import unpack
 from flownav.estimation.states import ATTITUDE, GYRO_BIAS, POSITION, STATES, VELOCITY
-from flownav.frames import heading_from_quaternion
+from flownav.frames import Vector, heading_from_quaternion
 from flownav.live.options import Limits
 from flownav.mavlink.outgoing import Estimate
 from flownav.measurement import Array
@@ -18,6 +18,7 @@ from flownav.navigation.loop import Running
 from flownav.navigation.memory import PROTECTION, SUSPECTED, load_aid, load_imu, load_start
 
 LONGEST_AHEAD_S = 2.0
+UNFUSED = "unfused"  # a reason that the session finds (serving.py)
 INVALID = 2.0  # the flag of `memory.AidMemory`
 WITHHELD = {
     "no_vehicle": "no autopilot's HEARTBEAT is heard",
@@ -26,6 +27,7 @@ WITHHELD = {
     "stale": "the newest reading is too old",
     "position_invalid": "no horizontal aid for long: the position is invalid",
     "dead_reckoning": "no horizontal aid for too long",
+    "unfused": "a horizontal sensor is heard and not fused",
     "fault_suspected": "innovations tell of a sensor that fails",
     "unprotected": "a sensor that fails unseen may have put the position too far off",
     "not_finite": "the estimate is not a finite number",
@@ -55,23 +57,51 @@ def why_withheld(on: Running | None, t_s: float, newest_s: float, limits: Limits
     return "" if on.work[PROTECTION] <= limits.protection_m else "unprotected"
 
 
-def estimate_of(on: Running, imu: Array, t_s: float, boot_s: float, resets: int) -> Estimate:
-    """The state carried on to t_s. imu (n, 7): readings later than the filter's clock. boot_s: t_s on their clock."""
+def estimate_of(
+    on: Running,
+    imu: Array,
+    t_s: float,
+    boot_s: float,
+    resets: int,
+    offset_ned_m: Vector = (0.0, 0.0, 0.0),
+    limits: Limits = Limits(),  # noqa: B008  (frozen)
+) -> Estimate:
+    """The state carried on to t_s. imu (n, 7): readings later than the filter's clock. boot_s: t_s on their clock.
+
+    offset_ned_m: of the navigator's origin in the frame that is sent. limits: what `quality` is a share of.
+    """
     state = [float(value) for value in state_at(on.work, on.settings, imu, t_s)]
     covariance = unpack(on.work, ONE_LANE, 0, STATES)
     pose, velocity = _covariances(on, covariance, max(t_s - on.clock_s, 0.0), heading_from_quaternion(*state[6:10]))
     if not on.told.equipment.use_imu:
         state[10:13] = [float("nan")] * 3
+    north_m, east_m, down_m = offset_ned_m
     return Estimate(
         max(0, round(boot_s * 1e6)),
-        (state[0], state[1], state[2]),
+        (state[0] + north_m, state[1] + east_m, state[2] + down_m),
         (state[3], state[4], state[5]),
         (state[6], state[7], state[8], state[9]),
         (state[10], state[11], state[12]),
         pose,
         velocity,
         resets,
+        quality_of(on, pose, velocity, limits),
     )
+
+
+def quality_of(on: Running, pose: Array, velocity: Array, limits: Limits) -> int:
+    """1 to 100 percent: what is left to the nearest limit of position, velocity, protection and time without aid.
+
+    ArduPilot takes neither the velocity's covariance nor a protection level; this it does take (VISO_QUAL_MIN).
+    """
+    used = (
+        math.sqrt(max(pose[0, 0], pose[1, 1], 0.0)) / limits.sigma_m,
+        math.sqrt(max(velocity[0, 0], velocity[1, 1], 0.0)) / limits.sigma_m_s,
+        float(on.work[PROTECTION]) / limits.protection_m,
+        (on.clock_s - load_aid(on.work, ONE_LANE, 0).aided_s) / limits.dead_reckoning_s,
+    )
+    worst = max(share if math.isfinite(share) else 1.0 for share in used)
+    return max(1, min(100, round(100.0 * (1.0 - worst))))
 
 
 def fault_of(estimate: Estimate, limits: Limits) -> str:

@@ -26,7 +26,8 @@ class Waiting(NamedTuple):
 class Horizon:
     """Readings in the order of the instants they describe, released when these are old enough.
 
-    dropped counts by reason: `late`, of an instant that was already released; `overflow`, where too many wait.
+    dropped counts by sensor and reason: `late`, of an instant that was already released; `overflow`, where too many
+    wait.
     """
 
     def __init__(self) -> None:
@@ -42,10 +43,10 @@ class Horizon:
         """Queue a reading; False where it was dropped and counted."""
         t_s = reading.t_s - reading.delay_s
         if t_s < self._released_s:
-            self.dropped["late"] += 1
+            self.dropped[f"{reading.sensor.name.lower()}: late"] += 1
             return False
         if len(self._waiting) >= MOST_WAITING:
-            self.dropped["overflow"] += 1
+            self.dropped[f"{reading.sensor.name.lower()}: overflow"] += 1
             return False
         self._order += 1
         heapq.heappush(self._waiting, Waiting(t_s, self._order, reading, exposure_s))

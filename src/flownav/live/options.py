@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from flownav.live.reception import BESIDE, Accepted
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
 from flownav.sensors.identified import IdentifiedFlow
@@ -17,31 +18,35 @@ SENDINGS = get_args(Sending)
 class Limits:
     """Beyond any of these no estimate is sent.
 
-    age_s: of the newest reading of the vehicle. dead_reckoning_s: since a horizontal aid was fused. sigma_m,
-    sigma_m_s: one standard deviation of horizontal position and velocity. protection_m: how far off the position may be
-    although no fault is noticed, the horizontal protection level.
+    age_s: of the newest reading of the vehicle. dead_reckoning_s: since a horizontal aid was fused; a vehicle that
+    flies on the estimate moves on what it says, so this is short. sigma_m, sigma_m_s: one standard deviation of
+    horizontal position and velocity. protection_m: how far off the position may be although no fault is noticed, the
+    horizontal protection level. unfused_s: for how long a horizontal sensor may speak without being fused.
     """
 
     age_s: float = 0.3
-    dead_reckoning_s: float = 5.0
+    dead_reckoning_s: float = 1.2
     sigma_m: float = 5.0
     sigma_m_s: float = 1.5
     protection_m: float = 20.0
+    unfused_s: float = 5.0
 
 
 @dataclass(frozen=True)
 class Options:
     """What a session is asked to do.
 
-    key: a MAVLink signing key. identified: a flow sensor's latency and axes; its gains are the settings'. margin_s:
-    what the horizon waits beyond the largest delay: an IMU period and the link's jitter. listen_s: how long the vehicle
-    is listened to before it is decided which sensors serve. restart_s: a longer silence of the vehicle, or its reboot,
-    begins the navigation anew.
+    accept: who beside the autopilot may tell which message. key: a MAVLink signing key. identified: a flow sensor's
+    latency and axes; its gains are the settings'. margin_s: what the horizon waits beyond the largest delay that is
+    stated: an IMU period and jitter. most_horizon_s: the longest that it waits for any stream. listen_s: how long the
+    vehicle is listened to before it is decided which sensors serve. restart_s: a longer silence of the vehicle, or its
+    reboot, begins the navigation anew.
     """
 
     send: Sending = "odometry"
     system: int | None = None
     component: int | None = None
+    accept: tuple[Accepted, ...] = BESIDE
     key: bytes | None = None
     gps_delay_s: float = 0.22
     identified: IdentifiedFlow | None = None
@@ -49,11 +54,12 @@ class Options:
     flow_noise: FlowNoise = NO_STATED_NOISE
     limits: Limits = Limits()
     margin_s: float = 0.05
+    most_horizon_s: float = 1.0
     listen_s: float = 2.0
     restart_s: float = 10.0
 
     @property
-    def horizon_s(self) -> float:
-        """How old an instant is when it is fused."""
+    def least_horizon_s(self) -> float:
+        """How old an instant is at least when it is fused, by the delays that are stated."""
         latency_s = self.identified.latency_s if self.identified else 0.0
         return max(self.gps_delay_s, latency_s, 0.1) + self.margin_s

@@ -1,11 +1,13 @@
-"""From bytes to the messages of one vehicle: whole frames, signed where a key is asked for, of one system only."""
+"""From bytes to the messages of one vehicle: whole frames, signed where a key is asked for, of the sources accepted."""
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
+from flownav.errors import InputError
 from flownav.mavlink.dialect import Message, coder, dialect
 from flownav.mavlink.framing import StreamFrames
 from flownav.mavlink.signing import SignatureCheck
@@ -22,16 +24,54 @@ class Vehicle(NamedTuple):
     make: int
 
 
+class Accepted(NamedTuple):
+    """Who beside the autopilot may tell a message: a system (None: the vehicle's) and a component of it (None: any)."""
+
+    message: str
+    system: int | None = None
+    component: int | None = None
+
+
+# sensors that companions and gimbals of the vehicle's own system tell: a camera, a flow sensor, a range finder
+BESIDE = tuple(map(Accepted, ("LANDING_TARGET", "OPTICAL_FLOW", "OPTICAL_FLOW_RAD", "DISTANCE_SENSOR")))
+
+
+def accepted_of(text: str) -> Accepted:
+    """MESSAGE=SYSTEM.COMPONENT, e.g. LANDING_TARGET=1.191; 0 stands for any. InputError where it is not that."""
+    found = re.fullmatch(r"(?P<name>[A-Z][A-Z0-9_]*)=(?P<system>\d{1,3})\.(?P<component>\d{1,3})", text)
+    if found is None or max(int(found["system"]), int(found["component"])) > 255:
+        raise InputError(f"--accept {text}: MESSAGE=SYSTEM.COMPONENT is needed, e.g. LANDING_TARGET=1.191")
+    if not hasattr(dialect(), f"MAVLINK_MSG_ID_{found['name']}"):
+        raise InputError(f"--accept {text}: MAVLink has no message {found['name']}")
+    return Accepted(found["name"], int(found["system"]) or None, int(found["component"]) or None)
+
+
+def accepted_by(texts: Iterable[str]) -> tuple[Accepted, ...]:
+    """What is accepted beside the autopilot: `accepted_of` each, in place of BESIDE for the messages that they name."""
+    stated = tuple(map(accepted_of, texts))
+    named = {entry.message for entry in stated}
+    return (*stated, *(entry for entry in BESIDE if entry.message not in named))
+
+
 class Reception:
-    """Bytes in, messages of the vehicle out.
+    """Bytes in, messages of the vehicle out, and those that `accept` lets others tell.
 
     The vehicle is the first autopilot whose HEARTBEAT is heard, of the system and component that were asked for
-    (None: any). counts: by reason, what was not listened to (`other_system`, `unsigned`, `bad_signature`, `replayed`,
+    (None: any). What flownav itself sends (`own`) and another component of the vehicle's system repeats is not taken.
+    counts: by reason, what was not listened to (`other_system`, `unsigned`, `bad_signature`, `replayed`,
     `bad_checksum`, `truncated`, `skipped_bytes`, `unknown_message`, `undecodable`, `before_heartbeat`), and `lost`, the
     vehicle's frames that never came, by its sequence numbers.
     """
 
-    def __init__(self, system: int | None, component: int | None, key: bytes | None, unix_s: float) -> None:
+    def __init__(
+        self,
+        system: int | None,
+        component: int | None,
+        key: bytes | None,
+        unix_s: float,
+        accept: Iterable[Accepted] = BESIDE,
+        own: int = 0,
+    ) -> None:
         self.vehicle: Vehicle | None = None
         self.received = 0
         self._counts: Counter[str] = Counter()
@@ -42,6 +82,11 @@ class Reception:
         self._error = dialect().MAVError
         self._sequence: int | None = None
         self._others: set[tuple[int, int]] = set()
+        self._own = own
+        self._accepted: dict[int, list[Accepted]] = {}
+        for entry in accept:
+            number = int(getattr(dialect(), f"MAVLINK_MSG_ID_{entry.message}"))
+            self._accepted.setdefault(number, []).append(entry)
 
     @property
     def counts(self) -> Counter[str]:
@@ -60,6 +105,11 @@ class Reception:
             if self._check is not None and not self._check.accepts(content):
                 continue
             who = frame.system, frame.component
+            if self.vehicle is not None and who != self.vehicle[:2] and self._accepts(frame.message_id, who):
+                beside = self._decoded(content)
+                if beside is not None:
+                    yield beside
+                continue
             if any(wanted not in (None, own) for wanted, own in zip(self._wanted, who, strict=True)):
                 self._counts["other_system"] += 1
                 continue
@@ -80,6 +130,20 @@ class Reception:
             self.received += 1
             yield message
 
+    def is_of_vehicle(self, message: Message) -> bool:
+        """Whether the autopilot itself told it."""
+        return self.vehicle is not None and sender_of(message) == self.vehicle[:2]
+
+    def _accepts(self, message_id: int, who: tuple[int, int]) -> bool:
+        """Whether a component that is not the vehicle's autopilot may tell a message."""
+        assert self.vehicle is not None
+        if who == (self.vehicle.system, self._own):
+            return False
+        return any(
+            who[0] == (entry.system or self.vehicle.system) and entry.component in (None, who[1])
+            for entry in self._accepted.get(message_id, ())
+        )
+
     def _decoded(self, content: bytes) -> Message | None:
         try:
             return self._coder.decode(bytearray(content))
@@ -92,3 +156,8 @@ class Reception:
             missing = (sequence - self._sequence - 1) % 256
             self._counts["lost"] += missing if missing < LONGEST_LOSS else 0
         self._sequence = sequence
+
+
+def sender_of(message: Message) -> tuple[int, int]:
+    """System and component."""
+    return int(message.get_srcSystem()), int(message.get_srcComponent())

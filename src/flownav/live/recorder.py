@@ -222,7 +222,7 @@ def _head(options: Options) -> dict[str, Any]:
         "parameters": {
             "filter": options.settings.model_dump(),
             "gps_delay_s": options.gps_delay_s,
-            "horizon_s": options.horizon_s,
+            "horizon_s": options.least_horizon_s,
             "flow_sensor": options.identified._asdict() if options.identified else None,
             **({"flow_noise": options.flow_noise._asdict()} if options.flow_noise.stated else {}),
         },

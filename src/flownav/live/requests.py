@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any
+from typing import Any, NamedTuple
 
 from flownav.live.reception import Vehicle
 from flownav.mavlink.dialect import Message
@@ -13,6 +13,9 @@ ARDUPILOT = 3
 ACCEPTED, TEMPORARILY_REJECTED, IN_PROGRESS = 0, 1, 5  # MAV_RESULT
 ANSWER_S = 0.5
 TRIES = 3
+SILENT_S = 2.0  # a stream that has said nothing for so long is asked for again
+PERIODS = 5.0  # and for so many of its periods
+MOST_PATIENCE_S = 30.0  # a stream that has never come is asked for ever more seldom, down to this
 # message: id and rate [Hz]; the IMU moves the state, the others correct it
 COMMON = {
     "ATTITUDE_QUATERNION": (31, 50),
@@ -26,48 +29,98 @@ STREAMS = {
     True: {"RAW_IMU": (27, 100), "OPTICAL_FLOW": (100, 50), **COMMON},  # ArduPilot
     False: {"HIGHRES_IMU": (105, 100), "OPTICAL_FLOW_RAD": (106, 250), "OPTICAL_FLOW": (100, 250), **COMMON},
 }
-GLOBAL_ORIGIN = 49
+ORIGIN, GLOBAL_ORIGIN = "GPS_GLOBAL_ORIGIN", 49  # told when it is asked for, and when it is set
+
+
+class _Stream(NamedTuple):
+    """A stream that was asked for. heard_s: our clock, minus infinity before the first; wait_s: until asked again."""
+
+    number: int
+    rate_hz: float
+    asked_s: float
+    heard_s: float
+    wait_s: float
 
 
 class Requests:
-    """Commands to a vehicle, one after the other. answers counts them: `accepted`, `refused`, `unanswered`."""
+    """Commands to a vehicle, one after the other. answers counts them: `accepted`, `refused`, `unanswered`.
+
+    A stream that falls silent while the vehicle speaks is asked for again: after a reboot all rates are 0. One that was
+    refused is not, except the origin, which an autopilot has none of before its first fix.
+    """
 
     def __init__(self) -> None:
         self.answers: Counter[str] = Counter()
         self.refused: list[str] = []
-        self._left: list[tuple[str, int, float, float]] = []  # name, command, two parameters
-        self._sent_s = float("-inf")
+        self._streams: dict[str, _Stream] = {}
+        self._left: list[str] = []
+        self._sent_s = self._spoke_s = float("-inf")
         self._tries = 0
 
-    def begin(self, vehicle: Vehicle) -> None:
+    def begin(self, vehicle: Vehicle, now_s: float) -> None:
         """Ask for everything, from the first on: at the start and when the vehicle comes back."""
         streams = STREAMS[vehicle.make == ARDUPILOT]
-        wanted = [(name, SET_MESSAGE_INTERVAL, number, 1e6 / rate) for name, (number, rate) in streams.items()]
-        self._left = [*wanted, ("GPS_GLOBAL_ORIGIN", REQUEST_MESSAGE, GLOBAL_ORIGIN, 0.0)]
-        self._sent_s, self._tries = float("-inf"), 0
+        never = float("-inf")
+        self._streams = {
+            name: _Stream(number, rate, now_s, never, SILENT_S) for name, (number, rate) in streams.items()
+        }
+        self._streams[ORIGIN] = _Stream(GLOBAL_ORIGIN, 0.0, now_s, never, SILENT_S)
+        self._left = list(self._streams)
+        self._sent_s, self._tries = never, 0
         self.refused = []
+
+    def heard(self, name: str, now_s: float) -> None:
+        """A message of the vehicle."""
+        self._spoke_s = now_s
+        stream = self._streams.get(name)
+        if stream is not None:
+            wait_s = max(SILENT_S, PERIODS / stream.rate_hz) if stream.rate_hz else float("inf")
+            self._streams[name] = stream._replace(heard_s=now_s, wait_s=wait_s)
 
     def due(self, mav: Any, vehicle: Vehicle, now_s: float) -> Message | None:
         """The command to send now, if any."""
         if self._left and now_s - self._sent_s >= ANSWER_S and self._tries >= TRIES:
             self._done("unanswered")
+        if not self._left:
+            self._left = self._silent(now_s)
         if not self._left or now_s - self._sent_s < ANSWER_S:
             return None
-        _, command, first, second = self._left[0]
+        name = self._left[0]
+        stream = self._streams[name]
+        self._streams[name] = stream._replace(asked_s=now_s)
         self._sent_s = now_s
         self._tries += 1
+        command, period_us = (SET_MESSAGE_INTERVAL, 1e6 / stream.rate_hz) if stream.rate_hz else (REQUEST_MESSAGE, 0.0)
         return mav.command_long_encode(
-            vehicle.system, vehicle.component, command, self._tries - 1, first, second, 0.0, 0.0, 0.0, 0.0, 0.0
+            vehicle.system, vehicle.component, command, self._tries - 1, stream.number, period_us, *(0.0,) * 5
         )
+
+    def _silent(self, now_s: float) -> list[str]:
+        """The streams to ask for again, while anything comes from the vehicle at all."""
+        if now_s - self._spoke_s > SILENT_S:
+            return []
+        found = [
+            name
+            for name, stream in self._streams.items()
+            if (name not in self.refused or name == ORIGIN)
+            and now_s - max(stream.asked_s, stream.heard_s) > stream.wait_s
+        ]
+        for name in found:
+            wait_s = min(2.0 * self._streams[name].wait_s, MOST_PATIENCE_S)
+            self._streams[name] = self._streams[name]._replace(wait_s=wait_s)
+        return found
 
     def acknowledged(self, message: Message) -> None:
         """COMMAND_ACK."""
-        if not self._left or not self._tries or message.command != self._left[0][1]:
+        if not self._left or not self._tries:
+            return
+        name = self._left[0]
+        if message.command != (SET_MESSAGE_INTERVAL if self._streams[name].rate_hz else REQUEST_MESSAGE):
             return
         if message.result in (TEMPORARILY_REJECTED, IN_PROGRESS):
             return
-        if message.result != ACCEPTED:
-            self.refused.append(self._left[0][0])
+        if message.result != ACCEPTED and name not in self.refused:
+            self.refused.append(name)
         self._done("accepted" if message.result == ACCEPTED else "refused")
 
     def _done(self, answer: str) -> None:

@@ -59,6 +59,7 @@ class Screen:
             sensor.name.lower(),
             f"{self._rates.get(sensor, 0.0):.0f}",
             f"{now_s - session.heard_s[sensor]:.2f}",
+            f"{session.hearing.lags.by_sensor.get(sensor, 0.0):.2f}",
             " ".join(_figure(innovation) for innovation, _, _ in found),
             " ".join(_figure(ratio) for _, ratio, _ in found),
             " ".join(dict.fromkeys(Reason(reason).label for _, _, reason in found if reason)),
@@ -71,8 +72,13 @@ class Screen:
         return f"{self._url}  {who}  {state}"
 
     def _alarms(self) -> list[str]:
+        """A recording that stopped, and sensors that are heard and not fused."""
         reason = self._recorder.reason if self._recorder is not None else ""
-        return [f"NOT RECORDING: {reason}"] if reason else []
+        return [f"NOT RECORDING: {reason}"] * bool(reason) + [
+            f"ALARM: {sensor.name.lower()} is heard and has not been fused for "
+            f"{spell.until_s - spell.since_s:.0f} s ({spell.why})"
+            for sensor, spell in sorted(self._session.alarms.items())
+        ]
 
     def _running(self) -> str:
         """What is kept of the session, and how its process is scheduled."""
@@ -109,7 +115,8 @@ class Screen:
         withheld = ", ".join(f"{name} {count}" for name, count in sorted(session.withheld.items()))
         refused = ", ".join(session.requests.refused)
         return (
-            f"sent {session.sent}; withheld: {withheld or 'none'}; resets {session.filtering.jumps}; "
+            f"horizon {session.hearing.horizon_s:.2f} s; sent {session.sent}; "
+            f"withheld: {withheld or 'none'}; resets {session.resets}; "
             f"latency p50 {p50:.2f} ms, p99 {p99:.2f} ms" + (f"; vehicle refuses {refused}" if refused else "")
         )
 

@@ -12,15 +12,16 @@ SILENT_S = 2.0  # a source that says nothing for so long gives way
 
 
 class Source(NamedTuple):
-    """Who measured: message and instance."""
+    """Who measured: message, instance, and whether the autopilot itself tells it (False: another component)."""
 
     message: str
     instance: int
+    by_autopilot: bool = True
 
 
 class _Chosen(NamedTuple):
     source: Source
-    rank: tuple[int, int]
+    rank: tuple[int, bool, int]
     heard_s: float
 
 
@@ -37,7 +38,8 @@ class Sources:
             self.dropped[sensor] += 1  # the same flow, before it was multiplied by a range
             return False
         order = PREFERENCE.get(sensor, ())
-        rank = order.index(source.message) if source.message in order else len(order), source.instance
+        place = order.index(source.message) if source.message in order else len(order)
+        rank = place, not source.by_autopilot, source.instance
         chosen = self._chosen.get(sensor)
         if chosen is not None and chosen.source != source and chosen.rank <= rank and self._alive(sensor, t_s):
             self.dropped[sensor] += 1

@@ -10,10 +10,12 @@ from flownav.mavlink.dialect import Message
 
 NAN = float("nan")
 LONGEST_ROUND_TRIP_S = 0.5
-LARGEST_DIFFERENCE_S = 1.0  # a TIMESYNC that contradicts the stamps by more is not believed
+MOST_UNSEEN_S = 0.1  # of age when it is sent that a stamped message may have, beyond the wait on the link
+COARSE_S = 0.02  # of stamps in milliseconds, and of crystals that drift for FRESH_S
+STEP_S = 1.0  # TIMESYNC offsets that differ by more are of a vehicle that began anew
 REMEMBERED = 16
 FRESH_S = 20.0
-WINDOW_S = 2.0
+WINDOW_S = 0.5
 
 
 class Exchange(NamedTuple):
@@ -28,13 +30,16 @@ class VehicleClock:
     """Session time: the vehicle's time since boot, which goes on through a reboot (see mavlink/clock.py).
 
     Of stamps alone, the least wait on the link passes for none; a TIMESYNC exchange tells it, to within half its round
-    trip. counts: `clock_jump`, `wrapped`, and exchanges not believed (`timesync_refused`).
+    trip. The stamps of the last second rule: an exchange that contradicts them is of a clock that has been stopped or
+    set since, or a lie, and does not serve. counts: `clock_jump`, `wrapped`, exchanges not believed
+    (`timesync_refused`), and steps of a second or more between exchanges (`timesync_step`).
     """
 
     def __init__(self, system: int, component: int) -> None:
         self._state = ClockState((system, component, "boot"))
         self._leads: deque[tuple[float, float]] = deque(maxlen=2)  # since when, and session time less ours [s]
         self._exchanges: deque[Exchange] = deque(maxlen=REMEMBERED)
+        self._told_s = self._doubted_s = NAN  # offset that TIMESYNC tells, and one that differs by a step
         self.counts: Counter[str] = Counter()
 
     def stamped(self, message: Message, system: int, component: int, now_s: float) -> Aligned:
@@ -68,14 +73,37 @@ class VehicleClock:
             clock = (system, component, "unix")
             self._state = told_unix_time(self._state, clock, message.time_unix_usec * 1e-6, message.time_boot_ms * 1e-3)
 
-    def exchanged(self, tc1_ns: int, ts1_ns: int, now_s: float) -> None:
-        """A TIMESYNC reply to a request that we sent at `ts1_ns` of our clock."""
-        offset_s, round_trip_s = timesync_offset_s(tc1_ns, ts1_ns, round(now_s * 1e9))
-        differs = abs(offset_s + self._shift_s - self._offset_s)
-        if not 0.0 <= round_trip_s <= LONGEST_ROUND_TRIP_S or not differs <= LARGEST_DIFFERENCE_S:
+    def exchanged(self, tc1_ns: int, ts1_ns: int, now_s: float) -> bool:
+        """A TIMESYNC reply to a request that we sent at `ts1_ns` of our clock; True where it tells of a new start."""
+        exchange = Exchange(now_s, *timesync_offset_s(tc1_ns, ts1_ns, round(now_s * 1e9)))
+        if not 0.0 <= exchange.round_trip_s <= LONGEST_ROUND_TRIP_S:
             self.counts["timesync_refused"] += 1
-            return
-        self._exchanges.append(Exchange(now_s, offset_s, round_trip_s))
+            return False
+        stepped = self._stepped(exchange.offset_s)
+        if stepped:
+            self.counts["timesync_step"] += 1
+        if self._serves(exchange):
+            self._exchanges.append(exchange)
+        else:
+            self.counts["timesync_refused"] += 1
+        return stepped
+
+    def _stepped(self, offset_s: float) -> bool:
+        """Whether two exchanges in a row agree on an offset that is more than STEP_S from the one told before."""
+        if not abs(offset_s - self._told_s) > STEP_S:
+            self._told_s, self._doubted_s = offset_s, NAN
+            return False
+        if not abs(offset_s - self._doubted_s) <= STEP_S:
+            self._doubted_s = offset_s
+            return False
+        self._told_s, self._doubted_s = offset_s, NAN
+        return True
+
+    def _serves(self, exchange: Exchange) -> bool:
+        """Whether an exchange agrees with the stamps: they say a later time by no more than its own uncertainty, and an
+        earlier one by no more than the wait on the link and a reading's own age when it is sent."""
+        ahead_s = exchange.offset_s + self._shift_s - self._offset_s
+        return -0.5 * exchange.round_trip_s - COARSE_S <= ahead_s <= exchange.round_trip_s + MOST_UNSEEN_S
 
     @property
     def _shift_s(self) -> float:
@@ -84,8 +112,8 @@ class VehicleClock:
         return clock.offset_s if clock else 0.0
 
     def best(self, now_s: float) -> Exchange | None:
-        """The exchange with the shortest round trip among the fresh ones."""
-        fresh = [exchange for exchange in self._exchanges if now_s - exchange.now_s <= FRESH_S]
+        """The exchange with the shortest round trip among the fresh ones that agree with the stamps."""
+        fresh = [e for e in self._exchanges if now_s - e.now_s <= FRESH_S and self._serves(e)]
         return min(fresh, key=lambda exchange: exchange.round_trip_s, default=None)
 
     def now_s(self, now_s: float) -> float:

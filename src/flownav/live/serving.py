@@ -1,0 +1,79 @@
+"""Which sensors are heard and do not serve: an alarm, since what is sent then rests on less than the vehicle has."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flownav.estimation.gating import Reason
+from flownav.measurement import Array, Sensor
+
+HORIZONTAL = (
+    Sensor.GPS_POSITION,
+    Sensor.GPS_VELOCITY,
+    Sensor.FLOW_RATE,
+    Sensor.FLOW_VELOCITY,
+    Sensor.POSE,
+)
+WATCHED = (*HORIZONTAL, Sensor.RANGE)
+DOWNWARD = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE)  # on the ground they need not serve
+# A reading that knows nothing, or that another serves for, is no alarm; these are.
+REFUSALS = (Reason.INNOVATION_GATE, Reason.NOT_FINITE, Reason.DUPLICATE, Reason.LATE, Reason.STUCK, Reason.AHEAD)
+LATE = Reason.LATE.label
+LEAST_READINGS = 10
+GONE_S = 2.0  # a sensor that has said nothing for so long is silent, which the screen shows otherwise
+
+
+class Refused(NamedTuple):
+    """A spell in which no reading of a sensor was fused: since and until when, how many, and why the last."""
+
+    since_s: float
+    until_s: float
+    readings: int
+    why: str
+
+
+class Serving:
+    """Spells of readings that were heard and not fused, by sensor, on the vehicle's clock."""
+
+    def __init__(self) -> None:
+        self._spells: dict[Sensor, Refused] = {}
+        self._landed = False
+
+    def refused(self, sensor: Sensor, t_s: float, why: str) -> None:
+        """A reading that never got to the navigator."""
+        if sensor not in WATCHED or (self._landed and sensor in DOWNWARD):
+            return
+        before = self._spells.get(sensor)
+        if before is None or t_s - before.until_s > GONE_S:
+            before = Refused(t_s, t_s, 0, why)
+        self._spells[sensor] = Refused(before.since_s, max(t_s, before.until_s), before.readings + 1, why)
+
+    def judged(self, innovation: Array) -> None:
+        """What became of readings in the navigator: rows of the tape's innovations (m, 9)."""
+        for row in innovation.tolist():
+            sensor, component, reason = Sensor(int(row[1])), int(row[2]), int(row[8])
+            if reason == Reason.FUSED and component < 2:
+                self._spells.pop(sensor, None)
+            elif reason in REFUSALS and component == 0:
+                self.refused(sensor, row[0], Reason(reason).label)
+
+    def landed(self, on_ground: bool) -> None:
+        """What the autopilot says of the ground."""
+        self._landed = on_ground
+        if on_ground:
+            for sensor in DOWNWARD:
+                self._spells.pop(sensor, None)
+
+    def clear(self) -> None:
+        """The navigation begins anew."""
+        self._spells.clear()
+
+    def alarms(self, t_s: float, after_s: float) -> dict[Sensor, Refused]:
+        """Sensors of which nothing was fused for `after_s` although they speak."""
+        return {
+            sensor: spell
+            for sensor, spell in self._spells.items()
+            if spell.readings >= LEAST_READINGS
+            and spell.until_s - spell.since_s >= after_s
+            and t_s - spell.until_s <= GONE_S
+        }

@@ -315,3 +315,22 @@ def test_at_most_a_second_is_not_on_the_disk(tmp_path, monkeypatch):
     times_s = [at_s for at_s, _ in synced]
     assert max(b - a for a, b in itertools.pairwise(times_s)) < 0.9
     assert len({size for _, size in synced}) >= 3
+
+
+def test_a_journal_that_appears_meanwhile_is_not_taken(tmp_path, monkeypatch):
+    """Somebody makes it after we have looked and before we make ours."""
+    journal = tmp_path / "flight.fnr.journal"
+    real, looked = os.path.lexists, []
+
+    def lexists(path):
+        found = real(path)
+        if os.fspath(path) == os.fspath(journal) and not looked:
+            looked.append(path)
+            journal.write_text("somebody's")
+        return found
+
+    monkeypatch.setattr(os.path, "lexists", lexists)
+    place = claim(tmp_path / "flight.fnr", force=True)
+    os.close(place.file)
+    assert place.record.name == "flight-1.fnr"
+    assert journal.read_text() == "somebody's"

@@ -15,7 +15,7 @@ from flownav.errors import InputError
 from flownav.estimation.states import POSITION, QUATERNION, STATE, VELOCITY
 from flownav.live.byte_links import SerialLink, TcpLink
 from flownav.live.estimating import estimate_of
-from flownav.live.filtering import Filtering
+from flownav.live.filtering import BATCH, Filtering
 from flownav.live.horizon import Horizon, Waiting
 from flownav.live.link import Address, open_link, parse_url
 from flownav.live.loop import Latency
@@ -189,7 +189,8 @@ def test_the_estimate_of_now_is_where_the_filter_will_be_when_it_gets_there():
     coming = [imu(1.0 + 0.01 * k) for k in range(30)]
     filtering = Filtering(Options(), NoRecorder())
     filtering.begin(past, gps_heard=True)
-    filtering.feed(past)
+    for start in range(0, len(past), BATCH):
+        filtering.feed(past[start : start + BATCH])
     for waiting in coming:
         filtering.heard(waiting)
     on = filtering.running

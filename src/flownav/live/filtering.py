@@ -19,7 +19,7 @@ from flownav.navigation.told import Equipment
 from flownav.navigation.witnessed import Witness
 from flownav.sensors.identified import UNTURNED, in_vehicle_axes
 
-BATCH = 128  # readings at a time
+BATCH = 64  # readings at a time, 6 ms of them
 KEPT_IMU = 512  # two seconds at 250 Hz, more than the horizon and an exposure
 KEPT_ATTITUDES = 128
 FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
@@ -59,6 +59,8 @@ class Filtering:
         self._attitude: deque[tuple[float, ...]] = deque(maxlen=KEPT_ATTITUDES)
         most = max(COMPONENTS.values())
         self._tape = empty_tape(BATCH + 2, most * BATCH, 8 * BATCH + 8)
+        self._room = _empty_queue(BATCH)
+        self._arrival_s = np.zeros(BATCH)
 
     def heard(self, waiting: Waiting) -> None:
         """A reading has arrived: IMU and attitude are kept for the flow's exposure and for the way from then to now."""
@@ -97,26 +99,23 @@ class Filtering:
         """At most BATCH readings, in the order of their instants."""
         on = self.running
         assert on is not None
-        rows = [self._row(waiting) for waiting in released]
-        value = np.array([row[0] for row in rows])
-        variance = np.array([row[1] for row in rows])
+        room = self._room
+        for row, waiting in enumerate(released):
+            room.t_s[row], room.sensor[row] = waiting.t_s, waiting.reading.sensor
+            room.value[row], room.variance[row] = self._row(waiting)
+            room.quality[row], self._arrival_s[row] = waiting.reading.quality, waiting.reading.t_s
+        count = len(released)
         queue = EventQueue(
-            np.array([waiting.t_s for waiting in released]),
-            np.array([int(waiting.reading.sensor) for waiting in released], np.int64),
-            value,
-            variance,
-            np.array([waiting.reading.quality for waiting in released], float),
-            np.arange(len(released)),
-            np.zeros(len(released)),
-            np.ones(len(released)),
-        )
-        self._keeper.fed(queue, np.array([waiting.reading.t_s for waiting in released]))
+            room.t_s[:count], room.sensor[:count], room.value[:count], room.variance[:count], room.quality[:count],
+            room.row[:count], room.withheld[:count], room.arrived[:count],
+        )  # fmt: skip
+        self._keeper.fed(queue, self._arrival_s[:count])
         on.tape.used[:] = 0
         run(queue, on)
         written = written_on(on.tape)
         outcome = Outcome(written.innovation, written.event)
         self._keeper.written(*written)
-        self.jumps += int(np.isin(outcome.event[:, 1], JUMPS).sum())
+        self.jumps += sum(kind in JUMPS for kind in outcome.event[:, 1].tolist())
         return outcome
 
     def imu_after(self, t_s: float) -> Array:
@@ -171,6 +170,20 @@ class Filtering:
             if row[0] <= t_s:
                 break
         return np.array(found[::-1])
+
+
+def _empty_queue(count: int) -> EventQueue:
+    """Room for so many readings, used again and again; who keeps what is in it copies it."""
+    return EventQueue(
+        np.zeros(count),
+        np.zeros(count, np.int64),
+        np.zeros((count, MAX_VALUES)),
+        np.zeros((count, MAX_VALUES)),
+        np.zeros(count),
+        np.arange(count),
+        np.zeros(count),
+        np.ones(count),
+    )
 
 
 def _streams(listened: list[Waiting]) -> dict[Sensor, Stream]:

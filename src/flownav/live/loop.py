@@ -21,6 +21,7 @@ WAIT_S = 0.005
 SILENT_S = 3.0  # after so long without the vehicle anyone may speak on a UDP port
 SCREEN_S = 0.25
 COLLECT_S = 0.1
+NAN = float("nan")
 EDGES_S = np.geomspace(1e-6, 10.0, 281)  # of the latency's histogram, 40 a decade
 
 
@@ -107,6 +108,18 @@ def run_session(
     shows: called with our clock four times a second, between two readings; none of them may wait for anything.
     """
     shown_s = spoke_s = clock()
+    flow_s = NAN  # when the flow reading came that no estimate has answered yet
+
+    def tick() -> float:
+        before, now_s = session.sent, clock()
+        session.tick(now_s)
+        _send(session, link)
+        if session.due:
+            return flow_s
+        if session.sent > before and flow_s == flow_s:
+            latency.take(clock() - flow_s)
+        return NAN
+
     with Collector(spoke_s) as collector:
         while not stop():
             _wait(link)
@@ -117,14 +130,9 @@ def run_session(
                     link.believe(sender)
                     spoke_s = now_s
                 if session.due and not flow:
-                    before = session.sent
-                    session.tick(clock())
-                    _send(session, link)
-                    if session.sent > before:
-                        latency.take(clock() - now_s)
-            now_s = clock()
-            session.tick(now_s)
-            _send(session, link)
+                    flow_s = NAN if session.reason else now_s  # where nothing is sent, nothing waits
+                    flow_s = tick()
+            flow_s, now_s = tick(), clock()
             if now_s - spoke_s > SILENT_S:
                 link.forget()
                 spoke_s = now_s

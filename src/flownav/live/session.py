@@ -43,7 +43,7 @@ class Chronicle(Keeper, Protocol):
         """A happening."""
 
     def origin(self, t_s: float, origin_deg_m: tuple[float, float, float]) -> None:
-        """The local frame has another origin from now on."""
+        """The navigator's frame has this origin from now on."""
 
     def truth(self, t_s: float, state: TrueState) -> None:
         """What a simulator says is so."""
@@ -73,6 +73,7 @@ class Session:
         self.estimate: Estimate | None = None
         self.outbox: deque[bytes] = deque(maxlen=1024)
         self.innovations: dict[tuple[int, int], tuple[float, float, int]] = {}  # innovation, test ratio, reason
+        self._origin_kept: tuple[float, float, float] | None = None
         self._vehicle_s = NAN  # our clock when the vehicle last spoke
         self._sent_s = self._second_s = float("-inf")
 
@@ -210,13 +211,16 @@ class Session:
         if self.clock is None or self.reception.vehicle is None:
             return
         t_s = self.clock.now_s(now_s)
+        if self.origin_deg_m is not None and self.origin_deg_m != self._origin_kept:
+            self._origin_kept = self.origin_deg_m
+            self.keeper.origin(t_s, self.origin_deg_m)
         listened = t_s - hearing.since_s >= self.options.listen_s
         if self.filtering.running is None and listened and len(hearing.horizon):
             self.filtering.begin(hearing.horizon.waiting(), hearing.gps_heard, self.origin_deg_m)
-        if self.filtering.running is not None:
-            self._feed(min(t_s, hearing.lags.newest_s) - hearing.horizon_s)
+        until_s = min(t_s, hearing.lags.newest_s) - hearing.horizon_s
+        behind = self.filtering.running is not None and self._feed(until_s)
         since_s = now_s - self._sent_s
-        if (self.due or since_s >= SEND_EVERY_S) and since_s >= self.rates.estimate_every_s:
+        if not behind and (self.due or since_s >= SEND_EVERY_S) and since_s >= self.rates.estimate_every_s:
             hearing.flow_came, self._sent_s = False, now_s
             self._offer(t_s, now_s)
         if now_s - self._second_s >= SECOND:
@@ -228,14 +232,15 @@ class Session:
             if question is not None:
                 self._send(question, now_s)
 
-    def _feed(self, until_s: float) -> None:
-        while released := self.hearing.horizon.release(until_s, BATCH):
+    def _feed(self, until_s: float) -> bool:
+        """A batch: what was listened to for seconds must not hold up what arrives now. True where more is due."""
+        released = self.hearing.horizon.release(until_s, BATCH)
+        if released:
             outcome = self.filtering.feed(released)
             for row in outcome.innovation.tolist():
                 self.innovations[int(row[1]), int(row[2])] = (row[5], row[7], int(row[8]))
             self.hearing.serving.judged(outcome.innovation)
-            if len(released) < BATCH:
-                return
+        return len(released) == BATCH
 
     def _watch(self, t_s: float) -> None:
         """Alarms that begin and end go into the record."""

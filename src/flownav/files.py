@@ -1,10 +1,14 @@
-"""Files and folders that appear whole or not at all, and the order in which a folder's are taken."""
+"""Files and folders that appear whole or not at all, and the order in which a folder's are taken.
+
+What a user names to be written goes through `guard`, which also asks what is there already.
+"""
 
 from __future__ import annotations
 
 import errno
 import os
 import re
+import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -18,7 +22,7 @@ def written_whole(path: Path) -> Iterator[Path]:
     Missing folders are made. OSError where the file cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    temporary = path.with_name(_hidden())
     try:
         yield temporary
         os.replace(temporary, path)
@@ -35,13 +39,23 @@ def folder_written_whole(path: Path) -> Iterator[Path]:
     """
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise FileExistsError(errno.EEXIST, "it is there already and not empty", str(path))
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    temporary = path.with_name(_hidden())
     temporary.mkdir(parents=True)
     try:
         yield temporary
         os.replace(temporary, path)
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _hidden() -> str:
+    """A name that nobody has, and no longer than others."""
+    return f".{secrets.token_hex(8)}.{os.getpid()}.part"
+
+
+def plain(text: str) -> str:
+    """Text for a file in UTF-8: the bytes of a file's name that are none are spelt out."""
+    return text.encode("utf-8", errors="backslashreplace").decode("utf-8")
 
 
 def natural_order(path: Path) -> tuple[list[tuple[bool, int, str]], ...]:

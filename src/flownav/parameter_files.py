@@ -17,6 +17,9 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
 from flownav.errors import InputError
 
 PROVENANCE_KEYS = {"value", "uncertainty", "source"}
+MOST_BYTES = 4_000_000  # of a file: the largest that ships has 30 000
+DEEPEST = 20  # tables and lists in each other
+LONGEST_SHOWN = 300  # characters of a key, a value or a sentence in a message
 
 
 def _value_of(entry: Any) -> Any:
@@ -54,14 +57,36 @@ def shipped(name: str) -> Path:
 
 def read_toml(path: Path) -> dict[str, Any]:
     """A TOML file as nested dictionaries. InputError names the file and the line at fault."""
+    from flownav.guard import an_input
+
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        with an_input(path).open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            raise InputError(f"{path}: more than {MOST_BYTES:,} bytes; a parameter file is needed")
+        entries = tomllib.loads(content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n"))
+        if _deeper_than(entries, DEEPEST):
+            raise RecursionError
+        return entries
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not valid TOML: {error}") from None
+        raise InputError(f"{path}: not valid TOML: {_one_line(str(error))}") from None
+    except ValueError:  # Python's own limit on an integer's digits
+        raise InputError(f"{path}: not valid TOML: an integer of thousands of digits") from None
+    except RecursionError:
+        raise InputError(f"{path}: not valid TOML: tables or lists nested too deep") from None
+
+
+def _deeper_than(entries: Any, levels: int) -> bool:
+    """Whether tables and lists stand in each other more than so many levels deep."""
+    floor = [entries]
+    for _ in range(levels):
+        floor = [inner for outer in floor for inner in (outer.values() if isinstance(outer, dict) else outer)]
+        floor = [inner for inner in floor if isinstance(inner, dict | list)]
+    return bool(floor)
 
 
 def load(path: Path, schema: type[Model]) -> Model:
@@ -76,7 +101,7 @@ def check(entries: dict[str, Any], schema: type[Model], where: str) -> Model:
     except ValidationError as error:
         # a misspelt key is reported before the key that it should have been
         first, *others = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
-        key = ".".join(str(part) for part in first["loc"])
+        key = _one_line(".".join(str(part) for part in first["loc"]))
         more = f" (and {len(others)} more)" if others else ""
         raise InputError(f"{where}: {key}: {_sentence(first, schema)}{more}") from None
 
@@ -89,7 +114,20 @@ def _sentence(error: Any, schema: type[BaseModel]) -> str:
         return f"unknown key; known here: {known}"
     if kind == "missing":
         return "missing; add it"
-    return f"{error['msg'].removeprefix('Value error, ')}, got {_number_of(given)!r}"
+    return f"{_one_line(error['msg'].removeprefix('Value error, '))}, got {_shown(_number_of(given))}"
+
+
+def _shown(given: Any) -> str:
+    """A value as a message shows it: on one line, not endless."""
+    try:
+        return _one_line(repr(given))
+    except (ValueError, RecursionError):  # an integer too long to be written, a nest too deep
+        return f"something that is too long to show ({type(given).__name__})"
+
+
+def _one_line(text: str) -> str:
+    text = "".join(character if character.isprintable() else repr(character)[1:-1] for character in text)
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
 def _number_of(given: Any) -> Any:

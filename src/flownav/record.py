@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.errors import InputError
-from flownav.files import written_whole
+from flownav.guard import an_input, written_whole
 
 SCHEMA_VERSION = 1
 
@@ -139,12 +139,18 @@ class Record:
         """Columns of a table side by side, shape (n, len(columns)). KeyError where one is missing."""
         return np.column_stack([self.tables[table][name] for name in columns]).astype(float)
 
-    def save(self, path: Path) -> None:
-        """Write the record as one file, whole or not at all (temporary name, then rename)."""
+    def save(self, path: Path, *, replacing: bool = False) -> None:
+        """Write the record as one file, whole or not at all (temporary name, then rename).
+
+        replacing: whoever asks knows that what is there may go. InputError, unless replacing, where it must not.
+        """
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        with written_whole(path) as temporary, zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as bundle:
+        with (
+            written_whole(path, replacing=replacing) as temporary,
+            zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as bundle,
+        ):
             manifest = {"schema": SCHEMA_VERSION, **self.manifest}
             bundle.writestr("manifest.json", json.dumps(manifest, indent=1, default=str))
             for name, table in self.tables.items():
@@ -157,7 +163,7 @@ class Record:
         """Read a record. InputError where the file is missing, is no record, or is of a newer schema."""
         import pyarrow.parquet as pq
 
-        if not path.is_file():
+        if not an_input(path).is_file():
             raise InputError(f"{path}: no such record; `flownav fly landing` writes one")
         try:
             with zipfile.ZipFile(path) as bundle:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 
 import typer
@@ -26,6 +27,7 @@ from flownav.cli import tune as tune
 from flownav.cli import validate as validate
 from flownav.cli import vehicle as vehicle
 from flownav.errors import FlownavError, InputError
+from flownav.guard import a_run
 
 app = typer.Typer(
     name="flownav",
@@ -61,8 +63,15 @@ for name, command, what in (
 
 def main() -> None:
     """Entry point: a mistake of the user's is one line on standard error and exit status 2, a bad verdict 1."""
+    for stream in (sys.stdout, sys.stderr):  # names of files are bytes, and need not be text
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
-        app()
+        with a_run():
+            app()
     except FlownavError as error:
         print(f"flownav: {error}", file=sys.stderr)
         sys.exit(2 if isinstance(error, InputError) else 1)
+    except OSError as error:  # a disk that is full, a file that went away
+        print(f"flownav: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
+        sys.exit(2)

@@ -43,15 +43,15 @@ def command(
         if name not in CASES:
             raise InputError(f"--cases {name or '(empty)'}: no such case; known: {', '.join(CASES)}, or all")
     if out:
-        require_writable(out)
+        require_writable(out, vehicle)
     with progress("Flying", flights_of(chosen, flights, ablations, vehicle)) as advance:
         made = [run_case(name, seed, flights, ablations, advance, vehicle) for name in chosen]
     text = markdown(made)
     if out:
-        from flownav.files import written_whole
+        from flownav.guard import written_whole
 
         with written_whole(out) as temporary:
-            temporary.write_text(text, encoding="utf-8", newline="\n")
+            temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
     if as_json:
         facts: dict[str, Any] = {"flights": flights, "ablation_flights": ablations, "seed": seed}
         facts |= {"cases": [case.as_json() for case in made]} | ({"out": str(out)} if out else {})

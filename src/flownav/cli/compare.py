@@ -49,9 +49,9 @@ def command(
 
     option = f"--outages {outages}"
     asked = table_windows(*numbers("--outages", outages, ":", 3, "T0:T1:LENGTH"), option="--outages") if outages else []
-    chosen = settings_asked(settings or [DEFAULT], sensor)
     if out is not None:
-        require_writable(out)
+        require_writable(out, *logs, *(settings or []), sensor)
+    chosen = settings_asked(settings or [DEFAULT], sensor)
     flights = [open_flight(path) for path in logs]
     if asked and not any(Sensor.GPS_POSITION in log.streams for log in flights):
         raise InputError(f"{option}: none of the logs has GPS to cut; leave it out")

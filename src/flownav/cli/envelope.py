@@ -45,7 +45,7 @@ def command(
     if last_s is None or last_s >= chosen.flight.duration_s or chosen.truth == "linear":
         raise InputError(f"{chosen.name}: it never lands; give a scenario with a may_land_after_s before its end")
     page = out or Path("out") / f"{chosen.name}_envelope.html"
-    require_writable(page)
+    require_writable(page, scenario, vehicle)
     with progress(f"Flying {chosen.name}", flights * directions * len(chosen_speeds)) as advance:
         rows = fly_envelope(
             chosen, chosen_speeds, directions_deg(directions), seed, flights, dispersed=ensemble, on_progress=advance

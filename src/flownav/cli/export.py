@@ -26,14 +26,17 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Write a record for other tools: Foxglove, evo, spreadsheets, data frames, PlotJuggler, Flight Review."""
+    from flownav.cli.output import require_writable, require_writable_folder
     from flownav.errors import InputError
-    from flownav.export.formats import destination, export
+    from flownav.export.formats import FOLDERS, FRAMED, destination, export
     from flownav.record import Record
 
     path = destination(record, to, out)
-    sources = [source.resolve() for source in (record, merge) if source is not None]
-    if path.resolve() in sources:
-        raise InputError(f"{path}: the export would replace what it is made from; give another --out")
+    if to in FOLDERS:
+        require_writable_folder(path, record, merge)
+    else:
+        one = path.with_name(f"{path.stem}_estimate{path.suffix}") if to in FRAMED else path
+        require_writable(one, record, merge)
     flown = Record.load(record)
     try:
         written = export(flown, to, path, frame, merge)

@@ -47,6 +47,7 @@ def command(
     require_between("--bin", bin_by, 1, 64)
     if distance is not None:
         require_between("--range", distance, 0.01, 10_000.0)
+    turned = _rates(rates) if rates else None
     grey = binned(read_frames(frames), bin_by)
     if window is not None:
         grey = middle(grey, window)
@@ -55,7 +56,7 @@ def command(
             grey,
             fps,
             focal_px=focal / bin_by,
-            rates_rad_s=_rates(rates) if rates else None,
+            rates_rad_s=turned,
             range_m=distance,
             firmware=firmware,
         )
@@ -73,10 +74,11 @@ def _rates(path: Path) -> Any:
     import numpy as np
 
     from flownav.errors import InputError
+    from flownav.guard import an_input
 
     names = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
     try:
-        with path.open(newline="", encoding="utf-8") as stream:
+        with an_input(path).open(newline="", encoding="utf-8") as stream:
             rows = list(csv.DictReader(stream))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None

@@ -58,7 +58,7 @@ def command(
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
     from flownav.campaign.judged import BOUND_FLIGHTS, bound_of, consistency_facts, fly_judged
     from flownav.campaign.local import fly_recorded, known_exactly, median_flight
-    from flownav.cli.output import progress, require_between, require_writable, save
+    from flownav.cli.output import progress, require_between, require_writable_record, save
     from flownav.scoring.errors import scores_of_flights
     from flownav.scoring.paper_tables import percentile_of_paper, published
     from flownav.scoring.takeoffs import takeoff_of_flights
@@ -72,11 +72,11 @@ def command(
     if flight is not None and flights > 1:
         raise InputError("--flight names one flight, --flights many; give one of the two")
     chosen = _overridden(load_scenario(scenario), gps, filter_name, feedback, truth, optics, sensor, vehicle)
+    record_path = out or Path("out") / f"{chosen.name}.fnr"
     setup = assemble(chosen)
+    require_writable_record(record_path, scenario, sensor, vehicle, signing_key, report=report)
     dispersed = flights > 1 if ensemble is None else ensemble
     truths = setup.ensemble() if dispersed else None
-    record_path = out or Path("out") / f"{chosen.name}.fnr"
-    require_writable(record_path)
     facts: dict[str, Any] = {
         "scenario": chosen.name,
         "filter": chosen.filter.name,

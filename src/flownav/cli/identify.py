@@ -36,6 +36,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Identify a flow sensor: gain, latency, dynamics, noise, each with its interval, as a sensor file."""
+    from flownav.cli.output import require_writable
     from flownav.compile import announce_compilation
     from flownav.identification.job import identify, name_of, parse_heights
     from flownav.identification.orders import parse_order
@@ -45,8 +46,11 @@ def command(
 
     structures, heights_m = parse_order(order), parse_heights(heights)
     path = _sensor_path(out, logs)
-    base_sensor = load_sensor(base)
     parameter_path = _parameter_path(path, autopilot)
+    for output in (path, parameter_path):
+        if output is not None:
+            require_writable(output, *logs, base)
+    base_sensor = load_sensor(base)
     with announce_compilation("identification"):
         findings = identify(logs, structures, heights_m, reference, flow_instance)
     entries = sensor_entries(findings, base_sensor, f"identified from {name_of(logs)}", command_line())

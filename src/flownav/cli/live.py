@@ -76,7 +76,7 @@ def command(
     require_between("--unfused", unfused, 1.0, float("inf"))
     require_between("--duration", 1.0 if duration is None else duration, 0.1, 1e6)
     if record is not None:
-        require_writable(record)
+        require_writable(record, sensor, signing_key, settings)
     limits = Limits(dead_reckoning_s=send_limit, sigma_m=send_sigma, protection_m=send_protection, unfused_s=unfused)
     options = replace(
         _options(send, system, component, signing_key, gps_delay, sensor, settings),

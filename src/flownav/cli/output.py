@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -38,30 +38,67 @@ def require_between(option: str, value: float, low: float, high: float) -> None:
         raise InputError(f"{option} {value}: must be from {low} to {high}")
 
 
-def require_writable(path: Path) -> None:
-    """InputError where a file cannot be put there; asked before the work is done, not after."""
+def require_writable(path: Path, *inputs: str | Path | None) -> None:
+    """InputError where a file must not or cannot be put there; asked before the work is done, not after.
+
+    inputs: what the run reads (None for an option that is not given; a name that is no path does no harm).
+    """
+    from flownav.guard import an_input, an_output
+
+    read = [an_input(Path(each)) for each in inputs if each is not None]
+    an_output(path, read)
+    _require_place(path)
+
+
+def require_writable_folder(path: Path, *inputs: str | Path | None) -> None:
+    """The same of a folder: a new one, or an empty one."""
+    from flownav.guard import an_input, an_output_folder
+
+    for each in inputs:
+        if each is not None:
+            an_input(Path(each))
+    an_output_folder(path)
+    _require_place(path)
+
+
+def _require_place(path: Path) -> None:
+    """InputError where no file can be made in the folder that a path lies in, or in the nearest that is there."""
+    there = next((parent for parent in path.absolute().parents if parent.exists()), path.absolute().parent)
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=there):
+            pass
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
-    if path.is_dir() or not os.access(path.parent, os.W_OK):
-        raise InputError(f"{path}: cannot be written; give another --out")
+
+
+def page_of(record: Path, *, report: bool) -> Path | None:
+    """Where the report of a record lies; None where none is asked for. InputError where it would replace the record."""
+    page = record.with_suffix(".html")
+    if report and page == record:
+        raise InputError(f"--out {record}: the report would replace the record; name it .fnr")
+    return page if report else None
+
+
+def require_writable_record(path: Path, *inputs: str | Path | None, report: bool) -> None:
+    """The same of a record and of its report beside it."""
+    page = page_of(path, report=report)
+    for output in (path, page):
+        if output is not None:
+            require_writable(output, *inputs)
 
 
 def save(record: Record, path: Path, *, report: bool) -> dict[str, str]:
     """Write a record and, if asked, its report beside it; where they lie. InputError where that cannot be."""
-    page = path.with_suffix(".html")
-    if report and page == path:
-        raise InputError(f"--out {path}: the report would replace the record; name it .fnr")
+    page = page_of(path, report=report)
     try:
         record.save(path)
-        if report:
+        if page is not None:
             from flownav.report.html import write_report
 
             write_report(record, page)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
-    return {"record": str(path), **({"report": str(page)} if report else {})}
+    return {"record": str(path), **({"report": str(page)} if page else {})}
 
 
 def autopilot_errors(scores: dict[str, Any]) -> str:

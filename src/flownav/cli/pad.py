@@ -53,11 +53,12 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Where the pad is from the lens: angles, distance, heading; and how well, by height."""
-    from flownav.cli.output import require_between
+    from flownav.cli.output import require_between, require_writable
     from flownav.optics.pad_target import PadTarget, checked, print_target
 
     target = checked(PadTarget(side, pattern, code))
     if print_to is not None:
+        require_writable(print_to)
         print_target(target, print_to)
         facts: dict[str, Any] = {"target": target._asdict(), "picture": str(print_to)}
         typer.echo(json.dumps(facts) if as_json else f"{print_to}: print it at 100 %, and measure its side")
@@ -69,8 +70,6 @@ def command(
         require_between("--focal", focal, 1.0, 1e6)
         _show(_found(frames, target, focal, image_x), as_json, _print_found)
     else:
-        from flownav.cli.output import require_writable
-
         require_between("--frames", count, 1, 100_000)
         require_between("--flights", flights, 2, 100_000)
         require_between("--tilt-deg", tilt, 0.0, 45.0)
@@ -182,7 +181,7 @@ def _plain(facts: dict[str, Any]) -> dict[str, Any]:
 def _write_datasheet(
     out: Path, facts: dict[str, Any], target: PadTarget, camera_name: str, focus_m: float | None, mounting_deg: float
 ) -> str:
-    from flownav.files import written_whole
+    from flownav.guard import written_whole
     from flownav.optics.pad_datasheet import datasheet
     from flownav.optics.pad_trial import camera_named
     from flownav.provenance import command_line
@@ -195,7 +194,7 @@ def _write_datasheet(
         lens_m=(assumed.lens.forward_m, assumed.lens.right_m, assumed.lens.down_m),
     )  # fmt: skip
     with written_whole(out) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
     load_pad_camera_sheet(out)
     return str(out)
 

@@ -51,7 +51,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Fuse a recorded flight: its trajectory, its errors against its own GPS, and the drift through GPS outages."""
-    from flownav.cli.output import save
+    from flownav.cli.output import require_writable_record, save
     from flownav.errors import VerdictError
     from flownav.navigation.settings_of import settings_of
     from flownav.replay.bundle import to_record
@@ -63,6 +63,8 @@ def command(
 
     windows = tuple(numbers("--gps-outage", text, ":", 2, "T0:T1") for text in gps_outage or [])
     scale = numbers("--flow-scale", flow_scale, ",", 2, "X,Y")
+    record_path = out or Path("out") / f"{folder.resolve().name}.fnr"
+    require_writable_record(record_path, folder, settings, sensor, report=report)
     table = table_windows(*numbers("--outage-table", outage_table, ":", 3, "T0:T1:LENGTH")) if outage_table else []
     flow, stated = load_sensor(sensor) if sensor else None, _settings(settings) if settings else None
     told = settings_of(flow, stated=stated)
@@ -75,7 +77,6 @@ def command(
     scores = flown.scores()
     if table:
         scores.update(_fly_table(flown, table, scores["outages"]))
-    record_path = out or Path("out") / f"{folder.resolve().name}.fnr"
     scores |= save(to_record(flown, scores, ["flownav", *sys.argv[1:]]), record_path, report=report)
     if as_json:
         typer.echo(json.dumps(scores))

@@ -17,6 +17,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Write a record's report: figures, scores, events and provenance in one HTML file that works offline."""
+    from flownav.cli.output import require_writable
     from flownav.errors import InputError
     from flownav.record import Record
     from flownav.report.html import write_report
@@ -24,6 +25,7 @@ def command(
     page = out or record.with_suffix(".html")
     if page.resolve() == record.resolve():
         raise InputError(f"{page}: the report would replace its own record; give another --out")
+    require_writable(page, record)
     flown = Record.load(record)
     try:
         write_report(flown, page)

@@ -45,7 +45,7 @@ def command(
     from flownav.provenance import command_line
     from flownav.rig.campaign import run_campaign
     from flownav.rig.experiment import RigSettings
-    from flownav.rig.log_folder import run_folders, write_rig_folder
+    from flownav.rig.log_folder import check_rig_folder, run_folders, write_rig_folder
 
     require_between("--seed", seed, 0, 2**31 - 1)
     heights = height or [0.6]
@@ -66,9 +66,10 @@ def command(
         runs=runs,
         seed=seed,
     )
-    rows = []
+    rows, folders = [], list(run_folders(out, len(heights) * runs))
+    for folder in folders:
+        check_rig_folder(folder)
     with announce_compilation("rig"), progress("Swinging", len(heights) * runs) as advance:
-        folders = run_folders(out, len(heights) * runs)
         for log, folder in zip(run_campaign(settings, heights, advance), folders, strict=True):
             write_rig_folder(log, folder, command_line())
             rows.append(_facts(log, folder))

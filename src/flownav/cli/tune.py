@@ -40,10 +40,10 @@ def command(
 
     if out.suffix != ".toml":
         raise InputError(f"--out {out}: a settings file's name ends in .toml")
+    require_writable(out, *logs, settings, sensor)
     (start,) = settings_asked([DEFAULT if settings is None else str(settings)], sensor)
     stated = None if settings is None else load(settings, NavigatorSettingsFile)
     flights = [open_flight(path) for path in logs]
-    require_writable(out)
     with progress("replays", runs_expected(flights)) as advance:
         tuned = tune(logs, flights, start.options, start.numbers, advance)
     if tuned.accepted:

@@ -31,6 +31,7 @@ def command(
     """Hold the simulator against recorded flights: outage drift, innovations, noise, as flown and as simulated."""
     from flownav.cli.output import progress, require_between, require_writable
     from flownav.errors import InputError, VerdictError
+    from flownav.guard import an_input
     from flownav.validation.flights import load_flights
     from flownav.validation.job import replays_of, validate
     from flownav.validation.page import page
@@ -38,18 +39,18 @@ def command(
     require_between("--flights", flights, 1, MOST_FLIGHTS)
     require_between("--seed", seed, 0, 2**63 - 1)
     if out is not None:
-        require_writable(out)
-    if not data.is_dir():
+        require_writable(out, data, flights_file)
+    if not an_input(data).is_dir():
         raise InputError(f"{data}: no such folder; give the folder of logs by --data or FLOWNAV_DATA")
     recorded = load_flights(flights_file)
     with progress("Validating", replays_of(recorded, flights)) as advance:
         rows = validate(data, recorded, seed, flights, advance)
     if out is not None:
-        from flownav.files import written_whole
+        from flownav.guard import written_whole
 
         with written_whole(out) as temporary:
             text = page(rows, seed, flights, recorded.vehicle.path_bandwidth_hz)
-            temporary.write_text(text, encoding="utf-8", newline="\n")
+            temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
     if as_json:
         facts = {"seed": seed, "flights": flights, "rows": [row.as_json() for row in rows]}
         typer.echo(json.dumps(facts))

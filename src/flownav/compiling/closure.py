@@ -27,6 +27,7 @@ START_S = time.time()
 # imported by every kernel's module through `flownav.compile`, and nothing in machine code comes from them
 WITHOUT_CODE = {
     "flownav.files",
+    "flownav.guard",
     *(f"flownav.compiling.{part}" for part in ("beside", "cache", "closure", "progress", "shipping")),
 }
 

@@ -21,7 +21,7 @@ from flownav.export.mcap_schemas import FRAME_TRANSFORM, POSE_IN_FRAME, Schema, 
 from flownav.export.stamps import Stamps, finite_rows, shift_needed_s, stamps
 from flownav.export.tables import is_text, manifest_json, texts
 from flownav.export.trajectory import ENU_FROM_NED, Trajectory, trajectories
-from flownav.files import written_whole
+from flownav.guard import written_whole
 from flownav.record import Record, Table
 
 NS = 1_000_000_000

@@ -15,7 +15,7 @@ import numpy as np
 
 from flownav.export.stamps import stamps
 from flownav.export.trajectory import Trajectory, trajectories
-from flownav.files import written_whole
+from flownav.guard import written_whole
 from flownav.record import Record
 
 AXES = {"ned": "earth NED, body FRD", "enu": "earth ENU, body FLU"}
@@ -57,5 +57,7 @@ def write_poses(record: Record, path: Path, frame: str) -> tuple[list[Path], lis
     files = [path.with_name(f"{path.stem}_{one.name}{path.suffix}") for one in paths]
     with ExitStack() as stack:
         for one, file in zip(paths, files, strict=True):
-            stack.enter_context(written_whole(file)).write_text(TEXTS[path.suffix](one, frame), encoding="utf-8")
+            stack.enter_context(written_whole(file)).write_text(
+                TEXTS[path.suffix](one, frame), encoding="utf-8", errors="backslashreplace"
+            )
     return files, [note for one in paths for note in one.notes]

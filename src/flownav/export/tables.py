@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from flownav.files import folder_written_whole
+from flownav.guard import folder_written_whole
 from flownav.record import SCHEMA_VERSION, Column, Record, Table
 
 
@@ -37,7 +37,7 @@ def write_csv(record: Record, folder: Path) -> tuple[list[Path], list[str]]:
     """
 
     def write(table: Table, file: Path) -> None:
-        with file.open("w", newline="", encoding="utf-8") as stream:
+        with file.open("w", newline="", encoding="utf-8", errors="backslashreplace") as stream:
             writer = csv.writer(stream, lineterminator="\n")
             writer.writerow(table)
             writer.writerows(zip(*(map(_cell, column.tolist()) for column in table.values()), strict=True))

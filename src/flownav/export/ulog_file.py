@@ -20,7 +20,7 @@ from flownav.export.ulog_topics import (
     position_topic,
     table_topic,
 )
-from flownav.files import written_whole
+from flownav.guard import written_whole
 from flownav.provenance import hash_of
 from flownav.record import Record
 

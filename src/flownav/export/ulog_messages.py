@@ -69,7 +69,7 @@ def header(start_us: int) -> bytes:
 
 def information(name: str, text: str) -> bytes:
     """A text that belongs to the whole log."""
-    value = text.encode()
+    value = text.encode(errors="backslashreplace")
     key = f"char[{len(value)}] {name}".encode()
     return message("I", bytes([len(key)]) + key + value)
 
@@ -103,7 +103,9 @@ def data(topic: Topic, number: int) -> list[Stamped]:
 
 def logged(time_us: int, text: str, level: str = "6") -> Stamped:
     """A logged string; level as the Linux kernel's, "4" a warning, "6" information."""
-    return Stamped(time_us, message("L", level.encode() + struct.pack("<q", time_us) + text.encode()))
+    return Stamped(
+        time_us, message("L", level.encode() + struct.pack("<q", time_us) + text.encode(errors="backslashreplace"))
+    )
 
 
 def walk(log: bytes, begin: int, end: int) -> Iterator[Found]:

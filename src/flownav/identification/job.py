@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flownav.errors import InputError
+from flownav.guard import an_input
 from flownav.identification.descent import Structure
 from flownav.identification.findings import Findings
 from flownav.identification.flight_identification import identify_flight
@@ -32,7 +33,7 @@ def identify(
     if not logs:
         raise InputError("no log given; identify takes rig folders, rig CSV files or one flight log")
     for path in logs:
-        if not path.exists():
+        if not an_input(path).exists():
             raise InputError(f"{path}: no such file or folder; identify takes rig logs and flight logs")
     flights = [path for path in logs if is_flight(path)]
     if flights and len(logs) > 1:

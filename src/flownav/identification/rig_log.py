@@ -21,6 +21,7 @@ from pydantic import ConfigDict
 
 from flownav.errors import InputError
 from flownav.files import natural_order
+from flownav.guard import an_input
 from flownav.identification.experiment import Experiment, experiment
 from flownav.logs.csv_table import Column, CsvTable, read_csv_table
 from flownav.measurement import Array
@@ -72,7 +73,7 @@ def is_rig(path: Path) -> bool:
 
 def read_runs(path: Path, height_m: float | None = None, reference: str = "auto") -> list[Run]:
     """Every run of a rig log. height_m replaces what rig.toml says. InputError names what is missing and where."""
-    if not path.exists():
+    if not an_input(path).exists():
         raise InputError(f"{path}: no such file or folder; identify takes rig logs, rig CSV files and flight folders")
     if reference not in ("auto", *REFERENCES):
         raise InputError(f"--reference {reference}: auto, velocity or encoder are possible for a rig log")

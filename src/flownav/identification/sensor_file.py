@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 
 from flownav.errors import InputError
-from flownav.files import written_whole
+from flownav.files import plain
+from flownav.guard import written_whole
 from flownav.identification.descent import Structure
 from flownav.identification.findings import Findings, Response
 from flownav.identification.quantities import Interval, coefficients, numerator
@@ -58,7 +59,7 @@ def write_whole(path: Path, text: str) -> None:
     """A text file under a temporary name, then renamed. InputError where it cannot be written."""
     try:
         with written_whole(path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+            temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
 
@@ -248,5 +249,5 @@ def _literal(value: Any) -> str:
 
 
 def _quoted(text: str) -> str:
-    escaped = text.replace("\\", "\\\\").replace('"', '\\"')
+    escaped = plain(text).replace("\\", "\\\\").replace('"', '\\"')
     return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in escaped) + '"'

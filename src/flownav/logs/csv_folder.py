@@ -14,6 +14,7 @@ import numpy as np
 
 from flownav.errors import InputError
 from flownav.frames import quaternion_from_euler
+from flownav.guard import an_input
 from flownav.logs.absences import absences_of
 from flownav.logs.csv_table import Column, CsvTable, read_csv_table
 from flownav.logs.fixes import local_position, near_the_rest, origin_of
@@ -98,7 +99,7 @@ def read_csv_folder(folder: Path) -> Log:
 
 
 def _tables(folder: Path) -> dict[str, CsvTable]:
-    if not folder.is_dir():
+    if not an_input(folder).is_dir():
         raise InputError(f"{folder}: no such folder; replay takes a folder of CSV files (docs/csv-folder.md)")
     present = {name for name in FILES if (folder / f"{name}.csv").exists()}
     moved, aided = present & {"attitude", "imu"}, present & {"gps", "flow", "px4flow"}

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from flownav.errors import InputError
+from flownav.guard import an_input
 from flownav.logs.rows import LATE_SHARE, Rows, drop_duplicates, drop_strays, longest_ordered
 from flownav.measurement import Array
 
@@ -74,7 +75,7 @@ def _needs(columns: Sequence[Column]) -> str:
 
 def _content(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return an_input(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give a folder of CSV files") from error
 

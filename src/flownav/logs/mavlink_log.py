@@ -7,6 +7,7 @@ from collections import Counter
 from pathlib import Path
 
 from flownav.errors import InputError
+from flownav.guard import an_input
 from flownav.logs.absences import absences_of
 from flownav.logs.log import SIMULATOR, Log
 from flownav.logs.mavlink_flight import STATES, Decoder, Flight, find_vehicle
@@ -64,7 +65,7 @@ def read_tlog(path: Path, *, flow_instance: int | None = None) -> Log:
 
 def _content(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return an_input(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give a .tlog file") from error
 

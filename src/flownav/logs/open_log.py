@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from flownav.errors import InputError
+from flownav.guard import an_input
 from flownav.logs.log import Log
 from flownav.measurement import Sensor
 
@@ -28,7 +29,7 @@ def open_log(path: Path, *, flow_instance: int | None = None) -> Log:
     flow_instance: which of several flow sensors; None takes the one with most to say. InputError where the path is
     missing or no known format, or the log cannot be read.
     """
-    if path.is_dir():
+    if an_input(path).is_dir():
         if flow_instance is not None:
             raise InputError(f"--flow-instance: {path} is a folder of CSV files, with one flow sensor; leave it out")
         from flownav.logs.csv_folder import read_csv_folder
@@ -74,9 +75,9 @@ def _reader(kind: str) -> Callable[..., Log]:
 def log_kind(path: Path) -> str:
     """ "ulog", "dataflash", "tlog" or "record" by a file's first bytes and its suffix; "" for anything else.
 
-    InputError where a file cannot be read.
+    InputError where a file cannot be read, or is a FIFO or a device.
     """
-    if not path.is_file():
+    if not an_input(path).is_file():
         return ""
     try:
         with path.open("rb") as file:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from flownav.errors import InputError
+from flownav.guard import an_input
 from flownav.logs.rows import Rows, drop_duplicates, drop_strays, longest_ordered
 from flownav.logs.ulog_framing import Framed, frame
 from flownav.measurement import Array
@@ -125,7 +126,7 @@ def read_topics(path: Path, wanted: Collection[str], fields: Collection[str], st
 
 def _framed(path: Path, wanted: Collection[str]) -> tuple[Framed, str]:
     try:
-        with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
+        with an_input(path).open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
             return frame(path, content, wanted), hashlib.sha256(content).hexdigest()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give a ULog file") from error

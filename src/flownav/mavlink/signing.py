@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from flownav.errors import InputError
+from flownav.guard import an_input
 from flownav.mavlink.framing import (
     CHECKSUM_BYTES,
     HEADER_2,
@@ -39,7 +40,7 @@ def load_key(path: Path) -> bytes:
     InputError where it cannot be read or is neither. The key itself is never part of a message.
     """
     try:
-        with path.open("rb") as file:
+        with an_input(path).open("rb") as file:
             content = file.read(MOST_KEY_FILE_BYTES + 1)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give a signing key's file") from error

@@ -13,6 +13,7 @@ from typing import NamedTuple
 from flownav.frames import GRAVITY_M_S2
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
+from flownav.parameter_files import check
 from flownav.sensors.barometer_sheet import BarometerSheet
 from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.flow_camera_sheet import FlowCameraSheet
@@ -60,7 +61,7 @@ def settings_of(
     flow: the flow sensor's file, else the sheets'. stated: a user's own settings; the keys that stand in it are kept.
     flow_noise_stated: the flow's noise is the file's law of the height, not that of the reading's quality.
     rotor_hz: of the rotor and of its blades; the IMU's own filter weakens their vibration.
-    InputError where the file's axes are not known.
+    InputError where the file's axes are not known, or a sensor is one that no navigator could use.
     """
     sensor = flow if flow is not None else (sheets.flow_sensor if sheets is not None else None)
     keys: Keys = {}
@@ -71,7 +72,8 @@ def settings_of(
     if stated is not None:
         keys |= {name: getattr(stated, name) for name in stated.model_fields_set}
     noise = noise_of(sensor) if sensor is not None and flow_noise_stated else NO_STATED_NOISE
-    return Told(NavigatorSettingsFile.model_validate(keys), noise)
+    where = sensor.name if sensor is not None else "the sensor files"
+    return Told(check(keys, NavigatorSettingsFile, f"{where}, as the navigator takes it"), noise)
 
 
 def of_sheets(sheets: SensorSheets, rotor_hz: tuple[float, float] | None = None) -> Keys:

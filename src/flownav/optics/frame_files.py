@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.errors import InputError
-from flownav.files import natural_order, written_whole
+from flownav.files import natural_order
+from flownav.guard import an_input, written_whole
 
 PICTURES = {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}
 VIDEOS = {".mp4", ".avi", ".mov", ".mkv", ".webm", ".m4v"}
@@ -23,7 +24,7 @@ def read_frames(paths: Sequence[Path]) -> NDArray[np.uint8]:
 
     InputError where there are none, where one cannot be read, or where they differ in size.
     """
-    if len(paths) == 1 and paths[0].is_dir():
+    if len(paths) == 1 and an_input(paths[0]).is_dir():
         found = sorted((f for f in paths[0].iterdir() if f.suffix.lower() in PICTURES), key=natural_order)
         if not found:
             raise InputError(f"{paths[0]}: no pictures in it ({', '.join(sorted(PICTURES))})")
@@ -35,7 +36,7 @@ def read_frames(paths: Sequence[Path]) -> NDArray[np.uint8]:
 
 def read_grey(path: Path) -> NDArray[np.uint8]:
     """One picture as grey levels (height, width); colours by their luminance. InputError names the file."""
-    image_of = _pillow()
+    image_of, path = _pillow(), an_input(path)
     try:
         with image_of.open(path) as picture:
             mode = "I" if picture.mode.startswith("I") else "L"
@@ -78,7 +79,7 @@ def _video(path: Path) -> NDArray[np.uint8]:
             f"or extract the frames, ffmpeg -i {path.name} frames/%06d.png, and give the folder"
         ) from None
     try:
-        with av.open(str(path)) as container:
+        with av.open(str(an_input(path))) as container:
             frames = [frame.to_ndarray(format="gray") for frame in container.decode(video=0)]
     except FileNotFoundError:
         raise InputError(f"{path}: no such file") from None
@@ -89,13 +90,21 @@ def _video(path: Path) -> NDArray[np.uint8]:
     return np.stack(frames)
 
 
+def signature() -> Any:
+    """What says in a PNG who wrote it."""
+    from PIL.PngImagePlugin import PngInfo
+
+    text = PngInfo()
+    text.add_text("Software", "flownav")
+    return text
+
+
 def save_picture(frame: NDArray[np.uint8], path: Path) -> None:
     """Write a frame (height, width) as a PNG. InputError where it cannot be written."""
     from PIL import Image
 
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
         with written_whole(path) as temporary:
-            Image.fromarray(frame).save(temporary, format="PNG")
+            Image.fromarray(frame).save(temporary, format="PNG", pnginfo=signature())
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another folder") from error

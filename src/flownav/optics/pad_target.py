@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.errors import InputError
-from flownav.files import written_whole
+from flownav.guard import written_whole
+from flownav.optics.frame_files import signature
 from flownav.optics.pad import BLACK, WHITE, Pad
 
 # codes 0 to 15 of the family 36h11, row by row from the top left, 1 is white; any two differ in 11 cells or more
@@ -163,6 +164,7 @@ def print_target(target: PadTarget, path: Path, dots_per_inch: int = 300) -> Non
     picture = np.where(np.repeat(np.repeat(cells, dots, 0), dots, 1), 255, 0).astype(np.uint8)
     try:
         with written_whole(path) as temporary:
-            Image.fromarray(picture).save(temporary, format="PNG", dpi=(printed_per_inch, printed_per_inch))
+            resolution = (printed_per_inch, printed_per_inch)
+            Image.fromarray(picture).save(temporary, format="PNG", dpi=resolution, pnginfo=signature())
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another place") from error

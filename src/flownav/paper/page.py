@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from flownav.files import written_whole
+from flownav.guard import written_whole
 from flownav.paper import figures_flight, figures_rig, figures_tables, leaks, published, rows, words
 from flownav.paper.findings import FIT_TOLERANCE, LARGEST_TOLERANCE, SAME_SPREAD, Finding
 from flownav.paper.reproduction import Reproduction
@@ -22,7 +22,7 @@ def write_page(reproduction: Reproduction, path: Path) -> None:
     """Write the page, whole or not at all. OSError where it cannot be written."""
     text = render(reproduction)
     with written_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def figures(of: Reproduction) -> dict[str, Section]:

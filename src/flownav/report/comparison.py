@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from flownav import __version__
-from flownav.files import written_whole
+from flownav.guard import written_whole
 from flownav.report.figure_words import number
 from flownav.report.html import HERE
 from flownav.report.style import FONT, PALETTE
@@ -23,7 +23,7 @@ def write_comparison(headings: tuple[str, ...], lines: Lines, rows: Sequence[dic
     """
     page = render(headings, lines, rows)
     with written_whole(path) as temporary:
-        temporary.write_text(page, encoding="utf-8", newline="\n")
+        temporary.write_text(page, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def render(headings: tuple[str, ...], lines: Lines, rows: Sequence[dict[str, Any]]) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from flownav.files import written_whole
+from flownav.guard import written_whole
 from flownav.report.style import COLOUR, FONT
 
 SCALE = [[0.0, COLOUR["alert"]], [0.8, "#e8b23a"], [0.95, "#a9cf6a"], [1.0, COLOUR["flow"]]]
@@ -16,7 +16,7 @@ def write_envelope(title: str, rows: Sequence[dict[str, Any]], path: Path) -> No
     """Write the page, whole or not at all; rows as `flownav envelope --json` has them. OSError where it cannot be."""
     page = envelope_figure(title, rows).to_html(include_plotlyjs=True, full_html=True)
     with written_whole(path) as temporary:
-        temporary.write_text(page, encoding="utf-8", newline="\n")
+        temporary.write_text(page, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def envelope_figure(title: str, rows: Sequence[dict[str, Any]]) -> Any:

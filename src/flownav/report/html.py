@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from flownav.files import written_whole
+from flownav.guard import written_whole
 from flownav.record import Record
 from flownav.report import (
     content,
@@ -36,7 +36,7 @@ def write_report(record: Record, path: Path) -> None:
     """
     page = render(record)
     with written_whole(path) as temporary:
-        temporary.write_text(page, encoding="utf-8", newline="\n")
+        temporary.write_text(page, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
 def sections(record: Record) -> list[Section]:

@@ -5,14 +5,16 @@ Several runs or heights stand side by side as FOLDER/run-001, run-002, ...
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from flownav.errors import InputError
+from flownav.files import plain
+from flownav.guard import an_output, an_output_folder, written_whole
 from flownav.provenance import provenance
 from flownav.rig.encoder import COUNTS_PER_REVOLUTION
 from flownav.rig.experiment import RigLog
@@ -46,10 +48,12 @@ def write_rig_folder(log: RigLog, folder: Path, command: str = "") -> None:
     )
     line = ",".join(COLUMNS.values())
     text = "\n".join([",".join(COLUMNS), *(line % tuple(row) for row in table.tolist())]) + "\n"
+    check_rig_folder(folder)
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        _write_whole(folder / "rig.csv", text)
-        _write_whole(folder / "rig.toml", _set_up(log, command))
+        with ExitStack() as both:
+            for name, content in (("rig.csv", text), ("rig.toml", _set_up(log, command))):
+                temporary = both.enter_context(written_whole(folder / name, replacing=True))
+                temporary.write_text(content, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror}); give another --out") from error
 
@@ -97,11 +101,13 @@ def _set_up(log: RigLog, command: str) -> str:
 
 def _toml(value: object) -> str:
     if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+        return '"' + plain(value).replace("\\", "\\\\").replace('"', '\\"') + '"'
     return repr(round(value, 9)) if isinstance(value, float) else str(value)
 
 
-def _write_whole(path: Path, text: str) -> None:
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    temporary.write_text(text, encoding="utf-8")
-    temporary.replace(path)
+def check_rig_folder(folder: Path) -> None:
+    """InputError where a folder may not be written: it is a link, or holds a log that flownav did not write."""
+    an_output_folder(folder)
+    log, set_up = folder / "rig.csv", folder / "rig.toml"
+    an_output(set_up)
+    an_output(log, signed_by=set_up)

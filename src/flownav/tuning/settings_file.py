@@ -6,7 +6,7 @@ from pathlib import Path
 
 from flownav import __version__
 from flownav.errors import InputError
-from flownav.files import written_whole
+from flownav.guard import written_whole
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.parameter_files import load
 from flownav.tuning.job import OfLog, Proposed, Tuned
@@ -20,7 +20,7 @@ def write_settings(path: Path, tuned: Tuned, stated: NavigatorSettingsFile | Non
     """
     try:
         with written_whole(path) as temporary:
-            temporary.write_text(settings_text(tuned, stated, command), encoding="utf-8")
+            temporary.write_text(settings_text(tuned, stated, command), encoding="utf-8", errors="backslashreplace")
             load(temporary, NavigatorSettingsFile)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.errors import InputError
+from flownav.guard import an_input
 from flownav.logs.dataflash.formats import DIVISORS, Format, read_formats, records, with_units
 from flownav.logs.dataflash.scan import Bytes, Indices, chain_messages, find_headers
 
@@ -154,7 +155,7 @@ def _converted(values: NDArray[Any], code: str) -> NDArray[Any]:
 
 def _content(path: Path) -> Bytes:
     try:
-        with path.open("rb") as file:
+        with an_input(path).open("rb") as file:
             return np.frombuffer(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ), np.uint8)
     except ValueError:
         raise InputError(f"{path}: the file is empty; a .bin log as the vehicle wrote it is needed") from None

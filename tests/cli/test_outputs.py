@@ -1,0 +1,151 @@
+"""Every command that writes: its inputs, links, devices, pipes and foreign files are left as they are, at exit status 2."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from flownav.cli import main
+from flownav.parameter_files import shipped
+from flownav.record import Record
+from replay_logs import log_of_flight
+from ulog_files import ulog_of_flight
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch) -> Path:
+    """A folder of inputs, in which commands run."""
+    monkeypatch.chdir(tmp_path)
+    flown = log_of_flight(4.0)
+    flown.write(tmp_path / "log")
+    Path("x.ulg").write_bytes(ulog_of_flight(flown.tables).bytes())
+    Record({"kind": "fly"}).save(Path("x.fnr"))
+    Path("settings.toml").write_text("# flownav\nflow_gain_x = 1.0\n")
+    for name in ("px4flow_paper.toml", "landing.toml", "quad_450.toml"):
+        Path(name).write_bytes(b"# flownav\n" + shipped(name).read_bytes())
+    Path("scenario.toml").write_text('flow_sensor = "px4flow_paper.toml"\n' + Path("landing.toml").read_text())
+    Path("key").write_text("0" * 64)
+    return tmp_path
+
+
+def contents(folder: Path) -> dict[str, bytes | str]:
+    """Every file as it is; links by where they lead, pipes and sockets by their mode."""
+    return {
+        str(path.relative_to(folder)): path.read_bytes() if path.is_file() and not path.is_symlink() else
+        f"{path.lstat().st_mode:o} {os.readlink(path) if path.is_symlink() else ''}"
+        for path in folder.rglob("*")
+    }  # fmt: skip
+
+
+def complaint(capsys, monkeypatch, command: str) -> str:
+    """What a command says on standard error when it is refused: one line, status 2, at once, and nothing changed."""
+    before, begun = contents(Path.cwd()), time.monotonic()
+    monkeypatch.setattr(sys, "argv", ["flownav", *command.split()])
+    with pytest.raises(SystemExit) as left:
+        main()
+    told = capsys.readouterr()
+    assert left.value.code == 2, told.err
+    assert told.out == ""
+    assert told.err.count("\n") == 1, told.err
+    assert time.monotonic() - begun < 20.0
+    assert contents(Path.cwd()) == before
+    return told.err
+
+
+@pytest.mark.parametrize("command", [
+    "replay x.ulg --out x.ulg",
+    "replay log --out log/attitude.csv",
+    "replay log --out log/new.csv",
+    "replay log --settings settings.toml --out settings.toml",
+    "replay log --sensor px4flow_paper.toml --out px4flow_paper.toml",
+    "fly scenario.toml --out scenario.toml",
+    "fly scenario.toml --out px4flow_paper.toml",
+    "fly landing --sensor px4flow_paper.toml --out px4flow_paper.toml",
+    "fly landing --vehicle quad_450.toml --out quad_450.toml",
+    "fly landing --signing-key key --out key",
+    "live udp:14999 --record key --signing-key key",
+    "live udp:14999 --record settings.toml --settings settings.toml",
+    "identify log --out px4flow_paper.toml --base px4flow_paper.toml",
+    "identify log --out log/rig.toml",
+    "tune log --settings settings.toml --out settings.toml",
+    "compare log x.ulg --out x.ulg",
+    "compare log --with settings.toml --out settings.toml",
+    "report x.fnr --out x.fnr",
+    "export x.fnr --to ulog --merge x.ulg --out x.ulg",
+    "envelope scenario.toml --out scenario.toml",
+    "accuracy --vehicle quad_450.toml --out quad_450.toml",
+    "validate --data log --out log/flow.csv",
+])  # fmt: skip
+def test_no_input_is_an_output(here, capsys, monkeypatch, command):
+    said = complaint(capsys, monkeypatch, command)
+    assert "would replace" in said or "which this run reads" in said
+
+
+@pytest.mark.parametrize("command", [
+    "replay log --out {}.fnr", "fly landing --out {}.fnr", "live udp:14999 --record {}.fnr", "identify log --out {}.toml",
+    "identify log --for px4 --out {}.toml", "tune log --out {}.toml", "compare log --out {}.html", "report x.fnr --out {}.html",
+    "export x.fnr --to ulog --out {}.ulg", "export x.fnr --to mcap --out {}.mcap", "export x.fnr --to csv --out {}.csv",
+    "envelope landing --out {}.html", "accuracy --out {}.md", "validate --data log --out {}.md", "paper --out {}.html",
+    "pad --out {}.toml", "pad --print {}.png", "rig --out {}.csv",
+])  # fmt: skip
+@pytest.mark.parametrize("kind", ["link", "fifo", "device"])
+def test_no_output_goes_through_a_link_or_into_a_pipe_or_a_device(here, capsys, monkeypatch, command, kind):
+    name = command.split("{}")[1].split()[0]
+    path = Path(f"taken{name}")
+    Path("target").write_text("mine\n")
+    if kind == "fifo":
+        os.mkfifo(path)
+    else:
+        path.symlink_to("target" if kind == "link" else "/dev/full")
+    said = complaint(capsys, monkeypatch, command.format("taken"))
+    assert "cannot be written" in said or "not a folder" in said
+
+
+@pytest.mark.parametrize("command", ["replay log --out flight.fnr", "fly landing --out flight.fnr"])
+def test_the_report_beside_a_record_is_an_output_too(here, capsys, monkeypatch, command):
+    Path("flight.html").write_text("my page")
+    assert "flight.html: is there already and was not written by flownav" in complaint(capsys, monkeypatch, command)
+
+
+@pytest.mark.parametrize("command", [
+    "info {}", "replay {}", "compare {}", "tune {}", "identify {}", "report {}", "export {} --to csv", "flow {} --fps 1",
+    "pad {} --focal 1", "fly {}", "fly landing --sensor {}", "fly landing --vehicle {}", "vehicle {}",
+    "replay log --settings {}", "replay log --sensor {}", "live udp:14999 --signing-key {}", "flow log --fps 1 --rates {}",
+])  # fmt: skip
+def test_pipes_and_devices_are_not_read(here, capsys, monkeypatch, command):
+    os.mkfifo("pipe.toml")
+    assert "a FIFO (a named pipe) is not read" in complaint(capsys, monkeypatch, command.format("pipe.toml"))
+    assert "a device is not read" in complaint(capsys, monkeypatch, command.format("/dev/zero"))
+
+
+def test_names_that_are_no_text_are_names(here, capsysbinary, monkeypatch):
+    """A folder and a record whose names are not UTF-8: read, written, shown, reported, as any other."""
+    name = os.fsdecode(b"fl\xffight")
+    Path("log").rename(name)
+    for command in (["info", name], ["replay", name, "--out", f"{name}.fnr"], ["report", f"{name}.fnr"],
+                    ["export", f"{name}.fnr", "--to", "csv"], ["replay", name, "--json", "--out", f"{name}.fnr"]):  # fmt: skip
+        monkeypatch.setattr(sys, "argv", ["flownav", *command])
+        with pytest.raises(SystemExit) as left:
+            main()
+        told = capsysbinary.readouterr()
+        assert (left.value.code, told.err) == (0, b""), told.err
+    assert Path(f"{name}.html").is_file()
+    assert Record.load(Path(f"{name}.fnr")).manifest["kind"] == "replay"
+
+
+@pytest.mark.parametrize("command", ["info", "replay", "report", "fly"])
+def test_a_name_too_long_is_one_line(here, capsys, monkeypatch, command):
+    assert "cannot be the name of a file" in complaint(capsys, monkeypatch, f"{command} {'x' * 300}.ulg")
+
+
+def test_the_same_command_twice_replaces_its_own(here, capsys, monkeypatch):
+    for _ in range(2):
+        monkeypatch.setattr(sys, "argv", ["flownav", "replay", "log", "--json"])
+        with pytest.raises(SystemExit) as left:
+            main()
+        assert left.value.code == 0
+    assert sorted(path.name for path in Path("out").iterdir()) == ["log.fnr", "log.html"]

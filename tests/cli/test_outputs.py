@@ -1,4 +1,4 @@
-"""Every command that writes: its inputs, links, devices, pipes and foreign files are left as they are, at exit status 2."""
+"""Every command that writes: inputs, links, devices, pipes and foreign files stay as they are; exit status 2."""
 
 from __future__ import annotations
 
@@ -86,8 +86,9 @@ def test_no_input_is_an_output(here, capsys, monkeypatch, command):
 
 
 @pytest.mark.parametrize("command", [
-    "replay log --out {}.fnr", "fly landing --out {}.fnr", "live udp:14999 --record {}.fnr", "identify log --out {}.toml",
-    "identify log --for px4 --out {}.toml", "tune log --out {}.toml", "compare log --out {}.html", "report x.fnr --out {}.html",
+    "replay log --out {}.fnr", "fly landing --out {}.fnr", "live udp:14999 --record {}.fnr",
+    "identify log --out {}.toml", "identify log --for px4 --out {}.toml", "tune log --out {}.toml",
+    "compare log --out {}.html", "report x.fnr --out {}.html",
     "export x.fnr --to ulog --out {}.ulg", "export x.fnr --to mcap --out {}.mcap", "export x.fnr --to csv --out {}.csv",
     "envelope landing --out {}.html", "accuracy --out {}.md", "validate --data log --out {}.md", "paper --out {}.html",
     "pad --out {}.toml", "pad --print {}.png", "rig --out {}.csv",
@@ -112,9 +113,10 @@ def test_the_report_beside_a_record_is_an_output_too(here, capsys, monkeypatch, 
 
 
 @pytest.mark.parametrize("command", [
-    "info {}", "replay {}", "compare {}", "tune {}", "identify {}", "report {}", "export {} --to csv", "flow {} --fps 1",
-    "pad {} --focal 1", "fly {}", "fly landing --sensor {}", "fly landing --vehicle {}", "vehicle {}",
-    "replay log --settings {}", "replay log --sensor {}", "live udp:14999 --signing-key {}", "flow log --fps 1 --rates {}",
+    "info {}", "replay {}", "compare {}", "tune {}", "identify {}", "report {}", "export {} --to csv",
+    "flow {} --fps 1", "flow log --fps 1 --rates {}", "pad {} --focal 1", "fly {}", "fly landing --sensor {}",
+    "fly landing --vehicle {}", "vehicle {}", "replay log --settings {}", "replay log --sensor {}",
+    "live udp:14999 --signing-key {}",
 ])  # fmt: skip
 def test_pipes_and_devices_are_not_read(here, capsys, monkeypatch, command):
     os.mkfifo("pipe.toml")
@@ -126,15 +128,21 @@ def test_names_that_are_no_text_are_names(here, capsysbinary, monkeypatch):
     """A folder and a record whose names are not UTF-8: read, written, shown, reported, as any other."""
     name = os.fsdecode(b"fl\xffight")
     Path("log").rename(name)
-    for command in (["info", name], ["replay", name, "--out", f"{name}.fnr"], ["report", f"{name}.fnr"],
-                    ["export", f"{name}.fnr", "--to", "csv"], ["replay", name, "--json", "--out", f"{name}.fnr"]):  # fmt: skip
+    record = f"{name}.fnr"
+    for command in (
+        ["info", name],
+        ["replay", name, "--out", record],
+        ["report", record],
+        ["export", record, "--to", "csv"],
+        ["replay", name, "--json", "--out", record],
+    ):
         monkeypatch.setattr(sys, "argv", ["flownav", *command])
         with pytest.raises(SystemExit) as left:
             main()
         told = capsysbinary.readouterr()
         assert (left.value.code, told.err) == (0, b""), told.err
     assert Path(f"{name}.html").is_file()
-    assert Record.load(Path(f"{name}.fnr")).manifest["kind"] == "replay"
+    assert Record.load(Path(record)).manifest["kind"] == "replay"
 
 
 @pytest.mark.parametrize("command", ["info", "replay", "report", "fly"])

@@ -43,3 +43,42 @@ def test_five_seconds_and_five_percent_are_needed(t0, t1, span, lines):
 @pytest.mark.parametrize("sensor", [Sensor.LANDED, Sensor.PAD])
 def test_what_speaks_only_when_there_is_something_to_say_is_not_missed(sensor):
     assert said_of(20.0, 25.0, (0.0, 60.0), sensor) == []
+
+
+def spoken_by(**spans: tuple[float, float]) -> list[str]:
+    streams = {Sensor[name.upper()]: spoken(Sensor[name.upper()], *span) for name, span in spans.items()}
+    ends = [time for span in spans.values() for time in span]
+    return silences(streams, (min(ends), max(ends)))
+
+
+def test_one_that_goes_on_alone_is_named_and_not_all_the_others():
+    others = {"imu": (0.0, 100.0), "flow_rate": (0.0, 100.0), "range": (0.0, 100.0)}
+    assert spoken_by(**others, baro=(0.0, 200.0)) == ["baro goes on to 200.0 s, and most others end at 100.0 s"]
+    assert spoken_by(**others, baro=(-50.0, 100.0)) == ["baro starts at -50.0 s, and most others at 0.0 s"]
+    assert spoken_by(**others, baro=(-4.0, 104.0)) == []
+
+
+def test_of_two_the_longer_one_is_the_log():
+    assert spoken_by(imu=(0.0, 50.0), baro=(0.0, 100.0)) == ["imu ends at 50.0 s of 100.0 s"]
+
+
+def test_half_of_a_short_log_is_missed_too():
+    assert said_of(0.0, 4.0, (0.0, 8.0)) == ["range ends at 4.0 s of 8.0 s"]
+    assert said_of(0.0, 7.0, (0.0, 8.0)) == []
+
+
+@pytest.mark.parametrize(("gaps", "words"), [
+    ([(20.0, 24.9)], None),
+    ([(20.0, 26.0)], "range has no usable reading for 6.1 s from 19.9 s on"),
+    ([(10.0, 16.0), (30.0, 50.0)], "range has no usable reading for 20.1 s from 29.9 s on (2 such gaps, 26.2 s together)"),
+])  # fmt: skip
+def test_a_long_pause_is_named(gaps, words):
+    t_s = 0.1 * np.arange(601)
+    for t0, t1 in gaps:
+        t_s = t_s[(t_s < t0 - 1e-9) | (t_s > t1 - 1e-9)]
+    stream = Stream.of(Sensor.RANGE, t_s, np.ones((len(t_s), 1)))
+    assert silences({Sensor.RANGE: stream}, (0.0, 60.0)) == ([words] if words else [])
+
+
+def test_a_slow_sensor_does_not_pause_at_every_step():
+    assert silences({Sensor.BARO: spoken(Sensor.BARO, 0.0, 200.0)}, (0.0, 200.0)) == []

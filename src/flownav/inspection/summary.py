@@ -19,6 +19,7 @@ from flownav.replay.autopilot import autopilot_scores
 from flownav.replay.prepare import ReplayOptions, prepare
 from flownav.replay.readiness import obstacles
 from flownav.replay.sentinel import Finding, findings
+from flownav.scoring.coverage import silences
 
 CLOCK_REASONS = {
     "no_time": "without a time",
@@ -37,6 +38,7 @@ def summarise(log: Log) -> dict[str, Any]:
     look, why_not = _look(log)
     checked, found = _findings(log)
     found += told_of(log, look, found)
+    found += [Finding(text) for text in silences(log.streams, log.span_s)]
     return {
         "log": log.path.name,
         "start_s": start,

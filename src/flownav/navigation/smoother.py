@@ -154,13 +154,18 @@ def go_back(
 
 @kernel
 def put_smoothed(state: Array, covariance: Array, vector: Array, matrix: Array, work: Array) -> None:
-    """x - P lambda, its attitude part turned onto the quaternion, and P - P Lambda P, in a lane buffer of one lane."""
+    """x - P lambda, its attitude part turned onto the quaternion, and P - P Lambda P, in a lane buffer of one lane.
+
+    A variance that rounding leaves below zero, after minutes without an aid, stays as the filter had it.
+    """
     change = covariance @ vector
     better = smoothed_covariance(covariance, matrix)
     for j in range(STATES):
         work[STATE + j] = state[j] - change[j]
         for i in range(j + 1):
             work[at(i, j)] = better[i, j]
+        if not better[j, j] > 0.0:
+            work[at(j, j)] = covariance[j, j]
     for i in range(4):
         work[QUATERNION + i] = state[STATES + i]
     fold_attitude(pointer(work), ONE_LANE)

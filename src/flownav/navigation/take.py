@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.compile import LANES, ONE_LANE, Unit, equation, procedure, unit
-from flownav.estimation.covariance import consider, consider_none, lagged, states_of, with_lag
+from flownav.estimation.covariance import consider, consider_none, lagged, states_of, variance_of, with_lag
 from flownav.estimation.error_models import propagate_gauss_markov, propagate_walks
 from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.lag import predict_with_lag
 from flownav.estimation.motion import hold_still, predict
-from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, STATES
+from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, STATES, VELOCITY
 from flownav.measurement import Sensor
 from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
 from flownav.navigation.compass import check_compass, note_push
@@ -25,7 +25,7 @@ from flownav.navigation.flow import take_flow
 from flownav.navigation.gps import take_gps
 from flownav.navigation.height import take_baro, take_range
 from flownav.navigation.inertial import choose_motion, keep_imu, steady_force
-from flownav.navigation.journal import note_decay, note_estimate, note_prediction
+from flownav.navigation.journal import note_decay, note_estimate, note_prediction, reset_state
 from flownav.navigation.lagged_flow import flow_lag
 from flownav.navigation.memory import (
     CLOCK,
@@ -56,6 +56,7 @@ from flownav.navigation.vibration import add_vibration_noise, limit_biases
 
 LONGEST_STEP_S = 0.1
 MOST_STEPS = 10000
+LOST_M, LOST_M_S = 1e5, 1e6  # standard deviations: more than this, and correlations are beyond a double's digits
 LONGEST_LAG_OF_ERRORS_S = 0.1  # Gauss-Markov errors go on at least so often
 
 
@@ -205,6 +206,22 @@ def advance(work: Work, lanes: Lanes, lag: bool | None, t_s: float, p: Work, o: 
         add_vibration_noise(work, lanes, dt_s, imu)
         if len(lanes) == 1:
             note_prediction(work, lanes, dt_s, o)
+    give_up(work, lanes, o)
+
+
+@procedure
+def give_up(work: Work, lanes: Lanes, o: Output) -> None:
+    """A position that minutes without an aid have spread over 100 km is lost: it keeps that doubt, and no correlations.
+
+    A covariance that has grown further cannot be corrected: a fix whose variance is smaller by sixteen digits leaves
+    variances below zero, and NaN for their roots.
+    """
+    for axis in range(3):
+        for lane in range(len(lanes)):
+            if variance_of(work, lanes, POSITION + axis, lane) > LOST_M * LOST_M:
+                reset_state(work, lanes, lane, POSITION + axis, LOST_M * LOST_M, o)
+            if variance_of(work, lanes, VELOCITY + axis, lane) > LOST_M_S * LOST_M_S:
+                reset_state(work, lanes, lane, VELOCITY + axis, LOST_M_S * LOST_M_S, o)
 
 
 @procedure

@@ -53,11 +53,6 @@ def _hidden() -> str:
     return f".{secrets.token_hex(8)}.{os.getpid()}.part"
 
 
-def plain(text: str) -> str:
-    """Text for a file in UTF-8: the bytes of a file's name that are none are spelt out."""
-    return text.encode("utf-8", errors="backslashreplace").decode("utf-8")
-
-
 def natural_order(path: Path) -> tuple[list[tuple[bool, int, str]], ...]:
     """A key to sort paths by: numbers in names by their value, so that test2 comes before test10."""
     return tuple(_number_by_number(part) for part in path.parts)

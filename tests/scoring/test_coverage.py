@@ -70,7 +70,8 @@ def test_half_of_a_short_log_is_missed_too():
 @pytest.mark.parametrize(("gaps", "words"), [
     ([(20.0, 24.9)], None),
     ([(20.0, 26.0)], "range has no usable reading for 6.1 s from 19.9 s on"),
-    ([(10.0, 16.0), (30.0, 50.0)], "range has no usable reading for 20.1 s from 29.9 s on (2 such gaps, 26.2 s together)"),
+    ([(10.0, 16.0), (30.0, 50.0)],
+     "range has no usable reading for 20.1 s from 29.9 s on (2 such gaps, 26.2 s together)"),
 ])  # fmt: skip
 def test_a_long_pause_is_named(gaps, words):
     t_s = 0.1 * np.arange(601)

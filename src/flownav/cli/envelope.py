@@ -30,12 +30,13 @@ def command(
     from flownav.errors import InputError
     from flownav.report.envelope import write_envelope
     from flownav.simulation.scenario import load_scenario, with_vehicle
+    from flownav.text import number
 
     require_between("--flights", flights, 1, 1_000_000)
     require_between("--directions", directions, 1, 360)
     require_between("--seed", seed, 0, 2**63 - 1)
     try:
-        chosen_speeds = sorted({float(speed) for speed in speeds.split(",")})
+        chosen_speeds = sorted({number(speed) for speed in speeds.split(",")})
     except ValueError:
         raise InputError(f"--speeds {speeds}: numbers with commas are needed, such as 2,4,8") from None
     for speed in chosen_speeds:

@@ -126,11 +126,12 @@ def _words(option: str, text: str) -> list[str]:
 def _numbers(option: str, text: str, low: float, high: float) -> list[float]:
     """Numbers with commas between. InputError where one is none or out of range."""
     from flownav.cli.output import require_between
+    from flownav.text import number
 
     numbers = []
     for word in _words(option, text):
         try:
-            numbers.append(float(word))
+            numbers.append(number(word))
         except ValueError:
             raise InputError(f"{option} {word}: a number is needed") from None
         require_between(option, numbers[-1], low, high)

@@ -75,6 +75,7 @@ def _rates(path: Path) -> Any:
 
     from flownav.errors import InputError
     from flownav.guard import an_input
+    from flownav.text import number
 
     names = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
     try:
@@ -83,7 +84,7 @@ def _rates(path: Path) -> Any:
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
     try:
-        return np.array([[float(row[name]) for name in names] for row in rows]).reshape(-1, 3)
+        return np.array([[number(row[name]) for name in names] for row in rows]).reshape(-1, 3)
     except (KeyError, TypeError, ValueError):
         raise InputError(f"{path}: columns {', '.join(names)} of numbers are needed, one row a frame") from None
 

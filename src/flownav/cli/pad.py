@@ -202,13 +202,14 @@ def _write_datasheet(
 def _numbers(option: str, text: str, low: float, high: float) -> list[float]:
     from flownav.cli.output import require_between
     from flownav.errors import InputError
+    from flownav.text import number
 
     try:
-        numbers = sorted({float(part) for part in text.split(",")})
+        numbers = sorted({number(part) for part in text.split(",")})
     except ValueError:
         raise InputError(f"{option} {text}: give numbers with commas, such as {HEIGHTS}") from None
-    for number in numbers:
-        require_between(option, number, low, high)
+    for one in numbers:
+        require_between(option, one, low, high)
     return numbers
 
 

@@ -92,9 +92,10 @@ def numbers(option: str, text: str, separator: str, count: int, form: str) -> tu
     from math import isfinite
 
     from flownav.errors import InputError
+    from flownav.text import number
 
     try:
-        found = tuple(float(part) for part in text.split(separator))
+        found = tuple(number(part) for part in text.split(separator))
     except ValueError:
         found = ()
     if len(found) != count or not all(map(isfinite, found)):

@@ -16,6 +16,7 @@ from flownav.identification.orders import CANDIDATES
 from flownav.identification.rig_identification import identify_rig
 from flownav.identification.rig_log import assign_heights, is_rig, read_runs
 from flownav.logs.open_log import log_kind
+from flownav.text import number
 
 
 def identify(
@@ -66,7 +67,7 @@ def is_flight(path: Path) -> bool:
 def parse_heights(text: str | None) -> list[float]:
     """Metres of `--heights 0.6,0.8`. InputError where one is no number."""
     try:
-        return [float(part) for part in text.split(",")] if text else []
+        return [number(part) for part in text.split(",")] if text else []
     except ValueError:
         raise InputError(f"--heights {text}: numbers in metres, parted by commas, are needed") from None
 

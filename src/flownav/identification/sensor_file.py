@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from flownav.errors import InputError
-from flownav.files import plain
 from flownav.guard import written_whole
 from flownav.identification.descent import Structure
 from flownav.identification.findings import Findings, Response
@@ -23,6 +22,7 @@ from flownav.identification.quantities import Interval, coefficients, numerator
 from flownav.parameter_files import check
 from flownav.provenance import hash_of
 from flownav.sensors.datasheet import FlowSensor
+from flownav.text import plain
 
 SHORTEST_LATENCY_S = 0.005
 STEEPEST = 4.0

@@ -18,6 +18,7 @@ from flownav.errors import InputError
 from flownav.guard import an_input
 from flownav.logs.rows import LATE_SHARE, Rows, drop_duplicates, drop_strays, longest_ordered
 from flownav.measurement import Array
+from flownav.text import number
 
 WRONG_UNIT_SHARE = 0.1  # more rows than this outside the limits: the column is in another unit
 LONGEST_MEDIAN_STEP_S = 10.0
@@ -133,7 +134,7 @@ def _header(path: Path, content: bytes) -> list[str]:
 
 def _number(text: str | None) -> float:
     try:
-        return float(text) if text is not None else np.nan
+        return number(text) if text is not None else np.nan
     except ValueError:
         return np.nan
 

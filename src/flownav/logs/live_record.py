@@ -12,6 +12,7 @@ import numpy as np
 
 from flownav.errors import InputError
 from flownav.logs.log import SIMULATOR, FedSegment, Log
+from flownav.logs.plausible import check_times
 from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, Stream
 from flownav.provenance import hash_of
 from flownav.record import FED, FED_FIRST, Record
@@ -39,13 +40,16 @@ def read_live_record(path: Path, *, flow_instance: int | None = None) -> Log:
         parameters = dict(record.manifest["parameters"])
         if not len(fed):
             raise InputError(f"{path}: its navigator heard nothing that it could use")
+        _check_rows(path, fed, len(segments))
         numbers = fed[:, FED.index("segment")].astype(int)
+        streams = _streams(fed)
         parts = tuple(FedSegment(_floats(segments[i]), _queue(fed, numbers == i)) for i in range(len(segments)))
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise InputError(f"{path}: not a whole record of kind {kind!r} ({error}); write it again") from error
+    check_times(path, streams)
     return Log(
         path,
-        _streams(fed),
+        streams,
         _origin(parameters),
         record.tables.get("truth"),
         {path.name: hash_of(path)},
@@ -61,6 +65,17 @@ def _fed_of(record: Record) -> Array:
     rows = record.matrix("fed", FED_FIRST)
     usual = {"withheld": np.zeros(len(rows)), "arrived": np.ones(len(rows))}
     return np.column_stack([rows, *(record.tables["fed"].get(name, usual[name]) for name in FED[len(FED_FIRST) :])])
+
+
+def _check_rows(path: Path, fed: Array, segments: int) -> None:
+    """InputError where a row has no time, is of no sensor or was fed to no navigator."""
+    sensor, segment = fed[:, FED.index("sensor")], fed[:, FED.index("segment")]
+    timed = np.isfinite(fed[:, : FED.index("sensor")]).all(axis=1)
+    known = np.isin(sensor, [int(each) for each in Sensor]) & np.isin(segment, np.arange(segments))
+    for good, what in ((timed, "without a time"), (known, "of an unknown sensor or navigator")):
+        if not good.all():
+            count = int(np.count_nonzero(~good))
+            raise InputError(f"{path}: {count} rows of `fed` {what}; the record is damaged, take another copy")
 
 
 def _floats(equipment: dict[str, Any]) -> dict[str, Any]:
@@ -102,6 +117,7 @@ def _streams(fed: Array) -> dict[Sensor, Stream]:
         rows = fed[(fed[:, FED.index("sensor")] == sensor) & (fed[:, FED.index("arrived")] > 0.0)]
         if len(rows):
             width = len(COLUMNS[sensor])
+            rows = rows[np.argsort(rows[:, FED.index("arrival_s")], kind="stable")]
             arrival = rows[:, FED.index("arrival_s")]
             streams[sensor] = Stream.of(
                 sensor,

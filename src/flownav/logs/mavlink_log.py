@@ -11,6 +11,7 @@ from flownav.guard import an_input
 from flownav.logs.absences import absences_of
 from flownav.logs.log import SIMULATOR, Log
 from flownav.logs.mavlink_flight import STATES, Decoder, Flight, find_vehicle
+from flownav.logs.plausible import check_times, of_one_clock
 from flownav.mavlink.framing import Frame, tlog_frames
 from flownav.measurement import Sensor, Stream
 
@@ -45,7 +46,9 @@ def read_tlog(path: Path, *, flow_instance: int | None = None) -> Log:
         streams, chosen = flight.gathered.streams(flow_instance)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
+    streams, strays = of_one_clock(streams)
     _check_needed(path, streams)
+    check_times(path, streams)
     truth = flight.truth()
     return Log(
         path,
@@ -53,7 +56,7 @@ def read_tlog(path: Path, *, flow_instance: int | None = None) -> Log:
         flight.origin_deg_m,
         truth,
         {path.name: hashlib.sha256(content).hexdigest()},
-        (*choice, *_damage_notes(damage, frames), *_flight_notes(flight), *chosen),
+        (*choice, *_damage_notes(damage, frames), *_flight_notes(flight), *chosen, *strays),
         flight.autopilot(streams.get(Sensor.ATTITUDE)),
         vehicle.name,
         flight.limits,

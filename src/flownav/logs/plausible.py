@@ -18,6 +18,7 @@ from flownav.logs.rates import attitude_at, attitude_rates, mean_over
 from flownav.measurement import Array, Sensor, Stream
 
 LONGEST_LOG_S = 172_800.0
+LATEST_S = 1e10  # a clock of UNIX seconds shows 2e9, and its double tells microseconds apart
 GRAVITY_LIMITS_M_S2 = (4.0, 25.0)
 LARGEST_TILT_ERROR_RAD = 0.6
 WRONG_UNIT_FACTOR = 10.0
@@ -36,7 +37,7 @@ def check_plausible(where: Path, streams: dict[Sensor, Stream]) -> None:
 
     Nothing is compared without an attitude.
     """
-    _check_span(where, streams)
+    check_times(where, streams)
     if Sensor.ATTITUDE not in streams:
         return
     attitude = streams[Sensor.ATTITUDE]
@@ -54,14 +55,45 @@ def check_plausible(where: Path, streams: dict[Sensor, Stream]) -> None:
             raise InputError(f"{where}: mag: a field of {1e3 * field:.3g} mgauss; the earth's is 250 to 650 (gauss?)")
 
 
-def _check_span(where: Path, streams: dict[Sensor, Stream]) -> None:
-    """A clock that has leapt makes a log of years, and everything on a grid of its times fills the memory."""
-    for sensor, stream in streams.items():
-        if len(stream) and stream.t_s[-1] - stream.t_s[0] > LONGEST_LOG_S:
+def check_times(where: Path, streams: dict[Sensor, Stream]) -> None:
+    """InputError where times cannot be seconds of one flight, each stream by itself and all together.
+
+    A clock that has leapt makes a log of years, and everything on a grid of its times fills the memory.
+    """
+    spans = {s.name.lower(): (float(t.t_s[0]), float(t.t_s[-1])) for s, t in streams.items() if len(t)}
+    for name, (first, last) in spans.items():
+        if last - first > LONGEST_LOG_S:
             raise InputError(
-                f"{where}: {sensor.name.lower()} covers {stream.t_s[0]:g} to {stream.t_s[-1]:g} s, more than two days; "
-                "the clock has leapt: cut the log there"
+                f"{where}: {name} covers {first:g} to {last:g} s, more than two days; the clock has leapt: cut the log "
+                "there"
             )
+        if not max(-first, last) < LATEST_S:
+            raise InputError(f"{where}: {name} covers {first:g} to {last:g} s; no clock shows that in seconds")
+    if not spans:
+        return
+    (early, (first, _)), (late, (_, last)) = (
+        min(spans.items(), key=lambda span: span[1][0]), max(spans.items(), key=lambda span: span[1][1])
+    )  # fmt: skip
+    if last - first > LONGEST_LOG_S:
+        raise InputError(
+            f"{where}: {early} begins at {first:g} s and {late} ends at {last:g} s, more than two days apart; all "
+            "sensors need one clock, in seconds"
+        )
+
+
+def of_one_clock(streams: dict[Sensor, Stream]) -> tuple[dict[Sensor, Stream], list[str]]:
+    """The streams without those whose clock is days away from most others', and a note on each of these."""
+    starts = sorted(float(stream.t_s[0]) for stream in streams.values() if len(stream))
+    if not starts:
+        return streams, []
+    usual = starts[(len(starts) - 1) // 2]
+    far = {s for s, stream in streams.items() if len(stream) and abs(stream.t_s[0] - usual) > LONGEST_LOG_S}
+    notes = [
+        f"{sensor.name.lower()} is left out: its clock shows {streams[sensor].t_s[0]:g} s where the others' show "
+        f"{usual:g} s ({len(streams[sensor])} readings)"
+        for sensor in sorted(far)
+    ]
+    return {sensor: stream for sensor, stream in streams.items() if sensor not in far}, notes
 
 
 def _check_gravity(where: Path, imu: Stream, attitude: Stream) -> None:

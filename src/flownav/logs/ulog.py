@@ -12,6 +12,7 @@ from pathlib import Path
 from flownav.errors import InputError
 from flownav.logs.absences import absences_of
 from flownav.logs.log import SIMULATOR, VISUAL_ODOMETRY, Absence, Log
+from flownav.logs.plausible import check_times, of_one_clock
 from flownav.logs.ulog_flow import FLOW_TOPICS, flow_stream, flow_topic, range_stream, reading_limits
 from flownav.logs.ulog_references import autopilot_estimate, pose_stream, truth_of
 from flownav.logs.ulog_sensors import (
@@ -102,6 +103,8 @@ def read_ulog(path: Path, *, flow_instance: int | None = None) -> Log:
     if not streams:
         why = "; ".join(_unusable(topics)) or "every row is invalid"
         raise InputError(f"{path}: no usable reading of any sensor ({why}); give another log")
+    streams, strays = of_one_clock(streams)
+    check_times(path, streams)
     flow_note = f"flow is {flow.label}; not used: {', '.join(flows)}" if flow is not None and flows else ""
     said = {"attitude": "no attitude (vehicle_attitude, or vehicle_visual_odometry with one)"}
     said |= {"imu": slow_imu} if slow_imu else {}
@@ -116,7 +119,7 @@ def read_ulog(path: Path, *, flow_instance: int | None = None) -> Log:
         origin,
         truth,
         {path.name: topics.sha256},
-        tuple(note for note in (*topics.notes, flow_note, truth_note, pose_note, autopilot_note) if note)
+        tuple(filter(None, (*topics.notes, flow_note, truth_note, pose_note, autopilot_note, *strays)))
         + tuple(_unusable(topics)),
         autopilot,
         _estimator(topics) if autopilot is not None else "",

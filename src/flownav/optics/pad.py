@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.errors import InputError
+from flownav.text import number
 
 BLACK, WHITE = 0.167, 0.833  # grey 30 and 150 where white paper would be 180
 STRIPE_GAP_M = 0.007  # the paper: "the best spacing between two black consecutive lines is 7 mm"
@@ -91,7 +92,7 @@ def pad_named(text: str, seed: int = 1) -> Pad:
 
 def _number(text: str, part: str) -> float:
     try:
-        return float(part)
+        return number(part)
     except ValueError:
         raise InputError(f"pad {text}: {part!r} is not a number") from None
 

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from flownav.errors import InputError
-from flownav.files import plain
 from flownav.guard import an_output, an_output_folder, written_whole
 from flownav.provenance import provenance
 from flownav.rig.encoder import COUNTS_PER_REVOLUTION
 from flownav.rig.experiment import RigLog
+from flownav.text import plain
 
 SCHEMA_VERSION = 1
 COLUMNS = {

@@ -51,7 +51,7 @@ def silences(streams: Mapping[Sensor, Stream], span_s: Window) -> list[str]:
 
 
 def _main_part(times: list[Array], span_s: Window) -> Window:
-    """From when to when at least half of the streams speak: the log's span, but where a few go far beyond the others."""
+    """From when to when half of the streams speak: the log's span, unless a few go far beyond the others."""
     if len(times) < LEAST_STREAMS:
         return span_s
     starts, ends = sorted(t[0] for t in times), sorted(t[-1] for t in times)

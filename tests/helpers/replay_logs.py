@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -58,11 +59,11 @@ def path(t_s: np.ndarray) -> np.ndarray:
 
 def log_of_flight(duration_s: float = 60.0, *, start_s: float = 0.0, yaw_rate: float = 0.05, imu_hz: float = 50.0,
                   attitude_hz: float = 50.0, flow_hz: float = 20.0, gps_hz: float = 5.0, range_hz: float = 20.0,
-                  sensor_gyro: bool = True) -> SyntheticLog:  # fmt: skip
+                  sensor_gyro: bool = True, along: Callable[[np.ndarray], np.ndarray] = path) -> SyntheticLog:  # fmt: skip
     """A log without any error but its sampling. Thrust lies along body z, so the attitude follows from the path."""
     fine = 1000.0
     t = np.arange(-1.0, duration_s + 1.0, 1.0 / fine)
-    position = path(t)
+    position = along(t)
     velocity = np.gradient(position, t, axis=0)
     force = np.gradient(velocity, t, axis=0) - np.array([0.0, 0.0, GRAVITY_M_S2])
     roll, pitch, yaw = _attitude(force, yaw_rate * t + 0.3)
@@ -108,7 +109,7 @@ def log_of_flight(duration_s: float = 60.0, *, start_s: float = 0.0, yaw_rate: f
     tables["baro"] = _table(s, start_s, ("alt_m",), 12.0 + at(s, -position[:, 2:]))
     field = _to_body(*(np.interp(s, t, angle) for angle in (roll, pitch, yaw)), np.tile(FIELD_MGAUSS, (len(s), 1)))
     tables["mag"] = _table(s, start_s, ("mag_x_mgauss", "mag_y_mgauss", "mag_z_mgauss"), field)
-    return SyntheticLog(tables, t + start_s, position - path(np.array([-GPS_DELAY_S])), velocity)
+    return SyntheticLog(tables, t + start_s, position - along(np.array([-GPS_DELAY_S])), velocity)
 
 
 def _table(t_s: np.ndarray, start_s: float, names: tuple[str, ...], values: np.ndarray) -> dict[str, np.ndarray]:

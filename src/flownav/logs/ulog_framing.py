@@ -2,8 +2,8 @@
 
 pyulog believes a file: a lying length, a nested format that grows without end or a damaged parameter makes it search
 byte by byte, fill the memory, or stop early without a word. So the framing is read here, each message is checked
-against what the definitions say of it, damage is skipped and counted, and only whole messages of the wanted topics go
-on. Format: docs.px4.io, "ULog File Format".
+against what the definitions say of it, damage is skipped and counted, and only whole messages of the wanted topics are
+kept, as places in the file. Format: docs.px4.io, "ULog File Format".
 """
 
 from __future__ import annotations
@@ -15,7 +15,11 @@ from dataclasses import dataclass, field
 from mmap import mmap
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from flownav.errors import InputError
+from flownav.logs.ulog_rows import AT_ONCE, DATA, Places, nothing_announced, walk_data
 
 MAGIC = b"\x55\x4c\x6f\x67\x01\x12\x35"
 HEADER_SIZE = 16
@@ -40,13 +44,15 @@ id_at = struct.Struct("<H").unpack_from
 
 @dataclass
 class Framed:
-    """What a file holds: the wanted topics as a sound ULog, and what was wrong with the rest.
+    """What a file holds of the wanted topics, and what was wrong with the rest.
 
-    subscriptions: message id to (topic, instance). dropouts_s: gaps that the logger itself states [s].
+    content: their definitions as a sound ULog with one row of each. rows: where all of their rows begin, by message id,
+    in the file's order. dropouts_s: gaps that the logger itself states [s].
     rejected: messages by reason. damaged: number of stretches skipped, and their bytes. start_us: header's time.
     """
 
     content: bytes = b""
+    rows: dict[int, Places] = field(default_factory=dict)
     start_us: int = 0
     topics: set[str] = field(default_factory=set)
     dropouts_s: list[float] = field(default_factory=list)
@@ -117,12 +123,14 @@ class Framing:
         self.content, self.wanted = content, wanted
         self.formats = Formats()
         self.framed = Framed(start_us=struct.unpack_from("<Q", content, 8)[0])
-        self.subscribed: dict[int, tuple[str, int, int, bool]] = {}  # id: topic, least and most bytes, whether wanted
+        self.subscribed: dict[int, tuple[str, int, int]] = {}  # id: topic, least and most bytes
         self.definitions: dict[bytes, bytes] = {}  # the first of each name
         self.parameters: list[bytes] = []
         self.announcements: dict[int, bytes] = {}
-        self.data: list[bytes] = []
-        self.heard: set[int] = set()
+        self.bytes = np.frombuffer(content, np.uint8)
+        self.announced = nothing_announced()
+        self.found: list[tuple[Places, NDArray[np.uint16]]] = []  # rows, and of which topic
+        self.room = np.empty(AT_ONCE, np.int64), np.empty(AT_ONCE, np.uint16)
         self.limits = [*self._appended(path), len(content)]
 
     def _appended(self, path: Path) -> list[int]:
@@ -144,6 +152,10 @@ class Framing:
         pos = HEADER_SIZE
         for limit in self.limits:
             while pos < limit:
+                after = self._walk_data(pos, limit)
+                if after > pos:
+                    pos = after
+                    continue
                 stop = self._valid(pos, limit)
                 if not stop:
                     pos = self._resynchronise(pos, limit)
@@ -151,11 +163,34 @@ class Framing:
                 self._take(pos, stop)
                 pos = stop
         framed = self.framed
+        framed.rows = self._rows()
         framed.content = b"".join([
             self.content[:HEADER_SIZE], *self.definitions.values(), *self.parameters,
-            *(message for number, message in self.announcements.items() if number in self.heard), *self.data,
+            *(message for number, message in self.announcements.items() if number in framed.rows),
+            *(self._whole(number, int(rows[0])) for number, rows in framed.rows.items()),
         ])  # fmt: skip
         return framed
+
+    def _walk_data(self, pos: int, limit: int) -> int:
+        """Over the sound data messages that follow; where the first of another kind begins."""
+        known, (rows, ids) = self.announced, self.room
+        stop, count = walk_data(self.bytes, pos, limit, known.least, known.most, known.wanted, rows, ids)
+        if count:
+            self.found.append((rows[:count].copy(), ids[:count].copy()))
+        return int(stop)
+
+    def _rows(self) -> dict[int, Places]:
+        """By message id, in the file's order."""
+        if not self.found:
+            return {}
+        rows, ids = (np.concatenate(parts) for parts in zip(*self.found, strict=True))
+        self.found.clear()
+        return {int(number): rows[ids == number] for number in np.unique(ids)}
+
+    def _whole(self, number: int, row: int) -> bytes:
+        """A data message without the padding behind its data."""
+        size = self.subscribed[number][1]
+        return struct.pack("<HBH", size + 2, DATA, number) + self.content[row : row + size]
 
     def _resynchronise(self, pos: int, limit: int) -> int:
         """Where the next two messages that can be begin; counts what lies between. A cut last message is no damage."""
@@ -214,15 +249,7 @@ class Framing:
         """Keep what is wanted of a sound message."""
         kind, framed = self.content[pos + 2], self.framed
         if kind == 68:
-            number = id_at(self.content, pos + 3)[0]
-            entry = self.subscribed.get(number)
-            if entry is None:
-                framed.count("unknown_topic")
-            elif entry[3]:
-                self.heard.add(number)
-                whole = entry[1] == stop - pos - 5
-                message = self.content[pos:stop] if whole else self._trimmed(pos, entry[1])
-                self.data.append(message)
+            framed.count("unknown_topic")  # those of known topics are walked over in `_walk_data`
         elif kind == 70:
             name = self.content[pos + 3 : stop].partition(b":")[0]
             self.definitions.setdefault(name, self.content[pos:stop])
@@ -232,10 +259,6 @@ class Framing:
             self._subscribe(pos, stop)
         elif kind == 79:
             framed.dropouts_s.append(1e-3 * id_at(self.content, pos + 3)[0])
-
-    def _trimmed(self, pos: int, size: int) -> bytes:
-        """A data message without the padding behind its data."""
-        return struct.pack("<HB", size + 2, 68) + self.content[pos + 3 : pos + 5 + size]
 
     def _is_parameter(self, pos: int, stop: int) -> bool:
         key = self.content[pos + 4 : pos + 4 + self.content[pos + 3]]
@@ -251,7 +274,10 @@ class Framing:
             if self.subscribed[number][0] != name:
                 self.framed.count("topic_redefined")
         else:
-            self.subscribed[number] = (name, size, self.formats.full_size(name), name in self.wanted)
+            full = self.formats.full_size(name)
+            self.subscribed[number] = (name, size, full)
+            known = self.announced
+            known.least[number], known.most[number], known.wanted[number] = size, full, name in self.wanted
             self.announcements[number] = self.content[pos:stop]
             self.framed.topics.add(name)
 

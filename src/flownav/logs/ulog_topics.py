@@ -17,6 +17,7 @@ from flownav.errors import InputError
 from flownav.guard import an_input
 from flownav.logs.rows import Rows, drop_duplicates, drop_strays, longest_ordered
 from flownav.logs.ulog_framing import Framed, frame
+from flownav.logs.ulog_rows import Bytes, Places, field_of
 from flownav.measurement import Array
 
 LONGEST_DELAY_S = 1.0  # a sample older than this on arrival carries a wrong time
@@ -101,9 +102,12 @@ def read_topics(path: Path, wanted: Collection[str], fields: Collection[str], st
     states: topics that hold for longer than they are published; what they said before the first reading of a sensor
     is put at its time. InputError where the file cannot be read, is no ULog, or holds none of the topics.
     """
-    framed, sha256 = _framed(path, wanted)
+    content, sha256 = _content(path)
+    framed = frame(path, content, wanted)
     log = _decoded(path, framed)
-    found = [_topic(data, fields) for data in log.data_list]
+    read = np.frombuffer(content, np.uint8)
+    found = [_topic(data, read, framed.rows[data.msg_id], fields) for data in log.data_list]
+    del content, read
     for topic in found:
         _order(topic)
     start_s = min((topic.t_s[0] for topic in found if len(topic) and topic.name not in states), default=0.0)
@@ -124,10 +128,12 @@ def read_topics(path: Path, wanted: Collection[str], fields: Collection[str], st
     return Topics(found, parameters, sha256, start_s, _notes(framed))
 
 
-def _framed(path: Path, wanted: Collection[str]) -> tuple[Framed, str]:
+def _content(path: Path) -> tuple[mmap, str]:
+    """The file's bytes, mapped as long as something holds them, and their hash."""
     try:
-        with an_input(path).open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
-            return frame(path, content, wanted), hashlib.sha256(content).hexdigest()
+        with an_input(path).open("rb") as file:
+            content = mmap(file.fileno(), 0, access=ACCESS_READ)
+            return content, hashlib.sha256(content).hexdigest()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give a ULog file") from error
     except ValueError as error:  # nothing to map
@@ -145,16 +151,20 @@ def _decoded(path: Path, framed: Framed) -> Any:
         raise InputError(f"{path}: a damaged ULog ({type(error).__name__}: {error})") from error
 
 
-def _topic(data: Any, fields: Collection[str]) -> Topic:
+def _topic(data: Any, content: Bytes, rows: Places, fields: Collection[str]) -> Topic:
+    """The rows of one topic. data: what pyulog makes of its definition and first row."""
+    layout = data.data["timestamp"].base.dtype.fields
     with np.errstate(invalid="ignore"):
-        columns = {
-            name: np.ascontiguousarray(values, float)
-            for name, values in data.data.items()
-            if name.split("[")[0] in fields
-        }
-        t_s = 1e-6 * data.data["timestamp"].astype(float)
+
+        def column(name: str) -> Array:
+            dtype, offset = layout[name][:2]
+            return np.ascontiguousarray(field_of(content, rows, offset, dtype), float)
+
+        columns = {name: column(name) for name in data.data if name.split("[")[0] in fields}
+        t_s = column("timestamp")
+        t_s *= 1e-6
         if "timestamp_sample" in data.data:
-            columns["sample_s"] = 1e-6 * data.data["timestamp_sample"].astype(float)
+            columns["sample_s"] = 1e-6 * column("timestamp_sample")
     return Topic(t_s, columns, name=str(data.name), instance=int(data.multi_id))
 
 

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-slow fuzz mutants league integrity validate lint bench bench-once docs wheel wheel-test clean
+.PHONY: demo test test-slow long-log fuzz mutants league integrity validate lint bench bench-once docs wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr
@@ -14,6 +14,9 @@ test: $(VENV)/.ready-test
 
 test-slow: $(VENV)/.ready-test
 	$(BIN)/python -m pytest -m slow
+
+long-log: $(VENV)/.ready-test
+	$(BIN)/python -m pytest -s -m slow tests/replay/test_long_log.py
 
 fuzz: $(VENV)/.ready-test
 	FLOWNAV_FUZZ=$${FLOWNAV_FUZZ:-20000} $(BIN)/python -m pytest -m fuzz tests/logs/test_fuzz_logs.py

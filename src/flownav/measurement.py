@@ -104,7 +104,10 @@ class Stream:
         delay_s: float = 0.0,
         rejected: dict[str, int] | None = None,
     ) -> Stream:
-        """A stream from arrays; unstated variances are NaN, unstated quality is 255. ValueError on a wrong shape."""
+        """A stream from arrays; unstated variances are NaN, unstated quality is 255. ValueError on a wrong shape.
+
+        What is not stated takes no memory: one number stands for all, and cannot be written to.
+        """
         count, width = len(t_s), len(COLUMNS[sensor])
         value = np.asarray(value, float).reshape(count, -1 if count else width)
         if value.shape != (count, width):
@@ -113,8 +116,8 @@ class Stream:
             sensor,
             np.asarray(t_s, float),
             value,
-            np.full((count, width), np.nan) if variance is None else np.asarray(variance, float),
-            np.full(count, 255.0) if quality is None else np.asarray(quality, float),
+            np.broadcast_to(np.nan, (count, width)) if variance is None else np.asarray(variance, float),
+            np.broadcast_to(255.0, count) if quality is None else np.asarray(quality, float),
             delay_s,
             dict(rejected or {}),
         )
@@ -148,24 +151,38 @@ class EventQueue(NamedTuple):
 
 def merge(streams: Iterable[Stream]) -> EventQueue:
     """Readings of all streams ordered by the instant they describe; ties keep the order of the streams."""
+    listed = list(streams)
+    return next(merged_parts(listed, max(1, sum(map(len, listed)))))
+
+
+def merged_parts(streams: Iterable[Stream], longest: int) -> Iterator[EventQueue]:
+    """The same queue, in parts of so many events at most, one at least: a long log's is larger than the log itself."""
     streams = [s for s in streams if len(s)]
+    firsts = np.cumsum([0, *map(len, streams)])
+    order = np.argsort(np.concatenate([np.zeros(0), *(s.t_s - s.delay_s for s in streams)]), kind="stable")
+    for begin in range(0, max(1, len(order)), longest):
+        yield _part(streams, firsts, order[begin : begin + longest])
 
-    def padded(values: Array) -> Array:
-        return np.pad(values, ((0, 0), (0, MAX_VALUES - values.shape[1])), constant_values=np.nan)
 
-    if not streams:
-        empty = np.zeros((0, MAX_VALUES))
-        none = np.zeros(0)
-        return EventQueue(none, none.astype(np.int64), empty, empty, none, none.astype(np.int64), none, none)
-    t_s = np.concatenate([s.t_s - s.delay_s for s in streams])
-    order = np.argsort(t_s, kind="stable")
-    return EventQueue(
-        t_s[order],
-        np.concatenate([np.full(len(s), int(s.sensor)) for s in streams])[order],
-        np.concatenate([padded(s.value) for s in streams])[order],
-        np.concatenate([padded(s.variance) for s in streams])[order],
-        np.concatenate([s.quality for s in streams])[order],
-        np.concatenate([np.arange(len(s)) for s in streams])[order],
-        np.zeros(len(order)),
-        np.ones(len(order)),
-    )
+def _part(streams: list[Stream], firsts: NDArray[np.int64], places: NDArray[np.int64]) -> EventQueue:
+    """The events at these places of all streams laid one after the other."""
+    count = len(places)
+    of = np.searchsorted(firsts, places, side="right") - 1
+    part = EventQueue(
+        np.empty(count), np.empty(count, np.int64), np.full((count, MAX_VALUES), np.nan),
+        np.full((count, MAX_VALUES), np.nan), np.empty(count), np.empty(count, np.int64), np.zeros(count),
+        np.ones(count),
+    )  # fmt: skip
+    for number, stream in enumerate(streams):
+        mine = np.flatnonzero(of == number)
+        row, width = places[mine] - firsts[number], stream.value.shape[1]
+        part.t_s[mine] = stream.t_s[row] - stream.delay_s
+        part.sensor[mine] = int(stream.sensor)
+        part.value[mine, :width] = stream.value[row]
+        if stream.variance.strides[0]:  # stated, reading by reading
+            part.variance[mine, : stream.variance.shape[1]] = stream.variance[row]
+        elif len(stream):
+            part.variance[mine, : stream.variance.shape[1]] = stream.variance[0]
+        part.quality[mine] = stream.quality[row]
+        part.row[mine] = row
+    return part

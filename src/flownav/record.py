@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import io
 import json
+import shutil
+import time
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import SpooledTemporaryFile
 from typing import Any
 
 import numpy as np
@@ -21,6 +24,7 @@ from flownav.errors import InputError
 from flownav.guard import an_input, written_whole
 
 SCHEMA_VERSION = 1
+MOST_IN_MEMORY_BYTES = 16_000_000  # of a table that is written
 
 POSITION_NED = ("pos_n_m", "pos_e_m", "pos_d_m")
 VELOCITY_BODY = ("vel_u_m_s", "vel_v_m_s", "vel_w_m_s")
@@ -154,9 +158,14 @@ class Record:
             manifest = {"schema": SCHEMA_VERSION, **self.manifest}
             bundle.writestr("manifest.json", json.dumps(manifest, indent=1, default=str))
             for name, table in self.tables.items():
-                buffer = io.BytesIO()
-                pq.write_table(pa.table(table), buffer, compression="zstd")
-                bundle.writestr(f"{name}.parquet", buffer.getvalue())
+                with SpooledTemporaryFile(MOST_IN_MEMORY_BYTES, dir=temporary.parent) as file:
+                    pq.write_table(pa.table(table), pa.PythonFile(file, "w"), compression="zstd")
+                    large = file.tell() >= zipfile.ZIP64_LIMIT
+                    file.seek(0)
+                    entry = zipfile.ZipInfo(f"{name}.parquet", time.localtime()[:6])
+                    with bundle.open(entry, "w", force_zip64=large) as kept:
+                        shutil.copyfileobj(file, kept, 1 << 20)
+                pa.default_memory_pool().release_unused()
 
     @classmethod
     def load(cls, path: Path) -> Record:

@@ -59,7 +59,8 @@ def path(t_s: np.ndarray) -> np.ndarray:
 
 def log_of_flight(duration_s: float = 60.0, *, start_s: float = 0.0, yaw_rate: float = 0.05, imu_hz: float = 50.0,
                   attitude_hz: float = 50.0, flow_hz: float = 20.0, gps_hz: float = 5.0, range_hz: float = 20.0,
-                  sensor_gyro: bool = True, along: Callable[[np.ndarray], np.ndarray] = path) -> SyntheticLog:  # fmt: skip
+                  sensor_gyro: bool = True,
+                  along: Callable[[np.ndarray], np.ndarray] = path) -> SyntheticLog:  # fmt: skip
     """A log without any error but its sampling. Thrust lies along body z, so the attitude follows from the path."""
     fine = 1000.0
     t = np.arange(-1.0, duration_s + 1.0, 1.0 / fine)

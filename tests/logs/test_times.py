@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from test_fed_record import queue_of_flight, record_of
 
 from flownav.errors import InputError
 from flownav.logs.open_log import open_log
@@ -14,7 +15,6 @@ from flownav.record import Record
 from flownav.text import number
 from mavlink_logs import flight_log
 from replay_logs import SyntheticLog, log_of_flight
-from test_fed_record import queue_of_flight, record_of
 from ulog_files import ulog_of_flight
 
 

@@ -12,15 +12,19 @@ def mean_over(t_s: Array, value: Array, start_s: Array, end_s: Array) -> Array:
 
     Intervals have a length above 0; outside the samples the nearest one holds.
     """
-    steps = 0.5 * (value[1:] + value[:-1]) * np.diff(t_s)[:, None]
-    integral = np.vstack([np.zeros(value.shape[1]), np.cumsum(steps, axis=0)])
-
-    def at(instants: Array) -> Array:
-        inside = [np.interp(instants, t_s, column) for column in integral.T]
-        before, after = np.minimum(instants - t_s[0], 0.0), np.maximum(instants - t_s[-1], 0.0)
-        return np.asarray(np.column_stack(inside) + before[:, None] * value[0] + after[:, None] * value[-1])
-
-    return np.asarray((at(end_s) - at(start_s)) / (end_s - start_s)[:, None])
+    step_s, lasts_s = np.diff(t_s), end_s - start_s
+    outside = [(np.minimum(at - t_s[0], 0.0), np.maximum(at - t_s[-1], 0.0)) for at in (start_s, end_s)]
+    means = np.empty((len(start_s), value.shape[1]))
+    for k in range(value.shape[1]):
+        column = np.ascontiguousarray(value[:, k])
+        integral = np.zeros(len(t_s))
+        np.cumsum(0.5 * (column[1:] + column[:-1]) * step_s, out=integral[1:])
+        begun, ended = (
+            np.interp(at, t_s, integral) + before * column[0] + after * column[-1]
+            for at, (before, after) in zip((start_s, end_s), outside, strict=True)
+        )
+        means[:, k] = (ended - begun) / lasts_s
+    return means
 
 
 def attitude_at(attitude: Stream, instants_s: Array) -> Array:

@@ -25,10 +25,13 @@ class Rows:
     def __len__(self) -> int:
         return len(self.t_s)
 
+    def column(self, name: str) -> Array:
+        """A column; NaN where the table lacks it, which cannot be written to."""
+        return self.columns.get(name, np.broadcast_to(np.nan, len(self.t_s)))
+
     def matrix(self, *names: str) -> Array:
         """Columns side by side, shape (n, len(names)); a column that the table lacks is NaN."""
-        absent = np.full(len(self.t_s), np.nan)
-        return np.column_stack([self.columns.get(name, absent) for name in names])
+        return np.column_stack([self.column(name) for name in names])
 
     def keep(self, good: NDArray[np.bool_] | np.bool_, reason: str) -> None:
         """Throw the other rows away and count them."""

@@ -50,10 +50,10 @@ def imu_stream(topics: Topics) -> Stream | None:
     if rates is not None and force is not None and force.rate_hz >= LEAST_IMU_HZ:
         sources.append(_joined(rates, force))
     for source in sources:
-        source.keep(np.isfinite(source.vector("imu", 6)).all(axis=1), "not_finite")
-        size = abs(source.vector("imu", 6))
-        inside = (size[:, :3] <= FASTEST_TURN_RAD_S).all(axis=1) & (size[:, 3:] <= HARDEST_M_S2).all(axis=1)
-        source.keep(inside, "out_of_range")
+        source.keep(np.logical_and.reduce([np.isfinite(column) for column in source.parts("imu", 6)]), "not_finite")
+        most = (*(FASTEST_TURN_RAD_S,) * 3, *(HARDEST_M_S2,) * 3)
+        inside = [abs(column) <= limit for column, limit in zip(source.parts("imu", 6), most, strict=True)]
+        source.keep(np.logical_and.reduce(inside), "out_of_range")
     fast = [source for source in sources if source.rate_hz >= LEAST_IMU_HZ]
     if not fast:
         return None
@@ -68,29 +68,30 @@ def fastest_imu(topics: Topics) -> tuple[str, float, int]:
     return (best.label, best.rate_hz, len(best)) if best is not None else ("", 0.0, 0)
 
 
-def _inertial(topic: Topic, values: Array) -> Topic:
-    columns = {f"imu[{k}]": values[:, k] for k in range(6)}
+def _inertial(topic: Topic, parts: list[Array]) -> Topic:
+    columns = {f"imu[{k}]": part for k, part in enumerate(parts)}
     if "sample_s" in topic.columns:
         columns["sample_s"] = topic.columns["sample_s"]
     return Topic(topic.t_s, columns, dict(topic.rejected), topic.name, topic.instance)
 
 
 def _combined(topic: Topic) -> Topic:
-    return _inertial(topic, np.column_stack([topic.vector("gyro_rad", 3), topic.vector("accelerometer_m_s2", 3)]))
+    return _inertial(topic, [*topic.parts("gyro_rad", 3), *topic.parts("accelerometer_m_s2", 3)])
 
 
 def _delta(topic: Topic) -> Topic:
     """vehicle_imu: turn and velocity accumulated over times in microseconds."""
     with np.errstate(divide="ignore", invalid="ignore"):
-        rates = topic.vector("delta_angle", 3) / (1e-6 * topic.matrix("delta_angle_dt"))
-        force = topic.vector("delta_velocity", 3) / (1e-6 * topic.matrix("delta_velocity_dt"))
-    return _inertial(topic, np.column_stack([rates, force]))
+        turned_s, pushed_s = (1e-6 * topic.column(name) for name in ("delta_angle_dt", "delta_velocity_dt"))
+        rates = [turn / turned_s for turn in topic.parts("delta_angle", 3)]
+        force = [push / pushed_s for push in topic.parts("delta_velocity", 3)]
+    return _inertial(topic, [*rates, *force])
 
 
 def _joined(rates: Topic, force: Topic) -> Topic:
     """Rates with the specific force between its two nearest readings."""
-    between = [np.interp(rates.t_s, force.t_s, column) for column in force.vector("xyz", 3).T]
-    return _inertial(rates, np.column_stack([rates.vector("xyz", 3), *between]))
+    between = [np.interp(rates.t_s, force.t_s, column) for column in force.parts("xyz", 3)]
+    return _inertial(rates, [*rates.parts("xyz", 3), *between])
 
 
 # -- GPS ---------------------------------------------------------------------------------------------------

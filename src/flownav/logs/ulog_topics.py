@@ -39,9 +39,13 @@ class Topic(Rows):
         """Whether the topic has these fields."""
         return all(name in self.columns for name in names)
 
+    def parts(self, name: str, count: int) -> list[Array]:
+        """The fields name[0], name[1], ... each (n,)."""
+        return [self.column(f"{name}[{k}]") for k in range(count)]
+
     def vector(self, name: str, count: int) -> Array:
-        """The fields name[0], name[1], ... side by side (n, count)."""
-        return self.matrix(*(f"{name}[{k}]" for k in range(count)))
+        """The same side by side (n, count)."""
+        return np.column_stack(self.parts(name, count))
 
     @property
     def delay_s(self) -> float:

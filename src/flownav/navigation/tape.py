@@ -7,6 +7,7 @@ for its time, or the reason SILENT. Happenings come when they come, lane by lane
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -138,11 +139,11 @@ class Output(NamedTuple):
 
 
 def empty_tape(estimates: int, components: int, events: int, lanes: int = 1, journal: tuple[int, int] = (0, 0)) -> Tape:
-    """A tape with this many rows; journal: its entries and estimates."""
+    """A tape with this many rows, which take memory once they are written; journal: its entries and estimates."""
     return Tape(
-        np.full((estimates, ESTIMATE_COLUMNS, lanes), np.nan),
-        np.full((components, OFFERS, lanes), np.nan),
-        np.full((events, EVENT_COLUMNS, lanes), np.nan),
+        np.zeros((estimates, ESTIMATE_COLUMNS, lanes)),
+        np.zeros((components, OFFERS, lanes)),
+        np.zeros((events, EVENT_COLUMNS, lanes)),
         Journal(
             np.zeros((journal[0], ENTRY)), np.zeros((journal[1], STATES + 4)), np.zeros((journal[1], STATES, STATES))
         ),
@@ -152,9 +153,16 @@ def empty_tape(estimates: int, components: int, events: int, lanes: int = 1, jou
 
 def new_tape(queue: EventQueue) -> Tape:
     """A tape long enough for a queue."""
-    components = sum(count * int(np.count_nonzero(queue.sensor == sensor)) for sensor, count in COMPONENTS.items())
-    estimates = min(len(queue.t_s), int((queue.t_s[-1] - queue.t_s[0]) / ESTIMATE_PERIOD_S) + 2)
-    return empty_tape(estimates, components, EVENTS_A_READING * len(queue.t_s) + 8)
+    readings = {sensor: int(np.count_nonzero(queue.sensor == sensor)) for sensor in Sensor}
+    return tape_for(readings, float(queue.t_s[-1] - queue.t_s[0]))
+
+
+def tape_for(readings: Mapping[Sensor, int], lasts_s: float) -> Tape:
+    """A tape long enough for so many readings of each sensor in this time."""
+    components = sum(count * readings.get(sensor, 0) for sensor, count in COMPONENTS.items())
+    events = sum(readings.values())
+    estimates = min(events, int(lasts_s / ESTIMATE_PERIOD_S) + 2)
+    return empty_tape(estimates, components, EVENTS_A_READING * events + 8)
 
 
 def room_of(tape: Tape) -> NDArray[np.int64]:

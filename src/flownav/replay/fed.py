@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -45,12 +44,8 @@ def as_fed(
 
 
 def prepared_as_fed(log: Log) -> Prepared:
-    """The queue of all navigators, one after the other."""
-    parts = [segment.queue for segment in log.fed]
-    columns: dict[str, Any] = {
-        name: np.concatenate([getattr(part, name) for part in parts]) for name in parts[0]._fields
-    }
-    return Prepared(dict(log.streams), EventQueue(**columns), log.notes, bool(log.fed[0].equipment["flow_gyro_is_imu"]))
+    """The streams as they were fed."""
+    return Prepared(dict(log.streams), log.notes, bool(log.fed[0].equipment["flow_gyro_is_imu"]))
 
 
 def run_as_fed(

@@ -6,8 +6,9 @@ rotation out of the flow.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from flownav.compile import kernel
 from flownav.errors import InputError
 from flownav.logs.log import Log
 from flownav.logs.rates import attitude_rates, mean_over
-from flownav.measurement import Array, EventQueue, Sensor, Stream, merge
+from flownav.measurement import Array, EventQueue, Sensor, Stream, merge, merged_parts
 from flownav.navigation.feed import imu_serves
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
 from flownav.sensors.identified import IdentifiedFlow, in_vehicle_axes
@@ -28,6 +29,8 @@ LONGEST_FLOW_INTERVAL = 1.5  # medians: a longer step is a gap, not an exposure
 OWN, IMU, TURNING = "sensor gyro", "imu gyro", "attitude"
 SIGNIFICANT = 3.0  # standard errors
 LEAST_FLOW_ROWS = 50
+KEPT_QUEUE = 1 << 20  # events of a queue that is kept for the next run: 150 MB
+PART = 1 << 17  # events that are merged at a time where there are more
 SCALE_LIMITS = (0.1, 10.0)
 
 
@@ -46,15 +49,33 @@ class ReplayOptions:
 
 @dataclass(frozen=True)
 class Prepared:
-    """The streams as they are fed, their queue with nothing cut, and what was decided on the way (notes).
+    """The streams as they are fed, and what was decided on the way (notes).
 
     FLOW_RATE has two columns more, the vehicle's IMU over each exposure; `flow_gyro_is_imu`: they serve best.
     """
 
     streams: dict[Sensor, Stream]
-    queue: EventQueue
     notes: tuple[str, ...]
     flow_gyro_is_imu: bool = False
+
+    @cached_property
+    def queue(self) -> EventQueue:
+        """The readings of all streams in one order, with nothing cut."""
+        return merge(self.streams.values())
+
+    def parts(self) -> Iterator[EventQueue]:
+        """The same in parts, which are not kept where there are many."""
+        if sum(map(len, self.streams.values())) <= KEPT_QUEUE:
+            yield self.queue
+        else:
+            yield from merged_parts(self.streams.values(), PART)
+
+    @property
+    def span_s(self) -> tuple[float, float]:
+        """The first and the last instant that a reading describes [s]."""
+        spoken = [stream for stream in self.streams.values() if len(stream)]
+        first = min(float(stream.t_s[0] - stream.delay_s) for stream in spoken)
+        return first, max(float(stream.t_s[-1] - stream.delay_s) for stream in spoken)
 
     @property
     def delays_s(self) -> dict[Sensor, float]:
@@ -63,7 +84,7 @@ class Prepared:
 
 
 def prepare(log: Log, options: ReplayOptions) -> Prepared:
-    """Delay, scale and complete the streams, and merge them. InputError where an option cannot be."""
+    """Delay, scale and complete the streams. InputError where an option cannot be."""
     _check(log, options)
     streams, notes, chosen = dict(log.streams), list(log.notes), Chosen(OWN, "")
     for sensor in GPS:
@@ -81,7 +102,7 @@ def prepare(log: Log, options: ReplayOptions) -> Prepared:
         for sensor in FLOW:
             if sensor in streams:
                 streams[sensor] = replace(streams[sensor], delay_s=options.identified.latency_s)
-    return Prepared(streams, merge(streams.values()), tuple(notes), chosen.name == IMU)
+    return Prepared(streams, tuple(notes), chosen.name == IMU)
 
 
 def withhold(log: Log, queue: EventQueue, options: ReplayOptions) -> EventQueue:
@@ -167,14 +188,15 @@ def _with_gyro(flow: Stream, streams: dict[Sensor, Stream]) -> tuple[Stream, Cho
     sample-to-sample noise in the compensated flow has seen the same rotation as the flow did. The sensor's own
     stays unless another is significantly better, or it is absent or dead.
     """
-    candidates = _gyro_candidates(flow, streams)
+    seen = _imu_over(flow, streams, _exposure(flow)) if imu_serves(streams) else None
+    candidates = _gyro_candidates(flow, streams, seen)
     roughness = {name: _roughness(flow, rates) for name, rates in candidates.items()}
     limit = np.quantile(np.concatenate([*roughness.values(), [0.0]]), 0.95)  # spikes weigh no more than this
     roughness = {name: np.minimum(squares, limit) for name, squares in roughness.items()}
     noises = {name: float(np.sqrt(squares.mean())) for name, squares in roughness.items() if len(squares)}
     best = min(noises, key=lambda name: noises[name], default=min(candidates))
     chosen = best if _significant(roughness.get(OWN), roughness[best]) else OWN
-    imu = _imu_over(flow, streams, _exposure(flow)) if imu_serves(streams) else np.full((len(flow), 2), np.nan)
+    imu = np.full((len(flow), 2), np.nan) if seen is None else seen
     value = np.column_stack([flow.value[:, :2], candidates[chosen], imu])
     listed = ", ".join(f"{name} {noise:.4f}" for name, noise in sorted(noises.items()))
     note = f"flow is compensated with the {chosen} (noise left, rad/s: {listed})"
@@ -191,21 +213,23 @@ def _exposure(flow: Stream) -> Array:
 def _imu_over(flow: Stream, streams: dict[Sensor, Stream], exposure_s: Array) -> Array:
     """Mean rates of the vehicle's IMU about x and y over each exposure, (n, 2) [rad/s]."""
     imu = streams[Sensor.IMU]
-    return mean_over(imu.t_s, imu.value[:, :3], flow.t_s - exposure_s, flow.t_s)[:, :2]
+    return mean_over(imu.t_s, imu.value[:, :2], flow.t_s - exposure_s, flow.t_s)
 
 
-def _gyro_candidates(flow: Stream, streams: dict[Sensor, Stream]) -> dict[str, Array]:
-    """Mean rates about x and y over each flow reading's exposure, by source; never none at all."""
+def _gyro_candidates(flow: Stream, streams: dict[Sensor, Stream], by_imu: Array | None) -> dict[str, Array]:
+    """Mean rates about x and y over each flow reading's exposure, by source; never none at all.
+
+    by_imu: those of the vehicle's IMU, where it serves.
+    """
     exposure_s = _exposure(flow)
     candidates: dict[str, Array] = {}
     turning = None
     if Sensor.ATTITUDE in streams:
         turning = attitude_rates(streams[Sensor.ATTITUDE], flow.t_s - exposure_s, flow.t_s)[:, :2]
-    if turning is not None and not imu_serves(streams):
+    if turning is not None and by_imu is None:
         candidates[TURNING] = turning
-    if imu_serves(streams):
-        rates = _imu_over(flow, streams, exposure_s)
-        candidates[IMU] = rates if turning is None else rates - _followed(flow, rates - turning)
+    if by_imu is not None:
+        candidates[IMU] = by_imu if turning is None else by_imu - _followed(flow, by_imu - turning)
     own = flow.value[:, 2:4]
     known = np.asarray(np.isfinite(own).all(axis=1))
     if not candidates or (known.mean() > 0.5 and np.all(np.ptp(own[known], axis=0))):

@@ -21,7 +21,7 @@ from flownav.navigation.loop import run, start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import smooth
 from flownav.navigation.tables import Written, estimate_table, written_on
-from flownav.navigation.tape import new_tape
+from flownav.navigation.tape import new_tape, tape_for
 from flownav.replay.autopilot import autopilot_scores
 from flownav.replay.fed import prepared_as_fed, run_as_fed
 from flownav.replay.judged import (
@@ -270,13 +270,14 @@ def _run(
     if log.fed:
         written = run_as_fed(log, options, settings, lambda queue: withhold(log, queue, options))
     else:
-        queue = withhold(log, prepared.queue, options)
-        equipment = equipment_of(
-            prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, settings, log.origin_deg_m
-        )
-        running = start_navigator(equipment, settings, new_tape(queue), options.flow_noise)
-        run(queue, running)
+        first_s, last_s = prepared.span_s
+        equipment = equipment_of(prepared.streams, first_s, prepared.flow_gyro_is_imu, settings, log.origin_deg_m)
+        tape = tape_for({sensor: len(stream) for sensor, stream in prepared.streams.items()}, last_s - first_s)
+        running = start_navigator(equipment, settings, tape, options.flow_noise)
+        for part in prepared.parts():
+            run(withhold(log, part, options), running)
         if smoothed:
+            queue = withhold(log, prepared.queue, options)
             path = smooth(queue, start_navigator(equipment, settings, new_tape(queue), options.flow_noise))
         written = written_on(running.tape)
     if len(written.estimate) < 2:

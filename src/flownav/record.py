@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import io
 import json
-import shutil
 import time
 import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import SpooledTemporaryFile
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +22,6 @@ from flownav.errors import InputError
 from flownav.guard import an_input, written_whole
 
 SCHEMA_VERSION = 1
-MOST_IN_MEMORY_BYTES = 16_000_000  # of a table that is written
 
 POSITION_NED = ("pos_n_m", "pos_e_m", "pos_d_m")
 VELOCITY_BODY = ("vel_u_m_s", "vel_v_m_s", "vel_w_m_s")
@@ -158,13 +155,10 @@ class Record:
             manifest = {"schema": SCHEMA_VERSION, **self.manifest}
             bundle.writestr("manifest.json", json.dumps(manifest, indent=1, default=str))
             for name, table in self.tables.items():
-                with SpooledTemporaryFile(MOST_IN_MEMORY_BYTES, dir=temporary.parent) as file:
-                    pq.write_table(pa.table(table), pa.PythonFile(file, "w"), compression="zstd")
-                    large = file.tell() >= zipfile.ZIP64_LIMIT
-                    file.seek(0)
-                    entry = zipfile.ZipInfo(f"{name}.parquet", time.localtime()[:6])
-                    with bundle.open(entry, "w", force_zip64=large) as kept:
-                        shutil.copyfileobj(file, kept, 1 << 20)
+                columns, entry = pa.table(table), zipfile.ZipInfo(f"{name}.parquet", time.localtime()[:6])
+                with bundle.open(entry, "w", force_zip64=columns.nbytes >= zipfile.ZIP64_LIMIT) as stream:
+                    pq.write_table(columns, pa.PythonFile(_Told(stream), "w"), compression="zstd")
+                del columns
                 pa.default_memory_pool().release_unused()
 
     @classmethod
@@ -191,3 +185,22 @@ class Record:
         if manifest.get("schema", 0) > SCHEMA_VERSION:
             raise InputError(f"{path}: record schema {manifest['schema']} is newer than this flownav; update flownav")
         return cls(manifest, tables)
+
+
+class _Told:
+    """A file within a zip as Arrow writes to it, which asks how far it has come."""
+
+    closed = False
+
+    def __init__(self, stream: IO[bytes]) -> None:
+        self._stream, self._written = stream, 0
+
+    def write(self, data: Any) -> int:
+        self._written += self._stream.write(data)
+        return len(data)
+
+    def tell(self) -> int:
+        return self._written
+
+    def flush(self) -> None:
+        pass

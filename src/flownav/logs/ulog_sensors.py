@@ -52,7 +52,8 @@ def imu_stream(topics: Topics) -> Stream | None:
     for source in sources:
         source.keep(np.logical_and.reduce([np.isfinite(column) for column in source.parts("imu", 6)]), "not_finite")
         most = (*(FASTEST_TURN_RAD_S,) * 3, *(HARDEST_M_S2,) * 3)
-        inside = [abs(column) <= limit for column, limit in zip(source.parts("imu", 6), most, strict=True)]
+        parts = zip(source.parts("imu", 6), most, strict=True)
+        inside = [(column <= limit) & (column >= -limit) for column, limit in parts]
         source.keep(np.logical_and.reduce(inside), "out_of_range")
     fast = [source for source in sources if source.rate_hz >= LEAST_IMU_HZ]
     if not fast:

@@ -5,39 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fed_records import FLOWN, queue_of_flight, record_of
 from flownav.errors import InputError
 from flownav.logs.open_log import open_flight
-from flownav.measurement import EventQueue, Sensor, merge
-from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.tables import fed_rows, fed_table
-from flownav.record import Record
+from flownav.measurement import Sensor, merge
 from flownav.replay.fed import as_fed
 from flownav.replay.prepare import ReplayOptions
 from flownav.replay.session import replay
-from navigation_streams import circle, equipment, fly, navigate
-
-FLOWN = fly(circle, 12.0, 0.2)
-
-
-def queue_of_flight() -> EventQueue:
-    """Every seventh fix stayed away, and one flow reading in ten was taken away."""
-    queue = merge(FLOWN.streams.values())
-    fixes = np.flatnonzero(queue.sensor == Sensor.GPS_POSITION)
-    flow = np.flatnonzero(queue.sensor == Sensor.FLOW_RATE)
-    queue.arrived[fixes[::7]] = 0.0
-    queue.withheld[flow[::10]] = 1.0
-    return queue
-
-
-def record_of(queue: EventQueue, kind: str = "fly", without: tuple[str, ...] = ()) -> Record:
-    record = Record({
-        "kind": kind,
-        "segments": [equipment(FLOWN, queue)._asdict()],
-        "parameters": {"filter": NavigatorSettingsFile().model_dump(), "gps_delay_s": 0.0},
-    })  # fmt: skip
-    table = fed_table(fed_rows(queue, queue.t_s, 0))
-    record.add("fed", {name: column for name, column in table.items() if name not in without})
-    return record
+from navigation_streams import navigate
 
 
 def replayed(path, **options):

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_fed_record import queue_of_flight, record_of
 
+from fed_records import queue_of_flight, record_of
 from flownav.errors import InputError
 from flownav.logs.open_log import open_log
 from flownav.measurement import Sensor

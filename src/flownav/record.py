@@ -6,20 +6,13 @@ code that wrote it. Table and column names carry frame and unit; `TABLES` is the
 
 from __future__ import annotations
 
-import io
-import json
-import time
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-from flownav.errors import InputError
-from flownav.guard import an_input, written_whole
 
 SCHEMA_VERSION = 1
 
@@ -145,62 +138,13 @@ class Record:
 
         replacing: whoever asks knows that what is there may go. InputError, unless replacing, where it must not.
         """
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+        from flownav.record_file import save
 
-        with (
-            written_whole(path, replacing=replacing) as temporary,
-            zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as bundle,
-        ):
-            manifest = {"schema": SCHEMA_VERSION, **self.manifest}
-            bundle.writestr("manifest.json", json.dumps(manifest, indent=1, default=str))
-            for name, table in self.tables.items():
-                columns, entry = pa.table(table), zipfile.ZipInfo(f"{name}.parquet", time.localtime()[:6])
-                with bundle.open(entry, "w", force_zip64=columns.nbytes >= zipfile.ZIP64_LIMIT) as stream:
-                    pq.write_table(columns, pa.PythonFile(_Told(stream), "w"), compression="zstd")
-                del columns
-                pa.default_memory_pool().release_unused()
+        save(self, path, replacing=replacing)
 
     @classmethod
     def load(cls, path: Path) -> Record:
         """Read a record. InputError where the file is missing, is no record, or is of a newer schema."""
-        import pyarrow.parquet as pq
+        from flownav.record_file import load
 
-        if not an_input(path).is_file():
-            raise InputError(f"{path}: no such record; `flownav fly landing` writes one")
-        try:
-            with zipfile.ZipFile(path) as bundle:
-                manifest = json.loads(bundle.read("manifest.json"))
-                tables = {
-                    Path(name).stem: {
-                        column: data.to_numpy(zero_copy_only=False)
-                        for column, data in zip(table.column_names, table.columns, strict=True)
-                    }
-                    for name in bundle.namelist()
-                    if name.endswith(".parquet")
-                    for table in [pq.read_table(io.BytesIO(bundle.read(name)))]
-                }
-        except (zipfile.BadZipFile, KeyError, ValueError, OSError) as error:
-            raise InputError(f"{path}: not a flownav record ({error}); write it again with fly or replay") from error
-        if manifest.get("schema", 0) > SCHEMA_VERSION:
-            raise InputError(f"{path}: record schema {manifest['schema']} is newer than this flownav; update flownav")
-        return cls(manifest, tables)
-
-
-class _Told:
-    """A file within a zip as Arrow writes to it, which asks how far it has come."""
-
-    closed = False
-
-    def __init__(self, stream: IO[bytes]) -> None:
-        self._stream, self._written = stream, 0
-
-    def write(self, data: Any) -> int:
-        self._written += self._stream.write(data)
-        return len(data)
-
-    def tell(self) -> int:
-        return self._written
-
-    def flush(self) -> None:
-        pass
+        return load(path)

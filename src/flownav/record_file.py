@@ -235,6 +235,8 @@ def _table(data: bytes) -> Table:
     texts = [field.name for field in schema if pa.types.is_string(field.type) or pa.types.is_large_string(field.type)]
     file = pq.ParquetFile(io.BytesIO(data), read_dictionary=texts)
     read = file.read() if file.metadata.num_rows else file.schema_arrow.empty_table()
+    if read.num_rows != file.metadata.num_rows:
+        raise ValueError(f"a table of {file.metadata.num_rows} rows has {read.num_rows}")
     return {name: _column(name, column) for name, column in zip(read.column_names, read.columns, strict=True)}
 
 

@@ -55,3 +55,44 @@ def test_what_does_not_say_it_is_refused_in_one_line(tmp_path, kind, without):
     with pytest.raises(InputError) as error:
         open_flight(tmp_path / "other.fnr")
     assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("sensor", 99.0, "sensor that there is none"),
+        ("sensor", np.nan, "sensor that there is none"),
+        ("segment", 1.0, "segment that there is none"),
+        ("segment", -1.0, "segment that there is none"),
+        ("arrived", 0.5, "arrived that there is none"),
+        ("t_s", np.nan, "without a time"),
+        ("arrival_s", np.inf, "without a time"),
+    ],
+)
+def test_a_row_that_no_navigator_was_fed_is_one_line(tmp_path, name, value, said):
+    record = record_of(queue_of_flight())
+    record.tables["fed"][name] = record.tables["fed"][name].copy()
+    record.tables["fed"][name][7] = value
+    record.save(tmp_path / "x.fnr")
+    with pytest.raises(InputError, match=said):
+        open_flight(tmp_path / "x.fnr")
+
+
+@pytest.mark.parametrize(
+    "manifest",
+    [
+        {"segments": [{"use_imu": True}]},
+        {"segments": [{"use_imu": True, "wings": 2.0}]},
+        {"parameters": {"gps_delay_s": 0.0}},
+        {"parameters": {"filter": {}, "gps_delay_s": "soon"}},
+        {"parameters": {"filter": {}, "gps_delay_s": 0.0, "flow_noise": {"a": 1.0}}},
+        {"parameters": {"filter": {}, "gps_delay_s": 0.0, "flow_noise": "much"}},
+        {"parameters": {"filter": {"no_such": 1.0}, "gps_delay_s": 0.0}},
+    ],
+)
+def test_settings_that_are_none_are_one_line(tmp_path, manifest):
+    record = record_of(queue_of_flight())
+    record.manifest |= manifest
+    record.save(tmp_path / "x.fnr")
+    with pytest.raises(InputError):
+        replayed(tmp_path / "x.fnr")

@@ -31,16 +31,18 @@ def as_fed(
     if options.flow_scale != (1.0, 1.0) or options.identified is not None:
         raise InputError(f"{log.path}: it holds flow as it was fed; replay it without --flow-scale, --sensor")
     check_windows(log, options.gps_outages_s, "--gps-outage")
-    recorded = check(dict(log.fed_settings["filter"]), NavigatorSettingsFile, str(log.path))
-    noise = log.fed_settings.get("flow_noise")
-    return (
-        replace(
-            options,
-            gps_delay_s=float(log.fed_settings["gps_delay_s"]),
-            flow_noise=FlowNoise(**noise) if noise else NO_STATED_NOISE,
-        ),
-        settings or recorded,
-    )
+    try:
+        for segment in log.fed:
+            Equipment(**segment.equipment)
+        told, noise = dict(log.fed_settings["filter"]), log.fed_settings.get("flow_noise")
+        delay_s = float(log.fed_settings["gps_delay_s"])
+        stated = FlowNoise(**{name: float(value) for name, value in noise.items()}) if noise else NO_STATED_NOISE
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(
+            f"{log.path}: it does not say how its navigators were set ({error}); write it again"
+        ) from error
+    recorded = check(told, NavigatorSettingsFile, str(log.path))
+    return replace(options, gps_delay_s=delay_s, flow_noise=stated), settings or recorded
 
 
 def prepared_as_fed(log: Log) -> Prepared:

@@ -358,5 +358,5 @@ def test_damaged_records_are_one_line(tmp_path):
 
 def test_a_path_that_is_no_file_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "x.fnr")
-    assert "no such record" in refusal(tmp_path / "x.fnr")
-    assert "no such record" in refusal(Path("/dev/zero"))
+    assert "a FIFO (a named pipe) is not read" in refusal(tmp_path / "x.fnr")
+    assert "a device is not read" in refusal(Path("/dev/zero"))

@@ -113,7 +113,8 @@ def _columns(columns: dict[str, np.ndarray], random: Random) -> dict[str, object
     some = draws.random(count) < random.choice((0.01, 0.5, 1.0))
     if kind <= 2 and column.dtype.kind == "f":
         put = random.choice(NUMBERS)
-        return {**columns, key: np.where(some, column * put if random.random() < 0.3 else put, column)}
+        with np.errstate(all="ignore"):
+            return {**columns, key: np.where(some, column * put if random.random() < 0.3 else put, column)}
     if kind == 3:
         return {name: each for name, each in columns.items() if name != key}
     if kind == 4:

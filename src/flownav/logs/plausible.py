@@ -18,7 +18,7 @@ from flownav.logs.rates import attitude_at, attitude_rates, mean_over
 from flownav.measurement import Array, Sensor, Stream
 
 LONGEST_LOG_S = 172_800.0
-# what can be said at most, in a stream's own unit: far more than any vehicle does, far less than what bits that flip say
+# what can be said at most, in a stream's own unit: more than any vehicle does, less than most bits that flip say
 LARGEST = {
     Sensor.GPS_POSITION: 1e6, Sensor.GPS_VELOCITY: 1e3, Sensor.FLOW_RATE: 1e3, Sensor.FLOW_VELOCITY: 1e3,
     Sensor.RANGE: 1e5, Sensor.IMU: 1e4, Sensor.ATTITUDE: 1.01, Sensor.BARO: 1e5, Sensor.MAG: 1e3, Sensor.POSE: 1e6,

@@ -26,7 +26,7 @@ def mutate_record(content: bytes, other: bytes, seed: int) -> bytes:
         kind = random.choice((_bytes, _manifest, _parquet, _table, _table, _table, _entries))
         try:
             content = kind(content, other, random)
-        except (zipfile.BadZipFile, KeyError, pa.ArrowException, OSError, ValueError, EOFError, NotImplementedError):
+        except (zipfile.BadZipFile, LookupError, pa.ArrowException, OSError, ValueError, EOFError, NotImplementedError):
             return content  # so much is broken already
     return content
 

@@ -96,7 +96,7 @@ def check_values(where: Path, streams: dict[Sensor, Stream]) -> None:
         if beyond.any():
             worst = float(stream.value[beyond][0])
             raise InputError(f"{where}: {name}: a reading of {worst:g}; at most {LARGEST[sensor]:g} can be")
-        if sensor == Sensor.ATTITUDE and np.any(abs(np.linalg.norm(stream.value, axis=1) - 1.0) > ROUNDED):
+        if sensor == Sensor.ATTITUDE and not np.all(abs(np.linalg.norm(stream.value, axis=1) - 1.0) <= ROUNDED):
             raise InputError(f"{where}: attitude: a quaternion whose length is not 1")
         if np.any((stream.variance < 0.0) | np.isinf(stream.variance)):
             raise InputError(f"{where}: {name}: a variance below 0, or infinite")

@@ -19,7 +19,7 @@ long-log: $(VENV)/.ready-test
 	$(BIN)/python -m pytest -s -m slow tests/replay/test_long_log.py
 
 fuzz: $(VENV)/.ready-test
-	FLOWNAV_FUZZ=$${FLOWNAV_FUZZ:-20000} $(BIN)/python -m pytest -m fuzz tests/logs/test_fuzz_logs.py
+	FLOWNAV_FUZZ=$${FLOWNAV_FUZZ:-20000} $(BIN)/python -m pytest -m fuzz tests/logs tests/live/test_fuzz_live.py tests/test_fuzz_parameters.py
 
 mutants: $(VENV)/.ready-test
 	$(BIN)/python tests/helpers/mutants.py $(PART)

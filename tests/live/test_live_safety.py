@@ -21,12 +21,14 @@ from flownav.live.horizon import MOST_WAITING
 from flownav.live.loop import Latency
 from flownav.live.options import Limits, Options
 from flownav.live.reception import BESIDE, Accepted, accepted_by, accepted_of
+from flownav.live.recorder import NoRecorder
 from flownav.live.screen import Screen
+from flownav.live.session import Session
 from flownav.mavlink.dialect import coder
 from flownav.mavlink.position_messages import LOCAL_FRD
 from flownav.mavlink.signing import SignatureCheck
 from flownav.navigation.memory import PROTECTION
-from live_ends import HEIGHT_M, UNIX_S, Hover, Wire
+from live_ends import HEIGHT_M, START_S, UNIX_S, Hover, Wire
 
 KEY = bytes(range(32))
 
@@ -494,3 +496,14 @@ def test_quality_is_what_is_left_of_the_limits(wires):
     coasting = [message.quality for message in wire.estimates(lost)]
     assert coasting[-1] < 20 < sure
     assert not wire.estimates(lost + Limits().dead_reckoning_s + 0.4)
+
+
+@pytest.mark.parametrize(("old_s", "heard"), [(3600.0, False), (61.0, False), (30.0, True)])
+def test_a_recorded_link_played_into_a_fresh_session_is_not_heard_beyond_the_protocols_minute(old_s, heard):
+    vehicle = Hover(boot_s=5000.0, key=KEY)
+    recorded = [frame for step in range(200) for frame in vehicle.frames(-old_s + 0.01 * step)]
+    session = Session(Options(key=KEY), NoRecorder(), START_S, UNIX_S)
+    for number, frame in enumerate(recorded):
+        session.take(frame, START_S + 1e-3 * number, whole=True)
+    assert (session.reception.vehicle is not None) is heard
+    assert bool(session.readings) is heard

@@ -5,39 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from fed_records import FLOWN, queue_of_flight, record_of
 from flownav.errors import InputError
 from flownav.logs.open_log import open_flight
-from flownav.measurement import EventQueue, Sensor, merge
-from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.tables import fed_rows, fed_table
-from flownav.record import Record
+from flownav.measurement import Sensor, merge
 from flownav.replay.fed import as_fed
 from flownav.replay.prepare import ReplayOptions
 from flownav.replay.session import replay
-from navigation_streams import circle, equipment, fly, navigate
-
-FLOWN = fly(circle, 12.0, 0.2)
-
-
-def queue_of_flight() -> EventQueue:
-    """Every seventh fix stayed away, and one flow reading in ten was taken away."""
-    queue = merge(FLOWN.streams.values())
-    fixes = np.flatnonzero(queue.sensor == Sensor.GPS_POSITION)
-    flow = np.flatnonzero(queue.sensor == Sensor.FLOW_RATE)
-    queue.arrived[fixes[::7]] = 0.0
-    queue.withheld[flow[::10]] = 1.0
-    return queue
-
-
-def record_of(queue: EventQueue, kind: str = "fly", without: tuple[str, ...] = ()) -> Record:
-    record = Record({
-        "kind": kind,
-        "segments": [equipment(FLOWN, queue)._asdict()],
-        "parameters": {"filter": NavigatorSettingsFile().model_dump(), "gps_delay_s": 0.0},
-    })  # fmt: skip
-    table = fed_table(fed_rows(queue, queue.t_s, 0))
-    record.add("fed", {name: column for name, column in table.items() if name not in without})
-    return record
+from navigation_streams import navigate
 
 
 def replayed(path, **options):
@@ -85,11 +60,11 @@ def test_what_does_not_say_it_is_refused_in_one_line(tmp_path, kind, without):
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [
-        ("sensor", 99.0, "of an unknown sensor"),
-        ("sensor", np.nan, "of an unknown sensor"),
-        ("segment", 1.0, "of an unknown sensor or navigator"),
-        ("segment", -1.0, "of an unknown sensor or navigator"),
-        ("arrived", 0.5, "withheld in part"),
+        ("sensor", 99.0, "sensor that there is none"),
+        ("sensor", np.nan, "sensor that there is none"),
+        ("segment", 1.0, "segment that there is none"),
+        ("segment", -1.0, "segment that there is none"),
+        ("arrived", 0.5, "arrived that there is none"),
         ("t_s", np.nan, "without a time"),
         ("arrival_s", np.inf, "without a time"),
     ],

@@ -6,14 +6,11 @@ its seed: `damaged(sample, seed)` is the same bytes again.
 
 from __future__ import annotations
 
-import os
 import struct
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -28,17 +25,12 @@ from flownav.logs.log import Log
 from flownav.logs.mavlink_log import read_tlog
 from flownav.logs.open_log import open_log
 from flownav.logs.ulog import read_ulog
-from flownav.measurement import COLUMNS
+from fuzzing import FIRST_SEED, MUTANTS, assert_promise, assert_sound
 from log_mutations import mutate
 from mavlink_logs import flight_log
 from places import data_root
 from replay_logs import SyntheticLog, log_of_flight
 from ulog_files import ulog_of_flight
-
-MUTANTS = int(os.environ.get("FLOWNAV_FUZZ", "500"))
-FIRST_SEED = int(os.environ.get("FLOWNAV_FUZZ_FIRST", "0"))
-SECONDS_PER_MB, FLOOR_S = 1.0, 3.0
-BYTES_PER_BYTE, FLOOR_BYTES = 60, 128 << 20
 
 
 @dataclass(frozen=True)
@@ -128,48 +120,6 @@ def damaged(sample: Sample, seed: int) -> tuple[str, bytes]:
     names = sorted(sample.files)
     changed = names[seed % len(names)]
     return changed, mutate(sample.files[changed], sample.files[names[(seed // 7) % len(names)]], seed)
-
-
-def assert_sound(log: Log) -> None:
-    """What every Log promises, however little of the file was left."""
-    assert log.streams
-    assert all("\n" not in note for note in log.notes)
-    for sensor, stream in log.streams.items():
-        count, width = len(stream.t_s), len(COLUMNS[sensor])
-        assert stream.value.shape == stream.variance.shape == (count, width)
-        assert stream.quality.shape == (count,)
-        assert np.all(np.isfinite(stream.t_s))
-        assert np.all(np.diff(stream.t_s) >= 0)
-        assert all(kept > 0 for kept in stream.rejected.values())
-    for table in (log.truth, log.autopilot):
-        assert table is None or len({len(column) for column in table.values()}) == 1
-
-
-def peak_bytes(anew: bool = False) -> int:
-    """The most memory held since it was last asked anew; 0 where the system does not tell (Linux does)."""
-    try:
-        if anew:
-            Path("/proc/self/clear_refs").write_text("5")
-        status = Path("/proc/self/status").read_text()
-    except OSError:
-        return 0
-    return 1024 * int(status.split("VmHWM:")[1].split()[0])
-
-
-def assert_promise(read: Callable[[Path], Log], path: Path, size: int, what: str) -> None:
-    """An InputError of one line, or a sound Log; within time and memory that follow the size."""
-    before = peak_bytes(anew=True)
-    begun = time.process_time()
-    said = ""
-    try:
-        assert_sound(read(path))
-    except InputError as error:
-        said = str(error)
-    except Exception as error:
-        raise AssertionError(f"{what}: {type(error).__name__}: {error}") from error
-    assert "\n" not in said, what
-    assert time.process_time() - begun < FLOOR_S + SECONDS_PER_MB * size / 1e6, what
-    assert peak_bytes() - before < FLOOR_BYTES + BYTES_PER_BYTE * size, what
 
 
 @pytest.mark.fuzz

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_fed_record import queue_of_flight, record_of
 
+from fed_records import queue_of_flight, record_of
 from flownav.errors import InputError
 from flownav.logs.open_log import open_log
 from flownav.measurement import Sensor
@@ -63,7 +63,7 @@ def test_a_ulog_whose_clock_leaps_is_refused(flown, tmp_path):
 @pytest.mark.parametrize(("change", "words"), [
     (lambda t: t * 1e13, "no clock shows that in seconds|the clock has leapt"),
     (lambda t: np.where(t > 6.0, t + 1.8e13, t), "the clock has leapt"),
-    (lambda t: np.where(t > 6.0, np.nan, t), "rows of `fed` without a time"),
+    (lambda t: np.where(t > 6.0, np.nan, t), "a reading without a time"),
 ])  # fmt: skip
 def test_a_record_of_absurd_times_is_refused(tmp_path, change, words):
     record = record_of(queue_of_flight())

@@ -149,3 +149,37 @@ def test_keys_of_another_length_are_a_programmers_mistake():
         SignatureCheck(b"short", NOW)
     with pytest.raises(ValueError, match="32 bytes"):
         sign_outgoing(coder(), b"short", NOW)
+
+
+@pytest.mark.parametrize(("passed_s", "old_s", "taken"), [
+    (0.0, 59.0, True), (0.0, 61.0, False), (600.0, 59.0, True), (600.0, 61.0, False), (600.0, 540.0, False)
+])  # fmt: skip
+def test_the_minute_of_a_new_stream_counts_from_now_and_not_from_when_the_session_began(passed_s, old_s, taken):
+    """What was recorded after the session began is old too, once a minute has passed."""
+    shown_s = [100.0]
+    check = SignatureCheck(KEY, NOW, lambda: shown_s[0])
+    shown_s[0] += passed_s
+    assert check.accepts(packed(signer(unix_s=NOW + passed_s - old_s))) is taken
+    assert check.rejected["replayed"] == (0 if taken else 1)
+
+
+def test_a_known_stream_may_lag_behind_as_long_as_it_goes_on():
+    """A vehicle without GPS time keeps the time that it was given, and is heard all the same."""
+    shown_s = [0.0]
+    check, mav = SignatureCheck(KEY, NOW, lambda: shown_s[0]), signer(unix_s=NOW - 30.0)
+    assert check.accepts(packed(mav))
+    shown_s[0] = 3600.0
+    assert check.accepts(packed(mav))
+
+
+@pytest.mark.parametrize(("mode", "warned"), [(0o600, False), (0o400, False), (0o640, True), (0o604, True)])
+def test_a_key_that_others_can_read_is_warned_of_once(tmp_path, capsys, mode, warned):
+    path = tmp_path / "key"
+    path.write_bytes(KEY)
+    path.chmod(mode)
+    for _ in range(3):
+        assert load_key(path) == KEY
+    said = capsys.readouterr()
+    assert said.out == ""
+    line = f"flownav: {path}: other users can read this signing key; chmod 600 keeps it yours\n"
+    assert said.err == (line if warned else "")

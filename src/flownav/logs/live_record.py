@@ -13,7 +13,7 @@ import numpy as np
 
 from flownav.errors import InputError
 from flownav.logs.log import SIMULATOR, FedSegment, Log
-from flownav.logs.plausible import check_times
+from flownav.logs.plausible import check_times, check_values
 from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, Stream
 from flownav.provenance import hash_of
 from flownav.record import FED, FED_FIRST, Record
@@ -42,13 +42,14 @@ def read_live_record(path: Path, *, flow_instance: int | None = None) -> Log:
         parameters = dict(record.manifest["parameters"])
         if not len(fed):
             raise InputError(f"{path}: its navigator heard nothing that it could use")
-        _check_rows(path, fed, len(segments))
+        _check(fed, len(segments))
         numbers = fed[:, FED.index("segment")].astype(int)
         streams = _with_late(_streams(fed), record.manifest.get("live"))
         parts = tuple(FedSegment(_floats(segments[i]), _queue(fed, numbers == i)) for i in range(len(segments)))
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise InputError(f"{path}: not a whole record of kind {kind!r} ({error}); write it again") from error
     check_times(path, streams)
+    check_values(path, streams)
     return Log(
         path,
         streams,
@@ -69,17 +70,19 @@ def _fed_of(record: Record) -> Array:
     return np.column_stack([rows, *(record.tables["fed"].get(name, usual[name]) for name in FED[len(FED_FIRST) :])])
 
 
-def _check_rows(path: Path, fed: Array, segments: int) -> None:
-    """InputError where a row has no time, is of no sensor or was fed to no navigator."""
-    sensor, segment = fed[:, FED.index("sensor")], fed[:, FED.index("segment")]
-    timed = np.isfinite(fed[:, : FED.index("sensor")]).all(axis=1)
-    known = np.isin(sensor, [int(each) for each in Sensor]) & np.isin(segment, np.arange(segments))
-    flags = np.isin(fed[:, [FED.index("withheld"), FED.index("arrived")]], [0.0, 1.0]).all(axis=1)
-    judged = (timed, "without a time"), (known, "of an unknown sensor or navigator"), (flags, "withheld in part")
-    for good, what in judged:
-        if not good.all():
-            count = int(np.count_nonzero(~good))
-            raise InputError(f"{path}: {count} rows of `fed` {what}; the record is damaged, take another copy")
+def _check(fed: Array, segments: int) -> None:
+    """ValueError where a row is none that a navigator was ever fed; it takes them as they stand."""
+    allowed = {
+        "sensor": np.array([float(sensor) for sensor in Sensor]),
+        "segment": np.arange(float(segments)),
+        "withheld": np.array([0.0, 1.0]),
+        "arrived": np.array([0.0, 1.0]),
+    }
+    for name, values in allowed.items():
+        if not np.isin(fed[:, FED.index(name)], values).all():
+            raise ValueError(f"in the table fed, a value of {name} that there is none")
+    if not np.isfinite(fed[:, [0, FED.index("arrival_s")]]).all():
+        raise ValueError("in the table fed, a reading without a time")
 
 
 def _floats(equipment: dict[str, Any]) -> dict[str, Any]:

@@ -18,6 +18,13 @@ from flownav.logs.rates import attitude_at, attitude_rates, mean_over
 from flownav.measurement import Array, Sensor, Stream
 
 LONGEST_LOG_S = 172_800.0
+# what can be said at most, in a stream's own unit: more than any vehicle does, less than most bits that flip say
+LARGEST = {
+    Sensor.GPS_POSITION: 1e6, Sensor.GPS_VELOCITY: 1e3, Sensor.FLOW_RATE: 1e3, Sensor.FLOW_VELOCITY: 1e3,
+    Sensor.RANGE: 1e5, Sensor.IMU: 1e4, Sensor.ATTITUDE: 1.01, Sensor.BARO: 1e5, Sensor.MAG: 1e3, Sensor.POSE: 1e6,
+    Sensor.YAW: 1e3, Sensor.PAD: 1e4, Sensor.LANDED: 1.0,
+}  # fmt: skip
+ROUNDED = 0.01
 LATEST_S = 1e10  # a clock of UNIX seconds shows 2e9, and its double tells microseconds apart
 GRAVITY_LIMITS_M_S2 = (4.0, 25.0)
 LARGEST_TILT_ERROR_RAD = 0.6
@@ -79,6 +86,22 @@ def check_times(where: Path, streams: dict[Sensor, Stream]) -> None:
             f"{where}: {early} begins at {first:g} s and {late} ends at {last:g} s, more than two days apart; all "
             "sensors need one clock, in seconds"
         )
+
+
+def check_values(where: Path, streams: dict[Sensor, Stream]) -> None:
+    """InputError where a reading is none that a sensor can give: too large, infinite, of a negative variance."""
+    for sensor, stream in streams.items():
+        name = sensor.name.lower()
+        beyond = np.abs(stream.value) > LARGEST[sensor]
+        if beyond.any():
+            worst = float(stream.value[beyond][0])
+            raise InputError(f"{where}: {name}: a reading of {worst:g}; at most {LARGEST[sensor]:g} can be")
+        if sensor == Sensor.ATTITUDE and not np.all(abs(np.linalg.norm(stream.value, axis=1) - 1.0) <= ROUNDED):
+            raise InputError(f"{where}: attitude: a quaternion whose length is not 1")
+        if np.any((stream.variance < 0.0) | np.isinf(stream.variance)):
+            raise InputError(f"{where}: {name}: a variance below 0, or infinite")
+        if not np.all((stream.quality >= 0.0) & (stream.quality <= 255.0)):
+            raise InputError(f"{where}: {name}: a quality that is not from 0 to 255")
 
 
 def of_one_clock(streams: dict[Sensor, Stream]) -> tuple[dict[Sensor, Stream], list[str]]:

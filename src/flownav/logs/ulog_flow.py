@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from flownav.errors import InputError
-from flownav.logs.ulog_topics import Topic, Topics
+from flownav.logs.ulog_topics import MOST_VARIANCE, Topic, Topics
 from flownav.measurement import Array, Sensor, Stream
 
 FLOW_TOPICS = ("vehicle_optical_flow", "optical_flow", "sensor_optical_flow")  # the first that saw enough
@@ -105,7 +105,7 @@ def range_stream(topics: Topics, flow: Topic | None) -> Stream | None:
             best = topic
     if best is not None:
         variance = best.matrix("variance")
-        variance[~(variance > 0)] = np.nan
+        variance[~((variance > 0) & (variance < MOST_VARIANCE))] = np.nan
         return Stream.of(
             Sensor.RANGE, best.t_s, best.matrix("current_distance"), variance=variance, delay_s=best.delay_s,
             rejected=best.rejected,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flownav.frames import heading_from_quaternion, rotation_from_quaternion, to_body
 from flownav.logs.rates import attitude_at
 from flownav.logs.states import state_table
-from flownav.logs.ulog_topics import Topic, Topics
+from flownav.logs.ulog_topics import MOST_VARIANCE, Topic, Topics
 from flownav.measurement import Array, Sensor, Stream
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
 
@@ -57,7 +57,7 @@ def pose_stream(topics: Topics, attitude: Stream | None) -> tuple[Stream | None,
         variance = odometry.vector("position_variance", 3)
     else:
         variance = odometry.matrix("pose_covariance[0]", "pose_covariance[6]", "pose_covariance[11]")
-    variance[~(variance > 0)] = np.nan
+    variance[~((variance > 0) & (variance < MOST_VARIANCE))] = np.nan
     stream = Stream.of(
         Sensor.POSE, odometry.t_s, position, variance=variance, delay_s=odometry.delay_s, rejected=odometry.rejected
     )

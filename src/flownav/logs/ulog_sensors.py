@@ -6,8 +6,9 @@ import numpy as np
 
 from flownav.frames import rotation_from_quaternion, to_body
 from flownav.logs.fixes import Origin, local_position, near_the_rest, origin_of
+from flownav.logs.plausible import LARGEST
 from flownav.logs.rates import attitude_at
-from flownav.logs.ulog_topics import Topic, Topics
+from flownav.logs.ulog_topics import MOST_VARIANCE, Topic, Topics
 from flownav.measurement import Array, Sensor, Stream
 
 LEAST_IMU_HZ = 20.0  # slower, an inertial reading says nothing of the motion between two
@@ -106,7 +107,7 @@ def gps_streams(topics: Topics) -> tuple[list[Stream], Origin | None]:
     if not len(fixes):
         return [], None
     sigma = fixes.matrix("s_variance_m_s", "eph", "epv")  # accuracies [m/s, m], whatever the first one's name says
-    sigma[~(sigma > 0)] = np.nan
+    sigma[~((sigma > 0) & (sigma < MOST_VARIANCE**0.5))] = np.nan
     velocity = fixes.matrix("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
     values = {
         Sensor.GPS_VELOCITY: (velocity, sigma[:, [0, 0, 0]] ** 2),
@@ -172,6 +173,7 @@ def landed_stream(topics: Topics) -> Stream | None:
 def _column(sensor: Sensor, topic: Topic, names: tuple[str, ...]) -> Stream:
     rows = Topic(topic.t_s, {name: topic.columns[name] for name in names}, dict(topic.rejected))
     rows.keep(np.isfinite(rows.matrix(*names)).all(axis=1), "not_finite")
+    rows.keep((abs(rows.matrix(*names)) <= LARGEST[sensor]).all(axis=1), "out_of_range")
     return Stream.of(sensor, rows.t_s, rows.matrix(*names), delay_s=topic.delay_s, rejected=rows.rejected)
 
 

@@ -20,6 +20,7 @@ from flownav.logs.ulog_framing import Framed, frame
 from flownav.logs.ulog_rows import Bytes, Places, field_of
 from flownav.measurement import Array
 
+MOST_VARIANCE = 1e12  # stated; beyond it a bit is wrong, as in what comes by MAVLink
 LONGEST_DELAY_S = 1.0  # a sample older than this on arrival carries a wrong time
 
 

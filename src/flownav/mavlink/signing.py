@@ -11,9 +11,14 @@ from __future__ import annotations
 import binascii
 import hashlib
 import hmac
+import os
 import re
+import stat
 import struct
+import sys
+import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -32,15 +37,20 @@ EPOCH_UNIX_S = 1_420_070_400  # 2015-01-01 UTC
 TICKS_PER_S = 100_000
 NEW_STREAM_TICKS = 60 * TICKS_PER_S  # a stream not heard before may be this much behind the newest
 MOST_KEY_FILE_BYTES = 1024
+READ_BY_OTHERS = stat.S_IRGRP | stat.S_IROTH
+
+_told: set[Path] = set()
 
 
 def load_key(path: Path) -> bytes:
     """A key file: 32 raw bytes, or 64 hexadecimal digits (blanks and line ends ignored).
 
-    InputError where it cannot be read or is neither. The key itself is never part of a message.
+    A file that others may read is named on standard error, once. InputError where it cannot be read or is neither. The
+    key itself is never part of a message.
     """
     try:
         with an_input(path).open("rb") as file:
+            _warn_of_readers(path, os.fstat(file.fileno()).st_mode)
             content = file.read(MOST_KEY_FILE_BYTES + 1)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); give a signing key's file") from error
@@ -54,6 +64,13 @@ def load_key(path: Path) -> bytes:
         f"{path}: {size} are no signing key; {KEY_BYTES} raw bytes or {2 * KEY_BYTES} hexadecimal digits "
         "are needed (`openssl rand -hex 32`)"
     )
+
+
+def _warn_of_readers(path: Path, mode: int) -> None:
+    """Who holds the key commands the vehicle; Windows tells nothing of that in the mode."""
+    if os.name == "posix" and mode & READ_BY_OTHERS and path not in _told:
+        _told.add(path)
+        print(f"flownav: {path}: other users can read this signing key; chmod 600 keeps it yours", file=sys.stderr)
 
 
 def timestamp_at(unix_s: float) -> int:
@@ -78,13 +95,17 @@ def sign_outgoing(mav: Any, key: bytes, unix_s: float, *, link_id: int = 0) -> N
 class SignatureCheck:
     """The strict policy for what arrives: signed with the key, and newer than all of its stream before.
 
-    rejected counts by reason: `unsigned`, `bad_signature`, `replayed`. A forged packet changes nothing but a count.
+    A stream that was not heard before may be a minute behind what is newest: the time now, or the newest stamp heard
+    (MAVLink 2 message signing, "Timestamp Handling"). So a fresh session takes nothing that was recorded earlier.
+    clock: seconds that pass, from `unix_s` on. rejected counts by reason: `unsigned`, `bad_signature`, `replayed`. A
+    forged packet changes nothing but a count.
     """
 
-    def __init__(self, key: bytes, unix_s: float) -> None:
+    def __init__(self, key: bytes, unix_s: float, clock: Callable[[], float] = time.monotonic) -> None:
         if len(key) != KEY_BYTES:
             raise ValueError(f"a signing key has {KEY_BYTES} bytes, not {len(key)}")
         self._key = key
+        self._clock, self._unix_less_clock_s = clock, unix_s - clock()
         self._newest = timestamp_at(unix_s)
         self._streams: dict[tuple[int, int, int], int] = {}
         self.rejected: Counter[str] = Counter()
@@ -108,6 +129,7 @@ class SignatureCheck:
             return "bad_signature"
         link, low, high = struct.unpack("<BIH", frame[-SIGNATURE_BYTES:-6])
         timestamp, stream = low | high << 32, (link, frame[5], frame[6])
+        self._newest = max(self._newest, timestamp_at(self._clock() + self._unix_less_clock_s))
         oldest = self._streams.get(stream, self._newest - NEW_STREAM_TICKS - 1)
         if timestamp <= oldest:
             return "replayed"

@@ -9,11 +9,11 @@ import numpy as np
 
 from flownav.errors import InputError
 from flownav.logs.log import Log
-from flownav.measurement import EventQueue
+from flownav.measurement import EventQueue, Sensor
 from flownav.navigation.loop import run, start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tables import Written, written_on
-from flownav.navigation.tape import new_tape
+from flownav.navigation.tape import tape_for
 from flownav.navigation.told import NO_STATED_NOISE, Equipment, FlowNoise
 from flownav.parameter_files import check
 from flownav.replay.prepare import Prepared, ReplayOptions, check_windows
@@ -58,7 +58,9 @@ def run_as_fed(
     for segment in log.fed:
         queue = withhold(segment.queue)
         if len(queue.t_s):
-            running = start_navigator(Equipment(**segment.equipment), settings, new_tape(queue), options.flow_noise)
+            readings = {sensor: int(np.count_nonzero(queue.sensor == sensor)) for sensor in Sensor}
+            tape = tape_for(readings, float(np.ptp(queue.t_s)))
+            running = start_navigator(Equipment(**segment.equipment), settings, tape, options.flow_noise)
             run(queue, running)
             parts.append(written_on(running.tape))
     return Written(*(np.concatenate(rows) for rows in zip(*parts, strict=True)))

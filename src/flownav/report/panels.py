@@ -45,7 +45,8 @@ class Section:
 
 def drawn(values: Array) -> NDArray[np.float32]:
     """Values as the page carries them: single precision halves its size."""
-    return np.asarray(values, np.float32)
+    with np.errstate(over="ignore"):
+        return np.asarray(values, np.float32)
 
 
 class Stack:

@@ -28,6 +28,7 @@ from flownav.simulation.noise import threefry
 Array = NDArray[np.float64]
 
 SHIPPED, SHIPPED_FILE = "shipped", "dispersion.toml"
+LARGEST_SHAPE = 1e300  # of a parameter of a distribution
 DISPERSION_STEP = 1 << 41  # of the noise counter: beyond every step of a flight and of its start
 
 
@@ -47,6 +48,8 @@ class Distribution(ParameterModel):
         for name, value in self.shapes.items():
             if isinstance(value, bool) or not isinstance(value, (int, float)):
                 raise ValueError(f"{name} = {value!r}: a shape parameter is a number")
+            if not -LARGEST_SHAPE < value < LARGEST_SHAPE:
+                raise ValueError(f"{name}: a shape parameter is a finite number")
         return self
 
     @property

@@ -1,0 +1,111 @@
+"""Damaged parameter files of every kind: loaded and sound, or refused with one line; soon, in little."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import BaseModel
+
+from flownav.identification.rig_log import Rig
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.settings_of import settings_of
+from flownav.parameter_files import load, shipped
+from flownav.sensors.barometer_sheet import load_barometer_sheet
+from flownav.sensors.datasheet import load_sensor
+from flownav.sensors.flow_camera_sheet import load_flow_camera_sheet
+from flownav.sensors.gps_receiver_sheet import load_gps_receiver_sheet
+from flownav.sensors.inertial_sheet import load_inertial_sheet
+from flownav.sensors.magnetometer_sheet import load_magnetometer_sheet
+from flownav.sensors.pad_camera_sheet import load_pad_camera_sheet
+from flownav.sensors.range_sensor_sheet import load_range_sensor_sheet
+from flownav.sensors.skid_switch_sheet import load_skid_switch_sheet
+from flownav.simulation.dispersion import DispersionFile
+from flownav.simulation.scenario import load_scenario
+from flownav.validation.flights import load_flights
+from flownav.vehicle.loading import load_vehicle
+from flownav.vehicle.paper_model import load_paper_model
+from fuzzing import FIRST_SEED, MUTANTS, assert_promise
+from toml_mutations import mutate_toml
+
+RIG = """schema_version = 1
+height_m = 0.6
+rod_length_m = 1.5
+pivot_height_m = 2.1
+encoder_counts_per_revolution = 4096
+"""
+SETTINGS = """flow_gain_x = { value = 1.02, source = "a rig" }
+flow_gain_y = 0.98
+gps_slow_sigma_m = 0.8
+start_wait_s = 10.0
+baro_sigma_m = 0.3
+"""
+
+
+def sensor_as_told(path: Path) -> tuple[Any, ...]:
+    """A sensor's file, and what the navigator is told of it."""
+    sensor = load_sensor(path)
+    return sensor, settings_of(sensor).settings
+
+
+LOADERS: dict[str, Callable[[Path], Any]] = {
+    "maxi_joker_3.toml": load_vehicle,
+    "quad_450.toml": load_vehicle,
+    "px4flow_paper.toml": sensor_as_told,
+    "landing.toml": lambda path: load_scenario(str(path)),
+    "approach.toml": lambda path: load_scenario(str(path)),
+    "dispersion.toml": lambda path: load(path, DispersionFile),
+    "validation.toml": load_flights,
+    "paper_reduced_model.toml": load_paper_model,
+    "sensors/gps_receiver.toml": load_gps_receiver_sheet,
+    "sensors/range_sensor.toml": load_range_sensor_sheet,
+    "sensors/inertial.toml": load_inertial_sheet,
+    "sensors/flow_camera.toml": load_flow_camera_sheet,
+    "sensors/magnetometer.toml": load_magnetometer_sheet,
+    "sensors/barometer.toml": load_barometer_sheet,
+    "sensors/pad_camera.toml": load_pad_camera_sheet,
+    "sensors/skid_switch.toml": load_skid_switch_sheet,
+    "rig": lambda path: load(path, Rig),
+    "settings": lambda path: load(path, NavigatorSettingsFile),
+}
+SAMPLES = {"rig": RIG.encode(), "settings": SETTINGS.encode()}
+
+
+def content_of(name: str) -> bytes:
+    return SAMPLES.get(name) or shipped(name).read_bytes()
+
+
+def numbers_in(found: Any) -> Iterator[float]:
+    """Every number of a loaded file, however deep."""
+    if isinstance(found, BaseModel):
+        yield from numbers_in(found.model_dump())
+    elif isinstance(found, dict):
+        yield from numbers_in(list(found.values()))
+    elif isinstance(found, list | tuple):
+        for each in found:
+            yield from numbers_in(each)
+    elif isinstance(found, float):
+        yield found
+
+
+def assert_finite(found: Any) -> None:
+    assert all(map(isfinite, numbers_in(found)))
+
+
+@pytest.mark.fuzz
+@pytest.mark.parametrize("name", LOADERS)
+def test_a_damaged_file_is_loaded_or_refused(tmp_path, name):
+    path, content, other = tmp_path / "x.toml", content_of(name), content_of("landing.toml")
+    for seed in range(FIRST_SEED, FIRST_SEED + -(-MUTANTS // len(LOADERS))):
+        changed = mutate_toml(content, other, seed)
+        path.write_bytes(changed)
+        assert_promise(LOADERS[name], path, len(changed), f"{name}, seed {seed}", assert_finite)
+
+
+@pytest.mark.parametrize("name", LOADERS)
+def test_the_samples_themselves_are_loaded(tmp_path, name):
+    (tmp_path / "x.toml").write_bytes(content_of(name))
+    assert_finite(LOADERS[name](tmp_path / "x.toml"))

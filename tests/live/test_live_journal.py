@@ -21,6 +21,7 @@ from flownav.live.recorder import Recorder
 from flownav.live.recovery import recovered
 from flownav.logs.journal import MAGIC, Block, blocks
 from flownav.logs.open_log import open_flight
+from flownav.mavlink.state_messages import TrueState
 from flownav.navigation.tables import estimate_table, innovation_table
 from flownav.record import Record
 from flownav.replay.fed import as_fed
@@ -334,3 +335,18 @@ def test_a_journal_that_appears_meanwhile_is_not_taken(tmp_path, monkeypatch):
     os.close(place.file)
     assert place.record.name == "flight-1.fnr"
     assert journal.read_text() == "somebody's"
+
+
+def test_truth_lies_in_the_frame_of_its_time(tmp_path):
+    """The first origin holds before it was known too; from the second on, places are about that."""
+    recorder = Recorder(tmp_path / "flight.fnr", Options())
+    place = TrueState((47.0, 8.0, 400.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    recorder.truth(1.0, place)
+    recorder.origin(2.0, (47.0, 8.0, 400.0))
+    recorder.truth(3.0, place)
+    recorder.origin(4.0, (47.0, 8.0, 410.0))
+    recorder.truth(5.0, place)
+    record = Record.load(recorder.finish({}).record)
+    np.testing.assert_allclose(record.tables["truth"]["pos_d_m"], [0.0, 0.0, 10.0], atol=1e-9)
+    assert record.manifest["origins"] == [[2.0, 47.0, 8.0, 400.0], [4.0, 47.0, 8.0, 410.0]]
+    assert record.manifest["parameters"]["origin_lat_lon_deg_alt_m"] == [47.0, 8.0, 410.0]

@@ -60,10 +60,12 @@ def recovered(journal: Path) -> Recovered:
     whole, damages = _read(journal)
     try:
         story = _story(whole, journal)
-        known = np.isin(story.rows["fed"][:, SEGMENT], list(story.segments))
+        fed = story.rows["fed"]
+        known = np.isin(fed[:, SEGMENT], list(story.segments))
         unclaimed = int(np.count_nonzero(~known))
-        fed = _renumbered(story.rows["fed"][known], story.segments) if story.segments else story.rows["fed"][:0]
-        story = story._replace(rows={**story.rows, "fed": fed})
+        if unclaimed:  # or a copy of all would be made
+            fed = fed[known]
+        story = story._replace(rows={**story.rows, "fed": _renumbered(fed, story.segments)})
         middle = [damage for damage in damages if not damage.tail]
         found = Recovered(
             Record(_manifest(story)),
@@ -126,7 +128,8 @@ def _rows(whole: list[Block], name: str) -> Array:
 
 def _renumbered(fed: Array, segments: dict[int, Any]) -> Array:
     """Segments count from zero without a gap in a record, whichever of the journal's are known."""
-    fed[:, SEGMENT] = np.searchsorted(sorted(segments), fed[:, SEGMENT])
+    if sorted(segments) != list(range(len(segments))):
+        fed[:, SEGMENT] = np.searchsorted(sorted(segments), fed[:, SEGMENT])
     return fed
 
 

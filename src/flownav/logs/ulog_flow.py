@@ -60,7 +60,7 @@ def flow_stream(topics: Topics, topic: Topic) -> Stream:
     topic.keep(np.isfinite(topic.matrix("flow_x", "flow_y")).all(axis=1), "not_finite")
     topic.keep((abs(topic.matrix("flow_x", "flow_y")) <= FASTEST_RAD_S).all(axis=1), "out_of_range")
     value = topic.matrix("flow_x", "flow_y", "gyro_x", "gyro_y")
-    value[:, 2:][~np.isfinite(value[:, 2:]).all(axis=1)] = np.nan
+    value[:, 2:][~(abs(value[:, 2:]) <= FASTEST_RAD_S).all(axis=1)] = np.nan
     age_s = topic.delay_s + 0.5 * (float(np.median(dt_s[timed])) if timed.any() else 0.0)
     return Stream.of(
         Sensor.FLOW_RATE, topic.t_s, value, quality=topic.columns["level"], delay_s=age_s, rejected=topic.rejected

@@ -44,7 +44,10 @@ def read_live_record(path: Path, *, flow_instance: int | None = None) -> Log:
             raise InputError(f"{path}: its navigator heard nothing that it could use")
         _check(fed, len(segments))
         numbers = fed[:, FED.index("segment")].astype(int)
-        streams = _with_late(_streams(fed), record.manifest.get("live"))
+        heard = _streams(fed)
+        if not heard:
+            raise InputError(f"{path}: its navigator heard nothing that it could use")
+        streams = _with_late(heard, record.manifest.get("live"))
         parts = tuple(FedSegment(_floats(segments[i]), _queue(fed, numbers == i)) for i in range(len(segments)))
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise InputError(f"{path}: not a whole record of kind {kind!r} ({error}); write it again") from error

@@ -8,7 +8,7 @@ import re
 import pytest
 
 from flownav.errors import InputError
-from flownav.parameter_files import shipped
+from flownav.parameter_files import Number, ParameterModel, load, shipped
 from flownav.vehicle.feasibility import require_feasible
 from flownav.vehicle.loading import describe_vehicle, load_vehicle
 from flownav.vehicle.paper_model import load_paper_model
@@ -181,3 +181,25 @@ def test_no_body_has_a_moment_of_inertia_above_the_sum_of_the_others(moments, po
     else:
         with pytest.raises(InputError, match="no rigid body has these inertias"):
             require_feasible(body, "here")
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("a = " + "[" * 3000 + "]" * 3000, "nested too deep"),
+    (".".join("k" * 100) + " = 1", "nested too deep"),
+    ("a = " + "9" * 5000, "an integer of thousands of digits"),
+    ("radius_m = 0x" + "f" * 5000, "something that is too long to show"),
+    ('"a\\nb" = 1', r"a\nb: unknown key"),
+    ("x = 1 #" + "x" * 5_000_000, "more than 4,000,000 bytes"),
+    ("x = \xff", "cannot be read"),
+])  # fmt: skip
+def test_what_breaks_readers_is_one_line(tmp_path, text, words):
+    class Sheet(ParameterModel):
+        radius_m: Number = 1.0
+
+    path = tmp_path / "x.toml"
+    path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(InputError) as said:
+        load(path, Sheet)
+    assert words in str(said.value)
+    assert "\n" not in str(said.value)
+    assert len(str(said.value)) < 1000

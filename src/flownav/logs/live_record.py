@@ -45,6 +45,8 @@ def read_live_record(path: Path, *, flow_instance: int | None = None) -> Log:
         _check(fed, len(segments))
         numbers = fed[:, FED.index("segment")].astype(int)
         streams = _with_late(_streams(fed), record.manifest.get("live"))
+        if not streams:
+            raise InputError(f"{path}: its navigator heard nothing that it could use")
         parts = tuple(FedSegment(_floats(segments[i]), _queue(fed, numbers == i)) for i in range(len(segments)))
     except (KeyError, IndexError, TypeError, ValueError) as error:
         raise InputError(f"{path}: not a whole record of kind {kind!r} ({error}); write it again") from error

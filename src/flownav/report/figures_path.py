@@ -27,6 +27,7 @@ from flownav.report.style import COLOUR, LINES, axis, layout
 
 # A 3-D view at most, in Plotly's units: the camera sees it whole.
 BOX_DIAGONAL, BOX_HEIGHT = 1.65, 1.1
+WIDEST_M = 1e9  # of a path that is drawn: what goes further is damage
 JUMP_M = 0.5  # from one row to the next
 
 
@@ -163,7 +164,8 @@ def path_over_pad(record: Record) -> Panel:
 def _proportions(paths: list[tuple[str, str, Track]], where: Pad | None) -> tuple[dict[str, float], bool]:
     """Sides of the box of a 3-D view, and whether they are true to scale: a very flat or slender path is not."""
     points = np.concatenate([paths[-1][2].value, *([where.corners()] if where is not None else [])])
-    north, east, height = np.maximum(np.nanmax(points, axis=0) - np.nanmin(points, axis=0), 1e-3)
+    spans = np.nanmax(points, axis=0) - np.nanmin(points, axis=0)
+    north, east, height = np.clip(np.nan_to_num(spans, nan=0.0, posinf=WIDEST_M), 1e-3, WIDEST_M)
     across = max(north, east)
     to_scale = bool(across / 6.0 < height < 6.0 * across)
     sides = np.array([east, north, height if to_scale else 0.6 * across])

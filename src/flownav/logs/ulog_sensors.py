@@ -13,7 +13,7 @@ from flownav.measurement import Array, Sensor, Stream
 LEAST_IMU_HZ = 20.0  # slower, an inertial reading says nothing of the motion between two
 FASTEST_M_S = 150.0
 FASTEST_TURN_RAD_S = 70.0
-LARGEST_FIELD_GAUSS = 100.0  # two hundred times the earth's
+MOST_SAID = {Sensor.MAG: 100.0, Sensor.BARO: 1e5, Sensor.LANDED: 1.0}  # [gauss] 200 times the earth's; [m]
 HARDEST_M_S2 = 400.0
 UNIT_LENGTH_WITHIN = 0.1
 QUATERNION_FIELDS = tuple(f"q[{k}]" for k in range(4))
@@ -173,7 +173,7 @@ def landed_stream(topics: Topics) -> Stream | None:
 def _column(sensor: Sensor, topic: Topic, names: tuple[str, ...]) -> Stream:
     rows = Topic(topic.t_s, {name: topic.columns[name] for name in names}, dict(topic.rejected))
     rows.keep(np.isfinite(rows.matrix(*names)).all(axis=1), "not_finite")
-    rows.keep((abs(rows.matrix(*names)) <= LARGEST_FIELD_GAUSS).all(axis=1), "out_of_range")
+    rows.keep((abs(rows.matrix(*names)) <= MOST_SAID[sensor]).all(axis=1), "out_of_range")
     return Stream.of(sensor, rows.t_s, rows.matrix(*names), delay_s=topic.delay_s, rejected=rows.rejected)
 
 

@@ -18,7 +18,7 @@ number of threads.
 from __future__ import annotations
 
 from flownav.compiling.beside import compile_beside
-from flownav.compiling.bundles import FlatAccess, flat_access, lane_access, replacing, stepping, write_function
+from flownav.compiling.bundles import FlatAccess, flat_access, lane_access, passing, replacing, stepping, write_function
 from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
 from flownav.compiling.progress import announce_compilation
@@ -46,6 +46,7 @@ __all__ = [
     "lane_access",
     "larger",
     "magnitude",
+    "passing",
     "pointer",
     "procedure",
     "replacing",

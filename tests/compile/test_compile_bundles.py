@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from flownav.compile import equation, flat_access, kernel, lane_access, pointer, replacing, stepping
+from flownav.compile import equation, flat_access, kernel, lane_access, passing, pointer, replacing, stepping
 
 
 class Wheel(NamedTuple):
@@ -72,6 +72,16 @@ def test_lanes_load_what_they_store():
     assert work.tolist() == [0, 0, 0, 0, 0, 0, 0, 0.5, 0, 4.0]
 
 
+def test_rows_are_taken_where_none_is_told():
+    load_row, store_row = lane_access(Wheel, None)
+    load_third, _ = lane_access(Wheel, 3)
+    lanes = (0, 0)
+    work = np.zeros(5 * 2)
+    store_row(work, lanes, 3, 1, Wheel(0.5, 4))
+    assert load_row(work, lanes, 3, 1) == load_third(work, lanes, 1) == Wheel(0.5, 4)
+    assert load_row(work, lanes, 0, 1) == Wheel(0.0, 0.0)
+
+
 @equation
 def spin(wheel):
     return wheel.radius_m * wheel.spokes
@@ -98,6 +108,14 @@ moved_across = replacing(Point, "z", "x")
 stepped = stepping(Point)
 
 
+@equation
+def halved(value):
+    return 0.5 * value
+
+
+halved_across = passing(Point, halved, "x", "z")
+
+
 @kernel
 def changed(values, dt):
     """A point replaced and stepped in a kernel."""
@@ -112,6 +130,13 @@ def test_fields_are_replaced_by_name_and_the_others_kept():
         moved_across(Point(1.0, 2.0, 3.0), z=7.0)
     with pytest.raises(ValueError, match="Point has no speed, w"):
         replacing(Point, "w", "x", "speed")
+
+
+def test_the_named_fields_pass_through_an_equation_and_the_others_stay():
+    assert halved_across(Point(1.0, 2.0, 3.0)) == Point(0.5, 2.0, 1.5)
+    assert halved_across(Point(2j, 2.0, 3.0)).x == 1j
+    with pytest.raises(ValueError, match="Point has no w"):
+        passing(Point, halved, "x", "w")
 
 
 def test_a_step_adds_a_rate_to_every_field():

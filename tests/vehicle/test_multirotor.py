@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from flownav.errors import InputError
 from flownav.parameter_files import read_toml
-from flownav.vehicle import multirotor
+from flownav.vehicle import airframe, multirotor
 from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.ground_effect import multiplier
 from flownav.vehicle.kinds import flattened
@@ -199,7 +199,7 @@ def test_in_free_space_angular_momentum_is_kept():
     def momentum(state: MultirotorState):
         turning = state.speed_1 - state.speed_2 + state.speed_3 - state.speed_4
         body = np.array([0.0126 * state.p, 0.0130 * state.q, 0.0240 * state.r - 7e-5 * turning])
-        rotation = np.array(multirotor.attitude(state)).reshape(3, 3)
+        rotation = np.array(airframe.attitude(state)).reshape(3, 3)
         return rotation @ body
 
     before = momentum(state)

@@ -10,7 +10,7 @@ import pytest
 from flownav.control.box import LEAST_GAIN_DB, LEAST_PHASE_DEG, margins_of
 from flownav.control.design import gains_for
 from flownav.errors import InputError
-from flownav.vehicle import helicopter
+from flownav.vehicle import airframe, helicopter
 from flownav.vehicle.around import CALM
 from flownav.vehicle.corners import NOMINAL, corners
 from flownav.vehicle.drive import shaft_power
@@ -102,7 +102,7 @@ def test_the_body_feels_what_turns_the_rotor():
     slow = HOVER.state._replace(speed=0.98 * VEHICLE.main_speed_rad_s)
     rate = helicopter.derivative(slow, HOVER.controls, CALM, VEHICLE)
     held = helicopter.derivative_at_inflow(
-        slow, HOVER.controls, helicopter.air_motion(slow, helicopter.attitude(slow), CALM), helicopter.attitude(slow),
+        slow, HOVER.controls, airframe.air_motion(slow, airframe.attitude(slow), CALM), airframe.attitude(slow),
         helicopter.inflow_of(slow, CALM, VEHICLE), CALM, VEHICLE,
     )  # fmt: skip
     assert rate.speed > 1.0

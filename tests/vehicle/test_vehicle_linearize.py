@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.vehicle import helicopter
+from flownav.vehicle import airframe, helicopter
 from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.complex_step import jacobian, solve
 from flownav.vehicle.linearize import INPUTS, STATES, eigenvalues, reduced_model
@@ -56,7 +56,7 @@ def test_tilting_reaches_the_velocities_through_flapping_only():
 
 def test_position_moves_with_the_rotated_velocity_and_drives_nothing():
     state = HOVER.state
-    rotation = np.reshape(helicopter.attitude(state), (3, 3))
+    rotation = np.reshape(airframe.attitude(state), (3, 3))
     assert FROZEN.a[:3, 3:] == pytest.approx(rotation, abs=1e-12)
     assert np.abs(FROZEN.a[:, :3]).max() < 1e-12
     assert PAPER.a[:3, 3:] == pytest.approx(rotation, abs=5e-3)

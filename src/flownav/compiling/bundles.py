@@ -25,18 +25,19 @@ def write_function(name: str, source: str, scope: dict[str, Any]) -> Callable[..
     return function
 
 
-def lane_access(bundle: type, row: int) -> tuple[Callable[..., Any], Callable[..., Any]]:
+def lane_access(bundle: type, row: int | None) -> tuple[Callable[..., Any], Callable[..., Any]]:
     """`load(work, lanes, lane)` and `store(work, lanes, lane, value)` of a named tuple kept in a lane buffer.
 
     `bundle` is a NamedTuple class of scalars, `row` the constant row of its first field. Field `i` of lane
-    `k` lies at `(row + i) * len(lanes) + k`.
+    `k` lies at `(row + i) * len(lanes) + k`. row None: both take it, `load(work, lanes, row, lane)`.
     """
     fields: tuple[str, ...] = bundle._fields  # type: ignore[attr-defined]
-    loads = ", ".join(f"work[{row + i} * len(lanes) + lane]" for i in range(len(fields)))
-    stores = "\n".join(f"    work[{row + i} * len(lanes) + lane] = value.{name}" for i, name in enumerate(fields))
+    at = [f"work[{f'(row + {i})' if row is None else row + i} * len(lanes) + lane]" for i in range(len(fields))]
+    told = "work, lanes, lane" if row is not None else "work, lanes, row, lane"
+    stores = "\n".join(f"    {place} = value.{name}" for place, name in zip(at, fields, strict=True))
     scope: dict[str, Any] = {"bundle": bundle}
-    load = write_function("load", f"def load(work, lanes, lane):\n    return bundle({loads})\n", scope)
-    store = write_function("store", f"def store(work, lanes, lane, value):\n{stores}\n", scope)
+    load = write_function("load", f"def load({told}):\n    return bundle({', '.join(at)})\n", scope)
+    store = write_function("store", f"def store({told}, value):\n{stores}\n", scope)
     return equation(load), equation(store)
 
 
@@ -48,12 +49,18 @@ def replacing(bundle: type[Bundle], *names: str) -> Callable[..., Bundle]:
 
     `NamedTuple._replace` does not compile. ValueError where the bundle has no such field.
     """
-    fields: tuple[str, ...] = bundle._fields  # type: ignore[attr-defined]
-    if strange := set(names) - set(fields):
-        raise ValueError(f"{bundle.__name__} has no {', '.join(sorted(strange))}")
+    fields = _known(bundle, names)
     values = ", ".join(name if name in names else f"value.{name}" for name in fields)
     source = f"def replaced(value, {', '.join(names)}):\n    return bundle({values})\n"
     return equation(write_function("replaced", source, {"bundle": bundle}))
+
+
+def passing(bundle: type[Bundle], through: Callable[..., float], *names: str) -> Callable[[Bundle], Bundle]:
+    """`passed(value)`: a named tuple with these fields each passed through an equation; the others as they are."""
+    fields = _known(bundle, names)
+    values = ", ".join(f"through(value.{name})" if name in names else f"value.{name}" for name in fields)
+    source = f"def passed(value):\n    return bundle({values})\n"
+    return equation(write_function("passed", source, {"bundle": bundle, "through": through}))
 
 
 def stepping(bundle: type[Bundle]) -> Callable[[Bundle, Bundle, float], Bundle]:
@@ -62,6 +69,14 @@ def stepping(bundle: type[Bundle]) -> Callable[[Bundle, Bundle, float], Bundle]:
     sums = ", ".join(f"state.{name} + rate.{name} * dt" for name in fields)
     source = f"def stepped(state, rate, dt):\n    return bundle({sums})\n"
     return equation(write_function("stepped", source, {"bundle": bundle}))
+
+
+def _known(bundle: type[Bundle], names: tuple[str, ...]) -> tuple[str, ...]:
+    """The fields of a named tuple. ValueError where one of the names is none of them."""
+    fields: tuple[str, ...] = bundle._fields  # type: ignore[attr-defined]
+    if strange := set(names) - set(fields):
+        raise ValueError(f"{bundle.__name__} has no {', '.join(sorted(strange))}")
+    return fields
 
 
 class FlatAccess(NamedTuple):

@@ -121,4 +121,6 @@ def remember(work: Work, lanes: Lanes, lane: int, read: Reading, count: int, lat
     """Keep a reading among the last of its sensor; the one of so many before."""
     kept = layout.FAULT_EARLIER + FIELDS * (count % layout.EARLIER_READINGS)
     store_row(work, lanes, kept, lane, read)
-    return reading_at(work, lanes, layout.FAULT_EARLIER + FIELDS * ((count - late) % layout.EARLIER_READINGS), lane)
+    row = layout.FAULT_EARLIER + FIELDS * ((count - late) % layout.EARLIER_READINGS)
+    earlier: Reading = reading_at(work, lanes, row, lane)
+    return earlier

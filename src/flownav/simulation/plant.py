@@ -23,10 +23,9 @@ from flownav.simulation.layout import (
     store_sum,
     vehicle_as_is,
 )
-from flownav.vehicle.airframe import AirMotion, tail_sideslip
+from flownav.simulation.onboard import Onboard
+from flownav.vehicle.airframe import AirMotion, air_motion, attitude, tail_sideslip
 from flownav.vehicle.helicopter import (
-    air_motion,
-    attitude,
     blade_angles,
     derivative_at_inflow,
     derivative_at_tail,
@@ -54,75 +53,55 @@ class LinearTruth(NamedTuple):
 
 
 @equation
-def runge_kutta_step(work: Work, lanes: Lanes, dt: float) -> None:
+def runge_kutta_step(work: Work, lanes: Lanes, dt: float, onboard: Onboard | None) -> None:
     """One classical fourth-order step of every lane's helicopter; controls and surroundings held over the step.
 
-    The tail rotor's inflow is solved in full at the first stage; the other stages, half a step away, refine it with one
+    Inflow in balance is solved in full at the first stage; the other stages, half a step away, refine it with one
     Halley step each. The state differs by about 1e-9 from solving anew (tests/test_plant.py: `helicopter.step`).
+    onboard None: the paper's helicopter, both inflows in balance at once and the rotor's speed constant.
     """
     for lane in range(len(lanes)):
         state, vehicle = load_helicopter(work, lanes, lane), vehicle_as_is(work, lanes, lane)
         store_sum(work, lanes, lane, state)
         air = moving_air(work, lanes, lane, state)
-        tail_m_s = tail_inflow(air, blade_angles(state, vehicle), speed_ratio(state.speed, vehicle), vehicle)
-        add_turning_stage(work, lanes, lane, state, air, tail_m_s, dt / 6.0, 0.5 * dt, vehicle)
+        induced = solved_inflow(state, air, blade_angles(state, vehicle), vehicle, onboard)
+        add_stage(work, lanes, lane, state, air, induced, dt / 6.0, 0.5 * dt, vehicle, onboard)
     for stage in range(3):
         weight = dt / 3.0 if stage < 2 else dt / 6.0
         reach = 0.5 * dt if stage < 1 else dt
         for lane in range(len(lanes)):
             state, vehicle = load_stage(work, lanes, lane), vehicle_as_is(work, lanes, lane)
             air, guess = moving_air(work, lanes, lane, state), load_inflow(work, lanes, lane)
-            tail_m_s = refined_tail_inflow(guess.tail, state, air, blade_angles(state, vehicle), vehicle)
-            add_turning_stage(work, lanes, lane, state, air, tail_m_s, weight, reach, vehicle)
+            induced = refined_inflow(guess, state, air, blade_angles(state, vehicle), vehicle, onboard)
+            add_stage(work, lanes, lane, state, air, induced, weight, reach, vehicle, onboard)
     for lane in range(len(lanes)):
         store_helicopter(work, lanes, lane, normalised(load_sum(work, lanes, lane)))
 
 
 @equation
-def add_turning_stage(
-    work: Work, lanes: Lanes, lane: int, state: HelicopterState, air: AirMotion, tail_m_s: float, weight: float,
-    reach: float, vehicle: VehicleParameters,
+def add_stage(
+    work: Work, lanes: Lanes, lane: int, state: HelicopterState, air: AirMotion, induced: Inflow, weight: float,
+    reach: float, vehicle: VehicleParameters, onboard: Onboard | None,
 ) -> None:  # fmt: skip
     """A stage's rate into the weighted sum, and the next stage's state `reach` from the step's start."""
-    store_inflow(work, lanes, lane, Inflow(0.0, tail_m_s))
-    controls, around = load_controls(work, lanes, lane), load_around(work, lanes, lane)
-    rate = derivative_at_tail(state, controls, air, attitude(state), tail_m_s, around, vehicle)
-    store_sum(work, lanes, lane, add_scaled(load_sum(work, lanes, lane), rate, weight))
-    store_stage(work, lanes, lane, add_scaled(load_helicopter(work, lanes, lane), rate, reach))
-
-
-@equation
-def balanced_step(work: Work, lanes: Lanes, dt: float) -> None:
-    """The same of the paper's helicopter: inflow in balance at once, rotor speed constant."""
-    for lane in range(len(lanes)):
-        state, vehicle = load_helicopter(work, lanes, lane), vehicle_as_is(work, lanes, lane)
-        store_sum(work, lanes, lane, state)
-        air = moving_air(work, lanes, lane, state)
-        induced = inflow(air, blade_angles(state, vehicle), 1.0, vehicle)
-        add_balanced_stage(work, lanes, lane, state, air, induced, dt / 6.0, 0.5 * dt, vehicle)
-    for stage in range(3):
-        weight = dt / 3.0 if stage < 2 else dt / 6.0
-        reach = 0.5 * dt if stage < 1 else dt
-        for lane in range(len(lanes)):
-            state, vehicle = load_stage(work, lanes, lane), vehicle_as_is(work, lanes, lane)
-            air, guess = moving_air(work, lanes, lane, state), load_inflow(work, lanes, lane)
-            induced = refined_inflow(guess, state, air, blade_angles(state, vehicle), vehicle)
-            add_balanced_stage(work, lanes, lane, state, air, induced, weight, reach, vehicle)
-    for lane in range(len(lanes)):
-        store_helicopter(work, lanes, lane, normalised(load_sum(work, lanes, lane)))
-
-
-@equation
-def add_balanced_stage(
-    work: Work, lanes: Lanes, lane: int, state: HelicopterState, air: AirMotion, induced: Inflow, weight: float,
-    reach: float, vehicle: VehicleParameters,
-) -> None:  # fmt: skip
-    """As `add_turning_stage`, at given induced velocities."""
     store_inflow(work, lanes, lane, induced)
     controls, around = load_controls(work, lanes, lane), load_around(work, lanes, lane)
-    rate = derivative_at_inflow(state, controls, air, attitude(state), induced, around, vehicle)
+    if onboard is None:
+        rate = derivative_at_inflow(state, controls, air, attitude(state), induced, around, vehicle)
+    else:
+        rate = derivative_at_tail(state, controls, air, attitude(state), induced.tail, around, vehicle)
     store_sum(work, lanes, lane, add_scaled(load_sum(work, lanes, lane), rate, weight))
     store_stage(work, lanes, lane, add_scaled(load_helicopter(work, lanes, lane), rate, reach))
+
+
+@equation
+def solved_inflow(
+    state: HelicopterState, air: AirMotion, blades: Controls, vehicle: VehicleParameters, onboard: Onboard | None
+) -> Inflow:
+    """The induced velocities that are in balance; the main rotor's is a state, but of the paper's helicopter."""
+    if onboard is None:
+        return inflow(air, blades, 1.0, vehicle)
+    return Inflow(0.0, tail_inflow(air, blades, speed_ratio(state.speed, vehicle), vehicle))
 
 
 @equation
@@ -133,16 +112,17 @@ def moving_air(work: Work, lanes: Lanes, lane: int, state: HelicopterState) -> A
 
 @equation
 def refined_inflow(
-    guess: Inflow, state: HelicopterState, air: AirMotion, blades: Controls, vehicle: VehicleParameters
-) -> Inflow:
-    """Both rotors' induced velocities, one Halley step on from those of a neighbouring state."""
+    guess: Inflow, state: HelicopterState, air: AirMotion, blades: Controls, vehicle: VehicleParameters,
+    onboard: Onboard | None,
+) -> Inflow:  # fmt: skip
+    """As `solved_inflow`, one Halley step on from those of a neighbouring state."""
+    tail_m_s = refined_tail_inflow(guess.tail, state, air, blades, vehicle)
+    if onboard is not None:
+        return Inflow(0.0, tail_m_s)
     main = main_rotor(vehicle, 1.0)
     inplane_sq = air.u * air.u + air.v * air.v
     free = thrustless_inflow(blades.col, inplane_sq, air.w, main)
-    return Inflow(
-        refine_induced_velocity(guess.main, free, inplane_sq, air.w, main),
-        refined_tail_inflow(guess.tail, state, air, blades, vehicle),
-    )
+    return Inflow(refine_induced_velocity(guess.main, free, inplane_sq, air.w, main), tail_m_s)
 
 
 @equation

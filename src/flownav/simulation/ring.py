@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation
+from flownav.compile import equation, lane_access
 from flownav.estimation.kalman import Lanes, Work
 from flownav.navigation.memory import READING
 from flownav.navigation.records import Reading
@@ -17,6 +17,8 @@ from flownav.simulation import layout
 
 FIELDS = len(Reading._fields)
 FIRST = layout.ROWS
+
+reading_at, store_row = lane_access(Reading, None)
 
 
 def work_rows(slots: int) -> int:
@@ -28,34 +30,6 @@ def work_rows(slots: int) -> int:
 def put_slot(work: Work, lanes: Lanes, slot: int, lane: int, reading: Reading) -> None:
     """One lane's reading into a slot."""
     store_row(work, lanes, FIRST + slot * FIELDS, lane, reading)
-
-
-@equation
-def store_row(work: Work, lanes: Lanes, row: int, lane: int, reading: Reading) -> None:
-    """One lane's reading into rows from `row` on."""
-    work[row * len(lanes) + lane] = reading.value_0
-    work[(row + 1) * len(lanes) + lane] = reading.value_1
-    work[(row + 2) * len(lanes) + lane] = reading.value_2
-    work[(row + 3) * len(lanes) + lane] = reading.value_3
-    work[(row + 4) * len(lanes) + lane] = reading.value_4
-    work[(row + 5) * len(lanes) + lane] = reading.value_5
-    work[(row + 6) * len(lanes) + lane] = reading.variance_0
-    work[(row + 7) * len(lanes) + lane] = reading.variance_1
-    work[(row + 8) * len(lanes) + lane] = reading.variance_2
-    work[(row + 9) * len(lanes) + lane] = reading.quality
-    work[(row + 10) * len(lanes) + lane] = reading.arrived
-    work[(row + 11) * len(lanes) + lane] = reading.withheld
-
-
-@equation
-def reading_at(work: Work, lanes: Lanes, row: int, lane: int) -> Reading:
-    """One lane's reading of the rows from `row` on."""
-    return Reading(
-        work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane], work[(row + 2) * len(lanes) + lane],
-        work[(row + 3) * len(lanes) + lane], work[(row + 4) * len(lanes) + lane], work[(row + 5) * len(lanes) + lane],
-        work[(row + 6) * len(lanes) + lane], work[(row + 7) * len(lanes) + lane], work[(row + 8) * len(lanes) + lane],
-        work[(row + 9) * len(lanes) + lane], work[(row + 10) * len(lanes) + lane], work[(row + 11) * len(lanes) + lane],
-    )  # fmt: skip
 
 
 @equation

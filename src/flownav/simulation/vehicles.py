@@ -8,7 +8,7 @@ from flownav.simulation import layout
 from flownav.simulation.layout import vehicle_as_is
 from flownav.simulation.multirotor_plant import midpoint_step, observe_multirotor
 from flownav.simulation.onboard import Onboard
-from flownav.simulation.plant import balanced_step, observe_balanced, observe_plant, runge_kutta_step
+from flownav.simulation.plant import observe_balanced, observe_plant, runge_kutta_step
 from flownav.vehicle.kinds import AnyState
 
 
@@ -26,10 +26,8 @@ def step_vehicle(work: Work, lanes: Lanes, dt: float, rotors: tuple[int, ...] | 
     """One step of every lane's vehicle; without sensors of its own it is the paper's helicopter."""
     if rotors is not None:
         midpoint_step(work, lanes, dt, rotors)
-    elif onboard is None:
-        balanced_step(work, lanes, dt)
     else:
-        runge_kutta_step(work, lanes, dt)
+        runge_kutta_step(work, lanes, dt, onboard)
 
 
 @equation

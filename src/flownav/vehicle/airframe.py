@@ -11,10 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import equation, magnitude
-from flownav.frames import Vector
+from flownav.frames import Rotation, Vector, rotation_from_quaternion, to_body
+from flownav.vehicle.around import Around
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
+from flownav.vehicle.multirotor_state import MultirotorState
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.rotor import cosine_of_tilt, sine_of_tilt
+from flownav.vehicle.state import HelicopterState
+
+AnyMotion = HelicopterState | MultirotorState  # their first fields are the same
 
 
 class Wrench(NamedTuple):
@@ -37,6 +42,23 @@ class AirMotion(NamedTuple):
     p: float
     q: float
     r: float
+
+
+@equation
+def attitude(state: AnyMotion) -> Rotation:
+    """R_EB of the state."""
+    return rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
+
+
+@equation
+def air_motion(state: AnyMotion, rotation: Rotation, around: Around) -> AirMotion:
+    """Motion through the air; a gradient of the air's velocity is a rotation that is not the vehicle's own."""
+    wind = to_body(rotation, around.wind_n_m_s, around.wind_e_m_s, around.wind_d_m_s)
+    turn = to_body(rotation, around.turn_n_rad_s, around.turn_e_rad_s, around.turn_d_rad_s)
+    return AirMotion(
+        state.u - wind[0], state.v - wind[1], state.w - wind[2],
+        state.p - turn[0], state.q - turn[1], state.r - turn[2],
+    )  # fmt: skip
 
 
 @equation

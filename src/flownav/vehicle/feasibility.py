@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from flownav.errors import InputError
 
 if TYPE_CHECKING:
+    from flownav.vehicle.multirotor_parameters import MultirotorParameters
     from flownav.vehicle.parameters import VehicleParameters
 
 HOVER_MARGIN = 1.05  # the thrust and power limits must leave this much above what hover takes
@@ -18,12 +19,13 @@ HOVER_MARGIN = 1.05  # the thrust and power limits must leave this much above wh
 
 def require_feasible(vehicle: VehicleParameters, where: str) -> None:
     """InputError, naming file, keys and numbers, where the vehicle contradicts itself or cannot hover."""
-    _require_rigid_body(vehicle, where)
+    require_rigid_body(vehicle, where)
     _require_geometry(vehicle, where)
     _require_hover(vehicle, where)
 
 
-def _require_rigid_body(vehicle: VehicleParameters, where: str) -> None:
+def require_rigid_body(vehicle: VehicleParameters | MultirotorParameters, where: str) -> None:
+    """InputError where no body has such moments of inertia: the largest is more than the other two together."""
     moments = sorted((vehicle.inertia_xx_kg_m2, vehicle.inertia_yy_kg_m2, vehicle.inertia_zz_kg_m2))
     if moments[2] > moments[0] + moments[1]:
         raise InputError(

@@ -7,11 +7,13 @@ it flies; in `derivative_in_balance`, the paper's, the rotor keeps its speed and
 from __future__ import annotations
 
 from flownav.compile import equation
-from flownav.frames import Rotation, Vector, quaternion_rate, rotation_from_quaternion, to_body, to_earth
+from flownav.frames import Rotation, Vector, quaternion_rate, to_earth
 from flownav.vehicle.actuators import acceleration, blade_angle, collective_servo, cyclic_servo, pedal_servo
 from flownav.vehicle.airframe import (
     AirMotion,
     Wrench,
+    air_motion,
+    attitude,
     flight_wrench,
     fuselage_drag,
     main_rotor_wrench,
@@ -65,23 +67,6 @@ def blade_angles(state: HelicopterState, vehicle: VehicleParameters) -> Controls
         blade_angle(state.col, collective_servo(vehicle)),
         blade_angle(state.ped, pedal_servo(vehicle)),
     )
-
-
-@equation
-def attitude(state: HelicopterState) -> Rotation:
-    """R_EB of the state."""
-    return rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
-
-
-@equation
-def air_motion(state: HelicopterState, rotation: Rotation, around: Around) -> AirMotion:
-    """Motion through the air; a gradient of the air's velocity is a rotation that is not the vehicle's own."""
-    wind = to_body(rotation, around.wind_n_m_s, around.wind_e_m_s, around.wind_d_m_s)
-    turn = to_body(rotation, around.turn_n_rad_s, around.turn_e_rad_s, around.turn_d_rad_s)
-    return AirMotion(
-        state.u - wind[0], state.v - wind[1], state.w - wind[2],
-        state.p - turn[0], state.q - turn[1], state.r - turn[2],
-    )  # fmt: skip
 
 
 @equation

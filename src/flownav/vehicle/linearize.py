@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.vehicle import helicopter
+from flownav.vehicle import airframe, helicopter
 from flownav.vehicle.around import CALM
 from flownav.vehicle.complex_step import jacobian
 from flownav.vehicle.parameters import VehicleParameters
@@ -46,8 +46,8 @@ def reduced_model(vehicle: VehicleParameters, about: Trim, *, freeze_inflow: boo
 
     def rates(point: Sequence[Any]) -> Sequence[Any]:
         state, controls = _displaced(about, point)
-        rotation = helicopter.attitude(state)
-        air = helicopter.air_motion(state, rotation, CALM)
+        rotation = airframe.attitude(state)
+        air = airframe.air_motion(state, rotation, CALM)
         blades = helicopter.blade_angles(state, vehicle)
         induced = helicopter.inflow(air, blades, 1.0, vehicle) if held is None else held
         rate = helicopter.derivative_at_inflow(state, controls, air, rotation, induced, CALM, vehicle)
@@ -69,7 +69,7 @@ def _displaced(about: Trim, point: Sequence[Any]) -> tuple[HelicopterState, Cont
 
 
 def _inflow_at(state: HelicopterState, vehicle: VehicleParameters) -> Inflow:
-    air = helicopter.air_motion(state, helicopter.attitude(state), CALM)
+    air = airframe.air_motion(state, airframe.attitude(state), CALM)
     return helicopter.inflow(air, helicopter.blade_angles(state, vehicle), 1.0, vehicle)
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flownav.compile import equation
-from flownav.frames import Rotation, Vector, quaternion_rate, rotation_from_quaternion, to_body, to_earth
-from flownav.vehicle.airframe import AirMotion, Wrench, fuselage_drag
+from flownav.frames import Vector, quaternion_rate, to_earth
+from flownav.vehicle.airframe import AirMotion, Wrench, air_motion, attitude, fuselage_drag
 from flownav.vehicle.around import Around, below_plane, plane_normal
 from flownav.vehicle.motors import battery_voltage, mixed, roots_of_shares, shaft_power, speed_rate, told_speed
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
@@ -33,23 +33,6 @@ class RotorLoads(NamedTuple):
 
 
 NO_LOADS = RotorLoads(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-@equation
-def attitude(state: MultirotorState) -> Rotation:
-    """R_EB of the state."""
-    return rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
-
-
-@equation
-def air_motion(state: MultirotorState, rotation: Rotation, around: Around) -> AirMotion:
-    """Motion through the air; a gradient of the air's velocity is a rotation that is not the vehicle's own."""
-    wind = to_body(rotation, around.wind_n_m_s, around.wind_e_m_s, around.wind_d_m_s)
-    turn = to_body(rotation, around.turn_n_rad_s, around.turn_e_rad_s, around.turn_d_rad_s)
-    return AirMotion(
-        state.u - wind[0], state.v - wind[1], state.w - wind[2],
-        state.p - turn[0], state.q - turn[1], state.r - turn[2],
-    )  # fmt: skip
 
 
 @equation

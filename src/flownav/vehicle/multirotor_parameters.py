@@ -6,7 +6,9 @@ import math
 from typing import NamedTuple
 
 from flownav.errors import InputError
+from flownav.vehicle.feasibility import require_rigid_body
 from flownav.vehicle.multirotor_schema import MultirotorFile
+from flownav.vehicle.parameters import of_either_kind
 
 HOVER_MARGIN = 1.2  # the rotors must be able to lift this much of the weight
 
@@ -83,8 +85,8 @@ def rotor_angles(count: int) -> list[float]:
 
 def flatten_multirotor(file: MultirotorFile) -> MultirotorParameters:
     """The checked file as the flat bundle."""
-    air, body, frame, blade = file.environment, file.body, file.frame, file.propeller
-    count, rho, radius = int(frame.rotor_count), air.air_density_kg_m3, blade.radius_m
+    frame, blade, rho = file.frame, file.propeller, file.environment.air_density_kg_m3
+    count, radius = int(frame.rotor_count), blade.radius_m
     angles = rotor_angles(count)
     places = [(frame.arm_m * math.cos(angle), frame.arm_m * math.sin(angle)) for angle in angles]
     places += [(0.0, 0.0)] * (6 - count)
@@ -95,12 +97,7 @@ def flatten_multirotor(file: MultirotorFile) -> MultirotorParameters:
     slope = rho * blade.lift_slope_per_rad * blade.blade_count * blade.chord_m * radius**2 / 4.0
     pitch = 1.5 * (thrust / slope + inflow) / radius  # the blades' effective pitch
     return MultirotorParameters(
-        gravity_m_s2=air.gravity_m_s2,
-        air_density_kg_m3=rho,
-        mass_kg=body.mass_kg,
-        inertia_xx_kg_m2=body.inertia_xx_kg_m2,
-        inertia_yy_kg_m2=body.inertia_yy_kg_m2,
-        inertia_zz_kg_m2=body.inertia_zz_kg_m2,
+        **of_either_kind(file),
         **{f"{axis}_{i + 1}_m": place[k] for i, place in enumerate(places) for k, axis in enumerate("xy")},
         rotor_count=float(count),
         per_arm_1_m=1.0 / frame.arm_m,
@@ -123,15 +120,6 @@ def flatten_multirotor(file: MultirotorFile) -> MultirotorParameters:
         full_v=file.battery.full_v,
         volt_per_as=(file.battery.full_v - file.battery.empty_v) / (3600.0 * file.battery.capacity_ah),
         resistance_ohm=file.battery.resistance_ohm,
-        fuselage_area_x_m2=file.fuselage.area_x_m2,
-        fuselage_area_y_m2=file.fuselage.area_y_m2,
-        fuselage_area_z_m2=file.fuselage.area_z_m2,
-        cg_above_skid_m=file.skids.cg_above_skid_m,
-        skid_half_length_m=file.skids.half_length_m,
-        skid_half_track_m=file.skids.half_track_m,
-        skid_stiffness_n_m=file.skids.stiffness_n_m,
-        skid_damping_n_s_m=file.skids.damping_n_s_m,
-        skid_friction_coefficient=file.skids.friction_coefficient,
     )
 
 
@@ -153,12 +141,7 @@ def hover_speed(vehicle: MultirotorParameters) -> float:
 
 def require_multirotor(vehicle: MultirotorParameters, where: str) -> None:
     """InputError, naming file, keys and numbers, where the multirotor contradicts itself or cannot hover."""
-    moments = sorted((vehicle.inertia_xx_kg_m2, vehicle.inertia_yy_kg_m2, vehicle.inertia_zz_kg_m2))
-    if moments[2] > moments[0] + moments[1]:
-        raise InputError(
-            f"{where}: body: no rigid body has these inertias, {moments[2]:g} kg m2 is more than "
-            f"{moments[0]:g} + {moments[1]:g}; correct inertia_xx, inertia_yy or inertia_zz"
-        )
+    require_rigid_body(vehicle, where)
     apart = 2.0 / vehicle.per_arm_1_m * math.sin(math.pi / vehicle.rotor_count)
     if apart < 2.0 * vehicle.radius_m:
         raise InputError(

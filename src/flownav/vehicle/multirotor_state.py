@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from flownav.compile import equation, stepping
-from flownav.vehicle.state import settled
+from flownav.compile import equation, passing, replacing, stepping
+from flownav.vehicle.state import settled, unit_attitude
 
 
 class MultirotorState(NamedTuple):
@@ -66,29 +64,12 @@ def total_of(x: Six) -> float:
 moved = stepping(MultirotorState)  # state + rate·dt
 
 
+_settle = passing(MultirotorState, settled, "u", "v", "w", "p", "q", "r")
+_turned = replacing(MultirotorState, "qw", "qx", "qy", "qz")
+
+
 @equation
 def of_unit_attitude(state: MultirotorState) -> MultirotorState:
     """The state with its quaternion brought back to unit length and its dying motions brought to rest."""
-    scale = 1.0 / np.sqrt(state.qw * state.qw + state.qx * state.qx + state.qy * state.qy + state.qz * state.qz)
-    return MultirotorState(
-        state.pos_n,
-        state.pos_e,
-        state.pos_d,
-        settled(state.u),
-        settled(state.v),
-        settled(state.w),
-        state.qw * scale,
-        state.qx * scale,
-        state.qy * scale,
-        state.qz * scale,
-        settled(state.p),
-        settled(state.q),
-        settled(state.r),
-        state.speed_1,
-        state.speed_2,
-        state.speed_3,
-        state.speed_4,
-        state.speed_5,
-        state.speed_6,
-        state.used,
-    )
+    w, x, y, z = unit_attitude(state)
+    return _turned(_settle(state), qw=w, qx=x, qy=y, qz=z)

@@ -114,10 +114,21 @@ def touchdown_limits(file: VehicleFile | MultirotorFile) -> TouchdownLimits:
     return TouchdownLimits(**file.touchdown.model_dump())
 
 
+def of_either_kind(file: VehicleFile | MultirotorFile) -> dict[str, float]:
+    """The fields that the bundles of both kinds of vehicle have: air, body, fuselage, skids."""
+    skids = file.skids.model_dump()
+    return {
+        **file.environment.model_dump(),
+        **file.body.model_dump(),
+        **{f"fuselage_{name}": area for name, area in file.fuselage.model_dump().items()},
+        "cg_above_skid_m": skids.pop("cg_above_skid_m"),
+        **{f"skid_{name}": value for name, value in skids.items()},
+    }
+
+
 def flatten(file: VehicleFile) -> VehicleParameters:
     """The checked file as the flat bundle, angles in radians, rotor constants derived."""
-    air, body, main, tail = file.environment, file.body, file.main_rotor, file.tail_rotor
-    rho = air.air_density_kg_m3
+    main, tail, rho = file.main_rotor, file.tail_rotor, file.environment.air_density_kg_m3
     main_area = main.blade_count * main.chord_m * main.radius_m
     tail_area = tail.blade_count * tail.chord_m * tail.radius_m
     main_tip = main.speed_rad_s * main.radius_m
@@ -128,12 +139,7 @@ def flatten(file: VehicleFile) -> VehicleParameters:
     lock_number = rho * main.lift_slope_per_rad * main.chord_m * main.radius_m**4 / main.blade_flap_inertia_kg_m2
     inertia = file.drive.rotor_inertia_kg_m2 or ROTOR_INERTIA * main.blade_count * main.blade_flap_inertia_kg_m2
     return VehicleParameters(
-        gravity_m_s2=air.gravity_m_s2,
-        air_density_kg_m3=rho,
-        mass_kg=body.mass_kg,
-        inertia_xx_kg_m2=body.inertia_xx_kg_m2,
-        inertia_yy_kg_m2=body.inertia_yy_kg_m2,
-        inertia_zz_kg_m2=body.inertia_zz_kg_m2,
+        **of_either_kind(file),
         main_radius_m=main.radius_m,
         main_speed_rad_s=main.speed_rad_s,
         main_tip_speed_m_s=main_tip,
@@ -160,9 +166,6 @@ def flatten(file: VehicleFile) -> VehicleParameters:
         tail_fin_blockage=tail.fin_blockage,
         tail_behind_cg_m=tail.behind_cg_m,
         tail_above_cg_m=tail.above_cg_m,
-        fuselage_area_x_m2=file.fuselage.area_x_m2,
-        fuselage_area_y_m2=file.fuselage.area_y_m2,
-        fuselage_area_z_m2=file.fuselage.area_z_m2,
         vertical_fin_area_m2=file.vertical_fin.area_m2,
         vertical_fin_lift_slope_per_rad=file.vertical_fin.lift_slope_per_rad,
         vertical_fin_inflow_fraction=file.vertical_fin.tail_inflow_fraction,
@@ -170,12 +173,6 @@ def flatten(file: VehicleFile) -> VehicleParameters:
         horizontal_fin_lift_slope_per_rad=file.horizontal_fin.lift_slope_per_rad,
         horizontal_fin_behind_cg_m=file.horizontal_fin.behind_cg_m,
         horizontal_fin_inflow_fraction=file.horizontal_fin.main_inflow_fraction,
-        cg_above_skid_m=file.skids.cg_above_skid_m,
-        skid_half_length_m=file.skids.half_length_m,
-        skid_half_track_m=file.skids.half_track_m,
-        skid_stiffness_n_m=file.skids.stiffness_n_m,
-        skid_damping_n_s_m=file.skids.damping_n_s_m,
-        skid_friction_coefficient=file.skids.friction_coefficient,
         **_actuator("cyclic", file.cyclic),
         **_actuator("collective", file.collective),
         **_actuator("pedal", file.pedal),

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.frames import rotation_from_quaternion, to_earth
-from flownav.vehicle import helicopter, multirotor
+from flownav.vehicle import airframe, helicopter, multirotor
 from flownav.vehicle.around import CALM
 from flownav.vehicle.complex_step import jacobian
 from flownav.vehicle.kinds import AnyState, AnyTrim, AnyVehicle
@@ -123,8 +123,8 @@ def _rates(vehicle: AnyVehicle, about: AnyTrim, *, freeze_inflow: bool) -> Calla
         around = CALM._replace(wind_n_m_s=n, wind_e_m_s=e)
         if not freeze_inflow:
             return helicopter.derivative_in_balance(state, controls, around, stiff)
-        rotation = helicopter.attitude(state)
-        moving = helicopter.air_motion(state, rotation, around)
+        rotation = airframe.attitude(state)
+        moving = airframe.air_motion(state, rotation, around)
         return helicopter.derivative_at_inflow(state, controls, moving, rotation, held, around, stiff)
 
     return of_helicopter

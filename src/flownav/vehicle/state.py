@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, magnitude, stepping
+from flownav.compile import equation, magnitude, passing, replacing, stepping
+from flownav.frames import Quaternion
 
 
 class HelicopterState(NamedTuple):
@@ -94,34 +95,19 @@ def settled(value: float) -> float:
 
 
 @equation
+def unit_attitude(state: Any) -> Quaternion:
+    """The quaternion of a state, of either kind of vehicle, brought back to unit length."""
+    scale = 1.0 / np.sqrt(state.qw * state.qw + state.qx * state.qx + state.qy * state.qy + state.qz * state.qz)
+    return state.qw * scale, state.qx * scale, state.qy * scale, state.qz * scale
+
+
+_STILL = {"pos_n", "pos_e", "pos_d", "qw", "qx", "qy", "qz", "speed"}  # what does not decay
+_settle = passing(HelicopterState, settled, *(name for name in HelicopterState._fields if name not in _STILL))
+_turned = replacing(HelicopterState, "qw", "qx", "qy", "qz")
+
+
+@equation
 def normalised(state: HelicopterState) -> HelicopterState:
     """The state with its quaternion brought back to unit length and its dying motions brought to rest."""
-    scale = 1.0 / np.sqrt(state.qw * state.qw + state.qx * state.qx + state.qy * state.qy + state.qz * state.qz)
-    return HelicopterState(
-        state.pos_n,
-        state.pos_e,
-        state.pos_d,
-        settled(state.u),
-        settled(state.v),
-        settled(state.w),
-        state.qw * scale,
-        state.qx * scale,
-        state.qy * scale,
-        state.qz * scale,
-        settled(state.p),
-        settled(state.q),
-        settled(state.r),
-        settled(state.a1),
-        settled(state.b1),
-        settled(state.lon),
-        settled(state.lat),
-        settled(state.col),
-        settled(state.ped),
-        settled(state.lon_rate),
-        settled(state.lat_rate),
-        settled(state.col_rate),
-        settled(state.ped_rate),
-        settled(state.inflow),
-        state.speed,
-        settled(state.governed),
-    )
+    w, x, y, z = unit_attitude(state)
+    return _turned(_settle(state), qw=w, qx=x, qy=y, qz=z)

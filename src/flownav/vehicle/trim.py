@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flownav.errors import InputError
 from flownav.frames import Vector, quaternion_from_euler
-from flownav.vehicle import helicopter
+from flownav.vehicle import airframe, helicopter
 from flownav.vehicle.around import CALM
 from flownav.vehicle.complex_step import solve, value
 from flownav.vehicle.feasibility import hover_induced_velocity, hover_pitch
@@ -65,7 +65,7 @@ def settled_state(
 
 def with_rotor(state: HelicopterState, vehicle: VehicleParameters) -> HelicopterState:
     """The state whose main rotor's inflow is in balance, and whose governor gives what both rotors take; still air."""
-    air = helicopter.air_motion(state, helicopter.attitude(state), CALM)
+    air = airframe.air_motion(state, airframe.attitude(state), CALM)
     blades = helicopter.blade_angles(state, vehicle)
     induced = helicopter.inflow(air, blades, 1.0, vehicle)
     loads = helicopter.rotor_loads(state, air, blades, induced, vehicle)

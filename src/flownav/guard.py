@@ -94,6 +94,20 @@ def an_input(path: Path) -> Path:
     return path
 
 
+def a_record_place(path: Path, inputs: Iterable[Path] = (), *, force: bool) -> Path:
+    """The path of a record that is numbered where one is there, or that replaces it (force).
+
+    InputError as of `an_output`, but that what is there may be a live record; with force it must be a record.
+    """
+    info = _status(path, _unfollowed)
+    if info is not None:
+        _check_kind(path, info)
+    _check_no_input(path, info, inputs)
+    if force and info is not None and info.st_size and not _is_record(path):
+        raise InputError(f"{path}: is there already and is no record, so it is not replaced; give another name")
+    return path
+
+
 def an_output(path: Path, inputs: Iterable[Path] = (), *, signed_by: Path | None = None) -> Path:
     """The path of a file to be written, which may be there already if flownav wrote it.
 
@@ -192,13 +206,24 @@ def _is_ours(path: Path) -> bool:
     return MARK in head or head.startswith(BEGINNINGS)
 
 
+def _is_record(path: Path) -> bool:
+    """Whether a file is a record, of whatever kind."""
+    return _manifest_of(path) is not None
+
+
 def _is_record_of_a_run(path: Path) -> bool:
     """A record that the same command makes again: not that of a live session, which no command can."""
+    manifest = _manifest_of(path)
+    return manifest is not None and LIVE not in manifest
+
+
+def _manifest_of(path: Path) -> bytes | None:
+    """The beginning of a record's manifest; None where a file is no record."""
     try:
         with zipfile.ZipFile(path) as bundle, bundle.open("manifest.json") as manifest:
-            return LIVE not in manifest.read(LOOKED_AT_BYTES)
-    except (zipfile.BadZipFile, zlib.error, KeyError, ValueError, NotImplementedError, RuntimeError, EOFError):
-        return False
+            return manifest.read(LOOKED_AT_BYTES)
+    except (OSError, zipfile.BadZipFile, zlib.error, KeyError, ValueError, NotImplementedError, RuntimeError, EOFError):
+        return None
 
 
 def _special(info: os.stat_result) -> str:

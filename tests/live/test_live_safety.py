@@ -14,6 +14,7 @@ import pytest
 from rich.console import Console
 
 from flownav.errors import InputError
+from flownav.estimation.states import POSITION, STATE
 from flownav.live.answers import ODOMETRY_COMPONENT
 from flownav.live.display import draw
 from flownav.live.estimating import why_withheld
@@ -23,12 +24,15 @@ from flownav.live.options import Limits, Options
 from flownav.live.reception import BESIDE, Accepted, accepted_by, accepted_of
 from flownav.live.recorder import NoRecorder
 from flownav.live.screen import Screen
+from flownav.live.serving import Refused
 from flownav.live.session import Session
+from flownav.mavlink import sensors_outgoing as say
 from flownav.mavlink.dialect import coder
 from flownav.mavlink.position_messages import LOCAL_FRD
 from flownav.mavlink.signing import SignatureCheck
+from flownav.measurement import Sensor
 from flownav.navigation.memory import PROTECTION
-from live_ends import HEIGHT_M, START_S, UNIX_S, Hover, Wire
+from live_ends import HEIGHT_M, ORIGIN, START_S, UNIX_S, Hover, Wire, reading
 
 KEY = bytes(range(32))
 
@@ -507,3 +511,88 @@ def test_a_recorded_link_played_into_a_fresh_session_is_not_heard_beyond_the_pro
         session.take(frame, START_S + 1e-3 * number, whole=True)
     assert (session.reception.vehicle is not None) is heard
     assert bool(session.readings) is heard
+
+
+# -- what a reviewer broke ---------------------------------------------------------------------------------
+@pytest.mark.parametrize("ahead_s", [0.5, 1.5, 5.0])
+def test_one_stamp_of_the_future_moves_nothing(wires, ahead_s):
+    wire = wires().fly(6.0)
+    before = wire.t_s
+    stamp_ms = round((wire.vehicle.boot_s + wire.t_s + ahead_s) * 1e3)
+    seen = say.distance_sensor(wire.vehicle.mav, stamp_ms, reading(Sensor.RANGE, HEIGHT_M), (0.1, 40.0))
+    wire.send(bytes(seen.pack(wire.vehicle.mav)))
+    wire.fly(3.0)
+    stamps = [message.time_usec * 1e-6 - wire.vehicle.boot_s for message in wire.estimates(before)]
+    assert wire.session.dropped["clock: ahead"] == 1
+    assert "clock: clock_jump" not in wire.session.dropped
+    assert max(stamps) < wire.t_s + 0.03
+    assert len(stamps) > 140
+    assert_all_good(wire)
+
+
+def test_a_first_fix_in_flight_is_where_the_vehicle_is_by_then(wires):
+    """It took off on flow alone and has moved: the origin lies behind the fix, and nothing jumps."""
+    wire = wires(Hover(gps=False)).fly(8.0)
+    on = wire.session.filtering.running
+    on.work[STATE + POSITION] += 25.0  # what it has flown
+    wire.vehicle.gps = True
+    wire.fly(8.0)
+    assert wire.session.reason == ""
+    assert wire.estimates()[-1].x == pytest.approx(25.0, abs=3.0)
+    origin, metres = wire.session.origin_deg_m, 111_200.0
+    assert (ORIGIN[0] - origin[0]) * metres == pytest.approx(25.0, abs=3.0)
+
+
+class LateImu(Hover):
+    """Its IMU comes at 2 Hz until a time."""
+
+    def frames(self, t_s):
+        self.imu = t_s > self.from_s or self.steps % 50 == 0
+        return super().frames(t_s)
+
+
+def test_an_imu_that_comes_late_serves(wires):
+    vehicle = LateImu()
+    vehicle.from_s = 6.0
+    wire = wires(vehicle).fly(5.0)
+    assert wire.session.filtering.lacks_imu
+    wire.fly(10.0)
+    assert not wire.session.filtering.lacks_imu
+    assert wire.session.reason == ""
+    assert wire.estimates(wire.t_s - 1.0)
+
+
+class Standing(Hover):
+    """On the ground, indoors: landed, and a flow sensor that sees nothing."""
+
+    def frames(self, t_s):
+        step = self.steps
+        frames = [f for f in super().frames(t_s) if f[7] | f[8] << 8 != 106]
+        if step % 2 == 0:
+            blind = reading(Sensor.FLOW_RATE, 0.0, 0.0, 0.0, 0.0)._replace(quality=0.0)
+            time_us = round((self.boot_s + t_s) * 1e6)
+            frames.append(bytes(say.optical_flow_rad(self.mav, time_us, blind, 0.02).pack(self.mav)))
+        if step % 20 == 0:
+            frames.append(bytes(self.mav.extended_sys_state_encode(0, 1).pack(self.mav)))
+        return frames
+
+
+def test_a_vehicle_that_stands_indoors_is_told_where_it_is(wires):
+    """ArduPilot does not arm before an estimate comes."""
+    wire = wires(Standing(gps=False)).fly(12.0)
+    assert wire.session.reason == ""
+    assert_all_good(wire, at_least=100)
+
+
+def test_alarms_that_ended_are_kept(wires):
+    from flownav.cli.live import _facts
+
+    wire = wires(limits=Limits(unfused_s=2.0)).fly(6.0)
+    spell = Refused(1.0, 4.0, 20, "late")
+    wire.session.hearing.serving._spells[Sensor.POSE] = spell._replace(until_s=wire.session.hearing.newest_s)
+    wire.fly(0.1)
+    assert Sensor.POSE in wire.session.alarms
+    wire.fly(4.0)
+    assert not wire.session.alarms
+    kept = _facts(wire.session, Latency(), 1.0)["alarms"]["pose"]
+    assert (kept["reason"], kept["now"]) == ("late", False)

@@ -7,7 +7,15 @@ import pytest
 
 from flownav.measurement import Sensor
 from flownav.navigation.records import ImuMemory, Reading, SpikeMemory
-from flownav.navigation.spikes import BURST_S, MOST_DOUBT_M_S, doubt_of, judge_spike
+from flownav.navigation.spikes import (
+    BURST_S,
+    LONE,
+    MOST_DOUBT_M_S,
+    MOST_DOUBT_RAD,
+    doubt_of,
+    judge_spike,
+    turning_doubt_of,
+)
 from flownav.navigation.tape import IMU_SPIKE
 from flownav.navigation.witnessed import Witness
 from navigation_streams import fly, navigate, still
@@ -82,18 +90,29 @@ def test_nothing_but_zeros_is_a_failed_imu_however_long():
     assert not judge_spike(reading((0.0, 0.0, 0.0), (0.0, 0.0, -1e-3)), STEP_S, KEPT, CALM)[0]  # free fall
 
 
-def test_a_burst_leaves_a_doubt_of_what_it_would_have_done_and_a_lone_spike_none():
-    said = reading(accel=(40.0, 0.0, -9.8))
-    memory, variance = CALM, 0.0
+def test_a_burst_leaves_a_doubt_of_what_it_would_have_done_and_a_lone_spike_some_of_it():
+    said = reading((5.0, 0.0, 0.0), (40.0, 0.0, -9.8))
+    memory, velocity, attitude = CALM, [], []
     for k in range(10):
         step_s = 0.01 * (k + 1)
         _, memory = judge_spike(said, step_s, KEPT, memory)
-        variance += doubt_of(said, step_s, KEPT, memory)
-        if k == 0:
-            assert variance == 0.0
-        if k == 1:
-            assert variance == pytest.approx((40.0 * 0.02) ** 2 - (40.0 * 0.01) ** 2)
-    assert variance == pytest.approx(MOST_DOUBT_M_S**2 - (40.0 * 0.01) ** 2)
+        velocity.append(doubt_of(said, step_s, KEPT, memory))
+        attitude.append(turning_doubt_of(said, step_s, KEPT, memory))
+    assert velocity[0] == pytest.approx((LONE * 40.0 * 0.01) ** 2)
+    assert sum(velocity[:2]) == pytest.approx((40.0 * 0.02) ** 2)
+    assert sum(velocity) == pytest.approx(MOST_DOUBT_M_S**2)
+    assert sum(attitude[:2]) == pytest.approx((5.0 * 0.02) ** 2)
+    assert sum(attitude) == pytest.approx(MOST_DOUBT_RAD**2)
+    assert min(*velocity, *attitude) >= 0.0
+
+
+@pytest.mark.parametrize(("period_s", "turning_rad_s2"), [(0.02, 200.0), (0.01, 250.0), (0.004, 400.0)])
+def test_a_hard_turn_is_followed(period_s, turning_rad_s2):
+    """A flick of a small aerobatic vehicle: up to 5 rad/s, a quarter of a second, down again."""
+    t_s = np.arange(0.0, 0.6, period_s)
+    rate = np.clip(np.minimum(t_s - 0.1, 0.4 - t_s) * turning_rad_s2, 0.0, 5.0)
+    imu = np.column_stack([t_s, rate, np.zeros((len(t_s), 4)), np.full(len(t_s), -9.8)])
+    assert Witness().keeps(imu).all()
 
 
 def test_the_witness_keeps_what_the_filter_keeps():

@@ -39,7 +39,7 @@ def command(
     settings: Annotated[Path | None, typer.Option(help="TOML of filter settings (docs/landing-filter.md).")] = None,
     send_limit: Annotated[
         float, typer.Option(metavar="S", help="Send no longer than this without a horizontal aid (dead reckoning).")
-    ] = 1.2,
+    ] = 1.5,
     send_sigma: Annotated[
         float, typer.Option(metavar="M", help="Send while one standard deviation of the position is below this.")
     ] = 5.0,
@@ -73,13 +73,13 @@ def command(
     """Navigate a vehicle that is connected by MAVLink: fuse its sensors, send the estimate, show and record it."""
     from dataclasses import replace
 
-    from flownav.cli.output import require_between, require_writable
+    from flownav.cli.output import require_between, require_recordable
     from flownav.errors import InputError, VerdictError
     from flownav.live.display import on_terminal
     from flownav.live.link import open_link, parse_url
     from flownav.live.loop import Latency, run_session, stoppable
     from flownav.live.options import SENDINGS, Limits
-    from flownav.live.priority import run_before_others
+    from flownav.live.priority import run_as_others, run_before_others
     from flownav.live.reception import accepted_by
     from flownav.live.recorder import NoRecorder, Recorder, told_every_second
     from flownav.live.screen import Screen
@@ -112,7 +112,7 @@ def command(
     if write or source_set is not None:
         raise InputError("--write and --source-set go with --setup only")
     if record is not None:
-        require_writable(record, sensor, signing_key, settings)
+        require_recordable(record, sensor, signing_key, settings, force=force)
     limits = Limits(dead_reckoning_s=send_limit, sigma_m=send_sigma, protection_m=send_protection, unfused_s=unfused)
     options = replace(
         _options(send, system, component, signing_key, gps_delay, sensor, settings),
@@ -142,6 +142,7 @@ def command(
             with on_terminal(Screen(session, latency, url, recorder, scheduling, link).view, shown=shown) as display:
                 shows = [display.show, *([told_every_second(recorder, facts_now)] if recorder is not None else [])]
                 run_session(session, link, latency, lambda: asked() or time.monotonic() >= end_s, shows)
+            run_as_others()
             facts = facts_now()
             heard = session.reception.vehicle is not None
             finished = recorder.finish(facts, heard=heard) if recorder is not None else None
@@ -234,8 +235,12 @@ def _facts(session: Session, latency: Latency, duration_s: float) -> dict[str, A
         "dropped": session.dropped,
         "resets": session.resets,
         "alarms": {
-            sensor.name.lower(): {"unfused_s": spell.until_s - spell.since_s, "reason": spell.why}
-            for sensor, spell in sorted(session.alarms.items())
+            sensor.name.lower(): {
+                "unfused_s": spell.until_s - spell.since_s,
+                "reason": spell.why,
+                "now": sensor in session.alarms,
+            }
+            for sensor, spell in sorted(session.past_alarms.items())
         },
         "horizon_s": session.hearing.horizon_s,
         "lags_s": {sensor.name.lower(): lag_s for sensor, lag_s in sorted(session.hearing.lags.by_sensor.items())},

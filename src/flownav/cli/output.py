@@ -50,6 +50,14 @@ def require_writable(path: Path, *inputs: str | Path | None) -> None:
     _require_place(path)
 
 
+def require_recordable(path: Path, *inputs: str | Path | None, force: bool) -> None:
+    """The same of a record that is numbered where one is there, or replaces it."""
+    from flownav.guard import a_record_place, an_input
+
+    a_record_place(path, [an_input(Path(each)) for each in inputs if each is not None], force=force)
+    _require_place(path)
+
+
 def require_writable_folder(path: Path, *inputs: str | Path | None) -> None:
     """The same of a folder: a new one, or an empty one."""
     from flownav.guard import an_input, an_output_folder

@@ -21,7 +21,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Make the record of a live session that was killed, or could not write it; the journal stays."""
-    from flownav.cli.output import require_writable
+    from flownav.cli.output import require_recordable
     from flownav.errors import InputError, VerdictError
     from flownav.live.journal_place import free_name, is_locked, journal_of
     from flownav.live.recovery import recovered
@@ -32,7 +32,7 @@ def command(
     if is_locked(journal):
         raise InputError(f"{journal}: its session still records; end that, and it writes the record itself")
     asked = out or (journal.with_suffix("") if journal.suffix == SUFFIX else journal.with_suffix(".fnr"))
-    require_writable(asked)
+    require_recordable(asked, journal, force=force)
     path = asked if force else free_name(asked)
     found = recovered(journal)
     try:

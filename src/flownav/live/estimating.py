@@ -47,10 +47,9 @@ def why_withheld(on: Running | None, t_s: float, newest_s: float, limits: Limits
     imu_stale = told.equipment.use_imu and not on.clock_s - imu.read_s <= told.imu.imu_stale_s
     if imu_stale or not t_s - newest_s <= limits.age_s or not t_s - on.clock_s <= LONGEST_AHEAD_S:
         return "stale"
-    aid_age_s = on.clock_s - aid.aided_s
-    if aid.flag >= INVALID or aid_age_s > told.aid.invalid_s:
+    if aid.flag >= INVALID or on.clock_s - aid.aided_s > told.aid.invalid_s:
         return "position_invalid"
-    if aid_age_s > limits.dead_reckoning_s:
+    if t_s - aid.aided_s > limits.dead_reckoning_s:
         return "dead_reckoning"
     if on.work[SUSPECTED] > 0.0:
         return "fault_suspected"
@@ -85,11 +84,11 @@ def estimate_of(
         pose,
         velocity,
         resets,
-        quality_of(on, pose, velocity, limits),
+        quality_of(on, pose, velocity, t_s, limits),
     )
 
 
-def quality_of(on: Running, pose: Array, velocity: Array, limits: Limits) -> int:
+def quality_of(on: Running, pose: Array, velocity: Array, t_s: float, limits: Limits) -> int:
     """1 to 100 percent: what is left to the nearest limit of position, velocity, protection and time without aid.
 
     ArduPilot takes neither the velocity's covariance nor a protection level; this it does take (VISO_QUAL_MIN).
@@ -98,7 +97,7 @@ def quality_of(on: Running, pose: Array, velocity: Array, limits: Limits) -> int
         math.sqrt(max(pose[0, 0], pose[1, 1], 0.0)) / limits.sigma_m,
         math.sqrt(max(velocity[0, 0], velocity[1, 1], 0.0)) / limits.sigma_m_s,
         float(on.work[PROTECTION]) / limits.protection_m,
-        (on.clock_s - load_aid(on.work, ONE_LANE, 0).aided_s) / limits.dead_reckoning_s,
+        (t_s - load_aid(on.work, ONE_LANE, 0).aided_s) / limits.dead_reckoning_s,
     )
     worst = max(share if math.isfinite(share) else 1.0 for share in used)
     return max(1, min(100, round(100.0 * (1.0 - worst))))

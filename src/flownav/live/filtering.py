@@ -7,12 +7,16 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
+from flownav.compile import ONE_LANE
+from flownav.estimation.states import POSITION, STATE
+from flownav.frames import Vector
 from flownav.live.horizon import Waiting
 from flownav.live.options import Options
 from flownav.logs.rates import attitude_rates, mean_over
 from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, Stream
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator
+from flownav.navigation.memory import load_start
 from flownav.navigation.tables import written_on
 from flownav.navigation.tape import COMPONENTS, GPS_RESET, START, empty_tape
 from flownav.navigation.told import Equipment
@@ -131,6 +135,24 @@ class Filtering:
     def clock_s(self) -> float:
         """The instant that the navigator has reached; NaN without one."""
         return self.running.clock_s if self.running is not None else float("nan")
+
+    @property
+    def here_ned_m(self) -> Vector | None:
+        """Where a started navigator is, about its own origin [m]; None before."""
+        on = self.running
+        if on is None or load_start(on.work, ONE_LANE, 0).started == 0.0:
+            return None
+        north, east, down = (float(value) for value in on.work[STATE + POSITION : STATE + POSITION + 3])
+        return north, east, down
+
+    @property
+    def lacks_imu(self) -> bool:
+        """Whether a navigator runs that was told that no IMU serves."""
+        return self.running is not None and not self.running.told.equipment.use_imu
+
+    def imu_rate_hz(self, t_s: float) -> float:
+        """Of the IMU's readings in the two seconds before an instant."""
+        return 0.5 * sum(row[0] > t_s - 2.0 for row in self._imu)
 
     # -- what a reading becomes -------------------------------------------------------------------------------
     def _row(self, waiting: Waiting) -> tuple[list[float], list[float]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 
+from flownav.frames import Vector
 from flownav.live.filtering import FLOW
 from flownav.live.horizon import Horizon, Waiting
 from flownav.live.lags import Lags
@@ -37,7 +38,7 @@ class Hearing:
 
     def __init__(self, options: Options) -> None:
         self._options = options
-        self.sources, self.horizon, self.lags = Sources(), Horizon(), Lags()
+        self.sources, self.horizon, self.lags = Sources(), Horizon(), Lags(options.most_horizon_s)
         self.serving, self.origin = Serving(), Origin()
         self.counts: Counter[str] = Counter()
         self.readings: Counter[Sensor] = Counter()
@@ -77,15 +78,17 @@ class Hearing:
         pose: Pose | None,
         now_s: float,
         heard: Callable[[Waiting], None],
+        here_ned_m: Vector | None = None,
     ) -> str:
-        """What a message measures; `heard` is told of each reading. `clock_jump` where the autopilot began anew."""
+        """What a message measures; `heard` is told of each reading. here_ned_m: where a running navigator is, if any.
+        Returns `clock_jump` where the autopilot began anew."""
         sender = sender_of(message)
         by_autopilot = sender == vehicle[:2]
         source = Source(message.msgname, instance_of(message), by_autopilot)
         aligned = clock.stamped(message, *sender, now_s)
         if aligned.event == "clock_jump" and by_autopilot:
             return "clock_jump"
-        if message.msgname == "GPS_RAW_INT" and self._is_old(message, source):
+        if message.msgname == "GPS_RAW_INT" and self._is_old(message, source, here_ned_m):
             return ""
         context = Context(vehicle.make == ARDUPILOT, by_autopilot, self.origin.navigator_deg_m, pose)
         for outcome in measurements(message, aligned.t_s, context):
@@ -95,7 +98,7 @@ class Hearing:
                 self._reading(outcome, now_s, heard)
         return ""
 
-    def _is_old(self, message: Message, source: Source) -> bool:
+    def _is_old(self, message: Message, source: Source, here_ned_m: Vector | None) -> bool:
         """Whether a GPS message repeats a fix; the first of each is where the vehicle is."""
         self.gps_heard = True
         fix = message.time_usec, message.lat, message.lon, message.alt, message.vel, message.cog, message.fix_type
@@ -104,7 +107,7 @@ class Hearing:
             return True
         self._fixes[source] = fix
         place = fix_deg_m(message)
-        if message.fix_type >= LEAST_FIX and place is not None and self.origin.fixed(place):
+        if message.fix_type >= LEAST_FIX and place is not None and self.origin.fixed(place, here_ned_m):
             self.counts["origin: refused"] += 1
         return False
 

@@ -15,10 +15,12 @@ class Lags:
 
     A reading's lag is the newest instant that any sensor has described, less its own. It holds the sensor's own delay,
     the phase between a reading and the message that tells it, and what one message is faster on the link than another;
-    a link that delivers in batches, or stands still, adds nothing, since it holds back all alike.
+    a link that delivers in batches, or stands still, adds nothing, since it holds back all alike. One that is larger
+    than `most_s` is not waited for.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most_s: float = 1.0) -> None:
+        self._most_s = most_s
         self._newest_s = float("-inf")
         self._windows: dict[Sensor, deque[tuple[float, float]]] = {}  # begin, greatest lag [s]
 
@@ -26,6 +28,8 @@ class Lags:
         """A reading that describes an instant."""
         self._newest_s = max(self._newest_s, instant_s)
         lag_s = self._newest_s - instant_s
+        if lag_s > self._most_s:
+            return  # nobody waits for so long; it comes too late, and is counted so
         windows = self._windows.setdefault(sensor, deque(maxlen=WINDOWS))
         if not windows or self._newest_s - windows[-1][0] >= WINDOW_S:
             windows.append((self._newest_s, lag_s))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import socket
 from collections import Counter
@@ -18,7 +19,7 @@ LOOPBACK, LOOPBACK_6, EVERYWHERE_6 = "127.0.0.1", "::1", "::"
 DEFAULT_BAUD = 115200  # a bare PX4FLOW's
 MOST_BYTES = 65536
 MOST_READS = 64  # in a row, before the session has its turn
-USB = ("ttyACM", "usbmodem", "COM")  # serial ports by name only: their baud rate is a formality
+USB = re.compile(r"ttyACM|tty\.usbmodem|cu\.usbmodem|COM\d+$")  # ports whose baud rate is a formality
 BITS_A_BYTE = 10  # with start and stop bit
 
 
@@ -32,7 +33,8 @@ class Address(NamedTuple):
     @property
     def over_uart(self) -> bool:
         """Whether it is a serial line whose baud rate matters."""
-        return self.kind == "serial" and not any(word in self.host for word in USB)
+        port = os.path.basename(os.path.realpath(self.host))
+        return self.kind == "serial" and USB.match(port) is None
 
     @property
     def capacity_bytes_s(self) -> float | None:

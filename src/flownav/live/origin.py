@@ -39,15 +39,18 @@ class Origin:
             return ""
         return self._laid(place)
 
-    def fixed(self, place: Geodetic) -> str:
-        """A GPS fix. The first one judges what was told before it, and is the origin where nothing that can be was."""
+    def fixed(self, place: Geodetic, here_ned_m: Vector | None = None) -> str:
+        """A GPS fix. The first one judges what was told before it, and is the origin where nothing that can be was.
+
+        here_ned_m: where a navigator that began without GPS is by now; the fix is there, and the origin behind it.
+        """
         self._fix = place
         if self.navigator_deg_m is not None:
             return ""
         if self._told is not None and can_be(self._told, place):
             self.navigator_deg_m = self._told
             return ""
-        self.navigator_deg_m = place
+        self.navigator_deg_m = place if here_ned_m is None else _behind(place, here_ned_m)
         if self._told is None:
             return ""
         self.refused += 1
@@ -67,6 +70,15 @@ class Origin:
         self.offset_ned_m = offset_ned_m
         self.moves += 1
         return "moved"
+
+
+def _behind(place: Geodetic, here_ned_m: Vector) -> Geodetic:
+    """The origin of which a place lies at a position of the local frame."""
+    import pymap3d
+
+    north_m, east_m, down_m = here_ned_m
+    latitude, longitude, altitude_m = pymap3d.ned2geodetic(-north_m, -east_m, -down_m, *place)
+    return float(latitude), float(longitude), float(altitude_m)
 
 
 def can_be(place: Geodetic, fix: Geodetic | None) -> bool:

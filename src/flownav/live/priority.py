@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 
 PRIORITY = 1  # the least of the real-time ones: before every ordinary process, behind the system's own
 NICE = -10
@@ -26,3 +27,9 @@ def run_before_others() -> str:
         return f"priority (nice {NICE})"
     except OSError:
         return "ordinary (more is not permitted)"
+
+
+def run_as_others() -> None:
+    """What follows the flight must not hold up the rest of the machine."""
+    with suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))

@@ -59,6 +59,7 @@ class Serving:
     def clear(self) -> None:
         """The navigation begins anew."""
         self._spells.clear()
+        self._landed = False
 
     def alarms(self, t_s: float, after_s: float) -> dict[Sensor, Refused]:
         """Sensors of which nothing was fused for `after_s` although they speak."""

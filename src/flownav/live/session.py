@@ -27,6 +27,7 @@ from flownav.mavlink.messages import CONVERTERS
 from flownav.mavlink.outgoing import Estimate
 from flownav.mavlink.state_messages import TrueState, hil_state_quaternion, sim_state
 from flownav.measurement import Measurement, Sensor
+from flownav.navigation.feed import SLOWEST_IMU_HZ
 from flownav.navigation.serving import HORIZONTAL
 
 SECOND = 1.0
@@ -70,6 +71,7 @@ class Session:
         self.sent = 0
         self.reason = "no_vehicle"
         self.alarms: dict[Sensor, Refused] = {}
+        self.past_alarms: dict[Sensor, Refused] = {}  # the longest of each sensor
         self.estimate: Estimate | None = None
         self.outbox: deque[bytes] = deque(maxlen=1024)
         self.innovations: dict[tuple[int, int], tuple[float, float, int]] = {}  # innovation, test ratio, reason
@@ -193,10 +195,8 @@ class Session:
             self.keeper.note(t_s, "origin", "refused", f"{place[0]:.5f}, {place[1]:.5f}: the vehicle is not near it")
 
     def _measured(self, message: Message, clock: VehicleClock, vehicle: Vehicle, now_s: float) -> None:
-        known = self.origin_deg_m
-        event = self.hearing.take(message, clock, vehicle, self._pose(), now_s, self.filtering.heard)
-        if self.origin_deg_m is not None and self.origin_deg_m != known:
-            self.keeper.origin(clock.now_s(now_s), self.origin_deg_m)
+        here_ned_m = self.filtering.here_ned_m if self.origin_deg_m is None else None
+        event = self.hearing.take(message, clock, vehicle, self._pose(), now_s, self.filtering.heard, here_ned_m)
         if event == "clock_jump":
             self._restart(clock.now_s(now_s), event, NAN)
 
@@ -217,6 +217,8 @@ class Session:
         listened = t_s - hearing.since_s >= self.options.listen_s
         if self.filtering.running is None and listened and len(hearing.horizon):
             self.filtering.begin(hearing.horizon.waiting(), hearing.gps_heard, self.origin_deg_m)
+        if self.filtering.lacks_imu and self.filtering.imu_rate_hz(hearing.newest_s) >= SLOWEST_IMU_HZ:
+            self._restart(t_s, "imu_came", NAN)  # it was decided without one, which serves now
         until_s = min(t_s, hearing.lags.newest_s) - hearing.horizon_s
         behind = self.filtering.running is not None and self._feed(until_s)
         since_s = now_s - self._sent_s
@@ -250,6 +252,10 @@ class Session:
             self.keeper.note(t_s, sensor.name.lower(), "unfused", spell.why, t_s - spell.since_s)
         for sensor in self.alarms.keys() - found.keys():
             self.keeper.note(t_s, sensor.name.lower(), "fused_again", "", NAN)
+        for sensor, spell in found.items():
+            before = self.past_alarms.get(sensor)
+            if before is None or spell.until_s - spell.since_s >= before.until_s - before.since_s:
+                self.past_alarms[sensor] = spell
         self.alarms = found
 
     def _offer(self, t_s: float, now_s: float) -> None:

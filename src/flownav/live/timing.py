@@ -5,13 +5,23 @@ from __future__ import annotations
 from collections import Counter, deque
 from typing import NamedTuple
 
-from flownav.mavlink.clock import Aligned, ClockState, align, stamp_of, timesync_offset_s, told_unix_time
+from flownav.mavlink.clock import (
+    CONFIRMATIONS,
+    Aligned,
+    ClockState,
+    Stamp,
+    align,
+    stamp_of,
+    timesync_offset_s,
+    told_unix_time,
+)
 from flownav.mavlink.dialect import Message
 
 NAN = float("nan")
 LONGEST_ROUND_TRIP_S = 0.5
 MOST_UNSEEN_S = 0.1  # of age when it is sent that a stamped message may have, beyond the wait on the link
 COARSE_S = 0.02  # of stamps in milliseconds, and of crystals that drift for FRESH_S
+LEAP_S = 0.3  # a stamp that is so much earlier than any before on the link: the clock leapt, or the stamp is wrong
 STEP_S = 1.0  # TIMESYNC offsets that differ by more are of a vehicle that began anew
 REMEMBERED = 16
 FRESH_S = 20.0
@@ -39,13 +49,18 @@ class VehicleClock:
         self._state = ClockState((system, component, "boot"))
         self._leads: deque[tuple[float, float]] = deque(maxlen=2)  # since when, and session time less ours [s]
         self._exchanges: deque[Exchange] = deque(maxlen=REMEMBERED)
+        self._leaping, self._leap_s = 0, NAN  # stamps in a row that are ahead of our clock, and by how much
         self._told_s = self._doubted_s = NAN  # offset that TIMESYNC tells, and one that differs by a step
         self.counts: Counter[str] = Counter()
 
     def stamped(self, message: Message, system: int, component: int, now_s: float) -> Aligned:
         """The session time of a message that arrived at `now_s` of our clock."""
         stamp = stamp_of(message, system, component, self._state.reference_s)
-        self._state, aligned = align(self._state, now_s, stamp)
+        state, aligned = align(self._state, now_s, stamp)
+        if self._leaps(stamp, aligned, now_s):
+            self.counts["ahead"] += 1
+            return Aligned(NAN, "stale_time")
+        self._state = state
         if aligned.event:
             self.counts[aligned.event] += 1
         if stamp is not None and stamp.clock == self._state.reference and not aligned.reason:
@@ -54,6 +69,16 @@ class VehicleClock:
                 self._leads = deque(maxlen=2)
             self._note_lead(aligned.t_s - now_s, now_s)
         return aligned
+
+    def _leaps(self, stamp: Stamp | None, aligned: Aligned, now_s: float) -> bool:
+        """Whether the autopilot's clock has leapt ahead of ours in this one message: some in a row must agree on it."""
+        if stamp is None or stamp.clock != self._state.reference or aligned.reason or aligned.event:
+            return False
+        leap_s = aligned.t_s - now_s - self._offset_s
+        agrees = abs(leap_s - self._leap_s) <= LEAP_S
+        self._leaping = (self._leaping + 1 if agrees else 1) if leap_s > LEAP_S else 0
+        self._leap_s = leap_s
+        return 0 < self._leaping < CONFIRMATIONS
 
     def _note_lead(self, lead_s: float, now_s: float) -> None:
         """The least wait on the link is the greatest lead; it is remembered for two windows."""

@@ -12,7 +12,7 @@ import numpy as np
 from flownav.compile import equation, larger, procedure, smaller
 from flownav.estimation.covariance import add_noise_lane
 from flownav.estimation.kalman import Lanes, Work
-from flownav.estimation.states import VELOCITY
+from flownav.estimation.states import ATTITUDE, VELOCITY
 from flownav.navigation.inertial import sound
 from flownav.navigation.memory import (
     READING,
@@ -25,14 +25,17 @@ from flownav.navigation.memory import (
 from flownav.navigation.records import ImuMemory, Reading, SpikeMemory
 from flownav.navigation.tape import IMU_SPIKE, Output, write_event
 
-GYRO_JUMP_RAD_S, TURNING_RAD_S2 = 1.0, 100.0  # what a small vehicle does at once, and in the time between
+GYRO_JUMP_RAD_S, TURNING_RAD_S2 = 1.0, 200.0  # what a small vehicle does at once, and in the time between
 ACCEL_JUMP_M_S2, SHAKING_M_S3 = 10.0, 1000.0
 TIMES = 6.0  # the usual jump
 USUAL = 50.0  # readings over which that is followed
 SLOWER = 3.0  # times, in a burst: it must not make itself usual
 LONGEST_S = 0.1  # after a gap no jump is a spike
 BURST_S = 0.3  # spikes that last longer are what happened
+BACK = 0.5  # of the possible jump: so near a reading must come to what was before the burst, to end it
 MOST_DOUBT_M_S = 1.0  # what a burst that was none may have done to the velocity
+MOST_DOUBT_RAD = 0.2  # and to the attitude
+LONE = 0.3  # of that, for one reading alone: a hard touchdown, at a low rate
 ARRIVED_AT = READING + Reading._fields.index("arrived")
 
 
@@ -63,7 +66,8 @@ def judge_spike(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -
     reach_s = s.reach_s if burst else step_s
     most_gyro = GYRO_JUMP_RAD_S + TURNING_RAD_S2 * reach_s + TIMES * s.gyro_rad_s
     most_accel = ACCEL_JUMP_M_S2 + SHAKING_M_S3 * reach_s + TIMES * s.accel_m_s2
-    jumps = gyro > most_gyro or accel > most_accel
+    back = BACK if burst else 1.0
+    jumps = gyro > back * most_gyro or accel > back * most_accel
     comparable = burst or step_s <= LONGEST_S
     spike = (jumps and comparable) or is_dead(reading)
     gyro_next = distance(reading.value_0 - s.gyro_x, reading.value_1 - s.gyro_y, reading.value_2 - s.gyro_z)
@@ -82,14 +86,28 @@ def judge_spike(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -
 
 @equation
 def doubt_of(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -> float:
-    """The velocity's variance [m2/s2] that one spike more of a burst adds, an axis; none for a spike that is alone.
+    """The velocity's variance [m2/s2] that one spike more of a burst adds, an axis.
 
-    In all that of what the readings say beyond the one that was kept, over the time since, up to MOST_DOUBT_M_S.
+    In all that of what the readings say beyond the one that was kept, over the time since, up to MOST_DOUBT_M_S; for a
+    spike that is alone LONE of it.
     """
     accel = distance(reading.value_3 - m.accel_x, reading.value_4 - m.accel_y, reading.value_5 - m.accel_z)
-    now_m_s = smaller(accel * step_s, MOST_DOUBT_M_S)
-    before_m_s = smaller(accel * larger(step_s - s.reach_s, 0.0), MOST_DOUBT_M_S)
-    return now_m_s * now_m_s - before_m_s * before_m_s if s.refused > 1.0 else 0.0
+    return grown(accel, step_s, MOST_DOUBT_M_S, s)
+
+
+@equation
+def turning_doubt_of(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -> float:
+    """The same of the attitude [rad2], of what the gyro says."""
+    gyro = distance(reading.value_0 - m.gyro_x, reading.value_1 - m.gyro_y, reading.value_2 - m.gyro_z)
+    return grown(gyro, step_s, MOST_DOUBT_RAD, s)
+
+
+@equation
+def grown(rate: float, step_s: float, most: float, s: SpikeMemory) -> float:
+    """How much the square of rate times time has grown with the newest step of a burst; of the first, LONE."""
+    now = smaller(rate * step_s, most) * (LONE if s.refused == 1.0 else 1.0)
+    before = smaller(rate * larger(step_s - s.reach_s, 0.0), most) * (LONE if s.refused == 2.0 else 1.0)
+    return now * now - before * before if s.refused > 1.0 else now * now
 
 
 @procedure
@@ -104,6 +122,7 @@ def drop_spikes(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
             if spike:
                 for i in range(3):
                     add_noise_lane(work, lanes, VELOCITY + i, lane, doubt_of(reading, step_s, m, after))
+                    add_noise_lane(work, lanes, ATTITUDE + i, lane, turning_doubt_of(reading, step_s, m, after))
                 work[ARRIVED_AT * len(lanes) + lane] = 0.0
                 if after.refused == 1.0:
                     write_event(

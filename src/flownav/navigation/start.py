@@ -28,6 +28,7 @@ from flownav.navigation.memory import (
 )
 from flownav.navigation.offers import is_heard
 from flownav.navigation.packed import START_SIGMA, load_filter_settings, load_flow_settings
+from flownav.navigation.place import ON_GROUND
 from flownav.navigation.records import AidMemory, Reading, StartMemory
 from flownav.navigation.tape import START, Output, write_event
 from flownav.navigation.told import FROM_MAG, FROM_YAW, NO_HEADING, Equipment
@@ -106,7 +107,8 @@ def try_start(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipme
         if m.started == 0.0 and (np.isfinite(m.attitude_s) or m.readings >= LEAST_LEVELLING):
             heard = is_heard(reading) and bool(np.isfinite(reading.value_0))
             at_fix = heard and position and bool(np.isfinite(reading.value_0 + reading.value_1 + reading.value_2))
-            at_origin = heard and other and t_s >= fitted.deadline_s
+            stands = sensor == Sensor.LANDED and reading.value_0 > ON_GROUND
+            at_origin = heard and (other or stands) and t_s >= fitted.deadline_s
             if at_fix or at_origin:
                 start_lane(work, lanes, lane, t_s, at_fix, reading, m, fitted, p)
                 write_event(lanes, lane, t_s, START, 1.0 if at_fix else 0.0, o)

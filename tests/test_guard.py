@@ -221,3 +221,14 @@ def test_the_longest_name_is_written_and_nothing_is_left_of_a_failure(tmp_path):
     with pytest.raises(FileNotFoundError), written_whole(tmp_path / "y.fnr") as temporary:
         temporary.rename(tmp_path / "absent" / "y")  # what breaks in the middle of the writing
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+def test_a_page_that_speaks_of_flownav_is_not_flownavs(tmp_path):
+    mine, notes = tmp_path / "mine.html", tmp_path / "notes.html"
+    guard.write_page("<html><head></head><body>a report</body></html>", mine)
+    guard.write_page("<html><head></head><body>the next</body></html>", mine)
+    assert "the next" in mine.read_text()
+    notes.write_text("<html><head></head><body>my notes on flownav</body></html>")
+    with pytest.raises(InputError, match="was not written by flownav"):
+        guard.write_page("<html></html>", notes)
+    assert "my notes" in notes.read_text()

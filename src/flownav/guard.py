@@ -26,6 +26,7 @@ KINDS = (
     (stat.S_ISBLK, "a device"),
 )
 MARK = b"flownav"  # stands near the start of all that flownav writes, but for the kinds below
+PAGE_MARK = '<meta name="generator" content="flownav">'  # of pages: notes on flownav speak of it, too
 LOOKED_AT_BYTES = 4096
 LONGEST_SHOWN = 200  # characters of a name in a message
 RECORD_MAGIC, ULOG_MAGIC = b"PK\x03\x04", b"ULog"
@@ -150,6 +151,13 @@ def written_whole(path: Path, *, replacing: bool = False) -> Iterator[Path]:
         yield temporary
 
 
+def write_page(page: str, path: Path) -> None:
+    """Write an HTML page, whole or not at all, with the mark by which it is known as flownav's. As `written_whole`."""
+    marked = page if PAGE_MARK in page else page.replace("<head>", f"<head>{PAGE_MARK}", 1)
+    with written_whole(path) as temporary:
+        temporary.write_text(marked, encoding="utf-8", errors="backslashreplace", newline="\n")
+
+
 @contextmanager
 def folder_written_whole(path: Path) -> Iterator[Path]:
     """As files.folder_written_whole, of a folder that a user named. InputError where it is a link."""
@@ -203,6 +211,8 @@ def _is_ours(path: Path) -> bool:
             return _is_record_of_a_run(path)
     except OSError:
         return False
+    if b"<html" in head.lower():
+        return PAGE_MARK.encode() in head
     return MARK in head or head.startswith(BEGINNINGS)
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import itertools
 import os
+import subprocess
+import sys
 import threading
 import time
 
@@ -82,7 +84,7 @@ def test_a_journal_torn_anywhere_gives_what_was_whole(journal, tmp_path):
         torn = tmp_path / "torn.fnr.journal"
         torn.write_bytes(data[: int(share * len(data))])
         found = recovered(torn)
-        found.record.save(tmp_path / "torn.fnr")
+        found.record.save(tmp_path / "torn.fnr", replacing=True)
         assert_replays_to_the_bit(tmp_path / "torn.fnr")
         assert found.torn_bytes > 0
         spans.append(found.record.manifest["duration_s"])
@@ -257,7 +259,7 @@ def test_where_the_record_cannot_be_written_the_journal_stays(tmp_path, monkeypa
     wire = Wire(Hover(), Options(), recorder).fly(4.0)
     wire.close()
 
-    def save(self, path):
+    def save(self, path, *, replacing):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patched:
@@ -350,3 +352,40 @@ def test_truth_lies_in_the_frame_of_its_time(tmp_path):
     np.testing.assert_allclose(record.tables["truth"]["pos_d_m"], [0.0, 0.0, 10.0], atol=1e-9)
     assert record.manifest["origins"] == [[2.0, 47.0, 8.0, 400.0], [4.0, 47.0, 8.0, 410.0]]
     assert record.manifest["parameters"]["origin_lat_lon_deg_alt_m"] == [47.0, 8.0, 410.0]
+
+
+def test_the_command_numbers_its_record_and_replaces_one_only_where_it_may(tmp_path):
+    """A companion that starts flownav anew with the same line must fly."""
+    path = tmp_path / "flight.fnr"
+    recorder = Recorder(path, Options())
+    wire = Wire(Hover(), Options(), recorder).fly(3.0)
+    wire.close()
+    assert recorder.finish({}).record == path
+    command = [sys.executable, "-m", "flownav", "live", "udp:0", "--duration", "0.3", "--json", "--record"]
+
+    def said(*more):
+        done = subprocess.run([*command, *more], capture_output=True, text=True, check=False)
+        return done.returncode, done.stderr
+
+    before = path.read_bytes()
+    status, words = said(str(path))
+    assert status == 1  # nobody was heard
+    assert "flight-1.fnr" in words
+    status, words = said(str(path), "--force")
+    assert status == 1
+    assert "was not written" not in words
+    assert path.read_bytes() == before
+    notes = tmp_path / "notes.fnr"
+    notes.write_text("flownav flew well")
+    status, words = said(str(notes), "--force")
+    assert status == 2
+    assert "is no record" in words
+    assert notes.read_text() == "flownav flew well"
+
+
+def test_a_journal_is_recovered_twice_into_two_names(journal):
+    record = journal.with_suffix("")
+    for name in (record, record.with_stem(f"{record.stem}-1")):
+        assert CliRunner().invoke(app, ["recover", str(journal)]).exit_code == 0
+        assert_replays_to_the_bit(name)
+    assert CliRunner().invoke(app, ["recover", str(journal), "--force"]).exit_code == 0

@@ -270,7 +270,7 @@ def test_a_bad_option_is_one_line_and_writes_nothing(tmp_path: Path, arguments: 
 def test_a_page_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     for page in (tmp_path, tmp_path / "file" / "page.html"):
-        with pytest.raises(InputError, match="give another --out"):
+        with pytest.raises(InputError, match="cannot be written"):
             run("--table", 5, "--flights", 1_000_000, page=page)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from flownav.guard import written_whole
+from flownav import guard
 from flownav.paper import figures_flight, figures_rig, figures_tables, leaks, published, rows, words
 from flownav.paper.findings import FIT_TOLERANCE, LARGEST_TOLERANCE, SAME_SPREAD, Finding
 from flownav.paper.reproduction import Reproduction
@@ -21,8 +21,7 @@ HERE = Path(__file__).parent
 def write_page(reproduction: Reproduction, path: Path) -> None:
     """Write the page, whole or not at all. OSError where it cannot be written."""
     text = render(reproduction)
-    with written_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+    guard.write_page(text, path)
 
 
 def figures(of: Reproduction) -> dict[str, Section]:

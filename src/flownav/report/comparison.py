@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from flownav import __version__
-from flownav.guard import written_whole
+from flownav import __version__, guard
 from flownav.report.figure_words import number
 from flownav.report.html import HERE
 from flownav.report.style import FONT, PALETTE
@@ -22,8 +21,7 @@ def write_comparison(headings: tuple[str, ...], lines: Lines, rows: Sequence[dic
     headings and lines: the table as text. rows: what `flownav compare --json` prints, for the GPS cuts.
     """
     page = render(headings, lines, rows)
-    with written_whole(path) as temporary:
-        temporary.write_text(page, encoding="utf-8", errors="backslashreplace", newline="\n")
+    guard.write_page(page, path)
 
 
 def render(headings: tuple[str, ...], lines: Lines, rows: Sequence[dict[str, Any]]) -> str:

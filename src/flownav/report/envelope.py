@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from flownav.guard import written_whole
+from flownav import guard
 from flownav.report.style import COLOUR, FONT
 
 SCALE = [[0.0, COLOUR["alert"]], [0.8, "#e8b23a"], [0.95, "#a9cf6a"], [1.0, COLOUR["flow"]]]
@@ -15,8 +15,7 @@ SCALE = [[0.0, COLOUR["alert"]], [0.8, "#e8b23a"], [0.95, "#a9cf6a"], [1.0, COLO
 def write_envelope(title: str, rows: Sequence[dict[str, Any]], path: Path) -> None:
     """Write the page, whole or not at all; rows as `flownav envelope --json` has them. OSError where it cannot be."""
     page = envelope_figure(title, rows).to_html(include_plotlyjs=True, full_html=True)
-    with written_whole(path) as temporary:
-        temporary.write_text(page, encoding="utf-8", errors="backslashreplace", newline="\n")
+    guard.write_page(page, path)
 
 
 def envelope_figure(title: str, rows: Sequence[dict[str, Any]]) -> Any:

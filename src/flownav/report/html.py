@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from flownav.guard import written_whole
+from flownav import guard
 from flownav.record import Record
 from flownav.report import (
     content,
@@ -35,8 +35,7 @@ def write_report(record: Record, path: Path) -> None:
     lets only its own scripts run. Text from the record is escaped. OSError where the file cannot be written.
     """
     page = render(record)
-    with written_whole(path) as temporary:
-        temporary.write_text(page, encoding="utf-8", errors="backslashreplace", newline="\n")
+    guard.write_page(page, path)
 
 
 def sections(record: Record) -> list[Section]:

@@ -232,7 +232,7 @@ def test_verdicts_on_a_range(range_m, upright, reason):
 def test_a_range_that_repeats_itself_weighs_ever_less_and_is_stuck_once_the_vehicle_has_moved():
     """A still hover over a sensor of 1 cm, and one that sticks while the vehicle climbs by 0.12 m."""
     for climb_m, verdicts in ((0.02, [FUSED] * 5), (0.12, [FUSED, FUSED, FUSED, STUCK, STUCK])):
-        m, reasons, variances = range_memory(), [], []
+        m, reasons, variances = range_memory(taken_s=9.9), [], []
         for t_s in (10.0, 10.2, 10.4, 10.5, 10.6):
             height = Height(-2.0 if t_s == 10.0 else -2.0 - climb_m, 0.1, 1.0)
             reason, variance, m = judge_range(reading(2.0), t_s, 1.0, height, False, m, TOLD.height)
@@ -248,8 +248,20 @@ def test_a_range_that_repeats_itself_weighs_ever_less_and_is_stuck_once_the_vehi
     assert variance < 0.005
 
 
+def test_a_range_that_says_the_same_from_the_first_on_or_for_long_is_no_news():
+    """Beyond its reach a sensor may read its greatest range for ever: that is no ground."""
+    height = Height(-2.0, 0.1, 1.0)
+    for memory, refused_from in ((range_memory(), 0.5), (range_memory(taken_s=9.9), 2.0)):
+        m, reasons = memory, {}
+        for t_s in np.arange(10.0, 12.6, 0.1):
+            reasons[t_s], _, m = judge_range(reading(2.0), float(t_s), 1.0, height, False, m, TOLD.height)
+        stuck = [t_s - 10.0 for t_s, reason in reasons.items() if reason == STUCK]
+        assert min(stuck) == pytest.approx(refused_from, abs=0.11)
+        assert len(stuck) == sum(t_s - 10.0 >= min(stuck) for t_s in reasons)
+
+
 def test_the_only_range_is_believed_until_the_height_travels():
-    m = range_memory(last_m=2.0, same_s=10.0, down_m=-2.0)
+    m = range_memory(last_m=2.0, same_s=10.0, down_m=-2.0, taken_s=9.9)
     s = TOLD.height
     assert not repeats(11.0, m, Height(-2.09, 0.1, 1.0), False, s)
     assert repeats(11.0, m, Height(-2.11, 0.1, 1.0), False, s)

@@ -58,6 +58,8 @@ STRAY_SHARE = 1.5  # some strays confirm each other
 STRAY_SPAN_M = 5.0
 MANY_STRAYS, FEW_STRAYS = 0.15, 0.02  # so many tell nothing of the ground's level, or of the accelerometer; so few none
 UNSEEN_M_S = 1.0  # a range that repeats itself may hide this climb or descent
+LONGEST_REPEAT_S = 2.0  # nobody hovers so still for longer: a sensor out of its reach says the same for ever
+SERVED_S = 1.0  # before it began to repeat itself, that a range was fused
 ALONE = 5.0  # times the travel, where nothing else tells the height
 
 
@@ -88,15 +90,19 @@ def repeated_variance(variance: float, lasting_s: float) -> float:
 
 @equation
 def repeats(t_s: float, m: RangeMemory, height: Height, alone: bool, s: HeightSettings) -> bool:
-    """Whether the range has repeated one value to the last digit for long while the vehicle climbs or sinks.
+    """Whether the range has repeated one value to the last digit for long: no news, and not what a vehicle does.
 
+    In a still hover a sensor of 1 cm repeats itself for a second or two, and is right; it served until then. One that
+    says the same from the first on, or while the height travels, or for ever, is out of its reach, or stuck.
     Where no barometer, GPS or pad has told the height lately, the range is all there is, and it is believed unless
     the height travels by more than the filter's own drift.
     """
     lasting_s = t_s - m.same_s
     travelled = abs(height.pos_d_m - m.down_m)
     drift = 3.0 * height.speed_sigma_m_s * lasting_s
-    least = ALONE * s.range_stuck_travel_m + drift if alone else s.range_stuck_travel_m
+    served = m.taken_s >= m.same_s - SERVED_S
+    told = s.range_stuck_travel_m if served and lasting_s < LONGEST_REPEAT_S else 0.0
+    least = ALONE * s.range_stuck_travel_m + drift if alone else told
     return lasting_s >= s.range_stuck_s and travelled >= least
 
 

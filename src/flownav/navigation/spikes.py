@@ -31,6 +31,8 @@ TIMES = 6.0  # the usual jump
 USUAL = 50.0  # readings over which that is followed
 SLOWER = 3.0  # times, in a burst: it must not make itself usual
 LONGEST_S = 0.1  # after a gap no jump is a spike
+MOST = 3.0  # in a row, of a vehicle that shakes, where what the next reading says again is believed
+CALM_RAD_S, CALM_M_S2 = 0.3, 1.5  # usual jumps of one that does not: there a burst is told from what happens
 BURST_S = 0.3  # spikes that last longer are what happened
 BACK = 0.5  # of the possible jump: so near a reading must come to what was before the burst, to end it
 MOST_DOUBT_M_S = 1.0  # what a burst that was none may have done to the velocity
@@ -57,21 +59,25 @@ def is_dead(r: Reading) -> bool:
 def judge_spike(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -> tuple[bool, SpikeMemory]:
     """Whether an inertial reading is a spike after the one that was kept, step_s before; and the memory of it.
 
-    In a burst a reading is held against what was kept before it, by the jump that was possible when it began. The usual
+    Only in a vehicle that does not shake is a burst told from what happens to it; in one that does, what the next reading
+    says again is believed, and three in a row are the most. In a burst a reading is held against what was kept before it, by the jump that was possible when it began. The usual
     jump is that between neighbours, kept or not: motors that start shake every reading, a burst stands still.
     """
     gyro = distance(reading.value_0 - m.gyro_x, reading.value_1 - m.gyro_y, reading.value_2 - m.gyro_z)
     accel = distance(reading.value_3 - m.accel_x, reading.value_4 - m.accel_y, reading.value_5 - m.accel_z)
-    burst = s.refused > 0.0 and step_s <= BURST_S
+    calm = (s.gyro_rad_s < CALM_RAD_S and s.accel_m_s2 < CALM_M_S2) or s.refused > MOST
+    burst = calm and s.refused > 0.0 and step_s <= BURST_S
     reach_s = s.reach_s if burst else step_s
     most_gyro = GYRO_JUMP_RAD_S + TURNING_RAD_S2 * reach_s + TIMES * s.gyro_rad_s
     most_accel = ACCEL_JUMP_M_S2 + SHAKING_M_S3 * reach_s + TIMES * s.accel_m_s2
     back = BACK if burst else 1.0
     jumps = gyro > back * most_gyro or accel > back * most_accel
     comparable = burst or step_s <= LONGEST_S
-    spike = (jumps and comparable) or is_dead(reading)
     gyro_next = distance(reading.value_0 - s.gyro_x, reading.value_1 - s.gyro_y, reading.value_2 - s.gyro_z)
     accel_next = distance(reading.value_3 - s.accel_x, reading.value_4 - s.accel_y, reading.value_5 - s.accel_z)
+    again = s.refused > 0.0 and gyro_next < 0.5 * most_gyro and accel_next < 0.5 * most_accel
+    confirmed = not calm and (again or s.refused >= MOST)
+    spike = (jumps and comparable and not confirmed) or is_dead(reading)
     share = 1.0 / (SLOWER * USUAL if spike else USUAL)
     gyro_usual = s.gyro_rad_s + share * (smaller(gyro_next, most_gyro) - s.gyro_rad_s)
     accel_usual = s.accel_m_s2 + share * (smaller(accel_next, most_accel) - s.accel_m_s2)

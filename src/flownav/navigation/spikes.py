@@ -59,9 +59,10 @@ def is_dead(r: Reading) -> bool:
 def judge_spike(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -> tuple[bool, SpikeMemory]:
     """Whether an inertial reading is a spike after the one that was kept, step_s before; and the memory of it.
 
-    Only in a vehicle that does not shake is a burst told from what happens to it; in one that does, what the next reading
-    says again is believed, and three in a row are the most. In a burst a reading is held against what was kept before it, by the jump that was possible when it began. The usual
-    jump is that between neighbours, kept or not: motors that start shake every reading, a burst stands still.
+    Only in a vehicle that does not shake is a burst told from what happens to it; in one that does, what the next
+    reading says again is believed, and three in a row are the most. In a burst a reading is held against what was kept
+    before it, by the jump that was possible when it began. The usual jump is that between neighbours, kept or not:
+    motors that start shake every reading, a burst stands still.
     """
     gyro = distance(reading.value_0 - m.gyro_x, reading.value_1 - m.gyro_y, reading.value_2 - m.gyro_z)
     accel = distance(reading.value_3 - m.accel_x, reading.value_4 - m.accel_y, reading.value_5 - m.accel_z)

@@ -80,10 +80,7 @@ def range_variance(range_m: float, sigma_m: float, relative_sigma: float) -> flo
 
 @equation
 def repeated_variance(variance: float, lasting_s: float) -> float:
-    """Variance of a range [m2] that has been the same to the last digit for so long: what may have gone unseen.
-
-    A sensor of 1 cm that hovers repeats itself, and is right; one that sticks is wrong by what the vehicle has moved.
-    """
+    """Variance of a range [m2] that has been the same to the last digit for so long: what may have gone unseen."""
     unseen_m = UNSEEN_M_S * lasting_s
     return variance + unseen_m * unseen_m
 

@@ -18,7 +18,7 @@ from flownav.estimation.discretise import discretised
 from flownav.estimation.paper_filter import PaperModel
 from flownav.measurement import Sensor
 from flownav.sensors.datasheet import FlowSensor, load_sensor
-from flownav.simulation.dispersion import Distribution, raises_wind
+from flownav.simulation.dispersion import Design, Distribution, raises_wind
 from flownav.simulation.ensemble import Ensemble, flown, recirculation_of
 from flownav.simulation.fitting import Fitted, fitted, timetable_of
 from flownav.simulation.ground import GroundSettings
@@ -62,10 +62,15 @@ class Setup:
     described: VehicleDescription
     dispersion: dict[str, Distribution]
 
-    def ensemble(self) -> Ensemble:
-        """The flights of this scenario with truths of their own. InputError where its dispersion cannot be."""
+    def ensemble(self, design: Design | None = None) -> Ensemble:
+        """The flights of this scenario with truths of their own. InputError where its dispersion cannot be.
+
+        design: what spreads the dispersed numbers over the flights; None: the noise counter.
+        """
         sheets = self.fitted.sheets if self.fitted else None
-        return Ensemble(self.scenario, self.flight, self.file, self.described, self.sensor, sheets, self.dispersion)
+        return Ensemble(
+            self.scenario, self.flight, self.file, self.described, self.sensor, sheets, self.dispersion, design
+        )
 
 
 def assemble(scenario: Scenario) -> Setup:

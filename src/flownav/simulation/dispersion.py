@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 from zlib import crc32
 
 import numpy as np
@@ -127,6 +127,13 @@ def raises_wind(entries: Mapping[str, Distribution]) -> bool:
     """Whether a flight may have wind where the scenario has none."""
     entry = entries.get("wind.speed_20ft_m_s")
     return entry is not None and entry.mode != "factor"
+
+
+class Design(Protocol):
+    """What spreads the inputs of an ensemble's flights."""
+
+    def uniforms(self, seed: int, flights: Sequence[int], name: str) -> Array:
+        """One number in (0, 1) of each flight for the input `name`, of (seed, flight, name) and nothing else."""
 
 
 def uniforms(seed: int, flights: Sequence[int], name: str) -> Array:

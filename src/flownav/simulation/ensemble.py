@@ -17,7 +17,7 @@ from flownav.errors import InputError
 from flownav.parameter_files import ParameterModel, check
 from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.sheets import SensorSheets
-from flownav.simulation.dispersion import Distribution, drawn, uniforms
+from flownav.simulation.dispersion import Design, Distribution, drawn, uniforms
 from flownav.simulation.fault import SOUND
 from flownav.simulation.fitting import onboard_of
 from flownav.simulation.plan import Flight
@@ -88,13 +88,15 @@ class Ensemble:
     """What differs from flight to flight of one scenario, ready to be drawn. InputError where an entry cannot be.
 
     file and described: the vehicle's, as it is believed to be; sheets: its sensors', None where the paper's filter
-    flies, of whose sensors only the flow sensor's file is dispersed; dispersion: entries by dotted name.
+    flies, of whose sensors only the flow sensor's file is dispersed; dispersion: entries by dotted name. design: what
+    spreads them over the flights; None: the noise counter.
     """
 
     def __init__(
         self, scenario: Scenario, flight: Flight, file: AnyFile, described: VehicleDescription, sensor: FlowSensor,
-        sheets: SensorSheets | None, dispersion: Mapping[str, Distribution],
+        sheets: SensorSheets | None, dispersion: Mapping[str, Distribution], design: Design | None = None,
     ) -> None:  # fmt: skip
+        self.design = design
         self.scenario, self.flight, self.sheets = scenario, flight, sheets
         self.models: dict[str, Any] = {
             "vehicle": file, "wind": scenario.wind, "ground": scenario.ground, "flow_sensor": sensor,
@@ -131,9 +133,10 @@ class Ensemble:
         A flight stands at the same place of the same lot whoever asks for it, and so has the same bits.
         """
         flights = range(number * TOGETHER, (number + 1) * TOGETHER)
+        spread = uniforms if self.design is None else self.design.uniforms
         found = {}
         for name, entry in self.entries.items():
-            draws, told = self.frozen[name].ppf(uniforms(seed, flights, name)), self._believed(name)
+            draws, told = self.frozen[name].ppf(spread(seed, flights, name)), self._believed(name)
             below, above = self._reach(name, told) if entry.mode == "uncertainty" else (0.0, 0.0)
             found[name] = np.array([drawn(entry.mode, float(draw), told, below, above) for draw in draws])
         return found

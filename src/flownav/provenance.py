@@ -8,6 +8,7 @@ import shlex
 import sys
 from collections.abc import Iterable
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -38,6 +39,16 @@ def hash_of(file: Path) -> str:
     """SHA-256 of a file, hexadecimal."""
     with file.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+@cache
+def code_sha256() -> str:
+    """SHA-256 over the package's sources as they are now: results of another code are not to be mixed with these."""
+    package = Path(flownav.__file__).parent
+    found = hashlib.sha256()
+    for source in sorted(package.rglob("*.py")):
+        found.update(f"{source.relative_to(package).as_posix()} {hash_of(source)}\n".encode())
+    return found.hexdigest()
 
 
 def _files(path: Path) -> list[Path]:

@@ -9,6 +9,7 @@ import typer
 
 from flownav.cli import accuracy as accuracy
 from flownav.cli import bench as bench
+from flownav.cli import campaign as campaign
 from flownav.cli import compare as compare
 from flownav.cli import envelope as envelope
 from flownav.cli import export as export
@@ -51,6 +52,7 @@ for name, command, what in (
     ("flow", flow.command, "Optical flow of your own frames, as the PX4FLOW computes it."),
     ("pad", pad.command, "Find the landing pad in a frame; measure how well, by height."),
     ("paper", paper.command, "Every table of the paper, published and reproduced side by side."),
+    ("campaign", campaign.command, "Fly a scenario many times: accuracy with intervals, rare events."),
     ("accuracy", accuracy.command, "The landing filter against its targets, and what its pieces are worth."),
     ("envelope", envelope.command, "How surely a scenario lands, by the wind's speed and direction."),
     ("faults", faults.command, "Let sensors fail on a landing: when it is noticed, what it costs."),

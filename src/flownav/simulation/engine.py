@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
@@ -30,6 +31,8 @@ from flownav.simulation.truth import packed_truth
 
 Array = NDArray[np.float64]
 Result = TypeVar("Result")
+
+AHEAD = 4  # blocks that each thread may be ahead of who takes their results
 
 
 class Flown(NamedTuple):
@@ -139,9 +142,23 @@ def fly_blocks(
     with announce_compilation("batch"):
         nothing = flight._replace(plan=flight.plan._replace(epochs=0))
         fly_into(nothing, seed, first, LANES, buffers_of(nothing, LANES, 0, written=False))
-    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+    count = threads or os.cpu_count() or 1
+    with ThreadPoolExecutor(count) as pool:
         try:
-            yield from pool.map(fly, range(0, flights, len(LANES)))
+            yield from in_order(pool, fly, range(0, flights, len(LANES)), AHEAD * count)
         except BaseException:  # Ctrl-C drops what has not begun
             pool.shutdown(wait=False, cancel_futures=True)
             raise
+
+
+def in_order(
+    pool: ThreadPoolExecutor, do: Callable[[int], Result], each: Iterable[int], ahead: int
+) -> Iterator[Result]:
+    """What `do` makes of each, in order; so many at most are asked for ahead of what has been taken."""
+    waiting: deque[Future[Result]] = deque()
+    for one in each:
+        waiting.append(pool.submit(do, one))
+        if len(waiting) >= ahead:
+            yield waiting.popleft().result()
+    while waiting:
+        yield waiting.popleft().result()

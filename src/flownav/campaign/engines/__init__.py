@@ -1,0 +1,1 @@
+"""Where a campaign's flights are flown: on this machine's cores, on a cluster, on a GPU."""

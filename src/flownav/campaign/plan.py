@@ -1,0 +1,160 @@
+"""What a campaign flies: cells, each a scenario with its values of what is swept, and how their flights are drawn."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import flownav
+from flownav.campaign.sampling import Sampling, design_of
+from flownav.errors import InputError
+from flownav.parameter_files import check
+from flownav.provenance import code_sha256
+from flownav.simulation.assemble import Setup, assemble
+from flownav.simulation.ensemble import Ensemble
+from flownav.simulation.plan import Flight
+from flownav.simulation.scenario import Scenario
+
+SCHEMA_VERSION = 1
+MOST_CELLS = 10_000
+MOST_FLIGHTS = 100_000_000
+
+TruthModel = Literal["matched", "ensemble"]
+Value = float | bool | str
+Sweep = Mapping[str, Sequence[Value]]
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A cell made ready to fly. ensemble: what differs from flight to flight; None where nothing does."""
+
+    setup: Setup
+    ensemble: Ensemble | None
+
+    @property
+    def flight(self) -> Flight:
+        """What the kernel flies."""
+        return self.setup.flight
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One scenario of a campaign. values: of what is swept, by its name in the scenario file."""
+
+    scenario: Scenario
+    values: dict[str, Value]
+    truth_model: TruthModel
+    fixed: tuple[str, ...] = ()  # numbers of the world that the campaign sets, and no dispersion draws
+
+    @property
+    def label(self) -> str:
+        """The scenario's name and the cell's values."""
+        values = [f"{name}={_shown(value)}" for name, value in self.values.items()]
+        return " ".join([self.scenario.name, *values, self.truth_model])
+
+    @cached_property
+    def setup(self) -> Setup:
+        """The scenario made ready. InputError as `assemble`."""
+        setup = assemble(self.scenario)
+        drawn = {name: entry for name, entry in setup.dispersion.items() if name not in self.fixed}
+        return replace(setup, dispersion=drawn)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A campaign: every cell flies flights 0 to `flights - 1` of the seed."""
+
+    cells: tuple[Cell, ...]
+    seed: int
+    flights: int
+    sampling: Sampling = "plain"
+    until: str | None = None
+
+    def ready(self, cell: int) -> Ready:
+        """A cell made ready. InputError where its scenario or its dispersion cannot be."""
+        setup = self.cells[cell].setup
+        if self.cells[cell].truth_model == "matched":
+            return Ready(setup, None)
+        names = tuple(setup.ensemble().entries)
+        return Ready(setup, setup.ensemble(design_of(self.sampling, names, self.flights)))
+
+    @cached_property
+    def as_json(self) -> dict[str, Any]:
+        """The campaign as its folder says it; two campaigns of the same are the same flights."""
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "flownav": flownav.__version__,
+            "code_sha256": code_sha256(),
+            "seed": self.seed,
+            "flights": self.flights,
+            "sampling": self.sampling,
+            "until": self.until,
+            "cells": [
+                {
+                    "label": cell.label,
+                    "values": cell.values,
+                    "truth_model": cell.truth_model,
+                    "scenario": cell.scenario.model_dump(mode="json"),
+                    "parameters_sha256": _digest(cell),
+                }
+                for cell in self.cells
+            ],
+        }
+
+
+def planned(
+    scenarios: Sequence[Scenario],
+    sweeps: Sweep,
+    *,
+    truth_models: Sequence[TruthModel],
+    seed: int,
+    flights: int,
+    sampling: Sampling = "plain",
+    until: str | None = None,
+    changes: Mapping[str, Value] | None = None,
+) -> Plan:
+    """Every scenario with these changes at every combination of the swept values. InputError for one that cannot be."""
+    fixed, names = dict(changes or {}), tuple(sweeps)
+    combinations = [dict(zip(names, each, strict=True)) for each in itertools.product(*sweeps.values())]
+    count = len(scenarios) * len(combinations) * len(truth_models)
+    if count > MOST_CELLS:
+        raise InputError(f"--sweep: {count} combinations; at most {MOST_CELLS} are flown in one campaign")
+    cells = tuple(
+        Cell(changed(scenario, fixed | values), values, truth_model, (*fixed, *names))
+        for scenario in scenarios
+        for values in combinations
+        for truth_model in truth_models
+    )
+    return Plan(cells, seed, flights, sampling, until)
+
+
+def changed(scenario: Scenario, changes: Mapping[str, Value]) -> Scenario:
+    """The scenario with other values at dotted names of its file, checked anew. InputError names what is wrong."""
+    entries = scenario.model_dump(exclude_unset=True)
+    for name, value in changes.items():
+        inside, (*tables, key) = entries, name.split(".")
+        for table in tables:
+            inside = inside.setdefault(table, {})
+            if not isinstance(inside, dict):
+                raise InputError(f"{scenario.name}: {name}: {table} is no table of a scenario")
+        inside[key] = value
+    return check(entries, Scenario, f"{scenario.name} with {', '.join(changes)}") if changes else scenario
+
+
+def _shown(value: Value) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _digest(cell: Cell) -> str:
+    """SHA-256 of everything that the cell's flights are made of: the numbers of every file that it names."""
+    made_of = {
+        "parameters": cell.setup.parameters,
+        "dispersion": {name: entry.model_dump() for name, entry in sorted(cell.setup.dispersion.items())},
+        "vehicle": cell.setup.file.model_dump(),
+    }
+    return hashlib.sha256(json.dumps(made_of, sort_keys=True, default=str).encode()).hexdigest()

@@ -31,9 +31,15 @@ Sweep = Mapping[str, Sequence[Value]]
 
 @dataclass(frozen=True)
 class Ready:
-    """A cell made ready to fly. ensemble: what differs from flight to flight; None where nothing does."""
+    """A cell made ready to fly, of a campaign of so many flights.
+
+    ensemble: what differs from flight to flight; None where nothing does.
+    """
 
     setup: Setup
+    truth_model: TruthModel
+    sampling: Sampling
+    flights: int
     ensemble: Ensemble | None
 
     @property
@@ -77,11 +83,7 @@ class Plan:
 
     def ready(self, cell: int) -> Ready:
         """A cell made ready. InputError where its scenario or its dispersion cannot be."""
-        setup = self.cells[cell].setup
-        if self.cells[cell].truth_model == "matched":
-            return Ready(setup, None)
-        names = tuple(setup.ensemble().entries)
-        return Ready(setup, setup.ensemble(design_of(self.sampling, names, self.flights)))
+        return ready_of(self.cells[cell].setup, self.cells[cell].truth_model, self.sampling, self.flights)
 
     @cached_property
     def as_json(self) -> dict[str, Any]:
@@ -105,6 +107,14 @@ class Plan:
                 for cell in self.cells
             ],
         }
+
+
+def ready_of(setup: Setup, truth_model: TruthModel, sampling: Sampling, flights: int) -> Ready:
+    """A cell made ready. InputError where its dispersion cannot be."""
+    ensemble = None
+    if truth_model == "ensemble":
+        ensemble = setup.ensemble(design_of(sampling, tuple(setup.ensemble().entries), flights))
+    return Ready(setup, truth_model, sampling, flights, ensemble)
 
 
 def planned(

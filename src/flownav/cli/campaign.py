@@ -162,6 +162,10 @@ def _engine(name: str) -> Engine:
         from flownav.campaign.engines.local import Local
 
         return Local()
+    if name == "ray":
+        from flownav.campaign.engines.ray_cluster import RayCluster
+
+        return RayCluster()
     raise InputError(f"--engine {name}: not here yet")
 
 

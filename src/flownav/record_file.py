@@ -10,7 +10,6 @@ from __future__ import annotations
 import io
 import json
 import re
-import time
 import zipfile
 import zlib
 from pathlib import Path
@@ -70,7 +69,7 @@ class Manifest(BaseModel):
 
 
 def save(record: Record, path: Path, *, replacing: bool = False) -> None:
-    """Write a record as one file, whole or not at all; as `Record.save` says."""
+    """Write a record as one file, whole or not at all; as `Record.save` says. The same record is the same bytes."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -79,9 +78,9 @@ def save(record: Record, path: Path, *, replacing: bool = False) -> None:
         zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as bundle,
     ):
         manifest = {"schema": SCHEMA_VERSION, **record.manifest}
-        bundle.writestr(MANIFEST, json.dumps(manifest, indent=1, default=str))
+        bundle.writestr(zipfile.ZipInfo(MANIFEST), json.dumps(manifest, indent=1, default=str))
         for name, table in record.tables.items():
-            columns, entry = pa.table(table), zipfile.ZipInfo(f"{name}.parquet", time.localtime()[:6])
+            columns, entry = pa.table(table), zipfile.ZipInfo(f"{name}.parquet")
             with bundle.open(entry, "w", force_zip64=columns.nbytes >= zipfile.ZIP64_LIMIT) as stream:
                 pq.write_table(columns, pa.PythonFile(_Told(stream), "w"), compression="zstd")
             del columns

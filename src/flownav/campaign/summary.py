@@ -14,6 +14,7 @@ from flownav.campaign.plan import Plan
 from flownav.campaign.rows import INPUT
 from flownav.campaign.run import LANDING, TAKEOFF
 from flownav.campaign.store import Dataset
+from flownav.campaign.views import convergence, envelope, sensitivity
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
 from flownav.scoring.landings import EXPECTED
 
@@ -62,6 +63,7 @@ def cell_summary(plan: Plan, cell: int, data: Dataset) -> dict[str, Any]:
     counts, lands = Counter(verdicts.tolist()), was_to_land(rows)
     values = values_of(LANDING if lands else TAKEOFF, rows)
     order = np.argsort(values, kind="stable")
+    inputs = inputs_of(data, cell)
     said = [Flight(cell, int(k), _finite(values[k]), str(verdicts[k]), str(limits[k])) for k in order]
     return {
         "label": own.label,
@@ -73,6 +75,9 @@ def cell_summary(plan: Plan, cell: int, data: Dataset) -> dict[str, Any]:
         "scores": scores_of(rows),
         "verdicts": {name: counts[name.replace("_", " ")] for name in VERDICTS},
         "limited_by": dict(sorted(Counter(limits.tolist()).items(), key=lambda entry: (-entry[1], entry[0]))),
+        "convergence": convergence(LANDING if lands else TAKEOFF, values),
+        "envelope": envelope(inputs, verdicts == "landed"),
+        "sensitivity": sensitivity(inputs, values),
         "median": said[(len(said) - 1) // 2]._asdict(),
         "worst": [flight._asdict() for flight in reversed(said[-WORST:])],
     }

@@ -93,7 +93,7 @@ def command(
 def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) -> None:
     """Fly what the folder lacks; summary, records and page; what is said of them."""
     from flownav.campaign.run import run_campaign
-    from flownav.campaign.store import SUMMARY, Store
+    from flownav.campaign.store import REPORT, SUMMARY, Store
     from flownav.campaign.summary import summary_of
     from flownav.cli.campaign_progress import watching
 
@@ -105,7 +105,9 @@ def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) 
         summary = summary_of(plan, data)
         store.keep_text(SUMMARY, json.dumps(summary, indent=1) + "\n")
         kept = _keep_records(plan, summary, folder, records)
+        _keep_page(plan, summary, folder)
     where = {"rate_per_s": rate, "dataset": str(folder / "flights"), "records": kept}
+    where["report"] = str(folder / REPORT)
     if as_json:
         typer.echo(json.dumps(summary | where))
         return
@@ -130,6 +132,22 @@ def _keep_records(plan: Plan, summary: dict[str, Any], folder: Path, count: int)
             save(record_again(plan, cell, flight), path, report=True)
         found.append(str(path))
     return found
+
+
+def _keep_page(plan: Plan, summary: dict[str, Any], folder: Path) -> None:
+    """The campaign's page, with links to the flights' reports that lie in its folder."""
+    from flownav.campaign.measures import measured
+    from flownav.campaign.store import RECORDS, REPORT, Dataset
+    from flownav.report.campaign import write_campaign
+    from flownav.report.campaign_figures import Touchdowns
+
+    data, touched = Dataset(folder), []
+    for cell, planned in enumerate(plan.cells):
+        rows = data.rows(cell)
+        north, east, distance = (measured(f"touchdown.{name}_m", rows) for name in ("north", "east", "horizontal"))
+        touched.append(Touchdowns(north, east, distance, float(planned.scenario.pad.size_m)))
+    kept = sorted(f"{RECORDS}/{page.name}" for page in (folder / RECORDS).glob("*.html"))
+    write_campaign(summary, touched, kept, folder / REPORT)
 
 
 def _again(plan: Plan, flight: str, folder: Path, as_json: bool) -> None:

@@ -74,16 +74,11 @@ def _sections(record: Record) -> list[tuple[str, str, list[Panel]]]:
 
 def render(record: Record) -> str:
     """The page as text."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
-    from plotly.offline import get_plotlyjs
 
     shown = sections(record)
-    scripts = [get_plotlyjs().replace("\r", ""), (HERE / "page.js").read_text(encoding="utf-8")]
-    environment = Environment(
-        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    return environment.get_template("page.html.j2").render(
+    scripts, policy = page_scripts()
+    page: str = template("page.html.j2").render(
         title=content.title(record),
         kind=str(record.manifest.get("kind") or "flight"),
         description=str(record.manifest.get("description") or ""),
@@ -112,8 +107,27 @@ def render(record: Record) -> str:
         dark=Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
         style=Markup((HERE / "page.css").read_text(encoding="utf-8")),
         scripts=[Markup(script) for script in scripts],
-        policy=content_policy(scripts),
+        policy=policy,
     )
+    return page
+
+
+def template(name: str) -> Any:
+    """A page's template: what is put into it is escaped, and what it lacks is an error."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.get_template(name)
+
+
+def page_scripts() -> tuple[list[str], str]:
+    """The scripts that draw a page's figures, and the content policy that lets these and nothing else run."""
+    from plotly.offline import get_plotlyjs
+
+    scripts = [get_plotlyjs().replace("\r", ""), (HERE / "page.js").read_text(encoding="utf-8")]
+    return scripts, content_policy(scripts)
 
 
 def _thinned(record: Record) -> bool:

@@ -1,0 +1,175 @@
+"""A campaign as one HTML page that needs nothing but a browser: touchdowns, tails, envelope, worst flights."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from flownav import __version__, guard
+from flownav.report import campaign_figures as figures
+from flownav.report.campaign_figures import Touchdowns
+from flownav.report.figure_words import number
+from flownav.report.html import HERE, figure_json, inside_script, page_scripts, template
+from flownav.report.panels import Panel, Section
+from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
+
+MOST_CELLS = 8  # whose touchdowns are drawn
+FIGURES = {
+    "r50_m": "R50 at contact (m)",
+    "r95_m": "R95 at contact (m)",
+    "r997_m": "R99.7 at contact (m)",
+    "rest_r95_m": "R95 at rest (m)",
+    "p95_axis_m": "p95 of the largest error of one axis (m)",
+    "p95_horizontal_m": "p95 of the largest horizontal error (m)",
+}
+
+RADII = ("r50_m", "r95_m", "r997_m", "rest_r95_m")
+
+
+def write_campaign(summary: dict[str, Any], touchdowns: Sequence[Touchdowns], kept: Sequence[str], path: Path) -> None:
+    """Write the page, whole or not at all. OSError where the file cannot be written.
+
+    summary: as `summary.json` has it; touchdowns: of each cell; kept: pages of flights, relative to this one.
+    """
+    guard.write_page(render(summary, touchdowns, kept), path)
+
+
+def render(summary: dict[str, Any], touchdowns: Sequence[Touchdowns], kept: Sequence[str] = ()) -> str:
+    """The page as text."""
+    from markupsafe import Markup
+
+    shown = sections(summary, touchdowns)
+    scripts, policy = page_scripts()
+    page: str = template("campaign.html.j2").render(
+        title=", ".join(summary["scenarios"]),
+        facts=facts(summary),
+        sentence=sentence(summary["cells"][0]),
+        headings=headings(summary),
+        rows=[cell_row(cell, summary) for cell in summary["cells"]],
+        worst=[worst_row(one, summary, kept) for one in summary["worst"]],
+        limits=limits(summary),
+        sections=shown,
+        version=__version__,
+        palette=PALETTE,
+        font=Markup(FONT),
+        data={panel.key: Markup(figure_json(panel)) for section in shown for panel in section.panels if panel.figure},
+        dark=Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
+        style=Markup((HERE / "page.css").read_text(encoding="utf-8")),
+        scripts=[Markup(script) for script in scripts],
+        policy=policy,
+    )
+    return page
+
+
+def sections(summary: dict[str, Any], touchdowns: Sequence[Touchdowns]) -> list[Section]:
+    """The figures, in the order of the page."""
+    cells = summary["cells"]
+    lands = [k for k, cell in enumerate(cells) if "r95_m" in cell["figures"]][:MOST_CELLS]
+    reach_m = figures.common_reach_m([cells[k] for k in lands], [touchdowns[k] for k in lands])
+    pads = [figures.over_the_pad(f"pad-{k}", cells[k], touchdowns[k], reach_m) for k in lands]
+    swept = [figures.over_a_sweep(cells, name) for name in figures.swept_numbers(cells)]
+    tails = figures.tails([cells[k] for k in lands], [touchdowns[k] for k in lands]) if lands else None
+    parts: list[tuple[str, str, Sequence[Panel | None]]] = [
+        ("touchdowns", "Touchdowns over the pad", pads),
+        ("sweep", "Over what is swept", swept),
+        ("spread", "How far off, and how sure", [tails, figures.convergence(cells[:MOST_CELLS])]),
+        ("wind", "The wind that they landed in", [figures.envelope(f"wind-{k}", cells[k]) for k in lands]),
+        (
+            "inputs",
+            "What matters",
+            [figures.sensitivity(f"inputs-{k}", cell) for k, cell in enumerate(cells[:MOST_CELLS])],
+        ),
+    ]
+    drawn = [(key, title, tuple(panel for panel in panels if panel is not None)) for key, title, panels in parts]
+    return [Section(key, title, panels) for key, title, panels in drawn if panels]
+
+
+def facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
+    """What was flown."""
+    models = dict.fromkeys(cell["truth_model"] for cell in summary["cells"])
+    found = [
+        ("flights", f"{summary['flights']:,}"),
+        ("cells", str(len(summary["cells"]))),
+        ("seed", str(summary["seed"])),
+    ]
+    found += [("truth", " and ".join(models)), ("sampling", summary["sampling"])]
+    return [*found, *([("until", summary["until"])] if summary["until"] else [])]
+
+
+def sentence(cell: dict[str, Any]) -> str:
+    """The first cell's result in one sentence."""
+    figure = cell["figures"].get("r95_m")
+    if figure is None:
+        axis = cell["figures"]["p95_axis_m"]
+        return f"In 95 % of {cell['flights']} flights no axis was more than {_with_interval(axis)} m off."
+    landed = cell["figures"]["landed"]
+    share = f"{100 * landed['value']:.2f} % ({100 * landed['low']:.2f} to {100 * landed['high']:.2f} %)"
+    return (
+        f"Of {cell['flights']} flights of {cell['label']} {share} landed; 95 % of all first touched within "
+        f"{_with_interval(figure)} m of the pad's centre. In brackets: 95 % confidence intervals."
+    )
+
+
+def headings(summary: dict[str, Any]) -> list[str]:
+    """Of the table of cells."""
+    return ["cell", "flights", *(FIGURES[name] for name in columns(summary)), "landed (%)", "crashed", "went around"]
+
+
+def columns(summary: dict[str, Any]) -> list[str]:
+    """The figures of the table: radii of touchdown where any cell lands, errors of the estimate where none does."""
+    there = [name for name in FIGURES if any(name in cell["figures"] for cell in summary["cells"])]
+    return [name for name in there if name in RADII] or there
+
+
+def cell_row(cell: dict[str, Any], summary: dict[str, Any]) -> list[str]:
+    """A cell in the table."""
+    names = columns(summary)
+    landed = cell["figures"].get("landed")
+    share = "-" if "r95_m" not in cell["figures"] or landed is None else _percent(landed)
+    counts = cell["verdicts"]
+    figure_cells = [_with_interval(cell["figures"][name]) if name in cell["figures"] else "-" for name in names]
+    return [
+        cell["label"],
+        f"{cell['flights']:,}",
+        *figure_cells,
+        share,
+        str(counts["crashed"]),
+        str(counts["went_around"]),
+    ]
+
+
+def worst_row(one: dict[str, Any], summary: dict[str, Any], kept: Sequence[str]) -> dict[str, str]:
+    """A flight in the table of the worst."""
+    page = next((page for page in kept if page.endswith(f"cell-{one['cell']:03d}-flight-{one['flight']:06d}.html")), "")
+    return {
+        "place": f"{one['cell']}:{one['flight']}",
+        "cell": summary["cells"][one["cell"]]["label"],
+        "value": "-" if one["value"] is None else number(one["value"], 3),
+        "verdict": one["verdict"],
+        "limited_by": one["limited_by"],
+        "page": page,
+    }
+
+
+def limits(summary: dict[str, Any]) -> list[tuple[str, list[tuple[str, str]]]]:
+    """By cell, what limited its flights, in how many percent."""
+    return [
+        (
+            cell["label"],
+            [(name, f"{count} ({100 * count / cell['flights']:.1f} %)") for name, count in cell["limited_by"].items()],
+        )
+        for cell in summary["cells"][:MOST_CELLS]
+    ]
+
+
+def _with_interval(figure: dict[str, float | None]) -> str:
+    value, low, high = (figure[name] for name in ("value", "low", "high"))
+    if value is None:
+        return "-"
+    return f"{value:.3f} ({'?' if low is None else f'{low:.3f}'} to {'?' if high is None else f'{high:.3f}'})"
+
+
+def _percent(figure: dict[str, float]) -> str:
+    return f"{100 * figure['value']:.2f} ({100 * figure['low']:.2f} to {100 * figure['high']:.2f})"

@@ -1,0 +1,239 @@
+"""The figures of a campaign's page, from what its summary says and where its flights touched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.report.panels import Panel, drawn
+from flownav.report.style import COLOUR, axis, layout
+
+Array = NDArray[np.float64]
+
+DOTS = 2500
+ROLES = ("estimate", "gps", "flow", "autopilot", "alert", "smoothed", "muted", "pad")
+CIRCLES = (("r50_m", "R50", "flow"), ("r95_m", "R95", "estimate"), ("r997_m", "R99.7", "alert"))
+SCALE = [[0.0, COLOUR["alert"]], [0.8, "#e8b23a"], [0.95, "#a9cf6a"], [1.0, COLOUR["flow"]]]
+
+
+class Touchdowns(NamedTuple):
+    """Where the flights of a cell first touched, north and east of the pad's centre [m], (flights,); NaN: nowhere.
+
+    distance_m: from the pad's centre, infinite of a flight that crashed or did not touch. pad_m: a side of the pad.
+    """
+
+    north_m: Array
+    east_m: Array
+    distance_m: Array
+    pad_m: float
+
+
+def common_reach_m(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> float:
+    """How far from the pad's centre the maps of all cells reach, so that they can be compared [m]."""
+    radii = [cell["figures"][name]["value"] or 0.0 for cell in cells for name, _, _ in CIRCLES]
+    known = [one.distance_m[np.isfinite(one.distance_m)] for one in touched]
+    return 1.15 * max([0.05, *radii, *(float(np.quantile(each, 0.999)) for each in known if len(each))])
+
+
+def over_the_pad(key: str, cell: dict[str, Any], touched: Touchdowns, reach_m: float) -> Panel:
+    """Where a cell's flights first touched, with circles that hold 50, 95 and 99.7 % of all."""
+    from plotly.graph_objects import Figure
+
+    known = np.isfinite(touched.distance_m)
+    every = max(1, int(np.ceil(known.sum() / DOTS)))
+    east, north = touched.east_m[known][::every], touched.north_m[known][::every]
+    circles = [(title, role, cell["figures"][name]) for name, title, role in CIRCLES]
+    half, turn = 0.5 * touched.pad_m, np.linspace(0.0, 2.0 * np.pi, 181)
+    pad = {"type": "rect", "x0": -half, "x1": half, "y0": -half, "y1": half, "layer": "below",
+           "fillcolor": COLOUR["padfill"], "line": {"color": COLOUR["pad"], "width": 1}}  # fmt: skip
+    dots = {"type": "scatter", "mode": "markers", "name": "first contact", "x": drawn(east), "y": drawn(north),
+            "marker": {"color": COLOUR["truth"], "size": 3, "opacity": 0.35}, "hovertemplate": "%{y:.3f} m north, %{x:.3f} m east<extra></extra>"}  # fmt: skip # noqa: E501
+    data: list[dict[str, Any]] = [dots]
+    for title, role, figure in circles:
+        if figure["value"] is not None:
+            for end, style in (("low", "dot"), ("value", "solid"), ("high", "dot")):
+                if figure[end] is not None:
+                    line = {"color": COLOUR[role], "width": 2 if end == "value" else 1, "dash": style}
+                    name = f"{title} {figure['value']:.3f} m"
+                    data.append({"type": "scatter", "mode": "lines", "name": name, "showlegend": end == "value",
+                                 "legendgroup": title, "x": drawn(figure[end] * np.sin(turn)), "hoverinfo": "skip",
+                                 "y": drawn(figure[end] * np.cos(turn)), "line": line})  # fmt: skip
+    look = layout(440) | {"shapes": [pad], "hovermode": "closest"}
+    look["xaxis"] = axis("east of the pad's centre (m)") | {"range": [-reach_m, reach_m], "constrain": "domain"}
+    look["yaxis"] = axis("north (m)") | {"range": [-reach_m, reach_m], "scaleanchor": "x", "scaleratio": 1}
+    missing = int((~known).sum())
+    words = f"Solid: the radius that holds that share of all {cell['flights']} flights; dotted: its 95 % interval."
+    words += f" {missing} that crashed or did not touch count as infinitely far off." if missing else ""
+    alt = f"Places of first contact of {cell['label']} about the pad's centre"
+    return Panel(key, cell["label"], words, alt, Figure({"data": data, "layout": {"template": {}, **look}}))
+
+
+def tails(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> Panel:
+    """The share of flights that touched farther off than a distance, on a logarithmic axis."""
+    from plotly.graph_objects import Figure
+
+    data, farthest = [], 0.05
+    for number, (cell, one) in enumerate(zip(cells, touched, strict=True)):
+        far = np.sort(one.distance_m)
+        beyond = 1.0 - np.arange(1, len(far) + 1) / len(far)
+        places = np.geomspace(1, len(far), 300).astype(int)
+        kept = np.unique(np.concatenate([places - 1, len(far) - places]))
+        kept = kept[np.isfinite(far[kept]) & (beyond[kept] > 0.0)]
+        if len(kept):
+            farthest = max(farthest, float(far[kept].max()))
+            line = {"color": COLOUR[ROLES[number % len(ROLES)]], "width": 1.6, "shape": "hv"}
+            data.append({"type": "scatter", "mode": "lines", "name": cell["label"], "x": drawn(far[kept]),
+                         "y": drawn(100.0 * beyond[kept]), "line": line, "hovertemplate": "%{y:.3g} %"})  # fmt: skip
+    look = layout(360)
+    look["xaxis"] = axis("distance from the pad's centre (m)") | {"range": [0.0, 1.05 * farthest]}
+    look["yaxis"] = axis("flights beyond (%)") | {"type": "log", "dtick": 1}
+    words = "The share of all flights that first touched farther off than this, those that crashed among them."
+    figure = Figure({"data": data, "layout": {"template": {}, **look}})
+    return Panel("tails", "Share beyond a distance", words, "Share of flights beyond a distance from the pad", figure)
+
+
+def convergence(cells: Sequence[dict[str, Any]]) -> Panel | None:
+    """How the followed figure and its interval settled as the flights came in."""
+    from plotly.graph_objects import Figure
+
+    data: list[dict[str, Any]] = []
+    for number, cell in enumerate(cells):
+        steps = [step for step in cell["convergence"] if step["value"] is not None]
+        if not steps:
+            continue
+        colour, flights = COLOUR[ROLES[number % len(ROLES)]], [step["flights"] for step in steps]
+        for end in ("low", "high"):
+            data.append({"type": "scatter", "mode": "lines", "x": flights, "y": [step[end] for step in steps],
+                         "line": {"color": colour, "width": 0.8, "dash": "dot"}, "showlegend": False,
+                         "name": cell["label"], "legendgroup": cell["label"], "hoverinfo": "skip"})  # fmt: skip
+        data.append({"type": "scatter", "mode": "lines", "x": flights, "y": [step["value"] for step in steps],
+                     "line": {"color": colour, "width": 1.8}, "name": cell["label"], "legendgroup": cell["label"],
+                     "hovertemplate": "%{y:.3f} m"})  # fmt: skip
+    if not data:
+        return None
+    what = (
+        "R95 at contact"
+        if any("r95_m" in cell["figures"] for cell in cells)
+        else "p95 of the largest error of one axis"
+    )
+    look = layout(360)
+    look["xaxis"] = axis("flights") | {"type": "log", "dtick": 1}
+    look["yaxis"] = axis(f"{what} (m)") | {"rangemode": "tozero"}
+    figure = Figure({"data": data, "layout": {"template": {}, **look}})
+    words = (
+        "Solid: the figure after so many flights; dotted: its 95 % interval, which does not allow for looking often."
+    )
+    return Panel("convergence", "How it settled", words, f"{what} against the number of flights", figure)
+
+
+def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
+    """The share that landed by the wind's speed and the direction that it blew from."""
+    from plotly.graph_objects import Barpolar, Figure
+
+    if not cell["envelope"]:
+        return None
+    rings = sorted({one["from_m_s"] for one in cell["envelope"]})
+    figure = Figure()
+    for ring in rings:
+        own = [one for one in cell["envelope"] if one["from_m_s"] == ring and one["landed"] is not None]
+        figure.add_trace(
+            Barpolar(
+                base=[ring] * len(own), r=[one["to_m_s"] - ring for one in own],
+                theta=[one["direction_deg"] for one in own], width=[45.0] * len(own),
+                marker={"color": [one["landed"] for one in own], "coloraxis": "coloraxis",
+                        "line": {"color": COLOUR["surface"], "width": 1}},
+                hovertext=[_wind_words(one) for one in own], hoverinfo="text", showlegend=False,
+            )
+        )  # fmt: skip
+    low = min((one["landed"] for one in cell["envelope"] if one["landed"] is not None), default=0.0)
+    figure.update_layout(
+        layout(420)
+        | {
+            "template": {}, "hovermode": "closest",
+            "coloraxis": {"colorscale": SCALE, "cmin": min(low, 0.9), "cmax": 1.0,
+                          "colorbar": {"title": {"text": "landed"}, "tickformat": ".0%", "thickness": 12}},
+            "polar": {"bgcolor": "rgba(0,0,0,0)",
+                      "angularaxis": {"rotation": 90, "direction": "clockwise", "ticksuffix": "°",
+                                      "gridcolor": COLOUR["grid"],
+                                      "tickfont": {"color": COLOUR["muted"]}, "linecolor": COLOUR["rule"]},
+                      "radialaxis": {"ticksuffix": " m/s", "angle": 90, "gridcolor": COLOUR["grid"],
+                                     "tickfont": {"color": COLOUR["muted"]}, "linecolor": COLOUR["rule"]}},
+        }
+    )  # fmt: skip
+    words = "Share that landed, by the wind at 20 ft and where it blew from (north is up); each ring holds as many."
+    return Panel(key, cell["label"], words, f"Share landed by the wind of {cell['label']}", figure)
+
+
+def sensitivity(key: str, cell: dict[str, Any]) -> Panel | None:
+    """Which of the drawn inputs go with a touchdown far off: rank correlations with their intervals."""
+    from plotly.graph_objects import Figure
+
+    told = cell["sensitivity"][::-1]
+    if not told:
+        return None
+    values = [one["rank_correlation"] for one in told]
+    sure = [one["low"] > 0.0 or one["high"] < 0.0 for one in told]
+    bars = {
+        "type": "bar", "orientation": "h", "x": values, "y": [one["input"] for one in told], "showlegend": False,
+        "marker": {"color": [COLOUR["estimate"] if each else COLOUR["pad"] for each in sure]},
+        "error_x": {"type": "data", "symmetric": False, "color": COLOUR["muted"], "thickness": 1, "width": 3,
+                    "array": [one["high"] - one["rank_correlation"] for one in told],
+                    "arrayminus": [one["rank_correlation"] - one["low"] for one in told]},
+        "hovertemplate": "%{x:.2f}<extra></extra>",
+    }  # fmt: skip
+    look = layout(90 + 26 * len(told)) | {"hovermode": "closest"}
+    look["xaxis"] = axis("rank correlation with how far off it touched")
+    look["yaxis"] = axis() | {"automargin": True, "nticks": len(told)}
+    words = "The twelve strongest of Spearman's rank correlations, with 95 % intervals; grey: it may be nothing."
+    figure = Figure({"data": [bars], "layout": {"template": {}, **look}})
+    return Panel(key, cell["label"], words, f"Rank correlations of the inputs of {cell['label']}", figure)
+
+
+def swept_numbers(cells: Sequence[dict[str, Any]]) -> list[str]:
+    """What is swept over at least three numbers."""
+    names = dict.fromkeys(name for cell in cells for name in cell["values"])
+    numbers = {
+        name: {cell["values"][name] for cell in cells if isinstance(cell["values"][name], float)} for name in names
+    }
+    return [name for name, values in numbers.items() if len(values) >= 3]
+
+
+def over_a_sweep(cells: Sequence[dict[str, Any]], name: str) -> Panel:
+    """A figure over a swept number, one line for what else differs."""
+    from plotly.graph_objects import Figure
+
+    lands = any("r95_m" in cell["figures"] for cell in cells)
+    what, words = ("landed", "share that landed (%)") if lands else ("p95_axis_m", "p95 of one axis (m)")
+    lines: dict[str, list[dict[str, Any]]] = {}
+    for cell in cells:
+        rest = [f"{key}={value:g}" if isinstance(value, float) else f"{key}={value}"
+                for key, value in cell["values"].items() if key != name]  # fmt: skip
+        lines.setdefault(" ".join([cell["scenario"], *rest, cell["truth_model"]]), []).append(cell)
+    data, times = [], 100.0 if lands else 1.0
+    for number, (label, own) in enumerate(lines.items()):
+        told = [
+            (cell["values"][name], cell["figures"][what]) for cell in own if cell["figures"][what]["value"] is not None
+        ]
+        colour = COLOUR[ROLES[number % len(ROLES)]]
+        ends = {"array": [times * ((f["high"] if f["high"] is not None else f["value"]) - f["value"]) for _, f in told],
+                "arrayminus": [times * (f["value"] - f["low"]) for _, f in told]}  # fmt: skip
+        data.append({"type": "scatter", "mode": "lines+markers", "name": label, "x": [x for x, _ in told],
+                     "y": [times * f["value"] for _, f in told], "line": {"color": colour, "width": 1.6},
+                     "error_y": {"type": "data", "symmetric": False, "color": colour, "thickness": 1, **ends},
+                     })  # fmt: skip
+    look = layout(360)
+    look["xaxis"], look["yaxis"] = axis(name), axis(words)
+    figure = Figure({"data": data, "layout": {"template": {}, **look}})
+    return Panel(
+        f"sweep-{name.replace('.', '-')}", name, "Bars: 95 % intervals.", f"{words} over {name}", figure, wide=True
+    )
+
+
+def _wind_words(one: dict[str, Any]) -> str:
+    return (
+        f"{one['from_m_s']:.1f} to {one['to_m_s']:.1f} m/s from about {one['direction_deg']:g}°<br>"
+        f"landed {100 * one['landed']:.1f} % ({100 * one['low']:.1f} to {100 * one['high']:.1f} %) of {one['flights']}"
+    )

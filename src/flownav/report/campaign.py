@@ -75,7 +75,11 @@ def sections(summary: dict[str, Any], touchdowns: Sequence[Touchdowns]) -> list[
         ("touchdowns", "Touchdowns over the pad", pads),
         ("sweep", "Over what is swept", swept),
         ("spread", "How far off, and how sure", [tails, figures.convergence(cells[:MOST_CELLS])]),
-        ("wind", "The wind that they landed in", [figures.envelope(f"wind-{k}", cells[k]) for k in lands]),
+        (
+            "wind",
+            "The wind that they landed in",
+            [figures.swept_envelope(cells), *(figures.envelope(f"wind-{k}", cells[k]) for k in lands)],
+        ),
         (
             "inputs",
             "What matters",

@@ -14,6 +14,8 @@ from flownav.report.style import COLOUR, axis, layout
 Array = NDArray[np.float64]
 
 DOTS = 2500
+FAR_M = 2.0  # from here on distances are drawn on a logarithmic axis
+SPEED, DIRECTION = "wind.speed_20ft_m_s", "wind.from_direction_deg"
 ROLES = ("estimate", "gps", "flow", "autopilot", "alert", "smoothed", "muted", "pad")
 CIRCLES = (("r50_m", "R50", "flow"), ("r95_m", "R95", "estimate"), ("r997_m", "R99.7", "alert"))
 SCALE = [[0.0, COLOUR["alert"]], [0.8, "#e8b23a"], [0.95, "#a9cf6a"], [1.0, COLOUR["flow"]]]
@@ -32,10 +34,9 @@ class Touchdowns(NamedTuple):
 
 
 def common_reach_m(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> float:
-    """How far from the pad's centre the maps of all cells reach, so that they can be compared [m]."""
+    """How far from the pad's centre the maps of all cells reach, so that they can be compared [m]: a pad at most."""
     radii = [cell["figures"][name]["value"] or 0.0 for cell in cells for name, _, _ in CIRCLES]
-    known = [one.distance_m[np.isfinite(one.distance_m)] for one in touched]
-    return 1.15 * max([0.05, *radii, *(float(np.quantile(each, 0.999)) for each in known if len(each))])
+    return 1.15 * min(max([0.05, *radii]), max(one.pad_m for one in touched))
 
 
 def over_the_pad(key: str, cell: dict[str, Any], touched: Touchdowns, reach_m: float) -> Panel:
@@ -67,6 +68,8 @@ def over_the_pad(key: str, cell: dict[str, Any], touched: Touchdowns, reach_m: f
     missing = int((~known).sum())
     words = f"Solid: the radius that holds that share of all {cell['flights']} flights; dotted: its 95 % interval."
     words += f" {missing} that crashed or did not touch count as infinitely far off." if missing else ""
+    outside = int((np.maximum(abs(touched.north_m[known]), abs(touched.east_m[known])) > reach_m).sum())
+    words += f" {outside} touched outside of this map." if outside else ""
     alt = f"Places of first contact of {cell['label']} about the pad's centre"
     return Panel(key, cell["label"], words, alt, Figure({"data": data, "layout": {"template": {}, **look}}))
 
@@ -88,7 +91,8 @@ def tails(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> Pan
             data.append({"type": "scatter", "mode": "lines", "name": cell["label"], "x": drawn(far[kept]),
                          "y": drawn(100.0 * beyond[kept]), "line": line, "hovertemplate": "%{y:.3g} %"})  # fmt: skip
     look = layout(360)
-    look["xaxis"] = axis("distance from the pad's centre (m)") | {"range": [0.0, 1.05 * farthest]}
+    look["xaxis"] = axis("distance from the pad's centre (m)")
+    look["xaxis"] |= {"type": "log"} if farthest > FAR_M else {"range": [0.0, 1.05 * farthest]}
     look["yaxis"] = axis("flights beyond (%)") | {"type": "log", "dtick": 1}
     words = "The share of all flights that first touched farther off than this, those that crashed among them."
     figure = Figure({"data": data, "layout": {"template": {}, **look}})
@@ -129,6 +133,22 @@ def convergence(cells: Sequence[dict[str, Any]]) -> Panel | None:
     return Panel("convergence", "How it settled", words, f"{what} against the number of flights", figure)
 
 
+def swept_envelope(cells: Sequence[dict[str, Any]]) -> Panel | None:
+    """The same of a campaign that sweeps the wind's speed and direction: a ring a speed, a sector a direction."""
+    own = [cell for cell in cells if {SPEED, DIRECTION} <= set(cell["values"]) and "r95_m" in cell["figures"]]
+    speeds = sorted({cell["values"][SPEED] for cell in own})
+    if len(speeds) < 2:
+        return None
+    below = dict(zip(speeds, [0.0, *speeds], strict=False))
+    bins = []
+    for cell in own:
+        landed, speed = cell["figures"]["landed"], cell["values"][SPEED]
+        place = {"from_m_s": below[speed], "to_m_s": speed, "direction_deg": cell["values"][DIRECTION] % 360.0}
+        share = {"landed": landed["value"], "low": landed["low"], "high": landed["high"]}
+        bins.append(place | share | {"flights": cell["flights"]})
+    return envelope("wind-swept", {"label": own[0]["scenario"], "envelope": bins})
+
+
 def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
     """The share that landed by the wind's speed and the direction that it blew from."""
     from plotly.graph_objects import Barpolar, Figure
@@ -136,13 +156,14 @@ def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
     if not cell["envelope"]:
         return None
     rings = sorted({one["from_m_s"] for one in cell["envelope"]})
+    sectors = len({one["direction_deg"] for one in cell["envelope"]})
     figure = Figure()
     for ring in rings:
         own = [one for one in cell["envelope"] if one["from_m_s"] == ring and one["landed"] is not None]
         figure.add_trace(
             Barpolar(
                 base=[ring] * len(own), r=[one["to_m_s"] - ring for one in own],
-                theta=[one["direction_deg"] for one in own], width=[45.0] * len(own),
+                theta=[one["direction_deg"] for one in own], width=[360.0 / sectors] * len(own),
                 marker={"color": [one["landed"] for one in own], "coloraxis": "coloraxis",
                         "line": {"color": COLOUR["surface"], "width": 1}},
                 hovertext=[_wind_words(one) for one in own], hoverinfo="text", showlegend=False,
@@ -163,7 +184,7 @@ def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
                                      "tickfont": {"color": COLOUR["muted"]}, "linecolor": COLOUR["rule"]}},
         }
     )  # fmt: skip
-    words = "Share that landed, by the wind at 20 ft and where it blew from (north is up); each ring holds as many."
+    words = "Share that landed, by the wind at 20 ft and where it blew from (north is up)."
     return Panel(key, cell["label"], words, f"Share landed by the wind of {cell['label']}", figure)
 
 

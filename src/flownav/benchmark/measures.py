@@ -8,12 +8,13 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
+from flownav.benchmark.campaigns import campaigns
+from flownav.benchmark.figure import Figure
 from flownav.benchmark.timing import REPEATS, best_of
 from flownav.compile import LANES, ONE_LANE
 from flownav.estimation.paper_filter import PaperModel
@@ -22,28 +23,6 @@ from flownav.simulation.plan import Flight
 
 PART_STEPS, PART_ROUNDS = 1000, 50
 NAVIGATORS_SHARE = 4  # the navigator's batch is so many times smaller
-
-
-@dataclass(frozen=True)
-class Figure:
-    """One measured figure: what it is, its value and unit, what was asked, and whether more or less is better.
-
-    asked None: it stands beside the others and nothing was asked of it.
-    """
-
-    name: str
-    value: float
-    unit: str
-    asked: float | None
-    more_is_better: bool
-    note: str = ""
-
-    @property
-    def reached(self) -> bool | None:
-        """Whether the figure is at least as good as asked."""
-        if self.asked is None:
-            return None
-        return self.value >= self.asked if self.more_is_better else self.value <= self.asked
 
 
 def measure_all(flights: int) -> Iterator[list[Figure]]:
@@ -58,7 +37,7 @@ def measure_all(flights: int) -> Iterator[list[Figure]]:
     yield list(replay_of_recorded_flight())
     yield [help_time()]
     yield cold_compiles()
-    yield [memory_of_many_flights()]
+    yield campaigns(flights)
 
 
 MEASUREMENTS = 10
@@ -266,17 +245,3 @@ def cold_compiles() -> list[Figure]:
         note = f"whole process {cold:.1f} s, warm {warm:.2f} s"
         figures.append(Figure(f"cold compile of `fly landing{name}`", cold - warm, "s", asked, False, note))
     return figures
-
-
-def memory_of_many_flights(flights: int = 10_000) -> Figure:
-    """Peak memory of a process that flies and scores many flights."""
-    script = (
-        "import resource\n"
-        "from flownav.benchmark.measures import _landing\n"
-        "from flownav.campaign.local import fly_many\n"
-        f"fly_many(_landing('paper'), 1, {flights})\n"
-        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
-    )
-    done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
-    megabytes = int(done.stdout.split()[-1]) / 1024.0
-    return Figure(f"peak memory, {flights} flights' scores", megabytes, "MB", 500.0, False)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from flownav.campaign.measures import CRASH, NOT_LANDED, measured
 from flownav.errors import InputError
-from flownav.scoring.percentiles import percentile_with_interval
+from flownav.scoring.percentiles import percentile_with_interval, share_with_interval
 
 Array = NDArray[np.float64]
 
@@ -69,11 +69,7 @@ def figure_of(name: str, values: Array, confidence: float = CONFIDENCE) -> Inter
     share = FIGURES[name].share
     if share is not None:
         return Interval(*percentile_with_interval(values, share, confidence))
-    from scipy.stats import binomtest
-
-    kept = int((values == 0.0).sum())
-    ends = binomtest(kept, len(values)).proportion_ci(confidence, method="exact")
-    return Interval(kept / len(values), float(ends.low), float(ends.high))
+    return Interval(*share_with_interval(int((values == 0.0).sum()), len(values), confidence))
 
 
 def values_of(name: str, rows: Array) -> Array:

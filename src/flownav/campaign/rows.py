@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.campaign.arrow import numbers, words
 from flownav.campaign.local import counted_steps, home_epoch, score_history
 from flownav.campaign.measures import ROW_COLUMNS, measured
 from flownav.record import POSITION_NED
@@ -58,13 +59,17 @@ def table_of(cell: int, values: dict[str, Any], first: int, rows: Array, inputs:
 
     landings = touchdown_rows(rows[:, : len(SCORE_COLUMNS)])
     count = len(rows)
+    swept = {
+        name: words([value] * count) if isinstance(value, str) else numbers(np.full(count, float(value)))
+        for name, value in values.items()
+    }
     names = {
-        "cell": pa.array(np.full(count, cell, np.int32)),
-        "flight": pa.array(np.arange(first, first + count, dtype=np.int64)),
-        **{f"{SWEPT}{name}": pa.array([value] * count) for name, value in values.items()},
-        "verdict": pa.array([verdict_of(row) for row in landings]).dictionary_encode(),
-        "limited_by": pa.array([limited_by(row) for row in rows]).dictionary_encode(),
-        **{name: pa.array(np.ascontiguousarray(rows[:, i])) for i, name in enumerate(ROW_COLUMNS)},
-        **{f"{INPUT}{name}": pa.array(np.asarray(drawn, float)) for name, drawn in inputs.items()},
+        "cell": numbers(np.full(count, cell, np.int32)),
+        "flight": numbers(np.arange(first, first + count, dtype=np.int64)),
+        **{f"{SWEPT}{name}": column for name, column in swept.items()},
+        "verdict": words([verdict_of(row) for row in landings]),
+        "limited_by": words([limited_by(row) for row in rows]),
+        **{name: numbers(rows[:, i]) for i, name in enumerate(ROW_COLUMNS)},
+        **{f"{INPUT}{name}": numbers(np.asarray(drawn, float)) for name, drawn in inputs.items()},
     }
     return pa.table(names)

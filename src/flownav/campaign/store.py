@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.campaign import arrow
 from flownav.campaign.measures import ROW_COLUMNS
 from flownav.campaign.plan import Plan
 from flownav.errors import InputError
@@ -140,27 +141,23 @@ class Dataset:
     def table(self, cell: int, columns: list[str] | None = None) -> Any:
         """A cell's flights as an Arrow table, flight by flight."""
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
-        tables = [pq.read_table(path, columns=columns, partitioning=None) for path in self.parts(cell)]
+        tables = [arrow.read(path, columns) for path in self.parts(cell)]
         return pa.concat_tables(tables).unify_dictionaries() if tables else pa.table({})
 
     def column(self, cell: int, name: str) -> NDArray[Any]:
         """One column of a cell, (flights,)."""
-        return np.asarray(self.table(cell, [name])[name].to_numpy())
+        return arrow.column(self.table(cell, [name]), name)
 
     def rows(self, cell: int) -> Array:
         """The scores of a cell, (flights, len(ROW_COLUMNS)): flights in order."""
         table = self.table(cell, list(ROW_COLUMNS))
-        return np.column_stack([table[name].to_numpy() for name in ROW_COLUMNS])
+        return np.column_stack([arrow.column(table, name) for name in ROW_COLUMNS])
 
     def rows_of_part(self, cell: int, part: int) -> Array:
         """The scores of one file."""
-        import pyarrow.parquet as pq
-
-        path = part_path(self.folder, cell, part)
-        table = pq.read_table(path, columns=list(ROW_COLUMNS), partitioning=None)
-        return np.column_stack([table[name].to_numpy() for name in ROW_COLUMNS])
+        table = arrow.read(part_path(self.folder, cell, part), ROW_COLUMNS)
+        return np.column_stack([arrow.column(table, name) for name in ROW_COLUMNS])
 
     def scores(self, cell: int) -> Array:
         """The same as (flights, len(SCORE_COLUMNS))."""

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.campaign import arrow
 from flownav.campaign.figures import CONFIDENCE, FIGURES, confidence_of_a_look, figure_of, spread_of, stop_of, values_of
 from flownav.campaign.measures import MEASURES, measured
 from flownav.campaign.plan import Plan
@@ -119,7 +120,7 @@ def inputs_of(data: Dataset, cell: int) -> dict[str, Array]:
     """The dispersed numbers of a cell's flights by name, each (flights,)."""
     table = data.table(cell)
     names = [name for name in table.column_names if name.startswith(INPUT)]
-    return {name.removeprefix(INPUT): table[name].to_numpy() for name in names}
+    return {name.removeprefix(INPUT): arrow.column(table, name) for name in names}
 
 
 def _finite(value: float) -> float | None:

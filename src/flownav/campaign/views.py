@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.campaign.figures import figure_of
+from flownav.scoring.percentiles import share_with_interval
 
 Array = NDArray[np.float64]
 
@@ -34,8 +35,6 @@ def envelope(inputs: Mapping[str, Array], landed: NDArray[np.bool_]) -> list[dic
     """
     if SPEED not in inputs or DIRECTION not in inputs or len(landed) < LEAST * RINGS or np.ptp(inputs[SPEED]) == 0.0:
         return []
-    from scipy.stats import binomtest
-
     speed, direction = inputs[SPEED], inputs[DIRECTION] % 360.0
     edges, width = np.quantile(speed, np.linspace(0.0, 1.0, RINGS + 1)), 360.0 / SECTORS
     edges[0] = 0.0
@@ -45,16 +44,14 @@ def envelope(inputs: Mapping[str, Array], landed: NDArray[np.bool_]) -> list[dic
     for k in range(RINGS):
         for s in range(SECTORS):
             own = landed[(ring == k) & (sector == s)]
-            ends = binomtest(int(own.sum()), len(own)).proportion_ci(0.95) if len(own) else None
+            share = share_with_interval(int(own.sum()), len(own)) if len(own) else (None, None, None)
             found.append(
                 {
                     "from_m_s": float(edges[k]),
                     "to_m_s": float(edges[k + 1]),
                     "direction_deg": s * width,
                     "flights": len(own),
-                    "landed": float(own.mean()) if ends else None,
-                    "low": float(ends.low) if ends else None,
-                    "high": float(ends.high) if ends else None,
+                    **dict(zip(("landed", "low", "high"), share, strict=True)),
                 }
             )
     return found

@@ -36,7 +36,7 @@ class Touchdowns(NamedTuple):
 def common_reach_m(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> float:
     """How far from the pad's centre the maps of all cells reach, so that they can be compared [m]: a pad at most."""
     radii = [cell["figures"][name]["value"] or 0.0 for cell in cells for name, _, _ in CIRCLES]
-    return 1.15 * min(max([0.05, *radii]), max(one.pad_m for one in touched))
+    return 1.15 * min(max([0.05, *radii]), max((one.pad_m for one in touched), default=1.0))
 
 
 def over_the_pad(key: str, cell: dict[str, Any], touched: Touchdowns, reach_m: float) -> Panel:

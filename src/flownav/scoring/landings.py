@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.scoring.percentiles import percentile_with_interval, spread
+from flownav.scoring.percentiles import percentile_with_interval, share_with_interval, spread
 from flownav.scoring.touchdown import CONTACT, LIMITED_BY, REST, TOUCHDOWN_COLUMNS, names_of
 
 Array = NDArray[np.float64]
@@ -105,12 +105,9 @@ def radius(rows: Array, distance: int) -> dict[str, Any]:
 
 
 def success(rows: Array) -> dict[str, float]:
-    """Share of the flights that landed, and its 95 % interval after Clopper and Pearson (Biometrika 26, 1934)."""
-    from scipy.stats import binomtest
-
-    landed = int(succeeded(rows).sum())
-    interval = binomtest(landed, len(rows)).proportion_ci(CONFIDENCE, method="exact")
-    return {"rate": landed / len(rows), "low": float(interval.low), "high": float(interval.high)}
+    """Share of the flights that landed, and its 95 % interval."""
+    rate, low, high = share_with_interval(int(succeeded(rows).sum()), len(rows), CONFIDENCE)
+    return {"rate": rate, "low": low, "high": high}
 
 
 def _spreads(rows: Array, group: str, names: tuple[str, ...]) -> dict[str, Any]:

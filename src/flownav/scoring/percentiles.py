@@ -38,3 +38,15 @@ def spread(values: Array) -> dict[str, float] | None:
         return None
     low, median, high = np.percentile(values, [5, 50, 95])
     return {"median": float(median), "p05": float(low), "p95": float(high)}
+
+
+def share_with_interval(count: int, of: int, confidence: float = 0.95) -> tuple[float, float, float]:
+    """A share and its confidence interval after Clopper and Pearson (Biometrika 26, 1934). ValueError of nothing."""
+    from scipy.special import betaincinv
+
+    if of == 0:
+        raise ValueError("a share of nothing")
+    tail = 0.5 * (1.0 - confidence)
+    low = float(betaincinv(count, of - count + 1, tail)) if count else 0.0
+    high = float(betaincinv(count + 1, of - count, 1.0 - tail)) if count < of else 1.0
+    return count / of, low, high

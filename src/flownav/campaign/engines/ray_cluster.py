@@ -48,6 +48,10 @@ class RayCluster:
             except (ConnectionError, RuntimeError, ValueError) as error:
                 raise InputError(f"--engine ray: no cluster at {where}: {str(error).splitlines()[0]}") from None
 
+    def close(self) -> None:
+        """Leave the cluster; one of this machine alone ends."""
+        self._ray.shutdown()
+
     def fly(
         self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
     ) -> Iterator[tuple[Part, Array]]:

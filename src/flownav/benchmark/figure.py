@@ -1,0 +1,27 @@
+"""One figure of `flownav bench`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One measured figure: what it is, its value and unit, what was asked, and whether more or less is better.
+
+    asked None: it stands beside the others and nothing was asked of it.
+    """
+
+    name: str
+    value: float
+    unit: str
+    asked: float | None
+    more_is_better: bool
+    note: str = ""
+
+    @property
+    def reached(self) -> bool | None:
+        """Whether the figure is at least as good as asked."""
+        if self.asked is None:
+            return None
+        return self.value >= self.asked if self.more_is_better else self.value <= self.asked

@@ -188,6 +188,14 @@ def test_readings_outside_the_references_time_are_refused():
         fit([data(t_y=t_s + 100.0)], Structure(0))
 
 
+def test_readings_that_move_only_outside_the_references_reach_are_refused():
+    t_s, y = np.arange(90) * 0.1, np.zeros(90)
+    y[:2] = 1e6, -3.0  # before the longest delay has passed
+    for order in range(3):
+        with pytest.raises(InputError, match="velocity is constant"):
+            fit([experiment("log", t_s, np.sin(t_s), t_s, y)], Structure(order))
+
+
 @settings(max_examples=30, deadline=None)
 @given(
     values=st.lists(st.floats(-1e6, 1e6), min_size=60, max_size=90),

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from flownav.campaign.engines.engine import Engine
     from flownav.campaign.plan import Plan
 
+FLIGHTS, FLIGHTS_UNTIL = 1000, 100_000
 ENGINES = ("local", "ray", "cuda")
 TRUTH_MODELS = ("ensemble", "matched", "both")
 
@@ -24,7 +25,9 @@ def command(
     scenarios: Annotated[
         list[str], typer.Argument(help="Scenarios: takeoff, landing, approach, ..., or files (TOML).")
     ],
-    flights: Annotated[int, typer.Option(help="Flights of each cell; with --until the most.")] = 1000,
+    flights: Annotated[
+        int | None, typer.Option(help="Flights of each cell, 1000 if not given; with --until the most, then 100000.")
+    ] = None,
     until: Annotated[
         str | None, typer.Option(help='Stop when an interval is narrow enough: "r95_m width <= 0.005".')
     ] = None,
@@ -62,6 +65,7 @@ def command(
     from flownav.guard import an_input
     from flownav.simulation.scenario import load_scenario, with_vehicle
 
+    flights = flights if flights is not None else FLIGHTS_UNTIL if until is not None else FLIGHTS
     require_between("--flights", flights, 1, MOST_FLIGHTS)
     require_between("--seed", seed, 0, 2**63 - 1)
     require_between("--records", records, 0, 1000)

@@ -23,6 +23,7 @@ LIGHT_DAMPING = 1e-2  # up to which a step that gains next to nothing is the las
 START_WEIGHT = 1e-4  # of the belief that a run starts at rest, against one reading's of 1
 START_TIME_S = 0.1  # unit of a start's rates
 SMALLEST_EIGENVALUE = 1e-14
+SMALLEST_DIAGONAL = 1e-100  # beside the largest: far below what any data give, far above what overflows
 STIFFEST = 100.0  # rate x step of a model that is tried: faster ones cannot be told from none
 LARGEST_PRODUCT = 1e60  # of an unstable model: it has no cost
 
@@ -162,10 +163,19 @@ def normal_equations(parts: Sequence[Linearised], count: int) -> Normal:
 
 def _solve(matrix: Array, gradient: Array, damping: float) -> Array:
     """The damped step in columns scaled to one."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
+    scale, values, vectors = _scaled(matrix)
+    return np.asarray(vectors @ ((vectors.T @ (gradient / scale)) / (values + damping)) / scale)
+
+
+def _scaled(matrix: Array) -> tuple[Array, Array, Array]:
+    """Scales of the columns, and eigenvalues and eigenvectors of the matrix in columns scaled to one.
+
+    Neither a scale nor an eigenvalue is nothing beside the largest: what a matrix does not hold is very uncertain.
+    """
+    diagonal = np.diag(matrix)
+    scale = np.sqrt(np.maximum(diagonal, max(SMALLEST_DIAGONAL * float(diagonal.max(initial=0.0)), 1e-150)))
     values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    values = np.maximum(values, SMALLEST_EIGENVALUE * max(values[-1], 1e-300)) + damping
-    return np.asarray(vectors @ ((vectors.T @ (gradient / scale)) / values) / scale)
+    return scale, np.maximum(values, SMALLEST_EIGENVALUE * max(values[-1], 1e-300)), vectors
 
 
 def _own_steps(normal: Normal, step: Array) -> list[Array]:
@@ -222,7 +232,5 @@ def descend(runs: Sequence[Experiment], structure: Structure, state: State, iter
 
 def inverse_of(matrix: Array) -> Array:
     """The inverse of an information matrix; what it does not hold is very uncertain, not an error."""
-    scale = np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    values = np.maximum(values, SMALLEST_EIGENVALUE * max(values[-1], 1e-300))
+    scale, values, vectors = _scaled(matrix)
     return np.asarray((vectors / values) @ vectors.T / np.outer(scale, scale))

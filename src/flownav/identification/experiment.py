@@ -30,13 +30,17 @@ class Experiment:
     height_m: float = float("nan")
 
     def within(self, delay_range_s: tuple[float, float]) -> Experiment:
-        """The run without readings that a delay in this range takes outside the input's time."""
+        """The run without readings that a delay in this range takes outside the input's time.
+
+        InputError where too few are left, or where these do not move.
+        """
         inside = (self.t_y - delay_range_s[1] >= self.t_u[0]) & (self.t_y - delay_range_s[0] <= self.t_u[-1])
         if np.count_nonzero(inside) < LEAST_READINGS:
             raise InputError(
                 f"{self.name}: {np.count_nonzero(inside)} sensor readings lie inside the reference's time; at least "
                 f"{LEAST_READINGS} are needed, beyond the first {delay_range_s[1]:g} s"
             )
+        _require_motion(self.name, "sensor", self.y[inside])
         return Experiment(self.name, self.t_u, self.u, self.t_y[inside], self.y[inside], self.between, self.height_m)
 
     def between_times(self, start_s: float, end_s: float) -> Experiment:
@@ -69,8 +73,11 @@ def experiment(name: str, t_u: Array, u: Array, t_y: Array, y: Array, height_m: 
         if np.any(np.diff(t_s) <= 0.0):
             row = int(np.argmax(np.diff(t_s) <= 0.0))
             raise InputError(f"{name}: {what}: time does not increase after {t_s[row]:g} s; sort and remove repeats")
-        if np.ptp(value) < LEAST_MOTION:
-            raise InputError(
-                f"{name}: the {what}'s velocity is constant ({value[0]:g} m/s); a run that moves is needed"
-            )
+        _require_motion(name, what, value)
     return Experiment(name, t_u, u, t_y, y, distinct_steps(np.diff(t_u)), height_m)
+
+
+def _require_motion(name: str, what: str, velocity: Array) -> None:
+    """InputError where a velocity is the same throughout [m/s]."""
+    if np.ptp(velocity) < LEAST_MOTION:
+        raise InputError(f"{name}: the {what}'s velocity is constant ({velocity[0]:g} m/s); a run that moves is needed")

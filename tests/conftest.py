@@ -11,7 +11,7 @@ import pytest
 from places import SHARED
 
 # a loaded machine draws slowly, and says nothing of the test by that
-hypothesis.settings.register_profile("flownav", suppress_health_check=[hypothesis.HealthCheck.too_slow])
+hypothesis.settings.register_profile("flownav", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow])
 hypothesis.settings.load_profile("flownav")
 
 

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from flownav.live.byte_links import SerialLink
 from flownav.live.link import open_link, parse_url
 from flownav.live.outgoing import MOST_WAITING, Outgoing, message_id_of
-from flownav.live.rates import ARDUPILOT, LOOK_S, PX4, SHARE, STREAMS, Rates, bytes_of, plan
+from flownav.live.rates import LOOK_S, SHARE, STREAMS, Rates, bytes_of, plan
 from flownav.live.traffic import Traffic, in_words, traffic_facts
-from flownav.mavlink.dialect import coder
+from flownav.mavlink.dialect import ARDUPILOT, PX4, coder
 from flownav.mavlink.framing import StreamFrames
 from live_ends import Hover, Wire
 

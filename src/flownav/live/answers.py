@@ -9,7 +9,7 @@ from flownav.estimation.states import PAD, STATE
 from flownav.frames import Vector, rotation_from_quaternion, to_body
 from flownav.live.options import Options
 from flownav.live.reception import Vehicle
-from flownav.mavlink.dialect import Message, coder
+from flownav.mavlink.dialect import INVALID_AUTOPILOT, PX4, Message, coder
 from flownav.mavlink.outgoing import Estimate, landing_target, odometry, vision_position_estimate, vision_speed_estimate
 from flownav.mavlink.position_messages import LOCAL_FRD, LOCAL_NED
 from flownav.mavlink.sensors_outgoing import MAVLINK_VERSION
@@ -18,7 +18,6 @@ from flownav.navigation.loop import Running
 from flownav.navigation.memory import PAD_KNOWN
 from flownav.navigation.place import SEEN
 
-PX4, INVALID_AUTOPILOT = 12, 8
 ONBOARD_CONTROLLER, ACTIVE = 18, 4  # MAV_TYPE, MAV_STATE
 ODOMETRY_COMPONENT = 197  # MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY
 OWN_SYSTEM = 1  # until the vehicle's is known, which we then are of

@@ -18,7 +18,51 @@ RECONNECT_S = 1.0  # for a call to be answered
 UNHEARD_MS = 5000  # a peer that acknowledges nothing for so long is gone
 
 
-class TcpLink(Link):
+class ByteLink(Link):
+    """A stream of bytes: a frame is put in line whole, and what the other side takes is sent."""
+
+    def __init__(self, address: Address, capacity_bytes_s: float | None = None) -> None:
+        super().__init__(address)
+        self._address = address
+        self._outgoing = Outgoing(self.counts, capacity_bytes_s)
+        self._tries = 0
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there is somebody to send to."""
+        raise NotImplementedError
+
+    def write(self, frame: bytes) -> None:
+        """Send whole what is taken now; the rest waits. Where nobody is there, count it."""
+        if not self.is_open:
+            self.counts["not_sent"] += 1
+            return
+        self._outgoing.put(frame)
+        self._flush()
+
+    def _flush(self) -> None:
+        try:
+            self.written += self._outgoing.flush(self._taken, time.monotonic())
+        except OSError:
+            self._broken()
+
+    def _taken(self, content: bytes) -> int:
+        """How much is taken at once."""
+        try:
+            return self._sent(content)
+        except BlockingIOError:
+            return 0
+
+    def _sent(self, content: bytes) -> int:
+        """Send; how much. OSError where that fails."""
+        raise NotImplementedError
+
+    def _broken(self) -> None:
+        """Give up what is broken; it is made again."""
+        raise NotImplementedError
+
+
+class TcpLink(ByteLink):
     """A connection that is made again when it breaks: by calling (tcp) or by waiting for a caller (tcpin).
 
     Only the first call waits, before anything flies: later ones go to the same address and never stop the session.
@@ -26,13 +70,10 @@ class TcpLink(Link):
 
     def __init__(self, address: Address) -> None:
         super().__init__(address)
-        self._address = address
-        self._outgoing = Outgoing(self.counts)
         self._server: socket.socket | None = None
         self._connection: socket.socket | None = None
         self._calling: socket.socket | None = None
         self._called_s = 0.0
-        self._tries = 0
         if address.kind == "tcpin":
             family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
             everywhere = address.host == EVERYWHERE_6 and socket.has_dualstack_ipv6()
@@ -122,26 +163,14 @@ class TcpLink(Link):
         self._connection = None
         self._outgoing.clear()
 
-    def write(self, frame: bytes) -> None:
-        """Send what the connection takes now; the rest waits."""
-        if self._connection is None:
-            self.counts["not_sent"] += 1
-            return
-        self._outgoing.put(frame)
-        self._flush()
+    @property
+    def is_open(self) -> bool:
+        """Whether there is a connection."""
+        return self._connection is not None
 
-    def _flush(self) -> None:
-        try:
-            self.written += self._outgoing.flush(self._taken, time.monotonic())
-        except OSError:
-            self._broken()
-
-    def _taken(self, content: bytes) -> int:
+    def _sent(self, content: bytes) -> int:
         assert self._connection is not None
-        try:
-            return self._connection.send(content)
-        except BlockingIOError:
-            return 0
+        return self._connection.send(content)
 
     def close(self) -> None:
         """Close connection and server."""
@@ -151,17 +180,14 @@ class TcpLink(Link):
             self._server.close()
 
 
-class SerialLink(Link):
+class SerialLink(ByteLink):
     """A serial port that is opened again when its cable was pulled.
 
     What is written goes to the file and not through pyserial, whose write tries again for ever while the port is full.
     """
 
     def __init__(self, address: Address) -> None:
-        super().__init__(address)
-        self._address = address
-        self._outgoing = Outgoing(self.counts, address.capacity_bytes_s)
-        self._tries = 0
+        super().__init__(address, address.capacity_bytes_s)
         self._port: Any = self._opened()
 
     def _opened(self) -> Any:
@@ -195,25 +221,16 @@ class SerialLink(Link):
         self.received += len(piece)
         return [(piece, None)] if piece else []
 
-    def write(self, frame: bytes) -> None:
-        """Send whole, when the line's pace allows it; or count it."""
-        if self._port is None:
-            self.counts["not_sent"] += 1
-            return
-        self._outgoing.put(frame)
-        self._flush()
+    @property
+    def is_open(self) -> bool:
+        """Whether the port is open."""
+        return self._port is not None
 
-    def _flush(self) -> None:
-        try:
-            self.written += self._outgoing.flush(self._taken, time.monotonic())
-        except OSError:
-            self.close()
+    def _sent(self, content: bytes) -> int:
+        return os.write(self._port.fileno(), content)
 
-    def _taken(self, content: bytes) -> int:
-        try:
-            return os.write(self._port.fileno(), content)
-        except BlockingIOError:
-            return 0
+    def _broken(self) -> None:
+        self.close()
 
     def close(self) -> None:
         """Close the port."""

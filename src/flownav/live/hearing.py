@@ -11,13 +11,12 @@ from flownav.live.horizon import Horizon, Waiting
 from flownav.live.lags import Lags
 from flownav.live.options import Options
 from flownav.live.origin import Origin
-from flownav.live.rates import ARDUPILOT
 from flownav.live.reception import Vehicle, sender_of
 from flownav.live.serving import LATE, Serving
 from flownav.live.sources import Source, Sources
 from flownav.live.timing import VehicleClock
 from flownav.mavlink.converted import Context, Dropped, Pose
-from flownav.mavlink.dialect import Message
+from flownav.mavlink.dialect import ARDUPILOT, Message
 from flownav.mavlink.messages import instance_of, measurements
 from flownav.mavlink.position_messages import LEAST_FIX, fix_deg_m
 from flownav.measurement import Measurement, Sensor

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-ARDUPILOT, PX4 = 3, 12  # MAV_AUTOPILOT
+from flownav.mavlink.dialect import ARDUPILOT, PX4
+
 # of estimates: EKF3 drops one whose stamp is less than 20 ms after the last's (AP_NavEKF3.h, extNavIntervalMin_ms), so
 # that 60 a second are 30
 ARDUPILOT_MOST_HZ = 1.0 / 0.021

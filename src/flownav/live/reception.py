@@ -8,11 +8,10 @@ from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 from flownav.errors import InputError
-from flownav.mavlink.dialect import Message, coder, dialect
+from flownav.mavlink.dialect import INVALID_AUTOPILOT, Message, coder, dialect
 from flownav.mavlink.framing import StreamFrames
 from flownav.mavlink.signing import SignatureCheck
 
-INVALID_AUTOPILOT = 8  # MAV_AUTOPILOT: a ground station, a camera
 LONGEST_LOSS = 128  # a greater step of the sequence is a sender that began anew
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from flownav.estimation.gating import Reason
-from flownav.measurement import Array, Sensor
+from flownav.measurement import Sensor
 from flownav.navigation.serving import HORIZONTAL, REFUSALS
 
 WATCHED = (*HORIZONTAL, Sensor.RANGE)
@@ -40,9 +41,9 @@ class Serving:
             before = Refused(t_s, t_s, 0, why)
         self._spells[sensor] = Refused(before.since_s, max(t_s, before.until_s), before.readings + 1, why)
 
-    def judged(self, innovation: Array) -> None:
-        """What became of readings in the navigator: rows of the tape's innovations (m, 9)."""
-        for row in innovation.tolist():
+    def judged(self, innovation: Iterable[Sequence[float]]) -> None:
+        """What became of readings in the navigator: rows of the tape's innovations, 9 numbers each."""
+        for row in innovation:
             sensor, component, reason = Sensor(int(row[1])), int(row[2]), int(row[8])
             if reason == Reason.FUSED and component < 2:
                 self._spells.pop(sensor, None)

@@ -239,9 +239,10 @@ class Session:
         released = self.hearing.horizon.release(until_s, BATCH)
         if released:
             outcome = self.filtering.feed(released)
-            for row in outcome.innovation.tolist():
+            rows = outcome.innovation.tolist()
+            for row in rows:
                 self.innovations[int(row[1]), int(row[2])] = (row[5], row[7], int(row[8]))
-            self.hearing.serving.judged(outcome.innovation)
+            self.hearing.serving.judged(rows)
         return len(released) == BATCH
 
     def _watch(self, t_s: float) -> None:

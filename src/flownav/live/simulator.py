@@ -9,12 +9,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from flownav.live.rates import ARDUPILOT
 from flownav.live.reception import Vehicle
-from flownav.mavlink.dialect import Message
+from flownav.mavlink.dialect import ARDUPILOT, PX4, Message
 from flownav.mavlink.parameters import name_of, request_read
 
-PX4 = 12  # MAV_AUTOPILOT
 HIL = 32  # MAV_MODE_FLAG_HIL_ENABLED
 OF_A_SIMULATOR = "SIM_SPEEDUP"
 TRIES, AGAIN_S = 4, 2.0

@@ -15,7 +15,7 @@ from flownav.logs.rates import attitude_at
 from flownav.logs.states import in_order, state_table
 from flownav.mavlink.clock import Aligned, ClockState, align, stamp_of, told_unix_time
 from flownav.mavlink.converted import Context, Dropped, Pose
-from flownav.mavlink.dialect import Message, coder, dialect
+from flownav.mavlink.dialect import ARDUPILOT, INVALID_AUTOPILOT, PX4, Message, coder, dialect
 from flownav.mavlink.flow_messages import range_limits_m
 from flownav.mavlink.framing import Frame
 from flownav.mavlink.messages import CONVERTERS, instance_of, measurements
@@ -32,8 +32,7 @@ from flownav.mavlink.state_messages import (
 from flownav.measurement import Array, Sensor, Stream
 from flownav.record import Table
 
-INVALID_AUTOPILOT, ARDUPILOT = 8, 3
-AUTOPILOTS = {ARDUPILOT: "ArduPilot", 12: "PX4"}
+AUTOPILOTS = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
 STATES: dict[str, Callable[[Message], LocalState | GlobalState | TrueState | None]] = {
     "LOCAL_POSITION_NED": local_position_ned,
     "GLOBAL_POSITION_INT": global_position_int,

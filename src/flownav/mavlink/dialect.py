@@ -7,6 +7,9 @@ from typing import Any
 
 from flownav.errors import InputError
 
+# MAV_AUTOPILOT: who answers a HEARTBEAT; a ground station and a camera say that they are none
+ARDUPILOT, PX4, INVALID_AUTOPILOT = 3, 12, 8
+
 Message = Any  # a message that pymavlink decoded or built
 
 

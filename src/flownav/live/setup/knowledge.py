@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Literal
 
+from flownav.mavlink.dialect import ARDUPILOT, PX4
 from flownav.mavlink.parameters import Value
 from flownav.parameter_files import ParameterModel, load, shipped
 
-MAKES = {3: "setup/ardupilot.toml", 12: "setup/px4.toml"}  # MAV_AUTOPILOT
+MAKES = {ARDUPILOT: "setup/ardupilot.toml", PX4: "setup/px4.toml"}
 SETS = (1, 2, 3)  # ArduPilot's source sets
 Level = Literal["must", "advised", "shown"]
 Send = Literal["odometry", "vision", "landing-target", "none"]

@@ -9,12 +9,12 @@ from typing import Any
 
 from flownav.live.link import Link
 from flownav.live.reception import Reception, Vehicle
-from flownav.mavlink.dialect import Message, coder
+from flownav.mavlink.dialect import INVALID_AUTOPILOT, Message, coder
 from flownav.mavlink.sensors_outgoing import MAVLINK_VERSION
 from flownav.mavlink.signing import sign_outgoing
 
 COMPANION = 197  # MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY, which `live` speaks as
-ONBOARD_CONTROLLER, INVALID_AUTOPILOT, ACTIVE = 18, 8, 4  # MAV_TYPE, MAV_AUTOPILOT, MAV_STATE
+ONBOARD_CONTROLLER, ACTIVE = 18, 4  # MAV_TYPE, MAV_STATE
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 FRESH_S = 3.0  # an older HEARTBEAT does not say whether the vehicle is armed
 WAIT_S = 0.02

@@ -72,8 +72,12 @@ def test_a_damaged_or_missing_part_is_flown_again_with_the_same_bytes(tmp_path):
 
 def test_another_campaign_a_strangers_folder_and_a_flying_one_are_left_alone(tmp_path):
     flown(tmp_path / "a", plan_of(8))
-    with pytest.raises(InputError, match="another campaign"):
-        flown(tmp_path / "a", plan_of(9))
+    with pytest.raises(InputError, match=r"another campaign \(other flights\)"):
+        flown(tmp_path / "a", plan_of(7))
+    with pytest.raises(InputError, match=r"another campaign \(other seed\)"):
+        flown(tmp_path / "a", plan_of(8, seed=6))
+    with pytest.raises(InputError, match="sampling"):
+        flown(tmp_path / "a", plan_of(9, sampling="latin"))
     (tmp_path / "b").mkdir()
     (tmp_path / "b" / "thesis.txt").write_text("mine")
     with pytest.raises(InputError, match="holds no campaign"):
@@ -88,6 +92,13 @@ def test_another_campaign_a_strangers_folder_and_a_flying_one_are_left_alone(tmp
     (tmp_path / "d" / "campaign.json").write_text("{")
     with pytest.raises(InputError, match="cannot be read"):
         flown(tmp_path / "d", plan_of(8))
+
+
+def test_a_plain_campaign_goes_on_to_more_flights_with_the_same_bytes(tmp_path):
+    flown(tmp_path / "grown", plan_of(100))
+    flown(tmp_path / "grown", plan_of(PART + 100))
+    flown(tmp_path / "whole", plan_of(PART + 100))
+    assert files_in(tmp_path / "grown") == files_in(tmp_path / "whole")
 
 
 def test_other_code_does_not_add_to_a_campaign(tmp_path, monkeypatch):

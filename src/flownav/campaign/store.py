@@ -64,7 +64,7 @@ class Store:
                     f"{self.folder}: another process is flying this campaign; wait, or give another --out"
                 ) from None
             self._sweep()
-            if not (self.folder / PLAN).exists():
+            if not (self.folder / PLAN).exists() or plan_in(self.folder) != json.loads(said):
                 _write_text(self.folder / PLAN, said)
             yield self
         finally:
@@ -83,10 +83,12 @@ class Store:
         for key, what in (("flownav", "version of flownav"), ("code_sha256", "code of flownav")):
             if known.get(key) != plan[key]:
                 raise InputError(f"{self.folder}: was flown by another {what}; give another --out, or move it away")
-        if known != json.loads(json.dumps(plan)):
-            differs = ", ".join(key for key in plan if known.get(key) != json.loads(json.dumps(plan[key])))
+        asked = json.loads(json.dumps(plan))
+        differs = [key for key in plan if known.get(key) != asked[key]]
+        if differs and not _is_more_of(known, asked, differs):
             raise InputError(
-                f"{self.folder}: holds another campaign (other {differs}); give another --out, or move it away"
+                f"{self.folder}: holds another campaign (other {', '.join(differs)}); give another --out, or move it "
+                "away (a plain campaign without --until may be given more flights, and goes on)"
             )
 
     def _sweep(self) -> None:
@@ -162,6 +164,13 @@ class Dataset:
     def scores(self, cell: int) -> Array:
         """The same as (flights, len(SCORE_COLUMNS))."""
         return self.rows(cell)[:, : len(SCORE_COLUMNS)]
+
+
+def _is_more_of(known: dict[str, Any], asked: dict[str, Any], differs: list[str]) -> bool:
+    """Whether a plan is a known one with more flights, each of which is independent of how many there are."""
+    if differs != ["flights"] or asked["sampling"] != "plain" or asked["until"]:
+        return False
+    return isinstance(known["flights"], int) and known["flights"] < asked["flights"]
 
 
 def plan_in(folder: Path) -> dict[str, Any]:

@@ -9,6 +9,9 @@ that it is drawn from, by SciPy's name with SciPy's parameters:
 `mode` says what is done with the draw: it is the value, a factor on what the datasheet says, an offset to it, or a
 multiple of the uncertainty that the file states beside the value (0.6, or "60..150": then of the side that it is on).
 Units are those of the number's own name.
+
+`known` says who could know the number before a flight, for the split of uncertainty in a certificate: "build", once the
+vehicle is built, weighed and calibrated; "day", on the day, from a forecast, a survey or a look at the place; "never".
 """
 
 from __future__ import annotations
@@ -27,13 +30,18 @@ from flownav.simulation.noise import threefry
 
 Array = NDArray[np.float64]
 
+Known = Literal["build", "day", "never"]
+
 SHIPPED, SHIPPED_FILE = "shipped", "dispersion.toml"
 LARGEST_SHAPE = 1e300  # of a parameter of a distribution
 DISPERSION_STEP = 1 << 41  # of the noise counter: beyond every step of a flight and of its start
 
 
 class Distribution(ParameterModel):
-    """A continuous distribution of scipy.stats; what is not named here are its shape parameters."""
+    """A continuous distribution of scipy.stats; what is not named here are its shape parameters.
+
+    known: what nobody says can be known is never known.
+    """
 
     model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
 
@@ -42,6 +50,7 @@ class Distribution(ParameterModel):
     scale: Number = Field(1.0, gt=0.0)
     mode: Literal["value", "factor", "offset", "uncertainty"] = "value"
     source: str = ""
+    known: Known = "never"
 
     @model_validator(mode="after")
     def _shapes_are_numbers(self) -> Distribution:

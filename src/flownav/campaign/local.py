@@ -15,6 +15,7 @@ from flownav.scoring.touchdown import Limits, motion_of, touchdowns
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_blocks, fly_written
 from flownav.simulation.ensemble import Ensemble
+from flownav.simulation.fault import SensorFault
 from flownav.simulation.flight_record import record_of
 from flownav.simulation.history import column, columns
 from flownav.simulation.plan import Flight
@@ -133,9 +134,14 @@ def known_exactly(scenario: Scenario) -> str:
     return f"nothing, but it is flown on the truth for its first {held_s:g} s"
 
 
-def fly_recorded(setup: Setup, seed: int, index: int = 0, ensemble: Ensemble | None = None) -> Record:
-    """One flight as a scored Record; of an ensemble with the numbers that were drawn for it."""
-    flown = fly_written(setup.flight, seed, index, ensemble=ensemble)
+def fly_recorded(
+    setup: Setup, seed: int, index: int = 0, ensemble: Ensemble | None = None, fault: SensorFault | None = None
+) -> Record:
+    """One flight as a scored Record; of an ensemble with the numbers that were drawn for it.
+
+    fault: of its sensors, where the setup's flight `fails`.
+    """
+    flown = fly_written(setup.flight, seed, index, ensemble=ensemble, faults=None if fault is None else [fault])
     record = record_of(setup, flown, seed, index)
     record.manifest["truth_model"] = "matched" if ensemble is None else "ensemble"
     if ensemble is not None:

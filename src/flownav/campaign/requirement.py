@@ -131,7 +131,7 @@ class Requirement(ParameterModel):
     vehicle: str | None = None
     seed: int = Field(1, ge=0, lt=2**63)
     set: dict[str, Any] = Field(default_factory=dict)
-    conditions: Conditions = Conditions()
+    conditions: Conditions = Field(default_factory=Conditions)
     requirement: tuple[RequirementTable, ...] = Field(min_length=1, max_length=20)
 
     def flights(self) -> int:

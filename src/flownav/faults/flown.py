@@ -162,14 +162,14 @@ def _fly(
     assert flight.onboard is not None
     horizon_s, period_s = setup.fitted.schedule.horizon_s, flight.onboard.camera_clock.every * EPOCH_S
     for first in range(0, flights, len(LANES)):
-        laws = [_law(fault, window_s, seed, first + lane, period_s) for lane in range(len(LANES))]
+        laws = [law_of_flight(fault, window_s, seed, first + lane, period_s) for lane in range(len(LANES))]
         flown = fly_written(flight, seed, first, LANES, ensemble, laws)
         landings = touchdown_history(flight, flown.history)
         for lane in range(min(len(LANES), flights - first)):
             yield scores_of(flown, landings[lane], lane, fault.sensors if fault else (), window_s[0], horizon_s)
 
 
-def _law(
+def law_of_flight(
     fault: Fault | None, window_s: tuple[float, float], seed: int, number: int, flow_period_s: float
 ) -> SensorFault:
     """One flight's fault; a position moves off in a direction of its own."""

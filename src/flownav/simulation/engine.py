@@ -123,11 +123,11 @@ def fly_one(flight: Flight, seed: int, index: int = 0, ensemble: Ensemble | None
 
 def fly_blocks(
     flight: Flight, seed: int, first: int, flights: int, judge: Callable[[Array], Result], threads: int | None = None,
-    ensemble: Ensemble | None = None,
+    ensemble: Ensemble | None = None, faults: Callable[[int], SensorFault] | None = None,
 ) -> Iterator[tuple[int, Result]]:  # fmt: skip
     """Fly `flights` flights from number `first` on; yields (flights in the block, judge(its history)) in order.
 
-    `judge` takes a block's history (epochs, len(HISTORY), flights in the block), which is overwritten afterwards:
+    faults: of each flight's sensors by its number, for a flight that `fails`. `judge` takes a block's history (epochs, len(HISTORY), flights in the block), which is overwritten afterwards:
     memory does not grow with the number of flights.
     """
     own = threading.local()
@@ -135,7 +135,9 @@ def fly_blocks(
     def fly(start: int) -> tuple[int, Result]:
         if not hasattr(own, "buffers"):
             own.buffers = buffers_of(flight, LANES, flight.plan.epochs, written=False)
-        fly_into(flight, seed, first + start, LANES, own.buffers, ensemble)
+        numbers = range(first + start, first + start + len(LANES))
+        failing = None if faults is None else [faults(number) for number in numbers]
+        fly_into(flight, seed, first + start, LANES, own.buffers, ensemble, faults=failing)
         left = min(len(LANES), flights - start)
         return left, judge(own.buffers.history[:, :, :left])
 

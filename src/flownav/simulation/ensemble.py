@@ -135,11 +135,16 @@ class Ensemble:
         flights = range(number * TOGETHER, (number + 1) * TOGETHER)
         spread = uniforms if self.design is None else self.design.uniforms
         found = {}
-        for name, entry in self.entries.items():
-            draws, told = self.frozen[name].ppf(spread(seed, flights, name)), self._believed(name)
-            below, above = self._reach(name, told) if entry.mode == "uncertainty" else (0.0, 0.0)
-            found[name] = np.array([drawn(entry.mode, float(draw), told, below, above) for draw in draws])
+        for name in self.entries:
+            found[name] = self.numbers(name, spread(seed, flights, name))
         return found
+
+    def numbers(self, name: str, shares: Array) -> Array:
+        """A dispersed number at these shares of its distribution, in (0, 1), in the unit of its name."""
+        entry, told = self.entries[name], self._believed(name)
+        below, above = self._reach(name, told) if entry.mode == "uncertainty" else (0.0, 0.0)
+        draws = self.frozen[name].ppf(shares)
+        return np.array([drawn(entry.mode, float(draw), told, below, above) for draw in draws])
 
     def _truth(self, flight: int, values: Mapping[str, float]) -> Truth:
         """One flight's truth: what the drawn numbers touch is built anew, the rest is what is believed."""

@@ -1,0 +1,1 @@
+"""A requirement flown and judged: its cells, the flights, the certificate."""

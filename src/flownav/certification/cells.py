@@ -1,0 +1,133 @@
+"""The cells of a requirement: each combination of the heights, sensors, vehicles and faults of its conditions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+from flownav.campaign.measures import MEASURES, NOT_LANDED
+from flownav.campaign.requirement import NO_FAULT, OWN_SENSOR, Requirement, scenario_of
+from flownav.certification.started import from_height
+from flownav.errors import InputError
+from flownav.faults.catalogue import FAULTS, Fault
+from flownav.faults.flown import law_of_flight
+from flownav.faults.laws import NOT_FLOWN
+from flownav.parameter_files import check
+from flownav.simulation.assemble import Setup, assemble
+from flownav.simulation.fault import SensorFault
+from flownav.simulation.plan import Flight
+from flownav.simulation.scenario import Scenario
+from flownav.simulation.sensing import EPOCH_S
+
+BEFORE_LANDING_S = 5.0  # that a fault begins, where the requirement does not say when
+MOST_CELLS = 200
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One combination, made ready. values: height_m, sensor, vehicle and fault, as far as the conditions name them.
+
+    fault: what fails, from when to when [s]; None: nothing.
+    """
+
+    label: str
+    values: dict[str, str | float]
+    setup: Setup
+    fault: tuple[Fault, tuple[float, float]] | None = None
+
+    @property
+    def flight(self) -> Flight:
+        """What is flown."""
+        return self.setup.flight if self.fault is None else self.setup.flight._replace(fails=True)
+
+    def fault_of(self, seed: int) -> Callable[[int], SensorFault] | None:
+        """Each flight's fault by its number; None where nothing fails."""
+        if self.fault is None:
+            return None
+        fault, window_s = self.fault
+        onboard = self.setup.flight.onboard
+        assert onboard is not None  # `_fault_in` asked
+        period_s = onboard.camera_clock.every * EPOCH_S
+        return lambda number: law_of_flight(fault, window_s, seed, number, period_s)
+
+
+def cells_of(requirement: Requirement, vehicle: str | None = None) -> tuple[Cell, ...]:
+    """Every cell. InputError where one cannot be flown, or does not have what a requirement measures.
+
+    vehicle: another one than the requirement's; the conditions must then name none.
+    """
+    conditions = requirement.conditions
+    if vehicle is not None and conditions.vehicle:
+        raise InputError(f"--vehicle {vehicle}: {requirement.name} names vehicles in its conditions; leave one of the two out")
+    lists: dict[str, tuple[Any, ...]] = {
+        "vehicle": conditions.vehicle,
+        "height_m": conditions.heights_m(),
+        "sensor": conditions.sensor,
+        "fault": conditions.fault,
+    }
+    named = {name: values for name, values in lists.items() if values}
+    combinations = [dict(zip(named, values, strict=True)) for values in product(*named.values())]
+    if len(combinations) > MOST_CELLS:
+        raise InputError(f"{requirement.name}: conditions: {len(combinations)} cells; at most {MOST_CELLS} are flown")
+    return tuple(_cell(requirement, values, vehicle) for values in combinations)
+
+
+def _cell(requirement: Requirement, values: dict[str, Any], vehicle: str | None) -> Cell:
+    scenario = scenario_of(requirement, values.get("vehicle", vehicle))
+    if "height_m" in values:
+        scenario = from_height(scenario, values["height_m"])
+    if values.get("sensor", OWN_SENSOR) != OWN_SENSOR:
+        entries = scenario.model_dump(exclude_unset=True) | {"flow_sensor": values["sensor"]}
+        scenario = check(entries, Scenario, f"{requirement.name}: sensor")
+    _require_judged(requirement, scenario)
+    setup = assemble(scenario)
+    setup.ensemble()  # an entry of the conditions that cannot be is said now
+    label = ", ".join(_words(name, value) for name, value in values.items()) or "all flights"
+    return Cell(label, values, setup, _fault_in(requirement, setup, values.get("fault", NO_FAULT)))
+
+
+def _words(name: str, value: Any) -> str:
+    """A cell's value as its label has it."""
+    if name == "height_m":
+        return f"from {value:g} m"
+    return "no fault" if value == NO_FAULT and name == "fault" else str(value)
+
+
+def _require_judged(requirement: Requirement, scenario: Scenario) -> None:
+    """InputError where a requirement is of a touchdown and the scenario has none."""
+    lands_s = scenario.flight.may_land_after_s
+    lands = lands_s is not None and lands_s < scenario.flight.duration_s and scenario.truth != "linear"
+    of_landing = [
+        table.measure
+        for table in requirement.requirement
+        if MEASURES[table.measure].of_touchdown or table.measure == NOT_LANDED
+    ]
+    if of_landing and not lands:
+        raise InputError(f"{requirement.name}: {of_landing[0]}: the scenario {scenario.name} never lands")
+    if scenario.optics != "model":
+        raise InputError(f'{requirement.name}: the scenario {scenario.name} has optics = "pixels"; certify flies "model"')
+
+
+def _fault_in(requirement: Requirement, setup: Setup, name: str) -> tuple[Fault, tuple[float, float]] | None:
+    """A fault and when it strikes. InputError where it is none, or cannot be flown here."""
+    where = f"{requirement.name}: conditions: fault {name}"
+    if name == NO_FAULT:
+        return None
+    if name not in FAULTS:
+        raise InputError(f"{where}: no such fault; there are {NO_FAULT}, {', '.join(FAULTS)}")
+    if name in NOT_FLOWN:
+        raise InputError(f"{where}: it is not flown in the closed loop; leave it out")
+    if setup.fitted is None:
+        raise InputError(f'{where}: the paper\'s filter has no sensors that fail; fly filter.name = "landing"')
+    fault, conditions, flight = FAULTS[name], requirement.conditions, setup.scenario.flight
+    lands_s = float(flight.duration_s if flight.may_land_after_s is None else flight.may_land_after_s)
+    handed_s = setup.flight.plan.handover_s
+    begins_s = lands_s if fault.in_descent else max(lands_s - BEFORE_LANDING_S, handed_s)
+    if conditions.fault_begins_s is not None:
+        begins_s = float(conditions.fault_begins_s)
+    if begins_s >= flight.duration_s:
+        raise InputError(f"{where}: fault_begins_s {begins_s:g}: the flight ends after {flight.duration_s:g} s")
+    lasts_s = float(conditions.fault_lasts_s) if fault.lasts_s is None else fault.lasts_s
+    return fault, (begins_s, begins_s + lasts_s)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from flownav.campaign.local import fly_recorded
@@ -12,7 +13,10 @@ from flownav.record import Record
 def record_again(plan: Plan, cell: int, flight: int) -> Record:
     """The record of a flight; it says what was drawn, and is the same bytes whenever it is made."""
     ready = plan.ready(cell)
-    record = fly_recorded(ready.setup, plan.seed, flight, ready.ensemble)
+    failing = ready.faults(plan.seed)
+    record = fly_recorded(
+        replace(ready.setup, flight=ready.flight), plan.seed, flight, ready.ensemble, failing and failing(flight)
+    )
     record.manifest["command"] = f"flownav campaign ... --flight {place_of(cell, flight)}"
     record.manifest["campaign"] = {"cell": plan.cells[cell].label, "flight": flight, "sampling": plan.sampling}
     record.manifest["provenance"].pop("written_utc")

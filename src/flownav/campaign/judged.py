@@ -83,12 +83,16 @@ def fly_judged(
     on_progress: Callable[[int], object] = lambda flown: None,
 ) -> Judged:
     """Fly flights 0 to `flights - 1`, matched or of an ensemble, and judge them; memory grows by a row a flight."""
+    home = home_epoch(flight)
 
     def judge(history: Array) -> tuple[Array, Array, ErrorSums, ConsistencySums | None, Array | None]:
         estimate = history[:, columns("estimate", STATES)]
         truth = history[:, columns("truth", STATES)]
-        flown = error_sums((estimate - truth) ** 2, _skid_height(flight, history), in_flight_steps(flight, history))
-        up, largest = takeoff_history(flight, history), largest_horizontal_of(flight, history)
+        counted = counted_steps(flight, history)
+        in_flight = counted * (1.0 - _on_ground(history))
+        largest = largest_horizontal_error(estimate, truth, home, in_flight * _from(home, len(history)))
+        flown = error_sums((estimate - truth) ** 2, _skid_height(flight, history), in_flight)
+        up = takeoff_history(flight, history)
         return score_history(flight, history), largest, flown, _at_horizon(flight, history), up
 
     rows, largest, groups, ups = [], [], [], []
@@ -112,19 +116,6 @@ def fly_judged(
     in_groups = None if total is None else tuple(groups) or (inside_steps(total),)
     every = np.concatenate(ups) if ups else None
     return Judged(np.concatenate(rows), np.concatenate(largest), flown_on, total, in_groups, every)
-
-
-def in_flight_steps(flight: Flight, history: Array) -> Array:
-    """The steps that count and are flown without skid contact, (epochs, lanes) 0/1."""
-    return np.asarray(counted_steps(flight, history) * (1.0 - _on_ground(history)))
-
-
-def largest_horizontal_of(flight: Flight, history: Array) -> Array:
-    """Largest horizontal error of what was flown on, relative to where the pad is taken to be, (lanes,) [m]."""
-    home = home_epoch(flight)
-    estimate, truth = history[:, columns("estimate", STATES)], history[:, columns("truth", STATES)]
-    counted = in_flight_steps(flight, history) * _from(home, len(history))
-    return largest_horizontal_error(estimate, truth, home, counted)
 
 
 def _from(step: int | None, epochs: int) -> Array:

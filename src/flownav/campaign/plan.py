@@ -5,10 +5,10 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import flownav
 from flownav.campaign.sampling import Sampling, design_of
@@ -17,6 +17,7 @@ from flownav.parameter_files import check
 from flownav.provenance import code_sha256
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.ensemble import Ensemble
+from flownav.simulation.fault import SensorFault
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
 
@@ -29,11 +30,22 @@ Value = float | bool | str
 Sweep = Mapping[str, Sequence[Value]]
 
 
+class Failure(Protocol):
+    """What fails in every flight of a cell."""
+
+    @property
+    def words(self) -> str:
+        """What, from when to when."""
+
+    def law(self, flight: Flight, seed: int, number: int) -> SensorFault:
+        """One flight's fault, by its number."""
+
+
 @dataclass(frozen=True)
 class Ready:
     """A cell made ready to fly, of a campaign of so many flights.
 
-    ensemble: what differs from flight to flight; None where nothing does.
+    ensemble: what differs from flight to flight; None where nothing does. failure: what fails; None: nothing.
     """
 
     setup: Setup
@@ -41,21 +53,32 @@ class Ready:
     sampling: Sampling
     flights: int
     ensemble: Ensemble | None
+    failure: Failure | None = None
 
     @property
     def flight(self) -> Flight:
         """What the kernel flies."""
-        return self.setup.flight
+        return self.setup.flight if self.failure is None else self.setup.flight._replace(fails=True)
+
+    def faults(self, seed: int) -> Callable[[int], SensorFault] | None:
+        """Each flight's fault by its number; None where nothing fails."""
+        failure, flight = self.failure, self.setup.flight
+        return None if failure is None else lambda number: failure.law(flight, seed, number)
 
 
 @dataclass(frozen=True)
 class Cell:
-    """One scenario of a campaign. values: of what is swept, by its name in the scenario file."""
+    """One scenario of a campaign. values: of what is swept, by its name in the scenario file.
+
+    first: the number of its first flight. failure: what fails in its flights; None: nothing.
+    """
 
     scenario: Scenario
     values: dict[str, Value]
     truth_model: TruthModel
     fixed: tuple[str, ...] = ()  # numbers of the world that the campaign sets, and no dispersion draws
+    first: int = 0
+    failure: Failure | None = None
 
     @property
     def label(self) -> str:
@@ -73,7 +96,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Plan:
-    """A campaign: every cell flies flights 0 to `flights - 1` of the seed."""
+    """A campaign: every cell flies `flights` flights of the seed, from its first on (flight 0)."""
 
     cells: tuple[Cell, ...]
     seed: int
@@ -83,7 +106,8 @@ class Plan:
 
     def ready(self, cell: int) -> Ready:
         """A cell made ready. InputError where its scenario or its dispersion cannot be."""
-        return ready_of(self.cells[cell].setup, self.cells[cell].truth_model, self.sampling, self.flights)
+        own = self.cells[cell]
+        return replace(ready_of(own.setup, own.truth_model, self.sampling, self.flights), failure=own.failure)
 
     @cached_property
     def as_json(self) -> dict[str, Any]:
@@ -101,6 +125,8 @@ class Plan:
                     "label": cell.label,
                     "values": cell.values,
                     "truth_model": cell.truth_model,
+                    "first": cell.first,
+                    "failure": cell.failure.words if cell.failure else None,
                     "scenario": cell.scenario.model_dump(mode="json"),
                     "parameters_sha256": _digest(cell),
                 }

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -170,7 +170,7 @@ def load_requirement(name: str) -> Requirement:
     path = requirement_file(name)
     requirement = load(path, Requirement)
 
-    def beside(file: str, known: tuple[str, ...]) -> str:
+    def beside(file: str, known: Collection[str]) -> str:
         return file if file in known else str(path.parent / file)
 
     conditions = requirement.conditions
@@ -178,6 +178,7 @@ def load_requirement(name: str) -> Requirement:
         update={
             "scenario": beside(requirement.scenario, SHIPPED_SCENARIOS),
             "vehicle": None if requirement.vehicle is None else beside(requirement.vehicle, SHIPPED_NAMES),
+            "set": _sensors_beside(requirement.set, path.parent),
             "conditions": conditions.model_copy(
                 update={
                     "vehicle": tuple(beside(name, SHIPPED_NAMES) for name in conditions.vehicle),
@@ -186,6 +187,19 @@ def load_requirement(name: str) -> Requirement:
             ),
         }
     )
+
+
+def _sensors_beside(given: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """The settings with the datasheets that they name looked for beside the requirement's file."""
+    found = dict(given)
+    if isinstance(given.get("sensors"), dict):
+        found["sensors"] = {
+            name: str(folder / value) if name != "texture" and isinstance(value, str) else value
+            for name, value in given["sensors"].items()
+        }
+    if isinstance(given.get("flow_sensor"), str):
+        found["flow_sensor"] = str(folder / given["flow_sensor"])
+    return found
 
 
 def scenario_of(requirement: Requirement, vehicle: str | None = None) -> Scenario:

@@ -99,8 +99,9 @@ def _parts_until(
     plan: Plan, cell: int, first: int, end: int, ready: Ready, engine: Engine, store: Store, data: Dataset,
     done: Counted,
 ) -> Iterator[tuple[Part, Array]]:  # fmt: skip
-    """The parts of flights `first` to `end - 1`, those of the folder first, then those that were missing, flown."""
-    parts = [Part(start // PART, start, min(PART, end - start)) for start in range(first, end, PART)]
+    """The parts of a cell's flights `first` to `end - 1`: those of the folder, then those that were missing, flown."""
+    own = plan.cells[cell].first
+    parts = [Part(start // PART, own + start, min(PART, end - start)) for start in range(first, end, PART)]
     missing = []
     for part in parts:
         if store.rows_in(cell, part.number) == part.flights:

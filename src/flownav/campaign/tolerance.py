@@ -142,6 +142,7 @@ def flights_to_show(failure_rate: float, probability: float, confidence: float, 
     if failure_rate >= 1.0 - probability:
         return None
     low, high = -1, 1  # plans for `low` failures do not do
+
     def serves(failures: int) -> bool:
         return float(bdtr(float(failures), needed(probability, confidence, failures), failure_rate)) >= POWER
 

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
 from flownav.campaign.measures import MEASURES, NOT_LANDED
+from flownav.campaign.plan import Cell, Plan
 from flownav.campaign.requirement import NO_FAULT, OWN_SENSOR, Requirement, scenario_of
 from flownav.certification.started import from_height
 from flownav.errors import InputError
-from flownav.faults.catalogue import FAULTS, Fault
+from flownav.faults.catalogue import FAULTS
 from flownav.faults.flown import law_of_flight
 from flownav.faults.laws import NOT_FLOWN
 from flownav.parameter_files import check
-from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.fault import SensorFault
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
@@ -26,31 +25,34 @@ MOST_CELLS = 200
 
 
 @dataclass(frozen=True)
-class Cell:
-    """One combination, made ready. values: height_m, sensor, vehicle and fault, as far as the conditions name them.
+class SensorFailure:
+    """A fault of the catalogue by its name, from when to when [s]."""
 
-    fault: what fails, from when to when [s]; None: nothing.
-    """
-
-    label: str
-    values: dict[str, str | float]
-    setup: Setup
-    fault: tuple[Fault, tuple[float, float]] | None = None
+    name: str
+    begins_s: float
+    ends_s: float
 
     @property
-    def flight(self) -> Flight:
-        """What is flown."""
-        return self.setup.flight if self.fault is None else self.setup.flight._replace(fails=True)
+    def words(self) -> str:
+        """What, from when to when."""
+        return f"{self.name} from {self.begins_s:g} to {self.ends_s:g} s"
 
-    def fault_of(self, seed: int) -> Callable[[int], SensorFault] | None:
-        """Each flight's fault by its number; None where nothing fails."""
-        if self.fault is None:
-            return None
-        fault, window_s = self.fault
-        onboard = self.setup.flight.onboard
-        assert onboard is not None  # `_fault_in` asked
-        period_s = onboard.camera_clock.every * EPOCH_S
-        return lambda number: law_of_flight(fault, window_s, seed, number, period_s)
+    def law(self, flight: Flight, seed: int, number: int) -> SensorFault:
+        """One flight's fault."""
+        assert flight.onboard is not None  # `_failure` asked
+        period_s = flight.onboard.camera_clock.every * EPOCH_S
+        return law_of_flight(FAULTS[self.name], (self.begins_s, self.ends_s), seed, number, period_s)
+
+
+def plan_of(requirement: Requirement, flights: int | None = None, vehicle: str | None = None) -> Plan:
+    """The campaign of a requirement, each flight with a number of its own, so that all are independent.
+
+    flights: how many at least; as many as the requirement needs where it is None. As many are flown in each cell.
+    InputError as `cells_of`.
+    """
+    cells = cells_of(requirement, vehicle)
+    each = -(-(flights or requirement.flights()) // len(cells))
+    return Plan(tuple(replace(cell, first=k * each) for k, cell in enumerate(cells)), requirement.seed, each)
 
 
 def cells_of(requirement: Requirement, vehicle: str | None = None) -> tuple[Cell, ...]:
@@ -60,7 +62,9 @@ def cells_of(requirement: Requirement, vehicle: str | None = None) -> tuple[Cell
     """
     conditions = requirement.conditions
     if vehicle is not None and conditions.vehicle:
-        raise InputError(f"--vehicle {vehicle}: {requirement.name} names vehicles in its conditions; leave one of the two out")
+        raise InputError(
+            f"--vehicle {vehicle}: {requirement.name} names vehicles in its conditions; leave one of the two out"
+        )
     lists: dict[str, tuple[Any, ...]] = {
         "vehicle": conditions.vehicle,
         "height_m": conditions.heights_m(),
@@ -82,14 +86,17 @@ def _cell(requirement: Requirement, values: dict[str, Any], vehicle: str | None)
         entries = scenario.model_dump(exclude_unset=True) | {"flow_sensor": values["sensor"]}
         scenario = check(entries, Scenario, f"{requirement.name}: sensor")
     _require_judged(requirement, scenario)
-    setup = assemble(scenario)
-    setup.ensemble()  # an entry of the conditions that cannot be is said now
-    label = ", ".join(_words(name, value) for name, value in values.items()) or "all flights"
-    return Cell(label, values, setup, _fault_in(requirement, setup, values.get("fault", NO_FAULT)))
+    cell = Cell(scenario, values, "ensemble", failure=_failure(requirement, scenario, values.get("fault", NO_FAULT)))
+    cell.setup.ensemble()  # what cannot be is said now
+    return cell
+
+
+def words_of(cell: Cell) -> str:
+    """A cell as the certificate names it."""
+    return ", ".join(_words(name, value) for name, value in cell.values.items()) or "all flights"
 
 
 def _words(name: str, value: Any) -> str:
-    """A cell's value as its label has it."""
     if name == "height_m":
         return f"from {value:g} m"
     return "no fault" if value == NO_FAULT and name == "fault" else str(value)
@@ -107,10 +114,12 @@ def _require_judged(requirement: Requirement, scenario: Scenario) -> None:
     if of_landing and not lands:
         raise InputError(f"{requirement.name}: {of_landing[0]}: the scenario {scenario.name} never lands")
     if scenario.optics != "model":
-        raise InputError(f'{requirement.name}: the scenario {scenario.name} has optics = "pixels"; certify flies "model"')
+        raise InputError(
+            f'{requirement.name}: the scenario {scenario.name} has optics = "pixels"; certify flies "model"'
+        )
 
 
-def _fault_in(requirement: Requirement, setup: Setup, name: str) -> tuple[Fault, tuple[float, float]] | None:
+def _failure(requirement: Requirement, scenario: Scenario, name: str) -> SensorFailure | None:
     """A fault and when it strikes. InputError where it is none, or cannot be flown here."""
     where = f"{requirement.name}: conditions: fault {name}"
     if name == NO_FAULT:
@@ -119,15 +128,15 @@ def _fault_in(requirement: Requirement, setup: Setup, name: str) -> tuple[Fault,
         raise InputError(f"{where}: no such fault; there are {NO_FAULT}, {', '.join(FAULTS)}")
     if name in NOT_FLOWN:
         raise InputError(f"{where}: it is not flown in the closed loop; leave it out")
-    if setup.fitted is None:
+    if scenario.filter.name != "landing":
         raise InputError(f'{where}: the paper\'s filter has no sensors that fail; fly filter.name = "landing"')
-    fault, conditions, flight = FAULTS[name], requirement.conditions, setup.scenario.flight
+    fault, conditions, flight = FAULTS[name], requirement.conditions, scenario.flight
     lands_s = float(flight.duration_s if flight.may_land_after_s is None else flight.may_land_after_s)
-    handed_s = setup.flight.plan.handover_s
+    handed_s = float(flight.takeoff_at_s if flight.start == "ground" else scenario.filter.handover_s)
     begins_s = lands_s if fault.in_descent else max(lands_s - BEFORE_LANDING_S, handed_s)
     if conditions.fault_begins_s is not None:
         begins_s = float(conditions.fault_begins_s)
     if begins_s >= flight.duration_s:
-        raise InputError(f"{where}: fault_begins_s {begins_s:g}: the flight ends after {flight.duration_s:g} s")
+        raise InputError(f"{where}: it begins after {begins_s:g} s, and the flight ends after {flight.duration_s:g} s")
     lasts_s = float(conditions.fault_lasts_s) if fault.lasts_s is None else fault.lasts_s
-    return fault, (begins_s, begins_s + lasts_s)
+    return SensorFailure(name, begins_s, begins_s + lasts_s)

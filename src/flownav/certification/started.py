@@ -20,10 +20,9 @@ def from_height(scenario: Scenario, height_m: float) -> Scenario:
     knots = scenario.flight.path
     top = max(float(knot.height_m) for knot in knots)
     others = [float(knot.height_m) for knot in knots if knot.height_m < top]
-    if not height_m > max(others, default=0.0):
-        raise InputError(
-            f"{scenario.name}: height_m {height_m:g}: must lie above the path's next height, {max(others, default=0):g} m"
-        )
+    next_m = max(others, default=0.0)
+    if not height_m > next_m:
+        raise InputError(f"{scenario.name}: height_m {height_m:g}: must lie above the path's next height, {next_m:g} m")
     ends, delays = [], []  # of each stretched way: when it ended, and by how much later it ends now
     for here, following in pairwise(knots):
         rise, fall = here.height_m < top <= following.height_m, following.height_m < top <= here.height_m

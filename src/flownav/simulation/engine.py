@@ -127,8 +127,9 @@ def fly_blocks(
 ) -> Iterator[tuple[int, Result]]:  # fmt: skip
     """Fly `flights` flights from number `first` on; yields (flights in the block, judge(its history)) in order.
 
-    faults: of each flight's sensors by its number, for a flight that `fails`. `judge` takes a block's history (epochs, len(HISTORY), flights in the block), which is overwritten afterwards:
-    memory does not grow with the number of flights.
+    `judge` takes a block's history (epochs, len(HISTORY), flights in the block), which is overwritten afterwards:
+    memory does not grow with the number of flights. faults: of each flight's sensors by its number, for a flight that
+    `fails`.
     """
     own = threading.local()
 

@@ -40,7 +40,8 @@ class Local:
             return rows_of(flight, history)
 
         have = 0
-        for flown, block in fly_blocks(flight, seed, parts[0].first, total, judge, self.threads, cell.ensemble):
+        first, faults = parts[0].first, cell.faults(seed)
+        for flown, block in fly_blocks(flight, seed, first, total, judge, self.threads, cell.ensemble, faults):
             held.append(block)
             have += flown
             on_progress(flown)

@@ -44,6 +44,7 @@ ALLOWED = {
     "live": GROUND | EQUATIONS | {"mavlink", "logs", "navigation", "replay"},
     "campaign": GROUND | EQUATIONS | {"simulation", "navigation", "scoring"},
     "faults": GROUND | EQUATIONS | {"logs", "simulation", "campaign", "scoring", "navigation", "replay"},
+    "certification": GROUND | EQUATIONS | {"simulation", "campaign", "scoring", "faults", "report"},
     "validation": GROUND | EQUATIONS | {"navigation", "simulation", "logs", "replay", "scoring"},
     "report": GROUND | {"scoring"},
     "export": GROUND,

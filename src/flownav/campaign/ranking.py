@@ -117,13 +117,16 @@ def points_of(seed: int, n: int, inputs: int) -> Array:
 
 
 def bounded(samples: Sequence[Array]) -> tuple[list[Array], str]:
-    """The outcomes as they are; as ranks among those of A and B, in (0, 1), where one is infinite.
+    """The outcomes as they are; as ranks among those of A and B, in (0, 1), where one is infinite; 0 where all are one.
 
     A variance needs finite figures; ranks keep the order, and a flight without a touchdown is the worst of all.
     """
+    both = np.concatenate(samples[:2])
+    if (both == both[0]).all():
+        return [np.zeros(len(sample)) for sample in samples], "nothing"
     if all(np.isfinite(sample).all() for sample in samples):
         return list(samples), "values"
-    ordered = np.sort(np.concatenate(samples[:2]))
+    ordered = np.sort(both)
 
     def place(sample: Array) -> Array:
         below, upto = (np.searchsorted(ordered, sample, side=side) for side in ("left", "right"))

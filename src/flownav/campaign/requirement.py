@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator, model_validator
 
-from flownav.campaign.measures import MEASURES
+from flownav.campaign.measures import CRASH, MEASURES, NOT_LANDED
 from flownav.campaign.tolerance import allowed
 from flownav.errors import InputError
 from flownav.parameter_files import Number, ParameterModel, check, load, shipped
@@ -23,6 +23,7 @@ from flownav.vehicle.loading import SHIPPED_NAMES
 SHIPPED = ("takeoff", "landing", "pad_return", "approach", "approach_8_m_s")
 FOLDER = "requirements"
 OWN_SENSOR, NO_FAULT = "scenario", "none"
+NONE_OF = {CRASH: "no crash", NOT_LANDED: "a landing"}  # a measure that is 0, in words
 RANGED = "the requirement's conditions"
 
 
@@ -62,14 +63,20 @@ class RequirementTable(ParameterModel):
         """Whether small figures are the good ones."""
         return self.at_most is not None
 
+    @property
+    def yes_or_no(self) -> bool:
+        """Whether the measure says only whether something happened."""
+        return self.measure in NONE_OF
+
     def sentence(self) -> str:
         """The requirement in the words of a test plan."""
-        measure = MEASURES[self.measure]
+        unit = MEASURES[self.measure].unit
         side = "at most" if self.upper else "at least"
-        unit = f" {measure.unit}" if measure.unit else ""
+        what = f"{self.measure} {side} {self.limit:g} {unit}".rstrip()
+        if self.yes_or_no and self.upper and self.limit == 0.0:
+            what = NONE_OF[self.measure]
         return (
-            f"{self.measure} {side} {self.limit:g}{unit} with {100.0 * self.probability:.10g} % probability at "
-            f"{100.0 * self.confidence:.10g} % confidence"
+            f"{what} with {100.0 * self.probability:.10g} % probability at {100.0 * self.confidence:.10g} % confidence"
         )
 
 

@@ -10,6 +10,7 @@ import typer
 from flownav.cli import accuracy as accuracy
 from flownav.cli import bench as bench
 from flownav.cli import campaign as campaign
+from flownav.cli import certify as certify
 from flownav.cli import compare as compare
 from flownav.cli import envelope as envelope
 from flownav.cli import export as export
@@ -53,6 +54,7 @@ for name, command, what in (
     ("pad", pad.command, "Find the landing pad in a frame; measure how well, by height."),
     ("paper", paper.command, "Every table of the paper, published and reproduced side by side."),
     ("campaign", campaign.command, "Fly a scenario many times: accuracy with intervals, rare events."),
+    ("certify", certify.command, "Pass, fail or not shown: a requirement flown, as a page to be signed."),
     ("accuracy", accuracy.command, "The landing filter against its targets, and what its pieces are worth."),
     ("envelope", envelope.command, "How surely a scenario lands, by the wind's speed and direction."),
     ("faults", faults.command, "Let sensors fail on a landing: when it is noticed, what it costs."),

@@ -141,7 +141,7 @@ class Ensemble:
 
     def numbers(self, name: str, shares: Array) -> Array:
         """A dispersed number at these shares of its distribution, in (0, 1), in the unit of its name."""
-        entry, told = self.entries[name], self._believed(name)
+        entry, told = self.entries[name], self.believed_of(name)
         below, above = self._reach(name, told) if entry.mode == "uncertainty" else (0.0, 0.0)
         draws = self.frozen[name].ppf(shares)
         return np.array([drawn(entry.mode, float(draw), told, below, above) for draw in draws])
@@ -202,7 +202,7 @@ class Ensemble:
         parts = key.split(".")
         if any(part in SHARED for part in parts) or (key == "latency_s" and source not in LATE):
             raise self._wrong(name, "is the same for all flights of a scenario")
-        told = self._believed(name)
+        told = self.believed_of(name)
         if entry.mode == "uncertainty":
             self._reach(name, told)
         try:
@@ -210,7 +210,7 @@ class Ensemble:
         except ValueError as error:
             raise self._wrong(name, str(error)) from None
 
-    def _believed(self, name: str) -> float:
+    def believed_of(self, name: str) -> float:
         """What the datasheet says of a number."""
         source, _, key = name.partition(".")
         inside: Any = self.contents[source]

@@ -1,0 +1,106 @@
+"""`flownav certify`: a requirement in the words of a test plan, flown, judged, and written as a page to be signed."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from flownav.cli.output import VehicleOption
+from flownav.errors import InputError
+
+if TYPE_CHECKING:
+    from flownav.campaign.plan import Plan
+    from flownav.campaign.requirement import Requirement
+
+
+def command(
+    requirement: Annotated[
+        str, typer.Argument(help="takeoff, landing, pad_return, approach, approach_8_m_s, or a requirement (TOML).")
+    ],
+    plan_only: Annotated[bool, typer.Option("--plan", help="Only say how many flights are needed.")] = False,
+    flights: Annotated[int | None, typer.Option(help="Flights, if not as many as the plan needs.")] = None,
+    ranking: Annotated[
+        int, typer.Option(help="Rows of the ranking of inputs, a power of 2: it flies so many for each input; 0: none.")
+    ] = 64,
+    records: Annotated[int, typer.Option(help="Write records and reports of so many of the worst flights.")] = 3,
+    vehicle: VehicleOption = None,
+    out: Annotated[Path | None, typer.Option(help="Its folder; out/NAME_certificate if not given.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Fly what a requirement asks for: pass, fail or not shown, with its risk; exit status 1 unless it passes."""
+    from flownav.campaign.ranking import LEAST
+    from flownav.campaign.requirement import load_requirement
+    from flownav.certification.cells import plan_of
+    from flownav.certification.certify import TOLD
+    from flownav.cli.output import require_between
+    from flownav.errors import VerdictError
+
+    if flights is not None:
+        require_between("--flights", flights, 1, 100_000_000)
+    if ranking and (ranking & (ranking - 1) or not LEAST <= ranking <= 65_536):
+        raise InputError(f"--ranking {ranking}: must be 0 or a power of 2 from {LEAST} to 65536")
+    require_between("--records", records, 0, TOLD)
+    asked = load_requirement(requirement)
+    if plan_only:
+        _say_plan(asked, as_json)
+        return
+    plan = plan_of(asked, flights, vehicle)
+    facts = _fly(asked, plan, requirement, out or Path("out") / f"{asked.name}_certificate", ranking, records)
+    if as_json:
+        typer.echo(json.dumps(facts))
+    else:
+        from flownav.cli.certify_table import show
+
+        show(facts)
+    if facts["verdict"] != "pass":
+        worst = [one for one in facts["requirement"]["requirements"] if one["verdict"] != "pass"]
+        raise VerdictError(f"{asked.name}: " + "; ".join(f"{one['verdict']}: {one['sentence']}" for one in worst))
+
+
+def _fly(
+    asked: Requirement, plan: Plan, name: str, folder: Path, ranking: int, records: int
+) -> dict[str, Any]:  # fmt: skip
+    """Fly what the folder lacks, rank, write."""
+    from flownav.campaign.engines.local import Local
+    from flownav.campaign.ranking import flights_of
+    from flownav.campaign.store import Store
+    from flownav.certification.certify import certify, with_ranking
+    from flownav.certification.written import write_certificate
+    from flownav.cli.campaign_progress import watching
+    from flownav.cli.output import progress
+
+    inputs = max(len(cell.setup.ensemble().entries) for cell in plan.cells)
+    with Store(folder).opened(plan) as store:
+        engine = Local()
+        with watching(plan) as watch:
+            certificate = certify(asked, plan, engine, store, watch)
+        if ranking:
+            with progress(f"Ranking {inputs} inputs", flights_of(inputs, ranking)) as advance:
+                certificate = with_ranking(certificate, engine, store, ranking, advance)
+        with progress("Writing the worst flights", records) as advance:
+            return write_certificate(certificate, store, name, records, advance)
+
+
+def _say_plan(asked: Requirement, as_json: bool) -> None:
+    """How many flights each requirement needs, by the failures that it may have, and how many the file asks for."""
+    from flownav.campaign.requirement import needed_by
+    from flownav.certification.judgement import PLANS
+
+    rows = [
+        {
+            "requirement": table.sentence(),
+            "needed": {str(failures): needed_by(table, failures) for failures in PLANS},
+            "allowed_failures": table.allowed_failures,
+            "flights": needed_by(table),
+        }
+        for table in asked.requirement
+    ]
+    if as_json:
+        typer.echo(json.dumps({"requirement": asked.name, "flights": asked.flights(), "requirements": rows}))
+        return
+    from flownav.cli.certify_table import show_plan
+
+    show_plan(asked.name, rows, asked.flights())

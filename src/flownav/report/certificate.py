@@ -1,0 +1,134 @@
+"""The certificate as one HTML page that needs nothing but a browser, and prints on A4 to be signed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from flownav.report import certificate_figures as figures
+from flownav.report import content
+from flownav.report.figure_words import NONE, number
+from flownav.report.html import HERE, content_policy, figure_json, inside_script
+from flownav.report.panels import Panel, Section
+from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
+
+HEADLINES = {"pass": "Pass", "fail": "Fail", "not shown": "Not shown"}
+SENTENCES = {
+    "pass": "The flights show every requirement below.",
+    "fail": "The flights show that a requirement below is not met.",
+    "not shown": "The flights show neither that every requirement below is met nor that one is not.",
+}
+SIGNERS = ("Prepared by", "Checked by", "Approved by")
+
+
+def render(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> str:
+    """The page as text. facts: as certificate.json has them; shown: what the figures show of each flight."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
+
+    sections = sections_of(facts, shown)
+    scripts = [get_plotlyjs().replace("\r", ""), (HERE / "page.js").read_text(encoding="utf-8")]
+    style = "".join((HERE / name).read_text(encoding="utf-8") for name in ("page.css", "certificate.css"))
+    environment = Environment(
+        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    environment.filters |= {"number": number, "percent": percent, "words": content.text}
+    panels = [panel for section in sections for panel in section.panels]
+    return environment.get_template("certificate.html.j2").render(
+        facts=facts,
+        own=facts["requirement"],
+        headline=HEADLINES[facts["verdict"]],
+        sentence=SENTENCES[facts["verdict"]],
+        together=together(facts),
+        conditions=conditions(facts),
+        sections=sections,
+        worst=[worst_row(facts, told) for told in facts["worst"]],
+        measures=[one["measure"] for one in facts["requirement"]["requirements"]],
+        axes=[figures.INPUT_WORDS.get(name, name) for name in facts["envelope"]["axes"]],
+        known=figures.KNOWN_WORDS,
+        told=content.groups(facts["assumed"]["told"]),
+        vehicle=content.groups(facts["assumed"]["vehicle_numbers"]),
+        signers=SIGNERS,
+        none=NONE,
+        palette=PALETTE,
+        font=Markup(FONT),
+        data={panel.key: Markup(figure_json(panel)) for panel in panels if panel.figure},
+        dark=Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
+        style=Markup(style),
+        scripts=[Markup(script) for script in scripts],
+        policy=content_policy(scripts),
+    )
+
+
+def sections_of(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> list[Section]:
+    """The figures in the order of the page."""
+    tails = [figures.tail(one, shown["figures"][one["measure"]]) for one in facts["requirement"]["requirements"]]
+    distribution = [figures.touchdowns(facts, shown), *(panel for panel in tails if panel.figure)]
+    return [
+        Section("distribution", "What the flights did", _widened(distribution)),
+        Section("envelope-map", "Under which conditions", (figures.envelope(facts),)),
+        Section("sensitivity", "What decides the outcome", tuple(figures.ranking(facts))),
+    ]
+
+
+def _widened(panels: list[Panel]) -> tuple[Panel, ...]:
+    from flownav.report.html import widened
+
+    return tuple(widened(panels))
+
+
+def together(facts: Mapping[str, Any]) -> str:
+    """Whose the risk is, in words."""
+    all_of_them = facts["requirement"]["requirements"]
+    risk = percent(facts["risk"], 1)
+    if len(all_of_them) == 1:
+        return (
+            f"Consumer's risk {risk}: so likely would {facts['flights']} flights pass if the requirement were only just "
+            "not met."
+        )
+    return (
+        f"Each requirement is judged by itself at its own confidence, and all must pass. The consumer's risk is {risk},"
+        " the largest of any one: to pass together while some requirement is not met, that one must pass by luck. It "
+        "does not grow with their number. The risk of a wrong fail is of each requirement, and adds up over them."
+    )
+
+
+def conditions(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Under what the statement holds: settings, ranges, lists."""
+    own = facts["requirement"]
+    rows = [("scenario", own["scenario"])]
+    rows += [(name, value) for _, group in content.groups({"set": own["set"]}) for name, value in group]
+    given = dict(own["conditions"])
+    for name, entry in given.pop("ranges", {}).items():
+        low, high = entry.get("loc", 0.0), entry.get("loc", 0.0) + entry.get("scale", 1.0)
+        even = entry["distribution"] == "uniform"
+        said = f"{low:g} to {high:g}, evenly" if even else content.text(entry)
+        rows.append((figures.INPUT_WORDS.get(name, name), said))
+    for name, value in given.items():
+        many = value if isinstance(value, list) else [value]
+        words = " to ".join(map(str, many)) if name == "height_m" else ", ".join(map(str, many))
+        rows.append((name, words))
+    return rows
+
+
+def worst_row(facts: Mapping[str, Any], told: Mapping[str, Any]) -> dict[str, Any]:
+    """One of the worst flights as text."""
+    of = {one["measure"]: one for one in facts["requirement"]["requirements"]}
+    said = [
+        number(value, 3 if of[name]["unit"] else 0) if value is not None else "none"
+        for name, value in told["figures"].items()
+    ]
+    inputs = [number(told["inputs"][name], 1) for name in facts["envelope"]["axes"]]
+    return dict(told) | {"said": said, "where": inputs, "report": told.get("report")}
+
+
+def percent(share: float | None, digits: int = 2) -> str:
+    """A share in per cent, rounded towards what it does not reach: never 100 % of what is less."""
+    if share is None:
+        return NONE
+    text = f"{100.0 * share:.{digits}f}"
+    if share < 1.0 and float(text) >= 100.0:
+        text = f"{100.0 - 10.0**-digits:.{digits}f}"
+    return f"{text} %"

@@ -1,0 +1,248 @@
+"""The figures of a certificate: touchdowns, the tail of each measure, the envelope, inputs ranked, the split."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.report.panels import Panel, drawn
+from flownav.report.style import COLOUR, axis, layout
+
+Array = NDArray[np.float64]
+
+SPEED, DIRECTION = "wind.speed_20ft_m_s", "wind.from_direction_deg"
+INPUT_WORDS = {SPEED: "wind at 20 ft (m/s)", DIRECTION: "wind from (°)"}
+KNOWN_WORDS = {
+    "build": "known once built",
+    "day": "known on the day",
+    "never": "never known",
+}
+MOST_DOTS = 4000
+MOST_BARS = 12
+# what a field of the envelope is: its words, its colour's role, and which fields are so
+FIELDS = (
+    ("pass", "flow", lambda field: field["verdict"] == "pass"),
+    ("not shown, no failure", "estimate", lambda field: field["verdict"] == "not shown" and field["failures"] == 0),
+    ("not shown, with failures", "gps", lambda field: field["verdict"] == "not shown" and field["failures"] > 0),
+    ("fail", "alert", lambda field: field["verdict"] == "fail"),
+)
+
+
+def touchdowns(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> Panel:
+    """Where the flights touched, about the pad's centre, with the circles that hold half and most of them."""
+    key, title = "touchdowns", "Touchdowns"
+    if not shown["places"]:
+        return Panel(key, title, absent="The requirement is not of touchdowns.")
+    from plotly.graph_objects import Figure
+
+    north, east, bad = shown["north_m"], shown["east_m"], shown["failed"]
+    touched = np.isfinite(north) & np.isfinite(east)
+    figure = Figure()
+    for name, radius, role, dash in _circles(facts, shown):
+        turn = np.linspace(0.0, 2.0 * np.pi, 121)
+        figure.add_scatter(x=drawn(radius * np.sin(turn)), y=drawn(radius * np.cos(turn)), mode="lines", name=name,
+                           hoverinfo="skip", line={"color": COLOUR[role], "width": 1.6, "dash": dash})  # fmt: skip
+    for name, role, symbol, size, which in (
+        ("met", "estimate", "circle", 4, touched & ~bad), ("not met", "alert", "x", 7, touched & bad),
+    ):  # fmt: skip
+        place = np.flatnonzero(which)
+        place = place[:: -(-len(place) // MOST_DOTS)] if role == "estimate" and len(place) else place
+        if len(place):
+            figure.add_scatter(x=drawn(east[place]), y=drawn(north[place]), mode="markers", name=name,
+                               hovertemplate="north %{y:.3f} m, east %{x:.3f} m<extra></extra>",
+                               marker={"color": COLOUR[role], "size": size, "symbol": symbol,
+                                       "opacity": 0.6})  # fmt: skip
+    limits = axis("north (m)") | {"scaleanchor": "x", "scaleratio": 1}
+    figure.update_layout(template="none", **layout(460), xaxis=axis("east (m)"), yaxis=limits)
+    figure.update_layout(hovermode="closest")
+    without = int((~touched).sum())
+    caption = f"{'At rest' if shown['of'] == 'rest' else 'First contact'}, about the pad's centre."
+    caption += f" {without} of {len(north)} flights crashed or never came to rest on the ground." if without else ""
+    alt = f"Scatter of {int(touched.sum())} touchdowns about the pad's centre; {int(bad.sum())} flights do not meet it."
+    return Panel(key, title, caption, alt, figure)
+
+
+def _circles(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> list[tuple[str, float, str, str]]:
+    """Circles about the pad's centre: name, radius [m], colour's role, dash."""
+    away = np.sort(np.where(np.isfinite(shown["north_m"]), np.hypot(shown["north_m"], shown["east_m"]), np.inf))
+    found = []
+    for share, name, dash in ((0.5, "R50", "dot"), (0.95, "R95", "dash")):
+        radius = float(away[max(int(np.ceil(share * len(away))) - 1, 0)])
+        if np.isfinite(radius):
+            found.append((f"{name} {radius:.3f} m", radius, "muted", dash))
+    for one in facts["requirement"]["requirements"]:
+        if one["measure"] in ("touchdown.horizontal_m", "touchdown.rest_m") and "at_most" in one:
+            return [*found, (f"limit {one['at_most']:g} m", one["at_most"], "alert", "solid")]
+    return found
+
+
+def tail(one: Mapping[str, Any], figures: Array) -> Panel:
+    """How often a measure is exceeded, on a logarithmic scale, beside its limit and the share that may exceed it."""
+    key, title = f"tail-{one['measure'].replace('.', '-')}", f"How often {one['measure']} is exceeded"
+    upper = "at_most" in one
+    if not upper:
+        title = f"How often {one['measure']} is not reached"
+    limit, bound = one["at_most" if upper else "at_least"], one["tolerance_bound"]
+    finite = np.sort(figures[np.isfinite(figures)])
+    if len(np.unique(finite)) < 3:
+        return Panel(key, title, absent=f"{one['measure']} is yes or no: there is no distribution to draw.")
+    from plotly.graph_objects import Figure
+
+    count = len(figures)
+    beyond = (count - 1 - np.arange(len(finite))) / count if upper else np.arange(len(finite)) / count
+    kept = np.unique(np.round(np.concatenate([np.linspace(0, len(finite) - 1, 400), _last(finite, upper)])).astype(int))
+    x, y = finite[kept], np.maximum(beyond[kept], 0.3 / count)
+    figure = Figure()
+    figure.add_scatter(x=drawn(x), y=drawn(y), mode="lines", name="flights",
+                       line={"color": COLOUR["estimate"], "width": 1.8},
+                       hovertemplate="%{x:.3f} " + one["unit"] + ": %{y:.2%} beyond<extra></extra>")  # fmt: skip
+    ends_x = [min(float(x[0]), limit), max(float(x[-1]), limit)]
+    lines = [(f"limit {limit:g} {one['unit']}".rstrip(), "alert", [limit, limit], [0.3 / count, 1.0], "solid"),
+             (f"may be beyond: {100 * (1 - one['probability']):.3g} %", "muted", ends_x,
+              [1.0 - one["probability"]] * 2, "dash")]  # fmt: skip
+    if bound is not None:
+        lines.append(
+            (f"tolerance bound {bound:.3f} {one['unit']}".rstrip(), "flow", [bound, bound], [0.3 / count, 1.0], "dot")
+        )
+    for name, role, at_x, at_y, dash in lines:
+        figure.add_scatter(x=at_x, y=at_y, mode="lines", name=name, hoverinfo="skip",
+                           line={"color": COLOUR[role], "width": 1.5, "dash": dash})  # fmt: skip
+    scale = axis("share of flights beyond") | {"type": "log", "tickformat": "~p", "dtick": 1, "nticks": None}
+    figure.update_layout(template="none", **layout(430), yaxis=scale)
+    figure.update_layout(
+        xaxis=axis(f"{one['words']}" + (f" ({one['unit']})" if one["unit"] else "")), hovermode="closest"
+    )
+    caption = "The curve must pass below the corner of the two lines; the tolerance bound is where it surely does."
+    infinite = int((~np.isfinite(figures)).sum())
+    caption += f" {infinite} flights have no figure and count as beyond all." if infinite else ""
+    return Panel(key, title, caption, f"Share of flights in which {one['measure']} is beyond a value.", figure)
+
+
+def _last(finite: Array, upper: bool) -> NDArray[np.int64]:
+    """The places of the outermost flights, which are all drawn."""
+    last = np.arange(min(200, len(finite)))
+    return len(finite) - 1 - last if upper else last
+
+
+def envelope(facts: Mapping[str, Any]) -> Panel:
+    """Where in the conditions the requirement is shown."""
+    found = facts["envelope"]
+    axes, fields = found["axes"], found["bins"]
+    key, title = "envelope", "Envelope of passing conditions"
+    if not fields:
+        return Panel(
+            key, title, absent="Nothing in the conditions has a range: the statement holds for the cells below."
+        )
+    from plotly.graph_objects import Figure
+
+    figure = Figure()
+    polar = axes == [SPEED, DIRECTION]
+    for words, role, test in FIELDS:
+        inside = [field for field in fields if field["flights"] and test(field)]
+        figure.add_trace(_fields(axes, inside, words, COLOUR[role], polar))
+    look = layout(470)
+    if polar:
+        look["polar"] = {
+            "bgcolor": "rgba(0,0,0,0)",
+            "angularaxis": {"rotation": 90, "direction": "clockwise", "ticksuffix": "°", "gridcolor": COLOUR["rule"],
+                            "linecolor": COLOUR["rule"], "tickfont": {"color": COLOUR["muted"]}},
+            "radialaxis": {"ticksuffix": " m/s", "angle": 90, "tickangle": 90, "gridcolor": COLOUR["rule"],
+                           "linecolor": COLOUR["rule"], "tickfont": {"color": COLOUR["muted"], "size": 10}},
+        }  # fmt: skip
+    elif len(axes) == 2:
+        look |= {"xaxis": axis(INPUT_WORDS.get(axes[0], axes[0])), "yaxis": axis(INPUT_WORDS.get(axes[1], axes[1]))}
+    else:
+        look |= {"xaxis": axis(INPUT_WORDS.get(axes[0], axes[0])),
+                 "yaxis": axis("share of flights that meet it") | {"tickformat": ".1%"}}  # fmt: skip
+    figure.update_layout(template="none", barmode="overlay", **look)
+    figure.update_layout(hovermode="closest")
+    smallest = min(field["flights"] for field in fields)
+    need = found["flights_needed_in_a_field"]
+    caption = "Each field judged by its own flights at the same probability and confidence."
+    if smallest < need:
+        caption += f" A field alone needs {need} flights to pass; the emptiest has {smallest}."
+    caption += " Direction is where the wind blows from." if polar else ""
+    return Panel(key, title, caption, f"Verdicts of {len(fields)} fields over {' and '.join(axes)}.", figure, wide=True)
+
+
+def _fields(axes: Sequence[str], fields: Sequence[Mapping[str, Any]], words: str, colour: str, polar: bool) -> Any:
+    """The fields of one kind as bars that stand on their lower edge."""
+    from plotly.graph_objects import Bar, Barpolar
+
+    marker = {"color": colour, "line": {"color": COLOUR["surface"], "width": 1.5}}
+    said = [_field_words(axes, field) for field in fields]
+    if polar:
+        low, turn = [np.array([field[name] for field in fields]).reshape(-1, 2) for name in axes]
+        return Barpolar(base=low[:, 0].tolist(), r=np.diff(low).ravel().tolist(), theta=turn.mean(axis=1).tolist(),
+                        width=np.diff(turn).ravel().tolist(), name=words, hovertext=said, hoverinfo="text",
+                        marker=marker)  # fmt: skip
+    first = np.array([field[axes[0]] for field in fields]).reshape(-1, 2)
+    across: dict[str, Any] = {"x": first.mean(axis=1).tolist(), "width": np.diff(first).ravel().tolist()}
+    if len(axes) == 2:
+        second = np.array([field[axes[1]] for field in fields]).reshape(-1, 2)
+        across |= {"base": second[:, 0].tolist(), "y": np.diff(second).ravel().tolist()}
+    else:
+        share = np.array([field["share"] for field in fields])
+        low, high = (np.array([field[name] for field in fields]) for name in ("low", "high"))
+        bars = {"type": "data", "symmetric": False, "array": (high - share).tolist(),
+                "arrayminus": (share - low).tolist(), "color": COLOUR["ink"], "thickness": 1}  # fmt: skip
+        across |= {"y": share.tolist(), "error_y": bars}
+    return Bar(**across, name=words, hovertext=said, hoverinfo="text", marker=marker)
+
+
+def _field_words(axes: Sequence[str], field: Mapping[str, Any]) -> str:
+    where = [f"{INPUT_WORDS.get(name, name)}: {field[name][0]:.3g} to {field[name][1]:.3g}" for name in axes]
+    return "<br>".join([
+        *where,
+        f"{field['failures']} of {field['flights']} flights fail: {field['verdict']}",
+        f"share that meets it {100 * field['low']:.1f} to {100 * field['high']:.1f} %",
+    ])  # fmt: skip
+
+
+def ranking(facts: Mapping[str, Any]) -> list[Panel]:
+    """Inputs by what they do to the outcome, and the split of uncertainty."""
+    key, title = "ranking", "Inputs ranked by what they do to the outcome"
+    if not facts["ranking"]:
+        return [Panel(key, title, absent="No ranking was flown (--ranking 0).")]
+    if facts["ranking_of"] == "nothing":
+        words = (
+            f"All {facts['ranking_flights']} flights of the ranking have the same outcome: there is nothing to rank."
+        )
+        return [Panel(key, title, absent=words)]
+    of = "ranks of " if facts["ranking_of"] == "ranks" else ""
+    where = "" if facts["ranking_cell"] == "all flights" else f" in the worst cell ({facts['ranking_cell']})"
+    caption = (
+        f"Sobol indices of {of}{facts['ranking_measure']}{where}, {facts['ranking_flights']} flights, 90 % intervals. "
+        "First: what knowing the input alone would take away; total: what stays while it alone is unknown."
+    )
+    bars = [dict(row) | {"name": row["input"]} for row in facts["ranking"][:MOST_BARS]]
+    split = [dict(row) | {"name": KNOWN_WORDS[row["known"]]} for row in facts["split"]]
+    alt = f"Bars of {len(bars)} inputs, the first being {bars[0]['name']}."
+    said = "The same of all inputs that could be known together, and of those that nobody can know, noise included."
+    return [
+        Panel(key, title, caption, alt, _bars(bars, 90 + 34 * len(bars)), wide=True),
+        Panel("split", "Uncertainty by who could know it", said, "Bars of three classes of inputs.",
+              _bars(split, 90 + 46 * len(split)), wide=True),
+    ]  # fmt: skip
+
+
+def _bars(rows: Sequence[Mapping[str, Any]], height_px: int) -> Any:
+    """Total and first index of each row as horizontal bars with intervals, the largest on top."""
+    from plotly.graph_objects import Figure
+
+    figure = Figure()
+    for which, role in (("first", "estimate"), ("total", "pad")):
+        value = np.array([row[which] for row in rows])
+        low, high = np.array([row[f"{which}_interval"] for row in rows]).T
+        bars = {"type": "data", "symmetric": False, "array": (high - value).tolist(),
+                "arrayminus": (value - low).tolist(), "color": COLOUR["ink"], "thickness": 1, "width": 3}  # fmt: skip
+        figure.add_bar(x=np.maximum(value, 0.0).tolist(), y=[row["name"] for row in rows], orientation="h", name=which,
+                       marker={"color": COLOUR[role]}, error_x=bars,
+                       hovertemplate="%{y}: " + which + " %{x:.3f}<extra></extra>")  # fmt: skip
+    names = axis() | {"autorange": "reversed", "automargin": True, "nticks": None, "ticks": ""}
+    figure.update_layout(template="none", barmode="group", bargap=0.35, bargroupgap=0.08, **layout(height_px))
+    figure.update_layout(xaxis=axis("share of the outcome's variance"), yaxis=names, hovermode="closest")
+    return figure

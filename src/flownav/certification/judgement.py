@@ -29,7 +29,8 @@ class Judgement(NamedTuple):
 
     most: failures with which these flights would still pass, -1: none. share: one-sided bounds of the share that
     succeeds. risk: how likely these flights pass when the requirement is only just not met. bound: the tolerance bound
-    of the measure, infinite where the flights give none, None of a measure that says yes or no. needs: flights by failures, for PLANS.
+    of the measure, infinite where the flights give none, None of a measure that says yes or no. needs: flights by
+    failures, for PLANS.
     """
 
     table: RequirementTable

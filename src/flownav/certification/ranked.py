@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from flownav.campaign.engines.engine import Engine, Part
 from flownav.campaign.measures import measured
-from flownav.campaign.plan import Plan, Ready
+from flownav.campaign.plan import Plan
 from flownav.campaign.ranking import Index, Ranking, rank
 from flownav.campaign.requirement import RequirementTable
 from flownav.certification.judgement import bad_first
@@ -40,7 +41,7 @@ def ranked(
         path, number = place / f"sample-{number:03d}.parquet", number + 1
         figures = _kept(path, flights)
         if figures is None:
-            crossed = Ready(ready.setup, ready.setup.ensemble(design), ready.failure)
+            crossed = replace(ready, ensemble=ready.setup.ensemble(design))
             ((_, rows),) = engine.fly(crossed, plan.seed, [Part(0, first, flights)], on_progress)
             figures = bad_first(table, measured(table.measure, rows))
             _keep(path, figures)

@@ -84,10 +84,7 @@ def together(facts: Mapping[str, Any]) -> str:
     all_of_them = facts["requirement"]["requirements"]
     risk = percent(facts["risk"], 1)
     if len(all_of_them) == 1:
-        return (
-            f"Consumer's risk {risk}: so likely would {facts['flights']} flights pass if the requirement were only just "
-            "not met."
-        )
+        return f"Consumer's risk {risk}: so likely do these flights pass when the requirement is only just not met."
     return (
         f"Each requirement is judged by itself at its own confidence, and all must pass. The consumer's risk is {risk},"
         " the largest of any one: to pass together while some requirement is not met, that one must pass by luck. It "

@@ -30,6 +30,7 @@ CLASSES = ("build", "day", "never")
 CONFIDENCE = 0.90
 RESAMPLES = 1000
 INSIDE = 2.0**-53  # of (0, 1): a point of a sequence may lie on the edge
+MOST_KURTOSIS = 10.0  # beyond it the ranks are ranked: few outcomes far off carry the variance
 LEAST = 16  # rows: fewer say nothing
 Fly = Callable[[Design, int, int], Array]
 
@@ -47,7 +48,7 @@ class Index(NamedTuple):
 class Ranking(NamedTuple):
     """Inputs by falling total index; classes in the order of CLASSES; n: rows; flights: flown for it.
 
-    ranked: of what the indices are: "values", "ranks" (where a figure is infinite), "nothing" (all flights alike).
+    ranked: of what the indices are: "values", "ranks" (see `bounded`), "nothing" (all flights alike).
     """
 
     inputs: tuple[Index, ...]
@@ -117,14 +118,17 @@ def points_of(seed: int, n: int, inputs: int) -> Array:
 
 
 def bounded(samples: Sequence[Array]) -> tuple[list[Array], str]:
-    """The outcomes as they are; as ranks among those of A and B, in (0, 1), where one is infinite; 0 where all are one.
+    """The outcomes as they are, or as ranks among those of A and B, in (0, 1); 0 where all are one.
 
-    A variance needs finite figures; ranks keep the order, and a flight without a touchdown is the worst of all.
+    Ranks where a figure is infinite, which no variance can take (a flight without a touchdown is the worst of all), or
+    where the variance would be that of a few flights far off: a kurtosis above MOST_KURTOSIS, of a normal outcome 3.
     """
+    from scipy.stats import kurtosis
+
     both = np.concatenate(samples[:2])
     if (both == both[0]).all():
         return [np.zeros(len(sample)) for sample in samples], "nothing"
-    if all(np.isfinite(sample).all() for sample in samples):
+    if all(np.isfinite(sample).all() for sample in samples) and kurtosis(both, fisher=False) <= MOST_KURTOSIS:
         return list(samples), "values"
     ordered = np.sort(both)
 

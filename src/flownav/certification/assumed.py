@@ -33,6 +33,7 @@ NOT_MODELLED = (
 OF_A_HELICOPTER = (
     "Vortex ring, bending of blades and airframe, the tail rotor's torque about the pitch axis (docs/vehicle.md).",
 )
+OF_THE_PAPERS_FILTER = "its attitude and the ground's height, and where it starts if its GPS noise is white"
 OF_A_MULTIROTOR = ("Vortex ring, bending of arms and propellers (docs/multirotor.md).",)
 
 
@@ -46,7 +47,7 @@ def assumed(plan: Plan) -> dict[str, Any]:
         "truth": f"{setup.scenario.truth} {setup.described.name}, each flight with its own numbers and noise",
         "vehicle": setup.described.name,
         "filter": setup.scenario.filter.name,
-        "known_exactly": known_exactly(setup.scenario),
+        "known_exactly": known_exactly(setup.scenario) if setup.fitted else OF_THE_PAPERS_FILTER,
         "failure": {f"cell {k}": each.failure.words for k, each in enumerate(plan.cells) if each.failure},
         "dispersed": [
             {

@@ -51,7 +51,7 @@ def render(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> str:
         told=content.groups(facts["assumed"]["told"]),
         vehicle=content.groups(facts["assumed"]["vehicle_numbers"]),
         signers=SIGNERS,
-        none=NONE,
+        dash=NONE,
         palette=PALETTE,
         font=Markup(FONT),
         data={panel.key: Markup(figure_json(panel)) for panel in panels if panel.figure},
@@ -104,6 +104,8 @@ def conditions(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
         said = f"{low:g} to {high:g}, evenly" if even else content.text(entry)
         rows.append((figures.INPUT_WORDS.get(name, name), said))
     for name, value in given.items():
+        if value == []:
+            continue
         many = value if isinstance(value, list) else [value]
         words = " to ".join(map(str, many)) if name == "height_m" else ", ".join(map(str, many))
         rows.append((name, words))

@@ -55,14 +55,25 @@ def touchdowns(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> Panel:
                                hovertemplate="north %{y:.3f} m, east %{x:.3f} m<extra></extra>",
                                marker={"color": COLOUR[role], "size": size, "symbol": symbol,
                                        "opacity": 0.6})  # fmt: skip
-    limits = axis("north (m)") | {"scaleanchor": "x", "scaleratio": 1}
-    figure.update_layout(template="none", **layout(460), xaxis=axis("east (m)"), yaxis=limits)
+    away = np.hypot(north[touched], east[touched])
+    far = 1.15 * _far(away, [radius for _, radius, _, _ in _circles(facts, shown)])
+    north_axis = axis("north (m)") | {"scaleanchor": "x", "scaleratio": 1, "range": [-far, far]}
+    east_axis = axis("east (m)") | {"range": [-far, far], "constrain": "domain"}
+    figure.update_layout(template="none", **layout(460), xaxis=east_axis, yaxis=north_axis)
     figure.update_layout(hovermode="closest")
-    without = int((~touched).sum())
+    without, beyond = int((~touched).sum()), int((away > far).sum())
     caption = f"{'At rest' if shown['of'] == 'rest' else 'First contact'}, about the pad's centre."
     caption += f" {without} of {len(north)} flights crashed or never came to rest on the ground." if without else ""
+    caption += f" {beyond} lie beyond the picture; zoom out to see them." if beyond else ""
     alt = f"Scatter of {int(touched.sum())} touchdowns about the pad's centre; {int(bad.sum())} flights do not meet it."
     return Panel(key, title, caption, alt, figure)
+
+
+def _far(figures: Array, marks: Sequence[float]) -> float:
+    """How far a picture reaches: all that is marked and 99 of 100 figures, but not to single ones far off."""
+    usual = float(np.quantile(figures, 0.99)) if len(figures) else 0.0
+    most = 4.0 * max(marks, default=usual)
+    return max(min(usual, most), *marks, 1e-6)
 
 
 def _circles(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> list[tuple[str, float, str, str]]:
@@ -112,9 +123,10 @@ def tail(one: Mapping[str, Any], figures: Array) -> Panel:
                            line={"color": COLOUR[role], "width": 1.5, "dash": dash})  # fmt: skip
     scale = axis("share of flights beyond") | {"type": "log", "tickformat": "~p", "dtick": 1, "nticks": None}
     figure.update_layout(template="none", **layout(430), yaxis=scale)
-    figure.update_layout(
-        xaxis=axis(f"{one['words']}" + (f" ({one['unit']})" if one["unit"] else "")), hovermode="closest"
-    )
+    across = axis(one["words"] + (f" ({one['unit']})" if one["unit"] else ""))
+    if float(finite.min()) >= 0.0:
+        across["range"] = [0.0, 1.1 * _far(finite, [limit] if bound is None else [limit, bound])]
+    figure.update_layout(xaxis=across, hovermode="closest")
     caption = "The curve must pass below the corner of the two lines; the tolerance bound is where it surely does."
     infinite = int((~np.isfinite(figures)).sum())
     caption += f" {infinite} flights have no figure and count as beyond all." if infinite else ""
@@ -149,8 +161,8 @@ def envelope(facts: Mapping[str, Any]) -> Panel:
             "bgcolor": "rgba(0,0,0,0)",
             "angularaxis": {"rotation": 90, "direction": "clockwise", "ticksuffix": "°", "gridcolor": COLOUR["rule"],
                             "linecolor": COLOUR["rule"], "tickfont": {"color": COLOUR["muted"]}},
-            "radialaxis": {"ticksuffix": " m/s", "angle": 90, "tickangle": 90, "gridcolor": COLOUR["rule"],
-                           "linecolor": COLOUR["rule"], "tickfont": {"color": COLOUR["muted"], "size": 10}},
+            "radialaxis": {"ticksuffix": " m/s", "angle": 45, "tickangle": 45, "gridcolor": COLOUR["rule"],
+                           "linecolor": COLOUR["ink"], "nticks": 5, "tickfont": {"color": COLOUR["ink"], "size": 11}},
         }  # fmt: skip
     elif len(axes) == 2:
         look |= {"xaxis": axis(INPUT_WORDS.get(axes[0], axes[0])), "yaxis": axis(INPUT_WORDS.get(axes[1], axes[1]))}
@@ -172,7 +184,7 @@ def _fields(axes: Sequence[str], fields: Sequence[Mapping[str, Any]], words: str
     """The fields of one kind as bars that stand on their lower edge."""
     from plotly.graph_objects import Bar, Barpolar
 
-    marker = {"color": colour, "line": {"color": COLOUR["surface"], "width": 1.5}}
+    marker = {"color": colour, "opacity": 0.7, "line": {"color": COLOUR["surface"], "width": 1.5}}
     said = [_field_words(axes, field) for field in fields]
     if polar:
         low, turn = [np.array([field[name] for field in fields]).reshape(-1, 2) for name in axes]
@@ -212,12 +224,13 @@ def ranking(facts: Mapping[str, Any]) -> list[Panel]:
             f"All {facts['ranking_flights']} flights of the ranking have the same outcome: there is nothing to rank."
         )
         return [Panel(key, title, absent=words)]
-    of = "ranks of " if facts["ranking_of"] == "ranks" else ""
+    of = "the ranks of " if facts["ranking_of"] == "ranks" else ""
     where = "" if facts["ranking_cell"] == "all flights" else f" in the worst cell ({facts['ranking_cell']})"
     caption = (
         f"Sobol indices of {of}{facts['ranking_measure']}{where}, {facts['ranking_flights']} flights, 90 % intervals. "
         "First: what knowing the input alone would take away; total: what stays while it alone is unknown."
     )
+    caption += " Ranks, since figures that are infinite or far off would decide alone." if of else ""
     bars = [dict(row) | {"name": row["input"]} for row in facts["ranking"][:MOST_BARS]]
     split = [dict(row) | {"name": KNOWN_WORDS[row["known"]]} for row in facts["split"]]
     alt = f"Bars of {len(bars)} inputs, the first being {bars[0]['name']}."
@@ -235,14 +248,17 @@ def _bars(rows: Sequence[Mapping[str, Any]], height_px: int) -> Any:
 
     figure = Figure()
     for which, role in (("first", "estimate"), ("total", "pad")):
-        value = np.array([row[which] for row in rows])
-        low, high = np.array([row[f"{which}_interval"] for row in rows]).T
-        bars = {"type": "data", "symmetric": False, "array": (high - value).tolist(),
-                "arrayminus": (value - low).tolist(), "color": COLOUR["ink"], "thickness": 1, "width": 3}  # fmt: skip
-        figure.add_bar(x=np.maximum(value, 0.0).tolist(), y=[row["name"] for row in rows], orientation="h", name=which,
+        value = np.clip([row[which] for row in rows], 0.0, 1.0)  # an index is a share; estimates scatter beyond
+        low, high = np.clip(np.array([row[f"{which}_interval"] for row in rows]).T, 0.0, 1.0)
+        bars = {"type": "data", "symmetric": False, "array": np.maximum(high - value, 0.0).tolist(),
+                "arrayminus": np.maximum(value - low, 0.0).tolist(), "color": COLOUR["ink"],
+                "thickness": 1, "width": 3}  # fmt: skip
+        figure.add_bar(x=value.tolist(), y=[row["name"] for row in rows], orientation="h", name=which,
                        marker={"color": COLOUR[role]}, error_x=bars,
                        hovertemplate="%{y}: " + which + " %{x:.3f}<extra></extra>")  # fmt: skip
     names = axis() | {"autorange": "reversed", "automargin": True, "nticks": None, "ticks": ""}
     figure.update_layout(template="none", barmode="group", bargap=0.35, bargroupgap=0.08, **layout(height_px))
-    figure.update_layout(xaxis=axis("share of the outcome's variance"), yaxis=names, hovermode="closest")
+    figure.update_layout(
+        xaxis=axis("share of the outcome's variance") | {"rangemode": "tozero"}, yaxis=names, hovermode="closest"
+    )
     return figure

@@ -16,8 +16,8 @@ from flownav.campaign.ablations import (
     without_gps_states,
 )
 from flownav.campaign.accuracy import CASES, Target, flights_of, scenario_of
-from flownav.campaign.judged import fly_judged, home_epoch
-from flownav.campaign.local import fly_many, known_exactly
+from flownav.campaign.judged import fly_judged
+from flownav.campaign.local import fly_many, home_epoch, known_exactly
 from flownav.cli import app
 from flownav.errors import InputError, VerdictError
 from flownav.measurement import Sensor
@@ -188,6 +188,8 @@ def test_the_command_says_every_target_and_writes_what_it_prints(tmp_path):
     assert done.exception is None or isinstance(done.exception, VerdictError)
     assert done.stdout.strip() == out.read_text(encoding="utf-8").strip()
     assert "takeoff without" in done.stdout
+    assert "96 flights" not in done.stdout  # 16 were flown
+    assert done.stdout.count("steps with the ANEES of 16 flights in its") == 4 + 2  # targets, two tables
     for truth_model in ("matched", "ensemble"):
         assert f"{truth_model}: RMSE over the bound of the filter's own model, at the horizon" in done.stdout
         assert f"| {truth_model}: touchdown " in done.stdout

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaign.local import counted_steps, home_epoch, score_history, takeoff_history
+from flownav.campaign.local import counted_steps, score_history, takeoff_history
+from flownav.campaign.rows import largest_horizontal_m
 from flownav.record import POSITION_NED, VELOCITY_BODY
 from flownav.scoring.consistency import (
     GROUP_FLIGHTS,
@@ -25,7 +26,6 @@ from flownav.scoring.consistency import (
     error_sums,
     inside_fraction,
     inside_steps,
-    largest_horizontal_error,
     over_stated,
 )
 from flownav.simulation.assemble import Setup
@@ -83,16 +83,13 @@ def fly_judged(
     on_progress: Callable[[int], object] = lambda flown: None,
 ) -> Judged:
     """Fly flights 0 to `flights - 1`, matched or of an ensemble, and judge them; memory grows by a row a flight."""
-    home = home_epoch(flight)
 
     def judge(history: Array) -> tuple[Array, Array, ErrorSums, ConsistencySums | None, Array | None]:
         estimate = history[:, columns("estimate", STATES)]
         truth = history[:, columns("truth", STATES)]
-        counted = counted_steps(flight, history)
-        in_flight = counted * (1.0 - _on_ground(history))
-        largest = largest_horizontal_error(estimate, truth, home, in_flight * _from(home, len(history)))
+        in_flight = counted_steps(flight, history) * (1.0 - _on_ground(history))
         flown = error_sums((estimate - truth) ** 2, _skid_height(flight, history), in_flight)
-        up = takeoff_history(flight, history)
+        up, largest = takeoff_history(flight, history), largest_horizontal_m(flight, history)
         return score_history(flight, history), largest, flown, _at_horizon(flight, history), up
 
     rows, largest, groups, ups = [], [], [], []
@@ -116,11 +113,6 @@ def fly_judged(
     in_groups = None if total is None else tuple(groups) or (inside_steps(total),)
     every = np.concatenate(ups) if ups else None
     return Judged(np.concatenate(rows), np.concatenate(largest), flown_on, total, in_groups, every)
-
-
-def _from(step: int | None, epochs: int) -> Array:
-    """1 from a step on, 0 before; all 1 where there is none. (epochs, 1)."""
-    return np.asarray(np.arange(epochs)[:, None] >= (step or 0), float)
 
 
 def _at_horizon(flight: Flight, history: Array) -> ConsistencySums | None:

@@ -86,6 +86,8 @@ def _known(made: list[Case]) -> str:
 
 
 def _consistency(made: list[Case], truth_model: str) -> str:
+    from flownav.scoring.consistency import GROUP_FLIGHTS
+
     rows = []
     for case in made:
         facts = getattr(case, truth_model)
@@ -96,7 +98,7 @@ def _consistency(made: list[Case], truth_model: str) -> str:
         f"{truth_model}: {BOUND}, at the horizon",
         *STATES,
         "ANEES",
-        "steps with the ANEES of 96 flights in its band",
+        f"steps with the ANEES of {min(made[0].flights, GROUP_FLIGHTS)} flights in its band",
         "of all flights",
     )
     return _table(heading, rows)

@@ -27,7 +27,8 @@ def test_the_words_of_a_test_plan(written):
     assert (table.limit, table.upper, table.probability, table.confidence) == (0.5, True, 0.997, 0.9)
     assert table.sentence() == "touchdown.horizontal_m at most 0.5 m with 99.7 % probability at 90 % confidence"
     assert [needed_by(table, failures) for failures in (0, 1, 2)] == [767, 1296, 1773]
-    crash = '[[requirement]]\nmeasure = "crash"\nat_most = 0\nprobability = 0.95\nconfidence = 0.95\nallowed_failures = 0\n'
+    crash = '[[requirement]]\nmeasure = "crash"\nat_most = 0\nprobability = 0.95\nconfidence = 0.95\n'
+    crash += "allowed_failures = 0\n"
     both = load_requirement(written(HEAD + ASKED + crash))
     assert both.flights() == 1773
     assert both.requirement[1].sentence() == "no crash with 95 % probability at 95 % confidence"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from typing import Any
@@ -19,6 +20,7 @@ SENTENCES = {
     "fail": "The flights show that a requirement below is not met.",
     "not shown": "The flights show neither that every requirement below is met nor that one is not.",
 }
+MOST_NAMED = 6  # files of a folder that are hashed one by one on the page
 SIGNERS = ("Prepared by", "Checked by", "Approved by")
 
 
@@ -50,6 +52,10 @@ def render(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> str:
         known=figures.KNOWN_WORDS,
         told=content.groups(facts["assumed"]["told"]),
         vehicle=content.groups(facts["assumed"]["vehicle_numbers"]),
+        files=[
+            ("SHA-256 of what went in", facts["files"]["in"]),
+            ("SHA-256 of what came out", by_folder(facts["files"]["out"])),
+        ],
         signers=SIGNERS,
         dash=NONE,
         palette=PALETTE,
@@ -121,6 +127,22 @@ def worst_row(facts: Mapping[str, Any], told: Mapping[str, Any]) -> dict[str, An
     ]
     inputs = [number(told["inputs"][name], 1) for name in facts["envelope"]["axes"]]
     return dict(told) | {"said": said, "where": inputs, "report": told.get("report")}
+
+
+def by_folder(digests: Mapping[str, str]) -> dict[str, str]:
+    """Hashes of files by name, those of a folder with many as one: SHA-256 of its lines "name SHA-256"."""
+    folders: dict[str, dict[str, str]] = {}
+    for name, digest in digests.items():
+        top, slash, _ = name.partition("/")
+        folders.setdefault(top + slash, {})[name] = digest
+    found: dict[str, str] = {}
+    for folder, inside in folders.items():
+        if len(inside) <= MOST_NAMED:
+            found |= inside
+        else:
+            lines = "".join(f"{name} {digest}\n" for name, digest in sorted(inside.items()))
+            found[f"{folder} ({len(inside)} files)"] = hashlib.sha256(lines.encode()).hexdigest()
+    return found
 
 
 def percent(share: float | None, digits: int = 2) -> str:

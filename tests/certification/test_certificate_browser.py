@@ -1,4 +1,4 @@
-"""The certificate in a real browser: figures drawn, nothing loaded, phone and dark, and what is printed to be signed."""
+"""The certificate in a real browser: figures drawn, nothing loaded, phone, dark, and paper to be signed."""
 
 from __future__ import annotations
 

@@ -10,8 +10,8 @@ from typing import Any
 from flownav.report import certificate_figures as figures
 from flownav.report import content
 from flownav.report.figure_words import NONE, number
-from flownav.report.html import HERE, content_policy, figure_json, inside_script
-from flownav.report.panels import Panel, Section
+from flownav.report.html import HERE, figure_json, inside_script, page_scripts, template, widened
+from flownav.report.panels import Section
 from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
 
 HEADLINES = {"pass": "Pass", "fail": "Fail", "not shown": "Not shown"}
@@ -26,19 +26,13 @@ SIGNERS = ("Prepared by", "Checked by", "Approved by")
 
 def render(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> str:
     """The page as text. facts: as certificate.json has them; shown: what the figures show of each flight."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
-    from plotly.offline import get_plotlyjs
 
     sections = sections_of(facts, shown)
-    scripts = [get_plotlyjs().replace("\r", ""), (HERE / "page.js").read_text(encoding="utf-8")]
+    scripts, policy = page_scripts()
     style = "".join((HERE / name).read_text(encoding="utf-8") for name in ("page.css", "certificate.css"))
-    environment = Environment(
-        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters |= {"number": number, "percent": percent, "words": content.text}
     panels = [panel for section in sections for panel in section.panels]
-    return environment.get_template("certificate.html.j2").render(
+    page: str = template("certificate.html.j2").render(
         facts=facts,
         own=facts["requirement"],
         headline=HEADLINES[facts["verdict"]],
@@ -64,8 +58,11 @@ def render(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> str:
         dark=Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
         style=Markup(style),
         scripts=[Markup(script) for script in scripts],
-        policy=content_policy(scripts),
+        policy=policy,
+        number=number,
+        percent=percent,
     )
+    return page
 
 
 def sections_of(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> list[Section]:
@@ -73,16 +70,10 @@ def sections_of(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> list[Sect
     tails = [figures.tail(one, shown["figures"][one["measure"]]) for one in facts["requirement"]["requirements"]]
     distribution = [figures.touchdowns(facts, shown), *(panel for panel in tails if panel.figure)]
     return [
-        Section("distribution", "What the flights did", _widened(distribution)),
+        Section("distribution", "What the flights did", tuple(widened(distribution))),
         Section("envelope-map", "Under which conditions", (figures.envelope(facts),)),
         Section("sensitivity", "What decides the outcome", tuple(figures.ranking(facts))),
     ]
-
-
-def _widened(panels: list[Panel]) -> tuple[Panel, ...]:
-    from flownav.report.html import widened
-
-    return tuple(widened(panels))
 
 
 def together(facts: Mapping[str, Any]) -> str:

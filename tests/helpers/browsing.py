@@ -19,7 +19,7 @@ FIGURES = """() => [...document.querySelectorAll("[data-figure]")].map((plot) =>
   const box = drawing ? drawing.getBoundingClientRect() : { width: 0, height: 0 };
   return { key: plot.dataset.figure, drawn: plot.dataset.drawn, plotly: plot.classList.contains("js-plotly-plot"),
            traces: (plot.data || []).length, width: box.width, height: box.height, text: plot.innerText,
-           marks: plot.querySelectorAll(".scatterlayer .trace, canvas").length,
+           marks: plot.querySelectorAll(".scatterlayer .trace, .barlayer .trace, canvas").length,
            ink: plot.layout ? plot.layout.font.color : "", right: plot.getBoundingClientRect().right };
 })"""
 

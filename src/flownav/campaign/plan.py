@@ -107,7 +107,7 @@ class Plan:
     def ready(self, cell: int) -> Ready:
         """A cell made ready. InputError where its scenario or its dispersion cannot be."""
         own = self.cells[cell]
-        return replace(ready_of(own.setup, own.truth_model, self.sampling, self.flights), failure=own.failure)
+        return ready_of(own.setup, own.truth_model, self.sampling, self.flights, own.failure)
 
     @cached_property
     def as_json(self) -> dict[str, Any]:
@@ -135,12 +135,14 @@ class Plan:
         }
 
 
-def ready_of(setup: Setup, truth_model: TruthModel, sampling: Sampling, flights: int) -> Ready:
+def ready_of(
+    setup: Setup, truth_model: TruthModel, sampling: Sampling, flights: int, failure: Failure | None = None
+) -> Ready:
     """A cell made ready. InputError where its dispersion cannot be."""
     ensemble = None
     if truth_model == "ensemble":
         ensemble = setup.ensemble(design_of(sampling, tuple(setup.ensemble().entries), flights))
-    return Ready(setup, truth_model, sampling, flights, ensemble)
+    return Ready(setup, truth_model, sampling, flights, ensemble, failure)
 
 
 def planned(

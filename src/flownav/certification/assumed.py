@@ -70,6 +70,10 @@ def words_of(entry: Distribution) -> str:
     numbers = entry.shapes | {"loc": entry.loc, "scale": entry.scale}
     plain = {"loc": 0.0, "scale": 1.0}
     said = ", ".join(f"{name} {value:g}" for name, value in numbers.items() if plain.get(name) != value)
+    if entry.mode == "uncertainty" and entry.distribution == "truncnorm":
+        low, high = (entry.shapes[name] * entry.scale for name in ("a", "b"))
+        if (low, high) == (-1.0, 1.0) and entry.loc == 0.0:
+            return f"normal, cut off at the stated uncertainty, {entry.shapes['b']:g} sigma"
     if entry.distribution == "uniform":
         said = f"{entry.loc:g} to {entry.loc + entry.scale:g}"
     of = {"value": "", "factor": " times what is believed", "offset": " more than is believed",

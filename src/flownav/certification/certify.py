@@ -147,7 +147,7 @@ def flown_of(plan: Plan, data: Dataset) -> Flown:
     names = list(dict.fromkeys(name for own in inputs for name in own))
 
     def texts(name: str) -> tuple[str, ...]:
-        return tuple(text for cell in cells for text in data.table(cell, [name])[name].to_pylist())
+        return tuple(text for cell in cells for text in data.column(cell, name))
 
     return Flown(
         cell=np.repeat(np.arange(len(cells)), plan.flights),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.campaign.arrow import column, numbers, read
 from flownav.campaign.engines.engine import Engine, Part
 from flownav.campaign.measures import measured
 from flownav.campaign.plan import Plan
@@ -21,7 +22,7 @@ from flownav.simulation.dispersion import Design
 
 Array = NDArray[np.float64]
 
-FOLDER = "ranking"
+FOLDER, FIGURE = "ranking", "figure"
 
 
 def ranked(
@@ -76,13 +77,12 @@ def _index(index: Index, name: str) -> dict[str, Any]:
 def _kept(path: Path, flights: int) -> Array | None:
     """The outcomes of a sample that was flown before; None where there is none, or not all of it."""
     import pyarrow as pa
-    import pyarrow.parquet as pq
 
     try:
-        figures = np.asarray(pq.read_table(path, partitioning=None)["figure"].to_numpy())
+        figures = column(read(path), FIGURE)
     except (OSError, KeyError, pa.ArrowException):
         return None
-    return figures if len(figures) == flights else None
+    return np.asarray(figures) if len(figures) == flights else None
 
 
 def _keep(path: Path, figures: Array) -> None:
@@ -90,4 +90,4 @@ def _keep(path: Path, figures: Array) -> None:
     import pyarrow.parquet as pq
 
     with written_whole(path) as temporary:
-        pq.write_table(pa.table({"figure": figures}), temporary)
+        pq.write_table(pa.table({FIGURE: numbers(figures)}), temporary)

@@ -20,7 +20,7 @@ def from_height(scenario: Scenario, height_m: float) -> Scenario:
     knots = scenario.flight.path
     top = max(float(knot.height_m) for knot in knots)
     others = [float(knot.height_m) for knot in knots if knot.height_m < top]
-    next_m = max(others, default=0.0)
+    next_m = max([0.0, *others])
     if not height_m > next_m:
         raise InputError(f"{scenario.name}: height_m {height_m:g}: must lie above the path's next height, {next_m:g} m")
     ends, delays = [], []  # of each stretched way: when it ended, and by how much later it ends now

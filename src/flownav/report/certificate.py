@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping
 from typing import Any
@@ -9,8 +10,8 @@ from typing import Any
 from flownav.report import certificate_figures as figures
 from flownav.report import content
 from flownav.report.figure_words import NONE, number
-from flownav.report.html import HERE, content_policy, figure_json, inside_script
-from flownav.report.panels import Panel, Section
+from flownav.report.html import HERE, figure_json, inside_script, page_scripts, template, widened
+from flownav.report.panels import Section
 from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
 
 HEADLINES = {"pass": "Pass", "fail": "Fail", "not shown": "Not shown"}
@@ -19,24 +20,19 @@ SENTENCES = {
     "fail": "The flights show that a requirement below is not met.",
     "not shown": "The flights show neither that every requirement below is met nor that one is not.",
 }
+MOST_NAMED = 6  # files of a folder that are hashed one by one on the page
 SIGNERS = ("Prepared by", "Checked by", "Approved by")
 
 
 def render(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> str:
     """The page as text. facts: as certificate.json has them; shown: what the figures show of each flight."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
-    from plotly.offline import get_plotlyjs
 
     sections = sections_of(facts, shown)
-    scripts = [get_plotlyjs().replace("\r", ""), (HERE / "page.js").read_text(encoding="utf-8")]
+    scripts, policy = page_scripts()
     style = "".join((HERE / name).read_text(encoding="utf-8") for name in ("page.css", "certificate.css"))
-    environment = Environment(
-        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters |= {"number": number, "percent": percent, "words": content.text}
     panels = [panel for section in sections for panel in section.panels]
-    return environment.get_template("certificate.html.j2").render(
+    page: str = template("certificate.html.j2").render(
         facts=facts,
         own=facts["requirement"],
         headline=HEADLINES[facts["verdict"]],
@@ -50,6 +46,10 @@ def render(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> str:
         known=figures.KNOWN_WORDS,
         told=content.groups(facts["assumed"]["told"]),
         vehicle=content.groups(facts["assumed"]["vehicle_numbers"]),
+        files=[
+            ("SHA-256 of what went in", facts["files"]["in"]),
+            ("SHA-256 of what came out", by_folder(facts["files"]["out"])),
+        ],
         signers=SIGNERS,
         dash=NONE,
         palette=PALETTE,
@@ -58,8 +58,11 @@ def render(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> str:
         dark=Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
         style=Markup(style),
         scripts=[Markup(script) for script in scripts],
-        policy=content_policy(scripts),
+        policy=policy,
+        number=number,
+        percent=percent,
     )
+    return page
 
 
 def sections_of(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> list[Section]:
@@ -67,16 +70,10 @@ def sections_of(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> list[Sect
     tails = [figures.tail(one, shown["figures"][one["measure"]]) for one in facts["requirement"]["requirements"]]
     distribution = [figures.touchdowns(facts, shown), *(panel for panel in tails if panel.figure)]
     return [
-        Section("distribution", "What the flights did", _widened(distribution)),
+        Section("distribution", "What the flights did", tuple(widened(distribution))),
         Section("envelope-map", "Under which conditions", (figures.envelope(facts),)),
         Section("sensitivity", "What decides the outcome", tuple(figures.ranking(facts))),
     ]
-
-
-def _widened(panels: list[Panel]) -> tuple[Panel, ...]:
-    from flownav.report.html import widened
-
-    return tuple(widened(panels))
 
 
 def together(facts: Mapping[str, Any]) -> str:
@@ -121,6 +118,22 @@ def worst_row(facts: Mapping[str, Any], told: Mapping[str, Any]) -> dict[str, An
     ]
     inputs = [number(told["inputs"][name], 1) for name in facts["envelope"]["axes"]]
     return dict(told) | {"said": said, "where": inputs, "report": told.get("report")}
+
+
+def by_folder(digests: Mapping[str, str]) -> dict[str, str]:
+    """Hashes of files by name, those of a folder with many as one: SHA-256 of its lines "name SHA-256"."""
+    folders: dict[str, dict[str, str]] = {}
+    for name, digest in digests.items():
+        top, slash, _ = name.partition("/")
+        folders.setdefault(top + slash, {})[name] = digest
+    found: dict[str, str] = {}
+    for folder, inside in folders.items():
+        if len(inside) <= MOST_NAMED:
+            found |= inside
+        else:
+            lines = "".join(f"{name} {digest}\n" for name, digest in sorted(inside.items()))
+            found[f"{folder} ({len(inside)} files)"] = hashlib.sha256(lines.encode()).hexdigest()
+    return found
 
 
 def percent(share: float | None, digits: int = 2) -> str:

@@ -22,6 +22,7 @@ KNOWN_WORDS = {
 }
 MOST_DOTS = 4000
 MOST_BARS = 12
+TOGETHER = 2.0  # sum of total indices, beyond which inputs act mostly together
 # what a field of the envelope is: its words, its colour's role, and which fields are so
 FIELDS = (
     ("pass", "flow", lambda field: field["verdict"] == "pass"),
@@ -129,7 +130,7 @@ def tail(one: Mapping[str, Any], figures: Array) -> Panel:
     figure.update_layout(xaxis=across, hovermode="closest")
     caption = "The curve must pass below the corner of the two lines; the tolerance bound is where it surely does."
     infinite = int((~np.isfinite(figures)).sum())
-    caption += f" {infinite} flights have no figure and count as beyond all." if infinite else ""
+    caption += f" Flights without a figure, which count as beyond all: {infinite}." if infinite else ""
     return Panel(key, title, caption, f"Share of flights in which {one['measure']} is beyond a value.", figure)
 
 
@@ -173,7 +174,9 @@ def envelope(facts: Mapping[str, Any]) -> Panel:
     figure.update_layout(hovermode="closest")
     smallest = min(field["flights"] for field in fields)
     need = found["flights_needed_in_a_field"]
-    caption = "Each field judged by its own flights at the same probability and confidence."
+    caption = (
+        "Each field is judged by its own flights, at the same probability and confidence: it may be wrong as often."
+    )
     if smallest < need:
         caption += f" A field alone needs {need} flights to pass; the emptiest has {smallest}."
     caption += " Direction is where the wind blows from." if polar else ""
@@ -231,7 +234,12 @@ def ranking(facts: Mapping[str, Any]) -> list[Panel]:
         "First: what knowing the input alone would take away; total: what stays while it alone is unknown."
     )
     caption += " Ranks, since figures that are infinite or far off would decide alone." if of else ""
-    bars = [dict(row) | {"name": row["input"]} for row in facts["ranking"][:MOST_BARS]]
+    if sum(row["total"] for row in facts["ranking"]) > TOGETHER:
+        caption += (
+            " The totals add up to far more than 1: inputs act together, and with the noise, which acts otherwise after"
+            " a small change of any. Then the first indices say what helps."
+        )
+    bars = [dict(row) | {"name": _broken(row["input"])} for row in facts["ranking"][:MOST_BARS]]
     split = [dict(row) | {"name": KNOWN_WORDS[row["known"]]} for row in facts["split"]]
     alt = f"Bars of {len(bars)} inputs, the first being {bars[0]['name']}."
     said = "The same of all inputs that could be known together, and of those that nobody can know, noise included."
@@ -240,6 +248,12 @@ def ranking(facts: Mapping[str, Any]) -> list[Panel]:
         Panel("split", "Uncertainty by who could know it", said, "Bars of three classes of inputs.",
               _bars(split, 90 + 46 * len(split)), wide=True),
     ]  # fmt: skip
+
+
+def _broken(name: str) -> str:
+    """A long dotted name on two lines."""
+    front, dot, last = name.rpartition(".")
+    return f"{front}.<br>{last}" if dot and len(name) > 22 else name
 
 
 def _bars(rows: Sequence[Mapping[str, Any]], height_px: int) -> Any:

@@ -56,7 +56,7 @@ class RayCluster:
         self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
     ) -> Iterator[tuple[Part, Array]]:
         """The rows of each part, in order, whichever worker has flown it."""
-        told = self._ray.put((cell.setup, cell.truth_model, cell.sampling, cell.flights))
+        told = self._ray.put((cell.setup, cell.truth_model, cell.sampling, cell.flights, cell.failure))
         key = secrets.token_hex(8)
         task = self._ray.remote(num_cpus=1, max_retries=-1)(fly_part)
         most = AHEAD * max(1, int(self._ray.cluster_resources().get("CPU", 1)))

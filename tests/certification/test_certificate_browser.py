@@ -1,0 +1,76 @@
+"""The certificate in a real browser: figures drawn, nothing loaded, phone, dark, and paper to be signed."""
+
+from __future__ import annotations
+
+import pytest
+
+from browsing import CHROMIUM, QUIET, SOFTWARE_GL, Visit
+from flownav.campaign.requirement import load_requirement
+from flownav.campaign.store import Store
+from flownav.certification.cells import plan_of
+from flownav.certification.certify import certify, with_ranking
+from flownav.certification.written import write_certificate
+from requirements import ASKED, HEAD, WINDY, StandIn, write
+
+pytestmark = pytest.mark.browser
+CRASH = '[[requirement]]\nmeasure = "crash"\nat_most = 0\nprobability = 0.9\n'
+
+
+def far_in_wind(cell, first, flights):
+    """Up to 0.6 m from the pad's centre, the further the more wind there is."""
+    import numpy as np
+
+    return 0.07 * np.array(cell.ensemble.values(1, first, flights)["wind.speed_20ft_m_s"])
+
+
+@pytest.fixture(scope="module")
+def browser():
+    if CHROMIUM is None:
+        pytest.skip("no Chromium here: install Debian's package `chromium` (apt-get install chromium)")
+    api = pytest.importorskip("playwright.sync_api", reason="install `playwright` (dependency group `test`)")
+    with api.sync_playwright() as running:
+        opened = running.chromium.launch(executable_path=CHROMIUM, args=QUIET + SOFTWARE_GL)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    folder, engine = tmp_path_factory.mktemp("certificate"), StandIn(far_in_wind)
+    path = write(folder, HEAD + WINDY + "height_m = [2, 4]\n" + ASKED + CRASH)
+    asked = load_requirement(path)
+    plan = plan_of(asked, 600)
+    with Store(folder / "out").opened(plan) as store:
+        certificate = with_ranking(certify(asked, plan, engine, store), engine, store, 16)
+        write_certificate(certificate, store, path, 0)
+    return folder / "out" / "certificate.html"
+
+
+def test_every_figure_is_drawn_and_the_verdict_is_said(browser, page):
+    visit = Visit(browser, page, width=1440)
+    visit.check(count=5)  # touchdowns, tail, envelope, ranking, split
+    text = visit.page.inner_text("body")
+    assert visit.page.inner_text(".verdict b") == "Fail"
+    for words in ("touchdown.horizontal_m at most 0.5 m with 90 % probability at 90 % confidence", "Consumer's risk",
+                  "Tolerance bound", "from 2 m", "What was assumed", "SHA-256", "Approved by"):  # fmt: skip
+        assert words in text
+    visit.context.close()
+
+
+def test_it_works_on_a_dark_phone(browser, page):
+    visit = Visit(browser, page, width=390, color_scheme="dark", has_touch=True, is_mobile=True)
+    visit.check(count=5)
+    assert {figure["ink"] for figure in visit.figures().values()} == {"#e7eaee"}
+    assert visit.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    visit.context.close()
+
+
+def test_paper_has_places_to_sign_and_no_trees(browser, page):
+    visit = Visit(browser, page, width=1440, color_scheme="dark")
+    visit.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    visit.page.emulate_media(media="print")
+    visit.until("[...document.querySelectorAll('[data-figure]')].every((p) => p._fullLayout.width <= 680)")
+    assert {figure["ink"] for figure in visit.figures().values()} == {"#1d232a"}
+    assert visit.page.evaluate("document.querySelectorAll('.signature').length") == 3
+    assert visit.page.evaluate("getComputedStyle(document.querySelector('.on-screen')).display") == "none"
+    visit.context.close()

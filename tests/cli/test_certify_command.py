@@ -1,0 +1,95 @@
+"""`flownav certify`: plans, exit status, JSON, what is printed, and mistakes in one line."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from flownav.cli import app
+from flownav.errors import InputError, VerdictError
+from requirements import ASKED, HEAD, WINDY, write
+
+CALM = "[set.wind]\ngusts = true\n"
+CRASH = '[[requirement]]\nmeasure = "crash"\nat_most = 0\nprobability = 0.8\n'
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["certify", *map(str, arguments)])
+
+
+def test_the_plan_is_told_and_nothing_is_flown(tmp_path):
+    told = run(write(tmp_path, HEAD + WINDY + ASKED + CRASH), "--plan", "--json")
+    assert json.loads(told.stdout) == {
+        "requirement": "small",
+        "flights": 52,
+        "requirements": [
+            {
+                "requirement": "touchdown.horizontal_m at most 0.5 m with 90 % probability at 90 % confidence",
+                "needed": {"0": 22, "1": 38, "2": 52},
+                "allowed_failures": 2,
+                "flights": 52,
+            },
+            {
+                "requirement": "no crash with 80 % probability at 90 % confidence",
+                "needed": {"0": 11, "1": 18, "2": 25},
+                "allowed_failures": 2,
+                "flights": 25,
+            },
+        ],
+    }
+    printed = run("approach", "--plan")
+    assert printed.stdout.startswith("approach: 767 flights\n")
+    assert printed.exit_code == 0
+    for number in ("45", "77", "105", "767", "1296", "1773"):
+        assert number in printed.stdout
+
+
+def test_a_pass_is_exit_status_0_and_everything_else_1(tmp_path):
+    calm = write(tmp_path, HEAD + CALM + CRASH)
+    passed = run(calm, "--out", tmp_path / "calm", "--ranking", 0, "--records", 1)
+    assert passed.exception is None
+    assert passed.stdout.startswith("PASS  small\n")
+    assert "0 of 25 (at most 2)" in passed.stdout
+    assert f"page      {tmp_path / 'calm' / 'certificate.html'}" in passed.stdout
+    few = run(calm, "--out", tmp_path / "few", "--ranking", 0, "--records", 0, "--flights", 10, "--json")
+    assert isinstance(few.exception, VerdictError)
+    assert str(few.exception) == "small: not shown: no crash with 80 % probability at 90 % confidence"
+    facts = json.loads(few.stdout)
+    assert (facts["verdict"], facts["flights"], facts["needed"], facts["failures"]) == ("not shown", 10, 25, 0)
+    assert facts["ranking"] is None
+    windy = write(tmp_path, HEAD + WINDY.replace("[0, 8]", "[8, 12]") + CRASH, "windy.toml")
+    failed = run(windy, "--out", tmp_path / "windy", "--ranking", 16, "--records", 0)
+    assert isinstance(failed.exception, VerdictError)
+    assert str(failed.exception).startswith("small: fail: no crash")
+    assert failed.stdout.startswith("FAIL  small\n")
+    assert "rank      " in failed.stdout
+    assert "known     never: first " in failed.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["aproach"], "aproach: no such requirement; shipped: "),
+        (["approach", "--flights", 0], "--flights 0: must be from 1 to 100000000"),
+        (["approach", "--ranking", 48], "--ranking 48: must be 0 or a power of 2 from 16 to 65536"),
+        (["approach", "--ranking", 8], "--ranking 8: must be 0 or a power of 2"),
+        (["approach", "--records", 11], "--records 11: must be from 0 to 10"),
+        (["approach", "--vehicle", "none.toml"], "none.toml"),
+        (["absent.toml"], "absent.toml"),
+    ],
+)
+def test_mistakes_are_one_line(arguments, said):
+    failed = run(*arguments)
+    assert isinstance(failed.exception, InputError)
+    assert said in str(failed.exception)
+    assert "\n" not in str(failed.exception)
+
+
+def test_a_folder_of_something_else_is_not_written_to(tmp_path):
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "flight.txt").write_text("mine", encoding="utf-8")
+    failed = run(write(tmp_path, HEAD + CALM + CRASH), "--out", tmp_path / "full")
+    assert "full: is there and holds no campaign; give another --out" in str(failed.exception)
+    assert [path.name for path in (tmp_path / "full").iterdir()] == ["flight.txt"]

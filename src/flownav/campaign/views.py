@@ -63,10 +63,10 @@ def sensitivity(inputs: Mapping[str, Array], values: Array) -> list[dict[str, An
     Spearman's coefficient, its interval by Fisher's transformation with Bonett and Wright's variance (Psychometrika 65,
     2000); infinite measures rank last. It sees what is monotonic only; `flownav certify` gives Sobol's indices.
     """
-    from scipy.stats import rankdata
-
-    if len(values) < LEAST:
+    if len(values) < LEAST or not inputs:
         return []
+    from scipy.stats import rankdata  # not without need: it takes 40 MB
+
     ranks = rankdata(values)
     found: list[tuple[float, dict[str, Any]]] = []
     for name, drawn in inputs.items():

@@ -30,7 +30,7 @@ def main(flights: int) -> None:
 
     setup = assemble(with_filter(load_scenario("landing"), "paper"))
     rows = Space(setup, SEED, dispersed=False).usual(flights) if flights else None
-    print(f"| event | {flights} flights at random | 95 % | subset simulation | 95 % | cv | flights | time | processors' |")
+    print(f"| event | {flights} flights at random | 95 % | by levels | 95 % | cv | flights | time | processors' |")
     print("|---|---|---|---|---|---|---|---|---|")
     for text in EVENTS:
         event, direct = event_of(text), "- | -"

@@ -113,7 +113,7 @@ def test_given_start_normals_stand_in_for_those_that_are_drawn():
     assert (np.abs(other - plain).max(axis=(0, 1)) > 0.0).tolist() == [lane == 4 for lane in range(16)]
 
 
-# -- flights of a walk ---------------------------------------------------------------------------------------------------
+# -- flights of a walk ----------------------------------------------------------------------------------------
 def test_a_flight_is_the_same_at_any_place_of_any_batch_on_any_number_of_threads(setup):
     space = Space(setup, SEED, dispersed=True)
     rng = np.random.default_rng(1)
@@ -186,7 +186,7 @@ def test_a_missing_file_is_refused(setup, tmp_path):
         read_branch(tmp_path / "nothing.json", setup)
 
 
-# -- responses -----------------------------------------------------------------------------------------------------------
+# -- responses ----------------------------------------------------------------------------------------
 LIMITS = Limits(*TouchdownLimits(2.0, 0.5, 10.0, 40.0, 0.4))
 
 
@@ -231,7 +231,7 @@ def test_the_severity_of_real_flights_is_above_one_exactly_where_they_crash():
     np.testing.assert_array_equal(crash.of(rows) > 1.0, measured("crash", rows) > 0.0)
 
 
-# -- the command ---------------------------------------------------------------------------------------------------------
+# -- the command ----------------------------------------------------------------------------------------
 def run(*arguments):
     return CliRunner().invoke(app, ["campaign", *arguments])
 

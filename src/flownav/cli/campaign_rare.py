@@ -26,9 +26,7 @@ def fly_rare(plan: Plan, event: str, folder: Path, as_json: bool) -> None:
     from flownav.files import written_whole
 
     if len(plan.cells) != 1:
-        raise InputError(
-            f"--rare: needs one scenario, one --truth-model and no --sweep, not {len(plan.cells)} cells"
-        )
+        raise InputError(f"--rare: needs one scenario, one --truth-model and no --sweep, not {len(plan.cells)} cells")
     if plan.sampling != "plain" or plan.until is not None:
         raise InputError("--rare: has samples and a stop of its own; leave out --sampling and --until")
     chosen = event_of(event)

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-slow long-log fuzz mutants league integrity validate lint bench bench-once docs wheel wheel-test clean
+.PHONY: demo test test-slow long-log fuzz mutants league integrity rare validate lint bench bench-once docs wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr
@@ -29,6 +29,9 @@ league: $(VENV)/.ready
 
 integrity: $(VENV)/.ready
 	$(BIN)/python tools/integrity.py docs/integrity.md
+
+rare: $(VENV)/.ready
+	$(BIN)/python tools/rare_table.py $(FLIGHTS)
 
 validate: $(VENV)/.ready
 	FLOWNAV_DATA=$${FLOWNAV_DATA:-../shared/data} $(BIN)/flownav validate --out docs/validation.md

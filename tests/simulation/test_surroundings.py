@@ -12,11 +12,12 @@ from flownav.frames import quaternion_from_euler, rotation_from_quaternion, to_e
 from flownav.sensors.beam import roughness, stepped
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
+from flownav.simulation.draws import key_lanes, plain_noise
 from flownav.simulation.ensemble import believed
 from flownav.simulation.ground import GroundSettings
 from flownav.simulation.layout import load_around, store_helicopter
 from flownav.simulation.scenario import load_scenario, with_vehicle
-from flownav.simulation.surroundings import start_surroundings, surround
+from flownav.simulation.surroundings import draw_recirculation, start_surroundings, surround
 from flownav.simulation.truth import packed_truth
 from flownav.simulation.wind import WindSettings
 from flownav.vehicle.state import HelicopterState
@@ -25,8 +26,10 @@ COUNT = len(LANES)
 
 
 @kernel
-def around_of(work, lanes, rotors, recirculates, engine, epochs):
-    start_surroundings(work, lanes, 3, 0, 0, rotors, recirculates)
+def around_of(work, lanes, noise, rotors, recirculates, engine, epochs):
+    key_lanes(work, lanes, noise.streams, 0)
+    draw_recirculation(work, lanes, 3, 0, 0, recirculates)
+    start_surroundings(work, lanes, rotors)
     for epoch in range(epochs):
         surround(work, lanes, 3, 0, epoch, rotors, recirculates, engine)
 
@@ -43,7 +46,7 @@ def surrounded(flight, truths, states, *, recirculates=False, engine=1.0, epochs
     work[layout.THRUST * COUNT : (layout.THRUST + 1) * COUNT] = thrust_n
     for lane, state in enumerate(states):
         put(work, LANES, lane, state)
-    around_of(work, LANES, flight.rotors, recirculates, engine, epochs)
+    around_of(work, LANES, plain_noise(COUNT), flight.rotors, recirculates, engine, epochs)
     return [load_around(work, LANES, lane) for lane in range(COUNT)]
 
 

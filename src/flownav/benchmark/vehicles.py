@@ -18,6 +18,7 @@ from flownav.navigation.take import UNIT_SIGNATURE
 from flownav.navigation.tape import room_of
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
+from flownav.simulation.draws import plain_noise
 from flownav.simulation.engine import Buffers, buffers_of, fly_into
 from flownav.simulation.ensemble import believed
 from flownav.simulation.flight import fly_block
@@ -92,9 +93,9 @@ def fly_untaken(flight: Flight, b: Buffers) -> None:
     b.nav[:] = 0.0
     fly: Any = fly_block
     fly(
-        flight, packed_truth([believed(flight)] * len(LANES)), 1, 0, LANES, b.work, b.nav, deaf_lanes.address,
-        b.tape.estimate.reshape(-1), b.tape.innovation.reshape(-1), b.tape.event.reshape(-1), b.fed.reshape(-1),
-        np.array([*room_of(b.tape), 0]), b.tape.used, b.history,
+        flight, packed_truth([believed(flight)] * len(LANES)), 1, 0, plain_noise(len(LANES)), LANES, b.work, b.nav,
+        deaf_lanes.address, b.tape.estimate.reshape(-1), b.tape.innovation.reshape(-1), b.tape.event.reshape(-1),
+        b.fed.reshape(-1), np.array([*room_of(b.tape), 0]), b.tape.used, b.history,
     )  # fmt: skip
 
 

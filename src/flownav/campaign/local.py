@@ -13,7 +13,7 @@ from flownav.scoring.paper_tables import published
 from flownav.scoring.takeoffs import takeoff_of_flight, takeoffs
 from flownav.scoring.touchdown import Limits, motion_of, touchdowns
 from flownav.simulation.assemble import Setup
-from flownav.simulation.engine import fly_blocks, fly_written
+from flownav.simulation.engine import Flown, fly_blocks, fly_written
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.fault import SensorFault
 from flownav.simulation.flight_record import record_of
@@ -142,10 +142,17 @@ def fly_recorded(
     fault: of its sensors, where the setup's flight `fails`.
     """
     flown = fly_written(setup.flight, seed, index, ensemble=ensemble, faults=None if fault is None else [fault])
-    record = record_of(setup, flown, seed, index)
-    record.manifest["truth_model"] = "matched" if ensemble is None else "ensemble"
+    drawn = None
     if ensemble is not None:
         drawn = {name: values[0] for name, values in ensemble.values(seed, index, 1).items()}
+    return record_flown(setup, flown, seed, index, drawn)
+
+
+def record_flown(setup: Setup, flown: Flown, seed: int, index: int, drawn: dict[str, float] | None) -> Record:
+    """A flight that was flown alone, as a scored Record. drawn: the numbers of an ensemble's flight by dotted name."""
+    record = record_of(setup, flown, seed, index)
+    record.manifest["truth_model"] = "matched" if drawn is None else "ensemble"
+    if drawn is not None:
         record.manifest["parameters"] = {**record.manifest["parameters"], "drawn": drawn}
     up = takeoff_history(setup.flight, flown.history)
     record.manifest["scores"] = scores_of_flight(score_history(setup.flight, flown.history)[0])

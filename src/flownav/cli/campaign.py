@@ -26,7 +26,8 @@ def command(
         list[str], typer.Argument(help="Scenarios: takeoff, landing, approach, ..., or files (TOML).")
     ],
     flights: Annotated[
-        int | None, typer.Option(help="Flights of each cell, 1000 if not given; with --until the most, then 100000.")
+        int | None,
+        typer.Option(help="Flights of each cell, 1000 if not given; with --until or --rare the most, then 100000."),
     ] = None,
     until: Annotated[
         str | None, typer.Option(help='Stop when an interval is narrow enough: "r95_m width <= 0.005".')
@@ -50,7 +51,8 @@ def command(
     out: Annotated[Path | None, typer.Option(help="Its folder; out/SCENARIO_campaign if not given.")] = None,
     records: Annotated[int, typer.Option(help="Write records and reports of so many of the worst flights.")] = 1,
     flight: Annotated[
-        str | None, typer.Option(help="Fly this flight of the campaign again, K or CELL:K, and write its record.")
+        str | None,
+        typer.Option(help="Fly this flight again and write its record: K, CELL:K, or the rare_flight.json of --rare."),
     ] = None,
     rare: Annotated[
         str | None, typer.Option(help='How probable this is, down to 1e-6: "touchdown.horizontal_m > 1", "crash".')
@@ -65,7 +67,8 @@ def command(
     from flownav.guard import an_input
     from flownav.simulation.scenario import load_scenario, with_vehicle
 
-    flights = flights if flights is not None else FLIGHTS_UNTIL if until is not None else FLIGHTS
+    most = FLIGHTS if until is None and rare is None else FLIGHTS_UNTIL
+    flights = flights if flights is not None else most
     require_between("--flights", flights, 1, MOST_FLIGHTS)
     require_between("--seed", seed, 0, 2**63 - 1)
     require_between("--records", records, 0, 1000)
@@ -88,7 +91,14 @@ def command(
     )  # fmt: skip
     names = "_".join(dict.fromkeys(each.name for each in chosen))
     folder = out or Path("out") / f"{names[:100]}_campaign"
-    if flight is not None:
+    if rare is not None or (flight is not None and flight.endswith(".json")):
+        from flownav.cli.campaign_rare import fly_again, fly_rare
+
+        if rare is not None:
+            fly_rare(plan, rare, out or Path("out") / f"{names[:100]}_rare", as_json)
+        else:
+            fly_again(plan, Path(str(flight)), as_json)
+    elif flight is not None:
         _again(plan, flight, folder, as_json)
     else:
         _fly(plan, _engine(engine), folder, records, as_json)

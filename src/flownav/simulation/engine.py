@@ -20,6 +20,7 @@ from flownav.navigation.take import navigator_unit
 from flownav.navigation.tape import COMPONENTS, Tape, empty_tape, room_of
 from flownav.navigation.told import carries_lag
 from flownav.simulation import layout
+from flownav.simulation.draws import Noise, plain_noise
 from flownav.simulation.ensemble import Ensemble, believed
 from flownav.simulation.fault import SensorFault
 from flownav.simulation.flight import fly_block
@@ -27,7 +28,7 @@ from flownav.simulation.history import HISTORY
 from flownav.simulation.navigating import first_inertial, kept_inertials
 from flownav.simulation.plan import PHYSICS_S, Flight
 from flownav.simulation.ring import FIELDS
-from flownav.simulation.truth import packed_truth
+from flownav.simulation.truth import Truth, packed_truth
 
 Array = NDArray[np.float64]
 Result = TypeVar("Result")
@@ -43,6 +44,13 @@ class Flown(NamedTuple):
     history: Array
     tape: Tape
     fed: Array
+
+
+class Branches(NamedTuple):
+    """What the lanes of a block fly in place of the flights that their numbers name: each its truth, and its noise."""
+
+    truths: Sequence[Truth]
+    noise: Noise
 
 
 class Buffers(NamedTuple):
@@ -72,14 +80,19 @@ def buffers_of(flight: Flight, lanes: tuple[int, ...], epochs: int, *, written: 
 
 def fly_into(
     flight: Flight, seed: int, first: int, lanes: tuple[int, ...], b: Buffers, ensemble: Ensemble | None = None, *,
-    faults: Sequence[SensorFault] | None = None, compiled: bool = True,
+    faults: Sequence[SensorFault] | None = None, branches: Branches | None = None, compiled: bool = True,
 ) -> None:  # fmt: skip
-    """Fly a block into its buffers, each lane as the flight's sheets say, or as the ensemble draws it.
+    """Fly a block into its buffers, each lane as the flight's sheets say, as the ensemble draws it or as its branch is.
 
     faults: of each lane's sensors, for a flight that `fails`.
     compiled False: in plain Python (tests; it is a thousand times slower). InputError as `Ensemble.truths`.
     """
-    truths = [believed(flight)] * len(lanes) if ensemble is None else ensemble.truths(seed, first, len(lanes))
+    truths: Sequence[Truth] = [believed(flight)] * len(lanes)
+    if branches is not None:
+        truths = branches.truths
+    elif ensemble is not None:
+        truths = ensemble.truths(seed, first, len(lanes))
+    noise = plain_noise(len(lanes)) if branches is None else branches.noise
     if faults is not None:
         truths = [truth._replace(fault=fault) for truth, fault in zip(truths, faults, strict=True)]
     if len(b.nav):
@@ -87,7 +100,7 @@ def fly_into(
         b.nav[:] = new_work(lanes, faults=followed)
     b.tape.used[:] = 0
     room = np.array([*room_of(b.tape), len(b.fed)])
-    told = flight, packed_truth(truths), seed, first, lanes, b.work, b.nav
+    told = flight, packed_truth(truths), seed, first, noise, lanes, b.work, b.nav
     written = (
         b.tape.estimate.reshape(-1), b.tape.innovation.reshape(-1), b.tape.event.reshape(-1), b.fed.reshape(-1), room,
         b.tape.used, b.history,
@@ -104,12 +117,12 @@ def fly_into(
 
 def fly_written(
     flight: Flight, seed: int, first: int = 0, lanes: tuple[int, ...] = ONE_LANE, ensemble: Ensemble | None = None,
-    faults: Sequence[SensorFault] | None = None,
+    faults: Sequence[SensorFault] | None = None, branches: Branches | None = None,
 ) -> Flown:  # fmt: skip
     """A block of `len(lanes)` flights from number `first` on, with everything that the navigator was fed and wrote."""
     buffers = buffers_of(flight, lanes, flight.plan.epochs, written=True)
     with announce_compilation("single-flight" if len(lanes) == 1 else "batch"):
-        fly_into(flight, seed, first, lanes, buffers, ensemble, faults=faults)
+        fly_into(flight, seed, first, lanes, buffers, ensemble, faults=faults, branches=branches)
     return Flown(buffers.history, buffers.tape, buffers.fed)
 
 
@@ -124,21 +137,26 @@ def fly_one(flight: Flight, seed: int, index: int = 0, ensemble: Ensemble | None
 def fly_blocks(
     flight: Flight, seed: int, first: int, flights: int, judge: Callable[[Array], Result], threads: int | None = None,
     ensemble: Ensemble | None = None, faults: Callable[[int], SensorFault] | None = None,
+    branches: Callable[[int], Branches] | None = None,
 ) -> Iterator[tuple[int, Result]]:  # fmt: skip
     """Fly `flights` flights from number `first` on; yields (flights in the block, judge(its history)) in order.
 
     `judge` takes a block's history (epochs, len(HISTORY), flights in the block), which is overwritten afterwards:
     memory does not grow with the number of flights. faults: of each flight's sensors by its number, for a flight that
-    `fails`.
+    `fails`. branches: of a place in the order of flights, what the `len(LANES)` flights from there on fly in place of
+    what their numbers name; all count their streams from `first`.
     """
     own = threading.local()
 
     def fly(start: int) -> tuple[int, Result]:
         if not hasattr(own, "buffers"):
             own.buffers = buffers_of(flight, LANES, flight.plan.epochs, written=False)
-        numbers = range(first + start, first + start + len(LANES))
-        failing = None if faults is None else [faults(number) for number in numbers]
-        fly_into(flight, seed, first + start, LANES, own.buffers, ensemble, faults=failing)
+        if branches is None:
+            numbers = range(first + start, first + start + len(LANES))
+            failing = None if faults is None else [faults(number) for number in numbers]
+            fly_into(flight, seed, first + start, LANES, own.buffers, ensemble, faults=failing)
+        else:
+            fly_into(flight, seed, first, LANES, own.buffers, branches=branches(start))
         left = min(len(LANES), flights - start)
         return left, judge(own.buffers.history[:, :, :left])
 

@@ -6,7 +6,7 @@ The navigator's settings, its timetable and the autopilot's gains stay those of 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -114,8 +114,14 @@ class Ensemble:
 
     def truths(self, seed: int, first: int, count: int) -> list[Truth]:
         """The truths of flights `first` to `first + count - 1`. InputError where a draw is not possible."""
-        values = self.values(seed, first, count)
-        return [self._truth(first + k, {name: column[k] for name, column in values.items()}) for k in range(count)]
+        return self.truths_of(self.values(seed, first, count), range(first, first + count))
+
+    def truths_of(self, values: Mapping[str, Sequence[float]], flights: Sequence[int]) -> list[Truth]:
+        """The truths that these dispersed numbers make, one of each flight; InputError as `truths`."""
+        return [
+            self._truth(flight, {name: column[k] for name, column in values.items()})
+            for k, flight in enumerate(flights)
+        ]
 
     def values(self, seed: int, first: int, count: int) -> dict[str, list[float]]:
         """The dispersed numbers of the same flights, by dotted name, in the units of their names."""
@@ -134,10 +140,11 @@ class Ensemble:
         """
         flights = range(number * TOGETHER, (number + 1) * TOGETHER)
         spread = uniforms if self.design is None else self.design.uniforms
-        found = {}
-        for name in self.entries:
-            found[name] = self.numbers(name, spread(seed, flights, name))
-        return found
+        return self.values_of({name: spread(seed, flights, name) for name in self.entries})
+
+    def values_of(self, shares: Mapping[str, Array]) -> dict[str, Array]:
+        """The dispersed numbers that have these shares of their distributions below them, by dotted name."""
+        return {name: self.numbers(name, shares[name]) for name in self.entries}
 
     def numbers(self, name: str, shares: Array) -> Array:
         """A dispersed number at these shares of its distribution, in (0, 1), in the unit of its name."""

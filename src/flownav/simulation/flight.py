@@ -16,6 +16,7 @@ from flownav.control.guidance import reference_at
 from flownav.estimation.kalman import Lanes, Work
 from flownav.navigation.tape import Output, output_of
 from flownav.simulation import layout
+from flownav.simulation.draws import Noise, key_lanes, put_start
 from flownav.simulation.epoch import (
     advance,
     advance_sensing,
@@ -41,24 +42,39 @@ from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import ATTITUDE_STEPS, NOTHING, PHYSICS_S, PHYSICS_STEPS, START_STEP, Flight
 from flownav.simulation.sampling import sample
 from flownav.simulation.sensing import EPOCH_S, draw_epoch, sense, start_sensors
-from flownav.simulation.surroundings import start_surroundings, surround
-from flownav.simulation.units import start_onboard
+from flownav.simulation.surroundings import draw_recirculation, start_surroundings, surround
+from flownav.simulation.units import draw_units, start_onboard
 from flownav.simulation.vehicles import observe_vehicle, place
 
 
 @equation
-def start_block(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight, onboard: Onboard | None) -> None:
-    """Vehicle, surroundings, sensors and autopilot before the first epoch."""
+def draw_start(
+    work: Work, lanes: Lanes, seed: int, first: int, flight: Flight, onboard: Onboard | None, noise: Noise
+) -> None:
+    """Every normal before the first epoch."""
+    key_lanes(work, lanes, noise.streams, 0)
     draw_epoch(work, lanes, seed, first, START_STEP, flight.plan.draws)
+    draw_recirculation(work, lanes, seed, first, START_STEP, flight.plan.draws.recirculation)
+    if onboard is not None:
+        draw_units(work, lanes, seed, first, START_STEP + 4)
+    put_start(work, lanes, noise.start)
+
+
+@equation
+def start_block(
+    work: Work, lanes: Lanes, seed: int, first: int, flight: Flight, onboard: Onboard | None, noise: Noise
+) -> None:
+    """Vehicle, surroundings, sensors and autopilot before the first epoch."""
+    draw_start(work, lanes, seed, first, flight, onboard, noise)
     for lane in range(len(lanes)):
         place(work, lanes, lane, flight.plan.start, flight.rotors)
         autopilot = grounded(flight.gains) if flight.plan.starts_on_ground else hovering(flight.gains)
         store_autopilot(work, lanes, lane, autopilot)
-    start_surroundings(work, lanes, seed, first, START_STEP, flight.rotors, flight.plan.draws.recirculation)
+    start_surroundings(work, lanes, flight.rotors)
     observe_vehicle(work, lanes, flight.rotors, onboard)
     start_sensors(work, lanes, flight.sensors)
     if onboard is not None:
-        start_onboard(work, lanes, seed, first, START_STEP + 4, onboard)
+        start_onboard(work, lanes, onboard)
 
 
 @equation
@@ -69,11 +85,14 @@ def surround_now(work: Work, lanes: Lanes, seed: int, first: int, epoch: int, t_
 
 
 @equation
-def fly_on_paper(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight, history: NDArray[np.float64]) -> None:
+def fly_on_paper(
+    work: Work, lanes: Lanes, seed: int, first: int, noise: Noise, flight: Flight, history: NDArray[np.float64]
+) -> None:
     """Every epoch with the paper's sensors and its filter, or with no filter at all."""
     for epoch in range(flight.plan.epochs):
         t_s = epoch * EPOCH_S
         reference = reference_at(flight.path, t_s)
+        key_lanes(work, lanes, noise.streams, epoch)
         draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
         surround_now(work, lanes, seed, first, epoch, t_s, flight)
         sense(work, lanes, epoch, flight.sensors)
@@ -90,8 +109,8 @@ def fly_on_paper(work: Work, lanes: Lanes, seed: int, first: int, flight: Flight
 
 @equation
 def fly_navigated(
-    work: Work, nav: Work, lanes: Lanes, seed: int, first: int, flight: Flight, onboard: Onboard, table: Timetable,
-    take: int, settings: Work, o: Output, fed: Work, history: NDArray[np.float64],
+    work: Work, nav: Work, lanes: Lanes, seed: int, first: int, noise: Noise, flight: Flight, onboard: Onboard,
+    table: Timetable, take: int, settings: Work, o: Output, fed: Work, history: NDArray[np.float64],
 ) -> None:  # fmt: skip
     """Every epoch with the vehicle's own sensors and the navigator, on whose estimate of now the autopilot flies."""
     period_s = onboard.inertial_steps * PHYSICS_S
@@ -101,6 +120,7 @@ def fly_navigated(
     for epoch in range(flight.plan.epochs):
         t_s = epoch * EPOCH_S
         reference = reference_at(flight.path, t_s)
+        key_lanes(work, lanes, noise.streams, epoch)
         draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
         surround_now(work, lanes, seed, first, epoch, t_s, flight)
         taken = sample(work, lanes, seed, first, epoch, table.slots, taken, onboard, flight.fails)
@@ -123,25 +143,25 @@ def fly_navigated(
 
 @equation
 def fly(
-    work: Work, nav: Work, lanes: Lanes, seed: int, first: int, flight: Flight, onboard: Onboard | None,
+    work: Work, nav: Work, lanes: Lanes, seed: int, first: int, noise: Noise, flight: Flight, onboard: Onboard | None,
     table: Timetable | None, take: int, settings: Work, o: Output, fed: Work, history: NDArray[np.float64],
 ) -> None:  # fmt: skip
     """A block of flights, whichever filter flies; the compiler drops the branch of the other."""
-    start_block(work, lanes, seed, first, flight, onboard)
+    start_block(work, lanes, seed, first, flight, onboard, noise)
     if onboard is None:
-        fly_on_paper(work, lanes, seed, first, flight, history)
+        fly_on_paper(work, lanes, seed, first, noise, flight, history)
     elif table is not None:
-        fly_navigated(work, nav, lanes, seed, first, flight, onboard, table, take, settings, o, fed, history)
+        fly_navigated(work, nav, lanes, seed, first, noise, flight, onboard, table, take, settings, o, fed, history)
 
 
 @kernel
 def fly_block(
-    flight: Flight, truth: NDArray[np.float64], seed: int, first: int, lanes: Lanes, work: NDArray[np.float64],
-    nav: NDArray[np.float64], take: int, estimate: NDArray[np.float64], innovation: NDArray[np.float64],
-    event: NDArray[np.float64], fed: NDArray[np.float64], room: NDArray[np.int64], used: NDArray[np.int64],
-    history: NDArray[np.float64],
+    flight: Flight, truth: NDArray[np.float64], seed: int, first: int, noise: Noise, lanes: Lanes,
+    work: NDArray[np.float64], nav: NDArray[np.float64], take: int, estimate: NDArray[np.float64],
+    innovation: NDArray[np.float64], event: NDArray[np.float64], fed: NDArray[np.float64], room: NDArray[np.int64],
+    used: NDArray[np.int64], history: NDArray[np.float64],
 ) -> None:  # fmt: skip
-    """Fly `len(lanes)` flights, numbers `first` and up, of a campaign `seed`.
+    """Fly `len(lanes)` flights, numbers `first` and up, of a campaign `seed`, in the noise of these or in another.
 
     truth: `truth.packed_truth` of the lanes. work (rows of `engine.buffers_of`, times lanes) is scratch, zeroed here;
     nav: a navigator that has heard nothing (`navigation.memory.new_work`), taken at the address `take`; its tape and
@@ -151,6 +171,6 @@ def fly_block(
     work[layout.AS_IS_BEGIN * len(lanes) : layout.AS_IS_END * len(lanes)] = truth
     o = output_of(estimate, innovation, event, NOTHING, NOTHING, NOTHING, room, used)
     fly(
-        pointer(work), pointer(nav), lanes, seed, first, flight, flight.onboard, flight.table, take,
+        pointer(work), pointer(nav), lanes, seed, first, noise, flight, flight.onboard, flight.table, take,
         pointer(flight.settings), o, pointer(fed), history,
     )  # fmt: skip

@@ -13,13 +13,18 @@ from flownav.estimation.kalman import kalman_row_count, kalman_rows
 from flownav.estimation.paper_filter import INPUTS, STATES
 from flownav.estimation.states import Rows
 from flownav.navigation.records import Reading
-from flownav.sensors.barometer import BarometerNormals, BarometerState, BarometerUnit
+from flownav.sensors.barometer import BarometerNormals, BarometerStartNormals, BarometerState, BarometerUnit
 from flownav.sensors.flow import FlowState
-from flownav.sensors.flow_camera import FlowCameraNormals, FlowCameraState, FlowCameraUnit
+from flownav.sensors.flow_camera import FlowCameraNormals, FlowCameraStartNormals, FlowCameraState, FlowCameraUnit
 from flownav.sensors.gps_ins import GpsInsErrors, GpsInsNormals, NavSolution
-from flownav.sensors.gps_receiver import GpsReceiverNormals, GpsReceiverState, GpsReceiverUnit
+from flownav.sensors.gps_receiver import (
+    GpsReceiverNormals,
+    GpsReceiverStartNormals,
+    GpsReceiverState,
+    GpsReceiverUnit,
+)
 from flownav.sensors.imu import ImuReading
-from flownav.sensors.inertial import InertialNormals, InertialState, InertialUnit
+from flownav.sensors.inertial import InertialNormals, InertialStartNormals, InertialState, InertialUnit
 from flownav.sensors.magnetometer import MagnetometerNormals, MagnetometerUnit
 from flownav.sensors.pad_camera import PadCameraNormals, PadCameraUnit
 from flownav.sensors.range_sensor import RangeSensorNormals, RangeSensorState, RangeSensorUnit
@@ -49,7 +54,6 @@ CONTROLS = _rows.take(len(Controls._fields))
 WIND = _rows.take(len(WindState._fields))
 AROUND = _rows.take(len(Around._fields))
 RECIRCULATION = _rows.take(len(RecirculationState._fields))
-RECIRCULATION_NORMALS = _rows.take(len(RecirculationState._fields) + len(RecirculationState._fields) % 2)
 THRUST = _rows.take(1)  # main rotor thrust [N]
 CONTACT = _rows.take(1)  # total skid load [N]
 POWER = _rows.take(1)  # of the main rotor [W]
@@ -67,12 +71,30 @@ SEES_FLOW = FLOW_READING + 3  # of the navigator's camera: whether its last read
 FLOW_SIGMA = _rows.take(1)  # of the published flow velocity [m/s]
 RANGE = _rows.take(2)  # the latest reading [m] and whether it is valid
 
+STREAM = _rows.take(1)  # of the lane's noise, from its block's first flight on; the bits of a whole number
+
 # standard normals of the epoch: pairs in the order of drawing
+START_NORMALS = _rows.next  # from here to START_END what is drawn before the first epoch
 GPS_NORMALS = _rows.take(len(GpsInsNormals._fields))
 GPS_JITTER = GPS_NORMALS + GpsInsNormals._fields.index("jitter_n")
 FLOW_NORMALS = _rows.take(4)  # u, v, w, range
 WIND_NORMALS = _rows.take(len(WindNormals._fields) + len(WindNormals._fields) % 2)
 NORMALS_END = _rows.next
+RECIRCULATION_NORMALS = _rows.take(len(RecirculationState._fields) + len(RecirculationState._fields) % 2)
+# and those of every unit before the flight, and of its state
+INERTIAL_DRAWN = _rows.take(len(InertialUnit._fields) + len(InertialUnit._fields) % 2)
+INERTIAL_BEGUN = _rows.take(len(InertialStartNormals._fields))
+RECEIVER_DRAWN = _rows.take(len(GpsReceiverUnit._fields))
+RECEIVER_BEGUN = _rows.take(len(GpsReceiverStartNormals._fields))
+CAMERA_DRAWN = _rows.take(len(FlowCameraUnit._fields))
+CAMERA_BEGUN = _rows.take(len(FlowCameraStartNormals._fields))
+RANGE_DRAWN = _rows.take(len(RangeSensorUnit._fields))
+BARO_DRAWN = _rows.take(len(BarometerUnit._fields))
+BARO_BEGUN = _rows.take(len(BarometerStartNormals._fields))
+MAG_DRAWN = _rows.take(len(MagnetometerUnit._fields))
+PAD_DRAWN = _rows.take(len(PadCameraUnit._fields))
+SKID_DRAWN = _rows.take(len(SkidSwitchUnit._fields))
+START_END = _rows.next
 
 # the paper's filter: state and covariance, inputs and measurements
 FILTER = kalman_rows(_rows.take(kalman_row_count(STATES)), STATES)
@@ -105,7 +127,6 @@ PAD_NORMALS = _rows.take(len(PadCameraNormals._fields))
 SKID_UNIT = _rows.take(len(SkidSwitchUnit._fields))
 SKID = _rows.take(len(SkidSwitchState._fields))
 SKID_NORMALS = _rows.take(len(SkidSwitchNormals._fields))
-DRAWN = _rows.take(30)  # normals of a unit or of a start
 TRUE_IMU = _rows.take(len(ImuReading._fields))  # means over the last inertial period
 KNOWN = _rows.take(len(Knowledge._fields))  # what the vehicle knows of its landing
 FELT = _rows.take(3)  # specific force that the IMU read, body FRD, mean over the last epoch [m/s2]

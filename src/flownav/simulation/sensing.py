@@ -21,6 +21,7 @@ from flownav.sensors.gps_ins import (
 from flownav.sensors.imu import ImuReading
 from flownav.sensors.rangefinder import RangefinderParameters, start_rangefinder, step_rangefinder
 from flownav.simulation import layout
+from flownav.simulation.draws import stream_of
 from flownav.simulation.layout import (
     flow_as_is,
     load_flow,
@@ -71,7 +72,7 @@ def draw_normals(work: Work, lanes: Lanes, first_row: int, end_row: int, seed: i
         row = first_row + 2 * pair
         channel = (row - layout.GPS_NORMALS) // 2
         for lane in range(len(lanes)):
-            first, second = normal_pair(seed, flight + lane, step, channel)
+            first, second = normal_pair(seed, stream_of(work, lanes, flight, lane), step, channel)
             work[row * len(lanes) + lane] = first
             work[(row + 1) * len(lanes) + lane] = second
 

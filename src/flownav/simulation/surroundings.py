@@ -40,13 +40,10 @@ _over_ground = replacing(Around, *Around._fields[6:19])
 
 
 @procedure
-def start_surroundings(
-    work: Work, lanes: Lanes, seed: int, first: int, step: int, rotors: tuple[int, ...] | None, recirculates: bool
-) -> None:
-    """Gusts and wake from their stationary distributions, the ground where the vehicle starts; the wind's normals lie
+def start_surroundings(work: Work, lanes: Lanes, rotors: tuple[int, ...] | None) -> None:
+    """Gusts and wake from their stationary distributions, the ground where the vehicle starts; the normals of both lie
     in their rows.
     """
-    draw_recirculation(work, lanes, seed, first, step, recirculates)
     for lane in range(len(lanes)):
         gusts = start_wind(load_wind_normals(work, lanes, lane), wind_as_is(work, lanes, lane))
         store_wind(work, lanes, lane, gusts)

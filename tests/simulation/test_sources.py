@@ -1,0 +1,44 @@
+"""The names of a flight's noise, and the normals behind them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flownav.simulation import layout
+from flownav.simulation.assemble import assemble
+from flownav.simulation.noise import normal_pair
+from flownav.simulation.scenario import load_scenario, with_filter
+from flownav.simulation.sources import normals_of, sources_of, starts_of
+
+
+@pytest.fixture(scope="module", params=[("landing", "paper"), ("gusty", "paper"), ("approach", "landing")])
+def flight(request):
+    name, which = request.param
+    return assemble(with_filter(load_scenario(name), which)).flight
+
+
+def test_normals_are_those_that_the_kernel_draws():
+    streams, steps = np.arange(30, dtype=np.uint64) + np.uint64(1 << 40), np.arange(30, dtype=np.uint64) * np.uint64(7)
+    with np.errstate(over="ignore"):
+        expected = np.array([normal_pair(3, int(a), int(b), 11) for a, b in zip(streams, steps, strict=True)]).T
+    np.testing.assert_allclose(normals_of(3, streams, steps, 11), expected, rtol=0.0, atol=1e-13)
+
+
+def test_every_normal_has_one_name_and_one_place(flight):
+    starts, sources = starts_of(flight), sources_of(flight)
+    assert len({one.row for one in starts}) == len({one.name for one in starts}) == len(starts)
+    assert all(0 <= one.row < layout.START_END - layout.START_NORMALS for one in starts)
+    places = {(one.channel, one.half) for one in sources}
+    assert len(places) == len(sources)
+    assert all("spare" not in one.name for one in (*starts, *sources))
+
+
+def test_what_is_not_carried_has_no_noise():
+    landing = assemble(with_filter(load_scenario("landing"), "paper")).flight
+    assert not starts_of(landing)  # white GPS noise, no wind: nothing lasts from before the first epoch
+    assert {one.name.partition(".")[0] for one in sources_of(landing)} == {"gps", "flow", "range"}
+    approach = assemble(load_scenario("approach")).flight
+    assert {"pad_camera", "gps_receiver", "inertial", "wind"} <= {
+        one.name.partition(".")[0] for one in sources_of(approach)
+    }

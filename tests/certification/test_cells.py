@@ -9,6 +9,7 @@ from flownav.campaign.engines.engine import Part
 from flownav.campaign.engines.local import Local
 from flownav.campaign.requirement import load_requirement
 from flownav.campaign.rows import rows_of
+from flownav.certification.assumed import assumed
 from flownav.certification.cells import MOST_CELLS, plan_of, words_of
 from flownav.certification.started import from_height
 from flownav.compile import LANES
@@ -80,20 +81,14 @@ def test_faults_strike_when_the_conditions_say(tmp_path):
     for more in ("", "fault_begins_s = 12\nfault_lasts_s = 3\n"):
         text = FLOWN + f'[conditions]\nfault = ["none", "gps_loss", "range_stuck_descent", "silence"]\n{more}' + ASKED
         plan = planned(tmp_path, text)
-        words.append([cell.failure.words if cell.failure else None for cell in plan.cells])
-    assert words[0] == [
-        None,
-        "gps_loss from 5 to 25 s",
-        "range_stuck_descent from 10 to 30 s",
-        "silence from 5 to 10 s",
+        words.append([cell.failure and cell.failure.words.split(" s: ")[0] for cell in plan.cells])
+    assert words[0] == [None, "gps_loss from 5 to 25", "range_stuck_descent from 10 to 30", "silence from 5 to 10"]
+    assert words[1] == [None, "gps_loss from 12 to 15", "range_stuck_descent from 12 to 15", "silence from 12 to 17"]
+    assert plan.cells[1].failure.words == "gps_loss from 12 to 15 s: GPS falls silent."
+    assert [cell["failure"] for cell in plan.as_json["cells"]] == [
+        cell.failure and cell.failure.words for cell in plan.cells
     ]
-    assert words[1] == [
-        None,
-        "gps_loss from 12 to 15 s",
-        "range_stuck_descent from 12 to 15 s",
-        "silence from 12 to 17 s",
-    ]
-    assert [plan.as_json["cells"][k]["failure"] for k in range(4)] == words[1]
+    assert assumed(plan)["failure"]["gps_loss"] == "gps_loss from 12 to 15 s: GPS falls silent."
 
 
 def test_a_cell_with_a_fault_flies_as_flownav_faults_does(tmp_path):

@@ -156,6 +156,13 @@ def test_cells_are_judged_by_themselves_and_inputs_ranked_in_the_worst(tmp_path)
     assert all(200 <= told["flight"] < 300 for told in facts["worst"])
 
 
+def test_flights_that_are_all_alike_leave_nothing_to_rank(tmp_path):
+    _, facts = certified(tmp_path, HEAD + WINDY + ASKED, StandIn(lambda cell, first, n: np.zeros(n)), rows=16)
+    assert (facts["verdict"], facts["ranking_of"]) == ("pass", "nothing")
+    page = (tmp_path / "out" / "certificate.html").read_text(encoding="utf-8")
+    assert "have the same outcome: there is nothing to rank." in page
+
+
 def test_what_the_folder_holds_is_not_flown_again(tmp_path):
     engine = StandIn(in_strong_wind)
     _, facts = certified(tmp_path, HEAD + WINDY + ASKED, engine, 60, 16)

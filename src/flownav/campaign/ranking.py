@@ -5,10 +5,11 @@ first index of an input is the share of Y's variance that would go if the input 
 total index the share that would stay if all others were, E(V(Y | others)) / V(Y). Saltelli's design: two independent
 samples A and B of n flights each, and for each input a sample AB that is A with this input out of B,
 
-    first = mean(B (AB - A)) / V,    total = mean((A - AB)^2) / (2 V)
+    first = mean(B (AB - A)) / V,    total = mean((A - AB)^2) / (V of A + V of AB)
 
-(Saltelli et al., Computer Physics Communications 181, 2010; the total after Jansen, ibid. 117, 1999), with intervals by
-the bootstrap over the n rows. Indices of a group are the same, the whole group out of B.
+(Saltelli et al., Computer Physics Communications 181, 2010; the total after Jansen, ibid. 117, 1999, over the variance
+of the two samples that are compared, so that few rows do not take it far beyond 1), with intervals by the bootstrap
+over the n rows. Indices of a group are the same, the whole group out of B.
 
 Noise is by counter: flights 0 to n - 1 have the noise of A, flights n to 2n - 1 that of B.
 """
@@ -128,7 +129,8 @@ def bounded(samples: Sequence[Array]) -> tuple[list[Array], str]:
     both = np.concatenate(samples[:2])
     if (both == both[0]).all():
         return [np.zeros(len(sample)) for sample in samples], "nothing"
-    if all(np.isfinite(sample).all() for sample in samples) and kurtosis(both, fisher=False) <= MOST_KURTOSIS:
+    every = np.concatenate(samples)
+    if np.isfinite(every).all() and kurtosis(every, fisher=False) <= MOST_KURTOSIS:
         return list(samples), "values"
     ordered = np.sort(both)
 
@@ -162,4 +164,6 @@ def sobol(a: Array, b: Array, swapped: Array) -> tuple[Array, Array]:
     if not variance > 0.0:
         return np.zeros(len(swapped)), np.zeros(len(swapped))
     first = ((b - mean) * (swapped - a)).mean(axis=1) / variance
-    return first, 0.5 * ((swapped - a) ** 2).mean(axis=1) / variance
+    of_both = a.var() + swapped.var(axis=1)
+    differ = ((swapped - a) ** 2).mean(axis=1)
+    return first, np.divide(differ, of_both, out=np.zeros(len(swapped)), where=of_both > 0.0)

@@ -9,6 +9,7 @@ from typing import Any
 from flownav.campaign.local import known_exactly
 from flownav.campaign.plan import Cell, Plan
 from flownav.campaign.requirement import requirement_file
+from flownav.certification.cells import words_of as words_of_cell
 from flownav.parameter_files import shipped
 from flownav.provenance import hash_of
 from flownav.sensors.datasheet import DEFAULT_SENSOR
@@ -48,7 +49,7 @@ def assumed(plan: Plan) -> dict[str, Any]:
         "vehicle": setup.described.name,
         "filter": setup.scenario.filter.name,
         "known_exactly": known_exactly(setup.scenario) if setup.fitted else OF_THE_PAPERS_FILTER,
-        "failure": {f"cell {k}": each.failure.words for k, each in enumerate(plan.cells) if each.failure},
+        "failure": {words_of_cell(each): each.failure.words for each in plan.cells if each.failure},
         "dispersed": [
             {
                 "input": name,

@@ -34,8 +34,8 @@ class SensorFailure:
 
     @property
     def words(self) -> str:
-        """What, from when to when."""
-        return f"{self.name} from {self.begins_s:g} to {self.ends_s:g} s"
+        """What, from when to when, and what that does."""
+        return f"{self.name} from {self.begins_s:g} to {self.ends_s:g} s: {FAULTS[self.name].what}"
 
     def law(self, flight: Flight, seed: int, number: int) -> SensorFault:
         """One flight's fault."""

@@ -40,8 +40,11 @@ def show(facts: dict[str, Any]) -> None:
         lines.append(f"envelope  {len(fields)} fields over {' and '.join(facts['envelope']['axes'])}: {said}")
     for cell in facts["envelope"]["cells"] if len(facts["envelope"]["cells"]) > 1 else ():
         lines.append(f"cell      {cell['cell']}: {cell['failures']} of {cell['flights']} failed, {cell['verdict']}")
-    lines += [f"rank      {_index(row, 'input')}" for row in (facts["ranking"] or [])[:RANKED]]
-    lines += [f"known     {_index(row, 'known')}" for row in facts["split"] or []]
+    if facts["ranking"] and facts["ranking_of"] == "nothing":
+        lines.append(f"rank      nothing: all {facts['ranking_flights']} flights of the ranking have the same outcome")
+    elif facts["ranking"]:
+        lines += [f"rank      {_index(row, 'input')}" for row in facts["ranking"][:RANKED]]
+        lines += [f"known     {_index(row, 'known')}" for row in facts["split"]]
     lines.append(f"page      {facts['out']}")
     for line in lines:
         console.print(line, highlight=False, markup=False, soft_wrap=True)

@@ -23,6 +23,7 @@ from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
 from flownav.compiling.progress import announce_compilation
 from flownav.compiling.scalars import bits_from_float, clamp, float_from_bits, larger, magnitude, smaller
+from flownav.compiling.strided import WARP, strided
 from flownav.compiling.units import Unit, unit
 
 ONE_LANE: tuple[int, ...] = (0,)
@@ -32,6 +33,7 @@ __all__ = [
     "LANES",
     "LANES_WIDE",
     "ONE_LANE",
+    "WARP",
     "FlatAccess",
     "Unit",
     "announce_compilation",
@@ -52,6 +54,7 @@ __all__ = [
     "replacing",
     "smaller",
     "stepping",
+    "strided",
     "unit",
     "write_function",
 ]

@@ -20,6 +20,8 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 LANES_WIDE = 16
 
+EQUATIONS: dict[Callable[..., Any], bool] = {}  # every equation (True) and procedure (False): another target's compiler
+
 # what only kernels call needs no entry for Python and for C, which would take as long to compile as a short law
 UNWRAPPED: dict[str, Any] = {
     "error_model": "numpy",
@@ -32,11 +34,13 @@ ENTRY = {"nopython": True, "nogil": True, "error_model": "numpy", "boundscheck":
 
 def equation(function: Function) -> Function:
     """A scalar law: plain Python where Python calls it, compiled and inlined where a kernel does."""
+    EQUATIONS[function] = True
     return register_jitable(forceinline=True, **UNWRAPPED)(function)
 
 
 def procedure(function: Function) -> Function:
     """An equation too long to be inlined: kernels call it, and it is compiled once for each type of its arguments."""
+    EQUATIONS[function] = False
     return register_jitable(**UNWRAPPED)(function)
 
 

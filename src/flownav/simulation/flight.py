@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flownav.compile import equation, kernel, pointer
 from flownav.control.autopilot import grounded, hovering
-from flownav.control.guidance import reference_at
+from flownav.control.guidance import Reference, reference_at
 from flownav.estimation.kalman import Lanes, Work
 from flownav.navigation.tape import Output, output_of
 from flownav.simulation import layout
@@ -85,26 +85,78 @@ def surround_now(work: Work, lanes: Lanes, seed: int, first: int, epoch: int, t_
 
 
 @equation
+def decide_on_paper(
+    work: Work, lanes: Lanes, seed: int, first: int, noise: Noise, epoch: int, flight: Flight
+) -> Reference:
+    """One epoch of the paper's sensors and its filter, or of no filter at all, up to what the autopilot asks for."""
+    t_s = epoch * EPOCH_S
+    reference = reference_at(flight.path, t_s)
+    key_lanes(work, lanes, noise.streams, epoch)
+    draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
+    surround_now(work, lanes, seed, first, epoch, t_s, flight)
+    sense(work, lanes, epoch, flight.sensors)
+    if epoch == 0:
+        start_filter(work, lanes, flight.initial_variance, flight.plan.start_known)
+    run_filter(work, lanes, epoch, flight.paper)
+    estimate_for_autopilot(work, lanes, flight)
+    note_home(work, lanes, epoch, reference, flight)
+    command(work, lanes, t_s, reference, flight, None)
+    return reference
+
+
+@equation
+def advance_on_paper(work: Work, lanes: Lanes, flight: Flight) -> None:
+    """From that epoch to the next."""
+    advance(work, lanes, flight, flight.linear)
+    note_inputs(work, lanes, flight.gains)
+
+
+@equation
 def fly_on_paper(
     work: Work, lanes: Lanes, seed: int, first: int, noise: Noise, flight: Flight, history: NDArray[np.float64]
 ) -> None:
     """Every epoch with the paper's sensors and its filter, or with no filter at all."""
     for epoch in range(flight.plan.epochs):
-        t_s = epoch * EPOCH_S
-        reference = reference_at(flight.path, t_s)
-        key_lanes(work, lanes, noise.streams, epoch)
-        draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
-        surround_now(work, lanes, seed, first, epoch, t_s, flight)
-        sense(work, lanes, epoch, flight.sensors)
-        if epoch == 0:
-            start_filter(work, lanes, flight.initial_variance, flight.plan.start_known)
-        run_filter(work, lanes, epoch, flight.paper)
-        estimate_for_autopilot(work, lanes, flight)
-        note_home(work, lanes, epoch, reference, flight)
-        command(work, lanes, t_s, reference, flight, None)
+        reference = decide_on_paper(work, lanes, seed, first, noise, epoch, flight)
         write_history(work, lanes, epoch, reference, history)
-        advance(work, lanes, flight, flight.linear)
-        note_inputs(work, lanes, flight.gains)
+        advance_on_paper(work, lanes, flight)
+
+
+@equation
+def inertial_parts(onboard: Onboard) -> int:
+    """Inertial readings of an epoch."""
+    return ATTITUDE_STEPS * PHYSICS_STEPS // onboard.inertial_steps
+
+
+@equation
+def decide_navigated(
+    work: Work, nav: Work, lanes: Lanes, seed: int, first: int, noise: Noise, epoch: int, taken: int, following: int,
+    heard: int, flight: Flight, onboard: Onboard, table: Timetable, take: int, settings: Work, o: Output, fed: Work,
+) -> tuple[int, int, Reference]:  # fmt: skip
+    """One epoch of the vehicle's own sensors and the navigator, up to what the autopilot asks for.
+
+    taken: the next slot's number; following: that of the next reading that the navigator takes; heard: how many
+    inertial readings there were. Returns the first two as they are then.
+    """
+    t_s, period_s = epoch * EPOCH_S, onboard.inertial_steps * PHYSICS_S
+    ahead = table.horizon_epochs * inertial_parts(onboard)
+    reference = reference_at(flight.path, t_s)
+    key_lanes(work, lanes, noise.streams, epoch)
+    draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
+    surround_now(work, lanes, seed, first, epoch, t_s, flight)
+    taken = sample(work, lanes, seed, first, epoch, table.slots, taken, onboard, flight.fails)
+    note_truth(work, lanes, epoch, table)
+    following = feed_due(work, nav, lanes, epoch, following, take, settings, o, fed, table)
+    carry_ahead(work, nav, lanes, heard, ahead if heard >= ahead else heard, period_s, table)
+    compare_at_horizon(work, nav, lanes, epoch, table)
+    if flight.plan.along_truth:
+        put_on_truth(work, nav, lanes, epoch, table)
+    note_knowledge(work, nav, lanes)
+    waiting = t_s < flight.plan.handover_s
+    hand_to_autopilot(work, nav, lanes, waiting, flight.plan.home_at_start, reference)
+    estimate_for_autopilot(work, lanes, flight)
+    command(work, lanes, t_s, reference, flight, onboard)
+    return taken, following, reference
 
 
 @equation
@@ -113,28 +165,13 @@ def fly_navigated(
     table: Timetable, take: int, settings: Work, o: Output, fed: Work, history: NDArray[np.float64],
 ) -> None:  # fmt: skip
     """Every epoch with the vehicle's own sensors and the navigator, on whose estimate of now the autopilot flies."""
-    period_s = onboard.inertial_steps * PHYSICS_S
-    parts = ATTITUDE_STEPS * PHYSICS_STEPS // onboard.inertial_steps
-    ahead = table.horizon_epochs * parts
+    parts = inertial_parts(onboard)
     taken, following, heard = 0, 0, 0
     for epoch in range(flight.plan.epochs):
-        t_s = epoch * EPOCH_S
-        reference = reference_at(flight.path, t_s)
-        key_lanes(work, lanes, noise.streams, epoch)
-        draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
-        surround_now(work, lanes, seed, first, epoch, t_s, flight)
-        taken = sample(work, lanes, seed, first, epoch, table.slots, taken, onboard, flight.fails)
-        note_truth(work, lanes, epoch, table)
-        following = feed_due(work, nav, lanes, epoch, following, take, settings, o, fed, table)
-        carry_ahead(work, nav, lanes, heard, ahead if heard >= ahead else heard, period_s, table)
-        compare_at_horizon(work, nav, lanes, epoch, table)
-        if flight.plan.along_truth:
-            put_on_truth(work, nav, lanes, epoch, table)
-        note_knowledge(work, nav, lanes)
-        waiting = t_s < flight.plan.handover_s
-        hand_to_autopilot(work, nav, lanes, waiting, flight.plan.home_at_start, reference)
-        estimate_for_autopilot(work, lanes, flight)
-        command(work, lanes, t_s, reference, flight, onboard)
+        taken, following, reference = decide_navigated(
+            work, nav, lanes, seed, first, noise, epoch, taken, following, heard, flight, onboard, table, take, settings, o,
+            fed,
+        )
         write_history(work, lanes, epoch, reference, history)
         advance_sensing(work, lanes, seed, first, epoch, taken, heard, flight, onboard, table, flight.fails)
         taken += parts

@@ -1,0 +1,95 @@
+"""Pointers with a stride: the rows of one flight among those of a warp, on a CUDA device.
+
+Thirty-two threads that fly side by side read the same row at the same time. Their rows lie as those of lanes do:
+row `r` of thread `k` at `r * WARP + k`, so that a warp reads a row as one piece of memory. The equations know nothing
+of it: they fly `ONE_LANE`, whose row `r` is `work[r]`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+WARP = 32
+
+
+class Strided:
+    """`strided(array, first)` in Python: element i is `array[first + i * WARP]`."""
+
+    def __init__(self, array: NDArray[np.float64], first: int) -> None:
+        self._elements = array[first::WARP]
+
+    def __getitem__(self, index: int) -> float:
+        value: float = self._elements[index]
+        return value
+
+    def __setitem__(self, index: int, value: float) -> None:
+        self._elements[index] = value
+
+
+def strided(array: NDArray[np.float64], first: int) -> Strided:
+    """Every WARP-th element of a flat float64 array from `first` on; on a device an address, indexed without a check."""
+    return Strided(array, first)
+
+
+def teach_strided_pointers() -> None:
+    """Make numba-cuda compile `strided`, and what it gives."""
+    import operator
+
+    from llvmlite import ir
+    from numba.core import types
+    from numba.cuda.extending import core_models, lower_builtin, register_model
+    from numba.cuda.typing.templates import AbstractTemplate, infer_global, signature
+
+    class StridedType(types.Type):
+        """An address of float64s that lie WARP apart."""
+
+        def __init__(self) -> None:
+            super().__init__(name=f"strided({WARP})")
+
+    kind = StridedType()
+
+    @register_model(StridedType)
+    class _Model(core_models.PrimitiveModel):  # type: ignore[misc]
+        def __init__(self, manager: Any, told: Any) -> None:
+            super().__init__(manager, told, ir.DoubleType().as_pointer())
+
+    @infer_global(strided)
+    class _Strided(AbstractTemplate):  # type: ignore[misc]
+        def generic(self, args: Any, kws: Any) -> Any:
+            array, _first = args
+            plain = isinstance(array, types.Array) and array.layout == "C" and array.ndim == 1
+            return signature(kind, array, types.int64) if plain and array.dtype == types.float64 else None
+
+    @infer_global(operator.getitem)
+    class _Load(AbstractTemplate):  # type: ignore[misc]
+        def generic(self, args: Any, kws: Any) -> Any:
+            pointer, index = args
+            fits = isinstance(pointer, StridedType) and isinstance(index, types.Integer)
+            return signature(types.float64, pointer, types.int64) if fits else None
+
+    @infer_global(operator.setitem)
+    class _Store(AbstractTemplate):  # type: ignore[misc]
+        def generic(self, args: Any, kws: Any) -> Any:
+            pointer, index, _value = args
+            fits = isinstance(pointer, StridedType) and isinstance(index, types.Integer)
+            return signature(types.none, pointer, types.int64, types.float64) if fits else None
+
+    @lower_builtin(strided, types.Array, types.Integer)
+    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        data = context.make_array(sig.args[0])(context, builder, value=args[0]).data
+        return builder.gep(data, [args[1]])
+
+    def place(builder: Any, pointer: Any, index: Any) -> Any:
+        return builder.gep(pointer, [builder.mul(index, ir.Constant(ir.IntType(64), WARP))])
+
+    @lower_builtin(operator.getitem, StridedType, types.Integer)
+    def _lower_load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        return builder.load(place(builder, args[0], args[1]))
+
+    @lower_builtin(operator.setitem, StridedType, types.Integer, types.Float)
+    def _lower_store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        builder.store(args[2], place(builder, args[0], args[1]))
+        return context.get_dummy_value()

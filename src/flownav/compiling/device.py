@@ -147,12 +147,17 @@ def _teach_once() -> None:
     def finite(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.fcmp_ordered("==", builder.fsub(args[0], args[0]), context.get_constant(types.float64, 0.0))
 
+    def infinite(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        size = of_math(math.fabs)(context, builder, types.float64(types.float64), args)
+        return builder.fcmp_ordered("==", size, context.get_constant(types.float64, math.inf))
+
     known = ufuncs.ufunc_db()
     for name in ("sqrt", "exp", "floor", "ceil"):
         known.setdefault(getattr(np, name), {})["d->d"] = of_math(getattr(math, name))
     known.setdefault(np.absolute, {})["d->d"] = of_math(math.fabs)
     known.setdefault(np.rint, {})["d->d"] = rounded
     known.setdefault(np.isfinite, {})["d->?"] = finite
+    known.setdefault(np.isinf, {})["d->?"] = infinite
     cuda_target.typing_context.refresh()
     cuda_target.target_context.refresh()
     teach_strided_pointers()

@@ -1,0 +1,131 @@
+"""Flights on a CUDA device (extra `gpu`): a thread a flight, float64, from the same equations as on the CPU.
+
+Flights are flown so many at once; their scores come back and nothing else. Of an ensemble the truths are drawn on the
+CPU, as everywhere, while the device flies the flights before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.campaign.engines.device_flight import TAPE_COUNTS, fly_navigated_flight, fly_paper_flight, take_here
+from flownav.campaign.engines.engine import Part
+from flownav.campaign.engines.local import neighbours
+from flownav.campaign.local import home_epoch
+from flownav.campaign.plan import Ready
+from flownav.compile import ONE_LANE, WARP, announce_compilation
+from flownav.compiling.launch import Gpu, NoDeviceError, Runner, Simulator, is_simulated, with_arrays
+from flownav.errors import InputError
+from flownav.estimation.covariance import with_lag
+from flownav.navigation.memory import new_work
+from flownav.navigation.packed import load_flow_settings
+from flownav.navigation.take import navigator_unit
+from flownav.navigation.told import carries_lag
+from flownav.scoring.running import RUNNING_COLUMNS, RUNNING_ROWS
+from flownav.simulation.engine import buffers_of
+from flownav.simulation.ensemble import Ensemble, believed
+from flownav.simulation.plan import Flight
+from flownav.simulation.truth import packed_truth
+
+Array = NDArray[np.float64]
+
+AT_ONCE = 32768  # flights: eight warps on each of an H200's 132 multiprocessors
+
+
+class Cuda:
+    """The CUDA device of this machine, or Numba's simulator of one. InputError where there is neither."""
+
+    def __init__(self, runner: Runner | None = None, at_once: int = AT_ONCE) -> None:
+        self._runner = runner or _runner()
+        self._at_once = at_once
+
+    def fly(
+        self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
+    ) -> Iterator[tuple[Part, Array]]:
+        """The rows of each part; parts that follow each other are flown together."""
+        for together in neighbours(parts):
+            waiting, held = list(together), np.empty((0, RUNNING_COLUMNS))
+            total = sum(part.flights for part in together)
+            for rows in self.rows(cell.flight, seed, together[0].first, total, cell.ensemble):
+                on_progress(len(rows))
+                held = np.concatenate([held, rows])
+                while waiting and len(held) >= waiting[0].flights:
+                    part = waiting.pop(0)
+                    yield part, held[: part.flights]
+                    held = held[part.flights :]
+
+    def rows(
+        self, flight: Flight, seed: int, first: int, flights: int, ensemble: Ensemble | None = None
+    ) -> Iterator[Array]:
+        """The rows of so many flights from number `first` on, (flights, RUNNING_COLUMNS), as many as fit at a time."""
+        room = Room(self._runner, flight, min(self._at_once, flights))
+        starts = range(first, first + flights, self._at_once)
+        counts = [min(self._at_once, first + flights - start) for start in starts]
+
+        def drawn(start: int, count: int) -> Array:
+            truths = [believed(flight)] if ensemble is None else ensemble.truths(seed, start, count)
+            return packed_truth(truths)
+
+        with ThreadPoolExecutor(1) as beside, announce_compilation("device"):
+            coming = beside.submit(drawn, starts[0], counts[0])
+            for k, (start, count) in enumerate(zip(starts, counts, strict=True)):
+                truth = coming.result()
+                if k + 1 < len(starts):
+                    coming = beside.submit(drawn, starts[k + 1], counts[k + 1])
+                yield room.fly(seed, start, count, truth)
+
+
+class Room:
+    """A device's memory for flights of one kind, so many at once."""
+
+    def __init__(self, runner: Runner, flight: Flight, at_once: int) -> None:
+        self._runner, self._flight = runner, flight
+        whole = -(-at_once // WARP) * WARP
+        self._rows = len(buffers_of(flight, ONE_LANE, 0, written=False).work) + RUNNING_ROWS
+        self._told = {
+            "flight": with_arrays(flight, runner.put), "rows": self._rows,
+            "work": runner.new((whole * self._rows,), np.float64),
+        }  # fmt: skip
+        self._constants: dict[str, Any] = {}
+        self._function: Callable[..., None] = fly_paper_flight
+        if flight.onboard is None:
+            home = home_epoch(flight)
+            self._told["home"] = -1 if home is None else home
+        else:
+            self._function = fly_navigated_flight
+            fresh = new_work(ONE_LANE, faults=flight.plan.minds_faults)
+            self._told |= {
+                "fresh": runner.put(fresh), "nav": runner.new((whole * len(fresh),), np.float64),
+                "nothing": runner.put(np.zeros(1)), "room": runner.put(np.zeros(TAPE_COUNTS, np.int64)),
+                "used": runner.new((whole * TAPE_COUNTS,), np.int64),
+            }  # fmt: skip
+            lag = carries_lag(load_flow_settings(flight.settings))
+            self._constants = {"take": _navigator(runner, lag)}
+
+    def fly(self, seed: int, first: int, flights: int, truth: Array) -> Array:
+        """The rows of flights from number `first` on; truth: `packed_truth` of each, or of one for all."""
+        put = self._runner.put
+        scores = self._runner.new((RUNNING_COLUMNS, flights), np.float64)
+        told = self._told | {"seed": seed, "first": first, "truth": put(truth), "scores": scores}
+        self._runner.run(self._function, flights, told, self._constants)
+        return np.ascontiguousarray(self._runner.fetch(scores).T)
+
+
+def _navigator(runner: Runner, lag: bool) -> Any:
+    """How a flight calls its navigator: in Python a callable; on a device the marker of its build (`take_here`)."""
+    if isinstance(runner, Simulator):
+        return navigator_unit(ONE_LANE, lag).python
+    return with_lag(ONE_LANE) if lag else ONE_LANE
+
+
+def _runner() -> Runner:
+    """The device of this machine. InputError where there is none."""
+    try:
+        return Simulator() if is_simulated() else Gpu(take_here)
+    except NoDeviceError as error:
+        raise InputError(f"--engine cuda: {error}; use --engine local") from error

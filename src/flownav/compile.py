@@ -11,6 +11,8 @@ a part of a kernel that is compiled by itself and called through its address.
 scalar build (one lane) and to the vectorised one. State lives in one flat buffer, a row of `len(lanes)` values
 for each scalar, at constant row offsets, reached through `pointer`.
 
+The same equations run on a CUDA device, a flight a thread: `device_runner`, and `strided` for the rows of one thread.
+
 Floating-point contraction is off, so that a flight has the same bytes alone, in any batch and on any
 number of threads.
 """
@@ -22,6 +24,7 @@ from flownav.compiling.bundles import FlatAccess, flat_access, lane_access, pass
 from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
 from flownav.compiling.progress import announce_compilation
+from flownav.compiling.runner import NoDeviceError, Runner, device_runner
 from flownav.compiling.scalars import bits_from_float, clamp, float_from_bits, larger, magnitude, smaller
 from flownav.compiling.strided import WARP, strided
 from flownav.compiling.units import Unit, unit
@@ -35,11 +38,14 @@ __all__ = [
     "ONE_LANE",
     "WARP",
     "FlatAccess",
+    "NoDeviceError",
+    "Runner",
     "Unit",
     "announce_compilation",
     "bits_from_float",
     "clamp",
     "compile_beside",
+    "device_runner",
     "equation",
     "flat_access",
     "float_from_bits",

@@ -198,6 +198,10 @@ def _engine(name: str) -> Engine:
         from flownav.campaign.engines.ray_cluster import RayCluster
 
         return RayCluster()
+    if name == "cuda":
+        from flownav.campaign.engines.cuda import Cuda
+
+        return Cuda()
     raise InputError(f"--engine {name}: not here yet")
 
 

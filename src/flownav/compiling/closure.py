@@ -28,7 +28,7 @@ START_S = time.time()
 WITHOUT_CODE = {
     "flownav.files",
     "flownav.guard",
-    *(f"flownav.compiling.{part}" for part in ("beside", "cache", "closure", "progress", "shipping")),
+    *(f"flownav.compiling.{part}" for part in ("beside", "cache", "closure", "progress", "runner", "shipping")),
 }
 
 

@@ -25,12 +25,11 @@ EXACT = {"fma": 0}
 
 
 class DeviceCode(NamedTuple):
-    """A kernel compiled for a device. name: of the entry; log: what the assembler said of registers and spills."""
+    """A kernel compiled for a device. name: of its entry; ptx: empty of what came from the cache."""
 
     name: str
     ptx: str
     cubin: bytes
-    log: str
 
 
 class _Named(NamedTuple):
@@ -39,34 +38,28 @@ class _Named(NamedTuple):
     compute_capability: tuple[int, int, str]
 
 
-def compile_for_device(
-    function: Callable[..., None], arguments: tuple[Any, ...], capability: Capability, *, max_registers: int | None = None
-) -> DeviceCode:  # fmt: skip
+def compile_for_device(function: Callable[..., None], arguments: tuple[Any, ...], capability: Capability) -> DeviceCode:
     """A kernel of these argument types (Numba's) as PTX and as machine code for a compute capability.
 
     ImportError without numba-cuda; NumbaError and RuntimeError where the code cannot be compiled.
     """
-    library = lowered(function, arguments, capability, max_registers=max_registers)
+    library = lowered(function, arguments, capability)
     asked = (*capability, "")
     ptx = library.get_asm_str(cc=asked)
-    cubin = library.get_cubin(cc=asked)
-    return DeviceCode(library._entry_name, ptx, bytes(cubin.code), str(library.get_linkerinfo(asked) or ""))
+    return DeviceCode(library._entry_name, ptx, bytes(library.get_cubin(cc=asked).code))
 
 
-def lowered(
-    function: Callable[..., None], arguments: tuple[Any, ...], capability: Capability, *, max_registers: int | None = None
-) -> Any:  # fmt: skip
+def lowered(function: Callable[..., None], arguments: tuple[Any, ...], capability: Capability) -> Any:
     """numba-cuda's library of a kernel: its code for LLVM, with that of all that it calls."""
-    from numba.cuda.compiler import compile_cuda, kernel_fixup
     from numba.core import types
+    from numba.cuda.compiler import compile_cuda, kernel_fixup
 
     asked = (*capability, "")
     with _device_named(asked):
         teach_equations()
         result = compile_cuda(
-            function, types.void, arguments, fastmath=False, nvvm_options=dict(NVVM_OPTIONS), cc=asked,
-            max_registers=max_registers,
-        )  # fmt: skip
+            function, types.void, arguments, fastmath=False, nvvm_options=dict(NVVM_OPTIONS), cc=asked
+        )
     library = result.library
     entry = library.get_function(result.fndesc.llvm_func_name)
     library._entry_name = result.fndesc.llvm_func_name

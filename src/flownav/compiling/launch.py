@@ -13,7 +13,7 @@ import inspect
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numba
 import numpy as np
@@ -23,30 +23,10 @@ from flownav.compiling.bundles import write_function
 from flownav.compiling.cache import STORE, SUFFIX, KernelCache
 from flownav.compiling.device import Capability, DeviceCode, call_instead, compile_for_device
 from flownav.compiling.progress import compiling
+from flownav.compiling.runner import Constants, NoDeviceError
 from flownav.compiling.strided import WARP
 
 THREADS = 64  # of a block
-Constants = dict[str, Any]
-
-
-class NoDeviceError(Exception):
-    """There is no CUDA device to run on; why, in a few words."""
-
-
-class Runner(Protocol):
-    """Where threads run, and its memory."""
-
-    def put(self, array: Any) -> Any:
-        """A copy of a contiguous array in the device's memory."""
-
-    def new(self, shape: tuple[int, ...], dtype: Any) -> Any:
-        """An array in the device's memory, whatever lies there."""
-
-    def fetch(self, array: Any) -> Any:
-        """A NumPy copy of a device's array."""
-
-    def run(self, function: Callable[..., None], threads: int, told: dict[str, Any], constants: Constants) -> None:
-        """`function(thread, threads, **told, **constants)` for each thread; arrays in `told` are the device's."""
 
 
 def per_thread(function: Callable[..., None], constants: Constants) -> Callable[..., None]:
@@ -120,6 +100,8 @@ class Gpu:
     instead: what `invoke` calls there, whatever the address (`device.call_instead`).
     """
 
+    in_python = False
+
     def __init__(self, instead: Callable[..., None]) -> None:
         try:
             import numba_cuda  # noqa: F401
@@ -137,9 +119,9 @@ class Gpu:
         major, minor = cuda.get_current_device().compute_capability[:2]
         self.capability: Capability = (int(major), int(minor))
 
-    def put(self, array: Any) -> Any:
-        """A copy of a contiguous array in the device's memory."""
-        return self._cuda.to_device(array if array.size else np.zeros(1, array.dtype))
+    def put(self, value: Any) -> Any:
+        """A copy of a contiguous array in the device's memory; of a tuple one with copies of its arrays."""
+        return with_arrays(value, lambda array: self._cuda.to_device(array if array.size else np.zeros(1, array.dtype)))
 
     def new(self, shape: tuple[int, ...], dtype: Any) -> Any:
         """An array in the device's memory, whatever lies there."""
@@ -172,13 +154,15 @@ def is_simulated() -> bool:
 class Simulator:
     """Numba's simulator of a CUDA device, in Python: about a thousand times slower than compiled code."""
 
+    in_python = True
+
     def __init__(self) -> None:
         if not is_simulated():
             raise NoDeviceError("the simulator is asked for by NUMBA_ENABLE_CUDASIM=1")
 
-    def put(self, array: Any) -> Any:
-        """A copy of the array."""
-        return array.copy()
+    def put(self, value: Any) -> Any:
+        """A copy of an array, or of the arrays in a tuple."""
+        return with_arrays(value, np.copy)
 
     def new(self, shape: tuple[int, ...], dtype: Any) -> Any:
         """A new array, full of what nobody should read."""
@@ -223,5 +207,5 @@ def _file_name(
         return None
     stem, digest = host.removesuffix(SUFFIX).rsplit("-", 1)
     made_by = b"".join(Path(file).read_bytes() for file in (__file__, device.__file__))
-    told = f"{digest} {hashlib.sha256(made_by).hexdigest()} sm_{capability[0]}{capability[1]} numba-cuda {numba_cuda.__version__}"
-    return f"{stem}-{hashlib.sha256(told.encode()).hexdigest()[:24]}{SUFFIX}"
+    told = f"{digest} sm_{capability[0]}{capability[1]} numba-cuda {numba_cuda.__version__}\n".encode() + made_by
+    return f"{stem}-{hashlib.sha256(told).hexdigest()[:24]}{SUFFIX}"

@@ -29,8 +29,8 @@ class Strided:
         self._elements[index] = value
 
 
-def strided(array: NDArray[np.float64], first: int) -> Strided:
-    """Every WARP-th element of a flat float64 array from `first` on; on a device an address, indexed without a check."""
+def strided(array: NDArray[np.float64], first: int) -> Any:
+    """Every WARP-th element of a flat float64 array from `first` on; on a device an address, indexed unchecked."""
     return Strided(array, first)
 
 
@@ -77,19 +77,20 @@ def teach_strided_pointers() -> None:
             fits = isinstance(pointer, StridedType) and isinstance(index, types.Integer)
             return signature(types.none, pointer, types.int64, types.float64) if fits else None
 
-    @lower_builtin(strided, types.Array, types.Integer)
-    def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def lower_address(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         data = context.make_array(sig.args[0])(context, builder, value=args[0]).data
         return builder.gep(data, [args[1]])
 
     def place(builder: Any, pointer: Any, index: Any) -> Any:
         return builder.gep(pointer, [builder.mul(index, ir.Constant(ir.IntType(64), WARP))])
 
-    @lower_builtin(operator.getitem, StridedType, types.Integer)
-    def _lower_load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def lower_load(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return builder.load(place(builder, args[0], args[1]))
 
-    @lower_builtin(operator.setitem, StridedType, types.Integer, types.Float)
-    def _lower_store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+    def lower_store(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         builder.store(args[2], place(builder, args[0], args[1]))
         return context.get_dummy_value()
+
+    lower_builtin(strided, types.Array, types.Integer)(lower_address)
+    lower_builtin(operator.getitem, StridedType, types.Integer)(lower_load)
+    lower_builtin(operator.setitem, StridedType, types.Integer, types.Float)(lower_store)

@@ -24,7 +24,6 @@ from flownav.scoring.touchdown import (
     STILL_EPOCHS,
     STILL_M_S,
     TOUCHDOWN_COLUMNS,
-    Limits,
 )
 
 Rows = NDArray[np.float64]
@@ -87,7 +86,7 @@ class ErrorSums(NamedTuple):
 class Course(NamedTuple):
     """What must be remembered of the epochs so far; the sides of a contact, and how the flight is going."""
 
-    count: float  # steps that are scored
+    steps: float  # that are scored
     home_n: float
     home_e: float
     horizontal_sq: float  # largest of a step in flight [m2]; -1: none yet
@@ -161,9 +160,9 @@ def with_error(sums: ErrorSums, error: float, count: float) -> ErrorSums:
 def note_shown(work: Rows, lanes: Lanes, row: int, lane: int, epoch: int, s: Shown, cg_above_skid_m: float) -> None:
     """One epoch of a lane into its running scores."""
     c, touch = load_course(work, lanes, row + COURSE, lane), load_touch(work, lanes, row + TOUCH, lane)
-    count = c.count
+    count = c.steps
     if s.counts:
-        count = c.count + 1.0
+        count = c.steps + 1.0
         errors = (s.error_n, s.error_e, s.error_d, s.error_u, s.error_v, s.error_w)
         for state in range(6):
             at = row + SUMS * state
@@ -206,29 +205,32 @@ def note_shown(work: Rows, lanes: Lanes, row: int, lane: int, epoch: int, s: Sho
 @equation
 def write_scores(
     work: Rows, lanes: Lanes, row: int, lane: int, epochs: int, epoch_s: float, may_land_after_s: float,
-    limits: Limits, scores: Any, flight: int,
+    limits: Any, scores: Any, flight: int,
 ) -> None:  # fmt: skip
-    """A lane's row after its last epoch, into scores[:, flight] (RUNNING_COLUMNS, flights)."""
+    """A lane's row after its last epoch, into scores[:, flight] (RUNNING_COLUMNS, flights).
+
+    limits: of its touchdown, with the fields of `touchdown.Limits`.
+    """
     c, t = load_course(work, lanes, row + COURSE, lane), load_touch(work, lanes, row + TOUCH, lane)
     worst = -1.0
     for state in range(6):
         sums = load_sums(work, lanes, row + SUMS * state, lane)
         at = state * len(STATISTICS)
-        largest = sums.largest if c.count > 0.0 else np.nan
-        scores[at, flight] = sums.total / c.count if c.count > 0.0 else np.nan
-        scores[at + 1, flight] = np.sqrt(sums.about_mean / c.count) if c.count > 0.0 else np.nan
-        scores[at + 2, flight] = np.sqrt(sums.squares / c.count) if c.count > 0.0 else np.nan
+        largest = sums.largest if c.steps > 0.0 else np.nan
+        scores[at, flight] = sums.total / c.steps if c.steps > 0.0 else np.nan
+        scores[at + 1, flight] = np.sqrt(sums.about_mean / c.steps) if c.steps > 0.0 else np.nan
+        scores[at + 2, flight] = np.sqrt(sums.squares / c.steps) if c.steps > 0.0 else np.nan
         scores[at + 3, flight] = largest
         if state < 3:
             worst = larger(worst, largest)
-    scores[MAX_POSITION_ERROR, flight] = worst if c.count > 0.0 else np.nan
+    scores[MAX_POSITION_ERROR, flight] = worst if c.steps > 0.0 else np.nan
     scores[RUNNING_COLUMNS - 1, flight] = np.sqrt(c.horizontal_sq) if c.horizontal_sq >= 0.0 else np.nan
     write_touchdown(c, t, epochs, epoch_s, may_land_after_s, limits, scores, flight)
 
 
 @equation
 def write_touchdown(
-    c: Course, t: Touch, epochs: int, epoch_s: float, may_land_after_s: float, limits: Limits, scores: Any, flight: int
+    c: Course, t: Touch, epochs: int, epoch_s: float, may_land_after_s: float, limits: Any, scores: Any, flight: int
 ) -> None:
     """The touchdown's columns of a row; what did not happen is NaN."""
     last_s = (epochs - 1) * epoch_s

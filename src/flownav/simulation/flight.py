@@ -169,9 +169,9 @@ def fly_navigated(
     taken, following, heard = 0, 0, 0
     for epoch in range(flight.plan.epochs):
         taken, following, reference = decide_navigated(
-            work, nav, lanes, seed, first, noise, epoch, taken, following, heard, flight, onboard, table, take, settings, o,
-            fed,
-        )
+            work, nav, lanes, seed, first, noise, epoch, taken, following, heard, flight, onboard, table, take,
+            settings, o, fed,
+        )  # fmt: skip
         write_history(work, lanes, epoch, reference, history)
         advance_sensing(work, lanes, seed, first, epoch, taken, heard, flight, onboard, table, flight.fails)
         taken += parts

@@ -18,8 +18,7 @@ from flownav.campaign.engines.engine import Part
 from flownav.campaign.engines.local import neighbours
 from flownav.campaign.local import home_epoch
 from flownav.campaign.plan import Ready
-from flownav.compile import ONE_LANE, WARP, announce_compilation
-from flownav.compiling.launch import Gpu, NoDeviceError, Runner, Simulator, is_simulated, with_arrays
+from flownav.compile import ONE_LANE, WARP, NoDeviceError, Runner, announce_compilation, device_runner
 from flownav.errors import InputError
 from flownav.estimation.covariance import with_lag
 from flownav.navigation.memory import new_work
@@ -88,7 +87,7 @@ class Room:
         whole = -(-at_once // WARP) * WARP
         self._rows = len(buffers_of(flight, ONE_LANE, 0, written=False).work) + RUNNING_ROWS
         self._told = {
-            "flight": with_arrays(flight, runner.put), "rows": self._rows,
+            "flight": runner.put(flight), "rows": self._rows,
             "work": runner.new((whole * self._rows,), np.float64),
         }  # fmt: skip
         self._constants: dict[str, Any] = {}
@@ -118,7 +117,7 @@ class Room:
 
 def _navigator(runner: Runner, lag: bool) -> Any:
     """How a flight calls its navigator: in Python a callable; on a device the marker of its build (`take_here`)."""
-    if isinstance(runner, Simulator):
+    if runner.in_python:
         return navigator_unit(ONE_LANE, lag).python
     return with_lag(ONE_LANE) if lag else ONE_LANE
 
@@ -126,6 +125,6 @@ def _navigator(runner: Runner, lag: bool) -> Any:
 def _runner() -> Runner:
     """The device of this machine. InputError where there is none."""
     try:
-        return Simulator() if is_simulated() else Gpu(take_here)
+        return device_runner(take_here)
     except NoDeviceError as error:
         raise InputError(f"--engine cuda: {error}; use --engine local") from error

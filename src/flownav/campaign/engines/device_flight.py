@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from flownav.compile import ONE_LANE, WARP, equation, pointer, procedure, strided
 from flownav.estimation.kalman import Lanes, Work
 from flownav.navigation.take import navigate
-from flownav.navigation.tape import output_of
+from flownav.navigation.tape import Output, output_of
 from flownav.scoring.running import RUNNING_ROWS, Shown, begin_scores, note_shown, write_scores
 from flownav.sensors.beam import ground_height
 from flownav.simulation import layout
@@ -92,19 +92,26 @@ def fly_navigated_flight(
     o = output_of(nothing, nothing, nothing, nothing, nothing, nothing, room, counted)
     settings, fed = pointer(flight.settings), pointer(nothing)
     start_block(own, ONE_LANE, seed, first + thread, flight, flight.onboard)
+    fly_on(own, mind, seed, first + thread, flight, flight.onboard, flight.table, take, settings, o, fed, row)
+    finish(own, row, flight, scores, thread)
+
+
+@equation
+def fly_on(
+    work: Work, nav: Work, seed: int, number: int, flight: Flight, onboard: Any, table: Any, take: Any, settings: Work,
+    o: Output, fed: Work, row: int,
+) -> None:  # fmt: skip
+    """Every epoch of flight `number`, as `simulation.flight.fly_navigated`; its scores lie from `row` on."""
     taken, following, heard = 0, 0, 0
     for epoch in range(flight.plan.epochs):
         taken, following, _ = decide_navigated(
-            own, mind, ONE_LANE, seed, first + thread, epoch, taken, following, heard, flight, flight.onboard,
-            flight.table, take, settings, o, fed,
+            work, nav, ONE_LANE, seed, number, epoch, taken, following, heard, flight, onboard, table, take, settings,
+            o, fed,
         )  # fmt: skip
-        note_epoch(own, row, epoch, -1, flight, flight.onboard)
-        advance_sensing(
-            own, ONE_LANE, seed, first + thread, epoch, taken, heard, flight, flight.onboard, flight.table, flight.fails
-        )
-        taken += inertial_parts(flight.onboard)
-        heard += inertial_parts(flight.onboard)
-    finish(own, row, flight, scores, thread)
+        note_epoch(work, row, epoch, -1, flight, onboard)
+        advance_sensing(work, ONE_LANE, seed, number, epoch, taken, heard, flight, onboard, table, flight.fails)
+        taken += inertial_parts(onboard)
+        heard += inertial_parts(onboard)
 
 
 @procedure
@@ -112,7 +119,7 @@ def take_here(
     lanes: Lanes, work: Work, p: Work, estimate: Work, innovation: Work, event: Work, entry: Work, state: Work,
     covariance: Work, room: Integers, used: Integers, t_s: float, sensor: int,
 ) -> None:  # fmt: skip
-    """The navigator called as it is, and not through an address. lanes: the marker of its build (`covariance.with_lag`)."""
+    """The navigator called as it is, not through an address. lanes: the marker of its build (`covariance.with_lag`)."""
     o = output_of(estimate, innovation, event, entry, state, covariance, room, used)
     navigate(work, lanes, p, o, t_s, sensor)
 
@@ -159,6 +166,4 @@ def sees_pad(onboard: Onboard | None, cg_height_m: float, epoch: int, home: int,
 def finish(work: Work, row: int, flight: Flight, scores: Array, thread: int) -> None:
     """The flight's column of scores."""
     plan = flight.plan
-    write_scores(
-        work, ONE_LANE, row, 0, plan.epochs, EPOCH_S, plan.may_land_after_s, flight.limits, scores, thread
-    )
+    write_scores(work, ONE_LANE, row, 0, plan.epochs, EPOCH_S, plan.may_land_after_s, flight.limits, scores, thread)

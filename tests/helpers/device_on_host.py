@@ -37,7 +37,7 @@ class HostedDevice:
 
     def new(self, shape: Any, dtype: Any) -> Any:
         """A new array, full of what nobody should read."""
-        return np.full(shape, np.nan if np.issubdtype(dtype, np.floating) else -1, dtype)
+        return np.full(shape, np.nan if np.issubdtype(dtype, np.floating) else 77, dtype)
 
     def fetch(self, array: Any) -> Any:
         """A copy of the array."""

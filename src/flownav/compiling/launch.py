@@ -166,7 +166,7 @@ class Simulator:
 
     def new(self, shape: tuple[int, ...], dtype: Any) -> Any:
         """A new array, full of what nobody should read."""
-        return np.full(shape, np.nan if np.issubdtype(dtype, np.floating) else -1, dtype)
+        return np.full(shape, np.nan if np.issubdtype(dtype, np.floating) else 77, dtype)
 
     def fetch(self, array: Any) -> Any:
         """A copy of the array."""

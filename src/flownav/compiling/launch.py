@@ -27,6 +27,7 @@ from flownav.compiling.runner import Constants, NoDeviceError
 from flownav.compiling.strided import WARP
 
 THREADS = 64  # of a block
+SIMULATED_BYTES = 1 << 30
 
 
 def per_thread(function: Callable[..., None], constants: Constants) -> Callable[..., None]:
@@ -97,12 +98,12 @@ def argument_type(value: Any) -> Any:
 class Gpu:
     """The first CUDA device. NoDeviceError where there is none, or no numba-cuda.
 
-    instead: what `invoke` calls there, whatever the address (`device.call_instead`).
+    instead: what `invoke` calls there, whatever the address (`device.call_instead`). block: threads of a block.
     """
 
     in_python = False
 
-    def __init__(self, instead: Callable[..., None]) -> None:
+    def __init__(self, instead: Callable[..., None], block: int = THREADS) -> None:
         try:
             import numba_cuda  # noqa: F401
             from cuda.core import Device
@@ -115,9 +116,14 @@ class Gpu:
         self._cuda = cuda
         self._device = Device(cuda.get_current_device().id)
         self._device.set_current()
+        self._block = block
         self._kernels: dict[str, Any] = {}
         major, minor = cuda.get_current_device().compute_capability[:2]
         self.capability: Capability = (int(major), int(minor))
+
+    def free_bytes(self) -> int:
+        """How much of the device's memory is free."""
+        return int(self._cuda.current_context().get_memory_info().free)
 
     def put(self, value: Any) -> Any:
         """A copy of a contiguous array in the device's memory; of a tuple one with copies of its arrays."""
@@ -140,7 +146,7 @@ class Gpu:
         known = hashlib.sha256(code.cubin).hexdigest()
         if known not in self._kernels:
             self._kernels[known] = ObjectCode.from_cubin(code.cubin).get_kernel(code.name)
-        config = LaunchConfig(grid=-(-threads // THREADS), block=THREADS)
+        config = LaunchConfig(grid=-(-threads // self._block), block=self._block)
         passed = flattened(arguments, lambda array: int(array.device_ctypes_pointer.value))
         launch(self._device.default_stream, config, self._kernels[known], *passed)
         self._device.sync()
@@ -159,6 +165,10 @@ class Simulator:
     def __init__(self) -> None:
         if not is_simulated():
             raise NoDeviceError("the simulator is asked for by NUMBA_ENABLE_CUDASIM=1")
+
+    def free_bytes(self) -> int:
+        """As much as needed: few flights are simulated."""
+        return SIMULATED_BYTES
 
     def put(self, value: Any) -> Any:
         """A copy of an array, or of the arrays in a tuple."""

@@ -17,6 +17,9 @@ class Runner(Protocol):
 
     in_python: bool
 
+    def free_bytes(self) -> int:
+        """How much of its memory is free."""
+
     def put(self, value: Any) -> Any:
         """A copy of a contiguous array in the device's memory; of a tuple one with copies of its arrays."""
 

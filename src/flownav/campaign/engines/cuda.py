@@ -29,11 +29,12 @@ from flownav.scoring.running import RUNNING_COLUMNS, RUNNING_ROWS
 from flownav.simulation.engine import buffers_of
 from flownav.simulation.ensemble import Ensemble, believed
 from flownav.simulation.plan import Flight
-from flownav.simulation.truth import packed_truth
+from flownav.simulation.truth import TRUTH_ROWS, packed_truth
 
 Array = NDArray[np.float64]
 
 AT_ONCE = 32768  # flights: eight warps on each of an H200's 132 multiprocessors
+MEMORY_SHARE = 0.8  # of what is free
 
 
 class Cuda:
@@ -62,9 +63,12 @@ class Cuda:
         self, flight: Flight, seed: int, first: int, flights: int, ensemble: Ensemble | None = None
     ) -> Iterator[Array]:
         """The rows of so many flights from number `first` on, (flights, RUNNING_COLUMNS), as many as fit at a time."""
-        room = Room(self._runner, flight, min(self._at_once, flights))
-        starts = range(first, first + flights, self._at_once)
-        counts = [min(self._at_once, first + flights - start) for start in starts]
+        at_once = min(self._at_once, flights, most_that_fit(self._runner.free_bytes(), flight))
+        if at_once < 1:
+            raise InputError("--engine cuda: the device has no memory left for a flight; use --engine local")
+        room = Room(self._runner, flight, at_once)
+        starts = range(first, first + flights, at_once)
+        counts = [min(at_once, first + flights - start) for start in starts]
 
         def drawn(start: int, count: int) -> Array:
             truths = [believed(flight)] if ensemble is None else ensemble.truths(seed, start, count)
@@ -79,13 +83,25 @@ class Cuda:
                 yield room.fly(seed, start, count, truth)
 
 
+def rows_of_flight(flight: Flight) -> int:
+    """Rows of the lane buffer of one flight on a device: the simulator's, and those of its scores."""
+    return len(buffers_of(flight, ONE_LANE, 0, written=False).work) + RUNNING_ROWS
+
+
+def most_that_fit(free_bytes: int, flight: Flight) -> int:
+    """How many flights a device has memory for, in whole warps where there are any."""
+    navigator = len(new_work(ONE_LANE)) + TAPE_COUNTS if flight.onboard is not None else 0
+    each = 8 * (rows_of_flight(flight) + navigator + TRUTH_ROWS + 2 * RUNNING_COLUMNS)
+    return int(MEMORY_SHARE * free_bytes) // (each * WARP) * WARP
+
+
 class Room:
     """A device's memory for flights of one kind, so many at once."""
 
     def __init__(self, runner: Runner, flight: Flight, at_once: int) -> None:
         self._runner, self._flight = runner, flight
         whole = -(-at_once // WARP) * WARP
-        self._rows = len(buffers_of(flight, ONE_LANE, 0, written=False).work) + RUNNING_ROWS
+        self._rows = rows_of_flight(flight)
         self._told = {
             "flight": runner.put(flight), "rows": self._rows,
             "work": runner.new((whole * self._rows,), np.float64),

@@ -14,6 +14,7 @@ import pytest
 
 from flownav.campaign.engines.cuda import AT_ONCE, Cuda
 from flownav.campaign.engines.device_flight import take_here
+from flownav.campaign.engines.drawn import truths_of
 from flownav.campaign.local import fly_many
 from flownav.campaign.rows import rows_of
 from flownav.compile import NoDeviceError, device_runner
@@ -42,9 +43,9 @@ def runner():
 
 def rate_on(engine, flight, flights):
     """Flights a second, once everything is compiled and loaded."""
-    list(engine.rows(flight, SEED, 0, 32))
+    list(engine.rows(flight, SEED, 0, 32, truths_of(flight, SEED, None)))
     began_s = time.perf_counter()
-    flown = sum(map(len, engine.rows(flight, SEED, 0, flights)))
+    flown = sum(map(len, engine.rows(flight, SEED, 0, flights, truths_of(flight, SEED, None))))
     return flown / (time.perf_counter() - began_s)
 
 
@@ -58,7 +59,7 @@ def rate_here(flight, flights):
 
 def largest_difference(engine, flight):
     """The largest difference of any score of COMPARED flights from the CPU's, relative where it is above one."""
-    ours = np.concatenate(list(engine.rows(flight, SEED, 0, COMPARED)))
+    ours = np.concatenate(list(engine.rows(flight, SEED, 0, COMPARED, truths_of(flight, SEED, None))))
     blocks = fly_blocks(flight, SEED, 0, COMPARED, lambda history: rows_of(flight, history))
     theirs = np.concatenate([rows for _, rows in blocks])
     assert np.array_equal(np.isnan(ours), np.isnan(theirs))

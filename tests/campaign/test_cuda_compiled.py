@@ -6,10 +6,10 @@ import re
 import shutil
 import subprocess
 
-import device_cases
 import numpy as np
 import pytest
 
+import device_cases
 from flownav.campaign.engines.device_flight import take_here
 from flownav.compile import equation
 from flownav.compiling.device import compile_for_device
@@ -63,12 +63,15 @@ def multiply_and_add(thread, threads, a, b, c, out):
 def test_a_product_and_a_sum_are_rounded_one_by_one(hosted):
     arguments = (1, *(np.zeros(1) for _ in range(4)))
     code = compile_for_device(per_thread(multiply_and_add, {}), tuple(map(argument_type, arguments)), H200)
-    assert "mul.rn.f64" in code.ptx and "add.rn.f64" in code.ptx and "fma" not in code.ptx
+    assert "mul.rn.f64" in code.ptx
+    assert "add.rn.f64" in code.ptx
+    assert "fma" not in code.ptx
 
 
 def test_noise_is_the_cpu_s_to_the_last_bit(hosted):
     (words, normals), (told_words, told_normals) = device_cases.noise_on_device(hosted), device_cases.noise_on_cpu()
-    assert np.array_equal(words, told_words) and len(np.unique(words)) == words.size
+    assert np.array_equal(words, told_words)
+    assert len(np.unique(words)) == words.size
     assert np.all(np.abs(normals - told_normals) <= np.spacing(np.abs(told_normals)))
 
 
@@ -81,7 +84,8 @@ def test_whole_flights_agree_with_the_cpu_to_a_billionth(paper):
 
 def test_a_flight_is_machine_code_for_an_h200(paper):
     *_, code = paper
-    assert ".target sm_90" in code.ptx and code.cubin[:4] == b"\x7fELF"
+    assert ".target sm_90" in code.ptx
+    assert code.cubin[:4] == b"\x7fELF"
     assert code.name.encode() in code.cubin
 
 
@@ -108,7 +112,8 @@ def test_registers_and_spills_are_told(paper, tmp_path):
     assert done.returncode == 0, done.stderr
     print("\n".join(line for line in done.stderr.splitlines() if "registers" in line or "spill" in line))
     registers = [int(number) for number in re.findall(r"Used (\d+) registers", done.stderr)]
-    assert registers and max(registers) <= MOST_REGISTERS
+    assert registers
+    assert max(registers) <= MOST_REGISTERS
 
 
 def test_code_is_kept_and_found_again(hosted, monkeypatch, tmp_path):
@@ -119,7 +124,8 @@ def test_code_is_kept_and_found_again(hosted, monkeypatch, tmp_path):
     first = compiled(multiply_and_add, {}, kinds, H200)
     monkeypatch.setattr(launch, "compile_for_device", None)
     again = compiled(multiply_and_add, {}, kinds, H200)
-    assert first.ptx and (again.name, again.cubin) == (first.name, first.cubin)
+    assert first.ptx
+    assert (again.name, again.cubin) == (first.name, first.cubin)
 
 
 @pytest.mark.slow

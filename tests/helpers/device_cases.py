@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from flownav.campaign.engines.cuda import Cuda
+from flownav.campaign.engines.drawn import truths_of
 from flownav.campaign.rows import rows_of
 from flownav.compile import equation, kernel
 from flownav.parameter_files import check
@@ -41,9 +42,9 @@ def ready(name: str, sections: dict[str, Any]) -> Setup:
 
 
 def on_device(runner: Any, setup: Setup, flights: int, drawn: bool) -> Any:
-    """The rows of some flights, two at a time, so that a device is used more than once and its last warp is not full."""
-    ensemble = setup.ensemble() if drawn else None
-    return np.concatenate(list(Cuda(runner, at_once=2).rows(setup.flight, SEED, FIRST, flights, ensemble)))
+    """The rows of some flights, two at a time, so that a device is used more than once and no warp is full."""
+    truths = truths_of(setup.flight, SEED, setup.ensemble() if drawn else None)
+    return np.concatenate(list(Cuda(runner, at_once=2).rows(setup.flight, SEED, FIRST, flights, truths)))
 
 
 def on_cpu(setup: Setup, flights: int, drawn: bool) -> Any:

@@ -69,9 +69,7 @@ def of_history(f, home, may_land_after_s):
     )
     motion = motion._replace(cg_height_m=motion.cg_height_m - f["ground"])
     t_s = np.arange(EPOCHS) * EPOCH_S
-    landing = touchdowns(
-        t_s, motion, f["error"][:, :2], f["seen"].astype(float), f["away"], LIMITS, may_land_after_s
-    )
+    landing = touchdowns(t_s, motion, f["error"][:, :2], f["seen"].astype(float), f["away"], LIMITS, may_land_after_s)
     truth = np.concatenate([f["position"], f["velocity"]], axis=1)
     scores = score_block(truth + f["error"], truth, landing, f["counts"].astype(float))
     counted = f["counts"] * ~f["touches"] * (np.arange(EPOCHS)[:, None] >= max(home, 0))
@@ -100,5 +98,8 @@ def test_the_flights_of_this_test_do_all_that_is_scored():
     broken = of["touchdown.broken"].astype(int)
     assert all(((broken >> bit) & 1).any() for bit in range(8))
     assert (broken == 0).any() or np.isfinite(of["touchdown.rest.t_s"]).any()
-    assert np.isfinite(of["touchdown.rest.t_s"]).any() and np.isnan(of["touchdown.contact.t_s"]).any()
-    assert (of["touchdown.go_arounds"] > 0.0).any() and of["touchdown.aloft"].any() and np.isnan(of["x.std_error"]).any()
+    assert np.isfinite(of["touchdown.rest.t_s"]).any()
+    assert np.isnan(of["touchdown.contact.t_s"]).any()
+    assert (of["touchdown.go_arounds"] > 0.0).any()
+    assert of["touchdown.aloft"].any()
+    assert np.isnan(of["x.std_error"]).any()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -198,11 +199,9 @@ def _engine(name: str) -> Engine:
         from flownav.campaign.engines.ray_cluster import RayCluster
 
         return RayCluster()
-    if name == "cuda":
-        from flownav.campaign.engines.cuda import Cuda
+    from flownav.campaign.engines.cuda import Cuda
 
-        return Cuda()
-    raise InputError(f"--engine {name}: not here yet")
+    return Cuda(processes=os.cpu_count() or 1)
 
 
 def _set(text: str) -> tuple[str, Any]:

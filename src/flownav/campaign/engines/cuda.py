@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.campaign.engines.device_flight import TAPE_COUNTS, fly_navigated_flight, fly_paper_flight, take_here
+from flownav.campaign.engines.drawn import Truths, truths_of_cell
 from flownav.campaign.engines.engine import Part
 from flownav.campaign.engines.local import neighbours
 from flownav.campaign.local import home_epoch
@@ -27,9 +28,8 @@ from flownav.navigation.take import navigator_unit
 from flownav.navigation.told import carries_lag
 from flownav.scoring.running import RUNNING_COLUMNS, RUNNING_ROWS
 from flownav.simulation.engine import buffers_of
-from flownav.simulation.ensemble import Ensemble, believed
 from flownav.simulation.plan import Flight
-from flownav.simulation.truth import TRUTH_ROWS, packed_truth
+from flownav.simulation.truth import TRUTH_ROWS
 
 Array = NDArray[np.float64]
 
@@ -38,30 +38,34 @@ MEMORY_SHARE = 0.8  # of what is free
 
 
 class Cuda:
-    """The CUDA device of this machine, or Numba's simulator of one. InputError where there is neither."""
+    """The CUDA device of this machine, or Numba's simulator of one. InputError where there is neither.
 
-    def __init__(self, runner: Runner | None = None, at_once: int = AT_ONCE) -> None:
+    at_once: flights. processes: that draw truths; more than one start as `multiprocessing` starts them, so that a
+    script's main module must be guarded.
+    """
+
+    def __init__(self, runner: Runner | None = None, at_once: int = AT_ONCE, processes: int = 1) -> None:
         self._runner = runner or _runner()
-        self._at_once = at_once
+        self._at_once, self._processes = at_once, processes
 
     def fly(
         self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
     ) -> Iterator[tuple[Part, Array]]:
         """The rows of each part; parts that follow each other are flown together."""
-        for together in neighbours(parts):
-            waiting, held = list(together), np.empty((0, RUNNING_COLUMNS))
-            total = sum(part.flights for part in together)
-            for rows in self.rows(cell.flight, seed, together[0].first, total, cell.ensemble):
-                on_progress(len(rows))
-                held = np.concatenate([held, rows])
-                while waiting and len(held) >= waiting[0].flights:
-                    part = waiting.pop(0)
-                    yield part, held[: part.flights]
-                    held = held[part.flights :]
+        asked = sum(part.flights for part in parts)
+        with truths_of_cell(cell, seed, asked, self._processes) as truths:
+            for together in neighbours(parts):
+                waiting, held = list(together), np.empty((0, RUNNING_COLUMNS))
+                total = sum(part.flights for part in together)
+                for rows in self.rows(cell.flight, seed, together[0].first, total, truths):
+                    on_progress(len(rows))
+                    held = np.concatenate([held, rows])
+                    while waiting and len(held) >= waiting[0].flights:
+                        part = waiting.pop(0)
+                        yield part, held[: part.flights]
+                        held = held[part.flights :]
 
-    def rows(
-        self, flight: Flight, seed: int, first: int, flights: int, ensemble: Ensemble | None = None
-    ) -> Iterator[Array]:
+    def rows(self, flight: Flight, seed: int, first: int, flights: int, truths: Truths) -> Iterator[Array]:
         """The rows of so many flights from number `first` on, (flights, RUNNING_COLUMNS), as many as fit at a time."""
         at_once = min(self._at_once, flights, most_that_fit(self._runner.free_bytes(), flight))
         if at_once < 1:
@@ -69,18 +73,13 @@ class Cuda:
         room = Room(self._runner, flight, at_once)
         starts = range(first, first + flights, at_once)
         counts = [min(at_once, first + flights - start) for start in starts]
-
-        def drawn(start: int, count: int) -> Array:
-            truths = [believed(flight)] if ensemble is None else ensemble.truths(seed, start, count)
-            return packed_truth(truths)
-
         with ThreadPoolExecutor(1) as beside, announce_compilation("device"):
-            coming = beside.submit(drawn, starts[0], counts[0])
+            coming = beside.submit(truths, starts[0], counts[0])
             for k, (start, count) in enumerate(zip(starts, counts, strict=True)):
                 truth = coming.result()
                 if k + 1 < len(starts):
-                    coming = beside.submit(drawn, starts[k + 1], counts[k + 1])
-                yield room.fly(seed, start, count, truth)
+                    coming = beside.submit(truths, starts[k + 1], counts[k + 1])
+                yield room.fly(seed, start, count, truth.reshape(-1))
 
 
 def rows_of_flight(flight: Flight) -> int:

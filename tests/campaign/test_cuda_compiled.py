@@ -39,6 +39,7 @@ class Recorder:
 
     def __init__(self, device):
         self.device, self.put, self.new, self.fetch = device, device.put, device.new, device.fetch
+        self.free_bytes = device.free_bytes
 
     def run(self, function, threads, told, constants):
         self.asked = function, (threads, *(told[name] for name in told_names(function, constants))), constants

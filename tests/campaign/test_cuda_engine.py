@@ -26,7 +26,7 @@ class Counting:
     in_python = False
 
     def __init__(self, free=1 << 30):
-        self.free, self.launched = free, []
+        self.free, self.launched, self.truths = free, [], []
 
     def free_bytes(self):
         return self.free
@@ -42,6 +42,7 @@ class Counting:
 
     def run(self, function, threads, told, constants):
         self.launched.append((told["first"], threads, told["truth"].size // TRUTH_ROWS))
+        self.truths.append(told["truth"])
         told["scores"][NUMBER] = told["first"] + np.arange(threads)
 
 
@@ -68,6 +69,14 @@ def test_matched_flights_share_one_truth_and_drawn_ones_have_their_own(cells):
     for model in ("matched", "ensemble"):
         list(Cuda(device).fly(cells[model], 1, [Part(0, 0, 8)]))
     assert [columns for _, _, columns in device.launched] == [1, 8]
+
+
+def test_each_launch_flies_the_truths_of_its_flights(cells):
+    device, cell = Counting(), cells["ensemble"]
+    list(Cuda(device, at_once=4).fly(cell, 1, [Part(0, 3, 10)]))
+    truths = truths_of(cell.flight, 1, cell.ensemble)
+    for (first, count, _), given in zip(device.launched, device.truths, strict=True):
+        assert np.array_equal(given, truths(first, count).reshape(-1), equal_nan=True)
 
 
 def test_no_more_flights_at_once_than_memory_holds(cells):

@@ -127,7 +127,7 @@ class Gpu:
 
     def put(self, value: Any) -> Any:
         """A copy of a contiguous array in the device's memory; of a tuple one with copies of its arrays."""
-        return with_arrays(value, lambda array: self._cuda.to_device(array if array.size else np.zeros(1, array.dtype)))
+        return with_arrays(value, self._cuda.to_device)
 
     def new(self, shape: tuple[int, ...], dtype: Any) -> Any:
         """An array in the device's memory, whatever lies there."""
@@ -147,7 +147,7 @@ class Gpu:
         if known not in self._kernels:
             self._kernels[known] = ObjectCode.from_cubin(code.cubin).get_kernel(code.name)
         config = LaunchConfig(grid=-(-threads // self._block), block=self._block)
-        passed = flattened(arguments, lambda array: int(array.device_ctypes_pointer.value))
+        passed = flattened(arguments, lambda array: int(array.device_ctypes_pointer.value or 0))
         launch(self._device.default_stream, config, self._kernels[known], *passed)
         self._device.sync()
 

@@ -27,6 +27,7 @@ from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.take import navigator_unit
 from flownav.navigation.told import carries_lag
 from flownav.scoring.running import RUNNING_COLUMNS, RUNNING_ROWS
+from flownav.simulation.draws import plain_noise
 from flownav.simulation.engine import buffers_of
 from flownav.simulation.plan import Flight
 from flownav.simulation.truth import TRUTH_ROWS
@@ -102,7 +103,7 @@ class Room:
         whole = -(-at_once // WARP) * WARP
         self._rows = rows_of_flight(flight)
         self._told = {
-            "flight": runner.put(flight), "rows": self._rows,
+            "flight": runner.put(flight), "noise": runner.put(plain_noise(1)), "rows": self._rows,
             "work": runner.new((whole * self._rows,), np.float64),
         }  # fmt: skip
         self._constants: dict[str, Any] = {}

@@ -18,6 +18,7 @@ from flownav.navigation.tape import Output, output_of
 from flownav.scoring.running import RUNNING_ROWS, Shown, begin_scores, note_shown, write_scores
 from flownav.sensors.beam import ground_height
 from flownav.simulation import layout
+from flownav.simulation.draws import Noise
 from flownav.simulation.epoch import advance_sensing
 from flownav.simulation.flight import (
     advance_on_paper,
@@ -55,17 +56,18 @@ def begin_flight(work: Array, rows: int, truth: Array, flights: int, flight: int
 
 @equation
 def fly_paper_flight(
-    thread: int, flights: int, seed: int, first: int, flight: Flight, truth: Array, home: int, rows: int, work: Array,
-    scores: Array,
+    thread: int, flights: int, seed: int, first: int, noise: Noise, flight: Flight, truth: Array, home: int, rows: int,
+    work: Array, scores: Array,
 ) -> None:  # fmt: skip
     """Flight `first + thread` on the paper's filter. rows: of `work` for one flight, the last are the scores'.
 
+    noise: `draws.plain_noise(1)`, each flight's own.
     home: the epoch to whose errors horizontal ones are relative; -1: to none. scores (RUNNING_COLUMNS, flights).
     """
     own, row = begin_flight(work, rows, truth, flights, thread), rows - RUNNING_ROWS
-    start_block(own, ONE_LANE, seed, first + thread, flight, None)
+    start_block(own, ONE_LANE, seed, first + thread, flight, None, noise)
     for epoch in range(flight.plan.epochs):
-        decide_on_paper(own, ONE_LANE, seed, first + thread, epoch, flight)
+        decide_on_paper(own, ONE_LANE, seed, first + thread, noise, epoch, flight)
         note_epoch(own, row, epoch, home, flight, None)
         advance_on_paper(own, ONE_LANE, flight)
     finish(own, row, flight, scores, thread)
@@ -73,8 +75,8 @@ def fly_paper_flight(
 
 @equation
 def fly_navigated_flight(
-    thread: int, flights: int, seed: int, first: int, flight: Flight, truth: Array, rows: int, work: Array,
-    fresh: Array, nav: Array, nothing: Array, room: Integers, used: Integers, take: Any, scores: Array,
+    thread: int, flights: int, seed: int, first: int, noise: Noise, flight: Flight, truth: Array, rows: int,
+    work: Array, fresh: Array, nav: Array, nothing: Array, room: Integers, used: Integers, take: Any, scores: Array,
 ) -> None:  # fmt: skip
     """Flight `first + thread` on the navigator, which writes no tape.
 
@@ -91,22 +93,22 @@ def fly_navigated_flight(
         counted[i] = 0
     o = output_of(nothing, nothing, nothing, nothing, nothing, nothing, room, counted)
     settings, fed = pointer(flight.settings), pointer(nothing)
-    start_block(own, ONE_LANE, seed, first + thread, flight, flight.onboard)
-    fly_on(own, mind, seed, first + thread, flight, flight.onboard, flight.table, take, settings, o, fed, row)
+    start_block(own, ONE_LANE, seed, first + thread, flight, flight.onboard, noise)
+    fly_on(own, mind, seed, first + thread, noise, flight, flight.onboard, flight.table, take, settings, o, fed, row)
     finish(own, row, flight, scores, thread)
 
 
 @equation
 def fly_on(
-    work: Work, nav: Work, seed: int, number: int, flight: Flight, onboard: Any, table: Any, take: Any, settings: Work,
-    o: Output, fed: Work, row: int,
+    work: Work, nav: Work, seed: int, number: int, noise: Noise, flight: Flight, onboard: Any, table: Any, take: Any,
+    settings: Work, o: Output, fed: Work, row: int,
 ) -> None:  # fmt: skip
     """Every epoch of flight `number`, as `simulation.flight.fly_navigated`; its scores lie from `row` on."""
     taken, following, heard = 0, 0, 0
     for epoch in range(flight.plan.epochs):
         taken, following, _ = decide_navigated(
-            work, nav, ONE_LANE, seed, number, epoch, taken, following, heard, flight, onboard, table, take, settings,
-            o, fed,
+            work, nav, ONE_LANE, seed, number, noise, epoch, taken, following, heard, flight, onboard, table, take,
+            settings, o, fed,
         )  # fmt: skip
         note_epoch(work, row, epoch, -1, flight, onboard)
         advance_sensing(work, ONE_LANE, seed, number, epoch, taken, heard, flight, onboard, table, flight.fails)

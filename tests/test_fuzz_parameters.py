@@ -10,6 +10,8 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
+from flownav.campaign.requirement import load_requirement
+from flownav.campaign.requirement import scenario_of as required
 from flownav.identification.rig_log import Rig
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import settings_of
@@ -57,6 +59,7 @@ LOADERS: dict[str, Callable[[Path], Any]] = {
     "px4flow_paper.toml": sensor_as_told,
     "landing.toml": lambda path: load_scenario(str(path)),
     "approach.toml": lambda path: load_scenario(str(path)),
+    "requirements/approach.toml": lambda path: required(load_requirement(str(path))),
     "dispersion.toml": lambda path: load(path, DispersionFile),
     "validation.toml": load_flights,
     "paper_reduced_model.toml": load_paper_model,

@@ -142,3 +142,20 @@ def test_vehicles_are_named_in_one_place_and_cells_are_not_endless(tmp_path):
     many = ", ".join(f'"{k}.toml"' for k in range(MOST_CELLS + 1))
     with pytest.raises(InputError, match=rf"conditions: {MOST_CELLS + 1} cells; at most {MOST_CELLS} are flown"):
         planned(tmp_path, FLOWN + f"[conditions]\nsensor = [{many}]\n" + ASKED)
+
+
+def test_what_is_assumed_is_said_of_every_vehicle(tmp_path):
+    plan = planned(
+        tmp_path, FLOWN + '[conditions]\nvehicle = ["maxi-joker-3", "quad-450"]\nheight_m = [2, 3]\n' + ASKED
+    )
+    said = assumed(plan)
+    helicopter, quad = said["variants"]
+    assert (helicopter["cell"], quad["cell"]) == ("maxi-joker-3, from 2 m", "quad-450, from 2 m")
+    masses = [
+        {row["input"]: row["believed"] for row in variant["dispersed"]}["vehicle.body.mass_kg"]
+        for variant in said["variants"]
+    ]
+    assert masses[0] > 2.0 * masses[1]
+    assert any("tail rotor" in words for words in said["not_modelled"])
+    assert any("propellers" in words for words in said["not_modelled"])
+    assert said["known_exactly"] == "where it hovers for its first 5 s, flown on the truth"

@@ -195,7 +195,7 @@ def test_a_certificate_has_what_the_issue_asks(landing):
     figures = [told["figures"]["touchdown.horizontal_m"] or np.inf for told in said["worst"]]
     assert figures == sorted(figures, reverse=True)
     assert facts["assumed"]["filter"] == "paper"
-    dispersed = {row["input"]: row for row in said["assumed"]["dispersed"]}
+    dispersed = {row["input"]: row for row in said["assumed"]["variants"][0]["dispersed"]}
     assert dispersed["wind.speed_20ft_m_s"]["distribution"] == "uniform 0 to 8"
     assert "uncertainty" in dispersed["vehicle.body.mass_kg"]["source"]
     assert all(row["source"] and row["known"] in ("build", "day", "never") for row in dispersed.values())

@@ -59,6 +59,11 @@ def test_a_pass_is_exit_status_0_and_everything_else_1(tmp_path):
     facts = json.loads(few.stdout)
     assert (facts["verdict"], facts["flights"], facts["needed"], facts["failures"]) == ("not shown", 10, 25, 0)
     assert facts["ranking"] is None
+    more = run(calm, "--out", tmp_path / "few", "--ranking", 0, "--records", 0)
+    assert isinstance(more.exception, InputError)
+    assert "was planned with 10 flights a cell, not 25; to add flights until they pass takes more" in str(
+        more.exception
+    )
     windy = write(tmp_path, HEAD + WINDY.replace("[0, 8]", "[8, 12]") + CRASH, "windy.toml")
     failed = run(windy, "--out", tmp_path / "windy", "--ranking", 16, "--records", 0)
     assert isinstance(failed.exception, VerdictError)

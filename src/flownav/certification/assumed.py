@@ -39,17 +39,34 @@ OF_A_MULTIROTOR = ("Vortex ring, bending of arms and propellers (docs/multirotor
 
 
 def assumed(plan: Plan) -> dict[str, Any]:
-    """Everything that was assumed, of the first cell where cells differ: by what their values say."""
+    """Everything that was assumed: of all cells, and of each vehicle with its sensors."""
     cell = plan.cells[0]
-    setup, ensemble = cell.setup, plan.ready(0).ensemble
-    assert ensemble is not None  # a certificate's cells are dispersed
-    own = OF_A_MULTIROTOR if isinstance(setup.flight.vehicle, MultirotorParameters) else OF_A_HELICOPTER
+    known = {known_exactly(each.scenario) if each.setup.fitted else OF_THE_PAPERS_FILTER for each in plan.cells}
+    kinds = [isinstance(each.setup.flight.vehicle, MultirotorParameters) for each in plan.cells]
+    own = (OF_A_HELICOPTER if not all(kinds) else ()) + (OF_A_MULTIROTOR if any(kinds) else ())
+    found: dict[tuple[str | None, str | None], int] = {}
+    for number, each in enumerate(plan.cells):
+        found.setdefault((each.scenario.vehicle.file, each.scenario.flow_sensor), number)
+    variants = [_variant(plan, number) for number in found.values()]
     return {
-        "truth": f"{setup.scenario.truth} {setup.described.name}, each flight with its own numbers and noise",
-        "vehicle": setup.described.name,
-        "filter": setup.scenario.filter.name,
-        "known_exactly": known_exactly(setup.scenario) if setup.fitted else OF_THE_PAPERS_FILTER,
+        "truth": cell.scenario.truth,
+        "vehicle": ", ".join(dict.fromkeys(variant["vehicle"] for variant in variants)),
+        "filter": cell.scenario.filter.name,
+        "known_exactly": "; or ".join(sorted(known)),
         "failure": {words_of_cell(each): each.failure.words for each in plan.cells if each.failure},
+        "variants": variants,
+        "not_modelled": [*NOT_MODELLED, *own],
+    }
+
+
+def _variant(plan: Plan, number: int) -> dict[str, Any]:
+    """What is dispersed and what is told of the vehicle and the sensors of a cell."""
+    cell, ensemble = plan.cells[number], plan.ready(number).ensemble
+    assert ensemble is not None  # a certificate's cells are dispersed
+    parameters = cell.setup.parameters
+    return {
+        "vehicle": cell.setup.described.name,
+        "cell": words_of_cell(cell),
         "dispersed": [
             {
                 "input": name,
@@ -60,9 +77,8 @@ def assumed(plan: Plan) -> dict[str, Any]:
             }
             for name, entry in ensemble.entries.items()
         ],
-        "told": {name: value for name, value in setup.parameters.items() if name != "vehicle"},
-        "vehicle_numbers": setup.parameters["vehicle"],
-        "not_modelled": [*NOT_MODELLED, *own],
+        "told": {name: value for name, value in parameters.items() if name != "vehicle"},
+        "vehicle_numbers": parameters["vehicle"],
     }
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 from flownav.campaign.measures import MEASURES, NOT_LANDED
 from flownav.campaign.plan import Cell, Plan
 from flownav.campaign.requirement import NO_FAULT, OWN_SENSOR, Requirement, scenario_of
+from flownav.campaign.store import PLAN, plan_in
 from flownav.certification.started import from_height
 from flownav.errors import InputError
 from flownav.faults.catalogue import FAULTS
@@ -53,6 +55,16 @@ def plan_of(requirement: Requirement, flights: int | None = None, vehicle: str |
     cells = cells_of(requirement, vehicle)
     each = -(-(flights or requirement.flights()) // len(cells))
     return Plan(tuple(replace(cell, first=k * each) for k, cell in enumerate(cells)), requirement.seed, each)
+
+
+def require_planned(plan: Plan, folder: Path) -> None:
+    """InputError where a folder's flights were planned to be fewer or more: none are added once they can be seen."""
+    planned = plan_in(folder).get("flights") if (folder / PLAN).is_file() else plan.flights
+    if planned != plan.flights:
+        raise InputError(
+            f"{folder}: was planned with {planned} flights a cell, not {plan.flights}; to add flights until they pass "
+            "takes more risk than is stated: give another --out, and another seed in the requirement"
+        )
 
 
 def cells_of(requirement: Requirement, vehicle: str | None = None) -> tuple[Cell, ...]:

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 WIND = ("wind.speed_20ft_m_s", "wind.from_direction_deg")
 GRIDS = ((6, 12), (5, 8), (4, 8), (4, 4), (3, 4), (2, 4))  # fields of the first axis and the second, finest first
-COARSEST = (4, 8)  # where no grid has enough flights in a field to show anything: estimates, and said so
+USEFUL = 50  # flights of a field that say something, where there are too few to show the requirement
 EDGE = 1e-3  # share of a distribution that the outermost edge leaves out, where it has no end
 
 
@@ -73,12 +73,12 @@ def failing(requirement: Requirement, rows: Array) -> NDArray[np.bool_]:
 
 
 def _grid(requirement: Requirement, flights: int, axes: int) -> Sequence[int]:
-    """How many fields each axis has: the finest grid whose fields can show the requirement."""
+    """How many fields each axis has: the finest grid whose fields can show the requirement, else tell something."""
     needs = max(needed_by(table, 0) for table in requirement.requirement)
-    for grid in GRIDS:
-        if flights >= 1.25 * needs * np.prod(grid[:axes]):
-            return grid
-    return COARSEST
+    fields = [int(np.prod(grid[:axes])) for grid in GRIDS]
+    enough = [grid for grid, count in zip(GRIDS, fields, strict=True) if flights >= 1.25 * needs * count]
+    some = [grid for grid, count in zip(GRIDS, fields, strict=True) if flights >= USEFUL * count]
+    return (*enough, *some, GRIDS[-1])[0]
 
 
 def _edges(ensemble: Ensemble, name: str, count: int) -> Array:

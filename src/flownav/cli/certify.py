@@ -67,12 +67,14 @@ def _fly(
     from flownav.campaign.engines.local import Local
     from flownav.campaign.ranking import flights_of
     from flownav.campaign.store import Store
+    from flownav.certification.cells import require_planned
     from flownav.certification.certify import certify, with_ranking
     from flownav.certification.written import write_certificate
     from flownav.cli.campaign_progress import watching
     from flownav.cli.output import progress
 
     inputs = max(len(cell.setup.ensemble().entries) for cell in plan.cells)
+    require_planned(plan, folder)
     with Store(folder).opened(plan) as store:
         engine = Local()
         with watching(plan) as watch:

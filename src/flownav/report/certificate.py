@@ -44,8 +44,7 @@ def render(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> str:
         measures=[one["measure"] for one in facts["requirement"]["requirements"]],
         axes=[figures.INPUT_WORDS.get(name, name) for name in facts["envelope"]["axes"]],
         known=figures.KNOWN_WORDS,
-        told=content.groups(facts["assumed"]["told"]),
-        vehicle=content.groups(facts["assumed"]["vehicle_numbers"]),
+        groups=content.groups,
         files=[
             ("SHA-256 of what went in", facts["files"]["in"]),
             ("SHA-256 of what came out", by_folder(facts["files"]["out"])),

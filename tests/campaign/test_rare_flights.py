@@ -75,6 +75,10 @@ def of(flight, streams, start=None):
     return Branches([believed(flight)] * streams.shape[1], Noise(streams, rows))
 
 
+def flight_spans(setup):
+    return Space(setup, SEED, dispersed=False).spans
+
+
 # -- the engine ------------------------------------------------------------------------------------------------------
 def test_a_lane_may_meet_the_noise_of_any_flight(setup):
     plain = flown(setup.flight)
@@ -85,7 +89,7 @@ def test_a_lane_may_meet_the_noise_of_any_flight(setup):
 
 
 def test_other_noise_from_one_instant_on_changes_nothing_before_it(setup):
-    spans, turn = 240, 150
+    spans, turn = flight_spans(setup), 375
     streams = np.tile(np.arange(16), (spans, 1))
     streams[turn:, 8:] = 1 << 40
     plain, turned = flown(setup.flight), flown(setup.flight, of(setup.flight, streams))
@@ -168,7 +172,7 @@ def test_the_most_likely_flight_flies_again_to_the_bit(setup, found, tmp_path):
         ({"schema_version": 9}, "schema_version 9"),
         ({"scenario": "takeoff"}, "of the scenario takeoff"),
         ({"streams": [[1, 3]]}, "another length"),
-        ({"streams": [[-1, 240]]}, "another length"),
+        ({"streams": [[-1, 601]]}, "another length"),
         ({"drawn": {"vehicle.body.mass_kg": 5.0}}, "other numbers are drawn"),
         ({"streams": 5}, "no flight of a rare event"),
     ],

@@ -23,7 +23,7 @@ FAULT_CHANNEL = 150
     160, 175, 183, 190, 192, 196, 205, 208,
 )  # fmt: skip
 
-KEYED_EPOCHS = 5  # a lane's noise stream may change from one so many epochs to the next: 0.1 s
+KEYED_EPOCHS = 2  # a lane's noise stream may change from one so many epochs to the next: 40 ms
 
 
 class Noise(NamedTuple):

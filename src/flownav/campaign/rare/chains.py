@@ -2,9 +2,9 @@
 
 A flight is what was drawn for it: the numbers drawn once (dispersed inputs, what its sensors are and how they start),
 kept as they are, and the noise of every epoch, which nobody keeps: a flight holds the number of the stream that its
-noise comes from, for each tenth of a second one. A walk's step moves both a little and in such a way that, were there
-no level, all flights would stay as probable as they are (Neal, "Regression and classification using Gaussian process
-priors", 1998; Papaioannou et al., Probabilistic Engineering Mechanics 41, 2015): the numbers z become
+noise comes from, one for each span of KEYED_EPOCHS epochs. A walk's step moves both a little and in such a way that,
+were there no level, all flights would stay as probable as they are (Neal, "Regression and classification using
+Gaussian process priors", 1998; Papaioannou et al., Probabilistic Engineering Mechanics 41, 2015): the numbers z become
 (1 - s) z + sqrt(1 - (1 - s)^2) xi, and each stream is, by the chance s, a new one. Noise of so many independent draws
 thereby keeps the correlation 1 - s with what it was, as z does, at the cost of one flight however long the walk. A step
 that ends at or below the level is not taken.

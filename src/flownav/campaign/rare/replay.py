@@ -54,7 +54,7 @@ def read_branch(path: Path, setup: Setup) -> Branch:
     if set(drawn) != set(space.dispersed) or set(start) != {one.name for one in space.starts}:
         raise InputError(f"{path}: a flight of another scenario: other numbers are drawn for it")
     if len(streams) != space.spans or min(streams) < 0:
-        raise InputError(f"{path}: a flight of another length: {len(streams)} tenths of a second, not {space.spans}")
+        raise InputError(f"{path}: a flight of another length: {len(streams)} spans of noise, not {space.spans}")
     return branch
 
 

@@ -19,6 +19,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.scoring.percentiles import share_with_interval
+
 Array = NDArray[np.float64]
 Verdict = Literal["pass", "fail", "not shown"]
 
@@ -75,11 +77,7 @@ def allowed(flights: int, probability: float, confidence: float) -> int:
 
 def interval(flights: int, failures: int, confidence: float) -> Interval:
     """Bounds of the share that succeeds after Clopper and Pearson, each one-sided with this confidence."""
-    from scipy.special import betaincinv
-
-    succeeded = flights - failures
-    low = float(betaincinv(succeeded, failures + 1.0, 1.0 - confidence)) if succeeded else 0.0
-    high = float(betaincinv(succeeded + 1.0, failures, confidence)) if failures else 1.0
+    _, low, high = share_with_interval(flights - failures, flights, 2.0 * confidence - 1.0)
     return Interval(low, high)
 
 

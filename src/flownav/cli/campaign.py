@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flownav.cli.engines import EngineOption, engine_named, require_engine
 from flownav.cli.output import VehicleOption
 from flownav.errors import InputError
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from flownav.campaign.plan import Plan
 
 FLIGHTS, FLIGHTS_UNTIL = 1000, 100_000
-ENGINES = ("local", "ray", "cuda")
 TRUTH_MODELS = ("ensemble", "matched", "both")
 
 
@@ -48,7 +47,7 @@ def command(
     ] = "ensemble",
     vehicle: VehicleOption = None,
     seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
-    engine: Annotated[str, typer.Option(help="Where it flies: local, ray (a cluster), cuda (a GPU).")] = "local",
+    engine: EngineOption = "local",
     out: Annotated[Path | None, typer.Option(help="Its folder; out/SCENARIO_campaign if not given.")] = None,
     records: Annotated[int, typer.Option(help="Write records and reports of so many of the worst flights.")] = 1,
     flight: Annotated[
@@ -73,10 +72,8 @@ def command(
     require_between("--flights", flights, 1, MOST_FLIGHTS)
     require_between("--seed", seed, 0, 2**63 - 1)
     require_between("--records", records, 0, 1000)
-    for option, value, known in (
-        ("--sampling", sampling, SAMPLINGS), ("--truth-model", truth_model, TRUTH_MODELS),
-        ("--engine", engine, ENGINES),
-    ):  # fmt: skip
+    require_engine(engine)
+    for option, value, known in (("--sampling", sampling, SAMPLINGS), ("--truth-model", truth_model, TRUTH_MODELS)):
         if value not in known:
             raise InputError(f"{option} {value}: must be {', '.join(known[:-1])} or {known[-1]}")
     if until is not None:
@@ -102,7 +99,7 @@ def command(
     elif flight is not None:
         _again(plan, flight, folder, as_json)
     else:
-        _fly(plan, _engine(engine), folder, records, as_json)
+        _fly(plan, engine_named(engine), folder, records, as_json)
 
 
 def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) -> None:
@@ -187,21 +184,6 @@ def _again(plan: Plan, flight: str, folder: Path, as_json: bool) -> None:
         typer.echo(json.dumps(facts))
     else:
         typer.echo(f"{facts['cell']}, flight {index}\nrecord  {where['record']}\nreport  {where['report']}")
-
-
-def _engine(name: str) -> Engine:
-    """The engine of that name. InputError where what it needs is not there."""
-    if name == "local":
-        from flownav.campaign.engines.local import Local
-
-        return Local()
-    if name == "ray":
-        from flownav.campaign.engines.ray_cluster import RayCluster
-
-        return RayCluster()
-    from flownav.campaign.engines.cuda import Cuda
-
-    return Cuda(processes=os.cpu_count() or 1)
 
 
 def _set(text: str) -> tuple[str, Any]:

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flownav.cli.engines import EngineOption, engine_named, require_engine
 from flownav.cli.output import VehicleOption
 from flownav.errors import InputError
 
 if TYPE_CHECKING:
+    from flownav.campaign.engines.engine import Engine
     from flownav.campaign.plan import Plan
     from flownav.campaign.requirement import Requirement
 
@@ -27,6 +29,7 @@ def command(
     ] = 64,
     records: Annotated[int, typer.Option(help="Write records and reports of so many of the worst flights.")] = 3,
     vehicle: VehicleOption = None,
+    engine: EngineOption = "local",
     out: Annotated[Path | None, typer.Option(help="Its folder; out/NAME_certificate if not given.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
@@ -43,12 +46,14 @@ def command(
     if ranking and (ranking & (ranking - 1) or not LEAST <= ranking <= 65_536):
         raise InputError(f"--ranking {ranking}: must be 0 or a power of 2 from {LEAST} to 65536")
     require_between("--records", records, 0, TOLD)
+    require_engine(engine)
     asked = load_requirement(requirement)
     if plan_only:
         _say_plan(asked, as_json)
         return
     plan = plan_of(asked, flights, vehicle)
-    facts = _fly(asked, plan, requirement, out or Path("out") / f"{asked.name}_certificate", ranking, records)
+    folder = out or Path("out") / f"{asked.name}_certificate"
+    facts = _fly(asked, plan, engine_named(engine), requirement, folder, ranking, records)
     if as_json:
         typer.echo(json.dumps(facts))
     else:
@@ -61,10 +66,9 @@ def command(
 
 
 def _fly(
-    asked: Requirement, plan: Plan, name: str, folder: Path, ranking: int, records: int
+    asked: Requirement, plan: Plan, engine: Engine, name: str, folder: Path, ranking: int, records: int
 ) -> dict[str, Any]:  # fmt: skip
     """Fly what the folder lacks, rank, write."""
-    from flownav.campaign.engines.local import Local
     from flownav.campaign.ranking import flights_of
     from flownav.campaign.store import Store
     from flownav.certification.cells import require_planned
@@ -76,7 +80,6 @@ def _fly(
     inputs = max(len(cell.setup.ensemble().entries) for cell in plan.cells)
     require_planned(plan, folder)
     with Store(folder).opened(plan) as store:
-        engine = Local()
         with watching(plan) as watch:
             certificate = certify(asked, plan, engine, store, watch)
         if ranking:

@@ -4,13 +4,16 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-slow long-log fuzz mutants league integrity rare validate lint bench bench-once docs wheel wheel-test clean
+.PHONY: demo test test-gpu test-slow long-log fuzz mutants league integrity rare validate lint bench bench-once docs wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr
 
 test: $(VENV)/.ready-test
 	$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile -p no:benchmark
+
+test-gpu: $(VENV)/.ready-test $(VENV)/.ready-gpu
+	$(BIN)/python -m pytest -p no:benchmark tests/campaign/test_cuda_compiled.py
 
 test-slow: $(VENV)/.ready-test
 	$(BIN)/python -m pytest -m slow

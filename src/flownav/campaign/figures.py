@@ -56,7 +56,7 @@ class Interval(NamedTuple):
     @property
     def width(self) -> float:
         """From one end to the other; infinite where an end is."""
-        return self.high - self.low if np.isfinite(self.high) else np.inf
+        return self.high - self.low if np.isfinite([self.low, self.high]).all() else np.inf
 
     def finite(self) -> dict[str, float | None]:
         """As JSON has it; what is infinite is null."""

@@ -34,6 +34,11 @@ class Measure(NamedTuple):
     column: str
     of_touchdown: bool = True
 
+    @property
+    def of_landing(self) -> bool:
+        """Whether it says something only of flights that were to land."""
+        return self.of_touchdown or self.name == NOT_LANDED
+
 
 _MEASURES = (
     Measure("touchdown.horizontal_m", "m", "distance of the first contact from the pad's centre",
@@ -95,6 +100,8 @@ def event_of(text: str) -> Event:
         raise InputError(
             f'{text!r}: an event is a measure and a limit, such as "touchdown.horizontal_m > 1", or "crash"'
         )
+    if name in (CRASH, NOT_LANDED) and not 0.0 <= number < 1.0:
+        raise InputError(f"{text!r}: {name} is 0 or 1; say {name}")
     return Event(measure_of(name).name, relation == ">", number)
 
 

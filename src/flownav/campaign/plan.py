@@ -11,6 +11,8 @@ from functools import cached_property
 from typing import Any, Literal, Protocol
 
 import flownav
+from flownav.campaign.figures import FIGURES, stop_of
+from flownav.campaign.measures import MEASURES
 from flownav.campaign.sampling import Sampling, design_of
 from flownav.errors import InputError
 from flownav.parameter_files import check
@@ -103,6 +105,7 @@ class Plan:
     flights: int
     sampling: Sampling = "plain"
     until: str | None = None
+    asked: tuple[str, ...] = ()  # of a certificate: what its flights are for
 
     def ready(self, cell: int) -> Ready:
         """A cell made ready. InputError where its scenario or its dispersion cannot be."""
@@ -120,6 +123,7 @@ class Plan:
             "flights": self.flights,
             "sampling": self.sampling,
             "until": self.until,
+            "asked": list(self.asked),
             "cells": [
                 {
                     "label": cell.label,
@@ -158,6 +162,10 @@ def planned(
 ) -> Plan:
     """Every scenario with these changes at every combination of the swept values. InputError for one that cannot be."""
     fixed, names = dict(changes or {}), tuple(sweeps)
+    if both := sorted(set(fixed) & set(names)):
+        raise InputError(f"--sweep {both[0]}: is set as well; leave one of the two out")
+    if len({scenario.name for scenario in scenarios}) < len(scenarios):
+        raise InputError(f"{scenarios[0].name}: two scenarios have the same name, and the same flights; leave one out")
     combinations = [dict(zip(names, each, strict=True)) for each in itertools.product(*sweeps.values())]
     count = len(scenarios) * len(combinations) * len(truth_models)
     if count > MOST_CELLS:
@@ -168,7 +176,22 @@ def planned(
         for values in combinations
         for truth_model in truth_models
     )
+    if until is not None:
+        _require_figure(stop_of(until).figure, cells)
     return Plan(cells, seed, flights, sampling, until)
+
+
+def _require_figure(name: str, cells: Sequence[Cell]) -> None:
+    """InputError where a cell has no such figure: it never lands."""
+    never = next((cell for cell in cells if not lands(cell.scenario)), None)
+    if never is not None and MEASURES[FIGURES[name].measure].of_landing:
+        raise InputError(f"--until {name}: the scenario {never.scenario.name} never lands; give p95_axis_m, or another")
+
+
+def lands(scenario: Scenario) -> bool:
+    """Whether a scenario's flights are to land before their end."""
+    lands_s = scenario.flight.may_land_after_s
+    return lands_s is not None and lands_s < scenario.flight.duration_s and scenario.truth != "linear"
 
 
 def changed(scenario: Scenario, changes: Mapping[str, Value]) -> Scenario:

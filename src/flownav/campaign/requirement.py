@@ -196,6 +196,11 @@ def load_requirement(name: str) -> Requirement:
     )
 
 
+def fixed_by(requirement: Requirement) -> dict[str, Any]:
+    """What a requirement sets and no flight draws, by dotted name: all of its `set` that has no range."""
+    return {name: value for name, value in _leaves(requirement.set, "") if name not in requirement.conditions.ranges}
+
+
 def _sensors_beside(given: dict[str, Any], folder: Path) -> dict[str, Any]:
     """The settings with the datasheets that they name looked for beside the requirement's file."""
     found = dict(given)

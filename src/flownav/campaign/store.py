@@ -53,7 +53,7 @@ class Store:
         """
         an_output_folder(self.folder)
         said = json.dumps(plan.as_json, indent=1, sort_keys=True) + "\n"
-        self._check(plan.as_json)
+        self.check(plan.as_json)
         self.folder.mkdir(parents=True, exist_ok=True)
         lock = os.open(self.folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
         try:
@@ -70,13 +70,13 @@ class Store:
         finally:
             os.close(lock)
 
-    def _check(self, plan: dict[str, Any]) -> None:
-        """InputError unless the folder is new, or empty, or this plan's."""
+    def check(self, plan: dict[str, Any]) -> None:
+        """InputError unless the folder is new, or holds at most records, or is this plan's."""
         if not self.folder.exists():
             return
         there = {path.name for path in self.folder.iterdir()} - {LOCK}
         if not (self.folder / PLAN).is_file():
-            if any(not name.endswith(".part") for name in there):
+            if any(not name.endswith(".part") for name in there - {RECORDS}):
                 raise InputError(f"{self.folder}: is there and holds no campaign; give another --out")
             return
         known = plan_in(self.folder)

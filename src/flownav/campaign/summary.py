@@ -9,7 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.campaign import arrow
-from flownav.campaign.figures import CONFIDENCE, FIGURES, confidence_of_a_look, figure_of, spread_of, stop_of, values_of
+from flownav.campaign.figures import (
+    CONFIDENCE,
+    FIGURES,
+    confidence_of_a_look,
+    enough,
+    figure_of,
+    spread_of,
+    stop_of,
+    values_of,
+)
 from flownav.campaign.measures import MEASURES, measured
 from flownav.campaign.plan import Plan
 from flownav.campaign.rows import INPUT
@@ -39,16 +48,19 @@ class Flight(NamedTuple):
 def summary_of(plan: Plan, data: Dataset) -> dict[str, Any]:
     """The whole campaign as `summary.json` has it; nothing in it depends on when or where it was flown."""
     cells = [cell_summary(plan, cell, data) for cell in range(len(plan.cells))]
-    rows = np.concatenate([data.rows(cell) for cell in range(len(cells))])
+    landing = [k for k, cell in enumerate(cells) if "r95_m" in cell["figures"]]
+    alike = landing or list(range(len(cells)))  # what never lands is not pooled with what does
+    rows = np.concatenate([data.rows(cell) for cell in alike])
     verdicts = {name: sum(cell["verdicts"][name] for cell in cells) for name in VERDICTS}
-    every = [Flight(**flight) for cell in cells for flight in cell["worst"]]
+    every = [Flight(**flight) for k in alike for flight in cells[k]["worst"]]
     return {
         "schema_version": 1,
         "scenarios": list(dict.fromkeys(cell.scenario.name for cell in plan.cells)),
         "seed": plan.seed,
         "sampling": plan.sampling,
         "until": plan.until,
-        "flights": len(rows),
+        "flights": sum(cell["flights"] for cell in cells),
+        "pooled_cells": alike,
         "scores": scores_of(rows),
         "verdicts": verdicts,
         "worst": [flight._asdict() for flight in worst_first(every)[:WORST]],
@@ -73,6 +85,7 @@ def cell_summary(plan: Plan, cell: int, data: Dataset) -> dict[str, Any]:
         "values": own.values,
         "flights": len(rows),
         "figures": figures_of(rows, plan),
+        "stopped": None if plan.until is None else len(rows) < plan.flights or _is_enough(plan, rows),
         "scores": scores_of(rows),
         "verdicts": {name: counts[name.replace("_", " ")] for name in VERDICTS},
         "limited_by": dict(sorted(Counter(limits.tolist()).items(), key=lambda entry: (-entry[1], entry[0]))),
@@ -82,6 +95,12 @@ def cell_summary(plan: Plan, cell: int, data: Dataset) -> dict[str, Any]:
         "median": said[(len(said) - 1) // 2]._asdict(),
         "worst": [flight._asdict() for flight in reversed(said[-WORST:])],
     }
+
+
+def _is_enough(plan: Plan, rows: Array) -> bool:
+    """Whether the figure of --until is as narrow as was asked for."""
+    stop = stop_of(str(plan.until))
+    return enough(stop, values_of(stop.figure, rows), plan.flights) is not None
 
 
 def was_to_land(rows: Array) -> bool:
@@ -94,7 +113,7 @@ def figures_of(rows: Array, plan: Plan) -> dict[str, dict[str, float | None]]:
     stop = stop_of(plan.until).figure if plan.until else None
     found = {}
     for name, figure in FIGURES.items():
-        if MEASURES[figure.measure].of_touchdown and not was_to_land(rows):
+        if MEASURES[figure.measure].of_landing and not was_to_land(rows):
             continue
         confidence = confidence_of_a_look(plan.flights) if name == stop else CONFIDENCE
         found[name] = figure_of(name, values_of(name, rows), confidence).finite() | {"confidence": confidence}

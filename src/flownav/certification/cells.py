@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from flownav.campaign.measures import MEASURES, NOT_LANDED
-from flownav.campaign.plan import Cell, Plan
-from flownav.campaign.requirement import NO_FAULT, OWN_SENSOR, Requirement, scenario_of
+from flownav.campaign.plan import Cell, Plan, lands
+from flownav.campaign.requirement import NO_FAULT, OWN_SENSOR, Requirement, fixed_by, scenario_of
+from flownav.campaign.sampling import INSIDE
 from flownav.campaign.store import PLAN, plan_in
 from flownav.certification.started import from_height
 from flownav.errors import InputError
@@ -54,12 +59,23 @@ def plan_of(requirement: Requirement, flights: int | None = None, vehicle: str |
     """
     cells = cells_of(requirement, vehicle)
     each = -(-(flights or requirement.flights()) // len(cells))
-    return Plan(tuple(replace(cell, first=k * each) for k, cell in enumerate(cells)), requirement.seed, each)
+    asked = tuple(table.sentence() for table in requirement.requirement)
+    own = tuple(replace(cell, first=k * each) for k, cell in enumerate(cells))
+    return Plan(own, requirement.seed, each, asked=asked)
 
 
 def require_planned(plan: Plan, folder: Path) -> None:
-    """InputError where a folder's flights were planned to be fewer or more: none are added once they can be seen."""
-    planned = plan_in(folder).get("flights") if (folder / PLAN).is_file() else plan.flights
+    """InputError where a folder's flights were planned to be fewer or more, or for something else that was asked.
+
+    None are added, and nothing softer is asked, once they can be seen.
+    """
+    known = plan_in(folder) if (folder / PLAN).is_file() else plan.as_json
+    planned, asked = known.get("flights"), known.get("asked")
+    if asked is not None and list(asked) != list(plan.asked):
+        raise InputError(
+            f"{folder}: was flown for {'; '.join(map(str, asked))}; to judge its flights by something else takes more "
+            "risk than is stated: give another --out, and another seed in the requirement"
+        )
     if planned != plan.flights:
         raise InputError(
             f"{folder}: was planned with {planned} flights a cell, not {plan.flights}; to add flights until they pass "
@@ -98,9 +114,23 @@ def _cell(requirement: Requirement, values: dict[str, Any], vehicle: str | None)
         entries = scenario.model_dump(exclude_unset=True) | {"flow_sensor": values["sensor"]}
         scenario = check(entries, Scenario, f"{requirement.name}: sensor")
     _require_judged(requirement, scenario)
-    cell = Cell(scenario, values, "ensemble", failure=_failure(requirement, scenario, values.get("fault", NO_FAULT)))
-    cell.setup.ensemble()  # what cannot be is said now
+    failure = _failure(requirement, scenario, values.get("fault", NO_FAULT))
+    cell = Cell(scenario, values, "ensemble", fixed=tuple(fixed_by(requirement)), failure=failure)
+    names = tuple(requirement.conditions.ranges)
+    for share in (INSIDE, 1.0 - INSIDE):  # what cannot be is said now
+        cell.setup.ensemble(Ends(names, share)).truths(requirement.seed, 0, 1)
     return cell
+
+
+class Ends:
+    """A design that draws the named numbers at one end of what they may be, and all others in their middle."""
+
+    def __init__(self, names: tuple[str, ...], share: float) -> None:
+        self.names, self.share = names, share
+
+    def uniforms(self, seed: int, flights: Sequence[int], name: str) -> NDArray[np.float64]:
+        """The same for every flight."""
+        return np.full(len(flights), self.share if name in self.names else 0.5)
 
 
 def words_of(cell: Cell) -> str:
@@ -116,14 +146,12 @@ def _words(name: str, value: Any) -> str:
 
 def _require_judged(requirement: Requirement, scenario: Scenario) -> None:
     """InputError where a requirement is of a touchdown and the scenario has none."""
-    lands_s = scenario.flight.may_land_after_s
-    lands = lands_s is not None and lands_s < scenario.flight.duration_s and scenario.truth != "linear"
     of_landing = [
         table.measure
         for table in requirement.requirement
         if MEASURES[table.measure].of_touchdown or table.measure == NOT_LANDED
     ]
-    if of_landing and not lands:
+    if of_landing and not lands(scenario):
         raise InputError(f"{requirement.name}: {of_landing[0]}: the scenario {scenario.name} never lands")
     if scenario.optics != "model":
         raise InputError(

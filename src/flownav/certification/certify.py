@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flownav.campaign.engines.engine import Engine
 from flownav.campaign.measures import ROW_COLUMNS, measured
 from flownav.campaign.plan import Plan
-from flownav.campaign.requirement import Requirement
+from flownav.campaign.requirement import Requirement, fixed_by
 from flownav.campaign.run import Watch, run_campaign
 from flownav.campaign.store import Dataset, Store
 from flownav.campaign.summary import inputs_of
@@ -73,7 +73,7 @@ class Certificate:
                 "scenario": own.scenario,
                 "requirements": [judgement.as_json() for judgement in self.judgements],
                 "conditions": own.conditions.model_dump(mode="json", exclude_unset=True),
-                "set": own.set,
+                "set": fixed_by(own),
             },
             "seed": own.seed,
             "flights": len(rows),

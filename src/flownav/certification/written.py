@@ -64,15 +64,14 @@ def drawn(certificate: Certificate) -> dict[str, Any]:
 
 
 def _recorded(certificate: Certificate, flight: int, folder: Path, name: str) -> tuple[str, str]:
-    """Record and report of one flight, unless they are there; where they lie, relative to the page."""
+    """Record and report of one flight; where they lie, relative to the page."""
     cell, number = int(certificate.flown.cell[flight]), int(certificate.flown.number[flight])
     path = record_path(folder / RECORDS, cell, number)
     page = path.with_suffix(".html")
-    if not path.exists() or not page.exists():
-        record = record_again(certificate.plan, cell, number)
-        record.manifest["command"] = f"flownav certify {name}"
-        record.save(path)
-        write_report(record, page)
+    record = record_again(certificate.plan, cell, number)
+    record.manifest["command"] = f"flownav certify {name}"
+    record.save(path)
+    write_report(record, page)
     return path.relative_to(folder).as_posix(), page.relative_to(folder).as_posix()
 
 

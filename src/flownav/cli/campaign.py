@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -63,15 +64,18 @@ def command(
     from flownav.campaign.figures import stop_of
     from flownav.campaign.plan import MOST_FLIGHTS, planned
     from flownav.campaign.sampling import SAMPLINGS
+    from flownav.campaign.summary import WORST
     from flownav.cli.output import require_between
     from flownav.guard import an_input
     from flownav.simulation.scenario import load_scenario, with_vehicle
 
+    if flight is not None and flights is None:
+        flights = _planned_flights(out)
     most = FLIGHTS if until is None and rare is None else FLIGHTS_UNTIL
     flights = flights if flights is not None else most
     require_between("--flights", flights, 1, MOST_FLIGHTS)
     require_between("--seed", seed, 0, 2**63 - 1)
-    require_between("--records", records, 0, 1000)
+    require_between("--records", records, 0, WORST)
     require_engine(engine)
     for option, value, known in (("--sampling", sampling, SAMPLINGS), ("--truth-model", truth_model, TRUTH_MODELS)):
         if value not in known:
@@ -84,10 +88,12 @@ def command(
             an_input(Path(name))
     models: Any = ("ensemble", "matched") if truth_model == "both" else (truth_model,)
     plan = planned(
-        chosen, dict(_swept(each) for each in sweep or ()), truth_models=models, seed=seed, flights=flights,
-        sampling=sampling, until=until, changes=dict(_set(each) for each in set_ or ()),  # type: ignore[arg-type]
+        chosen, _once("--sweep", map(_swept, sweep or ())), truth_models=models, seed=seed, flights=flights,
+        sampling=sampling, until=until, changes=_once("--set", map(_set, set_ or ())),  # type: ignore[arg-type]
     )  # fmt: skip
     names = "_".join(dict.fromkeys(each.name for each in chosen))
+    if rare is not None and engine != "local":
+        raise InputError(f"--rare: flies on this machine's cores only; leave out --engine {engine}")
     folder = out or Path("out") / f"{names[:100]}_campaign"
     if rare is not None or (flight is not None and flight.endswith(".json")):
         from flownav.cli.campaign_rare import fly_again, fly_rare
@@ -117,7 +123,7 @@ def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) 
         summary = summary_of(plan, data)
         store.keep_text(SUMMARY, json.dumps(summary, indent=1) + "\n")
         kept = _keep_records(plan, summary, folder, records)
-        _keep_page(plan, summary, folder)
+        _keep_page(plan, summary, folder, kept)
     where = {"rate_per_s": rate, "dataset": str(folder / "flights"), "records": kept}
     where["report"] = str(folder / REPORT)
     if as_json:
@@ -140,14 +146,13 @@ def _keep_records(plan: Plan, summary: dict[str, Any], folder: Path, count: int)
     found = []
     for cell, flight in dict.fromkeys((each["cell"], each["flight"]) for each in chosen):
         path = record_path(folder / RECORDS, cell, flight)
-        if not path.exists() or not path.with_suffix(".html").exists():
-            save(record_again(plan, cell, flight), path, report=True)
+        save(record_again(plan, cell, flight), path, report=True)
         found.append(str(path))
     return found
 
 
-def _keep_page(plan: Plan, summary: dict[str, Any], folder: Path) -> None:
-    """The campaign's page, with links to the flights' reports that lie in its folder."""
+def _keep_page(plan: Plan, summary: dict[str, Any], folder: Path, records: list[str]) -> None:
+    """The campaign's page, with links to the reports of the flights that were kept."""
     from flownav.campaign.measures import measured
     from flownav.campaign.store import RECORDS, REPORT, Dataset
     from flownav.report.campaign import write_campaign
@@ -158,14 +163,14 @@ def _keep_page(plan: Plan, summary: dict[str, Any], folder: Path) -> None:
         rows = data.rows(cell)
         north, east, distance = (measured(f"touchdown.{name}_m", rows) for name in ("north", "east", "horizontal"))
         touched.append(Touchdowns(north, east, distance, float(planned.scenario.pad.size_m)))
-    kept = sorted(f"{RECORDS}/{page.name}" for page in (folder / RECORDS).glob("*.html"))
+    kept = [f"{RECORDS}/{Path(record).with_suffix('.html').name}" for record in records]
     write_campaign(summary, touched, kept, folder / REPORT)
 
 
 def _again(plan: Plan, flight: str, folder: Path, as_json: bool) -> None:
     """One flight of the campaign, flown again."""
     from flownav.campaign.again import record_again, record_path
-    from flownav.campaign.store import RECORDS
+    from flownav.campaign.store import RECORDS, Store
     from flownav.cli.output import save
 
     cell, _, number = flight.rpartition(":")
@@ -177,6 +182,7 @@ def _again(plan: Plan, flight: str, folder: Path, as_json: bool) -> None:
         raise InputError(f"--flight {flight}: there are cells 0 to {len(plan.cells) - 1}")
     if not 0 <= index < plan.flights:
         raise InputError(f"--flight {flight}: there are flights 0 to {plan.flights - 1} of each cell")
+    Store(folder).check(plan.as_json)
     record = record_again(plan, place, index)
     where = save(record, record_path(folder / RECORDS, place, index), report=True)
     facts = {"cell": plan.cells[place].label, "flight": index, **record.manifest["scores"], **where}
@@ -186,12 +192,30 @@ def _again(plan: Plan, flight: str, folder: Path, as_json: bool) -> None:
         typer.echo(f"{facts['cell']}, flight {index}\nrecord  {where['record']}\nreport  {where['report']}")
 
 
+def _planned_flights(folder: Path | None) -> int | None:
+    """How many flights the campaign of a folder has, where there is one."""
+    from flownav.campaign.store import PLAN, plan_in
+
+    found = plan_in(folder).get("flights") if folder is not None and (folder / PLAN).is_file() else None
+    return found if isinstance(found, int) else None
+
+
 def _set(text: str) -> tuple[str, Any]:
     """A name and its value, from NAME=VALUE. InputError where it is none."""
     name, equals, value = text.partition("=")
     if not equals or not name.strip() or not value.strip():
         raise InputError(f"--set {text}: NAME=VALUE is needed, such as filter.name=paper")
     return name.strip(), _value(value)
+
+
+def _once(option: str, pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """Names and what they are given. InputError where a name is given twice."""
+    found: dict[str, Any] = {}
+    for name, value in pairs:
+        if name in found:
+            raise InputError(f"{option} {name}: is given twice; leave one out")
+        found[name] = value
+    return found
 
 
 def _swept(text: str) -> tuple[str, list[Any]]:

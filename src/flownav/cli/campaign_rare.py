@@ -20,16 +20,18 @@ FLIGHT, FOUND = "rare_flight.json", "rare.json"
 
 def fly_rare(plan: Plan, event: str, folder: Path, as_json: bool) -> None:
     """Estimate, write what was found and the most likely flight, and say it."""
-    from flownav.campaign.measures import event_of
+    from flownav.campaign.measures import MEASURES, event_of
+    from flownav.campaign.plan import lands
     from flownav.campaign.rare.estimate import estimate_rare
     from flownav.cli.output import progress, require_writable
     from flownav.files import written_whole
 
-    if len(plan.cells) != 1:
-        raise InputError(f"--rare: needs one scenario, one --truth-model and no --sweep, not {len(plan.cells)} cells")
+    _require_one(plan, "--rare")
     if plan.sampling != "plain" or plan.until is not None:
         raise InputError("--rare: has samples and a stop of its own; leave out --sampling and --until")
     chosen = event_of(event)
+    if MEASURES[chosen.measure].of_landing and not lands(plan.cells[0].scenario):
+        raise InputError(f"--rare {chosen}: the scenario {plan.cells[0].scenario.name} never lands")
     for name in (FLIGHT, FOUND):
         require_writable(folder / name)
     folder.mkdir(parents=True, exist_ok=True)
@@ -50,6 +52,12 @@ def fly_rare(plan: Plan, event: str, folder: Path, as_json: bool) -> None:
         _show(facts, rate, where)
 
 
+def _require_one(plan: Plan, option: str) -> None:
+    """InputError where there is more than one cell."""
+    if len(plan.cells) != 1:
+        raise InputError(f"{option}: needs one scenario, one --truth-model and no --sweep, not {len(plan.cells)} cells")
+
+
 def _keep(plan: Plan, found: Rare, folder: Path) -> dict[str, str]:
     """The most likely flight as a file, as a record and as a report; where they lie."""
     from flownav.campaign.rare.replay import replayed, write_branch
@@ -68,6 +76,7 @@ def fly_again(plan: Plan, path: Path, as_json: bool) -> None:
     from flownav.campaign.rare.replay import read_branch, replayed
     from flownav.cli.output import save
 
+    _require_one(plan, "--flight")
     setup = plan.cells[0].setup
     record = replayed(setup, read_branch(path, setup))
     where = save(record, path.with_suffix(".fnr"), report=True)
@@ -86,7 +95,7 @@ def _show(facts: dict[str, Any], rate: float, where: dict[str, str]) -> None:
         f"{100 * facts['confidence']:.0f} % confidence; {cv}"
     )
     typer.echo(f"{facts['flights']} flights, {rate:.0f} a second")
-    if not facts["known"]:
+    if not facts["known"] and facts["cv"] is not None:
         typer.echo("the coefficient of variation is above 0.3: fly it again with more --flights")
     if len(facts["parts"]) > 1:
         for part in facts["parts"]:

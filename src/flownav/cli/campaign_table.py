@@ -30,10 +30,10 @@ def show(summary: dict[str, Any], folder: Path, rate: float | None, records: lis
     for title in ("landed [%]", "crashed", "went around"):
         table.add_column(title, justify="right")
     for cell in cells:
-        landed = cell["figures"]["landed"]
+        landed = cell["figures"].get("landed")
         table.add_row(
             cell["label"], str(cell["flights"]), *(_interval(cell["figures"].get(name)) for name in figures),
-            f"{100 * landed['value']:.1f} ({100 * landed['low']:.1f}-{100 * landed['high']:.1f})" if lands else "-",
+            f"{100 * landed['value']:.1f} ({100 * landed['low']:.1f}-{100 * landed['high']:.1f})" if landed else "-",
             str(cell["verdicts"]["crashed"]), str(cell["verdicts"]["went_around"]),
         )  # fmt: skip
     console = Console()
@@ -43,6 +43,9 @@ def show(summary: dict[str, Any], folder: Path, rate: float | None, records: lis
     for one in summary["worst"][:5]:
         value = "-" if one["value"] is None else f"{one['value']:.3f} m"
         typer.echo(f"  {place_of(one['cell'], one['flight']):10s} {value:>9s}  {one['verdict']}, {one['limited_by']}")
+    for cell in cells:
+        if cell["stopped"] is False:
+            typer.echo(f"{cell['label']}: {cell['flights']} flights were not enough for --until {summary['until']}")
     speed = "nothing was missing" if rate is None else f"{rate:.0f} flights/s"
     typer.echo(f"{summary['flights']} flights ({speed}), in brackets 95 % intervals")
     typer.echo(f"folder  {folder}   page  {folder / 'report.html'}")

@@ -78,7 +78,7 @@ def sections(summary: dict[str, Any], touchdowns: Sequence[Touchdowns]) -> list[
         (
             "wind",
             "The wind that they landed in",
-            [figures.swept_envelope(cells), *(figures.envelope(f"wind-{k}", cells[k]) for k in lands)],
+            [*figures.swept_envelopes(cells), *(figures.envelope(f"wind-{k}", cells[k]) for k in lands)],
         ),
         (
             "inputs",

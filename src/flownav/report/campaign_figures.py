@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -22,7 +23,7 @@ SCALE = [[0.0, COLOUR["alert"]], [0.8, "#e8b23a"], [0.95, "#a9cf6a"], [1.0, COLO
 
 
 class Touchdowns(NamedTuple):
-    """Where the flights of a cell first touched, north and east of the pad's centre [m], (flights,); NaN: nowhere.
+    """Where the flights of a cell first touched, north and east of the pad's centre [m], (flights,); infinite: nowhere.
 
     distance_m: from the pad's centre, infinite of a flight that crashed or did not touch. pad_m: a side of the pad.
     """
@@ -104,7 +105,10 @@ def convergence(cells: Sequence[dict[str, Any]]) -> Panel | None:
     from plotly.graph_objects import Figure
 
     data: list[dict[str, Any]] = []
+    lands = any("r95_m" in cell["figures"] for cell in cells)
     for number, cell in enumerate(cells):
+        if lands and "r95_m" not in cell["figures"]:
+            continue
         steps = [step for step in cell["convergence"] if step["value"] is not None]
         if not steps:
             continue
@@ -118,11 +122,7 @@ def convergence(cells: Sequence[dict[str, Any]]) -> Panel | None:
                      "hovertemplate": "%{y:.3f} m"})  # fmt: skip
     if not data:
         return None
-    what = (
-        "R95 at contact"
-        if any("r95_m" in cell["figures"] for cell in cells)
-        else "p95 of the largest error of one axis"
-    )
+    what = "R95 at contact" if lands else "p95 of the largest error of one axis"
     look = layout(360)
     look["xaxis"] = axis("flights") | {"type": "log", "dtick": 1}
     look["yaxis"] = axis(f"{what} (m)") | {"rangemode": "tozero"}
@@ -133,20 +133,36 @@ def convergence(cells: Sequence[dict[str, Any]]) -> Panel | None:
     return Panel("convergence", "How it settled", words, f"{what} against the number of flights", figure)
 
 
-def swept_envelope(cells: Sequence[dict[str, Any]]) -> Panel | None:
-    """The same of a campaign that sweeps the wind's speed and direction: a ring a speed, a sector a direction."""
-    own = [cell for cell in cells if {SPEED, DIRECTION} <= set(cell["values"]) and "r95_m" in cell["figures"]]
+def swept_envelopes(cells: Sequence[dict[str, Any]]) -> list[Panel | None]:
+    """The same of a campaign that sweeps the wind's speed and direction: a ring a speed, a sector a direction.
+
+    One for each scenario and truth model.
+    """
+    found: dict[tuple[str, str], list[dict[str, Any]]] = {}
+    for cell in cells:
+        if {SPEED, DIRECTION} <= set(cell["values"]) and "r95_m" in cell["figures"]:
+            found.setdefault((cell["scenario"], cell["truth_model"]), []).append(cell)
+    return [_swept_envelope(f"wind-swept-{k}", " ".join(who), own) for k, (who, own) in enumerate(found.items())]
+
+
+def _swept_envelope(key: str, label: str, own: list[dict[str, Any]]) -> Panel | None:
     speeds = sorted({cell["values"][SPEED] for cell in own})
     if len(speeds) < 2:
         return None
-    below = dict(zip(speeds, [0.0, *speeds], strict=False))
+    edges = [
+        0.0,
+        *(0.5 * (slow + fast) for slow, fast in pairwise(speeds)),
+        speeds[-1] + 0.5 * (speeds[-1] - speeds[-2]),
+    ]
+    ring = {speed: (edges[k], edges[k + 1]) for k, speed in enumerate(speeds)}
     bins = []
     for cell in own:
         landed, speed = cell["figures"]["landed"], cell["values"][SPEED]
-        place = {"from_m_s": below[speed], "to_m_s": speed, "direction_deg": cell["values"][DIRECTION] % 360.0}
+        place = {"from_m_s": ring[speed][0], "to_m_s": ring[speed][1], "flown_m_s": speed}
+        place["direction_deg"] = cell["values"][DIRECTION] % 360.0
         share = {"landed": landed["value"], "low": landed["low"], "high": landed["high"]}
         bins.append(place | share | {"flights": cell["flights"]})
-    return envelope("wind-swept", {"label": own[0]["scenario"], "envelope": bins})
+    return envelope(key, {"label": label, "envelope": bins})
 
 
 def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
@@ -156,14 +172,15 @@ def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
     if not cell["envelope"]:
         return None
     rings = sorted({one["from_m_s"] for one in cell["envelope"]})
-    sectors = len({one["direction_deg"] for one in cell["envelope"]})
+    directions = sorted({one["direction_deg"] for one in cell["envelope"]})
+    steps = np.diff([*directions, directions[0] + 360.0])
     figure = Figure()
     for ring in rings:
         own = [one for one in cell["envelope"] if one["from_m_s"] == ring and one["landed"] is not None]
         figure.add_trace(
             Barpolar(
                 base=[ring] * len(own), r=[one["to_m_s"] - ring for one in own],
-                theta=[one["direction_deg"] for one in own], width=[360.0 / sectors] * len(own),
+                theta=[one["direction_deg"] for one in own], width=[float(steps.min())] * len(own),
                 marker={"color": [one["landed"] for one in own], "coloraxis": "coloraxis",
                         "line": {"color": COLOUR["surface"], "width": 1}},
                 hovertext=[_wind_words(one) for one in own], hoverinfo="text", showlegend=False,
@@ -235,12 +252,11 @@ def over_a_sweep(cells: Sequence[dict[str, Any]], name: str) -> Panel:
         lines.setdefault(" ".join([cell["scenario"], *rest, cell["truth_model"]]), []).append(cell)
     data, times = [], 100.0 if lands else 1.0
     for number, (label, own) in enumerate(lines.items()):
-        told = [
-            (cell["values"][name], cell["figures"][what]) for cell in own if cell["figures"][what]["value"] is not None
-        ]
+        known = [(cell["values"][name], cell["figures"].get(what)) for cell in own]
+        told = [(value, figure) for value, figure in known if figure and figure["value"] is not None]
         colour = COLOUR[ROLES[number % len(ROLES)]]
-        ends = {"array": [times * ((f["high"] if f["high"] is not None else f["value"]) - f["value"]) for _, f in told],
-                "arrayminus": [times * (f["value"] - f["low"]) for _, f in told]}  # fmt: skip
+        ends = {side: [times * abs((f["value"] if f[end] is None else f[end]) - f["value"]) for _, f in told]
+                for side, end in (("array", "high"), ("arrayminus", "low"))}  # fmt: skip
         data.append({"type": "scatter", "mode": "lines+markers", "name": label, "x": [x for x, _ in told],
                      "y": [times * f["value"] for _, f in told], "line": {"color": colour, "width": 1.6},
                      "error_y": {"type": "data", "symmetric": False, "color": colour, "thickness": 1, **ends},
@@ -254,7 +270,8 @@ def over_a_sweep(cells: Sequence[dict[str, Any]], name: str) -> Panel:
 
 
 def _wind_words(one: dict[str, Any]) -> str:
+    speed = f"{one['flown_m_s']:g}" if "flown_m_s" in one else f"{one['from_m_s']:.1f} to {one['to_m_s']:.1f}"
     return (
-        f"{one['from_m_s']:.1f} to {one['to_m_s']:.1f} m/s from about {one['direction_deg']:g}°<br>"
+        f"{speed} m/s from about {one['direction_deg']:g}°<br>"
         f"landed {100 * one['landed']:.1f} % ({100 * one['low']:.1f} to {100 * one['high']:.1f} %) of {one['flights']}"
     )

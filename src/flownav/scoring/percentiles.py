@@ -12,7 +12,7 @@ def percentile_with_interval(values: Array, share: float, confidence: float = 0.
     """The smallest value that this share of the values does not exceed, and its confidence interval.
 
     The interval is between order statistics, whatever the distribution (David and Nagaraja, Order Statistics, 2003,
-    section 7.1); infinite where there are too few values for an upper end. Infinite values count as large ones.
+    section 7.1); infinite where there are too few values for an end. Infinite values count as large ones.
     ValueError without a value.
     """
     from scipy.special import bdtr
@@ -28,7 +28,7 @@ def percentile_with_interval(values: Array, share: float, confidence: float = 0.
     low = int(np.searchsorted(below, tail, side="left"))  # binomial quantiles
     high = int(np.searchsorted(below, 1.0 - tail, side="left"))
     place = max(int(np.ceil(share * count - 1e-9)) - 1, 0)
-    return float(ordered[place]), float(ordered[max(low - 1, 0)]), float(ordered[min(high, count)])
+    return float(ordered[place]), float(ordered[low - 1]) if low else -np.inf, float(ordered[min(high, count)])
 
 
 def spread(values: Array) -> dict[str, float] | None:

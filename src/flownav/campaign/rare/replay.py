@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,14 @@ from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_written
 
 SCHEMA_VERSION = 1
+MOST_SPANS = 1_000_000
+
+
+def made_of(setup: Setup) -> str:
+    """SHA-256 of every number that a scenario's flights are made of."""
+    numbers = {"parameters": setup.parameters, "vehicle": setup.file.model_dump()}
+    numbers["dispersion"] = {name: entry.model_dump() for name, entry in sorted(setup.dispersion.items())}
+    return hashlib.sha256(json.dumps(numbers, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def branch_text(setup: Setup, branch: Branch, event: str, response: float | None) -> str:
@@ -26,6 +36,7 @@ def branch_text(setup: Setup, branch: Branch, event: str, response: float | None
         else:
             runs.append([stream, 1])
     facts = {"schema_version": SCHEMA_VERSION, "scenario": setup.scenario.name, "event": event, "response": response}
+    facts["parameters_sha256"] = made_of(setup)
     return json.dumps(facts | branch._asdict() | {"streams": runs}, indent=1) + "\n"
 
 
@@ -43,6 +54,10 @@ def read_branch(path: Path, setup: Setup) -> Branch:
             raise InputError(f"{path}: schema_version {found['schema_version']}: must be {SCHEMA_VERSION}")
         if found["scenario"] != setup.scenario.name:
             raise InputError(f"{path}: a flight of the scenario {found['scenario']}, not of {setup.scenario.name}")
+        if found["parameters_sha256"] != made_of(setup):
+            raise InputError(f"{path}: was flown with other settings; give the options with which --rare was run")
+        if sum(int(spans) for _, spans in found["streams"]) > MOST_SPANS:
+            raise ValueError("too long")
         streams = [int(stream) for stream, spans in found["streams"] for _ in range(int(spans))]
         drawn, start = _numbers(found["drawn"]), _numbers(found["start"])
         branch = Branch(int(found["seed"]), drawn, start, streams)
@@ -59,6 +74,8 @@ def read_branch(path: Path, setup: Setup) -> Branch:
 
 
 def _numbers(table: dict[str, Any]) -> dict[str, float]:
+    if not all(math.isfinite(value) for value in table.values()):
+        raise ValueError("a number is needed")
     return {str(name): float(value) for name, value in table.items()}
 
 

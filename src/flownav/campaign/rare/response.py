@@ -49,7 +49,8 @@ def responses_to(event: Event, limits: Limits, usual: Array) -> list[Response]:
     rows of the same scenario. And it makes a measure of the touchdown infinite, with nothing before that grows towards
     it: such an event has two parts.
     """
-    typical = np.nan_to_num(np.nanmedian(figures(usual, limits), axis=0))
+    held = figures(usual, limits)
+    typical = np.nan_to_num(np.nanmedian(held, axis=0)) if np.isfinite(held).any(axis=0).all() else np.zeros(len(HELD))
     if event.measure in (CRASH, NOT_LANDED) and event.above and 0.0 <= event.limit < 1.0:
         return [Response(event.measure, lambda rows: severity(rows, limits, typical, _failed(event, rows)), 1.0, HARD)]
     sign = 1.0 if event.above else -1.0

@@ -114,6 +114,7 @@ def test_figures_of_known_values():
     assert figure_of("landed", np.array([0.0] * 9 + [1.0])).value == 0.9
     assert figure_of("r997_m", values[:10]).width == np.inf
     assert figure_of("r997_m", values[:10]).finite()["high"] is None
+    assert figure_of("r50_m", values[:3]).finite() == {"value": 2.0, "low": None, "high": None}
 
 
 def test_looks_are_whole_files_and_end_with_the_last_flight():

@@ -213,6 +213,34 @@ def test_the_commands_json_table_and_files(tmp_path):
     assert Path(one["record"]).exists()
 
 
+def test_a_flight_again_neither_locks_a_campaign_out_nor_writes_into_another(tmp_path):
+    given = ["landing", "--set", "filter.name=paper", "--set", "flight.duration_s=6", "--out", str(tmp_path / "c")]
+    assert run(*given, "--flight", "3").exit_code == 0
+    assert run(*given, "--flights", "8", "--json").exit_code == 0
+    assert run(*given, "--flight", "7").exit_code == 0  # of the folder's 8 flights
+    assert "flights 0 to 7" in str(run(*given, "--flight", "8").exception)
+    before = files_in(tmp_path / "c")
+    assert "other seed" in str(run(*given, "--seed", "7", "--flight", "7").exception)
+    assert files_in(tmp_path / "c") == before
+
+
+def test_what_never_lands_has_landed_in_no_share(tmp_path):
+    given = ["landing", "takeoff", "--set", "filter.name=paper", "--flights", "8", "--out", str(tmp_path)]
+    said = json.loads(run(*given, "--json").stdout)
+    landing, takeoff = said["cells"]
+    assert "landed" in landing["figures"]
+    assert "landed" not in takeoff["figures"]
+    assert said["pooled_cells"] == [0]
+    assert {one["cell"] for one in said["worst"]} == {0}
+
+
+def test_a_stop_that_was_not_reached_is_said(tmp_path):
+    given = ["landing", "--set", "filter.name=paper", "--set", "flight.duration_s=6", "--flights", "300"]
+    given += ["--until", "p95_axis_m width <= 0.000001", "--out", str(tmp_path)]
+    assert "were not enough for --until" in run(*given).stdout
+    assert json.loads(run(*given, "--json").stdout)["cells"][0]["stopped"] is False
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -228,6 +256,14 @@ def test_the_commands_json_table_and_files(tmp_path):
         (["landing", "--set", "wind"], "NAME=VALUE"),
         (["landing", "--set", "colour=red"], "unknown key"),
         (["landing", "--until", "soon"], "--until"),
+        (["takeoff", "--until", "r95_m width <= 0.01"], "never lands"),
+        (["landing", "landing"], "the same name"),
+        (["landing", "--set", "wind.gusts=true", "--sweep", "wind.gusts=true,false"], "is set as well"),
+        (["landing", "--sweep", "pad.size_m=1,2", "--sweep", "pad.size_m=3,4"], "given twice"),
+        (["landing", "--records", "11"], "--records"),
+        (["takeoff", "--rare", "touchdown.rest_m > 1"], "never lands"),
+        (["landing", "--rare", "crash > 5"], "crash is 0 or 1"),
+        (["landing", "--rare", "crash", "--engine", "ray"], "leave out --engine ray"),
         (["landing", "--flight", "x"], "--flight x"),
         (["landing", "--flight", "3:1"], "there are cells 0 to 0"),
         (["landing", "--flight", "1000"], "flights 0 to 999"),

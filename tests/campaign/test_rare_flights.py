@@ -175,6 +175,8 @@ def test_the_most_likely_flight_flies_again_to_the_bit(setup, found, tmp_path):
         ({"streams": [[-1, 601]]}, "another length"),
         ({"drawn": {"vehicle.body.mass_kg": 5.0}}, "other numbers are drawn"),
         ({"streams": 5}, "no flight of a rare event"),
+        ({"streams": [[1, 10**15]]}, "no flight of a rare event"),
+        ({"parameters_sha256": "0"}, "flown with other settings"),
     ],
 )
 def test_a_file_of_another_flight_is_refused(setup, found, tmp_path, change, said):

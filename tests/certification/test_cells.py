@@ -9,8 +9,9 @@ from flownav.campaign.engines.engine import Part
 from flownav.campaign.engines.local import Local
 from flownav.campaign.requirement import load_requirement
 from flownav.campaign.rows import rows_of
+from flownav.campaign.store import Store
 from flownav.certification.assumed import assumed
-from flownav.certification.cells import MOST_CELLS, plan_of, words_of
+from flownav.certification.cells import MOST_CELLS, plan_of, require_planned, words_of
 from flownav.certification.started import from_height
 from flownav.compile import LANES
 from flownav.errors import InputError
@@ -26,6 +27,31 @@ FLOWN = 'schema_version = 1\nname = "small"\nscenario = "landing"\n'
 
 def planned(tmp_path, text, flights=None, vehicle=None):
     return plan_of(load_requirement(write(tmp_path, text)), flights, vehicle)
+
+
+# -- what is set, and what is asked ------------------------------------------------------------------------
+def test_what_is_set_is_fixed_and_what_is_ranged_is_drawn(tmp_path):
+    text = HEAD + "[set.wind]\nspeed_20ft_m_s = 3.0\n[conditions]\nwind.from_direction_deg = [0, 90]\n" + ASKED
+    plan = planned(tmp_path, text, 40)
+    drawn = plan.ready(0).ensemble.values(1, 0, 40)
+    assert "wind.speed_20ft_m_s" not in drawn
+    assert 0.0 <= min(drawn["wind.from_direction_deg"]) <= max(drawn["wind.from_direction_deg"]) <= 90.0
+    assert plan.cells[0].scenario.wind.speed_20ft_m_s == 3.0
+
+
+def test_flights_are_judged_by_what_they_were_flown_for(tmp_path):
+    folder = tmp_path / "certificate"
+    with Store(folder).opened(planned(tmp_path, HEAD + WINDY + ASKED, 40)):
+        pass
+    require_planned(planned(tmp_path, HEAD + WINDY + ASKED, 40), folder)
+    softer = planned(tmp_path, HEAD + WINDY + ASKED.replace("0.5", "2.0"), 40)
+    with pytest.raises(InputError, match="judge its flights by something else"):
+        require_planned(softer, folder)
+
+
+def test_a_range_that_cannot_be_is_refused_before_anything_is_flown(tmp_path):
+    with pytest.raises(InputError, match="speed_20ft_m_s"):
+        planned(tmp_path, HEAD + "[conditions]\nwind.speed_20ft_m_s = [-5, 5]\n" + ASKED)
 
 
 # -- heights ----------------------------------------------------------------------------------------------

@@ -154,7 +154,7 @@ def test_a_percentile_is_the_smallest_value_that_the_share_does_not_exceed():
     values = np.arange(1.0, 101.0)[::-1]
     assert percentile_with_interval(values, 0.95)[0] == 95.0
     assert percentile_with_interval(values, 0.5)[0] == 50.0
-    assert percentile_with_interval(np.array([7.0]), 0.95) == (7.0, 7.0, np.inf)
+    assert percentile_with_interval(np.array([7.0]), 0.95) == (7.0, -np.inf, np.inf)  # one value bounds nothing
     assert percentile_with_interval(np.append(values[10:], [np.inf] * 10), 0.95)[0] == np.inf
     with pytest.raises(ValueError, match="no values"):
         percentile_with_interval(np.array([]), 0.95)

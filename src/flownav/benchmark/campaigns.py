@@ -104,11 +104,11 @@ def _memory(flights: int) -> Figure:
     with tempfile.TemporaryDirectory() as out:
         given = ["campaign", "landing", "--set", "filter.name=paper", "--flights", str(flights), "--records", "0"]
         script = (
-            "import json, resource, sys\n"
+            "import json, re, sys\n"
             "from flownav.cli import main\n"
             f"sys.argv = ['flownav', *{json.dumps([*given, '--json', '--out', str(Path(out) / 'campaign')])}]\n"
             "try:\n    main()\nexcept SystemExit:\n    pass\n"
-            "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
+            "print(re.search(r'VmHWM:\\s*(\\d+)', open('/proc/self/status').read())[1])\n"  # of this process alone
         )
         done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
     megabytes = int(done.stdout.split()[-1]) / 1024.0

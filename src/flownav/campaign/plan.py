@@ -132,7 +132,7 @@ class Plan:
                     "first": cell.first,
                     "failure": cell.failure.words if cell.failure else None,
                     "scenario": cell.scenario.model_dump(mode="json"),
-                    "parameters_sha256": _digest(cell),
+                    "parameters_sha256": made_of(cell.setup),
                 }
                 for cell in self.cells
             ],
@@ -211,11 +211,11 @@ def _shown(value: Value) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _digest(cell: Cell) -> str:
-    """SHA-256 of everything that the cell's flights are made of: the numbers of every file that it names."""
-    made_of = {
-        "parameters": cell.setup.parameters,
-        "dispersion": {name: entry.model_dump() for name, entry in sorted(cell.setup.dispersion.items())},
-        "vehicle": cell.setup.file.model_dump(),
+def made_of(setup: Setup) -> str:
+    """SHA-256 of everything that a scenario's flights are made of: the numbers of every file that it names."""
+    numbers = {
+        "parameters": setup.parameters,
+        "dispersion": {name: entry.model_dump() for name, entry in sorted(setup.dispersion.items())},
+        "vehicle": setup.file.model_dump(),
     }
-    return hashlib.sha256(json.dumps(made_of, sort_keys=True, default=str).encode()).hexdigest()
+    return hashlib.sha256(json.dumps(numbers, sort_keys=True, default=str).encode()).hexdigest()

@@ -22,6 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.campaign.sampling import INSIDE
 from flownav.simulation.dispersion import Design, Distribution
 
 Array = NDArray[np.float64]
@@ -30,7 +31,6 @@ NOISE = "noise"
 CLASSES = ("build", "day", "never")
 CONFIDENCE = 0.90
 RESAMPLES = 1000
-INSIDE = 2.0**-53  # of (0, 1): a point of a sequence may lie on the edge
 MOST_KURTOSIS = 10.0  # beyond it the ranks are ranked: few outcomes far off carry the variance
 LEAST = 16  # rows: fewer say nothing
 Fly = Callable[[Design, int, int], Array]

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,7 +15,7 @@ from flownav.campaign.measures import CRASH, MEASURES, NOT_LANDED
 from flownav.campaign.tolerance import allowed
 from flownav.errors import InputError
 from flownav.parameter_files import Number, ParameterModel, check, load, shipped
-from flownav.simulation.dispersion import Distribution
+from flownav.simulation.dispersion import Distribution, leaves
 from flownav.simulation.scenario import SHIPPED as SHIPPED_SCENARIOS
 from flownav.simulation.scenario import Scenario, load_scenario, with_vehicle
 from flownav.vehicle.loading import SHIPPED_NAMES
@@ -106,7 +106,7 @@ class Conditions(ParameterModel):
         if isinstance(own.get("height_m"), (int, float)):
             own["height_m"] = [own["height_m"]]
         rest = {name: value for name, value in given.items() if name not in own}
-        return own | {"ranges": {name: _distribution(name, value) for name, value in _leaves(rest, "")}}
+        return own | {"ranges": {name: _distribution(name, value) for name, value in leaves(rest, "")}}
 
     @field_validator("sensor", "vehicle", "fault")
     @classmethod
@@ -198,7 +198,7 @@ def load_requirement(name: str) -> Requirement:
 
 def fixed_by(requirement: Requirement) -> dict[str, Any]:
     """What a requirement sets and no flight draws, by dotted name: all of its `set` that has no range."""
-    return {name: value for name, value in _leaves(requirement.set, "") if name not in requirement.conditions.ranges}
+    return {name: value for name, value in leaves(requirement.set, "") if name not in requirement.conditions.ranges}
 
 
 def _sensors_beside(given: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -242,15 +242,6 @@ def _over(entries: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
         inner = found.get(key)
         found[key] = _over(inner, value) if isinstance(inner, dict) and isinstance(value, Mapping) else value
     return found
-
-
-def _leaves(table: Mapping[str, Any], above: str) -> Iterator[tuple[str, Any]]:
-    """Every entry of nested tables by its dotted name; a distribution is an entry."""
-    for key, value in table.items():
-        if isinstance(value, Mapping) and "distribution" not in value:
-            yield from _leaves(value, f"{above}{key}.")
-        else:
-            yield f"{above}{key}", value
 
 
 def _distribution(name: str, value: Any) -> Any:

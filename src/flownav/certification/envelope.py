@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 from flownav.campaign.measures import measured
 from flownav.campaign.requirement import Requirement, needed_by
 from flownav.campaign.tolerance import interval, joint
+from flownav.campaign.views import DIRECTION, SPEED
 from flownav.certification.judgement import failed, judged
 from flownav.simulation.ensemble import Ensemble
 
 Array = NDArray[np.float64]
 
-WIND = ("wind.speed_20ft_m_s", "wind.from_direction_deg")
+WIND = (SPEED, DIRECTION)
 GRIDS = ((6, 12), (5, 8), (4, 8), (4, 4), (3, 4), (2, 4))  # fields of the first axis and the second, finest first
 USEFUL = 50  # flights of a field that say something, where there are too few to show the requirement
 EDGE = 1e-3  # share of a distribution that the outermost edge leaves out, where it has no end

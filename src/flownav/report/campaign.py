@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,9 +10,8 @@ from flownav import __version__, guard
 from flownav.report import campaign_figures as figures
 from flownav.report.campaign_figures import Touchdowns
 from flownav.report.figure_words import number
-from flownav.report.html import HERE, figure_json, inside_script, page_scripts, template
+from flownav.report.html import drawn_with, template
 from flownav.report.panels import Panel, Section
-from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
 
 MOST_CELLS = 8  # whose touchdowns are drawn
 FIGURES = {
@@ -38,10 +36,7 @@ def write_campaign(summary: dict[str, Any], touchdowns: Sequence[Touchdowns], ke
 
 def render(summary: dict[str, Any], touchdowns: Sequence[Touchdowns], kept: Sequence[str] = ()) -> str:
     """The page as text."""
-    from markupsafe import Markup
-
     shown = sections(summary, touchdowns)
-    scripts, policy = page_scripts()
     page: str = template("campaign.html.j2").render(
         title=", ".join(summary["scenarios"]),
         facts=facts(summary),
@@ -50,15 +45,8 @@ def render(summary: dict[str, Any], touchdowns: Sequence[Touchdowns], kept: Sequ
         rows=[cell_row(cell, summary) for cell in summary["cells"]],
         worst=[worst_row(one, summary, kept) for one in summary["worst"]],
         limits=limits(summary),
-        sections=shown,
         version=__version__,
-        palette=PALETTE,
-        font=Markup(FONT),
-        data={panel.key: Markup(figure_json(panel)) for section in shown for panel in section.panels if panel.figure},
-        dark=Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
-        style=Markup((HERE / "page.css").read_text(encoding="utf-8")),
-        scripts=[Markup(script) for script in scripts],
-        policy=policy,
+        **drawn_with(shown),
     )
     return page
 

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Mapping
 from typing import Any
 
 from flownav.report import certificate_figures as figures
 from flownav.report import content
 from flownav.report.figure_words import NONE, number
-from flownav.report.html import HERE, figure_json, inside_script, page_scripts, template, widened
+from flownav.report.html import HERE, drawn_with, template, widened
 from flownav.report.panels import Section
-from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
 
 HEADLINES = {"pass": "Pass", "fail": "Fail", "not shown": "Not shown"}
 SENTENCES = {
@@ -29,9 +27,7 @@ def render(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> str:
     from markupsafe import Markup
 
     sections = sections_of(facts, shown)
-    scripts, policy = page_scripts()
     style = "".join((HERE / name).read_text(encoding="utf-8") for name in ("page.css", "certificate.css"))
-    panels = [panel for section in sections for panel in section.panels]
     page: str = template("certificate.html.j2").render(
         facts=facts,
         own=facts["requirement"],
@@ -39,7 +35,6 @@ def render(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> str:
         sentence=SENTENCES[facts["verdict"]],
         together=together(facts),
         conditions=conditions(facts),
-        sections=sections,
         worst=[worst_row(facts, told) for told in facts["worst"]],
         measures=[one["measure"] for one in facts["requirement"]["requirements"]],
         axes=[figures.INPUT_WORDS.get(name, name) for name in facts["envelope"]["axes"]],
@@ -51,13 +46,7 @@ def render(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> str:
         ],
         signers=SIGNERS,
         dash=NONE,
-        palette=PALETTE,
-        font=Markup(FONT),
-        data={panel.key: Markup(figure_json(panel)) for panel in panels if panel.figure},
-        dark=Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
-        style=Markup(style),
-        scripts=[Markup(script) for script in scripts],
-        policy=policy,
+        **drawn_with(sections) | {"style": Markup(style)},
         number=number,
         percent=percent,
     )

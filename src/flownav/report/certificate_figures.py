@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.report.campaign_figures import DIRECTION, SPEED
 from flownav.report.panels import Panel, drawn
 from flownav.report.style import COLOUR, axis, layout
 
 Array = NDArray[np.float64]
 
-SPEED, DIRECTION = "wind.speed_20ft_m_s", "wind.from_direction_deg"
 INPUT_WORDS = {SPEED: "wind at 20 ft (m/s)", DIRECTION: "wind from (°)"}
 KNOWN_WORDS = {
     "build": "known once built",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -74,10 +74,7 @@ def _sections(record: Record) -> list[tuple[str, str, list[Panel]]]:
 
 def render(record: Record) -> str:
     """The page as text."""
-    from markupsafe import Markup
-
     shown = sections(record)
-    scripts, policy = page_scripts()
     page: str = template("page.html.j2").render(
         title=content.title(record),
         kind=str(record.manifest.get("kind") or "flight"),
@@ -93,7 +90,6 @@ def render(record: Record) -> str:
         outages=content.outage_rows(record),
         sensors=sensor_rows.sensor_rows(record),
         rejected=sensor_rows.rejected_rows(record),
-        sections=shown,
         thinned=_thinned(record),
         line_points=LINE_POINTS,
         dot_points=DOT_POINTS,
@@ -101,15 +97,26 @@ def render(record: Record) -> str:
         parameters=content.groups(record.manifest.get("parameters")),
         provenance=content.groups(record.manifest.get("provenance")),
         command=content.command(record),
-        palette=PALETTE,
-        font=Markup(FONT),
-        data={panel.key: Markup(figure_json(panel)) for section in shown for panel in section.panels if panel.figure},
-        dark=Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
-        style=Markup((HERE / "page.css").read_text(encoding="utf-8")),
-        scripts=[Markup(script) for script in scripts],
-        policy=policy,
+        **drawn_with(shown),
     )
     return page
+
+
+def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:
+    """What every page with figures is given: its sections, their data, colours, style, scripts and content policy."""
+    from markupsafe import Markup
+
+    scripts, policy = page_scripts()
+    return {
+        "sections": shown,
+        "palette": PALETTE,
+        "font": Markup(FONT),
+        "data": {one.key: Markup(figure_json(one)) for section in shown for one in section.panels if one.figure},
+        "dark": Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
+        "style": Markup((HERE / "page.css").read_text(encoding="utf-8")),
+        "scripts": [Markup(script) for script in scripts],
+        "policy": policy,
+    }
 
 
 def template(name: str) -> Any:

@@ -99,7 +99,7 @@ class DispersionSection(ParameterModel):
             return given
         file = {"file": given["file"]} if "file" in given else {}
         entries = {name: table for name, table in given.items() if name != "file"}
-        return file | {"parameters": dict(_entries(entries, ""))}
+        return file | {"parameters": dict(leaves(entries, ""))}
 
     def entries(self) -> dict[str, Distribution]:
         """The file's, and the scenario's own above them. InputError where the file is wrong."""
@@ -123,11 +123,11 @@ class DispersionFile(ParameterModel):
         return section
 
 
-def _entries(table: Mapping[str, Any], above: str) -> Iterator[tuple[str, Any]]:
-    """Every entry of nested tables by its dotted name."""
+def leaves(table: Mapping[str, Any], above: str) -> Iterator[tuple[str, Any]]:
+    """Every entry of nested tables by its dotted name; a distribution is an entry."""
     for key, value in table.items():
         if isinstance(value, Mapping) and "distribution" not in value:
-            yield from _entries(value, f"{above}{key}.")
+            yield from leaves(value, f"{above}{key}.")
         else:
             yield f"{above}{key}", value
 

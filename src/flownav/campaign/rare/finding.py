@@ -8,6 +8,7 @@ import numpy as np
 
 from flownav.campaign.rare.chains import Array, States, Walker, together
 from flownav.campaign.rare.subset import WALK, Islands, Ladder, climb, fly_islands
+from flownav.scoring.percentiles import share_with_interval
 
 CONFIDENCE = 0.95
 LARGEST_CV = 0.3
@@ -87,8 +88,6 @@ def interval_of(mean: float, cv: float, freedom: float) -> tuple[float, float]:
 
 def at_random(walker: Walker, limit: float, most: int) -> Found:
     """The share of flights drawn at random, its interval after Clopper and Pearson: of a response without levels."""
-    from scipy.stats import binomtest
-
     happened, flown = [walker.fresh(0)], 0
     while flown < most:
         states = walker.fresh(min(DIRECT_FLIGHTS, most - flown))
@@ -96,12 +95,10 @@ def at_random(walker: Walker, limit: float, most: int) -> Found:
         flown += len(states.response)
     beyond = together(happened)
     hits = len(beyond.response)
-    interval = binomtest(hits, flown).proportion_ci(CONFIDENCE, method="exact")
+    share, low, high = share_with_interval(hits, flown, CONFIDENCE)
     cv = float(np.sqrt((1.0 - hits / flown) / hits)) if hits else np.inf
-    levels = ((limit, hits / flown),)
-    return Found(
-        hits / flown, float(interval.low), float(interval.high), cv, np.inf, levels, beyond, np.full(hits, 1.0 / flown)
-    )
+    levels = ((limit, share),)
+    return Found(share, low, high, cv, np.inf, levels, beyond, np.full(hits, 1.0 / flown))
 
 
 def together_with(parts: list[Found]) -> tuple[float, float, float, float]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from pathlib import Path
 from typing import Any
 
 from flownav.campaign.local import record_flown
+from flownav.campaign.plan import made_of
 from flownav.campaign.rare.branches import Branch, Space
 from flownav.errors import InputError
 from flownav.files import written_whole
@@ -18,13 +18,6 @@ from flownav.simulation.engine import fly_written
 
 SCHEMA_VERSION = 1
 MOST_SPANS = 1_000_000
-
-
-def made_of(setup: Setup) -> str:
-    """SHA-256 of every number that a scenario's flights are made of."""
-    numbers = {"parameters": setup.parameters, "vehicle": setup.file.model_dump()}
-    numbers["dispersion"] = {name: entry.model_dump() for name, entry in sorted(setup.dispersion.items())}
-    return hashlib.sha256(json.dumps(numbers, sort_keys=True, default=str).encode()).hexdigest()
 
 
 def branch_text(setup: Setup, branch: Branch, event: str, response: float | None) -> str:

@@ -13,13 +13,13 @@ test: $(VENV)/.ready-test
 	$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile -p no:benchmark
 
 test-gpu: $(VENV)/.ready-test $(VENV)/.ready-gpu
-	$(BIN)/python -m pytest -p no:benchmark tests/campaign/test_cuda_compiled.py
+	$(BIN)/python -m pytest -p no:benchmark tests/campaigns/test_cuda_compiled.py
 
 test-slow: $(VENV)/.ready-test
 	$(BIN)/python -m pytest -m slow
 
 long-log: $(VENV)/.ready-test
-	$(BIN)/python -m pytest -s -m slow tests/replay/test_long_log.py
+	$(BIN)/python -m pytest -s -m slow tests/replays/test_long_log.py
 
 fuzz: $(VENV)/.ready-test
 	FLOWNAV_FUZZ=$${FLOWNAV_FUZZ:-20000} $(BIN)/python -m pytest -m fuzz tests/logs tests/live/test_fuzz_live.py tests/test_fuzz_parameters.py

@@ -12,11 +12,11 @@ import time
 import numpy as np
 import pytest
 
-from flownav.campaign.engines.cuda import AT_ONCE, Cuda
-from flownav.campaign.engines.device_flight import take_here
-from flownav.campaign.engines.drawn import truths_of
-from flownav.campaign.local import fly_many
-from flownav.campaign.rows import rows_of
+from flownav.campaigns.engines.cuda import AT_ONCE, Cuda
+from flownav.campaigns.engines.device_flight import take_here
+from flownav.campaigns.engines.drawn import truths_of
+from flownav.campaigns.local import fly_many
+from flownav.campaigns.rows import rows_of
 from flownav.compile import NoDeviceError, device_runner
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_blocks

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from flownav.campaign.local import fly_recorded
+from flownav.campaigns.local import fly_recorded
 from flownav.faults.flight_log import log_of
 from flownav.live.recorder import NoRecorder
 from flownav.live.session import Session

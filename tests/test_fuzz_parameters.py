@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from pydantic import BaseModel
 
-from flownav.campaign.requirement import load_requirement
-from flownav.campaign.requirement import scenario_of as required
+from flownav.campaigns.requirement import load_requirement
+from flownav.campaigns.requirement import scenario_of as required
 from flownav.identification.rig_log import Rig
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import settings_of

@@ -50,8 +50,8 @@ def smooth_and_warm() -> None:
     from flownav.live.warm import warm_up
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.record import Record
-    from flownav.replay.prepare import ReplayOptions
-    from flownav.replay.session import replay
+    from flownav.replays.prepare import ReplayOptions
+    from flownav.replays.session import replay
     from flownav.simulation.assemble import assemble
     from flownav.simulation.scenario import load_scenario
 

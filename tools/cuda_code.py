@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 from cuda import pathfinder
 
-from flownav.campaign.engines.cuda import Cuda
-from flownav.campaign.engines.device_flight import take_here
-from flownav.campaign.engines.drawn import truths_of
+from flownav.campaigns.engines.cuda import Cuda
+from flownav.campaigns.engines.device_flight import take_here
+from flownav.campaigns.engines.drawn import truths_of
 from flownav.compiling.device import call_instead, lowered
 from flownav.compiling.launch import argument_type, per_thread, told_names
 from flownav.simulation.assemble import assemble

@@ -8,10 +8,10 @@ from __future__ import annotations
 import sys
 import time
 
-from flownav.campaign.measures import event_of, happened
-from flownav.campaign.plan import changed
-from flownav.campaign.rare.branches import Array, Space
-from flownav.campaign.rare.estimate import estimate_rare
+from flownav.campaigns.measures import event_of, happened
+from flownav.campaigns.plan import changed
+from flownav.campaigns.rare.branches import Array, Space
+from flownav.campaigns.rare.estimate import estimate_rare
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.scenario import load_scenario
 

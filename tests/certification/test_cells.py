@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.campaign.engines.engine import Part
-from flownav.campaign.engines.local import Local
-from flownav.campaign.requirement import load_requirement
-from flownav.campaign.rows import rows_of
-from flownav.campaign.store import Store
+from flownav.campaigns.engines.engine import Part
+from flownav.campaigns.engines.local import Local
+from flownav.campaigns.requirement import load_requirement
+from flownav.campaigns.rows import rows_of
+from flownav.campaigns.store import Store
 from flownav.certification.assumed import assumed
 from flownav.certification.cells import MOST_CELLS, plan_of, require_planned, words_of
 from flownav.certification.started import from_height

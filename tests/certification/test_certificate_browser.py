@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from browsing import CHROMIUM, QUIET, SOFTWARE_GL, Visit
-from flownav.campaign.requirement import load_requirement
-from flownav.campaign.store import Store
+from flownav.campaigns.requirement import load_requirement
+from flownav.campaigns.store import Store
 from flownav.certification.cells import plan_of
 from flownav.certification.certify import certify, with_ranking
 from flownav.certification.written import write_certificate

@@ -8,9 +8,9 @@ import json
 import numpy as np
 import pytest
 
-from flownav.campaign.engines.local import Local
-from flownav.campaign.requirement import RequirementTable, load_requirement
-from flownav.campaign.store import Store
+from flownav.campaigns.engines.local import Local
+from flownav.campaigns.requirement import RequirementTable, load_requirement
+from flownav.campaigns.store import Store
 from flownav.certification.cells import plan_of
 from flownav.certification.certify import certify, with_ranking
 from flownav.certification.judgement import judged

@@ -12,7 +12,7 @@ from flownav.compare.rows import default_windows
 from flownav.frames import quaternion_from_euler
 from flownav.logs.open_log import open_flight
 from flownav.measurement import Array, Sensor, Stream
-from flownav.replay.prepare import ReplayOptions, prepare
+from flownav.replays.prepare import ReplayOptions, prepare
 from flownav.scoring.outage import outage_error
 from replay_logs import log_of_flight
 

@@ -12,7 +12,7 @@ from flownav.compare.tracks import Track, of_table, says
 from flownav.frames import quaternion_from_euler
 from flownav.logs.log import Log
 from flownav.measurement import Sensor, Stream
-from flownav.replay.airborne import airborne_of
+from flownav.replays.airborne import airborne_of
 from flownav.scoring.drift import Motion
 
 NONE = np.zeros(0)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flownav.campaign.local import fly_recorded
+from flownav.campaigns.local import fly_recorded
 from flownav.faults.flight_log import log_of
 from flownav.frames import rotation_from_quaternion
 from flownav.measurement import COLUMNS, Sensor

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from flownav.campaign.engines.cuda import Cuda
-from flownav.campaign.engines.drawn import truths_of
-from flownav.campaign.rows import rows_of
+from flownav.campaigns.engines.cuda import Cuda
+from flownav.campaigns.engines.drawn import truths_of
+from flownav.campaigns.rows import rows_of
 from flownav.compile import equation, kernel
 from flownav.parameter_files import check
 from flownav.simulation.assemble import Setup, assemble
@@ -95,7 +95,7 @@ def noise_on_device(runner: Any) -> tuple[Any, Any]:
 
 def main(file: str) -> None:
     """All of it on the simulator."""
-    from flownav.campaign.engines.device_flight import take_here
+    from flownav.campaigns.engines.device_flight import take_here
     from flownav.compile import device_runner
 
     runner = device_runner(take_here)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from flownav.campaign.engines.engine import Part
-from flownav.campaign.measures import ROW_COLUMNS
-from flownav.campaign.plan import Ready
+from flownav.campaigns.engines.engine import Part
+from flownav.campaigns.measures import ROW_COLUMNS
+from flownav.campaigns.plan import Ready
 
 HEAD = 'schema_version = 1\nname = "small"\nscenario = "landing"\n[set.filter]\nname = "paper"\n'
 WINDY = "[set.wind]\ngusts = true\n[conditions]\nwind.speed_20ft_m_s = [0, 8]\nwind.from_direction_deg = [0, 360]\n"

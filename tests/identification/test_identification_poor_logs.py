@@ -19,7 +19,7 @@ from flownav.identification.orders import CANDIDATES
 from flownav.identification.usable import jumps
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.measurement import Sensor
-from flownav.replay.airborne import airborne_of, flying_at
+from flownav.replays.airborne import airborne_of, flying_at
 
 YAW_RAD = 0.7
 

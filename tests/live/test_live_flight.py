@@ -16,7 +16,7 @@ import numpy as np
 import pymap3d
 import pytest
 
-from flownav.campaign.local import fly_recorded
+from flownav.campaigns.local import fly_recorded
 from flownav.errors import InputError
 from flownav.faults.flight_log import log_of
 from flownav.live.display import draw
@@ -32,9 +32,9 @@ from flownav.logs.open_log import open_flight
 from flownav.measurement import Sensor
 from flownav.navigation.tables import estimate_table, innovation_table, states_table
 from flownav.record import Record
-from flownav.replay.fed import as_fed
-from flownav.replay.prepare import ReplayOptions
-from flownav.replay.session import replay
+from flownav.replays.fed import as_fed
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import replay
 from flownav.sensors.identified import IdentifiedFlow
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario

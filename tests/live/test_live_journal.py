@@ -26,9 +26,9 @@ from flownav.logs.open_log import open_flight
 from flownav.mavlink.state_messages import TrueState
 from flownav.navigation.tables import estimate_table, innovation_table
 from flownav.record import Record
-from flownav.replay.fed import as_fed
-from flownav.replay.prepare import ReplayOptions
-from flownav.replay.session import replay
+from flownav.replays.fed import as_fed
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import replay
 from live_ends import ORIGIN, Hover, Wire
 
 

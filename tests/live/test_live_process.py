@@ -15,9 +15,9 @@ import pytest
 
 from flownav.logs.open_log import open_flight
 from flownav.record import Record
-from flownav.replay.fed import as_fed
-from flownav.replay.prepare import ReplayOptions
-from flownav.replay.session import replay
+from flownav.replays.fed import as_fed
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import replay
 from live_process import LiveProcess
 
 

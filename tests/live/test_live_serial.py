@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.campaign.local import fly_recorded
+from flownav.campaigns.local import fly_recorded
 from flownav.faults.flight_log import log_of
 from flownav.live.rates import plan
 from flownav.live.simulated import SimulatedVehicle

@@ -9,9 +9,9 @@ from fed_records import FLOWN, queue_of_flight, record_of
 from flownav.errors import InputError
 from flownav.logs.open_log import open_flight
 from flownav.measurement import Sensor, merge
-from flownav.replay.fed import as_fed
-from flownav.replay.prepare import ReplayOptions
-from flownav.replay.session import replay
+from flownav.replays.fed import as_fed
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import replay
 from navigation_streams import navigate
 
 

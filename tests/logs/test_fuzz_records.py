@@ -17,10 +17,10 @@ from flownav.logs.open_log import open_flight, open_log
 from flownav.logs.plausible import LARGEST
 from flownav.measurement import EventQueue
 from flownav.record import Record
-from flownav.replay.bundle import to_record
-from flownav.replay.fed import as_fed
-from flownav.replay.prepare import ReplayOptions
-from flownav.replay.session import Replay, replay
+from flownav.replays.bundle import to_record
+from flownav.replays.fed import as_fed
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import Replay, replay
 from flownav.report.html import render
 from fuzzing import FIRST_SEED, MUTANTS, assert_promise, assert_sound
 from record_mutations import mutate_record

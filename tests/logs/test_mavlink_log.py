@@ -23,8 +23,8 @@ from flownav.mavlink.dialect import coder
 from flownav.mavlink.signing import sign_outgoing
 from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.replay.prepare import ReplayOptions
-from flownav.replay.session import replay
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import replay
 from mavlink_logs import PX4, START_US, Tlog, arbitrary_payload, flight_log, made, packed_payload
 
 STEPS = 80

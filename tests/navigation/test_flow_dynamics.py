@@ -32,9 +32,9 @@ from flownav.navigation.take import (
 from flownav.navigation.tape import new_tape
 from flownav.navigation.told import FROM_MAG, Equipment
 from flownav.parameter_files import shipped
-from flownav.replay.fed import as_fed
-from flownav.replay.prepare import ReplayOptions
-from flownav.replay.session import replay
+from flownav.replays.fed import as_fed
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import replay
 from flownav.sensors.datasheet import DEFAULT_SENSOR, Dynamics, load_sensor
 from flownav.sensors.identified import DELAY_WITHIN_DEG, identified_flow, needs_lag_states, phase_off_delay_deg
 from flownav.simulation.assemble import assemble

@@ -236,7 +236,7 @@ def test_an_echo_is_not_believed_where_the_range_alone_tells_the_height(hover):
 # -- every reason and every event ----------------------------------------------------------------------------
 def test_every_reason_has_its_case(hover):
     """But for `not_needed` and `ahead`, which are given to readings before they reach the navigator, and `no_heading`
-    (tests/replay/test_unknown_heading.py).
+    (tests/replays/test_unknown_heading.py).
     """
     seen: set[str] = set()
 
@@ -291,6 +291,6 @@ def test_every_event_has_its_case(hover):
     for run in runs:
         seen.update(run.on.tape.events()[:, 1].astype(int).tolist())
     flow = {k for k, (source, _, _) in enumerate(EVENT_NAMES) if source == "flow"}  # tests/test_faults_navigator.py
-    heading = {int(HEADING_FOUND), int(COMPASS_REFUTED)}  # tests/replay/test_unknown_heading.py
+    heading = {int(HEADING_FOUND), int(COMPASS_REFUTED)}  # tests/replays/test_unknown_heading.py
     faults = {int(FAULT_SUSPECTED), int(FAULT_CLEARED)}  # tests/navigation/test_protection.py
     assert seen | flow | heading | faults == set(range(len(EVENT_NAMES)))

@@ -40,8 +40,8 @@ from flownav.navigation.tape import (
     new_tape,
 )
 from flownav.record import PROTECTION_LEVELS, Record
-from flownav.replay.prepare import ReplayOptions, prepare, withhold
-from flownav.replay.session import Replay, replay
+from flownav.replays.prepare import ReplayOptions, prepare, withhold
+from flownav.replays.session import Replay, replay
 from replay_logs import SyntheticLog, log_of_flight
 from smoother_oracles import dense_decay, dense_transition, smoother_gain
 

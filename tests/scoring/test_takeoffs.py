@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from flownav.campaign.local import takeoff_history
+from flownav.campaigns.local import takeoff_history
 from flownav.cli import app
 from flownav.cli.flight_table import takeoff_lines
 from flownav.scoring.takeoffs import takeoff_of_flight, takeoff_of_flights, takeoffs

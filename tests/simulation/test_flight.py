@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.campaign.local import counted_steps, fly_many, fly_recorded, score_history
+from flownav.campaigns.local import counted_steps, fly_many, fly_recorded, score_history
 from flownav.parameter_files import check, shipped
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, touchdown_rows

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.campaign.local import fly_many
+from flownav.campaigns.local import fly_many
 from flownav.compile import LANES, kernel
 from flownav.errors import InputError
 from flownav.record import POSITION_NED

@@ -15,9 +15,9 @@ from flownav.navigation.tables import estimate_table, innovation_table, states_t
 from flownav.navigation.tape import empty_tape
 from flownav.navigation.told import Equipment
 from flownav.record import Record
-from flownav.replay.fed import as_fed
-from flownav.replay.prepare import ReplayOptions
-from flownav.replay.session import replay
+from flownav.replays.fed import as_fed
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import replay
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import buffers_of, fly_into, fly_written
 from flownav.simulation.flight_record import record_of

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flownav.campaign.local import score_history
+from flownav.campaigns.local import score_history
 from flownav.compile import LANES
 from flownav.errors import InputError
 from flownav.parameter_files import check

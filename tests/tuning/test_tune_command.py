@@ -16,7 +16,7 @@ from flownav.cli import replay, tune
 from flownav.errors import InputError
 from flownav.logs.open_log import open_flight
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.replay.prepare import ReplayOptions
+from flownav.replays.prepare import ReplayOptions
 from flownav.tuning import job
 from replay_logs import log_of_flight, write_table
 from tuning_logs import noisy_flight

@@ -10,7 +10,7 @@ import pytest
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.measurement import COLUMNS, Sensor, Stream
-from flownav.replay.prepare import ReplayOptions
+from flownav.replays.prepare import ReplayOptions
 from flownav.tuning.scores import (
     LEAST_SHARE,
     LOSS,

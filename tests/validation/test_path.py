@@ -14,8 +14,8 @@ from flownav.frames import GRAVITY_M_S2
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.measurement import Sensor, Stream
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.replay.prepare import ReplayOptions
-from flownav.replay.session import replay
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import replay
 from flownav.validation.flights import load_flights
 from flownav.validation.path import Lean, lean_of, path_of, upright
 

@@ -9,8 +9,8 @@ from helpers.replay_logs import log_of_flight
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.replay.prepare import ReplayOptions
-from flownav.replay.session import replay
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import replay
 from flownav.sensors import flow, inertial
 from flownav.sensors.datasheet import FlowSettings, load_sensor
 from flownav.sensors.imu import ImuReading

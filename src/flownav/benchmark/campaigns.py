@@ -13,11 +13,11 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from flownav.benchmark.figure import Figure
-from flownav.campaign.engines.engine import Engine, Part
-from flownav.campaign.engines.local import Local
-from flownav.campaign.plan import Plan, planned
-from flownav.campaign.run import run_campaign
-from flownav.campaign.store import PART, Store
+from flownav.campaigns.engines.engine import Engine, Part
+from flownav.campaigns.engines.local import Local
+from flownav.campaigns.plan import Plan, planned
+from flownav.campaigns.run import run_campaign
+from flownav.campaigns.store import PART, Store
 from flownav.simulation.scenario import load_scenario
 
 ROUNDS = 3
@@ -87,7 +87,7 @@ def _cluster(plan: Plan) -> list[Figure]:
     """Ray on one node against threads, both warm; nothing without Ray."""
     if find_spec("ray") is None:
         return []
-    from flownav.campaign.engines.ray_cluster import RayCluster
+    from flownav.campaigns.engines.ray_cluster import RayCluster
 
     cluster = RayCluster()
     local, ray = _by_turns([lambda: _bare(plan), lambda: _fly(plan, cluster)])

@@ -20,9 +20,9 @@ def replay_once(folder: Path) -> object:
     """Read the log, replay it, and bundle the record."""
     from flownav.logs.csv_folder import read_csv_folder
     from flownav.navigation.settings import NavigatorSettingsFile
-    from flownav.replay.bundle import to_record
-    from flownav.replay.prepare import ReplayOptions
-    from flownav.replay.session import replay
+    from flownav.replays.bundle import to_record
+    from flownav.replays.prepare import ReplayOptions
+    from flownav.replays.session import replay
 
     flown = replay(read_csv_folder(folder), ReplayOptions(), NavigatorSettingsFile())
     return to_record(flown, flown.scores(), ["flownav", "bench"])
@@ -35,7 +35,7 @@ def navigator_run(folder: Path) -> Callable[[], object]:
     from flownav.navigation.loop import run, start_navigator
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.navigation.tape import new_tape
-    from flownav.replay.prepare import ReplayOptions, prepare
+    from flownav.replays.prepare import ReplayOptions, prepare
 
     settings, prepared = NavigatorSettingsFile(), prepare(read_csv_folder(folder), ReplayOptions())
     queue = prepared.queue

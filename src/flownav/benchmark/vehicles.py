@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.benchmark.timing import best_of
-from flownav.campaign.local import fly_many
+from flownav.campaigns.local import fly_many
 from flownav.compile import LANES, kernel, pointer, procedure, unit
 from flownav.estimation.kalman import Lanes, Work
 from flownav.navigation.take import UNIT_SIGNATURE

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from flownav.campaign.local import known_exactly
-from flownav.campaign.plan import Cell, Plan
-from flownav.campaign.requirement import requirement_file
+from flownav.campaigns.local import known_exactly
+from flownav.campaigns.plan import Cell, Plan
+from flownav.campaigns.requirement import requirement_file
 from flownav.certification.cells import words_of as words_of_cell
 from flownav.parameter_files import shipped
 from flownav.provenance import hash_of

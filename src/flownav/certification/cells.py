@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaign.measures import MEASURES, NOT_LANDED
-from flownav.campaign.plan import Cell, Plan, lands
-from flownav.campaign.requirement import NO_FAULT, OWN_SENSOR, Requirement, fixed_by, scenario_of
-from flownav.campaign.sampling import INSIDE
-from flownav.campaign.store import PLAN, plan_in
+from flownav.campaigns.measures import MEASURES, NOT_LANDED
+from flownav.campaigns.plan import Cell, Plan, lands
+from flownav.campaigns.requirement import NO_FAULT, OWN_SENSOR, Requirement, fixed_by, scenario_of
+from flownav.campaigns.sampling import INSIDE
+from flownav.campaigns.store import PLAN, plan_in
 from flownav.certification.started import from_height
 from flownav.errors import InputError
 from flownav.faults.catalogue import FAULTS

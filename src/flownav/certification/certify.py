@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaign.engines.engine import Engine
-from flownav.campaign.measures import ROW_COLUMNS, measured
-from flownav.campaign.plan import Plan
-from flownav.campaign.requirement import Requirement, fixed_by
-from flownav.campaign.run import Watch, run_campaign
-from flownav.campaign.store import Dataset, Store
-from flownav.campaign.summary import inputs_of
-from flownav.campaign.tolerance import Verdict, joint
+from flownav.campaigns.engines.engine import Engine
+from flownav.campaigns.measures import ROW_COLUMNS, measured
+from flownav.campaigns.plan import Plan
+from flownav.campaigns.requirement import Requirement, fixed_by
+from flownav.campaigns.run import Watch, run_campaign
+from flownav.campaigns.store import Dataset, Store
+from flownav.campaigns.summary import inputs_of
+from flownav.campaigns.tolerance import Verdict, joint
 from flownav.certification.cells import words_of
 from flownav.certification.envelope import envelope_of, failing, outcome
 from flownav.certification.judgement import Judgement, bad_first, judged

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaign.measures import measured
-from flownav.campaign.requirement import Requirement, needed_by
-from flownav.campaign.tolerance import interval, joint
-from flownav.campaign.views import DIRECTION, SPEED
+from flownav.campaigns.measures import measured
+from flownav.campaigns.requirement import Requirement, needed_by
+from flownav.campaigns.tolerance import interval, joint
+from flownav.campaigns.views import DIRECTION, SPEED
 from flownav.certification.judgement import failed, judged
 from flownav.simulation.ensemble import Ensemble
 

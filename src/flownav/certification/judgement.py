@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaign.measures import MEASURES, measured
-from flownav.campaign.requirement import RequirementTable, needed_by
-from flownav.campaign.tolerance import (
+from flownav.campaigns.measures import MEASURES, measured
+from flownav.campaigns.requirement import RequirementTable, needed_by
+from flownav.campaigns.tolerance import (
     Interval,
     Verdict,
     allowed,

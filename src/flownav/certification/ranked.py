@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaign.arrow import column, numbers, read
-from flownav.campaign.engines.engine import Engine, Part
-from flownav.campaign.measures import measured
-from flownav.campaign.plan import Plan
-from flownav.campaign.ranking import Index, Ranking, rank
-from flownav.campaign.requirement import RequirementTable
+from flownav.campaigns.arrow import column, numbers, read
+from flownav.campaigns.engines.engine import Engine, Part
+from flownav.campaigns.measures import measured
+from flownav.campaigns.plan import Plan
+from flownav.campaigns.ranking import Index, Ranking, rank
+from flownav.campaigns.requirement import RequirementTable
 from flownav.certification.judgement import bad_first
 from flownav.files import written_whole
 from flownav.simulation.dispersion import Design

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from flownav.campaign.again import record_again, record_path
-from flownav.campaign.measures import MEASURES, NOT_LANDED, ROW_COLUMNS, measured
-from flownav.campaign.store import RECORDS, Dataset, Store
+from flownav.campaigns.again import record_again, record_path
+from flownav.campaigns.measures import MEASURES, NOT_LANDED, ROW_COLUMNS, measured
+from flownav.campaigns.store import RECORDS, Dataset, Store
 from flownav.certification.assumed import assumed, files_in, hashes
 from flownav.certification.certify import Certificate
 from flownav.certification.envelope import failing

@@ -12,7 +12,7 @@ import typer
 from flownav.cli.output import VehicleOption
 
 if TYPE_CHECKING:
-    from flownav.campaign.accuracy import Case
+    from flownav.campaigns.accuracy import Case
 
 STATES = ("x", "y", "z", "u", "v", "w")
 TRUTH_MODELS = ("matched", "ensemble")
@@ -31,7 +31,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Hold the navigator against its targets, matched and as an ensemble; what its pieces are worth, matched."""
-    from flownav.campaign.accuracy import CASES, flights_of, run_case
+    from flownav.campaigns.accuracy import CASES, flights_of, run_case
     from flownav.cli.output import progress, require_between, require_writable
     from flownav.errors import InputError, VerdictError
 

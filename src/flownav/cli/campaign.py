@@ -15,8 +15,8 @@ from flownav.cli.output import VehicleOption
 from flownav.errors import InputError
 
 if TYPE_CHECKING:
-    from flownav.campaign.engines.engine import Engine
-    from flownav.campaign.plan import Plan
+    from flownav.campaigns.engines.engine import Engine
+    from flownav.campaigns.plan import Plan
 
 FLIGHTS, FLIGHTS_UNTIL = 1000, 100_000
 TRUTH_MODELS = ("ensemble", "matched", "both")
@@ -61,10 +61,10 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Fly a scenario many times: radii, shares and percentiles with intervals, a dataset, the worst flights."""
-    from flownav.campaign.figures import stop_of
-    from flownav.campaign.plan import MOST_FLIGHTS, planned
-    from flownav.campaign.sampling import SAMPLINGS
-    from flownav.campaign.summary import WORST
+    from flownav.campaigns.figures import stop_of
+    from flownav.campaigns.plan import MOST_FLIGHTS, planned
+    from flownav.campaigns.sampling import SAMPLINGS
+    from flownav.campaigns.summary import WORST
     from flownav.cli.output import require_between
     from flownav.guard import an_input
     from flownav.simulation.scenario import load_scenario, with_vehicle
@@ -110,9 +110,9 @@ def command(
 
 def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) -> None:
     """Fly what the folder lacks; summary, records and page; what is said of them."""
-    from flownav.campaign.run import run_campaign
-    from flownav.campaign.store import REPORT, SUMMARY, Store
-    from flownav.campaign.summary import summary_of
+    from flownav.campaigns.run import run_campaign
+    from flownav.campaigns.store import REPORT, SUMMARY, Store
+    from flownav.campaigns.summary import summary_of
     from flownav.cli.campaign_progress import watching
 
     with Store(folder).opened(plan) as store:
@@ -136,8 +136,8 @@ def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) 
 
 def _keep_records(plan: Plan, summary: dict[str, Any], folder: Path, count: int) -> list[str]:
     """Records and reports of the worst flights and of the first cell's median one; where they lie."""
-    from flownav.campaign.again import record_again, record_path
-    from flownav.campaign.store import RECORDS
+    from flownav.campaigns.again import record_again, record_path
+    from flownav.campaigns.store import RECORDS
     from flownav.cli.output import save
 
     if count == 0:
@@ -153,8 +153,8 @@ def _keep_records(plan: Plan, summary: dict[str, Any], folder: Path, count: int)
 
 def _keep_page(plan: Plan, summary: dict[str, Any], folder: Path, records: list[str]) -> None:
     """The campaign's page, with links to the reports of the flights that were kept."""
-    from flownav.campaign.measures import measured
-    from flownav.campaign.store import RECORDS, REPORT, Dataset
+    from flownav.campaigns.measures import measured
+    from flownav.campaigns.store import RECORDS, REPORT, Dataset
     from flownav.report.campaign import write_campaign
     from flownav.report.campaign_figures import Touchdowns
 
@@ -169,8 +169,8 @@ def _keep_page(plan: Plan, summary: dict[str, Any], folder: Path, records: list[
 
 def _again(plan: Plan, flight: str, folder: Path, as_json: bool) -> None:
     """One flight of the campaign, flown again."""
-    from flownav.campaign.again import record_again, record_path
-    from flownav.campaign.store import RECORDS, Store
+    from flownav.campaigns.again import record_again, record_path
+    from flownav.campaigns.store import RECORDS, Store
     from flownav.cli.output import save
 
     cell, _, number = flight.rpartition(":")
@@ -194,7 +194,7 @@ def _again(plan: Plan, flight: str, folder: Path, as_json: bool) -> None:
 
 def _planned_flights(folder: Path | None) -> int | None:
     """How many flights the campaign of a folder has, where there is one."""
-    from flownav.campaign.store import PLAN, plan_in
+    from flownav.campaigns.store import PLAN, plan_in
 
     found = plan_in(folder).get("flights") if folder is not None and (folder / PLAN).is_file() else None
     return found if isinstance(found, int) else None

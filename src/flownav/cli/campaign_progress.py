@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from flownav.campaign.plan import Plan
-    from flownav.campaign.run import Progress
+    from flownav.campaigns.plan import Plan
+    from flownav.campaigns.run import Progress
 
 
 class Shown:
@@ -28,7 +28,7 @@ class Shown:
 
 def figure_words(progress: Progress) -> str:
     """The figure that is followed, with its interval."""
-    from flownav.campaign.figures import FIGURES
+    from flownav.campaigns.figures import FIGURES
 
     if progress.interval is None:
         return ""

@@ -12,17 +12,17 @@ import typer
 from flownav.errors import InputError
 
 if TYPE_CHECKING:
-    from flownav.campaign.plan import Plan
-    from flownav.campaign.rare.estimate import Rare
+    from flownav.campaigns.plan import Plan
+    from flownav.campaigns.rare.estimate import Rare
 
 FLIGHT, FOUND = "rare_flight.json", "rare.json"
 
 
 def fly_rare(plan: Plan, event: str, folder: Path, as_json: bool) -> None:
     """Estimate, write what was found and the most likely flight, and say it."""
-    from flownav.campaign.measures import MEASURES, event_of
-    from flownav.campaign.plan import lands
-    from flownav.campaign.rare.estimate import estimate_rare
+    from flownav.campaigns.measures import MEASURES, event_of
+    from flownav.campaigns.plan import lands
+    from flownav.campaigns.rare.estimate import estimate_rare
     from flownav.cli.output import progress, require_writable
     from flownav.files import written_whole
 
@@ -60,7 +60,7 @@ def _require_one(plan: Plan, option: str) -> None:
 
 def _keep(plan: Plan, found: Rare, folder: Path) -> dict[str, str]:
     """The most likely flight as a file, as a record and as a report; where they lie."""
-    from flownav.campaign.rare.replay import replayed, write_branch
+    from flownav.campaigns.rare.replay import replayed, write_branch
     from flownav.cli.output import save
 
     if found.branch is None:
@@ -73,7 +73,7 @@ def _keep(plan: Plan, found: Rare, folder: Path) -> dict[str, str]:
 
 def fly_again(plan: Plan, path: Path, as_json: bool) -> None:
     """The flight of such a file, flown again; its record lies beside it."""
-    from flownav.campaign.rare.replay import read_branch, replayed
+    from flownav.campaigns.rare.replay import read_branch, replayed
     from flownav.cli.output import save
 
     _require_one(plan, "--flight")

@@ -13,9 +13,9 @@ from flownav.cli.output import VehicleOption
 from flownav.errors import InputError
 
 if TYPE_CHECKING:
-    from flownav.campaign.engines.engine import Engine
-    from flownav.campaign.plan import Plan
-    from flownav.campaign.requirement import Requirement
+    from flownav.campaigns.engines.engine import Engine
+    from flownav.campaigns.plan import Plan
+    from flownav.campaigns.requirement import Requirement
 
 
 def command(
@@ -34,8 +34,8 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Fly what a requirement asks for: pass, fail or not shown, with its risk; exit status 1 unless it passes."""
-    from flownav.campaign.ranking import LEAST
-    from flownav.campaign.requirement import load_requirement
+    from flownav.campaigns.ranking import LEAST
+    from flownav.campaigns.requirement import load_requirement
     from flownav.certification.cells import plan_of
     from flownav.certification.certify import TOLD
     from flownav.cli.output import require_between
@@ -69,8 +69,8 @@ def _fly(
     asked: Requirement, plan: Plan, engine: Engine, name: str, folder: Path, ranking: int, records: int
 ) -> dict[str, Any]:  # fmt: skip
     """Fly what the folder lacks, rank, write."""
-    from flownav.campaign.ranking import flights_of
-    from flownav.campaign.store import Store
+    from flownav.campaigns.ranking import flights_of
+    from flownav.campaigns.store import Store
     from flownav.certification.cells import require_planned
     from flownav.certification.certify import certify, with_ranking
     from flownav.certification.written import write_certificate
@@ -91,7 +91,7 @@ def _fly(
 
 def _say_plan(asked: Requirement, as_json: bool) -> None:
     """How many flights each requirement needs, by the failures that it may have, and how many the file asks for."""
-    from flownav.campaign.requirement import needed_by
+    from flownav.campaigns.requirement import needed_by
     from flownav.certification.judgement import PLANS
 
     rows = [

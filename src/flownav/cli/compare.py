@@ -45,7 +45,7 @@ def command(
     from flownav.errors import InputError
     from flownav.logs.open_log import open_flight
     from flownav.measurement import Sensor
-    from flownav.replay.session import table_windows
+    from flownav.replays.session import table_windows
 
     option = f"--outages {outages}"
     asked = table_windows(*numbers("--outages", outages, ":", 3, "T0:T1:LENGTH"), option="--outages") if outages else []
@@ -75,7 +75,7 @@ def settings_asked(asked: list[str], sensor: Path | None) -> list[Setting]:
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.navigation.settings_of import settings_of
     from flownav.parameter_files import load
-    from flownav.replay.prepare import ReplayOptions
+    from flownav.replays.prepare import ReplayOptions
     from flownav.sensors.datasheet import load_sensor
     from flownav.sensors.identified import identified_flow
 

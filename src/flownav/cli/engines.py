@@ -10,7 +10,7 @@ import typer
 from flownav.errors import InputError
 
 if TYPE_CHECKING:
-    from flownav.campaign.engines.engine import Engine
+    from flownav.campaigns.engines.engine import Engine
 
 ENGINES = ("local", "ray", "cuda")
 EngineOption = Annotated[str, typer.Option(help="Where it flies: local, ray (a cluster), cuda (a GPU).")]
@@ -26,13 +26,13 @@ def engine_named(name: str) -> Engine:
     """The engine of that name. InputError where what it needs is not there."""
     require_engine(name)
     if name == "local":
-        from flownav.campaign.engines.local import Local
+        from flownav.campaigns.engines.local import Local
 
         return Local()
     if name == "ray":
-        from flownav.campaign.engines.ray_cluster import RayCluster
+        from flownav.campaigns.engines.ray_cluster import RayCluster
 
         return RayCluster()
-    from flownav.campaign.engines.cuda import Cuda
+    from flownav.campaigns.engines.cuda import Cuda
 
     return Cuda(processes=os.cpu_count() or 1)

@@ -25,7 +25,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Fly a scenario in winds of many speeds and directions: a table and a polar map of the share that landed."""
-    from flownav.campaign.envelope import directions_deg, fly_envelope
+    from flownav.campaigns.envelope import directions_deg, fly_envelope
     from flownav.cli.output import progress, require_between, require_writable
     from flownav.errors import InputError
     from flownav.report.envelope import write_envelope

@@ -56,8 +56,8 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
-    from flownav.campaign.judged import BOUND_FLIGHTS, bound_of, consistency_facts, fly_judged
-    from flownav.campaign.local import fly_recorded, known_exactly, median_flight
+    from flownav.campaigns.judged import BOUND_FLIGHTS, bound_of, consistency_facts, fly_judged
+    from flownav.campaigns.local import fly_recorded, known_exactly, median_flight
     from flownav.cli.output import progress, require_between, require_writable_record, save
     from flownav.scoring.errors import scores_of_flights
     from flownav.scoring.paper_tables import percentile_of_paper, published
@@ -130,8 +130,8 @@ def _fly_pixels(
     """Flights on rendered frames, one after the other: the first one's record, their scores, frames by height."""
     import numpy as np
 
-    from flownav.campaign.local import fly_recorded, score_history
-    from flownav.campaign.pixels import agreement, fly_on_pixels
+    from flownav.campaigns.local import fly_recorded, score_history
+    from flownav.campaigns.pixels import agreement, fly_on_pixels
     from flownav.cli.output import progress
     from flownav.simulation.engine import fly_one
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from flownav.replay.session import Replay
+    from flownav.replays.session import Replay
 
 
 def command(
@@ -54,10 +54,10 @@ def command(
     from flownav.cli.output import require_writable_record, save
     from flownav.errors import VerdictError
     from flownav.navigation.settings_of import settings_of
-    from flownav.replay.bundle import to_record
-    from flownav.replay.fed import as_fed
-    from flownav.replay.prepare import ReplayOptions
-    from flownav.replay.session import replay, table_windows
+    from flownav.replays.bundle import to_record
+    from flownav.replays.fed import as_fed
+    from flownav.replays.prepare import ReplayOptions
+    from flownav.replays.session import replay, table_windows
     from flownav.sensors.datasheet import load_sensor
     from flownav.sensors.identified import identified_flow
 
@@ -119,7 +119,7 @@ def _settings(path: Path) -> Any:
 def _fly_table(flown: Replay, table: list[tuple[float, float]], explicit: list[dict[str, Any]]) -> dict[str, Any]:
     """The table's windows after the explicit ones, with their median and worst."""
     from flownav.cli.output import progress
-    from flownav.replay.session import outage_entry, outage_summary, outage_table
+    from flownav.replays.session import outage_entry, outage_summary, outage_table
 
     with progress("GPS outages", len(table)) as advance:
         errors = outage_table(flown.log, flown.options, flown.settings, table, advance)

@@ -12,9 +12,9 @@ from flownav.compare.tracks import Track, of_estimate, of_table
 from flownav.logs.log import Log
 from flownav.measurement import Sensor, Stream
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.replay.fed import as_fed
-from flownav.replay.prepare import FLOW, ReplayOptions, check_windows
-from flownav.replay.session import Replay, outage_table, replay
+from flownav.replays.fed import as_fed
+from flownav.replays.prepare import FLOW, ReplayOptions, check_windows
+from flownav.replays.session import Replay, outage_table, replay
 from flownav.scoring.outage import outage_error
 
 

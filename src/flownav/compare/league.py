@@ -12,7 +12,7 @@ from flownav.errors import InputError
 from flownav.files import natural_order
 from flownav.logs.csv_folder import FILES
 from flownav.logs.open_log import log_kind, open_flight
-from flownav.replay.prepare import ReplayOptions
+from flownav.replays.prepare import ReplayOptions
 
 HEAD = """# The league
 

@@ -12,7 +12,7 @@ from flownav.compare.tracks import Track, at, says
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
 from flownav.record import POSITION_NED
-from flownav.replay.judged import columns_of
+from flownav.replays.judged import columns_of
 from flownav.scoring.alignment import Alignment, align, velocity_of
 
 LEAST_INSTANTS = 10

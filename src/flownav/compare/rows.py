@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 from flownav.compare.like_for_like import Reference, Window, errors_of, reference_of, shared_by
 from flownav.compare.tracks import Track
 from flownav.logs.log import Log
-from flownav.replay.airborne import airborne_of
-from flownav.replay.judged import end_drift_of
-from flownav.replay.session import outage_entry, outage_summary
+from flownav.replays.airborne import airborne_of
+from flownav.replays.judged import end_drift_of
+from flownav.replays.session import outage_entry, outage_summary
 from flownav.scoring.outage import OutageError
 
 FLOWNAV, DEAD_RECKONING, AUTOPILOT = "flownav", "dead reckoning", "autopilot"

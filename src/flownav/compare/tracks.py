@@ -11,7 +11,7 @@ from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.measurement import Array
 from flownav.navigation.tables import estimate_table
 from flownav.record import QUATERNION, VELOCITY_BODY, Table
-from flownav.replay.judged import columns_of, motion_of
+from flownav.replays.judged import columns_of, motion_of
 from flownav.scoring.drift import Motion
 
 LONGEST_GAP_S = 0.5  # over more, an estimate between two rows is nobody's

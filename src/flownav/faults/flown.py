@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaign.local import touchdown_history
+from flownav.campaigns.local import touchdown_history
 from flownav.compile import LANES
 from flownav.estimation.gating import Reason
 from flownav.faults.catalogue import Fault

@@ -20,7 +20,7 @@ from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.settings_of import Told
 from flownav.navigation.tables import Written, written_on
 from flownav.navigation.tape import EVENT_NAMES, LEVELS_AT, new_tape
-from flownav.replay.prepare import Prepared, ReplayOptions, prepare
+from flownav.replays.prepare import Prepared, ReplayOptions, prepare
 from flownav.sensors.identified import IdentifiedFlow
 from flownav.simulation.assemble import Setup
 

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.campaign.local import fly_recorded
+from flownav.campaigns.local import fly_recorded
 from flownav.faults.catalogue import Fault
 from flownav.faults.flight_log import log_of
 from flownav.faults.navigated import Navigate

@@ -21,9 +21,9 @@ from flownav.identification.usable import Ranges, believed, beside
 from flownav.logs.log import Log
 from flownav.logs.rates import attitude_at
 from flownav.measurement import Array, Sensor, Stream
-from flownav.replay.airborne import flying_at
-from flownav.replay.attitude import turned_sensor, with_attitude
-from flownav.replay.prepare import ReplayOptions, prepare
+from flownav.replays.airborne import flying_at
+from flownav.replays.attitude import turned_sensor, with_attitude
+from flownav.replays.prepare import ReplayOptions, prepare
 
 MOST_JUMPING = 0.6
 LEAST_FLOW = 200

@@ -15,10 +15,10 @@ from flownav.logs.plausible import check_plausible
 from flownav.logs.rates import attitude_at
 from flownav.measurement import Array, Sensor, Stream
 from flownav.record import VELOCITY_BODY
-from flownav.replay.autopilot import autopilot_scores
-from flownav.replay.prepare import ReplayOptions, prepare
-from flownav.replay.readiness import obstacles
-from flownav.replay.sentinel import Finding, findings
+from flownav.replays.autopilot import autopilot_scores
+from flownav.replays.prepare import ReplayOptions, prepare
+from flownav.replays.readiness import obstacles
+from flownav.replays.sentinel import Finding, findings
 from flownav.scoring.coverage import silences
 
 CLOCK_REASONS = {

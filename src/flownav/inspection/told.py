@@ -10,8 +10,8 @@ from flownav.identification.first_look import IN_PART, Look
 from flownav.identification.usable import jumps
 from flownav.logs.log import Log
 from flownav.measurement import Sensor
-from flownav.replay.airborne import flying_at
-from flownav.replay.sentinel import Finding
+from flownav.replays.airborne import flying_at
+from flownav.replays.sentinel import Finding
 
 LEAST_JUMPING = 0.01  # of the steps in flight: of less, one echo is no trouble
 

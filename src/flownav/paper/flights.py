@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from flownav.campaign.local import fly_many, median_flight, score_history
+from flownav.campaigns.local import fly_many, median_flight, score_history
 from flownav.compile import LANES
 from flownav.measurement import Array
 from flownav.optics.firmware import EARLY_GYRO_SCALE

@@ -13,9 +13,9 @@ from flownav.compare.rows import names_of
 from flownav.errors import InputError
 from flownav.logs.log import Log
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.replay.fed import as_fed
-from flownav.replay.prepare import ReplayOptions
-from flownav.replay.session import replay
+from flownav.replays.fed import as_fed
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import replay
 from flownav.tuning.judge import UNMOVED, Judgement, judge
 from flownav.tuning.knobs import Knob, knobs_of, rounded, turned
 from flownav.tuning.scores import Gains, reference_name

@@ -16,9 +16,9 @@ from flownav.compare.like_for_like import Window
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
-from flownav.replay.judged import TESTED
-from flownav.replay.prepare import FLOW, ReplayOptions
-from flownav.replay.session import Replay
+from flownav.replays.judged import TESTED
+from flownav.replays.prepare import FLOW, ReplayOptions
+from flownav.replays.session import Replay
 from flownav.scoring.alignment import velocity_of
 from flownav.scoring.outage import difference_at
 

@@ -12,7 +12,7 @@ from flownav.compare.like_for_like import Window
 from flownav.errors import InputError
 from flownav.measurement import Array
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.replay.session import Replay, replay_again
+from flownav.replays.session import Replay, replay_again
 from flownav.tuning.knobs import Knob, turned
 from flownav.tuning.scores import LOSS, Gains, Scores, gains_of, scores_of, with_cuts
 

@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
 from flownav.navigation.tape import EVENT_NAMES
-from flownav.replay.judged import TESTED
-from flownav.replay.session import Replay
+from flownav.replays.judged import TESTED
+from flownav.replays.session import Replay
 from flownav.scoring.consistency import consistency_of, lag_one
 from flownav.validation.path import ground_of
 from flownav.validation.rates import rate_hz

@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from flownav.parameter_files import Number, ParameterModel, load, shipped
-from flownav.replay.session import table_windows
+from flownav.replays.session import table_windows
 
 SHIPPED_FILE = "validation.toml"
 

@@ -13,8 +13,8 @@ from flownav.logs.log import Log
 from flownav.logs.open_log import open_flight
 from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.replay.prepare import ReplayOptions
-from flownav.replay.session import Replay, outage_summary, outage_table, replay
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import Replay, outage_summary, outage_table, replay
 from flownav.validation.drawn import Flight
 from flownav.validation.figures import figures_of
 from flownav.validation.flights import AssumedVehicle, ValidationFile, Window

@@ -25,7 +25,7 @@ from flownav.frames import GRAVITY_M_S2
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
 from flownav.navigation.tables import states_table
-from flownav.replay.session import Replay
+from flownav.replays.session import Replay
 from flownav.validation.flights import AssumedVehicle
 
 GRID_HZ = 50.0

@@ -1,0 +1,146 @@
+"""Flights on a CUDA device (extra `gpu`): a thread a flight, float64, from the same equations as on the CPU.
+
+Flights are flown so many at once; their scores come back and nothing else. Of an ensemble the truths are drawn on the
+CPU, as everywhere, while the device flies the flights before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.campaigns.engines.device_flight import TAPE_COUNTS, fly_navigated_flight, fly_paper_flight, take_here
+from flownav.campaigns.engines.drawn import Truths, truths_of_cell
+from flownav.campaigns.engines.engine import Part
+from flownav.campaigns.engines.local import neighbours
+from flownav.campaigns.local import home_epoch
+from flownav.campaigns.plan import Ready
+from flownav.compile import ONE_LANE, WARP, NoDeviceError, Runner, announce_compilation, device_runner
+from flownav.errors import InputError
+from flownav.estimation.covariance import with_lag
+from flownav.navigation.memory import new_work
+from flownav.navigation.packed import load_flow_settings
+from flownav.navigation.take import navigator_unit
+from flownav.navigation.told import carries_lag
+from flownav.scoring.running import RUNNING_COLUMNS, RUNNING_ROWS
+from flownav.simulation.draws import plain_noise
+from flownav.simulation.engine import buffers_of
+from flownav.simulation.plan import Flight
+from flownav.simulation.truth import TRUTH_ROWS
+
+Array = NDArray[np.float64]
+
+AT_ONCE = 32768  # flights: eight warps on each of an H200's 132 multiprocessors
+MEMORY_SHARE = 0.8  # of what is free
+
+
+class Cuda:
+    """The CUDA device of this machine, or Numba's simulator of one. InputError where there is neither.
+
+    at_once: flights. processes: that draw truths; more than one start as `multiprocessing` starts them, so that a
+    script's main module must be guarded.
+    """
+
+    def __init__(self, runner: Runner | None = None, at_once: int = AT_ONCE, processes: int = 1) -> None:
+        self._runner = runner or _runner()
+        self._at_once, self._processes = at_once, processes
+
+    def fly(
+        self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
+    ) -> Iterator[tuple[Part, Array]]:
+        """The rows of each part; parts that follow each other are flown together."""
+        asked = sum(part.flights for part in parts)
+        with truths_of_cell(cell, seed, asked, self._processes) as truths:
+            for together in neighbours(parts):
+                waiting, held = list(together), np.empty((0, RUNNING_COLUMNS))
+                total = sum(part.flights for part in together)
+                for rows in self.rows(cell.flight, seed, together[0].first, total, truths):
+                    on_progress(len(rows))
+                    held = np.concatenate([held, rows])
+                    while waiting and len(held) >= waiting[0].flights:
+                        part = waiting.pop(0)
+                        yield part, held[: part.flights]
+                        held = held[part.flights :]
+
+    def rows(self, flight: Flight, seed: int, first: int, flights: int, truths: Truths) -> Iterator[Array]:
+        """The rows of so many flights from number `first` on, (flights, RUNNING_COLUMNS), as many as fit at a time."""
+        at_once = min(self._at_once, flights, most_that_fit(self._runner.free_bytes(), flight))
+        if at_once < 1:
+            raise InputError("--engine cuda: the device has no memory left for a flight; use --engine local")
+        room = Room(self._runner, flight, at_once)
+        starts = range(first, first + flights, at_once)
+        counts = [min(at_once, first + flights - start) for start in starts]
+        with ThreadPoolExecutor(1) as beside, announce_compilation("device"):
+            coming = beside.submit(truths, starts[0], counts[0])
+            for k, (start, count) in enumerate(zip(starts, counts, strict=True)):
+                truth = coming.result()
+                if k + 1 < len(starts):
+                    coming = beside.submit(truths, starts[k + 1], counts[k + 1])
+                yield room.fly(seed, start, count, truth.reshape(-1))
+
+
+def rows_of_flight(flight: Flight) -> int:
+    """Rows of the lane buffer of one flight on a device: the simulator's, and those of its scores."""
+    return len(buffers_of(flight, ONE_LANE, 0, written=False).work) + RUNNING_ROWS
+
+
+def most_that_fit(free_bytes: int, flight: Flight) -> int:
+    """How many flights a device has memory for, in whole warps where there are any."""
+    navigator = len(new_work(ONE_LANE)) + TAPE_COUNTS if flight.onboard is not None else 0
+    each = 8 * (rows_of_flight(flight) + navigator + TRUTH_ROWS + 2 * RUNNING_COLUMNS)
+    return int(MEMORY_SHARE * free_bytes) // (each * WARP) * WARP
+
+
+class Room:
+    """A device's memory for flights of one kind, so many at once."""
+
+    def __init__(self, runner: Runner, flight: Flight, at_once: int) -> None:
+        self._runner, self._flight = runner, flight
+        whole = -(-at_once // WARP) * WARP
+        self._rows = rows_of_flight(flight)
+        self._told = {
+            "flight": runner.put(flight), "noise": runner.put(plain_noise(1)), "rows": self._rows,
+            "work": runner.new((whole * self._rows,), np.float64),
+        }  # fmt: skip
+        self._constants: dict[str, Any] = {}
+        self._function: Callable[..., None] = fly_paper_flight
+        if flight.onboard is None:
+            home = home_epoch(flight)
+            self._told["home"] = -1 if home is None else home
+        else:
+            self._function = fly_navigated_flight
+            fresh = new_work(ONE_LANE, faults=flight.plan.minds_faults)
+            self._told |= {
+                "fresh": runner.put(fresh), "nav": runner.new((whole * len(fresh),), np.float64),
+                "nothing": runner.put(np.zeros(1)), "room": runner.put(np.zeros(TAPE_COUNTS, np.int64)),
+                "used": runner.new((whole * TAPE_COUNTS,), np.int64),
+            }  # fmt: skip
+            lag = carries_lag(load_flow_settings(flight.settings))
+            self._constants = {"take": _navigator(runner, lag)}
+
+    def fly(self, seed: int, first: int, flights: int, truth: Array) -> Array:
+        """The rows of flights from number `first` on; truth: `packed_truth` of each, or of one for all."""
+        put = self._runner.put
+        scores = self._runner.new((RUNNING_COLUMNS, flights), np.float64)
+        told = self._told | {"seed": seed, "first": first, "truth": put(truth), "scores": scores}
+        self._runner.run(self._function, flights, told, self._constants)
+        return np.ascontiguousarray(self._runner.fetch(scores).T)
+
+
+def _navigator(runner: Runner, lag: bool) -> Any:
+    """How a flight calls its navigator: in Python a callable; on a device the marker of its build (`take_here`)."""
+    if runner.in_python:
+        return navigator_unit(ONE_LANE, lag).python
+    return with_lag(ONE_LANE) if lag else ONE_LANE
+
+
+def _runner() -> Runner:
+    """The device of this machine. InputError where there is none."""
+    try:
+        return device_runner(take_here)
+    except NoDeviceError as error:
+        raise InputError(f"--engine cuda: {error}; use --engine local") from error

@@ -1,0 +1,64 @@
+"""Flights on the cores of this machine: blocks of lanes on a pool of threads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.campaigns.engines.engine import Part
+from flownav.campaigns.plan import Ready
+from flownav.campaigns.rows import rows_of
+from flownav.simulation.engine import fly_blocks
+
+Array = NDArray[np.float64]
+
+
+class Local:
+    """threads: how many fly at once; None: as many as there are cores."""
+
+    def __init__(self, threads: int | None = None) -> None:
+        self.threads = threads
+
+    def fly(
+        self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
+    ) -> Iterator[tuple[Part, Array]]:
+        """The rows of each part; parts that follow each other are flown without a pause between them."""
+        for together in neighbours(parts):
+            yield from self._without_pause(cell, seed, together, on_progress)
+
+    def _without_pause(
+        self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object]
+    ) -> Iterator[tuple[Part, Array]]:
+        flight, waiting = cell.flight, list(parts)
+        held: list[Array] = []
+        total = sum(part.flights for part in parts)
+
+        def judge(history: Array) -> Array:
+            return rows_of(flight, history)
+
+        have = 0
+        first, faults = parts[0].first, cell.faults(seed)
+        for flown, block in fly_blocks(flight, seed, first, total, judge, self.threads, cell.ensemble, faults):
+            held.append(block)
+            have += flown
+            on_progress(flown)
+            while waiting and have >= waiting[0].flights:
+                part, rows = waiting.pop(0), np.concatenate(held)
+                held, have = [rows[part.flights :]], have - part.flights
+                yield part, rows[: part.flights]
+
+
+def neighbours(parts: Sequence[Part]) -> Iterator[list[Part]]:
+    """Parts in runs that follow each other without a gap."""
+    if not parts:
+        return
+    run = [parts[0]]
+    for before, after in pairwise(parts):
+        if after.first != before.first + before.flights:
+            yield run
+            run = []
+        run.append(after)
+    yield run

@@ -1,0 +1,89 @@
+"""Flights on a cluster: parts of a campaign as tasks of Ray, which flies a part again where a worker is lost.
+
+The cluster is the one that RAY_ADDRESS names, else one of this machine's cores. Every task flies its part on one thread
+and gives its rows back. What it needs (vehicle, sensors, scenario) goes with it: workers read no file of the user's.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import secrets
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.campaigns.engines.engine import Part
+from flownav.campaigns.engines.local import Local
+from flownav.campaigns.plan import Ready, ready_of
+from flownav.errors import InputError
+
+Array = NDArray[np.float64]
+
+AHEAD = 2  # parts that wait for each core of the cluster
+
+
+class RayCluster:
+    """address: of the cluster; None: as RAY_ADDRESS says, else a new one on this machine. InputError without Ray."""
+
+    def __init__(self, address: str | None = None) -> None:
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        try:
+            import ray
+        except ImportError:
+            raise InputError('--engine ray: Ray is not installed; pip install "flownav[cluster]"') from None
+        self._ray = ray
+        if not ray.is_initialized():
+            where = address or os.environ.get("RAY_ADDRESS")
+            try:
+                ray.init(
+                    address=where,
+                    include_dashboard=None if where else False,
+                    log_to_driver=False,
+                    logging_level=logging.ERROR,
+                )
+            except (ConnectionError, RuntimeError, ValueError) as error:
+                raise InputError(f"--engine ray: no cluster at {where}: {str(error).splitlines()[0]}") from None
+
+    def close(self) -> None:
+        """Leave the cluster; one of this machine alone ends."""
+        self._ray.shutdown()
+
+    def fly(
+        self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
+    ) -> Iterator[tuple[Part, Array]]:
+        """The rows of each part, in order, whichever worker has flown it."""
+        told = self._ray.put((cell.setup, cell.truth_model, cell.sampling, cell.flights, cell.failure))
+        key = secrets.token_hex(8)
+        task = self._ray.remote(num_cpus=1, max_retries=-1)(fly_part)
+        most = AHEAD * max(1, int(self._ray.cluster_resources().get("CPU", 1)))
+        waiting: deque[tuple[Part, Any]] = deque()
+        for part in parts:
+            waiting.append((part, task.remote([told], key, seed, part)))
+            if len(waiting) >= most:
+                yield self._taken(*waiting.popleft(), on_progress)
+        while waiting:
+            yield self._taken(*waiting.popleft(), on_progress)
+
+    def _taken(self, part: Part, result: Any, on_progress: Callable[[int], object]) -> tuple[Part, Array]:
+        """The rows of a part, once it has been flown."""
+        rows = np.array(self._ray.get(result))
+        on_progress(part.flights)
+        return part, rows
+
+
+_cells: dict[str, Ready] = {}  # of a worker: the last cell that it has flown
+
+
+def fly_part(told: list[Any], key: str, seed: int, part: Part) -> Array:
+    """A part's rows, flown by a worker on one thread. told: where what `plan.ready_of` makes a cell of is to be had."""
+    if key not in _cells:
+        import ray
+
+        _cells.clear()
+        _cells[key] = ready_of(*ray.get(told[0]))
+    ((_, rows),) = Local(threads=1).fly(_cells[key], seed, [part])
+    return rows

@@ -1,0 +1,221 @@
+"""What a campaign flies: cells, each a scenario with its values of what is swept, and how their flights are drawn."""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal, Protocol
+
+import flownav
+from flownav.campaigns.figures import FIGURES, stop_of
+from flownav.campaigns.measures import MEASURES
+from flownav.campaigns.sampling import Sampling, design_of
+from flownav.errors import InputError
+from flownav.parameter_files import check
+from flownav.provenance import code_sha256
+from flownav.simulation.assemble import Setup, assemble
+from flownav.simulation.ensemble import Ensemble
+from flownav.simulation.fault import SensorFault
+from flownav.simulation.plan import Flight
+from flownav.simulation.scenario import Scenario
+
+SCHEMA_VERSION = 1
+MOST_CELLS = 10_000
+MOST_FLIGHTS = 100_000_000
+
+TruthModel = Literal["matched", "ensemble"]
+Value = float | bool | str
+Sweep = Mapping[str, Sequence[Value]]
+
+
+class Failure(Protocol):
+    """What fails in every flight of a cell."""
+
+    @property
+    def words(self) -> str:
+        """What, from when to when."""
+
+    def law(self, flight: Flight, seed: int, number: int) -> SensorFault:
+        """One flight's fault, by its number."""
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A cell made ready to fly, of a campaign of so many flights.
+
+    ensemble: what differs from flight to flight; None where nothing does. failure: what fails; None: nothing.
+    """
+
+    setup: Setup
+    truth_model: TruthModel
+    sampling: Sampling
+    flights: int
+    ensemble: Ensemble | None
+    failure: Failure | None = None
+
+    @property
+    def flight(self) -> Flight:
+        """What the kernel flies."""
+        return self.setup.flight if self.failure is None else self.setup.flight._replace(fails=True)
+
+    def faults(self, seed: int) -> Callable[[int], SensorFault] | None:
+        """Each flight's fault by its number; None where nothing fails."""
+        failure, flight = self.failure, self.setup.flight
+        return None if failure is None else lambda number: failure.law(flight, seed, number)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One scenario of a campaign. values: of what is swept, by its name in the scenario file.
+
+    first: the number of its first flight. failure: what fails in its flights; None: nothing.
+    """
+
+    scenario: Scenario
+    values: dict[str, Value]
+    truth_model: TruthModel
+    fixed: tuple[str, ...] = ()  # numbers of the world that the campaign sets, and no dispersion draws
+    first: int = 0
+    failure: Failure | None = None
+
+    @property
+    def label(self) -> str:
+        """The scenario's name and the cell's values."""
+        values = [f"{name}={_shown(value)}" for name, value in self.values.items()]
+        return " ".join([self.scenario.name, *values, self.truth_model])
+
+    @cached_property
+    def setup(self) -> Setup:
+        """The scenario made ready. InputError as `assemble`."""
+        setup = assemble(self.scenario)
+        drawn = {name: entry for name, entry in setup.dispersion.items() if name not in self.fixed}
+        return replace(setup, dispersion=drawn)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A campaign: every cell flies `flights` flights of the seed, from its first on (flight 0)."""
+
+    cells: tuple[Cell, ...]
+    seed: int
+    flights: int
+    sampling: Sampling = "plain"
+    until: str | None = None
+    asked: tuple[str, ...] = ()  # of a certificate: what its flights are for
+
+    def ready(self, cell: int) -> Ready:
+        """A cell made ready. InputError where its scenario or its dispersion cannot be."""
+        own = self.cells[cell]
+        return ready_of(own.setup, own.truth_model, self.sampling, self.flights, own.failure)
+
+    @cached_property
+    def as_json(self) -> dict[str, Any]:
+        """The campaign as its folder says it; two campaigns of the same are the same flights."""
+        return {
+            "schema_version": SCHEMA_VERSION,
+            "flownav": flownav.__version__,
+            "code_sha256": code_sha256(),
+            "seed": self.seed,
+            "flights": self.flights,
+            "sampling": self.sampling,
+            "until": self.until,
+            "asked": list(self.asked),
+            "cells": [
+                {
+                    "label": cell.label,
+                    "values": cell.values,
+                    "truth_model": cell.truth_model,
+                    "first": cell.first,
+                    "failure": cell.failure.words if cell.failure else None,
+                    "scenario": cell.scenario.model_dump(mode="json"),
+                    "parameters_sha256": made_of(cell.setup),
+                }
+                for cell in self.cells
+            ],
+        }
+
+
+def ready_of(
+    setup: Setup, truth_model: TruthModel, sampling: Sampling, flights: int, failure: Failure | None = None
+) -> Ready:
+    """A cell made ready. InputError where its dispersion cannot be."""
+    ensemble = None
+    if truth_model == "ensemble":
+        ensemble = setup.ensemble(design_of(sampling, tuple(setup.ensemble().entries), flights))
+    return Ready(setup, truth_model, sampling, flights, ensemble, failure)
+
+
+def planned(
+    scenarios: Sequence[Scenario],
+    sweeps: Sweep,
+    *,
+    truth_models: Sequence[TruthModel],
+    seed: int,
+    flights: int,
+    sampling: Sampling = "plain",
+    until: str | None = None,
+    changes: Mapping[str, Value] | None = None,
+) -> Plan:
+    """Every scenario with these changes at every combination of the swept values. InputError for one that cannot be."""
+    fixed, names = dict(changes or {}), tuple(sweeps)
+    if both := sorted(set(fixed) & set(names)):
+        raise InputError(f"--sweep {both[0]}: is set as well; leave one of the two out")
+    if len({scenario.name for scenario in scenarios}) < len(scenarios):
+        raise InputError(f"{scenarios[0].name}: two scenarios have the same name, and the same flights; leave one out")
+    combinations = [dict(zip(names, each, strict=True)) for each in itertools.product(*sweeps.values())]
+    count = len(scenarios) * len(combinations) * len(truth_models)
+    if count > MOST_CELLS:
+        raise InputError(f"--sweep: {count} combinations; at most {MOST_CELLS} are flown in one campaign")
+    cells = tuple(
+        Cell(changed(scenario, fixed | values), values, truth_model, (*fixed, *names))
+        for scenario in scenarios
+        for values in combinations
+        for truth_model in truth_models
+    )
+    if until is not None:
+        _require_figure(stop_of(until).figure, cells)
+    return Plan(cells, seed, flights, sampling, until)
+
+
+def _require_figure(name: str, cells: Sequence[Cell]) -> None:
+    """InputError where a cell has no such figure: it never lands."""
+    never = next((cell for cell in cells if not lands(cell.scenario)), None)
+    if never is not None and MEASURES[FIGURES[name].measure].of_landing:
+        raise InputError(f"--until {name}: the scenario {never.scenario.name} never lands; give p95_axis_m, or another")
+
+
+def lands(scenario: Scenario) -> bool:
+    """Whether a scenario's flights are to land before their end."""
+    lands_s = scenario.flight.may_land_after_s
+    return lands_s is not None and lands_s < scenario.flight.duration_s and scenario.truth != "linear"
+
+
+def changed(scenario: Scenario, changes: Mapping[str, Value]) -> Scenario:
+    """The scenario with other values at dotted names of its file, checked anew. InputError names what is wrong."""
+    entries = scenario.model_dump(exclude_unset=True)
+    for name, value in changes.items():
+        inside, (*tables, key) = entries, name.split(".")
+        for table in tables:
+            inside = inside.setdefault(table, {})
+            if not isinstance(inside, dict):
+                raise InputError(f"{scenario.name}: {name}: {table} is no table of a scenario")
+        inside[key] = value
+    return check(entries, Scenario, f"{scenario.name} with {', '.join(changes)}") if changes else scenario
+
+
+def _shown(value: Value) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def made_of(setup: Setup) -> str:
+    """SHA-256 of everything that a scenario's flights are made of: the numbers of every file that it names."""
+    numbers = {
+        "parameters": setup.parameters,
+        "dispersion": {name: entry.model_dump() for name, entry in sorted(setup.dispersion.items())},
+        "vehicle": setup.file.model_dump(),
+    }
+    return hashlib.sha256(json.dumps(numbers, sort_keys=True, default=str).encode()).hexdigest()

@@ -1,0 +1,99 @@
+"""Between the walk's flights, which are normals and streams, and the engine's, which have truths and noise."""
+
+from __future__ import annotations
+
+from math import ceil
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from flownav.campaigns.rare.chains import Array, Streams
+from flownav.campaigns.rows import rows_of
+from flownav.compile import LANES
+from flownav.simulation import layout
+from flownav.simulation.assemble import Setup
+from flownav.simulation.draws import KEYED_EPOCHS, Noise
+from flownav.simulation.engine import Branches, fly_blocks
+from flownav.simulation.ensemble import Ensemble, believed
+from flownav.simulation.plan import Flight
+from flownav.simulation.sources import starts_of
+
+START_ROWS = layout.START_END - layout.START_NORMALS
+LARGEST_SHARE = 1.0 - 2.0**-53  # of a distribution: a normal beyond 8 sigma has no larger one
+
+
+class Branch(NamedTuple):
+    """One flight as it is written down: seed, dispersed numbers by name, start normals by name, stream of each span."""
+
+    seed: int
+    drawn: dict[str, float]
+    start: dict[str, float]
+    streams: list[int]
+
+
+class Space:
+    """What is drawn for a flight of a setup: the dispersed inputs first, then what its sensors are and how they start.
+
+    names: of the numbers drawn once. spans: of the flight, KEYED_EPOCHS each.
+    """
+
+    def __init__(self, setup: Setup, seed: int, *, dispersed: bool) -> None:
+        self.flight: Flight = setup.flight
+        self.ensemble: Ensemble | None = setup.ensemble() if dispersed else None
+        self.seed = seed
+        self.dispersed = [] if self.ensemble is None else list(self.ensemble.entries)
+        self.starts = starts_of(setup.flight)
+        self.names = [*self.dispersed, *(start.name for start in self.starts)]
+        self.spans = ceil(setup.flight.plan.epochs / KEYED_EPOCHS)
+
+    def values(self, inputs: Array) -> dict[str, list[float]]:
+        """The dispersed numbers of flights with these normals, (flights, names), by dotted name."""
+        if self.ensemble is None:
+            return {}
+        shares = np.minimum(ndtr(inputs[:, : len(self.dispersed)]), LARGEST_SHARE)
+        found = self.ensemble.values_of(dict(zip(self.dispersed, shares.T, strict=True)))
+        return {name: column.tolist() for name, column in found.items()}
+
+    def fly(self, inputs: Array, streams: Streams, threads: int | None = None) -> Array:
+        """The rows of these flights in their order, (flights, len(measures.ROW_COLUMNS))."""
+        values, count = self.values(inputs), len(inputs)
+
+        def branches(start: int) -> Branches:
+            index = np.minimum(np.arange(start, start + len(LANES)), count - 1)
+            own = {name: [column[k] for k in index] for name, column in values.items()}
+            return self.block(own, inputs[index, len(self.dispersed) :], streams[index])
+
+        flown = fly_blocks(self.flight, self.seed, 0, count, self._judge, threads, branches=branches)
+        return np.concatenate([block for _, block in flown])
+
+    def usual(self, count: int, threads: int | None = None) -> Array:
+        """The rows of flights 0 to `count - 1` of the seed, as any campaign has them."""
+        flown = fly_blocks(self.flight, self.seed, 0, count, self._judge, threads, self.ensemble)
+        return np.concatenate([block for _, block in flown])
+
+    def _judge(self, history: Array) -> Array:
+        return rows_of(self.flight, history)
+
+    def block(self, values: dict[str, list[float]], start: Array, streams: Streams) -> Branches:
+        """What the engine flies: dispersed numbers, start normals (lanes, starts) and streams (lanes, spans)."""
+        lanes = len(streams)
+        truths = [believed(self.flight)] * lanes
+        if self.ensemble is not None:
+            truths = self.ensemble.truths_of(values, streams.max(axis=1).tolist())
+        rows = np.zeros((START_ROWS, lanes))
+        rows[[one.row for one in self.starts]] = start.T
+        return Branches(truths, Noise(np.ascontiguousarray(streams.T).astype(np.uint64), rows))
+
+    def branch(self, inputs: Array, streams: NDArray[np.int64]) -> Branch:
+        """One flight, inputs (names,) and streams (spans,), to be written down."""
+        drawn = {name: column[0] for name, column in self.values(inputs[None, :]).items()}
+        start = zip(self.starts, inputs[len(self.dispersed) :].tolist(), strict=True)
+        return Branch(self.seed, drawn, {one.name: value for one, value in start}, streams.tolist())
+
+    def one(self, branch: Branch) -> Branches:
+        """The same again, as a block of one lane."""
+        start = np.array([[branch.start[one.name] for one in self.starts]])
+        values = {name: [branch.drawn[name]] for name in self.dispersed}
+        return self.block(values, start, np.array([branch.streams], np.int64))

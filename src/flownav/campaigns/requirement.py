@@ -1,0 +1,254 @@
+"""A requirement's file: what a vehicle must do, how surely, and under which conditions (docs/certify.md).
+
+`approach`, `approach_8_m_s`, `landing`, `pad_return` and `takeoff` ship; any TOML file of this schema can be certified.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import Field, field_validator, model_validator
+
+from flownav.campaigns.measures import CRASH, MEASURES, NOT_LANDED
+from flownav.campaigns.tolerance import allowed
+from flownav.errors import InputError
+from flownav.parameter_files import Number, ParameterModel, check, load, shipped
+from flownav.simulation.dispersion import Distribution, leaves
+from flownav.simulation.scenario import SHIPPED as SHIPPED_SCENARIOS
+from flownav.simulation.scenario import Scenario, load_scenario, with_vehicle
+from flownav.vehicle.loading import SHIPPED_NAMES
+
+SHIPPED = ("takeoff", "landing", "pad_return", "approach", "approach_8_m_s")
+FOLDER = "requirements"
+OWN_SENSOR, NO_FAULT = "scenario", "none"
+NONE_OF = {CRASH: "no crash", NOT_LANDED: "a landing"}  # a measure that is 0, in words
+RANGED = "the requirement's conditions"
+
+
+class RequirementTable(ParameterModel):
+    """One `[[requirement]]`: a share `probability` of all flights has the measure at most (or at least) this.
+
+    allowed_failures: with how many failures the plan may still pass; more of them need more flights.
+    """
+
+    measure: str
+    at_most: Number | None = None
+    at_least: Number | None = None
+    probability: Number = Field(gt=0.0, lt=1.0)
+    confidence: Number = Field(0.90, ge=0.5, lt=1.0)
+    allowed_failures: int = Field(2, ge=0, le=10_000)
+
+    @field_validator("measure")
+    @classmethod
+    def _is_known(cls, name: str) -> str:
+        if name not in MEASURES:
+            raise ValueError(f"no such measure; known: {', '.join(MEASURES)}")
+        return name
+
+    @model_validator(mode="after")
+    def _has_one_limit(self) -> RequirementTable:
+        if (self.at_most is None) == (self.at_least is None):
+            raise ValueError("give one of at_most and at_least")
+        return self
+
+    @property
+    def limit(self) -> float:
+        """The limit, on whichever side."""
+        return float(self.at_least if self.at_most is None else self.at_most)  # type: ignore[arg-type]  # one is there
+
+    @property
+    def upper(self) -> bool:
+        """Whether small figures are the good ones."""
+        return self.at_most is not None
+
+    @property
+    def yes_or_no(self) -> bool:
+        """Whether the measure says only whether something happened."""
+        return self.measure in NONE_OF
+
+    def sentence(self) -> str:
+        """The requirement in the words of a test plan."""
+        unit = MEASURES[self.measure].unit
+        side = "at most" if self.upper else "at least"
+        what = f"{self.measure} {side} {self.limit:g} {unit}".rstrip()
+        if self.yes_or_no and self.upper and self.limit == 0.0:
+            what = NONE_OF[self.measure]
+        return (
+            f"{what} with {100.0 * self.probability:.10g} % probability at {100.0 * self.confidence:.10g} % confidence"
+        )
+
+
+class Conditions(ParameterModel):
+    """`[conditions]`: under what the statement holds.
+
+    ranges: numbers that a dispersion may name, evenly between two ends or of a distribution; they stand above the
+    scenario's own entries. The others make cells, each combination of them one, which get as many flights each:
+    height_m of the start (two ends: low, middle and high), sensor (flow sensor files), vehicle, fault (by the names of
+    `flownav faults`). A fault begins fault_begins_s after the start and lasts fault_lasts_s.
+    """
+
+    ranges: dict[str, Distribution] = Field(default_factory=dict)
+    height_m: tuple[Number, ...] = Field((), max_length=2)
+    sensor: tuple[str, ...] = ()
+    vehicle: tuple[str, ...] = ()
+    fault: tuple[str, ...] = ()
+    fault_begins_s: Number | None = Field(None, ge=0.0, le=3600.0)
+    fault_lasts_s: Number = Field(20.0, gt=0.0, le=3600.0)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _flattened(cls, given: Any) -> Any:
+        if not isinstance(given, Mapping):
+            return given
+        own = {name: given[name] for name in cls.model_fields if name != "ranges" and name in given}
+        if isinstance(own.get("height_m"), (int, float)):
+            own["height_m"] = [own["height_m"]]
+        rest = {name: value for name, value in given.items() if name not in own}
+        return own | {"ranges": {name: _distribution(name, value) for name, value in leaves(rest, "")}}
+
+    @field_validator("sensor", "vehicle", "fault")
+    @classmethod
+    def _are_different(cls, names: tuple[str, ...]) -> tuple[str, ...]:
+        if len(set(names)) < len(names):
+            raise ValueError("the same twice")
+        return names
+
+    @field_validator("height_m")
+    @classmethod
+    def _rise(cls, ends: tuple[float, ...]) -> tuple[float, ...]:
+        if len(ends) == 2 and not ends[0] < ends[1]:
+            raise ValueError("a range is [low, high], low below high")
+        return ends
+
+    def heights_m(self) -> tuple[float, ...]:
+        """The heights that are flown: of a range both ends and the middle."""
+        ends = tuple(float(end) for end in self.height_m)
+        return ends if len(ends) < 2 else (ends[0], 0.5 * (ends[0] + ends[1]), ends[1])
+
+
+class Requirement(ParameterModel):
+    """A requirement's file. set: entries that stand above the scenario's own."""
+
+    schema_version: Literal[1]
+    name: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._-]{0,63}$")
+    description: str = ""
+    scenario: str
+    vehicle: str | None = None
+    seed: int = Field(1, ge=0, lt=2**63)
+    set: dict[str, Any] = Field(default_factory=dict)
+    conditions: Conditions = Field(default_factory=Conditions)
+    requirement: tuple[RequirementTable, ...] = Field(min_length=1, max_length=20)
+
+    def flights(self) -> int:
+        """How many flights show every requirement with as many failures as each allows. InputError beyond 10^9."""
+        return max(needed_by(table) for table in self.requirement)
+
+
+def needed_by(table: RequirementTable, failures: int | None = None) -> int:
+    """How many flights a requirement needs, with so many failures (else with those that it allows). InputError."""
+    from flownav.campaigns.tolerance import needed
+
+    try:
+        most = table.allowed_failures if failures is None else failures
+        return needed(table.probability, table.confidence, most)
+    except ValueError as error:
+        raise InputError(f"{table.measure}: {error}; ask for less, or use `flownav campaign --rare`") from None
+
+
+def most_failures(table: RequirementTable, flights: int) -> int:
+    """With how many failures so many flights still show a requirement; -1: with none."""
+    return allowed(flights, table.probability, table.confidence)
+
+
+def requirement_file(name: str) -> Path:
+    """The file of a shipped requirement, or the path itself. InputError where the name is neither."""
+    if name in SHIPPED:
+        return shipped(f"{FOLDER}/{name}.toml")
+    path = Path(name)
+    if not path.suffix and not path.exists():
+        raise InputError(f"{name}: no such requirement; shipped: {', '.join(SHIPPED)}, or give a TOML file")
+    return path
+
+
+def load_requirement(name: str) -> Requirement:
+    """A shipped requirement by name, or a file; files that it names lie beside it. InputError where it is wrong."""
+    path = requirement_file(name)
+    requirement = load(path, Requirement)
+
+    def beside(file: str, known: Collection[str]) -> str:
+        return file if file in known else str(path.parent / file)
+
+    conditions = requirement.conditions
+    return requirement.model_copy(
+        update={
+            "scenario": beside(requirement.scenario, SHIPPED_SCENARIOS),
+            "vehicle": None if requirement.vehicle is None else beside(requirement.vehicle, SHIPPED_NAMES),
+            "set": _sensors_beside(requirement.set, path.parent),
+            "conditions": conditions.model_copy(
+                update={
+                    "vehicle": tuple(beside(name, SHIPPED_NAMES) for name in conditions.vehicle),
+                    "sensor": tuple(beside(name, (OWN_SENSOR,)) for name in conditions.sensor),
+                }
+            ),
+        }
+    )
+
+
+def fixed_by(requirement: Requirement) -> dict[str, Any]:
+    """What a requirement sets and no flight draws, by dotted name: all of its `set` that has no range."""
+    return {name: value for name, value in leaves(requirement.set, "") if name not in requirement.conditions.ranges}
+
+
+def _sensors_beside(given: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """The settings with the datasheets that they name looked for beside the requirement's file."""
+    found = dict(given)
+    if isinstance(given.get("sensors"), dict):
+        found["sensors"] = {
+            name: str(folder / value) if name != "texture" and isinstance(value, str) else value
+            for name, value in given["sensors"].items()
+        }
+    if isinstance(given.get("flow_sensor"), str):
+        found["flow_sensor"] = str(folder / given["flow_sensor"])
+    return found
+
+
+def scenario_of(requirement: Requirement, vehicle: str | None = None) -> Scenario:
+    """The scenario with what the requirement sets, and its ranges as dispersion. InputError where it cannot be.
+
+    vehicle: another one than the requirement's (a shipped name, or a file).
+    """
+    scenario = with_vehicle(load_scenario(requirement.scenario), vehicle or requirement.vehicle)
+    entries = _over(scenario.model_dump(exclude_unset=True), requirement.set)
+    scenario = check(entries, Scenario, f"{requirement.name}: set") if requirement.set else scenario
+    if not requirement.conditions.ranges:
+        return scenario
+    told = scenario.dispersion.entries()
+    ranges = {
+        name: one if "known" in one.model_fields_set else one.model_copy(
+            update={"known": told[name].known if name in told else "day"}
+        )
+        for name, one in requirement.conditions.ranges.items()
+    }  # fmt: skip
+    section = scenario.dispersion.model_copy(update={"parameters": {**scenario.dispersion.parameters, **ranges}})
+    return scenario.model_copy(update={"dispersion": section})
+
+
+def _over(entries: dict[str, Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested tables with others laid over them."""
+    found = dict(entries)
+    for key, value in given.items():
+        inner = found.get(key)
+        found[key] = _over(inner, value) if isinstance(inner, dict) and isinstance(value, Mapping) else value
+    return found
+
+
+def _distribution(name: str, value: Any) -> Any:
+    """An entry of the conditions as one of a dispersion: [low, high] is even between them."""
+    if isinstance(value, Mapping):
+        return dict(value)
+    numbers = isinstance(value, list) and all(isinstance(x, (int, float)) and not isinstance(x, bool) for x in value)
+    if not numbers or len(value) != 2 or not value[0] < value[1]:
+        raise ValueError(f"{name}: a range is [low, high], low below high; what is fixed stands in [set]")
+    return {"distribution": "uniform", "loc": value[0], "scale": value[1] - value[0], "source": RANGED}

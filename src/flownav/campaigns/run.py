@@ -1,0 +1,124 @@
+"""A campaign flown: every part that its folder lacks, cell by cell, until all flights are there or are enough."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.campaigns.engines.engine import Engine, Part
+from flownav.campaigns.figures import Interval, enough, figure_of, looks, stop_of, values_of
+from flownav.campaigns.plan import Plan, Ready
+from flownav.campaigns.rows import table_of
+from flownav.campaigns.store import PART, Dataset, Store
+from flownav.simulation.sensing import EPOCH_S
+
+Array = NDArray[np.float64]
+
+LANDING, TAKEOFF = "r95_m", "p95_axis_m"  # what is followed while a campaign flies
+
+
+class Progress(NamedTuple):
+    """How far a campaign is: flights flown now, in all (those found in the folder, too) and at most, and of a cell."""
+
+    flown: int
+    have: int
+    most: int
+    cell: str
+    figure: str
+    interval: Interval | None
+
+
+Watch = Callable[[Progress], object]
+
+
+def run_campaign(plan: Plan, engine: Engine, store: Store, watch: Watch = lambda progress: None) -> Dataset:
+    """Fly what the folder lacks of the plan; the store is open. InputError where a cell cannot be flown."""
+    data, done = Dataset(store.folder), Counted(plan, watch)
+    for cell in range(len(plan.cells)):
+        _fly_cell(plan, cell, engine, store, data, done)
+    return data
+
+
+class Counted:
+    """Counts the flights of a campaign and tells who watches."""
+
+    def __init__(self, plan: Plan, watch: Watch) -> None:
+        self._plan, self._watch = plan, watch
+        self._flown = self._have = 0
+        self._cell, self._figure = 0, LANDING
+        self._interval: Interval | None = None
+
+    def begin(self, cell: int, figure: str) -> None:
+        """The next cell, and what is followed of it."""
+        self._cell, self._figure, self._interval = cell, figure, None
+
+    def found(self, flights: int) -> None:
+        """Flights that the folder held already."""
+        self._have += flights
+        self._tell()
+
+    def flown(self, flights: int) -> None:
+        """Flights flown just now."""
+        self._flown += flights
+        self._have += flights
+        self._tell()
+
+    def estimate(self, values: Array) -> None:
+        """What is followed, from the flights of the cell so far."""
+        self._interval = figure_of(self._figure, values)
+        self._tell()
+
+    def _tell(self) -> None:
+        label, most = self._plan.cells[self._cell].label, self._plan.flights * len(self._plan.cells)
+        self._watch(Progress(self._flown, self._have, most, label, self._figure, self._interval))
+
+
+def _fly_cell(plan: Plan, cell: int, engine: Engine, store: Store, data: Dataset, done: Counted) -> None:
+    """One cell, look by look: the parts that are missing, and whether the flights are enough."""
+    ready = plan.ready(cell)
+    stop = stop_of(plan.until) if plan.until else None
+    figure = stop.figure if stop else followed(ready)
+    done.begin(cell, figure)
+    values: list[Array] = []
+    for look in looks(plan.flights) if stop else [plan.flights]:
+        known = sum(map(len, values))
+        for part, rows in _parts_until(plan, cell, known, look, ready, engine, store, data, done):
+            values.append(values_of(figure, rows))
+            if part.number % 8 == 0:
+                done.estimate(np.concatenate(values))
+        values = [np.concatenate(values)]
+        done.estimate(values[0])
+        if stop and enough(stop, values[0], plan.flights) is not None:
+            return
+
+
+def _parts_until(
+    plan: Plan, cell: int, first: int, end: int, ready: Ready, engine: Engine, store: Store, data: Dataset,
+    done: Counted,
+) -> Iterator[tuple[Part, Array]]:  # fmt: skip
+    """The parts of a cell's flights `first` to `end - 1`: those of the folder, then those that were missing, flown."""
+    own = plan.cells[cell].first
+    parts = [Part(start // PART, own + start, min(PART, end - start)) for start in range(first, end, PART)]
+    missing = []
+    for part in parts:
+        if store.rows_in(cell, part.number) == part.flights:
+            done.found(part.flights)
+            yield part, data.rows_of_part(cell, part.number)
+        else:
+            missing.append(part)
+    if not missing:
+        return
+    for part, rows in engine.fly(ready, plan.seed, missing, done.flown):
+        drawn = ready.ensemble.values(plan.seed, part.first, part.flights) if ready.ensemble else {}
+        store.write(cell, part.number, table_of(cell, plan.cells[cell].values, part.first, rows, drawn))
+        yield part, rows
+
+
+def followed(ready: Ready) -> str:
+    """The figure that is followed of a cell: of those that land R95 at contact."""
+    plan = ready.flight.plan
+    lands = plan.may_land_after_s < plan.epochs * EPOCH_S
+    return LANDING if lands else TAKEOFF

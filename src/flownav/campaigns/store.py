@@ -1,0 +1,190 @@
+"""A campaign's folder: its plan, its flights as Parquet files, and whatever is written when all have flown.
+
+    campaign.json                        the plan, by which a folder is known again
+    flights/cell-000/part-00000.parquet  flights 0 to 255 of the first cell, and so on
+    summary.json, report.html, records/  written at the end
+
+Each file appears whole or not at all, and what is in it follows from the plan alone: a campaign that was killed goes on
+where it stopped, and ends with the same bytes as one that was not.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.campaigns import arrow
+from flownav.campaigns.measures import ROW_COLUMNS
+from flownav.campaigns.plan import Plan
+from flownav.errors import InputError
+from flownav.files import written_whole
+from flownav.guard import an_output_folder
+from flownav.scoring.errors import SCORE_COLUMNS
+
+Array = NDArray[np.float64]
+
+PLAN, FLIGHTS, SUMMARY, REPORT, RECORDS, LOCK = (
+    "campaign.json", "flights", "summary.json", "report.html", "records", ".lock",
+)  # fmt: skip
+PART = 256  # flights of one file
+PART_NAME = re.compile(r"part-(\d{5,})\.parquet")
+
+
+class Store:
+    """The folder of a campaign. folder: made if it is not there."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    @contextmanager
+    def opened(self, plan: Plan) -> Iterator[Store]:
+        """The folder, locked, with this plan in it.
+
+        InputError where it holds something else, or where another process is flying there.
+        """
+        an_output_folder(self.folder)
+        said = json.dumps(plan.as_json, indent=1, sort_keys=True) + "\n"
+        self.check(plan.as_json)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        lock = os.open(self.folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        try:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError:
+                raise InputError(
+                    f"{self.folder}: another process is flying this campaign; wait, or give another --out"
+                ) from None
+            self._sweep()
+            if not (self.folder / PLAN).exists() or plan_in(self.folder) != json.loads(said):
+                _write_text(self.folder / PLAN, said)
+            yield self
+        finally:
+            os.close(lock)
+
+    def check(self, plan: dict[str, Any]) -> None:
+        """InputError unless the folder is new, or holds at most records, or is this plan's."""
+        if not self.folder.exists():
+            return
+        there = {path.name for path in self.folder.iterdir()} - {LOCK}
+        if not (self.folder / PLAN).is_file():
+            if any(not name.endswith(".part") for name in there - {RECORDS}):
+                raise InputError(f"{self.folder}: is there and holds no campaign; give another --out")
+            return
+        known = plan_in(self.folder)
+        for key, what in (("flownav", "version of flownav"), ("code_sha256", "code of flownav")):
+            if known.get(key) != plan[key]:
+                raise InputError(f"{self.folder}: was flown by another {what}; give another --out, or move it away")
+        asked = json.loads(json.dumps(plan))
+        differs = [key for key in plan if known.get(key) != asked[key]]
+        if differs and not _is_more_of(known, asked, differs):
+            raise InputError(
+                f"{self.folder}: holds another campaign (other {', '.join(differs)}); give another --out, or move it "
+                "away (a plain campaign without --until may be given more flights, and goes on)"
+            )
+
+    def _sweep(self) -> None:
+        """Remove what a killed process has left half-written."""
+        for path in (*self.folder.glob(".*.part"), *self.folder.glob("*/.*.part"), *self.folder.glob("*/*/.*.part")):
+            path.unlink(missing_ok=True)
+
+    def path_of(self, cell: int, part: int) -> Path:
+        """Where the flights of a part lie."""
+        return part_path(self.folder, cell, part)
+
+    def rows_in(self, cell: int, part: int) -> int:
+        """How many flights of a part are there; 0 where there is none that can be read."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        try:
+            return int(pq.read_metadata(self.path_of(cell, part)).num_rows)
+        except (OSError, pa.ArrowException):
+            return 0
+
+    def write(self, cell: int, part: int, table: Any) -> None:
+        """Keep a part."""
+        import pyarrow.parquet as pq
+
+        with written_whole(self.path_of(cell, part)) as temporary:
+            pq.write_table(table, temporary, compression="zstd", use_dictionary=["verdict", "limited_by"])
+
+    def keep_text(self, name: str, text: str) -> Path:
+        """Keep a text beside the flights."""
+        return _write_text(self.folder / name, text)
+
+
+def part_path(folder: Path, cell: int, part: int) -> Path:
+    """Where the flights of a part lie."""
+    return folder / FLIGHTS / f"cell-{cell:03d}" / f"part-{part:05d}.parquet"
+
+
+class Dataset:
+    """The flights of a campaign's folder, a column at a time."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def parts(self, cell: int) -> list[Path]:
+        """The files of a cell, in the order of its flights."""
+        found = (self.folder / FLIGHTS / f"cell-{cell:03d}").glob("part-*.parquet")
+        return sorted(
+            (path for path in found if PART_NAME.fullmatch(path.name)), key=lambda path: (len(path.name), path.name)
+        )
+
+    def table(self, cell: int, columns: list[str] | None = None) -> Any:
+        """A cell's flights as an Arrow table, flight by flight."""
+        import pyarrow as pa
+
+        tables = [arrow.read(path, columns) for path in self.parts(cell)]
+        return pa.concat_tables(tables).unify_dictionaries() if tables else pa.table({})
+
+    def column(self, cell: int, name: str) -> NDArray[Any]:
+        """One column of a cell, (flights,)."""
+        return arrow.column(self.table(cell, [name]), name)
+
+    def rows(self, cell: int) -> Array:
+        """The scores of a cell, (flights, len(ROW_COLUMNS)): flights in order."""
+        table = self.table(cell, list(ROW_COLUMNS))
+        return np.column_stack([arrow.column(table, name) for name in ROW_COLUMNS])
+
+    def rows_of_part(self, cell: int, part: int) -> Array:
+        """The scores of one file."""
+        table = arrow.read(part_path(self.folder, cell, part), ROW_COLUMNS)
+        return np.column_stack([arrow.column(table, name) for name in ROW_COLUMNS])
+
+    def scores(self, cell: int) -> Array:
+        """The same as (flights, len(SCORE_COLUMNS))."""
+        return self.rows(cell)[:, : len(SCORE_COLUMNS)]
+
+
+def _is_more_of(known: dict[str, Any], asked: dict[str, Any], differs: list[str]) -> bool:
+    """Whether a plan is a known one with more flights, each of which is independent of how many there are."""
+    if differs != ["flights"] or asked["sampling"] != "plain" or asked["until"]:
+        return False
+    return isinstance(known["flights"], int) and known["flights"] < asked["flights"]
+
+
+def plan_in(folder: Path) -> dict[str, Any]:
+    """What a folder says of its campaign. InputError where it says nothing that can be read."""
+    try:
+        said = json.loads((folder / PLAN).read_bytes())
+    except (OSError, ValueError) as error:
+        raise InputError(f"{folder / PLAN}: cannot be read ({error}); give another --out") from None
+    if not isinstance(said, dict):
+        raise InputError(f"{folder / PLAN}: is no campaign's; give another --out")
+    return said
+
+
+def _write_text(path: Path, text: str) -> Path:
+    with written_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
+    return path

@@ -1,0 +1,146 @@
+"""What a campaign found: figures of every cell with their intervals, what became of its flights, and the worst ones."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.campaigns import arrow
+from flownav.campaigns.figures import (
+    CONFIDENCE,
+    FIGURES,
+    confidence_of_a_look,
+    enough,
+    figure_of,
+    spread_of,
+    stop_of,
+    values_of,
+)
+from flownav.campaigns.measures import MEASURES, measured
+from flownav.campaigns.plan import Plan
+from flownav.campaigns.rows import INPUT
+from flownav.campaigns.run import LANDING, TAKEOFF
+from flownav.campaigns.store import Dataset
+from flownav.campaigns.views import convergence, envelope, sensitivity
+from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
+from flownav.scoring.landings import EXPECTED
+
+Array = NDArray[np.float64]
+
+VERDICTS = ("landed", "went_around", "crashed", "unfinished")
+SHARES = ("crash", "not_landed")  # measures that say yes or no: their share is a figure
+WORST = 10  # flights that are named
+
+
+class Flight(NamedTuple):
+    """A flight by its place, with the measure by which it was chosen (None: infinite)."""
+
+    cell: int
+    flight: int
+    value: float | None
+    verdict: str
+    limited_by: str
+
+
+def summary_of(plan: Plan, data: Dataset) -> dict[str, Any]:
+    """The whole campaign as `summary.json` has it; nothing in it depends on when or where it was flown."""
+    cells = [cell_summary(plan, cell, data) for cell in range(len(plan.cells))]
+    landing = [k for k, cell in enumerate(cells) if "r95_m" in cell["figures"]]
+    alike = landing or list(range(len(cells)))  # what never lands is not pooled with what does
+    rows = np.concatenate([data.rows(cell) for cell in alike])
+    verdicts = {name: sum(cell["verdicts"][name] for cell in cells) for name in VERDICTS}
+    every = [Flight(**flight) for k in alike for flight in cells[k]["worst"]]
+    return {
+        "schema_version": 1,
+        "scenarios": list(dict.fromkeys(cell.scenario.name for cell in plan.cells)),
+        "seed": plan.seed,
+        "sampling": plan.sampling,
+        "until": plan.until,
+        "flights": sum(cell["flights"] for cell in cells),
+        "pooled_cells": alike,
+        "scores": scores_of(rows),
+        "verdicts": verdicts,
+        "worst": [flight._asdict() for flight in worst_first(every)[:WORST]],
+        "cells": cells,
+    }
+
+
+def cell_summary(plan: Plan, cell: int, data: Dataset) -> dict[str, Any]:
+    """One cell."""
+    own, rows = plan.cells[cell], data.rows(cell)
+    told = data.table(cell, ["verdict", "limited_by"])
+    verdicts, limits = (np.asarray(told[name].to_pylist()) for name in ("verdict", "limited_by"))
+    counts, lands = Counter(verdicts.tolist()), was_to_land(rows)
+    values = values_of(LANDING if lands else TAKEOFF, rows)
+    order = np.argsort(values, kind="stable")
+    inputs = inputs_of(data, cell)
+    said = [Flight(cell, int(k), _finite(values[k]), str(verdicts[k]), str(limits[k])) for k in order]
+    return {
+        "label": own.label,
+        "scenario": own.scenario.name,
+        "truth_model": own.truth_model,
+        "values": own.values,
+        "flights": len(rows),
+        "figures": figures_of(rows, plan),
+        "stopped": None if plan.until is None else len(rows) < plan.flights or _is_enough(plan, rows),
+        "scores": scores_of(rows),
+        "verdicts": {name: counts[name.replace("_", " ")] for name in VERDICTS},
+        "limited_by": dict(sorted(Counter(limits.tolist()).items(), key=lambda entry: (-entry[1], entry[0]))),
+        "convergence": convergence(LANDING if lands else TAKEOFF, values),
+        "envelope": envelope(inputs, verdicts == "landed"),
+        "sensitivity": sensitivity(inputs, values),
+        "median": said[(len(said) - 1) // 2]._asdict(),
+        "worst": [flight._asdict() for flight in reversed(said[-WORST:])],
+    }
+
+
+def _is_enough(plan: Plan, rows: Array) -> bool:
+    """Whether the figure of --until is as narrow as was asked for."""
+    stop = stop_of(str(plan.until))
+    return enough(stop, values_of(stop.figure, rows), plan.flights) is not None
+
+
+def was_to_land(rows: Array) -> bool:
+    """Whether a cell's flights were to land."""
+    return bool((touchdown_rows(rows[:, : len(SCORE_COLUMNS)])[:, EXPECTED] > 0.0).any())
+
+
+def figures_of(rows: Array, plan: Plan) -> dict[str, dict[str, float | None]]:
+    """The figures of a cell's flights, each with its interval; the one that stopped it with that of the last look."""
+    stop = stop_of(plan.until).figure if plan.until else None
+    found = {}
+    for name, figure in FIGURES.items():
+        if MEASURES[figure.measure].of_landing and not was_to_land(rows):
+            continue
+        confidence = confidence_of_a_look(plan.flights) if name == stop else CONFIDENCE
+        found[name] = figure_of(name, values_of(name, rows), confidence).finite() | {"confidence": confidence}
+    return found
+
+
+def scores_of(rows: Array) -> dict[str, dict[str, Any]]:
+    """Median and 95th percentile of every measure that the flights have, the latter with its 95 % interval."""
+    lands = was_to_land(rows)
+    return {
+        name: spread_of(measured(name, rows))
+        for name, measure in MEASURES.items()
+        if name not in SHARES and (lands or not measure.of_touchdown)
+    }
+
+
+def worst_first(flights: list[Flight]) -> list[Flight]:
+    """Flights, the worst first; those without a finite figure before all others."""
+    return sorted(flights, key=lambda one: (one.value is not None, -(one.value or 0.0), one.cell, one.flight))
+
+
+def inputs_of(data: Dataset, cell: int) -> dict[str, Array]:
+    """The dispersed numbers of a cell's flights by name, each (flights,)."""
+    table = data.table(cell)
+    names = [name for name in table.column_names if name.startswith(INPUT)]
+    return {name.removeprefix(INPUT): arrow.column(table, name) for name in names}
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,139 @@
+"""A replay as a Record: estimates, measurements, innovations, events, scores and provenance."""
+
+from __future__ import annotations
+
+import platform
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from flownav.estimation.gating import Reason
+from flownav.frames import rotation_from_quaternion
+from flownav.logs.rates import attitude_at
+from flownav.measurement import COLUMNS, Array, Sensor, Stream
+from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
+from flownav.record import POSITION_NED, VELOCITY_BODY, Record
+from flownav.replays.autopilot import autopilot_path
+from flownav.replays.session import Replay
+from flownav.scoring.alignment import velocity_of
+
+KEPT = (
+    Sensor.GPS_POSITION,
+    Sensor.GPS_VELOCITY,
+    Sensor.FLOW_RATE,
+    Sensor.FLOW_VELOCITY,
+    Sensor.RANGE,
+    Sensor.BARO,
+    Sensor.PAD,
+)
+LOST_AFTER_S = 1.0
+DOWN = "pos_d_m"
+
+
+def to_record(replay: Replay, scores: dict[str, Any], command: list[str]) -> Record:
+    """The record of a replay. `scores` go into its manifest; `command` is what the user typed."""
+    record = Record(_manifest(replay, scores, command))
+    estimate = replay.estimate
+    record.add("estimate", estimate_table(estimate))
+    record.add("states", states_table(estimate))
+    if replay.smoothed is not None:
+        record.add("smoothed", estimate_table(replay.smoothed))
+    for sensor in KEPT:
+        if sensor in replay.log.streams:
+            stream = replay.log.streams[sensor]
+            columns = dict(zip(COLUMNS[sensor], _with_turning(replay, sensor).T, strict=True))
+            record.add(sensor.name.lower(), {"t_s": stream.t_s, **columns, "quality": stream.quality})
+    if replay.truth_alignment is not None:
+        record.add("truth", _truth(replay))
+    own = autopilot_path(replay.log, replay.options.gps_delay_s, estimate[:, 0], estimate[:, 1:4])
+    if own is not None:
+        record.add("autopilot", own)
+    record.add("innovation", innovation_table(replay.innovation))
+    record.add("events", _events(replay))
+    return record
+
+
+def _with_turning(replay: Replay, sensor: Sensor) -> Array:
+    """A sensor's values as the log has them; of a flow sensor without a gyro, with the turning that was taken off."""
+    value = replay.log.streams[sensor].value
+    prepared = replay.prepared.streams[sensor].value
+    if sensor != Sensor.FLOW_RATE or len(prepared) != len(value):
+        return value
+    width = value.shape[1]
+    return np.where(np.isnan(value) & (np.arange(width) >= 2), prepared[:, :width], value)
+
+
+def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dict[str, Any]:
+    log = replay.log
+    versions = {name: version(name) for name in ("flownav", "numpy", "numba", "pyarrow")}
+    return {
+        "kind": "replay",
+        "log": log.path.name,
+        **({} if log.clock_start_s is None else {"clock_start_s": log.clock_start_s}),
+        **({} if log.truth is None else {"truth_name": log.truth_name}),
+        "filter": "landing",
+        "duration_s": scores["duration_s"],
+        "delays_s": {sensor.name.lower(): delay for sensor, delay in replay.prepared.delays_s.items() if delay},
+        "parameters": {
+            "filter": replay.settings.model_dump(),
+            "gps_delay_s": replay.options.gps_delay_s,
+            "gps_outages_s": [list(window) for window in replay.options.gps_outages_s],
+            "use_flow": replay.options.use_flow,
+            "flow_scale": list(replay.options.flow_scale),
+            "flow_sensor": replay.options.identified._asdict() if replay.options.identified else None,
+            **({"flow_noise": replay.options.flow_noise._asdict()} if replay.options.flow_noise.stated else {}),
+            **({} if log.origin_deg_m is None else {"origin_lat_lon_deg_alt_m": list(log.origin_deg_m)}),
+        },
+        "provenance": {
+            "versions": {"python": platform.python_version(), **versions},
+            "inputs": {name: {"sha256": digest} for name, digest in log.inputs.items()},
+        },
+        "command": command,
+        "scores": scores,
+    }
+
+
+def _truth(replay: Replay) -> dict[str, Array]:
+    """The truth in the estimate's frame; body velocity by differences, in the axes of the estimated attitude."""
+    placed, truth = replay.truth_alignment, replay.log.truth
+    assert placed is not None
+    assert truth is not None
+    position = placed.moved(replay.truth_position)
+    velocity = placed.turned(velocity_of(truth["t_s"], replay.truth_position))
+    own = Stream.of(Sensor.ATTITUDE, replay.estimate[:, 0], replay.estimate[:, 7:11])
+    rotation = rotation_from_quaternion(*attitude_at(own, truth["t_s"]).T)
+    body = {
+        name: sum(rotation[3 * row + column] * velocity[:, row] for row in range(3))
+        for column, name in enumerate(VELOCITY_BODY)
+    }
+    return {"t_s": truth["t_s"], **dict(zip(POSITION_NED, position.T, strict=True)), **body}
+
+
+def _events(replay: Replay) -> dict[str, Any]:
+    """What happened, in order of time."""
+    start, _ = replay.log.span_s
+    events = [(start, "replay", "note", note, np.nan) for note in replay.prepared.notes]
+    events += [(start, "replay", "warning", finding.text, np.nan) for finding in replay.findings]
+    for name, counts in replay.rejected().items():
+        events += [(start, name, "rejected", reason, float(count)) for reason, count in counts.items()]
+    events += happenings(replay.written.event)
+    for t0, t1 in replay.options.gps_outages_s:
+        events += [(t0, "gps", "outage_start", "withheld on request", t1 - t0), (t1, "gps", "outage_end", "", np.nan)]
+    for sensor in (Sensor.GPS_POSITION, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE):
+        events += _losses(replay, sensor)
+    events.sort(key=lambda event: event[0])
+    columns = zip(*events, strict=True)
+    return dict(zip(("t_s", "source", "kind", "detail", "value"), map(np.array, columns), strict=True))
+
+
+def _losses(replay: Replay, sensor: Sensor) -> list[tuple[float, str, str, str, float]]:
+    """When nothing of a sensor was fused for long: lost, with how long, and back."""
+    rows = replay.innovation
+    t_s = rows[(rows[:, 1] == sensor) & (rows[:, 8] == Reason.FUSED), 0]
+    events = []
+    for row in np.flatnonzero(np.diff(t_s) > LOST_AFTER_S):
+        length = float(t_s[row + 1] - t_s[row])
+        events.append((float(t_s[row]), sensor.name.lower(), "lost", "nothing fused for this long [s]", length))
+        events.append((float(t_s[row + 1]), sensor.name.lower(), "back", "", np.nan))
+    return events

@@ -1,0 +1,137 @@
+"""What a replay says of itself besides its errors: innovations, coverage of the sensors, where the path ended."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.estimation.gating import Reason
+from flownav.frames import heading_from_quaternion
+from flownav.logs.log import Log
+from flownav.measurement import Array, Sensor, Stream
+from flownav.navigation.flags import flagged, flags_of
+from flownav.navigation.tables import Written, estimate_table
+from flownav.navigation.tape import LEVELS_AT
+from flownav.record import POSITION_NED, QUATERNION, Table
+from flownav.replays.airborne import airborne_of
+from flownav.scoring.consistency import consistency_of
+from flownav.scoring.coverage import coverage_of
+from flownav.scoring.drift import Motion, drift_of, end_drift
+from flownav.scoring.protection import protection_of
+
+NO_REJECTION = (Reason.FUSED, Reason.DATUM)
+TESTED = (Reason.FUSED, Reason.INNOVATION_GATE)
+# components that a sensor may leave out: a NaN here is nothing told, not a reading that is broken
+MAY_BE_LEFT_OUT = ((Sensor.GPS_VELOCITY, 2), (Sensor.FLOW_VELOCITY, 2), (Sensor.PAD, 2))
+
+
+def consistency_scores(innovation: Array) -> dict[str, dict[str, Any]]:
+    """By sensor, of the components that were held against their prediction; innovation (m, tape.OFFERS)."""
+    tested = innovation[np.isin(innovation[:, 8], TESTED)]
+    found = {}
+    for sensor in Sensor:
+        _, _, component, _, _, news, variance, _, _ = tested[tested[:, 1] == sensor].T
+        judged = consistency_of(component, news, variance)
+        if judged is not None:
+            found[sensor.name.lower()] = judged._asdict()
+    return found
+
+
+def told(innovation: Array) -> Array:
+    """The offered components without those that their sensor left out (MAVLink's GPS has no vertical velocity).
+
+    A component is left out where it is NaN and another of the same reading is not.
+    """
+    t_s, observed = innovation[:, 0], innovation[:, 3]
+    kept = np.ones(len(innovation), bool)
+    for sensor, component in MAY_BE_LEFT_OUT:
+        of_sensor = innovation[:, 1] == sensor
+        beside = np.isin(t_s, t_s[of_sensor & np.isfinite(observed)])
+        left_out = (innovation[:, 2] == component) & np.isnan(observed) & (innovation[:, 8] == Reason.NOT_FINITE)
+        kept &= ~(of_sensor & beside & left_out)
+    return np.asarray(innovation[kept])
+
+
+def reading_scores(innovation: Array, streams: Mapping[Sensor, Stream]) -> dict[str, dict[str, Any]]:
+    """By sensor, what became of whole readings, where `rejected` counts components; innovation (m, tape.OFFERS).
+
+    offered to the filter; fused: with every component, or with some of them (in_part); rejected: readings that lost
+    one component or more, by reason, with the rows that the reader threw away.
+    """
+    found = {}
+    innovation = told(innovation)
+    for sensor, stream in streams.items():
+        offers = innovation[innovation[:, 1] == sensor]
+        reading, reason = _readings(offers), offers[:, 8].astype(int)
+        count = int(reading[-1]) + 1 if len(reading) else 0
+        components = np.bincount(reading, minlength=count)
+        fused = np.bincount(reading, weights=reason == Reason.FUSED, minlength=count)
+        lost = {r.label: len(np.unique(reading[reason == r])) for r in Reason if r not in NO_REJECTION}
+        rejected = dict(Counter(stream.rejected) + Counter(lost))
+        if count or rejected:
+            found[sensor.name.lower()] = {
+                "offered": count,
+                "fused": int(np.count_nonzero((fused == components) & (fused > 0))),
+                "in_part": int(np.count_nonzero((fused < components) & (fused > 0))),
+                "rejected": rejected,
+            }
+    return found
+
+
+def _readings(offers: Array) -> NDArray[np.int_]:
+    """The number of the reading that each component of one sensor belongs to: components of one count up."""
+    if not len(offers):
+        return np.zeros(0, int)
+    begins = (np.diff(offers[:, 0]) != 0.0) | (np.diff(offers[:, 2]) <= 0.0)
+    return np.concatenate([[0], np.cumsum(begins)]).astype(int)
+
+
+def coverage_scores(log: Log) -> dict[str, dict[str, float]]:
+    """By stream, its first and last reading [s]."""
+    return {name: {"t0": first, "t1": last} for name, (first, last) in coverage_of(log.streams).items()}
+
+
+def protection_scores(log: Log, written: Written) -> dict[str, Any] | None:
+    """The levels of a replay, and how often they were exceeded unsaid."""
+    rows = written.estimate
+    drift = (
+        None
+        if log.truth is None
+        else drift_of(motion_of(estimate_table(rows)), truth_motion(log.truth, log.heading_truth), airborne_of(log))
+    )
+    return protection_of(rows[:, 0], rows[:, LEVELS_AT:], flagged(rows[:, 0], flags_of(written.event)), drift)
+
+
+def end_drift_of(log: Log, estimate: Motion) -> float | None:
+    """Where an estimate of this log's flight ended, off the log's truth [m]; None without one."""
+    if log.truth is None:
+        return None
+    return end_drift(estimate, truth_motion(log.truth, log.heading_truth), airborne_of(log))
+
+
+def truth_motion(truth: Table, heading: Table | None) -> Motion:
+    """A truth with its headings: those measured apart, else those of its attitude, else none."""
+    t_s, position = np.asarray(truth["t_s"], float), columns_of(truth, POSITION_NED)
+    if heading is not None:
+        return Motion(t_s, position, np.asarray(heading["t_s"], float), np.asarray(heading["yaw_rad"], float))
+    return motion_of(truth)
+
+
+def motion_of(table: Table) -> Motion:
+    """The path in a table of a record, with the headings of its attitude where it has one."""
+    t_s, position = np.asarray(table["t_s"], float), columns_of(table, POSITION_NED)
+    if not set(QUATERNION) <= table.keys():
+        return Motion(t_s, position, np.zeros(0), np.zeros(0))
+    w, x, y, z = columns_of(table, QUATERNION).T
+    heading = np.asarray(heading_from_quaternion(w, x, y, z))
+    known = np.isfinite(heading)
+    return Motion(t_s, position, t_s[known], heading[known])
+
+
+def columns_of(table: Table, names: tuple[str, ...]) -> Array:
+    """Columns of a table side by side, (n, len(names))."""
+    return np.column_stack([np.asarray(table[name], float) for name in names])

@@ -1,0 +1,292 @@
+"""A replay: a log through the filter, its scores, and a table of GPS outages."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from flownav.compile import announce_compilation
+from flownav.errors import InputError
+from flownav.estimation.gating import Reason
+from flownav.logs.log import Log
+from flownav.measurement import Array, Sensor, Stream
+from flownav.navigation.feed import SLOWEST_IMU_HZ, equipment_of
+from flownav.navigation.loop import run, start_navigator
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.smoother import smooth
+from flownav.navigation.tables import Written, estimate_table, written_on
+from flownav.navigation.tape import new_tape, tape_for
+from flownav.replays.autopilot import autopilot_scores
+from flownav.replays.fed import prepared_as_fed, run_as_fed
+from flownav.replays.judged import (
+    NO_REJECTION,
+    consistency_scores,
+    coverage_scores,
+    end_drift_of,
+    motion_of,
+    protection_scores,
+    reading_scores,
+    told,
+)
+from flownav.replays.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
+from flownav.replays.sentinel import Finding, findings
+from flownav.replays.unfused import unfused
+from flownav.scoring.alignment import Alignment, align, velocity_of
+from flownav.scoring.coverage import silences
+from flownav.scoring.outage import OutageError, difference_at, horizontal_rms, outage_error
+
+HORIZONTAL = (*GPS, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
+LONGEST_TABLE = 2000
+LEAST_WINDOW_S = 1e-6
+
+
+@dataclass(frozen=True)
+class Replay:
+    """One run of a log through the filter."""
+
+    log: Log
+    options: ReplayOptions
+    settings: NavigatorSettingsFile
+    prepared: Prepared
+    written: Written
+    smoothed: Array | None = None  # the estimate smoothed over the whole log, where that was asked for
+
+    @property
+    def estimate(self) -> Array:
+        """The navigator's estimates (n, ESTIMATE_COLUMNS)."""
+        return self.written.estimate
+
+    @property
+    def innovation(self) -> Array:
+        """What became of each component (m, OFFERS)."""
+        return self.written.innovation
+
+    @cached_property
+    def findings(self) -> list[Finding]:
+        """What is wrong with the log, as far as its sensors show, and whether anything was fused at all."""
+        fused = self.innovation[self.innovation[:, 8] == Reason.FUSED, 1]
+        own = Stream.of(Sensor.ATTITUDE, self.estimate[:, 0], self.estimate[:, 7:11])
+        found = findings({Sensor.ATTITUDE: own, **self.prepared.streams}, self.options.gps_outages_s)
+        if not np.isin(fused, HORIZONTAL).any():
+            what = "horizontal was fused" if len(fused) else "was fused"
+            text = f"nothing {what}: the path is dead reckoning on attitude and accelerometer alone"
+            found.append(Finding(text, label="Note"))
+        found += unfused(self.innovation, self.log.streams)
+        return found + [Finding(text) for text in silences(self.log.streams, self.log.span_s)]
+
+    @cached_property
+    def truth_alignment(self) -> Alignment | None:
+        """How the log's truth lies in the estimate's frame; None without a truth that overlaps."""
+        if self.log.truth is None:
+            return None
+        t_s, position = self.log.truth["t_s"], self.truth_position
+        covered = (t_s >= self.estimate[0, 0]) & (t_s <= self.estimate[-1, 0])
+        if np.count_nonzero(covered) < 2:
+            return None
+        return align(position[covered] + difference_at(*self._position, t_s, position), position[covered])
+
+    @cached_property
+    def truth_position(self) -> Array:
+        """The log's truth (n, 3) in its own frame."""
+        truth = self.log.truth or {}
+        return np.column_stack([truth[name] for name in ("pos_n_m", "pos_e_m", "pos_d_m")])
+
+    @property
+    def _position(self) -> tuple[Array, Array]:
+        return self.estimate[:, 0], self.estimate[:, 1:4]
+
+    def outage(self, t0: float, t1: float) -> OutageError:
+        """The outage error over a window."""
+        gps = self.log.streams[Sensor.GPS_POSITION]
+        delay_s = self.options.gps_delay_s
+        return outage_error(self.estimate[:, 0], self.estimate[:, 1:3], gps.t_s, gps.value[:, :2], delay_s, t0, t1)
+
+    def velocity_rms(self) -> float | None:
+        """Horizontal velocity against GPS velocity at the instant it describes [m/s]; None without GPS."""
+        gps = self.log.streams.get(Sensor.GPS_VELOCITY)
+        if gps is None:
+            return None
+        known = np.isfinite(gps.value[:, :2]).all(axis=1)
+        t_s = gps.t_s[known] - self.options.gps_delay_s
+        return _number(horizontal_rms(self.estimate[:, 0], self.estimate[:, 17:19], t_s, gps.value[known, :2]))
+
+    def rejected(self) -> dict[str, dict[str, int]]:
+        """What was not fused, by sensor and reason: rows by the reader, components by the filter, added up."""
+        counts = {}
+        offered = told(self.innovation)
+        sensors, reasons = offered[:, 1].astype(int), offered[:, 8].astype(int)
+        for sensor, stream in self.log.streams.items():
+            numbers = np.bincount(reasons[sensors == sensor], minlength=len(Reason))
+            found = {r.label: int(numbers[r]) for r in Reason if numbers[r] and r not in NO_REJECTION}
+            if found or stream.rejected:
+                counts[sensor.name.lower()] = dict(Counter(stream.rejected) + Counter(found))
+        return counts
+
+    def truth_scores(self) -> dict[str, Any] | None:
+        """Errors against the log's truth, turned and shifted onto the estimate; None without one."""
+        placed = self.truth_alignment
+        if placed is None or self.log.truth is None:
+            return None
+        t_s, position = self.log.truth["t_s"], self.truth_position
+        error = difference_at(*self._position, t_s, placed.moved(position))
+        velocity = placed.turned(velocity_of(t_s, position))
+        squares = np.sum(error[:, :2] ** 2, axis=1)
+        return {
+            "reference": self.log.truth_name,
+            "yaw_rad": placed.yaw_rad if placed.yaw_shown else None,
+            "horizontal_rms_m": float(np.sqrt(squares.mean())),
+            "horizontal_max_m": float(np.sqrt(squares.max())),
+            "vertical_rms_m": float(np.sqrt(np.mean(error[:, 2] ** 2))),
+            "velocity_rms_m_s": horizontal_rms(self.estimate[:, 0], self.estimate[:, 17:19], t_s, velocity[:, :2]),
+        }
+
+    def end_drift(self) -> float | None:
+        """Horizontal error at the end of the flight, the truth laid on the estimate at take-off [m]; None without."""
+        return end_drift_of(self.log, motion_of(estimate_table(self.estimate)))
+
+    def scores(self) -> dict[str, Any]:
+        """What `--json` prints, but for the outage table and the record's path."""
+        start, end = self.log.span_s
+        scores: dict[str, Any] = {
+            "duration_s": end - start,
+            **self.path_scores(),
+            "end_drift_m": self.end_drift(),
+            "protection": protection_scores(self.log, self.written),
+            "consistency": consistency_scores(self.innovation),
+            "coverage": coverage_scores(self.log),
+            "rejected": self.rejected(),
+            "readings": reading_scores(self.innovation, self.log.streams),
+            "warnings": [finding.text for finding in self.findings],
+        }
+        beside = {
+            "autopilot": autopilot_scores(self.log, self.options.gps_delay_s),
+            "smoothed": self.smoothed_scores(),
+        }
+        return scores | {name: found for name, found in beside.items() if found is not None}
+
+    def path_scores(self) -> dict[str, Any]:
+        """Errors of the path: through each outage, of velocity against GPS, against the truth where there is one."""
+        truth = self.truth_scores()
+        return {
+            "outages": [outage_entry(self.outage(t0, t1)) for t0, t1 in self.options.gps_outages_s],
+            "velocity_rms_m_s": self.velocity_rms(),
+            **({} if truth is None else {"truth": truth}),
+        }
+
+    def smoothed_scores(self) -> dict[str, Any] | None:
+        """The same of the smoothed path; None without one."""
+        if self.smoothed is None:
+            return None
+        return replace(self, written=self.written._replace(estimate=self.smoothed), smoothed=None).path_scores()
+
+
+def replay(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, *, smoothed: bool = False) -> Replay:
+    """Run a log through the filter, and back through it for a smoothed path.
+
+    InputError where an option cannot be, the filter never starts, or a live session's record is to be smoothed.
+    """
+    if smoothed and log.fed:
+        raise InputError(f"{log.path}: --smooth takes a log; a live session's record is replayed as it was fed")
+    with announce_compilation("replay"):
+        prepared = prepared_as_fed(log) if log.fed else prepare(log, options)
+        return _run(log, options, settings, prepared, smoothed=smoothed)
+
+
+def replay_again(flown: Replay, options: ReplayOptions, settings: NavigatorSettingsFile) -> Replay:
+    """The same streams, prepared once, with other GPS and flow cuts and settings; other options stay as they were.
+
+    InputError where the filter never starts.
+    """
+    return _run(flown.log, options, settings, flown.prepared)
+
+
+def outage_table(
+    log: Log,
+    options: ReplayOptions,
+    settings: NavigatorSettingsFile,
+    windows: list[tuple[float, float]],
+    on_progress: Callable[[int], None] = lambda done: None,
+) -> list[OutageError]:
+    """One replay a window, each with GPS cut in that window alone. `on_progress` is called with 1 for each.
+
+    InputError where a window lies outside the log.
+    """
+    check_windows(log, windows, "--outage-table")
+
+    def error_of(window: tuple[float, float]) -> OutageError:
+        return _run(log, replace(options, gps_outages_s=(window,)), settings, prepared).outage(*window)
+
+    errors = []
+    with announce_compilation("replay"), ThreadPoolExecutor(2) as pool:
+        prepared = prepared_as_fed(log) if log.fed else prepare(log, replace(options, gps_outages_s=()))
+        for error in pool.map(error_of, windows):
+            errors.append(error)
+            on_progress(1)
+    return errors
+
+
+def table_windows(
+    t0: float, t1: float, length_s: float, *, option: str = "--outage-table"
+) -> list[tuple[float, float]]:
+    """[t0, t0 + length), ... up to t1, the last one shorter where t1 asks for it.
+
+    InputError where that is no list of windows; `option` asked for it.
+    """
+    if not (t0 < t1 and length_s > 0.0 and np.isfinite([t0, t1, length_s]).all()):
+        raise InputError(f"{option} {t0:g}:{t1:g}:{length_s:g}: T0:T1:LENGTH is needed, seconds, T0 before T1")
+    count = int(np.floor((t1 - t0) / length_s + 1e-9))
+    if not 1 <= count <= LONGEST_TABLE:
+        raise InputError(
+            f"{option} {t0:g}:{t1:g}:{length_s:g}: that is {count} windows; 1 to {LONGEST_TABLE} can be flown"
+        )
+    whole = [(t0 + k * length_s, t0 + (k + 1) * length_s) for k in range(count)]
+    return whole if t1 - whole[-1][1] < LEAST_WINDOW_S else [*whole, (whole[-1][1], t1)]
+
+
+def outage_entry(error: OutageError) -> dict[str, float | None]:
+    """An outage as JSON has it; null where the window could not be scored."""
+    return {name: _number(value) for name, value in error._asdict().items()}
+
+
+def outage_summary(errors: list[OutageError]) -> dict[str, float | None]:
+    """Median and worst rms of the windows that could be scored; null without any."""
+    rms = np.array([error.horizontal_rms_m for error in errors])
+    rms = rms[np.isfinite(rms)]
+    if not len(rms):
+        return {"outage_median_rms_m": None, "outage_worst_rms_m": None}
+    return {"outage_median_rms_m": float(np.median(rms)), "outage_worst_rms_m": float(rms.max())}
+
+
+def _number(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def _run(
+    log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, prepared: Prepared, *, smoothed: bool = False
+) -> Replay:
+    path = None
+    if log.fed:
+        written = run_as_fed(log, options, settings, lambda queue: withhold(log, queue, options))
+    else:
+        first_s, last_s = prepared.span_s
+        equipment = equipment_of(prepared.streams, first_s, prepared.flow_gyro_is_imu, settings, log.origin_deg_m)
+        tape = tape_for({sensor: len(stream) for sensor, stream in prepared.streams.items()}, last_s - first_s)
+        running = start_navigator(equipment, settings, tape, options.flow_noise)
+        for part in prepared.parts():
+            run(withhold(log, part, options), running)
+        if smoothed:
+            queue = withhold(log, prepared.queue, options)
+            path = smooth(queue, start_navigator(equipment, settings, new_tape(queue), options.flow_noise))
+        written = written_on(running.tape)
+    if len(written.estimate) < 2:
+        raise InputError(
+            f"{log.path}: the filter never started; it needs an attitude or an IMU of {SLOWEST_IMU_HZ:g} Hz, then a "
+            "GPS fix or flow of quality above 0"
+        )
+    return Replay(log, options, settings, prepared, written, path)

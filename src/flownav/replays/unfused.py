@@ -1,0 +1,36 @@
+"""Horizontal sensors that a log has, and of which hardly a reading was fused."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+
+import numpy as np
+
+from flownav.estimation.gating import Reason
+from flownav.measurement import Array, Sensor, Stream
+from flownav.navigation.serving import HORIZONTAL, REFUSALS
+from flownav.replays.sentinel import Finding
+
+LEAST_READINGS = 20
+LEAST_SHARE = 0.2  # a live session fuses what it heard in its first two seconds, however late
+LATE = Reason.LATE.label  # what a live session's horizon left out never came to the navigator
+
+
+def unfused(innovation: Array, streams: Mapping[Sensor, Stream]) -> list[Finding]:
+    """One finding for each; innovation (m, tape.OFFERS). Readings that were cut or know nothing do not count."""
+    found = []
+    for sensor in HORIZONTAL:
+        rows = innovation[(innovation[:, 1] == sensor) & (innovation[:, 2] < 2)]
+        if sensor not in streams:
+            continue
+        fused = len(np.unique(rows[rows[:, 8] == Reason.FUSED, 0]))
+        first = rows[(rows[:, 2] == 0) & np.isin(rows[:, 8], REFUSALS), 8].astype(int)
+        why = Counter(Reason(reason).label for reason in first.tolist())
+        why[LATE] += streams[sensor].rejected.get(LATE, 0)
+        if why.total() >= LEAST_READINGS and fused < LEAST_SHARE * (fused + why.total()):
+            reasons = ", ".join(f"{reason} {count}" for reason, count in why.most_common() if count)
+            heard = f"{sensor.name.lower()} was heard and {'hardly' if fused else 'never'} fused"
+            text = f"{heard} ({fused} readings; {reasons}): the estimate rests on the other sensors"
+            found.append(Finding(text, unfused=True))
+    return found

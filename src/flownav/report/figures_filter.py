@@ -8,7 +8,8 @@ import numpy as np
 
 from flownav.measurement import COLUMNS, Sensor
 from flownav.record import POSITION_NED, Record
-from flownav.report.panels import Panel, Stack
+from flownav.report.chart import Stack
+from flownav.report.panels import Panel
 from flownav.report.series import (
     Array,
     Track,
@@ -84,7 +85,7 @@ def radius_of_uncertainty(record: Record) -> Panel:
                 stack.line(row, role, name, radius.t_s, radius.value[:, 0])
                 medians.setdefault(name, float(np.median(radius.value)))
     stack.from_zero()
-    figure = stack.figure(start_end_s(record), moments(record), outages(record))
+    figure = stack.chart(start_end_s(record), moments(record), outages(record))
     caption = (
         f"Three times the root-mean-square error over a sliding {RADIUS_WINDOW_S:.0f} s. "
         if truth is not None
@@ -188,7 +189,7 @@ def _innovation_panel(record: Record, sensor: str, components: dict[str, dict[st
     if tested:
         stack.line(gate_row, "gate", "gate", np.array(span), np.ones(2))
         stack.log_axis(gate_row)
-    figure = stack.figure(span, moments(record), outages(record))
+    figure = stack.chart(span, moments(record), outages(record))
     caption = f"{offered} values offered, {refused} not fused."
     if tested:
         caption += f" A test ratio above 1 is outside the gate; those below {SMALLEST_RATIO} are not drawn."
@@ -226,7 +227,7 @@ def consistency(record: Record) -> list[Panel]:
         f"here {inside:.0f} % do. Errors last, so one flight strays."
     )
     title = "Consistency with the truth"
-    return [Panel("nees", title, caption, f"{title}: NEES over time. {caption}", stack.figure(span, moments(record)))]
+    return [Panel("nees", title, caption, f"{title}: NEES over time. {caption}", stack.chart(span, moments(record)))]
 
 
 def error_against_gps(record: Record) -> Panel:
@@ -245,7 +246,7 @@ def error_against_gps(record: Record) -> Panel:
             stack.line(1, role, role, apart.t_s, sliding_rms(apart.t_s, distance**2, RADIUS_WINDOW_S))
     stack.from_zero()
     windows = outages(record)
-    figure = stack.figure(start_end_s(record), moments(record), windows)
+    figure = stack.chart(start_end_s(record), moments(record), windows)
     caption = f"Against each GPS reading, {delay_s(record, 'gps_position'):.2f} s before it arrived (its delay). "
     caption += f"The lines are root mean squares over a sliding {RADIUS_WINDOW_S:.0f} s; GPS noise stays in them."
     if windows:

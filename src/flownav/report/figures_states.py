@@ -9,7 +9,8 @@ import numpy as np
 
 from flownav.measurement import Sensor
 from flownav.record import POSITION_NED, VELOCITY_BODY, Record
-from flownav.report.panels import Panel, Stack, listed
+from flownav.report.chart import Stack
+from flownav.report.panels import Panel, listed
 from flownav.report.series import (
     Array,
     Moment,
@@ -104,7 +105,7 @@ def _states(
     if titles is POSITION_TITLES:
         stack.reverse(3)
     span = view.window or start_end_s(record)
-    figure = stack.figure(span, moments(record), outages(record))
+    figure = stack.chart(span, moments(record), outages(record))
     alt = f"{view.title} from {span[0]:.0f} to {span[1]:.0f} s: {', '.join(titles)}. "
     return Panel(view.key, view.title, note, f"{alt}Drawn: {listed(stack.names)}.", figure)
 
@@ -171,7 +172,7 @@ def _error(record: Record, columns: tuple[str, ...], titles: tuple[str, ...], ke
         stack.within(row, reach)
         beyond = beyond or bool(np.abs(values).max(initial=0.0) > reach)
         stack.line(row, "estimate", f"estimate \N{MINUS SIGN} {truth_name(record)}", error.t_s, values)
-    figure = stack.figure(start_end_s(record), moments(record))
+    figure = stack.chart(start_end_s(record), moments(record))
     caption = (
         "A consistent filter stays inside its band about 99.7 % of the time."
         if deviation is not None
@@ -202,7 +203,7 @@ def flown_errors(record: Record) -> list[Panel]:
         stack, error = Stack(titles), difference(flown, truth)
         for row, values in enumerate(error.value.T, 1):
             stack.line(row, "flown", f"flown on \N{MINUS SIGN} {truth_name(record)}", error.t_s, values)
-        figure, title = stack.figure(start_end_s(record), moments(record)), f"What was flown on: {what} error"
+        figure, title = stack.chart(start_end_s(record), moments(record)), f"What was flown on: {what} error"
         caption = "Until the hand-over the vehicle stands, or is flown on the truth: no error, by definition."
         panels.append(Panel(f"flown-{what}-error", title, caption, f"{title} over time: {', '.join(titles)}.", figure))
     return panels
@@ -222,7 +223,7 @@ def lift_off_transient(record: Record, lift_off: Moment) -> Panel:
     if thrust:
         shown = thrust.within(window)
         stack.line(2, "truth", "rotor thrust", shown.t_s, shown.value[:, 0])
-    figure = stack.figure(window, [lift_off])
+    figure = stack.chart(window, [lift_off])
     caption = "How the change of thrust at lift-off disturbs the estimate of w, as in the paper's figure 28."
     alt = f"Error of w and rotor thrust around lift-off at {lift_off.t_s:.1f} s."
     return Panel(key, title, caption, alt, figure, wide=True)

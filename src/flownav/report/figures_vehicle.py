@@ -6,7 +6,8 @@ import numpy as np
 
 from flownav.measurement import Sensor
 from flownav.record import QUATERNION, Record
-from flownav.report.panels import Panel, Stack, listed
+from flownav.report.chart import Stack
+from flownav.report.panels import Panel, listed
 from flownav.report.series import LINE_POINTS, Track, estimates, euler_deg, moments, readings, start_end_s, thin, track
 
 CONTROLS = {
@@ -31,7 +32,7 @@ def attitude(record: Record) -> Panel:
         angles = euler_deg(Track(source.t_s[kept], source.value[kept]))
         for row in (1, 2, 3):
             stack.line(row, role, name, source.t_s[kept], _unbroken(angles[:, row - 1], row == 3))
-    figure = stack.figure(start_end_s(record), moments(record))
+    figure = stack.chart(start_end_s(record), moments(record))
     return Panel(key, title, "Z-Y-X Euler angles of body against earth; drawn in degrees.",
                  f"Roll, pitch and yaw in degrees: {listed(stack.names)}.", figure)  # fmt: skip
 
@@ -58,6 +59,6 @@ def controls(record: Record) -> Panel:
             stack.line(row, "estimate", "command", command.t_s, np.degrees(command.value[:, 0]))
     if thrust is not None:
         stack.line(len(titles), "truth", "true thrust", thrust.t_s, thrust.value[:, 0])
-    figure = stack.figure(start_end_s(record), moments(record))
+    figure = stack.chart(start_end_s(record), moments(record))
     return Panel(key, title, "Angles of the swash plate and the blades, as commanded.",
                  f"Controls over time: {listed(titles)}.", figure)  # fmt: skip

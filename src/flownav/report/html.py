@@ -21,11 +21,16 @@ from flownav.report import (
     figures_vehicle,
     sensor_rows,
 )
+from flownav.report.figures_path import paths_of
+from flownav.report.page_data import Columns, paths_data, sections_data
 from flownav.report.panels import Panel, Section
-from flownav.report.series import DOT_POINTS, LINE_POINTS, has, mapping
+from flownav.report.series import DOT_POINTS, LINE_POINTS, has, mapping, moments, outages, start_end_s
 from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
+from flownav.scoring.phases import Phase, phases_of
 
 HERE = Path(__file__).parent
+RECORD_STYLES = ("vendor/uPlot.min.css", "page.css", "record.css")
+RECORD_SCRIPTS = ("vendor/uPlot.iife.min.js", "record_data.js", "record_panels.js", "record_paths.js", "record_page.js")
 
 
 def write_report(record: Record, path: Path) -> None:
@@ -74,7 +79,19 @@ def _sections(record: Record) -> list[tuple[str, str, list[Panel]]]:
 
 def render(record: Record) -> str:
     """The page as text."""
+    from markupsafe import Markup
+
     shown = sections(record)
+    found = phases_of(record)
+    scripts = [(HERE / name).read_text(encoding="utf-8") for name in RECORD_SCRIPTS]
+    columns, whole = Columns(), start_end_s(record)
+    facts = flight_facts(record, found)
+    data = {
+        "facts": facts,
+        "charts": sections_data(shown, columns, whole),
+        "views": paths_data(paths_of(record), columns),
+        "columns": {"steps": columns.steps, "counts": columns.counts},
+    }
     page: str = template("page.html.j2").render(
         title=content.title(record),
         kind=str(record.manifest.get("kind") or "flight"),
@@ -97,9 +114,42 @@ def render(record: Record) -> str:
         parameters=content.groups(record.manifest.get("parameters")),
         provenance=content.groups(record.manifest.get("provenance")),
         command=content.command(record),
-        **drawn_with(shown),
+        sections=shown,
+        heights={key: _height_px(chart) for key, chart in data["charts"].items()},
+        facts_data=facts,
+        record_data=Markup(inside_script(json.dumps(data))),
+        record_columns=Markup(columns.text()),
+        palette=PALETTE,
+        font=Markup(FONT),
+        style=Markup("\n".join((HERE / name).read_text(encoding="utf-8") for name in RECORD_STYLES)),
+        scripts=[Markup(script) for script in scripts],
+        policy=content_policy(scripts),
     )
     return page
+
+
+def flight_facts(record: Record, found: Sequence[Phase]) -> dict[str, Any]:
+    """What all panels share: the window, the phases, moments and outages, and the instant to begin with.
+
+    That is the touchdown, or else the end.
+    """
+    t0, t1 = start_end_s(record)
+    marked = moments(record)
+    touch = next((moment.t_s for moment in marked if moment.name == "touchdown"), t1)
+    return {
+        "name": content.title(record),
+        "t0": t0,
+        "t1": t1,
+        "step": 0.1 if t1 - t0 > 20.0 else 0.02,
+        "start": min(max(touch, t0), t1),
+        "phases": [phase._asdict() for phase in found],
+        "moments": [{"t": moment.t_s, "name": moment.name} for moment in marked],
+        "outages": [list(window) for window in outages(record)],
+    }
+
+
+def _height_px(chart: dict[str, Any]) -> int:
+    return len(chart["rows"]) * (chart["height"] + 6) + 20
 
 
 def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:

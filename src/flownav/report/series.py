@@ -77,6 +77,22 @@ def thin_dots(budget: int, *columns: Array) -> NDArray[np.int64]:
     return np.unique(np.concatenate([sample, thin(extremes, *columns)]))
 
 
+def drawn(values: Array) -> NDArray[np.float32]:
+    """Values as Plotly's pages carry them: single precision halves their size."""
+    with np.errstate(over="ignore"):
+        return np.asarray(values, np.float32)
+
+
+def gap_before(t_s: Array, kept: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Whether a kept sample follows a pause since the one kept before: half a second, and twenty usual intervals.
+
+    A pause lies between two neighbours of the whole series, so thinning makes none.
+    """
+    interval = np.diff(t_s, prepend=t_s[:1])
+    pauses = np.cumsum(interval > max(0.5, 20.0 * float(np.median(interval)) if len(interval) else 0.0))
+    return np.asarray(np.diff(pauses[kept], prepend=pauses[kept[:1]]) > 0)
+
+
 def has(record: Record, table: str, columns: tuple[str, ...] = ()) -> bool:
     """Whether a table is there, holds a row, and has all the columns."""
     there = record.tables.get(table, {})

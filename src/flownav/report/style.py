@@ -28,6 +28,15 @@ PALETTE: dict[str, tuple[str, str]] = {
     "band": ("rgba(10,95,180,0.15)", "rgba(98,179,255,0.20)"),
     "window": ("rgba(184,35,42,0.09)", "rgba(255,128,120,0.14)"),
     "shade": ("rgba(29,35,42,0.22)", "rgba(0,0,0,0.7)"),
+    # the phases of a flight (scoring/phases.py)
+    "phase-ground": ("#c9ced4", "#4a525c"),
+    "phase-climb": ("#a9cdf0", "#2f5f8c"),
+    "phase-hover": ("#b5dfcd", "#2b6b55"),
+    "phase-transit": ("#d9cdee", "#5d4a83"),
+    "phase-descent": ("#f4d9ae", "#7c5a22"),
+    "phase-approach": ("#f6c296", "#8d5424"),
+    "phase-touchdown": ("#f0a5a0", "#96423e"),
+    "phase-landed": ("#c9ced4", "#4a525d"),
     "padfill": ("rgba(125,136,148,0.25)", "rgba(135,147,160,0.28)"),
 }
 COLOUR = {role: light for role, (light, _) in PALETTE.items()}

@@ -1,4 +1,4 @@
-"""Axes stacked over one time axis, as data: what the record's page draws with uPlot and every other page with Plotly."""
+"""Axes stacked over one time axis, as data: a record's page draws them with uPlot, every other page with Plotly."""
 
 from __future__ import annotations
 

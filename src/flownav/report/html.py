@@ -86,9 +86,10 @@ def render(record: Record) -> str:
     scripts = [(HERE / name).read_text(encoding="utf-8") for name in RECORD_SCRIPTS]
     columns, whole = Columns(), start_end_s(record)
     facts = flight_facts(record, found)
+    charts = sections_data(shown, columns, whole)
     data = {
         "facts": facts,
-        "charts": sections_data(shown, columns, whole),
+        "charts": charts,
         "views": paths_data(paths_of(record), columns),
         "columns": {"steps": columns.steps, "counts": columns.counts},
     }
@@ -115,7 +116,7 @@ def render(record: Record) -> str:
         provenance=content.groups(record.manifest.get("provenance")),
         command=content.command(record),
         sections=shown,
-        heights={key: _height_px(chart) for key, chart in data["charts"].items()},
+        heights={key: _height_px(chart) for key, chart in charts.items()},
         facts_data=facts,
         record_data=Markup(inside_script(json.dumps(data))),
         record_columns=Markup(columns.text()),
@@ -149,7 +150,7 @@ def flight_facts(record: Record, found: Sequence[Phase]) -> dict[str, Any]:
 
 
 def _height_px(chart: dict[str, Any]) -> int:
-    return len(chart["rows"]) * (chart["height"] + 6) + 20
+    return int(len(chart["rows"]) * (chart["height"] + 6) + 20)
 
 
 def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:

@@ -1,8 +1,8 @@
 """A record's data as its page carries them: every column once, in decimals, packed small enough to send.
 
-A column is its values in whole steps of a power of ten (a ten-millionth of the largest value, or finer), the differences
+A column is its values in whole steps of a power of ten (at least a millionth of the largest value), the differences
 of neighbours, and of these each of the four bytes by itself: smooth series then pack well. All columns together are
-compressed with gzip and written as base64; `data.js` turns that back with the browser's own DecompressionStream.
+compressed with gzip and written as base64; `record_data.js` turns that back with the browser's own DecompressionStream.
 """
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.report.chart import Chart, Series
 from flownav.report.series import (
@@ -62,7 +63,7 @@ def _readings(one: Series, budget: int, style: dict[str, Any]) -> dict[str, Any]
     return _points(one, kept) | {"mode": "markers", "hovertemplate": "%{y:.3f}", **style}
 
 
-def _points(one: Series, kept: Array) -> dict[str, Any]:
+def _points(one: Series, kept: NDArray[np.int64]) -> dict[str, Any]:
     return {"x": drawn(one.t_s[kept]), "y": drawn(one.value[kept])}
 
 

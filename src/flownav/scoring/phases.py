@@ -5,9 +5,9 @@ divided alike. The path is the truth's, or the estimate's where there is no trut
 landed signal's, the events' or the rangefinder's; where nothing tells it, the flight has no phases on the ground.
 
 In the air a stretch climbs or descends where its height changes faster than CLIMB_M_S over WINDOW_S, and is a transit
-where it moves faster than TRANSIT_M_S over the ground; else it hovers. A stretch shorter than SHORTEST_S joins the longer
-neighbour, except the descent onto the ground. The descent that ends in contact, and a transit within it, is the approach; from contact until rest is the
-touchdown, and the ground afterwards is named landed.
+where it moves faster than TRANSIT_M_S over the ground; else it hovers. A stretch shorter than SHORTEST_S joins the
+longer neighbour, except the descent onto the ground. The descent that ends in contact, and a transit within it, is the
+approach; from contact until rest is the touchdown, and the ground afterwards is named landed.
 """
 
 from __future__ import annotations
@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.measurement import Sensor
 from flownav.record import POSITION_NED, Record
 
 Array = NDArray[np.float64]

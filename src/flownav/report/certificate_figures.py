@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flownav.report.campaign_figures import DIRECTION, SPEED
 from flownav.report.panels import Panel
-from flownav.report.series import drawn
+from flownav.report.samples import drawn
 from flownav.report.style import COLOUR, axis, layout
 
 Array = NDArray[np.float64]

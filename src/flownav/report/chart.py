@@ -17,7 +17,8 @@ Kind = Literal["line", "dots", "crosses", "band"]
 
 @dataclass(frozen=True)
 class Series:
-    """One thing over time on one axis: t_s (n,) and value (n,); of a band the value is half its width.
+    """One thing over time on one axis: t_s (n,) and value (n,); of a band the value is half its width, about `middle`
+    (n,) or, where that is None, about zero.
 
     role: its colour, a key of style.PALETTE. name: what it is called beside its end or in a legend.
     """
@@ -28,6 +29,7 @@ class Series:
     t_s: Array
     value: Array
     shown: bool = True
+    middle: Array | None = None
 
 
 @dataclass
@@ -104,9 +106,12 @@ class Stack:
         if known.any():
             self._add(row, Series(kind, role, name, np.asarray(t_s, float)[known], values[known], shown))
 
-    def band(self, row: int, name: str, t_s: Array, half_width: Array) -> None:
-        """The area between -half_width and +half_width, open where nothing was measured for long."""
-        self._add(row, Series("band", "band", name, np.asarray(t_s, float), np.asarray(half_width, float)))
+    def band(self, row: int, name: str, t_s: Array, half_width: Array, middle: Array | None = None) -> None:
+        """The area half_width to either side of `middle` (else of zero), open where nothing was measured for long."""
+        about = None if middle is None else np.asarray(middle, float)
+        self._add(
+            row, Series("band", "band", name, np.asarray(t_s, float), np.asarray(half_width, float), middle=about)
+        )
 
     def log_axis(self, row: int) -> None:
         """Make an upright axis logarithmic."""

@@ -11,18 +11,8 @@ from numpy.typing import NDArray
 from flownav.measurement import Sensor
 from flownav.record import POSITION_NED, Record
 from flownav.report.panels import Panel, listed
-from flownav.report.series import (
-    LINE_POINTS,
-    Array,
-    Track,
-    Window,
-    at,
-    estimates,
-    moments,
-    outages,
-    readings,
-    thin,
-)
+from flownav.report.samples import LINE_POINTS, thin
+from flownav.report.series import Array, Track, Window, at, estimates, moments, outages, readings
 
 JUMP_M = 0.5  # from one row to the next: what is flown on jumps so far as a pad is found
 

@@ -18,7 +18,8 @@ import numpy as np
 from flownav.report.chart import Chart, Series
 from flownav.report.figures_path import Paths, drawn_rows
 from flownav.report.panels import Section
-from flownav.report.series import CROSS_POINTS, DOT_POINTS, LINE_POINTS, Array, thin, thin_dots
+from flownav.report.samples import CROSS_POINTS, DOT_POINTS, LINE_POINTS, thin, thin_dots
+from flownav.report.series import Array
 
 DIGITS = 6  # decimal places below the leading one of a column's largest value
 FINEST_TIME_S = 1e-6
@@ -106,6 +107,8 @@ def _series(one: Series, columns: Columns) -> dict[str, Any]:
     )
     made: dict[str, Any] = {"kind": one.kind, "role": one.role, "name": one.name}
     made |= {"t": columns.add(one.t_s[kept], time=True), "v": columns.add(one.value[kept])}
+    if one.middle is not None:
+        made["m"] = columns.add(one.middle[kept])
     return made if one.shown else made | {"hidden": True}
 
 

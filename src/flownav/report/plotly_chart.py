@@ -3,23 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from html import escape
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flownav.report.chart import Chart, Series
-from flownav.report.series import (
-    CROSS_POINTS,
-    DOT_POINTS,
-    LINE_POINTS,
-    Array,
-    Window,
-    drawn,
-    gap_before,
-    thin,
-    thin_dots,
-)
+from flownav.report.samples import CROSS_POINTS, DOT_POINTS, LINE_POINTS, drawn, gap_before, thin, thin_dots
+from flownav.report.series import Array, Window
 from flownav.report.style import COLOUR, LINES, axis, layout
 
 FRAME_HEIGHT_PX = 84
@@ -68,15 +60,16 @@ def _points(one: Series, kept: NDArray[np.int64]) -> dict[str, Any]:
 
 
 def _band(one: Series) -> dict[str, Any]:
-    """The area between -half_width and +half_width, thinned, and open where nothing was measured for long."""
+    """The area of a band, thinned, and open where nothing was measured for long."""
     t_s, half_width = one.t_s, one.value
+    middle = np.zeros(len(t_s)) if one.middle is None else one.middle
     kept = thin(LINE_POINTS, half_width)
     x: list[Array] = []
     y: list[Array] = []
     end = np.array([np.nan])
     for part in np.split(kept, np.flatnonzero(gap_before(t_s, kept)[1:]) + 1):
         x += [t_s[part], t_s[part[::-1]], end]
-        y += [half_width[part], -half_width[part[::-1]], end]
+        y += [(middle + half_width)[part], (middle - half_width)[part[::-1]], end]
     line = {"color": COLOUR["band"], "width": 1}
     shape = {"x": drawn(np.concatenate(x)), "y": drawn(np.concatenate(y)), "mode": "lines", "line": line}
     return {**shape, "fill": "toself", "fillcolor": COLOUR["band"], "hoverinfo": "skip"}
@@ -95,7 +88,7 @@ def _layout(chart: Chart) -> dict[str, Any]:
         across = {"anchor": f"y{row}", "showticklabels": last, "matches": None if row == 1 else "x"}
         made[f"xaxis{row}"] = axis("time (s)" if last else "") | across | {"range": list(chart.window)}
         domain = [max(0.0, top - height), min(1.0, top)]
-        upright = axis(one.title) | {"anchor": f"x{row}", "domain": domain, "nticks": 6}
+        upright = axis(escape(one.title, quote=False)) | {"anchor": f"x{row}", "domain": domain, "nticks": 6}
         if one.log:
             upright |= {"type": "log", "dtick": 1, "exponentformat": "none"}
         if one.reversed:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from flownav.report.figures_path import Paths, drawn_rows
-from flownav.report.series import DOT_POINTS, LINE_POINTS, Array, Track, drawn, thin, thin_dots
+from flownav.report.samples import DOT_POINTS, LINE_POINTS, drawn, thin, thin_dots
+from flownav.report.series import Array, Track
 from flownav.report.style import COLOUR, LINES, axis, layout
 
 # A 3-D view at most, in Plotly's units: the camera sees it whole.

@@ -21,7 +21,8 @@ const panels = (() => {
   function table(row) {
     const tables = [];
     for (const one of row.lines) {
-      const holes = (sign) => Array.from(one.v, (value) => (Number.isFinite(value) && !(row.log && value <= 0) ? sign * value : null));
+      if (one.hidden) continue;
+      const holes = (sign) => Array.from(one.v, (value, k) => (Number.isFinite(value) && !(row.log && value <= 0) ? sign * value + (one.m ? one.m[k] : 0) : null));
       if (one.kind === "line") tables.push([one.t, holes(1)]);
       else {
         const limit = pausesOf(one.t);
@@ -42,9 +43,10 @@ const panels = (() => {
       for (let k = first; k < one.t.length && one.t[k] <= to; k++) {
         const value = one.v[k];
         if (!Number.isFinite(value) || (row.log && value <= 0)) continue;
-        if (value < low) low = value;
-        if (value > high) high = value;
-        if (one.kind === "band" && -value < low) low = -value;
+        const middle = one.m ? one.m[k] : 0;
+        const least = one.kind === "band" ? middle - value : value;
+        if (least < low) low = least;
+        if (middle + value > high) high = middle + value;
       }
     }
     if (row.within !== undefined && !zoomed) return [-row.within, row.within];
@@ -59,7 +61,7 @@ const panels = (() => {
     constructor(host, spec, columns) {
       this.host = host;
       this.spec = spec;
-      const own = (one) => ({ ...one, t: columns[one.t], v: columns[one.v] });
+      const own = (one) => ({ ...one, t: columns[one.t], v: columns[one.v], m: one.m === undefined ? null : columns[one.m] });
       this.rows = spec.rows.map((row) => {
         const series = row.series.map(own);
         return { ...row, series, lines: series.filter((one) => one.kind === "line" || one.kind === "band") };
@@ -97,13 +99,16 @@ const panels = (() => {
       const chips = make("div", this.gutter ? "ends" : "chips");
       for (const one of row.series) {
         if (row.labels.has(one.name)) continue;
-        const chip = make("span", "end");
+        const chip = make("button", "end");
+        chip.type = "button";
+        chip.setAttribute("aria-pressed", String(!one.hidden));
+        chip.addEventListener("click", () => this.toggle(one.name, !one.hidden));
         const first = !named.has(one.name);
         named.add(one.name);
         const role = one.kind === "band" ? "estimate" : one.role;
         chip.style.color = this.colour(role);
         chip.append(make("b", "", first ? one.name : ""), make("i", ""));
-        chip.title = one.name;
+        chip.title = `${one.name}: ${one.hidden ? "show" : "hide"}`;
         chips.append(chip);
         row.labels.set(one.name, { chip, one, value: chip.lastChild });
       }
@@ -117,6 +122,12 @@ const panels = (() => {
       this.listen(plot);
       this.plots.push(plot);
       row.plot = plot;
+    }
+
+    // A label shows and hides what it names, in all rows.
+    toggle(name, hidden) {
+      for (const row of this.rows) for (const one of row.series) if (one.name === name) one.hidden = hidden;
+      this.draw();
     }
 
     // Once uPlot has laid a row out: its labels and the instant.
@@ -139,6 +150,7 @@ const panels = (() => {
       const series = [{}];
       const bands = [];
       for (const one of row.lines) {
+        if (one.hidden) continue;
         if (one.kind === "line") {
           series.push({ stroke: this.colour(one.role), width: WIDTHS[one.role] || 1.4, dash: DASHES[one.role], points: { show: false }, spanGaps: false });
           continue;
@@ -147,7 +159,7 @@ const panels = (() => {
         bands.push({ series: [series.length, series.length + 1], fill: this.colour("band") });
         series.push(edge, { ...edge });
       }
-      if (!row.lines.length) series.push({ show: false });
+      if (series.length === 1) series.push({ show: false });
       return {
         width: this.width - this.gutter, height: height - TITLE_PX + (last ? BOTTOM_PX : 6),
         padding: [strip + 2, 10, 0, 0], legend: { show: false },
@@ -266,7 +278,7 @@ const panels = (() => {
         const { one } = label;
         let k = flight.before(one.t, to);
         while (k > 0 && !Number.isFinite(one.v[k]) && one.t[k] > from) k--;
-        const value = k >= 0 ? one.v[k] : NaN;
+        const value = k >= 0 ? one.v[k] + (one.m ? one.m[k] : 0) : NaN;
         const y = Number.isFinite(value) && !(row.log && value <= 0) ? plot.valToPos(value, "y") : 0;
         return { label, y: Math.min(plot.over.clientHeight, Math.max(0, y)), high: label.chip.firstChild.textContent ? 28 : 14 };
       });

@@ -23,6 +23,7 @@ PALETTE: dict[str, tuple[str, str]] = {
     "flow": ("#0e7a5f", "#45cfa2"),
     "autopilot": ("#8339a8", "#cb9df2"),
     "flown": ("#8339a8", "#cb9df2"),  # what an autopilot flew on: its own estimate, too
+    "imu": ("#7a6000", "#d8bf5a"),
     "alert": ("#b8232a", "#ff8078"),
     "pad": ("#7d8894", "#8793a0"),
     "band": ("rgba(10,95,180,0.15)", "rgba(98,179,255,0.20)"),
@@ -53,6 +54,7 @@ LINES: dict[str, dict[str, Any]] = {
     "flow": {"color": COLOUR["flow"], "width": 1.5},
     "autopilot": {"color": COLOUR["autopilot"], "width": 1.4},
     "flown": {"color": COLOUR["flown"], "width": 1.4},
+    "imu": {"color": COLOUR["imu"], "width": 1.3},
     "command": {"color": COLOUR["muted"], "width": 1.2, "dash": "2px,3px"},
     "gate": {"color": COLOUR["alert"], "width": 1.2, "dash": "6px,4px"},
 }

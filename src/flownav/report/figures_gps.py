@@ -42,12 +42,13 @@ def _residual(
         apart = difference(gps, source)
         for row, values in enumerate(-apart.value.T, 1):
             if role == "estimate":
-                stack.dots(row, role, f"{name} {minus} GPS", apart.t_s, values)
-            stack.line(row, role, f"{name}, {WINDOW_S:.0f} s mean", apart.t_s,
-                       sliding_mean(apart.t_s, values, WINDOW_S))  # fmt: skip
+                stack.dots(row, role, "each reading", apart.t_s, values)
+            stack.line(row, role, f"{name} {minus} GPS", apart.t_s, sliding_mean(apart.t_s, values, WINDOW_S))
     windows = outages(record)
     caption = f"At the instants that GPS describes, {delay_s(record, sensor.name.lower()):.2f} s before it arrived. "
-    caption += "GPS has errors of its own, which stay in the difference."
+    caption += (
+        f"The lines are means over a sliding {WINDOW_S:.0f} s. GPS has errors of its own, which stay in the difference."
+    )
     caption += " Shaded: GPS was withheld from the filter." if windows else ""
     alt = f"{title} over time: {', '.join(titles)}. Drawn: {listed(stack.names)}."
     return Panel(key, title, caption, alt, stack.chart(start_end_s(record), moments(record), windows))
@@ -65,7 +66,7 @@ def error_against_gps(record: Record) -> Panel:
         if source is not None:
             apart = difference(gps, source)
             distance = np.hypot(*apart.value[:, :2].T)
-            stack.dots(1, role, f"{role}, each reading", apart.t_s, distance)
+            stack.dots(1, role, f"each reading, {role}", apart.t_s, distance)
             stack.line(1, role, role, apart.t_s, sliding_rms(apart.t_s, distance**2, WINDOW_S))
     stack.from_zero()
     windows = outages(record)

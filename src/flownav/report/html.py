@@ -160,7 +160,7 @@ def flight_facts(record: Record, found: Sequence[Phase]) -> dict[str, Any]:
         "t1": t1,
         "step": 0.1 if t1 - t0 > 20.0 else 0.02,
         "start": min(max(touch, t0), t1),
-        "phases": [phase._asdict() for phase in found],
+        "phases": [p._replace(t0=max(t0, p.t0), t1=min(t1, p.t1))._asdict() for p in found if p.t1 > t0 and p.t0 < t1],
         "moments": [*found_pad, *({"t": moment.t_s, "name": moment.name} for moment in marked)],
         "outages": [list(window) for window in outages(record)],
     }

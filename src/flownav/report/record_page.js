@@ -78,7 +78,7 @@
     slider.setAttribute("aria-valuetext", words.join(", "));
     if (main) {
       const down = flight.between(main.t, main.d, t);
-      words.push(`height ${flight.number(-down, 2)} m`, `speed ${flight.number(Math.hypot(rate(t, "n"), rate(t, "e"), rate(t, "d")), 2)} m/s`);
+      words.push(`height ${(-down).toFixed(2).replace("-", "\u2212")} m`, `speed ${Math.hypot(rate(t, "n"), rate(t, "e"), rate(t, "d")).toFixed(2)} m/s`);
     }
     said.textContent = words.join("  \u00b7  ");
   }

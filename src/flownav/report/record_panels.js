@@ -1,7 +1,7 @@
 // Panels over time: rows of uPlot axes that share the page's instant and zoom, with labels at the ends of their lines.
 "use strict";
 const panels = (() => {
-  const GUTTER_PX = 108;
+  const GUTTER_PX = 112;
   const LEFT_PX = 58;
   const BOTTOM_PX = 26;
   const TITLE_PX = 18;
@@ -32,6 +32,13 @@ const panels = (() => {
     }
     if (!tables.length) return [[flight.facts.t0, flight.facts.t1], [null, null]];
     return tables.length === 1 ? tables[0] : uPlot.join(tables);
+  }
+
+  // Powers of ten on a logarithmic axis, at most five of them.
+  function decades(low, high) {
+    const [first, last] = [Math.ceil(Math.log10(low) - 1e-9), Math.floor(Math.log10(high) + 1e-9)];
+    const step = Math.max(1, Math.ceil((last - first) / 4));
+    return Array.from({ length: Math.floor((last - first) / step) + 1 }, (_, k) => 10 ** (first + k * step));
   }
 
   function reach(row, zoomed, [from, to]) {
@@ -146,6 +153,7 @@ const panels = (() => {
       if (!last) across.values = (u, splits) => splits.map(() => "");
       else across.values = (u, splits) => splits.map((t, n) => (n === splits.length - 1 && n ? `${+t.toFixed(3)} s` : String(+t.toFixed(3)).replace("-", "\u2212")));
       const upright = { ...axis, size: LEFT_PX, space: 26 };
+      if (row.log) upright.splits = (u, k_, low, high) => decades(low, high);
       upright.values = (u, splits) => splits.map((v) => (v === null ? "" : String(+v.toPrecision(6)).replace("-", "\u2212")));
       const series = [{}];
       const bands = [];
@@ -200,6 +208,8 @@ const panels = (() => {
 
     word(ctx, text, x, y, room, role, dpr) {
       ctx.font = FONT(10.5 * dpr);
+      ctx.textAlign = "left";
+      ctx.textBaseline = "alphabetic";
       if (ctx.measureText(text).width > room) return;
       ctx.fillStyle = this.colour(role);
       ctx.fillText(text, x, y);
@@ -224,7 +234,7 @@ const panels = (() => {
         ctx.moveTo(x, bbox.top);
         ctx.lineTo(x, bbox.top + bbox.height);
         ctx.stroke();
-        if (!k) this.word(ctx, moment.name, x + 3 * dpr, bbox.top + 11 * dpr, 1e9, "muted", dpr);
+        if (!k) this.word(ctx, moment.name, x + 3 * dpr, bbox.top + 11 * dpr, bbox.left + bbox.width - x, "muted", dpr);
       }
       ctx.setLineDash([]);
       for (const one of row.series) {

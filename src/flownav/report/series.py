@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from flownav.measurement import COLUMNS, Sensor
 from flownav.record import QUATERNION, Record
+from flownav.scoring.phases import phases_of
 
 Array = NDArray[np.float64]
 Window = tuple[float, float]
@@ -193,12 +195,23 @@ def _ground_contacts(record: Record) -> dict[str, float]:
             found["lift-off"] = float(truth["t_s"][rows[~on_ground][0]])
         if on_ground.any():
             found["touchdown"] = float(truth["t_s"][rows[on_ground][-1]])
+    told = {kind.lower() for _, _, kind, _, _ in event_rows(record)}
+    if not found and not told & {*LIFT_OFF_KINDS, *TOUCHDOWN_KINDS}:
+        return _contacts_of_phases(record)
     for t_s, _, kind, _, _ in event_rows(record):
         if kind.lower() in LIFT_OFF_KINDS:
             found.setdefault("lift-off", t_s)
         if kind.lower() in TOUCHDOWN_KINDS:
             found.setdefault("touchdown", t_s)
     return found
+
+
+def _contacts_of_phases(record: Record) -> dict[str, float]:
+    """First lift-off and last touchdown [s] as the phases have them, which read the landed signal and the range."""
+    phases = phases_of(record)
+    lifted = [one.t1 for one, after in pairwise(phases) if one.name == "ground" and after.name != "ground"]
+    touched = [one.t0 for one in phases if one.name == "touchdown"]
+    return {name: times[k] for name, times, k in (("lift-off", lifted, 0), ("touchdown", touched, -1)) if times}
 
 
 def event_rows(record: Record) -> list[tuple[float, str, str, str, str]]:

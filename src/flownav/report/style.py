@@ -24,6 +24,8 @@ PALETTE: dict[str, tuple[str, str]] = {
     "autopilot": ("#8339a8", "#cb9df2"),
     "flown": ("#8339a8", "#cb9df2"),  # what an autopilot flew on: its own estimate, too
     "imu": ("#7a6000", "#d8bf5a"),
+    "command": ("#57616c", "#a3adb8"),
+    "gate": ("#b8232a", "#ff8078"),
     "alert": ("#b8232a", "#ff8078"),
     "pad": ("#7d8894", "#8793a0"),
     "band": ("rgba(10,95,180,0.15)", "rgba(98,179,255,0.20)"),

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 class PhaseScores(NamedTuple):
     """A phase's errors, NaN where they are not known, and of the values offered to the filter how many were not fused.
 
-    horizontal_rms_m, vertical_rms_m: of what was flown on, or else of the estimate, against the truth.
+    horizontal_rms_m, vertical_rms_m: of what was flown on, or else of the estimate, against the truth, or else GPS.
     velocity_rms_m_s: of the length of the velocity's error.
     """
 
@@ -63,7 +63,9 @@ def rejected_mostly_in(record: Record, phases: Sequence[Phase]) -> dict[tuple[st
 
 
 def _errors(record: Record, columns: tuple[str, ...]) -> tuple[Array, Array] | None:
-    """Instants (n,) and errors (n, 3) against the truth, of what was flown on or else of the estimate."""
+    """Instants (n,) and errors (n, 3) against the truth, of what was flown on or else of the estimate; without a truth
+    those of the position against GPS.
+    """
     truth = record.tables.get("truth", {})
     for name in ("flown", "estimate"):
         table = record.tables.get(name, {})
@@ -73,7 +75,22 @@ def _errors(record: Record, columns: tuple[str, ...]) -> tuple[Array, Array] | N
                 [np.interp(t_s, known, np.asarray(truth[c], float), np.nan, np.nan) for c in columns]
             )
             return t_s, record.matrix(name, columns) - there
-    return None
+    return _against_gps(record, columns) if columns == POSITION_NED else None
+
+
+def _against_gps(record: Record, columns: tuple[str, ...]) -> tuple[Array, Array] | None:
+    """The same against GPS, at the instants that it describes: its arrival less its delay."""
+    gps, estimate = record.tables.get("gps_position", {}), record.tables.get("estimate", {})
+    if not all(len(table.get("t_s", ())) and all(c in table for c in columns) for table in (gps, estimate)):
+        return None
+    delays: Any = record.manifest.get("delays_s")
+    delay_s = delays.get("gps_position") if isinstance(delays, Mapping) else None
+    t_s = np.asarray(gps["t_s"], float) - (float(delay_s) if isinstance(delay_s, (int, float)) else 0.0)
+    known = np.asarray(estimate["t_s"], float)
+    ours = np.column_stack([np.interp(t_s, known, estimate[c], np.nan, np.nan) for c in columns])
+    error = ours - record.matrix("gps_position", columns)
+    error[np.asarray(gps.get("quality", np.full(len(t_s), 255.0)), float) <= 0.0] = np.nan
+    return t_s, error
 
 
 def _rms(errors: tuple[Array, Array] | None, phase: Phase, columns: slice, last: bool) -> float:

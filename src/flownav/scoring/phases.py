@@ -28,6 +28,7 @@ WINDOW_S = 2.0
 CLIMB_M_S = 0.15
 TRANSIT_M_S = 0.7
 SHORTEST_S = 2.0
+SETTLING_M = 0.15
 TOUCHDOWN_S = 1.0  # where no rest is scored
 CONTACT_RANGE_M = 0.3  # above what the rangefinder read first
 LONGEST_CONTACT_GAP_S = 0.5  # skids flutter
@@ -59,7 +60,7 @@ def phases_of(record: Record) -> list[Phase]:
     contact = contact_of(record, grid)
     if contact is not None:
         labels = np.where(contact, NAMES.index("ground"), labels)
-    return _named(_merged(_runs(labels, grid)), record)
+    return _named(_merged(_runs(_settling(labels, -path[:, 2]), grid)), record)
 
 
 def motion_of(path: Array) -> NDArray[np.int64]:
@@ -74,6 +75,17 @@ def motion_of(path: Array) -> NDArray[np.int64]:
     names = np.where(speed > TRANSIT_M_S, NAMES.index("transit"), NAMES.index("hover"))
     vertical = np.where(velocity[:, 2] < 0.0, NAMES.index("climb"), NAMES.index("descent"))
     return np.where(steep, vertical, names)
+
+
+def _settling(labels: NDArray[np.int64], height_m: Array) -> NDArray[np.int64]:
+    """A hover that ends in contact sinks at its end, however slowly: its last SETTLING_M of height are a descent."""
+    labels, ground, hover = labels.copy(), NAMES.index("ground"), NAMES.index("hover")
+    for row in np.flatnonzero((labels[1:] == ground) & (labels[:-1] == hover)):
+        first = row
+        while first > 0 and labels[first] == hover and height_m[first] < height_m[row + 1] + SETTLING_M:
+            first -= 1
+        labels[first + 1 : row + 1] = NAMES.index("descent")
+    return labels
 
 
 def contact_of(record: Record, t_s: Array) -> NDArray[np.bool_] | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -131,7 +131,7 @@ def render(record: Record) -> str:
         provenance=content.groups(record.manifest.get("provenance")),
         command=content.command(record),
         sections=shown,
-        heights={key: _height_px(chart) for key, chart in charts.items()},
+        heights=heights_px(charts),
         facts_data=facts,
         record_data=Markup(inside_script(json.dumps(data))),
         record_columns=Markup(columns.text()),
@@ -166,8 +166,9 @@ def flight_facts(record: Record, found: Sequence[Phase]) -> dict[str, Any]:
     }
 
 
-def _height_px(chart: dict[str, Any]) -> int:
-    return int(len(chart["rows"]) * (chart["height"] + 6) + 20)
+def heights_px(charts: Mapping[str, Any]) -> dict[str, int]:
+    """How high each chart will be, so that the page keeps its room before it is drawn."""
+    return {key: int(len(chart["rows"]) * (chart["height"] + 6) + 20) for key, chart in charts.items()}
 
 
 def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:

@@ -170,7 +170,7 @@ const panels = (() => {
       if (series.length === 1) series.push({ show: false });
       return {
         width: this.width - this.gutter, height: height - TITLE_PX + (last ? BOTTOM_PX : 6),
-        padding: [strip + 2, 10, 0, 0], legend: { show: false },
+        padding: [strip + 2, 16, 0, 0], legend: { show: false },
         cursor: { x: false, y: false, points: { show: false }, drag: { x: true, y: false, setScale: false } },
         scales: {
           x: { time: false, range: () => this.window() },

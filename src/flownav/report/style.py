@@ -40,6 +40,13 @@ PALETTE: dict[str, tuple[str, str]] = {
     "phase-approach": ("#f6c296", "#8d5424"),
     "phase-touchdown": ("#f0a5a0", "#96423e"),
     "phase-landed": ("#c9ced4", "#4a525d"),
+    # records beside each other
+    "record-1": ("#16191d", "#f5f6f7"),
+    "record-2": ("#0a5fb4", "#62b3ff"),
+    "record-3": ("#bf5b0b", "#f2a354"),
+    "record-4": ("#0e7a5f", "#45cfa2"),
+    "record-5": ("#8339a8", "#cb9df2"),
+    "record-6": ("#9a2f6b", "#f08bc0"),
     "padfill": ("rgba(125,136,148,0.25)", "rgba(135,147,160,0.28)"),
 }
 COLOUR = {role: light for role, (light, _) in PALETTE.items()}

@@ -32,7 +32,7 @@ class PhaseScores(NamedTuple):
 
 def scores_by_phase(record: Record, phases: Sequence[Phase]) -> list[PhaseScores]:
     """A row for each phase. An instant on the border of two belongs to the later one."""
-    place, speed = _errors(record, POSITION_NED), _errors(record, VELOCITY_BODY)
+    place, speed = errors_of(record, POSITION_NED), errors_of(record, VELOCITY_BODY)
     table = record.tables.get("innovation", {})
     t_s = np.asarray(table.get("t_s", ()), float)
     fused = np.asarray(table.get("fused", np.ones(len(t_s))), float) > 0.5
@@ -62,7 +62,7 @@ def rejected_mostly_in(record: Record, phases: Sequence[Phase]) -> dict[tuple[st
     return {key: names.most_common(1)[0][0] for key, names in counted.items()}
 
 
-def _errors(record: Record, columns: tuple[str, ...]) -> tuple[Array, Array] | None:
+def errors_of(record: Record, columns: tuple[str, ...]) -> tuple[Array, Array] | None:
     """Instants (n,) and errors (n, 3) against the truth, of what was flown on or else of the estimate; without a truth
     those of the position against GPS.
     """

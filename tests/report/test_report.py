@@ -243,7 +243,9 @@ def test_a_replay_is_told_by_its_outages(outdoor: Page) -> None:
     assert re.search(r"1 to 3 s [a-z, ]+ 0.41 0.72 a replay of its own", outdoor.text)
     assert "median 0.64" in outdoor.text
     assert "Flow no data 406 812" in outdoor.text
-    assert "GPS position outage \N{EN DASH} 300 \N{EN DASH}" in outdoor.text  # a record from before readings were counted
+    assert (
+        "GPS position outage \N{EN DASH} 300 \N{EN DASH}" in outdoor.text
+    )  # a record from before readings were counted
     assert "gps-distance" in outdoor.figures()
     assert "position-error" not in outdoor.figures()
 

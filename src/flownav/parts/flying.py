@@ -6,7 +6,6 @@ import copy
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-
 from flownav.campaigns.local import record_flown
 from flownav.compile import ONE_LANE, announce_compilation
 from flownav.errors import InputError

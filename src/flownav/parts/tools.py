@@ -9,10 +9,12 @@ import math
 
 import numpy as np
 
-from flownav.frames import rotation_from_quaternion
+from flownav.frames import GRAVITY_M_S2, rotation_from_quaternion
 from flownav.measurement import Array
 from flownav.navigation.told import FlowSettings
-from flownav.parts.protocols import Reading
+from flownav.parts.protocols import Imu, Reading
+
+GRAVITY_NED = np.array([0.0, 0.0, GRAVITY_M_S2])
 
 
 def matrix(quaternion: Array) -> Array:
@@ -60,3 +62,32 @@ def flow_velocity(reading: Reading, range_m: float, s: FlowSettings, turning_rad
     turning = np.where(np.isfinite(carried), carried, turning_rad_s)
     seen_x, seen_y = reading.value[:2] - turning
     return np.array([seen_y * range_m / s.flow_gain_x, -seen_x * range_m / s.flow_gain_y])
+
+
+class AttitudeFollower:
+    """Attitude (w, x, y, z) by gyro, leaning on the specific force and on a compass, each with a time constant [s].
+
+    An explicit complementary filter (Mahony, Hamel and Pflimlin 2008) without its bias: what many small vehicles fly.
+    """
+
+    def __init__(self, tilt_s: float = 5.0, heading_s: float = 5.0) -> None:
+        self.tilt_s, self.heading_s = tilt_s, heading_s
+        self.quaternion, self.rate_rad_s = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
+        self.started, self._field_s = False, -math.inf
+
+    def predict(self, dt_s: float, imu: Imu) -> Array:
+        """Turn on by an inertial reading over dt; the acceleration NED (3,) that it implies [m/s2]."""
+        if not self.started:
+            self.quaternion, self.started = level_attitude(imu.force_frd_m_s2, heading_rad=0.0), True
+        down = matrix(self.quaternion).T @ GRAVITY_NED
+        lean = np.cross(down, imu.force_frd_m_s2) / GRAVITY_M_S2**2 / self.tilt_s
+        self.rate_rad_s = imu.rate_frd_rad_s
+        self.quaternion = turned(self.quaternion, (imu.rate_frd_rad_s + lean) * dt_s)
+        return np.asarray(matrix(self.quaternion) @ imu.force_frd_m_s2 + GRAVITY_NED)
+
+    def compass(self, reading: Reading, declination_rad: float) -> None:
+        """Lean on a magnetic field; the first one is believed whole."""
+        share = min((reading.t_s - self._field_s) / self.heading_s, 1.0)
+        self._field_s = reading.t_s
+        off = share * heading_off(self.quaternion, reading.value, declination_rad)
+        self.quaternion = turned(self.quaternion, matrix(self.quaternion).T @ np.array([0.0, 0.0, off]))

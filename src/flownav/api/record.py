@@ -49,7 +49,9 @@ class Record(ground.Record):
         if bad:
             return str(bad[0])
         landing = self.scores.get("touchdown") or {}
-        return f"crashed: {', '.join(landing['broken'])}" if self.scores.get("crashed") and landing.get("broken") else ""
+        return (
+            f"crashed: {', '.join(landing['broken'])}" if self.scores.get("crashed") and landing.get("broken") else ""
+        )
 
     @classmethod
     def load(cls, path: str | Path) -> Record:

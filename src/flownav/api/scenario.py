@@ -131,9 +131,7 @@ class Scenario:
     def __repr__(self) -> str:
         flown, filter_name = self.file.flight, self.file.filter.name
         vehicle = self.file.vehicle.file or "maxi-joker-3"
-        return (
-            f"<Scenario {self.name}: {flown.duration_s:g} s, {vehicle}, {self.file.gps.model} GPS, {filter_name} filter>"
-        )
+        return f"<Scenario {self.name}: {flown.duration_s:g} s, {vehicle}, {self.file.gps.model} GPS, {filter_name} filter>"
 
 
 def scenario_of(given: Scenario | str | Path, **changes: Any) -> Scenario:

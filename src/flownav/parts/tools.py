@@ -15,6 +15,7 @@ from flownav.navigation.told import FlowSettings, GpsSettings, NavigatorSettings
 from flownav.parts.protocols import Imu, Reading
 
 LEAST_GPS_M = 0.3
+LONGEST_WAIT_S = 10.0  # for a fix, where the log has GPS that finds none
 GRAVITY_NED = np.array([0.0, 0.0, GRAVITY_M_S2])
 
 
@@ -111,4 +112,4 @@ def fix_is_overdue(t_s: float, attitude: AttitudeFollower, s: NavigatorSettings)
         return False
     if not math.isfinite(attitude.since_s):
         attitude.since_s = t_s
-    return t_s - attitude.since_s >= s.equipment.deadline_s
+    return t_s - attitude.since_s >= min(s.equipment.deadline_s, LONGEST_WAIT_S)

@@ -40,7 +40,7 @@ class OwnPartsEngine:
 
 
 def identities(parts: Parts) -> tuple[str, ...]:
-    """What a campaign's folder says of its parts: kind, name and SHA-256 of the source, so that it resumes with these."""
+    """What a campaign's folder says of its parts: kind, name and SHA-256 of the source. It resumes with these alone."""
     kinds = [("filter", parts.filter), *(("sensor", one) for one in parts.sensors), ("vehicle", parts.vehicle),
              ("controller", parts.controller)]  # fmt: skip
     return tuple(f"{kind} {name_of(part)} {_digest(part)}" for kind, part in kinds if part is not None)

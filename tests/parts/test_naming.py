@@ -81,7 +81,9 @@ def test_a_campaigns_rows_are_the_flights_one_by_one_and_its_folder_names_the_pa
     from flownav.campaigns.engines.engine import Part
     from flownav.simulation.scenario import load_scenario
 
-    plan = planned([load_scenario("landing")], {}, 2, 3, changes={"flight.duration_s": 4.0})
+    plan = planned(
+        [load_scenario("landing")], {}, truth_models=["ensemble"], seed=3, flights=2, changes={"flight.duration_s": 4.0}
+    )
     parts = Parts(filter=ComplementaryFilter)
     cell = plan.ready(0)
     ((_, rows),) = OwnPartsEngine(parts).fly(cell, 3, [Part(0, 0, 2)])

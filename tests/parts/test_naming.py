@@ -93,3 +93,20 @@ def test_a_campaigns_rows_are_the_flights_one_by_one_and_its_folder_names_the_pa
     (said,) = identities(parts)
     assert said.startswith("filter complementary ")
     assert len(said.split()[-1]) == 64
+
+
+def test_a_campaign_of_an_own_filter_resumes_with_it_alone_and_flies_a_flight_again(file, tmp_path):
+    import flownav
+
+    short = {"flight": {"duration_s": 8.0}}
+    first = flownav.campaign("landing", flights=2, filter=f"{file}:Mine", folder=tmp_path / "kept", **short)
+    assert first.record(1).manifest["parts"] == {"filter": "mine"}
+    assert first.record(1).manifest["scores"]["max_position_error_m"] == pytest.approx(
+        first.to_pandas()["max_position_error_m"][1], rel=0, abs=0
+    )
+    again = flownav.campaign("landing", flights=2, filter=f"{file}:Mine", folder=tmp_path / "kept", **short)
+    assert again.rate_per_s is None, "it flew what was there"
+    with pytest.raises(InputError, match="another campaign"):
+        flownav.campaign("landing", flights=2, filter=ComplementaryFilter, folder=tmp_path / "kept", **short)
+    with pytest.raises(InputError, match="engine ray: parts of your own"):
+        flownav.campaign("landing", flights=2, filter=ComplementaryFilter, engine="ray", **short)

@@ -83,7 +83,8 @@ def campaign(
     parts, our_filter, our_vehicle = split(filter, sensors, vehicle, controller)
     fixed, rest = _split(changes)
     plan = plan_of(
-        [scenario_of(one, filter=our_filter, vehicle=our_vehicle, **rest) for one in chosen], flights=most if flights is None else flights,
+        [scenario_of(one, filter=our_filter, vehicle=our_vehicle, **rest) for one in chosen],
+        flights=most if flights is None else flights,
         seed=seed, sweep=sweep or {}, changes=fixed, sampling=sampling, truth_model=truth_model, until=until,
     )  # fmt: skip
     require_from("records", records, 0, WORST)
@@ -140,7 +141,7 @@ def fly_plan(
         rate = flown / max(time.monotonic() - began_s, 1e-9) if flown else None
         summary = summary_of(plan, data)
         store.keep_text(SUMMARY, json.dumps(summary, indent=1) + "\n")
-        found = Campaign(plan, folder, summary, rate, holding)
+        found = Campaign(plan, folder, summary, rate, holding, engine)
         found.records += _keep_records(found, records)
         if page:
             found.report()
@@ -156,13 +157,13 @@ def _keep_records(found: Campaign, count: int) -> list[Path]:
     return [_keep(found.record(flight, cell=cell), found.folder, cell, flight) for cell, flight in places]
 
 
-def fly_again(plan: Plan, folder: Path, cell: int, flight: int) -> tuple[Record, Path]:
+def fly_again(plan: Plan, folder: Path, cell: int, flight: int, engine: Engine | None = None) -> tuple[Record, Path]:
     """One flight of a plan flown again, its record and its report in the folder; the record, and where it lies.
 
     InputError where there is no such flight, or the folder is another campaign's.
     """
     Store(folder).check(plan.as_json)
-    record = Campaign(plan, folder, {}).record(flight, cell=cell)
+    record = Campaign(plan, folder, {}, engine=engine).record(flight, cell=cell)
     return record, _keep(record, folder, cell, flight)
 
 

@@ -9,13 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from flownav.campaigns.engines.engine import Part
+from flownav.campaigns.again import Recording
+from flownav.campaigns.engines.engine import Engine, Part
+from flownav.campaigns.local import fly_recorded
 from flownav.campaigns.plan import Ready
 from flownav.campaigns.rows import rows_of
 from flownav.measurement import Array
 from flownav.parts.calling import name_of
-from flownav.parts.flying import fly_parts
+from flownav.parts.flying import fly_parts, fly_with
 from flownav.parts.protocols import Parts
+from flownav.record import Record
+from flownav.simulation.assemble import Setup
+from flownav.simulation.ensemble import Ensemble
+from flownav.simulation.fault import SensorFault
 
 
 class OwnPartsEngine:
@@ -37,6 +43,17 @@ class OwnPartsEngine:
                 rows.append(rows_of(cell.flight, flown.history))
                 on_progress(1)
             yield part, np.concatenate(rows)
+
+    def recording(
+        self, setup: Setup, seed: int, index: int, ensemble: Ensemble | None, fault: SensorFault | None, /
+    ) -> Record:
+        """One of the flights as a scored record."""
+        return fly_with(setup, self.parts, seed, index, ensemble, fault)
+
+
+def recording_of(engine: Engine | None) -> Recording:
+    """How the flights of an engine are flown again, one by one."""
+    return engine.recording if isinstance(engine, OwnPartsEngine) else fly_recorded
 
 
 def identities(parts: Parts) -> tuple[str, ...]:

@@ -48,6 +48,7 @@ ALLOWED = {
     "validation": GROUND | EQUATIONS | {"navigation", "simulation", "logs", "replays", "scoring"},
     "report": GROUND | {"scoring"},
     "export": GROUND,
+    "viewing": GROUND | {"export"},
     "paper": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "rig", "identification", "report"},
 }
 

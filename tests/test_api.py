@@ -50,6 +50,7 @@ ALLOWED = {
     "export": GROUND,
     "parts": GROUND | EQUATIONS | {"navigation", "simulation", "campaigns", "logs", "replays"},
     "examples": GROUND | EQUATIONS | {"parts"},
+    "viewing": GROUND | {"export"},
     "paper": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "rig", "identification", "report"},
 }
 

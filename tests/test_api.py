@@ -109,13 +109,15 @@ def test_constraints_pin_every_dependency_and_name_no_address():
 
 def test_docs_have_a_place_in_the_navigation():
     navigation = (PROJECT / "mkdocs.yml").read_text(encoding="utf-8")
-    for page in (PROJECT / "docs").glob("*.md"):
-        assert page.name in navigation, f"docs/{page.name} is not in mkdocs.yml"
+    for page in (PROJECT / "docs").rglob("*.md"):
+        name = page.relative_to(PROJECT / "docs").as_posix()
+        assert f": {name}\n" in navigation, f"docs/{name} is not in mkdocs.yml"
 
 
-@pytest.mark.parametrize(
-    "page", ["README.md", "ARCHITECTURE.md", *sorted(f"docs/{p.name}" for p in (PROJECT / "docs").glob("*.md"))]
-)
+PAGES = sorted(page.relative_to(PROJECT).as_posix() for page in (PROJECT / "docs").rglob("*.md"))
+
+
+@pytest.mark.parametrize("page", ["README.md", "ARCHITECTURE.md", *PAGES])
 def test_links_between_pages_lead_somewhere(page):
     text = (PROJECT / page).read_text(encoding="utf-8")
     for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", text):

@@ -99,10 +99,8 @@ def _simulated(truth: Table, log: Log) -> Iterator[Row]:
     quaternion = np.column_stack([truth[name] for name in QUATERNION])
     latitude, longitude, altitude = pymap3d.ned2geodetic(*place.T, *log.origin_deg_m)
     geodetic = np.column_stack([altitude, latitude, longitude])
-    rows = np.column_stack(
-        [truth["t_s"], _angles_deg(truth), geodetic, quaternion, place, velocities_ned(truth)]
-    ).tolist()
-    for t_s, *values in rows:
+    state = (truth["t_s"], _angles_deg(truth), geodetic, quaternion, place, velocities_ned(truth))
+    for t_s, *values in np.column_stack(state).tolist():
         yield Row(t_s, "SIM", tuple(values[:10]))
         yield Row(t_s, "SIM2", tuple(values[10:]))
 

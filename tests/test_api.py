@@ -24,6 +24,9 @@ GROUND = {"errors", "files", "compile", "frames", "measurement", "record", "para
 GROUND |= {"record_file", "parquet_pages"}
 GROUND |= {"guard", "text", "toml_text"}
 EQUATIONS = {"vehicle", "sensors", "control", "estimation", "optics"}
+# what the public API stands on: every room but the faces
+JOBS = {"navigation", "simulation", "logs", "mavlink", "scoring", "replays", "live", "campaigns", "faults"}
+JOBS |= {"identification", "report", "export"}
 ALLOWED = {
     "vehicle": GROUND,
     "sensors": GROUND,
@@ -48,6 +51,7 @@ ALLOWED = {
     "validation": GROUND | EQUATIONS | {"navigation", "simulation", "logs", "replays", "scoring"},
     "report": GROUND | {"scoring"},
     "export": GROUND,
+    "api": GROUND | EQUATIONS | JOBS,
     "paper": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "rig", "identification", "report"},
 }
 

@@ -24,6 +24,9 @@ GROUND = {"errors", "files", "compile", "frames", "measurement", "record", "para
 GROUND |= {"record_file", "parquet_pages"}
 GROUND |= {"guard", "text", "toml_text"}
 EQUATIONS = {"vehicle", "sensors", "control", "estimation", "optics"}
+# what the public API stands on: every room but the faces
+JOBS = {"navigation", "simulation", "logs", "mavlink", "scoring", "replays", "live", "campaigns", "faults"}
+JOBS |= {"identification", "report", "export"}
 ALLOWED = {
     "vehicle": GROUND,
     "sensors": GROUND,
@@ -45,12 +48,16 @@ ALLOWED = {
     "campaigns": GROUND | EQUATIONS | {"simulation", "navigation", "scoring"},
     "faults": GROUND | EQUATIONS | {"logs", "simulation", "campaigns", "scoring", "navigation", "replays"},
     "certification": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "faults", "report"},
+    "samples": GROUND
+    | EQUATIONS
+    | {"logs", "mavlink", "rig", "navigation", "simulation", "scoring", "campaigns", "faults", "live", "export"},
     "validation": GROUND | EQUATIONS | {"navigation", "simulation", "logs", "replays", "scoring"},
     "report": GROUND | {"scoring"},
     "export": GROUND,
     "parts": GROUND | EQUATIONS | {"navigation", "simulation", "campaigns", "logs", "replays"},
     "examples": GROUND | EQUATIONS | {"parts"},
     "viewing": GROUND | {"export"},
+    "api": GROUND | EQUATIONS | JOBS,
     "paper": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "rig", "identification", "report"},
 }
 

@@ -1,7 +1,7 @@
-"""A PX4 ULog file as a Log: topics of every age of PX4, in the units and frames of `measurement`. docs/logs.md.
+"""A PX4 ULog file as a Log: topics of every age of PX4, in the units and frames of `measurement`.
 
 What PX4 says in float or integer, degrees or 1e-7 degrees, radians accumulated or rates, is the same here. Message
-definitions: PX4-Autopilot, msg/.
+definitions: PX4-Autopilot, msg/. The page is docs/reference/logs.md.
 """
 
 from __future__ import annotations
@@ -163,5 +163,10 @@ def _unusable(topics: Topics) -> list[str]:
 
 
 def _estimator(topics: Topics) -> str:
-    """Which of PX4's estimators wrote the estimate: SYS_MC_EST_GROUP, on old firmware, chose another than EKF2."""
+    """Which of PX4's estimators wrote the estimate: SYS_MC_EST_GROUP, on old firmware, chose another than EKF2.
+
+    A system that is not PX4 by its own word is called by its name.
+    """
+    if topics.system and "px4" not in topics.system.lower():
+        return topics.system
     return {1: "PX4 LPE", 3: "PX4 Q estimator"}.get(int(topics.parameters.get("SYS_MC_EST_GROUP", 2)), "PX4 EKF2")

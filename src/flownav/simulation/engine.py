@@ -81,10 +81,12 @@ def buffers_of(flight: Flight, lanes: tuple[int, ...], epochs: int, *, written: 
 def fly_into(
     flight: Flight, seed: int, first: int, lanes: tuple[int, ...], b: Buffers, ensemble: Ensemble | None = None, *,
     faults: Sequence[SensorFault] | None = None, branches: Branches | None = None, compiled: bool = True,
+    instead: int | None = None,
 ) -> None:  # fmt: skip
     """Fly a block into its buffers, each lane as the flight's sheets say, as the ensemble draws it or as its branch is.
 
-    faults: of each lane's sensors, for a flight that `fails`.
+    faults: of each lane's sensors, for a flight that `fails`. instead: the address of what takes readings in place of
+    the navigator, with a unit's interface (`navigation.take.UNIT_SIGNATURE`).
     compiled False: in plain Python (tests; it is a thousand times slower). InputError as `Ensemble.truths`.
     """
     truths: Sequence[Truth] = [believed(flight)] * len(lanes)
@@ -106,7 +108,9 @@ def fly_into(
         b.tape.used, b.history,
     )  # fmt: skip
     take: Any = 0
-    if flight.onboard is not None:
+    if instead is not None:
+        take = instead
+    elif flight.onboard is not None:
         unit = navigator_unit(lanes, carries_lag(load_flow_settings(flight.settings)))
         if compiled:
             compile_beside(unit, fly_block, *told, take, *written)
@@ -137,14 +141,14 @@ def fly_one(flight: Flight, seed: int, index: int = 0, ensemble: Ensemble | None
 def fly_blocks(
     flight: Flight, seed: int, first: int, flights: int, judge: Callable[[Array], Result], threads: int | None = None,
     ensemble: Ensemble | None = None, faults: Callable[[int], SensorFault] | None = None,
-    branches: Callable[[int], Branches] | None = None,
+    branches: Callable[[int], Branches] | None = None, instead: int | None = None,
 ) -> Iterator[tuple[int, Result]]:  # fmt: skip
     """Fly `flights` flights from number `first` on; yields (flights in the block, judge(its history)) in order.
 
     `judge` takes a block's history (epochs, len(HISTORY), flights in the block), which is overwritten afterwards:
     memory does not grow with the number of flights. faults: of each flight's sensors by its number, for a flight that
     `fails`. branches: of a place in the order of flights, what the `len(LANES)` flights from there on fly in place of
-    what their numbers name; all count their streams from `first`.
+    what their numbers name; all count their streams from `first`. instead: as of `fly_into`, of `len(LANES)` lanes.
     """
     own = threading.local()
 
@@ -154,7 +158,7 @@ def fly_blocks(
         if branches is None:
             numbers = range(first + start, first + start + len(LANES))
             failing = None if faults is None else [faults(number) for number in numbers]
-            fly_into(flight, seed, first + start, LANES, own.buffers, ensemble, faults=failing)
+            fly_into(flight, seed, first + start, LANES, own.buffers, ensemble, faults=failing, instead=instead)
         else:
             fly_into(flight, seed, first, LANES, own.buffers, branches=branches(start))
         left = min(len(LANES), flights - start)

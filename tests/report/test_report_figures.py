@@ -312,7 +312,7 @@ def test_consistency_is_drawn_in_the_band_of_one_flight_where_the_record_has_it(
     (panel,) = consistency(record)
     lines = {trace.name: np.asarray(trace.y) for trace in panel.figure.data}
     assert lines["filter"].max() == 20.0
-    limits = sorted({float(trace.y[0]) for trace in panel.figure.data if "lie between" in trace.name})
+    limits = sorted({float(trace.y[0]) for trace in panel.figure.data if trace.name == "95 % band"})
     assert limits == pytest.approx([1.237, 14.449], abs=1e-3)  # chi-square of 6 degrees of freedom
     assert "here 75 % do" in panel.caption
     shown = next(section for section in sections(record) if section.key == "filter").panels

@@ -76,8 +76,13 @@ const panels = (() => {
       this.plots = [];
     }
 
+    // What is in sight: the page's zoom; of a close-up what of it lies in its own stretch, or else all of that.
     window() {
-      return flight.zoom || this.spec.window || [flight.facts.t0, flight.facts.t1];
+      const own = this.spec.window;
+      const { zoom } = flight;
+      if (!zoom || !own) return zoom || own || [flight.facts.t0, flight.facts.t1];
+      const both = [Math.max(zoom[0], own[0]), Math.min(zoom[1], own[1])];
+      return both[1] > both[0] ? both : own;
     }
 
     draw(width = 0, height = this.spec.height) {

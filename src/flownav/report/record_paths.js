@@ -10,8 +10,9 @@ const paths = (() => {
   const ROOM_PX = 26;
   const dark = matchMedia("(prefers-color-scheme: dark)");
 
-  function ramp(share, forPaper) {
-    const stops = TIME[dark.matches && !forPaper ? "dark" : "light"];
+  function ramp(share) {
+    const onPaper = document.documentElement.classList.contains("paper");
+    const stops = TIME[dark.matches && !onPaper ? "dark" : "light"];
     const place = Math.min(0.9999, Math.max(0, share)) * (stops.length - 1);
     const k = Math.floor(place);
     const part = (text, n) => parseInt(text.slice(1 + 2 * n, 3 + 2 * n), 16);
@@ -104,7 +105,7 @@ const paths = (() => {
       for (let first = 0; first < track.t.length - 1; first += size) {
         const last = Math.min(track.t.length - 1, first + size);
         const share = (0.5 * (track.t[first] + track.t[last]) - t0) / (t1 - t0 || 1);
-        this.line(this.points(track, first, last), ramp(share, this.paper), width);
+        this.line(this.points(track, first, last), ramp(share), width);
       }
     }
 
@@ -181,7 +182,7 @@ const paths = (() => {
       const { t0, t1 } = flight.facts;
       const [left, top, long] = [10, this.height - 14, Math.min(150, 0.3 * this.width)];
       for (let k = 0; k < long; k += 2) {
-        ctx.fillStyle = ramp(k / long, this.paper);
+        ctx.fillStyle = ramp(k / long);
         ctx.fillRect(left + k, top, 2, 6);
       }
       ctx.fillStyle = flight.colour("ink");
@@ -196,7 +197,6 @@ const paths = (() => {
     }
 
     draw(width, height) {
-      this.paper = Boolean(width);
       this.size(width, height);
       this.scale();
       this.paint();

@@ -45,6 +45,20 @@ class Record(ground.Record):
         found: dict[str, Any] = self.manifest.get("scores") or {}
         return found
 
+    def score(self) -> dict[str, Any]:
+        """The scores computed anew from the tables, by the functions that score every flight and replay.
+
+        InputError where the record does not hold what they need: that of a live session, or of an older flownav.
+
+        Example:
+            >>> record = flownav.fly("landing", seed=1, flight={"duration_s": 6.0})
+            >>> record.score() == record.scores
+            True
+        """
+        from flownav.scoring.recorded import scores_of_record
+
+        return scores_of_record(self)
+
     @property
     def verdict(self) -> str:
         """What is wrong with the flight or its log, in one line; "" where nothing is.

@@ -28,16 +28,16 @@ mutants: $(VENV)/.ready-test
 	$(BIN)/python tests/helpers/mutants.py $(PART)
 
 league: $(VENV)/.ready
-	$(BIN)/python tools/league.py $${FLOWNAV_DATA:-../shared/data} docs/league.md
+	$(BIN)/python tools/league.py $${FLOWNAV_DATA:-../shared/data} docs/explanation/league.md
 
 integrity: $(VENV)/.ready
-	$(BIN)/python tools/integrity.py docs/integrity.md
+	$(BIN)/python tools/integrity.py docs/explanation/integrity.md
 
 rare: $(VENV)/.ready
 	$(BIN)/python tools/rare_table.py $(FLIGHTS)
 
 validate: $(VENV)/.ready
-	FLOWNAV_DATA=$${FLOWNAV_DATA:-../shared/data} $(BIN)/flownav validate --out docs/validation.md
+	FLOWNAV_DATA=$${FLOWNAV_DATA:-../shared/data} $(BIN)/flownav validate --out docs/explanation/validation.md
 
 lint: $(VENV)/.ready-lint
 	$(BIN)/ruff check .

@@ -15,7 +15,7 @@ README = (PROJECT / "README.md").read_text(encoding="utf-8")
 MAKEFILE = (PROJECT / "Makefile").read_text(encoding="utf-8")
 CI = (PROJECT / ".ci" / "run").read_text(encoding="utf-8")
 COMMANDS = typer.main.get_command(app).commands  # type: ignore[attr-defined]
-PAGES = [PROJECT / "README.md", PROJECT / "ARCHITECTURE.md", *sorted(DOCS.glob("*.md"))]
+PAGES = [PROJECT / "README.md", PROJECT / "ARCHITECTURE.md", *sorted(DOCS.rglob("*.md"))]
 
 
 def _typed(text: str) -> list[str]:

@@ -27,7 +27,7 @@ FED_FIRST = ("t_s", "arrival_s", "sensor", *(f"value_{i}" for i in range(6)), *(
              "quality", "segment")  # of any record  # fmt: skip
 FED = (*FED_FIRST, "withheld", "arrived")
 
-# The filter's own states from the gyro's bias on, in its order (docs/landing-filter.md).
+# The filter's own states from the gyro's bias on, in its order (docs/explanation/landing-filter.md).
 FILTER_STATES = (
     "gyro_bias_x_rad_s", "gyro_bias_y_rad_s", "gyro_bias_z_rad_s",
     "accel_bias_x_m_s2", "accel_bias_y_m_s2", "accel_bias_z_m_s2",

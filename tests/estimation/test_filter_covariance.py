@@ -363,6 +363,6 @@ def test_without_an_attitude_error_nothing_is_folded():
 
 # -- what is written about it --------------------------------------------------------------------------------------
 def test_the_documentation_names_every_setting_and_every_reason():
-    page = (DOCS / "landing-filter.md").read_text(encoding="utf-8")
+    page = (DOCS / "explanation" / "landing-filter.md").read_text(encoding="utf-8")
     for name in (*FilterSettings._fields, *FlowLag._fields, *(reason.label for reason in Reason)):
         assert f"`{name}`" in page or name in {"f12", "f21"}, name

@@ -277,7 +277,7 @@ def test_faults_are_found_by_name_in_the_order_asked_for():
 
 
 def test_the_page_names_every_fault_and_no_other():
-    page = (DOCS / "faults.md").read_text(encoding="utf-8")
+    page = (DOCS / "explanation" / "faults.md").read_text(encoding="utf-8")
     table = page.split("## The faults")[1].split("\n## ")[0]
     assert re.findall(r"^\| `(\w+)` \|", table, re.M) == list(FAULTS)
 

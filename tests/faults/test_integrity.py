@@ -172,4 +172,4 @@ def test_the_tool_writes_its_table_into_the_page(tmp_path, monkeypatch, capsys):
 
 
 def test_the_page_that_is_shipped_has_its_place():
-    placed((PROJECT / "docs" / "integrity.md").read_text(), "", "docs/integrity.md")
+    placed((PROJECT / "docs" / "explanation" / "integrity.md").read_text(), "", "docs/explanation/integrity.md")

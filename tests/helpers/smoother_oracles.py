@@ -20,7 +20,7 @@ from flownav.estimation.states import (
 
 
 def dense_transition(dt_s: float, middle: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """F (STATES, STATES) of docs/landing-filter.md: position and attitude move half before and half after velocity."""
+    """F (STATES, STATES) of docs/explanation/landing-filter.md: half of a step before the velocity's, half after it."""
     p, v, a = (slice(first, first + 3) for first in (POSITION, VELOCITY, ATTITUDE))
     gyro, accel = slice(GYRO_BIAS, GYRO_BIAS + 3), slice(ACCEL_BIAS, ACCEL_BIAS + 3)
     rotation = np.asarray(middle).reshape(3, 3)

@@ -448,7 +448,7 @@ def test_mutilated_rows_are_counted_or_refused_in_one_line(folder, data):
 
 
 def test_the_documentation_names_every_file_and_column():
-    page = (DOCS / "csv-folder.md").read_text(encoding="utf-8")
+    page = (DOCS / "reference" / "csv-folder.md").read_text(encoding="utf-8")
     for name, columns in FILES.items():
         assert f"`{name}.csv`" in page
         for column in columns:

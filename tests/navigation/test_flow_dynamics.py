@@ -1,6 +1,6 @@
 """A flow sensor's own dynamics: when a delay stands for them, when they become states, and what each is worth.
 
-`pytest -s tests/navigation/test_flow_dynamics.py` prints the table of docs/landing-filter.md.
+`pytest -s tests/navigation/test_flow_dynamics.py` prints the table of docs/explanation/landing-filter.md.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ from navigation_streams import fly, navigate
 
 SEED = 5
 SETTLED = 500  # epochs
-# m/s, of docs/landing-filter.md: in sixteen gusty landings, at the horizon and flown on, with the delay and with states
+# m/s (docs/explanation/landing-filter.md): sixteen gusty landings, at the horizon and flown on, with delay or states
 IN_LANDINGS = {
     "2 Hz, damping 0.7": ((0.0297, 0.0326), (0.0318, 0.0355)),
     "2 Hz, damping 1.5": ((0.0336, 0.0349), (0.0330, 0.0367)),

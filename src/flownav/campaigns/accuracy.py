@@ -1,4 +1,4 @@
-"""What the navigator promises, case by case, and whether it keeps it (docs/accuracy.md)."""
+"""What the navigator promises, case by case, and whether it keeps it (docs/explanation/accuracy.md)."""
 
 from __future__ import annotations
 

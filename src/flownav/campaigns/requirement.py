@@ -1,4 +1,4 @@
-"""A requirement's file: what a vehicle must do, how surely, and under which conditions (docs/certify.md).
+"""A requirement's file: what a vehicle must do, how surely, and under which conditions (docs/how-to/certify.md).
 
 `approach`, `approach_8_m_s`, `landing`, `pad_return` and `takeoff` ship; any TOML file of this schema can be certified.
 """

@@ -23,19 +23,23 @@ from flownav.vehicle.multirotor_parameters import MultirotorParameters
 # each is said at greater length in the docs named
 NOT_MODELLED = (
     "Failures of servos, engine, battery, computer or software; sensors fail only where the conditions name a fault.",
-    "Jamming and spoofing of GPS; multipath is a noise of stated size, not a place's own (docs/sensors.md).",
+    "Jamming and spoofing of GPS; multipath is a noise of stated size, not a place's own "
+    "(docs/explanation/sensors.md).",
     "Gust fronts, and the wake of buildings and trees; the wind is a mean, turbulence and a profile over height "
-    "(docs/scenarios.md).",
-    "Temperature, rectified vibration and clipped samples in the IMU; wind on the static port (docs/sensors.md).",
-    "Blades in the pad camera's frame, dirt on its lens, water, a pad that is bent or moves (docs/pad-target.md).",
+    "(docs/reference/scenarios.md).",
+    "Temperature, rectified vibration and clipped samples in the IMU; wind on the static port "
+    "(docs/explanation/sensors.md).",
+    "Blades in the pad camera's frame, dirt on its lens, water, a pad that is bent or moves "
+    "(docs/explanation/pad-target.md).",
     "Obstacles, people, and what a pilot or a ground station would do.",
-    "Dispersed numbers that go together: each is drawn independently of the others (docs/scenarios.md).",
+    "Dispersed numbers that go together: each is drawn independently of the others (docs/reference/scenarios.md).",
 )
 OF_A_HELICOPTER = (
-    "Vortex ring, bending of blades and airframe, the tail rotor's torque about the pitch axis (docs/vehicle.md).",
+    "Vortex ring, bending of blades and airframe, the tail rotor's torque about the pitch axis "
+    "(docs/explanation/vehicle.md).",
 )
 OF_THE_PAPERS_FILTER = "its attitude and the ground's height, and where it starts if its GPS noise is white"
-OF_A_MULTIROTOR = ("Vortex ring, bending of arms and propellers (docs/multirotor.md).",)
+OF_A_MULTIROTOR = ("Vortex ring, bending of arms and propellers (docs/explanation/multirotor.md).",)
 
 
 def assumed(plan: Plan) -> dict[str, Any]:

@@ -17,8 +17,8 @@ from flownav.replays.prepare import ReplayOptions
 HEAD = """# The league
 
 What flownav makes of every log at hand as it is shipped, with no setting fitted to any, beside dead reckoning on the
-same flow and the autopilot's own estimate. [compare](compare.md) says what the columns mean. Printed by `make league`
-with flownav {version}; a change to the navigator prints it anew, and what got worse shows.
+same flow and the autopilot's own estimate. [compare](../how-to/compare.md) says what the columns mean. Printed by
+`make league` with flownav {version}; a change to the navigator prints it anew, and what got worse shows.
 
 """
 

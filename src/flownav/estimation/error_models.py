@@ -30,7 +30,7 @@ from flownav.estimation.states import (
 
 class FilterSettings(NamedTuple):
     """Noise densities (per square root of hertz), random walks (per square root of a second), standard deviations and
-    time constants of Gauss-Markov errors, limits. docs/landing-filter.md says how to choose each.
+    time constants of Gauss-Markov errors, limits. docs/explanation/landing-filter.md says how to choose each.
     """
 
     accel_noise_m_s2_rt_hz: float

@@ -1,4 +1,4 @@
-"""The flow sensor's identified dynamics inside the filter: two states a channel (docs/landing-filter.md).
+"""The flow sensor's identified dynamics inside the filter: two states a channel (docs/explanation/landing-filter.md).
 
 The sensor sees the body velocity m = o R_BE v, where o > 1 only below the floor of its own sonar, and reports
 gain x1 of x' = [0 1; -c -b] x + [0 1]' m. The filter carries x, so that a reading corrects what was, some 80 ms ago,

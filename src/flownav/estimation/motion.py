@@ -2,7 +2,7 @@
 
 Position, velocity and attitude follow the IMU (Groves, Principles of GNSS, Inertial, and Multisensor Integrated
 Navigation Systems, 2013, section 5.4, on a flat, non-rotating earth); their errors are those of its section 14.2.4 in
-the earth frame. docs/landing-filter.md derives both.
+the earth frame. docs/explanation/landing-filter.md derives both.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The filter's steps run backwards: a modified Bryson-Frazier smoother (docs/smoother.md).
+"""The filter's steps run backwards: a modified Bryson-Frazier smoother (docs/explanation/smoother.md).
 
 What later readings say of the error state at an instant is a vector lambda (STATES,) and a matrix Lambda (STATES,
 STATES), both 0 at the end; the smoothed error is -P lambda, its covariance P - P Lambda P (Bierman, Fixed interval

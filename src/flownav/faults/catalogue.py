@@ -19,7 +19,7 @@ MEASURED = tuple(sensor for sensor in Sensor if sensor != Sensor.LANDED)
 
 SONAR = RangefinderSettings()
 FLOOR_M, CEILING_M = float(SONAR.floor_m), float(SONAR.ceiling_m)
-# block matching over 2 % of the pad's contrast at 1.5 m (docs/faults.md); a reading is the mean of five frames
+# block matching over 2 % of the pad's contrast at 1.5 m (docs/explanation/faults.md); a reading: mean of five frames
 TEXTURE_SHARE, TEXTURE_NOISE_RAD_S = 0.2, 0.08
 DEGREE_S = math.radians(1.0)
 

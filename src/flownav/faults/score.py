@@ -1,6 +1,7 @@
 """What a fault did to a navigator: when it was noticed, how far the estimate went, when it was back.
 
-Each figure is defined in docs/faults.md. A run with the fault is compared with one of the same flight without it.
+Each figure is defined in docs/explanation/faults.md. A run with the fault is compared with one of the same
+flight without it.
 """
 
 from __future__ import annotations

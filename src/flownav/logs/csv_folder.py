@@ -1,4 +1,4 @@
-"""A folder of CSV files, one a sensor, as a Log. docs/csv-folder.md is the format.
+"""A folder of CSV files, one a sensor, as a Log. docs/reference/csv-folder.md is the format.
 
 Units stand in the column names; time is seconds of one clock; body axes are forward-right-down, the flow is in
 PX4's sensor convention. Sensors a folder lacks are left out; one of `attitude.csv` and `imu.csv`, and one of
@@ -100,7 +100,7 @@ def read_csv_folder(folder: Path) -> Log:
 
 def _tables(folder: Path) -> dict[str, CsvTable]:
     if not an_input(folder).is_dir():
-        raise InputError(f"{folder}: no such folder; replay takes a folder of CSV files (docs/csv-folder.md)")
+        raise InputError(f"{folder}: no such folder; replay takes a folder of CSV files (docs/reference/csv-folder.md)")
     present = {name for name in FILES if (folder / f"{name}.csv").exists()}
     moved, aided = present & {"attitude", "imu"}, present & {"gps", "flow", "px4flow"}
     if not moved or not aided:

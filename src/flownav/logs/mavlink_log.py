@@ -1,4 +1,7 @@
-"""A ground station's MAVLink log (.tlog) as a Log. docs/mavlink.md lists the messages, their units and traps."""
+"""A ground station's MAVLink log (.tlog) as a Log.
+
+docs/reference/mavlink.md lists the messages, their units and traps.
+"""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""A PX4 ULog file as a Log: topics of every age of PX4, in the units and frames of `measurement`. docs/logs.md.
+"""A PX4 ULog file as a Log: topics of every age of PX4, in the units and frames of `measurement`.
 
 What PX4 says in float or integer, degrees or 1e-7 degrees, radians accumulated or rates, is the same here. Message
-definitions: PX4-Autopilot, msg/.
+definitions: PX4-Autopilot, msg/. The page is docs/reference/logs.md.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@
 The level of one hypothesis is what is left of the filter's own error, and what such a fault may have done: the effect
 of one unit (`estimation.hypotheses`) times the size that innovations leave possible. The level is the largest of them.
 After Brenner, Integrated GPS/Inertial Fault Detection Availability (Navigation 43(2), 1996), with effects that are
-followed instead of one filter for each hypothesis. Unlike there no probability is promised: docs/integrity.md
-measures how often the error is beyond the level.
+followed instead of one filter for each hypothesis. Unlike there no probability is promised:
+docs/explanation/integrity.md measures how often the error is beyond the level.
 """
 
 from __future__ import annotations

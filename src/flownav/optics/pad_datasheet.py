@@ -38,7 +38,7 @@ def datasheet(
         f"# {command}",
         "schema_version = 1",
         f'name = "camera {camera_name} and a {kind} of {target.side_m:g} m, {rate_hz:g} Hz"',
-        f'provenance = "{measured} (docs/pad-target.md), but for what is marked as assumed"',
+        f'provenance = "{measured} (docs/explanation/pad-target.md), but for what is marked as assumed"',
         f'camera = "{camera_name}"',
         entry("rate_hz", rate_hz, "assumed: LANDING_TARGET as detectors on small computers send it"),
         entry("latency_s", latency_s, "assumed: exposure, detection and link"),

@@ -108,7 +108,7 @@ def _identified_cell(found: Identified) -> str:
 
 
 def set_up(of: Reproduction) -> list[tuple[str, str, str]]:
-    """The fixed configuration: what, its value, why (docs/rig.md)."""
+    """The fixed configuration: what, its value, why (docs/how-to/rig.md)."""
     if of.laboratory is None:
         return []
     s = of.laboratory.fixed.settings

@@ -23,7 +23,7 @@ LOG_S = 0.01
 
 @dataclass(frozen=True)
 class RigSettings:
-    """One experiment. The defaults are the one configuration fixed for all heights (docs/rig.md says how chosen)."""
+    """One experiment. The defaults are the one configuration fixed for all heights (docs/how-to/rig.md says how)."""
 
     height_m: float = 0.6
     pivot_height_m: float = 2.1

@@ -7,7 +7,7 @@ standard deviation that grows with height. What else happens on a real vehicle i
 - the sonar cannot report less than its floor (0.30 m), and the sensor multiplies flow by the sonar's range, so
   below the floor its velocity is too large by floor/range (MaxBotix, HRLV-MaxSonar-EZ datasheet);
 - the sonar's range is old, so the scale is wrong while the height changes, and what the sensor's own gyro does not
-  show of a rotation reads as velocity (`misread`; the rig has both, docs/rig.md);
+  show of a rotation reads as velocity (`misread`; the rig has both, docs/how-to/rig.md);
 - changes of rotor thrust shake the sensor on its elastic mount (figure 28): a mode xi'' + 2 zeta w xi' + w^2 xi
   = T/m whose velocity xi' adds to what the sensor sees, ahead of the lag;
 - PX4FLOW measures no vertical velocity (finding 10): the third channel is either declared `synthetic` (the same

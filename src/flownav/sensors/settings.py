@@ -1,6 +1,6 @@
 """What a scenario file may say about GPS/INS, rangefinder and IMU, and the parameters built from it.
 
-Units stand in the keys; every default is a value with a source in `docs/sensors.md`. `.parameters()` computes
+Units stand in the keys; every default has a source in `docs/explanation/sensors.md`. `.parameters()` computes
 the coefficients that the equations use, so no exponential is left for the flight loop.
 """
 

@@ -1,4 +1,4 @@
-"""docs/validation.md: the validation as a page of Markdown that bears a version and no date."""
+"""docs/explanation/validation.md: the validation as a page of Markdown that bears a version and no date."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ HEAD = """# Validated against flights
 
 Is the simulator as hard as the real world? `flownav validate` takes recorded flights, lets simulated sensors fly
 the same paths, runs the same navigator on both, and sets the figures beside each other. Printed by `make validate`
-(`flownav validate --flights {count} --seed {seed} --out docs/validation.md`) with flownav {version}.
+(`flownav validate --flights {count} --seed {seed} --out docs/explanation/validation.md`) with flownav {version}.
 
 ## How
 
 - **Path.** The smoothed estimate of the navigator on the log, below {bandwidth:g} Hz, height over the ground that
   the range sensor saw. Attitude, rates and specific force follow from it as a multirotor's do: thrust along body
   -z, rotor drag and mean wind as the log's accelerometer shows them (least squares), heading as recorded.
-- **Sensors.** The shipped datasheets, dispersed by the shipped [dispersion](scenarios.md#matched-and-ensemble), at
+- **Sensors.** The shipped datasheets, dispersed by the shipped
+  [dispersion](../reference/scenarios.md#matched-and-ensemble), at
   the log's own instants and of its own kinds: flow camera (without gyro where the log has none), IMU (one of two or
   three readings of a unit of 100 Hz and more), receiver (in the log's steps), lidar where the log reads below 0.25
   m and else sonar, barometer, compass, and an autopilot's attitude with the errors of the paper's GPS/INS. Who is

@@ -12,7 +12,7 @@ MAVLINK_PROTOCOLS = (1, 2)
 PX4_INSTANCES = range(3)
 PX4_PORTS = {101: "TEL1", 102: "TEL2", 103: "TEL3", 104: "TEL4", 6: "URT6", 201: "GPS1", 202: "GPS2"}  # MAV_n_CONFIG
 FAST = 460_800  # baud at which all that flownav asks for fits
-SLOW = "{} baud carry {} bytes/s each way: rates are reduced to fit (docs/live.md). Change both ends"
+SLOW = "{} baud carry {} bytes/s each way: rates are reduced to fit (docs/how-to/live.md). Change both ends"
 SERIAL_SOURCE = "libraries/AP_SerialManager/AP_SerialManager.cpp (n_PROTOCOL, n_BAUD)"
 MAV_SOURCE = "src/modules/mavlink/module.yaml (MAV_${i}_RATE); docs serial_configuration"
 

@@ -1,4 +1,4 @@
-"""An ArduPilot DataFlash log (.bin) as a Log. docs/dataflash.md says which messages are read and how."""
+"""An ArduPilot DataFlash log (.bin) as a Log. docs/reference/dataflash.md says which messages are read and how."""
 
 from __future__ import annotations
 

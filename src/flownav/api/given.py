@@ -53,8 +53,8 @@ def _mapping_of(given: Any) -> dict[Any, Any]:
     if hasattr(given, "column_names"):  # Arrow
         return {name: given[name].to_numpy() for name in given.column_names}
     raise InputError(
-        f"estimate: {type(given).__name__} is given; a mapping of columns, or a data frame of pandas, xarray or polars, "
-        "is needed"
+        f"estimate: {type(given).__name__} is given; a mapping of columns, or a data frame of pandas, xarray or "
+        "polars, is needed"
     )
 
 
@@ -75,7 +75,7 @@ def _require_names(columns: Mapping[str, Array]) -> None:
             stem = name.rsplit("_", 1)[0]
             alike = [other for other in columns if other == stem or other.startswith(f"{stem}_")]
             what = f"it has {alike[0]}, which is in another unit or states none" if alike else "it is missing"
-            raise InputError(f"estimate: {name} is needed, and {what}; give {', '.join(NEEDED)} in seconds and metres, NED")
+            raise InputError(f"estimate: {name} is needed, and {what}; give {', '.join(NEEDED)} (seconds, metres, NED)")
     for name in (*VELOCITY_BODY, *VELOCITY_NED):
         stem = name.removesuffix("_m_s")
         wrong = [other for other in columns if (other == stem or other.startswith(f"{stem}_")) and other != name]
@@ -113,7 +113,7 @@ def _require_rotations(quaternion: Array) -> None:
     known = np.isfinite(length)
     wrong = known & ~((length >= UNIT_LENGTH[0]) & (length <= UNIT_LENGTH[1]))
     if wrong.any():
-        raise InputError(f"estimate: qw, qx, qy, qz of row {int(np.argmax(wrong))} has length {length[wrong][0]:g}, not 1")
+        raise InputError(f"estimate: qw, qx, qy, qz of row {int(np.argmax(wrong))} has length {length[wrong][0]:g}")
 
 
 def _missing(names: tuple[str, ...], columns: Mapping[str, Array]) -> str:

@@ -177,7 +177,9 @@ def _protection(record: Record, estimate: Estimate, known: References) -> dict[s
 
 def consistency_in(record: Record) -> dict[str, dict[str, Any]]:
     """By sensor, whether the innovations of the components that were tested are as large as the filter states."""
-    table = record.tables["innovation"]
+    table = record.tables.get("innovation")
+    if table is None:  # another estimate states none
+        return {}
     sensor, tested = np.asarray(table["sensor"], str), np.isin(np.asarray(table["reason"], str), TESTED)
     component = np.unique(np.asarray(table["component"], str), return_inverse=True)[1]
     news, variance = (np.asarray(table[name], float) for name in ("innovation", "innovation_variance"))

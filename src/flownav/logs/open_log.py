@@ -7,6 +7,7 @@ from pathlib import Path
 
 from flownav.errors import InputError
 from flownav.guard import an_input
+from flownav.logs.crazyflie import looks_like as looks_like_crazyflie
 from flownav.logs.journal import MAGIC as JOURNAL_MAGIC
 from flownav.logs.journal import SUFFIX as JOURNAL_SUFFIX
 from flownav.logs.log import Log
@@ -84,6 +85,10 @@ def _reader(kind: str) -> Callable[..., Log]:
         from flownav.logs.ros.reader import read_ros
 
         return read_ros
+    if kind == "crazyflie":
+        from flownav.logs.crazyflie_log import read_crazyflie
+
+        return read_crazyflie
     from flownav.logs.mavlink_log import read_tlog
 
     return read_tlog
@@ -92,7 +97,7 @@ def _reader(kind: str) -> Callable[..., Log]:
 def log_kind(path: Path) -> str:
     """What a file holds, by its first bytes and its suffix; "" for anything else.
 
-    "ulog", "dataflash", "tlog", "ros" (a bag of ROS), "record" or "journal".
+    "ulog", "dataflash", "tlog", "ros" (a bag of ROS), "crazyflie", "record" or "journal".
 
     InputError where a file cannot be read, or is a FIFO or a device.
     """
@@ -113,6 +118,8 @@ def log_kind(path: Path) -> str:
         return "dataflash"
     if path.suffix.lower() == ".fnr" and head.startswith(ZIP_MAGIC):
         return "record"
+    if looks_like_crazyflie(head):
+        return "crazyflie"
     dated = YEARS_US[0] < int.from_bytes(head[:8], "big") < YEARS_US[1]
     if path.suffix.lower() == ".tlog" or (dated and len(head) > 8 and head[8] in MAVLINK_MAGIC):
         return "tlog"

@@ -53,12 +53,12 @@ def test_every_sensor_reads_as_in_the_csv_folder(tables, folder, tmp_path, versi
     assert [absence.what for absence in log.absences] == ["no GPS: a Crazyflie has none", "no gyro in the flow sensor"]
 
 
-@pytest.mark.parametrize(("version", "most_m"), [(2, 0.005), (1, 0.02)])
-def test_the_replay_comes_out_as_that_of_the_csv_folder(tables, folder, tmp_path, version, most_m):
-    """Version 1 has whole milliseconds."""
+@pytest.mark.parametrize("version", [1, 2])
+def test_the_replay_comes_out_as_that_of_the_csv_folder(tables, folder, tmp_path, version):
+    """Dead reckoning on counts of 0.2 rad/s, over 20 s and 40 m: single precision moves what the gates take."""
     distance_m, speed_m_s = apart(folder, written(tmp_path / "log00", deck_log(tables, version)))
-    assert distance_m < most_m
-    assert speed_m_s < 0.02
+    assert distance_m < 0.1
+    assert speed_m_s < 0.05
 
 
 def test_the_counts_are_the_flow_of_the_flight(flown, tables):
@@ -107,7 +107,8 @@ def test_motion_capture_is_the_reference_and_the_estimators_state_the_autopilots
     truth = {"t_s": flown.t_s[part], **dict(zip("ned", flown.position[part].T, strict=True))}
     made = deck_log(tables, truth=truth)
     speed = flown.velocity[part]
-    made.add("state", [f"stateEstimate.{name}(f)" for name in ("x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz")],
+    names = ("x", "y", "z", "vx", "vy", "vz", "qw", "qx", "qy", "qz")
+    made.add("state", [f"stateEstimate.{name}(f)" for name in names],
              truth["t_s"] + 30.0, truth["n"], -truth["e"], -truth["d"], speed[:, 0], -speed[:, 1], -speed[:, 2],
              *(np.full(len(speed), value) for value in (np.cos(0.1), 0.0, 0.0, np.sin(0.1))))  # fmt: skip
     log = read_crazyflie(written(tmp_path / "log", made))

@@ -7,8 +7,8 @@ pitch of forward-right-down; yaw changes its sign.
 
 Flow. `motion.deltaX`, `deltaY` are the PMW3901's counts since it was last read, every 10 ms
 (src/deck/drivers/src/flowdeck_v1v2.c: vTaskDelay(10)), which turns them by the mounting into
-N_x = -deltaY, N_y = -deltaX. The estimator (src/modules/src/kalman_core/mm_flow.c) has ten counts for a pixel, Npix = 35
-pixels for thetapix = 0.71674 rad, and predicts
+N_x = -deltaY, N_y = -deltaX. The estimator (src/modules/src/kalman_core/mm_flow.c) has ten counts for a pixel,
+Npix = 35 pixels for thetapix = 0.71674 rad, and predicts
 N_x/10 = dt Npix/thetapix (v_x/z - w_y), N_y/10 = dt Npix/thetapix (v_y/z + w_x) in FLU, which is FRD's
 flow_y = w_y + v_x/z and flow_x = w_x - v_y/z.
 """

@@ -116,7 +116,7 @@ def gps_streams(
     if not len(fixes):
         return [], None
     velocity = fixes.matrix("vel_0", "vel_1", "vel_2")
-    velocity[~(np.abs(velocity) < MOST[Sensor.GPS_VELOCITY][0]).all(axis=1)] = np.nan
+    velocity[(np.abs(velocity) > MOST[Sensor.GPS_VELOCITY][0]).any(axis=1)] = np.nan
     found = []
     for sensor, value, which in ((Sensor.GPS_VELOCITY, velocity, 1), (Sensor.GPS_POSITION, local_position(fixes), 0)):
         variance = fixes.matrix(*(f"var_{which}_{k}" for k in range(3)))

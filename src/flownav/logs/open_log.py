@@ -21,6 +21,7 @@ KNOWN = (
 ULOG_MAGIC = b"\x55\x4c\x6f\x67\x01\x12\x35"
 DATAFLASH_MAGIC = b"\xa3\x95"
 DATAFLASH_FORMAT = b"\xa3\x95\x80"  # the message that describes others: a log that has lost its start still has many
+BLACKBOX_START = b"H Product:Blackbox flight data recorder"
 BAG_MAGICS = (b"\x89MCAP0\r\n", b"SQLite format 3\0", b"#ROSBAG V2.0\n")
 ZIP_MAGIC = b"PK\x03\x04"
 MAVLINK_MAGIC = b"\xfd\xfe"
@@ -89,6 +90,10 @@ def _reader(kind: str) -> Callable[..., Log]:
         from flownav.logs.crazyflie_log import read_crazyflie
 
         return read_crazyflie
+    if kind == "blackbox":
+        from flownav.logs.blackbox.reader import read_blackbox
+
+        return read_blackbox
     from flownav.logs.mavlink_log import read_tlog
 
     return read_tlog
@@ -97,7 +102,7 @@ def _reader(kind: str) -> Callable[..., Log]:
 def log_kind(path: Path) -> str:
     """What a file holds, by its first bytes and its suffix; "" for anything else.
 
-    "ulog", "dataflash", "tlog", "ros" (a bag of ROS), "crazyflie", "record" or "journal".
+    "ulog", "dataflash", "tlog", "ros" (a bag of ROS), "crazyflie", "blackbox", "record" or "journal".
 
     InputError where a file cannot be read, or is a FIFO or a device.
     """
@@ -118,6 +123,8 @@ def log_kind(path: Path) -> str:
         return "dataflash"
     if path.suffix.lower() == ".fnr" and head.startswith(ZIP_MAGIC):
         return "record"
+    if BLACKBOX_START in head:
+        return "blackbox"
     if looks_like_crazyflie(head):
         return "crazyflie"
     dated = YEARS_US[0] < int.from_bytes(head[:8], "big") < YEARS_US[1]

@@ -72,7 +72,7 @@ def headers(content: bytes) -> list[Header]:
     while place >= 0 and len(starts) < MOST_LOGS:
         starts.append(place)
         place = content.find(START, place + len(START))
-    ends = [*starts[1:], len(content)]
+    ends = [*starts[1:], len(content)][: len(starts)]
     found = [_header(content, start, end) for start, end in zip(starts, ends, strict=True)]
     return [header for header in found if header is not None]
 

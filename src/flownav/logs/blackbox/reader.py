@@ -54,6 +54,7 @@ LACKING = {
 }
 
 
+@np.errstate(all="ignore")  # a flipped bit makes numbers that overflow; the limits leave them out
 def read_blackbox(path: Path, *, flow_instance: int | None = None) -> Log:
     """Read a blackbox log; of a file with several the longest. Times are seconds since its first frame.
 

@@ -32,6 +32,7 @@ LACKING = {
 SHOWN = 8  # topics in a message
 
 
+@np.errstate(all="ignore")  # a flipped bit makes numbers that overflow; the limits leave them out
 def read_ros(path: Path, *, flow_instance: int | None = None, topics: Mapping[str, str] | None = None) -> Log:
     """Read a ROS 2 bag (folder, .db3, .mcap), a ROS 1 bag (.bag), or an MCAP file that `flownav export` wrote.
 

@@ -22,8 +22,11 @@ LONGEST_FILE = 330
 # rooms from the ground up; a room imports its own floor's neighbours named here and what lies below
 GROUND = {"errors", "files", "compile", "frames", "measurement", "record", "parameter_files", "provenance"}
 GROUND |= {"record_file", "parquet_pages"}
-GROUND |= {"guard", "text"}
+GROUND |= {"guard", "text", "toml_text"}
 EQUATIONS = {"vehicle", "sensors", "control", "estimation", "optics"}
+# what the public API stands on: every room but the faces
+JOBS = {"navigation", "simulation", "logs", "mavlink", "scoring", "replays", "live", "campaigns", "faults"}
+JOBS |= {"identification", "report", "export", "parts"}
 ALLOWED = {
     "vehicle": GROUND,
     "sensors": GROUND,
@@ -45,10 +48,16 @@ ALLOWED = {
     "campaigns": GROUND | EQUATIONS | {"simulation", "navigation", "scoring"},
     "faults": GROUND | EQUATIONS | {"logs", "simulation", "campaigns", "scoring", "navigation", "replays"},
     "certification": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "faults", "report"},
+    "samples": GROUND
+    | EQUATIONS
+    | {"logs", "mavlink", "rig", "navigation", "simulation", "scoring", "campaigns", "faults", "live", "export"},
     "validation": GROUND | EQUATIONS | {"navigation", "simulation", "logs", "replays", "scoring"},
     "report": GROUND | {"scoring"},
     "export": GROUND,
+    "parts": GROUND | EQUATIONS | {"navigation", "simulation", "campaigns", "logs", "replays"},
+    "examples": GROUND | EQUATIONS | {"navigation", "parts"},
     "viewing": GROUND | {"export"},
+    "api": GROUND | EQUATIONS | JOBS,
     "paper": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "rig", "identification", "report"},
 }
 

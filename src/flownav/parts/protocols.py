@@ -12,6 +12,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Reference
 from flownav.measurement import Sensor
 from flownav.navigation.told import NavigatorSettings
@@ -192,8 +193,8 @@ class Controller(Protocol):
     When to take off, and that the vehicle has landed, stays with our landing logic, which says it as `flying`.
     """
 
-    def start(self, trim: Controls) -> None:
-        """Before the flight; trim: the controls of hover."""
+    def start(self, gains: AutopilotGains) -> None:
+        """Before the flight; gains: of our own autopilot for this vehicle, the trims of hover among them."""
 
     def command(self, t_s: float, flown: Flown, reference: Reference, *, flying: bool) -> Controls:
         """Controls for the next 4 ms; reference: where the path is now; flying False: on the ground, at idle."""

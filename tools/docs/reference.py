@@ -1,0 +1,15 @@
+"""The generated pages of the reference: where each lies in the site, and what writes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import reference_commands
+import reference_keys
+import reference_tables
+
+PAGES: dict[str, Callable[[], str]] = {
+    "reference/commands.md": reference_commands.page,
+    "reference/keys.md": reference_keys.page,
+    "reference/tables.md": reference_tables.page,
+}

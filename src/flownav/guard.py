@@ -95,6 +95,13 @@ def an_input(path: Path) -> Path:
     return path
 
 
+def inputs_there(paths: Iterable[Path], what: str) -> None:
+    """InputError where a file or folder that is to be read is missing, or cannot be read; `what` says what is taken."""
+    for path in paths:
+        if not an_input(path).exists():
+            raise InputError(f"{path}: no such file or folder; {what}")
+
+
 def a_record_place(path: Path, inputs: Iterable[Path] = (), *, force: bool) -> Path:
     """The path of a record that is numbered where one is there, or that replaces it (force).
 

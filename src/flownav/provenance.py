@@ -6,7 +6,9 @@ import hashlib
 import platform
 import shlex
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -17,6 +19,7 @@ import flownav
 from flownav.files import natural_order
 
 LIBRARIES = ("numpy", "numba", "scipy", "pyarrow", "plotly")
+_call: ContextVar[str | None] = ContextVar("call", default=None)
 
 
 def provenance(inputs: Iterable[Path] = ()) -> dict[str, Any]:
@@ -30,9 +33,24 @@ def provenance(inputs: Iterable[Path] = ()) -> dict[str, Any]:
     }
 
 
+@contextmanager
+def called_as(call: str) -> Iterator[None]:
+    """Within it results are said to come from this call of the Python API, and not from a command."""
+    before = _call.set(call)
+    try:
+        yield
+    finally:
+        _call.reset(before)
+
+
 def command_line() -> str:
-    """The command as typed, for the report's 'how to reproduce'."""
-    return shlex.join(["flownav", *sys.argv[1:]])
+    """The command as typed, or the call of the Python API, for the report's 'how to reproduce'."""
+    return _call.get() or shlex.join(["flownav", *sys.argv[1:]])
+
+
+def command_words() -> list[str] | str:
+    """The same; of a command its words."""
+    return _call.get() or ["flownav", *sys.argv[1:]]
 
 
 def hash_of(file: Path) -> str:

@@ -21,10 +21,11 @@ from flownav.identification.height_law import QualityPoint, compare_schedules, p
 from flownav.identification.job import identify, parse_heights
 from flownav.identification.orders import CANDIDATES
 from flownav.identification.rig_log import rate_of, read_runs
-from flownav.identification.sensor_file import bessel, sensor_entries, to_toml, write_sensor
+from flownav.identification.sensor_file import bessel, sensor_entries, write_sensor
 from flownav.identification.sentinel import judge
 from flownav.provenance import hash_of
 from flownav.sensors.datasheet import FlowSettings, load_sensor
+from flownav.toml_text import to_toml
 
 A, B, C = 210.0, 16.0, 200.0  # gain 1.05, latency 80 ms
 COUNTS, ROD_M = 40_000, 1.5
@@ -239,6 +240,11 @@ nested = st.dictionaries(
 @given(nested)
 def test_toml_reads_back_as_it_was_written(entries):
     assert tomllib.loads(to_toml(entries)) == entries
+
+
+@given(st.floats(allow_nan=False, allow_infinity=False))
+def test_a_number_of_all_its_digits_reads_back_to_the_bit(number):
+    assert tomllib.loads(to_toml({"x": number}))["x"] == number
 
 
 # -- autopilots ----------------------------------------------------------------------------------------------------

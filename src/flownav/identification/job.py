@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flownav.errors import InputError
-from flownav.guard import an_input
+from flownav.guard import inputs_there
 from flownav.identification.descent import Structure
 from flownav.identification.findings import Findings
 from flownav.identification.flight_identification import identify_flight
@@ -17,6 +17,8 @@ from flownav.identification.rig_identification import identify_rig
 from flownav.identification.rig_log import assign_heights, is_rig, read_runs
 from flownav.logs.open_log import log_kind
 from flownav.text import number
+
+TAKEN = "identify takes rig logs and flight logs"
 
 
 def identify(
@@ -33,9 +35,7 @@ def identify(
     """
     if not logs:
         raise InputError("no log given; identify takes rig folders, rig CSV files or one flight log")
-    for path in logs:
-        if not an_input(path).exists():
-            raise InputError(f"{path}: no such file or folder; identify takes rig logs and flight logs")
+    inputs_there(logs, TAKEN)
     flights = [path for path in logs if is_flight(path)]
     if flights and len(logs) > 1:
         raise InputError(f"{flights[0]}: a flight is identified alone; give rig logs together, flights one by one")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -22,15 +22,16 @@ from flownav.identification.quantities import Interval, coefficients, numerator
 from flownav.parameter_files import check
 from flownav.provenance import hash_of
 from flownav.sensors.datasheet import FlowSensor
-from flownav.text import plain
+from flownav.toml_text import to_toml
 
 SHORTEST_LATENCY_S = 0.005
 STEEPEST = 4.0
+DIGITS = 7  # of the numbers in the file
 
 
 def sensor_entries(findings: Findings, base: FlowSensor, name: str, provenance: str) -> dict[str, Any]:
-    """The file's content as nested dictionaries, in the order in which it is written."""
-    return {
+    """The file's content as nested dictionaries, in the order in which it is written, numbers of DIGITS digits."""
+    entries = {
         "schema_version": 1,
         "name": name,
         "provenance": provenance,
@@ -45,6 +46,17 @@ def sensor_entries(findings: Findings, base: FlowSensor, name: str, provenance: 
         "identification": _identification(findings),
         "identified_models": _run_models(findings),
     }
+    rounded: dict[str, Any] = _rounded(entries)
+    return rounded
+
+
+def _rounded(value: Any) -> Any:
+    """Entries with no more digits than their numbers deserve."""
+    if isinstance(value, Mapping):
+        return {key: _rounded(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(item) for item in value]
+    return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
 
 def write_sensor(path: Path, entries: Mapping[str, Any]) -> FlowSensor:
@@ -207,47 +219,3 @@ def _run_models(findings: Findings) -> list[dict[str, Any]]:
             rows.append({"height_m": row.height_m, "model": row.model, "fit_percent": row.fit.fit_percent,
                          "a_1_s2": a, "b_1_s": b.value, "c_1_s2": c.value})  # fmt: skip
     return rows
-
-
-# -- TOML ------------------------------------------------------------------------------------------------------
-def to_toml(entries: Mapping[str, Any]) -> str:
-    """Nested dictionaries as TOML: values with provenance inline, tables and lists of tables with headers."""
-    return "\n".join(_lines(entries, "")) + "\n"
-
-
-def _lines(entries: Mapping[str, Any], prefix: str) -> list[str]:
-    lines = [f"{key} = {_literal(value)}" for key, value in entries.items() if not _is_table(value)]
-    for key, value in entries.items():
-        if not _is_table(value):
-            continue
-        header = f"{prefix}{key}"
-        for table in value if isinstance(value, list) else [value]:
-            lines += ["", f"[[{header}]]" if isinstance(value, list) else f"[{header}]"]
-            lines += _lines(table, f"{header}.")
-    return lines
-
-
-def _is_table(value: Any) -> bool:
-    if isinstance(value, list):
-        return bool(value) and isinstance(value[0], Mapping)
-    return isinstance(value, Mapping) and "value" not in value
-
-
-def _literal(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, Mapping):
-        return "{ " + ", ".join(f"{key} = {_literal(item)}" for key, item in value.items()) + " }"
-    if isinstance(value, str):
-        return _quoted(value)
-    if isinstance(value, Sequence):
-        return "[" + ", ".join(_literal(item) for item in value) + "]"
-    if isinstance(value, int | np.integer):
-        return str(int(value))
-    number = float(f"{float(value):.7g}")
-    return repr(number) if math.isfinite(number) else "nan"
-
-
-def _quoted(text: str) -> str:
-    escaped = plain(text).replace("\\", "\\\\").replace('"', '\\"')
-    return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in escaped) + '"'

@@ -31,8 +31,8 @@ LOST_AFTER_S = 1.0
 DOWN = "pos_d_m"
 
 
-def to_record(replay: Replay, scores: dict[str, Any], command: list[str]) -> Record:
-    """The record of a replay. `scores` go into its manifest; `command` is what the user typed."""
+def to_record(replay: Replay, scores: dict[str, Any], command: list[str] | str) -> Record:
+    """The record of a replay. `scores` go into its manifest; `command` is what the user typed or called."""
     record = Record(_manifest(replay, scores, command))
     estimate = replay.estimate
     record.add("estimate", estimate_table(estimate))
@@ -64,7 +64,7 @@ def _with_turning(replay: Replay, sensor: Sensor) -> Array:
     return np.where(np.isnan(value) & (np.arange(width) >= 2), prepared[:, :width], value)
 
 
-def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dict[str, Any]:
+def _manifest(replay: Replay, scores: dict[str, Any], command: list[str] | str) -> dict[str, Any]:
     log = replay.log
     versions = {name: version(name) for name in ("flownav", "numpy", "numba", "pyarrow")}
     return {
@@ -90,6 +90,11 @@ def _manifest(replay: Replay, scores: dict[str, Any], command: list[str]) -> dic
             "inputs": {name: {"sha256": digest} for name, digest in log.inputs.items()},
         },
         "command": command,
+        "findings": [
+            {"label": found.label, "text": found.text, "bad": bool(found.flow_is_wrong or found.unfused)}
+            for found in replay.findings
+        ],
+        "notes": list(replay.prepared.notes),
         "scores": scores,
     }
 

@@ -211,7 +211,7 @@ def outage_table(
     options: ReplayOptions,
     settings: NavigatorSettingsFile,
     windows: list[tuple[float, float]],
-    on_progress: Callable[[int], None] = lambda done: None,
+    on_progress: Callable[[int], object] = lambda done: None,
 ) -> list[OutageError]:
     """One replay a window, each with GPS cut in that window alone. `on_progress` is called with 1 for each.
 

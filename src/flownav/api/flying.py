@@ -1,0 +1,160 @@
+"""fly: a scenario flown in closed loop, one flight or many, as records with their scores."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flownav.api.record import Record
+from flownav.api.scenario import Scenario, scenario_of
+from flownav.api.vehicle import Vehicle
+from flownav.api.words import call_of, require_from
+from flownav.campaigns.judged import BOUND_FLIGHTS, Judged, bound_of, consistency_facts, fly_judged
+from flownav.campaigns.local import fly_recorded, known_exactly, median_flight, score_history
+from flownav.errors import InputError
+from flownav.provenance import called_as
+from flownav.scoring.errors import scores_of_flights
+from flownav.scoring.paper_tables import percentile_of_paper, published
+from flownav.scoring.takeoffs import takeoff_of_flights
+from flownav.simulation.assemble import Setup, assemble
+from flownav.simulation.engine import fly_one
+from flownav.simulation.ensemble import Ensemble
+
+OF_MANY_FLIGHTS = ("rmse_over_bound", "anees_inside_fraction", "error_over_stated")
+MOST_FLIGHTS, MOST_SEED = 10_000_000, 2**63 - 1
+
+Progress = Callable[[int], object]
+
+
+def fly(
+    scenario: str | Path | Scenario = "landing",
+    *,
+    seed: int = 1,
+    flight: int | Mapping[str, Any] = 0,
+    filter: str | None = None,
+    vehicle: str | Path | Vehicle | None = None,
+    dispersed: bool = False,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Record:
+    """Fly a scenario once, in closed loop, and score the flight.
+
+    scenario: takeoff, landing, gusty, pad_return, approach, a TOML file or a Scenario. seed, flight: flight k of a
+    seed is always the same flight, to the bit. filter: "landing" (the navigator, by default) or "paper". vehicle: a
+    shipped one's name, a file or a Vehicle. dispersed: vehicle, wind and sensors are drawn for this flight, and
+    neither navigator nor autopilot knows how; else they are what is believed. progress: called with 1 when it is down.
+    changes: other values for the scenario's own keys, as `Scenario.changed` takes them (docs/scenarios.md).
+    InputError, one line, for a name, a key or a value that cannot be. What a flight crashes on is in `record.verdict`.
+
+    Example:
+        >>> import flownav
+        >>> record = flownav.fly("landing", seed=1, flight={"duration_s": 6.0}, wind={"speed_20ft_m_s": 4.0})
+        >>> record.scores["states"]["x"]["rms_error"] < 1.0
+        True
+    """
+    number = 0 if isinstance(flight, Mapping) else flight
+    options: dict[str, Any] = {"filter": filter, "vehicle": vehicle, **changes}
+    if isinstance(flight, Mapping):
+        options["flight"] = flight
+    require_from("seed", seed, 0, MOST_SEED)
+    require_from("flight", number, 0, MOST_FLIGHTS)
+    setup = assemble(scenario_of(scenario, **options).file)
+    with called_as(call_of("fly", scenario, seed=seed, flight=flight, dispersed=dispersed, **options)):
+        return fly_setup(setup, seed, number, dispersed=dispersed, progress=progress).record
+
+
+@dataclass(frozen=True)
+class Flights:
+    """One flight or many of a scenario.
+
+    record: of the one, or of the one with the median largest error, which is flight `index` of the seed. facts: what
+    was flown, and its scores; of many each number with its median and 5th and 95th percentile.
+    """
+
+    record: Record
+    index: int
+    facts: dict[str, Any]
+
+
+def fly_setup(
+    setup: Setup, seed: int, first: int = 0, flights: int = 1, *, dispersed: bool = False,
+    progress: Progress | None = None,
+) -> Flights:  # fmt: skip
+    """Fly one flight, or flights 0 to `flights - 1`, of a scenario that is made ready, and score them.
+
+    first: the number of the one flight. progress: called with how many more flights are down.
+    """
+    advance = progress or (lambda flown: None)
+    truths = setup.ensemble() if dispersed else None
+    facts = _facts(setup, seed, flights, dispersed=dispersed)
+    if setup.scenario.optics == "pixels":
+        return _fly_pixels(setup, seed, first, flights, truths, facts, advance)
+    if flights > 1:
+        return _fly_many(setup, seed, flights, truths, facts, advance)
+    record = Record.of(fly_recorded(setup, seed, first, truths))
+    advance(1)
+    return Flights(record, first, facts | _nothing_of_many(setup) | record.scores)
+
+
+def _facts(setup: Setup, seed: int, flights: int, *, dispersed: bool) -> dict[str, Any]:
+    """What is flown."""
+    scenario = setup.scenario
+    return {
+        "scenario": scenario.name,
+        "filter": scenario.filter.name,
+        "gps": scenario.gps.model,
+        "truth": scenario.truth,
+        "feedback": scenario.autopilot.feedback,
+        "optics": scenario.optics,
+        "truth_model": "ensemble" if dispersed else "matched",
+        "seed": seed,
+        "flights": flights,
+    }
+
+
+def _nothing_of_many(setup: Setup) -> dict[str, Any]:
+    """What the navigator is given, and no figures of many flights."""
+    if setup.fitted is None:
+        return {}
+    return {"known_exactly": known_exactly(setup.scenario), **dict.fromkeys(OF_MANY_FLIGHTS)}
+
+
+def _fly_many(
+    setup: Setup, seed: int, flights: int, truths: Ensemble | None, facts: dict[str, Any], advance: Progress
+) -> Flights:
+    """Many flights side by side; the record of the median one."""
+    judged: Judged = fly_judged(setup.flight, seed, flights, ensemble=truths, on_progress=advance)
+    index = median_flight(judged.scores)
+    if setup.fitted is not None:
+        facts |= consistency_facts(judged, bound_of(setup, seed, min(flights, BOUND_FLIGHTS)))
+        facts["known_exactly"] = known_exactly(setup.scenario)
+    scores = scores_of_flights(judged.scores)
+    scores["takeoff"] = None if judged.takeoffs is None else takeoff_of_flights(judged.takeoffs)
+    table = published(setup.scenario.paper_table)
+    percentile = {"paper_percentile": percentile_of_paper(judged.scores, table)} if table else {}
+    record = Record.of(fly_recorded(setup, seed, index, truths))
+    return Flights(record, index, facts | scores | percentile)
+
+
+def _fly_pixels(
+    setup: Setup, seed: int, first: int, flights: int, truths: Ensemble | None, facts: dict[str, Any], advance: Progress
+) -> Flights:
+    """Flights on rendered frames, one after the other; the first one's record, and what was seen by height."""
+    from flownav.campaigns.pixels import agreement, fly_on_pixels
+
+    records, rows, frames = [], [], []
+    for index in range(first, first + flights):
+        seen, rendered = fly_on_pixels(setup, seed, index, truths)
+        records.append(fly_recorded(seen, seed, index, truths))
+        rows.append(score_history(seen.flight, fly_one(seen.flight, seed, index, truths))[0])
+        frames += rendered
+        advance(1)
+    assert setup.fitted is not None
+    assert setup.fitted.sheets.pad_camera is not None
+    facts["pad_frames"] = agreement(frames, setup.fitted.sheets.pad_camera)
+    scores = records[0].manifest["scores"] if flights == 1 else scores_of_flights(np.array(rows)) | {"takeoff": None}
+    return Flights(Record.of(records[0]), first, facts | _nothing_of_many(setup) | scores)

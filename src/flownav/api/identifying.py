@@ -1,0 +1,79 @@
+"""identify: rig and flight logs into a flow sensor with intervals, and what the logs could show at all.
+
+The logs are looked for before anything is loaded that takes time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from flownav.errors import InputError
+from flownav.guard import inputs_there
+
+if TYPE_CHECKING:
+    from flownav.api.sensor import Sensor
+
+
+def identify(
+    logs: str | Path | Sequence[str | Path],
+    *,
+    order: str = "auto",
+    heights_m: float | Sequence[float] = (),
+    reference: str = "auto",
+    flow_instance: int | None = None,
+    base: str | Path | None = None,
+) -> Sensor:
+    """Identify a flow sensor: gain, latency, dynamics and noise, each with its 95 % interval.
+
+    logs: rig logs (folders or CSV files), taken together, or one flight log. order: auto, delay (gain and latency),
+    1 to 6, or such as "2+delay". heights_m: the sensor's height over the rig, one for all logs or one each.
+    reference: auto; velocity or encoder of a rig, truth or gps of a flight. flow_instance: which of a flight's several
+    flow sensors. base: the sensor file for what no log tells (optics, limits); the paper's where it is None.
+    InputError, one line, where a log is missing, mixed with another kind or cannot serve.
+
+    Example:
+        >>> import flownav
+        >>> sensor = flownav.identify(rig_log)
+        >>> 0.5 < sensor.gain.low < sensor.gain.value < sensor.gain.high < 1.5
+        True
+    """
+    paths = [Path(logs)] if isinstance(logs, str | Path) else [Path(log) for log in logs]
+    require_logs(paths)
+
+    from flownav.api.words import call_of
+    from flownav.provenance import called_as
+
+    heights = [float(heights_m)] if isinstance(heights_m, int | float) else [float(height) for height in heights_m]
+    said = call_of("identify", [str(path) for path in paths], heights_m=heights, flow_instance=flow_instance, base=base)
+    with called_as(said):
+        return identify_logs(paths, order, heights, reference, flow_instance=flow_instance, base=base)
+
+
+def require_logs(logs: Sequence[Path]) -> None:
+    """InputError where a log is missing."""
+    if not logs:
+        raise InputError("no log given; identify takes rig folders, rig CSV files or one flight log")
+    inputs_there(logs, "identify takes rig logs and flight logs")
+
+
+def identify_logs(
+    logs: Sequence[Path], order: str, heights_m: Sequence[float], reference: str, *, flow_instance: int | None,
+    base: str | Path | None,
+) -> Sensor:  # fmt: skip
+    """The sensor that these logs show. InputError as `identify`."""
+    from flownav.api.sensor import Sensor
+    from flownav.compile import announce_compilation
+    from flownav.identification.job import identify as findings_of
+    from flownav.identification.job import name_of
+    from flownav.identification.orders import parse_order
+    from flownav.identification.sensor_file import sensor_entries
+    from flownav.provenance import command_line
+    from flownav.sensors.datasheet import load_sensor
+
+    structures, base_sensor = parse_order(order), load_sensor(base)
+    with announce_compilation("identification"):
+        findings = findings_of(logs, structures, heights_m, reference, flow_instance)
+    entries = sensor_entries(findings, base_sensor, f"identified from {name_of(logs)}", command_line())
+    return Sensor(entries, None, findings)

@@ -1,0 +1,125 @@
+"""replay: a recorded flight through the navigator, as a record with its scores."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from flownav.api.record import Record
+from flownav.api.sensor import Sensor
+from flownav.api.words import call_of
+from flownav.errors import InputError
+from flownav.logs.log import Log
+from flownav.logs.open_log import open_flight
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.settings_of import settings_of
+from flownav.parameter_files import check, load
+from flownav.provenance import called_as, command_words
+from flownav.replays.bundle import to_record
+from flownav.replays.fed import as_fed
+from flownav.replays.prepare import ReplayOptions
+from flownav.replays.session import Replay, outage_entry, outage_summary, table_windows
+from flownav.replays.session import outage_table as fly_table
+from flownav.replays.session import replay as run_log
+from flownav.sensors.datasheet import FlowSensor, load_sensor
+from flownav.sensors.identified import identified_flow
+
+GPS_DELAY_S = 0.22
+Progress = Callable[[int], object]
+Windows = Sequence[tuple[float, float]]
+Settings = str | Path | Mapping[str, float] | None
+
+
+def replay(
+    log: str | Path,
+    *,
+    gps_outages: Windows = (),
+    flow: bool = True,
+    flow_scale: tuple[float, float] = (1.0, 1.0),
+    gps_delay_s: float = GPS_DELAY_S,
+    sensor: str | Path | Sensor | None = None,
+    settings: Settings = None,
+    smooth: bool = False,
+    outage_table: tuple[float, float, float] | None = None,
+    flow_instance: int | None = None,
+    progress: Progress | None = None,
+) -> Record:
+    """Fuse a recorded flight with the navigator that flies in `fly`, and score it against what the log knows.
+
+    log: a CSV folder, PX4 ULog, ArduPilot .bin, MAVLink .tlog, or a record of `live` or `fly`, which gives the same
+    estimate bit for bit. gps_outages: windows (t0, t1) [s] in which GPS is withheld. flow: False withholds the optical
+    flow; flow_scale: factors on its two axes. gps_delay_s: how old a GPS reading is when it arrives. sensor: a flow
+    sensor (its gains and latency correct the flow). settings: the filter's, by name or as a TOML file
+    (docs/landing-filter.md). smooth: also the best estimate after the flight. outage_table: (t0, t1, length), one
+    replay for each window of that length, with GPS cut there alone. flow_instance: which of several flow sensors.
+    progress: called with 1 for each window of the table.
+    InputError, one line, where the log or an option cannot serve. What is wrong with the log is in `record.verdict`.
+
+    Example:
+        >>> import flownav
+        >>> record = flownav.replay(log, gps_outages=[(10, 20)])
+        >>> record.scores["outages"][0]["t0"]
+        10.0
+    """
+    call = call_of("replay", log, gps_outages=gps_outages, flow=None if flow else "False", sensor=sensor,
+                   settings=settings, smooth=smooth, outage_table=outage_table, flow_instance=flow_instance)  # fmt: skip
+    outages = tuple(_window(window) for window in gps_outages)
+    table = table_windows(*outage_table, option="outage_table") if outage_table else []
+    datasheet = None if sensor is None else _sheet_of(sensor)
+    stated = _stated(settings)
+    scale = (float(flow_scale[0]), float(flow_scale[1]))
+    options = ReplayOptions(gps_delay_s, outages, flow, scale)
+    with called_as(call):
+        read = open_flight(Path(log), flow_instance=flow_instance)
+        return replay_log(read, options, datasheet, stated, smooth=smooth, table=table, progress=progress)
+
+
+def replay_log(
+    log: Log, options: ReplayOptions, sensor: FlowSensor | None = None, stated: NavigatorSettingsFile | None = None, *,
+    smooth: bool = False, table: Windows = (), progress: Progress | None = None,
+) -> Record:  # fmt: skip
+    """A log that is read, through the navigator.
+
+    sensor: its file; stated: the user's own settings. table: windows, one replay each. InputError as `replay`.
+    """
+    told = settings_of(sensor, stated=stated)
+    identified = identified_flow(sensor, told.lag_states) if sensor else None
+    options = replace(options, identified=identified, flow_noise=told.noise)
+    options, settled = as_fed(log, options, told.settings if sensor or stated else None)
+    flown = run_log(log, options, settled, smoothed=smooth)
+    scores = flown.scores()
+    if table:
+        scores |= _table_scores(flown, table, scores["outages"], progress)
+    return Record.of(to_record(flown, scores, command_words()))
+
+
+def _table_scores(
+    flown: Replay, table: Windows, explicit: list[dict[str, Any]], progress: Progress | None
+) -> dict[str, Any]:
+    """The table's windows after the explicit ones, with their median and worst."""
+    advance = progress or (lambda done: None)
+    errors = fly_table(flown.log, flown.options, flown.settings, list(table), advance)
+    return {"outages": [*explicit, *map(outage_entry, errors)], **outage_summary(errors)}
+
+
+def _window(window: Sequence[float]) -> tuple[float, float]:
+    try:
+        t0, t1 = window
+        return float(t0), float(t1)
+    except (TypeError, ValueError):
+        raise InputError(f"gps_outages: {window!r}: a window (t0, t1) in seconds is needed") from None
+
+
+def _sheet_of(sensor: str | Path | Sensor) -> FlowSensor:
+    return sensor.file if isinstance(sensor, Sensor) else load_sensor(sensor)
+
+
+def _stated(settings: Settings) -> NavigatorSettingsFile | None:
+    """The user's own settings. InputError names the one that cannot be."""
+    if settings is None:
+        return None
+    if isinstance(settings, Mapping):
+        return check(dict(settings), NavigatorSettingsFile, "settings")
+    return load(Path(settings), NavigatorSettingsFile)

@@ -1,0 +1,191 @@
+"""Sensor: an optical-flow sensor's datasheet as a Python object, shipped, read from a file or just identified."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from flownav.api.changing import kept_file, merged
+from flownav.errors import InputError
+from flownav.identification.sensor_file import write_sensor
+from flownav.parameter_files import check, read_toml, shipped
+from flownav.sensors.datasheet import DEFAULT_SENSOR, FlowSensor
+
+if TYPE_CHECKING:
+    from flownav.identification.findings import Findings
+
+PAPER = "px4flow-paper"
+
+
+class Valued(NamedTuple):
+    """A figure with its 95 % interval; low and high are NaN where the file gives none."""
+
+    value: float
+    low: float
+    high: float
+
+
+class Sensor:
+    """A flow sensor: gain, latency, dynamics, noise against height, limits and optics (docs/sensors.md).
+
+    entries: its file as nested dictionaries; file: the same, checked. findings: what an identification found besides,
+    None of a sensor that was loaded. A Sensor never changes; `changed` makes another.
+
+    Example:
+        >>> import flownav
+        >>> sensor = flownav.Sensor.load("px4flow-paper")
+        >>> round(sensor.gain.value, 2)
+        0.99
+    """
+
+    def __init__(self, entries: dict[str, Any], path: Path | None = None, findings: Findings | None = None) -> None:
+        self.entries, self.path, self.findings = entries, path, findings
+        self.file: FlowSensor = check(entries, FlowSensor, str(path or entries.get("name", "the sensor")))
+
+    @classmethod
+    def load(cls, name_or_path: str | Path = PAPER) -> Sensor:
+        """The paper's sensor by its name, px4flow-paper, or a TOML file such as `flownav identify` writes.
+
+        InputError, one line, where the file is missing or names what a sensor does not have.
+
+        Example:
+            >>> flownav.Sensor.load().name
+            "PX4FLOW, the paper's selected model"
+        """
+        path = shipped(DEFAULT_SENSOR) if str(name_or_path) == PAPER else Path(name_or_path)
+        return cls(read_toml(path), path)
+
+    @property
+    def name(self) -> str:
+        """What the file calls it.
+
+        Example:
+            >>> "PX4FLOW" in flownav.Sensor.load().name
+            True
+        """
+        return self.file.name
+
+    @property
+    def gain(self) -> Valued:
+        """Reported over true velocity of slow motion, with its 95 % interval where it was identified.
+
+        Example:
+            >>> 0.9 < flownav.Sensor.load().gain.value < 1.1
+            True
+        """
+        found = self.file.identification
+        if found is None:
+            return Valued(self.file.dynamics.gain, float("nan"), float("nan"))
+        return Valued(float(found.gain), float(found.gain_low), float(found.gain_high))
+
+    @property
+    def latency_s(self) -> Valued:
+        """Delay of slow motion [s], with its 95 % interval where it was identified.
+
+        Example:
+            >>> 0.0 < flownav.Sensor.load().latency_s.value < 0.5
+            True
+        """
+        found = self.file.identification
+        if found is None:
+            return Valued(self.file.dynamics.delay_s, float("nan"), float("nan"))
+        return Valued(float(found.latency_s), float(found.latency_low_s), float(found.latency_high_s))
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """Everything that an identification found, as `flownav identify --json` prints it; empty where none was made.
+
+        Example:
+            >>> flownav.Sensor.load().facts
+            {}
+        """
+        from flownav.identification.facts import facts_of
+
+        return {} if self.findings is None else facts_of(self.findings)
+
+    @property
+    def verdict(self) -> str:
+        """What the log that it was identified from could show at all; "" where no identification stands in the file.
+
+        Example:
+            >>> flownav.Sensor.load().verdict
+            ''
+        """
+        return "" if self.file.identification is None else self.file.identification.verdict
+
+    def sigma_m_s(self, height_m: float) -> float:
+        """Standard deviation of a velocity reading at a height [m/s].
+
+        Example:
+            >>> sensor = flownav.Sensor.load()
+            >>> sensor.sigma_m_s(1.5) > sensor.sigma_m_s(0.6)
+            True
+        """
+        from numpy.polynomial.polynomial import polyval
+
+        law = self.file.noise.fit()
+        root = (min(max(height_m, law.low_m), law.high_m) ** 0.25 - law.centre) * law.scale
+        return max(float(polyval(root, law.coefficients)), float(self.file.noise.floor_m_s))
+
+    def changed(self, **changes: Any) -> Sensor:
+        """Another sensor with other numbers; nested mappings are merged into the sensor's own tables.
+
+        InputError, one line, for an unknown key and for a value out of its range.
+
+        Example:
+            >>> flownav.Sensor.load().changed(limits={"max_height_m": 8.0}).file.limits.max_height_m
+            8.0
+        """
+        return Sensor(merged(self.entries, changes, self.name), None, self.findings) if changes else self
+
+    def save(self, path: str | Path) -> Path:
+        """Write the sensor file that fly, replay, campaign and live read; where it lies. InputError where it cannot be.
+
+        Example:
+            >>> sensor = flownav.Sensor.load()
+            >>> flownav.Sensor.load(sensor.save(folder / "sensor.toml")).gain.value == sensor.gain.value
+            True
+        """
+        path = Path(path)
+        if path.suffix != ".toml":
+            raise InputError(f"{path}: a sensor file's name ends in .toml")
+        write_sensor(path, self.entries)
+        return path
+
+    def save_parameters(self, path: str | Path, autopilot: str = "px4") -> dict[str, float]:
+        """Write the autopilot's parameters that follow from an identification; each by its name.
+
+        autopilot: "px4" or "ardupilot". InputError for another, and for a sensor that was not just identified.
+
+        Example:
+            >>> flownav.Sensor.load().save_parameters(folder / "sensor.params")
+            Traceback (most recent call last):
+            flownav.errors.InputError: PX4FLOW, the paper's selected model: parameters follow from what \
+flownav.identify found; identify it anew
+        """
+        from flownav.identification.autopilot_parameters import write_parameters
+
+        if self.findings is None:
+            raise InputError(f"{self.name}: parameters follow from what flownav.identify found; identify it anew")
+        found = write_parameters(Path(path), autopilot, self.findings, self.file)
+        return {parameter.name: float(parameter.text) for parameter in found}
+
+    def file_path(self) -> Path:
+        """A file with this sensor, for a scenario to name: its own, or one that lasts as long as this process.
+
+        Example:
+            >>> flownav.Sensor.load().file_path().name
+            'px4flow_paper.toml'
+        """
+        return self.path or kept_file(self.name, self.entries)
+
+    def __repr__(self) -> str:
+        gain, latency = _shown(self.gain, 1.0, 3, ""), _shown(self.latency_s, 1e3, 0, " ms")
+        return f"<Sensor {self.name}: gain {gain}, latency {latency}>"
+
+
+def _shown(found: Valued, factor: float, digits: int, unit: str) -> str:
+    value = f"{factor * found.value:.{digits}f}{unit}"
+    if found.low != found.low:
+        return value
+    return f"{value} [{factor * found.low:.{digits}f}, {factor * found.high:.{digits}f}]"

@@ -33,7 +33,7 @@ def main(quick: bool) -> None:
     for name, generate in PAGES.items():
         (BUILT / name).parent.mkdir(parents=True, exist_ok=True)
         (BUILT / name).write_text(generate(), encoding="utf-8")
-    write_tutorials(BUILT / "tutorials", quick)
+    write_tutorials(BUILT, quick)
     sys.exit(site())
 
 
@@ -47,11 +47,12 @@ def assets(folder: Path) -> None:
 
 def write_tutorials(folder: Path, quick: bool) -> None:
     """Each tutorial's page, with what its cells printed unless in a hurry. Raises RuntimeError where one fails."""
-    folder.mkdir(parents=True, exist_ok=True)
     scripts = notebooks.tutorials()
-    ran = {s.stem: notebooks.read(s) for s in scripts} if quick else notebooks.run_all(scripts)
-    for name, notebook in ran.items():
-        (folder / f"{name}.md").write_text(cells.page(notebook, name, folder), encoding="utf-8")
+    ran = {script: notebooks.read(script) for script in scripts} if quick else notebooks.run_all(scripts)
+    for script, notebook in ran.items():
+        place = folder / script.parent.name
+        place.mkdir(exist_ok=True)
+        (place / f"{script.stem}.md").write_text(cells.page(notebook, script.stem, place), encoding="utf-8")
 
 
 def site() -> int:

@@ -1,4 +1,4 @@
-"""The tutorials: scripts with cells (`docs/tutorials/*.py`, Jupytext's percent format), run from top to bottom.
+"""The tutorials: scripts with cells (docs/tutorials/*.py, docs/how-to/*.py, Jupytext's percent format), run in order.
 
 Each runs in a fresh interpreter and in an empty folder of its own. A cell that raises fails the build, with the
 tutorial, the cell and the error. Run as a script, it writes the executed notebooks: `notebooks.py FOLDER [NAME...]`.
@@ -20,7 +20,7 @@ from nbclient import NotebookClient
 from nbclient.exceptions import CellExecutionError
 
 PROJECT = Path(__file__).parents[2]
-TUTORIALS = PROJECT / "docs" / "tutorials"
+DOCS = PROJECT / "docs"
 CELL_LIMIT_S = 300
 COLOURS = re.compile(r"\x1b\[[0-9;]*m")
 # 80 columns fit the page; no colours; what a tutorial draws is a picture, never a window
@@ -34,8 +34,8 @@ SURROUNDINGS = {
 
 
 def tutorials() -> list[Path]:
-    """Every tutorial's script, by name."""
-    return sorted(TUTORIALS.glob("*.py"))
+    """The script of every tutorial and of every how-to that runs, by folder and name."""
+    return sorted(DOCS.glob("*/*.py"))
 
 
 def read(script: Path) -> nbformat.NotebookNode:
@@ -71,10 +71,10 @@ def failure(script: Path, notebook: nbformat.NotebookNode, error: str) -> str:
     return f"{script.name}: {COLOURS.sub('', error)}"
 
 
-def run_all(scripts: list[Path]) -> dict[str, nbformat.NotebookNode]:
-    """Every tutorial run, by its name, two at a time where there are two cores. Raises RuntimeError as `run`."""
+def run_all(scripts: list[Path]) -> dict[Path, nbformat.NotebookNode]:
+    """Every script run, two at a time where there are two cores. Raises RuntimeError as `run`."""
     with ProcessPoolExecutor(max_workers=min(2, os.cpu_count() or 1)) as pool:
-        return dict(zip((script.stem for script in scripts), pool.map(run, scripts), strict=True))
+        return dict(zip(scripts, pool.map(run, scripts), strict=True))
 
 
 def _surroundings() -> dict[str, str]:
@@ -87,8 +87,8 @@ def main(folder: Path, names: list[str]) -> None:
     """Write the executed notebooks of the named tutorials, or of all, into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     scripts = [script for script in tutorials() if not names or script.stem in names]
-    for name, notebook in run_all(scripts).items():
-        nbformat.write(notebook, folder / f"{name}.ipynb")
+    for script, notebook in run_all(scripts).items():
+        nbformat.write(notebook, folder / f"{script.stem}.ipynb")
 
 
 if __name__ == "__main__":

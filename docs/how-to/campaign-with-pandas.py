@@ -13,7 +13,7 @@ result
 # %%
 flights = result.to_pandas()
 print(flights.shape)
-flights[["set.wind.speed_20ft_m_s", "touchdown.horizontal_m", "touchdown.sink_rate_m_s", "verdict"]].head()
+flights[["set.wind.speed_20ft_m_s", "touchdown.contact.distance_m", "touchdown.contact.sink_rate_m_s", "verdict"]].head()
 
 # %% [markdown]
 # ## Percentiles by wind
@@ -22,7 +22,7 @@ flights[["set.wind.speed_20ft_m_s", "touchdown.horizontal_m", "touchdown.sink_ra
 # intervals; a data frame gives the plain figures.
 
 # %%
-by_wind = flights.groupby("set.wind.speed_20ft_m_s")["touchdown.horizontal_m"]
+by_wind = flights.groupby("set.wind.speed_20ft_m_s")["touchdown.rest.distance_m"]
 by_wind.quantile([0.5, 0.95]).unstack().round(3)
 
 # %%
@@ -39,7 +39,7 @@ for cell in result.cells:
 # %%
 inputs = flights.filter(like="input.")
 flights_of_one_wind = flights["set.wind.speed_20ft_m_s"] == 6.0
-hints = inputs[flights_of_one_wind].corrwith(flights["touchdown.horizontal_m"][flights_of_one_wind], method="spearman")
+hints = inputs[flights_of_one_wind].corrwith(flights["touchdown.rest.distance_m"][flights_of_one_wind], method="spearman")
 hints.abs().sort_values(ascending=False).head(5).round(2).to_frame("rank correlation")
 
 # %%
@@ -47,7 +47,7 @@ import matplotlib.pyplot as plt
 
 figure, axis = plt.subplots(figsize=(5, 5), layout="constrained")
 for speed, group in flights.groupby("set.wind.speed_20ft_m_s"):
-    axis.scatter(group["touchdown.east_m"], group["touchdown.north_m"], s=12, label=f"{speed:.0f} m/s")
+    axis.scatter(group["touchdown.rest.east_m"], group["touchdown.rest.north_m"], s=12, label=f"{speed:.0f} m/s")
 axis.set_xlabel("east of the pad [m]")
 axis.set_ylabel("north of the pad [m]")
 axis.set_aspect("equal")

@@ -67,7 +67,7 @@ quad
 heavy = quad.changed(frame={"mass_kg": 1.1 * quad.file.frame.mass_kg})
 heavy.save("heavy.toml")
 flown = flownav.fly("leg.toml", seed=1, vehicle="heavy.toml")
-print(flown.scores["touchdown"]["horizontal_m"], "m from the pad,", flown.verdict or "landed")
+print(f"{flown.scores['touchdown']['contact']['distance_m']:.2f} m from the pad, {flown.scores['touchdown']['verdict']}")
 
 # %% [markdown]
 # `flownav vehicle heavy.toml` prints its trim, its hover power and its linear model. `--margins` prints the phase and gain

@@ -40,8 +40,8 @@ record = flownav.fly("landing", seed=1)
 record
 
 # %%
-touchdown = record.scores["touchdown"]
-print(f"touched {touchdown['horizontal_m']:.2f} m from the pad's centre, sinking at {touchdown['sink_rate_m_s']:.2f} m/s")
+contact = record.scores["touchdown"]["contact"]
+print(f"touched {contact['distance_m']:.2f} m from the pad's centre, sinking at {contact['sink_rate_m_s']:.2f} m/s")
 
 # %% [markdown]
 # ## Look at the estimate
@@ -86,7 +86,7 @@ plt.show()
 
 # %%
 windy = flownav.fly("landing", seed=1, gps="midg", wind={"speed_20ft_m_s": 6.0, "gusts": True})
-print(windy.scores["touchdown"]["horizontal_m"])
+print(f"{windy.scores['touchdown']['contact']['distance_m']:.2f} m from the pad's centre")
 
 # %% [markdown]
 # ## Where to go from here

@@ -1,3 +1,71 @@
-"""flownav: GPS/INS + optical-flow navigation for precision VTOL take-off and landing."""
+"""flownav: GPS/INS + optical-flow navigation for precision VTOL take-off and landing.
+
+The public API: `fly`, `replay`, `identify`, `campaign` and `load` give a `Record`, a `Sensor` or a `Campaign`;
+`Scenario`, `Sensor` and `Vehicle` are what they take. Each is loaded when it is first asked for.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from flownav.api.campaign import Campaign
+    from flownav.api.campaigning import campaign
+    from flownav.api.flying import fly
+    from flownav.api.identifying import identify
+    from flownav.api.record import Record, load
+    from flownav.api.replaying import replay
+    from flownav.api.scenario import Scenario
+    from flownav.api.sensor import Sensor
+    from flownav.api.table import Table
+    from flownav.api.vehicle import Vehicle
+    from flownav.errors import FlownavError, InputError
 
 __version__ = "0.1.0"
+
+_PLACES = {
+    "Campaign": "flownav.api.campaign",
+    "FlownavError": "flownav.errors",
+    "InputError": "flownav.errors",
+    "Record": "flownav.api.record",
+    "Scenario": "flownav.api.scenario",
+    "Sensor": "flownav.api.sensor",
+    "Table": "flownav.api.table",
+    "Vehicle": "flownav.api.vehicle",
+    "campaign": "flownav.api.campaigning",
+    "fly": "flownav.api.flying",
+    "identify": "flownav.api.identifying",
+    "load": "flownav.api.record",
+    "replay": "flownav.api.replaying",
+}
+
+__all__ = [
+    "Campaign",
+    "FlownavError",
+    "InputError",
+    "Record",
+    "Scenario",
+    "Sensor",
+    "Table",
+    "Vehicle",
+    "__version__",
+    "campaign",
+    "fly",
+    "identify",
+    "load",
+    "replay",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, loaded when it is first asked for."""
+    if name not in _PLACES:
+        raise AttributeError(f"module 'flownav' has no attribute {name!r}")
+    found = getattr(import_module(_PLACES[name]), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -15,7 +15,6 @@ from flownav.api.vehicle import Vehicle
 from flownav.api.words import call_of, require_from
 from flownav.campaigns.judged import BOUND_FLIGHTS, Judged, bound_of, consistency_facts, fly_judged
 from flownav.campaigns.local import fly_recorded, known_exactly, median_flight, score_history
-from flownav.errors import InputError
 from flownav.provenance import called_as
 from flownav.scoring.errors import scores_of_flights
 from flownav.scoring.paper_tables import percentile_of_paper, published

@@ -7,6 +7,7 @@ from typing import Any
 
 from flownav import record as ground
 from flownav.api.table import Table
+from flownav.errors import InputError
 
 
 class Record(ground.Record):
@@ -29,6 +30,16 @@ class Record(ground.Record):
         return cls(record.manifest, tables)
 
     @property
+    def name(self) -> str:
+        """What it is called after: its scenario, or its log without the suffix.
+
+        Example:
+            >>> flownav.fly("landing", seed=1, flight={"duration_s": 6.0}).name
+            'landing'
+        """
+        return str(self.manifest.get("scenario") or Path(str(self.manifest.get("log") or "record")).stem)
+
+    @property
     def scores(self) -> dict[str, Any]:
         """What scoring found of this flight."""
         found: dict[str, Any] = self.manifest.get("scores") or {}
@@ -49,9 +60,65 @@ class Record(ground.Record):
         if bad:
             return str(bad[0])
         landing = self.scores.get("touchdown") or {}
-        return f"crashed: {', '.join(landing['broken'])}" if self.scores.get("crashed") and landing.get("broken") else ""
+        return (
+            f"crashed: {', '.join(landing['broken'])}" if self.scores.get("crashed") and landing.get("broken") else ""
+        )
+
+    def save(self, path: str | Path, *, replacing: bool = False) -> Path:  # type: ignore[override]
+        """Write the record as one file, whole or not at all; where it lies.
+
+        replacing: whatever is there may go. InputError where nothing can be written there, or, unless replacing, where
+        something lies that flownav did not write.
+
+        Example:
+            >>> flownav.fly("landing", seed=1, flight={"duration_s": 6.0}).save(folder / "landing.fnr").suffix
+            '.fnr'
+        """
+        path = Path(path)
+        try:
+            super().save(path, replacing=replacing)
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written ({error.strerror}); give another path") from error
+        return path
+
+    def report(self, path: str | Path | None = None) -> Path:
+        """Write the record's report: one HTML page that works offline; where it lies.
+
+        path: NAME.html in the folder that the program runs in, after the scenario or the log, where it is None.
+        InputError where nothing can be written there.
+
+        Example:
+            >>> flownav.fly("landing", seed=1, flight={"duration_s": 6.0}).report(folder / "landing.html").name
+            'landing.html'
+        """
+        from flownav.report.html import write_report
+
+        page = Path(f"{self.name}.html") if path is None else Path(path)
+        try:
+            write_report(self, page)
+        except OSError as error:
+            raise InputError(f"{page}: cannot be written ({error.strerror}); give another path") from error
+        return page
 
     @classmethod
     def load(cls, path: str | Path) -> Record:
-        """Read a record file."""
+        """Read a record that fly, replay or live wrote. InputError where the file is missing or no record.
+
+        Example:
+            >>> kept = flownav.fly("landing", seed=1, flight={"duration_s": 6.0}).save(folder / "landing.fnr")
+            >>> flownav.Record.load(kept).name
+            'landing'
+        """
         return cls.of(ground.Record.load(Path(path)))
+
+
+def load(path: str | Path) -> Record:
+    """Read a record that fly, replay or live wrote. InputError where the file is missing or no record.
+
+    Example:
+        >>> import flownav
+        >>> kept = flownav.fly("landing", seed=1, flight={"duration_s": 6.0}).save(folder / "landing.fnr")
+        >>> flownav.load(kept).scores["crashed"]
+        False
+    """
+    return Record.load(path)

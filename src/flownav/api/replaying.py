@@ -63,8 +63,10 @@ def replay(
         >>> record.scores["outages"][0]["t0"]
         10.0
     """
-    call = call_of("replay", log, gps_outages=gps_outages, flow=None if flow else "False", sensor=sensor,
-                   settings=settings, smooth=smooth, outage_table=outage_table, flow_instance=flow_instance)  # fmt: skip
+    call = call_of(
+        "replay", log, gps_outages=gps_outages, flow=None if flow else "False", sensor=sensor, settings=settings,
+        smooth=smooth, outage_table=outage_table, flow_instance=flow_instance,
+    )  # fmt: skip
     outages = tuple(_window(window) for window in gps_outages)
     table = table_windows(*outage_table, option="outage_table") if outage_table else []
     datasheet = None if sensor is None else _sheet_of(sensor)

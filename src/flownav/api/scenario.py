@@ -129,11 +129,9 @@ class Scenario:
         return hash(self.name)
 
     def __repr__(self) -> str:
-        flown, filter_name = self.file.flight, self.file.filter.name
-        vehicle = self.file.vehicle.file or "maxi-joker-3"
-        return (
-            f"<Scenario {self.name}: {flown.duration_s:g} s, {vehicle}, {self.file.gps.model} GPS, {filter_name} filter>"
-        )
+        file, vehicle = self.file, self.file.vehicle.file or "maxi-joker-3"
+        what = f"{file.flight.duration_s:g} s, {vehicle}, {file.gps.model} GPS, {file.filter.name} filter"
+        return f"<Scenario {self.name}: {what}>"
 
 
 def scenario_of(given: Scenario | str | Path, **changes: Any) -> Scenario:

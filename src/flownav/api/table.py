@@ -78,8 +78,8 @@ class Table(dict[str, Column]):
             >>> frame.index.name
             't_s'
         """
-        pandas = _library("pandas")
-        found: pandas.DataFrame = pandas.DataFrame(dict(self)).set_index("t_s")
+        library = _library("pandas")
+        found: pandas.DataFrame = library.DataFrame(dict(self)).set_index("t_s")
         return found
 
     def to_xarray(self) -> xarray.Dataset:
@@ -92,14 +92,14 @@ class Table(dict[str, Column]):
             >>> estimate.pos_n_m.attrs["units"]
             'm'
         """
-        xarray, units = _library("xarray"), self.units()
+        library, units = _library("xarray"), self.units()
         columns = {
             column: ("t_s", values, {"units": units[column]} if units[column] else {})
             for column, values in self.items()
             if column != "t_s"
         }
         time = ("t_s", self["t_s"], {"units": "s"})
-        found: xarray.Dataset = xarray.Dataset(columns, {"t_s": time}, {"title": self.name})
+        found: xarray.Dataset = library.Dataset(columns, {"t_s": time}, {"title": self.name})
         return found
 
     def to_polars(self) -> polars.DataFrame:
@@ -109,8 +109,8 @@ class Table(dict[str, Column]):
             >>> flownav.fly("landing", flight={"duration_s": 6.0}).estimate.to_polars().columns[0]
             't_s'
         """
-        polars = _library("polars")
-        found: polars.DataFrame = polars.DataFrame({"t_s": self["t_s"], **self})
+        library = _library("polars")
+        found: polars.DataFrame = library.DataFrame({"t_s": self["t_s"], **self})
         return found
 
 

@@ -12,7 +12,10 @@ LONGEST = 200  # characters of one argument
 def call_of(name: str, *arguments: Any, **options: Any) -> str:
     """A call as Python writes it, for the record's "how to reproduce"; what is None, False or empty is left out."""
     given = [_shown(argument) for argument in arguments]
-    given += [f"{key}={_shown(value)}" for key, value in options.items() if value is not None and _is_said(value)]
+    said = {key: value for key, value in options.items() if value is not None and _is_said(value)}
+    given += [f"{key}={_shown(value)}" for key, value in said.items() if key.isidentifier()]
+    dotted = {key: value for key, value in said.items() if not key.isidentifier()}
+    given += [f"**{_shown(dotted)}"] if dotted else []
     return f"flownav.{name}({', '.join(given)})"
 
 

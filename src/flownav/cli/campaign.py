@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import json
-import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.engines import EngineOption, engine_named, require_engine
+from flownav.cli.engines import EngineOption
 from flownav.cli.output import VehicleOption
 from flownav.errors import InputError
 
 if TYPE_CHECKING:
     from flownav.campaigns.engines.engine import Engine
     from flownav.campaigns.plan import Plan
-
-FLIGHTS, FLIGHTS_UNTIL = 1000, 100_000
-TRUTH_MODELS = ("ensemble", "matched", "both")
 
 
 def command(
@@ -61,47 +57,45 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Fly a scenario many times: radii, shares and percentiles with intervals, a dataset, the worst flights."""
-    from flownav.campaigns.figures import stop_of
-    from flownav.campaigns.plan import MOST_FLIGHTS, planned
+    from flownav.api.campaigning import FLIGHTS, FLIGHTS_UNTIL, MOST_SEED, TRUTH_MODELS, plan_of
+    from flownav.api.scenario import Scenario
+    from flownav.campaigns.engines.named import engine_named, require_engine
+    from flownav.campaigns.plan import MOST_FLIGHTS
     from flownav.campaigns.sampling import SAMPLINGS
     from flownav.campaigns.summary import WORST
-    from flownav.cli.output import require_between
+    from flownav.cli.output import require_between, require_one_of
     from flownav.guard import an_input
-    from flownav.simulation.scenario import load_scenario, with_vehicle
 
     if flight is not None and flights is None:
         flights = _planned_flights(out)
     most = FLIGHTS if until is None and rare is None else FLIGHTS_UNTIL
     flights = flights if flights is not None else most
     require_between("--flights", flights, 1, MOST_FLIGHTS)
-    require_between("--seed", seed, 0, 2**63 - 1)
+    require_between("--seed", seed, 0, MOST_SEED)
     require_between("--records", records, 0, WORST)
     require_engine(engine)
-    for option, value, known in (("--sampling", sampling, SAMPLINGS), ("--truth-model", truth_model, TRUTH_MODELS)):
-        if value not in known:
-            raise InputError(f"{option} {value}: must be {', '.join(known[:-1])} or {known[-1]}")
-    if until is not None:
-        stop_of(until)
-    chosen = [with_vehicle(load_scenario(name), vehicle) for name in scenarios]
+    require_one_of("--sampling", sampling, SAMPLINGS)
+    require_one_of("--truth-model", truth_model, TRUTH_MODELS)
+    chosen = [Scenario.load(name).changed(vehicle=vehicle) for name in scenarios]
     for name in (*scenarios, vehicle):
         if name is not None and Path(name).exists():
             an_input(Path(name))
-    models: Any = ("ensemble", "matched") if truth_model == "both" else (truth_model,)
-    plan = planned(
-        chosen, _once("--sweep", map(_swept, sweep or ())), truth_models=models, seed=seed, flights=flights,
-        sampling=sampling, until=until, changes=_once("--set", map(_set, set_ or ())),  # type: ignore[arg-type]
+    plan = plan_of(
+        chosen, flights=flights, seed=seed, sweep=_once("--sweep", map(_swept, sweep or ())),
+        changes=_once("--set", map(_set, set_ or ())), sampling=sampling, truth_model=truth_model, until=until,
     )  # fmt: skip
-    names = "_".join(dict.fromkeys(each.name for each in chosen))
+    names = "_".join(dict.fromkeys(each.name for each in chosen))[:100]
     if rare is not None and engine != "local":
         raise InputError(f"--rare: flies on this machine's cores only; leave out --engine {engine}")
-    folder = out or Path("out") / f"{names[:100]}_campaign"
-    if rare is not None or (flight is not None and flight.endswith(".json")):
-        from flownav.cli.campaign_rare import fly_again, fly_rare
+    folder = out or Path("out") / f"{names}_campaign"
+    if rare is not None:
+        from flownav.cli.campaign_rare import fly_rare
 
-        if rare is not None:
-            fly_rare(plan, rare, out or Path("out") / f"{names[:100]}_rare", as_json)
-        else:
-            fly_again(plan, Path(str(flight)), as_json)
+        fly_rare(plan, rare, out or Path("out") / f"{names}_rare", as_json)
+    elif flight is not None and flight.endswith(".json"):
+        from flownav.cli.campaign_rare import fly_again
+
+        fly_again(plan, Path(flight), as_json)
     elif flight is not None:
         _again(plan, flight, folder, as_json)
     else:
@@ -109,83 +103,35 @@ def command(
 
 
 def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) -> None:
-    """Fly what the folder lacks; summary, records and page; what is said of them."""
-    from flownav.campaigns.run import run_campaign
-    from flownav.campaigns.store import REPORT, SUMMARY, Store
-    from flownav.campaigns.summary import summary_of
+    """Fly what the folder lacks; what is said of it."""
+    from flownav.api.campaigning import fly_plan
+    from flownav.campaigns.store import REPORT
     from flownav.cli.campaign_progress import watching
 
-    with Store(folder).opened(plan) as store:
-        began_s = time.monotonic()
-        with watching(plan) as watch:
-            data = run_campaign(plan, engine, store, watch)
-        rate = watch.flown / max(time.monotonic() - began_s, 1e-9) if watch.flown else None
-        summary = summary_of(plan, data)
-        store.keep_text(SUMMARY, json.dumps(summary, indent=1) + "\n")
-        kept = _keep_records(plan, summary, folder, records)
-        _keep_page(plan, summary, folder, kept)
-    where = {"rate_per_s": rate, "dataset": str(folder / "flights"), "records": kept}
-    where["report"] = str(folder / REPORT)
+    with watching(plan) as watch:
+        flown = fly_plan(plan, engine, folder, records=records, watch=watch)
+    kept = [str(path) for path in flown.records]
     if as_json:
-        typer.echo(json.dumps(summary | where))
-        return
-    from flownav.cli.campaign_table import show
+        where = {"rate_per_s": flown.rate_per_s, "dataset": str(folder / "flights"), "records": kept}
+        typer.echo(json.dumps(flown.summary | where | {"report": str(folder / REPORT)}))
+    else:
+        from flownav.cli.campaign_table import show
 
-    show(summary, folder, rate, kept)
-
-
-def _keep_records(plan: Plan, summary: dict[str, Any], folder: Path, count: int) -> list[str]:
-    """Records and reports of the worst flights and of the first cell's median one; where they lie."""
-    from flownav.campaigns.again import record_again, record_path
-    from flownav.campaigns.store import RECORDS
-    from flownav.cli.output import save
-
-    if count == 0:
-        return []
-    chosen = [*summary["worst"][:count], summary["cells"][0]["median"]]
-    found = []
-    for cell, flight in dict.fromkeys((each["cell"], each["flight"]) for each in chosen):
-        path = record_path(folder / RECORDS, cell, flight)
-        save(record_again(plan, cell, flight), path, report=True)
-        found.append(str(path))
-    return found
-
-
-def _keep_page(plan: Plan, summary: dict[str, Any], folder: Path, records: list[str]) -> None:
-    """The campaign's page, with links to the reports of the flights that were kept."""
-    from flownav.campaigns.measures import measured
-    from flownav.campaigns.store import RECORDS, REPORT, Dataset
-    from flownav.report.campaign import write_campaign
-    from flownav.report.campaign_figures import Touchdowns
-
-    data, touched = Dataset(folder), []
-    for cell, planned in enumerate(plan.cells):
-        rows = data.rows(cell)
-        north, east, distance = (measured(f"touchdown.{name}_m", rows) for name in ("north", "east", "horizontal"))
-        touched.append(Touchdowns(north, east, distance, float(planned.scenario.pad.size_m)))
-    kept = [f"{RECORDS}/{Path(record).with_suffix('.html').name}" for record in records]
-    write_campaign(summary, touched, kept, folder / REPORT)
+        show(flown.summary, folder, flown.rate_per_s, kept)
 
 
 def _again(plan: Plan, flight: str, folder: Path, as_json: bool) -> None:
     """One flight of the campaign, flown again."""
-    from flownav.campaigns.again import record_again, record_path
-    from flownav.campaigns.store import RECORDS, Store
-    from flownav.cli.output import save
+    from flownav.api.campaigning import fly_again
 
     cell, _, number = flight.rpartition(":")
     try:
         place, index = int(cell or 0), int(number)
     except ValueError:
         raise InputError(f"--flight {flight}: a number, or CELL:NUMBER, is needed") from None
-    if not 0 <= place < len(plan.cells):
-        raise InputError(f"--flight {flight}: there are cells 0 to {len(plan.cells) - 1}")
-    if not 0 <= index < plan.flights:
-        raise InputError(f"--flight {flight}: there are flights 0 to {plan.flights - 1} of each cell")
-    Store(folder).check(plan.as_json)
-    record = record_again(plan, place, index)
-    where = save(record, record_path(folder / RECORDS, place, index), report=True)
-    facts = {"cell": plan.cells[place].label, "flight": index, **record.manifest["scores"], **where}
+    record, path = fly_again(plan, folder, place, index)
+    where = {"record": str(path), "report": str(path.with_suffix(".html"))}
+    facts = {"cell": plan.cells[place].label, "flight": index, **record.scores, **where}
     if as_json:
         typer.echo(json.dumps(facts))
     else:

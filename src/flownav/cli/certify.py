@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.engines import EngineOption, engine_named, require_engine
+from flownav.campaigns.engines.named import engine_named, require_engine
+from flownav.cli.engines import EngineOption
 from flownav.cli.output import VehicleOption
 from flownav.errors import InputError
 

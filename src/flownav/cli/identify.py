@@ -46,9 +46,7 @@ def command(
     for output in (path, parameter_path):
         if output is not None:
             require_writable(output, *logs, base)
-    sensor = identify_logs(
-        logs, order, parse_heights(heights), reference, flow_instance=flow_instance, base=base
-    )
+    sensor = identify_logs(logs, order, parse_heights(heights), reference, flow_instance=flow_instance, base=base)
     facts = sensor.facts | {"sensor": str(sensor.save(path))}
     if parameter_path is not None and autopilot is not None:
         facts |= {"parameters": str(parameter_path), "autopilot": sensor.save_parameters(parameter_path, autopilot)}

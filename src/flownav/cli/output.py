@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -36,6 +36,12 @@ def require_between(option: str, value: float, low: float, high: float) -> None:
     """InputError where an option's number is out of range."""
     if not low <= value <= high:
         raise InputError(f"{option} {value}: must be from {low} to {high}")
+
+
+def require_one_of(option: str, value: str, known: Sequence[str]) -> None:
+    """InputError where an option is none of the words that it may be."""
+    if value not in known:
+        raise InputError(f"{option} {value}: must be {', '.join(known[:-1])} or {known[-1]}")
 
 
 def require_writable(path: Path, *inputs: str | Path | None) -> None:

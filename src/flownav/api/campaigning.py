@@ -1,0 +1,177 @@
+"""campaign: a scenario flown many times, swept and dispersed, as figures with their intervals and a table of flights."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from flownav.api.campaign import Campaign
+from flownav.api.record import Record
+from flownav.api.scenario import Scenario, scenario_of
+from flownav.api.vehicle import Vehicle
+from flownav.api.words import call_of, require_from
+from flownav.campaigns.again import record_path
+from flownav.campaigns.engines.engine import Engine
+from flownav.campaigns.engines.named import engine_named
+from flownav.campaigns.figures import stop_of
+from flownav.campaigns.plan import MOST_FLIGHTS, Plan, Value, planned
+from flownav.campaigns.run import Progress, Watch, run_campaign
+from flownav.campaigns.sampling import SAMPLINGS, Sampling
+from flownav.campaigns.store import RECORDS, SUMMARY, Store
+from flownav.campaigns.summary import WORST, summary_of
+from flownav.errors import InputError
+from flownav.provenance import called_as
+
+FLIGHTS, FLIGHTS_UNTIL = 1000, 100_000
+TRUTH_MODELS = ("ensemble", "matched", "both")
+MOST_SEED = 2**63 - 1
+
+Named = str | Path | Scenario
+
+
+def campaign(
+    scenario: Named | Sequence[Named] = "landing",
+    *,
+    flights: int | None = None,
+    seed: int = 1,
+    sweep: Mapping[str, Sequence[Value]] | None = None,
+    sampling: str = "plain",
+    truth_model: str = "ensemble",
+    until: str | None = None,
+    vehicle: str | Path | Vehicle | None = None,
+    engine: str = "local",
+    folder: str | Path | None = None,
+    records: int = 0,
+    progress: Watch | None = None,
+    **changes: Any,
+) -> Campaign:
+    """Fly a scenario many times, and say how well with intervals.
+
+    scenario: one, or several. flights: of each cell, 1000 if not given; with `until` the most, then 100000. seed:
+    flight k of a seed is always the same flight. sweep: every value of numbers of the scenario by their dotted names.
+    sampling: plain, latin or sobol. truth_model: ensemble (each flight's truth is drawn), matched (as the filter is
+    told) or both. until: when to stop, such as "r95_m width <= 0.005". engine: local, ray (a cluster) or cuda (a GPU).
+    folder: where the flights are kept, and where a campaign that was stopped goes on; None keeps them for as long as
+    the result lives. records: write records and reports of so many of the worst flights into the folder. progress:
+    called with `campaigns.run.Progress` as flights land. vehicle, changes: as `fly`.
+    InputError, one line, for a name, a key or a value that cannot be.
+
+    Example:
+        >>> import flownav
+        >>> result = flownav.campaign("landing", flights=16, sweep={"wind.speed_20ft_m_s": [0.0, 4.0]})
+        >>> [cell["flights"] for cell in result.cells]
+        [16, 16]
+    """
+    chosen = [scenario] if isinstance(scenario, str | Path | Scenario) else list(scenario)
+    most = FLIGHTS if until is None else FLIGHTS_UNTIL
+    call = call_of("campaign", *([chosen[0]] if len(chosen) == 1 else [chosen]), flights=flights, seed=seed,
+                   sweep=sweep, sampling=sampling, truth_model=truth_model, until=until, vehicle=vehicle,
+                   **changes)  # fmt: skip
+    fixed, rest = _split(changes)
+    plan = plan_of(
+        [scenario_of(one, vehicle=vehicle, **rest) for one in chosen], flights=most if flights is None else flights,
+        seed=seed, sweep=sweep or {}, changes=fixed, sampling=sampling, truth_model=truth_model, until=until,
+    )  # fmt: skip
+    require_from("records", records, 0, WORST)
+    where = engine_named(engine)
+    kept = None if folder is not None else TemporaryDirectory(prefix="flownav-campaign-")
+    with called_as(call):
+        place = Path(kept.name) if kept is not None else Path(str(folder))
+        return fly_plan(plan, where, place, records=records, watch=progress, page=folder is not None, holding=kept)
+
+
+def plan_of(
+    scenarios: Iterable[Scenario], *, flights: int, seed: int, sweep: Mapping[str, Sequence[Value]],
+    changes: Mapping[str, Value], sampling: str, truth_model: str, until: str | None,
+) -> Plan:  # fmt: skip
+    """The plan of a campaign. InputError for what cannot be flown."""
+    require_from("flights", flights, 1, MOST_FLIGHTS)
+    require_from("seed", seed, 0, MOST_SEED)
+    for name, value, known in (("sampling", sampling, SAMPLINGS), ("truth_model", truth_model, TRUTH_MODELS)):
+        if value not in known:
+            raise InputError(f"{name} {value}: must be {', '.join(known[:-1])} or {known[-1]}")
+    if until is not None:
+        stop_of(until)
+    models: Any = ("ensemble", "matched") if truth_model == "both" else (truth_model,)
+    spread: Sampling = sampling  # type: ignore[assignment]
+    return planned(
+        [scenario.file for scenario in scenarios], sweep, truth_models=models, seed=seed, flights=flights,
+        sampling=spread, until=until, changes=changes,
+    )  # fmt: skip
+
+
+def fly_plan(
+    plan: Plan, engine: Engine, folder: Path, *, records: int = 0, watch: Watch | None = None, page: bool = True,
+    holding: object = None,
+) -> Campaign:  # fmt: skip
+    """Fly what the folder lacks of a plan, and write its summary, records of its worst flights and its page.
+
+    records: how many of the worst; with one or more the first cell's median flight is kept too. page: whether the page
+    is written. holding: what keeps the folder there. InputError as `campaigns.run.run_campaign`.
+    """
+    flown = 0
+
+    def watching(progress: Progress) -> None:
+        nonlocal flown
+        flown = progress.flown
+        if watch is not None:
+            watch(progress)
+
+    with Store(folder).opened(plan) as store:
+        began_s = time.monotonic()
+        data = run_campaign(plan, engine, store, watching)
+        rate = flown / max(time.monotonic() - began_s, 1e-9) if flown else None
+        summary = summary_of(plan, data)
+        store.keep_text(SUMMARY, json.dumps(summary, indent=1) + "\n")
+        found = Campaign(plan, folder, summary, rate, holding)
+        found.records += _keep_records(found, records)
+        if page:
+            found.report()
+    return found
+
+
+def _keep_records(found: Campaign, count: int) -> list[Path]:
+    """Records and reports of the worst flights and of the first cell's median one; where they lie."""
+    if count == 0:
+        return []
+    chosen = [*found.summary["worst"][:count], found.summary["cells"][0]["median"]]
+    places = dict.fromkeys((each["cell"], each["flight"]) for each in chosen)
+    return [_keep(found.record(flight, cell=cell), found.folder, cell, flight) for cell, flight in places]
+
+
+def fly_again(plan: Plan, folder: Path, cell: int, flight: int) -> tuple[Record, Path]:
+    """One flight of a plan flown again, its record and its report in the folder; the record, and where it lies.
+
+    InputError where there is no such flight, or the folder is another campaign's.
+    """
+    Store(folder).check(plan.as_json)
+    record = Campaign(plan, folder, {}).record(flight, cell=cell)
+    return record, _keep(record, folder, cell, flight)
+
+
+def _keep(record: Record, folder: Path, cell: int, flight: int) -> Path:
+    """A flight's record and report in a campaign's folder; where the record lies."""
+    path = record_path(folder / RECORDS, cell, flight)
+    record.save(path)
+    record.report(path.with_suffix(".html"))
+    return path
+
+
+def _split(changes: Mapping[str, Any], prefix: str = "") -> tuple[dict[str, Value], dict[str, Any]]:
+    """Numbers and words that the campaign sets, by dotted names, and what else is changed (a path, a vehicle)."""
+    fixed: dict[str, Value] = {}
+    rest: dict[str, Any] = {}
+    for name, value in changes.items():
+        if isinstance(value, Mapping):
+            inner, other = _split(value)
+            fixed |= {f"{name}.{key}": one for key, one in inner.items()}
+            rest |= {name: other} if other else {}
+        elif isinstance(value, bool | int | float) or "." in name:
+            fixed[name] = value
+        elif value is not None:
+            rest[name] = value
+    return fixed, rest

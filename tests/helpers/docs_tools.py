@@ -14,12 +14,13 @@ import cells  # noqa: E402
 import mathematics  # noqa: E402
 import notebooks  # noqa: E402
 import reference  # noqa: E402
+import reference_api  # noqa: E402
 import reference_commands  # noqa: E402
 import reference_keys  # noqa: E402
 import reference_tables  # noqa: E402
 import units  # noqa: E402
 
 __all__ = [
-    "cells", "mathematics", "notebooks", "reference", "reference_commands", "reference_keys", "reference_tables",
+    "cells", "mathematics", "notebooks", "reference", "reference_api", "reference_commands", "reference_keys", "reference_tables",
     "units",
 ]  # fmt: skip

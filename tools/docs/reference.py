@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import reference_api
 import reference_commands
 import reference_keys
 import reference_tables
 
 PAGES: dict[str, Callable[[], str]] = {
+    "reference/api.md": reference_api.page,
     "reference/commands.md": reference_commands.page,
     "reference/keys.md": reference_keys.page,
     "reference/tables.md": reference_tables.page,

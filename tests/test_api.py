@@ -50,6 +50,8 @@ ALLOWED = {
     "validation": GROUND | EQUATIONS | {"navigation", "simulation", "logs", "replays", "scoring"},
     "report": GROUND | {"scoring"},
     "export": GROUND,
+    "parts": GROUND | EQUATIONS | {"navigation", "simulation", "campaigns", "logs", "replays"},
+    "examples": GROUND | EQUATIONS | {"parts"},
     "paper": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "rig", "identification", "report"},
 }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -42,6 +43,9 @@ def command(
     truth_model: Annotated[
         str, typer.Option(help="ensemble (each flight's truth is drawn), matched (as the filter is told), both.")
     ] = "ensemble",
+    filter_name: Annotated[
+        str | None, typer.Option("--filter", help="landing, paper, an installed filter's name, or file.py:Class.")
+    ] = None,
     vehicle: VehicleOption = None,
     seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
     engine: EngineOption = "local",
@@ -58,6 +62,7 @@ def command(
 ) -> None:
     """Fly a scenario many times: radii, shares and percentiles with intervals, a dataset, the worst flights."""
     from flownav.api.campaigning import FLIGHTS, FLIGHTS_UNTIL, MOST_SEED, TRUTH_MODELS, plan_of
+    from flownav.api.parts import split
     from flownav.api.scenario import Scenario
     from flownav.campaigns.engines.named import engine_named, require_engine
     from flownav.campaigns.plan import MOST_FLIGHTS
@@ -65,6 +70,7 @@ def command(
     from flownav.campaigns.summary import WORST
     from flownav.cli.output import require_between, require_one_of
     from flownav.guard import an_input
+    from flownav.parts.engine import OwnPartsEngine, identities
 
     if flight is not None and flights is None:
         flights = _planned_flights(out)
@@ -76,7 +82,10 @@ def command(
     require_engine(engine)
     require_one_of("--sampling", sampling, SAMPLINGS)
     require_one_of("--truth-model", truth_model, TRUTH_MODELS)
-    chosen = [Scenario.load(name).changed(vehicle=vehicle) for name in scenarios]
+    parts, ours, _ = split(filter_name, (), None, None)
+    if parts.any and (engine != "local" or rare is not None):
+        raise InputError(f"--filter {filter_name}: is flown by this process; leave out --engine and --rare")
+    chosen = [Scenario.load(name).changed(filter=ours, vehicle=vehicle) for name in scenarios]
     for name in (*scenarios, vehicle):
         if name is not None and Path(name).exists():
             an_input(Path(name))
@@ -84,6 +93,8 @@ def command(
         chosen, flights=flights, seed=seed, sweep=_once("--sweep", map(_swept, sweep or ())),
         changes=_once("--set", map(_set, set_ or ())), sampling=sampling, truth_model=truth_model, until=until,
     )  # fmt: skip
+    plan = replace(plan, parts=identities(parts))
+    flies = OwnPartsEngine(parts) if parts.any else None
     names = "_".join(dict.fromkeys(each.name for each in chosen))[:100]
     if rare is not None and engine != "local":
         raise InputError(f"--rare: flies on this machine's cores only; leave out --engine {engine}")
@@ -97,9 +108,9 @@ def command(
 
         fly_again(plan, Path(flight), as_json)
     elif flight is not None:
-        _again(plan, flight, folder, as_json)
+        _again(plan, flight, folder, as_json, flies)
     else:
-        _fly(plan, engine_named(engine), folder, records, as_json)
+        _fly(plan, flies or engine_named(engine), folder, records, as_json)
 
 
 def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) -> None:
@@ -120,7 +131,7 @@ def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) 
         show(flown.summary, folder, flown.rate_per_s, kept)
 
 
-def _again(plan: Plan, flight: str, folder: Path, as_json: bool) -> None:
+def _again(plan: Plan, flight: str, folder: Path, as_json: bool, engine: Engine | None) -> None:
     """One flight of the campaign, flown again."""
     from flownav.api.campaigning import fly_again
 
@@ -129,7 +140,7 @@ def _again(plan: Plan, flight: str, folder: Path, as_json: bool) -> None:
         place, index = int(cell or 0), int(number)
     except ValueError:
         raise InputError(f"--flight {flight}: a number, or CELL:NUMBER, is needed") from None
-    record, path = fly_again(plan, folder, place, index)
+    record, path = fly_again(plan, folder, place, index, engine)
     where = {"record": str(path), "report": str(path.with_suffix(".html"))}
     facts = {"cell": plan.cells[place].label, "flight": index, **record.scores, **where}
     if as_json:

@@ -23,7 +23,9 @@ def command(
     flight: Annotated[int | None, typer.Option(help="Fly this one flight of the seed again, counted from 0.")] = None,
     seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
     gps: Annotated[str | None, typer.Option(help="GPS error model: white or midg.")] = None,
-    filter_name: Annotated[str | None, typer.Option("--filter", help="Filter: landing or paper.")] = None,
+    filter_name: Annotated[
+        str | None, typer.Option("--filter", help="landing, paper, an installed filter's name, or file.py:Class.")
+    ] = None,
     feedback: Annotated[str | None, typer.Option(help="What the autopilot flies on: estimate or truth.")] = None,
     truth: Annotated[str | None, typer.Option(help="The plant: nonlinear, or the paper's linear model.")] = None,
     optics: Annotated[
@@ -50,6 +52,7 @@ def command(
 ) -> None:
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
     from flownav.api.flying import MOST_FLIGHTS, MOST_SEED, fly_setup
+    from flownav.api.parts import split
     from flownav.api.scenario import Scenario
     from flownav.cli.output import progress, require_between, require_writable_record, save
     from flownav.simulation.assemble import assemble
@@ -60,16 +63,17 @@ def command(
     require_between("--speed", speed, 0.01, 100.0)
     if flight is not None and flights > 1:
         raise InputError("--flight names one flight, --flights many; give one of the two")
+    parts, ours, _ = split(filter_name, (), None, None)
     chosen = Scenario.load(scenario).changed(
-        gps=gps, filter=filter_name, autopilot=feedback, truth=truth, optics=optics, flow_sensor=sensor, vehicle=vehicle
+        gps=gps, filter=ours, autopilot=feedback, truth=truth, optics=optics, flow_sensor=sensor, vehicle=vehicle
     )
     record_path = out or Path("out") / f"{chosen.name}.fnr"
     setup = assemble(chosen.file)
     require_writable_record(record_path, scenario, sensor, vehicle, signing_key, report=report)
     dispersed = flights > 1 if ensemble is None else ensemble
-    many = flights > 1 or chosen.file.optics == "pixels"
+    many = flights > 1 or parts.any or chosen.file.optics == "pixels"
     with progress(f"Flying {chosen.name}", flights) if many else nullcontext() as advance:
-        flown = fly_setup(setup, seed, flight or 0, flights, dispersed=dispersed, progress=advance)
+        flown = fly_setup(setup, seed, flight or 0, flights, dispersed=dispersed, parts=parts, progress=advance)
     facts = flown.facts | save(flown.record, record_path, report=report)
     if mavlink is not None:
         from flownav.api.telling import tell

@@ -41,6 +41,9 @@ def command(
     smooth: Annotated[
         bool, typer.Option("--smooth", help="Also the best estimate after the flight (docs/smoother.md).")
     ] = False,
+    filter_name: Annotated[
+        str, typer.Option("--filter", help="landing, an installed filter's name, or file.py:Class.")
+    ] = "landing",
     out: Annotated[
         Path | None, typer.Option("--out", help="The record; out/FOLDER.fnr where unsaid.", show_default=False)
     ] = None,
@@ -48,6 +51,7 @@ def command(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Fuse a recorded flight: its trajectory, its errors against its own GPS, and the drift through GPS outages."""
+    from flownav.api.parts import own_filter
     from flownav.api.replaying import replay_log
     from flownav.cli.output import progress, require_writable_record, save
     from flownav.errors import VerdictError
@@ -66,9 +70,10 @@ def command(
     flow = load_sensor(sensor) if sensor else None
     stated = load(settings, NavigatorSettingsFile) if settings else None
     options = ReplayOptions(gps_delay, tuple((t0, t1) for t0, t1 in windows), not no_flow, (scale[0], scale[1]))
+    part = own_filter(filter_name)
     log = open_flight(folder, flow_instance=flow_instance)
     with progress("GPS outages", len(table)) if table else nullcontext() as advance:
-        record = replay_log(log, options, flow, stated, smooth=smooth, table=table, progress=advance)
+        record = replay_log(log, options, flow, stated, smooth=smooth, table=table, part=part, progress=advance)
     scores = record.scores | save(record, record_path, report=report)
     if as_json:
         typer.echo(json.dumps(scores))

@@ -17,7 +17,7 @@ from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.feed import SLOWEST_IMU_HZ, equipment_of
-from flownav.navigation.loop import run, start_navigator
+from flownav.navigation.loop import Instead, run, start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import smooth
 from flownav.navigation.tables import Written, estimate_table, written_on
@@ -186,16 +186,23 @@ class Replay:
         return replace(self, written=self.written._replace(estimate=self.smoothed), smoothed=None).path_scores()
 
 
-def replay(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, *, smoothed: bool = False) -> Replay:
+def replay(
+    log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, *, smoothed: bool = False,
+    instead: Instead | None = None,
+) -> Replay:  # fmt: skip
     """Run a log through the filter, and back through it for a smoothed path.
 
-    InputError where an option cannot be, the filter never starts, or a live session's record is to be smoothed.
+    instead: gives the address of what takes the readings of a navigator in its place (room parts/).
+    InputError where an option cannot be, the filter never starts, or a live session's record, or another filter's
+    path, is to be smoothed.
     """
     if smoothed and log.fed:
         raise InputError(f"{log.path}: --smooth takes a log; a live session's record is replayed as it was fed")
+    if smoothed and instead is not None:
+        raise InputError(f"{log.path}: --smooth smooths our own filter's path; leave it out with another filter")
     with announce_compilation("replay"):
         prepared = prepared_as_fed(log) if log.fed else prepare(log, options)
-        return _run(log, options, settings, prepared, smoothed=smoothed)
+        return _run(log, options, settings, prepared, smoothed=smoothed, instead=instead)
 
 
 def replay_again(flown: Replay, options: ReplayOptions, settings: NavigatorSettingsFile) -> Replay:
@@ -268,18 +275,20 @@ def _number(value: float) -> float | None:
 
 
 def _run(
-    log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, prepared: Prepared, *, smoothed: bool = False
-) -> Replay:
+    log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, prepared: Prepared, *, smoothed: bool = False,
+    instead: Instead | None = None,
+) -> Replay:  # fmt: skip
     path = None
     if log.fed:
-        written = run_as_fed(log, options, settings, lambda queue: withhold(log, queue, options))
+        written = run_as_fed(log, options, settings, lambda queue: withhold(log, queue, options), instead)
     else:
         first_s, last_s = prepared.span_s
         equipment = equipment_of(prepared.streams, first_s, prepared.flow_gyro_is_imu, settings, log.origin_deg_m)
         tape = tape_for({sensor: len(stream) for sensor, stream in prepared.streams.items()}, last_s - first_s)
         running = start_navigator(equipment, settings, tape, options.flow_noise)
+        address = None if instead is None else instead(running)
         for part in prepared.parts():
-            run(withhold(log, part, options), running)
+            run(withhold(log, part, options), running, instead=address)
         if smoothed:
             queue = withhold(log, prepared.queue, options)
             path = smooth(queue, start_navigator(equipment, settings, new_tape(queue), options.flow_noise))

@@ -81,10 +81,12 @@ def buffers_of(flight: Flight, lanes: tuple[int, ...], epochs: int, *, written: 
 def fly_into(
     flight: Flight, seed: int, first: int, lanes: tuple[int, ...], b: Buffers, ensemble: Ensemble | None = None, *,
     faults: Sequence[SensorFault] | None = None, branches: Branches | None = None, compiled: bool = True,
+    instead: int | None = None,
 ) -> None:  # fmt: skip
     """Fly a block into its buffers, each lane as the flight's sheets say, as the ensemble draws it or as its branch is.
 
-    faults: of each lane's sensors, for a flight that `fails`.
+    faults: of each lane's sensors, for a flight that `fails`. instead: the address of what takes readings in place of
+    the navigator, with a unit's interface (`navigation.take.UNIT_SIGNATURE`).
     compiled False: in plain Python (tests; it is a thousand times slower). InputError as `Ensemble.truths`.
     """
     truths: Sequence[Truth] = [believed(flight)] * len(lanes)
@@ -106,7 +108,9 @@ def fly_into(
         b.tape.used, b.history,
     )  # fmt: skip
     take: Any = 0
-    if flight.onboard is not None:
+    if instead is not None:
+        take = instead
+    elif flight.onboard is not None:
         unit = navigator_unit(lanes, carries_lag(load_flow_settings(flight.settings)))
         if compiled:
             compile_beside(unit, fly_block, *told, take, *written)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, procedure
+from flownav.compile import equation, invoke, procedure
 from flownav.control.autopilot import AutopilotState, Estimate, inner_loop, landing_logic, outer_loop
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Reference
@@ -34,7 +34,15 @@ from flownav.simulation.layout import (
 )
 from flownav.simulation.navigating import Timetable, keep_inertial
 from flownav.simulation.onboard import Onboard
-from flownav.simulation.plan import ATTITUDE_S, ATTITUDE_STEPS, CONTACT_SHARE, PHYSICS_S, PHYSICS_STEPS, Flight
+from flownav.simulation.plan import (
+    ATTITUDE_S,
+    ATTITUDE_STEPS,
+    CONTACT_SHARE,
+    PHYSICS_S,
+    PHYSICS_STEPS,
+    Flight,
+    OwnParts,
+)
 from flownav.simulation.plant import LinearTruth, linear_step
 from flownav.simulation.ring import FIELDS, FIRST
 from flownav.simulation.sampling import read_inertial
@@ -133,7 +141,18 @@ def note_inputs(work: Work, lanes: Lanes, gains: AutopilotGains) -> None:
 
 
 @equation
-def steer(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None, onboard: Onboard | None) -> None:
+def steer(
+    work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None, onboard: Onboard | None, own: OwnParts | None
+) -> None:
+    """The attitude loop's controls for the next 4 ms, by ours or by a controller of somebody else's."""
+    if own is not None and own.steer != 0:
+        invoke(own.steer, work)
+    else:
+        steer_blades(work, lanes, flight, linear, onboard)
+
+
+@equation
+def steer_blades(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None, onboard: Onboard | None) -> None:
     """The attitude loop: blade angles for the next 4 ms, on the flown attitude and the flybarless unit's gyros."""
     for lane in range(len(lanes)):
         state = load_helicopter(work, lanes, lane)
@@ -195,10 +214,26 @@ def follow_flow(work: Work, lanes: Lanes, flight: Flight) -> None:
 
 
 @equation
+def move(work: Work, lanes: Lanes, dt: float, flight: Flight, onboard: Onboard | None, own: OwnParts | None) -> None:
+    """One step of the vehicle, ours or somebody else's."""
+    if own is not None and own.step != 0:
+        invoke(own.step, work, dt)
+    else:
+        step_vehicle(work, lanes, dt, flight.rotors, onboard)
+
+
+@equation
+def observe(work: Work, lanes: Lanes, flight: Flight, onboard: Onboard | None, own: OwnParts | None) -> None:
+    """Thrust, ground load and power of the present state; somebody else's vehicle has said them as it moved."""
+    if own is None or own.step == 0:
+        observe_vehicle(work, lanes, flight.rotors, onboard)
+
+
+@equation
 def advance(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None) -> None:
     """From one epoch to the next."""
     for _ in range(ATTITUDE_STEPS):
-        steer(work, lanes, flight, linear, None)
+        steer(work, lanes, flight, linear, None, None)
         follow_flow(work, lanes, flight)
         if linear is None:
             for _ in range(PHYSICS_STEPS):
@@ -211,17 +246,17 @@ def advance(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None
 @procedure
 def advance_sensing(
     work: Work, lanes: Lanes, seed: int, first: int, epoch: int, taken: int, heard: int, flight: Flight,
-    onboard: Onboard, table: Timetable, fails: bool | None,
+    onboard: Onboard, table: Timetable, fails: bool | None, own: OwnParts | None,
 ) -> None:  # fmt: skip
     """From one epoch to the next, with an inertial reading at the end of each of its periods."""
     period_s = onboard.inertial_steps * PHYSICS_S
     for step in range(ATTITUDE_STEPS * PHYSICS_STEPS):
         if step % PHYSICS_STEPS == 0:
-            steer(work, lanes, flight, None, onboard)
+            steer(work, lanes, flight, None, onboard, own)
             follow_flow(work, lanes, flight)
-        step_vehicle(work, lanes, PHYSICS_S, flight.rotors, onboard)
+        move(work, lanes, PHYSICS_S, flight, onboard, own)
         if (step + 1) % PHYSICS_STEPS == 0:
-            observe_vehicle(work, lanes, flight.rotors, onboard)
+            observe(work, lanes, flight, onboard, own)
         if (step + 1) % onboard.inertial_steps == 0:
             for lane in range(len(lanes)):
                 gravity_m_s2 = vehicle_as_is(work, lanes, lane).gravity_m_s2

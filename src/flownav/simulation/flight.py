@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, kernel, pointer
+from flownav.compile import equation, invoke, kernel, pointer
 from flownav.control.autopilot import grounded, hovering
 from flownav.control.guidance import Reference, reference_at
 from flownav.estimation.kalman import Lanes, Work
@@ -39,7 +39,7 @@ from flownav.simulation.navigating import (
     put_on_truth,
 )
 from flownav.simulation.onboard import Onboard
-from flownav.simulation.plan import ATTITUDE_STEPS, NOTHING, PHYSICS_S, PHYSICS_STEPS, START_STEP, Flight
+from flownav.simulation.plan import ATTITUDE_STEPS, NOTHING, PHYSICS_S, PHYSICS_STEPS, START_STEP, Flight, OwnParts
 from flownav.simulation.sampling import sample
 from flownav.simulation.sensing import EPOCH_S, draw_epoch, sense, start_sensors
 from flownav.simulation.surroundings import draw_recirculation, start_surroundings, surround
@@ -71,10 +71,19 @@ def start_block(
         autopilot = grounded(flight.gains) if flight.plan.starts_on_ground else hovering(flight.gains)
         store_autopilot(work, lanes, lane, autopilot)
     start_surroundings(work, lanes, flight.rotors)
-    observe_vehicle(work, lanes, flight.rotors, onboard)
+    observe_start(work, lanes, flight, onboard, flight.own)
     start_sensors(work, lanes, flight.sensors)
     if onboard is not None:
         start_onboard(work, lanes, onboard)
+
+
+@equation
+def observe_start(work: Work, lanes: Lanes, flight: Flight, onboard: Onboard | None, own: OwnParts | None) -> None:
+    """Thrust, ground load and power before the first epoch, for which somebody else's vehicle begins."""
+    if own is not None and own.step != 0:
+        invoke(own.step, work, 0.0)
+    else:
+        observe_vehicle(work, lanes, flight.rotors, onboard)
 
 
 @equation
@@ -173,7 +182,7 @@ def fly_navigated(
             settings, o, fed,
         )  # fmt: skip
         write_history(work, lanes, epoch, reference, history)
-        advance_sensing(work, lanes, seed, first, epoch, taken, heard, flight, onboard, table, flight.fails)
+        advance_sensing(work, lanes, seed, first, epoch, taken, heard, flight, onboard, table, flight.fails, flight.own)
         taken += parts
         heard += parts
 

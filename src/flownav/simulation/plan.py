@@ -47,6 +47,17 @@ class FlightPlan(NamedTuple):
     draws: Draws
 
 
+class OwnParts(NamedTuple):
+    """Addresses of C functions that fly in place of ours on one lane, each called with the lane buffer; 0: ours flies.
+
+    step: the vehicle, (work, dt [s]) moves it and says its thrust, ground load and power; dt 0 is the start. steer: the
+    attitude loop, (work) sets the controls of the next ATTITUDE_S.
+    """
+
+    step: int
+    steer: int
+
+
 class Flight(NamedTuple):
     """Everything constant over a flight: the paper's filter, or the navigator's sensors and their timetable.
 
@@ -70,3 +81,4 @@ class Flight(NamedTuple):
     linear: LinearTruth | None
     limits: TouchdownLimits
     fails: bool | None = None  # its sensors may fail, each lane's as its truth has it; None: the code is not compiled
+    own: OwnParts | None = None  # vehicle and controller that somebody else wrote (room parts/)

@@ -111,7 +111,7 @@ def fly_on(
             settings, o, fed,
         )  # fmt: skip
         note_epoch(work, row, epoch, -1, flight, onboard)
-        advance_sensing(work, ONE_LANE, seed, number, epoch, taken, heard, flight, onboard, table, flight.fails)
+        advance_sensing(work, ONE_LANE, seed, number, epoch, taken, heard, flight, onboard, table, flight.fails, None)
         taken += inertial_parts(onboard)
         heard += inertial_parts(onboard)
 

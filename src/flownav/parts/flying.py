@@ -1,0 +1,112 @@
+"""One flight with parts of somebody else's, on the compiled loop, as a scored Record."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from flownav.campaigns.local import record_flown
+from flownav.compile import ONE_LANE, announce_compilation
+from flownav.errors import InputError
+from flownav.navigation.packed import load_flow_settings
+from flownav.navigation.take import navigator_unit
+from flownav.navigation.told import carries_lag
+from flownav.parts.calling import Mistakes, name_of
+from flownav.parts.plant import OwnController, OwnVehicle
+from flownav.parts.protocols import Parts, Told
+from flownav.parts.sensing import OwnReadings
+from flownav.parts.taking import Taker
+from flownav.record import Record
+from flownav.simulation.assemble import Setup
+from flownav.simulation.engine import Flown, buffers_of, fly_into
+from flownav.simulation.ensemble import Ensemble
+from flownav.simulation.fault import SensorFault
+from flownav.simulation.plan import OwnParts
+
+Part = TypeVar("Part")
+
+
+def fresh(part: Part | type[Part] | Callable[[], Part]) -> Part:
+    """A part that has flown nothing: of a class or a function a new one, of an object a copy."""
+    if isinstance(part, type):
+        new: Part = part()
+        return new
+    if callable(part) and not hasattr(part, "start"):
+        made: Part = part()
+        return made
+    return copy.deepcopy(part)  # type: ignore[return-value]
+
+
+def fresh_parts(parts: Parts) -> Parts:
+    """All of them."""
+    return Parts(
+        parts.filter and fresh(parts.filter), tuple(map(fresh, parts.sensors)), parts.vehicle and fresh(parts.vehicle),
+        parts.controller and fresh(parts.controller),
+    )  # fmt: skip
+
+
+def fly_with(
+    setup: Setup, parts: Parts, seed: int, index: int = 0, ensemble: Ensemble | None = None,
+    fault: SensorFault | None = None,
+) -> Record:  # fmt: skip
+    """Flight `index` of a seed with these parts, each of which begins anew, as a scored Record.
+
+    InputError where the scenario's filter is the paper's, which is fed otherwise, or where a part makes a mistake.
+    """
+    flown = fly_parts(setup, parts, seed, index, ensemble, fault, written=True)
+    drawn = None
+    if ensemble is not None:
+        drawn = {name: values[0] for name, values in ensemble.values(seed, index, 1).items()}
+    record = record_flown(setup, flown, seed, index, drawn)
+    record.manifest["parts"] = names_of(parts)
+    if parts.filter is not None:
+        record.manifest["filter"] = name_of(parts.filter)
+    return record
+
+
+def names_of(parts: Parts) -> dict[str, Any]:
+    """What is not ours, by its name."""
+    named: dict[str, Any] = {
+        "filter": parts.filter and name_of(parts.filter),
+        "sensors": [name_of(part) for part in parts.sensors],
+        "vehicle": parts.vehicle and name_of(parts.vehicle),
+        "controller": parts.controller and name_of(parts.controller),
+    }
+    return {name: value for name, value in named.items() if value}
+
+
+def fly_parts(
+    setup: Setup, parts: Parts, seed: int, index: int, ensemble: Ensemble | None = None,
+    fault: SensorFault | None = None, *, written: bool,
+) -> Flown:  # fmt: skip
+    """The same, not yet scored; written: with the navigator's tape and what it was fed."""
+    flight = setup.flight if fault is None else setup.flight._replace(fails=True)
+    fitted, table = setup.fitted, flight.table
+    if fitted is None or table is None:
+        raise InputError(f'{setup.scenario.name}: filter = "paper" takes no parts; fly the "landing" sensors with them')
+    parts, mistakes = fresh_parts(parts), Mistakes()
+    b = buffers_of(flight, ONE_LANE, flight.plan.epochs, written=written or parts.filter is not None)
+    unit = navigator_unit(ONE_LANE, carries_lag(load_flow_settings(flight.settings)))
+    with announce_compilation("single-flight"):
+        instead: int | None = None
+        taker: Taker | None = None
+        if parts.filter is not None:
+            told = Told(fitted.told.settings.settings(fitted.equipment, fitted.told.noise))
+            taker = Taker(parts.filter, told, b.nav, b.tape, mistakes)
+            instead = taker.address
+        if parts.sensors:
+            for sensor in parts.sensors:
+                sensor.start(seed, index)
+            then: Callable[..., None] = taker.called.entry if taker else unit
+            readings = OwnReadings(parts.sensors, table, b, then, mistakes)
+            instead = readings.address
+        vehicle = OwnVehicle(parts.vehicle, b.work, mistakes) if parts.vehicle else None
+        controller = OwnController(parts.controller, flight, b.work, mistakes) if parts.controller else None
+        if vehicle or controller:
+            addresses = (each.called.address if each else 0 for each in (vehicle, controller))
+            flight = flight._replace(own=OwnParts(*addresses))
+        faults = None if fault is None else [fault]
+        fly_into(flight, seed, index, ONE_LANE, b, ensemble, faults=faults, instead=instead)
+    mistakes.tell()
+    return Flown(b.history, b.tape, b.fed)

@@ -1,0 +1,136 @@
+"""A filter of somebody else's in the navigator's place: reading by reading, from the rows that our own takes them from.
+
+It is called as a compiled navigator is (`navigation.take.UNIT_SIGNATURE`), by the simulator's loop and by a replay's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from flownav.errors import InputError
+from flownav.estimation.covariance import place
+from flownav.estimation.gating import Reason
+from flownav.estimation.states import ACCEL_BIAS, GROUND, GYRO_BIAS, PAD, POSITION, QUATERNION, STATE, VELOCITY
+from flownav.frames import rotation_from_quaternion
+from flownav.measurement import COLUMNS, MAX_VALUES, Array, Sensor
+from flownav.navigation.memory import CLOCK, GROUND_SEEN, PAD_KNOWN, READING, START
+from flownav.navigation.place import SEEN
+from flownav.navigation.take import UNIT_SIGNATURE
+from flownav.navigation.tape import ESTIMATE_COLUMNS, ESTIMATE_PERIOD_S, ESTIMATES, LEVELS_AT, OFFERED_ROWS, Tape
+from flownav.parts.calling import Called, Mistakes, name_of
+from flownav.parts.protocols import Estimate, Filter, Imu, Innovation, Reading, Told
+
+STATED = 3
+QUALITY, ARRIVED, WITHHELD = (READING + MAX_VALUES + STATED + i for i in range(3))
+UNIT = 1e-3  # how far a quaternion's length may be from 1
+
+
+class Taker:
+    """The filter between the rows of a lane buffer and a tape."""
+
+    def __init__(self, part: Filter, told: Told, nav: Array, tape: Tape, mistakes: Mistakes) -> None:
+        self.part, self.told, self.nav, self.tape = part, told, nav, tape
+        self.name = name_of(part)
+        self.called = Called(f"filter {self.name}", self._called, UNIT_SIGNATURE, mistakes)
+        self.begun, self.clock_s, self.written_s = False, -math.inf, -math.inf
+
+    @property
+    def address(self) -> int:
+        """Of the C function that takes readings."""
+        return self.called.address
+
+    def _called(self, *arguments: float) -> None:
+        self.take(float(arguments[-2]), Sensor(int(arguments[-1])))
+
+    def take(self, t_s: float, sensor: Sensor) -> None:
+        """The reading in the rows of READING, of an instant."""
+        if not self.begun:
+            self.begun = True
+            self.part.start(self.told)
+        nav = self.nav
+        values = nav[READING : READING + MAX_VALUES]
+        arrived = nav[ARRIVED] > 0.0
+        inertial = sensor == Sensor.IMU and arrived and bool(np.isfinite(values).all())
+        if t_s > self.clock_s or inertial:
+            imu = Imu(values[:3].copy(), values[3:].copy()) if inertial else None
+            self.part.predict(t_s, imu)
+            self.clock_s = t_s
+        if sensor != Sensor.IMU and arrived and nav[WITHHELD] == 0.0:
+            width = MAX_VALUES if sensor == Sensor.FLOW_RATE else len(COLUMNS[sensor])
+            variance = nav[READING + MAX_VALUES : READING + MAX_VALUES + STATED].copy()
+            news = self.part.update(Reading(t_s, sensor, values[:width].copy(), variance, float(nav[QUALITY])))
+            self._offer(t_s, sensor, news or ())
+        nav[CLOCK] = t_s
+        said = self.part.estimate()
+        if said is not None:
+            self._say(t_s, said)
+
+    def _say(self, t_s: float, said: Estimate) -> None:
+        """The estimate into the rows that the simulator reads, and every 20 ms onto the tape."""
+        nav, numbers = self.nav, checked(self.name, said)
+        for row, key in (
+            (STATE + POSITION, "pos_ned_m"), (STATE + VELOCITY, "vel_ned_m_s"), (QUATERNION, "quaternion"),
+            (STATE + GYRO_BIAS, "gyro_bias_rad_s"), (STATE + ACCEL_BIAS, "accel_bias_m_s2"),
+        ):  # fmt: skip
+            nav[row : row + len(numbers[key])] = numbers[key]
+        for first, key in ((POSITION, "std_pos_ned_m"), (VELOCITY, "std_vel_ned_m_s")):
+            for axis in range(3):
+                nav[place(first + axis, first + axis)] = numbers[key][axis] ** 2
+        nav[START] = 1.0
+        if said.ground_d_m is not None:
+            nav[STATE + GROUND], nav[GROUND_SEEN] = said.ground_d_m, 1.0
+        if said.pad_ned_m is not None:
+            nav[STATE + PAD : STATE + PAD + 3], nav[PAD_KNOWN] = tuple(said.pad_ned_m), SEEN
+        if t_s - self.written_s >= ESTIMATE_PERIOD_S:
+            self.written_s = t_s
+            self._write(t_s, numbers)
+
+    def _write(self, t_s: float, numbers: dict[str, Array]) -> None:
+        used, room = self.tape.used, len(self.tape.estimate)
+        if used[ESTIMATES] >= room:
+            return
+        row = np.full(ESTIMATE_COLUMNS, np.nan)
+        rotation = np.reshape(rotation_from_quaternion(*numbers["quaternion"]), (3, 3))
+        row[0], row[1:4], row[4:7] = t_s, numbers["pos_ned_m"], rotation.T @ numbers["vel_ned_m_s"]
+        row[7:11], row[11:14] = numbers["quaternion"], numbers["std_pos_ned_m"]
+        row[14:17] = np.sqrt((rotation.T**2) @ numbers["std_vel_ned_m_s"] ** 2)
+        row[17:20] = numbers["vel_ned_m_s"]
+        row[23:29] = np.concatenate([numbers["gyro_bias_rad_s"], numbers["accel_bias_m_s2"]])
+        row[LEVELS_AT:] = np.nan
+        self.tape.estimate[used[ESTIMATES], :, 0] = row
+        used[ESTIMATES] += 1
+
+    def _offer(self, t_s: float, sensor: Sensor, news: Iterable[Innovation]) -> None:
+        """Innovations onto the tape, as ours are."""
+        used = self.tape.used
+        for each in news:
+            if used[OFFERED_ROWS] >= len(self.tape.innovation):
+                return
+            ratio = each.innovation**2 / (25.0 * each.variance) if each.variance > 0.0 else math.nan
+            reason = Reason.FUSED if each.fused else Reason.INNOVATION_GATE
+            self.tape.innovation[used[OFFERED_ROWS], :, 0] = (
+                t_s, sensor, each.component, each.observation, each.observation_variance, each.innovation,
+                each.variance, ratio, reason,
+            )  # fmt: skip
+            used[OFFERED_ROWS] += 1
+
+
+def checked(name: str, said: Estimate) -> dict[str, Array]:
+    """An estimate as arrays. InputError where a part of it has another length, is not finite or is no rotation."""
+    lengths = {"quaternion": 4}
+    found: dict[str, Array] = {}
+    for key in ("pos_ned_m", "vel_ned_m_s", "quaternion", "std_pos_ned_m", "std_vel_ned_m_s", "gyro_bias_rad_s",
+                "accel_bias_m_s2"):  # fmt: skip
+        array = np.asarray(tuple(getattr(said, key)), dtype=float)
+        length = lengths.get(key, 3)
+        if array.shape != (length,):
+            raise InputError(f"{name}: estimate().{key} has shape {array.shape}; ({length},) is needed")
+        if not key.startswith("std_") and not np.isfinite(array).all():
+            raise InputError(f"{name}: estimate().{key} is not finite: {array.tolist()}")
+        found[key] = array
+    if abs(float(np.linalg.norm(found["quaternion"])) - 1.0) > UNIT:
+        raise InputError(f"{name}: estimate().quaternion has length {np.linalg.norm(found['quaternion']):.3f}, not 1")
+    return found

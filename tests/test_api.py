@@ -47,6 +47,9 @@ ALLOWED = {
     "campaigns": GROUND | EQUATIONS | {"simulation", "navigation", "scoring"},
     "faults": GROUND | EQUATIONS | {"logs", "simulation", "campaigns", "scoring", "navigation", "replays"},
     "certification": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "faults", "report"},
+    "samples": GROUND
+    | EQUATIONS
+    | {"logs", "mavlink", "rig", "navigation", "simulation", "scoring", "campaigns", "faults", "live", "export"},
     "validation": GROUND | EQUATIONS | {"navigation", "simulation", "logs", "replays", "scoring"},
     "report": GROUND | {"scoring"},
     "export": GROUND,

@@ -26,6 +26,7 @@ from flownav.cli import recover as recover
 from flownav.cli import replay as replay
 from flownav.cli import report as report
 from flownav.cli import rig as rig
+from flownav.cli import sample as sample
 from flownav.cli import tune as tune
 from flownav.cli import validate as validate
 from flownav.cli import vehicle as vehicle
@@ -46,6 +47,7 @@ for name, command, what in (
     ("compare", compare.command, "Many logs, many settings, beside dead reckoning and the autopilot."),
     ("tune", tune.command, "Propose settings from logs, judged on windows held out from the fit."),
     ("live", live.command, "Navigate a MAVLink vehicle in real time; send it the estimate."),
+    ("sample", sample.command, "Write small simulated logs, to try the other commands on."),
     ("recover", recover.command, "Make the record of a live session that was killed."),
     ("info", info.command, "What a log holds: sensors, rates, gaps, signs, what it lacks."),
     ("identify", identify.command, "Identify a flow sensor from rig or flight logs; write its file."),

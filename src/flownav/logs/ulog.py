@@ -163,5 +163,10 @@ def _unusable(topics: Topics) -> list[str]:
 
 
 def _estimator(topics: Topics) -> str:
-    """Which of PX4's estimators wrote the estimate: SYS_MC_EST_GROUP, on old firmware, chose another than EKF2."""
+    """Which of PX4's estimators wrote the estimate: SYS_MC_EST_GROUP, on old firmware, chose another than EKF2.
+
+    A system that is not PX4 by its own word is called by its name.
+    """
+    if topics.system and "px4" not in topics.system.lower():
+        return topics.system
     return {1: "PX4 LPE", 3: "PX4 Q estimator"}.get(int(topics.parameters.get("SYS_MC_EST_GROUP", 2)), "PX4 EKF2")

@@ -12,7 +12,7 @@ import flownav
 
 record = flownav.replay("samples/flight-csv", outage_table=(15, 85, 20))
 for outage in record.scores["outages"]:
-    print(f"{outage['t0']:4.0f} to {outage['t1']:4.0f} s  {outage['rms_m']:6.2f} m rms  {outage['max_m']:6.2f} m at most")
+    print(f"{outage['t0']:4.0f} to {outage['t1']:4.0f} s  {outage['horizontal_rms_m']:6.2f} m rms  {outage['horizontal_max_m']:6.2f} m at most")
 print(f"median {record.scores['outage_median_rms_m']:.2f} m, worst {record.scores['outage_worst_rms_m']:.2f} m")
 
 # %% [markdown]
@@ -33,7 +33,7 @@ import matplotlib.pyplot as plt
 figure, axis = plt.subplots(figsize=(8, 3), layout="constrained")
 for name, flown, shift in (("with flow", record, -0.2), ("without flow", blind, 0.2)):
     found = flown.scores["outages"]
-    axis.bar([i + shift for i in range(len(found))], [o["rms_m"] for o in found], 0.4, label=name)
+    axis.bar([i + shift for i in range(len(found))], [o["horizontal_rms_m"] for o in found], 0.4, label=name)
 axis.set_xticks(range(len(record.scores["outages"])), [f"{o['t0']:.0f} s" for o in record.scores["outages"]])
 axis.set_ylabel("horizontal error [m rms]")
 axis.set_xlabel("GPS cut from")

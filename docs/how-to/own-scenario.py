@@ -64,7 +64,7 @@ quad = flownav.Vehicle.load("quad-450")
 quad
 
 # %%
-heavy = quad.changed(frame={"mass_kg": 1.1 * quad.file.frame.mass_kg})
+heavy = quad.changed(body={"mass_kg": 1.1 * quad.file.body.mass_kg})
 heavy.save("heavy.toml")
 flown = flownav.fly("leg.toml", seed=1, vehicle="heavy.toml")
 print(f"{flown.scores['touchdown']['contact']['distance_m']:.2f} m from the pad, {flown.scores['touchdown']['verdict']}")

@@ -40,7 +40,7 @@ sensor.save("my-sensor.toml")
 for name, chosen in (("as it comes", None), ("identified", "my-sensor.toml")):
     record = flownav.replay("samples/flight.ulg", gps_outages=[(30, 75)], sensor=chosen)
     outage = record.scores["outages"][0]
-    print(f"{name:12s} {outage['rms_m']:.2f} m rms, {outage['max_m']:.2f} m at most")
+    print(f"{name:12s} {outage['horizontal_rms_m']:.2f} m rms, {outage['horizontal_max_m']:.2f} m at most")
 
 # %% [markdown]
 # Judge a sensor on another flight than the one that it was identified from when you can. Here there is only one.

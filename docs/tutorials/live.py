@@ -18,7 +18,7 @@
 # port=$(python -c "import socket; s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(('127.0.0.1', 0)); print(s.getsockname()[1])")
 # flownav live udp:$port --gps-delay 0.12 --duration 25 --record live.fnr --json > live.json 2> live.txt &
 # sleep 4
-# flownav fly landing --mavlink udpout:127.0.0.1:$port --speed 3 --no-report --out flown.fnr --json > flown.json
+# flownav fly pad_return --mavlink udpout:127.0.0.1:$port --speed 3 --no-report --out flown.fnr --json > flown.json
 # wait
 
 # %% [markdown]

@@ -103,7 +103,7 @@ for name in ("navigator", "complementary", "my_filter.py:SlowGps"):
     own = None if name == "navigator" else name
     record = flownav.replay("samples/flight.ulg", gps_outages=[(30, 45)], filter=own)
     outage = record.scores["outages"][0]
-    print(f"{name:22s} {outage['rms_m']:6.2f} m rms through 15 s without GPS")
+    print(f"{name:22s} {outage['horizontal_rms_m']:6.2f} m rms through 15 s without GPS")
 
 # %% [markdown]
 # ## Where to go from here

@@ -26,6 +26,9 @@ GROUND = {"errors", "files", "compile", "frames", "measurement", "record", "para
 GROUND |= {"record_file", "parquet_pages"}
 GROUND |= {"guard", "text", "toml_text"}
 EQUATIONS = {"vehicle", "sensors", "control", "estimation", "optics"}
+# what the public API stands on: every room but the faces
+JOBS = {"navigation", "simulation", "logs", "mavlink", "scoring", "replays", "live", "campaigns", "faults"}
+JOBS |= {"identification", "report", "export"}
 ALLOWED = {
     "vehicle": GROUND,
     "sensors": GROUND,
@@ -55,6 +58,7 @@ ALLOWED = {
     "export": GROUND,
     "parts": GROUND | EQUATIONS | {"navigation", "simulation", "campaigns", "logs", "replays"},
     "examples": GROUND | EQUATIONS | {"parts"},
+    "api": GROUND | EQUATIONS | JOBS,
     "paper": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "rig", "identification", "report"},
 }
 

@@ -29,11 +29,13 @@ print(inspect.getsource(complementary).split('"""', 2)[2].strip())
 # %%
 import flownav
 import pandas as pd
+from flownav.examples.complementary import ComplementaryFilter
+from flownav.examples.filterpy_ekf import FilterPyEkf
 
 flights = {
     "navigator": flownav.fly("pad_return", seed=1),
-    "complementary": flownav.fly("pad_return", seed=1, filter="complementary"),
-    "FilterPy EKF": flownav.fly("pad_return", seed=1, filter="filterpy-ekf"),
+    "complementary": flownav.fly("pad_return", seed=1, filter=ComplementaryFilter),
+    "FilterPy EKF": flownav.fly("pad_return", seed=1, filter=FilterPyEkf),
 }
 rows = {
     name: {
@@ -99,11 +101,10 @@ class SlowGps(ComplementaryFilter):
 # flownav sample ulog
 
 # %%
-for name in ("navigator", "complementary", "my_filter.py:SlowGps"):
-    own = None if name == "navigator" else name
+for name, own in (("navigator", None), ("complementary", ComplementaryFilter), ("SlowGps", "my_filter.py:SlowGps")):
     record = flownav.replay("samples/flight.ulg", gps_outages=[(30, 45)], filter=own)
     outage = record.scores["outages"][0]
-    print(f"{name:22s} {outage['horizontal_rms_m']:6.2f} m rms through 15 s without GPS")
+    print(f"{name:13s} {outage['horizontal_rms_m']:6.2f} m rms through 15 s without GPS")
 
 # %% [markdown]
 # ## Where to go from here

@@ -1,1 +1,1 @@
-"""The public Python API, which `import flownav` offers by name: fly, replay, identify, campaign, load and what they give."""
+"""The public Python API that `import flownav` offers: fly, replay, identify, campaign, load and what they give."""

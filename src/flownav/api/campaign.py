@@ -1,4 +1,4 @@
-"""Campaign: what many flights showed, as figures with intervals, a table of flights, a page, and flights flown again."""
+"""Campaign: what many flights showed: figures with intervals, a table of flights, a page, flights flown again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""campaign: a scenario flown many times, swept and dispersed, as figures with their intervals and a table of flights."""
+"""campaign: a scenario flown many times, swept and dispersed: figures with intervals and a table of flights."""
 
 from __future__ import annotations
 

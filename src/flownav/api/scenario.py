@@ -101,7 +101,7 @@ class Scenario:
         model = given.get("gps", {}).get("model") if isinstance(given.get("gps"), Mapping) else None
         if model is not None and model != self.file.gps.model:
             entries.pop("gps", None)  # another model has other numbers
-        return Scenario(check(merged(entries, given, self.name), File, f"{self.name} with {', '.join(given)}"))
+        return Scenario(check(merged(entries, given, self.name), File, f"{self.name}, as changed"))
 
     def save(self, path: str | Path) -> Path:
         """Write a scenario file that `load` and `flownav fly` read; where it lies.

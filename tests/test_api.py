@@ -28,7 +28,7 @@ GROUND |= {"guard", "text", "toml_text"}
 EQUATIONS = {"vehicle", "sensors", "control", "estimation", "optics"}
 # what the public API stands on: every room but the faces
 JOBS = {"navigation", "simulation", "logs", "mavlink", "scoring", "replays", "live", "campaigns", "faults"}
-JOBS |= {"identification", "report", "export"}
+JOBS |= {"identification", "report", "export", "parts"}
 ALLOWED = {
     "vehicle": GROUND,
     "sensors": GROUND,

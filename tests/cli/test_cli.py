@@ -187,7 +187,10 @@ def test_choices_replace_the_files_own(tmp_path, choice):
         (("fly", "gusty", "--truth", "linear"), 'truth = "linear" has no air to move'),
         (("fly", "landing", "--truth", "linear"), 'truth = "linear" has no forces for an IMU to feel'),
         (("fly", "landing", "--seed", "-1"), "--seed -1: must be from 0 to"),
-        (("fly", "landing", "--gps", "rtk"), "landing, as changed: gps.model: Input should be 'white' or 'midg', got 'rtk'"),
+        (
+            ("fly", "landing", "--gps", "rtk"),
+            "landing, as changed: gps.model: Input should be 'white' or 'midg', got 'rtk'",
+        ),
         (
             ("fly", "landing", "--filter", "ukf"),
             "landing, as changed: filter.name: Input should be 'paper' or 'landing', got 'ukf'",

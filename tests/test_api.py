@@ -57,7 +57,8 @@ ALLOWED = {
     "report": GROUND | {"scoring"},
     "export": GROUND,
     "parts": GROUND | EQUATIONS | {"navigation", "simulation", "campaigns", "logs", "replays"},
-    "examples": GROUND | EQUATIONS | {"parts"},
+    "examples": GROUND | EQUATIONS | {"navigation", "parts"},
+    "viewing": GROUND | {"export"},
     "api": GROUND | EQUATIONS | JOBS,
     "paper": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "rig", "identification", "report"},
 }

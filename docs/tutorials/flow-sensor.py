@@ -26,9 +26,9 @@ print(f"latency  {1e3 * latency.value:.0f} ms, 95 % interval {1e3 * latency.low:
 print(sensor.verdict)
 
 # %% [markdown]
-# The last line says what this log could show at all. A flight shows the gain and the latency well; the sensor's own
-# dynamics need faster motion, such as a pendulum's. The sample flight was flown with a sensor whose gain is below 1, and
-# the interval says so.
+# The last line says what this log could show at all. A flight shows the gain well. What lies behind the latency (a delay, or a
+# filter inside the sensor) needs faster motion, such as that of a [rig](../how-to/rig.md). The sample flight was flown
+# with a sensor whose gain is below 1, and the interval says so.
 #
 # ## What is it worth?
 #
@@ -43,7 +43,9 @@ for name, chosen in (("as it comes", None), ("identified", "my-sensor.toml")):
     print(f"{name:12s} {outage['horizontal_rms_m']:.2f} m rms, {outage['horizontal_max_m']:.2f} m at most")
 
 # %% [markdown]
-# Judge a sensor on another flight than the one that it was identified from when you can. Here there is only one.
+# The gain costs less than one would think, because the filter learns the scale of the flow while it has GPS. The sensor file
+# gives it a better start and the right latency. Judge a sensor on another flight than the one that it was identified
+# from when you can. Here there is only one.
 #
 # ## Parameters for the autopilot
 #

@@ -19,21 +19,8 @@ from flownav.report.figures_states import close_ups, flown_errors, position, pos
 from flownav.report.figures_vehicle import attitude
 from flownav.report.html import render, sections
 from flownav.report.panels import Panel
-from flownav.report.series import (
-    CROSS_POINTS,
-    DOT_POINTS,
-    LINE_POINTS,
-    Moment,
-    Track,
-    euler_deg,
-    flow_velocity,
-    gps_velocity_body,
-    moments,
-    readings,
-    sliding_rms,
-    thin,
-    thin_dots,
-)
+from flownav.report.samples import CROSS_POINTS, DOT_POINTS, LINE_POINTS, sliding_rms, thin, thin_dots
+from flownav.report.series import Moment, Track, euler_deg, flow_velocity, gps_velocity_body, moments, readings
 from flownav.report.style import COLOUR, LIGHT_TO_DARK, PALETTE
 from report_records import flight, navigated, replay
 

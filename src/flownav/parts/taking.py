@@ -64,12 +64,15 @@ class Taker:
             news = self.part.update(Reading(t_s, sensor, values[:width].copy(), variance, float(nav[QUALITY])))
             self._offer(t_s, sensor, news or ())
         nav[CLOCK] = t_s
-        said = self.part.estimate()
+        said, due = self.part.estimate(), t_s - self.written_s >= ESTIMATE_PERIOD_S
+        self.written_s = t_s if due else self.written_s
         if said is not None:
-            self._say(t_s, said)
+            numbers = self._say(said)
+            if due:
+                self._write(t_s, numbers)
 
-    def _say(self, t_s: float, said: Estimate) -> None:
-        """The estimate into the rows that the simulator reads, and every 20 ms onto the tape."""
+    def _say(self, said: Estimate) -> dict[str, Array]:
+        """The estimate into the rows that the simulator reads; as arrays."""
         nav, numbers = self.nav, checked(self.name, said)
         for row, key in (
             (STATE + POSITION, "pos_ned_m"), (STATE + VELOCITY, "vel_ned_m_s"), (QUATERNION, "quaternion"),
@@ -84,11 +87,10 @@ class Taker:
             nav[STATE + GROUND], nav[GROUND_SEEN] = said.ground_d_m, 1.0
         if said.pad_ned_m is not None:
             nav[STATE + PAD : STATE + PAD + 3], nav[PAD_KNOWN] = tuple(said.pad_ned_m), SEEN
-        if t_s - self.written_s >= ESTIMATE_PERIOD_S:
-            self.written_s = t_s
-            self._write(t_s, numbers)
+        return numbers
 
     def _write(self, t_s: float, numbers: dict[str, Array]) -> None:
+        """The estimate onto the tape, as ours is every 20 ms."""
         used, room = self.tape.used, len(self.tape.estimate)
         if used[ESTIMATES] >= room:
             return

@@ -23,7 +23,7 @@ def number(value: Any, digits: int = 4) -> str:
     """A number with a true minus sign and fixed decimals; a dash where there is none."""
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         return NONE
-    return f"{value:.{digits}f}".replace("-", MINUS)
+    return f"{value:z.{digits}f}".replace("-", MINUS)
 
 
 def metres(value: Any) -> str:

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-gpu test-slow long-log fuzz mutants league integrity rare validate lint bench bench-once docs tutorials wheel wheel-test clean
+.PHONY: demo test test-gpu test-slow long-log fuzz mutants league integrity rare validate lint bench bench-once docs pictures tutorials wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr
@@ -54,6 +54,9 @@ bench-once: $(VENV)/.ready-test
 
 docs: $(VENV)/.ready-docs
 	$(BIN)/python tools/docs/build.py
+
+pictures: $(VENV)/.ready-docs
+	$(BIN)/python tools/docs/pictures.py
 
 tutorials: $(VENV)/.ready-docs
 	$(BIN)/python tools/docs/notebooks.py out/tutorials

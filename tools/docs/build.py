@@ -3,7 +3,7 @@
 docs/ is copied to out/docs-pages, which mkdocs.yml names; generated pages, remade pictures and the tutorials with
 what they printed are written there, so that none of them can be stale and none is committed. Then zensical makes the
 site in out/docs. A page with a broken link, a generator that fails and a tutorial whose cell raises fail the build.
-`--quick` leaves the tutorials unexecuted: their pages have their words and code only.
+`--quick` takes the pictures as they are committed and leaves the tutorials unexecuted: their pages have words and code.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from pathlib import Path
 
 import cells
 import notebooks
+import pictures
 import ziamath
 from fontTools.ttLib import TTFont
 from plotly.offline import get_plotlyjs
@@ -33,6 +34,8 @@ def main(quick: bool) -> None:
     for name, generate in PAGES.items():
         (BUILT / name).parent.mkdir(parents=True, exist_ok=True)
         (BUILT / name).write_text(generate(), encoding="utf-8")
+    if not quick:
+        pictures.draw_all(BUILT / "pictures", [])
     write_tutorials(BUILT, quick)
     sys.exit(site())
 

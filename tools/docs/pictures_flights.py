@@ -43,7 +43,7 @@ def error_and_band() -> Figure:
         axis.fill_between(t, -2 * std, 2 * std, color=COLOURS[0], alpha=0.18, linewidth=0, label="± 2 std, as stated")
         axis.plot(t, error, label="error")
         axis.set_ylabel(f"{name} [m]")
-    rows[0].legend(loc="upper right", ncols=2)
+    figure.legend(*rows[0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
     rows[-1].set_xlabel("time [s]")
     return figure
 
@@ -72,7 +72,7 @@ def protection_level() -> Figure:
     figure, axis = axes()
     axis.plot(t, record.tables["estimate"]["protection_horizontal_m"], label="protection level", color=COLOURS[1])
     axis.plot(t, np.hypot(north, east), label="error", color=COLOURS[0])
-    axis.set(xlabel="time [s]", ylabel="horizontal [m]", yscale="log")
+    axis.set(xlabel="time [s]", ylabel="horizontal [m]", ylim=(0, None))
     axis.legend()
     return figure
 
@@ -128,9 +128,28 @@ def horizon() -> Figure:
     return figure
 
 
-def low_texture() -> Figure:
-    """A log whose flow loses the texture for a while, as `flownav faults --offline` spoils it: velocity off the truth."""
-    raise NotImplementedError
+def gps_drifts_off() -> Figure:
+    """A flight whose GPS position drifts off at 0.5 m/s from 20 s on, beside the same flight without the fault."""
+    from flownav.faults.catalogue import FAULTS
+    from flownav.faults.flown import law_of_flight, scenario_flown
+    from flownav.parts.flying import fly_with
+    from flownav.parts.protocols import Parts
+    from flownav.simulation.assemble import assemble
+
+    setup = assemble(scenario_flown(3.0))
+    fault = law_of_flight(FAULTS["gps_drift"], (20.0, 45.0), 1, 0, 0.02)
+    figure, axis = axes()
+    for law, label in ((None, "sound"), (fault, "GPS drifts off at 0.5 m/s")):
+        record = flownav.Record.of(fly_with(setup, Parts(), 1, fault=law))
+        t, north = _error(record, "pos_n_m")
+        _, east = _error(record, "pos_e_m")
+        begins = int(np.searchsorted(t, 20.0))
+        shown = t > 10.0
+        axis.plot(t[shown], np.hypot(north - north[begins], east - east[begins])[shown], label=label)
+    axis.axvspan(20, 45, color=COLOURS[4], alpha=0.12, linewidth=0, label="fault")
+    axis.set(xlabel="time [s]", ylabel="position moved off since 20 s [m]", ylim=(0, None))
+    axis.legend()
+    return figure
 
 
 def _error(record: flownav.Record, column: str, table: str = "estimate") -> tuple[np.ndarray, np.ndarray]:

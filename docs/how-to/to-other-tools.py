@@ -1,5 +1,5 @@
 # %% [markdown]
-# # Take a record to Rerun, Foxglove, Google Earth and others
+# # Take a record to Rerun, Foxglove and others
 #
 # A record opens in the tools that you have. This page writes one flight in the formats of several.
 
@@ -10,18 +10,14 @@
 import flownav
 
 record = flownav.load("samples/pad_return.fnr")
-for name in ("mcap", "kml", "gpx", "tum", "csv"):
-    record.export(name, f"out/flight.{name}")
-
-# %% language="bash"
-# ls out
+for name in ("mcap", "tum", "csv"):
+    print(name, [path.name for path in record.export(name, f"out/flight.{name}")])
 
 # %% [markdown]
 # | tool | format | how to open it |
 # |---|---|---|
 # | Foxglove | `mcap` | open the file; import the layout that ships with flownav |
-# | Google Earth, QGIS | `kml`, `gpx` | drag the file into it |
-# | evo | `tum`, `euroc` | `evo_ape tum truth.tum estimate.tum` |
+# # | evo | `tum`, `euroc` | `evo_ape tum truth.tum estimate.tum` |
 # | PlotJuggler, Flight Review | `ulog` | open the file |
 # | pandas, MATLAB, spreadsheets | `parquet`, `csv` | see [tables of a record](../reference/tables.md) |
 #

@@ -33,9 +33,9 @@ from flownav.examples.complementary import ComplementaryFilter
 from flownav.examples.filterpy_ekf import FilterPyEkf
 
 flights = {
-    "navigator": flownav.fly("pad_return", seed=1),
-    "complementary": flownav.fly("pad_return", seed=1, filter=ComplementaryFilter),
-    "FilterPy EKF": flownav.fly("pad_return", seed=1, filter=FilterPyEkf),
+    "navigator": flownav.fly("pad_return", seed=2),
+    "complementary": flownav.fly("pad_return", seed=2, filter=ComplementaryFilter),
+    "FilterPy EKF": flownav.fly("pad_return", seed=2, filter=FilterPyEkf),
 }
 rows = {
     name: {
@@ -63,7 +63,8 @@ plt.show()
 
 # %% [markdown]
 # The vehicle flies on what the filter says. A filter that is wrong moves the vehicle, so that the three flights are three
-# different flights through the same wind.
+# different flights through the same wind. A filter that is rough enough crashes it: with seed 1 the complementary filter
+# tilts the helicopter too far at the touchdown, and the record says so (`record.verdict`).
 #
 # ## Write your own
 #
@@ -78,19 +79,19 @@ from flownav.measurement import Sensor
 
 
 class SlowGps(ComplementaryFilter):
-    """The complementary filter, which takes ten times as long to follow GPS."""
+    """The complementary filter, which takes twice as long to follow GPS."""
 
     name = "slow-gps"
 
     def update(self, reading):
         if reading.sensor == Sensor.GPS_POSITION and reading.sensor in self.seen_s:
-            followed = reading.t_s - (reading.t_s - self.seen_s[reading.sensor]) / 10
+            followed = reading.t_s - (reading.t_s - self.seen_s[reading.sensor]) / 2
             self.seen_s[reading.sensor] = followed
         super().update(reading)
 ''')
 
 # %% language="bash"
-# flownav fly pad_return --seed 1 --filter my_filter.py:SlowGps --no-report --out slow.fnr
+# flownav fly pad_return --seed 2 --filter my_filter.py:SlowGps --no-report --out slow.fnr
 
 # %% [markdown]
 # ## On a recorded flight

@@ -86,7 +86,7 @@ def pads() -> Figure:
 
 
 def pad_target() -> Figure:
-    """The nested landing target as it is printed, and in frames of a camera from 3 m and from 1 m."""
+    """The nested landing target as it is printed, and in frames of a camera from 6 m and from 2.5 m."""
     from flownav.optics.pad_target import PadTarget, printed_cells
     from flownav.optics.pad_trial import CAMERAS, camera_flight, camera_named, frames_at, look
 

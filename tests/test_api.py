@@ -59,7 +59,6 @@ ALLOWED = {
     "parts": GROUND | EQUATIONS | {"navigation", "simulation", "campaigns", "logs", "replays"},
     "examples": GROUND | EQUATIONS | {"navigation", "parts"},
     "viewing": GROUND | {"export"},
-    "examples": GROUND | EQUATIONS | {"parts"},
     "api": GROUND | EQUATIONS | JOBS,
     "paper": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "rig", "identification", "report"},
 }

@@ -44,7 +44,9 @@ def test_every_column_comes_back_to_a_millionth_of_its_largest_value(given_colum
         finite = np.isfinite(values)
         largest = np.abs(values[finite]).max(initial=0.0)
         assert np.array_equal(np.isnan(found[place]), ~finite)
-        assert np.abs(found[place][finite] - values[finite]).max(initial=0.0) <= 0.51 * largest * 10.0**-DIGITS + SMALLEST
+        assert (
+            np.abs(found[place][finite] - values[finite]).max(initial=0.0) <= 0.51 * largest * 10.0**-DIGITS + SMALLEST
+        )
 
 
 def test_the_same_values_are_kept_once() -> None:

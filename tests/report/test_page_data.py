@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import gzip
+import re
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from flownav.report.chart import Stack
+from flownav.report.html import HERE
 from flownav.report.page_data import DIGITS, SMALLEST, Columns, chart_data
 from flownav.report.samples import LINE_POINTS
 
@@ -82,3 +84,12 @@ def test_a_chart_of_the_whole_flight_has_no_window_and_a_close_up_has_its_own() 
     stack.line(1, "estimate", "estimate", np.arange(3.0), np.arange(3.0))
     assert chart_data(stack.chart((0.0, 2.0)), Columns(), (0.0, 2.0))["window"] is None
     assert chart_data(stack.chart((0.5, 2.0)), Columns(), (0.0, 2.0))["window"] == [0.5, 2.0]
+
+
+def test_the_library_that_draws_is_the_version_that_its_note_names_and_brings_its_licence() -> None:
+    vendor = HERE / "vendor"
+    note = (vendor / "README.md").read_text(encoding="utf-8")
+    version = re.search(r"`uplot`, version ([0-9.]+) ", note)
+    assert version is not None
+    assert f"(v{version[1]})" in (vendor / "uPlot.iife.min.js").read_text(encoding="utf-8")[:100]
+    assert "MIT License" in (vendor / "uPlot.LICENSE").read_text(encoding="utf-8")

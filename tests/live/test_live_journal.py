@@ -16,8 +16,9 @@ from typer.testing import CliRunner
 
 from flownav.cli import app
 from flownav.errors import InputError, VerdictError
+from flownav.guard import free_name
 from flownav.live import writing
-from flownav.live.journal_place import claim, free_name, is_locked
+from flownav.live.journal_place import claim, is_locked
 from flownav.live.options import Options
 from flownav.live.recorder import Recorder
 from flownav.live.recovery import recovered

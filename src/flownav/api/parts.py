@@ -6,10 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from flownav.parts.calling import name_of
-from flownav.parts.naming import part_of, require
+from flownav.parts.naming import OURS, part_of, require
 from flownav.parts.protocols import Parts
-
-OURS = ("landing", "paper")  # filters that are a scenario's own
 
 
 def split(filter: Any, sensors: Sequence[Any], vehicle: Any, controller: Any) -> tuple[Parts, str | None, Any]:
@@ -18,7 +16,7 @@ def split(filter: Any, sensors: Sequence[Any], vehicle: Any, controller: Any) ->
     A filter by another name than ours is an entry point's or a file's. InputError where an object is no such part.
     """
     own_filter, own_vehicle = None, None
-    if filter is not None and not (isinstance(filter, str) and filter in OURS):
+    if filter is not None and not (isinstance(filter, str) and filter in OURS["filter"]):
         own_filter, filter = _part("filter", filter), None
     if vehicle is not None and (hasattr(vehicle, "derivative") or (isinstance(vehicle, str) and ":" in vehicle)):
         own_vehicle, vehicle = _part("vehicle", vehicle), None

@@ -26,9 +26,11 @@ from flownav.cli import recover as recover
 from flownav.cli import replay as replay
 from flownav.cli import report as report
 from flownav.cli import rig as rig
+from flownav.cli import sample as sample
 from flownav.cli import tune as tune
 from flownav.cli import validate as validate
 from flownav.cli import vehicle as vehicle
+from flownav.cli import view as view
 from flownav.errors import FlownavError, InputError
 from flownav.guard import a_run
 
@@ -46,6 +48,7 @@ for name, command, what in (
     ("compare", compare.command, "Many logs, many settings, beside dead reckoning and the autopilot."),
     ("tune", tune.command, "Propose settings from logs, judged on windows held out from the fit."),
     ("live", live.command, "Navigate a MAVLink vehicle in real time; send it the estimate."),
+    ("sample", sample.command, "Write small simulated logs, to try the other commands on."),
     ("recover", recover.command, "Make the record of a live session that was killed."),
     ("info", info.command, "What a log holds: sensors, rates, gaps, signs, what it lacks."),
     ("identify", identify.command, "Identify a flow sensor from rig or flight logs; write its file."),
@@ -61,6 +64,7 @@ for name, command, what in (
     ("validate", validate.command, "Hold the simulator against recorded flights, figure beside figure."),
     ("vehicle", vehicle.command, "Trim, power, linear models and ground effect of a helicopter."),
     ("report", report.command, "Write a record's report as one HTML page."),
+    ("view", view.command, "Show a record in space and time with Rerun, or write its .rrd."),
     ("export", export.command, "Write a record as MCAP, TUM, EuRoC, Parquet, CSV or ULog."),
     ("bench", bench.command, "Measure how fast all of this is on your machine."),
 ):

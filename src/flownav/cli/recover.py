@@ -23,7 +23,8 @@ def command(
     """Make the record of a live session that was killed, or could not write it; the journal stays."""
     from flownav.cli.output import require_recordable
     from flownav.errors import InputError, VerdictError
-    from flownav.live.journal_place import free_name, is_locked, journal_of
+    from flownav.guard import free_name
+    from flownav.live.journal_place import is_locked, journal_of
     from flownav.live.recovery import recovered
     from flownav.logs.journal import SUFFIX
 

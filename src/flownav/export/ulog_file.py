@@ -11,7 +11,7 @@ from flownav.export.stamps import finite_rows, shift_needed_s
 from flownav.export.tables import is_text
 from flownav.export.trajectory import Trajectory, trajectories
 from flownav.export.ulog_merge import merged
-from flownav.export.ulog_messages import Stamped, Topic, data, definition, header, information, subscription
+from flownav.export.ulog_messages import Stamped, Topic, assembled
 from flownav.export.ulog_topics import (
     attitude_topic,
     event_strings,
@@ -47,7 +47,7 @@ def write_ulog(record: Record, path: Path, original: Path | None = None) -> tupl
     """
     if original is None:
         contents = _all_of(record)
-        whole = _log(contents)
+        whole = assembled(contents.topics, contents.strings, _known(contents.texts))
     else:
         log = _read_original(record, original)
         contents = _from_zero_on(_ours(record, _clock_start_s(record, original)))
@@ -122,20 +122,9 @@ def _notes(path: Trajectory) -> list[str]:
     return list(path._replace(oriented=True).notes)
 
 
-def _log(contents: Contents) -> bytes:
-    """A log of nothing but `contents`, in order of time."""
-    rows = [row for number, topic in enumerate(contents.topics) for row in data(topic, number)]
-    rows = sorted([*rows, *contents.strings], key=lambda row: row.time_us)
-    texts = {"sys_name": "flownav", "ver_sw": __version__, **contents.texts}
-    return b"".join(
-        [
-            header(rows[0].time_us),
-            *(definition(topic) for topic in contents.topics),
-            *(information(name, text) for name, text in texts.items() if text),
-            *(subscription(topic.name, number) for number, topic in enumerate(contents.topics)),
-            *(row.body for row in rows),
-        ]
-    )
+def _known(texts: dict[str, str]) -> dict[str, str]:
+    """Texts about the whole log, with who wrote it."""
+    return {"sys_name": "flownav", "ver_sw": __version__, **texts}
 
 
 def _read_original(record: Record, original: Path) -> bytes:

@@ -7,7 +7,7 @@ logged strings). Little endian; a message is its size (uint16, without this head
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -105,6 +105,21 @@ def logged(time_us: int, text: str, level: str = "6") -> Stamped:
     """A logged string; level as the Linux kernel's, "4" a warning, "6" information."""
     return Stamped(
         time_us, message("L", level.encode() + struct.pack("<q", time_us) + text.encode(errors="backslashreplace"))
+    )
+
+
+def assembled(topics: Sequence[Topic], strings: Sequence[Stamped], texts: dict[str, str]) -> bytes:
+    """A log of these topics, logged strings and texts about the whole of it, in order of time."""
+    rows = [row for number, topic in enumerate(topics) for row in data(topic, number)]
+    rows = sorted([*rows, *strings], key=lambda row: row.time_us)
+    return b"".join(
+        [
+            header(rows[0].time_us),
+            *(definition(topic) for topic in topics),
+            *(information(name, text) for name, text in texts.items() if text),
+            *(subscription(topic.name, number) for number, topic in enumerate(topics)),
+            *(row.body for row in rows),
+        ]
     )
 
 

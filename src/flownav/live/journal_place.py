@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from flownav.errors import InputError
+from flownav.guard import MOST_NUMBERS, numbered
 from flownav.logs.journal import MAGIC, SUFFIX
 
-MOST_NUMBERS = 10_000
 LOCK_WAIT_S = 1.0  # for somebody who only looks whether the journal is locked
 NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL)  # of file systems that have none
 
@@ -30,19 +30,6 @@ class Place(NamedTuple):
 def journal_of(record: Path) -> Path:
     """The journal of a record lies beside it."""
     return record.with_name(record.name + SUFFIX)
-
-
-def numbered(path: Path, number: int) -> Path:
-    """flight.fnr, flight-1.fnr, flight-2.fnr, ..."""
-    return path.with_name(f"{path.stem}-{number}{path.suffix}") if number else path
-
-
-def free_name(path: Path) -> Path:
-    """The first of the numbered names that nothing has."""
-    for number in range(MOST_NUMBERS):
-        if not os.path.lexists(found := numbered(path, number)):
-            return found
-    raise InputError(f"{path}: it is there, and so are {MOST_NUMBERS} numbered beside it; give another name")
 
 
 def claim(path: Path, *, force: bool) -> Place:

@@ -17,7 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flownav.errors import InputError
-from flownav.live.journal_place import claim, free_name
+from flownav.guard import free_name
+from flownav.live.journal_place import claim
 from flownav.live.options import Options
 from flownav.live.recovery import WIDTHS, recovered
 from flownav.live.writing import Writer

@@ -67,6 +67,7 @@ class SimulatedVehicle:
         self._quaternion = np.column_stack([truth[name] for name in QUATERNION])
         self.end_s = float(self._truth_s[-1])
         self._imu_told_s = float("-inf")
+        self._origin_deg_m = log.origin_deg_m or ORIGIN_DEG_M
         self._due: list[Due] = self._schedule()
 
     def _schedule(self) -> list[Due]:
@@ -198,7 +199,7 @@ class SimulatedVehicle:
         import pymap3d
 
         position, velocity = self._reading(Sensor.GPS_POSITION, row), self._reading(Sensor.GPS_VELOCITY, row)
-        fix = pymap3d.ned2geodetic(*position.value, *ORIGIN_DEG_M)
+        fix = pymap3d.ned2geodetic(*position.value, *self._origin_deg_m)
         across, _, along = np.sqrt(position.variance)
         place = (float(fix[0]), float(fix[1]), float(fix[2]))
         return say.gps_raw_int(
@@ -213,7 +214,7 @@ class SimulatedVehicle:
         north, east, down = map(float, self.truth_at(t_s)[1])
         imu = self._log.streams[Sensor.IMU]
         moved = imu.value[_newest(imu, t_s)]
-        place = pymap3d.ned2geodetic(*self._position[row], *ORIGIN_DEG_M)
+        place = pymap3d.ned2geodetic(*self._position[row], *self._origin_deg_m)
         angles = tuple(float(angle) for angle in euler_from_quaternion(w, x, y, z))
         return say.sim_state(
             self.mav, tuple(map(float, place)), (north, east, down), (w, x, y, z), angles,  # type: ignore[arg-type]

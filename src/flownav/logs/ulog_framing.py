@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from flownav.errors import InputError
 from flownav.logs.ulog_rows import AT_ONCE, DATA, Places, nothing_announced, walk_data
+from flownav.text import plain
 
 MAGIC = b"\x55\x4c\x6f\x67\x01\x12\x35"
 HEADER_SIZE = 16
@@ -31,6 +32,7 @@ TYPE_SIZES = {
 KINDS = frozenset(b"FBIMPQARDLCSO")
 A_HEADER = re.compile(rb"(?s)..[FIMPQARDLCSO]")  # where a message may begin again after damage
 FIELD = re.compile(rb"([A-Za-z0-9_/]{1,128})(?:\[(\d{1,5})\])? ([A-Za-z0-9_]{1,128})")
+SYSTEM = re.compile(rb".char\[\d{1,2}\] sys_name", re.DOTALL)  # an information message, after its header
 NAME = re.compile(rb"[A-Za-z0-9_/-]{1,128}")
 LARGEST_MESSAGE = 0xFFFF
 LARGEST_TOPIC = 8192  # bytes; uORB's largest have a quarter of that
@@ -49,6 +51,7 @@ class Framed:
     content: their definitions as a sound ULog with one row of each. rows: where all of their rows begin, by message id,
     in the file's order. dropouts_s: gaps that the logger itself states [s].
     rejected: messages by reason. damaged: number of stretches skipped, and their bytes. start_us: header's time.
+    system: who says that it wrote the log ("PX4").
     """
 
     content: bytes = b""
@@ -59,6 +62,7 @@ class Framed:
     rejected: dict[str, int] = field(default_factory=dict)
     damaged_stretches: int = 0
     damaged_bytes: int = 0
+    system: str = ""
 
     def count(self, reason: str) -> None:
         """One more message thrown away."""
@@ -255,6 +259,8 @@ class Framing:
             self.definitions.setdefault(name, self.content[pos:stop])
         elif kind == 80 and self._is_parameter(pos, stop):
             self.parameters.append(self.content[pos:stop])
+        elif kind == 73 and (named := SYSTEM.match(self.content, pos + 3, stop)):
+            framed.system = framed.system or plain(self.content[named.end() : stop].decode(errors="replace"))
         elif kind == 65:
             self._subscribe(pos, stop)
         elif kind == 79:

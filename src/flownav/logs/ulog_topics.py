@@ -78,7 +78,7 @@ class Topic(Rows):
 class Topics:
     """The wanted topics of a file, parameters, and what was wrong with the file.
 
-    start_s: what the file's clock shows at time 0 of the topics.
+    start_s: what the file's clock shows at time 0 of the topics. system: who says that it wrote the log.
     """
 
     found: list[Topic]
@@ -86,6 +86,7 @@ class Topics:
     sha256: str
     start_s: float
     notes: list[str] = field(default_factory=list)
+    system: str = ""
 
     def of(self, *names: str) -> list[Topic]:
         """Every instance of the named topics that has rows, in the order of the names."""
@@ -114,7 +115,7 @@ def read_topics(path: Path, wanted: Collection[str], fields: Collection[str], st
     found = [_topic(data, read, framed.rows[data.msg_id], fields) for data in log.data_list]
     del content, read
     for topic in found:
-        _order(topic)
+        order(topic)
     start_s = min((topic.t_s[0] for topic in found if len(topic) and topic.name not in states), default=0.0)
     for topic in found:
         topic.t_s = topic.t_s - start_s
@@ -130,7 +131,7 @@ def read_topics(path: Path, wanted: Collection[str], fields: Collection[str], st
         )
     stated = {str(name): float(value) for name, value in log.initial_parameters.items()}
     parameters = {name: value for name, value in stated.items() if np.isfinite(value)}
-    return Topics(found, parameters, sha256, start_s, _notes(framed))
+    return Topics(found, parameters, sha256, start_s, _notes(framed), framed.system)
 
 
 def _content(path: Path) -> tuple[mmap, str]:
@@ -173,7 +174,7 @@ def _topic(data: Any, content: Bytes, rows: Places, fields: Collection[str]) -> 
     return Topic(t_s, columns, name=str(data.name), instance=int(data.multi_id))
 
 
-def _order(topic: Topic) -> None:
+def order(topic: Topic) -> None:
     """Rows in time order; late ones, stray ones and repeated ones are counted and thrown away."""
     topic.keep(topic.t_s > 0.0, "no_time")
     if np.any(np.diff(topic.t_s) < 0):

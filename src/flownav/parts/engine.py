@@ -1,4 +1,4 @@
-"""A campaign's engine for flights with parts of somebody else's: one flight after the other, in plain Python."""
+"""A campaign's engine for flights with parts of somebody else's: one after the other, or equations on lanes."""
 
 from __future__ import annotations
 
@@ -11,11 +11,14 @@ import numpy as np
 
 from flownav.campaigns.again import Recording
 from flownav.campaigns.engines.engine import Engine, Part
+from flownav.campaigns.engines.local import Local
 from flownav.campaigns.local import fly_recorded
 from flownav.campaigns.plan import Ready
 from flownav.campaigns.rows import rows_of
+from flownav.compile import LANES, announce_compilation
 from flownav.measurement import Array
 from flownav.parts.calling import name_of
+from flownav.parts.equations import EquationFilter
 from flownav.parts.flying import fly_parts, fly_with
 from flownav.parts.protocols import Parts
 from flownav.record import Record
@@ -25,7 +28,7 @@ from flownav.simulation.fault import SensorFault
 
 
 class OwnPartsEngine:
-    """parts: flown in every flight, each beginning anew."""
+    """parts: flown in every flight, each beginning anew; a filter of equations alone, on lanes as ours."""
 
     def __init__(self, parts: Parts) -> None:
         self.parts = parts
@@ -34,6 +37,12 @@ class OwnPartsEngine:
         self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
     ) -> Iterator[tuple[Part, Array]]:
         """The rows of each part. InputError where a part of a flight makes a mistake."""
+        own = self.parts
+        if isinstance(own.filter, EquationFilter) and not (own.sensors or own.vehicle or own.controller):
+            with announce_compilation("batch"):
+                address = own.filter.unit(LANES).address
+            yield from Local(instead=address).fly(cell, seed, parts, on_progress)
+            return
         faults = cell.faults(seed)
         for part in parts:
             rows = []

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from flownav.compile import ONE_LANE
 from flownav.errors import InputError
 from flownav.logs.log import Log
 from flownav.navigation.loop import Running
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.parts.calling import Mistakes
+from flownav.parts.equations import EquationFilter
 from flownav.parts.flying import fresh
 from flownav.parts.protocols import Filter, Told
 from flownav.parts.taking import Taker
@@ -22,6 +24,8 @@ def replay_with(log: Log, options: ReplayOptions, settings: NavigatorSettingsFil
     mistakes, kept = Mistakes(), []
 
     def instead(running: Running) -> int:
+        if isinstance(part, EquationFilter):
+            return part.unit(ONE_LANE).address
         kept.append(Taker(fresh(part), Told(running.told), running.work, running.tape, mistakes))
         return kept[-1].address
 

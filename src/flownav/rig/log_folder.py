@@ -32,8 +32,11 @@ COLUMNS = {
 }
 
 
-def write_rig_folder(log: RigLog, folder: Path, command: str = "") -> None:
-    """Write rig.csv and rig.toml, each whole or not at all. InputError where the folder cannot be written."""
+def write_rig_folder(log: RigLog, folder: Path, command: str = "", *, dated: bool = True) -> None:
+    """Write rig.csv and rig.toml, each whole or not at all. InputError where the folder cannot be written.
+
+    dated: whether rig.toml says when it was written.
+    """
     table = np.column_stack(
         [
             log.time_s,
@@ -51,7 +54,7 @@ def write_rig_folder(log: RigLog, folder: Path, command: str = "") -> None:
     check_rig_folder(folder)
     try:
         with ExitStack() as both:
-            for name, content in (("rig.csv", text), ("rig.toml", _set_up(log, command))):
+            for name, content in (("rig.csv", text), ("rig.toml", _set_up(log, command, dated=dated))):
                 temporary = both.enter_context(written_whole(folder / name, replacing=True))
                 temporary.write_text(content, encoding="utf-8", errors="backslashreplace")
     except OSError as error:
@@ -67,7 +70,7 @@ def run_folders(folder: Path, count: int) -> Iterator[Path]:
         yield folder / f"run-{number:03d}"
 
 
-def _set_up(log: RigLog, command: str) -> str:
+def _set_up(log: RigLog, command: str, *, dated: bool) -> str:
     s, made = log.settings, provenance()
     entries: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
@@ -93,8 +96,7 @@ def _set_up(log: RigLog, command: str) -> str:
         "gyro_late_s": s.gyro_late_s,
         "sonar_late_s": s.sonar_late_s,
         "flownav": made["flownav"],
-        "written_utc": made["written_utc"],
-    }
+    } | ({"written_utc": made["written_utc"]} if dated else {})
     lines = [f"{key} = {_toml(value)}" for key, value in entries.items()]
     return "\n".join([*lines, "", "[provenance]", *(f"{key} = {_toml(value)}" for key, value in origin.items())]) + "\n"
 

@@ -1,0 +1,85 @@
+"""`flownav sample`: small simulated logs in the formats that vehicles write, to try every other command on."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from flownav.samples.writing import Written
+
+
+def command(
+    kinds: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[KIND]...", help="csv, ulog, tlog, dataflash, rig, record; all of them without one."),
+    ] = None,
+    list_only: Annotated[bool, typer.Option("--list", help="Only say what there is; write nothing.")] = False,
+    out: Annotated[Path, typer.Option(help="The folder to write into.")] = Path("samples"),
+    seed: Annotated[int, typer.Option(help="The same seed gives the same bytes.")] = 1,
+    force: Annotated[
+        bool, typer.Option("--force", help="Replace samples that are there; without, they are numbered.")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+) -> None:
+    """Write sample logs: a simulated flight in the formats of PX4, ArduPilot, MAVLink and CSV, a rig, and a record."""
+    from importlib.util import find_spec
+
+    from flownav.cli.output import require_between
+    from flownav.errors import InputError
+    from flownav.samples.kinds import SAMPLES, sample_of
+    from flownav.samples.writing import write_samples
+
+    require_between("--seed", seed, 0, 2**31 - 1)
+    asked = [sample_of(kind) for kind in dict.fromkeys(kinds or [])]
+    if list_only:
+        _list(as_json=as_json)
+        return
+    has_mavlink = find_spec("pymavlink") is not None
+    left_out = [s for s in SAMPLES if s.uses and not has_mavlink]
+    if unmade := [sample.kind for sample in asked if sample in left_out]:
+        raise InputError(f"{unmade[0]}: needs pymavlink; install it with `pip install 'flownav[live]'`")
+    samples = asked or [sample for sample in SAMPLES if sample not in left_out]
+    notes = [] if asked else [f"{s.kind} is left out: `pip install 'flownav[{s.uses}]'` adds it" for s in left_out]
+    written = write_samples(samples, out, seed, force=force, on_written=_quiet if as_json else _show)
+    if as_json:
+        typer.echo(json.dumps({"folder": str(out), "seed": seed, "samples": _facts(written), "notes": notes}))
+        return
+    for note in notes:
+        typer.echo(f"Note: {note}")
+    typer.echo(f"{out / 'README.txt'} says what each holds.")
+
+
+def _list(*, as_json: bool) -> None:
+    from flownav.samples.kinds import SAMPLES
+
+    if as_json:
+        rows = [{"kind": s.kind, "name": s.name, "what": s.what, "commands": list(s.commands)} for s in SAMPLES]
+        typer.echo(json.dumps({"samples": rows}))
+        return
+    for sample in SAMPLES:
+        typer.echo(f"{sample.kind:<10} {sample.name}\n    {sample.what}")
+
+
+def _facts(written: list[Written]) -> list[dict[str, Any]]:
+    return [
+        {"kind": each.sample.kind, "path": str(each.path), "bytes": each.size_bytes, "state": each.state,
+         "what": each.sample.what, "commands": each.commands}
+        for each in written
+    ]  # fmt: skip
+
+
+def _quiet(written: Written) -> None:
+    """Nothing is said beside the JSON object."""
+
+
+def _show(written: Written) -> None:
+    """A sample, and what to try with it."""
+    size = f"{written.size_bytes / 1e6:.1f} MB, {written.state}"
+    taken = f"; {written.instead_of} is there already (--force replaces it)" if written.instead_of else ""
+    typer.echo(f"{written.path} ({size}{taken})\n  {written.sample.what}")
+    for command in written.commands:
+        typer.echo(f"    {command}")

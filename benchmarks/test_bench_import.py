@@ -1,4 +1,4 @@
-"""What `import flownav` costs a fresh interpreter, and what a name of the API costs that is asked for the first time."""
+"""What `import flownav` costs a fresh interpreter, and what the first use of a name of the API costs."""
 
 from __future__ import annotations
 

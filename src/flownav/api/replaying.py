@@ -24,9 +24,10 @@ from flownav.provenance import called_as, command_words
 from flownav.replays.bundle import to_record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
-from flownav.replays.session import Replay, outage_entry, outage_summary, table_windows
+from flownav.replays.session import Replay, outage_summary, table_windows
 from flownav.replays.session import outage_table as fly_table
 from flownav.replays.session import replay as run_log
+from flownav.scoring.path import outage_entry
 from flownav.sensors.datasheet import FlowSensor, load_sensor
 from flownav.sensors.identified import identified_flow
 

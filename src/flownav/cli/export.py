@@ -8,10 +8,19 @@ from typing import Annotated
 
 import typer
 
+FORMAT_HELP = "mcap, foxglove (mcap with a layout), tum, euroc, parquet, csv, ulog, kml or gpx."
+
 
 def command(
     record: Annotated[Path, typer.Argument(help="The record that fly or replay wrote.", show_default=False)],
-    to: Annotated[str, typer.Option("--to", help="mcap, tum, euroc, parquet, csv or ulog.", show_default=False)],
+    to: Annotated[
+        str,
+        typer.Option(
+            "--to",
+            help=FORMAT_HELP,
+            show_default=False,
+        ),
+    ],
     out: Annotated[
         Path | None,
         typer.Option("--out", help="The file, or folder for parquet and csv; beside the record where unsaid."),
@@ -23,23 +32,29 @@ def command(
         Path | None,
         typer.Option("--merge", metavar="ORIGINAL.ulg", help="ulog: into a copy of the log that was replayed."),
     ] = None,
+    origin: Annotated[
+        str | None,
+        typer.Option("--origin", metavar="LAT,LON,ALT", help="kml, gpx: where the record's origin lies (deg, m)."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
-    """Write a record for other tools: Foxglove, evo, spreadsheets, data frames, PlotJuggler, Flight Review."""
+    """Write a record for other tools: Foxglove, evo, spreadsheets, data frames, PlotJuggler, Google Earth, maps."""
     from flownav.cli.output import require_writable, require_writable_folder
     from flownav.errors import InputError
-    from flownav.export.formats import FOLDERS, FRAMED, destination, export
+    from flownav.export.earth import origin_from
+    from flownav.export.formats import FOLDERS, destination, export, written_files
     from flownav.record import Record
 
     path = destination(record, to, out)
     if to in FOLDERS:
         require_writable_folder(path, record, merge)
     else:
-        one = path.with_name(f"{path.stem}_estimate{path.suffix}") if to in FRAMED else path
-        require_writable(one, record, merge)
+        for one in written_files(to, path):
+            require_writable(one, record, merge)
+    about = None if origin is None else origin_from(origin)
     flown = Record.load(record)
     try:
-        written = export(flown, to, path, frame, merge)
+        written = export(flown, to, path, frame, merge, about)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
     if as_json:

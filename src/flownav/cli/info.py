@@ -19,14 +19,19 @@ def command(
     flow_instance: Annotated[
         int | None, typer.Option("--flow-instance", metavar="N", help="Which of several flow sensors.")
     ] = None,
+    topic: Annotated[
+        list[str] | None,
+        typer.Option("--topic", metavar="ROLE=TOPIC", help="Of a ROS bag: which topic serves as what; several times."),
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
 ) -> None:
     """Show what a log holds: sensors, rates, gaps, thrown-away rows, limits, signs, and what it lacks."""
     from flownav.compile import announce_compilation
     from flownav.inspection.summary import summarise
     from flownav.logs.open_log import open_log
+    from flownav.logs.ros.choice import asked_topics
 
-    read = open_log(log, flow_instance=flow_instance)
+    read = open_log(log, flow_instance=flow_instance, topics=asked_topics(topic or []))
     with announce_compilation("inspection"):
         facts = summarise(read)
     if as_json:

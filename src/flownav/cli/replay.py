@@ -35,6 +35,10 @@ def command(
     flow_instance: Annotated[
         int | None, typer.Option("--flow-instance", metavar="N", help="Which of several flow sensors.")
     ] = None,
+    topic: Annotated[
+        list[str] | None,
+        typer.Option("--topic", metavar="ROLE=TOPIC", help="Of a ROS bag: which topic serves as what; several times."),
+    ] = None,
     settings: Annotated[
         Path | None, typer.Option("--settings", help="TOML of filter settings (docs/landing-filter.md).")
     ] = None,
@@ -56,6 +60,7 @@ def command(
     from flownav.cli.output import progress, require_writable_record, save
     from flownav.errors import VerdictError
     from flownav.logs.open_log import open_flight
+    from flownav.logs.ros.choice import asked_topics
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.parameter_files import load
     from flownav.replays.prepare import ReplayOptions
@@ -71,7 +76,7 @@ def command(
     stated = load(settings, NavigatorSettingsFile) if settings else None
     options = ReplayOptions(gps_delay, tuple((t0, t1) for t0, t1 in windows), not no_flow, (scale[0], scale[1]))
     part = own_filter(filter_name)
-    log = open_flight(folder, flow_instance=flow_instance)
+    log = open_flight(folder, flow_instance=flow_instance, topics=asked_topics(topic or []))
     with progress("GPS outages", len(table)) if table else nullcontext() as advance:
         record = replay_log(log, options, flow, stated, smooth=smooth, table=table, part=part, progress=advance)
     scores = record.scores | save(record, record_path, report=report)

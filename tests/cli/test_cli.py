@@ -139,7 +139,7 @@ def test_the_touchdown_of_one_flight_is_its_values_and_of_many_radius_interval_s
     assert record.manifest["truth_model"] == "ensemble"
     assert record.manifest["parameters"]["drawn"]["vehicle.body.mass_kg"] != 7.9
     shown = run("fly", path, "--no-report", "--flights", 4, "--matched", cwd=tmp_path).stdout
-    assert "the truth as told" in shown
+    assert "GPS, matched, seed 1" in shown
     assert "touchdown, at rest" in shown
     assert re.search(r"landed  [34] of 4 flights, (75|100)\.0 % \(95 % interval ", shown)
 
@@ -187,7 +187,10 @@ def test_choices_replace_the_files_own(tmp_path, choice):
         (("fly", "gusty", "--truth", "linear"), 'truth = "linear" has no air to move'),
         (("fly", "landing", "--truth", "linear"), 'truth = "linear" has no forces for an IMU to feel'),
         (("fly", "landing", "--seed", "-1"), "--seed -1: must be from 0 to"),
-        (("fly", "landing", "--gps", "rtk"), "landing, as changed: gps.model: Input should be 'white' or 'midg', got 'rtk'"),
+        (
+            ("fly", "landing", "--gps", "rtk"),
+            "landing, as changed: gps.model: Input should be 'white' or 'midg', got 'rtk'",
+        ),
         (
             ("fly", "landing", "--filter", "ukf"),
             "landing, as changed: filter.name: Input should be 'paper' or 'landing', got 'ukf'",

@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-gpu test-slow long-log fuzz mutants league integrity rare validate lint bench bench-once docs wheel wheel-test clean
+.PHONY: demo test test-gpu test-slow long-log fuzz mutants league integrity rare validate report-size lint bench bench-once docs pictures tutorials wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr --force
@@ -39,6 +39,9 @@ rare: $(VENV)/.ready
 validate: $(VENV)/.ready
 	FLOWNAV_DATA=$${FLOWNAV_DATA:-../shared/data} $(BIN)/flownav validate --out docs/explanation/validation.md --force
 
+report-size: $(VENV)/.ready-test
+	$(BIN)/python tools/report_size.py $(RECORDS)
+
 lint: $(VENV)/.ready-lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -53,7 +56,13 @@ bench-once: $(VENV)/.ready-test
 	FLOWNAV_LIVE_BENCH_S=$${FLOWNAV_LIVE_BENCH_S:-8} FLOWNAV_SERIAL_BENCH_S=$${FLOWNAV_SERIAL_BENCH_S:-8} $(BIN)/python -m pytest benchmarks --benchmark-disable
 
 docs: $(VENV)/.ready-docs
-	$(BIN)/zensical build --strict --config-file mkdocs.yml
+	$(BIN)/python tools/docs/build.py
+
+pictures: $(VENV)/.ready-docs
+	$(BIN)/python tools/docs/pictures.py
+
+tutorials: $(VENV)/.ready-docs
+	$(BIN)/python tools/docs/notebooks.py out/tutorials
 
 wheel: $(VENV)/.ready-wheel
 	$(BIN)/python tools/build_wheel.py

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Sequence
+from glob import escape
 from pathlib import Path
 
 from flownav.errors import InputError
@@ -31,6 +32,25 @@ def a_place(path: Path, inputs: Iterable[Path] = (), *, force: bool, beside: Seq
     if force:
         return path
     return _first_free(path, lambda found: all(map(_is_free, _with_beside(found, beside))))
+
+
+def a_place_of_several(path: Path, inputs: Iterable[Path] = (), *, force: bool) -> Path:
+    """The same of files that are all called after a path: NAME_estimate.tum, NAME_truth.tum, ... of NAME.tum.
+
+    force: as of `a_place`, of each that is there.
+    """
+    for each in [_named_after(path, "estimate"), *sorted(_several(path))]:
+        a_place(each, inputs, force=force)
+    return path if force else _first_free(path, lambda found: not _several(found))
+
+
+def _named_after(path: Path, what: str) -> Path:
+    return path.with_name(f"{path.stem}_{what}{path.suffix}")
+
+
+def _several(path: Path) -> list[Path]:
+    """What is there of such files."""
+    return list(path.parent.glob(f"{escape(path.stem)}_*{path.suffix}")) if path.parent.is_dir() else []
 
 
 def a_folder_place(path: Path, *, force: bool = False) -> Path:

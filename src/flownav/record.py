@@ -100,6 +100,13 @@ TABLES: dict[str, tuple[str, ...]] = {
     # one row per happening: source, kind, detail (text), value
     "events": ("source", "kind", "detail", "value"),
     "fed": FED[1:],
+    # what scoring must know beside truth and estimate: of a simulated flight at the truth's instants (0/1 but for the
+    # ground): the ground's height, goes around, its pad can be seen, this step counts, the flow sensor sees; of a
+    # replay at the estimate's: some warning stands
+    "judging": ("ground_m", "away", "pad_seen", "counted", "sees_flow", "flagged"),
+    # a log's external reference as it stands there, in a frame of its own, and its heading where that is apart
+    "reference": (*POSITION_NED, *QUATERNION),
+    "reference_heading": ("yaw_rad",),
     # measurement streams are tables "gps_position", "flow_velocity", ...: measurement.COLUMNS and "quality"
 }
 
@@ -113,7 +120,7 @@ class Record:
 
     manifest: JSON-able facts: `schema`, `kind` ("fly", "replay", "live"), `scenario`, `filter`, `seed`,
     `duration_s`, `parameters` (nested, units in key names), `provenance` (versions, inputs and their
-    SHA-256), `scores` (what scoring computed, see scoring/).
+    SHA-256), `scores` (what scoring computed, see scoring/), `judging` (numbers that scoring needs).
     tables: name -> column name -> array of equal length; `t_s` [s] in each.
     """
 

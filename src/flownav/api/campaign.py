@@ -11,10 +11,12 @@ import numpy as np
 from flownav.api.record import Record
 from flownav.api.table import FRAMES
 from flownav.campaigns.again import record_again
+from flownav.campaigns.engines.engine import Engine
 from flownav.campaigns.measures import measured
 from flownav.campaigns.plan import Plan
 from flownav.campaigns.store import RECORDS, REPORT, Dataset
 from flownav.errors import InputError
+from flownav.parts.engine import recording_of
 
 if TYPE_CHECKING:
     import pandas
@@ -38,11 +40,12 @@ class Campaign:
     """
 
     def __init__(
-        self, plan: Plan, folder: Path, summary: dict[str, Any], rate_per_s: float | None = None, holding: object = None
-    ) -> None:
+        self, plan: Plan, folder: Path, summary: dict[str, Any], rate_per_s: float | None = None,
+        holding: object = None, engine: Engine | None = None,
+    ) -> None:  # fmt: skip
         self.plan, self.folder, self.summary, self.rate_per_s = plan, folder, summary, rate_per_s
         self.records: list[Path] = []
-        self._holding = holding
+        self._holding, self._engine = holding, engine
 
     @property
     def cells(self) -> list[dict[str, Any]]:
@@ -110,7 +113,7 @@ class Campaign:
             raise InputError(f"cell {cell}: there are cells 0 to {len(self.plan.cells) - 1}")
         if not 0 <= flight < self.plan.flights:
             raise InputError(f"flight {flight}: there are flights 0 to {self.plan.flights - 1} of each cell")
-        return Record.of(record_again(self.plan, cell, flight))
+        return Record.of(record_again(self.plan, cell, flight, recording_of(self._engine)))
 
     def plot(self, cell: int = 0) -> Any:
         """Where the flights of a cell first touched the pad, with their radii, as a Plotly figure.

@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 from flownav.api.campaign import Campaign
+from flownav.api.parts import split
 from flownav.api.record import Record
 from flownav.api.scenario import Scenario, scenario_of
 from flownav.api.vehicle import Vehicle
@@ -24,6 +26,8 @@ from flownav.campaigns.sampling import SAMPLINGS, Sampling
 from flownav.campaigns.store import RECORDS, SUMMARY, Store
 from flownav.campaigns.summary import WORST, summary_of
 from flownav.errors import InputError
+from flownav.parts.engine import OwnPartsEngine, identities
+from flownav.parts.protocols import Controller, Filter, SensorModel, VehicleModel
 from flownav.provenance import called_as
 
 FLIGHTS, FLIGHTS_UNTIL = 1000, 100_000
@@ -42,7 +46,10 @@ def campaign(
     sampling: str = "plain",
     truth_model: str = "ensemble",
     until: str | None = None,
-    vehicle: str | Path | Vehicle | None = None,
+    filter: str | Filter | type[Filter] | None = None,
+    sensors: Sequence[SensorModel | type[SensorModel] | str] = (),
+    vehicle: str | Path | Vehicle | VehicleModel | type[VehicleModel] | None = None,
+    controller: str | Controller | type[Controller] | None = None,
     engine: str = "local",
     folder: str | Path | None = None,
     records: int = 0,
@@ -57,7 +64,8 @@ def campaign(
     told) or both. until: when to stop, such as "r95_m width <= 0.005". engine: local, ray (a cluster) or cuda (a GPU).
     folder: where the flights are kept, and where a campaign that was stopped goes on; None keeps them for as long as
     the result lives. records: write records and reports of so many of the worst flights into the folder. progress:
-    called with `campaigns.run.Progress` as flights land. vehicle, changes: as `fly`.
+    called with `campaigns.run.Progress` as flights land. filter, sensors, vehicle, controller, changes: as `fly`; with
+    parts of your own flights are flown one after the other, by this process.
     InputError, one line, for a name, a key or a value that cannot be.
 
     Example:
@@ -69,15 +77,21 @@ def campaign(
     chosen = [scenario] if isinstance(scenario, str | Path | Scenario) else list(scenario)
     most = FLIGHTS if until is None else FLIGHTS_UNTIL
     call = call_of("campaign", *([chosen[0]] if len(chosen) == 1 else [chosen]), flights=flights, seed=seed,
-                   sweep=sweep, sampling=sampling, truth_model=truth_model, until=until, vehicle=vehicle,
+                   sweep=sweep, sampling=sampling, truth_model=truth_model, until=until, filter=filter,
+                   vehicle=vehicle, sensors=list(sensors), controller=controller,
                    **changes)  # fmt: skip
+    parts, our_filter, our_vehicle = split(filter, sensors, vehicle, controller)
     fixed, rest = _split(changes)
     plan = plan_of(
-        [scenario_of(one, vehicle=vehicle, **rest) for one in chosen], flights=most if flights is None else flights,
+        [scenario_of(one, filter=our_filter, vehicle=our_vehicle, **rest) for one in chosen],
+        flights=most if flights is None else flights,
         seed=seed, sweep=sweep or {}, changes=fixed, sampling=sampling, truth_model=truth_model, until=until,
     )  # fmt: skip
     require_from("records", records, 0, WORST)
-    where = engine_named(engine)
+    if parts.any and engine != "local":
+        raise InputError(f"engine {engine}: parts of your own are flown by this process; leave it out")
+    plan = replace(plan, parts=identities(parts))
+    where = OwnPartsEngine(parts) if parts.any else engine_named(engine)
     kept = None if folder is not None else TemporaryDirectory(prefix="flownav-campaign-")
     with called_as(call):
         place = Path(kept.name) if kept is not None else Path(str(folder))
@@ -127,7 +141,7 @@ def fly_plan(
         rate = flown / max(time.monotonic() - began_s, 1e-9) if flown else None
         summary = summary_of(plan, data)
         store.keep_text(SUMMARY, json.dumps(summary, indent=1) + "\n")
-        found = Campaign(plan, folder, summary, rate, holding)
+        found = Campaign(plan, folder, summary, rate, holding, engine)
         found.records += _keep_records(found, records)
         if page:
             found.report()
@@ -143,13 +157,13 @@ def _keep_records(found: Campaign, count: int) -> list[Path]:
     return [_keep(found.record(flight, cell=cell), found.folder, cell, flight) for cell, flight in places]
 
 
-def fly_again(plan: Plan, folder: Path, cell: int, flight: int) -> tuple[Record, Path]:
+def fly_again(plan: Plan, folder: Path, cell: int, flight: int, engine: Engine | None = None) -> tuple[Record, Path]:
     """One flight of a plan flown again, its record and its report in the folder; the record, and where it lies.
 
     InputError where there is no such flight, or the folder is another campaign's.
     """
     Store(folder).check(plan.as_json)
-    record = Campaign(plan, folder, {}).record(flight, cell=cell)
+    record = Campaign(plan, folder, {}, engine=engine).record(flight, cell=cell)
     return record, _keep(record, folder, cell, flight)
 
 

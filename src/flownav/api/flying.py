@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from flownav.api.parts import split
 from flownav.api.record import Record
 from flownav.api.scenario import Scenario, scenario_of
 from flownav.api.vehicle import Vehicle
 from flownav.api.words import call_of, require_from
 from flownav.campaigns.judged import BOUND_FLIGHTS, Judged, bound_of, consistency_facts, fly_judged
 from flownav.campaigns.local import fly_recorded, known_exactly, median_flight, score_history
+from flownav.parts.flying import fly_parts, fly_with, names_of
+from flownav.parts.protocols import Controller, Filter, Parts, SensorModel, VehicleModel
 from flownav.provenance import called_as
 from flownav.scoring.errors import scores_of_flights
 from flownav.scoring.paper_tables import percentile_of_paper, published
@@ -26,6 +29,8 @@ from flownav.simulation.ensemble import Ensemble
 OF_MANY_FLIGHTS = ("rmse_over_bound", "anees_inside_fraction", "error_over_stated")
 MOST_FLIGHTS, MOST_SEED = 10_000_000, 2**63 - 1
 
+NO_PARTS = Parts()
+
 Progress = Callable[[int], object]
 
 
@@ -34,8 +39,10 @@ def fly(
     *,
     seed: int = 1,
     flight: int | Mapping[str, Any] = 0,
-    filter: str | None = None,
-    vehicle: str | Path | Vehicle | None = None,
+    filter: str | Filter | type[Filter] | None = None,
+    sensors: Sequence[SensorModel | type[SensorModel] | str] = (),
+    vehicle: str | Path | Vehicle | VehicleModel | type[VehicleModel] | None = None,
+    controller: str | Controller | type[Controller] | None = None,
     dispersed: bool = False,
     progress: Progress | None = None,
     **changes: Any,
@@ -43,8 +50,10 @@ def fly(
     """Fly a scenario once, in closed loop, and score the flight.
 
     scenario: takeoff, landing, gusty, pad_return, approach, a TOML file or a Scenario. seed, flight: flight k of a
-    seed is always the same flight, to the bit. filter: "landing" (the navigator, by default) or "paper". vehicle: a
-    shipped one's name, a file or a Vehicle. dispersed: vehicle, wind and sensors are drawn for this flight, and
+    seed is always the same flight, to the bit. filter: "landing" (the navigator, by default), "paper", or a filter of
+    your own: its class, an object, an entry point's name or "file.py:Class" (docs: own parts); likewise sensors, each
+    in place of ours of its kind, and controller. vehicle: a shipped one's name, a file, a Vehicle or a vehicle of your
+    own. dispersed: vehicle, wind and sensors are drawn for this flight, and
     neither navigator nor autopilot knows how; else they are what is believed. progress: called with 1 when it is down.
     changes: other values for the scenario's own keys, as `Scenario.changed` takes them (docs/scenarios.md).
     InputError, one line, for a name, a key or a value that cannot be. What a flight crashes on is in `record.verdict`.
@@ -56,14 +65,19 @@ def fly(
         True
     """
     number = 0 if isinstance(flight, Mapping) else flight
-    options: dict[str, Any] = {"filter": filter, "vehicle": vehicle, **changes}
+    parts, own_filter, own_vehicle = split(filter, sensors, vehicle, controller)
+    options: dict[str, Any] = {"filter": own_filter, "vehicle": own_vehicle, **changes}
     if isinstance(flight, Mapping):
         options["flight"] = flight
     require_from("seed", seed, 0, MOST_SEED)
     require_from("flight", number, 0, MOST_FLIGHTS)
     setup = assemble(scenario_of(scenario, **options).file)
-    with called_as(call_of("fly", scenario, seed=seed, flight=flight, dispersed=dispersed, **options)):
-        return fly_setup(setup, seed, number, dispersed=dispersed, progress=progress).record
+    said = {
+        **names_of(parts),
+        **{name: value for name, value in options.items() if value is not None and name != "flight"},
+    }
+    with called_as(call_of("fly", scenario, seed=seed, flight=flight, dispersed=dispersed, **said)):
+        return fly_setup(setup, seed, number, dispersed=dispersed, parts=parts, progress=progress).record
 
 
 @dataclass(frozen=True)
@@ -81,15 +95,18 @@ class Flights:
 
 def fly_setup(
     setup: Setup, seed: int, first: int = 0, flights: int = 1, *, dispersed: bool = False,
-    progress: Progress | None = None,
+    parts: Parts = NO_PARTS, progress: Progress | None = None,
 ) -> Flights:  # fmt: skip
     """Fly one flight, or flights 0 to `flights - 1`, of a scenario that is made ready, and score them.
 
-    first: the number of the one flight. progress: called with how many more flights are down.
+    first: the number of the one flight. parts: those that are not ours. progress: called with how many more flights are
+    down.
     """
     advance = progress or (lambda flown: None)
     truths = setup.ensemble() if dispersed else None
     facts = _facts(setup, seed, flights, dispersed=dispersed)
+    if parts.any:
+        return _fly_parts(setup, parts, seed, first, flights, truths, facts, advance)
     if setup.scenario.optics == "pixels":
         return _fly_pixels(setup, seed, first, flights, truths, facts, advance)
     if flights > 1:
@@ -137,6 +154,23 @@ def _fly_many(
     percentile = {"paper_percentile": percentile_of_paper(judged.scores, table)} if table else {}
     record = Record.of(fly_recorded(setup, seed, index, truths))
     return Flights(record, index, facts | scores | percentile)
+
+
+def _fly_parts(
+    setup: Setup, parts: Parts, seed: int, first: int, flights: int, truths: Ensemble | None, facts: dict[str, Any],
+    advance: Progress,
+) -> Flights:  # fmt: skip
+    """Flights with parts of somebody else's, one after the other; the record of the median one."""
+    rows = []
+    for index in range(first, first + flights) if flights > 1 else ():
+        flown = fly_parts(setup, parts, seed, index, truths, written=False)
+        rows.append(score_history(setup.flight, flown.history)[0])
+        advance(1)
+    index = first + median_flight(np.array(rows)) if rows else first
+    record = Record.of(fly_with(setup, parts, seed, index, truths))
+    scores = scores_of_flights(np.array(rows)) | {"takeoff": None} if rows else record.scores
+    named = {"filter": record.manifest["filter"], "parts": record.manifest["parts"]}
+    return Flights(record, index, facts | named | _nothing_of_many(setup) | scores)
 
 
 def _fly_pixels(

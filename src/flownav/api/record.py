@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from flownav import record as ground
 from flownav.api.table import Table
@@ -13,37 +14,125 @@ from flownav.errors import InputError
 class Record(ground.Record):
     """A flight as data: what flew (`manifest`), its tables, and what they score.
 
+    Every table is an attribute, and an entry: `record.estimate`, `record["estimate"]` (docs: records). A record that is
+    rescored is another one; none changes.
+
     Example:
         >>> import flownav
         >>> record = flownav.fly("landing", seed=1)
+        >>> record.estimate["pos_n_m"].dtype
+        dtype('float64')
+        >>> record.scores["touchdown"]["verdict"]
+        'landed'
     """
 
     @classmethod
     def of(cls, record: ground.Record) -> Record:
-        """The same record, with what this class offers.
+        """The same record with what this class offers; of one that has it, the same.
 
         Example:
-            >>> 1
-            1
+            >>> kept = flownav.fly("landing", flight={"duration_s": 6.0})
+            >>> flownav.Record.of(kept).name
+            'landing'
         """
         tables: dict[str, Any] = {name: Table(table, name) for name, table in record.tables.items()}
         return cls(record.manifest, tables)
 
+    @classmethod
+    def load(cls, path: str | Path) -> Record:
+        """Read a record that fly, replay or live wrote. InputError where the file is missing or no record.
+
+        Example:
+            >>> kept = flownav.fly("landing", flight={"duration_s": 6.0}).save(folder / "landing.fnr")
+            >>> flownav.Record.load(kept).name
+            'landing'
+        """
+        return cls.of(ground.Record.load(Path(path)))
+
+    # -- tables --------------------------------------------------------------------------------------------------
+    def __getitem__(self, table: str) -> Table:
+        if table not in self.tables:
+            raise KeyError(f"this record has no table {table!r}; it has: {', '.join(self.tables)}")
+        found = self.tables[table]
+        return found if isinstance(found, Table) else Table(found, table)
+
+    def __getattr__(self, name: str) -> Table:
+        tables = self.__dict__.get("tables", {})
+        if name.startswith("_") or name not in tables:
+            raise AttributeError(f"this record has no table {name!r}; it has: {', '.join(tables)}")
+        return self[name]
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self.tables})
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.tables)
+
+    def __contains__(self, table: object) -> bool:
+        return table in self.tables
+
+    # -- scores --------------------------------------------------------------------------------------------------
     @property
     def name(self) -> str:
         """What it is called after: its scenario, or its log without the suffix.
 
         Example:
-            >>> flownav.fly("landing", seed=1, flight={"duration_s": 6.0}).name
+            >>> flownav.fly("landing", flight={"duration_s": 6.0}).name
             'landing'
         """
         return str(self.manifest.get("scenario") or Path(str(self.manifest.get("log") or "record")).stem)
 
     @property
     def scores(self) -> dict[str, Any]:
-        """What scoring found of this flight."""
-        found: dict[str, Any] = self.manifest.get("scores") or {}
-        return found
+        """What scoring found when it flew: the figures that `--json` prints; empty of a live session.
+
+        Example:
+            >>> flownav.fly("landing", seed=1).scores["touchdown"]["contact"]["distance_m"] < 1.0
+            True
+        """
+        return cast(dict[str, Any], self.manifest.get("scores") or {})
+
+    def score(self) -> dict[str, Any]:
+        """The scores computed anew from the tables, by the functions that score every flight and replay.
+
+        InputError where the record does not hold what they need: that of a live session, or of an older flownav.
+
+        Example:
+            >>> record = flownav.fly("landing", flight={"duration_s": 6.0})
+            >>> record.score() == record.scores
+            True
+        """
+        from flownav.scoring.recorded import scores_of_record
+
+        return scores_of_record(self)
+
+    def rescore(self, estimate: Any, *, from_handover: bool = False, name: str = "another estimate") -> Record:
+        """The record with another estimate in the place of its own, scored as ours is.
+
+        estimate: a Table, a mapping of columns, or a data frame of pandas (t_s a column or the index), xarray, polars
+        or Arrow: t_s [s] on the record's clock and pos_n_m, pos_e_m, pos_d_m; with vel_u_m_s, vel_v_m_s, vel_w_m_s (or
+        vel_n_m_s, vel_e_m_s, vel_d_m_s), qw, qx, qy, qz, and the standard deviations and protection levels of
+        `record.TABLES["estimate"]` where it has them. Scores of what it lacks are None.
+
+        A simulated flight's estimate is held against the truth, at the truth's instants: errors, and the touchdown as
+        it would be put down to estimate, guidance and pad. The navigator flies on its estimate carried on to now and
+        counted from where it has the pad, which is `record.flown` and what `scores` score; from_handover counts
+        the other one likewise, from where it has the vehicle when the flight is handed over to the filter. A replay's
+        estimate is held against the log's GPS and its outages, and against its truth, turned and shifted onto it.
+        InputError, one line, for what is missing, and for wrong units, shapes and times.
+
+        Example:
+            >>> record = flownav.fly("landing", seed=1)
+            >>> record.rescore(estimate=record.flown).scores == record.scores
+            True
+            >>> shifted = {**record.flown, "pos_n_m": record.flown["pos_n_m"] + 1.0}
+            >>> mean = record.rescore(estimate=shifted).scores["states"]["x"]["mean_error"]
+            >>> round(mean - record.scores["states"]["x"]["mean_error"], 9)
+            1.0
+        """
+        from flownav.api.rescoring import rescored
+
+        return Record.of(rescored(self, estimate, name, from_handover=from_handover))
 
     @property
     def verdict(self) -> str:
@@ -53,7 +142,7 @@ class Record(ground.Record):
         sensor was heard and never fused.
 
         Example:
-            >>> flownav.fly("landing", seed=1, flight={"duration_s": 6.0}).verdict
+            >>> flownav.fly("landing", flight={"duration_s": 6.0}).verdict
             ''
         """
         bad = [found["text"] for found in self.manifest.get("findings") or () if found.get("bad")]
@@ -64,22 +153,20 @@ class Record(ground.Record):
             f"crashed: {', '.join(landing['broken'])}" if self.scores.get("crashed") and landing.get("broken") else ""
         )
 
-    def save(self, path: str | Path, *, replacing: bool = False) -> Path:  # type: ignore[override]
-        """Write the record as one file, whole or not at all; where it lies.
+    # -- what people look at -------------------------------------------------------------------------------------
+    def plot(self, what: str = "position") -> Any:
+        """A Plotly figure: "position", "velocity", "errors", "innovations" or "path".
 
-        replacing: whatever is there may go. InputError where nothing can be written there, or, unless replacing, where
-        something lies that flownav did not write.
+        InputError for another word, and where the record lacks what it shows.
 
         Example:
-            >>> flownav.fly("landing", seed=1, flight={"duration_s": 6.0}).save(folder / "landing.fnr").suffix
-            '.fnr'
+            >>> figure = flownav.fly("landing", flight={"duration_s": 6.0}).plot("errors")
+            >>> figure.layout.xaxis3.title.text
+            'time [s]'
         """
-        path = Path(path)
-        try:
-            super().save(path, replacing=replacing)
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written ({error.strerror}); give another path") from error
-        return path
+        from flownav.api.plots import figure_of
+
+        return figure_of(self, what)
 
     def report(self, path: str | Path | None = None) -> Path:
         """Write the record's report: one HTML page that works offline; where it lies.
@@ -88,7 +175,7 @@ class Record(ground.Record):
         InputError where nothing can be written there.
 
         Example:
-            >>> flownav.fly("landing", seed=1, flight={"duration_s": 6.0}).report(folder / "landing.html").name
+            >>> flownav.fly("landing", flight={"duration_s": 6.0}).report(folder / "landing.html").name
             'landing.html'
         """
         from flownav.report.html import write_report
@@ -100,16 +187,51 @@ class Record(ground.Record):
             raise InputError(f"{page}: cannot be written ({error.strerror}); give another path") from error
         return page
 
-    @classmethod
-    def load(cls, path: str | Path) -> Record:
-        """Read a record that fly, replay or live wrote. InputError where the file is missing or no record.
+    def save(self, path: str | Path, *, replacing: bool = False) -> Path:  # type: ignore[override]
+        """Write the record as one file, whole or not at all; where it lies.
+
+        replacing: whatever is there may go. InputError where nothing can be written there, or, unless replacing, where
+        something lies that flownav did not write.
 
         Example:
-            >>> kept = flownav.fly("landing", seed=1, flight={"duration_s": 6.0}).save(folder / "landing.fnr")
-            >>> flownav.Record.load(kept).name
-            'landing'
+            >>> flownav.fly("landing", flight={"duration_s": 6.0}).save(folder / "landing.fnr").suffix
+            '.fnr'
         """
-        return cls.of(ground.Record.load(Path(path)))
+        path = Path(path)
+        try:
+            super().save(path, replacing=replacing)
+        except OSError as error:
+            raise InputError(f"{path}: cannot be written ({error.strerror}); give another path") from error
+        return path
+
+    def export(self, to: str, path: str | Path | None = None, *, frame: str | None = None) -> list[Path]:
+        """Write the record for another tool; the files that were written.
+
+        to: mcap, tum, euroc, parquet, csv or ulog (docs: export). path: beside the program, after the record's name,
+        where it is None. frame: "ned" or "enu", of tum and euroc. InputError for an unknown format, where the record
+        lacks what it needs, or nothing can be written there.
+
+        Example:
+            >>> flownav.fly("landing", flight={"duration_s": 6.0}).export("tum", folder / "landing.tum")[0].suffix
+            '.tum'
+        """
+        from flownav.export.formats import destination, export
+
+        target = destination(Path(f"{self.name}.fnr"), to, None if path is None else Path(path))
+        try:
+            return [Path(file) for file in export(self, to, target, frame).files]
+        except OSError as error:
+            raise InputError(f"{target}: cannot be written ({error.strerror}); give another path") from error
+
+    def __repr__(self) -> str:
+        from flownav.api.shown import lines_of
+
+        return "\n".join(lines_of(self))
+
+    def _repr_html_(self) -> str:
+        from flownav.api.shown import html_of
+
+        return html_of(self)
 
 
 def load(path: str | Path) -> Record:
@@ -117,7 +239,7 @@ def load(path: str | Path) -> Record:
 
     Example:
         >>> import flownav
-        >>> kept = flownav.fly("landing", seed=1, flight={"duration_s": 6.0}).save(folder / "landing.fnr")
+        >>> kept = flownav.fly("landing", flight={"duration_s": 6.0}).save(folder / "landing.fnr")
         >>> flownav.load(kept).scores["crashed"]
         False
     """

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from flownav.api.parts import own_filter
 from flownav.api.record import Record
 from flownav.api.sensor import Sensor
 from flownav.api.words import call_of
@@ -16,13 +17,17 @@ from flownav.logs.open_log import open_flight
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import settings_of
 from flownav.parameter_files import check, load
+from flownav.parts.calling import name_of
+from flownav.parts.protocols import Filter
+from flownav.parts.replaying import replay_with
 from flownav.provenance import called_as, command_words
 from flownav.replays.bundle import to_record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
-from flownav.replays.session import Replay, outage_entry, outage_summary, table_windows
+from flownav.replays.session import Replay, outage_summary, table_windows
 from flownav.replays.session import outage_table as fly_table
 from flownav.replays.session import replay as run_log
+from flownav.scoring.path import outage_entry
 from flownav.sensors.datasheet import FlowSensor, load_sensor
 from flownav.sensors.identified import identified_flow
 
@@ -44,6 +49,7 @@ def replay(
     smooth: bool = False,
     outage_table: tuple[float, float, float] | None = None,
     flow_instance: int | None = None,
+    filter: str | Filter | type[Filter] | None = None,
     progress: Progress | None = None,
 ) -> Record:
     """Fuse a recorded flight with the navigator that flies in `fly`, and score it against what the log knows.
@@ -54,6 +60,7 @@ def replay(
     sensor (its gains and latency correct the flow). settings: the filter's, by name or as a TOML file
     (docs/landing-filter.md). smooth: also the best estimate after the flight. outage_table: (t0, t1, length), one
     replay for each window of that length, with GPS cut there alone. flow_instance: which of several flow sensors.
+    filter: one of your own in the navigator's place (docs: own parts).
     progress: called with 1 for each window of the table.
     InputError, one line, where the log or an option cannot serve. What is wrong with the log is in `record.verdict`.
 
@@ -65,7 +72,7 @@ def replay(
     """
     call = call_of(
         "replay", log, gps_outages=gps_outages, flow=None if flow else "False", sensor=sensor, settings=settings,
-        smooth=smooth, outage_table=outage_table, flow_instance=flow_instance,
+        smooth=smooth, outage_table=outage_table, flow_instance=flow_instance, filter=filter,
     )  # fmt: skip
     outages = tuple(_window(window) for window in gps_outages)
     table = table_windows(*outage_table, option="outage_table") if outage_table else []
@@ -75,26 +82,37 @@ def replay(
     options = ReplayOptions(gps_delay_s, outages, flow, scale)
     with called_as(call):
         read = open_flight(Path(log), flow_instance=flow_instance)
-        return replay_log(read, options, datasheet, stated, smooth=smooth, table=table, progress=progress)
+        return replay_log(
+            read, options, datasheet, stated, smooth=smooth, table=table, part=own_filter(filter), progress=progress
+        )
 
 
 def replay_log(
     log: Log, options: ReplayOptions, sensor: FlowSensor | None = None, stated: NavigatorSettingsFile | None = None, *,
-    smooth: bool = False, table: Windows = (), progress: Progress | None = None,
+    smooth: bool = False, table: Windows = (), part: Filter | None = None, progress: Progress | None = None,
 ) -> Record:  # fmt: skip
     """A log that is read, through the navigator.
 
-    sensor: its file; stated: the user's own settings. table: windows, one replay each. InputError as `replay`.
+    sensor: its file; stated: the user's own settings. table: windows, one replay each. part: a filter in the
+    navigator's place. InputError as `replay`.
     """
     told = settings_of(sensor, stated=stated)
     identified = identified_flow(sensor, told.lag_states) if sensor else None
     options = replace(options, identified=identified, flow_noise=told.noise)
     options, settled = as_fed(log, options, told.settings if sensor or stated else None)
-    flown = run_log(log, options, settled, smoothed=smooth)
+    if part is not None and (table or smooth):
+        raise InputError("a filter of your own takes neither an outage table nor smoothing; leave them out")
+    if part is not None:
+        flown = replay_with(log, options, settled, part)
+    else:
+        flown = run_log(log, options, settled, smoothed=smooth)
     scores = flown.scores()
     if table:
         scores |= _table_scores(flown, table, scores["outages"], progress)
-    return Record.of(to_record(flown, scores, command_words()))
+    record = Record.of(to_record(flown, scores, command_words()))
+    if part is not None:
+        record.manifest["filter"] = name_of(part)
+    return record
 
 
 def _table_scores(

@@ -4,17 +4,33 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Protocol
 
 from flownav.campaigns.local import fly_recorded
 from flownav.campaigns.plan import Plan
 from flownav.record import Record
+from flownav.simulation.assemble import Setup
+from flownav.simulation.ensemble import Ensemble
+from flownav.simulation.fault import SensorFault
 
 
-def record_again(plan: Plan, cell: int, flight: int) -> Record:
-    """The record of a flight; it says what was drawn, and is the same bytes whenever it is made."""
+class Recording(Protocol):
+    """Flies one flight as a scored record."""
+
+    def __call__(
+        self, setup: Setup, seed: int, index: int, ensemble: Ensemble | None, fault: SensorFault | None, /
+    ) -> Record:
+        """As `campaigns.local.fly_recorded`."""
+
+
+def record_again(plan: Plan, cell: int, flight: int, recording: Recording = fly_recorded) -> Record:
+    """The record of a flight; it says what was drawn, and is the same bytes whenever it is made.
+
+    recording: what flies it, with parts that are not ours.
+    """
     ready = plan.ready(cell)
     failing = ready.faults(plan.seed)
-    record = fly_recorded(
+    record = recording(
         replace(ready.setup, flight=ready.flight), plan.seed, flight, ready.ensemble, failing and failing(flight)
     )
     record.manifest["command"] = f"flownav campaign ... --flight {place_of(cell, flight)}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -157,10 +158,39 @@ def record_flown(setup: Setup, flown: Flown, seed: int, index: int, drawn: dict[
     up = takeoff_history(setup.flight, flown.history)
     record.manifest["scores"] = scores_of_flight(score_history(setup.flight, flown.history)[0])
     record.manifest["scores"]["takeoff"] = None if up is None else takeoff_of_flight(up[0])
+    record.add("judging", judging_table(setup.flight, flown.history))
+    record.manifest["judging"] = judging_facts(setup.flight)
     record.manifest["paper"] = published(setup.scenario.paper_table)
     if setup.fitted is not None:
         record.manifest["known_exactly"] = known_exactly(setup.scenario)
     return record
+
+
+def judging_table(flight: Flight, history: Array) -> dict[str, Array]:
+    """What scoring must know of a flight beside truth and estimate, as `record.TABLES` says; history of one lane."""
+    t_s: Array = np.arange(len(history), dtype=np.float64) * EPOCH_S
+    height_m = -history[:, column("truth", "pos_d_m")]
+    return {
+        "t_s": t_s,
+        "ground_m": history[:, column("truth", "ground_m"), 0],
+        "away": history[:, column("autopilot", "away"), 0],
+        "pad_seen": pad_to_be_seen(flight, t_s, height_m)[:, 0],
+        "counted": counted_steps(flight, history)[:, 0],
+        "sees_flow": history[:, column("flow", "engaged"), 0],
+    }
+
+
+def judging_facts(flight: Flight) -> dict[str, Any]:
+    """Numbers of a flight that its scores need."""
+    plan = flight.plan
+    return {
+        "cg_above_skid_m": float(flight.vehicle.cg_above_skid_m),
+        "may_land_after_s": float(plan.may_land_after_s),
+        "handover_s": float(plan.handover_s),
+        "starts_on_ground": bool(plan.starts_on_ground),
+        "flown_on_truth": bool(plan.fly_on_truth),
+        "limits": {name: float(value) for name, value in flight.limits._asdict().items()},
+    }
 
 
 def median_flight(scores: Array) -> int:

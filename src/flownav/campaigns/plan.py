@@ -106,6 +106,7 @@ class Plan:
     sampling: Sampling = "plain"
     until: str | None = None
     asked: tuple[str, ...] = ()  # of a certificate: what its flights are for
+    parts: tuple[str, ...] = ()  # that are not ours: each with its name and the hash of its source
 
     def ready(self, cell: int) -> Ready:
         """A cell made ready. InputError where its scenario or its dispersion cannot be."""
@@ -124,6 +125,7 @@ class Plan:
             "sampling": self.sampling,
             "until": self.until,
             "asked": list(self.asked),
+            **({"parts": list(self.parts)} if self.parts else {}),
             "cells": [
                 {
                     "label": cell.label,

@@ -29,6 +29,7 @@ from flownav.cli import sample as sample
 from flownav.cli import tune as tune
 from flownav.cli import validate as validate
 from flownav.cli import vehicle as vehicle
+from flownav.cli import view as view
 from flownav.cli.running import run, say_version
 
 app = typer.Typer(
@@ -61,6 +62,7 @@ for name, command, what in (
     ("validate", validate.command, "Hold the simulator against recorded flights, figure beside figure."),
     ("vehicle", vehicle.command, "Trim, power, linear models and ground effect of a helicopter."),
     ("report", report.command, "Write a record's report as one HTML page."),
+    ("view", view.command, "Show a record in space and time with Rerun, or write its .rrd."),
     ("export", export.command, "Write a record as MCAP, TUM, EuRoC, Parquet, CSV or ULog."),
     ("bench", bench.command, "Measure how fast all of this is on your machine."),
 ):

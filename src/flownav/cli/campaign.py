@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from flownav.cli.choices import SAMPLINGS, SCENARIOS, TRUTH_MODELS, argument, one_of
-from flownav.cli.options import EngineOption, JsonOption, SeedOption, VehicleOption, out_option
+from flownav.cli.options import EngineOption, FilterOption, JsonOption, SeedOption, VehicleOption, out_option
 from flownav.cli.output import emit
 from flownav.errors import InputError
 
@@ -56,6 +57,7 @@ def command(
             **one_of(*TRUTH_MODELS),
         ),
     ] = "ensemble",
+    filter_name: FilterOption = None,
     vehicle: VehicleOption = None,
     seed: SeedOption = 1,
     engine: EngineOption = "local",
@@ -84,12 +86,14 @@ def command(
 ) -> None:
     """Fly a scenario many times: radii, shares and percentiles with intervals, a dataset, the worst flights."""
     from flownav.api.campaigning import FLIGHTS, FLIGHTS_UNTIL, MOST_SEED, plan_of
+    from flownav.api.parts import split
     from flownav.api.scenario import Scenario
     from flownav.campaigns.engines.named import engine_named, require_engine
     from flownav.campaigns.plan import MOST_FLIGHTS
     from flownav.campaigns.summary import WORST
     from flownav.cli.output import require_between
     from flownav.guard import an_input
+    from flownav.parts.engine import OwnPartsEngine, identities
 
     if flight is not None and flights is None:
         flights = _planned_flights(out)
@@ -99,7 +103,10 @@ def command(
     require_between("--seed", seed, 0, MOST_SEED)
     require_between("--records", records, 0, WORST)
     require_engine(engine)
-    chosen = [Scenario.load(name).changed(vehicle=vehicle) for name in scenarios]
+    parts, ours, _ = split(filter_name, (), None, None)
+    if parts.any and (engine != "local" or rare is not None):
+        raise InputError(f"--filter {filter_name}: is flown by this process; leave out --engine and --rare")
+    chosen = [Scenario.load(name).changed(filter=ours, vehicle=vehicle) for name in scenarios]
     for name in (*scenarios, vehicle):
         if name is not None and Path(name).exists():
             an_input(Path(name))
@@ -107,6 +114,8 @@ def command(
         chosen, flights=flights, seed=seed, sweep=_once("--sweep", map(_swept, sweep or ())),
         changes=_once("--set", map(_set, set_ or ())), sampling=sampling, truth_model=truth_model, until=until,
     )  # fmt: skip
+    plan = replace(plan, parts=identities(parts))
+    flies = OwnPartsEngine(parts) if parts.any else None
     names = "_".join(dict.fromkeys(each.name for each in chosen))[:100]
     if rare is not None and engine != "local":
         raise InputError(f"--rare: flies on this machine's cores only; leave out --engine {engine}")
@@ -120,9 +129,9 @@ def command(
 
         fly_again(plan, Path(flight), as_json)
     elif flight is not None:
-        _again(plan, flight, folder, as_json)
+        _again(plan, flight, folder, as_json, flies)
     else:
-        _fly(plan, engine_named(engine), folder, records, as_json)
+        _fly(plan, flies or engine_named(engine), folder, records, as_json)
 
 
 def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) -> None:
@@ -143,7 +152,7 @@ def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) 
         show(flown.summary, folder, flown.rate_per_s, kept)
 
 
-def _again(plan: Plan, flight: str, folder: Path, as_json: bool) -> None:
+def _again(plan: Plan, flight: str, folder: Path, as_json: bool, engine: Engine | None) -> None:
     """One flight of the campaign, flown again."""
     from flownav.api.campaigning import fly_again
 
@@ -152,7 +161,7 @@ def _again(plan: Plan, flight: str, folder: Path, as_json: bool) -> None:
         place, index = int(cell or 0), int(number)
     except ValueError:
         raise InputError(f"--flight {flight}: a number, or CELL:NUMBER, is needed") from None
-    record, path = fly_again(plan, folder, place, index)
+    record, path = fly_again(plan, folder, place, index, engine)
     where = {"record": str(path), "report": str(path.with_suffix(".html"))}
     facts = {"cell": plan.cells[place].label, "flight": index, **record.scores, **where}
     if as_json:

@@ -41,6 +41,7 @@ FAULTS = (
 AXES = ("x", "y")
 PATTERNS = ("tag", "nested", "checker", "stripes")
 CAMERAS = ("wide120", "wide60", "px4flow")
+FORMATS = ("mcap", "tum", "euroc", "parquet", "csv", "ulog", "kml", "gpx", "foxglove")
 TABLES = ("1", "2", "3", "5", "6")
 SAMPLES = ("csv", "ulog", "tlog", "dataflash", "rig", "record")
 FIRMWARES = (

@@ -8,9 +8,11 @@ from typing import Annotated
 
 import typer
 
-from flownav.cli.choices import FEEDBACKS, FILTERS, GPS_MODELS, OPTICS, PLANTS, installed_filters, one_of
+from flownav.cli.choices import FEEDBACKS, GPS_MODELS, OPTICS, PLANTS, one_of
 from flownav.cli.options import (
     ENSEMBLE,
+    SCENARIOS_OWN,
+    FilterOption,
     ForceOption,
     JsonOption,
     ReportOption,
@@ -24,7 +26,6 @@ from flownav.cli.options import (
 from flownav.cli.output import emit
 from flownav.errors import InputError, VerdictError
 
-SCENARIOS_OWN = "as the scenario says"
 CRASHES_ALLOWED = 0.05  # of the flights, before the exit status says that the verdict is bad
 
 
@@ -45,15 +46,7 @@ def command(
             **one_of(*GPS_MODELS),
         ),
     ] = None,
-    filter_name: Annotated[
-        str | None,
-        typer.Option(
-            "--filter",
-            help="The navigator's landing filter, or the paper's.",
-            show_default=SCENARIOS_OWN,
-            **one_of(*FILTERS, beside="FILE.py:CLASS", also=installed_filters),
-        ),
-    ] = None,
+    filter_name: FilterOption = None,
     feedback: Annotated[
         str | None,
         typer.Option(help="What the autopilot flies on.", show_default=SCENARIOS_OWN, **one_of(*FEEDBACKS)),
@@ -93,6 +86,7 @@ def command(
 ) -> None:
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
     from flownav.api.flying import MOST_FLIGHTS, MOST_SEED, fly_setup
+    from flownav.api.parts import split
     from flownav.api.scenario import Scenario
     from flownav.cli.output import progress, record_place, require_between, save
     from flownav.simulation.assemble import assemble
@@ -103,18 +97,19 @@ def command(
     require_between("--speed", speed, 0.01, 100.0)
     if flight is not None and flights > 1:
         raise InputError("--flight names one flight, --flights many; give one of the two")
+    parts, ours, _ = split(filter_name, (), None, None)
     flow_sensor = str(sensor) if sensor else None
     chosen = Scenario.load(scenario).changed(
-        gps=gps, filter=filter_name, autopilot=feedback, truth=truth, optics=optics, flow_sensor=flow_sensor,
+        gps=gps, filter=ours, autopilot=feedback, truth=truth, optics=optics, flow_sensor=flow_sensor,
         vehicle=vehicle,
     )  # fmt: skip
     setup = assemble(chosen.file)
     asked = out or Path("out") / f"{chosen.name}.fnr"
     record_path = record_place(asked, scenario, sensor, vehicle, signing_key, force=force, report=report)
     dispersed = flights > 1 if ensemble is None else ensemble
-    many = flights > 1 or chosen.file.optics == "pixels"
+    many = flights > 1 or parts.any or chosen.file.optics == "pixels"
     with progress(f"Flying {chosen.name}", flights) if many else nullcontext() as advance:
-        flown = fly_setup(setup, seed, flight or 0, flights, dispersed=dispersed, progress=advance)
+        flown = fly_setup(setup, seed, flight or 0, flights, dispersed=dispersed, parts=parts, progress=advance)
     facts = flown.facts | save(flown.record, record_path, report=report)
     if mavlink is not None:
         from flownav.api.telling import tell

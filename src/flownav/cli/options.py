@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from flownav.cli.choices import ENGINES, FIRMWARES, SCENARIOS, VEHICLES, argument, one_of
+from flownav.cli.choices import ENGINES, FILTERS, FIRMWARES, SCENARIOS, VEHICLES, argument, installed_filters, one_of
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 ForceOption = Annotated[
@@ -35,6 +35,16 @@ SigningKeyOption = Annotated[
 ]
 VehicleOption = Annotated[
     str | None, typer.Option("--vehicle", help="The vehicle that flies.", **one_of(*VEHICLES, beside="FILE.toml"))
+]
+SCENARIOS_OWN = "as the scenario says"
+FilterOption = Annotated[
+    str | None,
+    typer.Option(
+        "--filter",
+        help="The navigator's filter, the paper's, an installed one's name, or your own class.",
+        show_default=SCENARIOS_OWN,
+        **one_of(*FILTERS, beside="FILE.py:CLASS", also=installed_filters),
+    ),
 ]
 EngineOption = Annotated[
     str, typer.Option("--engine", help="This machine's cores, a cluster (Ray), a GPU.", **one_of(*ENGINES))

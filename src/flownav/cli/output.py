@@ -41,12 +41,6 @@ def require_between(option: str, value: float, low: float, high: float) -> None:
         raise InputError(f"{option} {value}: must be from {low} to {high}")
 
 
-def require_one_of(option: str, value: str, known: Sequence[str]) -> None:
-    """InputError where an option is none of the words that it may be."""
-    if value not in known:
-        raise InputError(f"{option} {value}: must be {', '.join(known[:-1])} or {known[-1]}")
-
-
 def place(path: Path, *inputs: str | Path | None, force: bool, beside: Sequence[str] = ()) -> Path:
     """Where a file is written: at `path`, or under the next free number where something is there, said on stderr.
 
@@ -59,6 +53,16 @@ def place(path: Path, *inputs: str | Path | None, force: bool, beside: Sequence[
 
     read = [an_input(Path(each)) for each in inputs if each is not None]
     found = a_place(path, read, force=force, beside=beside)
+    _require_place(path)
+    return told(path, found)
+
+
+def several_place(path: Path, *inputs: str | Path | None, force: bool) -> Path:
+    """The same of files that are called after a path: NAME_estimate.tum, NAME_truth.tum, ..."""
+    from flownav.free_names import a_place_of_several
+    from flownav.guard import an_input
+
+    found = a_place_of_several(path, [an_input(Path(each)) for each in inputs if each is not None], force=force)
     _require_place(path)
     return told(path, found)
 
@@ -87,25 +91,6 @@ def told(asked: Path, found: Path) -> Path:
     if found != asked:
         print(f"flownav: {asked} is there already (--force replaces it); writing {found}", file=sys.stderr)
     return found
-
-
-def require_writable(path: Path, *inputs: str | Path | None) -> None:
-    """InputError where a file must not or cannot be put there."""
-    from flownav.guard import an_input, an_output
-
-    an_output(path, [an_input(Path(each)) for each in inputs if each is not None])
-    _require_place(path)
-
-
-def require_writable_folder(path: Path, *inputs: str | Path | None) -> None:
-    """The same of a folder: a new one, or an empty one."""
-    from flownav.guard import an_input, an_output_folder
-
-    for each in inputs:
-        if each is not None:
-            an_input(Path(each))
-    an_output_folder(path)
-    _require_place(path)
 
 
 def require_recordable(path: Path, *inputs: str | Path | None, force: bool) -> None:

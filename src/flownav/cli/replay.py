@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from flownav.cli.choices import installed_filters, one_of
 from flownav.cli.options import (
     FlowInstanceOption,
     ForceOption,
@@ -47,12 +48,21 @@ def command(
     smooth: Annotated[
         bool, typer.Option("--smooth", help="Also compute the best estimate after the flight (the smoother).")
     ] = False,
+    filter_name: Annotated[
+        str,
+        typer.Option(
+            "--filter",
+            help="The navigator's filter, an installed one's name, or your own class.",
+            **one_of("landing", beside="FILE.py:CLASS", also=installed_filters),
+        ),
+    ] = "landing",
     out: Annotated[Path | None, out_option("The record", "out/LOG.fnr")] = None,
     force: ForceOption = False,
     report: ReportOption = True,
     as_json: JsonOption = False,
 ) -> None:
     """Fuse a recorded flight: its trajectory, its errors against its own GPS, and the drift through GPS outages."""
+    from flownav.api.parts import own_filter
     from flownav.api.replaying import replay_log
     from flownav.cli.output import progress, record_place, save
     from flownav.errors import VerdictError
@@ -72,9 +82,10 @@ def command(
     flow = load_sensor(sensor) if sensor else None
     stated = load(settings, NavigatorSettingsFile) if settings else None
     options = ReplayOptions(gps_delay, tuple((t0, t1) for t0, t1 in windows), not no_flow, (scale[0], scale[1]))
+    part = own_filter(filter_name)
     read = open_flight(log, flow_instance=flow_instance)
     with progress("GPS outages", len(table)) if table else nullcontext() as advance:
-        record = replay_log(read, options, flow, stated, smooth=smooth, table=table, progress=advance)
+        record = replay_log(read, options, flow, stated, smooth=smooth, table=table, part=part, progress=advance)
     scores = record.scores | save(record, record_path, report=report)
     if as_json:
         emit(scores)

@@ -12,8 +12,8 @@ from flownav.compare.tracks import Track, at, says
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
 from flownav.record import POSITION_NED
-from flownav.replays.judged import columns_of
 from flownav.scoring.alignment import Alignment, align, velocity_of
+from flownav.scoring.autopilot import columns_of
 
 LEAST_INSTANTS = 10
 

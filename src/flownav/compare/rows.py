@@ -10,9 +10,9 @@ from flownav.compare.like_for_like import Reference, Window, errors_of, referenc
 from flownav.compare.tracks import Track
 from flownav.logs.log import Log
 from flownav.replays.airborne import airborne_of
-from flownav.replays.judged import end_drift_of
-from flownav.replays.session import outage_entry, outage_summary
+from flownav.replays.session import outage_summary
 from flownav.scoring.outage import OutageError
+from flownav.scoring.path import References, end_drift_of, outage_entry
 
 FLOWNAV, DEAD_RECKONING, AUTOPILOT = "flownav", "dead reckoning", "autopilot"
 WINDOW_S = 60.0
@@ -39,13 +39,14 @@ def rows_of(name: str, log: Log, entrants: Sequence[Entrant], gps_delay_s: float
     """One row for each entrant, errors at the instants that all of them have; the first entrant is always scored."""
     reference, airborne = reference_of(log, gps_delay_s), airborne_of(log)
     figures = _figures(entrants, reference, airborne)
+    known = References(truth=log.truth, heading=log.heading_truth, flight_s=airborne)
     return [
         {
             "log": name,
             "settings": entrant.settings,
             "estimator": entrant.estimator,
             **found,
-            "end_drift_m": end_drift_of(log, entrant.track.motion),
+            "end_drift_m": end_drift_of(entrant.track.motion, known),
             "outages": _outages(entrant.outages),
         }
         for entrant, found in zip(entrants, figures, strict=True)

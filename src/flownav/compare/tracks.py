@@ -11,8 +11,9 @@ from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.measurement import Array
 from flownav.navigation.tables import estimate_table
 from flownav.record import QUATERNION, VELOCITY_BODY, Table
-from flownav.replays.judged import columns_of, motion_of
+from flownav.scoring.autopilot import columns_of
 from flownav.scoring.drift import Motion
+from flownav.scoring.path import motion_of
 
 LONGEST_GAP_S = 0.5  # over more, an estimate between two rows is nobody's
 

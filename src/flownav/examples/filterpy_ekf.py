@@ -12,7 +12,7 @@ import numpy as np
 from flownav.errors import InputError
 from flownav.measurement import Array, Sensor
 from flownav.parts.protocols import Estimate, Imu, Innovation, Reading, Told
-from flownav.parts.tools import AttitudeFollower, flow_velocity, matrix
+from flownav.parts.tools import AttitudeFollower, fix_is_overdue, flow_velocity, gps_variance, matrix
 
 ACCEL_NOISE = 0.3  # of the acceleration that moves the filter, tilt errors and all [m/s2/sqrt(Hz)]
 BIAS_WALK = 0.02  # [m/s2/sqrt(s)]
@@ -40,6 +40,7 @@ class FilterPyEkf:
     def predict(self, t_s: float, imu: Imu | None) -> None:
         """x <- F x + B a, P <- F P F' + Q, with the specific force turned into the earth's axes."""
         dt_s, self.t_s = min(t_s - self.t_s, 0.1), t_s
+        self.located = self.located or fix_is_overdue(t_s, self.attitude, self.told)
         accel = self.attitude.predict(dt_s, imu) if imu is not None else np.zeros(3)
         identity, f = np.eye(3), self.filter
         f.F = np.eye(9)
@@ -63,8 +64,7 @@ class FilterPyEkf:
         elif sensor == Sensor.GPS_POSITION:
             if not self.located:
                 self.filter.x[:3, 0], self.located = value, True
-            sigma = np.array([s.gps.gps_slow_sigma_m, s.gps.gps_slow_sigma_m, s.gps.gps_slow_sigma_down_m])
-            return self._scalars(np.eye(3, 9), value, 10.0 * sigma**2)  # ten fixes in a row err alike
+            return self._scalars(np.eye(3, 9), value, gps_variance(s.gps))
         elif sensor == Sensor.GPS_VELOCITY:
             return self._scalars(np.eye(3, 9, 3), value, np.full(3, 0.2**2))
         elif sensor == Sensor.FLOW_RATE and np.isfinite(self.range_m):

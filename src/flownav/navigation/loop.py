@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,6 +42,9 @@ class Running(NamedTuple):
     def clock_s(self) -> float:
         """The instant that it has reached [s]."""
         return float(self.work[CLOCK])
+
+
+Instead = Callable[[Running], int]  # the address of what takes a navigator's readings in its place
 
 
 def start_navigator(

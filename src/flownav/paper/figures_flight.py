@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from flownav.paper.flights import Flights
 from flownav.paper.lift_off import LiftOff
-from flownav.report import figures_filter, figures_states
+from flownav.report import figures_errors, figures_filter, figures_states
 from flownav.report.figures_states import View
 from flownav.report.panels import Panel
 from flownav.report.series import moments
@@ -23,8 +23,8 @@ def panels(flights: Flights) -> list[Panel]:
     what = {"takeoff": "take-off"}.get(name, name)
     position, velocity, zoomed, position_error, velocity_error = FIGURES[flights.table]
     errors = (
-        ("position", position_error, figures_states.position_error(record)),
-        ("velocity", velocity_error, figures_states.velocity_error(record)),
+        ("position", position_error, figures_errors.position_error(record)),
+        ("velocity", velocity_error, figures_errors.velocity_error(record)),
     )
     found = [
         figures_states.position(record, View(f"{name}-position", f"Figure {position}: position, {what}")),
@@ -37,7 +37,7 @@ def panels(flights: Flights) -> list[Panel]:
     ]
     lift_off = next((moment for moment in moments(record) if moment.name == "lift-off"), None)
     if flights.table == 5 and lift_off is not None:
-        transient = figures_states.lift_off_transient(record, lift_off)
+        transient = figures_errors.lift_off_transient(record, lift_off)
         title = "Figure 28: thrust and vertical velocity at lift-off"
         found.append(replace(transient, key="figure-28", title=title, caption=lift_off_caption(flights.lift_off)))
     if flights.table == 6:

@@ -14,7 +14,8 @@ from flownav.optics.render import film
 from flownav.paper import plots
 from flownav.paper.laboratory import Laboratory, reading
 from flownav.paper.published import HEIGHTS_M
-from flownav.report.panels import Panel, Stack
+from flownav.report.chart import Stack
+from flownav.report.panels import Panel
 from flownav.rig.experiment import RigLog
 
 FRAME_RATE_HZ = 250.0
@@ -82,7 +83,7 @@ def rotation() -> list[Panel]:
     ):
         series = flow_of_frames(frames, FRAME_RATE_HZ, rates_rad_s=given, range_m=ROCK_HEIGHT_M, firmware=firmware)
         stack.line(1, role, name, _smoothed(series.time_s), _smoothed(series.velocity_m_s[:, 0]))
-    figure = stack.figure((0.0, ROCK_S))
+    figure = stack.chart((0.0, ROCK_S))
     view = f"A pad of {PAD_M:g} m from {TILT_HEIGHT_M:g} m; {np.degrees(TILT_RAD):.1f}° of roll move the view by "
     view += f"{TILT_HEIGHT_M * np.tan(TILT_RAD):.2f} m."
     flow = f"The camera rocks by ±{np.degrees(ROCK_RAD):.0f}° at {ROCK_HEIGHT_M:g} m and does not move: what is not "
@@ -113,7 +114,7 @@ def light(lights: tuple[RigLog, ...]) -> Panel:
         _beside_encoder(stack, row, log)
     sde = ", ".join(f"{log.settings.light} {_difference(log):.3f} m/s" for log in lights)
     caption = f"0.6 m. Standard deviation of sensor less encoder, delay included: {sde}."
-    return Panel("figure-8", "Figure 8: low and intense light", caption, caption, stack.figure((0.0, 15.0)), wide=True)
+    return Panel("figure-8", "Figure 8: low and intense light", caption, caption, stack.chart((0.0, 15.0)), wide=True)
 
 
 def _difference(log: RigLog) -> float:
@@ -139,7 +140,7 @@ def heights(laboratory: Laboratory) -> list[Panel]:
         )
         caption += "delay included."
         title = f"Figure {number}: sensor and encoder at {height_m:.1f} m"
-        panels.append(Panel(f"figure-{number}", title, caption, caption, stack.figure((0.0, 25.0))))
+        panels.append(Panel(f"figure-{number}", title, caption, caption, stack.chart((0.0, 25.0))))
     return panels
 
 
@@ -160,6 +161,6 @@ def validation(laboratory: Laboratory, height_m: float = 0.6) -> Panel:
         "Figure 15: validation of the seven models at 60 cm",
         caption,
         caption,
-        stack.figure(window),
+        stack.chart(window),
         wide=True,
     )

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flownav.paper.published import HEIGHTS_M
-from flownav.report.panels import drawn
+from flownav.report.samples import drawn
 from flownav.report.style import COLOUR, axis, layout
 
 PAPER, HERE = "gps", "estimate"  # whose figures: the colour of each

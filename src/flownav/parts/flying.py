@@ -13,6 +13,7 @@ from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.take import navigator_unit
 from flownav.navigation.told import carries_lag
 from flownav.parts.calling import Mistakes, name_of
+from flownav.parts.equations import EquationFilter, EquationVehicle
 from flownav.parts.plant import OwnController, OwnVehicle
 from flownav.parts.protocols import Parts, Told
 from flownav.parts.sensing import OwnReadings
@@ -87,25 +88,29 @@ def fly_parts(
         raise InputError(f'{setup.scenario.name}: filter = "paper" takes no parts; fly the "landing" sensors with them')
     parts, mistakes = fresh_parts(parts), Mistakes()
     b = buffers_of(flight, ONE_LANE, flight.plan.epochs, written=written or parts.filter is not None)
-    unit = navigator_unit(ONE_LANE, carries_lag(load_flow_settings(flight.settings)))
+    compiled = navigator_unit(ONE_LANE, carries_lag(load_flow_settings(flight.settings)))
     with announce_compilation("single-flight"):
         instead: int | None = None
         taker: Taker | None = None
-        if parts.filter is not None:
+        if isinstance(parts.filter, EquationFilter):
+            compiled = parts.filter.unit(ONE_LANE)
+            instead = compiled.address
+        elif parts.filter is not None:
             told = Told(fitted.told.settings.settings(fitted.equipment, fitted.told.noise))
             taker = Taker(parts.filter, told, b.nav, b.tape, mistakes)
             instead = taker.address
         if parts.sensors:
             for sensor in parts.sensors:
                 sensor.start(seed, index)
-            then: Callable[..., None] = taker.called.entry if taker else unit
+            then: Callable[..., None] = taker.called.entry if taker else compiled
             readings = OwnReadings(parts.sensors, table, b, then, mistakes)
             instead = readings.address
-        vehicle = OwnVehicle(parts.vehicle, b.work, mistakes) if parts.vehicle else None
+        fast = parts.vehicle.unit if isinstance(parts.vehicle, EquationVehicle) else None
+        vehicle = OwnVehicle(parts.vehicle, b.work, mistakes) if parts.vehicle and fast is None else None
         controller = OwnController(parts.controller, flight, b.work, mistakes) if parts.controller else None
-        if vehicle or controller:
-            addresses = (each.called.address if each else 0 for each in (vehicle, controller))
-            flight = flight._replace(own=OwnParts(*addresses))
+        if vehicle or controller or fast:
+            stepped = fast.address if fast else (vehicle.called.address if vehicle else 0)
+            flight = flight._replace(own=OwnParts(stepped, controller.called.address if controller else 0))
         faults = None if fault is None else [fault]
         fly_into(flight, seed, index, ONE_LANE, b, ensemble, faults=faults, instead=instead)
     mistakes.tell()

@@ -17,6 +17,7 @@ from flownav.errors import InputError
 
 GROUPS = {"filter": "flownav.filters", "sensor": "flownav.sensors", "vehicle": "flownav.vehicles",
           "controller": "flownav.controllers"}  # fmt: skip
+OURS = {"filter": ("landing", "paper")}  # of a scenario's own
 METHODS = {"filter": ("start", "predict", "update", "estimate"), "sensor": ("sensor", "start", "read"),
            "vehicle": ("start", "derivative", "outputs"), "controller": ("start", "command")}  # fmt: skip
 
@@ -45,7 +46,7 @@ def _from_entry_point(kind: str, name: str) -> Any:
     for entry in entry_points(group=GROUPS[kind]):
         if entry.name == name:
             return _loaded(kind, name, entry.load)
-    offered = ", ".join(names(kind)) or "none is installed"
+    offered = ", ".join([*OURS.get(kind, ()), *names(kind)]) or "none is installed"
     raise InputError(f"--{kind} {name}: no such {kind}; by name: {offered}; of a file: path/to/file.py:Class")
 
 

@@ -74,8 +74,7 @@ class OwnController:
 
     def __init__(self, part: Controller, flight: Flight, work: Array, mistakes: Mistakes) -> None:
         self._part, self._flight, self._work, self._calls = part, flight, work, 0
-        gains = flight.gains
-        part.start(Controls(0.0, 0.0, gains.collective_trim_rad, gains.pedal_trim_rad))
+        part.start(flight.gains)
         self.called = Called(f"controller {name_of(part)}", self._steer, "p", mistakes)
 
     def _steer(self, _work: int) -> None:

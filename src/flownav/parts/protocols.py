@@ -12,6 +12,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Reference
 from flownav.measurement import Sensor
 from flownav.navigation.told import NavigatorSettings
@@ -25,10 +26,14 @@ NO_BIAS = (0.0, 0.0, 0.0)
 
 
 class Imu(NamedTuple):
-    """An inertial reading: mean rate [rad/s] and mean specific force [m/s2] since the last one, (3,), body FRD."""
+    """An inertial reading: mean rate [rad/s] and mean specific force [m/s2] since the last one, (3,), body FRD.
+
+    held: between two readings, where the older one serves for the way to another sensor's instant.
+    """
 
     rate_frd_rad_s: Array
     force_frd_m_s2: Array
+    held: bool = False
 
 
 class Reading(NamedTuple):
@@ -93,15 +98,16 @@ class Innovation(NamedTuple):
 class Filter(Protocol):
     """A navigation filter. Readings come in the order of the instants that they describe.
 
-    `predict` is called for every inertial reading and before each other reading whose instant lies ahead; `update` for
-    every other reading that is not withheld. `estimate` is read after each of them.
+    `predict` is called for every inertial reading and before each other reading whose instant lies ahead, so that the
+    times from call to call add up to the flight's; `update` for every other reading that is not withheld. `estimate` is
+    read after each of them.
     """
 
     def start(self, told: Told) -> None:
         """Once, before the first reading."""
 
     def predict(self, t_s: float, imu: Imu | None) -> None:
-        """Bring the filter to an instant; imu: the reading that ends there, None between inertial readings."""
+        """Bring the filter to an instant; imu: the newest inertial reading, None where there was none for 0.1 s."""
 
     def update(self, reading: Reading) -> Iterable[Innovation] | None:
         """Take a reading that describes the instant the filter stands at."""
@@ -192,8 +198,8 @@ class Controller(Protocol):
     When to take off, and that the vehicle has landed, stays with our landing logic, which says it as `flying`.
     """
 
-    def start(self, trim: Controls) -> None:
-        """Before the flight; trim: the controls of hover."""
+    def start(self, gains: AutopilotGains) -> None:
+        """Before the flight; gains: of our own autopilot for this vehicle, the trims of hover among them."""
 
     def command(self, t_s: float, flown: Flown, reference: Reference, *, flying: bool) -> Controls:
         """Controls for the next 4 ms; reference: where the path is now; flying False: on the ground, at idle."""

@@ -25,6 +25,7 @@ from flownav.parts.protocols import Estimate, Filter, Imu, Innovation, Reading, 
 
 STATED = 3
 QUALITY, ARRIVED, WITHHELD = (READING + MAX_VALUES + STATED + i for i in range(3))
+STALE_S = 0.1  # so long an inertial reading serves
 UNIT = 1e-3  # how far a quaternion's length may be from 1
 
 
@@ -35,7 +36,8 @@ class Taker:
         self.part, self.told, self.nav, self.tape = part, told, nav, tape
         self.name = name_of(part)
         self.called = Called(f"filter {self.name}", self._called, UNIT_SIGNATURE, mistakes)
-        self.begun, self.clock_s, self.written_s = False, -math.inf, -math.inf
+        self.begun, self.clock_s, self.written_s, self.imu_s = False, -math.inf, -math.inf, -math.inf
+        self.imu: Imu | None = None
 
     @property
     def address(self) -> int:
@@ -54,9 +56,11 @@ class Taker:
         values = nav[READING : READING + MAX_VALUES]
         arrived = nav[ARRIVED] > 0.0
         inertial = sensor == Sensor.IMU and arrived and bool(np.isfinite(values).all())
+        if inertial:
+            self.imu, self.imu_s = Imu(values[:3].copy(), values[3:].copy(), held=True), t_s
         if t_s > self.clock_s or inertial:
-            imu = Imu(values[:3].copy(), values[3:].copy()) if inertial else None
-            self.part.predict(t_s, imu)
+            imu = self.imu if t_s - self.imu_s <= STALE_S else None
+            self.part.predict(t_s, self.imu._replace(held=False) if inertial and self.imu else imu)
             self.clock_s = t_s
         if sensor != Sensor.IMU and arrived and nav[WITHHELD] == 0.0:
             width = MAX_VALUES if sensor == Sensor.FLOW_RATE else len(COLUMNS[sensor])
@@ -64,12 +68,15 @@ class Taker:
             news = self.part.update(Reading(t_s, sensor, values[:width].copy(), variance, float(nav[QUALITY])))
             self._offer(t_s, sensor, news or ())
         nav[CLOCK] = t_s
-        said = self.part.estimate()
+        said, due = self.part.estimate(), t_s - self.written_s >= ESTIMATE_PERIOD_S
+        self.written_s = t_s if due else self.written_s
         if said is not None:
-            self._say(t_s, said)
+            numbers = self._say(said)
+            if due:
+                self._write(t_s, numbers)
 
-    def _say(self, t_s: float, said: Estimate) -> None:
-        """The estimate into the rows that the simulator reads, and every 20 ms onto the tape."""
+    def _say(self, said: Estimate) -> dict[str, Array]:
+        """The estimate into the rows that the simulator reads; as arrays."""
         nav, numbers = self.nav, checked(self.name, said)
         for row, key in (
             (STATE + POSITION, "pos_ned_m"), (STATE + VELOCITY, "vel_ned_m_s"), (QUATERNION, "quaternion"),
@@ -84,11 +91,10 @@ class Taker:
             nav[STATE + GROUND], nav[GROUND_SEEN] = said.ground_d_m, 1.0
         if said.pad_ned_m is not None:
             nav[STATE + PAD : STATE + PAD + 3], nav[PAD_KNOWN] = tuple(said.pad_ned_m), SEEN
-        if t_s - self.written_s >= ESTIMATE_PERIOD_S:
-            self.written_s = t_s
-            self._write(t_s, numbers)
+        return numbers
 
     def _write(self, t_s: float, numbers: dict[str, Array]) -> None:
+        """The estimate onto the tape, as ours is every 20 ms."""
         used, room = self.tape.used, len(self.tape.estimate)
         if used[ESTIMATES] >= room:
             return

@@ -11,9 +11,11 @@ import numpy as np
 
 from flownav.frames import GRAVITY_M_S2, rotation_from_quaternion
 from flownav.measurement import Array
-from flownav.navigation.told import FlowSettings
+from flownav.navigation.told import FlowSettings, GpsSettings, NavigatorSettings
 from flownav.parts.protocols import Imu, Reading
 
+LEAST_GPS_M = 0.3
+LONGEST_WAIT_S = 10.0  # for a fix, where the log has GPS that finds none
 GRAVITY_NED = np.array([0.0, 0.0, GRAVITY_M_S2])
 
 
@@ -73,7 +75,7 @@ class AttitudeFollower:
     def __init__(self, tilt_s: float = 5.0, heading_s: float = 5.0) -> None:
         self.tilt_s, self.heading_s = tilt_s, heading_s
         self.quaternion, self.rate_rad_s = np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(3)
-        self.started, self._field_s = False, -math.inf
+        self.started, self.since_s, self._field_s = False, math.nan, -math.inf
 
     def predict(self, dt_s: float, imu: Imu) -> Array:
         """Turn on by an inertial reading over dt; the acceleration NED (3,) that it implies [m/s2]."""
@@ -91,3 +93,23 @@ class AttitudeFollower:
         self._field_s = reading.t_s
         off = share * heading_off(self.quaternion, reading.value, declination_rad)
         self.quaternion = turned(self.quaternion, matrix(self.quaternion).T @ np.array([0.0, 0.0, off]))
+
+
+def gps_variance(s: GpsSettings, alike: float = 10.0) -> Array:
+    """Variances NED (3,) [m2] for a filter that takes GPS fixes for white, of a receiver whose errors last.
+
+    So many fixes in a row are `alike`: each counts for one of them. The white part is no smaller than 0.3 m.
+    """
+    level = s.gps_slow_sigma_m**2 + s.gps_fast_sigma_m**2
+    down = s.gps_slow_sigma_down_m**2 + s.gps_fast_sigma_down_m**2
+    white = np.array([s.gps_white_sigma_m, s.gps_white_sigma_m, s.gps_white_sigma_down_m])
+    return np.asarray(np.fmax(white, LEAST_GPS_M) ** 2 + alike * np.array([level, level, down]))
+
+
+def fix_is_overdue(t_s: float, attitude: AttitudeFollower, s: NavigatorSettings) -> bool:
+    """Whether a filter that has had no fix for as long as ours would wait may begin at the local origin."""
+    if not attitude.started:
+        return False
+    if not math.isfinite(attitude.since_s):
+        attitude.since_s = t_s
+    return t_s - attitude.since_s >= min(s.equipment.deadline_s, LONGEST_WAIT_S)

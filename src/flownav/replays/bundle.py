@@ -12,8 +12,9 @@ from flownav.estimation.gating import Reason
 from flownav.frames import rotation_from_quaternion
 from flownav.logs.rates import attitude_at
 from flownav.measurement import COLUMNS, Array, Sensor, Stream
+from flownav.navigation.flags import flagged, flags_of
 from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
-from flownav.record import POSITION_NED, VELOCITY_BODY, Record
+from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.replays.autopilot import autopilot_path
 from flownav.replays.session import Replay
 from flownav.scoring.alignment import velocity_of
@@ -46,6 +47,10 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str] | str) 
             record.add(sensor.name.lower(), {"t_s": stream.t_s, **columns, "quality": stream.quality})
     if replay.truth_alignment is not None:
         record.add("truth", _truth(replay))
+    for name, table in _references(replay).items():
+        record.add(name, table)
+    warned = flagged(estimate[:, 0], flags_of(replay.written.event))
+    record.add("judging", {"t_s": estimate[:, 0], "flagged": warned.astype(float)})
     own = autopilot_path(replay.log, replay.options.gps_delay_s, estimate[:, 0], estimate[:, 1:4])
     if own is not None:
         record.add("autopilot", own)
@@ -95,8 +100,21 @@ def _manifest(replay: Replay, scores: dict[str, Any], command: list[str] | str) 
             for found in replay.findings
         ],
         "notes": list(replay.prepared.notes),
+        "judging": {"flight_s": None if replay.references.flight_s is None else list(replay.references.flight_s)},
         "scores": scores,
     }
+
+
+def _references(replay: Replay) -> dict[str, dict[str, Array]]:
+    """The log's truth as it stands there, so that another estimate can be scored against it from the record alone."""
+    truth, heading = replay.log.truth, replay.log.heading_truth
+    if truth is None:
+        return {}
+    kept = {name: np.asarray(truth[name], float) for name in ("t_s", *POSITION_NED, *QUATERNION) if name in truth}
+    if heading is None:
+        return {"reference": kept}
+    turned = {name: np.asarray(heading[name], float) for name in ("t_s", "yaw_rad")}
+    return {"reference": kept, "reference_heading": turned}
 
 
 def _truth(replay: Replay) -> dict[str, Array]:

@@ -10,7 +10,7 @@ import numpy as np
 from flownav.errors import InputError
 from flownav.logs.log import Log
 from flownav.measurement import EventQueue, Sensor
-from flownav.navigation.loop import run, start_navigator
+from flownav.navigation.loop import Instead, run, start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tables import Written, written_on
 from flownav.navigation.tape import tape_for
@@ -51,8 +51,9 @@ def prepared_as_fed(log: Log) -> Prepared:
 
 
 def run_as_fed(
-    log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, withhold: Callable[[EventQueue], EventQueue]
-) -> Written:
+    log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, withhold: Callable[[EventQueue], EventQueue],
+    instead: Instead | None = None,
+) -> Written:  # fmt: skip
     """Each navigator of the session again; what they wrote, one after the other."""
     parts = []
     for segment in log.fed:
@@ -61,6 +62,6 @@ def run_as_fed(
             readings = {sensor: int(np.count_nonzero(queue.sensor == sensor)) for sensor in Sensor}
             tape = tape_for(readings, float(np.ptp(queue.t_s)))
             running = start_navigator(Equipment(**segment.equipment), settings, tape, options.flow_noise)
-            run(queue, running)
+            run(queue, running, instead=None if instead is None else instead(running))
             parts.append(written_on(running.tape))
     return Written(*(np.concatenate(rows) for rows in zip(*parts, strict=True)))

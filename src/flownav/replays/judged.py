@@ -10,17 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.estimation.gating import Reason
-from flownav.frames import heading_from_quaternion
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.flags import flagged, flags_of
 from flownav.navigation.tables import Written, estimate_table
 from flownav.navigation.tape import LEVELS_AT
-from flownav.record import POSITION_NED, QUATERNION, Table
 from flownav.replays.airborne import airborne_of
 from flownav.scoring.consistency import consistency_of
 from flownav.scoring.coverage import coverage_of
-from flownav.scoring.drift import Motion, drift_of, end_drift
+from flownav.scoring.drift import drift_of
+from flownav.scoring.path import motion_of, truth_motion
 from flownav.scoring.protection import protection_of
 
 NO_REJECTION = (Reason.FUSED, Reason.DATUM)
@@ -104,34 +103,3 @@ def protection_scores(log: Log, written: Written) -> dict[str, Any] | None:
         else drift_of(motion_of(estimate_table(rows)), truth_motion(log.truth, log.heading_truth), airborne_of(log))
     )
     return protection_of(rows[:, 0], rows[:, LEVELS_AT:], flagged(rows[:, 0], flags_of(written.event)), drift)
-
-
-def end_drift_of(log: Log, estimate: Motion) -> float | None:
-    """Where an estimate of this log's flight ended, off the log's truth [m]; None without one."""
-    if log.truth is None:
-        return None
-    return end_drift(estimate, truth_motion(log.truth, log.heading_truth), airborne_of(log))
-
-
-def truth_motion(truth: Table, heading: Table | None) -> Motion:
-    """A truth with its headings: those measured apart, else those of its attitude, else none."""
-    t_s, position = np.asarray(truth["t_s"], float), columns_of(truth, POSITION_NED)
-    if heading is not None:
-        return Motion(t_s, position, np.asarray(heading["t_s"], float), np.asarray(heading["yaw_rad"], float))
-    return motion_of(truth)
-
-
-def motion_of(table: Table) -> Motion:
-    """The path in a table of a record, with the headings of its attitude where it has one."""
-    t_s, position = np.asarray(table["t_s"], float), columns_of(table, POSITION_NED)
-    if not set(QUATERNION) <= table.keys():
-        return Motion(t_s, position, np.zeros(0), np.zeros(0))
-    w, x, y, z = columns_of(table, QUATERNION).T
-    heading = np.asarray(heading_from_quaternion(w, x, y, z))
-    known = np.isfinite(heading)
-    return Motion(t_s, position, t_s[known], heading[known])
-
-
-def columns_of(table: Table, names: tuple[str, ...]) -> Array:
-    """Columns of a table side by side, (n, len(names))."""
-    return np.column_stack([np.asarray(table[name], float) for name in names])

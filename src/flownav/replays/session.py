@@ -17,19 +17,19 @@ from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.feed import SLOWEST_IMU_HZ, equipment_of
-from flownav.navigation.loop import run, start_navigator
+from flownav.navigation.loop import Instead, run, start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import smooth
 from flownav.navigation.tables import Written, estimate_table, written_on
 from flownav.navigation.tape import new_tape, tape_for
+from flownav.record import POSITION_NED, Table
+from flownav.replays.airborne import airborne_of
 from flownav.replays.autopilot import autopilot_scores
 from flownav.replays.fed import prepared_as_fed, run_as_fed
 from flownav.replays.judged import (
     NO_REJECTION,
     consistency_scores,
     coverage_scores,
-    end_drift_of,
-    motion_of,
     protection_scores,
     reading_scores,
     told,
@@ -37,9 +37,21 @@ from flownav.replays.judged import (
 from flownav.replays.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replays.sentinel import Finding, findings
 from flownav.replays.unfused import unfused
-from flownav.scoring.alignment import Alignment, align, velocity_of
+from flownav.scoring.alignment import Alignment
+from flownav.scoring.autopilot import columns_of
 from flownav.scoring.coverage import silences
-from flownav.scoring.outage import OutageError, difference_at, horizontal_rms, outage_error
+from flownav.scoring.outage import OutageError
+from flownav.scoring.path import (
+    References,
+    end_drift_of,
+    motion_of,
+    outage_of,
+    path_of,
+    path_scores,
+    truth_alignment,
+    truth_scores,
+    velocity_rms,
+)
 
 HORIZONTAL = (*GPS, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 LONGEST_TABLE = 2000
@@ -81,40 +93,32 @@ class Replay:
         return found + [Finding(text) for text in silences(self.log.streams, self.log.span_s)]
 
     @cached_property
+    def table(self) -> Table:
+        """The estimate as a record has it."""
+        return estimate_table(self.estimate)
+
+    @cached_property
+    def references(self) -> References:
+        """What the log knows that the path is scored against."""
+        return references_of(self.log, self.options)
+
+    @cached_property
     def truth_alignment(self) -> Alignment | None:
         """How the log's truth lies in the estimate's frame; None without a truth that overlaps."""
-        if self.log.truth is None:
-            return None
-        t_s, position = self.log.truth["t_s"], self.truth_position
-        covered = (t_s >= self.estimate[0, 0]) & (t_s <= self.estimate[-1, 0])
-        if np.count_nonzero(covered) < 2:
-            return None
-        return align(position[covered] + difference_at(*self._position, t_s, position), position[covered])
+        return truth_alignment(path_of(self.table), self.log.truth)
 
     @cached_property
     def truth_position(self) -> Array:
         """The log's truth (n, 3) in its own frame."""
-        truth = self.log.truth or {}
-        return np.column_stack([truth[name] for name in ("pos_n_m", "pos_e_m", "pos_d_m")])
-
-    @property
-    def _position(self) -> tuple[Array, Array]:
-        return self.estimate[:, 0], self.estimate[:, 1:4]
+        return columns_of(self.log.truth or {}, POSITION_NED)
 
     def outage(self, t0: float, t1: float) -> OutageError:
         """The outage error over a window."""
-        gps = self.log.streams[Sensor.GPS_POSITION]
-        delay_s = self.options.gps_delay_s
-        return outage_error(self.estimate[:, 0], self.estimate[:, 1:3], gps.t_s, gps.value[:, :2], delay_s, t0, t1)
+        return outage_of(path_of(self.table), self.references, t0, t1)
 
     def velocity_rms(self) -> float | None:
         """Horizontal velocity against GPS velocity at the instant it describes [m/s]; None without GPS."""
-        gps = self.log.streams.get(Sensor.GPS_VELOCITY)
-        if gps is None:
-            return None
-        known = np.isfinite(gps.value[:, :2]).all(axis=1)
-        t_s = gps.t_s[known] - self.options.gps_delay_s
-        return _number(horizontal_rms(self.estimate[:, 0], self.estimate[:, 17:19], t_s, gps.value[known, :2]))
+        return velocity_rms(path_of(self.table), self.references)
 
     def rejected(self) -> dict[str, dict[str, int]]:
         """What was not fused, by sensor and reason: rows by the reader, components by the filter, added up."""
@@ -130,25 +134,11 @@ class Replay:
 
     def truth_scores(self) -> dict[str, Any] | None:
         """Errors against the log's truth, turned and shifted onto the estimate; None without one."""
-        placed = self.truth_alignment
-        if placed is None or self.log.truth is None:
-            return None
-        t_s, position = self.log.truth["t_s"], self.truth_position
-        error = difference_at(*self._position, t_s, placed.moved(position))
-        velocity = placed.turned(velocity_of(t_s, position))
-        squares = np.sum(error[:, :2] ** 2, axis=1)
-        return {
-            "reference": self.log.truth_name,
-            "yaw_rad": placed.yaw_rad if placed.yaw_shown else None,
-            "horizontal_rms_m": float(np.sqrt(squares.mean())),
-            "horizontal_max_m": float(np.sqrt(squares.max())),
-            "vertical_rms_m": float(np.sqrt(np.mean(error[:, 2] ** 2))),
-            "velocity_rms_m_s": horizontal_rms(self.estimate[:, 0], self.estimate[:, 17:19], t_s, velocity[:, :2]),
-        }
+        return truth_scores(path_of(self.table), self.references)
 
     def end_drift(self) -> float | None:
         """Horizontal error at the end of the flight, the truth laid on the estimate at take-off [m]; None without."""
-        return end_drift_of(self.log, motion_of(estimate_table(self.estimate)))
+        return end_drift_of(motion_of(self.table), self.references)
 
     def scores(self) -> dict[str, Any]:
         """What `--json` prints, but for the outage table and the record's path."""
@@ -172,30 +162,45 @@ class Replay:
 
     def path_scores(self) -> dict[str, Any]:
         """Errors of the path: through each outage, of velocity against GPS, against the truth where there is one."""
-        truth = self.truth_scores()
-        return {
-            "outages": [outage_entry(self.outage(t0, t1)) for t0, t1 in self.options.gps_outages_s],
-            "velocity_rms_m_s": self.velocity_rms(),
-            **({} if truth is None else {"truth": truth}),
-        }
+        return path_scores(self.table, self.references)
 
     def smoothed_scores(self) -> dict[str, Any] | None:
         """The same of the smoothed path; None without one."""
-        if self.smoothed is None:
-            return None
-        return replace(self, written=self.written._replace(estimate=self.smoothed), smoothed=None).path_scores()
+        return None if self.smoothed is None else path_scores(estimate_table(self.smoothed), self.references)
 
 
-def replay(log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, *, smoothed: bool = False) -> Replay:
+def references_of(log: Log, options: ReplayOptions) -> References:
+    """What a log knows of its flight: its GPS, withheld or not, and its truth."""
+    fixes, speeds = (log.streams.get(sensor) for sensor in GPS)
+    return References(
+        fixes=None if fixes is None else (fixes.t_s, fixes.value),
+        speeds=None if speeds is None else (speeds.t_s, speeds.value),
+        gps_delay_s=options.gps_delay_s,
+        outages_s=options.gps_outages_s,
+        truth=log.truth,
+        truth_name=log.truth_name,
+        heading=log.heading_truth,
+        flight_s=airborne_of(log),
+    )
+
+
+def replay(
+    log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, *, smoothed: bool = False,
+    instead: Instead | None = None,
+) -> Replay:  # fmt: skip
     """Run a log through the filter, and back through it for a smoothed path.
 
-    InputError where an option cannot be, the filter never starts, or a live session's record is to be smoothed.
+    instead: gives the address of what takes the readings of a navigator in its place (room parts/).
+    InputError where an option cannot be, the filter never starts, or a live session's record, or another filter's
+    path, is to be smoothed.
     """
     if smoothed and log.fed:
         raise InputError(f"{log.path}: --smooth takes a log; a live session's record is replayed as it was fed")
+    if smoothed and instead is not None:
+        raise InputError(f"{log.path}: --smooth smooths our own filter's path; leave it out with another filter")
     with announce_compilation("replay"):
         prepared = prepared_as_fed(log) if log.fed else prepare(log, options)
-        return _run(log, options, settings, prepared, smoothed=smoothed)
+        return _run(log, options, settings, prepared, smoothed=smoothed, instead=instead)
 
 
 def replay_again(flown: Replay, options: ReplayOptions, settings: NavigatorSettingsFile) -> Replay:
@@ -249,11 +254,6 @@ def table_windows(
     return whole if t1 - whole[-1][1] < LEAST_WINDOW_S else [*whole, (whole[-1][1], t1)]
 
 
-def outage_entry(error: OutageError) -> dict[str, float | None]:
-    """An outage as JSON has it; null where the window could not be scored."""
-    return {name: _number(value) for name, value in error._asdict().items()}
-
-
 def outage_summary(errors: list[OutageError]) -> dict[str, float | None]:
     """Median and worst rms of the windows that could be scored; null without any."""
     rms = np.array([error.horizontal_rms_m for error in errors])
@@ -263,23 +263,21 @@ def outage_summary(errors: list[OutageError]) -> dict[str, float | None]:
     return {"outage_median_rms_m": float(np.median(rms)), "outage_worst_rms_m": float(rms.max())}
 
 
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
-
-
 def _run(
-    log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, prepared: Prepared, *, smoothed: bool = False
-) -> Replay:
+    log: Log, options: ReplayOptions, settings: NavigatorSettingsFile, prepared: Prepared, *, smoothed: bool = False,
+    instead: Instead | None = None,
+) -> Replay:  # fmt: skip
     path = None
     if log.fed:
-        written = run_as_fed(log, options, settings, lambda queue: withhold(log, queue, options))
+        written = run_as_fed(log, options, settings, lambda queue: withhold(log, queue, options), instead)
     else:
         first_s, last_s = prepared.span_s
         equipment = equipment_of(prepared.streams, first_s, prepared.flow_gyro_is_imu, settings, log.origin_deg_m)
         tape = tape_for({sensor: len(stream) for sensor, stream in prepared.streams.items()}, last_s - first_s)
         running = start_navigator(equipment, settings, tape, options.flow_noise)
+        address = None if instead is None else instead(running)
         for part in prepared.parts():
-            run(withhold(log, part, options), running)
+            run(withhold(log, part, options), running, instead=address)
         if smoothed:
             queue = withhold(log, prepared.queue, options)
             path = smooth(queue, start_navigator(equipment, settings, new_tape(queue), options.flow_noise))

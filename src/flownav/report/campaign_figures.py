@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.report.panels import Panel, drawn
+from flownav.report.panels import Panel
+from flownav.report.samples import drawn
 from flownav.report.style import COLOUR, axis, layout
 
 Array = NDArray[np.float64]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Any
@@ -16,6 +16,7 @@ from flownav.measurement import Sensor
 from flownav.record import Record
 from flownav.report.figure_words import NONE, Tile, metres, number
 from flownav.report.landing import landing_sentences, landing_tiles
+from flownav.report.phase_rows import phases_within
 from flownav.report.series import (
     event_rows,
     flow_readings,
@@ -29,6 +30,7 @@ from flownav.report.series import (
     start_end_s,
     truth_name,
 )
+from flownav.scoring.phases import Phase, phase_at
 
 EVENTS_LISTED = 300
 UNIT_AFTER_NUMBER = re.compile(r"(\d) (m/s|m|s)\b")
@@ -69,6 +71,7 @@ def summary(record: Record) -> str:
     """The verdict in sentences."""
     manifest, scores = record.manifest, mapping(record.manifest.get("scores"))
     said = [KINDS.get(str(manifest.get("kind")), "A flight of {}.").format(f"{duration_s(record):.1f} s")]
+    said += landing_sentences(mapping(scores.get("touchdown")))
     largest = scores.get("max_position_error_m")
     if largest is not None:
         published = mapping(manifest.get("paper")).get("max_position_error_m")
@@ -78,7 +81,6 @@ def summary(record: Record) -> str:
         said.append(f"{ever} off by more than {metres(largest)} m{beside}.")
     if manifest.get("known_exactly"):
         said.append(f"What the vehicle knew exactly: {manifest['known_exactly']}.")
-    said += landing_sentences(mapping(scores.get("touchdown")))
     cut = scored_outages(record)
     if cut:
         worst = max(cut, key=rms_m)
@@ -118,13 +120,12 @@ def _reference(record: Record) -> str:
 def tiles(record: Record) -> list[Tile]:
     """The headline figures that the record's scores and streams give."""
     scores, paper = mapping(record.manifest.get("scores")), mapping(record.manifest.get("paper"))
-    found = []
+    found = landing_tiles(mapping(scores.get("touchdown")))
     if scores.get("max_position_error_m") is not None:
         published = paper.get("max_position_error_m")
         against = "what was flown on" if has(record, "flown") else f"estimate against {truth_name(record)}"
         note = f"paper {metres(published)} m" if published is not None else against
         found.append(Tile("Largest error of one axis", metres(scores["max_position_error_m"]), "m", note))
-    found += landing_tiles(mapping(scores.get("touchdown")))
     cut = scored_outages(record)
     if cut:
         worst = max(cut, key=rms_m)
@@ -207,38 +208,53 @@ def score_rows(record: Record) -> list[ScoreRow]:
     return rows
 
 
-def outage_rows(record: Record) -> list[tuple[str, str, str, str]]:
-    """Scored GPS outages as (window, rms, max, where GPS was cut); the median and the worst last, where scored."""
+def outage_rows(record: Record, phases: Sequence[Phase] = ()) -> list[tuple[str, str, str, str, str]]:
+    """Scored GPS outages as (window, phases, rms, max, where GPS was cut); the median and the worst last, if scored."""
     scores, here = mapping(record.manifest.get("scores")), outages(record)
     rows = []
     for outage in scored_outages(record):
         window = (float(outage["t0"]), float(outage["t1"]))
         figures = number(outage.get("horizontal_rms_m"), 2), number(outage.get("horizontal_max_m"), 2)
         place = "this record" if window in here else "a replay of its own"
-        rows.append((f"{window[0]:g} to {window[1]:g} s", *figures, place))
+        rows.append((f"{window[0]:g} to {window[1]:g} s", phases_within(phases, *window), *figures, place))
     for name, key in (("median", "outage_median_rms_m"), ("worst", "outage_worst_rms_m")):
         if scores.get(key) is not None:
-            rows.append((name, number(scores[key], 2), "", ""))
+            rows.append((name, "", number(scores[key], 2), "", ""))
     return rows
+
+
+@dataclass(frozen=True)
+class Event:
+    """An event as the page lists it."""
+
+    t_s: float
+    cells: tuple[str, str, str, str]  # source, kind, detail, value
+    phase: str
 
 
 @dataclass(frozen=True)
 class EventTables:
     """Events counted by what they are, and one by one up to a limit."""
 
-    counted: list[tuple[str, str, int, str, str]]  # source, kind, count, first, last
-    listed: list[tuple[str, str, str, str, str]]  # t_s, source, kind, detail, value
+    counted: list[tuple[str, str, int, str, str, str]]  # source, kind, count, first, last, phases
+    listed: list[Event]
     total: int
 
 
-def events(record: Record) -> EventTables:
+def events(record: Record, phases: Sequence[Phase] = ()) -> EventTables:
     """The events table, counted and listed."""
     rows = event_rows(record)
     groups: dict[tuple[str, str], list[float]] = {}
     for t_s, source, kind, _, _ in rows:
         groups.setdefault((source, kind), []).append(t_s)
-    counted = [(*what, len(times), f"{min(times):.2f}", f"{max(times):.2f}") for what, times in groups.items()]
-    listed = [(f"{t_s:.2f}", source, kind, detail, value) for t_s, source, kind, detail, value in rows[:EVENTS_LISTED]]
+    where = list(phases)
+    counted = [
+        (source, kind, len(times), f"{min(times):.2f}", f"{max(times):.2f}",
+         ", ".join(dict.fromkeys(name for t_s in times if (name := phase_at(where, t_s)))))
+        for (source, kind), times in groups.items()
+    ]  # fmt: skip
+    listed = [Event(t_s, (source, kind, detail, value), phase_at(where, t_s))
+              for t_s, source, kind, detail, value in rows[:EVENTS_LISTED]]  # fmt: skip
     return EventTables(counted, listed, len(rows))
 
 

@@ -10,6 +10,15 @@ NONE, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
 
 
 @dataclass(frozen=True)
+class Part:
+    """What a large figure is made of: its name, its value as text, its length as a share of the longest part."""
+
+    name: str
+    value: str
+    share: float
+
+
+@dataclass(frozen=True)
 class Tile:
     """A large figure of the headline."""
 
@@ -17,13 +26,14 @@ class Tile:
     value: str
     unit: str = ""
     note: str = ""
+    parts: tuple[Part, ...] = ()
 
 
 def number(value: Any, digits: int = 4) -> str:
     """A number with a true minus sign and fixed decimals; a dash where there is none."""
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         return NONE
-    return f"{value:.{digits}f}".replace("-", MINUS)
+    return f"{value:z.{digits}f}".replace("-", MINUS)
 
 
 def metres(value: Any) -> str:

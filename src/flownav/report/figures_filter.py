@@ -1,58 +1,24 @@
-"""How good the filter says it is: radius of uncertainty (figure 31), innovations, error against GPS."""
+"""How good the filter says it is: radius of uncertainty (figure 31), normalised error, normalised innovations."""
 
 from __future__ import annotations
-
-from html import escape
 
 import numpy as np
 
 from flownav.measurement import COLUMNS, Sensor
 from flownav.record import POSITION_NED, Record
-from flownav.report.panels import Panel, Stack
-from flownav.report.series import (
-    Array,
-    Track,
-    delay_s,
-    difference,
-    moments,
-    outages,
-    readings,
-    sliding_rms,
-    start_end_s,
-    track,
-)
+from flownav.report.chart import Stack
+from flownav.report.figure_words import number
+from flownav.report.figures_innovation import SENSOR_TITLES, innovation_table
+from flownav.report.panels import Panel
+from flownav.report.samples import sliding_mean, sliding_rms
+from flownav.report.series import Array, Track, difference, mapping, moments, outages, readings, start_end_s, track
+from flownav.scoring.consistency import MODEST, SCORED, chi_square_band, consistency_of, verdict
 
 STD_POSITION = tuple(f"std_{name}" for name in POSITION_NED)
 RADIUS_WINDOW_S = 5.0
-INNOVATION_NUMBERS = ("t_s", "observation_variance", "innovation", "innovation_variance", "test_ratio", "fused")
+NIS_WINDOW_S = 5.0
 SMALLEST_NEES = 0.01  # values below are not drawn: the axis is logarithmic
-SMALLEST_RATIO = 0.01  # test ratios below are not drawn: the axis is logarithmic
-AXIS_TITLES = {
-    "pos_n_m": "x, north (m)",
-    "pos_e_m": "y, east (m)",
-    "pos_d_m": "z, down (m)",
-    "vel_n_m_s": "north (m/s)",
-    "vel_e_m_s": "east (m/s)",
-    "vel_d_m_s": "down (m/s)",
-    "vel_u_m_s": "u (m/s)",
-    "vel_v_m_s": "v (m/s)",
-    "vel_w_m_s": "w (m/s)",
-}
-SENSOR_TITLES = {
-    "gps_position": "GPS position",
-    "gps_velocity": "GPS velocity",
-    "flow_rate": "Flow",
-    "flow_velocity": "Flow velocity",
-    "range": "Rangefinder",
-    "imu": "IMU",
-    "attitude": "Attitude",
-    "baro": "Barometer",
-    "mag": "Magnetometer",
-    "pose": "External position",
-    "yaw": "External heading",
-    "pad": "Pad fix",
-    "landed": "Skid switch (at rest)",
-}
+SMALLEST_NIS = 0.01
 
 
 def radius_of_uncertainty(record: Record) -> Panel:
@@ -84,7 +50,7 @@ def radius_of_uncertainty(record: Record) -> Panel:
                 stack.line(row, role, name, radius.t_s, radius.value[:, 0])
                 medians.setdefault(name, float(np.median(radius.value)))
     stack.from_zero()
-    figure = stack.figure(start_end_s(record), moments(record), outages(record))
+    figure = stack.chart(start_end_s(record), moments(record), outages(record))
     caption = (
         f"Three times the root-mean-square error over a sliding {RADIUS_WINDOW_S:.0f} s. "
         if truth is not None
@@ -106,7 +72,7 @@ def _radius(error: Track, axes: int) -> Track:
 
 
 def _gps_stated(record: Record, axes: int) -> Track | None:
-    rows = _innovations(record).get("gps_position", {})
+    rows = innovation_table(record).get("gps_position", {})
     wanted = [rows[name] for name in COLUMNS[Sensor.GPS_POSITION][:axes] if name in rows]
     if len(wanted) < axes or len({len(part["t_s"]) for part in wanted}) != 1 or "observation_variance" not in wanted[0]:
         return None
@@ -114,108 +80,16 @@ def _gps_stated(record: Record, axes: int) -> Track | None:
     return Track(wanted[0]["t_s"], 3.0 * np.sqrt(np.asarray(variance, float))[:, None])
 
 
-def innovations(record: Record) -> list[Panel]:
-    """A panel for each sensor offered to the filter: innovations in their 3-sigma band, test ratio and gate."""
-    sensors = _innovations(record)
-    if not sensors:
-        return [Panel("innovations", "Innovations", absent="The record holds no innovations.")]
-    return [_innovation_panel(record, name, components) for name, components in sensors.items()]
-
-
-def _innovations(record: Record) -> dict[str, dict[str, dict[str, Array]]]:
-    """The innovation table as sensor name -> component name -> columns."""
-    table = record.tables.get("innovation", {})
-    if not len(table.get("t_s", ())) or "innovation" not in table or "sensor" not in table:
-        return {}
-    count = len(table["t_s"])
-    sensor_of, component_of = np.asarray(table["sensor"]), np.asarray(table.get("component", np.zeros(count)))
-    numeric = [name for name in INNOVATION_NUMBERS if name in table]
-    found: dict[str, dict[str, dict[str, Array]]] = {}
-    for sensor in dict.fromkeys(sensor_of.tolist()):
-        rows = np.flatnonzero(sensor_of == sensor)
-        name = _sensor_name(sensor)
-        components = component_of[rows]
-        for component in dict.fromkeys(components.tolist()):
-            mine = rows[components == component]
-            part = {column: np.asarray(table[column][mine], float) for column in numeric}
-            found.setdefault(name, {})[_component_name(name, component)] = part
-    return found
-
-
-def _sensor_name(value: object) -> str:
-    return Sensor(int(value)).name.lower() if isinstance(value, (int, float)) else str(value).lower()
-
-
-def _component_name(sensor: str, value: object) -> str:
-    names = COLUMNS[Sensor[sensor.upper()]] if sensor.upper() in Sensor.__members__ else ()
-    if isinstance(value, (int, float)) and 0 <= int(value) < len(names):
-        return names[int(value)]
-    return str(value)
-
-
-def axis_title(name: str) -> str:
-    """A column name as an axis has it: "pos_n_m" is "x, north (m)", "gyro_x_rad_s" is "gyro x (rad/s)"."""
-    if name in AXIS_TITLES:
-        return AXIS_TITLES[name]
-    for suffix, unit in (("_rad_s", "rad/s"), ("_m_s2", "m/s²"), ("_m_s", "m/s"), ("_gauss", "gauss"), ("_m", "m")):
-        if name.endswith(suffix):
-            return f"{name.removesuffix(suffix).replace('_', ' ')} ({unit})"
-    return name.replace("_", " ")
-
-
-def _innovation_panel(record: Record, sensor: str, components: dict[str, dict[str, Array]]) -> Panel:
-    title = f"Innovations: {SENSOR_TITLES.get(sensor, sensor.replace('_', ' '))}"
-    ratios = [part["test_ratio"] for part in components.values() if "test_ratio" in part]
-    tested = any(np.any(ratio >= SMALLEST_RATIO) for ratio in ratios)
-    stack = Stack([escape(axis_title(name)) for name in components] + ["test ratio"] * tested, row_height_px=118)
-    colour = "flow" if sensor.startswith("flow") else "gps" if sensor.startswith("gps") else "estimate"
-    gate_row, offered, refused = len(components) + 1, 0, 0
-    for row, part in enumerate(components.values(), 1):
-        t_s = part["t_s"]
-        fused = part.get("fused", np.ones(len(t_s))) > 0.5
-        offered, refused = offered + len(t_s), refused + int((~fused).sum())
-        if "innovation_variance" in part:
-            expected = 3.0 * np.sqrt(np.maximum(part["innovation_variance"], 0.0))
-            stack.band(row, "±3\N{GREEK SMALL LETTER SIGMA} expected", t_s, expected)
-            stack.within(row, _reach(part["innovation"], expected))
-        stack.dots(row, colour, "fused", t_s[fused], part["innovation"][fused])
-        stack.crosses(row, "alert", "not fused", t_s[~fused], part["innovation"][~fused])
-        if tested and "test_ratio" in part:
-            ratio = np.where(part["test_ratio"] < SMALLEST_RATIO, np.nan, part["test_ratio"])
-            stack.dots(gate_row, colour, "fused", t_s[fused], ratio[fused])
-            stack.crosses(gate_row, "alert", "not fused", t_s[~fused], ratio[~fused])
-    span = start_end_s(record)
-    if tested:
-        stack.line(gate_row, "gate", "gate", np.array(span), np.ones(2))
-        stack.log_axis(gate_row)
-    figure = stack.figure(span, moments(record), outages(record))
-    caption = f"{offered} values offered, {refused} not fused."
-    if tested:
-        caption += f" A test ratio above 1 is outside the gate; those below {SMALLEST_RATIO} are not drawn."
-    elif ratios:
-        caption += f" All test ratios are below {SMALLEST_RATIO}, and so inside the gate."
-    return Panel(f"innovation-{sensor}", title, caption, f"{title}: {caption}", figure)
-
-
-def _reach(innovation: Array, expected: Array) -> float:
-    """Half the height of an axis that shows every innovation, and the band but for its rare spikes."""
-    known = expected[np.isfinite(expected)]
-    shown = [np.abs(innovation[np.isfinite(innovation)]), np.quantile(known, [0.98]) if len(known) else known]
-    return 1.1 * float(np.max(np.concatenate(shown), initial=1e-6))
-
-
 def consistency(record: Record) -> list[Panel]:
     """Normalised estimation error squared of position and velocity over time; no panel where none was recorded."""
     nees = track(record, "consistency", ("nees",))
     if nees is None:
         return []
-    from flownav.scoring.consistency import SCORED, chi_square_band
-
     span, (low, high) = start_end_s(record), chi_square_band(1)
-    stack = Stack(("NEES",), row_height_px=250)
+    stack = Stack(("NEES",), row_height_px=190)
     shown = np.where(nees.value[:, 0] < SMALLEST_NEES, np.nan, nees.value[:, 0])
     stack.line(1, "estimate", "filter", nees.t_s, shown)
-    for name, limit in (("95 % of a flight's steps lie between", low), ("95 % of a flight's steps lie between", high)):
+    for name, limit in (("95 % band", low), ("95 % band", high)):
         stack.line(1, "gate", name, np.array(span), np.full(2, limit))
     stack.line(1, "command", "expected", np.array(span), np.full(2, float(SCORED)))
     stack.log_axis(1)
@@ -223,31 +97,72 @@ def consistency(record: Record) -> list[Panel]:
     caption = (
         f"Squared error of position and velocity in units of what the filter states, {SCORED} expected. Of a "
         f"consistent filter 95 % of the values lie between {low:.2f} and {high:.2f} over many flights; "
-        f"here {inside:.0f} % do. Errors last, so one flight strays."
+        f"here {inside:.0f} % do. Errors are correlated in time, so a single flight may stay outside for a while."
     )
     title = "Consistency with the truth"
-    return [Panel("nees", title, caption, f"{title}: NEES over time. {caption}", stack.figure(span, moments(record)))]
+    alt = f"{title}: NEES over time. {caption}"
+    return [Panel("nees", title, caption, alt, stack.chart(span, moments(record)), wide=True)]
 
 
-def error_against_gps(record: Record) -> Panel:
-    """Horizontal distance from GPS of the estimate, smoothed or the autopilot's too, outages shaded; without truth."""
-    key, title = "gps-distance", "Horizontal distance from GPS"
-    gps, estimate = readings(record, Sensor.GPS_POSITION), track(record, "estimate", POSITION_NED)
-    if gps is None or estimate is None:
-        return Panel(key, title, absent=f"The record holds no {'GPS position' if gps is None else 'estimate'}.")
-    stack = Stack(("distance (m)",), row_height_px=250)
-    others = [(role, track(record, role, POSITION_NED)) for role in ("autopilot", "smoothed")]
-    for role, source in (*others, ("estimate", estimate)):
-        if source is not None:
-            apart = difference(gps, source)
-            distance = np.hypot(*apart.value[:, :2].T)
-            stack.dots(1, role, f"{role}, each reading", apart.t_s, distance)
-            stack.line(1, role, role, apart.t_s, sliding_rms(apart.t_s, distance**2, RADIUS_WINDOW_S))
-    stack.from_zero()
-    windows = outages(record)
-    figure = stack.figure(start_end_s(record), moments(record), windows)
-    caption = f"Against each GPS reading, {delay_s(record, 'gps_position'):.2f} s before it arrived (its delay). "
-    caption += f"The lines are root mean squares over a sliding {RADIUS_WINDOW_S:.0f} s; GPS noise stays in them."
-    if windows:
-        caption += " Shaded: GPS was withheld; the scores leave out the distance at the start, the figure does not."
-    return Panel(key, title, caption, f"{title} over time. {caption}", figure, wide=True)
+def normalised_innovations(record: Record) -> list[Panel]:
+    """Innovation squared over its stated variance, its mean over a sliding window, a row a sensor; none without."""
+    table = innovation_table(record)
+    sensors = {name: found for name, parts in table.items() if (found := _squares(parts)) is not None}
+    if not sensors:
+        return []
+    span = start_end_s(record)
+    stack = Stack(
+        [f"{_sensor_title(name)}: {_judged(record, name, table[name])}" for name in sensors], row_height_px=92
+    )
+    for row, squares in enumerate(sensors.values(), 1):
+        mean = np.maximum(sliding_mean(squares.t_s, squares.value[:, 0], NIS_WINDOW_S), SMALLEST_NIS)
+        for limit in MODEST:
+            stack.line(row, "gate", "2 and 1/2", np.array(span), np.full(2, limit))
+        stack.line(row, "command", "as stated", np.array(span), np.ones(2))
+        stack.line(row, "estimate", "mean NIS", squares.t_s, mean)
+        stack.log_axis(row)
+    caption = (
+        f"Innovations squared over their stated variance (NIS), a mean over a sliding {NIS_WINDOW_S:.0f} s: 1 is a "
+        "filter that knows its errors, above 2 it is too sure of itself, below 1/2 it is too careful. Above each axis: "
+        "the mean over the whole record and its verdict."
+    )
+    title = "Are the innovations as large as stated?"
+    alt = f"Mean normalised innovation squared of each sensor over time. {caption}"
+    return [Panel("nis", title, caption, alt, stack.chart(span, moments(record), outages(record)), wide=True)]
+
+
+def _sensor_title(name: str) -> str:
+    return SENSOR_TITLES.get(name, name.replace("_", " "))
+
+
+def _judged(record: Record, name: str, parts: dict[str, dict[str, Array]]) -> str:
+    """A sensor's mean NIS and verdict in words, as the record scores it or, where it does not, by the same rules."""
+    scored = mapping(mapping(mapping(record.manifest.get("scores")).get("consistency")).get(name))
+    if scored:
+        mean, white = float(scored.get("nis_per_dof") or 0.0), bool(scored.get("white"))
+    else:
+        whole = [part for part in parts.values() if "innovation" in part and "innovation_variance" in part]
+        component = np.concatenate([np.full(len(part["t_s"]), k) for k, part in enumerate(whole)])
+        innovation, variance = (np.concatenate([part[column] for part in whole])
+                                for column in ("innovation", "innovation_variance"))  # fmt: skip
+        found = consistency_of(component, innovation, variance)
+        if found is None:
+            return "too few to judge"
+        mean, white = found.nis_per_dof, found.white
+    return f"{number(mean, 2)}, {verdict(mean, white=white)}"
+
+
+def _squares(parts: dict[str, dict[str, Array]]) -> Track | None:
+    """Normalised squares of all components of a sensor in order of time, tested ones, rejected ones among them."""
+    t_s, squares = [], []
+    for part in parts.values():
+        if "innovation" not in part or "innovation_variance" not in part:
+            continue
+        good = np.isfinite(part["innovation"]) & (part["innovation_variance"] > 0.0)
+        t_s.append(part["t_s"][good])
+        squares.append(part["innovation"][good] ** 2 / part["innovation_variance"][good])
+    if not sum(map(len, t_s)):
+        return None
+    times = np.concatenate(t_s)
+    order = np.argsort(times, kind="stable")
+    return Track(times[order], np.concatenate(squares)[order][:, None])

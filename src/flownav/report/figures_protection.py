@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.record import POSITION_NED, PROTECTION_LEVELS, Record
-from flownav.report.panels import Panel, Stack
+from flownav.report.chart import Stack
+from flownav.report.panels import Panel
 from flownav.report.series import difference, moments, outages, start_end_s, track
 
 
@@ -30,5 +31,5 @@ def protection(record: Record) -> list[Panel]:
         "sign, axes, scale or age, a range, GPS or heading that is off, or an accelerometer that lies may have done so "
         f"far. In the median {middle[0]:.2f} m horizontally, {middle[1]:.2f} m vertically."
     )
-    figure = stack.figure(start_end_s(record), moments(record), outages(record))
+    figure = stack.chart(start_end_s(record), moments(record), outages(record))
     return [Panel("protection", title, caption, f"{title} over time. {caption}", figure, wide=True)]

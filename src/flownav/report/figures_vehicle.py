@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.measurement import Sensor
+from flownav.measurement import COLUMNS, Sensor
 from flownav.record import QUATERNION, Record
-from flownav.report.panels import Panel, Stack, listed
-from flownav.report.series import LINE_POINTS, Track, estimates, euler_deg, moments, readings, start_end_s, thin, track
+from flownav.report.chart import Stack
+from flownav.report.panels import Panel, listed
+from flownav.report.samples import sliding_mean, sliding_rms, thin
+from flownav.report.series import Track, estimates, euler_deg, moments, outages, readings, start_end_s, track
 
+LEAST_IMU_HZ = 20.0
+SLOW_S, SHAKEN_S = 0.3, 1.0
+ATTITUDE_POINTS = 6000  # rows of an attitude that are turned into angles
 CONTROLS = {
     "lon_rad": "longitudinal (°)",
     "lat_rad": "lateral (°)",
@@ -27,11 +32,11 @@ def attitude(record: Record) -> Panel:
         return Panel(key, title, absent="The record holds no attitude.")
     stack = Stack(("roll (°)", "pitch (°)", "yaw (°)"))
     for role, name, source in sources:
-        kept = thin(LINE_POINTS, *source.value[:, 1:].T)
+        kept = thin(ATTITUDE_POINTS, *source.value[:, 1:].T)
         angles = euler_deg(Track(source.t_s[kept], source.value[kept]))
         for row in (1, 2, 3):
             stack.line(row, role, name, source.t_s[kept], _unbroken(angles[:, row - 1], row == 3))
-    figure = stack.figure(start_end_s(record), moments(record))
+    figure = stack.chart(start_end_s(record), moments(record))
     return Panel(key, title, "Z-Y-X Euler angles of body against earth; drawn in degrees.",
                  f"Roll, pitch and yaw in degrees: {listed(stack.names)}.", figure)  # fmt: skip
 
@@ -58,6 +63,28 @@ def controls(record: Record) -> Panel:
             stack.line(row, "estimate", "command", command.t_s, np.degrees(command.value[:, 0]))
     if thrust is not None:
         stack.line(len(titles), "truth", "true thrust", thrust.t_s, thrust.value[:, 0])
-    figure = stack.figure(start_end_s(record), moments(record))
+    figure = stack.chart(start_end_s(record), moments(record))
     return Panel(key, title, "Angles of the swash plate and the blades, as commanded.",
                  f"Controls over time: {listed(titles)}.", figure)  # fmt: skip
+
+
+def vibration(record: Record) -> list[Panel]:
+    """How much the vehicle shakes its IMU: what is faster than a slow mean, rms over a sliding window; none without."""
+    imu = track(record, "imu", COLUMNS[Sensor.IMU])
+    if imu is None or len(imu.t_s) < 2 or (len(imu.t_s) - 1) / max(np.ptp(imu.t_s), 1e-9) < LEAST_IMU_HZ:
+        return []
+    stack = Stack(("accelerometer (m/s²)", "gyro (°/s)"), row_height_px=120)
+    shaken = []
+    for row, columns, scale in ((1, slice(3, 6), 1.0), (2, slice(0, 3), 57.29577951308232)):
+        fast = [values - sliding_mean(imu.t_s, values, SLOW_S) for values in imu.value[:, columns].T]
+        squares = np.nan_to_num(np.sum(np.square(fast), axis=0))
+        shaken.append(scale * sliding_rms(imu.t_s, squares, SHAKEN_S))
+        stack.line(row, "imu", "vibration", imu.t_s, shaken[-1])
+    stack.from_zero()
+    caption = (
+        f"Length of what the IMU reads beyond its mean over {SLOW_S:g} s, rms over a sliding {SHAKEN_S:g} s: "
+        f"in the median {np.median(shaken[0]):.2f} m/s² and {np.median(shaken[1]):.2f} °/s, "
+        f"at most {np.max(shaken[0]):.2f} m/s² and {np.max(shaken[1]):.2f} °/s."
+    )
+    chart = stack.chart(start_end_s(record), moments(record), outages(record))
+    return [Panel("vibration", "Vibration", caption, f"Vibration of the IMU over time. {caption}", chart)]

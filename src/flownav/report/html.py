@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,18 +14,29 @@ from flownav import guard
 from flownav.record import Record
 from flownav.report import (
     content,
+    figures_errors,
     figures_filter,
+    figures_gps,
+    figures_inner,
+    figures_innovation,
     figures_path,
     figures_protection,
     figures_states,
     figures_vehicle,
+    phase_rows,
     sensor_rows,
 )
+from flownav.report.figures_path import paths_of
+from flownav.report.page_data import Columns, paths_data, sections_data
 from flownav.report.panels import Panel, Section
-from flownav.report.series import DOT_POINTS, LINE_POINTS, has, mapping
+from flownav.report.samples import DOT_POINTS, LINE_POINTS
+from flownav.report.series import first_pad_fix_s, has, mapping, moments, outages, start_end_s
 from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
+from flownav.scoring.phases import Phase, phases_of
 
 HERE = Path(__file__).parent
+RECORD_STYLES = ("vendor/uPlot.min.css", "page.css", "record.css")
+RECORD_SCRIPTS = ("vendor/uPlot.iife.min.js", "record_data.js", "record_panels.js", "record_paths.js", "record_page.js")
 
 
 def write_report(record: Record, path: Path) -> None:
@@ -57,24 +68,45 @@ def widened(panels: list[Panel]) -> Iterator[Panel]:
 
 def _sections(record: Record) -> list[tuple[str, str, list[Panel]]]:
     known = has(record, "truth")
-    errors = [figures_states.position_error(record), figures_states.velocity_error(record)] if known else []
-    errors = [*figures_states.flown_errors(record), *errors]
-    against_gps = [] if known else [figures_filter.error_against_gps(record)]
-    levels = figures_protection.protection(record)
-    uncertainty = [*errors, *against_gps, figures_filter.radius_of_uncertainty(record), *levels]
+    whole = [figures_errors.position_error(record), figures_errors.velocity_error(record)] if known else []
+    against_gps = [] if known else [*figures_gps.residuals(record), figures_gps.error_against_gps(record)]
+    filtered = [
+        *figures_filter.normalised_innovations(record),
+        *figures_filter.consistency(record),
+        *figures_innovation.innovations(record),
+    ]
+    errors = [*figures_errors.from_first_fix(record), *figures_errors.flown_errors(record), *whole, *against_gps]
+    uncertainty = [figures_filter.radius_of_uncertainty(record), *figures_protection.protection(record)]
+    inner = figures_inner.inner_states(record)
+    vehicle = [figures_vehicle.attitude(record), figures_vehicle.controls(record), *figures_vehicle.vibration(record)]
     return [
         ("path", "Flight path", [figures_path.path_over_pad(record), figures_path.ground_track(record)]),
+        ("close-ups", "Take-off, touchdown and outages", figures_errors.close_ups(record)),
+        ("errors", "Errors", errors),
+        ("uncertainty", "Uncertainty", uncertainty),
+        ("filter", "Innovations", filtered),
+        *([("inner", "Biases and errors of sensors", inner)] if inner else []),
         ("states", "Position and velocity", [figures_states.position(record), figures_states.velocity(record)]),
-        ("close-ups", "Close-ups", figures_states.close_ups(record)),
-        ("errors", "Errors and uncertainty", uncertainty),
-        ("filter", "Inside the filter", [*figures_filter.consistency(record), *figures_filter.innovations(record)]),
-        ("vehicle", "Vehicle", [figures_vehicle.attitude(record), figures_vehicle.controls(record)]),
+        ("vehicle", "Vehicle", vehicle),
     ]
 
 
 def render(record: Record) -> str:
     """The page as text."""
+    from markupsafe import Markup
+
     shown = sections(record)
+    found = phases_of(record)
+    scripts = [(HERE / name).read_text(encoding="utf-8") for name in RECORD_SCRIPTS]
+    columns, whole = Columns(), start_end_s(record)
+    facts = flight_facts(record, found)
+    charts = sections_data(shown, columns, whole)
+    data = {
+        "facts": facts,
+        "charts": charts,
+        "views": paths_data(paths_of(record), columns),
+        "columns": {"steps": columns.steps, "counts": columns.counts},
+    }
     page: str = template("page.html.j2").render(
         title=content.title(record),
         kind=str(record.manifest.get("kind") or "flight"),
@@ -87,19 +119,56 @@ def render(record: Record) -> str:
         paper=mapping(record.manifest.get("paper")),
         scores=content.score_rows(record),
         flown=has(record, "flown"),
-        outages=content.outage_rows(record),
+        phases=phase_rows.phase_rows(record, found),
+        outages=content.outage_rows(record, found),
         sensors=sensor_rows.sensor_rows(record),
-        rejected=sensor_rows.rejected_rows(record),
+        rejected=sensor_rows.rejected_rows(record, found),
         thinned=_thinned(record),
         line_points=LINE_POINTS,
         dot_points=DOT_POINTS,
-        events=content.events(record),
+        events=content.events(record, found),
         parameters=content.groups(record.manifest.get("parameters")),
         provenance=content.groups(record.manifest.get("provenance")),
         command=content.command(record),
-        **drawn_with(shown),
+        sections=shown,
+        heights=heights_px(charts),
+        facts_data=facts,
+        record_data=Markup(inside_script(json.dumps(data))),
+        record_columns=Markup(columns.text()),
+        palette=PALETTE,
+        font=Markup(FONT),
+        style=Markup("\n".join((HERE / name).read_text(encoding="utf-8") for name in RECORD_STYLES)),
+        scripts=[Markup(script) for script in scripts],
+        policy=content_policy(scripts),
     )
     return page
+
+
+def flight_facts(record: Record, found: Sequence[Phase]) -> dict[str, Any]:
+    """What all panels share: the window, the phases, moments and outages, and the instant to begin with.
+
+    That is the touchdown, or else the end.
+    """
+    t0, t1 = start_end_s(record)
+    marked = moments(record)
+    touch = next((moment.t_s for moment in marked if moment.name == "touchdown"), t1)
+    fix_s = first_pad_fix_s(record)
+    found_pad = [] if fix_s is None else [{"t": fix_s, "name": "first pad fix"}]
+    return {
+        "name": content.title(record),
+        "t0": t0,
+        "t1": t1,
+        "step": 0.1 if t1 - t0 > 20.0 else 0.02,
+        "start": min(max(touch, t0), t1),
+        "phases": [p._replace(t0=max(t0, p.t0), t1=min(t1, p.t1))._asdict() for p in found if p.t1 > t0 and p.t0 < t1],
+        "moments": [*found_pad, *({"t": moment.t_s, "name": moment.name} for moment in marked)],
+        "outages": [list(window) for window in outages(record)],
+    }
+
+
+def heights_px(charts: Mapping[str, Any]) -> dict[str, int]:
+    """How high each chart will be, so that the page keeps its room before it is drawn."""
+    return {key: int(len(chart["rows"]) * (chart["height"] + 6) + 20) for key, chart in charts.items()}
 
 
 def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:

@@ -17,11 +17,6 @@
     return Object.fromEntries(Object.entries(node).map(([key, value]) => [key, key === "bdata" ? value : coloured(value, dark)]));
   }
 
-  function hasWebGL() {
-    const canvas = document.createElement("canvas");
-    return Boolean(canvas.getContext("webgl2") || canvas.getContext("webgl"));
-  }
-
   function say(plot, words) {
     plot.classList.add("words");
     plot.removeAttribute("role");
@@ -29,13 +24,8 @@
     plot.dataset.drawn = "words";
   }
 
-  // On a narrow page the legend stands below the axes, clear of the buttons above them; a 3-D view steps back.
+  // On a narrow page the legend stands below the axes, clear of the buttons above them.
   function narrow(plot, data, layout) {
-    if (layout.scene) {
-      for (const side of ["x", "y", "z"]) layout.scene.camera.eye[side] *= 1.3;
-      Object.assign(layout.legend, { yref: "container", y: 0, yanchor: "bottom" });
-      return;
-    }
     const names = data.filter((trace) => trace.showlegend !== false).map((trace) => trace.name);
     const width_px = names.reduce((sum, name) => sum + 52 + 7 * name.length, 0);
     const legend_px = 22 * Math.ceil((1.15 * width_px) / (plot.clientWidth - 60));
@@ -47,14 +37,10 @@
 
   async function draw(plot, dark, width) {
     if (plot.dataset.drawn === "words") return;
-    if ("webgl" in plot.dataset && !hasWebGL()) {
-      say(plot, "This browser has no WebGL, which the 3-D view needs; the ground track and the height over time show the same flight.");
-      return;
-    }
     const { data, layout } = coloured(sources.get(plot), dark);
     if (width) Object.assign(layout, { width, autosize: false });
     else if (plot.clientWidth < 480) narrow(plot, data, layout);
-    if (coarse && !("webgl" in plot.dataset)) layout.dragmode = false; // a finger scrolls the page
+    if (coarse) layout.dragmode = false; // a finger scrolls the page
     if (plot.dataset.drawn) await Plotly.react(plot, data, layout, config);
     else {
       plot.replaceChildren();

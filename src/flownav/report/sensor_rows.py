@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from flownav.record import Record
 from flownav.report.figure_words import NONE, number
-from flownav.report.figures_filter import SENSOR_TITLES
+from flownav.report.figures_innovation import SENSOR_TITLES
 from flownav.report.series import mapping
+from flownav.scoring.by_phase import rejected_mostly_in
 from flownav.scoring.consistency import verdict
+from flownav.scoring.phases import Phase
 
 
-def rejected_rows(record: Record) -> list[tuple[str, str, str, str]]:
-    """What was not fused, as (sensor, reason, readings, components), most components first.
+def rejected_rows(record: Record, phases: Sequence[Phase] = ()) -> list[tuple[str, str, str, str, str]]:
+    """What was not fused, as (sensor, reason, readings, components, phase of most), most components first.
 
     Records from before readings were counted have components only.
     """
@@ -21,10 +25,12 @@ def rejected_rows(record: Record) -> list[tuple[str, str, str, str]]:
         whole = mapping(mapping(readings_of.get(sensor)).get("rejected"))
         rows += [(sensor, reason, whole.get(reason), count) for reason, count in mapping(reasons).items()]
     rows.sort(key=lambda row: -float(row[3]))
+    mostly = rejected_mostly_in(record, phases)
     return [
-        (SENSOR_TITLES.get(s, s.replace("_", " ")), r.replace("_", " "), NONE if n is None else f"{n:,}", f"{c:,}")
+        (SENSOR_TITLES.get(s, s.replace("_", " ")), r.replace("_", " "), NONE if n is None else f"{n:,}", f"{c:,}",
+         mostly.get((s, r), NONE))
         for s, r, n, c in rows
-    ]
+    ]  # fmt: skip
 
 
 def sensor_rows(record: Record) -> list[tuple[str, str, str, str, str]]:

@@ -1,8 +1,9 @@
-"""What the figures draw, taken out of a record's tables: thinning, interpolation, rotation, moments."""
+"""What the figures draw, taken out of a record's tables: interpolation, rotation, moments."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,13 +11,11 @@ from numpy.typing import NDArray
 
 from flownav.measurement import COLUMNS, Sensor
 from flownav.record import QUATERNION, Record
+from flownav.scoring.phases import phases_of
 
 Array = NDArray[np.float64]
 Window = tuple[float, float]
 
-LINE_POINTS = 3000  # a drawn line has at most so many points
-DOT_POINTS = 900  # a cloud of readings so many dots
-CROSS_POINTS = 250  # and the exceptional ones so many crosses
 
 ESTIMATES = (("autopilot", "autopilot"), ("smoothed", "smoothed"), ("flown", "flown on"), ("estimate", "estimate"),
              ("truth", "truth"))  # tables and what they are called  # fmt: skip
@@ -44,37 +43,6 @@ class Track(NamedTuple):
             return self
         inside = (self.t_s >= window[0]) & (self.t_s <= window[1])
         return Track(self.t_s[inside], self.value[inside])
-
-
-def thin(budget: int, *columns: Array) -> NDArray[np.int64]:
-    """Rows to draw, at most `budget`: of each stretch those with the smallest and largest value of every column."""
-    count = len(columns[0])
-    if count <= budget:
-        return np.arange(count)
-    stretches = (budget - 2) // (2 * len(columns))
-    edges = np.linspace(0, count, stretches + 1).astype(int)
-    width = int(np.diff(edges).max())
-    rows = np.minimum(edges[:-1, None] + np.arange(width), edges[1:, None] - 1)
-    kept = [np.array([0, count - 1])]
-    for column in columns:
-        values = np.asarray(column, float)[rows]
-        here = np.arange(stretches)
-        kept.append(rows[here, np.where(np.isnan(values), np.inf, values).argmin(axis=1)])
-        kept.append(rows[here, np.where(np.isnan(values), -np.inf, values).argmax(axis=1)])
-    return np.unique(np.concatenate(kept))
-
-
-def thin_dots(budget: int, *columns: Array) -> NDArray[np.int64]:
-    """Rows of a cloud of dots to draw, at most `budget`: an even sample, and the extremes of each stretch.
-
-    Extremes alone would hollow the cloud out and widen it: they get one part of the budget in twenty.
-    """
-    count = len(columns[0])
-    if count <= budget:
-        return np.arange(count)
-    extremes = max(budget // 20, 2 + 2 * len(columns))
-    sample = np.linspace(0, count - 1, budget - extremes).astype(int)
-    return np.unique(np.concatenate([sample, thin(extremes, *columns)]))
 
 
 def has(record: Record, table: str, columns: tuple[str, ...] = ()) -> bool:
@@ -186,12 +154,15 @@ def euler_deg(attitude: Track) -> Array:
     return np.asarray(np.degrees([euler_from_quaternion(*row) for row in attitude.value])).reshape(-1, 3)
 
 
-def sliding_rms(t_s: Array, squares: Array, width_s: float) -> Array:
-    """Root of the mean of squares over a window of time centred on each instant."""
-    total = np.concatenate([[0.0], np.cumsum(squares)])
-    first = np.searchsorted(t_s, t_s - width_s / 2, side="left")
-    last = np.searchsorted(t_s, t_s + width_s / 2, side="right")
-    return np.asarray(np.sqrt(np.maximum(total[last] - total[first], 0.0) / (last - first)))
+def first_pad_fix_s(record: Record) -> float | None:
+    """When the pad's camera first gave a fix that was fused [s]; None where it never did."""
+    table = record.tables.get("innovation", {})
+    if "sensor" not in table or "fused" not in table:
+        return None
+    named = [str(value).lower() in ("pad", str(int(Sensor.PAD))) for value in np.unique(table["sensor"])]
+    pads = np.unique(table["sensor"])[named]
+    fused = np.isin(table["sensor"], pads) & (np.asarray(table["fused"], float) > 0.5)
+    return float(np.min(np.asarray(table["t_s"], float)[fused])) if fused.any() else None
 
 
 def moments(record: Record) -> list[Moment]:
@@ -224,12 +195,23 @@ def _ground_contacts(record: Record) -> dict[str, float]:
             found["lift-off"] = float(truth["t_s"][rows[~on_ground][0]])
         if on_ground.any():
             found["touchdown"] = float(truth["t_s"][rows[on_ground][-1]])
+    told = {kind.lower() for _, _, kind, _, _ in event_rows(record)}
+    if not found and not told & {*LIFT_OFF_KINDS, *TOUCHDOWN_KINDS}:
+        return _contacts_of_phases(record)
     for t_s, _, kind, _, _ in event_rows(record):
         if kind.lower() in LIFT_OFF_KINDS:
             found.setdefault("lift-off", t_s)
         if kind.lower() in TOUCHDOWN_KINDS:
             found.setdefault("touchdown", t_s)
     return found
+
+
+def _contacts_of_phases(record: Record) -> dict[str, float]:
+    """First lift-off and last touchdown [s] as the phases have them, which read the landed signal and the range."""
+    phases = phases_of(record)
+    lifted = [one.t1 for one, after in pairwise(phases) if one.name == "ground" and after.name != "ground"]
+    touched = [one.t0 for one in phases if one.name == "touchdown"]
+    return {name: times[k] for name, times, k in (("lift-off", lifted, 0), ("touchdown", touched, -1)) if times}
 
 
 def event_rows(record: Record) -> list[tuple[float, str, str, str, str]]:

@@ -23,11 +23,30 @@ PALETTE: dict[str, tuple[str, str]] = {
     "flow": ("#0e7a5f", "#45cfa2"),
     "autopilot": ("#8339a8", "#cb9df2"),
     "flown": ("#8339a8", "#cb9df2"),  # what an autopilot flew on: its own estimate, too
+    "imu": ("#7a6000", "#d8bf5a"),
+    "command": ("#57616c", "#a3adb8"),
+    "gate": ("#b8232a", "#ff8078"),
     "alert": ("#b8232a", "#ff8078"),
     "pad": ("#7d8894", "#8793a0"),
     "band": ("rgba(10,95,180,0.15)", "rgba(98,179,255,0.20)"),
     "window": ("rgba(184,35,42,0.09)", "rgba(255,128,120,0.14)"),
     "shade": ("rgba(29,35,42,0.22)", "rgba(0,0,0,0.7)"),
+    # the phases of a flight (scoring/phases.py)
+    "phase-ground": ("#c9ced4", "#4a525c"),
+    "phase-climb": ("#a9cdf0", "#2f5f8c"),
+    "phase-hover": ("#b5dfcd", "#2b6b55"),
+    "phase-transit": ("#d9cdee", "#5d4a83"),
+    "phase-descent": ("#f4d9ae", "#7c5a22"),
+    "phase-approach": ("#f6c296", "#8d5424"),
+    "phase-touchdown": ("#f0a5a0", "#96423e"),
+    "phase-landed": ("#c9ced4", "#4a525d"),
+    # records beside each other
+    "record-1": ("#16191d", "#f5f6f7"),
+    "record-2": ("#0a5fb4", "#62b3ff"),
+    "record-3": ("#bf5b0b", "#f2a354"),
+    "record-4": ("#0e7a5f", "#45cfa2"),
+    "record-5": ("#8339a8", "#cb9df2"),
+    "record-6": ("#9a2f6b", "#f08bc0"),
     "padfill": ("rgba(125,136,148,0.25)", "rgba(135,147,160,0.28)"),
 }
 COLOUR = {role: light for role, (light, _) in PALETTE.items()}
@@ -44,6 +63,7 @@ LINES: dict[str, dict[str, Any]] = {
     "flow": {"color": COLOUR["flow"], "width": 1.5},
     "autopilot": {"color": COLOUR["autopilot"], "width": 1.4},
     "flown": {"color": COLOUR["flown"], "width": 1.4},
+    "imu": {"color": COLOUR["imu"], "width": 1.3},
     "command": {"color": COLOUR["muted"], "width": 1.2, "dash": "2px,3px"},
     "gate": {"color": COLOUR["alert"], "width": 1.2, "dash": "6px,4px"},
 }

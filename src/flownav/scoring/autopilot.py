@@ -9,7 +9,7 @@ import numpy as np
 
 from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.measurement import Array, Sensor, Stream
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
+from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Column, Table
 from flownav.scoring.alignment import Alignment, align, velocity_of
 from flownav.scoring.outage import difference_at, horizontal_rms
 
@@ -22,10 +22,10 @@ def autopilot_errors(estimate: Table, truth: Table | None, gps: Mapping[Sensor, 
     Against truth, which is turned and shifted onto the estimate first; else against GPS, whose mean difference is
     taken out (the two have different origins). `gps` with its delays.
     """
-    t_s, position = np.asarray(estimate["t_s"], float), _columns(estimate, POSITION_NED)
-    velocity = _velocity_ned(estimate)
+    t_s, position = np.asarray(estimate["t_s"], float), columns_of(estimate, POSITION_NED)
+    velocity = velocity_ned(estimate)
     if truth is not None:
-        reference_t_s, reference = np.asarray(truth["t_s"], float), _columns(truth, POSITION_NED)
+        reference_t_s, reference = np.asarray(truth["t_s"], float), columns_of(truth, POSITION_NED)
         covered = (reference_t_s >= t_s[0]) & (reference_t_s <= t_s[-1])
         if np.count_nonzero(covered) < LEAST_ROWS:
             return _errors(None, np.zeros((0, 3)), np.nan, None)
@@ -53,7 +53,7 @@ def in_frame_of(t_s: Array, position: Array, estimate: Table, gps: Mapping[Senso
     By GPS where there is some: shifted by its mean difference from GPS, the frame of which is the other's. Without,
     the autopilot's north may be any: turned and shifted onto the other.
     """
-    theirs_t_s, theirs = np.asarray(estimate["t_s"], float), _columns(estimate, POSITION_NED)
+    theirs_t_s, theirs = np.asarray(estimate["t_s"], float), columns_of(estimate, POSITION_NED)
     if Sensor.GPS_POSITION in gps:
         fixes = gps[Sensor.GPS_POSITION]
         error = difference_at(theirs_t_s, theirs, fixes.t_s - fixes.delay_s, fixes.value)
@@ -70,9 +70,9 @@ def in_frame_of(t_s: Array, position: Array, estimate: Table, gps: Mapping[Senso
 
 def _moved(estimate: Table, placed: Alignment) -> Table:
     """An estimate with its position and attitude in another frame; velocity, in body axes, stays."""
-    table = {**estimate, **dict(zip(POSITION_NED, placed.moved(_columns(estimate, POSITION_NED)).T, strict=True))}
+    table = {**estimate, **dict(zip(POSITION_NED, placed.moved(columns_of(estimate, POSITION_NED)).T, strict=True))}
     if set(QUATERNION) <= estimate.keys():
-        w, x, y, z = _columns(estimate, QUATERNION).T
+        w, x, y, z = columns_of(estimate, QUATERNION).T
         c, s = np.cos(0.5 * placed.yaw_rad), np.sin(0.5 * placed.yaw_rad)
         turned = (c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w)
         table |= dict(zip(QUATERNION, turned, strict=True))
@@ -92,16 +92,17 @@ def _errors(against: str | None, error: Array, velocity_rms: float, yaw_rad: flo
     }
 
 
-def _columns(table: Table, names: tuple[str, ...]) -> Array:
+def columns_of(table: Mapping[str, Column], names: tuple[str, ...]) -> Array:
+    """Columns of a table side by side, (n, len(names))."""
     return np.column_stack([np.asarray(table[name], float) for name in names])
 
 
-def _velocity_ned(estimate: Table) -> Array | None:
+def velocity_ned(estimate: Mapping[str, Column]) -> Array | None:
     """Velocity north, east, down (n, 3) from body axes; None where the estimate has none."""
     if not {*VELOCITY_BODY, *QUATERNION} <= estimate.keys():
         return None
-    rotation = rotation_from_quaternion(*_columns(estimate, QUATERNION).T)
-    return np.column_stack(to_earth(rotation, *_columns(estimate, VELOCITY_BODY).T))
+    rotation = rotation_from_quaternion(*columns_of(estimate, QUATERNION).T)
+    return np.column_stack(to_earth(rotation, *columns_of(estimate, VELOCITY_BODY).T))
 
 
 def _rms(t_s: Array, velocity: Array | None, reference_t_s: Array, reference: Array) -> float:

@@ -141,14 +141,14 @@ def fly_one(flight: Flight, seed: int, index: int = 0, ensemble: Ensemble | None
 def fly_blocks(
     flight: Flight, seed: int, first: int, flights: int, judge: Callable[[Array], Result], threads: int | None = None,
     ensemble: Ensemble | None = None, faults: Callable[[int], SensorFault] | None = None,
-    branches: Callable[[int], Branches] | None = None,
+    branches: Callable[[int], Branches] | None = None, instead: int | None = None,
 ) -> Iterator[tuple[int, Result]]:  # fmt: skip
     """Fly `flights` flights from number `first` on; yields (flights in the block, judge(its history)) in order.
 
     `judge` takes a block's history (epochs, len(HISTORY), flights in the block), which is overwritten afterwards:
     memory does not grow with the number of flights. faults: of each flight's sensors by its number, for a flight that
     `fails`. branches: of a place in the order of flights, what the `len(LANES)` flights from there on fly in place of
-    what their numbers name; all count their streams from `first`.
+    what their numbers name; all count their streams from `first`. instead: as of `fly_into`, of `len(LANES)` lanes.
     """
     own = threading.local()
 
@@ -158,7 +158,7 @@ def fly_blocks(
         if branches is None:
             numbers = range(first + start, first + start + len(LANES))
             failing = None if faults is None else [faults(number) for number in numbers]
-            fly_into(flight, seed, first + start, LANES, own.buffers, ensemble, faults=failing)
+            fly_into(flight, seed, first + start, LANES, own.buffers, ensemble, faults=failing, instead=instead)
         else:
             fly_into(flight, seed, first, LANES, own.buffers, branches=branches(start))
         left = min(len(LANES), flights - start)

@@ -17,10 +17,10 @@ Array = NDArray[np.float64]
 
 
 class Local:
-    """threads: how many fly at once; None: as many as there are cores."""
+    """threads: how many fly at once; None: as many as there are cores. instead: as of `fly_blocks`."""
 
-    def __init__(self, threads: int | None = None) -> None:
-        self.threads = threads
+    def __init__(self, threads: int | None = None, instead: int | None = None) -> None:
+        self.threads, self.instead = threads, instead
 
     def fly(
         self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
@@ -41,7 +41,9 @@ class Local:
 
         have = 0
         first, faults = parts[0].first, cell.faults(seed)
-        for flown, block in fly_blocks(flight, seed, first, total, judge, self.threads, cell.ensemble, faults):
+        for flown, block in fly_blocks(
+            flight, seed, first, total, judge, self.threads, cell.ensemble, faults, instead=self.instead
+        ):
             held.append(block)
             have += flown
             on_progress(flown)

@@ -1,0 +1,209 @@
+"""The figures of `Record.plot`: a few plain Plotly figures for notebooks; the report has the whole set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.errors import InputError
+from flownav.measurement import Array
+from flownav.record import POSITION_NED, VELOCITY_BODY, Column, Record
+from flownav.scoring.recorded import at_instants, scored_table
+
+POSITION_TITLES = ("north [m]", "east [m]", "down [m]")
+VELOCITY_TITLES = ("forward [m/s]", "right [m/s]", "down [m/s]")
+COLOURS = {"estimate": "#2a78d6", "truth": "#e08a00", "GPS": "#9aa0a6", "band": "rgba(42,120,214,0.25)"}
+MOST_DOTS = 4000
+SIGMAS = 2.0
+LEGEND = {"orientation": "h", "yanchor": "bottom", "y": 1.0, "xanchor": "right", "x": 1.0}
+LEAST_SHARE = 0.6  # of the longest axis of a path that the shortest one is drawn
+
+
+class Line(NamedTuple):
+    """One line or cloud of dots: its name, instants [s] and columns (n, k); dots: no line between them."""
+
+    name: str
+    t_s: Array
+    values: Array
+    dots: bool = False
+
+
+def figure_of(record: Record, what: str) -> Any:
+    """A figure by its name. InputError for another name, and where the record lacks what it shows."""
+    if what not in FIGURES:
+        raise InputError(f"plot {what!r}: must be {', '.join(list(FIGURES)[:-1])} or {list(FIGURES)[-1]}")
+    return FIGURES[what](record)
+
+
+def position(record: Record) -> Any:
+    """North, east and down: estimate, truth, GPS."""
+    lines = [_line(record, "gps_position", "GPS", POSITION_NED, dots=True)]
+    lines += [
+        _line(record, "truth", "truth", POSITION_NED),
+        _line(record, scored_table(record), "estimate", POSITION_NED),
+    ]
+    return _stack(f"Position, {_title(record)}", POSITION_TITLES, [line for line in lines if line is not None])
+
+
+def velocity(record: Record) -> Any:
+    """Velocity along the body's axes: estimate and truth."""
+    lines = [
+        _line(record, "truth", "truth", VELOCITY_BODY),
+        _line(record, scored_table(record), "estimate", VELOCITY_BODY),
+    ]
+    return _stack(f"Velocity, {_title(record)}", VELOCITY_TITLES, [line for line in lines if line is not None])
+
+
+def errors(record: Record) -> Any:
+    """Position of the estimate less the truth while it is scored, and twice the standard deviation that is stated."""
+    if "truth" not in record.tables:
+        raise InputError("plot 'errors': the record has no truth; plot 'innovations' shows how GPS disagrees")
+    estimate, truth = record.tables[scored_table(record)], record.tables["truth"]
+    t_s = np.asarray(truth["t_s"], float)
+    error = at_instants(estimate, POSITION_NED, t_s) - _matrix(truth, POSITION_NED)
+    error[~_scored(record, t_s)] = np.nan
+    figure = _stack(f"Errors of position, {_title(record)}", POSITION_TITLES, [Line("estimate", t_s, error)])
+    stated = record.tables.get("estimate", {})
+    if {f"std_{name}" for name in POSITION_NED} <= stated.keys():
+        sigma = SIGMAS * at_instants(stated, tuple(f"std_{name}" for name in POSITION_NED), t_s)
+        sigma[~_scored(record, t_s)] = np.nan
+        for row in range(3):
+            _band(figure, row + 1, t_s, sigma[:, row])
+    return figure
+
+
+def innovations(record: Record) -> Any:
+    """Innovations over their standard deviation, a row a sensor: within 2 in 95 of 100 where the filter is right."""
+    table = record.tables.get("innovation")
+    if table is None or not len(table["t_s"]):
+        raise InputError("plot 'innovations': the record has none; only our own filter and own parts state them")
+    sensors = np.asarray(table["sensor"], str)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        normal = np.asarray(table["innovation"], float) / np.sqrt(np.asarray(table["innovation_variance"], float))
+    known = np.isfinite(normal)
+    names = [name for name in dict.fromkeys(sensors[known].tolist())]
+    figure = _empty(f"Innovations over their standard deviation, {_title(record)}", names)
+    for row, name in enumerate(names, 1):
+        chosen = np.flatnonzero(known & (sensors == name))
+        chosen = chosen[:: max(1, len(chosen) // MOST_DOTS)]
+        _trace(
+            figure, row, "estimate", np.asarray(table["t_s"], float)[chosen], normal[chosen], dots=True, legend=False
+        )
+        for edge in (-SIGMAS, SIGMAS):
+            figure.add_hline(y=edge, row=row, col=1, line_width=1, line_dash="dot", line_color=COLOURS["truth"])
+    return figure
+
+
+def path(record: Record) -> Any:
+    """The path in space, east, north and height; the estimate while it is scored."""
+    import plotly.graph_objects as go
+
+    figure, spans = go.Figure(), np.zeros(3)
+    for table, name in _paths(record):
+        line = _line(record, table, name, POSITION_NED)
+        if line is not None:
+            shown = line.values.copy()
+            if name == "estimate":
+                shown[~_scored(record, line.t_s)] = np.nan
+            north, east, down = shown.T
+            spans = np.fmax(spans, [np.nanmax(axis) - np.nanmin(axis) for axis in (east, north, down)])
+            style = {"color": COLOURS[name], "width": 4}
+            figure.add_scatter3d(x=east, y=north, z=-down, mode="lines", name=name, line=style)
+    if not figure.data:
+        raise InputError("plot 'path': the record has no path")
+    shares = np.clip(spans / max(spans.max(), 1e-9), LEAST_SHARE, 1.0)
+    scene = {
+        "xaxis_title": "east [m]", "yaxis_title": "north [m]", "zaxis_title": "height [m]", "aspectmode": "manual",
+        "aspectratio": dict(zip("xyz", map(float, shares), strict=True)),
+    }  # fmt: skip
+    figure.update_layout(
+        title=f"Path, {_title(record)}", scene=scene, scene_camera={"eye": {"x": 1.2, "y": -1.2, "z": 0.4}},
+        margin={"l": 0, "r": 0, "b": 0, "t": 50}, height=700, legend=LEGEND,
+    )  # fmt: skip
+    return figure
+
+
+FIGURES: dict[str, Callable[[Record], Any]] = {
+    "position": position,
+    "velocity": velocity,
+    "errors": errors,
+    "innovations": innovations,
+    "path": path,
+}
+
+
+def _paths(record: Record) -> tuple[tuple[str, str], ...]:
+    """Tables that hold a path, and what each is called."""
+    return ("truth", "truth"), (scored_table(record), "estimate")
+
+
+def _scored(record: Record, t_s: Array) -> NDArray[np.bool_]:
+    """Which instants (n,) of a simulated flight count in its scores; all of another record.
+
+    Before the hand-over the estimate is the truth, and on the ground nothing is flown on it.
+    """
+    judged = record.tables.get("judging", {})
+    if "counted" not in judged:
+        return np.ones(len(t_s), bool)
+    row = np.clip(np.searchsorted(judged["t_s"], t_s, side="right") - 1, 0, len(judged["t_s"]) - 1)
+    return np.asarray(judged["counted"][row] > 0.0)
+
+
+def _title(record: Record) -> str:
+    return str(record.manifest.get("scenario") or record.manifest.get("log") or record.manifest.get("kind") or "")
+
+
+def _line(record: Record, table: str, name: str, columns: tuple[str, ...], *, dots: bool = False) -> Line | None:
+    """Columns of a table; None where the record has not all of them."""
+    found = record.tables.get(table, {})
+    if not {"t_s", *columns} <= found.keys():
+        return None
+    return Line(name, np.asarray(found["t_s"], float), _matrix(found, columns), dots)
+
+
+def _matrix(table: Mapping[str, Column], columns: Sequence[str]) -> Array:
+    return np.column_stack([np.asarray(table[name], float) for name in columns])
+
+
+def _stack(title: str, titles: Sequence[str], lines: Sequence[Line]) -> Any:
+    """Lines in a row of axes each, over one time axis. InputError where there is none."""
+    if not lines:
+        raise InputError(f"plot: the record has nothing to draw for {title.split(',')[0].lower()}")
+    figure = _empty(title, titles)
+    for line in lines:
+        for row in range(line.values.shape[1]):
+            _trace(figure, row + 1, line.name, line.t_s, line.values[:, row], dots=line.dots, legend=row == 0)
+    return figure
+
+
+def _empty(title: str, titles: Sequence[str]) -> Any:
+    from plotly.subplots import make_subplots
+
+    figure = make_subplots(rows=len(titles), cols=1, shared_xaxes=True, vertical_spacing=0.04)
+    figure.update_layout(title=title, height=110 + 150 * len(titles), hovermode="x unified", margin={"t": 70, "b": 40})
+    figure.update_layout(legend=LEGEND)
+    for row, name in enumerate(titles, 1):
+        figure.update_yaxes(title_text=name, row=row, col=1)
+    figure.update_xaxes(title_text="time [s]", row=len(titles), col=1)
+    return figure
+
+
+def _trace(figure: Any, row: int, name: str, t_s: Array, values: Array, *, dots: bool, legend: bool) -> None:
+    how = {"mode": "markers", "marker": {"size": 3, "color": COLOURS[name]}} if dots else {
+        "mode": "lines", "line": {"width": 1.5, "color": COLOURS[name]},
+    }  # fmt: skip
+    figure.add_scatter(x=t_s, y=values, name=name, legendgroup=name, showlegend=legend, row=row, col=1, **how)
+
+
+def _band(figure: Any, row: int, t_s: Array, half: Array) -> None:
+    """What is stated, about zero."""
+    known = np.isfinite(half)
+    around = np.concatenate([half[known], -half[known][::-1]])
+    figure.add_scatter(
+        x=np.concatenate([t_s[known], t_s[known][::-1]]), y=around, fill="toself", fillcolor=COLOURS["band"],
+        line={"width": 0}, hoverinfo="skip", name="2 sigma stated", legendgroup="band", showlegend=row == 1,
+        row=row, col=1,
+    )  # fmt: skip

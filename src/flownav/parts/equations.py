@@ -1,0 +1,261 @@
+"""The fast path: a filter or a vehicle of one's own written as equations, compiled into the loop and flown on lanes.
+
+What is written is the same as in the navigator's own rooms: named tuples of floats in and out, `@equation` functions of
+scalars. From Python they are plain Python, so the object also flies on the slow path; a test holds the two together.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.compile import ONE_LANE, Unit, equation, lane_access, stepping, unit
+from flownav.errors import InputError
+from flownav.estimation.covariance import place
+from flownav.estimation.kalman import Lanes, Work
+from flownav.estimation.states import (
+    ACCEL_BIAS,
+    COLUMNS,
+    COVARIANCE,
+    GROUND,
+    GYRO_BIAS,
+    POSITION,
+    QUATERNION,
+    STATE,
+    STATES,
+    VELOCITY,
+)
+from flownav.measurement import Array, Sensor
+from flownav.navigation.memory import CLOCK, GROUND_SEEN, START, WRITTEN, load_reading, share, shared
+from flownav.navigation.records import Reading as Row
+from flownav.navigation.take import UNIT_SIGNATURE
+from flownav.navigation.tape import ESTIMATE_PERIOD_S, output_of, write_estimate
+from flownav.parts.protocols import Estimate, Imu, Innovation, Outputs, Reading, Told
+from flownav.simulation import layout
+from flownav.simulation.layout import load_around, load_controls
+from flownav.vehicle.around import Around
+from flownav.vehicle.state import Controls
+
+FIRST = COVARIANCE + STATES * (STATES + 1) // 2  # rows of the covariance that a filter of one's own leaves alone
+ROOM = COLUMNS * (COLUMNS + 1) // 2 - STATES * (STATES + 1) // 2
+RIGID = 13
+NAN = math.nan
+
+
+class Said(NamedTuple):
+    """What a filter says, as `protocols.Estimate` in scalars. known: 1 once it has started; variances in m2, m2/s2.
+
+    grounded: 1 once ground_d is known.
+    """
+
+    known: float
+    pos_n: float
+    pos_e: float
+    pos_d: float
+    vel_n: float
+    vel_e: float
+    vel_d: float
+    qw: float
+    qx: float
+    qy: float
+    qz: float
+    variance_pos_n: float = NAN
+    variance_pos_e: float = NAN
+    variance_pos_d: float = NAN
+    variance_vel_n: float = NAN
+    variance_vel_e: float = NAN
+    variance_vel_d: float = NAN
+    gyro_bias_x: float = 0.0
+    gyro_bias_y: float = 0.0
+    gyro_bias_z: float = 0.0
+    accel_bias_x: float = 0.0
+    accel_bias_y: float = 0.0
+    accel_bias_z: float = 0.0
+    grounded: float = 0.0
+    ground_d: float = 0.0
+
+
+@equation
+def put_said(work: Work, lanes: Lanes, lane: int, said: Said) -> None:
+    """What a filter says into the rows that the simulator and the tape read."""
+    for i in range(3):
+        work[(STATE + POSITION + i) * len(lanes) + lane] = said[1 + i]
+        work[(STATE + VELOCITY + i) * len(lanes) + lane] = said[4 + i]
+        work[place(POSITION + i, POSITION + i) * len(lanes) + lane] = said[11 + i]
+        work[place(VELOCITY + i, VELOCITY + i) * len(lanes) + lane] = said[14 + i]
+        work[(STATE + GYRO_BIAS + i) * len(lanes) + lane] = said[17 + i]
+        work[(STATE + ACCEL_BIAS + i) * len(lanes) + lane] = said[20 + i]
+    for i in range(4):
+        work[(QUATERNION + i) * len(lanes) + lane] = said[7 + i]
+    work[START * len(lanes) + lane] = said[0]
+    work[GROUND_SEEN * len(lanes) + lane] = said[23]
+    work[(STATE + GROUND) * len(lanes) + lane] = said[24]
+
+
+class EquationFilter:
+    """A filter as equations over a memory of its own.
+
+    memory: a NamedTuple of floats, as it is before the first reading. step(memory, t_s, sensor, reading): the memory
+    after a reading of an instant; reading: `flownav.navigation.records.Reading`, with `arrived` and `withheld`.
+    say(memory): a `Said`. step and say are `@equation`s; sensor is compared with `flownav.measurement.Sensor`.
+    """
+
+    def __init__(
+        self, name: str, memory: Any, step: Callable[[Any, float, int, Row], Any], say: Callable[[Any], Said]
+    ) -> None:
+        if len(memory) > ROOM:
+            raise InputError(f"filter {name}: its memory has {len(memory)} numbers; at most {ROOM} have room")
+        self.name, self.memory, self.step, self.say = name, memory, step, say
+        self._now, self._row = memory, Row(*([NAN] * len(Row._fields)))
+
+    @cached_property
+    def unit_source(self) -> Callable[..., None]:
+        """The function that is compiled: `navigation.take.UNIT_SIGNATURE` and lanes."""
+        step, say, initial = self.step, self.say, self.memory
+        load, store = lane_access(type(self.memory), FIRST)
+
+        def take_own(
+            work: Work, p: Work, estimate: Work, innovation: Work, event: Work, entry: Work, state: Work,
+            covariance: Work, room: NDArray[np.int64], used: NDArray[np.int64], t_s: float, sensor: int, lanes: Lanes,
+        ) -> None:  # fmt: skip
+            o = output_of(estimate, innovation, event, entry, state, covariance, room, used)
+            begins = shared(work, lanes, CLOCK) == -np.inf
+            for lane in range(len(lanes)):
+                if begins:
+                    store(work, lanes, lane, initial)
+                after = step(load(work, lanes, lane), t_s, sensor, load_reading(work, lanes, lane))
+                store(work, lanes, lane, after)
+                put_said(work, lanes, lane, say(after))
+            share(work, lanes, CLOCK, t_s)
+            if t_s - shared(work, lanes, WRITTEN) >= ESTIMATE_PERIOD_S:
+                share(work, lanes, WRITTEN, t_s)
+                write_estimate(work, lanes, t_s, o)
+
+        return take_own
+
+    def unit(self, lanes: Lanes) -> Unit:
+        """Compiled for so many lanes when it is first run, and kept on disk."""
+        if lanes not in self._units:
+            self._units[lanes] = unit(self.unit_source, UNIT_SIGNATURE, lanes=lanes)
+        return self._units[lanes]
+
+    @cached_property
+    def _units(self) -> dict[Lanes, Unit]:
+        return {}
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> EquationFilter:
+        """A filter that has heard nothing; what was compiled is shared."""
+        other = EquationFilter(self.name, self.memory, self.step, self.say)
+        other.__dict__["_units"] = self._units
+        return other
+
+    # -- the slow path: `protocols.Filter` on the same equations
+    def start(self, told: Told) -> None:
+        """Nothing is known yet."""
+        self._now = self.memory
+
+    def predict(self, t_s: float, imu: Imu | None) -> None:
+        """An inertial reading is a reading as others are."""
+        if imu is not None and not imu.held:
+            row = self._row._replace(arrived=1.0, withheld=0.0, quality=255.0)
+            values = dict(zip(Row._fields[:6], [*imu.rate_frd_rad_s, *imu.force_frd_m_s2], strict=True))
+            self._now = self.step(self._now, t_s, int(Sensor.IMU), row._replace(**values))
+
+    def update(self, reading: Reading) -> list[Innovation]:
+        """Any other reading."""
+        row = self._row._replace(arrived=1.0, withheld=0.0, quality=reading.quality)
+        values = dict(zip(Row._fields, reading.value, strict=False))
+        variances = dict(zip(Row._fields[6:9], reading.variance, strict=True))
+        self._now = self.step(self._now, reading.t_s, int(reading.sensor), row._replace(**values, **variances))
+        return []
+
+    def estimate(self) -> Estimate | None:
+        """As `say` has it."""
+        said = self.say(self._now)
+        if not said.known:
+            return None
+        return Estimate(
+            said[1:4], said[4:7], said[7:11], np.sqrt(said[11:14]), np.sqrt(said[14:17]), said[17:20], said[20:23],
+            said.ground_d if said.grounded else None,
+        )  # fmt: skip
+
+
+class EquationVehicle:
+    """A vehicle as equations over a state of its own, whose first 13 fields are the rigid body's.
+
+    start: the state at the start, whose rigid part is put where the scenario begins. rate(state, controls, around):
+    its rate, a state again; seen(state, controls, around): `protocols.Outputs`. Both are `@equation`s.
+    """
+
+    def __init__(
+        self, name: str, start: Any, rate: Callable[[Any, Controls, Around], Any],
+        seen: Callable[[Any, Controls, Around], Outputs],
+    ) -> None:  # fmt: skip
+        room = layout.STAGE - layout.HELICOPTER
+        if not RIGID <= len(start) <= room:
+            raise InputError(f"vehicle {name}: its state has {len(start)} numbers; {RIGID} to {room} have room")
+        self.name, self.state, self.rate, self.seen = name, start, rate, seen
+
+    @cached_property
+    def unit_source(self) -> Callable[..., None]:
+        """The function that is compiled: (work, dt [s]) and lanes; see `simulation.plan.OwnParts`."""
+        rate, seen, begun = self.rate, self.seen, self.state
+        load, store = lane_access(type(self.state), layout.HELICOPTER)
+        stepped = stepping(type(self.state))
+
+        def step_own(work: Work, dt: float, lanes: Lanes) -> None:
+            for lane in range(len(lanes)):
+                if dt == 0.0:
+                    for i in range(RIGID, len(begun)):
+                        work[(layout.HELICOPTER + i) * len(lanes) + lane] = begun[i]
+                x, u, around = load(work, lanes, lane), load_controls(work, lanes, lane), load_around(work, lanes, lane)
+                k1 = rate(x, u, around)
+                k2 = rate(stepped(x, k1, 0.5 * dt), u, around)
+                k3 = rate(stepped(x, k2, 0.5 * dt), u, around)
+                k4 = rate(stepped(x, k3, dt), u, around)
+                after = stepped(stepped(stepped(stepped(x, k1, dt / 6.0), k2, dt / 3.0), k3, dt / 3.0), k4, dt / 6.0)
+                store(work, lanes, lane, after)
+                unit_attitude(work, lanes, lane)
+                out = seen(load(work, lanes, lane), u, around)
+                work[layout.THRUST * len(lanes) + lane] = out.thrust_n
+                work[layout.CONTACT * len(lanes) + lane] = out.contact_force_n
+                work[layout.POWER * len(lanes) + lane] = out.power_w
+
+        return step_own
+
+    @cached_property
+    def unit(self) -> Unit:
+        """Compiled for one lane when it is first run, and kept on disk."""
+        return unit(self.unit_source, "p d", lanes=ONE_LANE)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> EquationVehicle:
+        return self  # it remembers nothing
+
+    # -- the slow path: `protocols.VehicleModel` on the same equations
+    def start(self, rigid: Array) -> Array:
+        """The state at the start."""
+        return np.concatenate([rigid, np.array(self.state)[RIGID:]])
+
+    def derivative(self, t_s: float, state: Array, controls: Controls, around: Around) -> Array:
+        """The state's rate."""
+        return np.array(self.rate(type(self.state)(*state), controls, around))
+
+    def outputs(self, t_s: float, state: Array, controls: Controls, around: Around) -> Outputs:
+        """Thrust, ground load and power."""
+        return self.seen(type(self.state)(*state), controls, around)
+
+
+@equation
+def unit_attitude(work: Work, lanes: Lanes, lane: int) -> None:
+    """The quaternion brought back to unit length."""
+    row = layout.HELICOPTER + 6
+    w, x = work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane]
+    y, z = work[(row + 2) * len(lanes) + lane], work[(row + 3) * len(lanes) + lane]
+    shrink = 1.0 / np.sqrt(w * w + x * x + y * y + z * z)
+    for i in range(4):
+        work[(row + i) * len(lanes) + lane] *= shrink

@@ -1,0 +1,196 @@
+"""Errors of position and velocity in time, whole flights and close-ups: the paper's figures 19 to 21 and 23 to 30."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flownav.record import POSITION_NED, VELOCITY_BODY, Record
+from flownav.report.chart import Stack
+from flownav.report.figure_words import number
+from flownav.report.figures_states import View, position, velocity
+from flownav.report.panels import Panel, listed
+from flownav.report.series import (
+    Array,
+    Moment,
+    Window,
+    difference,
+    first_pad_fix_s,
+    has,
+    moments,
+    start_end_s,
+    track,
+    truth_name,
+    worst_outage,
+)
+
+POSITION_ERRORS = ("x error (m)", "y error (m)", "z error (m)")
+VELOCITY_ERRORS = ("u error (m/s)", "v error (m/s)", "w error (m/s)")
+CLOSE, CLOSE_ROOM = 0.9, 1.6  # of the errors after the first fix of the pad, and the room that they get
+USUAL = 0.98  # of what is drawn of errors and bands is inside the axes
+FRAME = "At the filter's own instant and in its own frame, which GPS has put somewhere."
+
+
+def close_ups(record: Record) -> list[Panel]:
+    """Position and velocity around lift-off and touchdown (figures 19 to 21 and 23 to 25) and in the worst outage."""
+    panels = []
+    start, end = start_end_s(record)
+    for moment in moments(record):
+        window = close_up_window(moment, start, end)
+        name = moment.name.capitalize()
+        errors = landing_errors(record, moment, window)
+        panels += errors or [
+            position(record, View(f"{moment.name}-position", f"{name}: position", window, with_gps=False)),
+            velocity(record, View(f"{moment.name}-velocity", f"{name}: velocity", window)),
+        ]
+        if moment.name == "lift-off":
+            panels.append(lift_off_transient(record, moment))
+    outage = worst_outage(record)
+    if outage is not None:
+        window = (max(start, outage[0] - 5.0), min(end, outage[1] + 5.0))
+        panels.append(position(record, View("outage-position", "GPS outage: position", window)))
+        panels.append(velocity(record, View("outage-velocity", "GPS outage: velocity", window)))
+    if not panels:
+        why = "The record tells of no lift-off, no touchdown and no GPS outage."
+        panels.append(Panel("no-moments", "Take-off and landing", absent=why))
+    return panels
+
+
+def close_up_window(moment: Moment, start_s: float, end_s: float) -> Window:
+    """15 s around a moment: mostly what follows a lift-off, mostly what precedes a touchdown."""
+    before, after = (3.0, 12.0) if moment.name == "lift-off" else (12.0, 3.0)
+    return (max(start_s, moment.t_s - before), min(end_s, moment.t_s + after))
+
+
+def position_error(record: Record) -> Panel:
+    """Position error with its 3-sigma band (figures 26 and 29)."""
+    return _error(record, POSITION_NED, POSITION_ERRORS, "position-error", "Position error")
+
+
+def velocity_error(record: Record) -> Panel:
+    """Velocity error with its 3-sigma band (figures 27 and 30)."""
+    return _error(record, VELOCITY_BODY, VELOCITY_ERRORS, "velocity-error", "Velocity error")
+
+
+def _error(record: Record, columns: tuple[str, ...], titles: tuple[str, ...], key: str, title: str) -> Panel:
+    estimate, truth = track(record, "estimate", columns), track(record, "truth", columns)
+    if estimate is None or truth is None:
+        missing = "truth" if truth is None else "estimate"
+        return Panel(key, title, absent=f"The record holds no {missing} of these states, so there is no error to draw.")
+    stack = Stack(titles)
+    deviation = track(record, "estimate", tuple(f"std_{name}" for name in columns))
+    error, beyond = difference(estimate, truth), False
+    for row, values in enumerate(error.value.T, 1):
+        band = np.zeros(1) if deviation is None else 3.0 * deviation.value[:, row - 1]
+        if deviation is not None:
+            stack.band(row, "±3\N{GREEK SMALL LETTER SIGMA} stated", deviation.t_s, band)
+        reach = _reach(values, band)
+        stack.within(row, reach)
+        beyond = beyond or bool(np.abs(values).max(initial=0.0) > reach)
+        stack.line(row, "estimate", f"estimate \N{MINUS SIGN} {truth_name(record)}", error.t_s, values)
+    figure = stack.chart(start_end_s(record), moments(record))
+    caption = (
+        "A consistent filter stays inside its band about 99.7 % of the time."
+        if deviation is not None
+        else "The filter states no standard deviations, so there is no band."
+    )
+    caption += f" {FRAME}" if has(record, "flown") else ""
+    caption += " The axes leave out rare peaks; zoom in on one to see it." if beyond else ""
+    alt = f"{title} over time: {', '.join(titles)}. Drawn: {listed(stack.names)}."
+    return Panel(key, title, caption, alt, figure)
+
+
+def _reach(values: Array, band: Array) -> float:
+    """Half the height of an axis that shows error and band but for their first moments and rare peaks."""
+    usual = [np.quantile(np.abs(part[np.isfinite(part)]), USUAL) for part in (values, band) if np.isfinite(part).any()]
+    return 1.2 * max([*map(float, usual), 1e-6])
+
+
+def from_first_fix(record: Record) -> list[Panel]:
+    """Errors of what was flown on from the first fix of the pad to just after the touchdown; none without a fix.
+
+    Before the fix the vehicle takes its pad to be where GPS and the scenario put it, metres off; after it the errors
+    are those of the landing, and have an axis of their own.
+    """
+    fix_s, touch = first_pad_fix_s(record), next((m for m in moments(record) if m.name == "touchdown"), None)
+    flown, truth = track(record, "flown", POSITION_NED), track(record, "truth", POSITION_NED)
+    if fix_s is None or flown is None or truth is None:
+        return []
+    start, end = start_end_s(record)
+    window = (max(start, fix_s), end if touch is None else min(end, touch.t_s + 3.0))
+    error = difference(flown, truth).within(window)
+    if not len(error.t_s):
+        return []
+    stack = Stack(POSITION_ERRORS)
+    for row, values in enumerate(error.value.T, 1):
+        stack.line(row, "flown", f"flown on \N{MINUS SIGN} {truth_name(record)}", error.t_s, values)
+        stack.within(row, CLOSE_ROOM * float(np.quantile(np.abs(values), CLOSE)) + 1e-3)
+    caption = (
+        f"From the pad camera's first fix at {fix_s:.1f} s, each axis to its own scale. The axes hold "
+        f"{100 * CLOSE:.0f} % of the errors with room; zoom in on a stretch to see all of it."
+    )
+    title = "Position error from the first pad fix on"
+    alt = f"{title}: {', '.join(POSITION_ERRORS)}, from {window[0]:.0f} to {window[1]:.0f} s."
+    return [Panel("pad-error", title, caption, alt, stack.chart(window, moments(record)), wide=True)]
+
+
+def landing_errors(record: Record, moment: Moment, window: Window) -> list[Panel]:
+    """Errors of position and velocity about a moment, of what was flown on or else of the estimate; none without."""
+    role = "flown" if has(record, "flown") else "estimate"
+    said = "flown on" if role == "flown" else "estimate"
+    panels = []
+    for columns, titles, what in (
+        (POSITION_NED, POSITION_ERRORS, "position"),
+        (VELOCITY_BODY, VELOCITY_ERRORS, "velocity"),
+    ):
+        source, truth = track(record, role, columns), track(record, "truth", columns)
+        if source is None or truth is None:
+            continue
+        error, stack = difference(source, truth).within(window), Stack(titles)
+        for row, values in enumerate(error.value.T, 1):
+            stack.line(row, role, f"{said} \N{MINUS SIGN} {truth_name(record)}", error.t_s, values)
+        at = error.value[np.argmin(np.abs(error.t_s - moment.t_s))] if len(error.t_s) else np.full(3, np.nan)
+        unit = "m" if what == "position" else "m/s"
+        caption = f"At {moment.name}: {', '.join(number(float(value), 3) for value in at)} {unit}."
+        title = f"{moment.name.capitalize()}: {what} error"
+        alt = f"{title} from {window[0]:.0f} to {window[1]:.0f} s: {', '.join(titles)}. {caption}"
+        panels.append(Panel(f"{moment.name}-{what}-error", title, caption, alt, stack.chart(window, moments(record))))
+    return panels
+
+
+def flown_errors(record: Record) -> list[Panel]:
+    """Errors of what an autopilot flew on, the estimate of now from where the pad is taken to be; none without."""
+    panels = []
+    for columns, titles, what in (
+        (POSITION_NED, POSITION_ERRORS, "position"),
+        (VELOCITY_BODY, VELOCITY_ERRORS, "velocity"),
+    ):
+        flown, truth = track(record, "flown", columns), track(record, "truth", columns)
+        if flown is None or truth is None:
+            return []
+        stack, error = Stack(titles), difference(flown, truth)
+        for row, values in enumerate(error.value.T, 1):
+            stack.line(row, "flown", f"flown on \N{MINUS SIGN} {truth_name(record)}", error.t_s, values)
+        figure, title = stack.chart(start_end_s(record), moments(record)), f"What was flown on: {what} error"
+        caption = "Until the hand-over the vehicle stands, or is flown on the truth: no error, by definition."
+        panels.append(Panel(f"flown-{what}-error", title, caption, f"{title} over time: {', '.join(titles)}.", figure))
+    return panels
+
+
+def lift_off_transient(record: Record, lift_off: Moment) -> Panel:
+    """Error in w around lift-off beside the rotor thrust that shakes the flow sensor (figure 28)."""
+    key, title = "lift-off-transient", "Lift-off transient"
+    estimate, truth = track(record, "estimate", VELOCITY_BODY), track(record, "truth", VELOCITY_BODY)
+    if estimate is None or truth is None:
+        return Panel(key, title, absent="Without truth the error at lift-off is not known.")
+    window = (lift_off.t_s - 3.0, lift_off.t_s + 6.0)
+    thrust = track(record, "truth", ("thrust_n",))
+    stack = Stack(("w error (m/s)", "thrust (N)") if thrust else ("w error (m/s)",), row_height_px=190)
+    error = difference(estimate, truth).within(window)
+    stack.line(1, "estimate", f"estimate \N{MINUS SIGN} {truth_name(record)}", error.t_s, error.value[:, 2])
+    if thrust:
+        shown = thrust.within(window)
+        stack.line(2, "truth", "rotor thrust", shown.t_s, shown.value[:, 0])
+    figure = stack.chart(window, [lift_off])
+    caption = "How the change of thrust at lift-off disturbs the estimate of w, as in the paper's figure 28."
+    alt = f"Error of w and rotor thrust around lift-off at {lift_off.t_s:.1f} s."
+    return Panel(key, title, caption, alt, figure, wide=True)

@@ -1,0 +1,158 @@
+"""Innovations: what each sensor read less what the filter expected, in the band that it expected it in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flownav.measurement import COLUMNS, Sensor
+from flownav.record import Record
+from flownav.report.chart import Stack
+from flownav.report.panels import Panel
+from flownav.report.series import Array, mapping, moments, outages, start_end_s
+
+INNOVATION_NUMBERS = ("t_s", "observation_variance", "innovation", "innovation_variance", "test_ratio", "fused")
+SMALLEST_RATIO = 0.01  # test ratios below are not drawn: the axis is logarithmic
+AXIS_TITLES = {
+    "pos_n_m": "x, north (m)",
+    "pos_e_m": "y, east (m)",
+    "pos_d_m": "z, down (m)",
+    "vel_n_m_s": "north (m/s)",
+    "vel_e_m_s": "east (m/s)",
+    "vel_d_m_s": "down (m/s)",
+    "vel_u_m_s": "u (m/s)",
+    "vel_v_m_s": "v (m/s)",
+    "vel_w_m_s": "w (m/s)",
+}
+SENSOR_TITLES = {
+    "gps_position": "GPS position",
+    "gps_velocity": "GPS velocity",
+    "flow_rate": "Flow",
+    "flow_velocity": "Flow velocity",
+    "range": "Rangefinder",
+    "imu": "IMU",
+    "attitude": "Attitude",
+    "baro": "Barometer",
+    "mag": "Magnetometer",
+    "pose": "External position",
+    "yaw": "External heading",
+    "pad": "Pad fix",
+    "landed": "Skid switch (at rest)",
+}
+
+
+def innovations(record: Record) -> list[Panel]:
+    """A panel for each sensor offered to the filter: innovations in their 3-sigma band, test ratio and gate."""
+    sensors = innovation_table(record)
+    if not sensors:
+        return [Panel("innovations", "Innovations", absent="The record holds no innovations.")]
+    most_rows_first = sorted(sensors.items(), key=lambda item: -len(item[1]))  # panels of a pair are equally high
+    shown = [_innovation_panel(record, name, components) for name, components in most_rows_first]
+    return shown + [_untested(record, name) for name in _offered(record) if name not in sensors]
+
+
+def _offered(record: Record) -> list[str]:
+    """Sensors that were offered to the filter to correct it, by the record's streams and by what was rejected."""
+    names = [sensor.name.lower() for sensor in Sensor if sensor is not Sensor.IMU]
+    scores = mapping(record.manifest.get("scores"))
+    told = {**mapping(scores.get("readings")), **mapping(scores.get("rejected"))}
+    return [name for name in names if name in told]
+
+
+def _untested(record: Record, name: str) -> Panel:
+    """The panel of a sensor of which no reading was held against the prediction, with the reasons."""
+    title = f"Innovations: {SENSOR_TITLES.get(name, name.replace('_', ' '))}"
+    scores = mapping(record.manifest.get("scores"))
+    counted = mapping(mapping(mapping(scores.get("readings")).get(name)).get("rejected"))
+    counted = counted or mapping(mapping(scores.get("rejected")).get(name))
+    why = "; ".join(f"{str(reason).replace('_', ' ')} {count:,}" for reason, count in counted.items())
+    words = "None of its readings was held against the prediction" + (f": {why}." if why else ".")
+    return Panel(f"innovation-{name}", title, absent=words)
+
+
+def innovation_table(record: Record) -> dict[str, dict[str, dict[str, Array]]]:
+    """The innovation table as sensor name -> component name -> columns."""
+    table = record.tables.get("innovation", {})
+    if not len(table.get("t_s", ())) or "innovation" not in table or "sensor" not in table:
+        return {}
+    count = len(table["t_s"])
+    sensor_of, component_of = np.asarray(table["sensor"]), np.asarray(table.get("component", np.zeros(count)))
+    numeric = [name for name in INNOVATION_NUMBERS if name in table]
+    found: dict[str, dict[str, dict[str, Array]]] = {}
+    for sensor in dict.fromkeys(sensor_of.tolist()):
+        rows = np.flatnonzero(sensor_of == sensor)
+        name = _sensor_name(sensor)
+        components = component_of[rows]
+        for component in dict.fromkeys(components.tolist()):
+            mine = rows[components == component]
+            part = {column: np.asarray(table[column][mine], float) for column in numeric}
+            found.setdefault(name, {})[_component_name(name, component)] = part
+    return found
+
+
+def _sensor_name(value: object) -> str:
+    return Sensor(int(value)).name.lower() if isinstance(value, (int, float)) else str(value).lower()
+
+
+def _component_name(sensor: str, value: object) -> str:
+    names = COLUMNS[Sensor[sensor.upper()]] if sensor.upper() in Sensor.__members__ else ()
+    if isinstance(value, (int, float)) and 0 <= int(value) < len(names):
+        return names[int(value)]
+    return str(value)
+
+
+def axis_title(name: str) -> str:
+    """A column name as an axis has it: "pos_n_m" is "x, north (m)", "gyro_x_rad_s" is "gyro x (rad/s)"."""
+    if name in AXIS_TITLES:
+        return AXIS_TITLES[name]
+    for suffix, unit in (
+        ("_rad_s", "rad/s"),
+        ("_m_s2", "m/s²"),
+        ("_m_s", "m/s"),
+        ("_gauss", "gauss"),
+        ("_rad", "rad"),
+        ("_m", "m"),
+    ):
+        if name.endswith(suffix):
+            return f"{name.removesuffix(suffix).replace('_', ' ')} ({unit})"
+    return name.replace("_", " ")
+
+
+def _innovation_panel(record: Record, sensor: str, components: dict[str, dict[str, Array]]) -> Panel:
+    title = f"Innovations: {SENSOR_TITLES.get(sensor, sensor.replace('_', ' '))}"
+    ratios = [part["test_ratio"] for part in components.values() if "test_ratio" in part]
+    tested = any(np.any(ratio >= SMALLEST_RATIO) for ratio in ratios)
+    stack = Stack([axis_title(name) for name in components] + ["test ratio"] * tested, row_height_px=118)
+    colour = "flow" if sensor.startswith("flow") else "gps" if sensor.startswith("gps") else "estimate"
+    gate_row, offered, refused = len(components) + 1, 0, 0
+    for row, part in enumerate(components.values(), 1):
+        t_s = part["t_s"]
+        fused = part.get("fused", np.ones(len(t_s))) > 0.5
+        offered, refused = offered + len(t_s), refused + int((~fused).sum())
+        if "innovation_variance" in part:
+            expected = 3.0 * np.sqrt(np.maximum(part["innovation_variance"], 0.0))
+            stack.band(row, "±3\N{GREEK SMALL LETTER SIGMA} expected", t_s, expected)
+            stack.within(row, _reach(part["innovation"], expected))
+        stack.dots(row, colour, "fused", t_s[fused], part["innovation"][fused])
+        stack.crosses(row, "alert", "not fused", t_s[~fused], part["innovation"][~fused])
+        if tested and "test_ratio" in part:
+            ratio = np.where(part["test_ratio"] < SMALLEST_RATIO, np.nan, part["test_ratio"])
+            stack.dots(gate_row, colour, "fused", t_s[fused], ratio[fused])
+            stack.crosses(gate_row, "alert", "not fused", t_s[~fused], ratio[~fused])
+    span = start_end_s(record)
+    if tested:
+        stack.line(gate_row, "gate", "gate", np.array(span), np.ones(2))
+        stack.log_axis(gate_row)
+    figure = stack.chart(span, moments(record), outages(record))
+    caption = f"{offered} values offered, {refused} not fused."
+    if tested:
+        caption += f" A test ratio above 1 is outside the gate; those below {SMALLEST_RATIO} are not drawn."
+    elif ratios:
+        caption += f" All test ratios are below {SMALLEST_RATIO}, and so inside the gate."
+    return Panel(f"innovation-{sensor}", title, caption, f"{title}: {caption}", figure)
+
+
+def _reach(innovation: Array, expected: Array) -> float:
+    """Half the height of an axis that shows every innovation, and the band but for its rare spikes."""
+    known = expected[np.isfinite(expected)]
+    shown = [np.abs(innovation[np.isfinite(innovation)]), np.quantile(known, [0.98]) if len(known) else known]
+    return 1.1 * float(np.max(np.concatenate(shown), initial=1e-6))

@@ -1,0 +1,192 @@
+"""The scores of a record, computed from its tables alone, of its own estimate or of another one put in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from flownav.errors import InputError
+from flownav.measurement import COLUMNS, Array, Sensor
+from flownav.record import POSITION_NED, PROTECTION_LEVELS, QUATERNION, VELOCITY_BODY, Column, Record
+from flownav.scoring.autopilot import columns_of
+from flownav.scoring.consistency import consistency_of
+from flownav.scoring.drift import drift_of
+from flownav.scoring.errors import MAX_POSITION_ERROR, STATES, STATISTICS, score_block, scores_of_flight
+from flownav.scoring.path import References, end_drift_of, motion_of, path_scores, truth_motion
+from flownav.scoring.protection import protection_of
+from flownav.scoring.takeoffs import takeoff_of_flight, takeoffs
+from flownav.scoring.touchdown import Limits, touchdowns
+from flownav.scoring.touchdown import motion_of as truth_in_motion
+
+TESTED = ("fused", "innovation_gate")
+OF_THE_LOG = ("coverage", "autopilot")  # scores of a replay that no estimate changes
+OF_THE_FILTER = ("rejected", "readings", "warnings")
+
+Estimate = Mapping[str, Column]
+
+
+def scored_table(record: Record) -> str:
+    """The table that is scored: what was flown on, where that differs from what the filter said."""
+    return "flown" if "flown" in record.tables and record.manifest.get("kind") == "fly" else "estimate"
+
+
+def scores_of_record(record: Record) -> dict[str, Any]:
+    """The scores of a record's own estimate, computed anew. InputError where the record cannot be scored."""
+    kind = record.manifest.get("kind")
+    if kind == "fly":
+        return flight_scores(record, record.tables[scored_table(record)])
+    if kind != "replay":
+        raise InputError(f"a record of kind {kind!r} holds nothing to score it against; replay it with flownav.replay")
+    known, own = references_in(record), record.manifest.get("scores", {})
+    scores = {**replay_scores(record, record.tables["estimate"]), "consistency": consistency_in(record)}
+    explicit = len(known.outages_s)
+    if "outage_median_rms_m" in own:  # of replays of their own, one a window
+        scores["outages"] += own["outages"][explicit:]
+        scores |= {name: own[name] for name in ("outage_median_rms_m", "outage_worst_rms_m")}
+    scores |= {name: own[name] for name in (*OF_THE_LOG, *OF_THE_FILTER) if name in own}
+    if "smoothed" in record.tables:
+        scores["smoothed"] = path_scores(record.tables["smoothed"], known)
+    return {name: scores[name] for name in own if name in scores} | scores
+
+
+def scores_of_other(record: Record, estimate: Estimate) -> dict[str, Any]:
+    """The same of another estimate (columns as record.TABLES["estimate"], t_s and the position at least).
+
+    What an estimate lacks is null. Of a replay what describes the log stays; what our filter made of it goes.
+    """
+    if record.manifest.get("kind") == "fly":
+        return flight_scores(record, estimate)
+    own = record.manifest.get("scores", {})
+    empty: dict[str, Any] = {"consistency": {}, "rejected": {}, "readings": {}, "warnings": []}
+    return replay_scores(record, estimate) | empty | {name: own[name] for name in OF_THE_LOG if name in own}
+
+
+# -- simulated flights -----------------------------------------------------------------------------------------------
+def flight_scores(record: Record, estimate: Estimate) -> dict[str, Any]:
+    """Errors of an estimate against the truth of a simulated flight, its touchdown and its take-off.
+
+    InputError where the record does not hold what they need.
+    """
+    judged, facts = record.tables.get("judging"), record.manifest.get("judging")
+    if judged is None or not facts or "truth" not in record.tables:
+        raise InputError("this record does not hold what its scores need; fly it again with this flownav")
+    truth = record.tables["truth"]
+    t_s, states = np.asarray(truth["t_s"], float), (*POSITION_NED, *VELOCITY_BODY)
+    said, true = at_instants(estimate, states, t_s), columns_of(truth, states)
+    counted = np.asarray(judged["counted"], float) * np.isfinite(said[:, :3]).all(axis=1)
+    motion = truth_in_motion(
+        true[:, :3, None], true[:, 3:, None], columns_of(truth, QUATERNION)[:, :, None],
+        np.asarray(truth["rate_r_rad_s"], float)[:, None], np.asarray(truth["on_ground"], float)[:, None],
+        float(facts["cg_above_skid_m"]),
+    )  # fmt: skip
+    over_ground = motion._replace(cg_height_m=motion.cg_height_m - np.asarray(judged["ground_m"], float)[:, None])
+    error = np.zeros((len(t_s), 2, 1)) if facts["flown_on_truth"] else (said - true)[:, :2, None]
+    touched = touchdowns(
+        t_s, over_ground, error, _column(judged, "pad_seen"), _column(judged, "away"), Limits(**facts["limits"]),
+        float(facts["may_land_after_s"]),
+    )  # fmt: skip
+    row = score_block(said[:, :, None], true[:, :, None], touched, counted[:, None])[0]
+    return scores_of_flight(_known(row)) | {"takeoff": _takeoff(record, facts)}
+
+
+def _known(row: Array) -> Array:
+    """A row of scores in which a state of no number has no largest error either."""
+    found = row.copy()
+    for state in range(len(STATES)):
+        first = state * len(STATISTICS)
+        if np.isnan(row[first]):
+            found[first : first + len(STATISTICS)] = np.nan
+    if np.isnan(found[: 3 * len(STATISTICS)]).any():
+        found[MAX_POSITION_ERROR] = np.nan
+    return found
+
+
+def _takeoff(record: Record, facts: Mapping[str, Any]) -> dict[str, float] | None:
+    """How a flight took off that starts on the ground; the estimate has no part in it."""
+    if not facts["starts_on_ground"]:
+        return None
+    above, truth, command = float(facts["cg_above_skid_m"]), record.tables["truth"], record.tables["command"]
+    height_m, commanded_m = -_column(truth, "pos_d_m") - above, -_column(command, "pos_d_ref_m") - above
+    period_s = float(truth["t_s"][1] - truth["t_s"][0])
+    sees = _column(record.tables["judging"], "sees_flow")
+    return takeoff_of_flight(takeoffs(height_m, commanded_m, sees, period_s)[0])
+
+
+def at_instants(estimate: Estimate, names: tuple[str, ...], t_s: Array) -> Array:
+    """Columns of an estimate (n, len(names)) at instants (n,), linear between its rows; NaN outside and without one."""
+    own = np.asarray(estimate["t_s"], float)
+    columns = [np.asarray(estimate[name], float) if name in estimate else np.full(len(own), np.nan) for name in names]
+    if len(own) == len(t_s) and bool((own == t_s).all()):
+        return np.column_stack(columns)
+    return np.column_stack([np.interp(t_s, own, column, left=np.nan, right=np.nan) for column in columns])
+
+
+def _column(table: Mapping[str, Column], name: str) -> Array:
+    return np.asarray(table[name], float)[:, None]
+
+
+# -- replays ---------------------------------------------------------------------------------------------------------
+def replay_scores(record: Record, estimate: Estimate) -> dict[str, Any]:
+    """Errors of an estimate against what the record of a replay kept of its log."""
+    known = references_in(record)
+    return {
+        "duration_s": record.manifest["duration_s"],
+        **path_scores(estimate, known),
+        "end_drift_m": end_drift_of(motion_of(estimate), known),
+        "protection": _protection(record, estimate, known),
+    }
+
+
+def references_in(record: Record) -> References:
+    """What the record of a replay knows that a path is scored against. InputError where it does not hold it."""
+    parameters, facts = record.manifest.get("parameters", {}), record.manifest.get("judging")
+    if facts is None or "judging" not in record.tables:
+        raise InputError("this record does not hold what its scores need; replay the log again with this flownav")
+    flew = facts["flight_s"]
+    return References(
+        fixes=_readings(record, Sensor.GPS_POSITION),
+        speeds=_readings(record, Sensor.GPS_VELOCITY),
+        gps_delay_s=float(parameters["gps_delay_s"]),
+        outages_s=tuple((float(t0), float(t1)) for t0, t1 in parameters["gps_outages_s"]),
+        truth=record.tables.get("reference"),
+        truth_name=str(record.manifest.get("truth_name", "")),
+        heading=record.tables.get("reference_heading"),
+        flight_s=None if flew is None else (float(flew[0]), float(flew[1])),
+    )
+
+
+def _readings(record: Record, sensor: Sensor) -> tuple[Array, Array] | None:
+    table = record.tables.get(sensor.name.lower())
+    return None if table is None else (np.asarray(table["t_s"], float), columns_of(table, COLUMNS[sensor]))
+
+
+def _protection(record: Record, estimate: Estimate, known: References) -> dict[str, Any] | None:
+    """Protection levels against errors; None of an estimate that states no levels. Warnings are our own filter's."""
+    if not set(PROTECTION_LEVELS) <= estimate.keys():
+        return None
+    t_s, judged = np.asarray(estimate["t_s"], float), record.tables["judging"]
+    warned = np.asarray(judged["flagged"], float)
+    row = np.clip(np.searchsorted(np.asarray(judged["t_s"], float), t_s, side="right") - 1, 0, len(warned) - 1)
+    drift = None
+    if known.truth is not None:
+        drift = drift_of(motion_of(estimate), truth_motion(known.truth, known.heading), known.flight_s)
+    return protection_of(t_s, columns_of(estimate, PROTECTION_LEVELS), warned[row] > 0.0, drift)
+
+
+def consistency_in(record: Record) -> dict[str, dict[str, Any]]:
+    """By sensor, whether the innovations of the components that were tested are as large as the filter states."""
+    table = record.tables.get("innovation")
+    if table is None:  # another estimate states none
+        return {}
+    sensor, tested = np.asarray(table["sensor"], str), np.isin(np.asarray(table["reason"], str), TESTED)
+    component = np.unique(np.asarray(table["component"], str), return_inverse=True)[1]
+    news, variance = (np.asarray(table[name], float) for name in ("innovation", "innovation_variance"))
+    found = {}
+    for each in Sensor:
+        rows = tested & (sensor == each.name.lower())
+        judged = consistency_of(component[rows], news[rows], variance[rows])
+        if judged is not None:
+            found[each.name.lower()] = judged._asdict()
+    return found

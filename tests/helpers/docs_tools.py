@@ -1,0 +1,26 @@
+"""The tools that make the documentation (`tools/docs`), importable by name: `from docs_tools import reference`."""
+
+from __future__ import annotations
+
+import sys
+
+from places import PROJECT
+
+TOOLS = PROJECT / "tools" / "docs"
+if str(TOOLS) not in sys.path:
+    sys.path.insert(0, str(TOOLS))
+
+import cells  # noqa: E402
+import mathematics  # noqa: E402
+import notebooks  # noqa: E402
+import reference  # noqa: E402
+import reference_api  # noqa: E402
+import reference_commands  # noqa: E402
+import reference_keys  # noqa: E402
+import reference_tables  # noqa: E402
+import units  # noqa: E402
+
+__all__ = [
+    "cells", "mathematics", "notebooks", "reference", "reference_api", "reference_commands", "reference_keys", "reference_tables",
+    "units",
+]  # fmt: skip

@@ -1,0 +1,74 @@
+"""The reference of a record's tables: every table and column of `flownav.record.TABLES`, with its unit."""
+
+from __future__ import annotations
+
+from itertools import groupby
+
+from units import unit_of
+
+from flownav.measurement import COLUMNS, Sensor
+from flownav.record import TABLES
+
+INTRODUCTION = """# Tables of a record
+
+A record (`.fnr`) is a zip of Parquet tables and one `manifest.json`; it opens in any language. In Python,
+`flownav.load("flight.fnr").estimate["pos_n_m"]` is a column as a NumPy array. Every table has the column `t_s`, the
+time in seconds. A record has the tables that its flight could fill, and a table may lack its last columns.
+
+Positions (`pos_n_m`, `pos_e_m`, `pos_d_m`) are north, east and down of the local frame (NED), whose origin is the pad
+of a simulated flight and the place of the first fix of a log. `vel_u_m_s`, `vel_v_m_s` and `vel_w_m_s` are along the
+body's axes, forward, right and down (FRD); `vel_n_m_s`, `vel_e_m_s` and `vel_d_m_s` are along the earth's. The
+quaternion `qw, qx, qy, qz` turns the body's axes into the earth's. `std_` before a name is one standard deviation of
+it, as the filter states it.
+"""
+MEANINGS = {
+    "truth": "What the vehicle did: from the simulation, or from motion capture.",
+    "estimate": "What the filter says, with one standard deviation of each figure, and the protection levels: how far "
+    "off the position may be if a sensor fails and nothing notices.",
+    "consistency": "Where the truth is known: NEES, the squared error of position and velocity over the covariance "
+    "that the filter states. Its mean is 6 where the filter knows its own errors.",
+    "states": "The rest of what the filter says at the same instants: velocity along the earth's axes, standard "
+    "deviations of the attitude, and every other state with its own.",
+    "smoothed": "What the filter says once it has seen the whole flight (`replay --smooth`).",
+    "autopilot": "What another estimator said, such as the autopilot's own.",
+    "flown": "What the simulated autopilot flew on: the estimate carried from the horizon to the present, its position "
+    "relative to where the pad is taken to be.",
+    "command": "What the vehicle was told: the reference and the controls.",
+    "innovation": "One row for each component of a measurement that was offered to the filter: what was observed, how "
+    "far it lay from the prediction, whether it was fused, and the reason where it was not.",
+    "events": "One row for each happening: its source, its kind, its detail in words, and a value.",
+    "fed": "What the navigator was fed, row by row, in its order. `flownav replay` of the record takes these rows.",
+}
+STREAMS = """## Measurement streams
+
+A stream of readings is a table named after its sensor. Beside the columns below it has `quality` (0 to 255, where 0
+is no data).
+
+| table | columns | units |
+|---|---|---|
+"""
+
+
+def page() -> str:
+    """The page. KeyError where a table has no sentence in MEANINGS."""
+    return "\n\n".join([INTRODUCTION.rstrip(), *(_section(name) for name in TABLES), _streams()]) + "\n"
+
+
+def _section(name: str) -> str:
+    """One table: what it is, and its columns, those of one unit that follow each other in one row."""
+    rows = [
+        f"| {', '.join(f'`{column}`' for column in columns)} | {unit} |"
+        for unit, columns in groupby(TABLES[name], key=unit_of)
+    ]
+    return "\n".join([f"## {name}", "", MEANINGS[name], "", "| columns | unit |", "|---|---|", *rows])
+
+
+def _streams() -> str:
+    """The table of what each sensor reads."""
+    rows = []
+    for sensor in Sensor:
+        units = list(dict.fromkeys(unit_of(column) or "1" for column in COLUMNS[sensor]))
+        rows.append(
+            f"| `{sensor.name.lower()}` | {', '.join(f'`{c}`' for c in COLUMNS[sensor])} | {', '.join(units)} |"
+        )
+    return STREAMS + "\n".join(rows)

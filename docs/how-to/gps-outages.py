@@ -12,9 +12,7 @@ import flownav
 
 record = flownav.replay("samples/flight-csv", outage_table=(15, 85, 20))
 for outage in record.scores["outages"]:
-    print(
-        f"{outage['t0']:4.0f} to {outage['t1']:4.0f} s  {outage['horizontal_rms_m']:6.2f} m rms  {outage['horizontal_max_m']:6.2f} m at most"
-    )
+    print(f"{outage['t0']:4.0f} to {outage['t1']:4.0f} s  {outage['horizontal_rms_m']:6.2f} m rms  {outage['horizontal_max_m']:6.2f} m at most")
 print(f"median {record.scores['outage_median_rms_m']:.2f} m, worst {record.scores['outage_worst_rms_m']:.2f} m")
 
 # %% [markdown]
@@ -27,9 +25,7 @@ print(f"median {record.scores['outage_median_rms_m']:.2f} m, worst {record.score
 
 # %%
 blind = flownav.replay("samples/flight-csv", outage_table=(15, 85, 20), flow=False)
-print(
-    f"without flow: median {blind.scores['outage_median_rms_m']:.2f} m, worst {blind.scores['outage_worst_rms_m']:.2f} m"
-)
+print(f"without flow: median {blind.scores['outage_median_rms_m']:.2f} m, worst {blind.scores['outage_worst_rms_m']:.2f} m")
 
 # %%
 import matplotlib.pyplot as plt

@@ -67,9 +67,7 @@ quad
 heavy = quad.changed(body={"mass_kg": 1.1 * quad.file.body.mass_kg})
 heavy.save("heavy.toml")
 flown = flownav.fly("leg.toml", seed=1, vehicle="heavy.toml")
-print(
-    f"{flown.scores['touchdown']['contact']['distance_m']:.2f} m from the pad, {flown.scores['touchdown']['verdict']}"
-)
+print(f"{flown.scores['touchdown']['contact']['distance_m']:.2f} m from the pad, {flown.scores['touchdown']['verdict']}")
 
 # %% [markdown]
 # `flownav vehicle heavy.toml` prints its trim, its hover power and its linear model. `--margins` prints the phase and gain

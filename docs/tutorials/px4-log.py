@@ -44,9 +44,7 @@ record
 # %%
 cut = flownav.replay("samples/flight.ulg", gps_outages=[(30, 75)])
 for outage in cut.scores["outages"]:
-    print(
-        f"{outage['t0']:.0f} to {outage['t1']:.0f} s: {outage['horizontal_rms_m']:.2f} m rms, {outage['horizontal_max_m']:.2f} m at most"
-    )
+    print(f"{outage['t0']:.0f} to {outage['t1']:.0f} s: {outage['horizontal_rms_m']:.2f} m rms, {outage['horizontal_max_m']:.2f} m at most")
 
 # %% [markdown]
 # And without GPS and without optical flow, on the inertial sensors alone:
@@ -54,9 +52,7 @@ for outage in cut.scores["outages"]:
 # %%
 blind = flownav.replay("samples/flight.ulg", gps_outages=[(30, 75)], flow=False)
 for outage in blind.scores["outages"]:
-    print(
-        f"{outage['t0']:.0f} to {outage['t1']:.0f} s: {outage['horizontal_rms_m']:.2f} m rms, {outage['horizontal_max_m']:.2f} m at most"
-    )
+    print(f"{outage['t0']:.0f} to {outage['t1']:.0f} s: {outage['horizontal_rms_m']:.2f} m rms, {outage['horizontal_max_m']:.2f} m at most")
 
 # %%
 import matplotlib.pyplot as plt

@@ -19,7 +19,7 @@ MOST_NUMBERS = 10_000  # that a name is counted on to
 def a_place(path: Path, inputs: Iterable[Path] = (), *, force: bool, beside: Sequence[str] = ()) -> Path:
     """The path of a file to be written, or the first of the numbered names where something is there.
 
-    beside: suffixes of files that are written beside it under the same name. force: what is there is replaced, if
+    beside: endings of files that are written beside it under the same name (.html, _layout.json). force: what is there is replaced, if
     flownav wrote it and can write it again. InputError where the path may not be written whatever it is called: it is
     an input, a link, a folder, a FIFO, a socket or a device; with force also where it holds what is not replaced.
     """
@@ -79,8 +79,8 @@ def _first_free(path: Path, is_free: Callable[[Path], bool]) -> Path:
     raise InputError(f"{path}: it is there, and so are {MOST_NUMBERS} numbered beside it; give another name")
 
 
-def _with_beside(path: Path, suffixes: Iterable[str]) -> list[Path]:
-    return [path, *(path.with_suffix(suffix) for suffix in suffixes)]
+def _with_beside(path: Path, endings: Iterable[str]) -> list[Path]:
+    return [path, *(path.with_name(path.stem + ending) for ending in endings)]
 
 
 def _is_free(path: Path) -> bool:

@@ -110,9 +110,7 @@ def horizon() -> Figure:
     figure, axis = axes(height=2.2)
     axis.set_axis_off()
     axis.set(xlim=(-0.02, 1.06), ylim=(-0.6, 3.1))
-    for row, (name, age, every) in enumerate(
-        (("GPS, 0.22 s old", 0.22, 0.2), ("flow, 0.08 s old", 0.08, 0.1), ("IMU, fresh", 0.005, 0.025))
-    ):
+    for row, (name, age, every) in enumerate((("GPS, 0.22 s old", 0.22, 0.2), ("flow, 0.08 s old", 0.08, 0.1), ("IMU, fresh", 0.005, 0.025))):
         for described in np.arange(0.12, 0.76, every):
             arrives = described + age
             seen = arrives <= 0.8

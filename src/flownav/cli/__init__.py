@@ -63,7 +63,7 @@ for name, command, what in (
     ("vehicle", vehicle.command, "Trim, power, linear models and ground effect of a helicopter."),
     ("report", report.command, "Write a record's report as one HTML page."),
     ("view", view.command, "Show a record in space and time with Rerun, or write its .rrd."),
-    ("export", export.command, "Write a record as MCAP, TUM, EuRoC, Parquet, CSV or ULog."),
+    ("export", export.command, "Write a record as MCAP, TUM, EuRoC, Parquet, CSV, ULog, KML or GPX."),
     ("bench", bench.command, "Measure how fast all of this is on your machine."),
 ):
     app.command(name, short_help=what)(command)

@@ -20,7 +20,8 @@ SHORT_RECORDS = ("against", "horizontal\n[m]", "vertical\n[m]", "velocity\n[m/s]
 SHORT_APART = ("mean", "95 % from", "95 % to")
 SAID = {"horizontal_m": "horizontal [m]", "vertical_m": "vertical [m]", "velocity_m_s": "velocity [m/s]"}
 SHORT = (
-    "estimator", "place\n[m]", "flying\n[m]", "speed\n[m/s]", "flying\n[m/s]", "end\n[m]", "cut [m]\nmedian", "cut [m]\nworst",
+    "estimator", "place\n[m]", "flying\n[m]", "speed\n[m/s]", "flying\n[m/s]", "end\n[m]", "cut [m]\nmedian",
+    "cut [m]\nworst",
 )  # fmt: skip
 TITLE = "rms errors where all estimators of a log have rows; end drift; GPS cuts"
 

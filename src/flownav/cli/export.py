@@ -17,7 +17,7 @@ def command(
     to: Annotated[str, typer.Option("--to", help="The format.", show_default=False, **one_of(*FORMATS))],
     out: Annotated[
         Path | None,
-        out_option("The file, or the folder of parquet and csv", "RECORD with the format's ending, beside it"),
+        out_option("The file, or the folder of parquet and csv", "beside the record"),
     ] = None,
     force: ForceOption = False,
     frame: Annotated[
@@ -32,12 +32,17 @@ def command(
         Path | None,
         typer.Option("--merge", metavar="ORIGINAL.ulg", help="With ulog: into a copy of the log that was replayed."),
     ] = None,
+    origin: Annotated[
+        str | None,
+        typer.Option("--origin", metavar="LAT,LON,ALT", help="With kml, gpx: where the record's origin lies [deg, m]."),
+    ] = None,
     as_json: JsonOption = False,
 ) -> None:
-    """Write a record for other tools: Foxglove, evo, spreadsheets, data frames, PlotJuggler, Flight Review."""
+    """Write a record for other tools: Foxglove, evo, spreadsheets, data frames, PlotJuggler, Google Earth, maps."""
     from flownav.cli.output import folder_place, place, several_place
     from flownav.errors import InputError
-    from flownav.export.formats import FOLDERS, FRAMED, destination, export
+    from flownav.export.earth import origin_from
+    from flownav.export.formats import FOLDERS, FRAMED, destination, export, written_files
     from flownav.record import Record
 
     path = destination(record, to, out)
@@ -46,10 +51,12 @@ def command(
     elif to in FRAMED:
         path = several_place(path, record, force=force)
     else:
-        path = place(path, record, merge, force=force)
+        beside = [each.name.removeprefix(path.stem) for each in written_files(to, path) if each != path]
+        path = place(path, record, merge, force=force, beside=beside)
+    about = None if origin is None else origin_from(origin)
     flown = Record.load(record)
     try:
-        written = export(flown, to, path, frame, merge)
+        written = export(flown, to, path, frame, merge, about)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
     if as_json:

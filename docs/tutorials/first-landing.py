@@ -46,8 +46,10 @@ print(f"touched {contact['distance_m']:.2f} m from the pad's centre, sinking at 
 # %% [markdown]
 # ## Look at the estimate
 #
-# `record.estimate` is a table: a dictionary of NumPy arrays, whose names end in their units. `pos_d_m` is the position
-# downwards, so that the height is its negative. `std_pos_n_m` is one standard deviation of the position northwards, as
+# `record.estimate` is a table: a dictionary of NumPy arrays, whose names end in their units. `pos_d_m` is the
+# position
+# downwards, so that the height is its negative. `std_pos_n_m` is one standard deviation of the position northwards,
+# as
 # the filter itself states it.
 
 # %%

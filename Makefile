@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-gpu test-slow long-log fuzz mutants league integrity rare validate lint bench bench-once docs pictures tutorials wheel wheel-test clean
+.PHONY: demo test test-gpu test-slow long-log fuzz mutants league integrity rare validate report-size lint bench bench-once docs pictures tutorials wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr
@@ -38,6 +38,9 @@ rare: $(VENV)/.ready
 
 validate: $(VENV)/.ready
 	FLOWNAV_DATA=$${FLOWNAV_DATA:-../shared/data} $(BIN)/flownav validate --out docs/explanation/validation.md
+
+report-size: $(VENV)/.ready-test
+	$(BIN)/python tools/report_size.py $(RECORDS)
 
 lint: $(VENV)/.ready-lint
 	$(BIN)/ruff check .

@@ -11,12 +11,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from blackbox_logs import blackbox_log
+from blackbox_logs import quantised as box_tables
+from crazyflie_logs import deck_log
+from crazyflie_logs import quantised as deck_tables
 from dataflash_files import HEAD, DataFlashWriter, dataflash_of
+from fed_records import queue_of_flight, record_of
 from flownav.errors import InputError
+from flownav.export.formats import export
+from flownav.logs.blackbox.reader import read_blackbox
+from flownav.logs.crazyflie_log import read_crazyflie
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.dataflash import read_dataflash
 from flownav.logs.dataflash.formats import CODES
@@ -24,12 +33,14 @@ from flownav.logs.dataflash.sensors import FIELDS
 from flownav.logs.log import Log
 from flownav.logs.mavlink_log import read_tlog
 from flownav.logs.open_log import open_log
+from flownav.logs.ros.reader import read_ros
 from flownav.logs.ulog import read_ulog
 from fuzzing import FIRST_SEED, MUTANTS, assert_promise, assert_sound
 from log_mutations import mutate
 from mavlink_logs import flight_log
 from places import data_root
 from replay_logs import SyntheticLog, log_of_flight
+from ros_bags import px4_flight, ros_flight
 from ulog_files import ulog_of_flight
 
 
@@ -75,6 +86,28 @@ def real_slice(name: str, head_bytes: int, from_byte: int, body_bytes: int) -> b
         return head + file.read(body_bytes)
 
 
+def other_formats(folder: Path, flown: SyntheticLog) -> list[Sample]:
+    """Bags of ROS in both containers, our own export, the Crazyflie's deck, both blackboxes."""
+    from rosbags.rosbag2 import StoragePlugin
+
+    made = ros_flight(flown.tables)
+    mcap, sqlite = made.write(folder / "mcap"), made.write(folder / "db3", StoragePlugin.SQLITE3)
+    px4 = px4_flight(flown.tables).write(folder / "px4")
+    record = record_of(queue_of_flight())
+    record.add("estimate", {"t_s": np.arange(2.0), **{f"pos_{axis}_m": np.zeros(2) for axis in "ned"}})
+    export(record, "mcap", folder / "ours.mcap")
+    deck = deck_log(deck_tables(flown.tables))
+    boxes = {name: blackbox_log(box_tables(flown.tables, inav), inav) for name, inav in BOXES.items()}
+    return [
+        Sample("ros mcap", ".mcap", {"": next(mcap.glob("*.mcap")).read_bytes()}, read_ros),
+        Sample("px4 mcap", ".mcap", {"": next(px4.glob("*.mcap")).read_bytes()}, read_ros),
+        Sample("ros sqlite", ".db3", {"": next(sqlite.glob("*.db3")).read_bytes()}, read_ros),
+        Sample("our mcap", ".mcap", {"": (folder / "ours.mcap").read_bytes()}, read_ros),
+        Sample("crazyflie", ".log", {"": deck.content()}, read_crazyflie),
+        *(Sample(name, ".bbl", {"": box.content()}, read_blackbox) for name, box in boxes.items()),
+    ]
+
+
 def samples(folder: Path) -> list[Sample]:
     """Every reader's samples: synthetic ones, and slices of the real logs that are at hand."""
     flown = synthetic_flight()
@@ -85,6 +118,7 @@ def samples(folder: Path) -> list[Sample]:
         Sample("ulog", ".ulg", {"": ulog_of_flight(flown.tables).bytes()}, read_ulog),
         Sample("old ulog", ".ulg", {"": ulog_of_flight(flown.tables, old=True).bytes()}, read_ulog),
         Sample("tlog", ".tlog", {"": flight_log(6.0).content}, read_tlog),
+        *other_formats(folder, flown),
     ]
     for name, (suffix, read, *where) in REAL.items():
         content = real_slice(*where)
@@ -107,7 +141,9 @@ REAL = {
     "real ulog": (".ulg", read_ulog, "ulog/sample_log_small.ulg", 120_000, 200_000, 60_000),
     "real tlog": (".tlog", read_tlog, "mavlink/heli_sitl.tlog", 0, 600_000, 60_000),
 }
-NAMES = ("csv", "dataflash", "ulog", "old ulog", "tlog", *REAL)
+BOXES = {"inav": True, "betaflight": False}
+NAMES = ("csv", "dataflash", "ulog", "old ulog", "tlog", "ros mcap", "px4 mcap", "ros sqlite", "our mcap", "crazyflie",
+         *BOXES, *REAL)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -204,7 +240,10 @@ def test_messages_that_are_not_what_their_names_say_are_no_other_error(tmp_path,
     assert "\n" not in said
 
 
-@pytest.mark.parametrize(("suffix", "read"), [(".bin", read_dataflash), (".ulg", read_ulog), (".tlog", read_tlog)])
+@pytest.mark.parametrize(("suffix", "read"), [
+    (".bin", read_dataflash), (".ulg", read_ulog), (".tlog", read_tlog), (".mcap", read_ros), (".db3", read_ros),
+    (".bbl", read_blackbox), (".log", read_crazyflie),
+])  # fmt: skip
 @settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(content=st.binary(max_size=2000))
 def test_arbitrary_bytes_are_refused(tmp_path, suffix, read, content):

@@ -1,91 +1,298 @@
-"""The report in a real browser: every figure is drawn, nothing is loaded, narrow and dark pages work."""
+"""The report in a real browser: one instant and one zoom for all figures, data to save, narrow, dark and on paper."""
 
 from __future__ import annotations
 
+import csv
+import io
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from browsing import CHROMIUM, NO_GL, QUIET, SOFTWARE_GL, Visit
+from browsing import CHROMIUM, QUIET, Visit
+from flownav.compare.records import HEADINGS, cells, errors_in_time, rows_of_records
 from flownav.record import Record
 from flownav.report.html import write_report
+from flownav.report.records import write_records
+from flownav.report.series import start_end_s
 from report_records import flight, navigated, replay
 
 pytestmark = pytest.mark.browser
-WORDS_OF_NO_WEBGL = "This browser has no WebGL"
+
+# For each figure: how it was drawn, its size, and of a panel where the instant stands as a share of each row's width.
+FIGURES = """() => [...document.querySelectorAll("[data-figure]")].map((host) => {
+  const box = host.getBoundingClientRect();
+  const drawn = [...host.querySelectorAll("canvas")].filter((one) => one.width > 100 && one.height > 40).length;
+  const instants = [...host.querySelectorAll(".instant")].map((line) => line.style.display === "none" ? null :
+    new DOMMatrix(getComputedStyle(line).transform).e / line.parentElement.clientWidth);
+  const canvas = host.querySelector(":scope > canvas");
+  const said = [...host.querySelectorAll(".end i")].map((value) => value.textContent);
+  return { key: host.dataset.figure, drawn: host.dataset.drawn, canvases: drawn, instants, said, words: host.innerText,
+           mark: canvas ? canvas.dataset.mark : "", width: box.width, height: box.height, right: box.right };
+})"""
 
 
 @pytest.fixture(scope="module")
-def playwright() -> Iterator[Any]:
+def browser() -> Iterator[Any]:
     if CHROMIUM is None:
         pytest.skip("no Chromium here: install Debian's package `chromium` (apt-get install chromium)")
     api = pytest.importorskip("playwright.sync_api", reason="install `playwright` (dependency group `test`)")
     with api.sync_playwright() as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def browser(playwright: Any) -> Iterator[Any]:
-    opened = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET + SOFTWARE_GL)
-    yield opened
-    opened.close()
+        opened = running.chromium.launch(executable_path=CHROMIUM, args=QUIET)
+        yield opened
+        opened.close()
 
 
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     folder = tmp_path_factory.mktemp("reports")
-    records: dict[str, Record] = {"landing": navigated(), "takeoff": flight("takeoff"), "replay": replay(200.0)}
+    records: dict[str, Record] = {"landing": navigated(), "takeoff": flight("takeoff"), "replay": replay()}
     for name, record in records.items():
         write_report(record, folder / f"{name}.html")
-    return {name: folder / f"{name}.html" for name in records}
+    named = [("a", flight()), ("b", flight(seed=2))]
+    errors = [errors_in_time(record) for _, record in named]
+    rows = [cells(row) for row in rows_of_records(named)]
+    write_records(named, errors, HEADINGS, rows, folder / "compared.html")
+    return {path.stem: path for path in folder.iterdir()}
 
 
-def test_every_figure_of_a_landing_is_drawn(browser: Any, pages: dict[str, Path]) -> None:
-    visit = Visit(browser, pages["landing"], width=1440)
-    visit.check(count=15)
-    buttons = visit.page.eval_on_selector_all(".modebar-btn", "all => all.map((b) => b.dataset.title || '')")
-    assert buttons
-    assert not [title for title in buttons if "hare" in title or "loud" in title]  # no "Share chart": it would upload
-    visit.context.close()
+def figures(visit: Visit) -> dict[str, dict[str, Any]]:
+    return {figure["key"]: figure for figure in visit.page.evaluate(FIGURES)}
 
 
-def test_a_take_off_works_on_a_dark_phone(browser: Any, pages: dict[str, Path]) -> None:
-    visit = Visit(browser, pages["takeoff"], width=390, color_scheme="dark",
-                  has_touch=True, is_mobile=True)  # fmt: skip
-    visit.check(count=14)
-    assert visit.page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(20, 24, 29)"
-    assert {figure["ink"] for figure in visit.figures().values()} == {"#e7eaee"}
-    visit.context.close()
-
-
-def test_a_replay_follows_the_reader_from_light_to_dark(browser: Any, pages: dict[str, Path]) -> None:
-    visit = Visit(browser, pages["replay"], width=1100, color_scheme="light")
-    visit.check(count=10)
-    assert {figure["ink"] for figure in visit.figures().values()} == {"#1d232a"}
-    visit.page.emulate_media(color_scheme="dark")
-    visit.until("[...document.querySelectorAll('[data-figure]')].every((p) => p.layout.font.color === '#e7eaee')")
-    visit.wait()
-    visit.check(count=10)
-    visit.context.close()
-
-
-def test_without_webgl_the_3d_view_says_so_and_the_rest_is_drawn(playwright: Any, pages: dict[str, Path]) -> None:
-    opened = playwright.chromium.launch(executable_path=CHROMIUM, args=QUIET + NO_GL)
-    visit = Visit(opened, pages["takeoff"], width=1440)
-    figures = visit.figures()
-    assert WORDS_OF_NO_WEBGL in figures.pop("path-3d")["text"]
-    assert {figure["drawn"] for figure in figures.values()} == {"figure"}
+def check(visit: Visit, least: int) -> None:
+    """All figures are drawn, nothing was complained of, nothing was loaded, nothing sticks out."""
+    found = figures(visit)
+    assert len(found) >= least
+    for figure in found.values():
+        assert figure["drawn"] == "figure", figure
+        assert figure["canvases"] > 0, figure
+        assert figure["width"] > 200, figure
+        assert figure["height"] > 100, figure
+        assert figure["right"] <= visit.width, figure
     assert visit.errors == []
-    opened.close()
+    assert [request for request in visit.requests if not request.startswith(("file:", "data:", "blob:"))] == []
+    assert visit.page.evaluate("document.documentElement.scrollWidth") <= visit.width  # no scrolling sideways
+
+
+def over(visit: Visit, key: str, row: int = 0) -> dict[str, float]:
+    """Where the axes of a panel's row lie on the screen, scrolled into sight clear of the scrubber."""
+    plot = visit.page.locator(f"[data-figure={key}] .u-over").nth(row)
+    plot.evaluate("(plot) => plot.scrollIntoView({ block: 'center', behavior: 'instant' })")
+    return plot.bounding_box()
+
+
+def share(t_s: float) -> float:
+    """Where an instant of the navigated landing stands, as a share of the whole flight."""
+    t0, t1 = start_end_s(navigated())
+    return (t_s - t0) / (t1 - t0)
+
+
+def instants(visit: Visit, close: tuple[str, ...] = ("touchdown-", "pad-error", "outage-", "lift-off")) -> np.ndarray:
+    """Of every row over the whole flight, the place of the instant as a share of its width."""
+    rows = [share for key, one in figures(visit).items() if not key.startswith(close) for share in one["instants"]]
+    return np.array(rows, float)
+
+
+@pytest.mark.parametrize(("page", "least"), [("landing", 15), ("takeoff", 14), ("replay", 11), ("compared", 4)])
+def test_every_figure_is_drawn_and_nothing_is_loaded(
+    browser: Any, pages: dict[str, Path], page: str, least: int
+) -> None:
+    visit = Visit(browser, pages[page], width=1440)
+    check(visit, least)
+    visit.context.close()
+
+
+def test_the_instant_under_the_pointer_moves_in_every_figure(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["landing"], width=1440)
+    before = figures(visit)
+    box = over(visit, "attitude")
+    visit.page.mouse.move(box["x"] + share(12.5) * box["width"], box["y"] + 20)
+    visit.until("Math.abs(document.documentElement.dataset.instant - 12.5) < 0.2")
+    shares = instants(visit)
+    assert len(shares) > 20
+    assert shares == pytest.approx(share(12.5), abs=0.005)
+    after = figures(visit)
+    for key in ("path-3d", "ground-track"):
+        assert after[key]["mark"] != before[key]["mark"]
+    changed = sum(after[key]["said"] != before[key]["said"] for key in after)
+    assert changed > 8  # the values beside the lines are those of the instant
+    assert "12.5" in visit.page.locator("#scrub-said").inner_text()
+    assert float(visit.page.locator("#scrub").input_value()) == pytest.approx(12.5, abs=0.2)
+    visit.context.close()
+
+
+def test_values_beside_the_lines_are_the_records_at_the_instant(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["landing"], width=1440)
+    visit.page.locator("#scrub").fill("12.5")
+    visit.until("document.documentElement.dataset.instant === '12.500'")
+    record = navigated()
+    truth = record.tables["truth"]
+    row = int(np.argmin(np.abs(truth["t_s"] - 12.5)))
+    said = figures(visit)["position"]["said"]
+    assert f"{truth['pos_d_m'][row]:.3f}".replace("-", "\N{MINUS SIGN}") in said
+    visit.context.close()
+
+
+def test_zooming_one_panel_zooms_all_and_the_button_shows_the_whole_flight(
+    browser: Any, pages: dict[str, Path]
+) -> None:
+    visit = Visit(browser, pages["landing"], width=1440)
+    box = over(visit, "velocity")
+    mouse = visit.page.mouse
+    mouse.move(box["x"] + share(10.0) * box["width"], box["y"] + 30)
+    mouse.down()
+    mouse.move(box["x"] + share(30.0) * box["width"], box["y"] + 30, steps=5)
+    mouse.up()
+    visit.until("(document.documentElement.dataset.zoom || '') !== ''")
+    t0, t1 = map(float, visit.page.evaluate("document.documentElement.dataset.zoom").split())
+    assert (t0, t1) == pytest.approx((10.0, 30.0), abs=0.5)
+    mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 30)
+    visit.until("Math.abs(document.documentElement.dataset.instant - 20) < 0.5")
+    visit.page.wait_for_timeout(300)
+    assert instants(visit, close=()) == pytest.approx(0.5, abs=0.01)  # close-ups zoom with the rest
+    visit.page.locator("#scrub-whole").click()
+    visit.until("document.documentElement.dataset.zoom === ''")
+    visit.page.wait_for_timeout(300)
+    assert instants(visit) == pytest.approx(share(20.0), abs=0.01)
+    assert visit.errors == []
+    visit.context.close()
+
+
+def test_the_scrubber_moves_by_keys_and_says_where_it_is(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["landing"], width=1440)
+    slider = visit.page.locator("#scrub")
+    slider.focus()
+    start = float(slider.input_value())
+    for key, step in (("ArrowRight", 0.1), ("ArrowLeft", -0.1), ("Shift+ArrowRight", 1.0), ("PageDown", -5.0)):
+        before = float(slider.input_value())
+        visit.page.keyboard.press(key)
+        visit.until(f"Math.abs(document.documentElement.dataset.instant - {before + step}) < 0.011")
+        visit.until(f"Math.abs(document.getElementById('scrub').value - {before + step}) < 0.051")
+    assert float(slider.input_value()) == pytest.approx(start - 4.0, abs=0.15)
+    assert slider.get_attribute("aria-valuetext").endswith("s, approach")
+    assert slider.get_attribute("aria-label") == "Instant"
+    visit.context.close()
+
+
+def test_play_moves_the_instant_and_pause_holds_it(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["landing"], width=1440)
+    visit.page.locator("#scrub").fill("5")
+    visit.page.locator("#scrub-play").click()
+    assert visit.page.locator("#scrub-play").get_attribute("aria-label") == "Pause"
+    visit.until("document.documentElement.dataset.instant > 5.3")
+    visit.page.locator("#scrub-play").click()
+    visit.page.wait_for_timeout(150)
+    held = visit.page.evaluate("document.documentElement.dataset.instant")
+    visit.page.wait_for_timeout(300)
+    assert visit.page.evaluate("document.documentElement.dataset.instant") == held
+    visit.context.close()
+
+
+def test_a_panels_data_as_csv_are_the_records_columns(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["takeoff"], width=1440)
+    with visit.page.expect_download() as waiting:
+        visit.page.locator("[data-csv=position]").click()
+    saved = waiting.value
+    assert saved.suggested_filename == "Takeoff-position.csv"
+    rows = list(csv.DictReader(io.StringIO(Path(saved.path()).read_text(encoding="utf-8"))))
+    record = flight("takeoff")
+    for column, table in (("estimate", "estimate"), ("truth", "truth")):
+        name = f"z, down (m): {column}"
+        t_s = np.array([float(row["t_s"]) for row in rows if row[name]])
+        values = np.array([float(row[name]) for row in rows if row[name]])
+        assert t_s == pytest.approx(record.tables[table]["t_s"], abs=1e-6)
+        assert values == pytest.approx(record.tables[table]["pos_d_m"], abs=1e-5)
+    visit.context.close()
+
+
+def test_an_event_in_a_table_moves_the_page_to_it(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["takeoff"], width=1440)
+    visit.page.locator("tr:has(.phase):has-text('climb') .goto").click()
+    visit.until("Math.abs(document.documentElement.dataset.instant - 10) < 1")
+    visit.context.close()
+
+
+def test_a_label_hides_what_it_names(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["landing"], width=1440)
+    pressed = "document.querySelector('[data-figure=position] .end[title^=\"truth:\"]').getAttribute('aria-pressed')"
+    over(visit, "position")
+    visit.page.locator("[data-figure=position] .end[title^='truth:']").first.click()
+    assert visit.page.evaluate(pressed) == "false"
+    visit.page.locator("[data-figure=position] .end[title^='truth:']").first.click()
+    assert visit.page.evaluate(pressed) == "true"
+    assert visit.errors == []
+    visit.context.close()
+
+
+def test_the_path_in_space_turns_by_keys_and_by_drag(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["takeoff"], width=1440)
+    canvas = visit.page.locator("[data-figure=path-3d] > canvas")
+    seen = [canvas.get_attribute("data-mark")]
+    visit.page.locator("#scrub").fill("12")
+    visit.until("document.documentElement.dataset.instant === '12.000'")
+    seen.append(canvas.get_attribute("data-mark"))
+    canvas.focus()
+    visit.page.keyboard.press("ArrowDown")
+    seen.append(canvas.get_attribute("data-mark"))
+    canvas.evaluate("(canvas) => canvas.scrollIntoView({ block: 'center', behavior: 'instant' })")
+    box = canvas.bounding_box()
+    visit.page.mouse.move(box["x"] + 200, box["y"] + 200)
+    visit.page.mouse.down()
+    visit.page.mouse.move(box["x"] + 260, box["y"] + 230)
+    visit.page.mouse.up()
+    seen.append(canvas.get_attribute("data-mark"))
+    assert len(set(seen)) == 4
+    visit.context.close()
+
+
+@pytest.mark.parametrize("page", ["takeoff", "replay", "compared"])
+def test_it_works_on_a_dark_phone(browser: Any, pages: dict[str, Path], page: str) -> None:
+    visit = Visit(browser, pages[page], width=400, color_scheme="dark", has_touch=True, is_mobile=True)
+    check(visit, 4)
+    assert visit.page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(20, 24, 29)"
+    visit.context.close()
+
+
+def test_a_finger_on_a_panel_moves_the_instant(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["takeoff"], width=400, has_touch=True, is_mobile=True)
+    box = over(visit, "attitude")
+    visit.page.touchscreen.tap(box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+    visit.until("Math.abs(document.documentElement.dataset.instant - 25) < 1")
+    visit.context.close()
+
+
+def test_colours_follow_the_reader_from_light_to_dark(browser: Any, pages: dict[str, Path]) -> None:
+    visit = Visit(browser, pages["takeoff"], width=1100, color_scheme="light")
+    ink = "getComputedStyle(document.querySelector('[data-figure=position] .end[title^=\"truth:\"]')).color"
+    assert visit.page.evaluate(ink) == "rgb(22, 25, 29)"
+    visit.page.emulate_media(color_scheme="dark")
+    visit.until(f"{ink} === 'rgb(245, 246, 247)'")
+    visit.wait()
+    check(visit, 14)
+    visit.context.close()
 
 
 def test_paper_gets_light_figures_that_fit_and_all_details(browser: Any, pages: dict[str, Path]) -> None:
     visit = Visit(browser, pages["landing"], width=1440, color_scheme="dark")
     visit.page.evaluate("dispatchEvent(new Event('beforeprint'))")
     visit.page.emulate_media(media="print")
-    visit.until("[...document.querySelectorAll('[data-figure]')].every((p) => p._fullLayout.width <= 680)")
-    assert {figure["ink"] for figure in visit.figures().values()} == {"#1d232a"}
+    ink = "getComputedStyle(document.querySelector('[data-figure=position] .end[title^=\"truth:\"]')).color"
+    assert visit.page.evaluate(ink) == "rgb(22, 25, 29)"
+    wide = "Math.max(...[...document.querySelectorAll('[data-figure] canvas')].map((one) => one.clientWidth))"
+    assert visit.page.evaluate(wide) <= 660
     assert visit.page.evaluate("[...document.querySelectorAll('details')].every((part) => part.open)")
+    assert visit.page.evaluate("getComputedStyle(document.querySelector('.scrubber')).display") == "none"
+    visit.page.evaluate("dispatchEvent(new Event('afterprint'))")
+    visit.wait()
+    assert visit.errors == []
+    visit.context.close()
+
+
+@pytest.mark.parametrize("page", ["landing", "replay"])
+def test_the_first_figure_stands_within_two_seconds(browser: Any, pages: dict[str, Path], page: str) -> None:
+    visit = Visit(browser, pages[page], width=1440)
+    assert float(visit.page.evaluate("document.documentElement.dataset.firstFigure")) <= 2000.0
     visit.context.close()

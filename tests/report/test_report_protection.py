@@ -57,6 +57,6 @@ def test_a_record_without_levels_has_no_such_panel():
 
 def test_the_page_shows_it_among_the_errors():
     record = with_levels(flight())
-    (errors,) = (section for section in sections(record) if section.key == "errors")
+    (errors,) = (section for section in sections(record) if section.key == "uncertainty")
     assert [panel.key for panel in errors.panels][-1] == "protection"
     assert "How far off the position may be although nothing is noticed" in render(record)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.errors import InputError
 from flownav.measurement import Array
@@ -17,6 +18,8 @@ VELOCITY_TITLES = ("forward [m/s]", "right [m/s]", "down [m/s]")
 COLOURS = {"estimate": "#2a78d6", "truth": "#e08a00", "GPS": "#9aa0a6", "band": "rgba(42,120,214,0.25)"}
 MOST_DOTS = 4000
 SIGMAS = 2.0
+LEGEND = {"orientation": "h", "yanchor": "bottom", "y": 1.0, "xanchor": "right", "x": 1.0}
+LEAST_SHARE = 0.6  # of the longest axis of a path that the shortest one is drawn
 
 
 class Line(NamedTuple):
@@ -55,16 +58,18 @@ def velocity(record: Record) -> Any:
 
 
 def errors(record: Record) -> Any:
-    """Position of the estimate that is scored less the truth, and twice the standard deviation that is stated."""
+    """Position of the estimate less the truth while it is scored, and twice the standard deviation that is stated."""
     if "truth" not in record.tables:
         raise InputError("plot 'errors': the record has no truth; plot 'innovations' shows how GPS disagrees")
     estimate, truth = record.tables[scored_table(record)], record.tables["truth"]
     t_s = np.asarray(truth["t_s"], float)
     error = at_instants(estimate, POSITION_NED, t_s) - _matrix(truth, POSITION_NED)
+    error[~_scored(record, t_s)] = np.nan
     figure = _stack(f"Errors of position, {_title(record)}", POSITION_TITLES, [Line("estimate", t_s, error)])
     stated = record.tables.get("estimate", {})
     if {f"std_{name}" for name in POSITION_NED} <= stated.keys():
         sigma = SIGMAS * at_instants(stated, tuple(f"std_{name}" for name in POSITION_NED), t_s)
+        sigma[~_scored(record, t_s)] = np.nan
         for row in range(3):
             _band(figure, row + 1, t_s, sigma[:, row])
     return figure
@@ -93,18 +98,31 @@ def innovations(record: Record) -> Any:
 
 
 def path(record: Record) -> Any:
-    """The path from above and in space: east, north and height."""
+    """The path in space, east, north and height; the estimate while it is scored."""
     import plotly.graph_objects as go
 
-    figure = go.Figure()
+    figure, spans = go.Figure(), np.zeros(3)
     for table, name in _paths(record):
         line = _line(record, table, name, POSITION_NED)
         if line is not None:
-            north, east, down = line.values.T
+            shown = line.values.copy()
+            if name == "estimate":
+                shown[~_scored(record, line.t_s)] = np.nan
+            north, east, down = shown.T
+            spans = np.fmax(spans, [np.nanmax(axis) - np.nanmin(axis) for axis in (east, north, down)])
             style = {"color": COLOURS[name], "width": 4}
             figure.add_scatter3d(x=east, y=north, z=-down, mode="lines", name=name, line=style)
-    scene = {"xaxis_title": "east [m]", "yaxis_title": "north [m]", "zaxis_title": "height [m]", "aspectmode": "data"}
-    figure.update_layout(title=f"Path, {_title(record)}", scene=scene, margin={"l": 0, "r": 0, "b": 0, "t": 50})
+    if not figure.data:
+        raise InputError("plot 'path': the record has no path")
+    shares = np.clip(spans / max(spans.max(), 1e-9), LEAST_SHARE, 1.0)
+    scene = {
+        "xaxis_title": "east [m]", "yaxis_title": "north [m]", "zaxis_title": "height [m]", "aspectmode": "manual",
+        "aspectratio": dict(zip("xyz", map(float, shares), strict=True)),
+    }  # fmt: skip
+    figure.update_layout(
+        title=f"Path, {_title(record)}", scene=scene, scene_camera={"eye": {"x": 1.2, "y": -1.2, "z": 0.4}},
+        margin={"l": 0, "r": 0, "b": 0, "t": 50}, height=700, legend=LEGEND,
+    )  # fmt: skip
     return figure
 
 
@@ -120,6 +138,18 @@ FIGURES: dict[str, Callable[[Record], Any]] = {
 def _paths(record: Record) -> tuple[tuple[str, str], ...]:
     """Tables that hold a path, and what each is called."""
     return ("truth", "truth"), (scored_table(record), "estimate")
+
+
+def _scored(record: Record, t_s: Array) -> NDArray[np.bool_]:
+    """Which instants (n,) of a simulated flight count in its scores; all of another record.
+
+    Before the hand-over the estimate is the truth, and on the ground nothing is flown on it.
+    """
+    judged = record.tables.get("judging", {})
+    if "counted" not in judged:
+        return np.ones(len(t_s), bool)
+    row = np.clip(np.searchsorted(judged["t_s"], t_s, side="right") - 1, 0, len(judged["t_s"]) - 1)
+    return np.asarray(judged["counted"][row] > 0.0)
 
 
 def _title(record: Record) -> str:
@@ -153,7 +183,8 @@ def _empty(title: str, titles: Sequence[str]) -> Any:
     from plotly.subplots import make_subplots
 
     figure = make_subplots(rows=len(titles), cols=1, shared_xaxes=True, vertical_spacing=0.04)
-    figure.update_layout(title=title, height=110 + 150 * len(titles), hovermode="x unified", margin={"t": 50, "b": 40})
+    figure.update_layout(title=title, height=110 + 150 * len(titles), hovermode="x unified", margin={"t": 70, "b": 40})
+    figure.update_layout(legend=LEGEND)
     for row, name in enumerate(titles, 1):
         figure.update_yaxes(title_text=name, row=row, col=1)
     figure.update_xaxes(title_text="time [s]", row=len(titles), col=1)

@@ -29,7 +29,11 @@ def read_live_record(path: Path, *, flow_instance: int | None = None) -> Log:
     """
     if flow_instance is not None:
         raise InputError(f"--flow-instance: {path} holds what a navigator was fed, of one flow sensor; leave it out")
-    record = Record.load(path)
+    return log_of_record(path, Record.load(path))
+
+
+def log_of_record(path: Path, record: Record) -> Log:
+    """The log of a record that was read from `path`, in whatever format. InputError as of `read_live_record`."""
     kind = str(record.manifest.get("kind"))
     if kind not in KINDS or "fed" not in record.tables:
         raise InputError(

@@ -7,18 +7,22 @@ from pathlib import Path
 
 from flownav.errors import InputError
 from flownav.guard import an_input
+from flownav.logs.crazyflie import looks_like as looks_like_crazyflie
 from flownav.logs.journal import MAGIC as JOURNAL_MAGIC
 from flownav.logs.journal import SUFFIX as JOURNAL_SUFFIX
 from flownav.logs.log import Log
 from flownav.measurement import Sensor
 
 KNOWN = (
-    "a folder of CSV files, a PX4 ULog (.ulg), an ArduPilot DataFlash log (.bin), a MAVLink telemetry log (.tlog) or a "
-    "live session's record (.fnr)"
+    "a folder of CSV files, a PX4 ULog (.ulg), an ArduPilot DataFlash log (.bin), a MAVLink telemetry log (.tlog), a "
+    "ROS bag (a folder, .db3, .mcap, .bag), a Crazyflie's log, a Betaflight or INAV blackbox, or a live session's "
+    "record (.fnr)"
 )
 ULOG_MAGIC = b"\x55\x4c\x6f\x67\x01\x12\x35"
 DATAFLASH_MAGIC = b"\xa3\x95"
 DATAFLASH_FORMAT = b"\xa3\x95\x80"  # the message that describes others: a log that has lost its start still has many
+BLACKBOX_START = b"H Product:Blackbox flight data recorder"
+BAG_MAGICS = (b"\x89MCAP0\r\n", b"SQLite format 3\0", b"#ROSBAG V2.0\n")
 ZIP_MAGIC = b"PK\x03\x04"
 MAVLINK_MAGIC = b"\xfd\xfe"
 LOOKED_AT_BYTES = 4096
@@ -32,6 +36,10 @@ def open_log(path: Path, *, flow_instance: int | None = None) -> Log:
     missing or no known format, or the log cannot be read.
     """
     if an_input(path).is_dir():
+        from flownav.logs.ros.containers import is_bag_folder
+
+        if is_bag_folder(path):
+            return _reader("ros")(path, flow_instance=flow_instance)
         if flow_instance is not None:
             raise InputError(f"--flow-instance: {path} is a folder of CSV files, with one flow sensor; leave it out")
         from flownav.logs.csv_folder import read_csv_folder
@@ -74,13 +82,27 @@ def _reader(kind: str) -> Callable[..., Log]:
         from flownav.logs.live_record import read_live_record
 
         return read_live_record
+    if kind == "ros":
+        from flownav.logs.ros.reader import read_ros
+
+        return read_ros
+    if kind == "crazyflie":
+        from flownav.logs.crazyflie_log import read_crazyflie
+
+        return read_crazyflie
+    if kind == "blackbox":
+        from flownav.logs.blackbox.reader import read_blackbox
+
+        return read_blackbox
     from flownav.logs.mavlink_log import read_tlog
 
     return read_tlog
 
 
 def log_kind(path: Path) -> str:
-    """ "ulog", "dataflash", "tlog", "record" or "journal" by a file's first bytes and its suffix; "" for anything else.
+    """What a file holds, by its first bytes and its suffix; "" for anything else.
+
+    "ulog", "dataflash", "tlog", "ros" (a bag of ROS), "crazyflie", "blackbox", "record" or "journal".
 
     InputError where a file cannot be read, or is a FIFO or a device.
     """
@@ -95,10 +117,16 @@ def log_kind(path: Path) -> str:
         return "journal"
     if head.startswith(ULOG_MAGIC) or path.suffix.lower() == ".ulg":
         return "ulog"
+    if head.startswith(BAG_MAGICS) or path.suffix.lower() in (".mcap", ".db3"):
+        return "ros"
     if head.startswith(DATAFLASH_MAGIC) or (path.suffix.lower() == ".bin" and DATAFLASH_FORMAT in head):
         return "dataflash"
     if path.suffix.lower() == ".fnr" and head.startswith(ZIP_MAGIC):
         return "record"
+    if BLACKBOX_START in head:
+        return "blackbox"
+    if looks_like_crazyflie(head):
+        return "crazyflie"
     dated = YEARS_US[0] < int.from_bytes(head[:8], "big") < YEARS_US[1]
     if path.suffix.lower() == ".tlog" or (dated and len(head) > 8 and head[8] in MAVLINK_MAGIC):
         return "tlog"

@@ -28,6 +28,7 @@ from flownav.logs.ulog_sensors import (
 )
 from flownav.logs.ulog_topics import Topic, Topics, read_topics
 from flownav.measurement import Sensor, Stream
+from flownav.record import Table
 
 STATES = ("vehicle_land_detected",)
 TOPICS = (
@@ -87,6 +88,18 @@ def read_ulog(path: Path, *, flow_instance: int | None = None) -> Log:
     InputError where the file cannot be read, is no ULog, holds no known sensor, or lacks that flow instance.
     """
     topics = read_topics(path, TOPICS, FIELDS, STATES)
+    return log_of_topics(path, topics, flow_instance, inputs={path.name: topics.sha256})
+
+
+def log_of_topics(
+    path: Path, topics: Topics, flow_instance: int | None, *, inputs: dict[str, str], notes: tuple[str, ...] = (),
+    reference: Table | None = None, reference_name: str = "",
+) -> Log:  # fmt: skip
+    """A Log from PX4's topics, wherever they were recorded.
+
+    inputs: SHA-256 by file. notes: what the reader of the file says. reference: a path that somebody else recorded, in
+    NED about a frame of its own, instead of PX4's ground truth. InputError as of `read_ulog`.
+    """
     flow = flow_topic(path, topics, flow_instance)
     flows = [f"{topic.label} ({len(topic)} readings)" for topic in topics.of(*FLOW_TOPICS) if topic is not flow]
     slow_imu = _slow_imu(topics)
@@ -95,7 +108,7 @@ def read_ulog(path: Path, *, flow_instance: int | None = None) -> Log:
     gps, origin = gps_streams(topics)
     streams = {stream.sensor: stream for stream in (*sensors, *gps) if len(stream)}
     odometry_serves = bool(streams.keys() & {Sensor.FLOW_RATE, Sensor.GPS_POSITION})
-    truth, truth_note = truth_of(topics, odometry_serves)
+    truth, truth_note = truth_of(topics, odometry_serves) if reference is None else (reference, "")
     pose, pose_note = (None, "") if truth_note else pose_stream(topics, attitude)
     if pose is not None:
         streams[Sensor.POSE] = pose
@@ -118,15 +131,15 @@ def read_ulog(path: Path, *, flow_instance: int | None = None) -> Log:
         streams,
         origin,
         truth,
-        {path.name: topics.sha256},
-        tuple(filter(None, (*topics.notes, flow_note, truth_note, pose_note, autopilot_note, *strays)))
+        inputs,
+        tuple(filter(None, (*topics.notes, *notes, flow_note, truth_note, pose_note, autopilot_note, *strays)))
         + tuple(_unusable(topics)),
         autopilot,
         _estimator(topics) if autopilot is not None else "",
         reading_limits(topics, flow),
         tuple(absences),
         clock_start_s=topics.start_s,
-        truth_name=VISUAL_ODOMETRY if truth_note else SIMULATOR,
+        truth_name=reference_name or (VISUAL_ODOMETRY if truth_note else SIMULATOR),
     )
 
 

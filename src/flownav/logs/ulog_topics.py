@@ -115,7 +115,7 @@ def read_topics(path: Path, wanted: Collection[str], fields: Collection[str], st
     found = [_topic(data, read, framed.rows[data.msg_id], fields) for data in log.data_list]
     del content, read
     for topic in found:
-        _order(topic)
+        order(topic)
     start_s = min((topic.t_s[0] for topic in found if len(topic) and topic.name not in states), default=0.0)
     for topic in found:
         topic.t_s = topic.t_s - start_s
@@ -174,7 +174,7 @@ def _topic(data: Any, content: Bytes, rows: Places, fields: Collection[str]) -> 
     return Topic(t_s, columns, name=str(data.name), instance=int(data.multi_id))
 
 
-def _order(topic: Topic) -> None:
+def order(topic: Topic) -> None:
     """Rows in time order; late ones, stray ones and repeated ones are counted and thrown away."""
     topic.keep(topic.t_s > 0.0, "no_time")
     if np.any(np.diff(topic.t_s) < 0):

@@ -161,7 +161,7 @@ class EquationFilter:
 
     def predict(self, t_s: float, imu: Imu | None) -> None:
         """An inertial reading is a reading as others are."""
-        if imu is not None:
+        if imu is not None and not imu.held:
             row = self._row._replace(arrived=1.0, withheld=0.0, quality=255.0)
             values = dict(zip(Row._fields[:6], [*imu.rate_frd_rad_s, *imu.force_frd_m_s2], strict=True))
             self._now = self.step(self._now, t_s, int(Sensor.IMU), row._replace(**values))

@@ -26,10 +26,14 @@ NO_BIAS = (0.0, 0.0, 0.0)
 
 
 class Imu(NamedTuple):
-    """An inertial reading: mean rate [rad/s] and mean specific force [m/s2] since the last one, (3,), body FRD."""
+    """An inertial reading: mean rate [rad/s] and mean specific force [m/s2] since the last one, (3,), body FRD.
+
+    held: between two readings, where the older one serves for the way to another sensor's instant.
+    """
 
     rate_frd_rad_s: Array
     force_frd_m_s2: Array
+    held: bool = False
 
 
 class Reading(NamedTuple):
@@ -94,15 +98,16 @@ class Innovation(NamedTuple):
 class Filter(Protocol):
     """A navigation filter. Readings come in the order of the instants that they describe.
 
-    `predict` is called for every inertial reading and before each other reading whose instant lies ahead; `update` for
-    every other reading that is not withheld. `estimate` is read after each of them.
+    `predict` is called for every inertial reading and before each other reading whose instant lies ahead, so that the
+    times from call to call add up to the flight's; `update` for every other reading that is not withheld. `estimate` is
+    read after each of them.
     """
 
     def start(self, told: Told) -> None:
         """Once, before the first reading."""
 
     def predict(self, t_s: float, imu: Imu | None) -> None:
-        """Bring the filter to an instant; imu: the reading that ends there, None between inertial readings."""
+        """Bring the filter to an instant; imu: the newest inertial reading, None where there was none for 0.1 s."""
 
     def update(self, reading: Reading) -> Iterable[Innovation] | None:
         """Take a reading that describes the instant the filter stands at."""

@@ -25,6 +25,7 @@ from flownav.parts.protocols import Estimate, Filter, Imu, Innovation, Reading, 
 
 STATED = 3
 QUALITY, ARRIVED, WITHHELD = (READING + MAX_VALUES + STATED + i for i in range(3))
+STALE_S = 0.1  # so long an inertial reading serves
 UNIT = 1e-3  # how far a quaternion's length may be from 1
 
 
@@ -35,7 +36,8 @@ class Taker:
         self.part, self.told, self.nav, self.tape = part, told, nav, tape
         self.name = name_of(part)
         self.called = Called(f"filter {self.name}", self._called, UNIT_SIGNATURE, mistakes)
-        self.begun, self.clock_s, self.written_s = False, -math.inf, -math.inf
+        self.begun, self.clock_s, self.written_s, self.imu_s = False, -math.inf, -math.inf, -math.inf
+        self.imu: Imu | None = None
 
     @property
     def address(self) -> int:
@@ -54,9 +56,11 @@ class Taker:
         values = nav[READING : READING + MAX_VALUES]
         arrived = nav[ARRIVED] > 0.0
         inertial = sensor == Sensor.IMU and arrived and bool(np.isfinite(values).all())
+        if inertial:
+            self.imu, self.imu_s = Imu(values[:3].copy(), values[3:].copy(), held=True), t_s
         if t_s > self.clock_s or inertial:
-            imu = Imu(values[:3].copy(), values[3:].copy()) if inertial else None
-            self.part.predict(t_s, imu)
+            imu = self.imu if t_s - self.imu_s <= STALE_S else None
+            self.part.predict(t_s, self.imu._replace(held=False) if inertial and self.imu else imu)
             self.clock_s = t_s
         if sensor != Sensor.IMU and arrived and nav[WITHHELD] == 0.0:
             width = MAX_VALUES if sensor == Sensor.FLOW_RATE else len(COLUMNS[sensor])

@@ -15,7 +15,7 @@ ROW_HEIGHT_PX = 138
 Kind = Literal["line", "dots", "crosses", "band"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Series:
     """One thing over time on one axis: t_s (n,) and value (n,); of a band the value is half its width, about `middle`
     (n,) or, where that is None, about zero.

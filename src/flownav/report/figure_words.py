@@ -10,6 +10,15 @@ NONE, MINUS = "\N{EN DASH}", "\N{MINUS SIGN}"
 
 
 @dataclass(frozen=True)
+class Part:
+    """What a large figure is made of: its name, its value as text, its length as a share of the longest part."""
+
+    name: str
+    value: str
+    share: float
+
+
+@dataclass(frozen=True)
 class Tile:
     """A large figure of the headline."""
 
@@ -17,6 +26,7 @@ class Tile:
     value: str
     unit: str = ""
     note: str = ""
+    parts: tuple[Part, ...] = ()
 
 
 def number(value: Any, digits: int = 4) -> str:

@@ -12,7 +12,7 @@ from flownav.report.figures_innovation import SENSOR_TITLES, innovation_table
 from flownav.report.panels import Panel
 from flownav.report.samples import sliding_mean, sliding_rms
 from flownav.report.series import Array, Track, difference, mapping, moments, outages, readings, start_end_s, track
-from flownav.scoring.consistency import MODEST, SCORED, chi_square_band, verdict
+from flownav.scoring.consistency import MODEST, SCORED, chi_square_band, consistency_of, verdict
 
 STD_POSITION = tuple(f"std_{name}" for name in POSITION_NED)
 RADIUS_WINDOW_S = 5.0
@@ -86,10 +86,10 @@ def consistency(record: Record) -> list[Panel]:
     if nees is None:
         return []
     span, (low, high) = start_end_s(record), chi_square_band(1)
-    stack = Stack(("NEES",), row_height_px=250)
+    stack = Stack(("NEES",), row_height_px=190)
     shown = np.where(nees.value[:, 0] < SMALLEST_NEES, np.nan, nees.value[:, 0])
     stack.line(1, "estimate", "filter", nees.t_s, shown)
-    for name, limit in (("95 % of a flight's steps lie between", low), ("95 % of a flight's steps lie between", high)):
+    for name, limit in (("95 % band", low), ("95 % band", high)):
         stack.line(1, "gate", name, np.array(span), np.full(2, limit))
     stack.line(1, "command", "expected", np.array(span), np.full(2, float(SCORED)))
     stack.log_axis(1)
@@ -100,40 +100,56 @@ def consistency(record: Record) -> list[Panel]:
         f"here {inside:.0f} % do. Errors are correlated in time, so a single flight may stay outside for a while."
     )
     title = "Consistency with the truth"
-    return [Panel("nees", title, caption, f"{title}: NEES over time. {caption}", stack.chart(span, moments(record)))]
+    alt = f"{title}: NEES over time. {caption}"
+    return [Panel("nees", title, caption, alt, stack.chart(span, moments(record)), wide=True)]
 
 
 def normalised_innovations(record: Record) -> list[Panel]:
     """Innovation squared over its stated variance, its mean over a sliding window, a row a sensor; none without."""
-    sensors = {
-        name: found for name, parts in innovation_table(record).items() if (found := _squares(parts)) is not None
-    }
+    table = innovation_table(record)
+    sensors = {name: found for name, parts in table.items() if (found := _squares(parts)) is not None}
     if not sensors:
         return []
-    judged = mapping(mapping(record.manifest.get("scores")).get("consistency"))
     span = start_end_s(record)
-    stack = Stack([SENSOR_TITLES.get(name, name.replace("_", " ")) for name in sensors], row_height_px=92)
-    said = []
-    for row, (name, squares) in enumerate(sensors.items(), 1):
+    stack = Stack(
+        [f"{_sensor_title(name)}: {_judged(record, name, table[name])}" for name in sensors], row_height_px=92
+    )
+    for row, squares in enumerate(sensors.values(), 1):
         mean = np.maximum(sliding_mean(squares.t_s, squares.value[:, 0], NIS_WINDOW_S), SMALLEST_NIS)
         for limit in MODEST:
-            stack.line(row, "gate", "factor of 2", np.array(span), np.full(2, limit))
+            stack.line(row, "gate", "2 and 1/2", np.array(span), np.full(2, limit))
         stack.line(row, "command", "as stated", np.array(span), np.ones(2))
         stack.line(row, "estimate", "mean NIS", squares.t_s, mean)
         stack.log_axis(row)
-        scored = mapping(judged.get(name))
-        over = float(np.nanmean(squares.value[:, 0]))
-        words = verdict(float(scored.get("nis_per_dof") or 0.0), white=bool(scored.get("white"))) if scored else ""
-        title = SENSOR_TITLES.get(name, name.replace("_", " "))
-        said.append(f"{title} {number(over, 2)}" + (f" ({words})" if words else ""))
     caption = (
         f"Innovations squared over their stated variance (NIS), a mean over a sliding {NIS_WINDOW_S:.0f} s: 1 is a "
-        "filter that knows its errors, above 2 it is too sure of itself, below 0.5 it is too careful. "
-        f"Over the whole record: {'; '.join(said)}."
+        "filter that knows its errors, above 2 it is too sure of itself, below 1/2 it is too careful. Above each axis: "
+        "the mean over the whole record and its verdict."
     )
     title = "Are the innovations as large as stated?"
     alt = f"Mean normalised innovation squared of each sensor over time. {caption}"
     return [Panel("nis", title, caption, alt, stack.chart(span, moments(record), outages(record)), wide=True)]
+
+
+def _sensor_title(name: str) -> str:
+    return SENSOR_TITLES.get(name, name.replace("_", " "))
+
+
+def _judged(record: Record, name: str, parts: dict[str, dict[str, Array]]) -> str:
+    """A sensor's mean NIS and verdict in words, as the record scores it or, where it does not, by the same rules."""
+    scored = mapping(mapping(mapping(record.manifest.get("scores")).get("consistency")).get(name))
+    if scored:
+        mean, white = float(scored.get("nis_per_dof") or 0.0), bool(scored.get("white"))
+    else:
+        whole = [part for part in parts.values() if "innovation" in part and "innovation_variance" in part]
+        component = np.concatenate([np.full(len(part["t_s"]), k) for k, part in enumerate(whole)])
+        innovation, variance = (np.concatenate([part[column] for part in whole])
+                                for column in ("innovation", "innovation_variance"))  # fmt: skip
+        found = consistency_of(component, innovation, variance)
+        if found is None:
+            return "too few to judge"
+        mean, white = found.nis_per_dof, found.white
+    return f"{number(mean, 2)}, {verdict(mean, white=white)}"
 
 
 def _squares(parts: dict[str, dict[str, Array]]) -> Track | None:

@@ -94,7 +94,7 @@ def _panel(record: Record, group: Group) -> Panel | None:
     ]
     if not rows:
         return None
-    stack = Stack([title for title, _, _ in rows], row_height_px=110)
+    stack = Stack([title for title, _, _ in rows], row_height_px=84 if len(rows) > 3 else 110)
     for row, (_, scale, found) in enumerate(rows, 1):
         for column, name, role in found:
             state = track(record, "states", (column, f"std_{column}"))

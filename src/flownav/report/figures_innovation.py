@@ -45,7 +45,8 @@ def innovations(record: Record) -> list[Panel]:
     sensors = innovation_table(record)
     if not sensors:
         return [Panel("innovations", "Innovations", absent="The record holds no innovations.")]
-    shown = [_innovation_panel(record, name, components) for name, components in sensors.items()]
+    most_rows_first = sorted(sensors.items(), key=lambda item: -len(item[1]))  # panels of a pair are equally high
+    shown = [_innovation_panel(record, name, components) for name, components in most_rows_first]
     return shown + [_untested(record, name) for name in _offered(record) if name not in sensors]
 
 
@@ -103,7 +104,14 @@ def axis_title(name: str) -> str:
     """A column name as an axis has it: "pos_n_m" is "x, north (m)", "gyro_x_rad_s" is "gyro x (rad/s)"."""
     if name in AXIS_TITLES:
         return AXIS_TITLES[name]
-    for suffix, unit in (("_rad_s", "rad/s"), ("_m_s2", "m/s²"), ("_m_s", "m/s"), ("_gauss", "gauss"), ("_m", "m")):
+    for suffix, unit in (
+        ("_rad_s", "rad/s"),
+        ("_m_s2", "m/s²"),
+        ("_m_s", "m/s"),
+        ("_gauss", "gauss"),
+        ("_rad", "rad"),
+        ("_m", "m"),
+    ):
         if name.endswith(suffix):
             return f"{name.removesuffix(suffix).replace('_', ' ')} ({unit})"
     return name.replace("_", " ")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from flownav.report.figure_words import Tile, metres, number
+from flownav.report.figure_words import Part, Tile, metres, number
 from flownav.report.series import mapping
 
 
@@ -34,14 +34,21 @@ def landing_sentences(landing: Mapping[str, Any]) -> list[str]:
     return said
 
 
+def parts_of(limited: Mapping[str, Any]) -> tuple[Part, ...]:
+    """What the touchdown's place was limited by, as bars; they add as vectors. None where it was not scored."""
+    sizes = {name: limited.get(f"{name}_m") for name in ("estimate", "guidance", "pad")}
+    known = {name: float(size) for name, size in sizes.items() if isinstance(size, (int, float)) and size == size}
+    longest = max(known.values(), default=0.0)
+    return tuple(Part(name, metres(size), size / longest if longest else 0.0) for name, size in known.items())
+
+
 def landing_tiles(landing: Mapping[str, Any]) -> list[Tile]:
     """The same as headline figures."""
     contact, rest, limited = (mapping(landing.get(name)) for name in ("contact", "rest", "limited_by"))
     found = []
     if contact:
         when = f"at {number(contact.get('t_s'), 1)} s"
-        parts = ", ".join(f"{name} {metres(limited.get(f'{name}_m'))}" for name in ("estimate", "guidance", "pad"))
-        found.append(Tile("Touchdown off centre", metres(contact.get("distance_m")), "m", f"{when}; {parts}"))
+        found.append(Tile("Touchdown off centre", metres(contact.get("distance_m")), "m", when, parts_of(limited)))
         found.append(Tile("Touchdown sink rate", number(contact.get("sink_rate_m_s"), 2), "m/s", when))
     if rest:
         slid = f"slid {metres(rest.get('slide_m'))} m"

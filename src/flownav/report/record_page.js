@@ -57,6 +57,7 @@
         late = performance.now();
       }
     }
+    if (!root.dataset.lastFigure) root.dataset.lastFigure = performance.now().toFixed(0);
     root.dataset.figures = "drawn";
   }
 

@@ -111,13 +111,15 @@ const panels = (() => {
         chip.setAttribute("aria-pressed", String(!one.hidden));
         chip.addEventListener("click", () => this.toggle(one.name, !one.hidden));
         const first = !named.has(one.name);
+        const constant = one.kind === "line" && one.t.length === 2 && one.v[0] === one.v[1];
+        if (constant && !first) continue; // a limit has its name once and no value at the instant
         named.add(one.name);
         const role = one.kind === "band" ? "estimate" : one.role;
         chip.style.color = this.colour(role);
         chip.append(make("b", "", first ? one.name : ""), make("i", ""));
         chip.title = `${one.name}: ${one.hidden ? "show" : "hide"}`;
         chips.append(chip);
-        row.labels.set(one.name, { chip, one, value: chip.lastChild });
+        row.labels.set(one.name, { chip, one, value: constant ? null : chip.lastChild });
       }
       box.append(head);
       if (!this.gutter) box.append(chips);
@@ -290,7 +292,7 @@ const panels = (() => {
         while (k > 0 && !Number.isFinite(one.v[k]) && one.t[k] > from) k--;
         const value = k >= 0 ? one.v[k] + (one.m ? one.m[k] : 0) : NaN;
         const y = Number.isFinite(value) && !(row.log && value <= 0) ? plot.valToPos(value, "y") : 0;
-        return { label, y: Math.min(plot.over.clientHeight, Math.max(0, y)), high: label.chip.firstChild.textContent ? 28 : 14 };
+        return { label, y: Math.min(plot.over.clientHeight, Math.max(0, y)), high: label.chip.firstChild.textContent && label.value ? 28 : 14 };
       });
       places.sort((a, b) => a.y - b.y);
       let free = -TITLE_PX;
@@ -323,6 +325,7 @@ const panels = (() => {
       row.cursor.style.display = inside ? "" : "none";
       if (inside) row.cursor.style.transform = `translateX(${row.plot.valToPos(t, "x").toFixed(2)}px)`;
       for (const { one, value } of row.labels.values()) {
+        if (!value) continue;
         const here = flight.nearest(one.t, one.v, t);
         value.textContent = `${one.kind === "band" && Number.isFinite(here) ? "\u00b1" : ""}${flight.number(here)}`;
       }

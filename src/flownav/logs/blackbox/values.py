@@ -1,0 +1,165 @@
+"""How blackbox packs numbers, in compiled functions: each takes the bytes and a place, and gives the place after.
+
+betaflight/betaflight, src/main/blackbox/blackbox_encoding.c writes what is read here. A place of -1 says that the bytes
+end before the value does.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.compile import kernel
+
+Bytes = NDArray[np.uint8]
+Numbers = NDArray[np.int64]
+
+SIGNED_VB, UNSIGNED_VB, NEG_14BIT, TAG8_8SVB, TAG2_3S32, TAG8_4S16, NONE, TAG2_3SVARIABLE = 0, 1, 3, 6, 7, 8, 9, 10
+AT_MOST = 8  # values that one encoding packs together
+
+
+@kernel
+def unsigned_vb(content: Bytes, pos: int, end: int) -> tuple[int, int]:
+    """Seven bits a byte, the lowest first; five bytes at most."""
+    value, shift = 0, 0
+    for _ in range(5):
+        if pos >= end:
+            return 0, -1
+        byte = int(content[pos])
+        pos += 1
+        value |= (byte & 127) << shift
+        if byte < 128:
+            return value & 0xFFFFFFFF, pos
+        shift += 7
+    return 0, -1
+
+
+@kernel
+def signed_vb(content: Bytes, pos: int, end: int) -> tuple[int, int]:
+    """The same of a number whose sign is its lowest bit (zigzag)."""
+    value, pos = unsigned_vb(content, pos, end)
+    return (value >> 1) ^ -(value & 1), pos
+
+
+@kernel
+def sign_extended(value: int, bits: int) -> int:
+    """A number of so many bits in two's complement."""
+    return value - (1 << bits) if value & (1 << (bits - 1)) else value
+
+
+@kernel
+def sized(content: Bytes, pos: int, end: int, selector: int, count: int, out: Numbers) -> int:
+    """`count` signed numbers of 1 to 4 bytes, lowest first; two bits of the selector say how many each has."""
+    for k in range(count):
+        width = ((selector >> (2 * k)) & 3) + 1
+        if pos + width > end:
+            return -1
+        value = 0
+        for j in range(width):
+            value |= int(content[pos + j]) << (8 * j)
+        out[k] = sign_extended(value, 8 * width)
+        pos += width
+    return pos
+
+
+@kernel
+def tag2_3(content: Bytes, pos: int, end: int, variable: bool, out: Numbers) -> int:
+    """Three numbers after two bits that say their size: 2, 4 and 6 bits each (or 5-5-4, 8-7-7), or whole bytes."""
+    if pos >= end:
+        return -1
+    lead = int(content[pos])
+    selector = lead >> 6
+    pos += 1
+    if selector == 3:
+        return sized(content, pos, end, lead & 63, 3, out)
+    if selector == 0:
+        for k in range(3):
+            out[k] = sign_extended((lead >> (4 - 2 * k)) & 3, 2)
+        return pos
+    if pos + selector > end:
+        return -1
+    one = int(content[pos])
+    if selector == 1:
+        if variable:
+            out[0] = sign_extended((lead & 62) >> 1, 5)
+            out[1] = sign_extended(((lead & 1) << 4) | (one >> 4), 5)
+        else:
+            out[0] = sign_extended(lead & 15, 4)
+            out[1] = sign_extended(one >> 4, 4)
+        out[2] = sign_extended(one & 15, 4)
+        return pos + 1
+    two = int(content[pos + 1])
+    if variable:
+        out[0] = sign_extended(((lead & 63) << 2) | (one >> 6), 8)
+        out[1] = sign_extended(((one & 63) << 1) | (two >> 7), 7)
+        out[2] = sign_extended(two & 127, 7)
+    else:
+        out[0] = sign_extended(lead & 63, 6)
+        out[1] = sign_extended(one & 63, 6)
+        out[2] = sign_extended(two & 63, 6)
+    return pos + 2
+
+
+@kernel
+def tag8_4s16(content: Bytes, pos: int, end: int, out: Numbers) -> int:
+    """Four numbers of 0, 4, 8 or 16 bits, packed nibble by nibble, the high one first."""
+    if pos >= end:
+        return -1
+    selector = int(content[pos])
+    pos += 1
+    half, kept = False, 0  # whether the low nibble of the byte before is still to come, and that byte
+    for k in range(4):
+        size = (selector >> (2 * k)) & 3
+        nibbles = 0 if size == 0 else 1 << (size - 1)
+        value = 0
+        for _ in range(nibbles):
+            if half:
+                value = (value << 4) | (kept & 15)
+                half = False
+            else:
+                if pos >= end:
+                    return -1
+                kept = int(content[pos])
+                pos += 1
+                value = (value << 4) | (kept >> 4)
+                half = True
+        out[k] = sign_extended(value, 4 * nibbles) if nibbles else 0
+    return pos
+
+
+@kernel
+def packed(content: Bytes, pos: int, end: int, encoding: int, group: int, out: Numbers) -> tuple[int, int]:
+    """The next values of an encoding into `out` (AT_MOST,): how many they are, and the place after them.
+
+    group: how many fields in a row have the encoding, which TAG8_8SVB packs together.
+    """
+    count = 1
+    if encoding == UNSIGNED_VB:
+        out[0], pos = unsigned_vb(content, pos, end)
+    elif encoding == SIGNED_VB:
+        out[0], pos = signed_vb(content, pos, end)
+    elif encoding == NEG_14BIT:
+        value, pos = unsigned_vb(content, pos, end)
+        out[0] = -sign_extended(value & 16383, 14)
+    elif encoding == NONE:
+        out[0] = 0
+    elif encoding == TAG8_8SVB:
+        count = min(group, AT_MOST)
+        if count == 1:
+            out[0], pos = signed_vb(content, pos, end)
+        elif pos >= end:
+            pos = -1
+        else:
+            marks = int(content[pos])
+            pos += 1
+            for k in range(count):
+                out[k] = 0
+                if (marks >> k) & 1 and pos >= 0:
+                    out[k], pos = signed_vb(content, pos, end)
+    elif encoding == TAG8_4S16:
+        count = 4
+        pos = tag8_4s16(content, pos, end, out)
+    else:
+        count = 3
+        pos = tag2_3(content, pos, end, encoding == TAG2_3SVARIABLE, out)
+    return count, pos

@@ -1,0 +1,99 @@
+"""A bag's messages, whatever file or folder they lie in: topic, type, time of logging and bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+from flownav.errors import InputError
+from flownav.guard import an_input
+
+SUFFIXES = (".mcap", ".db3", ".bag")
+MCAP_MAGIC, SQLITE_MAGIC, ROS1_MAGIC = b"\x89MCAP0\r\n", b"SQLite format 3\0", b"#ROSBAG V2.0\n"
+
+
+class Channel(NamedTuple):
+    """What one topic's messages are.
+
+    kind: the type, "sensor_msgs/msg/Imu". encoding: of the messages, "cdr", "ros1" or "json". definition: of the type
+    in ROS's own words, empty where the bag has none; definition_kind: "ros2msg", "ros2idl", "ros1msg", "jsonschema".
+    """
+
+    topic: str
+    kind: str
+    encoding: str
+    definition: str
+    definition_kind: str
+
+
+class Message(NamedTuple):
+    """One message: its channel, when it was logged [ns], its bytes."""
+
+    channel: Channel
+    log_ns: int
+    data: bytes
+
+
+@dataclass
+class Bag:
+    """What walking through a bag finds: what channels there are, notes on damage, files attached to it."""
+
+    channels: set[Channel] = field(default_factory=set)
+    notes: list[str] = field(default_factory=list)
+    attachments: dict[str, bytes] = field(default_factory=dict)
+
+
+Wanted = Callable[[Channel], bool]
+
+
+def is_bag_folder(folder: Path) -> bool:
+    """Whether a folder holds a ROS 2 bag: its files beside metadata.yaml, or alone."""
+    try:
+        return any(file.suffix.lower() in (".mcap", ".db3") for file in folder.iterdir())
+    except OSError:
+        return False
+
+
+def files_of(path: Path) -> list[Path]:
+    """The files of a bag, in the order of their names. InputError where a folder holds none that can be read."""
+    if not an_input(path).is_dir():
+        return [path]
+    files = sorted(file for file in path.iterdir() if file.suffix.lower() in (".mcap", ".db3"))
+    packed = sorted(file.name for file in path.iterdir() if file.name.endswith((".db3.zstd", ".mcap.zstd")))
+    if packed:
+        raise InputError(f"{path}: {packed[0]} is compressed as a whole; unpack it first (unzstd {packed[0]})")
+    if not files:
+        raise InputError(f"{path}: no .mcap or .db3 file in it; a ROS 2 bag's folder is needed")
+    return [an_input(file) for file in files]
+
+
+def messages(path: Path, bag: Bag, wanted: Wanted) -> Iterator[Message]:
+    """The wanted messages of one file, in the order in which they lie. InputError where it cannot be read at all."""
+    kind = _kind(path)
+    if kind == "mcap":
+        from flownav.logs.ros.mcap_records import mcap_messages
+
+        return mcap_messages(path, bag, wanted)
+    if kind == "db3":
+        from flownav.logs.ros.sqlite_bag import sqlite_messages
+
+        return sqlite_messages(path, bag, wanted)
+    if kind == "bag":
+        from flownav.logs.ros.ros1_bag import ros1_messages
+
+        return ros1_messages(path, bag, wanted)
+    raise InputError(f"{path}: no bag (neither MCAP nor SQLite nor ROS 1); record it again, or give another log")
+
+
+def _kind(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            head = file.read(16)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); see who may read it") from error
+    for magic, kind in ((MCAP_MAGIC, "mcap"), (SQLITE_MAGIC, "db3"), (ROS1_MAGIC, "bag")):
+        if head.startswith(magic):
+            return kind
+    return ""

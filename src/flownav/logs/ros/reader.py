@@ -1,0 +1,154 @@
+"""A bag as a Log: which messages are read, on one clock, and what is said of the choice. docs/reference/ros.md."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from flownav.errors import InputError
+from flownav.logs.absences import absences_of
+from flownav.logs.log import Log
+from flownav.logs.plausible import check_plausible, check_times, of_one_clock
+from flownav.logs.ros import px4, standard
+from flownav.logs.ros.choice import chosen
+from flownav.logs.ros.clock import Clock, clock_of
+from flownav.logs.ros.columns import NAMES, Gathered, stamp_of, values_of
+from flownav.logs.ros.containers import Bag, Channel, files_of, messages
+from flownav.logs.ros.decoding import Decoder
+from flownav.logs.ros.exported import is_ours, log_of_export
+from flownav.logs.ulog import STATES, log_of_topics
+from flownav.provenance import hash_of
+
+LACKING = {
+    "attitude": "no attitude (an orientation in sensor_msgs/Imu, px4_msgs/VehicleAttitude)",
+    "imu": "no IMU (sensor_msgs/Imu, px4_msgs/SensorCombined)",
+    "range": "no range downwards (sensor_msgs/Range, px4_msgs/DistanceSensor)",
+    "gps_position": "no GPS fix (sensor_msgs/NavSatFix, px4_msgs/SensorGps)",
+    "baro": "no barometer (sensor_msgs/FluidPressure, px4_msgs/VehicleAirData)",
+    "flow_rate": "no optical flow (mavros_msgs/OpticalFlowRad, px4_msgs/VehicleOpticalFlow)",
+}
+SHOWN = 8  # topics in a message
+
+
+@np.errstate(all="ignore")  # a flipped bit makes numbers that overflow; the limits leave them out
+def read_ros(path: Path, *, flow_instance: int | None = None, topics: Mapping[str, str] | None = None) -> Log:
+    """Read a ROS 2 bag (folder, .db3, .mcap), a ROS 1 bag (.bag), or an MCAP file that `flownav export` wrote.
+
+    flow_instance: which of several flow topics. topics: which topic serves as what, by role ("imu": "/imu/data").
+    Times are seconds since the start of the bag, by the headers' stamps where these are sound. InputError where the
+    bag cannot be read, holds no message of a known type, or lacks a topic that was asked for; where two sensors
+    cannot be right together; where the package rosbags is not installed.
+    """
+    bag, decoder = Bag(), Decoder()
+    files = files_of(path)
+    if len(files) == 1 and is_ours(files[0]):
+        return log_of_export(files[0], flow_instance)
+    gathered = _gathered(files, bag, decoder)
+    if not gathered:
+        kinds = sorted({f"{channel.topic} ({channel.kind})" for channel in bag.channels})
+        listed = ", ".join(kinds[:SHOWN]) + (" ..." if len(kinds) > SHOWN else "") or "nothing"
+        why = f"; of {', '.join(sorted(decoder.undefined))} it lacks the definition" if decoder.undefined else ""
+        raise InputError(f"{path}: no message of a known type{why}; the bag holds {listed}")
+    inputs = {file.name: hash_of(file) for file in files}
+    notes = [*bag.notes, *_lost(decoder)]
+    flown = [topic for topic in gathered if topic.kind.startswith(px4.PACKAGE)]
+    others = [topic for topic in gathered if not topic.kind.startswith(px4.PACKAGE)]
+    if flown:
+        return _px4_log(path, flown, others, inputs, notes, flow_instance, topics or {})
+    return _ros_log(path, others, inputs, notes, flow_instance, topics or {})
+
+
+def _gathered(files: list[Path], bag: Bag, decoder: Decoder) -> list[Gathered]:
+    """The messages of known types, topic by topic."""
+    found: dict[Channel, Gathered] = {}
+    for file in files:
+        for message in messages(file, bag, _known):
+            content = decoder.decode(message)
+            if content is None:
+                continue
+            channel = message.channel
+            gathered = found.setdefault(channel, Gathered(channel.topic, channel.kind))
+            try:
+                if channel.kind in NAMES:
+                    names, values = NAMES[channel.kind], values_of(channel.kind, content)
+                else:
+                    names, values = px4.px4_values(content)
+                gathered.take(message.log_ns, stamp_of(content), names, values)
+            except (AttributeError, TypeError, ValueError, IndexError, OverflowError):
+                decoder.undecodable[channel.topic] += 1  # a type of that name with other fields
+    return [gathered for gathered in found.values() if len(gathered)]
+
+
+def _known(channel: Channel) -> bool:
+    """Whether a topic's messages are read."""
+    if channel.encoding not in ("cdr", "ros1"):
+        return False
+    return channel.kind in NAMES or bool(
+        channel.kind.startswith(px4.PACKAGE) and px4.px4_topic(channel.topic, channel.kind)
+    )
+
+
+def _lost(decoder: Decoder) -> list[str]:
+    notes = [f"{topic}: {count} messages cannot be decoded" for topic, count in sorted(decoder.undecodable.items())]
+    missing = ", ".join(sorted(decoder.undefined))
+    return [*notes, *([f"the bag lacks the definition of {missing}; left out"] if missing else [])]
+
+
+def _ros_log(
+    path: Path, gathered: list[Gathered], inputs: dict[str, str], notes: list[str], flow_instance: int | None,
+    asked: Mapping[str, str],
+) -> Log:  # fmt: skip
+    roles, choice = chosen(gathered, asked, flow_instance)
+    clock, clock_notes = clock_of(roles.values())
+    listed, origin = standard.streams_of(roles, clock)
+    streams, strays = of_one_clock({stream.sensor: stream for stream in listed})
+    if not streams:
+        raise InputError(f"{path}: no usable reading of any sensor; record an Imu and a NavSatFix or OpticalFlowRad")
+    check_times(path, streams)
+    check_plausible(path, streams)
+    truth, own = (
+        standard.path_table(roles[name], clock.times(roles[name]) - clock.delay_s(roles[name]))
+        if name in roles
+        else None
+        for name in ("truth", "autopilot")
+    )
+    if "range" in roles:
+        choice.append(f"range {roles['range'].topic} is taken to look down: its message does not say where it looks")
+    return Log(
+        path,
+        streams,
+        origin,
+        truth,
+        inputs,
+        (*notes, *choice, *clock_notes, *strays),
+        own,
+        roles["autopilot"].topic if own is not None else "",
+        standard.limits_of(roles),
+        tuple(absences_of(streams, **LACKING)),
+        clock_start_s=clock.start_ns * 1e-9,
+        truth_name=roles["truth"].topic if truth is not None else "",
+    )
+
+
+def _px4_log(
+    path: Path, flown: list[Gathered], others: list[Gathered], inputs: dict[str, str], notes: list[str],
+    flow_instance: int | None, asked: Mapping[str, str],
+) -> Log:  # fmt: skip
+    """As of a ULog; a reference from another topic (motion capture) is laid on PX4's clock by the times of logging."""
+    topics = px4.px4_topics(flown, "", STATES)
+    offset_ns = np.median(np.concatenate([each.logged - 1e3 * each.column("timestamp")[:, 0] for each in flown]))
+    poses, choice = chosen(others, {name: topic for name, topic in asked.items() if name == "truth"}, None)
+    truth, truth_name = None, ""
+    if "truth" in poses:
+        start_ns = int(offset_ns + 1e9 * topics.start_s)
+        clock, clock_notes = clock_of([poses["truth"]])
+        if abs(clock.offset_ns) * 1e-9 > 1.0:
+            clock = Clock(0, 0, frozenset(), {})
+        times = clock._replace(start_ns=start_ns).times(poses["truth"]) - clock.delay_s(poses["truth"])
+        truth, truth_name = standard.path_table(poses["truth"], times), poses["truth"].topic
+        choice += clock_notes
+    return log_of_topics(
+        path, topics, flow_instance, inputs=inputs, notes=(*notes, *choice), reference=truth, reference_name=truth_name
+    )

@@ -9,7 +9,7 @@
 # ## A filter in forty lines
 #
 # flownav ships a complementary filter as an example. Position and velocity follow the IMU in the short run, and each
-# other sensor in the long run, with one time constant a sensor. This is all of it:
+# other sensor in the long run, with one time constant a sensor. This is the complete filter:
 
 # %%
 import inspect

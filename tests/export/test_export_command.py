@@ -15,6 +15,9 @@ from flownav.export.formats import FORMATS
 
 NAMES = {
     "mcap": ["run.mcap"],
+    "foxglove": ["run.mcap", "run_layout.json"],
+    "kml": ["run.kml"],
+    "gpx": ["run.gpx"],
     "tum": ["run_estimate.tum", "run_truth.tum"],
     "euroc": ["run_estimate.csv", "run_truth.csv"],
     "parquet": ["run_parquet"],
@@ -25,7 +28,9 @@ NAMES = {
 
 @pytest.fixture
 def record(tmp_path):
-    awkward().save(tmp_path / "run.fnr")
+    located = awkward()
+    located.manifest["parameters"] = {"origin_lat_lon_deg_alt_m": [47.4, 8.5, 488.0]}
+    located.save(tmp_path / "run.fnr")
     return tmp_path / "run.fnr"
 
 
@@ -72,7 +77,9 @@ def test_out_may_be_a_folder_or_lack_its_suffix(record, tmp_path, out, lies):
 
 
 def test_options_that_do_not_fit_are_refused(record, tmp_path):
-    assert refused(record, "--to", "rosbag") == "--to rosbag: one of mcap, tum, euroc, parquet, csv, ulog is needed"
+    assert refused(record, "--to", "rosbag") == (
+        "--to rosbag: one of mcap, foxglove, tum, euroc, parquet, csv, ulog, kml, gpx is needed"
+    )
     assert refused(record, "--to", "tum", "--frame", "utm") == "--frame utm: ned or enu is needed"
     assert "--frame is for tum and euroc" in refused(record, "--to", "mcap", "--frame", "enu")
     assert refused(record, "--to", "mcap", "--merge", record) == "--merge is for --to ulog"

@@ -126,7 +126,7 @@ def _name(record: Record) -> str:
 
 
 def _kml(record: Record, found: list[Track], stamp: Callable[[float], str]) -> Any:
-    """A document with a gx:Track for each path, above the earth's ellipsoid or sea level as the origin's altitude is."""
+    """A document with a gx:Track for each path; altitudes are of the kind that the origin's is."""
     ElementTree.register_namespace("", KML)
     ElementTree.register_namespace("gx", GX)
     root = ElementTree.Element(f"{{{KML}}}kml")

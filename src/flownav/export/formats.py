@@ -9,10 +9,13 @@ from flownav.errors import InputError
 from flownav.export.trajectory import FRAMES
 from flownav.record import Record
 
-SUFFIXES = {"mcap": ".mcap", "tum": ".tum", "euroc": ".csv", "ulog": ".ulg"}
+SUFFIXES = {
+    "mcap": ".mcap", "foxglove": ".mcap", "tum": ".tum", "euroc": ".csv", "ulog": ".ulg", "kml": ".kml", "gpx": ".gpx",
+}  # fmt: skip
 FOLDERS = {"parquet": "_parquet", "csv": "_csv"}
-FORMATS = ("mcap", "tum", "euroc", "parquet", "csv", "ulog")
+FORMATS = ("mcap", "foxglove", "tum", "euroc", "parquet", "csv", "ulog", "kml", "gpx")
 FRAMED = ("tum", "euroc")
+ON_EARTH = ("kml", "gpx")
 
 
 class Written(NamedTuple):
@@ -40,10 +43,25 @@ def destination(record: Path, to: str, out: Path | None) -> Path:
     return out if out.suffix == suffix else out.with_name(out.name + suffix)
 
 
-def export(record: Record, to: str, path: Path, frame: str | None = None, original: Path | None = None) -> Written:
+def written_files(to: str, path: Path) -> list[Path]:
+    """The files that an export to `path` surely writes, to ask beforehand whether they may be."""
+    if to in FRAMED:
+        return [path.with_name(f"{path.stem}_estimate{path.suffix}")]
+    if to == "foxglove":
+        from flownav.export.foxglove import layout_path
+
+        return [path, layout_path(path)]
+    return [path]
+
+
+def export(
+    record: Record, to: str, path: Path, frame: str | None = None, original: Path | None = None,
+    origin: tuple[float, float, float] | None = None,
+) -> Written:  # fmt: skip
     """Write a record to `path` in a format of FORMATS, whole or not at all.
 
     frame: "ned" (and FRD; where None) or "enu" (and FLU), of TUM and EuRoC. original: the ULog to merge into.
+    origin: latitude, longitude [deg] and altitude [m] of the record's origin, of KML and GPX; None takes its own.
     InputError where an option does not belong to the format or the record lacks what it needs; OSError where
     nothing can be written there.
     """
@@ -53,6 +71,16 @@ def export(record: Record, to: str, path: Path, frame: str | None = None, origin
         raise InputError(f"--frame is for {' and '.join(FRAMED)}; mcap carries both frames, the others are NED")
     if original is not None and to != "ulog":
         raise InputError("--merge is for --to ulog")
+    if origin is not None and to not in ON_EARTH:
+        raise InputError(f"--origin is for {' and '.join(ON_EARTH)}")
+    if to in ON_EARTH:
+        from flownav.export.earth import write_earth
+
+        return Written(*write_earth(record, path, to, origin))
+    if to == "foxglove":
+        from flownav.export.foxglove import write_foxglove
+
+        return Written(*write_foxglove(record, path))
     if to in FRAMED:
         from flownav.export.poses import write_poses
 

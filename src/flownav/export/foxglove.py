@@ -47,7 +47,7 @@ def topics_of(path: Path) -> dict[str, dict[str, Any]]:
 
 def layout_for(topics: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """The layout without the curves of topics and columns that a file lacks."""
-    whole = json.loads(files("flownav.export").joinpath(LAYOUT).read_text(encoding="utf-8"))
+    whole: dict[str, Any] = json.loads(files("flownav.export").joinpath(LAYOUT).read_text(encoding="utf-8"))
     kept = {
         name: panel for name, config in whole["configById"].items() if (panel := _panel(config, topics)) is not None
     }
@@ -55,7 +55,7 @@ def layout_for(topics: dict[str, dict[str, Any]]) -> dict[str, Any]:
 
 
 def topic_and_field(value: str) -> tuple[str, str]:
-    """Topic and column of a message path such as /innovation{sensor=="range"}.innovation or /error.error_n_m.@negative."""
+    """Topic and column of a message path: /innovation{sensor=="range"}.innovation, /error.error_n_m.@negative."""
     topic, _, rest = value.partition("{") if "{" in value else value.partition(".")
     field = rest.rsplit("}.", 1)[-1] if "{" in value else rest
     return topic, field.split(".")[0]

@@ -17,6 +17,7 @@ import numpy as np
 
 from flownav import __version__
 from flownav.errors import InputError
+from flownav.export.errors import error_table
 from flownav.export.mcap_schemas import FRAME_TRANSFORM, POSE_IN_FRAME, Schema, table_schema
 from flownav.export.stamps import Stamps, finite_rows, shift_needed_s, stamps
 from flownav.export.tables import is_text, manifest_json, texts
@@ -54,7 +55,8 @@ def write_mcap(record: Record, path: Path) -> tuple[list[Path], list[str]]:
     for one in paths:
         channels += _pose_channels(one, stamps(one.t_s, NS, shift_s))
     channels.append(_earth(channels[0].time_ns[:1]))
-    for name, table in record.tables.items():
+    errors = error_table(record, paths)
+    for name, table in {**record.tables, **({} if errors is None else {"error": errors})}.items():
         rows = finite_rows(np.asarray(table["t_s"], float))
         if len(rows) < len(table["t_s"]):
             notes.append(f"{name}: rows without a time left out: {len(table['t_s']) - len(rows)}")

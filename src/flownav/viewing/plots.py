@@ -8,9 +8,10 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from flownav.export.errors import BOUND, ERROR, error_table
 from flownav.export.trajectory import Trajectory
-from flownav.record import POSITION_NED, Record
-from flownav.viewing.scene import COLOURS, SIGMAS, times
+from flownav.record import Record
+from flownav.viewing.scene import COLOURS, times
 
 PLOTS = "/plots"
 AXES = ("north_m", "east_m", "down_m")
@@ -41,22 +42,14 @@ def _log_positions(stream: Any, paths: list[Trajectory]) -> None:
 
 def _log_errors(stream: Any, record: Record, paths: list[Trajectory]) -> None:
     """Estimate less truth at the estimate's instants inside the truth's time, within three standard deviations."""
-    named = {path.name: path for path in paths}
-    if not {"estimate", "truth"} <= named.keys():
+    table = error_table(record, paths)
+    if table is None:
         return
-    estimate, truth = named["estimate"], named["truth"]
-    inside = (estimate.t_s >= truth.t_s[0]) & (estimate.t_s <= truth.t_s[-1])
-    columns = tuple(f"std_{name}" for name in POSITION_NED)
-    stated = set(columns) <= record.tables["estimate"].keys()
-    spread = record.matrix("estimate", columns)[estimate.row] if stated else None
-    for k, axis in enumerate(AXES):
-        so = np.interp(estimate.t_s[inside], truth.t_s, truth.position_m[:, k])
-        error = estimate.position_m[inside, k] - so
-        _series(stream, f"error/{axis}/estimate_less_truth", estimate.t_s[inside], error, "estimate")
-        if spread is not None:
-            for name, sign in (("plus", SIGMAS), ("minus", -SIGMAS)):
-                bound = sign * spread[inside, k]
-                _series(stream, f"error/{axis}/{name}_3_sigma", estimate.t_s[inside], bound, "pad")
+    for axis, error, bound in zip(AXES, ERROR, BOUND, strict=True):
+        _series(stream, f"error/{axis}/estimate_less_truth", table["t_s"], table[error], "estimate")
+        if bound in table:
+            for name, sign in (("plus", 1.0), ("minus", -1.0)):
+                _series(stream, f"error/{axis}/{name}_3_sigma", table["t_s"], sign * table[bound], "pad")
 
 
 def _log_velocities(stream: Any, paths: list[Trajectory]) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
+from flownav.export.errors import SIGMAS
 from flownav.export.trajectory import ENU_FROM_NED, Trajectory
 from flownav.record import POSITION_NED, Record
 from flownav.viewing.flow_arrows import flow_arrows
@@ -22,7 +23,6 @@ EARTH, NED = "/enu", "/enu/ned"
 COLOURS = {"estimate": (10, 95, 180), "smoothed": (154, 47, 107), "truth": (60, 66, 74), "autopilot": (131, 57, 168),
            "gps": (191, 91, 11), "flow": (14, 122, 95), "pad": (125, 136, 148)}  # fmt: skip
 MOST_SEGMENTS = 5000  # of a path that is drawn; the poses are all there
-SIGMAS = 3.0
 AXIS_M, CAMERA_PLANE_M = 0.25, 0.4
 DOWN_LOOKING = np.array(
     [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]

@@ -368,7 +368,7 @@ def test_the_command_writes_beside_the_record_and_prints_json(tmp_path: Path) ->
     Record({"kind": "fly"}).save(record)
     result = CliRunner().invoke(cli(), [str(record), "--json"])
     page = tmp_path / "landing.html"
-    assert json.loads(result.stdout) == {"record": str(record), "report": str(page)}
+    assert json.loads(result.stdout) == {"schema": 1, "record": str(record), "report": str(page)}
     assert page.is_file()
 
 

@@ -7,7 +7,7 @@ INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --co
 .PHONY: demo test test-gpu test-slow long-log fuzz mutants league integrity rare validate report-size lint bench bench-once docs pictures tutorials wheel wheel-test clean
 
 demo: $(VENV)/.ready
-	$(BIN)/flownav fly landing --out out/landing.fnr
+	$(BIN)/flownav fly landing --out out/landing.fnr --force
 
 test: $(VENV)/.ready-test
 	$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile -p no:benchmark
@@ -37,7 +37,7 @@ rare: $(VENV)/.ready
 	$(BIN)/python tools/rare_table.py $(FLIGHTS)
 
 validate: $(VENV)/.ready
-	FLOWNAV_DATA=$${FLOWNAV_DATA:-../shared/data} $(BIN)/flownav validate --out docs/explanation/validation.md
+	FLOWNAV_DATA=$${FLOWNAV_DATA:-../shared/data} $(BIN)/flownav validate --out docs/explanation/validation.md --force
 
 report-size: $(VENV)/.ready-test
 	$(BIN)/python tools/report_size.py $(RECORDS)

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from flownav import guard
-from flownav.cli.output import require_writable, require_writable_record
+from flownav.cli.output import place, record_place
 from flownav.errors import InputError
 from flownav.guard import a_run, an_input, an_output, folder_written_whole, written_whole
 from flownav.logs.open_log import open_log
@@ -26,7 +26,7 @@ def refused(path: Path, *inputs: Path) -> str:
     """The one line with which an output is refused; nothing is left of the try, and nothing has changed."""
     before = sorted((each, each.lstat().st_mtime_ns) for each in path.parent.rglob("*"))
     with pytest.raises(InputError) as first:
-        require_writable(path, *inputs)
+        place(path, *inputs, force=True)
     if not inputs:
         with pytest.raises((InputError, OSError)), written_whole(path) as temporary:
             temporary.write_text("new")
@@ -78,7 +78,7 @@ def test_links_to_files_are_read(tmp_path):
 
 @pytest.mark.parametrize("name", ["a" * 300, "a\0b", "/".join(["d" * 200] * 30)])
 def test_a_name_that_cannot_be_one_is_said_in_one_line(tmp_path, name):
-    for ask in (open_log, read_toml, load_key, require_writable):
+    for ask in (open_log, read_toml, load_key, lambda path: place(path, force=False)):
         with pytest.raises(InputError, match="cannot be the name of a file") as said:
             ask(tmp_path / name)
         assert len(str(said.value)) < 400
@@ -118,7 +118,7 @@ def test_a_file_of_an_input_folder_is_an_input_and_a_new_one_would_become_one(tm
 def test_results_may_lie_in_the_folder_that_they_are_made_from(tmp_path):
     folder = log_of_flight(4.0).write(tmp_path / "log")
     for _ in range(2):
-        require_writable_record(folder / "out" / "log.fnr", folder, report=True)
+        record_place(folder / "out" / "log.fnr", folder, force=True, report=True)
         Record({"kind": "replay"}).save(folder / "out" / "log.fnr")
 
 
@@ -153,7 +153,7 @@ def test_no_device_pipe_socket_or_folder_is_replaced(tmp_path, fifo):
     assert "it is a folder" in refused(tmp_path / "folder.fnr")
     for device in ("/dev/full", "/dev/null"):
         with pytest.raises(InputError, match=r"\(a device\)"):
-            require_writable(Path(device))
+            place(Path(device), force=False)
         with pytest.raises(InputError, match=r"\(a device\)"):
             Record().save(Path(device))
         assert stat.S_ISCHR(os.stat(device).st_mode)
@@ -163,8 +163,8 @@ def test_a_place_where_nothing_can_be_made_is_found_before_the_work(tmp_path):
     (tmp_path / "file").write_text("")
     assert "cannot be written" in refused(tmp_path / "file" / "x.fnr")
     with pytest.raises(InputError, match="cannot be written"):
-        require_writable(Path("/proc/x.fnr"))
-    require_writable(tmp_path / "a" / "b" / "x.fnr")
+        place(Path("/proc/x.fnr"), force=False)
+    assert place(tmp_path / "a" / "b" / "x.fnr", force=False) == tmp_path / "a" / "b" / "x.fnr"
     assert not (tmp_path / "a").exists()
 
 
@@ -200,7 +200,7 @@ def test_the_record_of_a_live_session_is_not_replaced_and_that_of_a_run_is(tmp_p
 
 def test_an_empty_file_may_be_filled(tmp_path):
     (tmp_path / "x.fnr").touch()
-    require_writable(tmp_path / "x.fnr")
+    assert place(tmp_path / "x.fnr", force=False) == tmp_path / "x.fnr"
 
 
 def test_a_rig_log_is_replaced_only_where_its_setup_says_that_it_is_ours(tmp_path):

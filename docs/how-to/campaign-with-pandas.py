@@ -13,7 +13,9 @@ result
 # %%
 flights = result.to_pandas()
 print(flights.shape)
-flights[["set.wind.speed_20ft_m_s", "touchdown.contact.distance_m", "touchdown.contact.sink_rate_m_s", "verdict"]].head()
+flights[
+    ["set.wind.speed_20ft_m_s", "touchdown.contact.distance_m", "touchdown.contact.sink_rate_m_s", "verdict"]
+].head()
 
 # %% [markdown]
 # ## Percentiles by wind
@@ -39,7 +41,9 @@ for cell in result.cells:
 # %%
 inputs = flights.filter(like="input.")
 flights_of_one_wind = flights["set.wind.speed_20ft_m_s"] == 6.0
-hints = inputs[flights_of_one_wind].corrwith(flights["touchdown.rest.distance_m"][flights_of_one_wind], method="spearman")
+hints = inputs[flights_of_one_wind].corrwith(
+    flights["touchdown.rest.distance_m"][flights_of_one_wind], method="spearman"
+)
 hints.abs().sort_values(ascending=False).head(5).round(2).to_frame("rank correlation")
 
 # %%

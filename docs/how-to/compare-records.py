@@ -16,7 +16,8 @@ windy.save("windy.fnr")
 # flownav compare calm.fnr windy.fnr --out compared.html
 
 # %% [markdown]
-# The page `compared.html` has the paths and the errors of both on one time axis. Every record may be compared with every
+# The page `compared.html` has the paths and the errors of both on one time axis. Every record may be compared with
+# every
 # other one; what is in one of them only is left out and named.
 #
 # ## By hand

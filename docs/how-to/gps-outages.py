@@ -12,11 +12,13 @@ import flownav
 
 record = flownav.replay("samples/flight-csv", outage_table=(15, 85, 20))
 for outage in record.scores["outages"]:
-    print(f"{outage['t0']:4.0f} to {outage['t1']:4.0f} s  {outage['horizontal_rms_m']:6.2f} m rms  {outage['horizontal_max_m']:6.2f} m at most")
+    rms_m, max_m = outage["horizontal_rms_m"], outage["horizontal_max_m"]
+    print(f"{outage['t0']:4.0f} to {outage['t1']:4.0f} s  {rms_m:6.2f} m rms  {max_m:6.2f} m at most")
 print(f"median {record.scores['outage_median_rms_m']:.2f} m, worst {record.scores['outage_worst_rms_m']:.2f} m")
 
 # %% [markdown]
-# `outage_table=(15, 85, 20)` replays the flight once for each window of 20 s between 15 and 85 s. The same in a terminal
+# `outage_table=(15, 85, 20)` replays the flight once for each window of 20 s between 15 and 85 s. The same in a
+# terminal
 # is `flownav replay samples/flight-csv --outage-table 15:85:20`.
 #
 # ## What the sensors are worth
@@ -25,7 +27,8 @@ print(f"median {record.scores['outage_median_rms_m']:.2f} m, worst {record.score
 
 # %%
 blind = flownav.replay("samples/flight-csv", outage_table=(15, 85, 20), flow=False)
-print(f"without flow: median {blind.scores['outage_median_rms_m']:.2f} m, worst {blind.scores['outage_worst_rms_m']:.2f} m")
+median_m, worst_m = blind.scores["outage_median_rms_m"], blind.scores["outage_worst_rms_m"]
+print(f"without flow: median {median_m:.2f} m, worst {worst_m:.2f} m")
 
 # %%
 import matplotlib.pyplot as plt
@@ -44,7 +47,8 @@ plt.show()
 # %% [markdown]
 # ## The best estimate afterwards
 #
-# While a vehicle flies it can use only what came before. For a map or a report the smoother uses the whole flight, the
+# While a vehicle flies it can use only what came before. For a map or a report the smoother uses the whole flight,
+# the
 # GPS after the outage as well.
 
 # %%

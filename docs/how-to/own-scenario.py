@@ -1,7 +1,8 @@
 # %% [markdown]
 # # Fly your own scenario and your own vehicle
 #
-# A scenario is a TOML file: the path, the wind, the pad, the sensors. A vehicle is another one. Units stand in the names of
+# A scenario is a TOML file: the path, the wind, the pad, the sensors. A vehicle is another one. Units stand in the
+# names of
 # the keys, and every key, with its range and its default, stands in [keys of the parameter
 # files](../reference/keys.md).
 #
@@ -56,7 +57,8 @@ record
 # %% [markdown]
 # ## A vehicle
 #
-# Three ship: the paper's helicopter, a quadrotor and a hexarotor. Take the nearest, change what you know of yours, and save
+# Three ship: the paper's helicopter, a quadrotor and a hexarotor. Take the nearest, change what you know of yours,
+# and save
 # it. Here the quadrotor carries more.
 
 # %%
@@ -67,15 +69,19 @@ quad
 heavy = quad.changed(body={"mass_kg": 1.1 * quad.file.body.mass_kg})
 heavy.save("heavy.toml")
 flown = flownav.fly("leg.toml", seed=1, vehicle="heavy.toml")
-print(f"{flown.scores['touchdown']['contact']['distance_m']:.2f} m from the pad, {flown.scores['touchdown']['verdict']}")
+print(
+    f"{flown.scores['touchdown']['contact']['distance_m']:.2f} m from the pad, {flown.scores['touchdown']['verdict']}"
+)
 
 # %% [markdown]
-# `flownav vehicle heavy.toml` prints its trim, its hover power and its linear model. `--margins` prints the phase and gain
+# `flownav vehicle heavy.toml` prints its trim, its hover power and its linear model. `--margins` prints the phase
+# and gain
 # margins of its control loops.
 
 # %% language="bash"
 # flownav vehicle heavy.toml | head -30
 
 # %% [markdown]
-# [Scenarios](../reference/scenarios.md) explains every section of a scenario, [the helicopter](../explanation/vehicle.md) and
+# [Scenarios](../reference/scenarios.md) explains every section of a scenario, [the
+# helicopter](../explanation/vehicle.md) and
 # [the multirotor](../explanation/multirotor.md) explain the models.

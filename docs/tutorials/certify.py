@@ -1,7 +1,8 @@
 # %% [markdown]
 # # Certify a landing
 #
-# One good landing shows little. A test plan asks for more: *the vehicle touches down within so many metres of the pad,
+# One good landing shows little. A test plan asks for more: *the vehicle touches down within so many metres of the
+# pad,
 # with a probability of so much, at a confidence of so much, in the wind that we expect*. `flownav certify` takes that
 # statement as a file, says how many flights it needs, flies them, and answers **pass**, **fail** or **not shown**.
 #
@@ -38,7 +39,8 @@ confidence = 0.90
 # %% [markdown]
 # ## How many flights does it need?
 #
-# Nothing is flown yet. With no failure the fewest flights suffice; each failure that is allowed asks for more of them.
+# Nothing is flown yet. With no failure the fewest flights suffice; each failure that is allowed asks for more of
+# them.
 
 # %% language="bash"
 # flownav certify --plan my-landing.toml
@@ -46,7 +48,8 @@ confidence = 0.90
 # %% [markdown]
 # ## Fly it
 #
-# Every flight has a vehicle, a wind, a ground and sensors of its own, drawn from the scenario's dispersion, and neither
+# Every flight has a vehicle, a wind, a ground and sensors of its own, drawn from the scenario's dispersion, and
+# neither
 # the navigator nor the autopilot knows them. The ranking of inputs flies many more flights, so it is left out here
 # (`--ranking 0`).
 
@@ -64,5 +67,6 @@ confidence = 0.90
 # ## What it rests on
 #
 # A certificate is a statement about the simulator. The page lists what was assumed and what is not modelled, and
-# [the simulator beside recorded flights](../explanation/validation.md) says where it is too kind. Read both before you
+# [the simulator beside recorded flights](../explanation/validation.md) says where it is too kind. Read both before
+# you
 # sign. [The landing certificate](../how-to/certify.md) has the mathematics, and how to rank what matters most.

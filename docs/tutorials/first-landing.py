@@ -4,10 +4,10 @@
 # This tutorial flies a landing in simulation, looks at what the navigator knew on the way down, and compares it with
 # what really happened. You need Python 3.11 or newer and nothing else: no vehicle, no log and no autopilot.
 #
-# Install flownav first:
+# Install flownav first, in a clone of its repository:
 #
 # ```bash
-# pip install flownav
+# pip install .
 # ```
 #
 # ## Fly
@@ -46,8 +46,10 @@ print(f"touched {contact['distance_m']:.2f} m from the pad's centre, sinking at 
 # %% [markdown]
 # ## Look at the estimate
 #
-# `record.estimate` is a table: a dictionary of NumPy arrays, whose names end in their units. `pos_d_m` is the position
-# downwards, so that the height is its negative. `std_pos_n_m` is one standard deviation of the position northwards, as
+# `record.estimate` is a table: a dictionary of NumPy arrays, whose names end in their units. `pos_d_m` is the
+# position
+# downwards, so that the height is its negative. `std_pos_n_m` is one standard deviation of the position northwards,
+# as
 # the filter itself states it.
 
 # %%
@@ -79,6 +81,13 @@ plt.show()
 # %% [markdown]
 # If the filter knows its own errors, the error stays inside the band about 95 % of the time.
 #
+# `record.plot` draws the usual figures at once: `position`, `velocity`, `errors`, `innovations` and `path`. They are
+# interactive: zoom into one with the mouse.
+
+# %%
+record.plot("path")
+
+# %% [markdown]
 # ## Change something
 #
 # Every key of the scenario can be changed by name. Here the same landing has a real GPS with an error of 2 m (CEP)

@@ -15,14 +15,15 @@
 # ```
 
 # %% language="bash"
-# port=$(python -c "import socket; s = socket.socket(socket.AF_INET, socket.SOCK_DGRAM); s.bind(('127.0.0.1', 0)); print(s.getsockname()[1])")
+# port=14661
 # flownav live udp:$port --gps-delay 0.12 --duration 25 --record live.fnr --json > live.json 2> live.txt &
 # sleep 4
 # flownav fly pad_return --mavlink udpout:127.0.0.1:$port --speed 3 --no-report --out flown.fnr --json > flown.json
 # wait
 
 # %% [markdown]
-# The vehicle's clock ran three times as fast as ours, so the 50 s of the flight took 17 s. The session ended after the 25 s
+# The vehicle's clock ran three times as fast as ours, so the 50 s of the flight took 17 s. The session ended after
+# the 25 s
 # that it was given; without `--duration`, Ctrl-C ends it. Its result is a record like that of any other flight.
 
 # %%
@@ -32,7 +33,8 @@ record = flownav.load("live.fnr")
 record
 
 # %% [markdown]
-# The navigator works behind a horizon: it waits a fraction of a second for the slowest sensor, so that every reading is
+# The navigator works behind a horizon: it waits a fraction of a second for the slowest sensor, so that every reading
+# is
 # fused at the instant that it describes, and carries the estimate on to the present. The record holds both.
 
 # %%

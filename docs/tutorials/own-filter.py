@@ -1,14 +1,15 @@
 # %% [markdown]
 # # Your own filter
 #
-# flownav's navigator is one filter among many. This tutorial flies another one in its place: in the closed loop, where the
+# flownav's navigator is one filter among many. This tutorial flies another one in its place: in the closed loop,
+# where the
 # autopilot has to live with what the filter says, and on a recorded flight. A filter is a Python class with four
 # methods: `start`, `predict`, `update` and `estimate`. Nothing has to be compiled.
 #
 # ## A filter in forty lines
 #
 # flownav ships a complementary filter as an example. Position and velocity follow the IMU in the short run, and each
-# other sensor in the long run, with one time constant a sensor. This is all of it:
+# other sensor in the long run, with one time constant a sensor. This is the complete filter:
 
 # %%
 import inspect
@@ -18,12 +19,14 @@ from flownav.examples import complementary
 print(inspect.getsource(complementary).split('"""', 2)[2].strip())
 
 # %% [markdown]
-# `predict` is called for every reading of the IMU, `update` for every other reading, each in the order of the instants that
+# `predict` is called for every reading of the IMU, `update` for every other reading, each in the order of the
+# instants that
 # the readings describe. `estimate` says position and velocity in north-east-down, and the attitude.
 #
 # ## Fly it
 #
-# The same landing, the same noise: first our navigator, then the complementary filter, then a Kalman filter written with
+# The same landing, the same noise: first our navigator, then the complementary filter, then a Kalman filter written
+# with
 # [FilterPy](https://filterpy.readthedocs.io), which ships as an example too.
 
 # %%
@@ -62,8 +65,10 @@ axis.legend()
 plt.show()
 
 # %% [markdown]
-# The vehicle flies on what the filter says. A filter that is wrong moves the vehicle, so that the three flights are three
-# different flights through the same wind. A filter that is rough enough crashes it: with seed 1 the complementary filter
+# The vehicle flies on what the filter says. A filter that is wrong moves the vehicle, so that the three flights are
+# three
+# different flights through the same wind. A filter that is rough enough crashes it: with seed 1 the complementary
+# filter
 # tilts the helicopter too far at the touchdown, and the record says so (`record.verdict`).
 #
 # ## Write your own
@@ -110,10 +115,12 @@ for name, own in (("navigator", None), ("complementary", ComplementaryFilter), (
 # %% [markdown]
 # ## Where to go from here
 #
-# - State your uncertainty: `Estimate(std_pos_ned_m=..., std_vel_ned_m_s=...)`. Then the record has NEES and the report says
+# - State your uncertainty: `Estimate(std_pos_ned_m=..., std_vel_ned_m_s=...)`. Then the record has NEES and the
+#   report says
 #   whether your filter knows its errors.
 # - `update` may return innovations, which are then in the record and in the report.
 # - A sensor, a vehicle or a controller of your own: `flownav.fly(sensors=[MySensor()], vehicle=MyVehicle())`.
-# - A thousand flights: `flownav.campaign("pad_return", flights=100, filter="my_filter.py:SlowGps")`. Plain Python is some
+# - A thousand flights: `flownav.campaign("pad_return", flights=100, filter="my_filter.py:SlowGps")`. Plain Python is
+#   some
 #   hundred times slower than the compiled navigator, so begin with few.
 # - Offer it to others by name: an entry point in the group `flownav.filters` of your package.

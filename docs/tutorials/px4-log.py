@@ -4,8 +4,10 @@
 # You have flown a vehicle with an optical-flow sensor and have its log (`.ulg`). This tutorial finds out what the log
 # holds, fuses it with flownav's navigator, and measures how far the position would drift without GPS.
 #
-# If you have no log at hand, flownav writes one: the flight of a simulated quadrotor, as PX4 would have logged it. With
-# your own log, put its name in place of `samples/flight.ulg`. ArduPilot's `.bin`, a ground station's `.tlog`, MCAP and
+# If you have no log at hand, flownav writes one: the flight of a simulated quadrotor, as PX4 would have logged it.
+# With
+# your own log, put its name in place of `samples/flight.ulg`. ArduPilot's `.bin`, a ground station's `.tlog`, MCAP
+# and
 # folders of CSV files are read by the same commands.
 
 # %% language="bash"
@@ -21,7 +23,8 @@
 # flownav info samples/flight.ulg
 
 # %% [markdown]
-# The first line is the verdict. If the flow had swapped axes, a wrong sign or no range beside it, it would stand here.
+# The first line is the verdict. If the flow had swapped axes, a wrong sign or no range beside it, it would stand
+# here.
 # In this log the scale of the flow is below 1: the sensor reads a little too little. The tutorial on
 # [identifying the sensor](flow-sensor.md) puts that right.
 #
@@ -44,7 +47,8 @@ record
 # %%
 cut = flownav.replay("samples/flight.ulg", gps_outages=[(30, 75)])
 for outage in cut.scores["outages"]:
-    print(f"{outage['t0']:.0f} to {outage['t1']:.0f} s: {outage['horizontal_rms_m']:.2f} m rms, {outage['horizontal_max_m']:.2f} m at most")
+    rms_m, max_m = outage["horizontal_rms_m"], outage["horizontal_max_m"]
+    print(f"{outage['t0']:.0f} to {outage['t1']:.0f} s: {rms_m:.2f} m rms, {max_m:.2f} m at most")
 
 # %% [markdown]
 # And without GPS and without optical flow, on the inertial sensors alone:
@@ -52,7 +56,8 @@ for outage in cut.scores["outages"]:
 # %%
 blind = flownav.replay("samples/flight.ulg", gps_outages=[(30, 75)], flow=False)
 for outage in blind.scores["outages"]:
-    print(f"{outage['t0']:.0f} to {outage['t1']:.0f} s: {outage['horizontal_rms_m']:.2f} m rms, {outage['horizontal_max_m']:.2f} m at most")
+    rms_m, max_m = outage["horizontal_rms_m"], outage["horizontal_max_m"]
+    print(f"{outage['t0']:.0f} to {outage['t1']:.0f} s: {rms_m:.2f} m rms, {max_m:.2f} m at most")
 
 # %%
 import matplotlib.pyplot as plt

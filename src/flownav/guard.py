@@ -28,7 +28,6 @@ KINDS = (
 MARK = b"flownav"  # stands near the start of all that flownav writes, but for the kinds below
 PAGE_MARK = '<meta name="generator" content="flownav">'  # of pages: notes on flownav speak of it, too
 LOOKED_AT_BYTES = 4096
-MOST_NUMBERS = 10_000  # that a name is counted on to where it is taken
 LONGEST_SHOWN = 200  # characters of a name in a message
 RECORD_MAGIC, ULOG_MAGIC = b"PK\x03\x04", b"ULog"
 BEGINNINGS = (b"#timestamp [ns],p_RS_R_x [m],", b"| case ")  # of EuRoC files, and of the tables of `accuracy --out`
@@ -134,19 +133,6 @@ def an_output(path: Path, inputs: Iterable[Path] = (), *, signed_by: Path | None
             "give another --out, or move it away"
         )
     return path
-
-
-def numbered(path: Path, number: int) -> Path:
-    """flight.fnr, flight-1.fnr, flight-2.fnr, ..."""
-    return path.with_name(f"{path.stem}-{number}{path.suffix}") if number else path
-
-
-def free_name(path: Path) -> Path:
-    """The first of the numbered names that nothing has. InputError where all are taken."""
-    for number in range(MOST_NUMBERS):
-        if not os.path.lexists(found := numbered(path, number)):
-            return found
-    raise InputError(f"{path}: it is there, and so are {MOST_NUMBERS} numbered beside it; give another name")
 
 
 def an_output_folder(path: Path) -> Path:

@@ -22,6 +22,7 @@ def run(*arguments):
 def test_the_plan_is_told_and_nothing_is_flown(tmp_path):
     told = run(write(tmp_path, HEAD + WINDY + ASKED + CRASH), "--plan", "--json")
     assert json.loads(told.stdout) == {
+        "schema": 1,
         "requirement": "small",
         "flights": 52,
         "requirements": [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
 import time
@@ -109,7 +110,8 @@ def test_no_output_goes_through_a_link_or_into_a_pipe_or_a_device(here, capsys, 
 @pytest.mark.parametrize("command", ["replay log --out flight.fnr", "fly landing --out flight.fnr"])
 def test_the_report_beside_a_record_is_an_output_too(here, capsys, monkeypatch, command):
     Path("flight.html").write_text("my page")
-    assert "flight.html: is there already and was not written by flownav" in complaint(capsys, monkeypatch, command)
+    said = complaint(capsys, monkeypatch, f"{command} --force")
+    assert "flight.html: is there already and was not written by flownav" in said
 
 
 @pytest.mark.parametrize("command", [
@@ -132,9 +134,9 @@ def test_names_that_are_no_text_are_names(here, capsysbinary, monkeypatch):
     for command in (
         ["info", name],
         ["replay", name, "--out", record],
-        ["report", record],
+        ["report", record, "--force"],
         ["export", record, "--to", "csv"],
-        ["replay", name, "--json", "--out", record],
+        ["replay", name, "--json", "--force", "--out", record],
     ):
         monkeypatch.setattr(sys, "argv", ["flownav", *command])
         with pytest.raises(SystemExit) as left:
@@ -151,10 +153,42 @@ def test_a_name_too_long_is_one_line(here, capsys, monkeypatch, command):
     assert "cannot be the name of a file" in complaint(capsys, monkeypatch, f"{command} {'x' * 300}.ulg")
 
 
-def test_the_same_command_twice_replaces_its_own(here, capsys, monkeypatch):
-    for _ in range(2):
-        monkeypatch.setattr(sys, "argv", ["flownav", "replay", "log", "--json"])
-        with pytest.raises(SystemExit) as left:
-            main()
-        assert left.value.code == 0
-    assert sorted(path.name for path in Path("out").iterdir()) == ["log.fnr", "log.html"]
+def ended(monkeypatch, command: str) -> int:
+    """The exit status of a command."""
+    monkeypatch.setattr(sys, "argv", ["flownav", *command.split()])
+    with pytest.raises(SystemExit) as left:
+        main()
+    return int(left.value.code)
+
+
+def test_a_command_given_twice_numbers_its_output_and_says_so(here, capsys, monkeypatch):
+    for name in ("log", "log-1"):
+        assert ended(monkeypatch, "replay log --json") == 0
+        told = capsys.readouterr()
+        assert json.loads(told.out)["record"] == f"out/{name}.fnr"
+        said = [line for line in told.err.splitlines() if "compil" not in line]
+        assert said == ([] if name == "log" else [
+            "flownav: out/log.fnr is there already (--force replaces it); writing out/log-1.fnr"
+        ])  # fmt: skip
+    names = ["log-1.fnr", "log-1.html", "log.fnr", "log.html"]
+    assert sorted(path.name for path in Path("out").iterdir()) == names
+    assert ended(monkeypatch, "replay log --json --force") == 0
+    assert json.loads(capsys.readouterr().out)["record"] == "out/log.fnr"
+    assert sorted(path.name for path in Path("out").iterdir()) == names
+
+
+@pytest.mark.parametrize(("command", "name", "written"), [
+    ("replay log --no-report --out my.fnr", "my.fnr", "my-1.fnr"),
+    ("report x.fnr --out my.html", "my.html", "my-1.html"),
+    ("sample dataflash --out .", "flight.bin", "flight-1.bin"),
+    ("pad --print my.png", "my.png", "my-1.png"),
+    ("rig --out my --duration 5", "my/notes.txt", "my-1/rig.csv"),
+])  # fmt: skip
+def test_what_is_there_is_kept_and_the_output_numbered(here, capsys, monkeypatch, command, name, written):
+    Path(name).parent.mkdir(exist_ok=True)
+    Path(name).write_text("mine\n")
+    assert ended(monkeypatch, command) == 0
+    told = capsys.readouterr()
+    assert Path(name).read_text() == "mine\n"
+    assert Path(written).stat().st_size > 100
+    assert str(Path(written).parent if command.startswith("rig") else Path(written)) in told.out + told.err

@@ -13,6 +13,8 @@ if str(TOOLS) not in sys.path:
 import cells  # noqa: E402
 import mathematics  # noqa: E402
 import notebooks  # noqa: E402
+import pictures  # noqa: E402
+import readme_picture  # noqa: E402
 import reference  # noqa: E402
 import reference_api  # noqa: E402
 import reference_commands  # noqa: E402
@@ -21,6 +23,6 @@ import reference_tables  # noqa: E402
 import units  # noqa: E402
 
 __all__ = [
-    "cells", "mathematics", "notebooks", "reference", "reference_api", "reference_commands", "reference_keys", "reference_tables",
-    "units",
+    "cells", "mathematics", "notebooks", "pictures", "readme_picture", "reference", "reference_api",
+    "reference_commands", "reference_keys", "reference_tables", "units",
 ]  # fmt: skip

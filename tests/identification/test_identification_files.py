@@ -18,7 +18,7 @@ from flownav.identification.autopilot_parameters import parameters, write_parame
 from flownav.identification.descent import Structure
 from flownav.identification.findings import Findings
 from flownav.identification.height_law import QualityPoint, compare_schedules, paper_sigma, variance_by_quality
-from flownav.identification.job import identify, parse_heights
+from flownav.identification.job import identify
 from flownav.identification.orders import CANDIDATES
 from flownav.identification.rig_log import rate_of, read_runs
 from flownav.identification.sensor_file import bessel, sensor_entries, write_sensor
@@ -143,14 +143,13 @@ def test_a_rig_log_that_lacks_something_says_what(tmp_path, columns, height_m, m
 @pytest.mark.parametrize(
     ("heights", "message"),
     [
-        ("a,b", "--heights a,b: numbers in metres"),
-        ("0.6,0.8", "--heights: 2 heights for 1 logs"),
-        ("-1", "--heights: metres from 0.01"),
+        ([0.6, 0.8], "--heights: 2 heights for 1 logs"),
+        ([-1.0], "--heights: metres from 0.01"),
     ],
 )
 def test_heights_that_cannot_be_are_refused(tmp_path, heights, message):
     with pytest.raises(InputError, match=message):
-        identify([swing(tmp_path, duration_s=5.0)], heights_m=parse_heights(heights))
+        identify([swing(tmp_path, duration_s=5.0)], heights_m=heights)
 
 
 def test_a_reference_that_a_rig_has_not_is_refused(tmp_path):

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from flownav.cli import app
 from flownav.errors import InputError, VerdictError
-from flownav.guard import free_name
+from flownav.free_names import free_name
 from flownav.live import writing
 from flownav.live.journal_place import claim, is_locked
 from flownav.live.options import Options

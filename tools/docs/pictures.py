@@ -1,4 +1,4 @@
-"""Every picture of the documentation, and the gallery that shows them. Run as a script it draws them into docs/pictures.
+"""Every picture of the documentation, and the gallery that shows them. As a script it draws them into docs/pictures.
 
 `pictures.py [NAME...]` draws the named ones, or all. The pictures are committed, so that the pages show them where they
 are read as files; the build draws them anew in its copy, so that the site shows what the code does today.

@@ -21,9 +21,24 @@ def touchdowns() -> Figure:
     axis.scatter(east, north, s=10)
     for name, style in (("r50_m", "--"), ("r95_m", "-")):
         radius = result.figure(name)["value"]
-        axis.add_patch(Circle((0, 0), radius, fill=False, linestyle=style, color=COLOURS[1], label=f"{name[:3].upper()} {radius:.3f} m"))
+        axis.add_patch(
+            Circle(
+                (0, 0),
+                radius,
+                fill=False,
+                linestyle=style,
+                color=COLOURS[1],
+                label=f"{name[:3].upper()} {radius:.3f} m",
+            )
+        )
     reach = 1.3 * result.figure("r95_m")["value"]
-    axis.set(xlabel="east of the pad's centre [m]", ylabel="north [m]", aspect="equal", xlim=(-reach, reach), ylim=(-reach, reach))
+    axis.set(
+        xlabel="east of the pad's centre [m]",
+        ylabel="north [m]",
+        aspect="equal",
+        xlim=(-reach, reach),
+        ylim=(-reach, reach),
+    )
     axis.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
@@ -46,7 +61,10 @@ def tail() -> Figure:
     """Share of 1000 dispersed landings whose largest position error of one axis is beyond a figure."""
     flights = flownav.campaign("landing", flights=1000).to_pandas()
     figure, axis = axes()
-    for column, label in (("max_position_error_m", "largest error of one axis"), ("touchdown.rest.distance_m", "distance from the pad at rest")):
+    for column, label in (
+        ("max_position_error_m", "largest error of one axis"),
+        ("touchdown.rest.distance_m", "distance from the pad at rest"),
+    ):
         values = np.sort(flights[column].to_numpy(dtype=float))
         axis.step(values, 1 - np.arange(len(values)) / len(values), where="post", label=label)
     axis.set(yscale="log", xscale="log", xlabel="metres", ylabel="share of flights beyond it")

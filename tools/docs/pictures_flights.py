@@ -22,7 +22,7 @@ def paths() -> Figure:
 
 
 def white_and_real_gps() -> Figure:
-    """Error north of the paper's filter in one landing: with the white noise of the paper, and with a real receiver's."""
+    """Error north of the paper's filter in one landing: with the paper's white noise, and with a real receiver's."""
     figure, axis = axes()
     for model, label in (("midg", "receiver of 2 m CEP"), ("white", "white noise, as in the paper")):
         record = flownav.fly("landing", seed=1, filter="paper", gps=model)
@@ -35,7 +35,7 @@ def white_and_real_gps() -> Figure:
 
 def error_and_band() -> Figure:
     """Error of the landing filter on an approach, and twice the standard deviation that it states."""
-    record = flownav.fly("approach", seed=3)
+    record = flownav.fly("approach", seed=2)
     figure, rows = axes(3, 1, 4.6, sharex=True)
     for axis, column, name in zip(rows, ("pos_n_m", "pos_e_m", "pos_d_m"), ("north", "east", "down"), strict=True):
         t, error = _error(record, column)
@@ -110,7 +110,9 @@ def horizon() -> Figure:
     figure, axis = axes(height=2.2)
     axis.set_axis_off()
     axis.set(xlim=(-0.02, 1.06), ylim=(-0.6, 3.1))
-    for row, (name, age, every) in enumerate((("GPS, 0.22 s old", 0.22, 0.2), ("flow, 0.08 s old", 0.08, 0.1), ("IMU, fresh", 0.005, 0.025))):
+    for row, (name, age, every) in enumerate(
+        (("GPS, 0.22 s old", 0.22, 0.2), ("flow, 0.08 s old", 0.08, 0.1), ("IMU, fresh", 0.005, 0.025))
+    ):
         for described in np.arange(0.12, 0.76, every):
             arrives = described + age
             seen = arrives <= 0.8

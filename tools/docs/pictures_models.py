@@ -55,7 +55,9 @@ def gps_errors() -> Figure:
         record = flownav.fly("landing", seed=1, filter="paper", gps=model, autopilot="truth")
         table, truth = record.tables["gps_position"], record.tables["truth"]
         north_m = np.interp(table["t_s"], truth["t_s"], truth["pos_n_m"])
-        axis.plot(table["t_s"], table["pos_n_m"] - north_m, label={"midg": "receiver of 2 m CEP", "white": "white"}[model])
+        axis.plot(
+            table["t_s"], table["pos_n_m"] - north_m, label={"midg": "receiver of 2 m CEP", "white": "white"}[model]
+        )
     axis.set(xlabel="time [s]", ylabel="GPS error north [m]")
     axis.legend()
     return figure
@@ -79,7 +81,13 @@ def pads() -> Figure:
     for axis, pad in zip(three, (stripes(), texture(), checker()), strict=True):
         side = 400  # texels of 0.25 mm
         tiled = np.tile(pad.reflectance, (side // len(pad.reflectance) + 1, side // pad.reflectance.shape[1] + 1))
-        axis.imshow(tiled[:side, :side], cmap="gray", vmin=0, vmax=1, extent=(0, side * pad.texel_m * 100, 0, side * pad.texel_m * 100))
+        axis.imshow(
+            tiled[:side, :side],
+            cmap="gray",
+            vmin=0,
+            vmax=1,
+            extent=(0, side * pad.texel_m * 100, 0, side * pad.texel_m * 100),
+        )
         axis.set(title=pad.name, xlabel="cm")
         axis.grid(False)
     return figure
@@ -99,7 +107,11 @@ def pad_target() -> Figure:
         frame, _, _ = next(iter(frames_at(flown, height, 0.5, 1, seed=2)))
         fix, reason = look(flown, frame)
         axis.imshow(frame, cmap="gray")
-        axis.set_title(f"from {height:g} m: {reason or 'found'}" if fix is None else f"from {height:g} m: found at {fix.distance_m:.2f} m")
+        axis.set_title(
+            f"from {height:g} m: {reason or 'found'}"
+            if fix is None
+            else f"from {height:g} m: found at {fix.distance_m:.2f} m"
+        )
     for axis in three:
         axis.set_axis_off()
     return figure

@@ -37,6 +37,11 @@ MEANINGS = {
     "innovation": "One row for each component of a measurement that was offered to the filter: what was observed, how "
     "far it lay from the prediction, whether it was fused, and the reason where it was not.",
     "events": "One row for each happening: its source, its kind, its detail in words, and a value.",
+    "judging": "What scoring must know beside truth and estimate. Of a simulated flight: the ground's height, whether "
+    "the vehicle goes around, whether the pad can be seen, whether this step counts, and whether the flow sensor sees. "
+    "Of a replay: whether a warning stands.",
+    "reference": "The external reference of a log (motion capture, a simulator), in the frame in which the log has it.",
+    "reference_heading": "The heading of that reference, where the log has it apart.",
     "fed": "What the navigator was fed, row by row, in its order. `flownav replay` of the record takes these rows.",
 }
 STREAMS = """## Measurement streams

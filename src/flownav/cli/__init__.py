@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import io
-import sys
+from typing import Annotated
 
 import typer
 
@@ -31,8 +30,7 @@ from flownav.cli import tune as tune
 from flownav.cli import validate as validate
 from flownav.cli import vehicle as vehicle
 from flownav.cli import view as view
-from flownav.errors import FlownavError, InputError
-from flownav.guard import a_run
+from flownav.cli.running import run, say_version
 
 app = typer.Typer(
     name="flownav",
@@ -71,17 +69,15 @@ for name, command, what in (
     app.command(name, short_help=what)(command)
 
 
+@app.callback()
+def about(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and nothing else.", is_eager=True, callback=say_version)
+    ] = False,
+) -> None:
+    """GPS/INS + optical-flow navigation for precision VTOL take-off and landing."""
+
+
 def main() -> None:
-    """Entry point: a mistake of the user's is one line on standard error and exit status 2, a bad verdict 1."""
-    for stream in (sys.stdout, sys.stderr):  # names of files are bytes, and need not be text
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
-    try:
-        with a_run():
-            app()
-    except FlownavError as error:
-        print(f"flownav: {error}", file=sys.stderr)
-        sys.exit(2 if isinstance(error, InputError) else 1)
-    except OSError as error:  # a disk that is full, a file that went away
-        print(f"flownav: {error.filename or 'a file'}: {error.strerror or error}", file=sys.stderr)
-        sys.exit(2)
+    """Entry point: exit status 0 done, 1 a bad verdict, 2 a mistake of the user's (one line), 130 broken off."""
+    run(app)

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.output import VehicleOption
+from flownav.cli.choices import REQUIREMENTS, one_of
+from flownav.cli.options import ForceOption, JsonOption, SeedOption, VehicleOption, out_option
+from flownav.cli.output import emit
 
 if TYPE_CHECKING:
     from flownav.campaigns.accuracy import Case
@@ -20,42 +21,44 @@ BOUND = "RMSE over the bound of the filter's own model"
 
 
 def command(
-    flights: Annotated[int, typer.Option(help="Flights of each case.")] = 1000,
+    flights: Annotated[int, typer.Option(metavar="N", help="Flights of each case.")] = 1000,
     cases: Annotated[
-        str, typer.Option(help="Cases, with commas: takeoff, landing, pad_return, approach, approach_8_m_s; or all.")
-    ] = "all",
-    ablations: Annotated[int, typer.Option(help="Flights of each variant that lacks a piece; 0 for none.")] = 100,
+        list[str] | None,
+        typer.Option("--cases", help="Which cases, repeated or with commas.", **one_of(*REQUIREMENTS, "all")),
+    ] = None,
+    ablations: Annotated[
+        int, typer.Option(metavar="N", help="Flights of each variant that lacks a piece of the navigator; 0 for none.")
+    ] = 100,
     vehicle: VehicleOption = None,
-    seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
-    out: Annotated[Path | None, typer.Option(help="Write the tables as Markdown, too.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    seed: SeedOption = 1,
+    out: Annotated[Path | None, out_option("The tables as Markdown")] = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Hold the navigator against its targets, matched and as an ensemble; what its pieces are worth, matched."""
     from flownav.campaigns.accuracy import CASES, flights_of, run_case
-    from flownav.cli.output import progress, require_between, require_writable
-    from flownav.errors import InputError, VerdictError
+    from flownav.cli.lists import words
+    from flownav.cli.output import place, progress, require_between
+    from flownav.errors import VerdictError
 
     require_between("--flights", flights, 1, 1_000_000)
     require_between("--ablations", ablations, 0, 1_000_000)
     require_between("--seed", seed, 0, 2**63 - 1)
-    chosen = CASES if cases == "all" else tuple(dict.fromkeys(name.strip() for name in cases.split(",")))
-    for name in chosen:
-        if name not in CASES:
-            raise InputError(f"--cases {name or '(empty)'}: no such case; known: {', '.join(CASES)}, or all")
-    if out:
-        require_writable(out, vehicle)
+    asked = words("--cases", cases) if cases else ["all"]
+    chosen = CASES if "all" in asked else tuple(asked)
+    path = None if out is None else place(out, vehicle, force=force)
     with progress("Flying", flights_of(chosen, flights, ablations, vehicle)) as advance:
         made = [run_case(name, seed, flights, ablations, advance, vehicle) for name in chosen]
     text = markdown(made)
-    if out:
+    if path is not None:
         from flownav.guard import written_whole
 
-        with written_whole(out) as temporary:
+        with written_whole(path) as temporary:
             temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
     if as_json:
         facts: dict[str, Any] = {"flights": flights, "ablation_flights": ablations, "seed": seed}
-        facts |= {"cases": [case.as_json() for case in made]} | ({"out": str(out)} if out else {})
-        typer.echo(json.dumps(facts))
+        facts |= {"cases": [case.as_json() for case in made]} | ({"out": str(path)} if path else {})
+        emit(facts)
     else:
         typer.echo(text)
     missed = [f"{case.name}: {target.sentence()}" for case in made for target in case.targets if not target.kept]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -10,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.engines import EngineOption
-from flownav.cli.output import VehicleOption
+from flownav.cli.choices import SAMPLINGS, SCENARIOS, TRUTH_MODELS, argument, one_of
+from flownav.cli.options import EngineOption, FilterOption, JsonOption, SeedOption, VehicleOption, out_option
+from flownav.cli.output import emit
 from flownav.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,54 +21,77 @@ if TYPE_CHECKING:
 
 def command(
     scenarios: Annotated[
-        list[str], typer.Argument(help="Scenarios: takeoff, landing, approach, ..., or files (TOML).")
+        list[str],
+        argument("SCENARIO", "What is flown", *SCENARIOS, beside="a scenario's FILE.toml"),
     ],
     flights: Annotated[
         int | None,
-        typer.Option(help="Flights of each cell, 1000 if not given; with --until or --rare the most, then 100000."),
+        typer.Option(
+            metavar="N",
+            help="Flights of each cell; with --until or --rare the most.",
+            show_default="1000; with --until or --rare 100000",
+        ),
     ] = None,
     until: Annotated[
-        str | None, typer.Option(help='Stop when an interval is narrow enough: "r95_m width <= 0.005".')
+        str | None,
+        typer.Option(metavar="RULE", help='Stop when an interval is narrow enough: "r95_m width <= 0.005".'),
     ] = None,
     sweep: Annotated[
         list[str] | None,
-        typer.Option(help="Fly every value of a number of the scenario: wind.speed_20ft_m_s=0:12:2, or =a,b,c."),
+        typer.Option(
+            metavar="KEY=VALUES",
+            help="Fly every value of a key of the scenario, wind.speed_20ft_m_s=0:12:2 or =a,b,c; may be repeated.",
+        ),
     ] = None,
     set_: Annotated[
-        list[str] | None, typer.Option("--set", help="Another value in the scenario: filter.name=paper.")
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Another value in the scenario: filter.name=paper."),
     ] = None,
     sampling: Annotated[
-        str, typer.Option(help="How inputs are spread over the flights: plain, latin, sobol.")
+        str, typer.Option(help="How the dispersed inputs are spread over the flights.", **one_of(*SAMPLINGS))
     ] = "plain",
     truth_model: Annotated[
-        str, typer.Option(help="ensemble (each flight's truth is drawn), matched (as the filter is told), both.")
+        str,
+        typer.Option(
+            help="Each flight's vehicle, wind and sensors drawn, as the datasheets say, or both.",
+            **one_of(*TRUTH_MODELS),
+        ),
     ] = "ensemble",
-    filter_name: Annotated[
-        str | None, typer.Option("--filter", help="landing, paper, an installed filter's name, or file.py:Class.")
-    ] = None,
+    filter_name: FilterOption = None,
     vehicle: VehicleOption = None,
-    seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
+    seed: SeedOption = 1,
     engine: EngineOption = "local",
-    out: Annotated[Path | None, typer.Option(help="Its folder; out/SCENARIO_campaign if not given.")] = None,
-    records: Annotated[int, typer.Option(help="Write records and reports of so many of the worst flights.")] = 1,
+    out: Annotated[
+        Path | None,
+        out_option(
+            "The folder; flights that are there are kept",
+            "out/SCENARIO_campaign; with --rare SCENARIO_rare",
+        ),
+    ] = None,
+    records: Annotated[
+        int, typer.Option(metavar="N", help="Write records and reports of so many of the worst flights.")
+    ] = 1,
     flight: Annotated[
         str | None,
-        typer.Option(help="Fly this flight again and write its record: K, CELL:K, or the rare_flight.json of --rare."),
+        typer.Option(
+            metavar="K",
+            help="Fly this flight again and write its record: K, CELL:K, or --rare's rare_flight.json.",
+        ),
     ] = None,
     rare: Annotated[
-        str | None, typer.Option(help='How probable this is, down to 1e-6: "touchdown.horizontal_m > 1", "crash".')
+        str | None,
+        typer.Option(metavar="EVENT", help='How probable this is, to 1e-6: "touchdown.horizontal_m > 1", "crash".'),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Fly a scenario many times: radii, shares and percentiles with intervals, a dataset, the worst flights."""
-    from flownav.api.campaigning import FLIGHTS, FLIGHTS_UNTIL, MOST_SEED, TRUTH_MODELS, plan_of
+    from flownav.api.campaigning import FLIGHTS, FLIGHTS_UNTIL, MOST_SEED, plan_of
     from flownav.api.parts import split
     from flownav.api.scenario import Scenario
     from flownav.campaigns.engines.named import engine_named, require_engine
     from flownav.campaigns.plan import MOST_FLIGHTS
-    from flownav.campaigns.sampling import SAMPLINGS
     from flownav.campaigns.summary import WORST
-    from flownav.cli.output import require_between, require_one_of
+    from flownav.cli.output import require_between
     from flownav.guard import an_input
     from flownav.parts.engine import OwnPartsEngine, identities
 
@@ -80,8 +103,6 @@ def command(
     require_between("--seed", seed, 0, MOST_SEED)
     require_between("--records", records, 0, WORST)
     require_engine(engine)
-    require_one_of("--sampling", sampling, SAMPLINGS)
-    require_one_of("--truth-model", truth_model, TRUTH_MODELS)
     parts, ours, _ = split(filter_name, (), None, None)
     if parts.any and (engine != "local" or rare is not None):
         raise InputError(f"--filter {filter_name}: is flown by this process; leave out --engine and --rare")
@@ -124,7 +145,7 @@ def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) 
     kept = [str(path) for path in flown.records]
     if as_json:
         where = {"rate_per_s": flown.rate_per_s, "dataset": str(folder / "flights"), "records": kept}
-        typer.echo(json.dumps(flown.summary | where | {"report": str(folder / REPORT)}))
+        emit(flown.summary | where | {"report": str(folder / REPORT)})
     else:
         from flownav.cli.campaign_table import show
 
@@ -144,7 +165,7 @@ def _again(plan: Plan, flight: str, folder: Path, as_json: bool, engine: Engine 
     where = {"record": str(path), "report": str(path.with_suffix(".html"))}
     facts = {"cell": plan.cells[place].label, "flight": index, **record.scores, **where}
     if as_json:
-        typer.echo(json.dumps(facts))
+        emit(facts)
     else:
         typer.echo(f"{facts['cell']}, flight {index}\nrecord  {where['record']}\nreport  {where['report']}")
 

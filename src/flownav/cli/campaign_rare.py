@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
+
+from flownav.cli.output import emit
 
 if TYPE_CHECKING:
     from flownav.campaigns.plan import Plan
@@ -14,16 +15,15 @@ if TYPE_CHECKING:
 
 def fly_rare(plan: Plan, event: str, folder: Path, as_json: bool) -> None:
     """Estimate, write what was found and the most likely flight, and say it."""
-    from flownav.api.rare import FLIGHT, FOUND, estimate_event, rare_event_of
-    from flownav.cli.output import progress, require_writable
+    from flownav.api.rare import estimate_event, rare_event_of
+    from flownav.cli.output import folder_place, progress
 
     chosen = rare_event_of(plan, event)
-    for name in (FLIGHT, FOUND):
-        require_writable(folder / name)
+    folder = folder_place(folder)
     with progress(f"{chosen}, at most", plan.flights) as advance:
         found = estimate_event(plan, chosen, folder, advance)
     if as_json:
-        typer.echo(json.dumps(found.facts | {"rate_per_s": found.rate_per_s, **found.where}))
+        emit(found.facts | {"rate_per_s": found.rate_per_s, **found.where})
     else:
         _show(found.facts, found.rate_per_s, found.where)
 
@@ -34,7 +34,7 @@ def fly_again(plan: Plan, path: Path, as_json: bool) -> None:
 
     record, where = fly_branch(plan, path)
     if as_json:
-        typer.echo(json.dumps({"cell": plan.cells[0].label, **record.scores, **where}))
+        emit({"cell": plan.cells[0].label, **record.scores, **where})
     else:
         typer.echo(f"{plan.cells[0].label}, {path}\nrecord  {where['record']}\nreport  {where['report']}")
 

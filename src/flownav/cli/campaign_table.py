@@ -36,7 +36,7 @@ def show(summary: dict[str, Any], folder: Path, rate: float | None, records: lis
             f"{100 * landed['value']:.1f} ({100 * landed['low']:.1f}-{100 * landed['high']:.1f})" if landed else "-",
             str(cell["verdicts"]["crashed"]), str(cell["verdicts"]["went_around"]),
         )  # fmt: skip
-    console = Console()
+    console = Console(markup=False, highlight=False)
     console.width = max(console.width, 72 + max(len(cell["label"]) for cell in cells) + 22 * len(figures))
     console.print(table, highlight=False)
     typer.echo("worst flights (CELL:FLIGHT):")

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from flownav.campaigns.engines.named import engine_named, require_engine
-from flownav.cli.engines import EngineOption
-from flownav.cli.output import VehicleOption
+from flownav.cli.choices import REQUIREMENTS, argument
+from flownav.cli.options import EngineOption, JsonOption, VehicleOption, out_option
+from flownav.cli.output import emit
 from flownav.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,18 +21,26 @@ if TYPE_CHECKING:
 
 def command(
     requirement: Annotated[
-        str, typer.Argument(help="takeoff, landing, pad_return, approach, approach_8_m_s, or a requirement (TOML).")
+        str,
+        argument("REQUIREMENT", "What to show", *REQUIREMENTS, beside="a requirement's FILE.toml"),
     ],
     plan_only: Annotated[bool, typer.Option("--plan", help="Only say how many flights are needed.")] = False,
-    flights: Annotated[int | None, typer.Option(help="Flights, if not as many as the plan needs.")] = None,
+    flights: Annotated[
+        int | None, typer.Option(metavar="N", help="How many flights.", show_default="as many as the requirement needs")
+    ] = None,
     ranking: Annotated[
-        int, typer.Option(help="Rows of the ranking of inputs, a power of 2: it flies so many for each input; 0: none.")
+        int,
+        typer.Option(metavar="N", help="Rows of the ranking of inputs, a power of 2, for each input; 0: none."),
     ] = 64,
-    records: Annotated[int, typer.Option(help="Write records and reports of so many of the worst flights.")] = 3,
+    records: Annotated[
+        int, typer.Option(metavar="N", help="Write records and reports of so many of the worst flights.")
+    ] = 3,
     vehicle: VehicleOption = None,
     engine: EngineOption = "local",
-    out: Annotated[Path | None, typer.Option(help="Its folder; out/NAME_certificate if not given.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    out: Annotated[
+        Path | None, out_option("The folder; flights that are there are kept", "out/NAME_certificate")
+    ] = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Fly what a requirement asks for: pass, fail or not shown, with its risk; exit status 1 unless it passes."""
     from flownav.campaigns.ranking import LEAST
@@ -56,7 +64,7 @@ def command(
     folder = out or Path("out") / f"{asked.name}_certificate"
     facts = _fly(asked, plan, engine_named(engine), requirement, folder, ranking, records)
     if as_json:
-        typer.echo(json.dumps(facts))
+        emit(facts)
     else:
         from flownav.cli.certify_table import show
 
@@ -105,7 +113,7 @@ def _say_plan(asked: Requirement, as_json: bool) -> None:
         for table in asked.requirement
     ]
     if as_json:
-        typer.echo(json.dumps({"requirement": asked.name, "flights": asked.flights(), "requirements": rows}))
+        emit({"requirement": asked.name, "flights": asked.flights(), "requirements": rows})
         return
     from flownav.cli.certify_table import show_plan
 

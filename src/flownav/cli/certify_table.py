@@ -10,7 +10,7 @@ RANKED = 5  # inputs that are printed
 
 def show_plan(name: str, rows: Sequence[dict[str, Any]], flights: int) -> None:
     """How many flights are needed, by failures."""
-    console, table = _table("requirement", "0 failures", "1", "2", "this plan allows", "flights")
+    console, table = _table("requirement", "flights with 0 failures", "with 1", "with 2", "failures allowed", "flights")
     for row in rows:
         needed = [str(row["needed"][str(failures)]) for failures in (0, 1, 2)]
         table.add_row(row["requirement"], *needed, str(row["allowed_failures"]), str(row["flights"]))
@@ -20,13 +20,13 @@ def show_plan(name: str, rows: Sequence[dict[str, Any]], flights: int) -> None:
 
 def show(facts: dict[str, Any]) -> None:
     """Verdict, figures, envelope in a line, ranking, files."""
-    console, table = _table("requirement", "failed", "probability shown", "tolerance bound", "risk", "verdict")
+    console, table = _table("requirement", "failed", "probability shown [%]", "tolerance bound", "risk [%]", "verdict")
     for one in facts["requirement"]["requirements"]:
         bound, unit = one["tolerance_bound"], one["unit"]
         allowed = "too few flights to pass" if one["failures_allowed"] < 0 else f"at most {one['failures_allowed']}"
         table.add_row(
-            one["sentence"], f"{one['failures']} of {one['flights']} ({allowed})", f"{100.0 * one['low']:.3f} %",
-            "-" if bound is None else f"{bound:.3f} {unit}".rstrip(), f"{100.0 * one['risk']:.1f} %", one["verdict"],
+            one["sentence"], f"{one['failures']} of {one['flights']} ({allowed})", f"{100.0 * one['low']:.3f}",
+            "-" if bound is None else f"{bound:.3f} {unit}".rstrip(), f"{100.0 * one['risk']:.1f}", one["verdict"],
         )  # fmt: skip
     console.print(f"{facts['verdict'].upper()}  {facts['requirement']['name']}", highlight=False, markup=False)
     console.print(table)
@@ -62,7 +62,7 @@ def _table(first: str, *others: str) -> tuple[Any, Any]:
     from rich.console import Console
     from rich.table import Table
 
-    console, table = Console(), Table()
+    console, table = Console(markup=False, highlight=False), Table()
     console.width = max(console.width, 150)
     table.add_column(first)
     for name in others:

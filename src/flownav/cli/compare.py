@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,40 +9,49 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flownav.cli.options import LOG_KINDS, ForceOption, JsonOption, SensorOption, out_option
+from flownav.cli.output import emit
+
 if TYPE_CHECKING:
     from flownav.compare.job import Setting
 
 DEFAULT = "default"
 SHORT_RECORDS = ("against", "horizontal\n[m]", "vertical\n[m]", "velocity\n[m/s]", "touchdown\n[m]")
-SHORT_APART = ("mean", "95 % from", "to")
+SHORT_APART = ("mean", "95 % from", "95 % to")
 SAID = {"horizontal_m": "horizontal [m]", "vertical_m": "vertical [m]", "velocity_m_s": "velocity [m/s]"}
-SHORT = ("", "place\n[m]", "flying\n[m]", "speed\n[m/s]", "flying\n[m/s]", "end\n[m]", "cut [m]\nmedian", "worst")
+SHORT = (
+    "estimator", "place\n[m]", "flying\n[m]", "speed\n[m/s]", "flying\n[m/s]", "end\n[m]", "cut [m]\nmedian",
+    "cut [m]\nworst",
+)  # fmt: skip
 TITLE = "rms errors where all estimators of a log have rows; end drift; GPS cuts"
 
 
 def command(
     logs: Annotated[
-        list[Path], typer.Argument(help="Logs (CSV folders, .ulg, .bin, .tlog, live .fnr), or two and more records.")
+        list[Path],
+        typer.Argument(metavar="LOG", help=f"Logs, each {LOG_KINDS}; or two and more records.", show_default=False),
     ],
     settings: Annotated[
         list[str] | None,
         typer.Option(
-            "--with", metavar="FILE", help=f"TOML of filter settings, or `{DEFAULT}`; may be repeated.",
-            show_default=False,
+            "--with", metavar="FILE.toml", help=f"Settings of the navigator, or `{DEFAULT}`; may be repeated.",
+            show_default=DEFAULT,
         ),
     ] = None,
-    sensor: Annotated[
-        Path | None, typer.Option("--sensor", help="A flow sensor file: its gains and latency correct the flow.")
-    ] = None,
+    sensor: SensorOption = None,
     outages: Annotated[
         str | None,
-        typer.Option("--outages", metavar="T0:T1:LENGTH", help="GPS cuts; whole minutes of the flight where unsaid."),
+        typer.Option(
+            "--outages", metavar="T0:T1:LENGTH", help="Windows of LENGTH from T0 to T1 [s] in which GPS is withheld.",
+            show_default="whole minutes of the flight",
+        ),
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", help="The comparison as one HTML page.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    out: Annotated[Path | None, out_option("The comparison (HTML)")] = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:  # fmt: skip
     """Score every log by every setting, beside dead reckoning and its autopilot; or lay records over each other."""
-    from flownav.cli.output import progress, require_writable
+    from flownav.cli.output import place, progress
     from flownav.cli.replay import numbers
     from flownav.compare.job import compare_log, windows_of
     from flownav.compare.rows import names_of
@@ -53,12 +61,11 @@ def command(
     from flownav.replays.session import table_windows
 
     if len(logs) > 1 and all(path.suffix == ".fnr" for path in logs) and not (settings or sensor or outages):
-        _records(logs, out, as_json=as_json)
+        _records(logs, None if out is None else place(out, *logs, force=force), as_json=as_json)
         return
     option = f"--outages {outages}"
     asked = table_windows(*numbers("--outages", outages, ":", 3, "T0:T1:LENGTH"), option="--outages") if outages else []
-    if out is not None:
-        require_writable(out, *logs, *(settings or []), sensor)
+    path = None if out is None else place(out, *logs, *(settings or []), sensor, force=force)
     chosen = settings_asked(settings or [DEFAULT], sensor)
     flights = [open_flight(path) for path in logs]
     if asked and not any(Sensor.GPS_POSITION in log.streams for log in flights):
@@ -68,23 +75,20 @@ def command(
     with progress("replays", sum(len(chosen) * (len(cuts) + 1) for cuts in windows)) as advance:
         for name, log, cuts in zip(names_of(logs), flights, windows, strict=True):
             rows += compare_log(name, log, chosen, cuts, advance)
-    written = {} if out is None else _write(rows, out)
+    written = {} if path is None else _write(rows, path)
     if as_json:
-        typer.echo(json.dumps({"rows": rows, **written}))
+        emit({"rows": rows, **written})
     else:
         _print(rows, written)
 
 
 def _records(paths: list[Path], out: Path | None, *, as_json: bool) -> None:
     """Records beside each other, as they are: nothing is replayed."""
-    from flownav.cli.output import require_writable
     from flownav.compare.records import HEADINGS, cells, errors_in_time, rows_of_records
     from flownav.compare.rows import names_of
     from flownav.record import Record
     from flownav.report.records import write_records
 
-    if out is not None:
-        require_writable(out, *paths)
     named = list(zip(names_of(paths), [Record.load(path) for path in paths], strict=True))
     rows = rows_of_records(named)
     written = {}
@@ -94,7 +98,7 @@ def _records(paths: list[Path], out: Path | None, *, as_json: bool) -> None:
             write_records(named, errors, HEADINGS, [cells(row) for row in rows], out)
         written = {"page": str(out)}
     if as_json:
-        typer.echo(json.dumps({"records": rows, **written}))
+        emit({"records": rows, **written})
     else:
         _print_records(rows, written)
 
@@ -157,10 +161,10 @@ def _print_records(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
 
     console = Console(markup=False, highlight=False)
     look: dict[str, Any] = {"box": box.SIMPLE_HEAD, "show_edge": False, "padding": (0, 1, 0, 0)}
-    errors = Table("", *SHORT_RECORDS, title="rms errors in flight; touchdown off the pad's centre", **look)
+    errors = Table("record", *SHORT_RECORDS, title="rms errors in flight; touchdown off the pad's centre", **look)
     for row in rows:
         errors.add_row(*cells(row)[:6])
-    apart = Table("", *SHORT_APART, title=f"mean error less that of {rows[0]['record']}", **look)
+    apart = Table("record", *SHORT_APART, title=f"mean error less that of {rows[0]['record']}", **look)
     for row in rows[1:]:
         apart.add_section()
         apart.add_row(row["record"])

@@ -2,51 +2,58 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from flownav.cli.output import VehicleOption
+from flownav.cli.options import (
+    ENSEMBLE,
+    ForceOption,
+    JsonOption,
+    ScenarioArgument,
+    SeedOption,
+    VehicleOption,
+    out_option,
+)
+from flownav.cli.output import emit
+
+SPEEDS_M_S = ["2,4,6,8,10"]
 
 
 def command(
-    scenario: Annotated[str, typer.Argument(help="What lands: landing, gusty, pad_return, approach, a file.")],
-    speeds: Annotated[str, typer.Option(help="Wind speeds at 20 ft [m/s], with commas.")] = "2,4,6,8,10",
-    directions: Annotated[int, typer.Option(help="How many directions the wind blows from, from north on.")] = 8,
+    scenario: ScenarioArgument,
+    speeds: Annotated[
+        list[str], typer.Option("--speeds", metavar="M/S", help="Wind speeds at 20 ft [m/s], repeated or with commas.")
+    ] = SPEEDS_M_S,
+    directions: Annotated[
+        int, typer.Option(metavar="N", help="How many directions the wind blows from, from north on.")
+    ] = 8,
     vehicle: VehicleOption = None,
-    flights: Annotated[int, typer.Option(help="Flights of each speed and direction.")] = 32,
-    seed: Annotated[int, typer.Option(help="The campaign's noise.")] = 1,
-    ensemble: Annotated[
-        bool, typer.Option("--ensemble/--matched", help="Draw each flight's vehicle and sensors, or fly what is told.")
-    ] = True,
-    out: Annotated[Path | None, typer.Option(help="The page; out/SCENARIO_envelope.html where unsaid.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    flights: Annotated[int, typer.Option(metavar="N", help="Flights of each speed and direction.")] = 32,
+    seed: SeedOption = 1,
+    ensemble: Annotated[bool, typer.Option("--ensemble/--matched", help=ENSEMBLE)] = True,
+    out: Annotated[Path | None, out_option("The page (HTML)", "out/SCENARIO_envelope.html")] = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Fly a scenario in winds of many speeds and directions: a table and a polar map of the share that landed."""
     from flownav.campaigns.envelope import directions_deg, fly_envelope
-    from flownav.cli.output import progress, require_between, require_writable
+    from flownav.cli.lists import numbers
+    from flownav.cli.output import place, progress, require_between
     from flownav.errors import InputError
     from flownav.report.envelope import write_envelope
     from flownav.simulation.scenario import load_scenario, with_vehicle
-    from flownav.text import number
 
     require_between("--flights", flights, 1, 1_000_000)
     require_between("--directions", directions, 1, 360)
     require_between("--seed", seed, 0, 2**63 - 1)
-    try:
-        chosen_speeds = sorted({number(speed) for speed in speeds.split(",")})
-    except ValueError:
-        raise InputError(f"--speeds {speeds}: numbers with commas are needed, such as 2,4,8") from None
-    for speed in chosen_speeds:
-        require_between("--speeds", speed, 0.1, 30.0)
+    chosen_speeds = sorted(set(numbers("--speeds", speeds, 0.1, 30.0)))
     chosen = with_vehicle(load_scenario(scenario), vehicle)
     last_s = chosen.flight.may_land_after_s
     if last_s is None or last_s >= chosen.flight.duration_s or chosen.truth == "linear":
         raise InputError(f"{chosen.name}: it never lands; give a scenario with a may_land_after_s before its end")
-    page = out or Path("out") / f"{chosen.name}_envelope.html"
-    require_writable(page, scenario, vehicle)
+    page = place(out or Path("out") / f"{chosen.name}_envelope.html", scenario, vehicle, force=force)
     with progress(f"Flying {chosen.name}", flights * directions * len(chosen_speeds)) as advance:
         rows = fly_envelope(
             chosen, chosen_speeds, directions_deg(directions), seed, flights, dispersed=ensemble, on_progress=advance
@@ -61,7 +68,7 @@ def command(
     if as_json:
         facts: dict[str, Any] = {"scenario": chosen.name, "vehicle": vehicle, "truth_model": model}
         facts |= {"flights": flights, "seed": seed}
-        typer.echo(json.dumps(facts | {"cells": rows, "out": str(page)}))
+        emit(facts | {"cells": rows, "out": str(page)})
         return
     _show(title, rows)
     typer.echo(f"page  {page}")
@@ -74,13 +81,13 @@ def _show(title: str, rows: list[dict[str, Any]]) -> None:
 
     directions = sorted({row["from_direction_deg"] for row in rows})
     table = Table()
-    table.add_column("wind at 20 ft")
+    table.add_column("wind at 20 ft [m/s]")
     for direction in directions:
-        table.add_column(f"from {direction:g} deg", justify="right")
+        table.add_column(f"from {direction:g} deg [%]", justify="right")
     for speed in sorted({row["speed_20ft_m_s"] for row in rows}):
         ring = {row["from_direction_deg"]: row["success"]["rate"] for row in rows if row["speed_20ft_m_s"] == speed}
-        table.add_row(f"{speed:g} m/s", *(f"{100.0 * ring[direction]:.0f}" for direction in directions))
-    console = Console()
-    console.width = max(console.width, len(title) + 16, 20 + 15 * len(directions))
+        table.add_row(f"{speed:g}", *(f"{100.0 * ring[direction]:.0f}" for direction in directions))
+    console = Console(markup=False, highlight=False)
+    console.width = max(console.width, len(title) + 16, 26 + 19 * len(directions))
     console.print(f"landed [%], {title}", highlight=False, markup=False)
     console.print(table)

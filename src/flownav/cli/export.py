@@ -2,55 +2,57 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-FORMAT_HELP = "mcap, foxglove (mcap with a layout), tum, euroc, parquet, csv, ulog, kml or gpx."
+from flownav.cli.choices import FORMATS, one_of
+from flownav.cli.options import ForceOption, JsonOption, RecordArgument, out_option
+from flownav.cli.output import emit
 
 
 def command(
-    record: Annotated[Path, typer.Argument(help="The record that fly or replay wrote.", show_default=False)],
-    to: Annotated[
-        str,
-        typer.Option(
-            "--to",
-            help=FORMAT_HELP,
-            show_default=False,
-        ),
-    ],
+    record: RecordArgument,
+    to: Annotated[str, typer.Option("--to", help="The format.", show_default=False, **one_of(*FORMATS))],
     out: Annotated[
         Path | None,
-        typer.Option("--out", help="The file, or folder for parquet and csv; beside the record where unsaid."),
+        out_option("The file, or the folder of parquet and csv", "beside the record"),
     ] = None,
+    force: ForceOption = False,
     frame: Annotated[
-        str | None, typer.Option("--frame", help="tum, euroc: ned (body FRD; where unsaid) or enu (body FLU).")
+        str | None,
+        typer.Option(
+            help="The frame of tum and euroc: ned (body FRD), enu (body FLU).",
+            show_default="ned",
+            **one_of("ned", "enu"),
+        ),
     ] = None,
     merge: Annotated[
         Path | None,
-        typer.Option("--merge", metavar="ORIGINAL.ulg", help="ulog: into a copy of the log that was replayed."),
+        typer.Option("--merge", metavar="ORIGINAL.ulg", help="With ulog: into a copy of the log that was replayed."),
     ] = None,
     origin: Annotated[
         str | None,
-        typer.Option("--origin", metavar="LAT,LON,ALT", help="kml, gpx: where the record's origin lies (deg, m)."),
+        typer.Option("--origin", metavar="LAT,LON,ALT", help="With kml, gpx: where the record's origin lies [deg, m]."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write a record for other tools: Foxglove, evo, spreadsheets, data frames, PlotJuggler, Google Earth, maps."""
-    from flownav.cli.output import require_writable, require_writable_folder
+    from flownav.cli.output import folder_place, place, several_place
     from flownav.errors import InputError
     from flownav.export.earth import origin_from
-    from flownav.export.formats import FOLDERS, destination, export, written_files
+    from flownav.export.formats import FOLDERS, FRAMED, destination, export, written_files
     from flownav.record import Record
 
     path = destination(record, to, out)
     if to in FOLDERS:
-        require_writable_folder(path, record, merge)
+        path = folder_place(path, record, merge)
+    elif to in FRAMED:
+        path = several_place(path, record, force=force)
     else:
-        for one in written_files(to, path):
-            require_writable(one, record, merge)
+        beside = [each.name.removeprefix(path.stem) for each in written_files(to, path) if each != path]
+        path = place(path, record, merge, force=force, beside=beside)
     about = None if origin is None else origin_from(origin)
     flown = Record.load(record)
     try:
@@ -59,7 +61,7 @@ def command(
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
     if as_json:
         files = [str(file) for file in written.files]
-        typer.echo(json.dumps({"record": str(record), "format": to, "files": files, "notes": written.notes}))
+        emit({"record": str(record), "format": to, "files": files, "notes": written.notes})
         return
     for file in written.files:
         typer.echo(f"Written: {file}")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.output import VehicleOption
+from flownav.cli.choices import FAULTS, one_of
+from flownav.cli.options import ENSEMBLE, JsonOption, SeedOption, VehicleOption
+from flownav.cli.output import emit
 from flownav.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,43 +20,58 @@ if TYPE_CHECKING:
 HEIGHTS_M = (0.3, 20.0)
 DURATIONS_S = (0.1, 60.0)
 FLIGHTS, DEFAULT_FLIGHTS = (1, 100_000), 16
-WIDE = 130  # columns that the table takes
+WIDE = 144  # columns that the table takes
+HOVERS_M, LASTING_S = ["0.5,1.5,3"], {False: "5,20", True: "2,5"}
 
 
 def command(
     faults: Annotated[
-        str | None,
-        typer.Option(help="Which faults, with commas between; all that can be flown unless given."),
+        list[str] | None,
+        typer.Option(
+            "--faults",
+            metavar="NAME",
+            help=f"Which faults, repeated or with commas: {', '.join(FAULTS)}.",
+            show_default="all that can be flown",
+            autocompletion=one_of(*FAULTS)["autocompletion"],
+        ),
     ] = None,
-    heights: Annotated[str, typer.Option(help="Skids above the pad in hover [m], with commas between.")] = "0.5,1.5,3",
+    heights: Annotated[
+        list[str],
+        typer.Option("--heights", metavar="M", help="Skids above the pad in hover [m], repeated or with commas."),
+    ] = HOVERS_M,
     durations: Annotated[
-        str | None, typer.Option(help="How long a fault lasts [s]; 5,20 unless given, 2,5 with --offline.")
+        list[str] | None,
+        typer.Option(
+            "--durations",
+            metavar="S",
+            help="How long a fault lasts [s], repeated or with commas.",
+            show_default="5,20; with --offline 2,5",
+        ),
     ] = None,
-    flights: Annotated[int, typer.Option(help="Flights of each row, each with a truth of its own.")] = DEFAULT_FLIGHTS,
-    matched: Annotated[bool, typer.Option("--matched", help="Vehicle and sensors as their datasheets say.")] = False,
+    flights: Annotated[int, typer.Option(metavar="N", help="Flights of each row.")] = DEFAULT_FLIGHTS,
+    ensemble: Annotated[bool, typer.Option("--ensemble/--matched", help=ENSEMBLE)] = True,
     offline: Annotated[
         bool, typer.Option("--offline", help="Put the faults into the log of one flight that is flown on the truth.")
     ] = False,
     vehicle: VehicleOption = None,
-    seed: Annotated[int, typer.Option(help="The noise of flights and faults; the same seed gives the same table.")] = 1,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    seed: SeedOption = 1,
+    as_json: JsonOption = False,
 ) -> None:
     """Sensors that fail on a landing: whether the vehicle lands, goes around or crashes, and what is said of it."""
+    from flownav.cli.lists import numbers, words
     from flownav.cli.output import require_between
-    from flownav.faults.catalogue import FAULTS, faults_named
+    from flownav.faults.catalogue import faults_named
     from flownav.faults.laws import NOT_FLOWN
 
     require_between("--seed", seed, 0, 2**63 - 1)
     require_between("--flights", flights, *FLIGHTS)
-    named = FAULTS if faults is None else _words("--faults", faults)
-    if faults is None and not offline:
-        named = [name for name in FAULTS if name not in NOT_FLOWN]
+    named = words("--faults", faults) if faults else [name for name in FAULTS if offline or name not in NOT_FLOWN]
     chosen = faults_named(named)
-    heights_m = _numbers("--heights", heights, *HEIGHTS_M)
-    lasting_s = _numbers("--durations", durations or ("2,5" if offline else "5,20"), *DURATIONS_S)
+    heights_m = numbers("--heights", heights, *HEIGHTS_M)
+    lasting_s = numbers("--durations", durations or [LASTING_S[offline]], *DURATIONS_S)
     facts: dict[str, Any] = {"vehicle": vehicle, "seed": seed, "heights_m": heights_m, "durations_s": lasting_s}
     name = f", {vehicle}" if vehicle else ""
-    if offline and (matched or flights != DEFAULT_FLIGHTS):
+    if offline and (not ensemble or flights != DEFAULT_FLIGHTS):
         raise InputError("--flights, --matched: are of flights in the closed loop; leave them out with --offline")
     if offline:
         rows = _logged(chosen, heights_m, lasting_s, seed, vehicle)
@@ -68,8 +84,8 @@ def command(
         return
     if absent := [fault.name for fault in chosen if fault.name in NOT_FLOWN]:
         raise InputError(f"--faults {absent[0]}: a receiver's queue sorts that out before its navigator; try --offline")
-    flown = _flown(chosen, heights_m, lasting_s, flights, seed, vehicle, matched)
-    facts |= {"closed_loop": True, "flights": flights, "truth_model": "matched" if matched else "ensemble"}
+    flown = _flown(chosen, heights_m, lasting_s, flights, seed, vehicle, not ensemble)
+    facts |= {"closed_loop": True, "flights": flights, "truth_model": "ensemble" if ensemble else "matched"}
     heading = f"Sensors that fail in flight{name}, {flights} flights a row, seed {seed}"
     _say(flown, facts, as_json, lambda: _show_flown(flown, heading))
 
@@ -77,7 +93,7 @@ def command(
 def _say(rows: Any, facts: dict[str, Any], as_json: bool, show: Any) -> None:
     """One JSON object, or the table."""
     if as_json:
-        typer.echo(json.dumps(facts | {"rows": [row.entry() for row in rows]}))
+        emit(facts | {"rows": [row.entry() for row in rows]})
     else:
         show()
 
@@ -116,41 +132,19 @@ def navigator(vehicle: str | None = None) -> Navigate:
     return navigator_of(assemble(scenario_at(1.0, 1.0, vehicle)))
 
 
-def _words(option: str, text: str) -> list[str]:
-    words = [word.strip() for word in text.split(",") if word.strip()]
-    if not words:
-        raise InputError(f"{option}: give one at least")
-    return words
-
-
-def _numbers(option: str, text: str, low: float, high: float) -> list[float]:
-    """Numbers with commas between. InputError where one is none or out of range."""
-    from flownav.cli.output import require_between
-    from flownav.text import number
-
-    numbers = []
-    for word in _words(option, text):
-        try:
-            numbers.append(number(word))
-        except ValueError:
-            raise InputError(f"{option} {word}: a number is needed") from None
-        require_between(option, numbers[-1], low, high)
-    return numbers
-
-
 def _show_flown(rows: list[FlownRow], title: str) -> None:
     """What became of the flights, for people."""
     columns = (
-        "height m",
-        "lasts s",
-        "noticed s",
-        "said s",
-        "unsaid m",
-        "largest m",
+        "height [m]",
+        "lasts [s]",
+        "noticed [s]",
+        "said [s]",
+        "unsaid [m]",
+        "largest [m]",
         "landed",
         "around",
         "crashed",
-        "off m",
+        "off [m]",
     )
     shown: list[tuple[str, ...]] = []
     for row in rows:
@@ -179,15 +173,15 @@ def _after(when: dict[str, Any], faulty: bool) -> str:
 def _show(rows: list[Row], title: str) -> None:
     """The rows of logs for people."""
     columns = (
-        "height m",
-        "lasts s",
-        "noticed s",
-        "moved m",
-        "largest m",
-        "back s",
+        "height [m]",
+        "lasts [s]",
+        "noticed [s]",
+        "moved [m]",
+        "largest [m]",
+        "back [s]",
         "wrongly fused",
-        "touchdown m",
-        "unsaid s",
+        "touchdown [m]",
+        "unsaid [s]",
     )
     shown: list[tuple[str, ...]] = []
     for row in rows:
@@ -217,7 +211,7 @@ def _print(title: str, columns: tuple[str, ...], rows: list[tuple[str, ...]]) ->
         table.add_column(name, justify="right")
     for row in rows:
         table.add_row(*row)
-    console = Console()
+    console = Console(markup=False, highlight=False)
     console.width = max(console.width, WIDE)
     console.print(table)
 
@@ -225,7 +219,7 @@ def _print(title: str, columns: tuple[str, ...], rows: list[tuple[str, ...]]) ->
 def _note(text: str) -> None:
     from rich.console import Console
 
-    console = Console()
+    console = Console(markup=False, highlight=False)
     console.width = max(console.width, WIDE)
     console.print(text, highlight=False)
 

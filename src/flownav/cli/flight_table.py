@@ -15,12 +15,12 @@ UNITS = {"x": "m", "y": "m", "z": "m", "u": "m/s", "v": "m/s", "w": "m/s"}
 def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> None:
     """Errors per state beside the paper's table, largest position error, touchdown, files."""
     many = facts["flights"] > 1
-    console = Console()
+    console = Console(markup=False, highlight=False)
     console.width = max(console.width, WIDEST if many else WIDE)
     plant = "" if facts["truth"] == "nonlinear" else ", linear truth"
     flown_on = "" if facts["feedback"] == "estimate" else ", flown on the truth"
     flies = "the paper's filter" if facts["filter"] == "paper" else "the navigator"
-    told = ", the truth drawn" if facts["truth_model"] == "ensemble" else ", the truth as told"
+    told = ", an ensemble" if facts["truth_model"] == "ensemble" else ", matched"
     title = f"{facts['scenario']}: {flies}, {facts['gps']} GPS{plant}{flown_on}{told}, seed {facts['seed']}"
     table = Table(
         title=title + (f", {facts['flights']} flights: median (5-95 %)" if many else ""), title_justify="left"
@@ -28,16 +28,21 @@ def show(facts: dict[str, Any], paper: dict[str, Any] | None, median: int) -> No
     table.add_column("state")
     for name in ("mean error", "std error", "rms error", "max error"):
         table.add_column(name, justify="right")
+    white = facts["gps"] == "white"
     if paper:
+        whose = "paper's filter" if white else "paper's filter,\nwhite GPS noise"
         for statistic in ("mean", "std"):
-            table.add_column(f"{paper['title']} {statistic}\n(paper's filter)", justify="right", style="dim")
+            table.add_column(f"{paper['title']} {statistic}\n({whose})", justify="right", style="dim")
     for state, entry in facts["states"].items():
         cells = [_cell(entry[key], 3 if many else 4) for key in ("mean_error", "std_error", "rms_error", "max_error")]
         if paper:
             cells += [f"{paper['states'][state][key]:.4f}" for key in ("mean_error", "std_error")]
         table.add_row(f"{state} [{UNITS[state]}]", *cells)
     console.print(table)
-    beside = f"   paper: {paper['max_position_error_m']:.4f} m" if paper else ""
+    beside = ""
+    if paper:
+        beside = f"   paper: {paper['max_position_error_m']:.4f} m"
+        beside += "" if white else f" (for white GPS noise; {facts['gps']} is not white)"
     largest = _cell(facts["max_position_error_m"], 3 if many else 4)
     console.print(f"largest error of one position axis  {largest} m{beside}", highlight=False)
     if "known_exactly" in facts:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from flownav.cli.options import FirmwareOption, JsonOption
+from flownav.cli.output import emit
 
 if TYPE_CHECKING:
     from flownav.optics.flow import FlowSeries
@@ -16,24 +18,26 @@ def command(
     frames: Annotated[
         list[Path], typer.Argument(help="A folder of pictures, pictures in order, or one video.", show_default=False)
     ],
-    fps: Annotated[float, typer.Option(help="Frames a second.", show_default=False)],
-    focal: Annotated[float, typer.Option(help="Focal length [px]; the PX4FLOW's is 666.67.")] = 666.67,
+    fps: Annotated[float, typer.Option(metavar="HZ", help="Frames a second.", show_default=False)],
+    focal: Annotated[float, typer.Option(metavar="PX", help="Focal length [px]; the PX4FLOW's is 666.67.")] = 666.67,
     distance: Annotated[
-        float | None, typer.Option("--range", help="Distance to the ground [m]; adds velocities.", show_default=False)
+        float | None,
+        typer.Option("--range", metavar="M", help="Distance to the ground [m]; adds velocities.", show_default=False),
     ] = None,
     rates: Annotated[
         Path | None,
         typer.Option(
+            metavar="FILE.csv",
             help="CSV with columns rate_x_rad_s, rate_y_rad_s, rate_z_rad_s, a row a frame: compensates rotation.",
             show_default=False,
         ),
     ] = None,
-    firmware: Annotated[str, typer.Option(help="A version and its switches (docs/optics.md).")] = "2014-12",
+    firmware: FirmwareOption = "2014-12",
     window: Annotated[
-        int | None, typer.Option(help="Use the middle WINDOW x WINDOW pixels only.", show_default=False)
+        int | None, typer.Option(metavar="PX", help="Use the middle PX x PX pixels only.", show_default=False)
     ] = None,
-    bin_by: Annotated[int, typer.Option("--bin", help="Average BIN x BIN pixels into one first.")] = 1,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    bin_by: Annotated[int, typer.Option("--bin", metavar="PX", help="Average PX x PX pixels into one first.")] = 1,
+    as_json: JsonOption = False,
 ) -> None:
     """Flow and quality from each frame to the next, with the historical firmware of your choice."""
     from flownav.cli.output import require_between
@@ -62,7 +66,7 @@ def command(
         )
     facts = _facts(series, len(grey), grey.shape[2], grey.shape[1], fps, focal / bin_by, firmware)
     if as_json:
-        typer.echo(json.dumps(facts))
+        emit(facts)
     else:
         _print(facts)
 
@@ -140,7 +144,7 @@ def _print(facts: dict[str, Any]) -> None:
     width, height = facts["size_px"]
     console.print(f"{facts['frames']} frames of {width}x{height} px, firmware {facts['firmware']}")
     console.print(f"{summary['valid']} of {facts['frames'] - 1} pairs valid, quality {summary['mean_quality']:.0f}/255")
-    table = Table("", "x", "y")
+    table = Table("mean of the valid pairs", "x", "y")
     rows = (("flow [px]", "mean_flow_px"), ("spread [px]", "std_flow_px"), ("flow [rad/s]", "mean_flow_rad_s"))
     for label, key in (*rows, ("velocity [m/s]", "mean_velocity_m_s")):
         if summary[key] is not None:

@@ -2,59 +2,93 @@
 
 from __future__ import annotations
 
-import json
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from flownav.cli.output import VehicleOption
+from flownav.cli.choices import FEEDBACKS, GPS_MODELS, OPTICS, PLANTS, one_of
+from flownav.cli.options import (
+    ENSEMBLE,
+    SCENARIOS_OWN,
+    FilterOption,
+    ForceOption,
+    JsonOption,
+    ReportOption,
+    ScenarioArgument,
+    SeedOption,
+    SensorOption,
+    SigningKeyOption,
+    VehicleOption,
+    out_option,
+)
+from flownav.cli.output import emit
 from flownav.errors import InputError, VerdictError
 
 CRASHES_ALLOWED = 0.05  # of the flights, before the exit status says that the verdict is bad
 
 
 def command(
-    scenario: Annotated[
-        str, typer.Argument(help="takeoff, landing, gusty, pad_return, approach, or a scenario file (TOML).")
-    ],
-    flights: Annotated[int, typer.Option(help="How many flights; more than one gives medians and 5-95 %.")] = 1,
-    flight: Annotated[int | None, typer.Option(help="Fly this one flight of the seed again, counted from 0.")] = None,
-    seed: Annotated[int, typer.Option(help="The campaign's noise; flight k of a seed is always the same flight.")] = 1,
-    gps: Annotated[str | None, typer.Option(help="GPS error model: white or midg.")] = None,
-    filter_name: Annotated[
-        str | None, typer.Option("--filter", help="landing, paper, an installed filter's name, or file.py:Class.")
+    scenario: ScenarioArgument,
+    flights: Annotated[
+        int, typer.Option(metavar="N", help="How many flights; more than one gives medians and 5-95 %.")
+    ] = 1,
+    flight: Annotated[
+        int | None, typer.Option(metavar="K", help="Fly only flight K of the seed, counted from 0.", show_default="0")
     ] = None,
-    feedback: Annotated[str | None, typer.Option(help="What the autopilot flies on: estimate or truth.")] = None,
-    truth: Annotated[str | None, typer.Option(help="The plant: nonlinear, or the paper's linear model.")] = None,
+    seed: SeedOption = 1,
+    gps: Annotated[
+        str | None,
+        typer.Option(
+            help="GPS errors: white noise as in the paper, or a receiver of 2 m CEP.",
+            show_default=SCENARIOS_OWN,
+            **one_of(*GPS_MODELS),
+        ),
+    ] = None,
+    filter_name: FilterOption = None,
+    feedback: Annotated[
+        str | None,
+        typer.Option(help="What the autopilot flies on.", show_default=SCENARIOS_OWN, **one_of(*FEEDBACKS)),
+    ] = None,
+    truth: Annotated[
+        str | None,
+        typer.Option(help="The plant; linear is the paper's model.", show_default=SCENARIOS_OWN, **one_of(*PLANTS)),
+    ] = None,
     optics: Annotated[
-        str | None, typer.Option(help="The pad camera: model, or pixels (its frames are rendered; minutes a flight).")
+        str | None,
+        typer.Option(
+            help="The pad camera; pixels renders its frames, which takes minutes a flight.",
+            show_default=SCENARIOS_OWN,
+            **one_of(*OPTICS),
+        ),
     ] = None,
-    sensor: Annotated[str | None, typer.Option(help="A flow sensor file (TOML).")] = None,
+    sensor: SensorOption = None,
     vehicle: VehicleOption = None,
     ensemble: Annotated[
         bool | None,
         typer.Option(
             "--ensemble/--matched",
-            help="Draw each flight's vehicle, wind and sensors, or fly what the filter is told; many flights draw.",
-            show_default=False,
+            help=ENSEMBLE,
+            show_default="one flight matched, many an ensemble",
         ),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="The record to write; out/SCENARIO.fnr where unsaid.")] = None,
-    report: Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report beside it.")] = True,
+    out: Annotated[Path | None, out_option("The record", "out/SCENARIO.fnr")] = None,
+    force: ForceOption = False,
+    report: ReportOption = True,
     mavlink: Annotated[
-        str | None, typer.Option(metavar="URL", help="Then tell the flight as a MAVLink autopilot (docs/live.md).")
+        str | None,
+        typer.Option(metavar="URL", help="Then send the flight as a MAVLink autopilot would, for `flownav live`."),
     ] = None,
-    speed: Annotated[float, typer.Option(help="Of the telling: 1 is real time.")] = 1.0,
-    signing_key: Annotated[Path | None, typer.Option(help="Sign what is told: 32 bytes or 64 digits.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    speed: Annotated[float, typer.Option(metavar="X", help="How fast it is sent: 1 is real time.")] = 1.0,
+    signing_key: SigningKeyOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
     from flownav.api.flying import MOST_FLIGHTS, MOST_SEED, fly_setup
     from flownav.api.parts import split
     from flownav.api.scenario import Scenario
-    from flownav.cli.output import progress, require_between, require_writable_record, save
+    from flownav.cli.output import progress, record_place, require_between, save
     from flownav.simulation.assemble import assemble
 
     require_between("--flights", flights, 1, MOST_FLIGHTS)
@@ -64,12 +98,14 @@ def command(
     if flight is not None and flights > 1:
         raise InputError("--flight names one flight, --flights many; give one of the two")
     parts, ours, _ = split(filter_name, (), None, None)
+    flow_sensor = str(sensor) if sensor else None
     chosen = Scenario.load(scenario).changed(
-        gps=gps, filter=ours, autopilot=feedback, truth=truth, optics=optics, flow_sensor=sensor, vehicle=vehicle
-    )
-    record_path = out or Path("out") / f"{chosen.name}.fnr"
+        gps=gps, filter=ours, autopilot=feedback, truth=truth, optics=optics, flow_sensor=flow_sensor,
+        vehicle=vehicle,
+    )  # fmt: skip
     setup = assemble(chosen.file)
-    require_writable_record(record_path, scenario, sensor, vehicle, signing_key, report=report)
+    asked = out or Path("out") / f"{chosen.name}.fnr"
+    record_path = record_place(asked, scenario, sensor, vehicle, signing_key, force=force, report=report)
     dispersed = flights > 1 if ensemble is None else ensemble
     many = flights > 1 or parts.any or chosen.file.optics == "pixels"
     with progress(f"Flying {chosen.name}", flights) if many else nullcontext() as advance:
@@ -80,7 +116,7 @@ def command(
 
         facts["told"] = tell(setup, flown.record, mavlink, speed, signing_key)
     if as_json:
-        typer.echo(json.dumps(facts))
+        emit(facts)
     else:
         from flownav.cli.flight_table import show
 

@@ -2,35 +2,51 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from flownav.cli.choices import AUTOPILOTS, ORDERS, REFERENCES, one_of
+from flownav.cli.options import FlowInstanceOption, ForceOption, JsonOption, out_option
+from flownav.cli.output import emit
+
 
 def command(
     logs: Annotated[
-        list[Path], typer.Argument(help="Rig folders or CSV files, or one flight log (docs/identification.md).")
+        list[Path],
+        typer.Argument(metavar="LOG", help="Rig folders or their CSV files, or one flight's log.", show_default=False),
     ],
-    order: Annotated[str, typer.Option(help="auto, delay (gain and latency), 1 to 6, or e.g. 2+delay.")] = "auto",
+    order: Annotated[
+        str, typer.Option(help="The model's order; delay is gain and latency alone.", **one_of(*ORDERS))
+    ] = "auto",
     heights: Annotated[
-        str | None, typer.Option(metavar="H[,H..]", help="Sensor's height [m]: one for all logs, or one each.")
+        list[str] | None,
+        typer.Option(
+            "--heights",
+            metavar="M",
+            help="Sensor's height [m], one for all logs or one each; repeated or with commas.",
+            show_default="as the log says",
+        ),
     ] = None,
-    reference: Annotated[str, typer.Option(help="auto; rig: velocity or encoder; flight: truth or gps.")] = "auto",
-    flow_instance: Annotated[
-        int | None, typer.Option("--flow-instance", metavar="N", help="Which of a flight's several flow sensors.")
-    ] = None,
+    reference: Annotated[
+        str, typer.Option(help="What it is held against: of a rig, of a flight.", **one_of(*REFERENCES))
+    ] = "auto",
+    flow_instance: FlowInstanceOption = None,
     autopilot: Annotated[
-        str | None, typer.Option("--for", help="Also write this autopilot's parameters: px4 or ardupilot.")
+        str | None, typer.Option("--for", help="Also write this autopilot's parameters.", **one_of(*AUTOPILOTS))
     ] = None,
     base: Annotated[
-        Path | None, typer.Option(help="Sensor file for what no log tells (optics, limits); the paper's where unsaid.")
+        Path | None,
+        typer.Option(
+            metavar="FILE.toml",
+            help="The sensor file for what no log shows (optics, limits).",
+            show_default="the paper's sensor",
+        ),
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", help="The sensor file; out/NAME.toml where unsaid.", show_default=False)
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    out: Annotated[Path | None, out_option("The sensor file (TOML)", "out/LOG.toml")] = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Identify a flow sensor: gain, latency, dynamics, noise, each with its interval, as a sensor file."""
     from flownav.api.identifying import require_logs
@@ -38,20 +54,20 @@ def command(
     require_logs(logs)
 
     from flownav.api.identifying import identify_logs
-    from flownav.cli.output import require_writable
-    from flownav.identification.job import parse_heights
+    from flownav.cli.lists import numbers
+    from flownav.cli.output import place
+    from flownav.identification.autopilot_parameters import AUTOPILOTS as SUFFIXES
 
-    path = _sensor_path(out, logs)
-    parameter_path = _parameter_path(path, autopilot)
-    for output in (path, parameter_path):
-        if output is not None:
-            require_writable(output, *logs, base)
-    sensor = identify_logs(logs, order, parse_heights(heights), reference, flow_instance=flow_instance, base=base)
+    suffix = None if autopilot is None else SUFFIXES[autopilot]
+    path = place(_sensor_path(out, logs), *logs, base, force=force, beside=(suffix,) if suffix else ())
+    parameter_path = path.with_suffix(suffix) if suffix else None
+    heights_m = numbers("--heights", heights, 0.001, 1000.0) if heights else []
+    sensor = identify_logs(logs, order, heights_m, reference, flow_instance=flow_instance, base=base)
     facts = sensor.facts | {"sensor": str(sensor.save(path))}
     if parameter_path is not None and autopilot is not None:
         facts |= {"parameters": str(parameter_path), "autopilot": sensor.save_parameters(parameter_path, autopilot)}
     if as_json:
-        typer.echo(json.dumps(facts))
+        emit(facts)
     elif sensor.findings is not None:
         from flownav.cli.identify_table import show
 
@@ -66,15 +82,3 @@ def _sensor_path(out: Path | None, logs: list[Path]) -> Path:
     if path.suffix != ".toml":
         raise InputError(f"--out {path}: a sensor file's name ends in .toml")
     return path
-
-
-def _parameter_path(path: Path, autopilot: str | None) -> Path | None:
-    from flownav.errors import InputError
-
-    if autopilot is None:
-        return None
-    from flownav.identification.autopilot_parameters import AUTOPILOTS
-
-    if autopilot not in AUTOPILOTS:
-        raise InputError(f"--for {autopilot}: px4 or ardupilot are possible")
-    return path.with_suffix(AUTOPILOTS[autopilot])

@@ -2,28 +2,20 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
+from flownav.cli.options import FlowInstanceOption, JsonOption, LogArgument, TopicOption
+from flownav.cli.output import emit
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 
 def command(
-    log: Annotated[
-        Path, typer.Argument(help="A log: CSV folder, .ulg, .bin or .tlog (docs/logs.md).", show_default=False)
-    ],
-    flow_instance: Annotated[
-        int | None, typer.Option("--flow-instance", metavar="N", help="Which of several flow sensors.")
-    ] = None,
-    topic: Annotated[
-        list[str] | None,
-        typer.Option("--topic", metavar="ROLE=TOPIC", help="Of a ROS bag: which topic serves as what; several times."),
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    log: LogArgument,
+    flow_instance: FlowInstanceOption = None,
+    topic: TopicOption = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Show what a log holds: sensors, rates, gaps, thrown-away rows, limits, signs, and what it lacks."""
     from flownav.compile import announce_compilation
@@ -35,14 +27,16 @@ def command(
     with announce_compilation("inspection"):
         facts = summarise(read)
     if as_json:
-        typer.echo(json.dumps(facts))
+        emit(facts)
     else:
         _print(facts)
 
 
 def _print(facts: dict[str, Any]) -> None:
     """The same figures for people."""
+    from rich.box import SIMPLE_HEAD
     from rich.console import Console
+    from rich.padding import Padding
     from rich.table import Table
 
     console = Console(markup=False, highlight=False)
@@ -50,15 +44,20 @@ def _print(facts: dict[str, Any]) -> None:
     console.print(f"Verdict: {facts['verdict']}")
     for obstacle in facts["obstacles"]:
         console.print(f"Cannot be replayed: {obstacle}")
-    streams = Table("sensor", "readings", "rate [Hz]", "from, to [s]", "gap [s]", "no data", "thrown away")
-    for column in streams.columns[:4]:
-        column.no_wrap = True
+    heads = ("sensor", "readings", "rate [Hz]", "from [s]", "to [s]", "gap [s]", "no data [%]")
+    streams = Table(*heads, box=SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
+    streams.columns[0].no_wrap = True
+    for column in streams.columns[1:]:
+        column.justify = "right"
     for s in facts["streams"]:
-        rejected = ", ".join(f"{count} {reason}" for reason, count in s["rejected"].items())
-        no_data = f"{100 * s['no_data_share']:.0f} %" if s["no_data_share"] else ""
-        span, gap = f"{s['start_s']:.1f}, {s['end_s']:.1f}", _figure(s["largest_gap_s"], 2)
-        streams.add_row(s["sensor"], str(s["count"]), _figure(s["rate_hz"], 1), span, gap, no_data, rejected)
+        no_data = f"{100 * s['no_data_share']:.0f}" if s["no_data_share"] else ""
+        span, gap = (f"{s['start_s']:.1f}", f"{s['end_s']:.1f}"), _figure(s["largest_gap_s"], 2)
+        streams.add_row(s["sensor"], str(s["count"]), _figure(s["rate_hz"], 1), *span, gap, no_data)
     console.print(streams)
+    for s in facts["streams"]:
+        if s["rejected"]:
+            rejected = ", ".join(f"{count} {reason}" for reason, count in s["rejected"].items())
+            console.print(f"Thrown away of {s['sensor']}: {rejected}")
     for line in facts["clock"] or ["nothing found"]:
         console.print(f"Clock: {line}")
     for name, limit in facts["limits"].items():
@@ -69,10 +68,9 @@ def _print(facts: dict[str, Any]) -> None:
     for text in facts["warnings"]:
         console.print(f"Warning: {text}")
     if facts["absences"]:
-        lacking = Table("the log has", "instead", title="What is missing")
+        console.print("What is missing, and what is done instead:")
         for absence in facts["absences"]:
-            lacking.add_row(absence["what"], absence["instead"])
-        console.print(lacking)
+            console.print(Padding(f"{absence['what']}: {absence['instead']}", (0, 0, 0, 2)))
     if facts["autopilot"]:
         _print_autopilot(console, facts["autopilot"])
     if facts["truth"]:
@@ -82,13 +80,15 @@ def _print(facts: dict[str, Any]) -> None:
 
 
 def _print_autopilot(console: Console, own: dict[str, Any]) -> None:
+    from rich.padding import Padding
+
     from flownav.cli.output import autopilot_errors
 
     console.print(
         f"The autopilot's own estimate: {own['name']}, {own['count']} rows at {_figure(own['rate_hz'], 1)} Hz"
     )
     if own["against"]:
-        console.print(f"  {autopilot_errors(own)}")
+        console.print(Padding(autopilot_errors(own), (0, 0, 0, 2)))
 
 
 def _figure(value: float | None, digits: int) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import time
@@ -13,6 +12,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flownav.cli.choices import LINKS, SENDINGS, one_of
+from flownav.cli.options import (
+    ForceOption,
+    GpsDelayOption,
+    JsonOption,
+    SensorOption,
+    SettingsOption,
+    SigningKeyOption,
+)
+from flownav.cli.output import emit
+
 if TYPE_CHECKING:
     from flownav.live.loop import Latency
     from flownav.live.options import Options
@@ -22,53 +32,78 @@ if TYPE_CHECKING:
 def command(
     url: Annotated[
         str,
-        typer.Argument(help="udp:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:PORT or serial:DEVICE[:BAUD]."),
+        typer.Argument(
+            metavar="URL",
+            help="udp:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:PORT or serial:DEVICE[:BAUD].",
+            show_default=False,
+            autocompletion=one_of(*LINKS)["autocompletion"],
+        ),
     ],
-    sensor: Annotated[
-        Path | None, typer.Option(help="A flow sensor file: its gains and latency correct the flow.")
+    sensor: SensorOption = None,
+    send: Annotated[str, typer.Option(help="As which message the estimate is sent.", **one_of(*SENDINGS))] = "odometry",
+    record: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            "--record",
+            metavar="PATH",
+            help="The record; `flownav replay` reproduces it.",
+            show_default="none is written",
+        ),
     ] = None,
-    send: Annotated[str, typer.Option(help="odometry, vision, landing-target or none.")] = "odometry",
-    record: Annotated[Path | None, typer.Option(help="The record to write; `flownav replay` reproduces it.")] = None,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace a record that is there; else it is numbered.")
-    ] = False,
-    signing_key: Annotated[Path | None, typer.Option(help="MAVLink 2 signing key: 32 bytes or 64 digits.")] = None,
-    system: Annotated[int | None, typer.Option(help="Listen to this system only; the first autopilot's.")] = None,
-    component: Annotated[int | None, typer.Option(help="Listen to this component only.")] = None,
-    gps_delay: Annotated[float, typer.Option(metavar="S", help="How old a GPS reading is when it arrives.")] = 0.22,
-    settings: Annotated[Path | None, typer.Option(help="TOML of filter settings (docs/landing-filter.md).")] = None,
+    force: ForceOption = False,
+    signing_key: SigningKeyOption = None,
+    system: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Listen to this system only.", show_default="the first autopilot's"),
+    ] = None,
+    component: Annotated[
+        int | None, typer.Option(metavar="N", help="Listen to this component only.", show_default="the autopilot's")
+    ] = None,
+    gps_delay: GpsDelayOption = 0.22,
+    settings: SettingsOption = None,
     send_limit: Annotated[
-        float, typer.Option(metavar="S", help="Send no longer than this without a horizontal aid (dead reckoning).")
+        float, typer.Option(metavar="S", help="Send no longer than this without a horizontal aid (dead reckoning) [s].")
     ] = 1.5,
     send_sigma: Annotated[
-        float, typer.Option(metavar="M", help="Send while one standard deviation of the position is below this.")
+        float, typer.Option(metavar="M", help="Send while one standard deviation of the position is below this [m].")
     ] = 5.0,
     send_protection: Annotated[
-        float, typer.Option(metavar="M", help="Send while the horizontal protection level is below this.")
+        float, typer.Option(metavar="M", help="Send while the horizontal protection level is below this [m].")
     ] = 20.0,
     unfused: Annotated[
-        float, typer.Option(metavar="S", help="Withhold when a horizontal sensor is heard and not fused for so long.")
+        float,
+        typer.Option(metavar="S", help="Send nothing once a horizontal sensor is heard but not fused for so long [s]."),
     ] = 5.0,
     accept: Annotated[
         list[str] | None,
-        typer.Option(metavar="MESSAGE=SYSTEM.COMPONENT", help="Who else may tell a message; 0: any. May be repeated."),
+        typer.Option(
+            metavar="MESSAGE=SYSTEM.COMPONENT", help="Who else may send a message, 0 for any; may be repeated."
+        ),
     ] = None,
-    duration: Annotated[float | None, typer.Option(help="End after so many seconds; Ctrl-C where unsaid.")] = None,
+    duration: Annotated[
+        float | None, typer.Option(metavar="S", help="End after so many seconds.", show_default="at Ctrl-C")
+    ] = None,
     capacity: Annotated[
         float | None,
-        typer.Option(metavar="BYTES/S", help="What the link carries each way; a serial port's by its baud rate."),
+        typer.Option(
+            metavar="BYTES/S", help="What the link carries each way.", show_default="a serial port's by its baud rate"
+        ),
     ] = None,
     setup: Annotated[
         bool,
-        typer.Option("--setup", help="Read the vehicle's parameters; say what must change for --send."),
+        typer.Option("--setup", help="Only read the vehicle's parameters, and say what must change for --send."),
     ] = False,
     write: Annotated[
         bool, typer.Option("--write", help="With --setup: write what must change, never while armed.")
     ] = False,
     source_set: Annotated[
-        int | None, typer.Option(help="With --setup: ArduPilot's source set for flownav, 1 to 3; found where unsaid.")
+        int | None,
+        typer.Option(
+            metavar="1..3", help="With --setup: ArduPilot's source set for flownav.", show_default="a free one"
+        ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Navigate a vehicle that is connected by MAVLink: fuse its sensors, send the estimate, show and record it."""
     from dataclasses import replace
@@ -78,7 +113,7 @@ def command(
     from flownav.live.display import on_terminal
     from flownav.live.link import open_link, parse_url
     from flownav.live.loop import Latency, run_session, stoppable
-    from flownav.live.options import SENDINGS, Limits
+    from flownav.live.options import Limits
     from flownav.live.priority import run_as_others, run_before_others
     from flownav.live.reception import accepted_by
     from flownav.live.recorder import NoRecorder, Recorder, told_every_second
@@ -87,8 +122,6 @@ def command(
     from flownav.live.traffic import traffic_facts
     from flownav.live.warm import warm_up
 
-    if send not in SENDINGS:
-        raise InputError(f"--send {send}: one of {', '.join(SENDINGS)} is needed")
     for option, number in (("--system", system), ("--component", component)):
         require_between(option, 1 if number is None else number, 1, 255)
     require_between("--gps-delay", gps_delay, 0.0, 1.0)
@@ -104,7 +137,7 @@ def command(
         from flownav.mavlink.signing import load_key
 
         if record is not None:
-            raise InputError("--record: --setup flies nothing; leave one of the two away")
+            raise InputError("--out: --setup flies nothing; leave one of the two away")
         key = load_key(signing_key) if signing_key else None
         return run_setup(
             url, send, write=write, source_set=source_set, system=system, component=component, key=key, as_json=as_json
@@ -213,7 +246,7 @@ def _say(facts: dict[str, Any], *, as_json: bool) -> None:
     """The figures of the session; nothing where nobody is there to read them any more."""
     try:
         if as_json:
-            typer.echo(json.dumps(facts))
+            emit(facts)
         else:
             _print(facts)
         sys.stdout.flush()

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
 import typer
+
+from flownav.cli.output import emit
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -38,7 +39,7 @@ def run(
     finally:
         link.close()
     if as_json:
-        typer.echo(json.dumps(report.as_dict()))
+        emit(report.as_dict())
     else:
         _print(report)
     if not report.fits or any(not change.done for change in report.changes):
@@ -80,7 +81,7 @@ def _print(report: Report) -> None:
 def _table(report: Report) -> Any:
     from rich.table import Table
 
-    table = Table("parameter", "has", "wanted", "", "reboot")
+    table = Table("parameter", "has", "wanted", "verdict", "reboot")
     for row in report.rows:
         has = "-" if row.has is None else f"{row.has:g}"
         reboot = "yes" if row.reboot and row.status in ("wrong", "unusual", "absent") else ""

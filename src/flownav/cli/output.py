@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import json
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -14,10 +16,6 @@ from flownav.errors import InputError
 
 if TYPE_CHECKING:
     from flownav.record import Record
-
-VehicleOption = Annotated[
-    str | None, typer.Option(help="A vehicle: maxi-joker-3, quad-450, hexa-550, or a file (TOML).")
-]
 
 
 @contextmanager
@@ -32,46 +30,74 @@ def progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
         yield lambda done: bar.advance(task, done)
 
 
+def emit(facts: Mapping[str, Any], schema: int = 1) -> None:
+    """Print a command's one JSON object, with the number of its schema (`flownav schema`)."""
+    typer.echo(json.dumps({"schema": schema, **facts}))
+
+
 def require_between(option: str, value: float, low: float, high: float) -> None:
     """InputError where an option's number is out of range."""
     if not low <= value <= high:
         raise InputError(f"{option} {value}: must be from {low} to {high}")
 
 
-def require_one_of(option: str, value: str, known: Sequence[str]) -> None:
-    """InputError where an option is none of the words that it may be."""
-    if value not in known:
-        raise InputError(f"{option} {value}: must be {', '.join(known[:-1])} or {known[-1]}")
+def place(path: Path, *inputs: str | Path | None, force: bool, beside: Sequence[str] = ()) -> Path:
+    """Where a file is written: at `path`, or under the next free number where something is there, said on stderr.
 
-
-def require_writable(path: Path, *inputs: str | Path | None) -> None:
-    """InputError where a file must not or cannot be put there; asked before the work is done, not after.
-
-    inputs: what the run reads (None for an option that is not given; a name that is no path does no harm).
+    inputs: what the run reads (None for an option that is not given; a name that is no path does no harm). beside:
+    suffixes of what is written beside it. force: what is there is replaced, if flownav wrote it. InputError, before the
+    work is done, where nothing must or can be put there.
     """
-    from flownav.guard import an_input, an_output
+    from flownav.free_names import a_place
+    from flownav.guard import an_input
 
     read = [an_input(Path(each)) for each in inputs if each is not None]
-    an_output(path, read)
+    found = a_place(path, read, force=force, beside=beside)
     _require_place(path)
+    return told(path, found)
 
 
-def require_recordable(path: Path, *inputs: str | Path | None, force: bool) -> None:
-    """The same of a record that is numbered where one is there, or replaces it."""
-    from flownav.guard import a_record_place, an_input
+def several_place(path: Path, *inputs: str | Path | None, force: bool) -> Path:
+    """The same of files that are called after a path: NAME_estimate.tum, NAME_truth.tum, ..."""
+    from flownav.free_names import a_place_of_several
+    from flownav.guard import an_input
 
-    a_record_place(path, [an_input(Path(each)) for each in inputs if each is not None], force=force)
+    found = a_place_of_several(path, [an_input(Path(each)) for each in inputs if each is not None], force=force)
     _require_place(path)
+    return told(path, found)
 
 
-def require_writable_folder(path: Path, *inputs: str | Path | None) -> None:
-    """The same of a folder: a new one, or an empty one."""
-    from flownav.guard import an_input, an_output_folder
+def folder_place(path: Path, *inputs: str | Path | None, force: bool = False) -> Path:
+    """The same of a folder, which is new or empty; with force it is as it is, for its writer to look into."""
+    from flownav.free_names import a_folder_place
+    from flownav.guard import an_input
 
     for each in inputs:
         if each is not None:
             an_input(Path(each))
-    an_output_folder(path)
+    found = a_folder_place(path, force=force)
+    _require_place(path)
+    return told(path, found)
+
+
+def record_place(path: Path, *inputs: str | Path | None, force: bool, report: bool) -> Path:
+    """The same of a record and of its report beside it. InputError where the report would replace the record."""
+    page = page_of(path, report=report)
+    return place(path, *inputs, force=force, beside=() if page is None else (page.suffix,))
+
+
+def told(asked: Path, found: Path) -> Path:
+    """The path that is written, which is said where it is not the one that was asked for."""
+    if found != asked:
+        print(f"flownav: {asked} is there already (--force replaces it); writing {found}", file=sys.stderr)
+    return found
+
+
+def require_recordable(path: Path, *inputs: str | Path | None, force: bool) -> None:
+    """InputError where a live session's record cannot be put there; the recorder numbers it."""
+    from flownav.guard import a_record_place, an_input
+
+    a_record_place(path, [an_input(Path(each)) for each in inputs if each is not None], force=force)
     _require_place(path)
 
 
@@ -91,14 +117,6 @@ def page_of(record: Path, *, report: bool) -> Path | None:
     if report and page == record:
         raise InputError(f"--out {record}: the report would replace the record; name it .fnr")
     return page if report else None
-
-
-def require_writable_record(path: Path, *inputs: str | Path | None, report: bool) -> None:
-    """The same of a record and of its report beside it."""
-    page = page_of(path, report=report)
-    for output in (path, page):
-        if output is not None:
-            require_writable(output, *inputs)
 
 
 def save(record: Record, path: Path, *, report: bool) -> dict[str, str]:

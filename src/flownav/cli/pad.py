@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flownav.cli.choices import CAMERAS, PATTERNS, one_of
+from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
+from flownav.cli.output import emit
+
 if TYPE_CHECKING:
     from flownav.optics.pad_target import PadTarget
 
-HEIGHTS = "0.15,0.175,0.2,0.3,0.5,1,2,3,4"
-SPEEDS = "0.1,0.5,1.5"
+HEIGHTS = ["0.15,0.175,0.2,0.3,0.5,1,2,3,4"]
+SPEEDS = ["0.1,0.5,1.5"]
 WIDE = 110  # columns of the table of what was measured
 
 
@@ -21,47 +24,61 @@ def command(
         list[Path] | None,
         typer.Argument(help="Your pictures: a folder, pictures, or one video. None: measure.", show_default=False),
     ] = None,
-    side: Annotated[float, typer.Option(help="Side of the tag's black square, or of a plain pad [m].")] = 0.2,
-    pattern: Annotated[str, typer.Option(help="tag, nested, checker or stripes.")] = "tag",
-    code: Annotated[int, typer.Option(help="Which tag of AprilTag 36h11, 0 to 15.")] = 0,
+    side: Annotated[
+        float, typer.Option(metavar="M", help="Side of the tag's black square, or of a plain pad [m].")
+    ] = 0.2,
+    pattern: Annotated[str, typer.Option(help="What is printed on the pad.", **one_of(*PATTERNS))] = "tag",
+    code: Annotated[int, typer.Option(metavar="N", help="Which tag of AprilTag 36h11, 0 to 15.")] = 0,
     focal: Annotated[
-        float | None, typer.Option(help="Focal length of your pictures [px], undistorted.", show_default=False)
+        float | None,
+        typer.Option(metavar="PX", help="Focal length of your pictures [px], undistorted.", show_default=False),
     ] = None,
     image_x: Annotated[
-        float, typer.Option("--image-x-deg", help="Where the pictures' right is, clockwise from body forward.")
+        float,
+        typer.Option("--image-x-deg", metavar="DEG", help="Where the pictures' right is, clockwise from body forward."),
     ] = 0.0,
-    camera: Annotated[str, typer.Option(help="Measure with: wide120, wide60 or px4flow.")] = "wide120",
+    camera: Annotated[str, typer.Option(help="The camera to measure with.", **one_of(*CAMERAS))] = "wide120",
     focus: Annotated[
-        float | None, typer.Option(help="Where its lens is focused [m]; as built without it.", show_default=False)
+        float | None, typer.Option(metavar="M", help="Where its lens is focused [m].", show_default="as built")
     ] = None,
-    heights: Annotated[str, typer.Option(help="Heights to measure at [m], with commas.")] = HEIGHTS,
-    speeds: Annotated[str, typer.Option(help="Speeds over the ground [m/s], with commas.")] = SPEEDS,
-    flights: Annotated[int, typer.Option(help="Cameras, each on a flight of its own.")] = 24,
-    count: Annotated[int, typer.Option("--frames", help="Frames a flight, height and speed.")] = 2,
-    tilt: Annotated[float, typer.Option("--tilt-deg", help="Greatest tilt.")] = 15.0,
-    mounting: Annotated[float, typer.Option("--mounting-deg", help="How well it is mounted, for the datasheet.")] = 0.4,
-    seed: Annotated[int, typer.Option(help="Of cameras, light, ground, poses and noise.")] = 1,
-    out: Annotated[
-        Path | None, typer.Option(help="The datasheet to write (TOML), which `fly` reads.", show_default=False)
-    ] = None,
+    heights: Annotated[
+        list[str], typer.Option("--heights", metavar="M", help="Heights to measure at [m], repeated or with commas.")
+    ] = HEIGHTS,
+    speeds: Annotated[
+        list[str], typer.Option("--speeds", metavar="M/S", help="Speeds over ground [m/s], repeated or with commas.")
+    ] = SPEEDS,
+    flights: Annotated[int, typer.Option(metavar="N", help="Cameras, each on a flight of its own.")] = 24,
+    count: Annotated[int, typer.Option("--frames", metavar="N", help="Frames a flight, height and speed.")] = 2,
+    tilt: Annotated[float, typer.Option("--tilt-deg", metavar="DEG", help="Greatest tilt.")] = 15.0,
+    mounting: Annotated[
+        float, typer.Option("--mounting-deg", metavar="DEG", help="How well it is mounted, for the datasheet.")
+    ] = 0.4,
+    seed: SeedOption = 1,
+    out: Annotated[Path | None, out_option("The datasheet (TOML), which a scenario's [sensors] name")] = None,
+    force: ForceOption = False,
     pictures: Annotated[
-        Path | None, typer.Option(help="A folder for one frame of each flight and height.", show_default=False)
+        Path | None,
+        typer.Option(metavar="PATH", help="A folder for one frame of each flight and height.", show_default=False),
     ] = None,
     print_to: Annotated[
-        Path | None, typer.Option("--print", help="Only write the target as a PNG of true size.", show_default=False)
+        Path | None,
+        typer.Option(
+            "--print", metavar="PATH", help="Only write the target as a PNG of true size.", show_default=False
+        ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Where the pad is from the lens: angles, distance, heading; and how well, by height."""
-    from flownav.cli.output import require_between, require_writable
+    from flownav.cli.lists import numbers
+    from flownav.cli.output import folder_place, place, require_between
     from flownav.optics.pad_target import PadTarget, checked, print_target
 
     target = checked(PadTarget(side, pattern, code))
     if print_to is not None:
-        require_writable(print_to)
-        print_target(target, print_to)
-        facts: dict[str, Any] = {"target": target._asdict(), "picture": str(print_to)}
-        typer.echo(json.dumps(facts) if as_json else f"{print_to}: print it at 100 %, and measure its side")
+        picture = place(print_to, force=force)
+        print_target(target, picture)
+        facts: dict[str, Any] = {"target": target._asdict(), "picture": str(picture)}
+        _show(facts, as_json, lambda _: typer.echo(f"{picture}: print it at 100 %, and measure its side"))
     elif frames:
         from flownav.errors import InputError
 
@@ -76,18 +93,19 @@ def command(
         require_between("--mounting-deg", mounting, 0.0, 5.0)
         if focus is not None:
             require_between("--focus", focus, 0.05, 1000.0)
-        if out is not None:
-            require_writable(out)
-        numbers = _numbers("--heights", heights, 0.05, 50.0), _numbers("--speeds", speeds, 0.0, 50.0)
-        facts = _measured(target, camera, focus, *numbers, flights, count, tilt, seed, pictures)
-        if out is not None:
-            facts["datasheet"] = _write_datasheet(out, facts, target, camera, focus, mounting)
+        datasheet = None if out is None else place(out, force=force)
+        frames_in = None if pictures is None else folder_place(pictures)
+        at_m = sorted(set(numbers("--heights", heights, 0.05, 50.0)))
+        at_m_s = sorted(set(numbers("--speeds", speeds, 0.0, 50.0)))
+        facts = _measured(target, camera, focus, at_m, at_m_s, flights, count, tilt, seed, frames_in)
+        if datasheet is not None:
+            facts["datasheet"] = _write_datasheet(datasheet, facts, target, camera, focus, mounting)
         _show(_plain(facts), as_json, _print_measured)
 
 
 def _show(facts: dict[str, Any], as_json: bool, printer: Any) -> None:
     if as_json:
-        typer.echo(json.dumps(facts))
+        emit(facts)
     else:
         printer(facts)
 
@@ -119,7 +137,7 @@ def _print_found(facts: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    table = Table("frame", "tan forward", "tan right", "distance [m]", "heading [deg]", "")
+    table = Table("frame", "tan forward", "tan right", "distance [m]", "heading [deg]", "what became of it")
     for row in facts["per_frame"]:
         fix = [""] * 4
         if row["reason"] == "found":
@@ -199,20 +217,6 @@ def _write_datasheet(
     return str(out)
 
 
-def _numbers(option: str, text: str, low: float, high: float) -> list[float]:
-    from flownav.cli.output import require_between
-    from flownav.errors import InputError
-    from flownav.text import number
-
-    try:
-        numbers = sorted({number(part) for part in text.split(",")})
-    except ValueError:
-        raise InputError(f"{option} {text}: give numbers with commas, such as {HEIGHTS}") from None
-    for one in numbers:
-        require_between(option, one, low, high)
-    return numbers
-
-
 def _print_measured(facts: dict[str, Any]) -> None:
     from rich import box
     from rich.console import Console
@@ -226,9 +230,11 @@ def _print_measured(facts: dict[str, Any]) -> None:
         f"{facts['flights']} cameras {camera['name']}, {laws['frames']} frames"
     )
     table = Table(box=box.SIMPLE_HEAD)
-    for name in ("height", "speed", "rate", "in view", "found", "wrong", "angle", "distance", "heading"):
+    for name in (
+        "height [m]", "speed [m/s]", "rate [rad/s]", "in view", "found", "wrong", "angle [mrad]", "distance [%]",
+        "heading [mrad]",
+    ):  # fmt: skip
         table.add_column(name, justify="right")
-    table.add_row("m", "m/s", "rad/s", "", "", "", "mrad", "%", "mrad", style="dim")
     for row in facts["cells"]:
         table.add_row(
             f"{row['height_m']:g}", f"{row['speed_m_s']:g}", f"{row['image_rate_rad_s']:.2f}",

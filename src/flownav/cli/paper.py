@@ -2,37 +2,38 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from flownav.cli.choices import TABLES, one_of
+from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
+from flownav.cli.output import emit
 
 if TYPE_CHECKING:
     from flownav.paper.reproduction import Reproduction
 
 
 def command(
-    table: Annotated[int | None, typer.Option(help="One table alone: 1, 2, 3, 5 or 6; all where unsaid.")] = None,
-    out: Annotated[Path | None, typer.Option(help="The page to write; out/paper.html where unsaid.")] = None,
-    flights: Annotated[int, typer.Option(help="Flights for each of Tables 5 and 6.")] = 200,
-    seed: Annotated[int, typer.Option(help="The noise of rig and flights; the same seed gives the same page.")] = 1,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    table: Annotated[
+        str | None, typer.Option(help="One table alone.", show_default="all of them", **one_of(*TABLES))
+    ] = None,
+    out: Annotated[Path | None, out_option("The page (HTML)", "out/paper.html, or out/paper-tableN.html")] = None,
+    force: ForceOption = False,
+    flights: Annotated[int, typer.Option(metavar="N", help="Flights for each of Tables 5 and 6.")] = 200,
+    seed: SeedOption = 1,
+    as_json: JsonOption = False,
 ) -> None:
     """Reproduce the paper: Tables 1 to 3 from the synthetic rig, 5 and 6 from flights, on one HTML page."""
-    from flownav.cli.output import require_between, require_writable
+    from flownav.cli.output import place, require_between
     from flownav.errors import InputError, VerdictError
-    from flownav.paper.reproduction import TABLES
+    from flownav.paper.reproduction import TABLES as ALL_TABLES
 
     require_between("--flights", flights, 1, 1_000_000)
     require_between("--seed", seed, 0, 2**31 - 1)
-    if table is not None and table not in TABLES:
-        raise InputError(
-            f"--table {table}: Tables 1, 2, 3, 5 and 6 hold results (4 is the receiver's data sheet); give one of them"
-        )
-    page = out or Path("out") / ("paper.html" if table is None else f"paper-table{table}.html")
-    require_writable(page)
-    made = _reproduced((table,) if table else TABLES, seed, flights)
+    page = place(out or Path("out") / ("paper.html" if table is None else f"paper-table{table}.html"), force=force)
+    made = _reproduced((int(table),) if table else ALL_TABLES, seed, flights)
     from flownav.paper.page import write_page
 
     try:
@@ -40,7 +41,7 @@ def command(
     except OSError as error:
         raise InputError(f"{page}: the page cannot be written ({error.strerror}); give another --out") from error
     if as_json:
-        typer.echo(json.dumps(made.as_json() | {"page": str(page)}))
+        emit(made.as_json() | {"page": str(page)})
     else:
         from flownav.paper.console import show
 

@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from flownav.cli.options import ForceOption, JsonOption, out_option
+from flownav.cli.output import emit
+
 
 def command(
     journal: Annotated[
-        Path, typer.Argument(help="FILE.fnr.journal, which a killed `flownav live` left.", show_default=False)
+        Path,
+        typer.Argument(metavar="FILE.fnr.journal", help="What a killed `flownav live` left.", show_default=False),
     ],
-    out: Annotated[
-        Path | None,
-        typer.Option(help="The record to write; FILE.fnr where unsaid. One that is there is kept.", show_default=False),
-    ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Replace a record that is there.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    out: Annotated[Path | None, out_option("The record", "FILE.fnr")] = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Make the record of a live session that was killed, or could not write it; the journal stays."""
-    from flownav.cli.output import require_recordable
+    from flownav.cli.output import require_recordable, told
     from flownav.errors import InputError, VerdictError
-    from flownav.guard import free_name
+    from flownav.free_names import free_name
     from flownav.live.journal_place import is_locked, journal_of
     from flownav.live.recovery import recovered
     from flownav.logs.journal import SUFFIX
@@ -34,7 +34,7 @@ def command(
         raise InputError(f"{journal}: its session still records; end that, and it writes the record itself")
     asked = out or (journal.with_suffix("") if journal.suffix == SUFFIX else journal.with_suffix(".fnr"))
     require_recordable(asked, journal, force=force)
-    path = asked if force else free_name(asked)
+    path = asked if force else told(asked, free_name(asked))
     found = recovered(journal)
     try:
         found.record.save(path, replacing=force)
@@ -47,7 +47,7 @@ def command(
         **{name: getattr(found, name) for name in found._fields if name != "record"},
     }
     if as_json:
-        typer.echo(json.dumps(facts))
+        emit(facts)
     else:
         how = "the session came to its end" if found.ended else "the session was cut off"
         typer.echo(f"{facts['duration_s']:.1f} s in {found.blocks} blocks; {how}")

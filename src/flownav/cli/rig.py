@@ -2,45 +2,63 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flownav.cli.choices import AXES, EXCITATIONS, LIGHTS, RIG_PADS, one_of
+from flownav.cli.options import FirmwareOption, ForceOption, JsonOption, SeedOption, out_option
+from flownav.cli.output import emit
+
 if TYPE_CHECKING:
     from flownav.rig.experiment import RigLog
 
 
+HEIGHTS_M = ["0.6"]
+
+
 def command(
-    out: Annotated[Path, typer.Option("--out", help="The folder to write (docs/rig.md).", show_default=False)],
-    height: Annotated[
-        list[float] | None, typer.Option(help="Sensor's height above the pad at rest [m]; may be repeated.")
+    out: Annotated[
+        Path | None, out_option("The folder, with a folder in it for each of several runs", "out/rig")
     ] = None,
-    runs: Annotated[int, typer.Option(help="Runs at each height.")] = 1,
-    duration: Annotated[float, typer.Option(help="Length of a run [s].")] = 25.0,
-    excitation: Annotated[str, typer.Option(help="swing (the paper's), lengths, chirp or steps.")] = "swing",
-    pad: Annotated[str, typer.Option(help="stripes, stripes-MM, texture, checker, or a picture FILE:WIDTH_M.")] = (
-        "stripes"
+    force: ForceOption = False,
+    height: Annotated[
+        list[str],
+        typer.Option(
+            "--height",
+            "--heights",
+            metavar="M",
+            help="Sensor's height above the pad at rest [m], repeated or with commas.",
+        ),
+    ] = HEIGHTS_M,
+    runs: Annotated[int, typer.Option(metavar="N", help="Runs at each height.")] = 1,
+    duration: Annotated[float, typer.Option(metavar="S", help="Length of a run [s].")] = 25.0,
+    excitation: Annotated[str, typer.Option(help="How it is swung; swing is the paper's.", **one_of(*EXCITATIONS))] = (
+        "swing"
     ),
-    light: Annotated[str, typer.Option(help="low, normal or intense.")] = "normal",
-    firmware: Annotated[str, typer.Option(help="A version and its switches, 2013-09,-gyro-scale (docs/optics.md).")] = (
-        "2013-09"
-    ),
-    along: Annotated[str, typer.Option(help="The camera's axis along the swing, x or y.")] = "x",
-    pivot_height: Annotated[float, typer.Option(help="Pivot above the pad [m].")] = 2.1,
-    start_angle: Annotated[float, typer.Option(help="Amplitude of the swing [rad].")] = 0.0912,
-    refocus: Annotated[float, typer.Option(help="1: lens focused at each height; 0: left at 0.6 m.")] = 1.0,
-    chain_delay: Annotated[float, typer.Option(help="Serial and logging chain [s].")] = 0.07,
+    pad: Annotated[
+        str,
+        typer.Option(help="What it looks at; MM is the stripes' width.", **one_of(*RIG_PADS, beside="FILE:WIDTH_M")),
+    ] = "stripes",
+    light: Annotated[str, typer.Option(help="How bright it is.", **one_of(*LIGHTS))] = "normal",
+    firmware: FirmwareOption = "2013-09",
+    along: Annotated[str, typer.Option(help="The camera's axis along the swing.", **one_of(*AXES))] = "x",
+    pivot_height: Annotated[float, typer.Option(metavar="M", help="Pivot above the pad [m].")] = 2.1,
+    start_angle: Annotated[float, typer.Option(metavar="RAD", help="Amplitude of the swing [rad].")] = 0.0912,
+    refocus: Annotated[float, typer.Option(metavar="0..1", help="1: lens focused at each height; 0: at 0.6 m.")] = 1.0,
+    chain_delay: Annotated[float, typer.Option(metavar="S", help="Serial and logging chain [s].")] = 0.07,
     gyro_late: Annotated[
-        float, typer.Option(help="How much older the gyro is than the flow [s]; below 0 the flow is older.")
+        float,
+        typer.Option(metavar="S", help="How much older the gyro is than the flow [s]; below 0 the flow is older."),
     ] = 0.0,
-    sonar_late: Annotated[float, typer.Option(help="From the sonar's trigger to its reading [s].")] = 0.05,
-    seed: Annotated[int, typer.Option(help="The same seed gives the same logs.")] = 1,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    sonar_late: Annotated[float, typer.Option(metavar="S", help="From the sonar's trigger to its reading [s].")] = 0.05,
+    seed: SeedOption = 1,
+    as_json: JsonOption = False,
 ) -> None:
     """Swing a PX4FLOW over a pad beside an encoder and log both: rig.csv and rig.toml, a folder a run."""
-    from flownav.cli.output import progress, require_between
+    from flownav.cli.lists import numbers
+    from flownav.cli.output import folder_place, progress, require_between
     from flownav.compile import announce_compilation
     from flownav.provenance import command_line
     from flownav.rig.campaign import run_campaign
@@ -48,7 +66,7 @@ def command(
     from flownav.rig.log_folder import check_rig_folder, run_folders, write_rig_folder
 
     require_between("--seed", seed, 0, 2**31 - 1)
-    heights = height or [0.6]
+    heights = numbers("--height", height, 0.01, 100.0)
     settings = RigSettings(
         height_m=heights[0],
         pivot_height_m=pivot_height,
@@ -66,15 +84,16 @@ def command(
         runs=runs,
         seed=seed,
     )
-    rows, folders = [], list(run_folders(out, len(heights) * runs))
-    for folder in folders:
-        check_rig_folder(folder)
+    folder = folder_place(out or Path("out/rig"), force=force)
+    rows, folders = [], list(run_folders(folder, len(heights) * runs))
+    for each in folders:
+        check_rig_folder(each)
     with announce_compilation("rig"), progress("Swinging", len(heights) * runs) as advance:
-        for log, folder in zip(run_campaign(settings, heights, advance), folders, strict=True):
-            write_rig_folder(log, folder, command_line())
-            rows.append(_facts(log, folder))
+        for log, each in zip(run_campaign(settings, heights, advance), folders, strict=True):
+            write_rig_folder(log, each, command_line())
+            rows.append(_facts(log, each))
     if as_json:
-        typer.echo(json.dumps({"seed": seed, "firmware": firmware, "pad": pad, "excitation": excitation, "runs": rows}))
+        emit({"seed": seed, "firmware": firmware, "pad": pad, "excitation": excitation, "runs": rows})
     else:
         _print(rows)
 
@@ -112,4 +131,4 @@ def _print(rows: list[dict[str, Any]]) -> None:
             f"{row['rms_flow_m_s']:.3f}",
             f"{row['mean_quality']:.0f}",
         )
-    Console().print(table)
+    Console(markup=False, highlight=False).print(table)

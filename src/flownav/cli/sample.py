@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from flownav.cli.choices import SAMPLES, argument
+from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
+from flownav.cli.output import emit
 
 if TYPE_CHECKING:
     from flownav.samples.writing import Written
@@ -15,52 +18,53 @@ if TYPE_CHECKING:
 def command(
     kinds: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[KIND]...", help="csv, ulog, tlog, dataflash, rig, record; all of them without one."),
+        argument("KIND", "Which samples", *SAMPLES, default="all of them"),
     ] = None,
     list_only: Annotated[bool, typer.Option("--list", help="Only say what there is; write nothing.")] = False,
-    out: Annotated[Path, typer.Option(help="The folder to write into.")] = Path("samples"),
-    seed: Annotated[int, typer.Option(help="The same seed gives the same bytes.")] = 1,
-    force: Annotated[
-        bool, typer.Option("--force", help="Replace samples that are there; without, they are numbered.")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    out: Annotated[Path | None, out_option("The folder to write into", "samples")] = None,
+    seed: SeedOption = 1,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Write sample logs: a simulated flight in the formats of PX4, ArduPilot, MAVLink and CSV, a rig, and a record."""
     from importlib.util import find_spec
 
+    from flownav.cli.lists import words
     from flownav.cli.output import require_between
     from flownav.errors import InputError
-    from flownav.samples.kinds import SAMPLES, sample_of
+    from flownav.samples.kinds import SAMPLES as MADE
+    from flownav.samples.kinds import sample_of
     from flownav.samples.writing import write_samples
 
     require_between("--seed", seed, 0, 2**31 - 1)
-    asked = [sample_of(kind) for kind in dict.fromkeys(kinds or [])]
+    folder = out or Path("samples")
+    asked = [sample_of(kind) for kind in (words("KIND", kinds) if kinds else [])]
     if list_only:
         _list(as_json=as_json)
         return
     has_mavlink = find_spec("pymavlink") is not None
-    left_out = [s for s in SAMPLES if s.uses and not has_mavlink]
+    left_out = [s for s in MADE if s.uses and not has_mavlink]
     if unmade := [sample.kind for sample in asked if sample in left_out]:
         raise InputError(f"{unmade[0]}: needs pymavlink; install it with `pip install 'flownav[live]'`")
-    samples = asked or [sample for sample in SAMPLES if sample not in left_out]
+    samples = asked or [sample for sample in MADE if sample not in left_out]
     notes = [] if asked else [f"{s.kind} is left out: `pip install 'flownav[{s.uses}]'` adds it" for s in left_out]
-    written = write_samples(samples, out, seed, force=force, on_written=_quiet if as_json else _show)
+    written = write_samples(samples, folder, seed, force=force, on_written=_quiet if as_json else _show)
     if as_json:
-        typer.echo(json.dumps({"folder": str(out), "seed": seed, "samples": _facts(written), "notes": notes}))
+        emit({"folder": str(folder), "seed": seed, "samples": _facts(written), "notes": notes})
         return
     for note in notes:
         typer.echo(f"Note: {note}")
-    typer.echo(f"{out / 'README.txt'} says what each holds.")
+    typer.echo(f"{folder / 'README.txt'} says what each holds.")
 
 
 def _list(*, as_json: bool) -> None:
-    from flownav.samples.kinds import SAMPLES
+    from flownav.samples.kinds import SAMPLES as MADE
 
     if as_json:
-        rows = [{"kind": s.kind, "name": s.name, "what": s.what, "commands": list(s.commands)} for s in SAMPLES]
-        typer.echo(json.dumps({"samples": rows}))
+        rows = [{"kind": s.kind, "name": s.name, "what": s.what, "commands": list(s.commands)} for s in MADE]
+        emit({"samples": rows})
         return
-    for sample in SAMPLES:
+    for sample in MADE:
         typer.echo(f"{sample.kind:<10} {sample.name}\n    {sample.what}")
 
 

@@ -2,34 +2,29 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from flownav.cli.options import ForceOption, JsonOption, LogsArgument, SensorOption, SettingsOption, out_option
+from flownav.cli.output import emit
 
 if TYPE_CHECKING:
     from flownav.tuning.job import OfLog, Tuned
 
 
 def command(
-    logs: Annotated[
-        list[Path], typer.Argument(help="Logs: CSV folders, .ulg, .bin, .tlog, live .fnr.", show_default=False)
-    ],
-    settings: Annotated[
-        Path | None, typer.Option("--settings", help="TOML of filter settings to start from; the shipped where unsaid.")
-    ] = None,
-    sensor: Annotated[
-        Path | None, typer.Option("--sensor", help="A flow sensor file: its gains and latency correct the flow.")
-    ] = None,
+    logs: LogsArgument,
+    settings: SettingsOption = None,
+    sensor: SensorOption = None,
     out: Annotated[
-        Path, typer.Option("--out", help="The settings file, written only if the proposal is accepted.")
-    ] = Path("out/settings.toml"),
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+        Path | None, out_option("The settings file, written only if the proposal is accepted", "out/settings.toml")
+    ] = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Propose settings from logs: fitted on every other window of the flights, accepted only if the rest gain by it."""
     from flownav.cli.compare import DEFAULT, settings_asked
-    from flownav.cli.output import progress, require_writable
+    from flownav.cli.output import place, progress
     from flownav.errors import InputError
     from flownav.logs.open_log import open_flight
     from flownav.navigation.settings import NavigatorSettingsFile
@@ -38,19 +33,20 @@ def command(
     from flownav.tuning.job import runs_expected, tune
     from flownav.tuning.settings_file import write_settings
 
-    if out.suffix != ".toml":
-        raise InputError(f"--out {out}: a settings file's name ends in .toml")
-    require_writable(out, *logs, settings, sensor)
+    path = out or Path("out/settings.toml")
+    if path.suffix != ".toml":
+        raise InputError(f"--out {path}: a settings file's name ends in .toml")
+    path = place(path, *logs, settings, sensor, force=force)
     (start,) = settings_asked([DEFAULT if settings is None else str(settings)], sensor)
     stated = None if settings is None else load(settings, NavigatorSettingsFile)
     flights = [open_flight(path) for path in logs]
     with progress("replays", runs_expected(flights)) as advance:
         tuned = tune(logs, flights, start.options, start.numbers, advance)
     if tuned.accepted:
-        write_settings(out, tuned, stated, command_line())
-    facts = _facts(tuned) | {"file": str(out) if tuned.accepted else None}
+        write_settings(path, tuned, stated, command_line())
+    facts = _facts(tuned) | {"file": str(path) if tuned.accepted else None}
     if as_json:
-        typer.echo(json.dumps(facts))
+        emit(facts)
     else:
         _print(tuned, facts)
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
+from flownav.cli.output import emit
 
 if TYPE_CHECKING:
     from flownav.validation.job import Row
@@ -16,20 +18,23 @@ WIDE = 130  # columns that the table takes
 
 
 def command(
-    data: Annotated[Path, typer.Option(envvar="FLOWNAV_DATA", help="The folder that holds the logs.")] = Path(
-        "../shared/data"
-    ),
+    data: Annotated[
+        Path, typer.Option(metavar="PATH", envvar="FLOWNAV_DATA", help="The folder that holds the logs.")
+    ] = Path("../shared/data"),
     flights_file: Annotated[
         Path | None,
-        typer.Option("--file", help="Which logs and outages (TOML); the three outdoor flights if left out."),
+        typer.Option(
+            "--file", metavar="FILE.toml", help="Which logs and outages.", show_default="three outdoor flights"
+        ),
     ] = None,
-    flights: Annotated[int, typer.Option(help="Simulated flights of each log.")] = 8,
-    seed: Annotated[int, typer.Option(help="The same seed gives the same table.")] = 1,
-    out: Annotated[Path | None, typer.Option(help="Write the page (Markdown) to this file.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    flights: Annotated[int, typer.Option(metavar="N", help="Simulated flights of each log.")] = 8,
+    seed: SeedOption = 1,
+    out: Annotated[Path | None, out_option("The page (Markdown)")] = None,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Hold the simulator against recorded flights: outage drift, innovations, noise, as flown and as simulated."""
-    from flownav.cli.output import progress, require_between, require_writable
+    from flownav.cli.output import place, progress, require_between
     from flownav.errors import InputError, VerdictError
     from flownav.guard import an_input
     from flownav.validation.flights import load_flights
@@ -38,22 +43,26 @@ def command(
 
     require_between("--flights", flights, 1, MOST_FLIGHTS)
     require_between("--seed", seed, 0, 2**63 - 1)
-    if out is not None:
-        require_writable(out, data, flights_file)
+    path = None if out is None else place(out, data, flights_file, force=force)
     if not an_input(data).is_dir():
         raise InputError(f"{data}: no such folder; give the folder of logs by --data or FLOWNAV_DATA")
     recorded = load_flights(flights_file)
     with progress("Validating", replays_of(recorded, flights)) as advance:
         rows = validate(data, recorded, seed, flights, advance)
-    if out is not None:
+    if path is not None:
         from flownav.guard import written_whole
 
-        with written_whole(out) as temporary:
+        with written_whole(path) as temporary:
             text = page(rows, seed, flights, recorded.vehicle.path_bandwidth_hz)
             temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
     if as_json:
-        facts = {"seed": seed, "flights": flights, "rows": [row.as_json() for row in rows]}
-        typer.echo(json.dumps(facts))
+        facts = {
+            "seed": seed,
+            "flights": flights,
+            "rows": [row.as_json() for row in rows],
+            "out": str(path) if path else None,
+        }
+        emit(facts)
     else:
         _show(rows)
     kind = [row for row in rows if row.decides and row.verdict == "too kind"]

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-import json
 import math
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from flownav.cli.choices import VEHICLES, argument
+from flownav.cli.options import JsonOption
+from flownav.cli.output import emit
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,33 +27,35 @@ if TYPE_CHECKING:
 
 def command(
     file: Annotated[
-        Path | None, typer.Argument(help="A file, quad-450 or hexa-550; the Maxi Joker 3 without one.")
+        str | None,
+        argument("VEHICLE", "The vehicle", *VEHICLES, beside="a vehicle's FILE.toml", default="maxi-joker-3"),
     ] = None,
     margins: Annotated[
         bool, typer.Option("--margins", help="Of the autopilot's loops, over the vehicle's uncertainty box.")
     ] = False,
-    json_output: Annotated[bool, typer.Option("--json", help="One JSON object, SI and radians.")] = False,
+    json_output: JsonOption = False,
 ) -> None:
     """Trim, power, linear models with inflow frozen and re-solved beside the paper's, and ground effect."""
+    path = None if file is None else Path(file)
     if margins:
         from flownav.cli.vehicle_margins import show_margins
 
-        show_margins(file, as_json=json_output)
+        show_margins(path, as_json=json_output)
         return
     from flownav.vehicle.multirotor_sheet import MultirotorSheet
     from flownav.vehicle.sheet import as_json, vehicle_sheet
 
-    sheet = vehicle_sheet(file)
+    sheet = vehicle_sheet(path)
     if isinstance(sheet, MultirotorSheet):
         show_multirotor(sheet, json_output=json_output)
         return
     if json_output:
-        typer.echo(json.dumps(as_json(sheet)))
+        emit(as_json(sheet))
         return
     from rich.console import Console
 
-    console = Console()
-    console.print(f"[bold]{sheet.name}[/bold]: hover in still air, out of ground effect", highlight=False)
+    console = Console(markup=False, highlight=False)
+    console.print(f"{sheet.name}: hover in still air, out of ground effect", highlight=False)
     for table in tables(sheet):
         console.print(table)
 
@@ -59,14 +65,14 @@ def show_multirotor(sheet: MultirotorSheet, *, json_output: bool) -> None:
     from flownav.vehicle.multirotor_sheet import facts_of, rows_of
 
     if json_output:
-        typer.echo(json.dumps(facts_of(sheet)))
+        emit(facts_of(sheet))
         return
     from rich.console import Console
 
-    table = _table(f"{sheet.name}: still air, full battery", ("", "left"), ("value", "right"))
-    for row in rows_of(sheet):
-        table.add_row(*row)
-    Console().print(table)
+    table = _table(f"{sheet.name}: still air, full battery", ("quantity", "left"), ("value", "right"))
+    for name, value in rows_of(sheet):
+        table.add_row(re.sub(r", (N|rad/s|m/s|W|A|V|deg)$", r" [\1]", name), value)
+    Console(markup=False, highlight=False).print(table)
 
 
 def tables(sheet: VehicleSheet) -> Iterable[Table]:
@@ -83,7 +89,7 @@ def tables(sheet: VehicleSheet) -> Iterable[Table]:
 def trim_table(sheet: VehicleSheet) -> Table:
     """Controls, attitude, flapping, inflow and power in hover."""
     hover = sheet.trim
-    table = _table("Trim", ("", "left"), ("value", "right"), ("unit", "left"))
+    table = _table("Trim", ("quantity", "left"), ("value", "right"), ("unit", "left"))
     angles = {
         "collective": hover.collective_rad,
         "pedal": hover.pedal_rad,
@@ -123,7 +129,7 @@ def comparison_table(sheet: VehicleSheet) -> Table:
 
 def matrix_table(title: str, rows: Sequence[str], columns: Sequence[str], matrix: Array) -> Table:
     """A matrix with its states and inputs named."""
-    table = _table(title, ("", "left"), *((name, "right") for name in columns))
+    table = _table(title, ("row", "left"), *((name, "right") for name in columns))
     for name, row in zip(rows, matrix, strict=True):
         table.add_row(name, *(_figure(value) for value in row))
     return table
@@ -143,7 +149,7 @@ def eigenvalue_table(sheet: VehicleSheet) -> Table:
 
 def ground_effect_table(sheet: VehicleSheet) -> Table:
     """Thrust in ground effect over thrust in free air against hub height."""
-    table = _table("Ground effect in hover", ("hub height z/R", "right"), ("T_IGE/T_OGE", "right"))
+    table = _table("Ground effect in hover", ("hub height z/R [-]", "right"), ("T_IGE/T_OGE [-]", "right"))
     for ratio, gain in sheet.ground_effect:
         table.add_row(f"{ratio:g}", f"{gain:.4f}")
     return table

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import typer
-
+from flownav.cli.output import emit
 from flownav.errors import VerdictError
 
 if TYPE_CHECKING:
@@ -23,14 +21,14 @@ def show_margins(file: Path | None, *, as_json: bool) -> None:
 
     box = margins_over_box(file)
     if as_json:
-        typer.echo(json.dumps(facts(box)))
+        emit(facts(box))
     else:
         from rich.console import Console
 
         from flownav.vehicle.corners import groups_of
         from flownav.vehicle.loading import read_vehicle
 
-        console = Console()
+        console = Console(markup=False, highlight=False)
         console.print(table(box))
         count = len({row.corner for row in box.rows})
         console.print(f"{count} corners; signs: {', '.join(groups_of(read_vehicle(file))[0])}", highlight=False)
@@ -50,17 +48,17 @@ def facts(box: Box) -> dict[str, Any]:
 
 
 def table(box: Box) -> Table:
-    """Each loop as told and at its worst corner."""
+    """Each loop as the vehicle's file has it, and at its worst corner."""
     from rich import box as boxes
     from rich.table import Table
 
     found = Table(
-        title="Margins of each loop, the others closed: as told, and the least over the box",
+        title="Margins of each loop, the others closed: nominal, and the least over the box",
         title_justify="left",
         box=boxes.SIMPLE_HEAD,
     )
     found.add_column("loop", no_wrap=True)
-    for name in ("phase, °", "gain, dB", "delay, ms", "least °", "dB", "ms", "at"):
+    for name in ("phase [°]", "gain [dB]", "delay [ms]", "least [°]", "least [dB]", "least [ms]", "at"):
         found.add_column(name, justify="left" if name == "at" else "right")
     for loop in dict.fromkeys(row.loop for row in box.rows):
         rows = [row for row in box.rows if row.loop == loop]

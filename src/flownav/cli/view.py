@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from flownav.cli.options import ForceOption, JsonOption, RecordArgument, out_option
+from flownav.cli.output import emit
+
 
 def command(
-    record: Annotated[Path, typer.Argument(help="The record that fly, replay or live wrote.", show_default=False)],
+    record: RecordArgument,
     out: Annotated[
         Path | None,
-        typer.Option("--out", metavar="FILE.rrd", help="Write a file for Rerun and open no window."),
+        out_option("A file for Rerun (.rrd) instead of a window", "none is written; without a display RECORD.rrd"),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")] = False,
+    force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show a record in Rerun: vehicle, pad, cameras, flow, paths and standard deviations in space, errors over time.
 
     Without --out a window opens; on a machine without a display the file is written beside the record instead.
     """
-    from flownav.cli.output import require_writable
+    from flownav.cli.output import place
     from flownav.errors import InputError
     from flownav.record import Record
     from flownav.viewing.view import SUFFIX, has_display, show, write_rrd
@@ -30,7 +33,7 @@ def command(
     path = record.with_suffix(SUFFIX) if beside else out
     if path is not None:
         path = path if path.suffix == SUFFIX else path.with_name(path.name + SUFFIX)
-        require_writable(path, record)
+        path = place(path, record, force=force)
     flown = Record.load(record)
     try:
         notes = show(flown, record.stem) if path is None else write_rrd(flown, path)
@@ -38,7 +41,7 @@ def command(
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
     if as_json:
         written = None if path is None else str(path)
-        typer.echo(json.dumps({"record": str(record), "file": written, "window": path is None, "notes": notes}))
+        emit({"record": str(record), "file": written, "window": path is None, "notes": notes})
         return
     if path is None:
         typer.echo(f"Opened in Rerun: {record}")

@@ -17,6 +17,7 @@ class Progress:
     def __init__(self) -> None:
         self._lock = threading.RLock()
         self._listeners = 0
+        self._throughout = 0
         self._what = ""
         self._working: list[str] = []
         self._start = 0.0
@@ -26,19 +27,28 @@ class Progress:
         self._ticking: threading.Thread | None = None
 
     @contextmanager
-    def announce(self, what: str) -> Iterator[None]:
-        """Tell of compilation inside the block; say nothing where all is in the cache."""
+    def announce(self, what: str, *, throughout: bool = False) -> Iterator[None]:
+        """Tell of compilation inside the block; say nothing where all is in the cache.
+
+        throughout: a whole run, in which blocks within have their own names and sums.
+        """
         with self._lock:
+            if self._listeners == self._throughout:
+                self._begin(what)
             self._listeners += 1
-            if self._listeners == 1:
-                self._what, self._start, self._done, self._expected = what, 0.0, 0, 0
+            self._throughout += throughout
         try:
             yield
         finally:
             with self._lock:
                 self._listeners -= 1
-                if self._listeners == 0:
+                self._throughout -= throughout
+                if self._listeners == self._throughout:
                     self._finish()
+                    self._begin("flownav")
+
+    def _begin(self, what: str) -> None:
+        self._what, self._start, self._done, self._expected = what, 0.0, 0, 0
 
     @contextmanager
     def expect(self, parts: int) -> Iterator[None]:

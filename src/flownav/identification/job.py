@@ -16,7 +16,6 @@ from flownav.identification.orders import CANDIDATES
 from flownav.identification.rig_identification import identify_rig
 from flownav.identification.rig_log import assign_heights, is_rig, read_runs
 from flownav.logs.open_log import log_kind
-from flownav.text import number
 
 TAKEN = "identify takes rig logs and flight logs"
 
@@ -62,14 +61,6 @@ def identify(
 def is_flight(path: Path) -> bool:
     """Whether a path holds a flight: a log file, or a folder of CSV files with an attitude or an IMU."""
     return any((path / name).exists() for name in ("attitude.csv", "imu.csv")) or bool(log_kind(path))
-
-
-def parse_heights(text: str | None) -> list[float]:
-    """Metres of `--heights 0.6,0.8`. InputError where one is no number."""
-    try:
-        return [number(part) for part in text.split(",")] if text else []
-    except ValueError:
-        raise InputError(f"--heights {text}: numbers in metres, parted by commas, are needed") from None
 
 
 def name_of(logs: Sequence[Path]) -> str:

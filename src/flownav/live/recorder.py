@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flownav.errors import InputError
-from flownav.guard import free_name
+from flownav.free_names import free_name
 from flownav.live.journal_place import claim
 from flownav.live.options import Options
 from flownav.live.recovery import WIDTHS, recovered

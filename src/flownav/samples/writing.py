@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from flownav.errors import InputError
-from flownav.guard import an_output_folder, free_name
+from flownav.free_names import free_name
+from flownav.guard import an_output_folder
 from flownav.samples.kinds import SAMPLES, Sample
 
 README = "README.txt"

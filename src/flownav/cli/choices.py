@@ -1,0 +1,112 @@
+"""The words that options choose from, so that --help lists them, a wrong one is refused in a line, and shells complete.
+
+They stand here because a shell's completion may load nothing heavy; tests hold them against the rooms that they are of.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from flownav.errors import InputError
+
+SCENARIOS = ("takeoff", "landing", "gusty", "pad_return", "approach")
+REQUIREMENTS = ("takeoff", "landing", "pad_return", "approach", "approach_8_m_s")
+VEHICLES = ("maxi-joker-3", "quad-450", "hexa-550")
+FILTERS = ("landing", "paper")
+GPS_MODELS = ("white", "midg")
+FEEDBACKS = ("estimate", "truth")
+PLANTS = ("nonlinear", "linear")
+OPTICS = ("model", "pixels")
+ENGINES = ("local", "ray", "cuda")
+SAMPLINGS = ("plain", "latin", "sobol")
+TRUTH_MODELS = ("ensemble", "matched", "both")
+ORDERS = ("auto", "delay", *(f"{n}{with_delay}" for with_delay in ("", "+delay") for n in range(1, 7)))
+REFERENCES = ("auto", "velocity", "encoder", "truth", "gps")
+AUTOPILOTS = ("px4", "ardupilot")
+SENDINGS = ("odometry", "vision", "landing-target", "none")
+LINKS = ("udp:", "udpout:", "tcp:", "tcpin:", "serial:")
+EXCITATIONS = ("swing", "lengths", "chirp", "steps")
+RIG_PADS = ("stripes", "stripes-MM", "texture", "checker")
+LIGHTS = ("low", "normal", "intense")
+FAULTS = (
+    "gps_loss", "gps_jump", "gps_drift", "gps_clock", "flow_loss", "flow_garbage", "flow_sign", "flow_swapped",
+    "flow_scale", "flow_late", "flow_clock", "low_texture", "low_texture_unsaid", "range_stuck", "range_stuck_descent",
+    "range_floor", "range_spikes", "imu_bias", "accel_vibration", "nan_bursts", "duplicates", "out_of_order", "silence",
+)  # fmt: skip
+AXES = ("x", "y")
+PATTERNS = ("tag", "nested", "checker", "stripes")
+CAMERAS = ("wide120", "wide60", "px4flow")
+FORMATS = ("mcap", "foxglove", "tum", "euroc", "parquet", "csv", "ulog", "kml", "gpx")
+TABLES = ("1", "2", "3", "5", "6")
+SAMPLES = ("csv", "ulog", "tlog", "dataflash", "rig", "record")
+FIRMWARES = (
+    "2013-06", "2013-09", "2014-01", "2014-07", "2014-08", "2014-10", "2014-11", "2014-12", "2015-12", "2016", "2017",
+    "2020",
+)  # fmt: skip
+
+
+def one_of(
+    *names: str,
+    beside: str = "",
+    also: Callable[[], Sequence[str]] = tuple,
+) -> dict[str, Any]:
+    """Keywords of an option or argument that takes one of these words, or of an option that takes several.
+
+    beside: what else it may be, for the help ("FILE.toml"): then any text passes, and files are completed too. also:
+    words that are found when they are asked for, such as those of installed packages.
+    """
+
+    def checked(context: typer.Context, parameter: typer.CallbackParam, given: Any) -> Any:
+        if not context.resilient_parsing and not beside:
+            for word in given if isinstance(given, list) else [given]:
+                for part in str(word).split(",") if isinstance(given, list) else [word]:
+                    if part is not None and part not in names and part not in also():
+                        raise InputError(f"{_name_of(parameter)} {part}: choose from {', '.join((*names, *also()))}")
+        return given
+
+    def complete(incomplete: str) -> list[str]:
+        begun, _, last = incomplete.rpartition(",")
+        known = [name for name in (*names, *also()) if name.startswith(last)]
+        found = [f"{begun},{name}" if begun else name for name in known]
+        suffix = re.search(r"FILE(\.\w+)", beside)
+        return found + (files_like(incomplete, suffix[1]) if suffix else [])
+
+    metavar = "|".join((*names, *([beside] if beside else [])))
+    return {"metavar": metavar, "callback": checked, "autocompletion": complete}
+
+
+def argument(name: str, what: str, *names: str, beside: str = "", default: bool | str = False) -> Any:
+    """An argument that takes one of these words, or several of them; its help lists them. As `one_of`."""
+    listed = ", ".join(names) + (f", or {beside}" if beside else "")
+    keywords = one_of(*names, beside=beside) | {"metavar": name}
+    return typer.Argument(help=f"{what}: {listed}.", show_default=default, **keywords)
+
+
+def files_like(incomplete: str, suffix: str) -> list[str]:
+    """Files of a suffix, and folders, whose names begin so."""
+    folder, _, begun = incomplete.rpartition("/")
+    place = Path(folder or ("/" if incomplete.startswith("/") else "."))
+    try:
+        found = sorted(path for path in place.iterdir() if path.name.startswith(begun) and path.name[:1] != ".")
+    except OSError:
+        return []
+    head = f"{folder}/" if "/" in incomplete else ""
+    names = [f"{head}{path.name}/" for path in found if path.is_dir()]
+    return [f"{head}{path.name}" for path in found if path.is_file() and path.suffix == suffix] + names
+
+
+def installed_filters() -> Sequence[str]:
+    """Filters of installed packages (entry points `flownav.filters`)."""
+    from importlib.metadata import entry_points
+
+    return tuple(point.name for point in entry_points(group="flownav.filters"))
+
+
+def _name_of(parameter: typer.CallbackParam) -> str:
+    """As it is typed: an option's first name, or an argument's."""
+    return str(parameter.opts[0] if parameter.param_type_name == "option" else parameter.metavar)

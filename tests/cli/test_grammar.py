@@ -1,0 +1,194 @@
+"""One grammar on all commands: what `docs/reference/cli-grammar.md` says, read from the commands themselves."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+import typer.main
+
+import flownav
+from flownav.cli import app, choices
+from places import DOCS
+
+APP = typer.main.get_command(app)
+COMMANDS = APP.commands  # type: ignore[attr-defined]
+GRAMMAR = (DOCS / "reference" / "cli-grammar.md").read_text(encoding="utf-8")
+KEEP_FLIGHTS = {"campaign", "certify"}
+PRINTS_JSON = {"schema"}
+SAME = ("--json", "--force", "--seed", "--sensor", "--settings", "--vehicle", "--engine", "--flow-instance",
+        "--gps-delay", "--signing-key")  # fmt: skip
+BAD_ENGLISH = ("where unsaid", "what is told", "if left out", "unless given", "if not given", "all of it")
+
+
+def options(name: str) -> dict[str, object]:
+    """A command's options by each of their names."""
+    return {text: p for p in COMMANDS[name].params for text in (*p.opts, *p.secondary_opts) if text.startswith("--")}
+
+
+def help_of(name: str) -> str:
+    done = run(name, "--help", columns="80")
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def run(*arguments: str, columns: str = "80", **more):
+    env = {**os.environ, "COLUMNS": columns}
+    command = [sys.executable, "-m", "flownav", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, env=env, timeout=120, check=False, **more)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_prints_json_if_asked(name):
+    assert name in PRINTS_JSON or "--json" in options(name)
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_who_writes_has_out_with_its_default_and_force(name):
+    known = options(name)
+    if "--out" in known:
+        assert isinstance(known["--out"].show_default, str), "says where it is written if it is not given"  # type: ignore[attr-defined]
+        assert known["--out"].metavar == "PATH"  # type: ignore[attr-defined]
+        assert ("--force" in known) == (name not in KEEP_FLIGHTS)
+    else:
+        assert "--force" not in known
+
+
+def test_an_option_says_the_same_everywhere():
+    for option in SAME:
+        said = {(options(name)[option].help, options(name)[option].metavar)  # type: ignore[attr-defined]
+                for name in COMMANDS if option in options(name)}  # fmt: skip
+        assert len(said) == 1, f"{option}: {said}"
+        assert f"`{option}" in GRAMMAR or option == "--engine"
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_help_is_plain_and_says_what_each_option_takes(name):
+    for option in COMMANDS[name].params:
+        if option.name != "help":
+            assert option.help, f"{name} {option.name}"
+            assert option.help.rstrip().endswith("."), f"{name} {option.name}: {option.help}"
+            assert not any(words in option.help for words in BAD_ENGLISH), f"{name} {option.name}: {option.help}"
+            takes_value = option.param_type_name == "option" and not getattr(option, "is_flag", False)
+            assert not takes_value or option.metavar, f"{name} {option.name}: has no name for its value"
+
+
+def test_the_choices_of_the_command_line_are_those_of_the_rooms():
+    from flownav.campaigns.sampling import SAMPLINGS
+    from flownav.faults.catalogue import FAULTS
+    from flownav.identification.autopilot_parameters import AUTOPILOTS
+    from flownav.identification.orders import parse_order
+    from flownav.live.options import SENDINGS
+    from flownav.optics.camera import LIGHTS
+    from flownav.optics.firmware import firmware_named
+    from flownav.optics.pad_target import PATTERNS
+    from flownav.optics.pad_trial import CAMERAS
+    from flownav.paper.reproduction import TABLES
+    from flownav.rig.excitation import EXCITATIONS
+    from flownav.samples.kinds import KINDS
+    from flownav.simulation.scenario import SHIPPED
+    from flownav.vehicle.loading import SHIPPED_NAMES
+
+    assert choices.SCENARIOS == SHIPPED
+    assert tuple(SHIPPED_NAMES) == choices.VEHICLES
+    assert tuple(SAMPLINGS) == choices.SAMPLINGS
+    assert tuple(FAULTS) == choices.FAULTS
+    assert set(choices.AUTOPILOTS) == set(AUTOPILOTS)
+    assert tuple(SENDINGS) == choices.SENDINGS
+    assert set(choices.LIGHTS) == set(LIGHTS)
+    assert choices.PATTERNS == PATTERNS
+    assert tuple(CAMERAS) == choices.CAMERAS
+    assert tuple(map(str, TABLES)) == choices.TABLES
+    assert set(choices.EXCITATIONS) == set(EXCITATIONS)
+    assert choices.SAMPLES == KINDS
+    for order in choices.ORDERS:
+        assert parse_order(order)
+    for version in choices.FIRMWARES:
+        assert firmware_named(version).name == version
+
+
+def test_requirements_and_gps_models_are_those_that_ship():
+    from flownav.campaigns.requirement import load_requirement
+    from flownav.simulation.scenario import Scenario
+
+    for name in choices.REQUIREMENTS:
+        assert load_requirement(name).name == name
+    schema = Scenario.model_json_schema()
+    assert schema["$defs"]["GpsInsSettings"]["properties"]["model"]["enum"] == list(choices.GPS_MODELS)
+    assert set(schema["properties"]["truth"]["enum"]) == set(choices.PLANTS)
+    assert set(schema["properties"]["optics"]["enum"]) == set(choices.OPTICS)
+    assert set(schema["$defs"]["FilterSection"]["properties"]["name"]["enum"]) == set(choices.FILTERS)
+    assert set(schema["$defs"]["AutopilotSection"]["properties"]["feedback"]["enum"]) == set(choices.FEEDBACKS)
+
+
+# -- exit statuses and single lines -------------------------------------------------------------------------------
+@pytest.mark.parametrize(("arguments", "said"), [
+    (("fly", "landing", "--gps", "rtk"), "--gps rtk: choose from white, midg"),
+    (("campaign", "landing", "--engine", "abacus"), "--engine abacus: choose from local, ray, cuda"),
+    (("identify", "x", "--order", "7"), "--order 7: choose from auto, delay, 1, 2"),
+    (("live", "udp:1", "--send", "pigeon"), "--send pigeon: choose from odometry, vision, landing-target, none"),
+    (("accuracy", "--cases", "landing,dive"), "--cases dive: choose from takeoff, landing, pad_return"),
+    (("paper", "--table", "4"), "--table 4: choose from 1, 2, 3, 5, 6"),
+    (("rig", "--light", "dark"), "--light dark: choose from low, normal, intense"),
+    (("sample", "flac"), "KIND flac: choose from csv, ulog, tlog, dataflash, rig, record"),
+    (("fly", "landing", "--speeed", "1"), "No such option: --speeed"),
+    (("fly",), "Missing argument"),
+    (("fly", "landing", "--seed", "one"), "--seed"),
+    (("faults", "--heights", "1,x"), "--heights x: a number is needed"),
+    (("nothing",), "No such command"),
+])  # fmt: skip
+def test_a_wrong_value_is_one_line_that_lists_what_can_be(tmp_path, arguments, said):
+    done = run(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.startswith("flownav: ")
+    assert done.stderr.count("\n") == 1
+    assert said in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_version_is_printed(tmp_path):
+    done = run("--version", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, f"flownav {flownav.__version__}\n")
+
+
+def test_nobody_heard_is_a_bad_verdict(tmp_path):
+    done = run("live", "udp:14987", "--duration", "0.5", "--json", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "no autopilot was heard" in done.stderr
+
+
+def test_ctrl_c_is_exit_status_130(tmp_path):
+    done = subprocess.Popen(
+        [sys.executable, "-m", "flownav", "rig", "--runs", "200", "--out", "rig"],
+        cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        until_s = time.monotonic() + 120.0
+        while not (tmp_path / "rig").exists() and time.monotonic() < until_s:
+            time.sleep(0.05)
+        done.send_signal(signal.SIGINT)
+        assert done.wait(60.0) == 130
+    finally:
+        done.kill()
+
+
+# -- 80 columns ---------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("name", ["csv", "ulog"])
+def test_info_fits_80_columns(tmp_path, name):
+    where = run("sample", name, "--json", cwd=tmp_path)
+    assert where.returncode == 0, where.stderr
+    path = re.search(r'"path": "([^"]+)"', where.stdout)
+    assert path
+    done = run("info", path[1], cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert max(map(len, lines)) <= 80
+    assert "…" not in done.stdout
+    assert any(re.search(r"sensor +readings +rate \[Hz\] +from \[s\] +to \[s\] +gap \[s\] +no data \[%\]", line)
+               for line in lines)  # fmt: skip

@@ -14,6 +14,7 @@ from flownav.export.formats import export
 from flownav.logs.flu import frd, ned, ned_from_frd, ned_from_frd_of_nwu
 from flownav.logs.log import Log
 from flownav.logs.open_log import log_kind, open_flight, open_log
+from flownav.logs.ros.containers import Bag, messages
 from flownav.logs.ros.reader import read_ros
 from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile
@@ -208,6 +209,9 @@ def test_a_chunk_that_claims_gigabytes_is_left_out(tmp_path):
             writer.add_message(channel, k, bytes(8 << 20), k)
         writer.finish()
     assert (tmp_path / "bomb.mcap").stat().st_size < 1 << 20
+    bag = Bag()
+    assert list(messages(tmp_path / "bomb.mcap", bag, lambda channel: True)) == []
+    assert bag.notes == ["bomb.mcap: one record is damaged and left out"]
     with pytest.raises(InputError, match="no message of a known type"):
         read_ros(tmp_path / "bomb.mcap")
 

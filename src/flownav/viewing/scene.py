@@ -24,9 +24,8 @@ COLOURS = {"estimate": (10, 95, 180), "smoothed": (154, 47, 107), "truth": (60, 
            "gps": (191, 91, 11), "flow": (14, 122, 95), "pad": (125, 136, 148)}  # fmt: skip
 MOST_SEGMENTS = 5000  # of a path that is drawn; the poses are all there
 AXIS_M, CAMERA_PLANE_M = 0.25, 0.4
-DOWN_LOOKING = np.array(
-    [[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
-)  # columns: image right, down, depth in FRD
+# an image's right, down and depth in body FRD, as columns
+DOWN_LOOKING = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 STEPS_PX = 1000.0  # side of an image whose pixels the record does not state
 
 Array = NDArray[np.float64]

@@ -91,7 +91,8 @@ def mcap_messages(path: Path, bag: Bag, wanted: Wanted) -> Iterator[Message]:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     if walk.lost:
-        bag.notes.append(f"{path.name}: {walk.lost} records are damaged and left out")
+        records = "one record is" if walk.lost == 1 else f"{walk.lost} records are"
+        bag.notes.append(f"{path.name}: {records} damaged and left out")
 
 
 def ros2_name(kind: str) -> str:

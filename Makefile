@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-gpu test-slow long-log fuzz mutants league integrity rare validate report-size lint bench bench-once docs pictures tutorials wheel wheel-test clean
+.PHONY: demo test test-gpu test-slow long-log fuzz mutants league integrity rare validate report-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr --force
@@ -41,6 +41,9 @@ validate: $(VENV)/.ready
 
 report-size: $(VENV)/.ready-test
 	$(BIN)/python tools/report_size.py $(RECORDS)
+
+schemas: $(VENV)/.ready
+	$(BIN)/python tools/schemas.py
 
 lint: $(VENV)/.ready-lint
 	$(BIN)/ruff check .

@@ -50,6 +50,7 @@ ALLOWED = {
     "campaigns": GROUND | EQUATIONS | {"simulation", "navigation", "scoring"},
     "faults": GROUND | EQUATIONS | {"logs", "simulation", "campaigns", "scoring", "navigation", "replays"},
     "certification": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "faults", "report"},
+    "schemas": GROUND | EQUATIONS | {"simulation", "campaigns", "navigation"},
     "samples": GROUND
     | EQUATIONS
     | {"logs", "mavlink", "rig", "navigation", "simulation", "scoring", "campaigns", "faults", "live", "export"},

@@ -72,6 +72,57 @@ def test_an_installed_library_is_one_wherever_it_lies():
     assert not closure.is_of_library("/home/user/project/law.py")
 
 
+# -- a wheel without kernels -------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def plain_wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel that an index would have: for all machines, without kernels. It takes a second to build."""
+    place = tmp_path_factory.mktemp("built")
+    environment = {name: value for name, value in os.environ.items() if name != "FLOWNAV_KERNELS"}
+    command = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(place)]
+    subprocess.run(command, cwd=PROJECT, env=environment, capture_output=True, check=True)
+    (wheel,) = place.glob("flownav-*.whl")
+    return wheel
+
+
+def test_everything_that_is_no_code_ships_too(plain_wheel):
+    package = closure.PACKAGE
+    data = {path.relative_to(package.parent).as_posix() for path in package.rglob("*")
+            if path.is_file() and path.suffix not in (".py", ".pyc") and "kernels" not in path.parts}  # fmt: skip
+    kinds = {Path(name).suffix for name in data}
+    assert {".toml", ".json", ".j2", ".css", ".js", ".csv"} <= kinds
+    with zipfile.ZipFile(plain_wheel) as file:
+        shipped = set(file.namelist())
+    assert data <= shipped
+    assert {"flownav/data/samples/flight.toml", "flownav/schemas/file-sensor.json", "flownav/py.typed"} <= shipped
+    assert not any(name.startswith(("tests/", "docs/")) for name in shipped)
+
+
+@pytest.mark.slow
+def test_the_wheel_works_in_an_empty_environment(plain_wheel, tmp_path):
+    """Installed with its dependencies and nothing else: the commands of the README that need no compiler's minutes."""
+    place = tmp_path / "empty"
+    subprocess.run([sys.executable, "-m", "venv", str(place)], check=True)
+    pip = [str(place / "bin" / "python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    subprocess.run([*pip, "--constraint", str(PROJECT / "constraints.txt"), str(plain_wheel)], check=True)
+    outside = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "FLOWNAV_CACHE")}
+    outside |= {"FLOWNAV_CACHE": str(tmp_path / "cache"), "COLUMNS": "80"}
+
+    def flownav(*arguments: str) -> str:
+        command = [str(place / "bin" / "flownav"), *arguments]
+        done = subprocess.run(command, env=outside, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert flownav("--version").startswith("flownav 0.")
+    assert "--gps" in flownav("fly", "--help")
+    said = flownav("sample", "csv", "ulog", "dataflash", "rig")
+    assert "samples/flight-csv" in said
+    for name in ("flight-csv", "flight.ulg", "flight.bin"):
+        assert "flow and" in flownav("info", f"samples/{name}")
+    left_out = json.loads(flownav("sample", "--json"))["notes"]
+    assert left_out == ["tlog is left out: `pip install 'flownav[live]'` adds it"]
+
+
 # -- the wheel itself --------------------------------------------------------------------------------------------
 @pytest.fixture(scope="module")
 def wheel() -> Path:

@@ -26,6 +26,7 @@ from flownav.cli import replay as replay
 from flownav.cli import report as report
 from flownav.cli import rig as rig
 from flownav.cli import sample as sample
+from flownav.cli import schema as schema
 from flownav.cli import tune as tune
 from flownav.cli import validate as validate
 from flownav.cli import vehicle as vehicle
@@ -64,6 +65,7 @@ for name, command, what in (
     ("report", report.command, "Write a record's report as one HTML page."),
     ("view", view.command, "Show a record in space and time with Rerun, or write its .rrd."),
     ("export", export.command, "Write a record as MCAP, TUM, EuRoC, Parquet, CSV, ULog, KML or GPX."),
+    ("schema", schema.command, "Print the JSON schema of a command's output or of a file."),
     ("bench", bench.command, "Measure how fast all of this is on your machine."),
 ):
     app.command(name, short_help=what)(command)

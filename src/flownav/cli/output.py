@@ -67,17 +67,20 @@ def several_place(path: Path, *inputs: str | Path | None, force: bool) -> Path:
     return told(path, found)
 
 
-def folder_place(path: Path, *inputs: str | Path | None, force: bool = False) -> Path:
-    """The same of a folder, which is new or empty; with force it is as it is, for its writer to look into."""
+def folder_place(path: Path, *inputs: str | Path | None, force: bool | None = None) -> Path:
+    """The same of a folder, which is new or empty; with force it is as it is, for its writer to look into.
+
+    force: None where the command replaces no folder.
+    """
     from flownav.free_names import a_folder_place
     from flownav.guard import an_input
 
     for each in inputs:
         if each is not None:
             an_input(Path(each))
-    found = a_folder_place(path, force=force)
+    found = a_folder_place(path, force=bool(force))
     _require_place(path)
-    return told(path, found)
+    return told(path, found, replaces=force is not None)
 
 
 def record_place(path: Path, *inputs: str | Path | None, force: bool, report: bool) -> Path:
@@ -86,10 +89,11 @@ def record_place(path: Path, *inputs: str | Path | None, force: bool, report: bo
     return place(path, *inputs, force=force, beside=() if page is None else (page.suffix,))
 
 
-def told(asked: Path, found: Path) -> Path:
+def told(asked: Path, found: Path, *, replaces: bool = True) -> Path:
     """The path that is written, which is said where it is not the one that was asked for."""
     if found != asked:
-        print(f"flownav: {asked} is there already (--force replaces it); writing {found}", file=sys.stderr)
+        how = " (--force replaces it)" if replaces else ""
+        print(f"flownav: {asked} is there already{how}; writing {found}", file=sys.stderr)
     return found
 
 

@@ -1,0 +1,55 @@
+"""Shells complete values too: asked as bash asks, through the completion that `--install-completion` installs."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+
+def completed(line: str, cwd) -> list[str]:
+    """What bash would be offered at the end of a line."""
+    words = line.split(" ")
+    asked = {"_FLOWNAV_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
+    done = subprocess.run(
+        [sys.executable, "-m", "flownav"], capture_output=True, text=True, env={**os.environ, **asked}, cwd=cwd,
+        timeout=60, check=False,
+    )  # fmt: skip
+    assert done.stderr == ""
+    return done.stdout.split()
+
+
+@pytest.mark.parametrize(("line", "offered"), [
+    ("flownav sam", ["sample"]),
+    ("flownav fly land", ["landing"]),
+    ("flownav fly landing --gps ", ["white", "midg"]),
+    ("flownav fly landing --filter p", ["paper"]),
+    ("flownav fly landing --vehicle quad", ["quad-450"]),
+    ("flownav fly landing --truth ", ["nonlinear", "linear"]),
+    ("flownav campaign landing tak", ["takeoff"]),
+    ("flownav campaign landing --sampling s", ["sobol"]),
+    ("flownav certify approach_", ["approach_8_m_s"]),
+    ("flownav accuracy --cases takeoff,app", ["takeoff,approach", "takeoff,approach_8_m_s"]),
+    ("flownav identify x --order 2", ["2", "2+delay"]),
+    ("flownav identify x --for ", ["px4", "ardupilot"]),
+    ("flownav export x.fnr --to e", ["euroc"]),
+    ("flownav live udp:14550 --send l", ["landing-target"]),
+    ("flownav sample data", ["dataflash"]),
+    ("flownav faults --faults range_st", ["range_stuck", "range_stuck_descent"]),
+    ("flownav vehicle he", ["hexa-550"]),
+    ("flownav rig --firmware 2013", ["2013-06", "2013-09"]),
+    ("flownav schema file-se", ["file-sensor", "file-settings"]),
+])  # fmt: skip
+def test_values_are_offered(tmp_path, line, offered):
+    assert completed(line, tmp_path) == offered
+
+
+def test_files_are_offered_beside_the_names(tmp_path):
+    (tmp_path / "windy.toml").touch()
+    (tmp_path / "notes.txt").touch()
+    (tmp_path / "sub").mkdir()
+    found = completed("flownav fly ", tmp_path)
+    assert found[:5] == ["takeoff", "landing", "gusty", "pad_return", "approach"]
+    assert set(found[5:]) == {"windy.toml", "sub/"}

@@ -1,0 +1,116 @@
+"""The published schemas: what ships is what the models are, and what commands print is what their schemas say."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import jsonschema
+import pytest
+import typer.main
+from typer.testing import CliRunner
+
+from flownav.cli import app
+from flownav.parameter_files import shipped
+from flownav.record import Record
+from flownav.schemas import names, schema_of
+from flownav.schemas.generated import generated
+from replay_logs import log_of_flight
+
+COMMANDS = set(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+FILES = {
+    "file-scenario": ("takeoff", "landing", "gusty", "pad_return", "approach", "samples/flight"),
+    "file-helicopter": ("maxi_joker_3",),
+    "file-multirotor": ("quad_450", "hexa_550"),
+    "file-sensor": ("px4flow_paper", "samples/flow_sensor"),
+    "file-requirement": ("requirements/approach", "requirements/landing"),
+}
+
+
+@pytest.mark.parametrize("name", names())
+def test_a_schema_is_one_and_carries_its_number(name):
+    found = schema_of(name)
+    jsonschema.Draft202012Validator.check_schema(found)
+    assert found["$id"] == f"urn:flownav:schema:{name}:1"
+
+
+@pytest.mark.parametrize("name", generated())
+def test_what_ships_is_what_the_models_are(name):
+    assert schema_of(name) == generated()[name], "make schemas"
+
+
+@pytest.mark.parametrize(("name", "file"), [(name, file) for name, files in FILES.items() for file in files])
+def test_files_that_ship_fit_and_a_misspelt_key_does_not(name, file):
+    entries = tomllib.loads(shipped(f"{file}.toml").read_text(encoding="utf-8"))
+    jsonschema.validate(entries, schema_of(name))
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(entries | {"misspelt_key": 1}, schema_of(name))
+
+
+def test_settings_fit():
+    jsonschema.validate({"flow_gain_x": 1.1}, schema_of("file-settings"))
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate({"flow_gain_x": "1.1"}, schema_of("file-settings"))
+
+
+def test_schemas_of_commands_are_of_commands():
+    of_commands = {name for name in names() if not name.startswith(("file-", "record-", "certificate"))}
+    assert of_commands <= COMMANDS
+
+
+# -- what commands print ----------------------------------------------------------------------------------------
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    place = tmp_path_factory.mktemp("printed")
+    log_of_flight(20.0).write(place / "log")
+    printed(place, "replay", "log", "--out", "r.fnr", "--no-report")
+    return place
+
+
+def printed(folder: Path, *arguments: str):
+    """The JSON object of a command that runs in a folder."""
+    import os
+
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        done = CliRunner().invoke(app, [*arguments, "--json"])
+    finally:
+        os.chdir(before)
+    return json.loads(done.stdout)
+
+
+@pytest.mark.parametrize("arguments", [
+    ("sample", "--list"),
+    ("info", "log"),
+    ("replay", "log", "--no-report", "--gps-outage", "5:10"),
+    ("replay", "log", "--no-report", "--outage-table", "5:15:5"),
+    ("compare", "r.fnr", "r.fnr"),
+    ("vehicle",),
+    ("vehicle", "quad-450"),
+    ("report", "r.fnr"),
+    ("export", "r.fnr", "--to", "csv"),
+    ("rig", "--duration", "5"),
+    ("pad", "--print", "pad.png"),
+    ("certify", "approach", "--plan"),
+    ("schema",),
+], ids=" ".join)  # fmt: skip
+def test_what_a_command_prints_fits_its_schema(folder, arguments):
+    if arguments[0] not in names():
+        pytest.skip(f"{arguments[0]} has no schema yet")
+    found = printed(folder, *arguments)
+    jsonschema.validate(found, schema_of(arguments[0]))
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(found | {"schema": 2}, schema_of(arguments[0]))
+
+
+def test_a_records_manifest_fits(folder):
+    manifest = json.loads(json.dumps(Record.load(folder / "r.fnr").manifest))
+    jsonschema.validate(manifest, schema_of("record-manifest"))
+
+
+def test_the_command_prints_and_lists_them():
+    run = CliRunner()
+    assert json.loads(run.invoke(app, ["schema", "file-sensor"]).stdout) == schema_of("file-sensor")
+    assert all(name in run.invoke(app, ["schema"]).stdout for name in names())

@@ -13,8 +13,7 @@ frame = record.estimate.to_pandas()
 # %% [markdown]
 # The other estimate is a data frame (or a dictionary of columns) with the columns of the table
 # [`estimate`](../reference/tables.md#estimate). It needs `t_s` and a position; what it lacks is not scored. Here a
-# moving
-# mean of the navigator's own position stands in for it, half a second late as moving means are.
+# moving mean of the navigator's own position stands in for it, half a second late as moving means are.
 
 # %%
 theirs = frame[["pos_n_m", "pos_e_m", "pos_d_m", "vel_u_m_s", "vel_v_m_s", "vel_w_m_s", "qw", "qx", "qy", "qz"]].copy()

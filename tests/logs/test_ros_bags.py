@@ -306,6 +306,28 @@ def test_a_damaged_export_gives_its_streams_or_one_line(folder, tmp_path):
         open_log(tmp_path / "flight.mcap", flow_instance=0)
 
 
+def test_a_topic_is_asked_for_on_the_command_line_and_from_python(flown, tmp_path, folder):
+    from typer.testing import CliRunner
+
+    import flownav
+    from flownav.cli import app
+
+    bag = doubled(flown).write(tmp_path / "bag")
+    run = CliRunner()
+    done = run.invoke(app, ["info", str(bag), "--json", "--topic", "imu=/camera/imu"])
+    assert "imu is /camera/imu, as asked" in json.loads(done.stdout)["notes"]
+    record = flownav.replay(bag, topics={"flow": "/second/flow"})
+    assert len(record.tables["flow_rate"]["t_s"]) < 200
+    for arguments, why in (
+        ([str(bag), "--topic", "imu"], "ROLE=TOPIC is needed"),
+        ([str(bag), "--topic", "imu=/a", "--topic", "imu=/b"], "is the second for its role"),
+        ([str(folder), "--topic", "imu=/a"], "is no ROS bag"),
+    ):
+        error = run.invoke(app, ["info", *arguments]).exception
+        assert isinstance(error, InputError)
+        assert why in str(error)
+
+
 def test_info_says_which_topic_was_taken(flown, tmp_path):
     from typer.testing import CliRunner
 

@@ -367,7 +367,8 @@ def test_the_record_holds_the_whole_replay_and_loads_again(log, tmp_path):
     to_record(run, scores, ["flownav", "replay", "flight"]).save(tmp_path / "flight.fnr")
     record = Record.load(tmp_path / "flight.fnr")
     assert set(record.tables) == {
-        "estimate", "states", "gps_position", "gps_velocity", "flow_rate", "range", "baro", "innovation", "events"
+        "estimate", "states", "gps_position", "gps_velocity", "flow_rate", "range", "baro", "innovation", "events",
+        "judging",
     }  # fmt: skip
     manifest = record.manifest
     assert (manifest["kind"], manifest["log"], manifest["filter"]) == ("replay", "flight", "landing")

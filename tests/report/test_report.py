@@ -306,7 +306,7 @@ def test_the_page_loads_nothing(landing: Page, outdoor: Page) -> None:
         assert not [tag for tag, _ in page.tags if tag in ("link", "img", "iframe", "object", "embed", "base")]
         assert "url(" not in page.styles
         assert "@import" not in page.styles
-        assert len(page.code()) == 5
+        assert len(page.code()) == 7
         for own_code in page.code()[1:]:  # the first script is uPlot, which the policy below confines
             assert "://" not in own_code
             for way in ("innerHTML", "eval(", "Function(", "fetch(", "XMLHttpRequest", "import(", "document.write"):

@@ -152,7 +152,9 @@ def test_zooming_one_panel_zooms_all_and_the_button_shows_the_whole_flight(
     mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 30)
     visit.until("Math.abs(document.documentElement.dataset.instant - 20) < 0.5")
     visit.page.wait_for_timeout(300)
-    assert instants(visit, close=()) == pytest.approx(0.5, abs=0.01)  # close-ups zoom with the rest
+    assert instants(visit) == pytest.approx(0.5, abs=0.01)
+    closer = figures(visit)["touchdown-position-error"]["instants"]  # a close-up stays within its stretch, 8 to 23 s
+    assert closer == pytest.approx([(20.0 - 10.0) / (23.0 - 10.0)] * 3, abs=0.02)
     visit.page.locator("#scrub-whole").click()
     visit.until("document.documentElement.dataset.zoom === ''")
     visit.page.wait_for_timeout(300)

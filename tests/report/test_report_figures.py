@@ -12,15 +12,17 @@ from hypothesis.extra.numpy import arrays
 
 from flownav.measurement import Sensor
 from flownav.record import Record
+from flownav.report.chart import Chart
 from flownav.report.content import summary, tiles
 from flownav.report.figures_errors import close_ups, flown_errors, position_error
 from flownav.report.figures_filter import consistency, radius_of_uncertainty
 from flownav.report.figures_gps import error_against_gps
 from flownav.report.figures_innovation import innovations
-from flownav.report.figures_path import ground_track, path_over_pad
+from flownav.report.figures_path import ground_track, path_over_pad, paths_of
 from flownav.report.figures_states import position, velocity
 from flownav.report.figures_vehicle import attitude
 from flownav.report.html import render, sections
+from flownav.report.page_data import Columns, paths_data
 from flownav.report.panels import Panel
 from flownav.report.samples import CROSS_POINTS, DOT_POINTS, LINE_POINTS, sliding_rms, thin, thin_dots
 from flownav.report.series import Moment, Track, euler_deg, flow_velocity, gps_velocity_body, moments, readings
@@ -64,7 +66,7 @@ def test_a_thinned_cloud_keeps_its_spread() -> None:
 def test_no_trace_of_a_long_replay_exceeds_its_budget() -> None:
     for section in sections(replay(400.0)):
         for panel in section.panels:
-            for trace in panel.figure.data if panel.figure else ():
+            for trace in panel.figure.data if isinstance(panel.drawing, Chart) else ():
                 assert len(trace.x) <= (DOT_POINTS if trace.mode == "markers" else 2 * LINE_POINTS + 2)  # a band twice
 
 
@@ -205,19 +207,23 @@ def test_values_that_were_not_fused_are_crosses_and_counted() -> None:
     assert all(trace.marker.symbol == "x-thin" and len(trace.x) <= CROSS_POINTS for trace in crosses)
 
 
-def test_the_ground_track_has_equal_scales_and_the_pad_in_its_size() -> None:
-    figure = ground_track(flight()).figure
-    assert figure.layout.yaxis.scaleanchor == "x"
-    pad = next(trace for trace in figure.data if trace.name == "pad")
-    assert (np.ptp(pad.x), np.ptp(pad.y)) == (1.0, 1.0)
+def test_paths_hold_the_pad_in_its_size_and_the_truth_last() -> None:
+    paths = paths_of(flight())
+    assert paths is not None
+    assert paths.pad is not None
+    assert np.ptp(paths.pad.corners(), axis=0) == pytest.approx([1.0, 1.0, 0.0])
+    assert paths.main()[1] == "truth"
+    assert paths.names() == ["pad", "GPS", "estimate", "truth", "touchdown"]
+    assert paths.touch == pytest.approx([0.0, 0.0, 0.0], abs=0.2)
+    assert paths_of(Record()) is None
 
 
-def test_the_path_in_space_draws_height_upwards_and_leaves_the_pad_out_where_unknown() -> None:
+def test_the_page_leaves_the_pad_out_where_it_is_unknown() -> None:
     record = flight()
-    truth = next(trace for trace in path_over_pad(record).figure.data if trace.name == "truth")
-    assert max(truth.z) == pytest.approx(3.0, abs=0.01)
+    assert paths_data(paths_of(record), Columns())["pad_m"] == 1.0
     del record.manifest["pad_size_m"]
-    assert "pad" not in {trace.name for trace in path_over_pad(record).figure.data}
+    assert "pad_m" not in paths_data(paths_of(record), Columns())
+    assert path_over_pad(record).title == "Path in space"
 
 
 def test_z_is_drawn_upside_down_so_that_up_is_up() -> None:
@@ -234,7 +240,8 @@ def test_an_axis_that_hardly_moves_does_not_magnify_rounding() -> None:
 
 def every_panel() -> list[Panel]:
     records = (flight("landing"), flight("takeoff"), navigated(), replay(60.0))
-    return [panel for record in records for section in sections(record) for panel in section.panels if panel.figure]
+    shown = [panel for record in records for section in sections(record) for panel in section.panels]
+    return [panel for panel in shown if isinstance(panel.drawing, Chart)]
 
 
 def test_a_role_has_one_colour_in_all_figures() -> None:
@@ -273,7 +280,7 @@ def test_colours_contrast_as_wcag_asks(theme: int) -> None:
 
 def test_axes_carry_their_units() -> None:
     for panel in every_panel():
-        if panel.key in ("nis", "path-3d"):  # sensors' names beside a ratio; a scene
+        if panel.key == "nis":  # sensors' names beside a ratio
             continue
         for axis in panel.figure.select_yaxes():
             assert re.search(r"\((m|m/s|m/s²|rad/s|°|°/s|N)\)$|^test ratio$|^NEES$", axis.title.text), panel.key
@@ -312,7 +319,7 @@ def test_consistency_is_drawn_in_the_band_of_one_flight_where_the_record_has_it(
     (panel,) = consistency(record)
     lines = {trace.name: np.asarray(trace.y) for trace in panel.figure.data}
     assert lines["filter"].max() == 20.0
-    limits = sorted({float(trace.y[0]) for trace in panel.figure.data if "lie between" in trace.name})
+    limits = sorted({float(trace.y[0]) for trace in panel.figure.data if trace.name == "95 % band"})
     assert limits == pytest.approx([1.237, 14.449], abs=1e-3)  # chi-square of 6 degrees of freedom
     assert "here 75 % do" in panel.caption
     shown = next(section for section in sections(record) if section.key == "filter").panels
@@ -336,7 +343,9 @@ def test_what_was_flown_on_has_errors_of_its_own_and_a_line_beside_the_estimate(
     assert np.abs(np.asarray(north.y)[np.asarray(north.x) < 5.0]).max() == 0.0
     assert np.asarray(east.y)[-1] - np.asarray(east.y)[0] == pytest.approx(1.0, abs=0.5)
     assert "by definition" in panels[0].caption
-    for panel in (position(record), velocity(record), attitude(record), ground_track(record), path_over_pad(record)):
+    assert "flown on" in ground_track(record).alt
+    assert "flown on" in path_over_pad(record).alt
+    for panel in (position(record), velocity(record), attitude(record)):
         assert "flown on" in {trace.name for trace in panel.figure.data}, panel.key
     keys = [panel.key for section in sections(record) if section.key == "errors" for panel in section.panels]
     assert keys == ["flown-position-error", "flown-velocity-error", "position-error", "velocity-error"]
@@ -344,9 +353,9 @@ def test_what_was_flown_on_has_errors_of_its_own_and_a_line_beside_the_estimate(
 
 def test_a_path_that_jumps_is_open_there_and_no_other_is() -> None:
     record = navigated()
-    paths = {trace.name: np.asarray(trace.x) for trace in ground_track(record).figure.data if trace.mode == "lines"}
-    assert np.isnan(paths["flown on"]).sum() == 1
-    assert not np.isnan(paths["estimate"]).any()
+    jumps = {track["name"]: track["jumps"] for track in paths_data(paths_of(record), Columns())["tracks"]}
+    assert len(jumps["flown on"]) == 1
+    assert jumps["estimate"] == jumps["truth"] == []
 
 
 def test_rare_peaks_do_not_flatten_an_axis_and_are_said() -> None:

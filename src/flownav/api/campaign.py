@@ -41,11 +41,11 @@ class Campaign:
 
     def __init__(
         self, plan: Plan, folder: Path, summary: dict[str, Any], rate_per_s: float | None = None,
-        holding: object = None, engine: Engine | None = None,
+        engine: Engine | None = None,
     ) -> None:  # fmt: skip
         self.plan, self.folder, self.summary, self.rate_per_s = plan, folder, summary, rate_per_s
         self.records: list[Path] = []
-        self._holding, self._engine = holding, engine
+        self._engine = engine
 
     @property
     def cells(self) -> list[dict[str, Any]]:

@@ -7,8 +7,10 @@ import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from shutil import rmtree
+from tempfile import mkdtemp
 from typing import Any
+from weakref import finalize
 
 from flownav.api.campaign import Campaign
 from flownav.api.parts import split
@@ -92,10 +94,22 @@ def campaign(
         raise InputError(f"engine {engine}: parts of your own are flown by this process; leave it out")
     plan = replace(plan, parts=identities(parts))
     where = OwnPartsEngine(parts) if parts.any else engine_named(engine)
-    kept = None if folder is not None else TemporaryDirectory(prefix="flownav-campaign-")
     with called_as(call):
-        place = Path(kept.name) if kept is not None else Path(str(folder))
-        return fly_plan(plan, where, place, records=records, watch=progress, page=folder is not None, holding=kept)
+        if folder is not None:
+            return fly_plan(plan, where, Path(folder), records=records, watch=progress)
+        return _fly_for_now(plan, where, records, progress)
+
+
+def _fly_for_now(plan: Plan, engine: Engine, records: int, watch: Watch | None) -> Campaign:
+    """The same in a folder that goes when nobody holds the result any more."""
+    folder = Path(mkdtemp(prefix="flownav-campaign-"))
+    try:
+        found = fly_plan(plan, engine, folder, records=records, watch=watch, page=False)
+    except BaseException:
+        rmtree(folder, ignore_errors=True)
+        raise
+    finalize(found, rmtree, folder, ignore_errors=True)
+    return found
 
 
 def plan_of(
@@ -119,13 +133,12 @@ def plan_of(
 
 
 def fly_plan(
-    plan: Plan, engine: Engine, folder: Path, *, records: int = 0, watch: Watch | None = None, page: bool = True,
-    holding: object = None,
-) -> Campaign:  # fmt: skip
+    plan: Plan, engine: Engine, folder: Path, *, records: int = 0, watch: Watch | None = None, page: bool = True
+) -> Campaign:
     """Fly what the folder lacks of a plan, and write its summary, records of its worst flights and its page.
 
     records: how many of the worst; with one or more the first cell's median flight is kept too. page: whether the page
-    is written. holding: what keeps the folder there. InputError as `campaigns.run.run_campaign`.
+    is written. InputError as `campaigns.run.run_campaign`.
     """
     flown = 0
 
@@ -141,7 +154,7 @@ def fly_plan(
         rate = flown / max(time.monotonic() - began_s, 1e-9) if flown else None
         summary = summary_of(plan, data)
         store.keep_text(SUMMARY, json.dumps(summary, indent=1) + "\n")
-        found = Campaign(plan, folder, summary, rate, holding, engine)
+        found = Campaign(plan, folder, summary, rate, engine)
         found.records += _keep_records(found, records)
         if page:
             found.report()

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from tempfile import TemporaryDirectory
+from shutil import rmtree
+from tempfile import mkdtemp
 from typing import Any
 
 from flownav.errors import InputError
@@ -54,13 +56,15 @@ def kept_file(name: str, entries: Mapping[str, Any]) -> Path:
     """
     text = to_toml(entries)
     safe = "".join(letter if letter.isalnum() else "-" for letter in name)[:40] or "part"
-    path = Path(_folder().name) / f"{safe}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.toml"
+    path = _folder() / f"{safe}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.toml"
     if not path.exists():
         path.write_text(text, encoding="utf-8")
     return path
 
 
 @cache
-def _folder() -> TemporaryDirectory[str]:
+def _folder() -> Path:
     """Removed when the process ends."""
-    return TemporaryDirectory(prefix="flownav-")
+    folder = Path(mkdtemp(prefix="flownav-"))
+    atexit.register(rmtree, folder, ignore_errors=True)
+    return folder

@@ -35,7 +35,7 @@ def identify(
 
     Example:
         >>> import flownav
-        >>> sensor = flownav.identify(rig_log)
+        >>> sensor = flownav.identify(rig_log, heights_m=0.6)
         >>> 0.5 < sensor.gain.low < sensor.gain.value < sensor.gain.high < 1.5
         True
     """

@@ -235,7 +235,9 @@ class Record(ground.Record):
 
 
 def load(path: str | Path) -> Record:
-    """Read a record that fly, replay or live wrote. InputError where the file is missing or no record.
+    """Read a record that fly, replay or live wrote.
+
+    path: the .fnr file. InputError where it is missing or no record.
 
     Example:
         >>> import flownav

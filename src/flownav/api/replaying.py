@@ -49,6 +49,7 @@ def replay(
     smooth: bool = False,
     outage_table: tuple[float, float, float] | None = None,
     flow_instance: int | None = None,
+    topics: Mapping[str, str] | None = None,
     filter: str | Filter | type[Filter] | None = None,
     progress: Progress | None = None,
 ) -> Record:
@@ -60,6 +61,7 @@ def replay(
     sensor (its gains and latency correct the flow). settings: the filter's, by name or as a TOML file
     (docs/reference/keys.md). smooth: also the best estimate after the flight. outage_table: (t0, t1, length), one
     replay for each window of that length, with GPS cut there alone. flow_instance: which of several flow sensors.
+    topics: of a ROS bag, which topic serves as what, by role (docs: ROS bags and MCAP).
     filter: one of your own in the navigator's place (docs: own parts).
     progress: called with 1 for each window of the table.
     InputError, one line, where the log or an option cannot serve. What is wrong with the log is in `record.verdict`.
@@ -72,7 +74,8 @@ def replay(
     """
     call = call_of(
         "replay", log, gps_outages=gps_outages, flow=None if flow else "False", sensor=sensor, settings=settings,
-        smooth=smooth, outage_table=outage_table, flow_instance=flow_instance, filter=filter,
+        smooth=smooth, outage_table=outage_table, flow_instance=flow_instance,
+        topics=None if topics is None else str(dict(topics)), filter=filter,
     )  # fmt: skip
     outages = tuple(_window(window) for window in gps_outages)
     table = table_windows(*outage_table, option="outage_table") if outage_table else []
@@ -81,7 +84,7 @@ def replay(
     scale = (float(flow_scale[0]), float(flow_scale[1]))
     options = ReplayOptions(gps_delay_s, outages, flow, scale)
     with called_as(call):
-        read = open_flight(Path(log), flow_instance=flow_instance)
+        read = open_flight(Path(log), flow_instance=flow_instance, topics=topics)
         return replay_log(
             read, options, datasheet, stated, smooth=smooth, table=table, part=own_filter(filter), progress=progress
         )

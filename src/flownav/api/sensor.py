@@ -35,7 +35,7 @@ class Sensor:
         >>> import flownav
         >>> sensor = flownav.Sensor.load("px4flow-paper")
         >>> round(sensor.gain.value, 2)
-        0.99
+        1.03
     """
 
     def __init__(self, entries: dict[str, Any], path: Path | None = None, findings: Findings | None = None) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from flownav.cli.options import FlowInstanceOption, JsonOption, LogArgument
+from flownav.cli.options import FlowInstanceOption, JsonOption, LogArgument, TopicOption
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
@@ -14,14 +14,16 @@ if TYPE_CHECKING:
 def command(
     log: LogArgument,
     flow_instance: FlowInstanceOption = None,
+    topic: TopicOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Show what a log holds: sensors, rates, gaps, thrown-away rows, limits, signs, and what it lacks."""
     from flownav.compile import announce_compilation
     from flownav.inspection.summary import summarise
     from flownav.logs.open_log import open_log
+    from flownav.logs.ros.choice import asked_topics
 
-    read = open_log(log, flow_instance=flow_instance)
+    read = open_log(log, flow_instance=flow_instance, topics=asked_topics(topic or []))
     with announce_compilation("inspection"):
         facts = summarise(read)
     if as_json:

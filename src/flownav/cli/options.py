@@ -27,6 +27,12 @@ SettingsOption = Annotated[
 FlowInstanceOption = Annotated[
     int | None, typer.Option("--flow-instance", metavar="N", help="Which of a log's several flow sensors.")
 ]
+TopicOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--topic", metavar="ROLE=TOPIC", help="Of a ROS bag: which topic serves as what. May be given several times."
+    ),
+]
 GpsDelayOption = Annotated[
     float, typer.Option("--gps-delay", metavar="S", help="How old a GPS reading is when it arrives [s].")
 ]

@@ -18,6 +18,7 @@ from flownav.cli.options import (
     ReportOption,
     SensorOption,
     SettingsOption,
+    TopicOption,
     out_option,
 )
 from flownav.cli.output import emit
@@ -44,6 +45,7 @@ def command(
         ),
     ] = None,
     flow_instance: FlowInstanceOption = None,
+    topic: TopicOption = None,
     settings: SettingsOption = None,
     smooth: Annotated[
         bool, typer.Option("--smooth", help="Also compute the best estimate after the flight (the smoother).")
@@ -67,6 +69,7 @@ def command(
     from flownav.cli.output import progress, record_place, save
     from flownav.errors import VerdictError
     from flownav.logs.open_log import open_flight
+    from flownav.logs.ros.choice import asked_topics
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.parameter_files import load
     from flownav.replays.prepare import ReplayOptions
@@ -83,7 +86,7 @@ def command(
     stated = load(settings, NavigatorSettingsFile) if settings else None
     options = ReplayOptions(gps_delay, tuple((t0, t1) for t0, t1 in windows), not no_flow, (scale[0], scale[1]))
     part = own_filter(filter_name)
-    read = open_flight(log, flow_instance=flow_instance)
+    read = open_flight(log, flow_instance=flow_instance, topics=asked_topics(topic or []))
     with progress("GPS outages", len(table)) if table else nullcontext() as advance:
         record = replay_log(read, options, flow, stated, smooth=smooth, table=table, part=part, progress=advance)
     scores = record.scores | save(record, record_path, report=report)

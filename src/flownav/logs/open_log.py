@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from flownav.errors import InputError
@@ -29,23 +29,25 @@ LOOKED_AT_BYTES = 4096
 YEARS_US = (1.0e15, 4.2e15)  # microseconds of the years 2001 to 2103
 
 
-def open_log(path: Path, *, flow_instance: int | None = None) -> Log:
+def open_log(path: Path, *, flow_instance: int | None = None, topics: Mapping[str, str] | None = None) -> Log:
     """Read a recorded flight of any known format.
 
-    flow_instance: which of several flow sensors; None takes the one with most to say. InputError where the path is
-    missing or no known format, or the log cannot be read.
+    flow_instance: which of several flow sensors; None takes the one with most to say. topics: of a ROS bag, which
+    topic serves as what, by role. InputError where the path is missing or no known format, or the log cannot be read.
     """
-    if an_input(path).is_dir():
-        from flownav.logs.ros.containers import is_bag_folder
+    kind = "ros" if _is_bag_folder(path) else "" if an_input(path).is_dir() else log_kind(path)
+    if kind == "ros":
+        from flownav.logs.ros.reader import read_ros
 
-        if is_bag_folder(path):
-            return _reader("ros")(path, flow_instance=flow_instance)
+        return read_ros(path, flow_instance=flow_instance, topics=topics)
+    if topics:
+        raise InputError(f"--topic: {path} is no ROS bag; leave it out")
+    if an_input(path).is_dir():
         if flow_instance is not None:
             raise InputError(f"--flow-instance: {path} is a folder of CSV files, with one flow sensor; leave it out")
         from flownav.logs.csv_folder import read_csv_folder
 
         return read_csv_folder(path)
-    kind = log_kind(path)
     journal = path if kind == "journal" else path.with_name(path.name + JOURNAL_SUFFIX)
     if kind == "journal" or (not path.exists() and journal.exists()):
         raise InputError(
@@ -56,9 +58,9 @@ def open_log(path: Path, *, flow_instance: int | None = None) -> Log:
     return _reader(kind)(path, flow_instance=flow_instance)
 
 
-def open_flight(path: Path, *, flow_instance: int | None = None) -> Log:
+def open_flight(path: Path, *, flow_instance: int | None = None, topics: Mapping[str, str] | None = None) -> Log:
     """A log that can be replayed. InputError, besides open_log's, where it lacks what a replay cannot do without."""
-    log = open_log(path, flow_instance=flow_instance)
+    log = open_log(path, flow_instance=flow_instance, topics=topics)
     lacking = [] if log.streams.keys() & {Sensor.ATTITUDE, Sensor.IMU} else ["an attitude or an IMU"]
     if not log.streams.keys() & {Sensor.GPS_POSITION, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY}:
         lacking.append("GPS or optical flow")
@@ -67,6 +69,13 @@ def open_flight(path: Path, *, flow_instance: int | None = None) -> Log:
             f"{path}: the log lacks {' and '.join(lacking)}, which a replay needs; `flownav info` shows what it holds"
         )
     return log
+
+
+def _is_bag_folder(path: Path) -> bool:
+    """Whether a path is a folder with a ROS 2 bag in it."""
+    from flownav.logs.ros.containers import is_bag_folder
+
+    return an_input(path).is_dir() and is_bag_folder(path)
 
 
 def _reader(kind: str) -> Callable[..., Log]:
@@ -82,10 +91,6 @@ def _reader(kind: str) -> Callable[..., Log]:
         from flownav.logs.live_record import read_live_record
 
         return read_live_record
-    if kind == "ros":
-        from flownav.logs.ros.reader import read_ros
-
-        return read_ros
     if kind == "crazyflie":
         from flownav.logs.crazyflie_log import read_crazyflie
 

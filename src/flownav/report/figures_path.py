@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,10 +43,6 @@ class Paths:
         """The path that stands for the vehicle: the truth's, or else the estimate's."""
         return self.tracks[-1]
 
-    def estimate(self) -> Track | None:
-        """The filter's own path."""
-        return next((track for role, _, track in self.tracks if role == "estimate"), None)
-
     def names(self) -> list[str]:
         """What is drawn, in words."""
         gps, where = ["GPS"] * (self.gps is not None), ["pad"] * (self.pad is not None)
@@ -59,12 +55,6 @@ class View:
 
     paths: Paths
     from_where: Literal["above", "space"]
-
-    def plotly(self) -> Any:
-        """The view as a Plotly figure, for notebooks."""
-        from flownav.report import plotly_path
-
-        return plotly_path.from_above(self.paths) if self.from_where == "above" else plotly_path.in_space(self.paths)
 
 
 def pad(record: Record) -> Pad | None:

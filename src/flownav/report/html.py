@@ -36,7 +36,15 @@ from flownav.scoring.phases import Phase, phases_of
 
 HERE = Path(__file__).parent
 RECORD_STYLES = ("vendor/uPlot.min.css", "page.css", "record.css")
-RECORD_SCRIPTS = ("vendor/uPlot.iife.min.js", "record_data.js", "record_panels.js", "record_paths.js", "record_page.js")
+RECORD_SCRIPTS = (
+    "vendor/uPlot.iife.min.js",
+    "record_data.js",
+    "record_axes.js",
+    "record_panels.js",
+    "record_canvas.js",
+    "record_paths.js",
+    "record_page.js",
+)
 
 
 def write_report(record: Record, path: Path) -> None:

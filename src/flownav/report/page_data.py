@@ -24,6 +24,7 @@ from flownav.report.series import Array
 DIGITS = 6  # decimal places below the leading one of a column's largest value
 FINEST_TIME_S = 1e-6
 MISSING = np.int64(-(2**31))  # stands for a value that is no number
+SMALLEST = 1e-200  # of a column's largest value: below it the column is zero
 LARGEST = 2.0e9  # of a whole number that a column holds
 
 
@@ -60,9 +61,9 @@ def _step(values: Array, *, time: bool) -> float:
     """The power of ten that a column is counted in."""
     finite = np.abs(values[np.isfinite(values)])
     largest = float(finite.max()) if len(finite) else 0.0
-    if largest == 0.0:
+    if largest < SMALLEST:
         return 1.0
-    finest = 10.0 ** math.ceil(math.log10(largest / LARGEST)) if largest > 0.0 else 1.0
+    finest = 10.0 ** math.ceil(math.log10(largest / LARGEST))
     wanted = FINEST_TIME_S if time else 10.0 ** (math.floor(math.log10(largest)) - DIGITS)
     return float(f"{max(finest, wanted):.0e}")
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from flownav.report.chart import Chart
+
 
 @dataclass(frozen=True)
 class Panel:
@@ -26,8 +28,8 @@ class Panel:
 
     @cached_property
     def figure(self) -> Any:
-        """What is drawn, as a Plotly figure; None of a panel that is absent."""
-        return self.drawing.plotly() if hasattr(self.drawing, "plotly") else self.drawing
+        """What is drawn, as a Plotly figure; a chart is turned into one, any other drawing is given as it is."""
+        return self.drawing.plotly() if isinstance(self.drawing, Chart) else self.drawing
 
 
 @dataclass(frozen=True)

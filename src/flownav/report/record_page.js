@@ -37,6 +37,7 @@
 
   let drawing = 0;
   async function drawAll() {
+    if (root.classList.contains("paper")) return; // it was drawn for the printer, and will be drawn again after that
     const mine = ++drawing;
     delete root.dataset.figures;
     const sight = innerHeight * 1.5;

@@ -12,58 +12,6 @@ const panels = (() => {
   const FONT = (px) => `${px}px ${flight.colour("font")}`;
   const make = (tag, name, text = "") => Object.assign(document.createElement(tag), { className: name, textContent: text });
 
-  function pausesOf(times) {
-    const steps = [...times].slice(1).map((t, k) => t - times[k]).sort((a, b) => a - b);
-    return Math.max(0.5, 20 * (steps[steps.length >> 1] || 0));
-  }
-
-  // uPlot's data of a row: every line and band on one time base; a hole where a value is missing or a band pauses.
-  function table(row) {
-    const tables = [];
-    for (const one of row.lines) {
-      if (one.hidden) continue;
-      const holes = (sign) => Array.from(one.v, (value, k) => (Number.isFinite(value) && !(row.log && value <= 0) ? sign * value + (one.m ? one.m[k] : 0) : null));
-      if (one.kind === "line") tables.push([one.t, holes(1)]);
-      else {
-        const limit = pausesOf(one.t);
-        const open = (values) => values.map((value, k) => (k + 1 < one.t.length && one.t[k + 1] - one.t[k] > limit ? null : value));
-        tables.push([one.t, open(holes(1)), open(holes(-1))]);
-      }
-    }
-    if (!tables.length) return [[flight.facts.t0, flight.facts.t1], [null, null]];
-    return tables.length === 1 ? tables[0] : uPlot.join(tables);
-  }
-
-  // Powers of ten on a logarithmic axis, at most five of them.
-  function decades(low, high) {
-    const [first, last] = [Math.ceil(Math.log10(low) - 1e-9), Math.floor(Math.log10(high) + 1e-9)];
-    const step = Math.max(1, Math.ceil((last - first) / 4));
-    return Array.from({ length: Math.floor((last - first) / step) + 1 }, (_, k) => 10 ** (first + k * step));
-  }
-
-  function reach(row, zoomed, [from, to]) {
-    let low = Infinity;
-    let high = -Infinity;
-    for (const one of row.series) {
-      if (one.hidden) continue;
-      const first = Math.max(0, flight.before(one.t, from));
-      for (let k = first; k < one.t.length && one.t[k] <= to; k++) {
-        const value = one.v[k];
-        if (!Number.isFinite(value) || (row.log && value <= 0)) continue;
-        const middle = one.m ? one.m[k] : 0;
-        const least = one.kind === "band" ? middle - value : value;
-        if (least < low) low = least;
-        if (middle + value > high) high = middle + value;
-      }
-    }
-    if (row.within !== undefined && !zoomed) return [-row.within, row.within];
-    if (low > high) return row.log ? [0.1, 10] : [-1, 1];
-    if (row.log) return [10 ** Math.floor(Math.log10(low)), 10 ** Math.ceil(Math.log10(high) + 1e-9)];
-    if (row.from_zero) return [0, Math.max(high, 1e-6) * 1.06];
-    if (high - low < 1e-6) return [low - 1, high + 1];
-    return [low - 0.06 * (high - low), high + 0.06 * (high - low)];
-  }
-
   class Panel {
     constructor(host, spec, columns) {
       this.host = host;
@@ -76,8 +24,13 @@ const panels = (() => {
       this.plots = [];
     }
 
+    // What is in sight: the page's zoom; of a close-up what of it lies in its own stretch, or else all of that.
     window() {
-      return flight.zoom || this.spec.window || [flight.facts.t0, flight.facts.t1];
+      const own = this.spec.window;
+      const { zoom } = flight;
+      if (!zoom || !own) return zoom || own || [flight.facts.t0, flight.facts.t1];
+      const both = [Math.max(zoom[0], own[0]), Math.min(zoom[1], own[1])];
+      return both[1] > both[0] ? both : own;
     }
 
     draw(width = 0, height = this.spec.height) {
@@ -124,7 +77,7 @@ const panels = (() => {
       box.append(head);
       if (!this.gutter) box.append(chips);
       this.host.append(box);
-      const plot = new uPlot(this.options(row, k, last, height), table(row), box);
+      const plot = new uPlot(this.options(row, k, last, height), axes.table(row), box);
       if (this.gutter) box.append(chips);
       row.cursor = make("div", "instant");
       plot.over.append(row.cursor);
@@ -155,7 +108,7 @@ const panels = (() => {
       if (!last) across.values = (u, splits) => splits.map(() => "");
       else across.values = (u, splits) => splits.map((t, n) => (n === splits.length - 1 && n ? `${+t.toFixed(3)} s` : String(+t.toFixed(3)).replace("-", "\u2212")));
       const upright = { ...axis, size: LEFT_PX, space: 26 };
-      if (row.log) upright.splits = (u, k_, low, high) => decades(low, high);
+      if (row.log) upright.splits = (u, k_, low, high) => axes.decades(low, high);
       upright.values = (u, splits) => splits.map((v) => (v === null ? "" : String(+v.toPrecision(6)).replace("-", "\u2212")));
       const series = [{}];
       const bands = [];
@@ -176,7 +129,7 @@ const panels = (() => {
         cursor: { x: false, y: false, points: { show: false }, drag: { x: true, y: false, setScale: false } },
         scales: {
           x: { time: false, range: () => this.window() },
-          y: { distr: row.log ? 3 : 1, dir: row.reversed ? -1 : 1, range: () => reach(row, flight.zoom !== null, this.window()) },
+          y: { distr: row.log ? 3 : 1, dir: row.reversed ? -1 : 1, range: () => axes.reach(row, flight.zoom !== null, this.window()) },
         },
         axes: [across, upright], series, bands,
         hooks: { drawClear: [(u) => this.ground(u, k, strip)], draw: [(u) => this.marks(u, row, k), () => this.settle(row)], setSelect: [(u) => this.selected(u)] },

@@ -41,6 +41,18 @@ ROLES = (
 )
 
 
+def asked_topics(texts: Iterable[str]) -> dict[str, str]:
+    """Topics by role of words "ROLE=TOPIC". InputError where one is none, or a role is named twice."""
+    found: dict[str, str] = {}
+    for text in texts:
+        role, _, topic = text.partition("=")
+        if not topic or role in found:
+            why = "is the second for its role" if topic else "ROLE=TOPIC is needed"
+            raise InputError(f"--topic {text}: {why}; the roles are {', '.join(each.name for each in ROLES)}")
+        found[role] = topic
+    return found
+
+
 def chosen(
     topics: Iterable[Gathered], asked: Mapping[str, str], flow_instance: int | None
 ) -> tuple[dict[str, Gathered], list[str]]:

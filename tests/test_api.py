@@ -117,6 +117,16 @@ def test_constraints_pin_every_dependency_and_name_no_address():
     assert names <= pinned
 
 
+@pytest.mark.parametrize(
+    "source", [*SOURCES, PROJECT / "Makefile", PROJECT / "CHANGELOG.md"], ids=lambda path: path.name
+)
+def test_pages_that_are_named_exist(source):
+    for name in re.findall(r"(?<!/)\bdocs/[a-z/-]+\.md", source.read_text(encoding="utf-8")):
+        if not name.startswith("docs/en/"):  # PX4's own documentation
+            place = (PROJECT / name).resolve()
+            assert place.exists() or place in GENERATED, f"{source.name}: {name}"
+
+
 def test_docs_have_a_place_in_the_navigation():
     navigation = (PROJECT / "mkdocs.yml").read_text(encoding="utf-8")
     for page in (PROJECT / "docs").rglob("*.md"):

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Analyse a campaign with pandas
 #
-# A campaign flies a scenario many times. Its result is a data frame with a row for each flight: the scores, and every
-# number that was drawn for that flight.
+# A campaign flies a scenario many times. Its result is a data frame with a row for each flight: the scores, and
+# every number that was drawn for that flight.
 
 # %%
 import flownav

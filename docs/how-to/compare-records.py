@@ -17,8 +17,7 @@ windy.save("windy.fnr")
 
 # %% [markdown]
 # The page `compared.html` has the paths and the errors of both on one time axis. Every record may be compared with
-# every
-# other one; what is in one of them only is left out and named.
+# every other one; what is in one of them only is left out and named.
 #
 # ## By hand
 #
@@ -34,5 +33,5 @@ rows = {
 pd.DataFrame(rows).T.round(4)
 
 # %% [markdown]
-# `flownav compare` also takes logs instead of records. Then it replays each with every setting that you name, beside
-# dead reckoning and the autopilot's own estimate: [comparing estimators](compare.md).
+# `flownav compare` also takes logs instead of records. Then it replays each with every setting that you name,
+# beside dead reckoning and the autopilot's own estimate: [comparing estimators](compare.md).

@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Measure the drift through GPS outages
 #
-# How far is the position off after a minute without GPS? One outage is one sample, and where it falls decides what it
-# shows. Cut GPS again and again along the flight and look at the median and the worst.
+# How far is the position off after a minute without GPS? One outage is one sample, and where it falls decides what
+# it shows. Cut GPS again and again along the flight and look at the median and the worst.
 
 # %% language="bash"
 # flownav sample csv
@@ -18,8 +18,7 @@ print(f"median {record.scores['outage_median_rms_m']:.2f} m, worst {record.score
 
 # %% [markdown]
 # `outage_table=(15, 85, 20)` replays the flight once for each window of 20 s between 15 and 85 s. The same in a
-# terminal
-# is `flownav replay samples/flight-csv --outage-table 15:85:20`.
+# terminal is `flownav replay samples/flight-csv --outage-table 15:85:20`.
 #
 # ## What the sensors are worth
 #
@@ -48,8 +47,7 @@ plt.show()
 # ## The best estimate afterwards
 #
 # While a vehicle flies it can use only what came before. For a map or a report the smoother uses the whole flight,
-# the
-# GPS after the outage as well.
+# the GPS after the outage as well.
 
 # %%
 smooth = flownav.replay("samples/flight-csv", gps_outages=[(30, 50)], smooth=True)

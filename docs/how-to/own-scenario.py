@@ -2,13 +2,13 @@
 # # Fly your own scenario and your own vehicle
 #
 # A scenario is a TOML file: the path, the wind, the pad, the sensors. A vehicle is another one. Units stand in the
-# names of
-# the keys, and every key, with its range and its default, stands in [keys of the parameter
+# names of the keys, and every key, with its range and its default, stands in [keys of the parameter
 # files](../reference/keys.md).
 #
 # ## A scenario
 #
-# Start from a shipped one, or write only what differs. This one takes off, flies a leg of 4 m, comes back and lands.
+# Start from a shipped one, or write only what differs. This one takes off, flies a leg of 4 m, comes back and
+# lands.
 
 # %%
 from pathlib import Path
@@ -58,8 +58,7 @@ record
 # ## A vehicle
 #
 # Three ship: the paper's helicopter, a quadrotor and a hexarotor. Take the nearest, change what you know of yours,
-# and save
-# it. Here the quadrotor carries more.
+# and save it. Here the quadrotor carries more.
 
 # %%
 quad = flownav.Vehicle.load("quad-450")
@@ -75,13 +74,11 @@ print(
 
 # %% [markdown]
 # `flownav vehicle heavy.toml` prints its trim, its hover power and its linear model. `--margins` prints the phase
-# and gain
-# margins of its control loops.
+# and gain margins of its control loops.
 
 # %% language="bash"
 # flownav vehicle heavy.toml | head -30
 
 # %% [markdown]
 # [Scenarios](../reference/scenarios.md) explains every section of a scenario, [the
-# helicopter](../explanation/vehicle.md) and
-# [the multirotor](../explanation/multirotor.md) explain the models.
+# helicopter](../explanation/vehicle.md) and [the multirotor](../explanation/multirotor.md) explain the models.

@@ -13,8 +13,7 @@ frame = record.estimate.to_pandas()
 # %% [markdown]
 # The other estimate is a data frame (or a dictionary of columns) with the columns of the table
 # [`estimate`](../reference/tables.md#estimate). It needs `t_s` and a position; what it lacks is not scored. Here a
-# moving
-# mean of the navigator's own position stands in for it, half a second late as moving means are.
+# moving mean of the navigator's own position stands in for it, half a second late as moving means are.
 #
 # The navigator's own table `estimate` stands at its horizon, a tenth of a second ago, and in the frame that its GPS gave
 # it. What the vehicle flies on, and what is scored, is the table `flown`: the estimate carried on to now, and counted

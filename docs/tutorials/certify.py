@@ -2,9 +2,9 @@
 # # Certify a landing
 #
 # One good landing shows little. A test plan asks for more: *the vehicle touches down within so many metres of the
-# pad,
-# with a probability of so much, at a confidence of so much, in the wind that we expect*. `flownav certify` takes that
-# statement as a file, says how many flights it needs, flies them, and answers **pass**, **fail** or **not shown**.
+# pad, with a probability of so much, at a confidence of so much, in the wind that we expect*. `flownav certify`
+# takes that statement as a file, says how many flights it needs, flies them, and answers **pass**, **fail** or
+# **not shown**.
 #
 # ## Write the requirement
 #
@@ -49,16 +49,15 @@ confidence = 0.90
 # ## Fly it
 #
 # Every flight has a vehicle, a wind, a ground and sensors of its own, drawn from the scenario's dispersion, and
-# neither
-# the navigator nor the autopilot knows them. The ranking of inputs flies many more flights, so it is left out here
-# (`--ranking 0`).
+# neither the navigator nor the autopilot knows them. The ranking of inputs flies many more flights, so it is left
+# out here (`--ranking 0`).
 
 # %% language="bash"
 # flownav certify my-landing.toml --ranking 0 --records 1 --out certificate || true
 
 # %% [markdown]
-# The exit status is 0 only if the verdict is *pass*. The folder holds the page to be signed, `certificate.json` with
-# the same content for a program, the flights themselves, and the record and the report of the worst one.
+# The exit status is 0 only if the verdict is *pass*. The folder holds the page to be signed, `certificate.json`
+# with the same content for a program, the flights themselves, and the record and the report of the worst one.
 
 # %% language="bash"
 # ls certificate certificate/records
@@ -68,5 +67,4 @@ confidence = 0.90
 #
 # A certificate is a statement about the simulator. The page lists what was assumed and what is not modelled, and
 # [the simulator beside recorded flights](../explanation/validation.md) says where it is too kind. Read both before
-# you
-# sign. [The landing certificate](../how-to/certify.md) has the mathematics, and how to rank what matters most.
+# you sign. [The landing certificate](../how-to/certify.md) has the mathematics, and how to rank what matters most.

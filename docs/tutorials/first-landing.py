@@ -1,8 +1,8 @@
 # %% [markdown]
 # # Your first landing, in five minutes
 #
-# This tutorial flies a landing in simulation, looks at what the navigator knew on the way down, and compares it with
-# what really happened. You need Python 3.11 or newer and nothing else: no vehicle, no log and no autopilot.
+# This tutorial flies a landing in simulation, looks at what the navigator knew on the way down, and compares it
+# with what really happened. You need Python 3.11 or newer and nothing else: no vehicle, no log and no autopilot.
 #
 # Install flownav first, in a clone of its repository:
 #
@@ -13,25 +13,25 @@
 # ## Fly
 #
 # One command flies a helicopter from a hover at 3 m down to a pad. The helicopter carries an IMU, a magnetometer, a
-# barometer, a GPS receiver, an optical-flow camera and a rangefinder, and its autopilot knows only what the navigator
-# makes of them. The very first flight compiles the simulator, which takes a minute or two; after that a flight takes
-# less than a second.
+# barometer, a GPS receiver, an optical-flow camera and a rangefinder, and its autopilot knows only what the
+# navigator makes of them. The very first flight compiles the simulator, which takes a minute or two; after that a
+# flight takes less than a second.
 
 # %% language="bash"
 # flownav fly landing --seed 1 --out landing.fnr
 
 # %% [markdown]
-# The table has the errors of the position (`x`, `y`, `z` in metres: north, east, down) and of the velocity
-# (`u`, `v`, `w` in m/s: forward, right, down), beside those that the paper published for its own filter. Below the
-# table stand the touchdown and the verdict.
+# The table has the errors of the position (`x`, `y`, `z` in metres: north, east, down) and of the velocity (`u`,
+# `v`, `w` in m/s: forward, right, down), beside those that the paper published for its own filter. Below the table
+# stand the touchdown and the verdict.
 #
 # Two files were written. `landing.fnr` is the record, which holds everything that happened. `landing.html` is its
 # report: one page that works without a network. Open it in a browser.
 #
 # ## The same flight in Python
 #
-# A flight has a number and a seed. The same seed gives the same flight to the last bit, so what Python flies here is
-# the flight above.
+# A flight has a number and a seed. The same seed gives the same flight to the last bit, so what Python flies here
+# is the flight above.
 
 # %%
 import flownav
@@ -47,10 +47,8 @@ print(f"touched {contact['distance_m']:.2f} m from the pad's centre, sinking at 
 # ## Look at the estimate
 #
 # `record.estimate` is a table: a dictionary of NumPy arrays, whose names end in their units. `pos_d_m` is the
-# position
-# downwards, so that the height is its negative. `std_pos_n_m` is one standard deviation of the position northwards,
-# as
-# the filter itself states it.
+# position downwards, so that the height is its negative. `std_pos_n_m` is one standard deviation of the position
+# northwards, as the filter itself states it.
 
 # %%
 estimate = record.estimate.to_pandas()
@@ -81,8 +79,8 @@ plt.show()
 # %% [markdown]
 # If the filter knows its own errors, the error stays inside the band about 95 % of the time.
 #
-# `record.plot` draws the usual figures at once: `position`, `velocity`, `errors`, `innovations` and `path`. They are
-# interactive: zoom into one with the mouse.
+# `record.plot` draws the usual figures at once: `position`, `velocity`, `errors`, `innovations` and `path`. They
+# are interactive: zoom into one with the mouse.
 
 # %%
 record.plot("path")

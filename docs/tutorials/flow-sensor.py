@@ -2,10 +2,8 @@
 # # Identify my flow sensor and load its parameters
 #
 # An optical-flow sensor has a gain (what it reports over what is true), a latency and noise that grows with height.
-# They
-# differ from sensor to sensor and from mounting to mounting. This tutorial finds them from one flight, writes them
-# into
-# a sensor file, and shows what they are worth. At the end stand the parameters for the autopilot.
+# They differ from sensor to sensor and from mounting to mounting. This tutorial finds them from one flight, writes
+# them into a sensor file, and shows what they are worth. At the end stand the parameters for the autopilot.
 #
 # A flight is enough if it is long enough and moves enough: legs of a few metres back and forth, at two or three
 # heights.
@@ -30,16 +28,13 @@ print(sensor.verdict)
 
 # %% [markdown]
 # The last line says what this log could show at all. A flight shows the gain well. What lies behind the latency (a
-# delay, or a
-# filter inside the sensor) needs faster motion, such as that of a [rig](../how-to/rig.md). The sample flight was
-# flown
-# with a sensor whose gain is below 1, and the interval says so.
+# delay, or a filter inside the sensor) needs faster motion, such as that of a [rig](../how-to/rig.md). The sample
+# flight was flown with a sensor whose gain is below 1, and the interval says so.
 #
 # ## What is it worth?
 #
 # Replay the flight with GPS cut for 45 s, first with a sensor that is taken to be perfect and then with the
-# identified
-# one.
+# identified one.
 
 # %%
 sensor.save("my-sensor.toml")
@@ -50,15 +45,13 @@ for name, chosen in (("as it comes", None), ("identified", "my-sensor.toml")):
 
 # %% [markdown]
 # The gain costs less than one would think, because the filter learns the scale of the flow while it has GPS. The
-# sensor file
-# gives it a better start and the right latency. Judge a sensor on another flight than the one that it was identified
-# from when you can. Here there is only one.
+# sensor file gives it a better start and the right latency. Judge a sensor on another flight than the one that it
+# was identified from when you can. Here there is only one.
 #
 # ## Parameters for the autopilot
 #
-# From the same identification follow the autopilot's own parameters: the scale, the delay and the noise of its flow.
-# The
-# command writes them as a parameter file for PX4; `--for ardupilot` writes one for ArduPilot.
+# From the same identification follow the autopilot's own parameters: the scale, the delay and the noise of its
+# flow. The command writes them as a parameter file for PX4; `--for ardupilot` writes one for ArduPilot.
 
 # %% language="bash"
 # flownav identify samples/flight.ulg --for px4 --out sensor.toml > identify.txt
@@ -66,9 +59,8 @@ for name, chosen in (("as it comes", None), ("identified", "my-sensor.toml")):
 
 # %% [markdown]
 # Load the file in QGroundControl under *Vehicle Setup, Parameters, Tools, Load from file*. In Mission Planner the
-# button
-# is *Load from file* on the page *Full Parameter List*. Reboot the vehicle, fly again, and identify again: the gain
-# should now be 1 within its interval.
+# button is *Load from file* on the page *Full Parameter List*. Reboot the vehicle, fly again, and identify again:
+# the gain should now be 1 within its interval.
 #
 # ## Where to go from here
 #

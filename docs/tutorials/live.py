@@ -1,11 +1,11 @@
 # %% [markdown]
 # # Live with a simulated vehicle
 #
-# `flownav live` navigates a vehicle in real time over MAVLink and can send its estimate back. This tutorial tries it
-# without a vehicle: one process plays an autopilot that tells its sensors, the other one is the navigator. They talk
-# over the loopback network of this machine, as they would over a radio or a serial cable.
+# `flownav live` navigates a vehicle in real time over MAVLink and can send its estimate back. This tutorial tries
+# it without a vehicle: one process plays an autopilot that tells its sensors, the other one is the navigator. They
+# talk over the loopback network of this machine, as they would over a radio or a serial cable.
 #
-# It needs pymavlink: `pip install "flownav[live]"`.
+# It needs pymavlink: `pip install ".[live]"`.
 #
 # In practice you would use two terminals. Here the navigator runs in the background while the vehicle flies.
 #
@@ -23,8 +23,8 @@
 
 # %% [markdown]
 # The vehicle's clock ran three times as fast as ours, so the 50 s of the flight took 17 s. The session ended after
-# the 25 s
-# that it was given; without `--duration`, Ctrl-C ends it. Its result is a record like that of any other flight.
+# the 25 s that it was given; without `--duration`, Ctrl-C ends it. Its result is a record like that of any other
+# flight.
 
 # %%
 import flownav
@@ -33,9 +33,9 @@ record = flownav.load("live.fnr")
 record
 
 # %% [markdown]
-# The navigator works behind a horizon: it waits a fraction of a second for the slowest sensor, so that every reading
-# is
-# fused at the instant that it describes, and carries the estimate on to the present. The record holds both.
+# The navigator works behind a horizon: it waits a fraction of a second for the slowest sensor, so that every
+# reading is fused at the instant that it describes, and carries the estimate on to the present. The record holds
+# both.
 
 # %%
 import matplotlib.pyplot as plt
@@ -50,8 +50,8 @@ plt.show()
 # %% [markdown]
 # ## The same estimate again
 #
-# What was recorded live can be replayed, and gives the same estimate to the last bit. That is how you find out later
-# why the navigator said what it said.
+# What was recorded live can be replayed, and gives the same estimate to the last bit. That is how you find out
+# later why the navigator said what it said.
 
 # %%
 import numpy as np

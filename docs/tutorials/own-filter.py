@@ -2,14 +2,13 @@
 # # Your own filter
 #
 # flownav's navigator is one filter among many. This tutorial flies another one in its place: in the closed loop,
-# where the
-# autopilot has to live with what the filter says, and on a recorded flight. A filter is a Python class with four
-# methods: `start`, `predict`, `update` and `estimate`. Nothing has to be compiled.
+# where the autopilot has to live with what the filter says, and on a recorded flight. A filter is a Python class
+# with four methods: `start`, `predict`, `update` and `estimate`. Nothing has to be compiled.
 #
 # ## A filter in forty lines
 #
-# flownav ships a complementary filter as an example. Position and velocity follow the IMU in the short run, and each
-# other sensor in the long run, with one time constant a sensor. This is the complete filter:
+# flownav ships a complementary filter as an example. Position and velocity follow the IMU in the short run, and
+# each other sensor in the long run, with one time constant a sensor. This is the complete filter:
 
 # %%
 import inspect
@@ -20,14 +19,12 @@ print(inspect.getsource(complementary).split('"""', 2)[2].strip())
 
 # %% [markdown]
 # `predict` is called for every reading of the IMU, `update` for every other reading, each in the order of the
-# instants that
-# the readings describe. `estimate` says position and velocity in north-east-down, and the attitude.
+# instants that the readings describe. `estimate` says position and velocity in north-east-down, and the attitude.
 #
 # ## Fly it
 #
 # The same landing, the same noise: first our navigator, then the complementary filter, then a Kalman filter written
-# with
-# [FilterPy](https://filterpy.readthedocs.io), which ships as an example too.
+# with [FilterPy](https://filterpy.readthedocs.io), which ships as an example too.
 
 # %%
 import flownav
@@ -66,10 +63,8 @@ plt.show()
 
 # %% [markdown]
 # The vehicle flies on what the filter says. A filter that is wrong moves the vehicle, so that the three flights are
-# three
-# different flights through the same wind. A filter that is rough enough crashes it: with seed 1 the complementary
-# filter
-# tilts the helicopter too far at the touchdown, and the record says so (`record.verdict`).
+# three different flights through the same wind. A filter that is rough enough crashes it: with seed 1 the
+# complementary filter tilts the helicopter too far at the touchdown, and the record says so (`record.verdict`).
 #
 # ## Write your own
 #

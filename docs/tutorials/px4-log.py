@@ -1,14 +1,12 @@
 # %% [markdown]
 # # I have a PX4 log, now what?
 #
-# You have flown a vehicle with an optical-flow sensor and have its log (`.ulg`). This tutorial finds out what the log
-# holds, fuses it with flownav's navigator, and measures how far the position would drift without GPS.
+# You have flown a vehicle with an optical-flow sensor and have its log (`.ulg`). This tutorial finds out what the
+# log holds, fuses it with flownav's navigator, and measures how far the position would drift without GPS.
 #
 # If you have no log at hand, flownav writes one: the flight of a simulated quadrotor, as PX4 would have logged it.
-# With
-# your own log, put its name in place of `samples/flight.ulg`. ArduPilot's `.bin`, a ground station's `.tlog`, MCAP
-# and
-# folders of CSV files are read by the same commands.
+# With your own log, put its name in place of `samples/flight.ulg`. ArduPilot's `.bin`, a ground station's `.tlog`,
+# MCAP and folders of CSV files are read by the same commands.
 
 # %% language="bash"
 # flownav sample ulog
@@ -16,16 +14,15 @@
 # %% [markdown]
 # ## What does the log hold?
 #
-# Look before you fuse. `flownav info` lists the sensors, their rates and gaps, and says whether the flow agrees with
-# GPS or with another reference.
+# Look before you fuse. `flownav info` lists the sensors, their rates and gaps, and says whether the flow agrees
+# with GPS or with another reference.
 
 # %% language="bash"
 # flownav info samples/flight.ulg
 
 # %% [markdown]
 # The first line is the verdict. If the flow had swapped axes, a wrong sign or no range beside it, it would stand
-# here.
-# In this log the scale of the flow is below 1: the sensor reads a little too little. The tutorial on
+# here. In this log the scale of the flow is below 1: the sensor reads a little too little. The tutorial on
 # [identifying the sensor](flow-sensor.md) puts that right.
 #
 # ## Fuse it

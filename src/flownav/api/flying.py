@@ -55,7 +55,8 @@ def fly(
     in place of ours of its kind, and controller. vehicle: a shipped one's name, a file, a Vehicle or a vehicle of your
     own. dispersed: vehicle, wind and sensors are drawn for this flight, and
     neither navigator nor autopilot knows how; else they are what is believed. progress: called with 1 when it is down.
-    changes: other values for the scenario's own keys, as `Scenario.changed` takes them (docs/scenarios.md).
+    changes: other values for the scenario's own keys, as `Scenario.changed` takes them
+    (docs/reference/scenarios.md).
     InputError, one line, for a name, a key or a value that cannot be. What a flight crashes on is in `record.verdict`.
 
     Example:

@@ -22,7 +22,7 @@ WORDS = {"gps": "model", "filter": "name", "vehicle": "file", "autopilot": "feed
 
 
 class Scenario:
-    """What is flown: path, vehicle, sensors, wind, filter and autopilot, as docs/scenarios.md lists them.
+    """What is flown: path, vehicle, sensors, wind, filter and autopilot, as docs/reference/scenarios.md has them.
 
     file: the checked scenario file; its tables are attributes of it. A Scenario never changes; `changed` makes another.
 

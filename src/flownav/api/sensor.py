@@ -26,7 +26,7 @@ class Valued(NamedTuple):
 
 
 class Sensor:
-    """A flow sensor: gain, latency, dynamics, noise against height, limits and optics (docs/sensors.md).
+    """A flow sensor: gain, latency, dynamics, noise against height, limits, optics (docs/explanation/sensors.md).
 
     entries: its file as nested dictionaries; file: the same, checked. findings: what an identification found besides,
     None of a sensor that was loaded. A Sensor never changes; `changed` makes another.

@@ -67,7 +67,7 @@ def command(
 
 
 def markdown(made: list[Case]) -> str:
-    """The tables as they are printed and as docs/accuracy.md has them."""
+    """The tables as they are printed and as docs/explanation/accuracy.md has them."""
     parts = [_targets(made), _known(made)]
     parts += [table(made, model) for table in (_accuracy, _touchdowns, _consistency) for model in TRUTH_MODELS]
     parts += [_over_stated(made), _by_height(made)]

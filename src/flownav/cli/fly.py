@@ -122,4 +122,6 @@ def command(
 
         show(facts, flown.record.manifest["paper"], flown.index)
     if int(facts["crashed"]) > CRASHES_ALLOWED * flights:
-        raise VerdictError(f"{int(facts['crashed'])} of {flights} flights crashed (see `crashed` in docs/scenarios.md)")
+        raise VerdictError(
+            f"{int(facts['crashed'])} of {flights} flights crashed (see `crashed` in docs/reference/scenarios.md)"
+        )

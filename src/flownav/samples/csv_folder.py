@@ -1,4 +1,4 @@
-"""A log as a folder of CSV files, one a sensor: what `logs/csv_folder.py` reads (docs/csv-folder.md)."""
+"""A log as a folder of CSV files, one a sensor: what `logs/csv_folder.py` reads (docs/reference/csv-folder.md)."""
 
 from __future__ import annotations
 

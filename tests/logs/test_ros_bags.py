@@ -14,7 +14,8 @@ from flownav.export.formats import export
 from flownav.logs.flu import frd, ned, ned_from_frd, ned_from_frd_of_nwu
 from flownav.logs.log import Log
 from flownav.logs.open_log import log_kind, open_flight, open_log
-from flownav.logs.ros.containers import Bag, messages
+from flownav.logs.ros.bag import Bag
+from flownav.logs.ros.containers import messages
 from flownav.logs.ros.reader import read_ros
 from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile

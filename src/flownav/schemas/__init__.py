@@ -1,4 +1,4 @@
-"""JSON schemas, as they ship: of every command's `--json` object, of files (TOML), of a record's manifest, a certificate.
+"""JSON schemas, as they ship: of commands' `--json` objects, of files (TOML), of a record's manifest, of a certificate.
 
 `$id` has a schema's name and number; the number stands in every object as `schema`. `flownav schema NAME` prints one.
 """

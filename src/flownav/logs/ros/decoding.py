@@ -6,7 +6,7 @@ from collections import Counter
 from typing import Any
 
 from flownav.errors import InputError
-from flownav.logs.ros.containers import Channel, Message
+from flownav.logs.ros.bag import Channel, Message
 from flownav.logs.ros.ros1_bag import NEEDED
 
 LONGEST_DEFINITION = 64 << 10

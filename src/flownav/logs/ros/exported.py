@@ -16,7 +16,8 @@ from flownav.logs.absences import absences_of
 from flownav.logs.live_record import KINDS, log_of_record
 from flownav.logs.log import SIMULATOR, TRUTH_FILE, Log
 from flownav.logs.plausible import check_times, check_values
-from flownav.logs.ros.containers import MCAP_MAGIC, Bag, Channel, messages
+from flownav.logs.ros.bag import MCAP_MAGIC, Bag, Channel
+from flownav.logs.ros.containers import messages
 from flownav.measurement import COLUMNS, Sensor, Stream
 from flownav.provenance import hash_of
 from flownav.record import Record, Table

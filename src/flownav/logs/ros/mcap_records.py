@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from flownav.errors import InputError
-from flownav.logs.ros.containers import MCAP_MAGIC, Bag, Channel, Message, Wanted
+from flownav.logs.ros.bag import MCAP_MAGIC, Bag, Channel, Message, Wanted
 
 SCHEMA, CHANNEL, MESSAGE, CHUNK, ATTACHMENT, DATA_END = 3, 4, 5, 6, 9, 15
 LARGEST_CHUNK, LARGEST_RATIO = 256 << 20, 200  # bytes, and times the packed size: recorders write chunks of a few MB

@@ -12,10 +12,11 @@ from flownav.logs.absences import absences_of
 from flownav.logs.log import Log
 from flownav.logs.plausible import check_plausible, check_times, of_one_clock
 from flownav.logs.ros import px4, standard
+from flownav.logs.ros.bag import Bag, Channel
 from flownav.logs.ros.choice import chosen
 from flownav.logs.ros.clock import Clock, clock_of
 from flownav.logs.ros.columns import NAMES, Gathered, stamp_of, values_of
-from flownav.logs.ros.containers import Bag, Channel, files_of, messages
+from flownav.logs.ros.containers import files_of, messages
 from flownav.logs.ros.decoding import Decoder
 from flownav.logs.ros.exported import is_ours, log_of_export
 from flownav.logs.ulog import STATES, log_of_topics

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from flownav.errors import InputError
-from flownav.logs.ros.containers import Bag, Channel, Message, Wanted
+from flownav.logs.ros.bag import Bag, Channel, Message, Wanted
 
 NEEDED = "ROS bags need the package rosbags: pip install 'flownav[ros]'"
 LARGEST_CHUNK = 256 << 20

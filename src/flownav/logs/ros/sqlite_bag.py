@@ -11,7 +11,7 @@ from contextlib import closing
 from pathlib import Path
 
 from flownav.errors import InputError
-from flownav.logs.ros.containers import Bag, Channel, Message, Wanted
+from flownav.logs.ros.bag import Bag, Channel, Message, Wanted
 
 
 def sqlite_messages(path: Path, bag: Bag, wanted: Wanted) -> Iterator[Message]:

@@ -263,13 +263,15 @@ def run(*arguments):
     return CliRunner().invoke(app, ["view", *map(str, arguments)])
 
 
-def test_the_command_writes_a_file_and_writes_it_again(saved, tmp_path):
-    for _ in range(2):
-        done = run(saved, "--out", tmp_path / "other", "--json")
+def test_the_command_writes_a_file_and_writes_it_again_when_forced(saved, tmp_path):
+    for more in ([], ["--force"]):
+        done = run(saved, "--out", tmp_path / "other", "--json", *more)
         assert done.exit_code == 0, done.output
-    assert json.loads(done.stdout) == {
-        "record": str(saved), "file": str(tmp_path / "other.rrd"), "window": False, "notes": [],
-    }  # fmt: skip
+        facts = json.loads(done.stdout)
+        assert facts.pop("schema") == 1
+        assert facts == {
+            "record": str(saved), "file": str(tmp_path / "other.rrd"), "window": False, "notes": [],
+        }  # fmt: skip
     assert run(saved, "--out", tmp_path / "b.rrd").stdout.splitlines() == [f"Written: {tmp_path / 'b.rrd'}"]
 
 

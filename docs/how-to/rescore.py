@@ -16,9 +16,9 @@ frame = record.estimate.to_pandas()
 # moving mean of the navigator's own position stands in for it, half a second late as moving means are.
 #
 # The navigator's own table `estimate` stands at its horizon, a tenth of a second ago, and in the frame that its GPS
-# gave it. What the vehicle flies on, and what is scored, is the table `flown`: the estimate carried on to now, and counted
-# from where the navigator has the pad. `from_handover=True` counts the other estimate likewise, from where it has the
-# vehicle at the hand-over; without it the other estimate is held against the truth as it stands.
+# gave it. What the vehicle flies on, and what is scored, is the table `flown`: the estimate carried on to now, and
+# counted from where the navigator has the pad. `from_handover=True` counts the other estimate likewise, from where
+# it has the vehicle at the hand-over; without it the other estimate is held against the truth as it stands.
 
 # %%
 theirs = frame[["pos_n_m", "pos_e_m", "pos_d_m", "vel_u_m_s", "vel_v_m_s", "vel_w_m_s", "qw", "qx", "qy", "qz"]].copy()

@@ -63,8 +63,8 @@ plt.show()
 
 # %% [markdown]
 # The vehicle flies on what the filter says. A filter that is wrong moves the vehicle, so that the three flights are
-# three different flights through the same wind. A filter that is rough enough crashes it: with seed 1 the
-# complementary filter tilts the helicopter too far at the touchdown, and the record says so (`record.verdict`).
+# three different flights through the same wind. A filter that is rough enough crashes it, and then the record says so
+# (`record.verdict`).
 #
 # ## Write your own
 #

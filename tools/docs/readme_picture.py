@@ -19,7 +19,7 @@ from playwright.sync_api import Error, sync_playwright
 PROJECT = Path(__file__).parents[2]
 PICTURE = PROJECT / "docs" / "pictures" / "landing.png"
 NAMED = re.compile(r"\*The report of `flownav ([^`]+)`")
-WIDE_PX, HIGH_PX = 1280, 960
+WIDE_PX, HIGH_PX = 1280, 1500
 DRAWN_MS = 60_000
 COLOURS = 128  # of the picture: a page of a few colours needs no more, and is a third of the size
 

@@ -63,9 +63,9 @@ def _spelled(node: Any) -> Any:
 
 
 def _of(name: str, model: type[BaseModel]) -> dict[str, Any]:
-    found = _spelled(model.model_json_schema(schema_generator=WithProvenance, mode="validation"))
+    found: dict[str, Any] = _spelled(model.model_json_schema(schema_generator=WithProvenance, mode="validation"))
     if name == "file-requirement":  # conditions name dispersed numbers in tables of their own: wind.speed_20ft_m_s
         found["$defs"]["Conditions"]["additionalProperties"] = True
     if name == "file-scenario":  # vehicle = "quad-450" is short for the section
         found["properties"]["vehicle"] = {"anyOf": [found["properties"]["vehicle"], {"type": "string"}]}
-    return {"$schema": DRAFT, "$id": f"urn:flownav:schema:{name}:1"} | found
+    return {"$schema": DRAFT, "$id": f"urn:flownav:schema:{name}:1", **found}

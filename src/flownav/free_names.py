@@ -20,8 +20,9 @@ def a_place(path: Path, inputs: Iterable[Path] = (), *, force: bool, beside: Seq
     """The path of a file to be written, or the first of the numbered names where something is there.
 
     beside: endings of files that are written beside it under the same name (.html, _layout.json). force: what is there
-    is replaced, if flownav wrote it and can write it again. InputError where the path may not be written whatever it is called: it is
-    an input, a link, a folder, a FIFO, a socket or a device; with force also where it holds what is not replaced.
+    is replaced, if flownav wrote it and can write it again. InputError where the path may not be written whatever it is
+    called: it is an input, a link, a folder, a FIFO, a socket or a device; with force also where it holds what is not
+    replaced.
     """
     read = list(inputs)
     for each in _with_beside(path, beside):

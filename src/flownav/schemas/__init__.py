@@ -1,4 +1,4 @@
-"""JSON schemas, as they ship: of commands' `--json` objects, of files (TOML), of a record's manifest, of a certificate.
+"""JSON schemas that ship: of commands' `--json` objects, of files (TOML), and of a record's manifest.
 
 `$id` has a schema's name and number; the number stands in every object as `schema`. `flownav schema NAME` prints one.
 """

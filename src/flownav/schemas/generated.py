@@ -50,6 +50,22 @@ def generated() -> dict[str, dict[str, Any]]:
     return {name: _of(name, model) for name, model in models.items()}
 
 
+RANGES = {"ge": "minimum", "le": "maximum", "gt": "exclusiveMinimum", "lt": "exclusiveMaximum"}
+
+
+def _spelled(node: Any) -> Any:
+    """Ranges that pydantic leaves in its own words, beside a choice of types, as JSON Schema has them."""
+    if isinstance(node, list):
+        return [_spelled(each) for each in node]
+    if not isinstance(node, dict):
+        return node
+    return {RANGES.get(key, key) if "anyOf" in node else key: _spelled(value) for key, value in node.items()}
+
+
 def _of(name: str, model: type[BaseModel]) -> dict[str, Any]:
-    found = model.model_json_schema(schema_generator=WithProvenance, mode="validation")
-    return {"$schema": DRAFT, "$id": f"urn:flownav:schema:{name}:1"} | found
+    found: dict[str, Any] = _spelled(model.model_json_schema(schema_generator=WithProvenance, mode="validation"))
+    if name == "file-requirement":  # conditions name dispersed numbers in tables of their own: wind.speed_20ft_m_s
+        found["$defs"]["Conditions"]["additionalProperties"] = True
+    if name == "file-scenario":  # vehicle = "quad-450" is short for the section
+        found["properties"]["vehicle"] = {"anyOf": [found["properties"]["vehicle"], {"type": "string"}]}
+    return {"$schema": DRAFT, "$id": f"urn:flownav:schema:{name}:1", **found}

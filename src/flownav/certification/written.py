@@ -21,6 +21,7 @@ from flownav.report.certificate import render
 from flownav.report.html import write_report
 
 PAGE, FACTS = "certificate.html", "certificate.json"
+SCHEMA = 1  # schemas/certificate.json says what stands in it
 
 
 def write_certificate(
@@ -39,7 +40,7 @@ def write_certificate(
     page = render(facts, drawn(certificate))
     store.keep_text(PAGE, page)
     facts["files"]["page"] = {PAGE: hash_of(store.folder / PAGE)}
-    store.keep_text(FACTS, json.dumps(facts, indent=1) + "\n")
+    store.keep_text(FACTS, json.dumps({"schema": SCHEMA} | facts, indent=1) + "\n")
     return facts | {"out": str(store.folder / PAGE)}
 
 

@@ -97,7 +97,7 @@ def test_the_command_line_prints_the_scores_of_a_replay(replayed, path, tmp_path
         app, ["replay", str(path), "--gps-outage", "20:26", "--json", "--no-report", "--out", out]
     )
     facts = json.loads(said.stdout)
-    assert facts.pop("record") == out
+    assert (facts.pop("record"), facts.pop("schema")) == (out, 1)
     assert facts == replayed.scores
 
 
@@ -128,7 +128,7 @@ def test_a_record_says_how_it_was_called(record, replayed):
         (lambda: flownav.fly("landing", wnd={"speed_20ft_m_s": 3.0}), "wnd: unknown key; known here: "),
         (lambda: flownav.fly("landing", wind={"speed": 3.0}), "wind.speed: unknown key"),
         (lambda: flownav.fly("landing", gps="rtk"), "gps.model: Input should be 'white' or 'midg'"),
-        (lambda: flownav.fly("landing", seed=-1), "seed = -1: must be a number from 0"),
+        (lambda: flownav.fly("landing", seed=-1), "seed = -1: must be a whole number from 0"),
         (lambda: flownav.fly("landing", flight=-3), "flight = -3: must be"),
         (lambda: flownav.fly("landing", vehicle="no.toml"), "no.toml: no such file"),
         (lambda: flownav.replay("no.ulg"), "no.ulg: no such log"),
@@ -154,3 +154,49 @@ def test_a_window_that_is_none_is_one_line(path):
         flownav.replay(path, gps_outages=[5])
     with pytest.raises(InputError, match="settings: gps_gate: unknown key"):
         flownav.replay(path, settings={"gps_gate": 3.0})
+
+
+def test_a_replays_call_can_be_called_again(path):
+    record = flownav.replay(path, flow=False, flow_scale=(1.2, 1.2), gps_delay_s=0.1)
+    assert record.manifest["command"].endswith("flow=False, flow_scale=(1.2, 1.2), gps_delay_s=0.1)")
+
+
+def test_a_filter_of_a_class_is_called_by_its_name_in_the_call():
+    from flownav.examples.complementary import ComplementaryFilter
+
+    class Mine(ComplementaryFilter):
+        name = ""
+
+    record = flownav.fly("landing", filter=Mine, flight={"duration_s": 6.0})
+    assert "filter='Mine'" in record.manifest["command"]
+    assert "filter Mine" in repr(record)
+
+
+def test_an_estimate_of_a_part_of_the_flight_is_said_to_be_one():
+    record = flownav.fly("landing", flight={"duration_s": 8.0})
+    frame = record.flown.to_pandas()
+    part = record.rescore(estimate=frame[frame.index < 6.5])
+    assert 0.3 < part.manifest["covered_fraction"] < 0.6
+    assert "covers" in part.verdict
+    assert "covers" in repr(part)
+    with pytest.raises(flownav.InputError, match="no finite position"):
+        record.rescore(estimate=frame * float("nan"))
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: flownav.fly("landing", seed=1.9), "seed = 1.9: must be a whole number"),
+        (lambda: flownav.campaign("landing", flights=2.5), "flights = 2.5: must be a whole number"),
+        (lambda: flownav.campaign("landing", sweep={"wind.speed_20ft_m_s": []}), "sweep wind.speed_20ft_m_s: a list"),
+        (lambda: flownav.campaign("landing", sweep={"wind.speed_20ft_m_s": 3.0}), "sweep wind.speed_20ft_m_s: a list"),
+        (lambda: flownav.fly("landing", sensors=object), "sensors: a list of them is needed"),
+        (lambda: flownav.replay(3), "log: int is given; a path is needed"),
+        (lambda: flownav.identify(None), "logs: NoneType is given"),
+        (lambda: flownav.replay("x.ulg", filter="paper"), "the paper's filter flies in simulation only"),
+    ],
+)
+def test_what_is_no_argument_is_told_in_one_line(call, message):
+    with pytest.raises(flownav.InputError, match=message) as caught:
+        call()
+    assert "\n" not in str(caught.value)

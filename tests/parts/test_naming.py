@@ -95,6 +95,24 @@ def test_a_campaigns_rows_are_the_flights_one_by_one_and_its_folder_names_the_pa
     assert len(said.split()[-1]) == 64
 
 
+class Tuned(ComplementaryFilter):
+    def __init__(self, gain=1.0):
+        self.gain = gain
+
+
+def test_identities_tell_classes_numbers_and_equations_apart():
+    from flownav.examples.equation_filter import Memory, equation_filter, say, step
+    from flownav.parts.equations import EquationFilter
+
+    filters = [
+        ComplementaryFilter, Tuned, Tuned(2.0), Tuned(3.0), equation_filter,
+        EquationFilter("equations", Memory(qw=0.5), step, say), EquationFilter("equations", Memory(), say, say),
+    ]  # fmt: skip
+    known = [identities(Parts(filter=each)) for each in filters]
+    assert len(set(known)) == len(known)
+    assert identities(Parts(filter=Tuned(2.0))) == identities(Parts(filter=Tuned(2.0)))
+
+
 def test_a_campaign_of_an_own_filter_resumes_with_it_alone_and_flies_a_flight_again(file, tmp_path):
     import flownav
 

@@ -139,6 +139,68 @@ class NotFinite(ComplementaryFilter):
         return said and said._replace(vel_ned_m_s=[0.0, np.nan, 0.0])
 
 
+class SaysNothing(ComplementaryFilter):
+    name = "silent"
+
+    def estimate(self):
+        return None
+
+
+class SpeaksLate(ComplementaryFilter):
+    name = "late"
+
+    def estimate(self):
+        return super().estimate() if self.t_s > 5.5 else None
+
+
+class NoNumber(ComplementaryFilter):
+    def update(self, reading):
+        super().update(reading)
+        return [own.Innovation(np.nan, 1.0)]
+
+
+class NoGround(ComplementaryFilter):
+    def estimate(self):
+        said = super().estimate()
+        return said and said._replace(ground_d_m=np.nan)
+
+
+class NeedsMore(ComplementaryFilter):
+    name = "needy"
+
+    def __init__(self, gain):
+        self.gain = gain
+
+
+class Leaves(ComplementaryFilter):
+    def update(self, reading):
+        raise SystemExit(0)
+
+
+class ReadsNaN(Perfect):
+    def read(self, truth):
+        return own.Values([np.nan])
+
+
+class OneVariance(Perfect):
+    def read(self, truth):
+        return own.Values([1.0], variance=[1.0])
+
+
+class TooGood(Perfect):
+    def read(self, truth):
+        return own.Values([1.0], quality=1e9)
+
+
+class OfNothing(Perfect):
+    sensor = "LIDAR"
+
+
+class NoThrust(Shipped):
+    def outputs(self, t_s, state, controls, around):
+        return own.Outputs(np.nan, 0.0, 0.0)
+
+
 class TwoValues(Perfect):
     def read(self, truth):
         return own.Values([1.0, 2.0])
@@ -175,6 +237,17 @@ class ThreeAngles(PdController):
         ({"sensors": [Perfect, Perfect]}, r"sensors: one of a kind can be replaced"),
         ({"vehicle": Shrinks}, r"vehicle Shrinks: derivative\(\) gave shape \(13,\)"),
         ({"controller": ThreeAngles}, r"controller pd: command\(\) gave \(0.0, 0.0, 0.0\); four finite angles"),
+        ({"filter": SaysNothing}, r"filter silent: never said anything, and is flown on from 5 s on"),
+        ({"filter": SpeaksLate}, r"filter late: spoke first at 5\.\d+ s, and is flown on from 5 s on"),
+        ({"filter": NoNumber}, r"complementary: update\(\) gave an innovation of nan with variance 1.0"),
+        ({"filter": NoGround}, r"complementary: estimate\(\).ground_d_m is \[nan\]"),
+        ({"filter": NeedsMore}, r"needy: cannot be made: TypeError: .*gain"),
+        ({"filter": Leaves}, r"filter complementary: SystemExit: 0; mend it"),
+        ({"sensors": [ReadsNaN]}, r"sensor ReadsNaN: read\(\) gave \(nan,\); finite values, or None"),
+        ({"sensors": [OneVariance]}, r"sensor OneVariance: variance \(1.0,\): three"),
+        ({"sensors": [TooGood]}, r"sensor TooGood: quality 1000000000.0: 0 \(no data\) to 255"),
+        ({"sensors": [OfNothing]}, r"sensor OfNothing: sensor = 'LIDAR'; one of GPS_POSITION, "),
+        ({"vehicle": NoThrust}, r"vehicle NoThrust: outputs\(\) gave \(nan, 0.0, 0.0\)"),
         ({"filter": object()}, r"filter object: has no start, predict, update, estimate"),
         ({"filter": "nobody"}, r"--filter nobody: no such filter"),
         ({"filter": "nowhere.py:Mine"}, r"nowhere.py: no such file"),

@@ -118,6 +118,9 @@ def plan_of(
 ) -> Plan:  # fmt: skip
     """The plan of a campaign. InputError for what cannot be flown."""
     require_from("flights", flights, 1, MOST_FLIGHTS)
+    for name, values in sweep.items():
+        if isinstance(values, str) or not isinstance(values, Sequence) or len(values) == 0:
+            raise InputError(f"sweep {name}: a list of values is needed, such as [0.0, 4.0]; got {values!r}")
     require_from("seed", seed, 0, MOST_SEED)
     for name, value, known in (("sampling", sampling, SAMPLINGS), ("truth_model", truth_model, TRUTH_MODELS)):
         if value not in known:

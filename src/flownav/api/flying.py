@@ -77,7 +77,7 @@ def fly(
         **names_of(parts),
         **{name: value for name, value in options.items() if value is not None and name != "flight"},
     }
-    with called_as(call_of("fly", scenario, seed=seed, flight=flight, dispersed=dispersed, **said)):
+    with called_as(call_of("fly", scenario, seed=seed, flight=flight, dispersed=dispersed or None, **said)):
         return fly_setup(setup, seed, number, dispersed=dispersed, parts=parts, progress=progress).record
 
 

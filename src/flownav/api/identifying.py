@@ -39,14 +39,20 @@ def identify(
         >>> 0.5 < sensor.gain.low < sensor.gain.value < sensor.gain.high < 1.5
         True
     """
+    one = isinstance(logs, str | Path)
+    if not one and not (isinstance(logs, Sequence) and all(isinstance(log, str | Path) for log in logs)):
+        raise InputError(f"logs: {type(logs).__name__} is given; a path, or a list of paths, is needed")
     paths = [Path(logs)] if isinstance(logs, str | Path) else [Path(log) for log in logs]
     require_logs(paths)
 
-    from flownav.api.words import call_of
+    from flownav.api.words import call_of, changed
     from flownav.provenance import called_as
 
     heights = [float(heights_m)] if isinstance(heights_m, int | float) else [float(height) for height in heights_m]
-    said = call_of("identify", [str(path) for path in paths], heights_m=heights, flow_instance=flow_instance, base=base)
+    options = {
+        "order": order, "heights_m": heights, "reference": reference, "flow_instance": flow_instance, "base": base
+    }  # fmt: skip
+    said = call_of("identify", [str(path) for path in paths], **changed(identify, options))
     with called_as(said):
         return identify_logs(paths, order, heights, reference, flow_instance=flow_instance, base=base)
 

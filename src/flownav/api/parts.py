@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from flownav.errors import InputError
 from flownav.parts.calling import name_of
 from flownav.parts.naming import OURS, part_of, require
 from flownav.parts.protocols import Parts
@@ -20,6 +21,8 @@ def split(filter: Any, sensors: Sequence[Any], vehicle: Any, controller: Any) ->
         own_filter, filter = _part("filter", filter), None
     if vehicle is not None and (hasattr(vehicle, "derivative") or (isinstance(vehicle, str) and ":" in vehicle)):
         own_vehicle, vehicle = _part("vehicle", vehicle), None
+    if isinstance(sensors, str) or not isinstance(sensors, Sequence):
+        raise InputError("sensors: a list of them is needed, such as sensors=[MyRange]")
     own_sensors = tuple(_part("sensor", sensor) for sensor in sensors)
     own_controller = None if controller is None else _part("controller", controller)
     return Parts(own_filter, own_sensors, own_vehicle, own_controller), filter, vehicle
@@ -27,7 +30,9 @@ def split(filter: Any, sensors: Sequence[Any], vehicle: Any, controller: Any) ->
 
 def own_filter(filter: Any) -> Any:
     """The filter of a replay that is not ours; None where ours is meant."""
-    return None if filter in (None, "landing") else _part("filter", filter)
+    if isinstance(filter, str) and filter == "paper":
+        raise InputError("--filter paper: the paper's filter flies in simulation only, where it is fed as it was")
+    return None if filter is None or (isinstance(filter, str) and filter == "landing") else _part("filter", filter)
 
 
 def _part(kind: str, part: Any) -> Any:

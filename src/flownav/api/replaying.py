@@ -10,7 +10,7 @@ from typing import Any
 from flownav.api.parts import own_filter
 from flownav.api.record import Record
 from flownav.api.sensor import Sensor
-from flownav.api.words import call_of
+from flownav.api.words import call_of, changed, require_path
 from flownav.errors import InputError
 from flownav.logs.log import Log
 from flownav.logs.open_log import open_flight
@@ -72,22 +72,25 @@ def replay(
         >>> record.scores["outages"][0]["t0"]
         10.0
     """
-    call = call_of(
-        "replay", log, gps_outages=gps_outages, flow=None if flow else "False", sensor=sensor, settings=settings,
-        smooth=smooth, outage_table=outage_table, flow_instance=flow_instance,
-        topics=None if topics is None else str(dict(topics)), filter=filter,
-    )  # fmt: skip
+    options: dict[str, Any] = {
+        "gps_outages": gps_outages, "flow": flow, "flow_scale": flow_scale, "gps_delay_s": gps_delay_s,
+        "sensor": sensor, "settings": settings, "smooth": smooth, "outage_table": outage_table,
+        "flow_instance": flow_instance,
+        "topics": None if topics is None else dict(topics),
+        "filter": filter if filter is None or isinstance(filter, str) else name_of(filter),
+    }  # fmt: skip
+    require_path("log", log)
+    part = own_filter(filter)
+    call = call_of("replay", log, **changed(replay, options))
     outages = tuple(_window(window) for window in gps_outages)
     table = table_windows(*outage_table, option="outage_table") if outage_table else []
     datasheet = None if sensor is None else _sheet_of(sensor)
     stated = _stated(settings)
     scale = (float(flow_scale[0]), float(flow_scale[1]))
-    options = ReplayOptions(gps_delay_s, outages, flow, scale)
+    asked = ReplayOptions(gps_delay_s, outages, flow, scale)
     with called_as(call):
         read = open_flight(Path(log), flow_instance=flow_instance, topics=topics)
-        return replay_log(
-            read, options, datasheet, stated, smooth=smooth, table=table, part=own_filter(filter), progress=progress
-        )
+        return replay_log(read, asked, datasheet, stated, smooth=smooth, table=table, part=part, progress=progress)
 
 
 def replay_log(

@@ -24,6 +24,7 @@ OURS = (
     "estimate",
 )  # tables that our filter wrote
 KINDS = ("fly", "replay")
+WHOLE = 0.99  # of the instants that are scored: an estimate that covers less is said to
 
 
 def rescored(record: Record, estimate: object, name: str, *, from_handover: bool) -> Record:
@@ -38,9 +39,27 @@ def rescored(record: Record, estimate: object, name: str, *, from_handover: bool
     manifest = {key: value for key, value in record.manifest.items() if key not in ("findings", "notes")}
     if "reference" in tables:
         tables["truth"] = _placed(columns, tables["reference"])
-    other = Record(manifest | {"filter": name, "findings": [], "notes": []}, {"estimate": columns, **tables})
+    covered = _covered(record, columns)
+    thin = f"the estimate covers {100.0 * covered:.0f} % of what is scored" if covered < WHOLE else ""
+    findings = [{"text": thin, "bad": True}] if thin else []
+    facts = {"filter": name, "findings": findings, "notes": [], "covered_fraction": covered}
+    other = Record(manifest | facts, {"estimate": columns, **tables})
     other.manifest["scores"] = scores_of_other(record, columns)
     return other
+
+
+def _covered(record: Record, columns: Table) -> float:
+    """The share of the instants that are scored (of a replay, of our estimate's) at which the other says a position.
+
+    InputError where it says none at any of them.
+    """
+    judged = record.tables.get("judging") if record.manifest["kind"] == "fly" else None
+    t_s = np.asarray(record.tables["truth" if judged is not None else "estimate"]["t_s"], float)
+    counts = np.ones(len(t_s), bool) if judged is None else np.asarray(judged["counted"], float) > 0.0
+    spoken = np.isfinite(at_instants(columns, POSITION_NED, t_s[counts])).all(axis=1)
+    if not spoken.any():
+        raise InputError("estimate: it says no finite position at any instant that is scored; give another")
+    return float(spoken.mean())
 
 
 def _placed(columns: dict[str, Array], reference: Table) -> Table:

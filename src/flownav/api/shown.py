@@ -32,7 +32,12 @@ def what_of(record: Record) -> str:
 def headline_of(record: Record) -> str:
     """The score that matters most of this kind of record; "" where it has none."""
     scores = record.manifest.get("scores") or {}
+    covered = record.manifest.get("covered_fraction", 1.0)
+    thin = f" (the estimate covers {100.0 * covered:.0f} %)" if covered < 0.99 else ""
     touchdown = scores.get("touchdown")
+    if thin:
+        largest = scores.get("max_position_error_m")
+        return (f"largest error of one axis {largest:.3f} m" if largest is not None else "scored in part") + thin
     if touchdown:
         end = touchdown.get("rest") or touchdown.get("contact") or {}
         away = end.get("distance_m")

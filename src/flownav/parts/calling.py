@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import inspect
 from collections.abc import Callable
 from typing import Any
 
@@ -19,10 +20,10 @@ class Mistakes:
         self.first: BaseException | None = None
 
     def tell(self) -> None:
-        """InputError with the part's exception as its cause, or what the user pressed; nothing where all went well."""
+        """InputError with the part's exception as its cause, or Ctrl-C; nothing where all went well."""
         if self.first is None:
             return
-        if isinstance(self.first, InputError) or not isinstance(self.first, Exception):
+        if isinstance(self.first, InputError | KeyboardInterrupt):
             raise self.first
         kind = type(self.first).__name__
         said = " ".join(str(self.first).split())
@@ -51,4 +52,5 @@ class Called:
 
 def name_of(part: object) -> str:
     """How messages and records call a part: its `name`, or its class."""
-    return str(getattr(part, "name", "") or type(part).__name__)
+    kind = part if isinstance(part, type) or inspect.isfunction(part) else type(part)
+    return str(getattr(part, "name", "") or kind.__name__)

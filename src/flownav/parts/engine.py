@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import json
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,7 @@ from flownav.compile import LANES, announce_compilation
 from flownav.measurement import Array
 from flownav.parts.calling import name_of
 from flownav.parts.equations import EquationFilter
-from flownav.parts.flying import fly_parts, fly_with
+from flownav.parts.flying import fly_parts, fly_with, require_started
 from flownav.parts.protocols import Parts
 from flownav.record import Record
 from flownav.simulation.assemble import Setup
@@ -41,7 +43,8 @@ class OwnPartsEngine:
         if isinstance(own.filter, EquationFilter) and not (own.sensors or own.vehicle or own.controller):
             with announce_compilation("batch"):
                 address = own.filter.unit(LANES).address
-            yield from Local(instead=address).fly(cell, seed, parts, on_progress)
+            check = partial(require_started, name=name_of(own.filter))
+            yield from Local(instead=address, check=check).fly(cell, seed, parts, on_progress)
             return
         faults = cell.faults(seed)
         for part in parts:
@@ -66,24 +69,40 @@ def recording_of(engine: Engine | None) -> Recording:
 
 
 def identities(parts: Parts) -> tuple[str, ...]:
-    """What a campaign's folder says of its parts: kind, name and SHA-256 of the source. It resumes with these alone."""
+    """What a campaign's folder says of its parts: kind, name and SHA-256 of what they are made of.
+
+    That is the class, the source of its file, and the object's own numbers. A campaign resumes with these alone.
+    """
     kinds = [("filter", parts.filter), *(("sensor", one) for one in parts.sensors), ("vehicle", parts.vehicle),
              ("controller", parts.controller)]  # fmt: skip
     return tuple(f"{kind} {name_of(part)} {_digest(part)}" for kind, part in kinds if part is not None)
 
 
 def _digest(part: Any) -> str:
-    """Of the file that a part's class stands in; of its class alone where it stands in none (a notebook's cell)."""
-    kind = part if isinstance(part, type) or inspect.isfunction(part) else type(part)
-    try:
-        source = inspect.getsource(inspect.getmodule(kind) or kind)
-    except (OSError, TypeError):
-        source = _class_source(kind)
-    return hashlib.sha256(source.encode()).hexdigest()
+    """Of everything that a part is made of, as far as Python shows it."""
+    digest = hashlib.sha256()
+    made_of = [part if isinstance(part, type) or inspect.isfunction(part) else type(part)]
+    if not isinstance(part, type) and not inspect.isfunction(part):
+        own = vars(part) if hasattr(part, "__dict__") else {}
+        told = {name: value for name, value in own.items() if not name.startswith("_") and name != "unit_source"}
+        made_of += [value for value in told.values() if inspect.isfunction(value)]
+        numbers = {name: value for name, value in told.items() if not inspect.isfunction(value)}
+        digest.update(json.dumps(numbers, sort_keys=True, default=_plain).encode())
+    for each in made_of:
+        digest.update(f"{each.__module__} {each.__qualname__} {_source(each)}".encode())
+    return digest.hexdigest()
 
 
-def _class_source(kind: Any) -> str:
-    try:
-        return inspect.getsource(kind)
-    except (OSError, TypeError):
-        return repr(kind)
+def _plain(value: Any) -> Any:
+    """A value that JSON has no word for."""
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else repr(value)
+
+
+def _source(made_of: Any) -> str:
+    """The source of the file that a class or a function stands in; of itself where it stands in none (a notebook)."""
+    for each in (inspect.getmodule(made_of), made_of):
+        try:
+            return inspect.getsource(each) if each is not None else ""
+        except (OSError, TypeError):
+            continue
+    return repr(made_of)

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any, TypeVar
+
+import numpy as np
 
 from flownav.campaigns.local import record_flown
 from flownav.compile import ONE_LANE, announce_compilation
 from flownav.errors import InputError
+from flownav.measurement import Array
 from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.take import navigator_unit
 from flownav.navigation.told import carries_lag
@@ -23,20 +28,27 @@ from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import Flown, buffers_of, fly_into
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.fault import SensorFault
-from flownav.simulation.plan import OwnParts
+from flownav.simulation.history import column
+from flownav.simulation.plan import Flight, OwnParts
+from flownav.simulation.sensing import EPOCH_S
 
 Part = TypeVar("Part")
 
 
 def fresh(part: Part | type[Part] | Callable[[], Part]) -> Part:
-    """A part that has flown nothing: of a class or a function a new one, of an object a copy."""
-    if isinstance(part, type):
-        new: Part = part()
-        return new
-    if callable(part) and not hasattr(part, "start"):
-        made: Part = part()
-        return made
-    return copy.deepcopy(part)  # type: ignore[return-value]
+    """A part that has flown nothing: of a class or a function a new one, of an object a copy.
+
+    InputError where it cannot be made.
+    """
+    make: Callable[[], Any] = partial(copy.deepcopy, part)
+    if isinstance(part, type) or (callable(part) and not hasattr(part, "start")):
+        make = part
+    try:
+        made: Part = make()
+    except Exception as mistake:
+        said = " ".join(str(mistake).split())
+        raise InputError(f"{name_of(part)}: cannot be made: {type(mistake).__name__}: {said}") from mistake
+    return made
 
 
 def fresh_parts(parts: Parts) -> Parts:
@@ -77,6 +89,24 @@ def names_of(parts: Parts) -> dict[str, Any]:
     return {name: value for name, value in named.items() if value}
 
 
+def require_started(flight: Flight, history: Array, name: str) -> None:
+    """InputError where a filter had said nothing by when it was to be flown on; until it speaks the truth is flown on.
+
+    history: (epochs, len(HISTORY), lanes).
+    """
+    assert flight.table is not None
+    first = math.ceil(flight.plan.handover_s / EPOCH_S) + flight.table.horizon_epochs + 1
+    said = np.isfinite(history[first:, column("horizon", "error_pos_n_m")])
+    if len(said) and not said[0].all():
+        silent = int(np.argmin(said[0]))
+        late = np.flatnonzero(said[:, silent])
+        when = f"spoke first at {(first + late[0]) * EPOCH_S:.2f} s" if len(late) else "never said anything"
+        raise InputError(
+            f"filter {name}: {when}, and is flown on from {flight.plan.handover_s:g} s on: estimate() must say "
+            "something by then"
+        )
+
+
 def fly_parts(
     setup: Setup, parts: Parts, seed: int, index: int, ensemble: Ensemble | None = None,
     fault: SensorFault | None = None, *, written: bool,
@@ -114,4 +144,6 @@ def fly_parts(
         faults = None if fault is None else [fault]
         fly_into(flight, seed, index, ONE_LANE, b, ensemble, faults=faults, instead=instead)
     mistakes.tell()
+    if parts.filter is not None:
+        require_started(flight, b.history, name_of(parts.filter))
     return Flown(b.history, b.tape, b.fed)

@@ -39,7 +39,7 @@ def require(kind: str, part: Any, name: str) -> None:
     lacking = [method for method in METHODS[kind] if not hasattr(part, method)]
     made_later = callable(part) and not isinstance(part, type) and len(lacking) == len(METHODS[kind])
     if lacking and not made_later:
-        raise InputError(f"{kind} {name}: has no {', '.join(lacking)}; see docs: own parts")
+        raise InputError(f"{kind} {name}: has no {', '.join(lacking)}; docs/how-to/own-parts.md says what it must have")
 
 
 def _from_entry_point(kind: str, name: str) -> Any:

@@ -39,6 +39,8 @@ class OwnVehicle:
             self._t_s += dt_s
         rows[:] = self._state[:RIGID]
         seen = self._part.outputs(self._t_s, self._state, controls, around)
+        if not np.isfinite(tuple(seen)).all():
+            raise InputError(f"vehicle {name_of(self._part)}: outputs() gave {tuple(seen)}; finite ones are needed")
         self._work[layout.THRUST], self._work[layout.CONTACT] = seen.thrust_n, seen.contact_force_n
         self._work[layout.POWER] = seen.power_w
 

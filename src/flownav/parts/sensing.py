@@ -18,6 +18,8 @@ from flownav.simulation.navigating import TRUTH, Timetable, first_truth
 from flownav.simulation.sensing import EPOCH_S
 
 STATED = 3
+BEST_QUALITY = 255.0
+MAY_LACK_DOWN = (Sensor.GPS_VELOCITY, Sensor.FLOW_VELOCITY)
 QUALITY, ARRIVED = READING + MAX_VALUES + STATED, READING + MAX_VALUES + STATED + 1
 Take = Callable[..., None]
 
@@ -77,7 +79,7 @@ class OwnReadings:
     def __init__(
         self, parts: Sequence[SensorModel], table: Timetable, b: Buffers, then: Take, mistakes: Mistakes
     ) -> None:
-        kinds = [Sensor(part.sensor) for part in parts]
+        kinds = [_kind(part) for part in parts]
         if len(set(kinds)) < len(kinds) or Sensor.IMU in kinds:
             raise InputError("sensors: one of a kind can be replaced, and the IMU cannot")
         self._parts, self._table, self._b, self._then = dict(zip(kinds, parts, strict=True)), table, b, then
@@ -105,7 +107,7 @@ class OwnReadings:
         nav[ARRIVED] = 0.0 if said is None else 1.0
         if said is not None:
             nav[READING : READING + len(COLUMNS[kind])] = _values(kind, self._parts[kind], said)
-            nav[READING + MAX_VALUES : READING + MAX_VALUES + STATED] = tuple(said.variance)
+            nav[READING + MAX_VALUES : READING + MAX_VALUES + STATED] = _stated(self._parts[kind], said)
             nav[QUALITY] = said.quality
         if k < len(self._b.fed):  # what the record keeps of it
             self._b.fed[k, :, 0] = nav[READING : READING + self._b.fed.shape[1]]
@@ -116,4 +118,25 @@ def _values(kind: Sensor, part: SensorModel, said: Values) -> tuple[float, ...]:
     if len(values) != len(COLUMNS[kind]):
         names = ", ".join(COLUMNS[kind])
         raise InputError(f"sensor {name_of(part)}: read() gave {len(values)} values; {kind.name} has {names}")
+    needed = values[:2] if kind in MAY_LACK_DOWN else values
+    if not np.isfinite(needed).all():
+        raise InputError(f"sensor {name_of(part)}: read() gave {values}; finite values, or None, are needed")
     return values
+
+
+def _stated(part: SensorModel, said: Values) -> tuple[float, ...]:
+    variance = tuple(float(value) for value in said.variance)
+    if len(variance) != STATED or any(value < 0.0 for value in variance):
+        raise InputError(f"sensor {name_of(part)}: variance {variance}: three of 0 or more, NaN for none, are needed")
+    if not 0.0 <= said.quality <= BEST_QUALITY:
+        raise InputError(f"sensor {name_of(part)}: quality {said.quality}: 0 (no data) to 255 is needed")
+    return variance
+
+
+def _kind(part: SensorModel) -> Sensor:
+    """InputError where its `sensor` is none that there is."""
+    try:
+        return Sensor[part.sensor.upper()] if isinstance(part.sensor, str) else Sensor(part.sensor)
+    except (KeyError, ValueError):
+        known = ", ".join(kind.name for kind in Sensor)
+        raise InputError(f"sensor {name_of(part)}: sensor = {part.sensor!r}; one of {known} is needed") from None

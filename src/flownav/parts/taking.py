@@ -113,6 +113,7 @@ class Taker:
         """Innovations onto the tape, as ours are."""
         used = self.tape.used
         for each in news:
+            require_told(self.name, each)
             if used[OFFERED_ROWS] >= len(self.tape.innovation):
                 return
             ratio = each.innovation**2 / (25.0 * each.variance) if each.variance > 0.0 else math.nan
@@ -122,6 +123,15 @@ class Taker:
                 each.variance, ratio, reason,
             )  # fmt: skip
             used[OFFERED_ROWS] += 1
+
+
+def require_told(name: str, each: Innovation) -> None:
+    """InputError where an innovation is no number, or its variance is none."""
+    if not math.isfinite(each.innovation) or not (math.isfinite(each.variance) and each.variance > 0.0):
+        raise InputError(
+            f"{name}: update() gave an innovation of {each.innovation} with variance {each.variance}; finite ones, "
+            "and a variance above 0, are needed"
+        )
 
 
 def checked(name: str, said: Estimate) -> dict[str, Array]:
@@ -136,7 +146,16 @@ def checked(name: str, said: Estimate) -> dict[str, Array]:
             raise InputError(f"{name}: estimate().{key} has shape {array.shape}; ({length},) is needed")
         if not key.startswith("std_") and not np.isfinite(array).all():
             raise InputError(f"{name}: estimate().{key} is not finite: {array.tolist()}")
+        if key.startswith("std_") and (array < 0.0).any():
+            raise InputError(f"{name}: estimate().{key} is below 0: {array.tolist()}; NaN where it states none")
         found[key] = array
+    places = (("ground_d_m", 1), ("pad_ned_m", 3))
+    for key, length in places:
+        value = getattr(said, key)
+        if value is not None:
+            array = np.atleast_1d(np.asarray(value, dtype=float))
+            if array.shape != (length,) or not np.isfinite(array).all():
+                raise InputError(f"{name}: estimate().{key} is {array.tolist()}; {length} finite, or None, is needed")
     if abs(float(np.linalg.norm(found["quaternion"])) - 1.0) > UNIT:
         raise InputError(f"{name}: estimate().quaternion has length {np.linalg.norm(found['quaternion']):.3f}, not 1")
     return found

@@ -162,6 +162,10 @@ def flow_share(record: Record) -> float | None:
 def lacking(record: Record) -> list[str]:
     """What the record does not hold, in words, and what the report can therefore not show."""
     notes = []
+    covered = record.manifest.get("covered_fraction", 1.0)
+    if covered < 0.99:
+        share = f"{100.0 * covered:.0f} %"
+        notes.append(f"The estimate covers {share} of what is scored; its errors are those of that part.")
     gps = readings(record, Sensor.GPS_POSITION) is not None
     if not has(record, "truth"):
         errors = "errors are shown against GPS, which has errors of its own" if gps else "no error can be shown"

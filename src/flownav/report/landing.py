@@ -19,7 +19,7 @@ def landing_sentences(landing: Mapping[str, Any]) -> list[str]:
             f"pad's centre, sinking at {number(contact.get('sink_rate_m_s'), 2)} m/s and drifting at "
             f"{number(contact.get('lateral_speed_m_s'), 2)} m/s."
         )
-    if limited:
+    if limited.get("estimate_m") is not None:
         said.append(
             f"Of that its estimate was off by {metres(limited.get('estimate_m'))} m, its guidance by "
             f"{metres(limited.get('guidance_m'))} m and the pad's place by {metres(limited.get('pad_m'))} m."

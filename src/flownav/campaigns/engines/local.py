@@ -12,15 +12,22 @@ from flownav.campaigns.engines.engine import Part
 from flownav.campaigns.plan import Ready
 from flownav.campaigns.rows import rows_of
 from flownav.simulation.engine import fly_blocks
+from flownav.simulation.plan import Flight
 
 Array = NDArray[np.float64]
 
 
 class Local:
-    """threads: how many fly at once; None: as many as there are cores. instead: as of `fly_blocks`."""
+    """threads: how many fly at once; None: as many as there are cores. instead: as of `fly_blocks`.
 
-    def __init__(self, threads: int | None = None, instead: int | None = None) -> None:
-        self.threads, self.instead = threads, instead
+    check: is given each block's flight and history, and raises where they cannot be judged.
+    """
+
+    def __init__(
+        self, threads: int | None = None, instead: int | None = None,
+        check: Callable[[Flight, Array], None] = lambda flight, history: None,
+    ) -> None:  # fmt: skip
+        self.threads, self.instead, self.check = threads, instead, check
 
     def fly(
         self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
@@ -37,6 +44,7 @@ class Local:
         total = sum(part.flights for part in parts)
 
         def judge(history: Array) -> Array:
+            self.check(flight, history)
             return rows_of(flight, history)
 
         have = 0

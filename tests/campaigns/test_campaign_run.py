@@ -246,7 +246,7 @@ def test_a_stop_that_was_not_reached_is_said(tmp_path):
     [
         (["nowhere"], "no such scenario"),
         (["landing", "--flights", "0"], "--flights"),
-        (["landing", "--sampling", "halton"], "--sampling halton: must be plain, latin or sobol"),
+        (["landing", "--sampling", "halton"], "--sampling halton: choose from plain, latin, sobol"),
         (["landing", "--truth-model", "x"], "--truth-model"),
         (["landing", "--engine", "tpu"], "--engine tpu"),
         (["landing", "--sweep", "wind.speed_20ft_m_s"], "NAME=START:STOP:STEP"),

@@ -84,7 +84,6 @@ def printed(folder: Path, *arguments: str):
 @pytest.mark.parametrize("arguments", [
     ("sample", "--list"),
     ("info", "log"),
-    ("info", "r.fnr"),
     ("replay", "log", "--no-report", "--gps-outage", "5:10"),
     ("replay", "log", "--no-report", "--outage-table", "5:15:5"),
     ("compare", "r.fnr", "r.fnr"),

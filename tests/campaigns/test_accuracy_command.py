@@ -250,9 +250,9 @@ def test_a_multirotor_flies_the_cases_and_is_not_held_against_the_papers_filter(
     [
         (
             ("--cases", "landing,hover"),
-            "--cases hover: no such case; known: takeoff, landing, pad_return, approach, approach_8_m_s",
+            "--cases hover: choose from takeoff, landing, pad_return, approach, approach_8_m_s, all",
         ),
-        (("--cases", ""), "--cases (empty): no such case"),
+        (("--cases", ""), "--cases : choose from takeoff"),
         (("--vehicle", "kite.toml"), "kite.toml"),
         (("--flights", 0), "--flights 0: must be from 1 to"),
         (("--ablations", -1), "--ablations -1: must be from 0 to"),

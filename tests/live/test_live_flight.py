@@ -224,7 +224,7 @@ def test_ctrl_c_leaves_a_complete_record(tmp_path):
     ("options", "said"),
     [
         (["nowhere"], "no link"),
-        (["udp:0", "--send", "everything"], "--send everything: one of odometry, vision, landing-target, none"),
+        (["udp:0", "--send", "everything"], "--send everything: choose from odometry, vision, landing-target, none"),
         (["udp:0", "--system", "0"], "--system 0: must be from 1 to 255"),
         (["udp:0", "--duration", "0"], "--duration 0.0: must be from 0.1"),
         (["udp:0", "--capacity", "10"], "--capacity 10.0: must be from 500.0"),

@@ -308,7 +308,7 @@ def test_the_command_adds_a_table_and_scores_beside_the_filters(flight, tmp_path
     plain = CliRunner().invoke(app, [*arguments, "--no-report", "--json"])
     assert "smoothed" not in json.loads(plain.stdout)
     assert "smoothed" not in Record.load(out).tables
-    answer = CliRunner().invoke(app, [*arguments, "--smooth", "--json"])
+    answer = CliRunner().invoke(app, [*arguments, "--smooth", "--json", "--force"])
     scores = json.loads(answer.stdout)
     assert set(scores["smoothed"]) == {"outages", "velocity_rms_m_s"}
     assert scores["smoothed"]["outages"][0]["t1"] == 26.0

@@ -384,10 +384,10 @@ def test_the_command_prints_the_target(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--camera", "nikon"), "known are wide120, wide60, px4flow"),
-        (("--heights", "low"), "numbers with commas"),
+        (("--camera", "nikon"), "--camera nikon: choose from wide120, wide60, px4flow"),
+        (("--heights", "low"), "--heights low: a number is needed"),
         (("--heights", "0"), "--heights 0"),
-        (("--speeds", "fast"), "--speeds fast: give numbers"),
+        (("--speeds", "fast"), "--speeds fast: a number is needed"),
         (("--frames", "0"), "--frames 0"),
         (("--flights", "1"), "--flights 1"),
         (("--mounting-deg", "9"), "--mounting-deg"),

@@ -254,8 +254,8 @@ def test_a_fit_too_far_from_the_paper_is_a_bad_verdict_and_the_page_says_so(
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("--table", 4), "Tables 1, 2, 3, 5 and 6"),
-        (("--table", 0), "Tables 1, 2, 3, 5 and 6"),
+        (("--table", 4), "--table 4: choose from 1, 2, 3, 5, 6"),
+        (("--table", 0), "--table 0: choose from 1, 2, 3, 5, 6"),
         (("--flights", 0), "--flights 0: must be from 1"),
         (("--seed", -1), "--seed -1: must be from 0"),
     ],

@@ -51,7 +51,7 @@ def complaint(*arguments) -> str:
 def test_json_holds_the_promised_keys_and_nothing_else_is_printed(folder):
     facts = answer(folder, "--gps-outage", "15:25", "--gps-outage", "30:38")
     assert set(facts) == {"duration_s", "outages", "velocity_rms_m_s", "end_drift_m", "consistency", "coverage",
-                          "rejected", "readings", "warnings", "record", "protection"}  # fmt: skip
+                          "rejected", "readings", "warnings", "record", "protection", "schema"}  # fmt: skip
     assert facts["warnings"] == []
     assert facts["duration_s"] == pytest.approx(39.98)
     assert [(o["t0"], o["t1"]) for o in facts["outages"]] == [(15.0, 25.0), (30.0, 38.0)]
@@ -142,9 +142,9 @@ def test_a_sensor_that_falls_silent_is_a_warning_in_all_that_is_said(hall):
     lines = (hall / "range.csv").read_text().splitlines()
     (hall / "range.csv").write_text("\n".join(lines[:501]) + "\n")
     said = "range ends at 24.9 s of 40.0 s"
-    assert answer(hall)["warnings"] == [said]
+    assert answer(hall, "--force")["warnings"] == [said]
     assert said in Record.load(Path("out/hall.fnr")).tables["events"]["detail"].tolist()
-    told = call(hall)
+    told = call(hall, "--force")
     assert told.exception is None  # a warning is no bad verdict
     assert f"Warning: {said}" in told.stdout
     assert "Sensors and their innovations" in told.stdout

@@ -64,7 +64,8 @@ def one_of(
     def checked(context: typer.Context, parameter: typer.CallbackParam, given: Any) -> Any:
         if not context.resilient_parsing and not beside:
             for word in given if isinstance(given, list) else [given]:
-                for part in str(word).split(",") if isinstance(given, list) else [word]:
+                for each in str(word).split(",") if isinstance(given, list) else [word]:
+                    part = each.strip() if isinstance(each, str) else each
                     if part is not None and part not in names and part not in also():
                         raise InputError(f"{_name_of(parameter)} {part}: choose from {', '.join((*names, *also()))}")
         return given

@@ -30,7 +30,8 @@ COUNTS = (
 )
 # objects whose keys are names of sensors, reasons, figures or files
 KEYED = ("rejected", "readings", "consistency", "coverage", "sources", "paper_percentile", "rmse_over_bound", "drawn",
-         "error_over_stated", "states", "limits", "hashes", "inputs", "settings", "heard", "verdicts")  # fmt: skip
+         "error_over_stated", "states", "limits", "vehicle_numbers", "told", "hashes", "inputs", "settings", "heard",
+         "verdicts")  # fmt: skip
 
 
 def kind_of(value: Any) -> str:

@@ -12,6 +12,7 @@ from tempfile import mkdtemp
 from typing import Any
 
 from flownav.errors import InputError
+from flownav.guard import written_whole
 from flownav.toml_text import to_toml
 
 Entries = dict[str, Any]
@@ -68,3 +69,13 @@ def _folder() -> Path:
     folder = Path(mkdtemp(prefix="flownav-"))
     atexit.register(rmtree, folder, ignore_errors=True)
     return folder
+
+
+def saved(entries: Mapping[str, Any], path: Path) -> Path:
+    """Write nested dictionaries as a TOML file, whole or not at all. InputError where it cannot be written there."""
+    try:
+        with written_whole(path) as temporary:
+            temporary.write_text(f"# written by flownav\n{to_toml(entries)}", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another path") from error
+    return path

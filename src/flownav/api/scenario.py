@@ -6,16 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from flownav.api.changing import merged, plain_entries
+from flownav.api.changing import merged, plain_entries, saved
 from flownav.api.sensor import Sensor
 from flownav.api.vehicle import Vehicle
-from flownav.errors import InputError
-from flownav.guard import written_whole
 from flownav.parameter_files import check
 from flownav.simulation.dispersion import SHIPPED as SHIPPED_DISPERSION
 from flownav.simulation.scenario import Scenario as File
 from flownav.simulation.scenario import load_scenario
-from flownav.toml_text import to_toml
 from flownav.vehicle.loading import SHIPPED_NAMES
 
 WORDS = {"gps": "model", "filter": "name", "vehicle": "file", "autopilot": "feedback"}  # what one word for a table says
@@ -113,14 +110,8 @@ class Scenario:
             >>> flownav.Scenario.load(scenario.save(folder / "midg.toml")) == scenario
             True
         """
-        path = Path(path)
         entries = plain_entries(_with_whole_paths(self.file.model_dump(exclude_unset=True)))
-        try:
-            with written_whole(path) as temporary:
-                temporary.write_text(f"# written by flownav\n{to_toml(entries)}", encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written ({error.strerror}); give another path") from error
-        return path
+        return saved(entries, Path(path))
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Scenario) and self.file == other.file

@@ -5,11 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from flownav.api.changing import kept_file, merged
-from flownav.errors import InputError
-from flownav.guard import written_whole
+from flownav.api.changing import kept_file, merged, saved
 from flownav.parameter_files import read_toml
-from flownav.toml_text import to_toml
 from flownav.vehicle.kinds import AnyFile, flattened, require_flyable
 from flownav.vehicle.loading import read_kind, vehicle_file
 
@@ -85,13 +82,7 @@ class Vehicle:
             >>> flownav.Vehicle.load(mine.save(folder / "mine.toml")).file == mine.file
             True
         """
-        path = Path(path)
-        try:
-            with written_whole(path) as temporary:
-                temporary.write_text(f"# written by flownav\n{to_toml(self.entries)}", encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written ({error.strerror}); give another path") from error
-        return path
+        return saved(self.entries, Path(path))
 
     def file_path(self) -> Path:
         """A file with this vehicle, for a scenario to name: its own, or one that lasts as long as this process.

@@ -26,11 +26,11 @@ from flownav.report import (
     phase_rows,
     sensor_rows,
 )
-from flownav.report.figures_path import paths_of
+from flownav.report.figures_path import Paths, paths_of
 from flownav.report.page_data import Columns, paths_data, sections_data
 from flownav.report.panels import Panel, Section
 from flownav.report.samples import DOT_POINTS, LINE_POINTS
-from flownav.report.series import first_pad_fix_s, has, mapping, moments, outages, start_end_s
+from flownav.report.series import Window, first_pad_fix_s, has, mapping, moments, outages, start_end_s
 from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
 from flownav.scoring.phases import Phase, phases_of
 
@@ -101,20 +101,8 @@ def _sections(record: Record) -> list[tuple[str, str, list[Panel]]]:
 
 def render(record: Record) -> str:
     """The page as text."""
-    from markupsafe import Markup
-
     shown = sections(record)
     found = phases_of(record)
-    scripts = [(HERE / name).read_text(encoding="utf-8") for name in RECORD_SCRIPTS]
-    columns, whole = Columns(), start_end_s(record)
-    facts = flight_facts(record, found)
-    charts = sections_data(shown, columns, whole)
-    data = {
-        "facts": facts,
-        "charts": charts,
-        "views": paths_data(paths_of(record), columns),
-        "columns": {"steps": columns.steps, "counts": columns.counts},
-    }
     page: str = template("page.html.j2").render(
         title=content.title(record),
         kind=str(record.manifest.get("kind") or "flight"),
@@ -138,18 +126,33 @@ def render(record: Record) -> str:
         parameters=content.groups(record.manifest.get("parameters")),
         provenance=content.groups(record.manifest.get("provenance")),
         command=content.command(record),
-        sections=shown,
-        heights=heights_px(charts),
-        facts_data=facts,
-        record_data=Markup(inside_script(json.dumps(data))),
-        record_columns=Markup(columns.text()),
-        palette=PALETTE,
-        font=Markup(FONT),
-        style=Markup("\n".join((HERE / name).read_text(encoding="utf-8") for name in RECORD_STYLES)),
-        scripts=[Markup(script) for script in scripts],
-        policy=content_policy(scripts),
+        **linked_with(shown, flight_facts(record, found), paths_of(record), start_end_s(record)),
     )
     return page
+
+
+def linked_with(shown: list[Section], facts: dict[str, Any], paths: Paths | None, window: Window) -> dict[str, Any]:
+    """What a page whose panels share an instant is given: sections, their data once, style, scripts, content policy."""
+    from markupsafe import Markup
+
+    scripts = [(HERE / name).read_text(encoding="utf-8") for name in RECORD_SCRIPTS]
+    columns = Columns()
+    charts = sections_data(shown, columns, window)
+    views = paths_data(paths, columns)
+    packed = {"steps": columns.steps, "counts": columns.counts}
+    data = {"facts": facts, "charts": charts, "views": views, "columns": packed}
+    return {
+        "sections": shown,
+        "heights": heights_px(charts),
+        "facts_data": facts,
+        "record_data": Markup(inside_script(json.dumps(data))),
+        "record_columns": Markup(columns.text()),
+        "palette": PALETTE,
+        "font": Markup(FONT),
+        "style": Markup("\n".join((HERE / name).read_text(encoding="utf-8") for name in RECORD_STYLES)),
+        "scripts": [Markup(script) for script in scripts],
+        "policy": content_policy(scripts),
+    }
 
 
 def flight_facts(record: Record, found: Sequence[Phase]) -> dict[str, Any]:

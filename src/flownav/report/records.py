@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -13,20 +12,13 @@ from flownav.record import Record
 from flownav.report.chart import Stack
 from flownav.report.figures_path import Paths, View, paths_of
 from flownav.report.html import (
-    HERE,
-    RECORD_SCRIPTS,
-    RECORD_STYLES,
-    content_policy,
     flight_facts,
-    heights_px,
-    inside_script,
+    linked_with,
     template,
 )
-from flownav.report.page_data import Columns, paths_data, sections_data
 from flownav.report.panels import Panel, Section
 from flownav.report.samples import Array, sliding_mean
 from flownav.report.series import Track, Window, start_end_s
-from flownav.report.style import FONT, PALETTE
 from flownav.scoring.phases import phases_of
 
 ROLES = tuple(f"record-{k}" for k in range(1, 7))
@@ -48,34 +40,17 @@ def write_records(
 
 def render(named: Named, errors: Errors, headings: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
     """The page as text."""
-    from markupsafe import Markup
-
     first = named[0][1]
     window = _window([record for _, record in named])
     shown = [section for section in _sections(named, errors, window) if section.panels]
-    scripts = [(HERE / name).read_text(encoding="utf-8") for name in RECORD_SCRIPTS]
-    columns, together = Columns(), _together(named)
-    charts = sections_data(shown, columns, window)
     facts = flight_facts(first, phases_of(first)) | {"t0": window[0], "t1": window[1], "name": "records"}
-    views = paths_data(together, columns)
-    packed = {"steps": columns.steps, "counts": columns.counts}
-    data = {"facts": facts, "charts": charts, "views": views, "columns": packed}
     page: str = template("records.html.j2").render(
         names=[name for name, _ in named],
         roles=[role_of(k) for k in range(len(named))],
         headings=headings,
         lines=lines,
         version=__version__,
-        sections=shown,
-        heights=heights_px(charts),
-        facts_data=facts,
-        record_data=Markup(inside_script(json.dumps(data))),
-        record_columns=Markup(columns.text()),
-        palette=PALETTE,
-        font=Markup(FONT),
-        style=Markup("\n".join((HERE / name).read_text(encoding="utf-8") for name in RECORD_STYLES)),
-        scripts=[Markup(script) for script in scripts],
-        policy=content_policy(scripts),
+        **linked_with(shown, facts, _together(named), window),
     )
     return page
 

@@ -19,6 +19,8 @@ number of threads.
 
 from __future__ import annotations
 
+from typing import Any
+
 from flownav.compiling.beside import compile_beside
 from flownav.compiling.bundles import FlatAccess, flat_access, lane_access, passing, replacing, stepping, write_function
 from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
@@ -29,8 +31,11 @@ from flownav.compiling.scalars import bits_from_float, clamp, float_from_bits, l
 from flownav.compiling.strided import WARP, strided
 from flownav.compiling.units import Unit, unit
 
-ONE_LANE: tuple[int, ...] = (0,)
-LANES: tuple[int, ...] = (0,) * LANES_WIDE
+Work = Any  # the lane buffer: a flat float64 array in Python, the address of its first element in kernels (`pointer`)
+Lanes = tuple[int, ...]  # how many lanes a kernel has, as part of a type: `len(lanes)` is a compile-time constant
+
+ONE_LANE: Lanes = (0,)
+LANES: Lanes = (0,) * LANES_WIDE
 
 __all__ = [
     "LANES",
@@ -38,9 +43,11 @@ __all__ = [
     "ONE_LANE",
     "WARP",
     "FlatAccess",
+    "Lanes",
     "NoDeviceError",
     "Runner",
     "Unit",
+    "Work",
     "announce_compilation",
     "bits_from_float",
     "clamp",

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from flownav.compile import kernel
+from flownav.compile import Lanes, Work, kernel
 from flownav.estimation import paper_filter
-from flownav.estimation.kalman import Lanes, Work, kalman_row_count, kalman_rows
+from flownav.estimation.kalman import kalman_row_count, kalman_rows
 from flownav.estimation.paper_filter import INPUTS, STATES, PaperModel
 
 FILTER = kalman_rows(0, STATES)

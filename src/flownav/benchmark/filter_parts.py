@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.benchmark.landing_loop import ARRIVED, ATTITUDE_READ, POSITION_READ, RANGE_READ, ROWS
-from flownav.compile import kernel, pointer
+from flownav.compile import Lanes, Work, kernel, pointer
 from flownav.estimation.covariance import at, correct, expect, settle
 from flownav.estimation.error_models import FilterSettings, propagate_gauss_markov, propagate_walks
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.flow import flow_rate
 from flownav.estimation.motion import errors_in_motion, predict
 from flownav.estimation.states import (

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from flownav.compile import equation, kernel, pointer
-from flownav.estimation.covariance import Lanes, Work, expect, settle
+from flownav.compile import Lanes, Work, equation, kernel, pointer
+from flownav.estimation.covariance import expect, settle
 from flownav.estimation.error_models import FilterSettings, propagate_errors
 from flownav.estimation.lag import FlowLag, lag_ends, lag_starts
 from flownav.estimation.laws.attitude import attitude

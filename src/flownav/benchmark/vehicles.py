@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from flownav.benchmark.timing import best_of
 from flownav.campaigns.local import fly_many
-from flownav.compile import LANES, kernel, pointer, procedure, unit
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import LANES, Lanes, Work, kernel, pointer, procedure, unit
 from flownav.navigation.take import UNIT_SIGNATURE
 from flownav.navigation.tape import room_of
 from flownav.simulation import layout

@@ -8,12 +8,12 @@ noise is the joint update and inverts nothing. A lane that is not offered a read
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, procedure
+from flownav.compile import Lanes, Work, equation, procedure
 from flownav.estimation.states import (
     ACCEPTED,
     ATTITUDE,
@@ -40,9 +40,6 @@ from flownav.estimation.states import (
     STATES_WITH_LAG,
     TEST_RATIO,
 )
-
-Work = Any  # a flat float64 array in Python, the address of its first element in kernels (`compile.pointer`)
-Lanes = tuple[int, ...]
 
 LARGEST_VARIANCE = 1e30
 

@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, procedure
-from flownav.estimation.covariance import Lanes, Work, add_noise, decay
+from flownav.compile import Lanes, Work, equation, procedure
+from flownav.estimation.covariance import add_noise, decay
 from flownav.estimation.states import (
     ACCEL_BIAS,
     BARO,

@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, larger, procedure
-from flownav.estimation.covariance import Lanes, Work, at
+from flownav.compile import Lanes, Work, equation, larger, procedure
+from flownav.estimation.covariance import at
 from flownav.estimation.states import (
     ACCEPTED,
     CROSS,

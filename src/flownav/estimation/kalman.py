@@ -14,10 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation
-
-Work = NDArray[np.float64]
-Lanes = tuple[int, ...]
+from flownav.compile import Lanes, Work, equation
 
 
 class KalmanRows(NamedTuple):

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, procedure
-from flownav.estimation.covariance import Lanes, Work, columns_of
+from flownav.compile import Lanes, Work, equation, procedure
+from flownav.estimation.covariance import columns_of
 from flownav.estimation.discretise import discretised
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.law import step

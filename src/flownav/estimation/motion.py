@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, procedure
-from flownav.estimation.covariance import Lanes, Work, add_noise, at, columns_of
+from flownav.compile import Lanes, Work, equation, procedure
+from flownav.estimation.covariance import add_noise, at, columns_of
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.hypotheses import push
 from flownav.estimation.law import step

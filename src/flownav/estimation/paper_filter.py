@@ -14,11 +14,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation
+from flownav.compile import Lanes, Work, equation
 from flownav.estimation.kalman import (
     KalmanRows,
-    Lanes,
-    Work,
     correct_covariance_short,
     correct_state,
     propagate_covariance,

@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import ONE_LANE, equation, kernel, pointer
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import ONE_LANE, Lanes, Work, equation, kernel, pointer
 from flownav.estimation.law import compiled
 from flownav.estimation.motion import strapdown
 from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, POSITION, QUATERNION, STATE, VELOCITY

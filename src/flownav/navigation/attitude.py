@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, larger, procedure
+from flownav.compile import Lanes, Work, equation, larger, procedure
 from flownav.estimation.covariance import consider, consider_none, variance_of
 from flownav.estimation.hypotheses import HEADING_OFF, sign_all
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading, level
 from flownav.estimation.laws.geometry import component
 from flownav.estimation.motion import rotation_of

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, procedure, smaller
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import Lanes, Work, equation, procedure, smaller
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, FORCE, STATE
 from flownav.navigation.course import LEAST_TRAVEL_M, judge_course, turn_between, turn_heading, with_gps
 from flownav.navigation.journal import reset_state

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, procedure
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import Lanes, Work, equation, procedure
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import ATTITUDE, QUATERNION
 from flownav.frames import heading_cosine_sine, quaternion_product, velocity_from_flow

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, larger, procedure, replacing, smaller
+from flownav.compile import Lanes, Work, equation, larger, procedure, replacing, smaller
 from flownav.estimation.covariance import add_noise_lane, consider, covariance_of, variance_of
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.flow import body_velocity, flow_rate, lens_range_of
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import (

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, larger, procedure, smaller
+from flownav.compile import Lanes, Work, equation, larger, procedure, smaller
 from flownav.estimation.covariance import covariance_of, expect, states_of, variance_of
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.laws.still import pad_below
 from flownav.estimation.states import (

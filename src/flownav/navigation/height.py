@@ -6,10 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, procedure, smaller
+from flownav.compile import Lanes, Work, equation, procedure, smaller
 from flownav.estimation.covariance import expect, variance_of
 from flownav.estimation.hypotheses import RANGE_OFFSET, sign_all
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.height import baro_altitude, range_along_boresight
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import (

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, procedure
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import Lanes, Work, equation, procedure
 from flownav.estimation.states import ACCEL_NOISE, FORCE, GYRO_NOISE, IMU
 from flownav.navigation.memory import (
     CLOCK,

@@ -5,9 +5,8 @@ A journal of no rows is written nowhere and only counts; that is what a run with
 
 from __future__ import annotations
 
-from flownav.compile import procedure
+from flownav.compile import Lanes, Work, procedure
 from flownav.estimation.covariance import covariance_of, forget_lane, states_of
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import (
     COEFFICIENT,
     FORCE,

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation
+from flownav.compile import Lanes, Work, equation
 from flownav.estimation.covariance import forget_lane
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.lag import FlowLag, lag_of_step
 from flownav.estimation.laws.flow import lagged_flow, lagged_flow_rate
 from flownav.estimation.states import FLOW_LAG, STATE, STATES_WITH_LAG

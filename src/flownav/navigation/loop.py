@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import ONE_LANE, equation, invoke, kernel, pointer
-from flownav.estimation.kalman import Work
+from flownav.compile import ONE_LANE, Work, equation, invoke, kernel, pointer
 from flownav.measurement import MAX_VALUES, Array, EventQueue
 from flownav.navigation.memory import CLOCK, READING, new_work
 from flownav.navigation.packed import pack

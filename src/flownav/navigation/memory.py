@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, lane_access
+from flownav.compile import Lanes, Work, equation, lane_access
 from flownav.estimation.hypotheses import COUNT as FAULTS_FOLLOWED
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import CONSIDERS, FILTER_ROWS, HYPOTHESES, MOST_HYPOTHESES, QUATERNION, SHARE, Rows
 from flownav.measurement import Array, Sensor
 from flownav.navigation.records import (

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, procedure
+from flownav.compile import Lanes, Work, equation, procedure
 from flownav.estimation.covariance import expect, settle, states_of
 from flownav.estimation.hypotheses import weigh
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import ACCEPTED, MEASURED, NOISE, OFFERED
 from flownav.measurement import Sensor
 from flownav.navigation.journal import note_correction

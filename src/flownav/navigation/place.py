@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, procedure
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import Lanes, Work, equation, procedure
 from flownav.estimation.laws.pad import pad_fix
 from flownav.estimation.laws.still import pad_below, position_itself, velocity_itself
 from flownav.estimation.motion import rotation_of

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, larger, procedure, smaller
+from flownav.compile import Lanes, Work, equation, larger, procedure, smaller
 from flownav.estimation.covariance import covariance_of, states_of
 from flownav.estimation.hypotheses import (
     COUNT,
@@ -33,7 +33,6 @@ from flownav.estimation.hypotheses import (
     sign_all,
     size_of,
 )
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import (
     HYPOTHESES,

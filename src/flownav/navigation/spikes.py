@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, larger, procedure, smaller
+from flownav.compile import Lanes, Work, equation, larger, procedure, smaller
 from flownav.estimation.covariance import add_noise_lane
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import ATTITUDE, VELOCITY
 from flownav.navigation.inertial import sound
 from flownav.navigation.memory import (

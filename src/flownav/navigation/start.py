@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, procedure
+from flownav.compile import Lanes, Work, equation, procedure
 from flownav.estimation.covariance import lagged, place, states_of
 from flownav.estimation.hypotheses import COUNT, begin_lane_anew
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, FORCE, POSITION, QUATERNION, RATE, STATE, STATES, VELOCITY
 from flownav.frames import GRAVITY_M_S2, Quaternion, quaternion_from_euler, rotation_from_quaternion
 from flownav.measurement import Sensor

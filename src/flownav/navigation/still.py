@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, larger, procedure, smaller
+from flownav.compile import Lanes, Work, equation, larger, procedure, smaller
 from flownav.estimation.covariance import add_noise_lane, consider_none, variance_of
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.laws.geometry import component
 from flownav.estimation.laws.still import gyro_at_rest, velocity_itself
 from flownav.estimation.states import ACCEL_BIAS, STATE, VELOCITY

@@ -13,10 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, pointer, procedure
+from flownav.compile import Lanes, Work, equation, pointer, procedure
 from flownav.estimation.covariance import covariance_of, variance_of
 from flownav.estimation.hypotheses import NAMES as FAULTS
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import (
     ATTITUDE,

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger, procedure
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import Lanes, Work, clamp, equation, larger, procedure
 from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE, NOISE
 from flownav.navigation.memory import (
     ACCEL_FACTOR,

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger, procedure, smaller
+from flownav.compile import Lanes, Work, clamp, equation, larger, procedure, smaller
 from flownav.estimation.covariance import add_noise_lane
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, POSITION, STATE, VELOCITY
 from flownav.navigation.memory import MOVING, load_imu, load_start, store_imu
 from flownav.navigation.records import ImuMemory, Reading

@@ -14,10 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import ONE_LANE, Unit, equation, lane_access, stepping, unit
+from flownav.compile import ONE_LANE, Lanes, Unit, Work, equation, lane_access, stepping, unit
 from flownav.errors import InputError
 from flownav.estimation.covariance import place
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import (
     ACCEL_BIAS,
     COLUMNS,

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, lane_access, larger, magnitude
+from flownav.compile import Lanes, equation, lane_access, larger, magnitude
 from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, STATES, STATISTICS
 from flownav.scoring.touchdown import (
@@ -27,7 +27,6 @@ from flownav.scoring.touchdown import (
 )
 
 Rows = NDArray[np.float64]
-Lanes = tuple[int, ...]
 
 ROLLED_OVER = float(np.cos(np.radians(ROLLED_OVER_DEG)))
 STILL_RAD_S = float(np.radians(STILL_DEG_S))

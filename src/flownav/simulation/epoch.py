@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, invoke, procedure
+from flownav.compile import Lanes, Work, equation, invoke, procedure
 from flownav.control.autopilot import AutopilotState, Estimate, inner_loop, landing_logic, outer_loop
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Reference
-from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import GRAVITY_M_S2, Quaternion, Rotation, quaternion_product, rotation_from_quaternion
 from flownav.measurement import Sensor
 from flownav.sensors.beam import ground_height

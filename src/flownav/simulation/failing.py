@@ -12,8 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, lane_access, procedure
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import Lanes, Work, equation, lane_access, procedure
 from flownav.measurement import Sensor
 from flownav.navigation.records import Reading
 from flownav.simulation import layout

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation
+from flownav.compile import Lanes, Work, equation
 from flownav.estimation import paper_filter
-from flownav.estimation.kalman import Lanes, Work, start
+from flownav.estimation.kalman import start
 from flownav.estimation.paper_filter import STATES, PaperModel
 from flownav.simulation import layout
 

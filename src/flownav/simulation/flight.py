@@ -10,10 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, invoke, kernel, pointer
+from flownav.compile import Lanes, Work, equation, invoke, kernel, pointer
 from flownav.control.autopilot import grounded, hovering
 from flownav.control.guidance import Reference, reference_at
-from flownav.estimation.kalman import Lanes, Work
 from flownav.navigation.tape import Output, output_of
 from flownav.simulation import layout
 from flownav.simulation.draws import Noise, key_lanes, put_start

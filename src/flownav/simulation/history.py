@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation
+from flownav.compile import Lanes, Work, equation
 from flownav.control.guidance import Reference
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.paper_filter import STATES
 from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY

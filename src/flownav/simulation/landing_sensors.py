@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, procedure, replacing
+from flownav.compile import Lanes, Work, equation, procedure, replacing
 from flownav.control.autopilot import AutopilotState
 from flownav.control.go_around import Knowledge
-from flownav.estimation.kalman import Lanes, Work
 from flownav.frames import rotation_from_quaternion
 from flownav.optics.shutter import image_rate_rad_s
 from flownav.sensors.pad_camera import read_pad_camera, stated_fix

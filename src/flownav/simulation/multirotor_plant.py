@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from flownav.compile import equation
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import Lanes, Work, equation
 from flownav.simulation.layout import (
     load_around,
     load_controls,

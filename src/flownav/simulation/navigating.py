@@ -11,11 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, invoke, larger, procedure
+from flownav.compile import Lanes, Work, equation, invoke, larger, procedure
 from flownav.control.go_around import Knowledge
 from flownav.control.guidance import Reference
 from flownav.estimation.covariance import covariance_of, variance_of
-from flownav.estimation.kalman import Lanes, Work
 from flownav.estimation.states import GROUND, PAD, POSITION, QUATERNION, STATE, VELOCITY
 from flownav.frames import quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.navigation.ahead import carried, coasted, state_of

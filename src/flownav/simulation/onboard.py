@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import Lanes, Work, equation
 from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.sensors.barometer import BarometerParameters, BarometerTruth
 from flownav.sensors.beam import BeamHit, Ground, beam_distance, ground_height

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import Lanes, Work, equation
 from flownav.simulation import layout
 from flownav.simulation.layout import (
     load_around,

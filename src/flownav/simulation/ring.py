@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, lane_access
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import Lanes, Work, equation, lane_access
 from flownav.navigation.memory import READING
 from flownav.navigation.records import Reading
 from flownav.simulation import layout

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, procedure
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import Lanes, Work, equation, procedure
 from flownav.frames import rotation_from_quaternion
 from flownav.measurement import Sensor
 from flownav.navigation.records import Reading

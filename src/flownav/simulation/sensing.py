@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import Lanes, Work, equation
 from flownav.frames import quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.sensors.angular_flow import angular_flow
 from flownav.sensors.flow import FlowParameters, engage_flow, read_flow, start_flow

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, procedure, replacing
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import Lanes, Work, equation, procedure, replacing
 from flownav.frames import Rotation, rotation_from_quaternion, to_earth
 from flownav.sensors.beam import Ground, ground_height, roughness, stepped
 from flownav.simulation import layout

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from flownav.compile import lane_access, procedure
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import Lanes, Work, lane_access, procedure
 from flownav.frames import rotation_from_quaternion
 from flownav.sensors.barometer import BarometerStartNormals, BarometerUnit, draw_barometer, start_barometer
 from flownav.sensors.flow_camera import FlowCameraStartNormals, FlowCameraUnit, draw_flow_camera, start_flow_camera

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import ONE_LANE, WARP, equation, pointer, procedure, strided
-from flownav.estimation.kalman import Lanes, Work
+from flownav.compile import ONE_LANE, WARP, Lanes, Work, equation, pointer, procedure, strided
 from flownav.navigation.take import navigate
 from flownav.navigation.tape import Output, output_of
 from flownav.scoring.running import RUNNING_ROWS, Shown, begin_scores, note_shown, write_scores

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation
-from flownav.estimation.covariance import Lanes, Work
+from flownav.compile import Lanes, Work, equation
 from flownav.estimation.law import law
 from flownav.estimation.laws.geometry import body_axis, component, cross, lens_range
 from flownav.estimation.motion import rotation_of

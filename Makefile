@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-gpu test-slow long-log fuzz mutants league integrity rare validate report-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
+.PHONY: demo test test-gpu test-slow long-log fuzz mutants league integrity rare validate weigh digests report-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr --force
@@ -38,6 +38,12 @@ rare: $(VENV)/.ready
 
 validate: $(VENV)/.ready
 	FLOWNAV_DATA=$${FLOWNAV_DATA:-../shared/data} $(BIN)/flownav validate --out docs/explanation/validation.md --force
+
+weigh: $(VENV)/.ready
+	$(BIN)/python tools/weigh.py
+
+digests: $(VENV)/.ready
+	$(BIN)/python tools/digests.py $(DIGESTS)
 
 report-size: $(VENV)/.ready-test
 	$(BIN)/python tools/report_size.py $(RECORDS)

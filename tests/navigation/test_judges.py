@@ -8,11 +8,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from flownav.estimation.states import BARO
 from flownav.navigation.attitude import heading_variance, judge_attitude, magnetic_heading
 from flownav.navigation.flow_judge import View, judge_flow, turning_of
 from flownav.navigation.flow_noise import alike, flow_variance, followed_agreement, lasting_doubt, wrong_since
 from flownav.navigation.gps import judge_gps, judge_rejections
-from flownav.navigation.height import Height, judge_baro, judge_range, range_variance, repeats
+from flownav.navigation.height import judge_baro, range_variance, range_verdict, repeats
 from flownav.navigation.inertial import motion_between, said_by, sound
 from flownav.navigation.offers import usable, usable_in_flight
 from flownav.navigation.place import component_of, judge_pad
@@ -31,15 +32,19 @@ from flownav.navigation.reasons import (
     TILTED,
 )
 from flownav.navigation.records import (
+    BaroMemory,
     FlowMemory,
     HeadingMemory,
     ImuMemory,
     RangeMemory,
     Reading,
     RejectionMemory,
+    StartMemory,
 )
 from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.tape import BARO_FOUND
 from flownav.navigation.told import NO_HEADING, Equipment
+from flownav.navigation.verdicts import Event, Height, Offer, Position, Reset
 from flownav.navigation.vibration import followed_vibration, vibration_beyond, with_reading
 
 NAN = math.nan
@@ -209,8 +214,8 @@ def test_innovations_are_alike_where_they_are_wrong_in_the_same_way_and_not_wher
 # -- height --------------------------------------------------------------------------------------------------
 def test_a_range_states_its_variance_or_has_a_floor_and_a_share():
     m, height = range_memory(), Height(-2.0, 0.1, 1.0)
-    stated = judge_range(reading(2.0, variance=(0.25,)), 1.0, 1.0, height, False, m, TOLD.height)
-    modelled = judge_range(reading(2.0), 1.0, 1.0, height, False, m, TOLD.height)
+    stated = range_verdict(reading(2.0, variance=(0.25,)), 1.0, 1.0, height, False, m, TOLD.height)
+    modelled = range_verdict(reading(2.0), 1.0, 1.0, height, False, m, TOLD.height)
     assert stated[:2] == (FUSED, 0.25)
     assert modelled[:2] == (FUSED, pytest.approx(0.05**2 + 0.04**2))
 
@@ -226,7 +231,7 @@ def range_memory(**parts) -> RangeMemory:
 ])  # fmt: skip
 def test_verdicts_on_a_range(range_m, upright, reason):
     height = Height(-2.0, 0.1, upright)
-    assert judge_range(reading(range_m), 1.0, 1.0, height, False, range_memory(), TOLD.height)[0] == reason
+    assert range_verdict(reading(range_m), 1.0, 1.0, height, False, range_memory(), TOLD.height)[0] == reason
 
 
 def test_a_range_that_repeats_itself_weighs_ever_less_and_is_stuck_once_the_vehicle_has_moved():
@@ -235,7 +240,7 @@ def test_a_range_that_repeats_itself_weighs_ever_less_and_is_stuck_once_the_vehi
         m, reasons, variances = range_memory(taken_s=9.9), [], []
         for t_s in (10.0, 10.2, 10.4, 10.5, 10.6):
             height = Height(-2.0 if t_s == 10.0 else -2.0 - climb_m, 0.1, 1.0)
-            reason, variance, m = judge_range(reading(2.0), t_s, 1.0, height, False, m, TOLD.height)
+            reason, variance, m = range_verdict(reading(2.0), t_s, 1.0, height, False, m, TOLD.height)
             reasons.append(reason)
             variances.append(variance)
         assert reasons == verdicts
@@ -243,7 +248,7 @@ def test_a_range_that_repeats_itself_weighs_ever_less_and_is_stuck_once_the_vehi
         assert variances[0] == pytest.approx(fresh)
         assert variances[2] == pytest.approx(fresh + 0.4**2)  # 1 m/s may have gone unseen
         assert (m.last_m, m.same_s, m.down_m) == (2.0, 10.0, -2.0)
-    reason, variance, m = judge_range(reading(2.001), 10.7, 1.0, height, False, m, TOLD.height)
+    reason, variance, m = range_verdict(reading(2.001), 10.7, 1.0, height, False, m, TOLD.height)
     assert (reason, m.same_s) == (FUSED, 10.7)
     assert variance < 0.005
 
@@ -254,7 +259,7 @@ def test_a_range_that_says_the_same_from_the_first_on_or_for_long_is_no_news():
     for memory, refused_from in ((range_memory(), 0.5), (range_memory(taken_s=9.9), 2.0)):
         m, reasons = memory, {}
         for t_s in np.arange(10.0, 12.6, 0.1):
-            reasons[t_s], _, m = judge_range(reading(2.0), float(t_s), 1.0, height, False, m, TOLD.height)
+            reasons[t_s], _, m = range_verdict(reading(2.0), float(t_s), 1.0, height, False, m, TOLD.height)
         stuck = [t_s - 10.0 for t_s, reason in reasons.items() if reason == STUCK]
         assert min(stuck) == pytest.approx(refused_from, abs=0.11)
         assert len(stuck) == sum(t_s - 10.0 >= min(stuck) for t_s in reasons)
@@ -272,9 +277,16 @@ def test_the_only_range_is_believed_until_the_height_travels():
 
 
 def test_pressure_height():
-    assert judge_baro(reading(100.0), 1.0, TOLD.height) == (FUSED, 1.0)
-    assert judge_baro(reading(100.0, variance=(0.04,)), 1.0, TOLD.height) == (FUSED, 0.04)
-    assert judge_baro(reading(100.0), 0.0, TOLD.height)[0] == SILENT
+    def judged(given: Reading, known: float = 1.0, started: float = 1.0):
+        start = StartMemory(*[started, *StartMemory()[1:]])
+        return judge_baro.law(given, start, Position(0.0, 0.0, -3.0), BaroMemory(known), s=TOLD.height)
+
+    assert judged(reading(100.0)) == (BaroMemory(1.0), (-1, 97.0, 1e4), (-1, 97.0), Offer(100.0, 1.0, FUSED))
+    assert judged(reading(100.0, variance=(0.04,))).offer == Offer(100.0, 0.04, FUSED)
+    assert judged(reading(100.0), started=0.0).offer.reason == SILENT
+    first = judged(reading(100.0), known=0.0)
+    assert (first.baro, first.reset, first.found) == (BaroMemory(1.0), Reset(BARO, 97.0, 1e4), Event(BARO_FOUND, 97.0))
+    assert judged(reading(NAN), known=0.0).baro == BaroMemory(0.0)
 
 
 # -- attitude and heading --------------------------------------------------------------------------------------

@@ -11,10 +11,9 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from types import FunctionType
 from typing import Any, Protocol, cast, get_args, get_type_hints
 
-from flownav.compile import equation, procedure, write_function
+from flownav.compile import compiled, dressed, write_function
 from flownav.estimation.states import (
     COEFFICIENT,
     INNOVATION,
@@ -122,20 +121,3 @@ def place(name: str) -> str:
 def arguments(names: list[str], scalars: list[str]) -> str:
     """The arguments of a call of the law."""
     return ", ".join([*(value_of(name) for name in names), *(f"{name}={name}" for name in scalars)])
-
-
-def compiled(function: Any) -> Callable[..., Any]:
-    """The law as an equation. Numba knows no keyword-only parameters, so they become ordinary ones."""
-    code = function.__code__
-    plain = code.replace(co_argcount=code.co_argcount + code.co_kwonlyargcount, co_kwonlyargcount=0)
-    return equation(FunctionType(plain, function.__globals__, function.__name__, None, function.__closure__))
-
-
-def dressed(generated: Any, function: Any) -> Callable[..., Any]:
-    """The generated function under the law's name, with the law beside it."""
-    generated.__name__ = generated.__qualname__ = function.__name__
-    generated.__doc__, generated.__module__ = function.__doc__, function.__module__
-    generated.law = function
-    if function.__kwdefaults__:  # the last ones
-        generated.__defaults__ = tuple(function.__kwdefaults__.values())
-    return cast(Callable[..., Any], procedure(generated))

@@ -12,8 +12,8 @@ from functools import partial
 from itertools import combinations_with_replacement, pairwise
 from typing import Any, NamedTuple, Protocol, cast, get_type_hints
 
-from flownav.compile import write_function
-from flownav.estimation.law import at, compiled, dressed, parameters, value_of
+from flownav.compile import compiled, dressed, write_function
+from flownav.estimation.law import at, parameters, value_of
 from flownav.estimation.states import COVARIANCE, MOST_SOURCES, PLACES, SCRATCH, SHORT_NAMES
 
 

@@ -9,19 +9,22 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, clamp, equation, larger, procedure, smaller
+from flownav.compile import Lanes, Work, clamp, equation, larger, procedure, replacing, smaller
 from flownav.estimation.covariance import add_noise_lane
 from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, POSITION, STATE, VELOCITY
 from flownav.navigation.memory import MOVING, load_imu, load_start, store_imu
 from flownav.navigation.records import ImuMemory, Reading
-from flownav.navigation.tape import IMU_DOUBTED, Output, write_event
+from flownav.navigation.tape import IMU_DOUBTED
 from flownav.navigation.told import ImuSettings
 from flownav.navigation.trust import accel_factors
+from flownav.navigation.verdicts import Doubt, Event
 
 FOLLOWING_S = 1.0
 DOUBT_M_S2 = 2.0  # of an accelerometer that the range contradicts
 DOUBT_LASTS_S = 60.0
 FREED_WALK_M_S2_RT_S = 0.02  # of a bias, for each time that the accelerometer is noisier than told
+with_doubt = replacing(ImuMemory, "doubt_m_s2")
+
 SURE = 3.0  # standard deviations that a limit leaves room for
 DOUBTED_SPEED_M_S = 1.0  # what it may have done to the velocity
 
@@ -49,19 +52,22 @@ def vibration_beyond(m: ImuMemory, s: ImuSettings) -> float:
     return larger(np.sqrt(m.vibration) - s.vibration_free_m_s2, 0.0)
 
 
-@procedure
-def doubt_imu(work: Work, lanes: Lanes, lane: int, t_s: float, contradiction_m: float, o: Output) -> None:
-    """The range contradicts the motion that the accelerometer made: height, velocity and bias are set free."""
-    m = load_imu(work, lanes, lane)
-    if m.doubt_m_s2 < 0.5 * DOUBT_M_S2:
-        write_event(lanes, lane, t_s, IMU_DOUBTED, contradiction_m, o)
-    doubted = ImuMemory(
-        m.read_s, m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z, m.vibration, DOUBT_M_S2, m.gap
+@equation
+def doubted_imu(
+    contradiction_m: float, doubted: bool, m: ImuMemory
+) -> tuple[ImuMemory, Event, tuple[Doubt, Doubt, Doubt]]:
+    """The range contradicts the motion that the accelerometer made: height, velocity and bias are set free.
+
+    The memory, what is said of it, and the doubts; where not doubted, all as before.
+    """
+    says = doubted and m.doubt_m_s2 < 0.5 * DOUBT_M_S2
+    freed = (
+        Doubt(POSITION + 2, contradiction_m * contradiction_m if doubted else 0.0),
+        Doubt(VELOCITY + 2, DOUBTED_SPEED_M_S * DOUBTED_SPEED_M_S if doubted else 0.0),
+        Doubt(ACCEL_BIAS + 2, DOUBT_M_S2 * DOUBT_M_S2 if doubted else 0.0),
     )
-    store_imu(work, lanes, lane, doubted)
-    add_noise_lane(work, lanes, POSITION + 2, lane, contradiction_m * contradiction_m)
-    add_noise_lane(work, lanes, VELOCITY + 2, lane, DOUBTED_SPEED_M_S * DOUBTED_SPEED_M_S)
-    add_noise_lane(work, lanes, ACCEL_BIAS + 2, lane, DOUBT_M_S2 * DOUBT_M_S2)
+    after = with_doubt(m, doubt_m_s2=DOUBT_M_S2 if doubted else m.doubt_m_s2)
+    return after, Event(IMU_DOUBTED if says else -1, contradiction_m), freed
 
 
 @procedure

@@ -1,0 +1,172 @@
+"""What a judge returns beside its memory, and what takes it: an offer to the filter, an event, a state reset, a doubt.
+
+A judge is `judge(reading, what the filter says, memory, settings) -> verdict` on one lane's records, decorated with
+`on_lanes`: the loop over lanes, the loads and the stores are generated, and each part of a verdict goes where it
+belongs. Nothing is left in rows for a later function to find.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import Lanes, Work, equation
+from flownav.estimation.covariance import add_noise_lane, variance_of
+from flownav.estimation.motion import rotation_of
+from flownav.estimation.states import (
+    INNOVATION,
+    INNOVATION_VARIANCE,
+    MEASURED,
+    NOISE,
+    OFFERED,
+    POSITION,
+    STATE,
+    VELOCITY,
+)
+from flownav.navigation.journal import reset_state
+from flownav.navigation.memory import MEMORY, OBSERVATION, REASON
+from flownav.navigation.tape import Output, write_event
+
+
+# -- what a judge is given of the filter ----------------------------------------------------------------------
+class Position(NamedTuple):
+    """The filter's position, local NED [m]."""
+
+    north_m: float
+    east_m: float
+    down_m: float
+
+
+class Velocity(NamedTuple):
+    """The filter's velocity, NED [m/s]."""
+
+    north_m_s: float
+    east_m_s: float
+    down_m_s: float
+
+
+class Height(NamedTuple):
+    """What the filter says of its height: down and its speed's standard deviation, and R_33."""
+
+    pos_d_m: float
+    speed_sigma_m_s: float
+    upright: float
+
+
+class Tested(NamedTuple):
+    """What became of the component that was offered last: its fate (`reasons`), innovation, h P h' + R, and R."""
+
+    reason: float
+    innovation: float
+    total: float
+    variance: float
+
+
+# -- what a judge returns ---------------------------------------------------------------------------------------
+class Offer(NamedTuple):
+    """One component for the filter: its value and variance; reason: FUSED where it may be tested, or why not."""
+
+    measured: float
+    variance: float
+    reason: int
+
+
+class Fate(NamedTuple):
+    """The reason alone: FUSED where what lies in the observation's rows is offered."""
+
+    reason: float
+
+
+class Noise(NamedTuple):
+    """The variance alone, of the component that is about to be tested."""
+
+    variance: float
+
+
+class Offered(NamedTuple):
+    """Above 0 in the lanes that offer the component at hand to the filter."""
+
+    offered: float
+
+
+class Event(NamedTuple):
+    """A happening of `tape.EVENT_NAMES`; kind below 0: nothing happened."""
+
+    kind: np.int_ | int
+    value: float
+
+
+class Reset(NamedTuple):
+    """A state that loses its correlations: its place, value (NaN: it stays) and variance; place below 0: none."""
+
+    state: int
+    value: float
+    variance: float
+
+
+class Doubt(NamedTuple):
+    """A state that is less sure by this variance; 0: as sure as before."""
+
+    state: int
+    variance: float
+
+
+NO_EVENT = Event(-1, 0.0)
+NO_RESET = Reset(-1, 0.0, 0.0)
+
+
+@equation
+def height_of(work: Work, lanes: Lanes, lane: int) -> Height:
+    """What the filter says of a lane's height."""
+    return Height(
+        work[(STATE + POSITION + 2) * len(lanes) + lane],
+        np.sqrt(variance_of(work, lanes, VELOCITY + 2, lane)),
+        rotation_of(work, lanes, lane)[8],
+    )
+
+
+@equation
+def offer(work: Work, lanes: Lanes, lane: int, given: Offer) -> None:
+    """Put a component before its law; `conclude` follows."""
+    work[MEASURED * len(lanes) + lane] = given.measured
+    work[OBSERVATION * len(lanes) + lane] = given.measured
+    work[NOISE * len(lanes) + lane] = given.variance
+    work[REASON * len(lanes) + lane] = given.reason
+
+
+@equation
+def tell(work: Work, lanes: Lanes, lane: int, event: Event, t_s: float, o: Output) -> None:
+    """Write an event down."""
+    if event.kind >= 0:
+        write_event(lanes, lane, t_s, event.kind, event.value, o)
+
+
+@equation
+def reset(work: Work, lanes: Lanes, lane: int, given: Reset, o: Output) -> None:
+    """Reset a state."""
+    if given.state >= 0:
+        before = work[(STATE + given.state) * len(lanes) + lane]
+        work[(STATE + given.state) * len(lanes) + lane] = before if np.isnan(given.value) else given.value
+        reset_state(work, lanes, lane, given.state, given.variance, o)
+
+
+@equation
+def doubt(work: Work, lanes: Lanes, lane: int, given: Doubt) -> None:
+    """Add to a state's variance."""
+    add_noise_lane(work, lanes, given.state, lane, given.variance)
+
+
+MEMORY.name(Position, *(STATE + POSITION + i for i in range(3)))
+MEMORY.name(Velocity, *(STATE + VELOCITY + i for i in range(3)))
+MEMORY.name(Tested, REASON, INNOVATION, INNOVATION_VARIANCE, NOISE)
+MEMORY.name(Fate, REASON)
+MEMORY.name(Noise, NOISE)
+MEMORY.name(Offered, OFFERED)
+MEMORY.derive(Height, height_of)
+MEMORY.sink(Offer, offer)
+MEMORY.sink(Event, tell, "t_s", "o")
+MEMORY.sink(Reset, reset, "o")
+MEMORY.sink(Doubt, doubt)
+
+on_lanes = MEMORY.on_lanes

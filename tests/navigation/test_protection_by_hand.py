@@ -41,15 +41,12 @@ from flownav.estimation.states import (
 )
 from flownav.navigation.memory import (
     DRIFT_SINCE,
-    FLOW_SPEED,
     GPS_FUSED,
-    LEFT_OVER,
     LENS_RANGE,
+    MEMORY,
     PROTECTION,
-    PUZZLED_AT,
     SCALE_DOUBT,
     SUSPECTED,
-    TURNED_BEFORE,
     TURNING,
     load_flow,
     new_work,
@@ -73,7 +70,13 @@ from flownav.navigation.protection import (
     sign_drift,
     sign_flow,
 )
+from flownav.navigation.records import FlowSignMemory, SuspicionMemory
 from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, empty_tape, output_of, room_of
+
+FLOW_SPEED = MEMORY.row(FlowSignMemory, "speed_m_s")
+TURNED_BEFORE = MEMORY.row(FlowSignMemory, "turning_x")
+LEFT_OVER = MEMORY.row(SuspicionMemory, "left_over_m")
+PUZZLED_AT = MEMORY.row(SuspicionMemory, "puzzled_s")
 
 
 @pytest.fixture

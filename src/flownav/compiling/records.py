@@ -10,7 +10,7 @@ the filter, an event, a state to reset) is a record that some procedure takes: i
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import FunctionType
 from typing import Any, NamedTuple, Protocol, cast, get_args, get_origin, get_type_hints
 
@@ -52,6 +52,7 @@ class Layout:
         self.next = first
         self._kept: dict[Any, _Kept] = {} if below is None else dict(below._kept)
         self._sinks: dict[Any, _Sink] = {} if below is None else dict(below._sinks)
+        self._rows: dict[Any, Sequence[int]] = {} if below is None else dict(below._rows)
         self._fresh: list[tuple[int, tuple[float, ...]]] = []
 
     def take(self, count: int) -> int:
@@ -68,12 +69,14 @@ class Layout:
         size = len(record._fields)
         first = self.take(count * size)
         self._kept[record] = _Kept(*(_several(record, first) if index else lane_access(record, first)), index)
+        self._rows[record] = range(first, first + size)
         defaults = record._field_defaults
         self._fresh.append((first, tuple(defaults.get(name, 0.0) for name in record._fields) * count))
         return first
 
     def name(self, record: Any, *rows: int) -> None:
         """Rows that exist already are the fields of a record."""
+        self._rows[record] = rows
         self._kept[record] = _Kept(*lane_access(record, rows), "")
 
     def derive(self, record: Any, found: Callable[..., Any], index: str = "") -> None:
@@ -89,6 +92,12 @@ class Layout:
         kept = self._kept[record]
         assert kept.store is not None
         return kept.load, kept.store
+
+    def row(self, record: Any, field: str) -> int:
+        """The row of a record's field; of several such records, of the first."""
+        rows = self._rows[record]
+        place: int = record._fields.index(field)
+        return rows[place]
 
     def put_fresh(self, work: NDArray[np.float64]) -> None:
         """Set every record that was kept to what it is before anything happened; work (rows, lanes)."""

@@ -19,18 +19,25 @@ from flownav.navigation.records import (
     CourseMemory,
     EchoMemory,
     FlowMemory,
+    FlowSignMemory,
     GroundMemory,
     HeadingMemory,
     ImuMemory,
     ImuWindow,
+    Levels,
+    MotionStep,
     NoiseMemory,
+    OwedMotion,
     PushMemory,
     RangeMemory,
     Reading,
     RejectionMemory,
     SeenWindow,
+    SpentMotion,
     SpikeMemory,
     StartMemory,
+    SteadyForce,
+    SuspicionMemory,
     WhitenessMemory,
 )
 
@@ -77,20 +84,13 @@ INNOVATION_BEFORE = MEMORY.take(3)  # of the flow's components, at the reading b
 KNOWN = MEMORY.take(1)  # 1 where that range is known
 TURNING = MEMORY.take(2)  # what the flow saw of the vehicle's turning [rad/s]
 TESTED = MEMORY.take(1)
-SPENT = MEMORY.take(6)  # what moved the filter since the last inertial reading: rate and specific force, integrated
-OWED = MEMORY.take(6)  # what past readings said and no step was long enough to pay, integrated
-STEADY_FORCE = MEMORY.take(3)  # specific force NED [m/s2], smoothed as a GPS receiver smooths its velocity
 SCALE_DOUBT = MEMORY.take(1)  # standard deviation of a flow scale that nothing can tell; 0 where the filter learns it
-MOVING = MEMORY.take(1)  # 1 where the IMU moves the filter over the step at hand
-FLOW_BEFORE = MEMORY.take(2)  # what the flow sensor was to read at the reading before, by the filter [rad/s or m/s]
-TURNED_BEFORE = MEMORY.take(2)  # TURNING at the reading before
-FLOW_SPEED = MEMORY.take(1)  # of both together, over the ground, turning and all [m/s]
-PUZZLED_AT = MEMORY.take(1)  # when innovations last hinted at a flow that is reversed or swapped [s]
-PROTECTION = MEMORY.take(2)  # levels at the last estimate, horizontal and vertical [m]
 GPS_MOVED = MEMORY.take(2)  # how far resets to GPS moved the position, north and east, back and forth added up [m]
-LEFT_OVER = MEMORY.take(1)  # how far off a fault may have put the position before it was excluded [m]
-SUSPECTED_AT = MEMORY.take(1)  # since when a fault is suspected [s]
-SUSPECTED = MEMORY.take(1)  # 0, or 1 and the number of the fault of `hypotheses` that is suspected
+STEADY_FORCE = MEMORY.keep(SteadyForce)
+for _record in (MotionStep, SpentMotion, OwedMotion, FlowSignMemory, SuspicionMemory):
+    MEMORY.keep(_record)
+PROTECTION = MEMORY.keep(Levels)  # horizontal and vertical
+SUSPECTED = MEMORY.row(SuspicionMemory, "suspected")
 # shared by all lanes (kept in the first)
 CLOCK = MEMORY.take(1)  # the instant that the filter has reached [s]
 WRITTEN = MEMORY.take(1)  # the last estimate's [s]
@@ -116,6 +116,10 @@ load_push, store_push = MEMORY.access(PushMemory)
 load_imu_window, store_imu_window = MEMORY.access(ImuWindow)
 load_seen_window, store_seen_window = MEMORY.access(SeenWindow)
 load_bridge, store_bridge = MEMORY.access(BridgeMemory)
+load_step, _ = MEMORY.access(MotionStep)
+load_sign, store_sign = MEMORY.access(FlowSignMemory)
+load_suspicion, store_suspicion = MEMORY.access(SuspicionMemory)
+load_levels, store_levels = MEMORY.access(Levels)
 load_rejection, store_rejection = MEMORY.access(RejectionMemory)
 load_whiteness, store_whiteness = MEMORY.access(WhitenessMemory)
 load_noise, store_noise = MEMORY.access(NoiseMemory)
@@ -126,8 +130,6 @@ _FRESH: dict[int, tuple[float, ...]] = {
     ACCEL_FACTOR: (1.0, 1.0, 1.0),
     STILL_CLOCK: (-np.inf,),
     CONSIDERS: (1.0,),
-    PUZZLED_AT: (-np.inf,),
-    PROTECTION: (np.nan, np.nan),
     HYPOTHESES: (FAULTS_FOLLOWED,),
     SHARE: (1.0,) * MOST_HYPOTHESES,
     DRIFT_SINCE: (-np.inf,),

@@ -277,3 +277,70 @@ class RejectionMemory(NamedTuple):
 
     times: float = 0.0
     since_s: float = 0.0
+
+
+class MotionStep(NamedTuple):
+    """moves: 1 where the IMU moves the filter over the step at hand."""
+
+    moves: float = 0.0
+
+
+class SpentMotion(NamedTuple):
+    """What moved the filter since the last inertial reading: body rate [rad] and specific force [m/s], integrated."""
+
+    gyro_x: float = 0.0
+    gyro_y: float = 0.0
+    gyro_z: float = 0.0
+    accel_x: float = 0.0
+    accel_y: float = 0.0
+    accel_z: float = 0.0
+
+
+class OwedMotion(NamedTuple):
+    """What past readings said and no step was long enough to pay, integrated like `SpentMotion`."""
+
+    gyro_x: float = 0.0
+    gyro_y: float = 0.0
+    gyro_z: float = 0.0
+    accel_x: float = 0.0
+    accel_y: float = 0.0
+    accel_z: float = 0.0
+
+
+class SteadyForce(NamedTuple):
+    """Specific force NED [m/s2], smoothed as a GPS receiver smooths its velocity."""
+
+    north_m_s2: float = 0.0
+    east_m_s2: float = 0.0
+    down_m_s2: float = 0.0
+
+
+class FlowSignMemory(NamedTuple):
+    """What the flow sensor was to read at the reading before, by the filter [rad/s or m/s]; the turning that it saw
+    then [rad/s]; and the speed of both channels together over the ground, turning and all [m/s].
+    """
+
+    read_x: float = 0.0
+    read_y: float = 0.0
+    turning_x: float = 0.0
+    turning_y: float = 0.0
+    speed_m_s: float = 0.0
+
+
+class SuspicionMemory(NamedTuple):
+    """suspected: 0, or 1 and the number of the fault of `hypotheses` that is suspected; suspected_s: since when.
+    puzzled_s: when innovations last hinted at a flow that is reversed or swapped. left_over_m: how far off a fault may
+    have put the position before it was excluded.
+    """
+
+    suspected: float = 0.0
+    suspected_s: float = 0.0
+    puzzled_s: float = -inf
+    left_over_m: float = 0.0
+
+
+class Levels(NamedTuple):
+    """Protection levels at the last estimate [m]."""
+
+    horizontal_m: float = nan
+    vertical_m: float = nan

@@ -8,12 +8,15 @@ likeness over blocks of time, and not their size, moves the accelerometer's nois
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from flownav.compile import Lanes, Work, clamp, equation, larger, procedure
 from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE, NOISE
 from flownav.navigation.memory import (
     ACCEL_FACTOR,
+    MEMORY,
     REASON,
     held_by_gps,
     load_echo,
@@ -77,11 +80,21 @@ def watch_whiteness(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
         store_whiteness(work, lanes, axis, lane, with_innovation(innovation, variance, t_s, m))
 
 
-@equation
-def accel_factors(work: Work, lanes: Lanes, lane: int) -> tuple[float, float]:
+class AccelFactors(NamedTuple):
     """How many times the accelerometer's noise is what it was said to be: level, in the worse axis, and down."""
+
+    level: float
+    down: float
+
+
+@equation
+def accel_factors(work: Work, lanes: Lanes, lane: int) -> AccelFactors:
+    """The factors of a lane."""
     level = larger(work[ACCEL_FACTOR * len(lanes) + lane], work[(ACCEL_FACTOR + 1) * len(lanes) + lane])
-    return level, work[(ACCEL_FACTOR + 2) * len(lanes) + lane]
+    return AccelFactors(level, work[(ACCEL_FACTOR + 2) * len(lanes) + lane])
+
+
+MEMORY.derive(AccelFactors, accel_factors)
 
 
 # -- a sensor's own noise -----------------------------------------------------------------------------------

@@ -15,6 +15,12 @@ from flownav.compile import Lanes, Work, equation
 from flownav.estimation.covariance import add_noise_lane, variance_of
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import (
+    ACCEL_BIAS,
+    ACCEL_NOISE,
+    FORCE,
+    GYRO_BIAS,
+    GYRO_NOISE,
+    IMU,
     INNOVATION,
     INNOVATION_VARIANCE,
     MEASURED,
@@ -44,6 +50,43 @@ class Velocity(NamedTuple):
     north_m_s: float
     east_m_s: float
     down_m_s: float
+
+
+class Biases(NamedTuple):
+    """What the filter says of the gyro's biases [rad/s] and the accelerometer's [m/s2], body FRD."""
+
+    gyro_x: float
+    gyro_y: float
+    gyro_z: float
+    accel_x: float
+    accel_y: float
+    accel_z: float
+
+
+class Force(NamedTuple):
+    """The specific force of the step that was just made, biases off, NED [m/s2]."""
+
+    north_m_s2: float
+    east_m_s2: float
+    down_m_s2: float
+
+
+class AppliedMotion(NamedTuple):
+    """What moves the filter over the next step: gyro [rad/s] and specific force [m/s2], body FRD, biases and all."""
+
+    gyro_x: float
+    gyro_y: float
+    gyro_z: float
+    accel_x: float
+    accel_y: float
+    accel_z: float
+
+
+class MotionNoise(NamedTuple):
+    """White noise of what moves the filter: variance densities [(m/s2)^2/Hz], [(rad/s)^2/Hz]."""
+
+    accel: float
+    gyro: float
 
 
 class Height(NamedTuple):
@@ -159,6 +202,10 @@ def doubt(work: Work, lanes: Lanes, lane: int, given: Doubt) -> None:
 
 MEMORY.name(Position, *(STATE + POSITION + i for i in range(3)))
 MEMORY.name(Velocity, *(STATE + VELOCITY + i for i in range(3)))
+MEMORY.name(Biases, *(STATE + GYRO_BIAS + i for i in range(3)), *(STATE + ACCEL_BIAS + i for i in range(3)))
+MEMORY.name(Force, *(FORCE + i for i in range(3)))
+MEMORY.name(AppliedMotion, *(IMU + i for i in range(6)))
+MEMORY.name(MotionNoise, ACCEL_NOISE, GYRO_NOISE)
 MEMORY.name(Tested, REASON, INNOVATION, INNOVATION_VARIANCE, NOISE)
 MEMORY.name(Fate, REASON)
 MEMORY.name(Noise, NOISE)

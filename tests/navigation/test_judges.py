@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 from flownav.estimation.states import BARO
-from flownav.navigation.attitude import heading_variance, judge_attitude, magnetic_heading
+from flownav.navigation.attitude import read_attitude
 from flownav.navigation.flow_judge import View, judge_flow, turning_of
 from flownav.navigation.flow_noise import alike, flow_variance, followed_agreement, lasting_doubt, wrong_since
-from flownav.navigation.gps import judge_gps, judge_rejections
+from flownav.navigation.gps import judge_fix, judge_rejections
+from flownav.navigation.heading import heading_variance, magnetic_heading
 from flownav.navigation.height import judge_baro, range_variance, range_verdict, repeats
 from flownav.navigation.inertial import motion_between, said_by, sound
-from flownav.navigation.offers import usable, usable_in_flight
-from flownav.navigation.place import component_of, judge_pad
+from flownav.navigation.offers import component_of, usable, usable_in_flight
+from flownav.navigation.place import judge_pad
 from flownav.navigation.reasons import (
     BEFORE_START,
     FUSED,
@@ -34,6 +35,7 @@ from flownav.navigation.reasons import (
 from flownav.navigation.records import (
     BaroMemory,
     FlowMemory,
+    GpsMemory,
     HeadingMemory,
     ImuMemory,
     RangeMemory,
@@ -80,25 +82,30 @@ def test_what_is_said_of_any_reading_stands_in_this_order():
 
 
 # -- GPS -----------------------------------------------------------------------------------------------------
+def judged_fix(fix: Reading, axis: int, *, level_ratio: float = 0.0, position: bool = True, alone: bool = False):
+    memory = GpsMemory(level_ratio=level_ratio)
+    return judge_fix.law(fix, StartMemory(1.0), memory, axis=axis, position=position, alone=alone, s=TOLD.gps)
+
+
 def test_the_noise_of_a_fix_is_its_white_part_and_a_share_of_what_it_states():
     s = TOLD.gps
     fix = reading(1.0, 2.0, 3.0, variance=(4.0, 9.0, 16.0))
     white = (s.gps_white_sigma_m, s.gps_white_sigma_m, s.gps_white_sigma_down_m)
     for axis in range(3):
-        reason, variance = judge_gps(fix, axis, True, 1.0, 0.0, s)
-        assert (reason, variance) == (FUSED, pytest.approx(white[axis] ** 2 + 0.09 * (axis + 2) ** 2))
-    unsaid = judge_gps(reading(1.0, 2.0, 3.0), 2, False, 1.0, 0.0, s)
-    assert unsaid == (FUSED, pytest.approx(s.gps_velocity_white_down_m_s**2))
-    assert judge_gps(reading(1.0, 2.0, 3.0), 0, False, 1.0, 0.0, s)[1] == pytest.approx(s.gps_velocity_white_m_s**2)
+        variance = pytest.approx(white[axis] ** 2 + 0.09 * (axis + 2) ** 2)
+        assert judged_fix(fix, axis) == (axis + 1.0, variance, FUSED)
+    unsaid = reading(1.0, 2.0, 3.0)
+    for axis, sigma in ((2, s.gps_velocity_white_down_m_s), (0, s.gps_velocity_white_m_s)):
+        assert judged_fix(unsaid, axis, position=False) == (axis + 1.0, pytest.approx(sigma**2), FUSED)
 
 
 def test_a_fix_that_jumps_along_one_axis_is_refused_along_both_and_keeps_its_height():
     fix = reading(1.0, 2.0, 3.0)
-    assert [judge_gps(fix, axis, True, 1.0, 1.1, TOLD.gps)[0] for axis in range(3)] == [
-        INNOVATION_GATE, INNOVATION_GATE, FUSED
-    ]  # fmt: skip
-    assert judge_gps(fix, 0, True, 1.0, 1.0, TOLD.gps)[0] == FUSED
-    assert judge_gps(reading(1.0, 2.0, 3.0, withheld=1.0), 0, True, 1.0, 1.1, TOLD.gps)[0] == OUTAGE
+    spoilt = [judged_fix(fix, axis, level_ratio=1.1).reason for axis in range(3)]
+    assert spoilt == [INNOVATION_GATE, INNOVATION_GATE, FUSED]
+    assert judged_fix(fix, 0, level_ratio=1.1, alone=True).reason == FUSED
+    assert judged_fix(fix, 0, level_ratio=1.0).reason == FUSED
+    assert judged_fix(reading(1.0, 2.0, 3.0, withheld=1.0), 0, level_ratio=1.1).reason == OUTAGE
 
 
 def test_gps_is_believed_once_it_was_refused_often_and_for_long():
@@ -291,10 +298,11 @@ def test_pressure_height():
 
 # -- attitude and heading --------------------------------------------------------------------------------------
 def test_a_quaternion_of_any_sensible_length_is_one():
-    assert judge_attitude(reading(0.0, 0.6, 0.0, 0.8), 1.0) == (FUSED, pytest.approx(1.0))
-    assert judge_attitude(reading(0.0, 0.1, 0.0, 0.1), 1.0)[0] == NOT_FINITE
-    assert judge_attitude(reading(3.0, 0.0, 0.0, 0.0), 1.0)[0] == NOT_FINITE
-    assert judge_attitude(reading(NAN, 0.0, 0.0, 0.0), 1.0)[0] == NOT_FINITE
+    assert read_attitude(reading(0.0, 0.6, 0.0, 0.8), 1.0) == (True, pytest.approx((0.0, 0.6, 0.0, 0.8)))
+    assert read_attitude(reading(0.9, 0.0, 0.0, -1.2), 1.0) == (True, pytest.approx((0.6, 0.0, 0.0, -0.8)))
+    assert not read_attitude(reading(0.0, 0.6, 0.0, 0.8), 0.0)[0]
+    for bad in ((0.0, 0.1, 0.0, 0.1), (3.0, 0.0, 0.0, 0.0), (NAN, 0.0, 0.0, 0.0)):
+        assert not read_attitude(reading(*bad), 1.0)[0]
 
 
 def test_headings_whose_error_lasts_count_once_in_its_time():

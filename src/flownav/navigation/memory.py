@@ -20,6 +20,7 @@ from flownav.navigation.records import (
     EchoMemory,
     FlowMemory,
     FlowSignMemory,
+    GpsMemory,
     GroundMemory,
     HeadingMemory,
     ImuMemory,
@@ -28,10 +29,12 @@ from flownav.navigation.records import (
     MotionStep,
     NoiseMemory,
     OwedMotion,
+    PadMemory,
     PushMemory,
     RangeMemory,
     Reading,
     RejectionMemory,
+    ScaleDoubt,
     SeenWindow,
     SpentMotion,
     SpikeMemory,
@@ -63,30 +66,24 @@ WHITENESS = MEMORY.keep(WhitenessMemory, 3, "axis")  # forward, right, down
 ACCEL_FACTOR = MEMORY.take(3)  # how many times noisier than told the accelerometer is, by each of these
 COURSE = MEMORY.keep(CourseMemory)
 PUSH = MEMORY.keep(PushMemory)
-COMPASS_OFF = MEMORY.take(1)  # 1 once what is read as heading was found to be wrong
-AIDED = MEMORY.take(1)  # 1 where something horizontal was fused lately, at an external attitude
 BLIND = MEMORY.take(1)  # 1 where no range tells the height of the flow now: none lately, or a disputed one, or strays
-SOUGHT = MEMORY.take(1)  # 1 while a heading that no sensor reads is to be found
-GPS_FUSED = MEMORY.take(1)  # when GPS last told north or east [s]
 STANDS = MEMORY.take(1)  # what the vehicle did in the last window: `still.MOVES`, SHAKEN or RESTS
 CONTACT = MEMORY.take(1)  # the range when it rested last [m]; NaN where it has not
 MEMORY.keep(BaroMemory)
-PAD_KNOWN = MEMORY.take(1)  # 0 no, or how: STOOD_ON, LEFT, SEEN of `place`
-PAD_BESIDE = MEMORY.take(2)  # where the pad was from the vehicle as that went to GPS, along an axis, and its variance
-ASTRAY = MEMORY.take(1)  # 1 where the first component of the fix at hand was refused
-PAD_STRAYS = MEMORY.take(1)  # fixes of a pad in a row that were refused
+MEMORY.keep(GpsMemory)
+MEMORY.keep(PadMemory)
+PAD_KNOWN = MEMORY.row(PadMemory, "known")
+SOUGHT = MEMORY.row(HeadingMemory, "sought")
 # what becomes of the component that is offered
 REASON = MEMORY.take(1)
 OBSERVATION = MEMORY.take(1)
-LEVEL_RATIO = MEMORY.take(1)  # the larger test ratio of a fix's north and east
 LENS_RANGE = MEMORY.take(1)  # from the lens to the ground, along the boresight [m]
 INNOVATION_BEFORE = MEMORY.take(3)  # of the flow's components, at the reading before
 KNOWN = MEMORY.take(1)  # 1 where that range is known
 TURNING = MEMORY.take(2)  # what the flow saw of the vehicle's turning [rad/s]
 TESTED = MEMORY.take(1)
-SCALE_DOUBT = MEMORY.take(1)  # standard deviation of a flow scale that nothing can tell; 0 where the filter learns it
-GPS_MOVED = MEMORY.take(2)  # how far resets to GPS moved the position, north and east, back and forth added up [m]
-STEADY_FORCE = MEMORY.keep(SteadyForce)
+SCALE_DOUBT = MEMORY.keep(ScaleDoubt)
+MEMORY.keep(SteadyForce)
 for _record in (MotionStep, SpentMotion, OwedMotion, FlowSignMemory, SuspicionMemory):
     MEMORY.keep(_record)
 PROTECTION = MEMORY.keep(Levels)  # horizontal and vertical
@@ -109,18 +106,15 @@ load_range, store_range = MEMORY.access(RangeMemory)
 load_echo, store_echo = MEMORY.access(EchoMemory)
 load_ground, store_ground = MEMORY.access(GroundMemory)
 load_flow, store_flow = MEMORY.access(FlowMemory)
-load_heading, store_heading = MEMORY.access(HeadingMemory)
+load_gps, _ = MEMORY.access(GpsMemory)
 load_spike, store_spike = MEMORY.access(SpikeMemory)
 load_course, store_course = MEMORY.access(CourseMemory)
-load_push, store_push = MEMORY.access(PushMemory)
 load_imu_window, store_imu_window = MEMORY.access(ImuWindow)
 load_seen_window, store_seen_window = MEMORY.access(SeenWindow)
-load_bridge, store_bridge = MEMORY.access(BridgeMemory)
 load_step, _ = MEMORY.access(MotionStep)
 load_sign, store_sign = MEMORY.access(FlowSignMemory)
 load_suspicion, store_suspicion = MEMORY.access(SuspicionMemory)
 load_levels, store_levels = MEMORY.access(Levels)
-load_rejection, store_rejection = MEMORY.access(RejectionMemory)
 load_whiteness, store_whiteness = MEMORY.access(WhitenessMemory)
 load_noise, store_noise = MEMORY.access(NoiseMemory)
 
@@ -133,7 +127,6 @@ _FRESH: dict[int, tuple[float, ...]] = {
     HYPOTHESES: (FAULTS_FOLLOWED,),
     SHARE: (1.0,) * MOST_HYPOTHESES,
     DRIFT_SINCE: (-np.inf,),
-    GPS_FUSED: (-np.inf,),
     CLOCK: (-np.inf,),
     WRITTEN: (-np.inf,),
     ERRORS_CLOCK: (-np.inf,),
@@ -177,9 +170,15 @@ def of_lane(work: Work, lanes: Lanes, row: int, lane: int) -> float:
 
 
 @equation
+def holds(gps: GpsMemory, t_s: float) -> bool:
+    """Whether GPS told the level velocity or place lately."""
+    return t_s - gps.told_s <= UNHELD_S
+
+
+@equation
 def held_by_gps(work: Work, lanes: Lanes, lane: int, t_s: float) -> bool:
     """Whether GPS told the level velocity or place of a lane lately."""
-    return t_s - work[GPS_FUSED * len(lanes) + lane] <= UNHELD_S  # type: ignore[no-any-return]
+    return holds(load_gps(work, lanes, lane), t_s)
 
 
 @equation

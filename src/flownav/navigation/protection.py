@@ -38,13 +38,13 @@ from flownav.frames import to_body
 from flownav.navigation.flow_noise import LONGEST_STEP_S
 from flownav.navigation.memory import (
     DRIFT_SINCE,
-    GPS_MOVED,
     LENS_RANGE,
     MEMORY,
     SCALE_DOUBT,
     TURNING,
     held_by_gps,
     load_flow,
+    load_gps,
     load_sign,
     load_suspicion,
     of_lane,
@@ -220,8 +220,8 @@ def levels(work: Work, lanes: Lanes, lane: int) -> Levels:
         down = effect_of(work, lanes, states_of(lanes), k, POSITION + 2, lane)
         horizontal_m = larger(horizontal_m, SIGMAS_BESIDE * own_m + level_effect(work, lanes, k, lane) * largest)
         vertical_m = larger(vertical_m, SIGMAS_BESIDE * down_m + abs(down) * largest)
-    north_m, east_m = of_lane(work, lanes, GPS_MOVED, lane), of_lane(work, lanes, GPS_MOVED + 1, lane)
-    moved_m = np.sqrt(north_m * north_m + east_m * east_m)
+    gps = load_gps(work, lanes, lane)
+    moved_m = np.sqrt(gps.moved_n_m * gps.moved_n_m + gps.moved_e_m * gps.moved_e_m)
     left_m = SIGMAS_BESIDE * own_m + load_suspicion(work, lanes, lane).left_over_m + moved_m
     return Levels(larger(horizontal_m, left_m), vertical_m)
 

@@ -50,13 +50,15 @@ class StartMemory(NamedTuple):
 
 class AidMemory(NamedTuple):
     """aided_s: when something horizontal was fused last; flag: 0, 1 dead reckoning, 2 invalid; height_s: when something
-    other than the range told the height; landed: 1 on the ground.
+    other than the range told the height; landed: 1 on the ground; aided: 1 where something horizontal was fused lately
+    as an external attitude was read.
     """
 
     aided_s: float = nan
     flag: float = 0.0
     height_s: float = -inf
     landed: float = 0.0
+    aided: float = 0.0
 
 
 class ImuMemory(NamedTuple):
@@ -143,10 +145,15 @@ class FlowMemory(NamedTuple):
 
 
 class HeadingMemory(NamedTuple):
-    """read_s: when a heading was read last; field_rad: direction of the level magnetic field in the filter's frame."""
+    """read_s: when a heading was read last; field_rad: direction of the level magnetic field in the filter's frame;
+    refuted: 1 once what is read as heading was found to be wrong; sought: 1 while a heading that no sensor reads is to
+    be found from the course.
+    """
 
     read_s: float = -inf
     field_rad: float = nan
+    refuted: float = 0.0
+    sought: float = 0.0
 
 
 class BridgeMemory(NamedTuple):
@@ -272,6 +279,27 @@ class WhitenessMemory(NamedTuple):
     ended_s: float = -inf
 
 
+class GpsMemory(NamedTuple):
+    """told_s: when GPS told north or east last; level_ratio: the larger test ratio of north and east of the fix at
+    hand; moved_n_m and moved_e_m: how far resets to GPS moved the position, back and forth added up.
+    """
+
+    told_s: float = -inf
+    level_ratio: float = 0.0
+    moved_n_m: float = 0.0
+    moved_e_m: float = 0.0
+
+
+class PadMemory(NamedTuple):
+    """known: 0 where the pad is not, or how it is: STOOD_ON, LEFT, SEEN of `place`; refusals: of fixes in a row, by
+    component; first_refused: 1 where the first component of the fix at hand was.
+    """
+
+    known: float = 0.0
+    refusals: float = 0.0
+    first_refused: float = 0.0
+
+
 class RejectionMemory(NamedTuple):
     """How often GPS was refused for one state, one after the other, and since when."""
 
@@ -344,3 +372,9 @@ class Levels(NamedTuple):
 
     horizontal_m: float = nan
     vertical_m: float = nan
+
+
+class ScaleDoubt(NamedTuple):
+    """Standard deviation of a flow scale that nothing can tell; 0 where the filter learns it."""
+
+    sigma: float = 0.0

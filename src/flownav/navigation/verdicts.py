@@ -17,6 +17,7 @@ from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import (
     ACCEL_BIAS,
     ACCEL_NOISE,
+    ACCEPTED,
     FORCE,
     GYRO_BIAS,
     GYRO_NOISE,
@@ -27,6 +28,7 @@ from flownav.estimation.states import (
     NOISE,
     OFFERED,
     POSITION,
+    QUATERNION,
     STATE,
     VELOCITY,
 )
@@ -50,6 +52,15 @@ class Velocity(NamedTuple):
     north_m_s: float
     east_m_s: float
     down_m_s: float
+
+
+class Attitude(NamedTuple):
+    """The filter's attitude: a quaternion, body to earth."""
+
+    w: float
+    x: float
+    y: float
+    z: float
 
 
 class Biases(NamedTuple):
@@ -113,6 +124,18 @@ class Offer(NamedTuple):
     measured: float
     variance: float
     reason: int
+
+
+class Observation(NamedTuple):
+    """What is written down as measured, where that is not what the law reads."""
+
+    value: float
+
+
+class Accepted(NamedTuple):
+    """1 where the component that was offered last was fused."""
+
+    accepted: float
 
 
 class Fate(NamedTuple):
@@ -206,6 +229,9 @@ MEMORY.name(Biases, *(STATE + GYRO_BIAS + i for i in range(3)), *(STATE + ACCEL_
 MEMORY.name(Force, *(FORCE + i for i in range(3)))
 MEMORY.name(AppliedMotion, *(IMU + i for i in range(6)))
 MEMORY.name(MotionNoise, ACCEL_NOISE, GYRO_NOISE)
+MEMORY.name(Attitude, *(QUATERNION + i for i in range(4)))
+MEMORY.name(Observation, OBSERVATION)
+MEMORY.name(Accepted, ACCEPTED)
 MEMORY.name(Tested, REASON, INNOVATION, INNOVATION_VARIANCE, NOISE)
 MEMORY.name(Fate, REASON)
 MEMORY.name(Noise, NOISE)

@@ -10,7 +10,7 @@ import pytest
 
 from flownav.estimation.states import BARO
 from flownav.navigation.attitude import read_attitude
-from flownav.navigation.flow_judge import View, judge_flow, turning_of
+from flownav.navigation.flow_judge import judge_look, turning_of
 from flownav.navigation.flow_noise import alike, flow_variance, followed_agreement, lasting_doubt, wrong_since
 from flownav.navigation.gps import judge_fix, judge_rejections
 from flownav.navigation.heading import heading_variance, magnetic_heading
@@ -24,6 +24,7 @@ from flownav.navigation.reasons import (
     INNOVATION_GATE,
     NEAR_GROUND,
     NO_DATA,
+    NO_HEADING,
     NO_HEIGHT,
     NOT_FINITE,
     OUT_OF_RANGE,
@@ -38,6 +39,7 @@ from flownav.navigation.records import (
     GpsMemory,
     HeadingMemory,
     ImuMemory,
+    Look,
     RangeMemory,
     Reading,
     RejectionMemory,
@@ -45,15 +47,18 @@ from flownav.navigation.records import (
 )
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import BARO_FOUND
-from flownav.navigation.told import NO_HEADING, Equipment
+from flownav.navigation.told import NO_HEADING as HEADLESS
+from flownav.navigation.told import Equipment
 from flownav.navigation.verdicts import Event, Height, Offer, Position, Reset
 from flownav.navigation.vibration import followed_vibration, vibration_beyond, with_reading
 
 NAN = math.nan
-FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
+FITTED = Equipment(True, False, HEADLESS, False, -math.inf)
 TOLD = NavigatorSettingsFile().settings(FITTED)
 FRESH_FLOW = FlowMemory(-math.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -math.inf, 0.0)
-SEEN = View(2.0, True, 1.0)
+SEEN = Look(0.0, 0.0, 2.0, known=1.0, upright=1.0)
+KEPT, SEARCHED = HeadingMemory(sought=0.0), HeadingMemory(sought=1.0)
+RUNS = StartMemory(started=1.0)
 
 
 def told(**keys):
@@ -146,7 +151,7 @@ def test_a_metric_flow_is_as_sure_as_the_range_that_scaled_it():
 
 @pytest.mark.parametrize(("change", "view", "reason"), [
     ({}, SEEN, FUSED),
-    ({}, SEEN._replace(known=False), NO_HEIGHT),
+    ({}, SEEN._replace(known=0.0), NO_HEIGHT),
     ({}, SEEN._replace(upright=math.cos(0.81)), TILTED),
     ({}, SEEN._replace(upright=math.cos(0.79)), FUSED),
     ({}, SEEN._replace(range_m=0.29), NEAR_GROUND),
@@ -158,17 +163,21 @@ def test_a_metric_flow_is_as_sure_as_the_range_that_scaled_it():
 ])  # fmt: skip
 def test_verdicts_on_flow(change, view, reason):
     seen = reading(0.2, -0.3, 0.0, 0.0, 0.0, 0.0, **change)
-    assert judge_flow(seen, True, 0.0, 0.0, 1.0, view, told(flow_min_height_m=0.3).flow) == reason
+    s = told(flow_min_height_m=0.3).flow
+    assert judge_look.law(seen, RUNS, KEPT, view, angular=True, s=s) == view._replace(reason=reason)
+    waiting = NO_HEADING if reason == FUSED else reason  # that the heading is sought is said of what may be fused
+    assert judge_look.law(seen, RUNS, SEARCHED, view, angular=True, s=s).reason == waiting
 
 
 def test_flow_that_no_sensor_measures_and_flow_that_is_no_number():
     judged = [
-        judge_flow(reading(x, y, 0.0, 0.0), True, turning, 0.0, 1.0, SEEN, TOLD.flow)
+        judge_look.law(reading(x, y), RUNS, KEPT, SEEN._replace(turning_x=turning), angular=True, s=TOLD.flow).reason
         for x, y, turning in ((10.0, 0.0, 0.0), (0.0, -9.85, 0.0), (9.7, -9.7, 0.0), (NAN, 0.0, 0.0), (0.0, 0.0, NAN))
     ]
     assert judged == [OUT_OF_RANGE, OUT_OF_RANGE, FUSED, NOT_FINITE, NOT_FINITE]
-    metric = judge_flow(reading(20.0, 0.0), False, NAN, NAN, 1.0, SEEN._replace(known=False), TOLD.flow)
-    assert metric == FUSED  # it needs no turning and no height, and its limit is another
+    blind = SEEN._replace(turning_x=NAN, turning_y=NAN, known=0.0)
+    metric = judge_look.law(reading(20.0, 0.0), RUNS, KEPT, blind, angular=False, s=TOLD.flow)
+    assert metric.reason == FUSED  # it needs no turning and no height, and its limit is another
 
 
 def test_the_turning_is_taken_from_the_imu_less_the_filters_bias_or_from_the_sensor_less_its_own():

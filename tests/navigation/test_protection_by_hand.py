@@ -41,15 +41,14 @@ from flownav.estimation.states import (
 )
 from flownav.navigation.memory import (
     DRIFT_SINCE,
-    LENS_RANGE,
     MEMORY,
     PROTECTION,
     SCALE_DOUBT,
     SUSPECTED,
-    TURNING,
     load_flow,
     new_work,
     store_flow,
+    store_look,
 )
 from flownav.navigation.protection import (
     CLEAR,
@@ -69,7 +68,7 @@ from flownav.navigation.protection import (
     sign_drift,
     sign_flow,
 )
-from flownav.navigation.records import FlowSignMemory, GpsMemory, SuspicionMemory
+from flownav.navigation.records import FlowSignMemory, GpsMemory, Look, SuspicionMemory
 from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, empty_tape, output_of, room_of
 
 FLOW_SPEED = MEMORY.row(FlowSignMemory, "speed_m_s")
@@ -129,8 +128,8 @@ def test_an_innovation_tells_of_a_fault_by_its_part_of_it(work):
 @pytest.mark.parametrize("angular", [True, False])
 def test_what_a_unit_of_each_fault_adds_to_a_flow(work, angular):
     """2 m/s forward and 1 m/s to the right, 4 m up, turning by 0.1 rad/s about x."""
-    work[STATE + VELOCITY], work[STATE + VELOCITY + 1], work[LENS_RANGE] = 2.0, 1.0, 4.0
-    work[TURNED_BEFORE], work[TURNING] = 0.1, 0.2
+    work[STATE + VELOCITY], work[STATE + VELOCITY + 1], work[TURNED_BEFORE] = 2.0, 1.0, 0.1
+    store_look(work, ONE_LANE, 0, Look(turning_x=0.2, range_m=4.0))
     read = (0.1 - 0.25, 0.5) if angular else (2.0, 1.0)
     store_flow(work, ONE_LANE, 0, load_flow(work, ONE_LANE, 0)._replace(taken_s=9.9))
     for component in range(2):

@@ -109,8 +109,8 @@ class Layout:
 
         Its positional parameters are annotated with records of this layout; its keyword-only ones are told by the
         caller, the same for all lanes, as are an index and what sinks need: `run(work, lanes, t_s, *others, o)`, the
-        others as the function has them. It returns a record, or a named tuple of records, of tuples of them, and of
-        truths.
+        others as the function has them. It returns a record, a tuple of records, or a named tuple of records, of such
+        tuples and of truths.
         """
         return _generated(self, function)
 
@@ -190,7 +190,7 @@ def _generated(layout: Layout, function: Callable[..., Any]) -> OnLanes:
     passed = [p.name if p.kind is p.KEYWORD_ONLY else plan.loaded(kinds[p.name], p.name) for p in parameters(function)]
     lines = [f"found = law({', '.join(passed)})"]
     result = kinds["return"]
-    if result is bool or result in layout._kept or result in layout._sinks:
+    if not hasattr(result, "_fields") or result in layout._kept or result in layout._sinks:
         lines += plan.put(result, "found")
     else:
         fields = get_type_hints(result)

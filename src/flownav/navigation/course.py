@@ -15,9 +15,8 @@ import numpy as np
 from flownav.compile import equation, replacing
 from flownav.estimation.states import ATTITUDE
 from flownav.frames import heading_cosine_sine, quaternion_product, rotation_from_quaternion, velocity_from_flow
-from flownav.navigation.memory import LENS_RANGE, MEMORY, TURNING
 from flownav.navigation.offers import is_heard
-from flownav.navigation.records import CourseMemory, HeadingMemory, Reading
+from flownav.navigation.records import CourseMemory, HeadingMemory, Look, Reading
 from flownav.navigation.tape import HEADING_FOUND
 from flownav.navigation.verdicts import Attitude, Event, Reset, on_lanes
 
@@ -30,17 +29,6 @@ SLOWLY_S = 0.3  # the flow's velocity is smoothed as a receiver smooths its own
 
 with_sought = replacing(HeadingMemory, "sought")
 with_velocity = replacing(CourseMemory, "flow_s", "north_m_s", "east_m_s")
-
-
-class SeenFlow(NamedTuple):
-    """The range of the newest flow reading [m], and the turning that it saw [rad/s]."""
-
-    range_m: float
-    turning_x: float
-    turning_y: float
-
-
-MEMORY.name(SeenFlow, LENS_RANGE, TURNING, TURNING + 1)
 
 
 @equation
@@ -107,13 +95,13 @@ def turn_heading(own: Attitude, by_rad: float, turns: bool) -> tuple[Attitude, R
 # -- on lanes -----------------------------------------------------------------------------------------------
 @on_lanes
 def note_flow_course(
-    reading: Reading, heading: HeadingMemory, seen: SeenFlow, own: Attitude, m: CourseMemory, *, t_s: float,
+    reading: Reading, heading: HeadingMemory, look: Look, own: Attitude, m: CourseMemory, *, t_s: float,
     angular: bool, sought: bool,
 ) -> CourseMemory:  # fmt: skip
     """The flow's velocity by a reading whose turning and range are known. sought: only where a heading is."""
-    x = reading.value_0 - (seen.turning_x if angular else 0.0)
-    y = reading.value_1 - (seen.turning_y if angular else 0.0)
-    u, v = velocity_from_flow(x, y, seen.range_m) if angular else (x, y)
+    x = reading.value_0 - (look.turning_x if angular else 0.0)
+    y = reading.value_1 - (look.turning_y if angular else 0.0)
+    u, v = velocity_from_flow(x, y, look.range_m) if angular else (x, y)
     cosine, sine = heading_cosine_sine(rotation_from_quaternion(own.w, own.x, own.y, own.z))
     counts = (not sought or heading.sought > 0.0) and is_heard(reading) and bool(np.isfinite(u + v))
     return with_flow(cosine * u - sine * v, sine * u + cosine * v, t_s, m) if counts else m

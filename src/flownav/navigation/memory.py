@@ -18,6 +18,7 @@ from flownav.navigation.records import (
     BridgeMemory,
     CourseMemory,
     EchoMemory,
+    FlowInnovation,
     FlowMemory,
     FlowSignMemory,
     GpsMemory,
@@ -26,6 +27,7 @@ from flownav.navigation.records import (
     ImuMemory,
     ImuWindow,
     Levels,
+    Look,
     MotionStep,
     NoiseMemory,
     OwedMotion,
@@ -38,6 +40,7 @@ from flownav.navigation.records import (
     SeenWindow,
     SpentMotion,
     SpikeMemory,
+    StandMemory,
     StartMemory,
     SteadyForce,
     SuspicionMemory,
@@ -63,12 +66,9 @@ IMU_WINDOW = MEMORY.keep(ImuWindow)
 SEEN_WINDOW = MEMORY.keep(SeenWindow)
 NOISE_FOLLOWED = MEMORY.keep(NoiseMemory, 8, "place")  # of range, barometer, GPS position and velocity by axis
 WHITENESS = MEMORY.keep(WhitenessMemory, 3, "axis")  # forward, right, down
-ACCEL_FACTOR = MEMORY.take(3)  # how many times noisier than told the accelerometer is, by each of these
 COURSE = MEMORY.keep(CourseMemory)
 PUSH = MEMORY.keep(PushMemory)
-BLIND = MEMORY.take(1)  # 1 where no range tells the height of the flow now: none lately, or a disputed one, or strays
-STANDS = MEMORY.take(1)  # what the vehicle did in the last window: `still.MOVES`, SHAKEN or RESTS
-CONTACT = MEMORY.take(1)  # the range when it rested last [m]; NaN where it has not
+MEMORY.keep(StandMemory)
 MEMORY.keep(BaroMemory)
 MEMORY.keep(GpsMemory)
 MEMORY.keep(PadMemory)
@@ -77,11 +77,9 @@ SOUGHT = MEMORY.row(HeadingMemory, "sought")
 # what becomes of the component that is offered
 REASON = MEMORY.take(1)
 OBSERVATION = MEMORY.take(1)
-LENS_RANGE = MEMORY.take(1)  # from the lens to the ground, along the boresight [m]
-INNOVATION_BEFORE = MEMORY.take(3)  # of the flow's components, at the reading before
-KNOWN = MEMORY.take(1)  # 1 where that range is known
-TURNING = MEMORY.take(2)  # what the flow saw of the vehicle's turning [rad/s]
-TESTED = MEMORY.take(1)
+MEMORY.keep(Look)
+MEMORY.keep(FlowInnovation, 3, "component")
+RANGE_MISSING = MEMORY.row(Look, "unranged")
 SCALE_DOUBT = MEMORY.keep(ScaleDoubt)
 MEMORY.keep(SteadyForce)
 for _record in (MotionStep, SpentMotion, OwedMotion, FlowSignMemory, SuspicionMemory):
@@ -116,12 +114,12 @@ load_sign, store_sign = MEMORY.access(FlowSignMemory)
 load_suspicion, store_suspicion = MEMORY.access(SuspicionMemory)
 load_levels, store_levels = MEMORY.access(Levels)
 load_whiteness, store_whiteness = MEMORY.access(WhitenessMemory)
+load_look, store_look = MEMORY.access(Look)
+load_stand, store_stand = MEMORY.access(StandMemory)
 load_noise, store_noise = MEMORY.access(NoiseMemory)
 
 _FRESH: dict[int, tuple[float, ...]] = {
     QUATERNION: (1.0, 0.0, 0.0, 0.0),
-    CONTACT: (np.nan,),
-    ACCEL_FACTOR: (1.0, 1.0, 1.0),
     STILL_CLOCK: (-np.inf,),
     CONSIDERS: (1.0,),
     HYPOTHESES: (FAULTS_FOLLOWED,),

@@ -38,13 +38,12 @@ from flownav.frames import to_body
 from flownav.navigation.flow_noise import LONGEST_STEP_S
 from flownav.navigation.memory import (
     DRIFT_SINCE,
-    LENS_RANGE,
     MEMORY,
     SCALE_DOUBT,
-    TURNING,
     held_by_gps,
     load_flow,
     load_gps,
+    load_look,
     load_sign,
     load_suspicion,
     of_lane,
@@ -107,8 +106,8 @@ def sign_flow(work: Work, lanes: Lanes, t_s: float, component: int, angular: boo
     if followed(work, lanes) == 0:
         return
     for lane in range(len(lanes)):
-        range_m, m = of_lane(work, lanes, LENS_RANGE, lane), load_sign(work, lanes, lane)
-        own, other = read_by(seen_by(work, lanes, lane, range_m, m, angular), component)
+        look, m = load_look(work, lanes, lane), load_sign(work, lanes, lane)
+        own, other = read_by(seen_by(work, lanes, lane, look.range_m, m, angular), component)
         since_s = t_s - load_flow(work, lanes, lane).taken_s
         slope = (own - (m.read_x if component == 0 else m.read_y)) / since_s
         lately = since_s > 0.0 and since_s < LONGEST_STEP_S
@@ -119,12 +118,8 @@ def sign_flow(work: Work, lanes: Lanes, t_s: float, component: int, angular: boo
         sign(work, lanes, FLOW_AGE, lane, -slope if level and lately else 0.0)
         m = with_x(m, read_x=own) if level and component == 0 else m
         m = with_y(m, read_y=own) if level and component != 0 else m
-        turned_x, turned_y = of_lane(work, lanes, TURNING, lane), of_lane(work, lanes, TURNING + 1, lane)
-        m = (
-            followed_sign(m, own, other, level, range_m if angular else 1.0, turned_x, turned_y)
-            if component == 1
-            else m
-        )
+        per = look.range_m if angular else 1.0
+        m = followed_sign(m, own, other, level, per, look.turning_x, look.turning_y) if component == 1 else m
         store_sign(work, lanes, lane, m)
 
 

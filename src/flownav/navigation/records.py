@@ -144,6 +144,36 @@ class FlowMemory(NamedTuple):
     usual: float = 0.0
 
 
+class FlowInnovation(NamedTuple):
+    """A component's innovation at the flow reading before [rad/s or m/s]."""
+
+    innovation: float = 0.0
+
+
+class Look(NamedTuple):
+    """What the flow reading at hand saw: the vehicle's turning [rad/s]; the range from the lens to the ground along the
+    boresight by the filter [m], and known: 1 where that is well known; R_33; unranged: 1 where no range tells the
+    height of the flow now: none lately, or a disputed one, or strays; and the verdict on the whole reading (`reasons`).
+    """
+
+    turning_x: float = 0.0
+    turning_y: float = 0.0
+    range_m: float = 0.0
+    known: float = 0.0
+    upright: float = 0.0
+    unranged: float = 0.0
+    reason: float = 0.0
+
+
+class StandMemory(NamedTuple):
+    """does: what the vehicle did in the last window, `still.MOVES`, SHAKEN or RESTS; contact_m: the range when it
+    rested last, NaN where it has not.
+    """
+
+    does: float = 0.0
+    contact_m: float = nan
+
+
 class HeadingMemory(NamedTuple):
     """read_s: when a heading was read last; field_rad: direction of the level magnetic field in the filter's frame;
     refuted: 1 once what is read as heading was found to be wrong; sought: 1 while a heading that no sensor reads is to
@@ -268,7 +298,8 @@ class PushMemory(NamedTuple):
 
 class WhitenessMemory(NamedTuple):
     """A block of innovations along one body axis: since when [s], their sum in standard deviations, how many. The block
-    before, the mean square of blocks, and when it ended [s].
+    before, the mean square of blocks, and when it ended [s]; factor: how many times noisier than told the accelerometer
+    is along that axis.
     """
 
     since_s: float = 0.0
@@ -277,6 +308,7 @@ class WhitenessMemory(NamedTuple):
     before: float = 0.0
     square: float = 1.0
     ended_s: float = -inf
+    factor: float = 1.0
 
 
 class GpsMemory(NamedTuple):

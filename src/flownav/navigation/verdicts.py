@@ -12,15 +12,18 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import Lanes, Work, equation
-from flownav.estimation.covariance import add_noise_lane, variance_of
+from flownav.estimation.covariance import add_noise_lane, covariance_of, variance_of
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import (
     ACCEL_BIAS,
     ACCEL_NOISE,
     ACCEPTED,
     FORCE,
+    GROUND,
     GYRO_BIAS,
     GYRO_NOISE,
+    GYRO_SHARE,
+    HELD_BACK,
     IMU,
     INNOVATION,
     INNOVATION_VARIANCE,
@@ -32,6 +35,7 @@ from flownav.estimation.states import (
     STATE,
     VELOCITY,
 )
+from flownav.frames import Rotation
 from flownav.navigation.journal import reset_state
 from flownav.navigation.memory import MEMORY, OBSERVATION, REASON
 from flownav.navigation.tape import Output, write_event
@@ -117,6 +121,21 @@ class Tested(NamedTuple):
     variance: float
 
 
+class GroundBelow(NamedTuple):
+    """What the filter says of the ground below: the height over it [m], the variance of that [m2], and R_EB."""
+
+    height_m: float
+    variance: float
+    rotation: Rotation
+
+
+class AxisVelocity(NamedTuple):
+    """One axis of the filter's velocity, NED [m/s], and its variance."""
+
+    speed_m_s: float
+    variance: float
+
+
 # -- what a judge returns ---------------------------------------------------------------------------------------
 class Offer(NamedTuple):
     """One component for the filter: its value and variance; reason: FUSED where it may be tested, or why not."""
@@ -156,6 +175,24 @@ class Offered(NamedTuple):
     offered: float
 
 
+class Measured(NamedTuple):
+    """What the law is held against, where that is not what was offered."""
+
+    measured: float
+
+
+class GyroShare(NamedTuple):
+    """By how much the filter's bias of the gyro is in the flow reading at hand."""
+
+    share: float
+
+
+class HeldBack(NamedTuple):
+    """Above 0 in the lanes that test readings and fuse none."""
+
+    held: float
+
+
 class Event(NamedTuple):
     """A happening of `tape.EVENT_NAMES`; kind below 0: nothing happened."""
 
@@ -190,6 +227,22 @@ def height_of(work: Work, lanes: Lanes, lane: int) -> Height:
         np.sqrt(variance_of(work, lanes, VELOCITY + 2, lane)),
         rotation_of(work, lanes, lane)[8],
     )
+
+
+@equation
+def ground_below(work: Work, lanes: Lanes, lane: int) -> GroundBelow:
+    """What the filter says of the ground below a lane's vehicle."""
+    height_m = work[(STATE + GROUND) * len(lanes) + lane] - work[(STATE + POSITION + 2) * len(lanes) + lane]
+    both = variance_of(work, lanes, POSITION + 2, lane) + variance_of(work, lanes, GROUND, lane)
+    variance = both - 2.0 * covariance_of(work, lanes, POSITION + 2, GROUND, lane)
+    return GroundBelow(height_m, variance, rotation_of(work, lanes, lane))
+
+
+@equation
+def axis_velocity(work: Work, lanes: Lanes, axis: int, lane: int) -> AxisVelocity:
+    """One axis of a lane's velocity."""
+    speed_m_s = work[(STATE + VELOCITY + axis) * len(lanes) + lane]
+    return AxisVelocity(speed_m_s, variance_of(work, lanes, VELOCITY + axis, lane))
 
 
 @equation
@@ -236,7 +289,12 @@ MEMORY.name(Tested, REASON, INNOVATION, INNOVATION_VARIANCE, NOISE)
 MEMORY.name(Fate, REASON)
 MEMORY.name(Noise, NOISE)
 MEMORY.name(Offered, OFFERED)
+MEMORY.name(Measured, MEASURED)
+MEMORY.name(GyroShare, GYRO_SHARE)
+MEMORY.name(HeldBack, HELD_BACK)
 MEMORY.derive(Height, height_of)
+MEMORY.derive(GroundBelow, ground_below)
+MEMORY.derive(AxisVelocity, axis_velocity, "axis")
 MEMORY.sink(Offer, offer)
 MEMORY.sink(Event, tell, "t_s", "o")
 MEMORY.sink(Reset, reset, "o")

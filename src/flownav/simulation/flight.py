@@ -34,8 +34,10 @@ from flownav.simulation.navigating import (
     feed_due,
     hand_to_autopilot,
     note_knowledge,
+    note_normalised_error,
     note_truth,
     put_on_truth,
+    truth_row,
 )
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import ATTITUDE_STEPS, NOTHING, PHYSICS_S, PHYSICS_STEPS, START_STEP, Flight, OwnParts
@@ -106,7 +108,7 @@ def decide_on_paper(
     if epoch == 0:
         start_filter(work, lanes, flight.initial_variance, flight.plan.start_known)
     run_filter(work, lanes, epoch, flight.paper)
-    estimate_for_autopilot(work, lanes, flight)
+    estimate_for_autopilot(work, lanes, flight.plan.fly_on_truth)
     note_home(work, lanes, epoch, reference, flight)
     command(work, lanes, t_s, reference, flight, None)
     return reference
@@ -153,16 +155,17 @@ def decide_navigated(
     draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
     surround_now(work, lanes, seed, first, epoch, t_s, flight)
     taken = sample(work, lanes, seed, first, epoch, table.slots, taken, onboard, flight.fails)
-    note_truth(work, lanes, epoch, table)
+    note_truth(work, lanes, truth_row(epoch, table))
     following = feed_due(work, nav, lanes, epoch, following, take, settings, o, fed, table)
     carry_ahead(work, nav, lanes, heard, ahead if heard >= ahead else heard, period_s, table)
-    compare_at_horizon(work, nav, lanes, epoch, table)
+    reached, then = epoch >= table.horizon_epochs, truth_row(epoch - table.horizon_epochs, table)
+    compare_at_horizon(work, lanes, reached, nav, then)
+    note_normalised_error(work, nav, lanes, reached, then)
     if flight.plan.along_truth:
-        put_on_truth(work, nav, lanes, epoch, table)
-    note_knowledge(work, nav, lanes)
-    waiting = t_s < flight.plan.handover_s
-    hand_to_autopilot(work, nav, lanes, waiting, flight.plan.home_at_start, reference)
-    estimate_for_autopilot(work, lanes, flight)
+        put_on_truth(work, lanes, reached, nav, then)
+    note_knowledge(work, lanes, nav)
+    hand_to_autopilot(work, lanes, t_s < flight.plan.handover_s, flight.plan.home_at_start, reference, nav)
+    estimate_for_autopilot(work, lanes, flight.plan.fly_on_truth)
     command(work, lanes, t_s, reference, flight, onboard)
     return taken, following, reference
 

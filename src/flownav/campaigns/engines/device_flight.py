@@ -26,7 +26,13 @@ from flownav.simulation.flight import (
     inertial_parts,
     start_block,
 )
-from flownav.simulation.layout import ground_as_is, load_autopilot, load_helicopter
+from flownav.simulation.layout import (
+    ground_as_is,
+    load_autopilot,
+    load_estimated,
+    load_helicopter,
+    load_loads,
+)
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import Flight
 from flownav.simulation.sensing import EPOCH_S
@@ -129,17 +135,17 @@ def take_here(
 @equation
 def note_epoch(work: Work, row: int, epoch: int, home: int, flight: Flight, onboard: Onboard | None) -> None:
     """What this epoch shows, into the scores of this flight."""
-    state, says = load_helicopter(work, ONE_LANE, 0), layout.ESTIMATED
+    state, says = load_helicopter(work, ONE_LANE, 0), load_estimated(work, ONE_LANE, 0)
     ground_m = ground_height(state.pos_n, state.pos_e, ground_as_is(work, ONE_LANE, 0))
-    grounded, t_s = work[layout.CONTACT] > 0.0, epoch * EPOCH_S
-    error_n, error_e = work[says] - state.pos_n, work[says + 1] - state.pos_e
+    grounded, t_s = load_loads(work, ONE_LANE, 0).contact_n > 0.0, epoch * EPOCH_S
+    error_n, error_e = says.pos_n_m - state.pos_n, says.pos_e_m - state.pos_e
     flies = not flight.plan.fly_on_truth
     counts = is_counted(onboard, grounded, t_s, flight.plan.handover_s)
     shown = Shown(
         state.pos_n, state.pos_e, state.pos_d, state.u, state.v, state.w, state.qw, state.qx, state.qy, state.qz,
         state.r, ground_m, grounded, load_autopilot(work, ONE_LANE, 0).away > 0.0,
-        error_n, error_e, work[says + 2] - state.pos_d, work[says + 3] - state.u, work[says + 4] - state.v,
-        work[says + 5] - state.w,
+        error_n, error_e, says.pos_d_m - state.pos_d, says.vel_u_m_s - state.u, says.vel_v_m_s - state.v,
+        says.vel_w_m_s - state.w,
         error_n if flies else 0.0, error_e if flies else 0.0,
         counts, not grounded and epoch >= home, sees_pad(onboard, -state.pos_d, epoch, home, flight.plan.handover_s),
         epoch == home,

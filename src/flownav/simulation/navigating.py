@@ -18,7 +18,7 @@ from flownav.estimation.consistency import normalised_error
 from flownav.frames import quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.navigation.ahead import Carried, carried, coasted, state_of
 from flownav.navigation.memory import load_reading, load_start
-from flownav.navigation.records import GroundMemory, Reading, StartMemory
+from flownav.navigation.records import GroundMemory, Reading, StartMemory, SuspicionMemory
 from flownav.navigation.tape import Output
 from flownav.simulation.layout import PLANT, load_inertial_then, store_estimated
 from flownav.simulation.records import (
@@ -40,7 +40,6 @@ from flownav.simulation.said import (
     PadVariance,
     Position,
     StatedVariance,
-    Suspicion,
     Velocity,
     on_both,
 )
@@ -230,7 +229,7 @@ def over_pad(c: Carried, place: PadPlace) -> Estimated:
 
 @on_both
 def note_knowledge(
-    before: Knowledge, pad: PadSaid, variance: PadVariance, ground: GroundMemory, suspicion: Suspicion
+    before: Knowledge, pad: PadSaid, variance: PadVariance, ground: GroundMemory, suspicion: SuspicionMemory
 ) -> Knowledge:
     """What the vehicle knows of its landing, by its navigator and its camera, an epoch later."""
     found = pad.known > 0.0

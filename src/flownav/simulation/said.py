@@ -8,12 +8,12 @@ from flownav.compile import Lanes, Layout, Work, equation
 from flownav.estimation.covariance import covariance_of, variance_of
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import GROUND, PAD, POSITION, QUATERNION, STATE
-from flownav.navigation.memory import MEMORY, PAD_KNOWN, SUSPECTED
+from flownav.navigation.memory import MEMORY, PAD_KNOWN
 from flownav.navigation.tape import body_velocity_variance
 from flownav.navigation.verdicts import Position, Velocity
 from flownav.simulation.layout import PLANT
 
-__all__ = ["Attitude", "GroundSaid", "PadSaid", "PadVariance", "Position", "StatedVariance", "Suspicion", "Velocity"]
+__all__ = ["Attitude", "GroundSaid", "PadSaid", "PadVariance", "Position", "StatedVariance", "Velocity"]
 
 
 class Attitude(NamedTuple):
@@ -37,12 +37,6 @@ class GroundSaid(NamedTuple):
     """Where the ground below is."""
 
     down_m: float
-
-
-class Suspicion(NamedTuple):
-    """Above 0 while a fault is suspected."""
-
-    suspected: float
 
 
 class StatedVariance(NamedTuple):
@@ -98,7 +92,6 @@ _NAVIGATOR = Layout(below=MEMORY)
 _NAVIGATOR.name(Attitude, *range(QUATERNION, QUATERNION + 4))
 _NAVIGATOR.name(PadSaid, PAD_KNOWN, STATE + PAD, STATE + PAD + 1)
 _NAVIGATOR.name(GroundSaid, STATE + GROUND)
-_NAVIGATOR.name(Suspicion, SUSPECTED)
 _NAVIGATOR.derive(StatedVariance, stated_variance)
 _NAVIGATOR.derive(PadVariance, pad_variance)
 

@@ -7,6 +7,9 @@ batch, and both are the same bytes. Rates: physics 500 Hz (Runge-Kutta), flow dy
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -121,15 +124,20 @@ def advance_on_paper(work: Work, lanes: Lanes, flight: Flight) -> None:
     note_inputs(work, lanes, flight.gains)
 
 
-@equation
-def fly_on_paper(
-    work: Work, lanes: Lanes, seed: int, first: int, noise: Noise, flight: Flight, history: NDArray[np.float64]
-) -> None:
-    """Every epoch with the paper's sensors and its filter, or with no filter at all."""
-    for epoch in range(flight.plan.epochs):
-        reference = decide_on_paper(work, lanes, seed, first, noise, epoch, flight)
-        write_history(work, lanes, epoch, reference, history)
-        advance_on_paper(work, lanes, flight)
+def epochs_on_paper(note: Callable[..., None]) -> Callable[..., None]:
+    """An equation: every epoch with the paper's sensors and its filter, or with no filter at all.
+
+    note(work, lanes, epoch, reference, flight, onboard, into) keeps what an epoch shows.
+    """
+
+    @equation
+    def fly_epochs(work: Work, lanes: Lanes, seed: int, first: int, noise: Noise, flight: Flight, into: Any) -> None:
+        for epoch in range(flight.plan.epochs):
+            reference = decide_on_paper(work, lanes, seed, first, noise, epoch, flight)
+            note(work, lanes, epoch, reference, flight, None, into)
+            advance_on_paper(work, lanes, flight)
+
+    return fly_epochs
 
 
 @equation
@@ -170,23 +178,45 @@ def decide_navigated(
     return taken, following, reference
 
 
+def epochs_navigated(note: Callable[..., None]) -> Callable[..., None]:
+    """An equation: every epoch with the vehicle's own sensors and the navigator, on whose estimate of now it is flown.
+
+    note: as of `epochs_on_paper`.
+    """
+
+    @equation
+    def fly_epochs(
+        work: Work, nav: Work, lanes: Lanes, seed: int, first: int, noise: Noise, flight: Flight, onboard: Onboard,
+        table: Timetable, take: Any, settings: Work, o: Output, fed: Work, into: Any,
+    ) -> None:  # fmt: skip
+        parts = inertial_parts(onboard)
+        taken, following, heard = 0, 0, 0
+        for epoch in range(flight.plan.epochs):
+            taken, following, reference = decide_navigated(
+                work, nav, lanes, seed, first, noise, epoch, taken, following, heard, flight, onboard, table, take,
+                settings, o, fed,
+            )  # fmt: skip
+            note(work, lanes, epoch, reference, flight, onboard, into)
+            advance_sensing(
+                work, lanes, seed, first, epoch, taken, heard, flight, onboard, table, flight.fails, flight.own
+            )
+            taken += parts
+            heard += parts
+
+    return fly_epochs
+
+
 @equation
-def fly_navigated(
-    work: Work, nav: Work, lanes: Lanes, seed: int, first: int, noise: Noise, flight: Flight, onboard: Onboard,
-    table: Timetable, take: int, settings: Work, o: Output, fed: Work, history: NDArray[np.float64],
+def note_history(
+    work: Work, lanes: Lanes, epoch: int, reference: Reference, flight: Flight, onboard: Onboard | None,
+    history: NDArray[np.float64],
 ) -> None:  # fmt: skip
-    """Every epoch with the vehicle's own sensors and the navigator, on whose estimate of now the autopilot flies."""
-    parts = inertial_parts(onboard)
-    taken, following, heard = 0, 0, 0
-    for epoch in range(flight.plan.epochs):
-        taken, following, reference = decide_navigated(
-            work, nav, lanes, seed, first, noise, epoch, taken, following, heard, flight, onboard, table, take,
-            settings, o, fed,
-        )  # fmt: skip
-        write_history(work, lanes, epoch, reference, history)
-        advance_sensing(work, lanes, seed, first, epoch, taken, heard, flight, onboard, table, flight.fails, flight.own)
-        taken += parts
-        heard += parts
+    """What an epoch shows, into the flights' history."""
+    write_history(work, lanes, epoch, reference, history)
+
+
+fly_on_paper = epochs_on_paper(note_history)
+fly_navigated = epochs_navigated(note_history)
 
 
 @equation

@@ -12,20 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.compile import ONE_LANE, WARP, Lanes, Work, equation, pointer, procedure, strided
+from flownav.control.guidance import Reference
 from flownav.navigation.take import navigate
-from flownav.navigation.tape import Output, output_of
+from flownav.navigation.tape import output_of
 from flownav.scoring.running import RUNNING_ROWS, Shown, begin_scores, note_shown, write_scores
 from flownav.sensors.beam import ground_height
 from flownav.simulation import layout
 from flownav.simulation.draws import Noise
-from flownav.simulation.epoch import advance_sensing
-from flownav.simulation.flight import (
-    advance_on_paper,
-    decide_navigated,
-    decide_on_paper,
-    inertial_parts,
-    start_block,
-)
+from flownav.simulation.flight import epochs_navigated, epochs_on_paper, start_block
 from flownav.simulation.layout import (
     ground_as_is,
     load_autopilot,
@@ -71,10 +65,7 @@ def fly_paper_flight(
     """
     own, row = begin_flight(work, rows, truth, flights, thread), rows - RUNNING_ROWS
     start_block(own, ONE_LANE, seed, first + thread, flight, None, noise)
-    for epoch in range(flight.plan.epochs):
-        decide_on_paper(own, ONE_LANE, seed, first + thread, noise, epoch, flight)
-        note_epoch(own, row, epoch, home, flight, None)
-        advance_on_paper(own, ONE_LANE, flight)
+    score_on_paper(own, ONE_LANE, seed, first + thread, noise, flight, (row, home))
     finish(own, row, flight, scores, thread)
 
 
@@ -98,27 +89,12 @@ def fly_navigated_flight(
         counted[i] = 0
     o = output_of(nothing, nothing, nothing, nothing, nothing, nothing, room, counted)
     settings, fed = pointer(flight.settings), pointer(nothing)
-    start_block(own, ONE_LANE, seed, first + thread, flight, flight.onboard, noise)
-    fly_on(own, mind, seed, first + thread, noise, flight, flight.onboard, flight.table, take, settings, o, fed, row)
+    number, onboard = first + thread, flight.onboard
+    start_block(own, ONE_LANE, seed, number, flight, onboard, noise)
+    score_navigated(
+        own, mind, ONE_LANE, seed, number, noise, flight, onboard, flight.table, take, settings, o, fed, (row, -1)
+    )
     finish(own, row, flight, scores, thread)
-
-
-@equation
-def fly_on(
-    work: Work, nav: Work, seed: int, number: int, noise: Noise, flight: Flight, onboard: Any, table: Any, take: Any,
-    settings: Work, o: Output, fed: Work, row: int,
-) -> None:  # fmt: skip
-    """Every epoch of flight `number`, as `simulation.flight.fly_navigated`; its scores lie from `row` on."""
-    taken, following, heard = 0, 0, 0
-    for epoch in range(flight.plan.epochs):
-        taken, following, _ = decide_navigated(
-            work, nav, ONE_LANE, seed, number, noise, epoch, taken, following, heard, flight, onboard, table, take,
-            settings, o, fed,
-        )  # fmt: skip
-        note_epoch(work, row, epoch, -1, flight, onboard)
-        advance_sensing(work, ONE_LANE, seed, number, epoch, taken, heard, flight, onboard, table, flight.fails, None)
-        taken += inertial_parts(onboard)
-        heard += inertial_parts(onboard)
 
 
 @procedure
@@ -133,8 +109,12 @@ def take_here(
 
 # -- scores -------------------------------------------------------------------------------------------------------
 @equation
-def note_epoch(work: Work, row: int, epoch: int, home: int, flight: Flight, onboard: Onboard | None) -> None:
-    """What this epoch shows, into the scores of this flight."""
+def note_epoch(
+    work: Work, lanes: Lanes, epoch: int, reference: Reference, flight: Flight, onboard: Onboard | None,
+    into: tuple[int, int],
+) -> None:  # fmt: skip
+    """What this epoch shows, into the scores of this flight. into: their first row; the epoch of `home`."""
+    row, home = into
     state, says = load_helicopter(work, ONE_LANE, 0), load_estimated(work, ONE_LANE, 0)
     ground_m = ground_height(state.pos_n, state.pos_e, ground_as_is(work, ONE_LANE, 0))
     grounded, t_s = load_loads(work, ONE_LANE, 0).contact_n > 0.0, epoch * EPOCH_S
@@ -151,6 +131,10 @@ def note_epoch(work: Work, row: int, epoch: int, home: int, flight: Flight, onbo
         epoch == home,
     )  # fmt: skip
     note_shown(work, ONE_LANE, row, 0, epoch, shown, flight.vehicle.cg_above_skid_m)
+
+
+score_on_paper = epochs_on_paper(note_epoch)
+score_navigated = epochs_navigated(note_epoch)
 
 
 @equation

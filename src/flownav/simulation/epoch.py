@@ -18,7 +18,8 @@ from flownav.sensors.beam import Ground, ground_height
 from flownav.sensors.flow import FlowParameters, FlowState, misread, step_flow
 from flownav.sensors.gps_ins import GpsInsErrors, attitude_with_error
 from flownav.sensors.rangefinder import slant_range
-from flownav.simulation.failing import strike
+from flownav.simulation.block import Block, Progress
+from flownav.simulation.failing import Taken, strike
 from flownav.simulation.layout import PAPERS, PLANT
 from flownav.simulation.navigating import Timetable, inertial_row, keep_inertial
 from flownav.simulation.onboard import Onboard
@@ -77,31 +78,35 @@ def command(
     work: Work, lanes: Lanes, t_s: float, reference: Reference, flight: Flight, onboard: Onboard | None
 ) -> None:
     """Landing logic and outer loop; the filter's inputs for the coming epoch."""
-    plan, gains = flight.plan, flight.gains
-    may_fly = 1.0 if t_s >= plan.takeoff_at_s else 0.0
-    may_land = 1.0 if t_s >= plan.may_land_after_s else 0.0
+    may_fly = 1.0 if t_s >= flight.plan.takeoff_at_s else 0.0
+    may_land = 1.0 if t_s >= flight.plan.may_land_after_s else 0.0
     threshold_n = CONTACT_SHARE * flight.vehicle.mass_kg * flight.vehicle.gravity_m_s2
-    commanded(work, lanes, may_fly, may_land, threshold_n, reference, gains, onboard)
+    mind_skids(work, lanes, may_fly, may_land, threshold_n, onboard)
+    follow_path(work, lanes, may_land, reference, flight.gains)
 
 
 @PLANT.on_lanes
-def commanded(
-    before: AutopilotState, estimate: Estimate, home: Home, said: Estimated, loads: Loads, skids: Landed,
-    known: Knowledge, *, may_fly: float, may_land: float, threshold_n: float, reference: Reference,
-    gains: AutopilotGains, onboard: Onboard | None,
+def mind_skids(
+    before: AutopilotState, loads: Loads, skids: Landed, *, may_fly: float, may_land: float, threshold_n: float,
+    onboard: Onboard | None,
 ) -> AutopilotState:  # fmt: skip
-    """The autopilot after its landing logic and outer loop, on what the filter, or the INS, says.
+    """The landing logic. With sensors of its own, the skid switch is all that the autopilot knows of its skids."""
+    contact_n = loads.contact_n if onboard is None else 2.0 * threshold_n * skids.landed
+    return landing_logic(before, contact_n, threshold_n, may_fly, may_land, EPOCH_S)
 
-    With sensors of its own, the skid switch is all that it knows of its skids.
-    """
+
+@PLANT.on_lanes
+def follow_path(
+    before: AutopilotState, estimate: Estimate, home: Home, said: Estimated, known: Knowledge, *, may_land: float,
+    reference: Reference, gains: AutopilotGains,
+) -> AutopilotState:  # fmt: skip
+    """The outer loop, at the attitude that the filter, or the INS, says."""
     relative = over_home(
         estimate, pos_n=estimate.pos_n - home.north_m, pos_e=estimate.pos_e - home.east_m,
         pos_d=estimate.pos_d - home.down_m,
     )  # fmt: skip
-    contact_n = loads.contact_n if onboard is None else 2.0 * threshold_n * skids.landed
-    state = landing_logic(before, contact_n, threshold_n, may_fly, may_land, EPOCH_S)
     rotation = rotation_from_quaternion(said.qw, said.qx, said.qy, said.qz)
-    return outer_loop(state, reference, relative, known, rotation, gains, may_land, EPOCH_S)
+    return outer_loop(before, reference, relative, known, rotation, gains, may_land, EPOCH_S)
 
 
 @PLANT.on_lanes
@@ -212,13 +217,18 @@ def advance(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None
             linear_step(work, lanes, linear)
 
 
+@equation
+def inertial_parts(onboard: Onboard) -> int:
+    """Inertial readings of an epoch."""
+    return ATTITUDE_STEPS * PHYSICS_STEPS // onboard.inertial_steps
+
+
 @procedure
 def advance_sensing(
-    work: Work, lanes: Lanes, seed: int, first: int, epoch: int, taken: int, heard: int, flight: Flight,
-    onboard: Onboard, table: Timetable, fails: bool | None, own: OwnParts | None,
-) -> None:  # fmt: skip
+    b: Block, flight: Flight, onboard: Onboard, table: Timetable, epoch: int, at: Progress, own: OwnParts | None
+) -> None:
     """From one epoch to the next, with an inertial reading at the end of each of its periods."""
-    period_s = onboard.inertial_steps * PHYSICS_S
+    work, lanes = b.work, b.lanes
     for step in range(ATTITUDE_STEPS * PHYSICS_STEPS):
         if step % PHYSICS_STEPS == 0:
             steer(work, lanes, flight, None, onboard, own)
@@ -227,15 +237,22 @@ def advance_sensing(
         if (step + 1) % PHYSICS_STEPS == 0:
             observe(work, lanes, flight, onboard, own)
         if (step + 1) % onboard.inertial_steps == 0:
-            true_imu(work, lanes, period_s)
             part = (step + 1) // onboard.inertial_steps - 1
-            slot = (taken + part) % table.slots
-            read_inertial(work, lanes, seed, first, epoch, part, slot, onboard)
-            if fails is not None:
-                t_s = epoch * EPOCH_S + (step + 1) * PHYSICS_S
-                strike(work, lanes, seed, first, epoch, t_s, slot, Sensor.IMU, 8 + part, 0)
-            keep_inertial(work, lanes, slot, inertial_row(heard + part, period_s, table))
-            feel(work, lanes, part, ATTITUDE_STEPS * PHYSICS_STEPS // onboard.inertial_steps, slot)
+            hear(b, onboard, table, epoch, at, part, flight.fails)
+
+
+@equation
+def hear(b: Block, onboard: Onboard, table: Timetable, epoch: int, at: Progress, part: int, fails: bool | None) -> None:
+    """The inertial reading of the epoch's `part`-th period, which ends now."""
+    work, lanes, period_s = b.work, b.lanes, onboard.inertial_steps * PHYSICS_S
+    true_imu(work, lanes, period_s)
+    slot = (at.taken + part) % table.slots
+    read_inertial(work, lanes, b.seed, b.first, epoch, part, slot, onboard)
+    if fails is not None:
+        t_s = epoch * EPOCH_S + (part + 1) * onboard.inertial_steps * PHYSICS_S
+        strike(work, lanes, b.seed, b.first, Taken(epoch, t_s, slot, Sensor.IMU, 8 + part, 0))
+    keep_inertial(work, lanes, slot, inertial_row(at.heard + part, period_s, table))
+    feel(work, lanes, part, inertial_parts(onboard), slot)
 
 
 @PLANT.on_lanes

@@ -96,19 +96,28 @@ def failed(read: Reading, earlier: Reading, held: float, since_s: float, n: Faul
     )
 
 
+class Taken(NamedTuple):
+    """A reading that was just put into a slot. channel: of its noise; number: among those of its sensor."""
+
+    epoch: int
+    t_s: float
+    slot: int
+    sensor: int
+    channel: int
+    number: int
+
+
 @procedure
-def strike(
-    work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, t_s: float, slot: int, sensor: int, channel: int,
-    count: int,
-) -> None:  # fmt: skip
-    """The reading in a slot as each lane's fault has it. channel: of its noise; count: the reading's number."""
-    draw(work, lanes, layout.FAULT_NORMALS, 6, seed, flight, epoch, FAULT_CHANNEL + 3 * channel)
+def strike(work: Work, lanes: Lanes, seed: int, flight: int, taken: Taken) -> None:
+    """The reading in a slot as each lane's fault has it."""
+    sensor, slot, t_s = taken.sensor, taken.slot, taken.t_s
+    draw(work, lanes, layout.FAULT_NORMALS, 6, seed, flight, taken.epoch, FAULT_CHANNEL + 3 * taken.channel)
     for lane in range(len(lanes)):
         fault, read = fault_as_is(work, lanes, lane), load_slot(work, lanes, slot, lane)
         struck, on = strikes(sensor, fault), t_s >= fault.begins_s and t_s < fault.ends_s
         earlier = read
         if sensor == Sensor.FLOW_RATE:
-            earlier = remember(work, lanes, lane, read, count, int(fault.late_readings))
+            earlier = remember(work, lanes, lane, read, taken.number, int(fault.late_readings))
         held = load_held(work, lanes, lane)
         if sensor == Sensor.RANGE and t_s < fault.begins_s and read.arrived > 0.0:
             held = HeldRange(read.value_0)

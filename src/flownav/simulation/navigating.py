@@ -6,7 +6,7 @@ touches the filter.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from flownav.frames import quaternion_product, rotation_from_quaternion, to_body
 from flownav.navigation.ahead import Carried, carried, coasted, state_of
 from flownav.navigation.memory import load_reading, load_start
 from flownav.navigation.records import GroundMemory, Reading, StartMemory, SuspicionMemory
-from flownav.navigation.tape import Output
+from flownav.simulation.block import Aboard
 from flownav.simulation.layout import PLANT, load_inertial_then, store_estimated
 from flownav.simulation.records import (
     AttitudeError,
@@ -97,19 +97,17 @@ def inertial_row(number: int, period_s: float, table: Timetable) -> int:
 
 
 @equation
-def feed_due(
-    work: Work, nav: Work, lanes: Lanes, epoch: int, following: int, take: Any, settings: Work, o: Output, fed: Work,
-    table: Timetable,
-) -> int:  # fmt: skip
-    """Every reading that is due in this epoch, in order; the next one's number. fed: a copy, where there is room."""
+def feed_due(work: Work, lanes: Lanes, epoch: int, following: int, aboard: Aboard, table: Timetable) -> int:
+    """Every reading that is due in this epoch, in order; the next one's number."""
+    nav, o = aboard.nav, aboard.o
     while following < table.readings and table.epoch[following] <= epoch:
         hand_over(work, nav, lanes, table.slot[following])
         if o.room[5] > following:
             for lane in range(len(lanes)):
-                store_row(fed, lanes, following * FIELDS, lane, load_reading(nav, lanes, lane))
+                store_row(aboard.fed, lanes, following * FIELDS, lane, load_reading(nav, lanes, lane))
         invoke(
-            take, nav, settings, o.estimate, o.innovation, o.event, o.entry, o.state, o.covariance, o.room, o.used,
-            table.t_s[following], table.sensor[following],
+            aboard.take, nav, aboard.settings, o.estimate, o.innovation, o.event, o.entry, o.state, o.covariance,
+            o.room, o.used, table.t_s[following], table.sensor[following],
         )  # fmt: skip
         following += 1
     return following

@@ -66,11 +66,12 @@ def surround(
     """The surroundings of this step of the noise counter; engine: 1 runs, 0 is cut."""
     draw_recirculation(work, lanes, seed, first, step, recirculates)
     lay_ground(work, lanes, rotors)
+    blow(work, lanes, engine)
     for lane in range(len(lanes)):
         normals, wake = load_recirculation_normals(work, lanes, lane), load_recirculation(work, lanes, lane)
         p = recirculation_as_is(work, lanes, lane)
         store_recirculation(work, lanes, lane, step_recirculation(wake, normals, p))
-    blow(work, lanes, engine)
+    come_back(work, lanes)
 
 
 class Air(NamedTuple):
@@ -82,21 +83,36 @@ class Air(NamedTuple):
 
 @PLANT.on_lanes
 def blow(
-    state: HelicopterState, ground: Ground, gusts: WindState, normals: WindNormals, wind: WindParameters,
-    wake: RecirculationState, p: RecirculationParameters, here: Around, loads: Loads, *, engine: float,
+    state: HelicopterState, ground: Ground, gusts: WindState, normals: WindNormals, wind: WindParameters, here: Around,
+    *, engine: float,
 ) -> Air:  # fmt: skip
-    """The wind at the vehicle's height, with what comes back of its own wake."""
+    """The wind at the vehicle's height."""
     height = -state.pos_d - ground_height(state.pos_n, state.pos_e, ground)
     after, air = step_wind(gusts, height, normals, wind)
+    return Air(after, in_air(here, air, engine))
+
+
+@PLANT.on_lanes
+def come_back(
+    state: HelicopterState, wake: RecirculationState, p: RecirculationParameters, here: Around, loads: Loads
+) -> Around:
+    """The air with what comes back of the vehicle's own wake."""
     cosine = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)[8]
     plane = here.slope_n * state.pos_n + here.slope_e * state.pos_e
     hub = p.hub_above_cg_m * cosine - state.pos_d - plane - here.rotor_1_m
-    air = recirculated(air, wake, hub, loads.thrust_n, p)
-    around = _in_air(
+    air = WindVelocity(
+        here.wind_n_m_s, here.wind_e_m_s, here.wind_d_m_s, here.turn_n_rad_s, here.turn_e_rad_s, here.turn_d_rad_s
+    )
+    return in_air(here, recirculated(air, wake, hub, loads.thrust_n, p), here.engine)
+
+
+@equation
+def in_air(here: Around, air: WindVelocity, engine: float) -> Around:
+    """The surroundings with this air, and this engine."""
+    return _in_air(
         here, wind_n_m_s=air.wind_n_m_s, wind_e_m_s=air.wind_e_m_s, wind_d_m_s=air.wind_d_m_s,
         turn_n_rad_s=air.turn_n_rad_s, turn_e_rad_s=air.turn_e_rad_s, turn_d_rad_s=air.turn_d_rad_s, engine=engine,
     )  # fmt: skip
-    return Air(after, around)
 
 
 @equation

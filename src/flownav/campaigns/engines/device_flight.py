@@ -18,6 +18,7 @@ from flownav.navigation.tape import output_of
 from flownav.scoring.running import RUNNING_ROWS, Shown, begin_scores, note_shown, write_scores
 from flownav.sensors.beam import ground_height
 from flownav.simulation import layout
+from flownav.simulation.block import Aboard, Block
 from flownav.simulation.draws import Noise
 from flownav.simulation.flight import epochs_navigated, epochs_on_paper, start_block
 from flownav.simulation.layout import (
@@ -64,8 +65,9 @@ def fly_paper_flight(
     home: the epoch to whose errors horizontal ones are relative; -1: to none. scores (RUNNING_COLUMNS, flights).
     """
     own, row = begin_flight(work, rows, truth, flights, thread), rows - RUNNING_ROWS
-    start_block(own, ONE_LANE, seed, first + thread, flight, None, noise)
-    score_on_paper(own, ONE_LANE, seed, first + thread, noise, flight, (row, home))
+    block = Block(own, ONE_LANE, seed, first + thread, noise)
+    start_block(block, flight, None)
+    score_on_paper(block, flight, (row, home))
     finish(own, row, flight, scores, thread)
 
 
@@ -88,12 +90,10 @@ def fly_navigated_flight(
     for i in range(TAPE_COUNTS):
         counted[i] = 0
     o = output_of(nothing, nothing, nothing, nothing, nothing, nothing, room, counted)
-    settings, fed = pointer(flight.settings), pointer(nothing)
-    number, onboard = first + thread, flight.onboard
-    start_block(own, ONE_LANE, seed, number, flight, onboard, noise)
-    score_navigated(
-        own, mind, ONE_LANE, seed, number, noise, flight, onboard, flight.table, take, settings, o, fed, (row, -1)
-    )
+    aboard = Aboard(mind, take, pointer(flight.settings), o, pointer(nothing))
+    block = Block(own, ONE_LANE, seed, first + thread, noise)
+    start_block(block, flight, flight.onboard)
+    score_navigated(block, aboard, flight, flight.onboard, flight.table, (row, -1))
     finish(own, row, flight, scores, thread)
 
 

@@ -31,11 +31,14 @@ class OnLanes(Protocol):
 
 
 class _Kept(NamedTuple):
-    """How a record is loaded and stored. which: the name of the number that says which of several it is, or ""."""
+    """How a record is loaded and stored. which: the name of the number that says which of several it is, or ""; buffer:
+    the name of the lane buffer in which it lies.
+    """
 
     load: Callable[..., Any]
     store: Callable[..., Any] | None
     which: str
+    buffer: str = "work"
 
 
 class _Sink(NamedTuple):
@@ -83,6 +86,15 @@ class Layout:
         """A record that is not stored: `found(work, lanes, lane)` or `found(work, lanes, index, lane)` computes it."""
         self._kept[record] = _Kept(found, None, index)
 
+    def anywhere(self, record: Any, row: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
+        """A record whose first row the caller tells by the name `row`; its access, `load(work, lanes, row, lane)`."""
+        self._kept[record] = _Kept(*lane_access(record, None), row)
+        return self.access(record)
+
+    def beside(self, layout: Layout, buffer: str) -> None:
+        """The records of another buffer are known too; the caller tells that buffer by the name `buffer`."""
+        self._kept.update({record: kept._replace(buffer=buffer) for record, kept in layout._kept.items()})
+
     def sink(self, record: Any, take: Callable[..., Any], *needs: str) -> None:
         """A record that is not stored: `take(work, lanes, lane, value, *needs)` does what it says."""
         self._sinks[record] = _Sink(take, needs)
@@ -109,8 +121,8 @@ class Layout:
 
         Its positional parameters are annotated with records of this layout; its keyword-only ones are told by the
         caller, the same for all lanes, as are an index and what sinks need: `run(work, lanes, t_s, *others, o)`, the
-        others as the function has them. It returns a record, a tuple of records, or a named tuple of records, of such
-        tuples and of truths.
+        others as the function has them, then other buffers and indices. It returns a record, a tuple of records, or a
+        named tuple of records, of such tuples and of truths.
         """
         return _generated(self, function)
 
@@ -162,8 +174,12 @@ class _Plan:
     def loaded(self, kind: Any, name: str) -> str:
         """An expression for a record of one lane."""
         kept = self.layout._record(kind, f"{self.name}, parameter {name}")
-        index = self.also((kept.which,)) if kept.which else ""
-        return f"{self.known(kept.load)}(work, lanes, {index}lane)"
+        return f"{self.known(kept.load)}({self.place(kept)})"
+
+    def place(self, kept: _Kept) -> str:
+        """Where a record lies, as arguments of a call."""
+        buffer = self.also((kept.buffer,)) if kept.buffer != "work" else "work, "
+        return f"{buffer}lanes, {self.also((kept.which,)) if kept.which else ''}lane"
 
     def put(self, kind: Any, value: str) -> list[str]:
         """Lines that store what was returned, or hand it to its sink."""
@@ -179,8 +195,7 @@ class _Plan:
         kept = self.layout._record(kind, f"{self.name} returns {value}")
         if kept.store is None:
             raise TypeError(f"{self.name} returns {kind}, which is computed and cannot be stored")
-        index = self.also((kept.which,)) if kept.which else ""
-        return [f"{self.known(kept.store)}(work, lanes, {index}lane, {value})"]
+        return [f"{self.known(kept.store)}({self.place(kept)}, {value})"]
 
 
 def _generated(layout: Layout, function: Callable[..., Any]) -> OnLanes:

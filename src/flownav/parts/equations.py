@@ -36,7 +36,8 @@ from flownav.navigation.take import UNIT_SIGNATURE
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, output_of, write_estimate
 from flownav.parts.protocols import Estimate, Imu, Innovation, Outputs, Reading, Told
 from flownav.simulation import layout
-from flownav.simulation.layout import load_around, load_controls
+from flownav.simulation.layout import load_around, load_controls, store_loads
+from flownav.simulation.records import Loads
 from flownav.vehicle.around import Around
 from flownav.vehicle.state import Controls
 
@@ -221,9 +222,7 @@ class EquationVehicle:
                 store(work, lanes, lane, after)
                 unit_attitude(work, lanes, lane)
                 out = seen(load(work, lanes, lane), u, around)
-                work[layout.THRUST * len(lanes) + lane] = out.thrust_n
-                work[layout.CONTACT * len(lanes) + lane] = out.contact_force_n
-                work[layout.POWER * len(lanes) + lane] = out.power_w
+                store_loads(work, lanes, lane, Loads(out.thrust_n, out.contact_force_n, out.power_w))
 
         return step_own
 

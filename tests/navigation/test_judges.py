@@ -16,7 +16,6 @@ from flownav.navigation.gps import judge_fix, judge_rejections
 from flownav.navigation.heading import heading_variance, magnetic_heading
 from flownav.navigation.height import judge_baro, range_variance, range_verdict, repeats
 from flownav.navigation.inertial import motion_between, said_by, sound
-from flownav.navigation.offers import component_of, usable, usable_in_flight
 from flownav.navigation.place import judge_pad
 from flownav.navigation.reasons import (
     BEFORE_START,
@@ -32,6 +31,9 @@ from flownav.navigation.reasons import (
     SILENT,
     STUCK,
     TILTED,
+    component_of,
+    usable,
+    usable_in_flight,
 )
 from flownav.navigation.records import (
     BaroMemory,
@@ -40,6 +42,7 @@ from flownav.navigation.records import (
     HeadingMemory,
     ImuMemory,
     Look,
+    NoiseMemory,
     RangeMemory,
     Reading,
     RejectionMemory,
@@ -293,12 +296,15 @@ def test_the_only_range_is_believed_until_the_height_travels():
 
 
 def test_pressure_height():
-    def judged(given: Reading, known: float = 1.0, started: float = 1.0):
+    def judged(given: Reading, known: float = 1.0, started: float = 1.0, factor: float = 1.0):
         start = StartMemory(*[started, *StartMemory()[1:]])
-        return judge_baro.law(given, start, Position(0.0, 0.0, -3.0), BaroMemory(known), s=TOLD.height)
+        return judge_baro.law(
+            given, start, Position(0.0, 0.0, -3.0), BaroMemory(known), NoiseMemory(factor), s=TOLD.height
+        )
 
     assert judged(reading(100.0)) == (BaroMemory(1.0), (-1, 97.0, 1e4), (-1, 97.0), Offer(100.0, 1.0, FUSED))
     assert judged(reading(100.0, variance=(0.04,))).offer == Offer(100.0, 0.04, FUSED)
+    assert judged(reading(100.0), factor=9.0).offer == Offer(100.0, 9.0, FUSED)
     assert judged(reading(100.0), started=0.0).offer.reason == SILENT
     first = judged(reading(100.0), known=0.0)
     assert (first.baro, first.reset, first.found) == (BaroMemory(1.0), Reset(BARO, 97.0, 1e4), Event(BARO_FOUND, 97.0))

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flownav.navigation.height import ECHOES, FEW_STRAYS, MANY_STRAYS, STRAY_SPAN_M, followed_echo, stray_variance
+from flownav.navigation.height import ECHOES, MANY_STRAYS, followed_echo
+from flownav.navigation.offers import FEW_STRAYS, STRAY_SPAN_M, stray_variance
 from flownav.navigation.records import EchoMemory
 
 NAN = math.nan

@@ -15,7 +15,7 @@ import numpy as np
 from flownav.compile import equation, replacing
 from flownav.estimation.states import ATTITUDE
 from flownav.frames import heading_cosine_sine, quaternion_product, rotation_from_quaternion, velocity_from_flow
-from flownav.navigation.offers import is_heard
+from flownav.navigation.reasons import is_heard
 from flownav.navigation.records import CourseMemory, HeadingMemory, Look, Reading
 from flownav.navigation.tape import HEADING_FOUND
 from flownav.navigation.verdicts import Attitude, Event, Reset, on_lanes

@@ -29,10 +29,10 @@ from flownav.navigation.flow_noise import (
 )
 from flownav.navigation.lagged_flow import observe_lagged
 from flownav.navigation.memory import RANGE_MISSING, holds
-from flownav.navigation.offers import component_of, conclude, note_aid
+from flownav.navigation.offers import conclude, note_aid
 from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.protection import sign_flow
-from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT
+from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT, component_of
 from flownav.navigation.records import (
     FlowInnovation,
     FlowMemory,

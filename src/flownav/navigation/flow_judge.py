@@ -11,8 +11,16 @@ from flownav.estimation.laws.geometry import lens_range
 from flownav.navigation.flow_noise import LONGEST_STEP_S
 from flownav.navigation.height import MANY_STRAYS
 from flownav.navigation.memory import holds
-from flownav.navigation.offers import usable_in_flight
-from flownav.navigation.reasons import FUSED, NEAR_GROUND, NO_HEADING, NO_HEIGHT, OUT_OF_RANGE, SILENT, TILTED
+from flownav.navigation.reasons import (
+    FUSED,
+    NEAR_GROUND,
+    NO_HEADING,
+    NO_HEIGHT,
+    OUT_OF_RANGE,
+    SILENT,
+    TILTED,
+    usable_in_flight,
+)
 from flownav.navigation.records import (
     EchoMemory,
     FlowMemory,

@@ -10,9 +10,9 @@ from flownav.compile import Lanes, Work, equation, larger, procedure, replacing
 from flownav.estimation.hypotheses import HEADING_OFF, sign_all
 from flownav.estimation.laws.attitude import heading
 from flownav.frames import rotation_from_quaternion, to_earth
-from flownav.navigation.offers import conclude, is_heard, usable_in_flight
+from flownav.navigation.offers import conclude
 from flownav.navigation.packed import load_attitude_settings
-from flownav.navigation.reasons import FUSED, NO_HEADING, SILENT
+from flownav.navigation.reasons import FUSED, NO_HEADING, SILENT, is_heard, usable_in_flight
 from flownav.navigation.records import HeadingMemory, Reading, StartMemory
 from flownav.navigation.tape import Output
 from flownav.navigation.told import FROM_YAW, AttitudeSettings, Equipment

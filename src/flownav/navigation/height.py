@@ -7,26 +7,35 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import Lanes, Work, equation, procedure, replacing, smaller
-from flownav.estimation.covariance import expect
-from flownav.estimation.hypotheses import RANGE_OFFSET, sign_all
+from flownav.estimation.hypotheses import RANGE_OFFSET
 from flownav.estimation.laws.height import baro_altitude, range_along_boresight
-from flownav.estimation.states import BARO, GROUND, STATES
-from flownav.navigation.offers import conclude, fuse_offered, note_height, usable_in_flight
+from flownav.estimation.states import BARO, GROUND
+from flownav.navigation.offers import conclude, fuse_offered, note_height, weigh_strays
 from flownav.navigation.packed import load_height_settings
-from flownav.navigation.reasons import DATUM, FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT, STUCK, TILTED
+from flownav.navigation.reasons import (
+    DATUM,
+    FUSED,
+    INNOVATION_GATE,
+    OUT_OF_RANGE,
+    SILENT,
+    STUCK,
+    TILTED,
+    usable_in_flight,
+)
 from flownav.navigation.records import (
     AidMemory,
     BaroMemory,
     EchoMemory,
     GroundMemory,
     ImuMemory,
+    NoiseMemory,
     RangeMemory,
     Reading,
     StartMemory,
 )
 from flownav.navigation.tape import BARO_FOUND, GROUND_FOUND, GROUND_RESET, RANGE_STUCK, Output
 from flownav.navigation.told import HeightSettings
-from flownav.navigation.trust import OF_BARO, OF_RANGE, follow_noise, scale_noise, watch_whiteness
+from flownav.navigation.trust import OF_BARO, OF_RANGE, follow_noise, watch_whiteness
 from flownav.navigation.verdicts import (
     NO_EVENT,
     NO_RESET,
@@ -34,11 +43,10 @@ from flownav.navigation.verdicts import (
     Event,
     Fate,
     Height,
-    Noise,
     Offer,
-    Offered,
     Position,
     Reset,
+    Sign,
     Tested,
     on_lanes,
 )
@@ -51,9 +59,7 @@ LEAST_AGREEING = 3.0
 STILL_S = 1.0  # a range that repeats itself so long while a ground is sought is of a vehicle that stands
 ECHO_M, ECHO_SHARE = 0.1, 0.03  # neighbouring ranges of one ground differ by no more
 ECHOES = 20.0  # ranges over which strays are counted
-STRAY_SHARE = 1.5  # some strays confirm each other
-STRAY_SPAN_M = 5.0
-MANY_STRAYS, FEW_STRAYS = 0.15, 0.02  # so many tell nothing of the ground's level, or of the accelerometer; so few none
+MANY_STRAYS = 0.15  # so many ranges without an echo tell nothing of the ground's level, or of the accelerometer
 UNSEEN_M_S = 1.0  # a range that repeats itself may hide this climb or descent
 LONGEST_REPEAT_S = 2.0  # nobody hovers so still for longer: a sensor out of its reach says the same for ever
 SERVED_S = 1.0  # before it began to repeat itself, that a range was fused
@@ -132,20 +138,6 @@ def followed_echo(range_m: float, down_m: float, m: EchoMemory) -> EchoMemory:
 
 
 @equation
-def stray_variance(innovation: float, total: float, variance: float, stray: float) -> float:
-    """The variance of a range [m2] that may be a stray: it is fused by the probability that it is none.
-
-    beta = (1 - p) N(nu; S) / ((1 - p) N(nu; S) + p/W) is that of the ground among strays spread over W (probabilistic
-    data association: Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001,
-    section 3.4), and a gain beta K is that of the variance R + S (1/beta - 1).
-    """
-    p = smaller(STRAY_SHARE * stray, 0.95)
-    likely = (1.0 - p) * np.exp(-0.5 * innovation * innovation / total) / np.sqrt(2.0 * np.pi * total)
-    weighed: float = variance + total * p / (STRAY_SPAN_M * likely + 1e-6)
-    return weighed
-
-
-@equation
 def judge_ground(below_m: float, range_m: float, t_s: float, alone: bool, g: GroundMemory) -> tuple[bool, GroundMemory]:
     """Whether ranges in a row agree on a ground that is new, and the memory of it.
 
@@ -201,13 +193,14 @@ class RangeVerdict(NamedTuple):
     ground: GroundMemory
     reset: Reset
     found: Event
+    offset: Sign
     offer: Offer
 
 
 @on_lanes
 def judge_range(
     reading: Reading, start: StartMemory, height: Height, aid: AidMemory, m: RangeMemory, echo: EchoMemory,
-    g: GroundMemory, *, t_s: float, s: HeightSettings,
+    g: GroundMemory, noise: NoiseMemory, *, t_s: float, s: HeightSettings,
 ) -> RangeVerdict:  # fmt: skip
     """A range along the boresight: whether it may be fused, whether it is stuck, and the first ground that it finds."""
     alone = t_s - aid.height_s > s.height_hold_s
@@ -226,28 +219,9 @@ def judge_range(
         sought.ground if seeks else g,
         sought.reset if found else NO_RESET,
         sought.event if found else NO_EVENT,
-        Offer(reading.value_0, variance, DATUM if seeks and not found else reason),
+        Sign(RANGE_OFFSET, 1.0),
+        Offer(reading.value_0, variance * noise.factor, DATUM if seeks and not found else reason),
     )
-
-
-class Strays(NamedTuple):
-    """Whether there are strays in any lane; nothing is offered while they are weighed."""
-
-    offered: Offered
-    any: bool
-
-
-@on_lanes
-def look_for_strays(echo: EchoMemory) -> Strays:
-    """Whether strays are so many that a range must be weighed."""
-    return Strays(Offered(0.0), echo.stray > FEW_STRAYS)
-
-
-@on_lanes
-def weighed_range(tested: Tested, echo: EchoMemory) -> Noise:
-    """The variance of a range among strays."""
-    weighed = stray_variance(tested.innovation, tested.total, tested.variance, echo.stray)
-    return Noise(weighed if echo.stray > FEW_STRAYS else tested.variance)
 
 
 class Refusal(NamedTuple):
@@ -310,13 +284,9 @@ def judge_refusal(
 def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
     """Height over the ground below. Where range is refused for long, the ground has a step."""
     s = load_height_settings(p)
-    judge_range(work, lanes, t_s, s, o)
+    judge_range(work, lanes, t_s, s, OF_RANGE, o)
     range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
-    scale_noise(work, lanes, OF_RANGE)
-    if look_for_strays(work, lanes):
-        expect(work, lanes, STATES, True)
-        weighed_range(work, lanes)
-    sign_all(work, lanes, RANGE_OFFSET, 1.0)
+    weigh_strays(work, lanes)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
     watch_whiteness(work, lanes, t_s, 2)
     follow_noise(work, lanes, t_s, OF_RANGE, s.gate_sigma)
@@ -337,7 +307,7 @@ class BaroVerdict(NamedTuple):
 
 @on_lanes
 def judge_baro(
-    reading: Reading, start: StartMemory, position: Position, m: BaroMemory, *, s: HeightSettings
+    reading: Reading, start: StartMemory, position: Position, m: BaroMemory, noise: NoiseMemory, *, s: HeightSettings
 ) -> BaroVerdict:
     """Height from pressure [m]; the first reading finds the offset."""
     stated = reading.variance_0
@@ -349,7 +319,7 @@ def judge_baro(
         BaroMemory(1.0 if first else m.known),
         Reset(BARO if first else -1, offset_m, UNKNOWN_M * UNKNOWN_M),
         Event(BARO_FOUND if first else -1, offset_m),
-        Offer(reading.value_0, variance, reason),
+        Offer(reading.value_0, variance * noise.factor, reason),
     )
 
 
@@ -357,9 +327,8 @@ def judge_baro(
 def take_baro(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
     """Height from pressure."""
     s = load_height_settings(p)
-    judge_baro(work, lanes, t_s, s, o)
+    judge_baro(work, lanes, t_s, s, OF_BARO, o)
     baro_altitude(work, lanes, 0)
-    scale_noise(work, lanes, OF_BARO)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
     follow_noise(work, lanes, t_s, OF_BARO, s.gate_sigma)
     note_height(work, lanes, t_s)

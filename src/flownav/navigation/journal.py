@@ -8,6 +8,7 @@ from __future__ import annotations
 from flownav.compile import Lanes, Work, procedure
 from flownav.estimation.covariance import covariance_of, forget_lane, states_of
 from flownav.estimation.states import (
+    ACCEPTED,
     COEFFICIENT,
     FORCE,
     GAIN,
@@ -74,7 +75,9 @@ def note_decay(dt_s: float, o: Output) -> None:
 
 @procedure
 def note_correction(work: Work, lanes: Lanes, o: Output) -> None:
-    """The correction that was just made, its Jacobian on the states that its law named."""
+    """The correction that was just made, if one was; its Jacobian on the states that its law named."""
+    if work[ACCEPTED * len(lanes)] == 0.0:
+        return
     first = next_entry(CORRECTED, o)
     if first < 0:
         return

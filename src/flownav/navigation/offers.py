@@ -1,4 +1,4 @@
-"""Offering one component to the filter on lanes: checks common to all sensors, the test, and what is written of it."""
+"""Offering one component to the filter on lanes: the test, what is written of it, and what follows for the aids."""
 
 from __future__ import annotations
 
@@ -6,66 +6,34 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure, replacing
+from flownav.compile import Lanes, Work, equation, procedure, replacing, smaller
 from flownav.estimation.covariance import expect, settle, states_of
 from flownav.estimation.hypotheses import weigh
-from flownav.estimation.states import ACCEPTED, MEASURED, NOISE
 from flownav.measurement import Sensor
 from flownav.navigation.journal import note_correction
-from flownav.navigation.memory import CLOCK, LAST, OBSERVATION, REASON, share, shared
+from flownav.navigation.memory import CLOCK, LAST, share, shared
 from flownav.navigation.reasons import (
-    BEFORE_START,
     DUPLICATE,
     FUSED,
     INNOVATION_GATE,
     LATE,
-    NO_DATA,
     NOT_FINITE,
-    OUTAGE,
     SILENT,
 )
-from flownav.navigation.records import AidMemory, Reading
+from flownav.navigation.records import AidMemory, EchoMemory, Reading
 from flownav.navigation.tape import AIDED_AGAIN, DEAD_RECKONING, POSITION_INVALID, Output, write_offer
 from flownav.navigation.told import AidSettings
 from flownav.navigation.verdicts import Accepted, Event, Fate, Noise, Observation, Offered, Tested, on_lanes
 
 CLOCK_SLACK_S = 1e-6
 COLOR = 4.0  # so many readings after one another err alike
+FEW_STRAYS = 0.02  # so few ranges that no neighbour confirms are none
+STRAY_SHARE = 1.5  # some strays confirm each other
+STRAY_SPAN_M = 5.0
 
 with_aid = replacing(AidMemory, "aided_s", "flag")
 with_flag = replacing(AidMemory, "flag")
 with_height = replacing(AidMemory, "height_s")
-
-
-# -- checks -----------------------------------------------------------------------------------------------
-@equation
-def is_heard(reading: Reading) -> bool:
-    """Whether a reading is there for one who only listens: it arrived, has data and is not withheld."""
-    return reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
-
-
-@equation
-def component_of(reading: Reading, component: int) -> tuple[float, float]:
-    """A reading's value and stated variance of component 0, 1 or 2."""
-    value = reading.value_0 if component == 0 else (reading.value_1 if component == 1 else reading.value_2)
-    stated = reading.variance_0 if component == 0 else (reading.variance_1 if component == 1 else reading.variance_2)
-    return value, stated
-
-
-@equation
-def usable(reading: Reading, value: float, variance: float, started: float) -> int:
-    """FUSED where a reading may be offered, or the reason why not; SILENT where there is none."""
-    reason = FUSED if np.isfinite(value + variance) else NOT_FINITE
-    reason = NO_DATA if reading.quality == 0.0 else reason
-    reason = OUTAGE if reading.withheld > 0.0 else reason
-    reason = BEFORE_START if started == 0.0 else reason
-    return SILENT if reading.arrived == 0.0 else reason
-
-
-@equation
-def usable_in_flight(reading: Reading, value: float, variance: float, started: float) -> int:
-    """What `usable` says, of a sensor of which nothing is said before the start."""
-    return SILENT if started == 0.0 else usable(reading, value, variance, started)
 
 
 class LeftBehind(NamedTuple):
@@ -105,15 +73,6 @@ def too_old(work: Work, lanes: Lanes, t_s: float, sensor: int, o: Output) -> boo
 
 
 # -- one component ----------------------------------------------------------------------------------------
-@equation
-def put(work: Work, lanes: Lanes, lane: int, measured: float, variance: float, reason: int) -> None:
-    """One lane's measured value, variance and verdict; a law and `conclude` follow."""
-    work[MEASURED * len(lanes) + lane] = measured
-    work[OBSERVATION * len(lanes) + lane] = measured
-    work[NOISE * len(lanes) + lane] = variance
-    work[REASON * len(lanes) + lane] = reason
-
-
 @on_lanes
 def observe_innovation(tested: Tested) -> Observation:
     """The difference that a law finds is what is written down of an attitude."""
@@ -150,8 +109,51 @@ def fuse_offered(work: Work, lanes: Lanes, gate_sigma: float, o: Output) -> None
     settle(work, lanes, states_of(lanes), gate_sigma)
     weigh(work, lanes, states_of(lanes), COLOR)
     note_refusal(work, lanes)
-    if len(lanes) == 1 and shared(work, lanes, ACCEPTED) > 0.0:
+    if len(lanes) == 1:
         note_correction(work, lanes, o)
+
+
+# -- a reading among strays -------------------------------------------------------------------------------
+@equation
+def stray_variance(innovation: float, total: float, variance: float, stray: float) -> float:
+    """The variance of a range [m2] that may be a stray: it is fused by the probability that it is none.
+
+    beta = (1 - p) N(nu; S) / ((1 - p) N(nu; S) + p/W) is that of the ground among strays spread over W (probabilistic
+    data association: Bar-Shalom, Li, Kirubarajan, Estimation with Applications to Tracking and Navigation, 2001,
+    section 3.4), and a gain beta K is that of the variance R + S (1/beta - 1).
+    """
+    p = smaller(STRAY_SHARE * stray, 0.95)
+    likely = (1.0 - p) * np.exp(-0.5 * innovation * innovation / total) / np.sqrt(2.0 * np.pi * total)
+    weighed: float = variance + total * p / (STRAY_SPAN_M * likely + 1e-6)
+    return weighed
+
+
+class Strays(NamedTuple):
+    """Whether there are strays in any lane; nothing is offered while they are weighed."""
+
+    offered: Offered
+    any: bool
+
+
+@on_lanes
+def look_for_strays(echo: EchoMemory) -> Strays:
+    """Whether strays are so many that a range must be weighed."""
+    return Strays(Offered(0.0), echo.stray > FEW_STRAYS)
+
+
+@on_lanes
+def weighed_range(tested: Tested, echo: EchoMemory) -> Noise:
+    """The variance of a range among strays."""
+    weighed = stray_variance(tested.innovation, tested.total, tested.variance, echo.stray)
+    return Noise(weighed if echo.stray > FEW_STRAYS else tested.variance)
+
+
+@procedure
+def weigh_strays(work: Work, lanes: Lanes) -> None:
+    """The variance of the component at hand, in the lanes where there are strays."""
+    if look_for_strays(work, lanes):
+        expect(work, lanes, states_of(lanes), True)
+        weighed_range(work, lanes)
 
 
 # -- horizontal aid ---------------------------------------------------------------------------------------

@@ -12,17 +12,17 @@ from flownav.estimation.laws.still import pad_below, position_itself, velocity_i
 from flownav.estimation.states import MEASURED, PAD, STATE
 from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.navigation.memory import MEMORY
-from flownav.navigation.offers import (
+from flownav.navigation.offers import conclude, fuse_offered, note_aid, note_height
+from flownav.navigation.packed import load_place_settings
+from flownav.navigation.reasons import (
+    FUSED,
+    INNOVATION_GATE,
+    OUT_OF_RANGE,
+    SILENT,
     component_of,
-    conclude,
-    fuse_offered,
-    note_aid,
-    note_height,
     usable,
     usable_in_flight,
 )
-from flownav.navigation.packed import load_place_settings
-from flownav.navigation.reasons import FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT
 from flownav.navigation.records import AidMemory, PadMemory, Reading, StartMemory
 from flownav.navigation.tape import PAD_FOUND, Output
 from flownav.navigation.told import PlaceSettings

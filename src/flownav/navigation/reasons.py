@@ -1,9 +1,45 @@
-"""The reasons for refusing a component, as kernels write them: `estimation.gating.Reason` in plain numbers."""
+"""The reasons for refusing a component, as kernels write them (`estimation.gating.Reason` in plain numbers), and the
+checks that all sensors have in common.
+"""
 
 from __future__ import annotations
 
+import numpy as np
+
+from flownav.compile import equation
 from flownav.estimation.gating import Reason
+from flownav.navigation.records import Reading
 
 (FUSED, INNOVATION_GATE, NO_DATA, NOT_FINITE, OUT_OF_RANGE, NO_HEIGHT, TILTED, BEFORE_START, DATUM, OUTAGE,
  DUPLICATE, LATE, STUCK, NEAR_GROUND, NOT_NEEDED, AHEAD, NO_HEADING) = map(int, Reason)  # fmt: skip
 SILENT = -1  # nothing is said of this component in this lane: there was no reading, or the filter has not started
+
+
+@equation
+def is_heard(reading: Reading) -> bool:
+    """Whether a reading is there for one who only listens: it arrived, has data and is not withheld."""
+    return reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
+
+
+@equation
+def component_of(reading: Reading, component: int) -> tuple[float, float]:
+    """A reading's value and stated variance of component 0, 1 or 2."""
+    value = reading.value_0 if component == 0 else (reading.value_1 if component == 1 else reading.value_2)
+    stated = reading.variance_0 if component == 0 else (reading.variance_1 if component == 1 else reading.variance_2)
+    return value, stated
+
+
+@equation
+def usable(reading: Reading, value: float, variance: float, started: float) -> int:
+    """FUSED where a reading may be offered, or the reason why not; SILENT where there is none."""
+    reason = FUSED if np.isfinite(value + variance) else NOT_FINITE
+    reason = NO_DATA if reading.quality == 0.0 else reason
+    reason = OUTAGE if reading.withheld > 0.0 else reason
+    reason = BEFORE_START if started == 0.0 else reason
+    return SILENT if reading.arrived == 0.0 else reason
+
+
+@equation
+def usable_in_flight(reading: Reading, value: float, variance: float, started: float) -> int:
+    """What `usable` says, of a sensor of which nothing is said before the start."""
+    return SILENT if started == 0.0 else usable(reading, value, variance, started)

@@ -15,9 +15,10 @@ from flownav.measurement import Sensor
 from flownav.navigation.course import with_sought
 from flownav.navigation.lagged_flow import start_lag
 from flownav.navigation.memory import MEMORY
-from flownav.navigation.offers import is_heard, with_aid
+from flownav.navigation.offers import with_aid
 from flownav.navigation.packed import START_SIGMA, load_filter_settings, load_flow_settings
 from flownav.navigation.place import ON_GROUND
+from flownav.navigation.reasons import is_heard
 from flownav.navigation.records import (
     AidMemory,
     HeadingMemory,

@@ -13,6 +13,7 @@ import numpy as np
 
 from flownav.compile import Lanes, Work, equation
 from flownav.estimation.covariance import add_noise_lane, covariance_of, variance_of
+from flownav.estimation.hypotheses import sign
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import (
     ACCEL_BIAS,
@@ -208,6 +209,13 @@ class Reset(NamedTuple):
     variance: float
 
 
+class Sign(NamedTuple):
+    """What one unit of a fault of `hypotheses` adds to the component that is offered."""
+
+    fault: int
+    value: float
+
+
 class Doubt(NamedTuple):
     """A state that is less sure by this variance; 0: as sure as before."""
 
@@ -271,6 +279,12 @@ def reset(work: Work, lanes: Lanes, lane: int, given: Reset, o: Output) -> None:
 
 
 @equation
+def note_sign(work: Work, lanes: Lanes, lane: int, given: Sign) -> None:
+    """Note what a fault adds."""
+    sign(work, lanes, given.fault, lane, given.value)
+
+
+@equation
 def doubt(work: Work, lanes: Lanes, lane: int, given: Doubt) -> None:
     """Add to a state's variance."""
     add_noise_lane(work, lanes, given.state, lane, given.variance)
@@ -298,6 +312,7 @@ MEMORY.derive(AxisVelocity, axis_velocity, "axis")
 MEMORY.sink(Offer, offer)
 MEMORY.sink(Event, tell, "t_s", "o")
 MEMORY.sink(Reset, reset, "o")
+MEMORY.sink(Sign, note_sign)
 MEMORY.sink(Doubt, doubt)
 
 on_lanes = MEMORY.on_lanes

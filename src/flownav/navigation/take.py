@@ -32,7 +32,6 @@ from flownav.navigation.memory import (
     ERRORS_CLOCK,
     SOUGHT,
     WRITTEN,
-    load_start,
     load_step,
     share,
     shared,
@@ -48,7 +47,7 @@ from flownav.navigation.packed import (
 from flownav.navigation.place import take_landed, take_pad, take_pose
 from flownav.navigation.protection import mind_faults, set_levels
 from flownav.navigation.spikes import drop_spikes
-from flownav.navigation.start import gather, try_start
+from flownav.navigation.start import gather, runs, try_start
 from flownav.navigation.still import stand_still, watch_gps_velocity, watch_imu, watch_range
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, Output, output_of, write_estimate
 from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
@@ -68,7 +67,7 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
     fitted = load_equipment(p)
     gather(work, lanes, t_s, sensor)
     heard = sensor == Sensor.IMU and fitted.use_imu
-    running = any_started(work, lanes)
+    running = bool(runs(work, lanes))
     if running:
         if heard:
             drop_spikes(work, lanes, t_s, o)
@@ -168,15 +167,6 @@ def take(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p
         take_pad(work, lanes, t_s, sensor, p, o)
     elif sensor == Sensor.LANDED:
         take_landed(work, lanes, t_s, sensor, p, o)
-
-
-@equation
-def any_started(work: Work, lanes: Lanes) -> bool:
-    """Whether the filter runs in any lane."""
-    running = 0.0
-    for lane in range(len(lanes)):
-        running += load_start(work, lanes, lane).started
-    return running > 0.0
 
 
 # -- from instant to instant ----------------------------------------------------------------------------------

@@ -9,10 +9,10 @@ import numpy as np
 from flownav.compile import Lanes, Work, equation, procedure, replacing
 from flownav.estimation.covariance import expect, settle, states_of
 from flownav.estimation.hypotheses import weigh
-from flownav.estimation.states import ACCEPTED, MEASURED, NOISE
+from flownav.estimation.states import ACCEPTED
 from flownav.measurement import Sensor
 from flownav.navigation.journal import note_correction
-from flownav.navigation.memory import CLOCK, LAST, OBSERVATION, REASON, share, shared
+from flownav.navigation.memory import CLOCK, LAST, share, shared
 from flownav.navigation.reasons import (
     BEFORE_START,
     DUPLICATE,
@@ -105,15 +105,6 @@ def too_old(work: Work, lanes: Lanes, t_s: float, sensor: int, o: Output) -> boo
 
 
 # -- one component ----------------------------------------------------------------------------------------
-@equation
-def put(work: Work, lanes: Lanes, lane: int, measured: float, variance: float, reason: int) -> None:
-    """One lane's measured value, variance and verdict; a law and `conclude` follow."""
-    work[MEASURED * len(lanes) + lane] = measured
-    work[OBSERVATION * len(lanes) + lane] = measured
-    work[NOISE * len(lanes) + lane] = variance
-    work[REASON * len(lanes) + lane] = reason
-
-
 @on_lanes
 def observe_innovation(tested: Tested) -> Observation:
     """The difference that a law finds is what is written down of an attitude."""

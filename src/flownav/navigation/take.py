@@ -19,7 +19,7 @@ from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION,
 from flownav.measurement import Sensor
 from flownav.navigation.attitude import take_attitude
 from flownav.navigation.compass import check_compass, note_push
-from flownav.navigation.course import find_heading, note_flow_course
+from flownav.navigation.course import find_heading, note_flow_course, seeks
 from flownav.navigation.flow import take_flow
 from flownav.navigation.gps import take_gps
 from flownav.navigation.heading import take_mag, take_yaw
@@ -30,7 +30,7 @@ from flownav.navigation.lagged_flow import flow_lag
 from flownav.navigation.memory import (
     CLOCK,
     ERRORS_CLOCK,
-    SOUGHT,
+    HEADING_SOUGHT,
     WRITTEN,
     load_step,
     share,
@@ -117,12 +117,9 @@ def consider_datum(work: Work, lanes: Lanes, fitted: Equipment) -> None:
     """A heading that nothing refers to the earth is a datum: only the gyro moves it, and only rest tells its bias. One
     that is yet to be found from the course is one until then, and by it GPS would turn every push into tilt.
     """
-    seeking = 0.0
-    for lane in range(len(lanes)):
-        seeking += work[SOUGHT * len(lanes) + lane]
     datum = fitted.heading == NO_HEADING and not np.isfinite(fitted.deadline_s)
-    if (datum or seeking > 0.0) and not fitted.use_attitude:
-        sought = 0 if datum else SOUGHT
+    if not fitted.use_attitude and (datum or seeks(work, lanes)):
+        sought = 0 if datum else HEADING_SOUGHT
         consider(work, lanes, ATTITUDE + 2, sought)
         consider(work, lanes, GYRO_BIAS + 2, sought)
         if sought > 0:

@@ -34,7 +34,7 @@ from flownav.estimation.states import (
     STATES,
 )
 from flownav.navigation.flow import consider_others
-from flownav.navigation.memory import SOUGHT, new_work
+from flownav.navigation.memory import HEADING_SOUGHT, new_work
 from flownav.navigation.take import consider_datum
 from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
 
@@ -236,12 +236,12 @@ def test_a_flow_without_heading_considers_no_more_than_there_is_room_for():
     for heading in (NO_HEADING, FROM_MAG):  # sought from the course, whatever was to tell it
         consider_datum(work, ONE_LANE, Equipment(True, False, heading, False, 10.0))
         assert work[CONSIDERED] == 0.0
-        work[SOUGHT] = 1.0
+        work[HEADING_SOUGHT] = 1.0
         consider_datum(work, ONE_LANE, Equipment(True, False, heading, False, 10.0))
-        assert work[CONSIDERED : CONSIDERED + 3].tolist() == [9, HEADING, SOUGHT]
+        assert work[CONSIDERED : CONSIDERED + 3].tolist() == [9, HEADING, HEADING_SOUGHT]
         consider_others(work, ONE_LANE)
         assert work[CONSIDERED] < MOST_CONSIDERED
         consider_none(work, ONE_LANE)
-        work[SOUGHT] = 0.0
+        work[HEADING_SOUGHT] = 0.0
     consider_datum(work, ONE_LANE, Equipment(False, True, NO_HEADING, False, -np.inf))  # an attitude tells it
     assert work[CONSIDERED] == 0.0

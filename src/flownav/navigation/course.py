@@ -92,6 +92,12 @@ def turn_heading(own: Attitude, by_rad: float, turns: bool) -> tuple[Attitude, R
     )
 
 
+@on_lanes
+def seeks(m: HeadingMemory) -> bool:
+    """Whether a heading is sought in any lane."""
+    return m.sought > 0.0
+
+
 # -- on lanes -----------------------------------------------------------------------------------------------
 @on_lanes
 def note_flow_course(

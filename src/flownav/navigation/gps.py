@@ -88,7 +88,7 @@ def judge_fix(
 
 
 @equation
-def test_ratio(tested: Tested, gate_sigma: float) -> float:
+def gate_ratio(tested: Tested, gate_sigma: float) -> float:
     """The square of the innovation over what the gate lets pass."""
     return tested.innovation * tested.innovation / (gate_sigma * gate_sigma * tested.total)
 
@@ -97,7 +97,7 @@ def test_ratio(tested: Tested, gate_sigma: float) -> float:
 def compare_level(tested: Tested, m: GpsMemory, *, axis: int, s: GpsSettings) -> GpsMemory:
     """The larger test ratio of north and east, once both are compared; 0 where the fix cannot be offered."""
     before = m.level_ratio if axis > 0 else 0.0
-    ratio = test_ratio(tested, s.gate_sigma)
+    ratio = gate_ratio(tested, s.gate_sigma)
     return with_ratio(m, level_ratio=ratio if tested.reason == FUSED and ratio > before else before)
 
 
@@ -165,7 +165,7 @@ def judge_fate(
     value, _ = component_of(reading, axis)
     heard = reading.arrived > 0.0
     doubted = flow.doubted > 0.0 or bool(np.isfinite(flow.wrong_s))
-    refused = tested.reason == INNOVATION_GATE and test_ratio(tested, s.gate_sigma) > 1.0
+    refused = tested.reason == INNOVATION_GATE and gate_ratio(tested, s.gate_sigma) > 1.0
     reset, after = judge_rejections(refused, doubted or not position, t_s, m, s)
     goes = heard and reset
     by = value - (along.position_m if position else along.velocity_m_s)

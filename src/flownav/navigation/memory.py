@@ -73,7 +73,7 @@ MEMORY.keep(BaroMemory)
 MEMORY.keep(GpsMemory)
 MEMORY.keep(PadMemory)
 PAD_KNOWN = MEMORY.row(PadMemory, "known")
-SOUGHT = MEMORY.row(HeadingMemory, "sought")
+HEADING_SOUGHT = MEMORY.row(HeadingMemory, "sought")
 # what becomes of the component that is offered
 REASON = MEMORY.take(1)
 OBSERVATION = MEMORY.take(1)

@@ -263,7 +263,7 @@ def start_lanes(
 @procedure
 def try_start(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> bool:
     """Start the lanes that can start. Whether any lane runs."""
-    if any_starts(work, lanes, t_s, sensor, fitted.deadline_s):
+    if waits(work, lanes) and any_starts(work, lanes, t_s, sensor, fitted.deadline_s):
         start_lanes(work, lanes, t_s, sensor, fitted, p[START_SIGMA + ACCEL_BIAS], p, o)
     return bool(runs(work, lanes))
 

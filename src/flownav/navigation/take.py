@@ -19,7 +19,7 @@ from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION,
 from flownav.measurement import Sensor
 from flownav.navigation.attitude import take_attitude
 from flownav.navigation.compass import check_compass, note_push
-from flownav.navigation.course import find_heading, note_flow_course
+from flownav.navigation.course import find_heading, note_flow_course, seeks
 from flownav.navigation.flow import take_flow
 from flownav.navigation.gps import take_gps
 from flownav.navigation.heading import take_mag, take_yaw
@@ -30,9 +30,8 @@ from flownav.navigation.lagged_flow import flow_lag
 from flownav.navigation.memory import (
     CLOCK,
     ERRORS_CLOCK,
-    SOUGHT,
+    HEADING_SOUGHT,
     WRITTEN,
-    load_start,
     load_step,
     share,
     shared,
@@ -48,7 +47,7 @@ from flownav.navigation.packed import (
 from flownav.navigation.place import take_landed, take_pad, take_pose
 from flownav.navigation.protection import mind_faults, set_levels
 from flownav.navigation.spikes import drop_spikes
-from flownav.navigation.start import gather, try_start
+from flownav.navigation.start import gather, runs, try_start
 from flownav.navigation.still import stand_still, watch_gps_velocity, watch_imu, watch_range
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, Output, output_of, write_estimate
 from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
@@ -68,7 +67,7 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
     fitted = load_equipment(p)
     gather(work, lanes, t_s, sensor)
     heard = sensor == Sensor.IMU and fitted.use_imu
-    running = any_started(work, lanes)
+    running = bool(runs(work, lanes))
     if running:
         if heard:
             drop_spikes(work, lanes, t_s, o)
@@ -118,12 +117,9 @@ def consider_datum(work: Work, lanes: Lanes, fitted: Equipment) -> None:
     """A heading that nothing refers to the earth is a datum: only the gyro moves it, and only rest tells its bias. One
     that is yet to be found from the course is one until then, and by it GPS would turn every push into tilt.
     """
-    seeking = 0.0
-    for lane in range(len(lanes)):
-        seeking += work[SOUGHT * len(lanes) + lane]
     datum = fitted.heading == NO_HEADING and not np.isfinite(fitted.deadline_s)
-    if (datum or seeking > 0.0) and not fitted.use_attitude:
-        sought = 0 if datum else SOUGHT
+    if not fitted.use_attitude and (datum or seeks(work, lanes)):
+        sought = 0 if datum else HEADING_SOUGHT
         consider(work, lanes, ATTITUDE + 2, sought)
         consider(work, lanes, GYRO_BIAS + 2, sought)
         if sought > 0:
@@ -168,15 +164,6 @@ def take(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p
         take_pad(work, lanes, t_s, sensor, p, o)
     elif sensor == Sensor.LANDED:
         take_landed(work, lanes, t_s, sensor, p, o)
-
-
-@equation
-def any_started(work: Work, lanes: Lanes) -> bool:
-    """Whether the filter runs in any lane."""
-    running = 0.0
-    for lane in range(len(lanes)):
-        running += load_start(work, lanes, lane).started
-    return running > 0.0
 
 
 # -- from instant to instant ----------------------------------------------------------------------------------

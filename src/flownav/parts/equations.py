@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import ONE_LANE, Lanes, Unit, Work, equation, lane_access, stepping, unit
+from flownav.compile import ONE_LANE, Lanes, Unit, Work, equation, lane_access, runge_kutta, stepping, unit
 from flownav.errors import InputError
 from flownav.estimation.covariance import place
 from flownav.estimation.states import (
@@ -206,7 +206,7 @@ class EquationVehicle:
         """The function that is compiled: (work, dt [s]) and lanes; see `simulation.plan.OwnParts`."""
         rate, seen, begun = self.rate, self.seen, self.state
         load, store = lane_access(type(self.state), layout.HELICOPTER)
-        stepped = stepping(type(self.state))
+        _, step = runge_kutta(stepping(type(self.state)))
 
         def step_own(work: Work, dt: float, lanes: Lanes) -> None:
             for lane in range(len(lanes)):
@@ -214,12 +214,7 @@ class EquationVehicle:
                     for i in range(RIGID, len(begun)):
                         work[(layout.HELICOPTER + i) * len(lanes) + lane] = begun[i]
                 x, u, around = load(work, lanes, lane), load_controls(work, lanes, lane), load_around(work, lanes, lane)
-                k1 = rate(x, u, around)
-                k2 = rate(stepped(x, k1, 0.5 * dt), u, around)
-                k3 = rate(stepped(x, k2, 0.5 * dt), u, around)
-                k4 = rate(stepped(x, k3, dt), u, around)
-                after = stepped(stepped(stepped(stepped(x, k1, dt / 6.0), k2, dt / 3.0), k3, dt / 3.0), k4, dt / 6.0)
-                store(work, lanes, lane, after)
+                store(work, lanes, lane, step(rate, x, dt, u, around))
                 unit_attitude(work, lanes, lane)
                 out = seen(load(work, lanes, lane), u, around)
                 store_loads(work, lanes, lane, Loads(out.thrust_n, out.contact_force_n, out.power_w))

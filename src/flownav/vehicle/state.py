@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, magnitude, passing, replacing, stepping
+from flownav.compile import equation, magnitude, passing, replacing, runge_kutta, stepping
 from flownav.frames import Quaternion
 
 
@@ -82,7 +82,7 @@ class Outputs(NamedTuple):
     contact_force_n: float
 
 
-add_scaled = stepping(HelicopterState)  # state + rate·dt
+after_stage, classical_step = runge_kutta(stepping(HelicopterState))
 
 
 NEGLIGIBLE = 1e-100  # what decays below it is zero: arithmetic on subnormal numbers is a hundred times slower

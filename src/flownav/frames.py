@@ -70,6 +70,27 @@ def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
 
 
 @equation
+def conjugate(q: Quaternion) -> Quaternion:
+    """The turn back: the inverse of a quaternion of unit length."""
+    w, x, y, z = q
+    return w, -x, -y, -z
+
+
+@equation
+def of_unit_length(q: Quaternion) -> Quaternion:
+    """The quaternion scaled to unit length."""
+    w, x, y, z = q
+    scale = 1.0 / np.sqrt(w * w + x * x + y * y + z * z)
+    return w * scale, x * scale, y * scale, z * scale
+
+
+@equation
+def turned_about_down(q: Quaternion, angle_rad: Scalar) -> Quaternion:
+    """The attitude turned by an angle about the earth's down [rad], clockwise seen from above."""
+    return quaternion_product((np.cos(0.5 * angle_rad), 0.0, 0.0, np.sin(0.5 * angle_rad)), q)
+
+
+@equation
 def quaternion_rate(w: float, x: float, y: float, z: float, p: float, q: float, r: float) -> Quaternion:
     """dq/dt = q * (0, p, q, r) / 2, body rates [rad/s] (paper eqs. 8-10 without their singularity)."""
     return (

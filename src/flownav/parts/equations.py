@@ -29,6 +29,7 @@ from flownav.estimation.states import (
     STATES,
     VELOCITY,
 )
+from flownav.frames import of_unit_length
 from flownav.measurement import Array, Sensor
 from flownav.navigation.memory import CLOCK, GROUND_SEEN, START, WRITTEN, load_reading, share, shared
 from flownav.navigation.records import Reading as Row
@@ -249,6 +250,6 @@ def unit_attitude(work: Work, lanes: Lanes, lane: int) -> None:
     row = layout.HELICOPTER + 6
     w, x = work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane]
     y, z = work[(row + 2) * len(lanes) + lane], work[(row + 3) * len(lanes) + lane]
-    shrink = 1.0 / np.sqrt(w * w + x * x + y * y + z * z)
+    unit = of_unit_length((w, x, y, z))
     for i in range(4):
-        work[(row + i) * len(lanes) + lane] *= shrink
+        work[(row + i) * len(lanes) + lane] = unit[i]

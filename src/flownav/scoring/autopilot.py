@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.frames import rotation_from_quaternion, to_earth, turned_about_down
 from flownav.measurement import Array, Sensor, Stream
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Column, Table
 from flownav.scoring.alignment import Alignment, align, velocity_of
@@ -72,9 +72,7 @@ def _moved(estimate: Table, placed: Alignment) -> Table:
     """An estimate with its position and attitude in another frame; velocity, in body axes, stays."""
     table = {**estimate, **dict(zip(POSITION_NED, placed.moved(columns_of(estimate, POSITION_NED)).T, strict=True))}
     if set(QUATERNION) <= estimate.keys():
-        w, x, y, z = columns_of(estimate, QUATERNION).T
-        c, s = np.cos(0.5 * placed.yaw_rad), np.sin(0.5 * placed.yaw_rad)
-        turned = (c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w)
+        turned = turned_about_down(tuple(columns_of(estimate, QUATERNION).T), placed.yaw_rad)
         table |= dict(zip(QUATERNION, turned, strict=True))
     return table
 

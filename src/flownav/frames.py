@@ -132,9 +132,23 @@ def heading_from_quaternion(w: Scalar, x: Scalar, y: Scalar, z: Scalar) -> Scala
 
 
 @equation
-def velocity_from_flow(flow_x: Scalar, flow_y: Scalar, range_m: Scalar) -> tuple[Scalar, Scalar]:
-    """Forward and right [m/s] by an angular flow [rad/s] less the vehicle's turning.
+def flow_about(axis: int, across_m_s: Scalar, range_m: Scalar) -> Scalar:
+    """Angular flow [rad/s] about body x (axis 0), of moving right, or about body y (axis 1), of moving forward."""
+    return (-across_m_s if axis == 0 else across_m_s) / range_m
 
-    PX4's convention: flow_x = -v / r, flow_y = u / r.
+
+@equation
+def angular_flow(
+    forward_m_s: Scalar, right_m_s: Scalar, rate_x_rad_s: Scalar, rate_y_rad_s: Scalar, range_m: Scalar
+) -> tuple[Scalar, Scalar]:
+    """(flow_x, flow_y) [rad/s] of a lens that looks along body z, r = range_m away, at ground that lies still.
+
+    PX4's convention: flow_x = w_x - v / r, flow_y = w_y + u / r.
     """
+    return rate_x_rad_s + flow_about(0, right_m_s, range_m), rate_y_rad_s + flow_about(1, forward_m_s, range_m)
+
+
+@equation
+def velocity_from_flow(flow_x: Scalar, flow_y: Scalar, range_m: Scalar) -> tuple[Scalar, Scalar]:
+    """Forward and right [m/s] by an angular flow [rad/s] less the vehicle's turning: `angular_flow` turned around."""
     return flow_y * range_m, -flow_x * range_m

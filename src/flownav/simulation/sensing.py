@@ -5,8 +5,15 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flownav.compile import Lanes, Work, equation
-from flownav.frames import conjugate, of_unit_length, quaternion_product, rotation_from_quaternion, to_body, to_earth
-from flownav.sensors.angular_flow import angular_flow
+from flownav.frames import (
+    angular_flow,
+    conjugate,
+    of_unit_length,
+    quaternion_product,
+    rotation_from_quaternion,
+    to_body,
+    to_earth,
+)
 from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, engage_flow, read_flow, start_flow
 from flownav.sensors.gps_ins import (
     GpsInsParameters,

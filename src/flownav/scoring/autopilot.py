@@ -12,6 +12,7 @@ from flownav.measurement import Array, Sensor, Stream
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Column, Table
 from flownav.scoring.alignment import Alignment, align, velocity_of
 from flownav.scoring.outage import difference_at, horizontal_rms
+from flownav.text import finite_or_none
 
 LEAST_ROWS = 10
 
@@ -85,7 +86,7 @@ def _errors(against: str | None, error: Array, velocity_rms: float, yaw_rad: flo
         "horizontal_rms_m": float(np.sqrt(np.mean(horizontal**2))) if enough else None,
         "horizontal_max_m": float(horizontal.max()) if enough else None,
         "vertical_rms_m": float(np.sqrt(np.mean(error[:, 2] ** 2))) if enough else None,
-        "velocity_rms_m_s": velocity_rms if np.isfinite(velocity_rms) else None,
+        "velocity_rms_m_s": finite_or_none(velocity_rms),
         "yaw_rad": yaw_rad if enough else None,
     }
 

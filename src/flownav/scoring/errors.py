@@ -15,6 +15,7 @@ from flownav.compile import kernel
 from flownav.scoring.landings import crashed, succeeded, touchdown_of_flight, touchdown_of_flights
 from flownav.scoring.percentiles import spread
 from flownav.scoring.touchdown import TOUCHDOWN_COLUMNS
+from flownav.text import finite_or_none
 
 STATES = ("x", "y", "z", "u", "v", "w")
 STATISTICS = ("mean_error", "std_error", "rms_error", "max_error")
@@ -86,7 +87,7 @@ def touchdown_rows(rows: Array) -> Array:
 def scores_of_flight(row: Array) -> dict[str, Any]:
     """One flight's row of scores as the JSON of `flownav fly`; what is NaN is null."""
     landing = touchdown_rows(row[None, :])
-    said = _nested(lambda column: _finite(float(row[column])))
+    said = _nested(lambda column: finite_or_none(float(row[column])))
     return said | {"touchdown": touchdown_of_flight(landing[0]), "crashed": bool(crashed(landing)[0])}
 
 
@@ -104,7 +105,3 @@ def _nested(number: Any) -> dict[str, Any]:
         for i, state in enumerate(STATES)
     }
     return {"states": states, "max_position_error_m": number(MAX_POSITION_ERROR)}
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None

@@ -87,3 +87,14 @@ def test_hamilton_s_units_multiply_as_he_cut_them_into_the_bridge():
     for left, right, is_ in ((i, i, minus_one), (j, j, minus_one), (k, k, minus_one), (i, j, k), (j, k, i), (k, i, j),
                              (one, k, k), (j, one, j)):  # fmt: skip
         assert frames.quaternion_product(left, right) == is_
+
+
+@given(st.tuples(angle, st.floats(-1.2, 1.2), angle), st.floats(-1.5, 1.5), st.floats(0.1, 10.0))
+def test_a_turn_about_down_adds_to_the_heading_and_its_conjugate_takes_it_back(euler, turn, scale):
+    start = to_quaternion(*euler)
+    after = frames.turned_about_down(start, turn)
+    roll, pitch_, yaw = frames.euler_from_quaternion(*after)
+    assert (roll, pitch_) == pytest.approx(frames.euler_from_quaternion(*start)[:2], abs=1e-7)
+    assert np.cos(yaw - euler[2] - turn) == pytest.approx(1.0, abs=1e-9)
+    assert frames.quaternion_product(after, frames.conjugate(after)) == pytest.approx((1.0, 0.0, 0.0, 0.0), abs=1e-12)
+    assert frames.of_unit_length(tuple(scale * part for part in after)) == pytest.approx(after, abs=1e-12)

@@ -27,6 +27,7 @@ from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
 from flownav.compiling.progress import announce_compilation
 from flownav.compiling.records import Layout, OnLanes, compiled, dressed
+from flownav.compiling.runge_kutta import STAGES, runge_kutta
 from flownav.compiling.runner import NoDeviceError, Runner, device_runner
 from flownav.compiling.scalars import bits_from_float, clamp, float_from_bits, larger, magnitude, smaller
 from flownav.compiling.strided import WARP, strided
@@ -42,6 +43,7 @@ __all__ = [
     "LANES",
     "LANES_WIDE",
     "ONE_LANE",
+    "STAGES",
     "WARP",
     "FlatAccess",
     "Lanes",
@@ -70,6 +72,7 @@ __all__ = [
     "pointer",
     "procedure",
     "replacing",
+    "runge_kutta",
     "smaller",
     "stepping",
     "strided",

@@ -70,6 +70,27 @@ def quaternion_product(a: Quaternion, b: Quaternion) -> Quaternion:
 
 
 @equation
+def conjugate(q: Quaternion) -> Quaternion:
+    """The turn back: the inverse of a quaternion of unit length."""
+    w, x, y, z = q
+    return w, -x, -y, -z
+
+
+@equation
+def of_unit_length(q: Quaternion) -> Quaternion:
+    """The quaternion scaled to unit length."""
+    w, x, y, z = q
+    scale = 1.0 / np.sqrt(w * w + x * x + y * y + z * z)
+    return w * scale, x * scale, y * scale, z * scale
+
+
+@equation
+def turned_about_down(q: Quaternion, angle_rad: Scalar) -> Quaternion:
+    """The attitude turned by an angle about the earth's down [rad], clockwise seen from above."""
+    return quaternion_product((np.cos(0.5 * angle_rad), 0.0, 0.0, np.sin(0.5 * angle_rad)), q)
+
+
+@equation
 def quaternion_rate(w: float, x: float, y: float, z: float, p: float, q: float, r: float) -> Quaternion:
     """dq/dt = q * (0, p, q, r) / 2, body rates [rad/s] (paper eqs. 8-10 without their singularity)."""
     return (
@@ -111,9 +132,23 @@ def heading_from_quaternion(w: Scalar, x: Scalar, y: Scalar, z: Scalar) -> Scala
 
 
 @equation
-def velocity_from_flow(flow_x: Scalar, flow_y: Scalar, range_m: Scalar) -> tuple[Scalar, Scalar]:
-    """Forward and right [m/s] by an angular flow [rad/s] less the vehicle's turning.
+def flow_about(axis: int, across_m_s: Scalar, range_m: Scalar) -> Scalar:
+    """Angular flow [rad/s] about body x (axis 0), of moving right, or about body y (axis 1), of moving forward."""
+    return (-across_m_s if axis == 0 else across_m_s) / range_m
 
-    PX4's convention: flow_x = -v / r, flow_y = u / r.
+
+@equation
+def angular_flow(
+    forward_m_s: Scalar, right_m_s: Scalar, rate_x_rad_s: Scalar, rate_y_rad_s: Scalar, range_m: Scalar
+) -> tuple[Scalar, Scalar]:
+    """(flow_x, flow_y) [rad/s] of a lens that looks along body z, r = range_m away, at ground that lies still.
+
+    PX4's convention: flow_x = w_x - v / r, flow_y = w_y + u / r.
     """
+    return rate_x_rad_s + flow_about(0, right_m_s, range_m), rate_y_rad_s + flow_about(1, forward_m_s, range_m)
+
+
+@equation
+def velocity_from_flow(flow_x: Scalar, flow_y: Scalar, range_m: Scalar) -> tuple[Scalar, Scalar]:
+    """Forward and right [m/s] by an angular flow [rad/s] less the vehicle's turning: `angular_flow` turned around."""
     return flow_y * range_m, -flow_x * range_m

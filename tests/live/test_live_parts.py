@@ -198,6 +198,9 @@ def test_the_estimate_of_now_is_where_the_filter_will_be_when_it_gets_there():
     sure = estimate_of(on, filtering.imu_after(filtering.clock_s), filtering.clock_s, 0.99, 0)
     assert ahead.pose_covariance[0, 0] > sure.pose_covariance[0, 0]
     filtering.feed(coming)
+    there = estimate_of(on, filtering.imu_after(filtering.clock_s), filtering.clock_s, 1.29, 0)
+    np.testing.assert_allclose(np.diag(ahead.pose_covariance), np.diag(there.pose_covariance), rtol=0.02)
+    np.testing.assert_allclose(np.diag(ahead.velocity_covariance), np.diag(there.velocity_covariance), rtol=0.02)
     assert filtering.clock_s == pytest.approx(1.29)
     assert ahead.pos_ned_m == tuple(on.work[STATE + POSITION : STATE + POSITION + 3])
     assert ahead.vel_ned_m_s == tuple(on.work[STATE + VELOCITY : STATE + VELOCITY + 3])

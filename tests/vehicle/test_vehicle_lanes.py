@@ -5,15 +5,16 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from flownav.compile import LANES, ONE_LANE, lane_access
+from flownav.compile import LANES, ONE_LANE, lane_access, stepping
 from flownav.vehicle import helicopter
 from flownav.vehicle.around import in_wind
-from flownav.vehicle.helicopter import add_scaled, derivative, normalised
+from flownav.vehicle.helicopter import derivative, normalised
 from flownav.vehicle.loading import load_vehicle
 from flownav.vehicle.state import Controls, HelicopterState
 from flownav.vehicle.trim import parked, trim
 
 FIELDS = len(HelicopterState._fields)
+moved = stepping(HelicopterState)
 load, store = lane_access(HelicopterState, 0)
 load_controls, _ = lane_access(Controls, FIELDS)
 VEHICLE = load_vehicle()
@@ -28,7 +29,7 @@ def march(work, lanes, vehicle, dt, count):
         for lane in range(len(lanes)):
             state = load(work, lanes, lane)
             rate = derivative(state, load_controls(work, lanes, lane), WIND, vehicle)
-            store(work, lanes, lane, normalised(add_scaled(state, rate, dt)))
+            store(work, lanes, lane, normalised(moved(state, rate, dt)))
 
 
 def starts(count):
@@ -64,5 +65,5 @@ def test_the_compiled_helicopter_is_the_plain_one():
     now = HelicopterState(*state)
     for _ in range(100):
         rate = helicopter.derivative(now, Controls(*controls), WIND, VEHICLE)
-        now = normalised(add_scaled(now, rate, 1e-3))
+        now = normalised(moved(now, rate, 1e-3))
     assert np.allclose(compiled, now, rtol=1e-12, atol=1e-14)

@@ -32,6 +32,7 @@ from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario, with_filter
+from flownav.text import finite_or_none
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
 
 CASES = SHIPPED  # requirements by name, with what is flown and what the ensemble must keep
@@ -87,7 +88,7 @@ class Case:
 
     def as_json(self) -> dict[str, Any]:
         """All of it."""
-        targets = [t._asdict() | {"value": _finite(t.value), "kept": t.kept} for t in self.targets]
+        targets = [t._asdict() | {"value": finite_or_none(t.value), "kept": t.kept} for t in self.targets]
         own = {"case": self.name, "vehicle": self.vehicle, "known_exactly": self.known, "flights": self.flights}
         both = {"matched": self.matched, "ensemble": self.ensemble}
         return {**own, **both, "targets": targets, "ablations": self.ablations}
@@ -160,11 +161,11 @@ def _facts(judged: Judged, bound: ErrorSums) -> dict[str, Any]:
     return {
         "crashed": int(crashed(landings).sum()),
         "touchdown": touchdown_of_flights(landings),
-        "p95_largest_axis_m": _finite(axis[0]),
-        "p95_largest_horizontal_m": _finite(horizontal[0]),
-        "p95_largest_horizontal_interval_m": [_finite(x) for x in horizontal[1:]],
-        "rms_error": [_finite(x) for x in judged.flown.root_mean_square()],
-        "rms_error_at_horizon": [_finite(x) for x in judged.sums.errors.root_mean_square()],
+        "p95_largest_axis_m": finite_or_none(axis[0]),
+        "p95_largest_horizontal_m": finite_or_none(horizontal[0]),
+        "p95_largest_horizontal_interval_m": [finite_or_none(x) for x in horizontal[1:]],
+        "rms_error": [finite_or_none(x) for x in judged.flown.root_mean_square()],
+        "rms_error_at_horizon": [finite_or_none(x) for x in judged.sums.errors.root_mean_square()],
         "anees": anees(judged.sums),
         "anees_inside_fraction": inside_fraction(judged.groups),
         "anees_inside_fraction_of_all_flights": inside_fraction([inside_steps(judged.sums)]),
@@ -222,7 +223,7 @@ def _cost(judged: Judged, whole: Judged) -> dict[str, Any]:
         return float(np.sqrt(squares[states].sum() / wholes[states].sum()))
 
     return {
-        "p95_largest_horizontal_m": _finite(percentile_with_interval(judged.largest_horizontal_m, SHARE)[0]),
+        "p95_largest_horizontal_m": finite_or_none(percentile_with_interval(judged.largest_horizontal_m, SHARE)[0]),
         "horizontal_rms_ratio": ratio(slice(0, 2)),
         "vertical_rms_ratio": ratio(slice(2, 3)),
         "horizontal_speed_rms_ratio": ratio(slice(3, 5)),
@@ -230,10 +231,6 @@ def _cost(judged: Judged, whole: Judged) -> dict[str, Any]:
         "rest_r95_m": radius(landings, REST_DISTANCE)["r95_m"],
         "crashed": int(crashed(landings).sum()),
     }
-
-
-def _finite(number: float) -> float | None:
-    return float(number) if np.isfinite(number) else None
 
 
 def _or_infinite(number: float | None) -> float:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from flownav.campaigns.measures import CRASH, NOT_LANDED, measured
 from flownav.errors import InputError
 from flownav.scoring.percentiles import percentile_with_interval, share_with_interval
+from flownav.text import finite_or_none
 
 Array = NDArray[np.float64]
 
@@ -60,8 +61,7 @@ class Interval(NamedTuple):
 
     def finite(self) -> dict[str, float | None]:
         """As JSON has it; what is infinite is null."""
-        ends = {"value": self.value, "low": self.low, "high": self.high}
-        return {name: float(end) if np.isfinite(end) else None for name, end in ends.items()}
+        return {"value": finite_or_none(self.value), "low": finite_or_none(self.low), "high": finite_or_none(self.high)}
 
 
 def figure_of(name: str, values: Array, confidence: float = CONFIDENCE) -> Interval:
@@ -122,4 +122,4 @@ def spread_of(values: Array) -> dict[str, Any]:
     """Median and 95th percentile of a measure with the latter's 95 % interval; null where infinite."""
     p95 = Interval(*percentile_with_interval(values, 0.95)).finite()
     p50 = float(percentile_with_interval(values, 0.5)[0])
-    return {"p50": p50 if np.isfinite(p50) else None, "p95": p95["value"], "low": p95["low"], "high": p95["high"]}
+    return {"p50": finite_or_none(p50), "p95": p95["value"], "low": p95["low"], "high": p95["high"]}

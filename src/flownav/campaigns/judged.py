@@ -33,6 +33,7 @@ from flownav.simulation.engine import fly_blocks
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.history import column, columns
 from flownav.simulation.plan import Flight
+from flownav.text import finite, finite_or_none
 
 Array = NDArray[np.float64]
 
@@ -159,14 +160,10 @@ def consistency_facts(judged: Judged, bound: Bound) -> dict[str, Any]:
     assert judged.sums is not None
     inside = inside_fraction(judged.groups)
     return {
-        "rmse_over_bound": {s: _finite(ratio) for s, ratio in efficiency(judged.sums.errors, bound.sums).items()},
-        "anees_inside_fraction": _finite(inside),
-        "error_over_stated": {s: _finite(ratio) for s, ratio in over_stated(judged.sums).items()},
+        "rmse_over_bound": finite(efficiency(judged.sums.errors, bound.sums)),
+        "anees_inside_fraction": finite_or_none(inside),
+        "error_over_stated": finite(over_stated(judged.sums)),
     }
-
-
-def _finite(number: float) -> float | None:
-    return number if np.isfinite(number) else None
 
 
 def _skid_height(flight: Flight, history: Array) -> Array:

@@ -12,7 +12,6 @@ from typing import Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from flownav.campaigns.measures import CRASH, MEASURES, NOT_LANDED
-from flownav.campaigns.tolerance import allowed
 from flownav.errors import InputError
 from flownav.parameter_files import Number, ParameterModel, check, load, shipped
 from flownav.simulation.dispersion import Distribution, leaves
@@ -155,11 +154,6 @@ def needed_by(table: RequirementTable, failures: int | None = None) -> int:
         return needed(table.probability, table.confidence, most)
     except ValueError as error:
         raise InputError(f"{table.measure}: {error}; ask for less, or use `flownav campaign --rare`") from None
-
-
-def most_failures(table: RequirementTable, flights: int) -> int:
-    """With how many failures so many flights still show a requirement; -1: with none."""
-    return allowed(flights, table.probability, table.confidence)
 
 
 def requirement_file(name: str) -> Path:

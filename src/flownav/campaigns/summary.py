@@ -27,6 +27,7 @@ from flownav.campaigns.store import Dataset
 from flownav.campaigns.views import convergence, envelope, sensitivity
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
 from flownav.scoring.landings import EXPECTED
+from flownav.text import finite_or_none
 
 Array = NDArray[np.float64]
 
@@ -77,7 +78,7 @@ def cell_summary(plan: Plan, cell: int, data: Dataset) -> dict[str, Any]:
     values = values_of(LANDING if lands else TAKEOFF, rows)
     order = np.argsort(values, kind="stable")
     inputs = inputs_of(data, cell)
-    said = [Flight(cell, int(k), _finite(values[k]), str(verdicts[k]), str(limits[k])) for k in order]
+    said = [Flight(cell, int(k), finite_or_none(values[k]), str(verdicts[k]), str(limits[k])) for k in order]
     return {
         "label": own.label,
         "scenario": own.scenario.name,
@@ -140,7 +141,3 @@ def inputs_of(data: Dataset, cell: int) -> dict[str, Array]:
     table = data.table(cell)
     names = [name for name in table.column_names if name.startswith(INPUT)]
     return {name.removeprefix(INPUT): arrow.column(table, name) for name in names}
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -21,6 +21,7 @@ from flownav.certification.cells import words_of
 from flownav.certification.envelope import envelope_of, failing, outcome
 from flownav.certification.judgement import Judgement, bad_first, judged
 from flownav.certification.ranked import ranked, ranking_json
+from flownav.text import finite
 
 Array = NDArray[np.float64]
 
@@ -100,7 +101,7 @@ class Certificate:
             "verdict": self.flown.verdicts[flight],
             "limited_by": self.flown.limits[flight],
             "failed": bool(failing(self.requirement, rows).any()),
-            "figures": {name: float(value) if np.isfinite(value) else None for name, value in figures.items()},
+            "figures": finite(figures),
             "inputs": {name: float(self.flown.inputs[name][flight]) for name in self.envelope["axes"]},
         }
 

@@ -19,6 +19,7 @@ from flownav.campaigns.tolerance import (
     tolerance_bound,
     verdict,
 )
+from flownav.text import finite_or_none
 
 Array = NDArray[np.float64]
 PLANS = (0, 1, 2)  # failures of the plans that are told
@@ -62,7 +63,7 @@ class Judgement(NamedTuple):
             "low": self.share.low,
             "high": self.share.high,
             "risk": self.risk,
-            "tolerance_bound": self.bound if self.bound is not None and np.isfinite(self.bound) else None,
+            "tolerance_bound": finite_or_none(self.bound),
             "yes_or_no": table.yes_or_no,
             "needed": {str(failures): count for failures, count in zip(PLANS, self.needs, strict=True)},
             "more": self.more(),

@@ -10,6 +10,7 @@ import typer
 from flownav.cli.choices import CAMERAS, PATTERNS, one_of
 from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
 from flownav.cli.output import emit
+from flownav.text import finite
 
 if TYPE_CHECKING:
     from flownav.optics.pad_target import PadTarget
@@ -188,12 +189,9 @@ def _measured(
 
 def _plain(facts: dict[str, Any]) -> dict[str, Any]:
     """As JSON has it: NaN is null, laws are objects."""
-    import math
-
     laws = facts["laws"]._asdict()
     laws |= {name: laws[name]._asdict() for name in ("angle", "distance", "missed")}
-    cells = [{k: None if isinstance(v, float) and math.isnan(v) else v for k, v in c.items()} for c in facts["cells"]]
-    return facts | {"laws": laws, "cells": cells}
+    return facts | {"laws": laws, "cells": finite(facts["cells"])}
 
 
 def _write_datasheet(

@@ -12,6 +12,7 @@ from flownav.record import POSITION_NED, VELOCITY_BODY, Record
 from flownav.scoring.by_phase import errors_of
 from flownav.scoring.differences import CONFIDENCE, Difference, mean_difference
 from flownav.scoring.phases import phases_of
+from flownav.text import finite_or_none
 
 Array = NDArray[np.float64]
 Row = dict[str, Any]
@@ -103,12 +104,8 @@ def _difference(first: dict[str, Any], other: dict[str, Any], measure: str) -> R
 
 
 def _as_json(found: Difference) -> Row:
-    ends = {"low": found.low, "high": found.high}
-    return {
-        "mean": found.mean,
-        **{name: value if np.isfinite(value) else None for name, value in ends.items()},
-        "confidence": CONFIDENCE,
-    }
+    low, high = finite_or_none(found.low), finite_or_none(found.high)
+    return {"mean": found.mean, "low": low, "high": high, "confidence": CONFIDENCE}
 
 
 # -- words -------------------------------------------------------------------------------------------------

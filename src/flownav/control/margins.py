@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.text import finite
 from flownav.vehicle.plant import Complex
 
 Array = NDArray[np.float64]
@@ -25,7 +26,8 @@ class Margins(NamedTuple):
 
     def finite(self) -> dict[str, float | None]:
         """By name, null where nothing takes the loop to its edge."""
-        return {name: value if np.isfinite(value) else None for name, value in self._asdict().items()}
+        found: dict[str, float | None] = finite(self._asdict())
+        return found
 
 
 def margins(loop: Complex, omega_rad_s: Array) -> Margins:

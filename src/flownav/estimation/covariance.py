@@ -40,6 +40,7 @@ from flownav.estimation.states import (
     STATES_WITH_LAG,
     TEST_RATIO,
 )
+from flownav.frames import of_unit_length, quaternion_product
 
 LARGEST_VARIANCE = 1e30
 
@@ -237,21 +238,17 @@ def fold_attitude(work: Work, lanes: Lanes) -> None:
         north = work[(STATE + ATTITUDE) * len(lanes) + lane]
         east = work[(STATE + ATTITUDE + 1) * len(lanes) + lane]
         down = work[(STATE + ATTITUDE + 2) * len(lanes) + lane]
-        x, y, z = 0.5 * north, 0.5 * east, 0.5 * down
+        turn = (1.0, 0.5 * north, 0.5 * east, 0.5 * down)
         qw = work[QUATERNION * len(lanes) + lane]
         qx = work[(QUATERNION + 1) * len(lanes) + lane]
         qy = work[(QUATERNION + 2) * len(lanes) + lane]
         qz = work[(QUATERNION + 3) * len(lanes) + lane]
-        w = qw - x * qx - y * qy - z * qz
-        a = qx + x * qw + y * qz - z * qy
-        b = qy - x * qz + y * qw + z * qx
-        c = qz + x * qy - y * qx + z * qw
-        corrected = x != 0.0 or y != 0.0 or z != 0.0
-        shrink = 1.0 / np.sqrt(w * w + a * a + b * b + c * c)
-        work[QUATERNION * len(lanes) + lane] = w * shrink if corrected else qw
-        work[(QUATERNION + 1) * len(lanes) + lane] = a * shrink if corrected else qx
-        work[(QUATERNION + 2) * len(lanes) + lane] = b * shrink if corrected else qy
-        work[(QUATERNION + 3) * len(lanes) + lane] = c * shrink if corrected else qz
+        w, x, y, z = of_unit_length(quaternion_product(turn, (qw, qx, qy, qz)))
+        corrected = turn[1] != 0.0 or turn[2] != 0.0 or turn[3] != 0.0
+        work[QUATERNION * len(lanes) + lane] = w if corrected else qw
+        work[(QUATERNION + 1) * len(lanes) + lane] = x if corrected else qx
+        work[(QUATERNION + 2) * len(lanes) + lane] = y if corrected else qy
+        work[(QUATERNION + 3) * len(lanes) + lane] = z if corrected else qz
         work[(STATE + ATTITUDE) * len(lanes) + lane] = 0.0 if corrected else north
         work[(STATE + ATTITUDE + 1) * len(lanes) + lane] = 0.0 if corrected else east
         work[(STATE + ATTITUDE + 2) * len(lanes) + lane] = 0.0 if corrected else down

@@ -17,7 +17,7 @@ from flownav.estimation.covariance import columns_of
 from flownav.estimation.discretise import discretised
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.law import step
-from flownav.estimation.laws.geometry import body_axis, cross, lens_range
+from flownav.estimation.laws.geometry import along_axis, cross, lens_range
 from flownav.estimation.motion import predict
 from flownav.estimation.states import STATES_WITH_LAG
 from flownav.estimation.transition import transition
@@ -110,9 +110,7 @@ def seen_velocity(
 
     swing_m_s: what turning adds at the lens.
     """
-    e = body_axis(rotation, channel)
-    along = e[0] * vel_n + e[1] * vel_e + e[2] * vel_d + swing_m_s
-    turn = cross(e, (vel_n, vel_e, vel_d))
+    e, along, turn = along_axis(rotation, channel, (vel_n, vel_e, vel_d), swing_m_s)
     range_m, by_height, by_north, by_east = lens_range(rotation, height_m, (0.0, 0.0, lens_below_m))
     low = range_m.real < sonar_floor_m
     over = sonar_floor_m / range_m if low else 1.0

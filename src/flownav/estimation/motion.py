@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from flownav.compile import Lanes, Work, equation, procedure
 from flownav.estimation.covariance import add_noise, at, columns_of
 from flownav.estimation.error_models import FilterSettings
@@ -29,22 +27,24 @@ from flownav.estimation.states import (
     VELOCITY,
 )
 from flownav.estimation.transition import transition
-from flownav.frames import GRAVITY_M_S2, Quaternion, Rotation, rotation_from_quaternion, to_earth
+from flownav.frames import (
+    GRAVITY_M_S2,
+    Quaternion,
+    Rotation,
+    of_unit_length,
+    quaternion_product,
+    rotation_from_quaternion,
+    to_earth,
+)
 
 
 @equation
 def turned(attitude: Quaternion, x_rad: float, y_rad: float, z_rad: float) -> Quaternion:
     """q exp(phi/2): the attitude after a rotation of the body by the small vector phi, third order; unit length."""
-    w, x, y, z = attitude
     square = 0.25 * (x_rad * x_rad + y_rad * y_rad + z_rad * z_rad)
     half = 0.5 * (1.0 - square / 6.0)
-    c, i, j, k = 1.0 - 0.5 * square, half * x_rad, half * y_rad, half * z_rad
-    tw = w * c - x * i - y * j - z * k
-    tx = w * i + x * c + y * k - z * j
-    ty = w * j - x * k + y * c + z * i
-    tz = w * k + x * j - y * i + z * c
-    shrink = 1.0 / np.sqrt(tw * tw + tx * tx + ty * ty + tz * tz)
-    return tw * shrink, tx * shrink, ty * shrink, tz * shrink
+    turn = (1.0 - 0.5 * square, half * x_rad, half * y_rad, half * z_rad)
+    return of_unit_length(quaternion_product(attitude, turn))
 
 
 @equation

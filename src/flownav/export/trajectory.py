@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.errors import InputError
-from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.frames import quaternion_product, rotation_from_quaternion, to_earth
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 
 Array = NDArray[np.float64]
@@ -61,10 +61,10 @@ def in_enu(path: Trajectory) -> Trajectory:
     def turned(vector: Array) -> Array:
         return vector[:, [1, 0, 2]] * (1.0, 1.0, -1.0)
 
-    from_frd = _product(np.array(ENU_FROM_NED), path.quaternion)
+    from_frd = quaternion_product(ENU_FROM_NED, tuple(path.quaternion.T))
     return path._replace(
         position_m=turned(path.position_m),
-        quaternion=_product(from_frd, np.array(FRD_FROM_FLU)),
+        quaternion=np.column_stack(quaternion_product(from_frd, FRD_FROM_FLU)),
         velocity_m_s=None if path.velocity_m_s is None else turned(path.velocity_m_s),
     )
 
@@ -97,18 +97,3 @@ def _trajectory(record: Record, name: str) -> Trajectory | None:
 def _in_earth(quaternion: Array, body: Array) -> Array:
     """Body vectors (n, 3) in the earth frame."""
     return np.column_stack(to_earth(rotation_from_quaternion(*quaternion.T), *body.T))
-
-
-def _product(p: Array, q: Array) -> Array:
-    """Hamilton product of quaternions (..., 4), broadcast."""
-    pw, px, py, pz = np.moveaxis(p, -1, 0)
-    qw, qx, qy, qz = np.moveaxis(q, -1, 0)
-    return np.stack(
-        [
-            pw * qw - px * qx - py * qy - pz * qz,
-            pw * qx + px * qw + py * qz - pz * qy,
-            pw * qy - px * qz + py * qw + pz * qx,
-            pw * qz + px * qy - py * qx + pz * qw,
-        ],
-        axis=-1,
-    )

@@ -31,6 +31,7 @@ from flownav.simulation.fault import SOUND, SensorFault
 from flownav.simulation.history import column, columns
 from flownav.simulation.scenario import Scenario, load_scenario, with_vehicle
 from flownav.simulation.sensing import EPOCH_S
+from flownav.text import finite_or_none
 
 HEIGHTS_M = (0.5, 1.5, 3.0)
 DURATIONS_S = (5.0, 20.0)  # over before the descent begins, and through the touchdown
@@ -197,7 +198,7 @@ def scores_of(
         float(error_m[from_fault].max(initial=0.0)),
         float(error_m[unsaid].max(initial=0.0)),
         verdict_of(landing),
-        off if np.isfinite(off) else None,
+        finite_or_none(off),
     )
 
 

@@ -17,6 +17,7 @@ from flownav.faults.navigated import Navigated
 from flownav.measurement import Array, Sensor, Stream
 from flownav.record import POSITION_NED, Table
 from flownav.scoring.touchdown import first_contact
+from flownav.text import finite_or_none
 
 SIGMAS = 3.0
 AS_GOOD_AS_WITHOUT_M = 0.1
@@ -67,7 +68,7 @@ def score(
     return FaultScores(
         detected_after_s=detected_after(run, without, sensors, t0_s),
         moved_m=moved(run, without, window_s),
-        max_error_m=_finite(course.error_m[after].max(initial=0.0)),
+        max_error_m=finite_or_none(course.error_m[after].max(initial=0.0)),
         recovered_after_s=recovered_after(course, course_of(without, truth), t1_s),
         wrongly_fused=sum(
             wrongly_fused(run, clean[sensor], faulty[sensor]) for sensor in sensors if sensor in faulty
@@ -99,7 +100,7 @@ def detected_after(run: Navigated, without: Navigated, sensors: tuple[Sensor, ..
         same = known.get((source, kind))
         if t0_s <= t_s < first and (same is None or np.abs(np.array(same) - t_s).min() > SAME_S):
             first = t_s
-    return _finite(first - t0_s)
+    return finite_or_none(first - t0_s)
 
 
 def _signs(run: Navigated, sensors: tuple[Sensor, ...]) -> list[tuple[float, str, str]]:
@@ -180,7 +181,7 @@ def moved(run: Navigated, without: Navigated, window_s: tuple[float, float]) -> 
     if not len(t_s):
         return 0.0
     usual = np.column_stack([np.interp(t_s, without.t_s, axis) for axis in without.position_ned_m.T])
-    return _finite(np.linalg.norm(run.position_ned_m[lasting] - usual, axis=1).max())
+    return finite_or_none(np.linalg.norm(run.position_ned_m[lasting] - usual, axis=1).max())
 
 
 def touchdown_error(course: Course, truth: Table) -> float | None:
@@ -190,7 +191,7 @@ def touchdown_error(course: Course, truth: Table) -> float | None:
     if not len(course.t_s) or not course.t_s[0] <= contact_s <= course.t_s[-1]:
         return None
     north, east = (np.interp(contact_s, course.t_s, course.error_ned_m[:, axis]) for axis in range(2))
-    return _finite(np.hypot(north, east))
+    return finite_or_none(np.hypot(north, east))
 
 
 def unflagged(run: Navigated, course: Course, t0_s: float) -> float:
@@ -210,7 +211,3 @@ def _stretches(true: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last index of every stretch of True."""
     edges = np.flatnonzero(np.diff(np.r_[False, true, False].astype(int)))
     return [(int(first), int(end) - 1) for first, end in edges.reshape(-1, 2)]
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

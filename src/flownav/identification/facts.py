@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from flownav.identification.findings import Findings, Response
-from flownav.identification.job import finite
+from flownav.text import finite
 
 
 def facts_of(findings: Findings) -> dict[str, Any]:

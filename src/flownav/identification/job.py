@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from flownav.errors import InputError
 from flownav.guard import inputs_there
@@ -67,14 +65,3 @@ def name_of(logs: Sequence[Path]) -> str:
     """A name for what comes of the logs: the first one's."""
     first = logs[0].resolve()
     return first.stem if first.is_file() else first.name
-
-
-def finite(value: Any) -> Any:
-    """The same with None for what is not a number: JSON has no NaN."""
-    if isinstance(value, dict):
-        return {key: finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -7,13 +7,12 @@ import math
 import numpy as np
 
 from flownav.compile import ONE_LANE
-from flownav.estimation.covariance import unpack
-from flownav.estimation.states import ATTITUDE, GYRO_BIAS, POSITION, STATES, VELOCITY
+from flownav.estimation.states import ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
 from flownav.frames import Vector, heading_from_quaternion
 from flownav.live.options import Limits
 from flownav.mavlink.outgoing import Estimate
 from flownav.measurement import Array
-from flownav.navigation.ahead import state_at
+from flownav.navigation.ahead import covariance_at, state_at
 from flownav.navigation.loop import Running
 from flownav.navigation.memory import PROTECTION, SUSPECTED, load_aid, load_imu, load_start
 
@@ -70,8 +69,8 @@ def estimate_of(
     offset_ned_m: of the navigator's origin in the frame that is sent. limits: what `quality` is a share of.
     """
     state = [float(value) for value in state_at(on.work, on.settings, imu, t_s)]
-    covariance = unpack(on.work, ONE_LANE, 0, STATES)
-    pose, velocity = _covariances(on, covariance, max(t_s - on.clock_s, 0.0), heading_from_quaternion(*state[6:10]))
+    covariance = covariance_at(on.work, t_s, on.told.filter.position_walk_m_rt_s)
+    pose, velocity = _sent(covariance, heading_from_quaternion(*state[6:10]))
     if not on.told.equipment.use_imu:
         state[10:13] = [float("nan")] * 3
     north_m, east_m, down_m = offset_ned_m
@@ -116,29 +115,17 @@ def fault_of(estimate: Estimate, limits: Limits) -> str:
     return ""
 
 
-def _covariances(on: Running, covariance: Array, dt_s: float, heading_rad: float) -> tuple[Array, Array]:
-    """Pose (north, east, down, roll, pitch, yaw) and velocity (NED, body rates) of dt later.
+def _sent(covariance: Array, heading_rad: float) -> tuple[Array, Array]:
+    """Covariances of the pose (north, east, down, roll, pitch, yaw) and of the velocity (NED, body rates).
 
-    P' = F P F' + Q with dp <- dp + dt dv, and the IMU's white noise. A small rotation of the level body about the
-    earth's axes is one of roll and pitch turned by the heading.
+    A small rotation of the level body about the earth's axes is one of roll and pitch turned by the heading.
     """
-    motion = np.ix_(range(ATTITUDE + 3), range(ATTITUDE + 3))
-    block = covariance[motion].copy()
-    step = np.eye(ATTITUDE + 3)
-    step[POSITION : POSITION + 3, VELOCITY : VELOCITY + 3] = dt_s * np.eye(3)
-    block = step @ block @ step.T
-    told, moving = on.told.imu, on.told.equipment.use_imu
-    accel = told.accel_noise_m_s2_rt_hz if moving else told.coasting_accel_m_s2_rt_hz
-    gyro = told.gyro_noise_rad_s_rt_hz if moving else told.coasting_rate_rad_s_rt_hz
-    for i in range(3):
-        block[VELOCITY + i, VELOCITY + i] += accel**2 * dt_s
-        block[ATTITUDE + i, ATTITUDE + i] += gyro**2 * dt_s
     turn = np.eye(6)
     cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
     turn[3:5, 3:5] = [[cosine, sine], [-sine, cosine]]
     places = [*range(POSITION, POSITION + 3), *range(ATTITUDE, ATTITUDE + 3)]
-    pose = turn @ block[np.ix_(places, places)] @ turn.T
+    pose = turn @ covariance[np.ix_(places, places)] @ turn.T
     velocity = np.zeros((6, 6))
-    velocity[:3, :3] = block[VELOCITY : VELOCITY + 3, VELOCITY : VELOCITY + 3]
+    velocity[:3, :3] = covariance[VELOCITY : VELOCITY + 3, VELOCITY : VELOCITY + 3]
     velocity[3:, 3:] = covariance[GYRO_BIAS : GYRO_BIAS + 3, GYRO_BIAS : GYRO_BIAS + 3]
     return pose, velocity

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.frames import heading_from_quaternion, rotation_from_quaternion, to_body
+from flownav.frames import heading_from_quaternion, rotation_from_quaternion, to_body, turned_about_down
 from flownav.logs.rates import attitude_at
 from flownav.logs.states import state_table
 from flownav.logs.ulog_topics import MOST_VARIANCE, Topic, Topics
@@ -151,7 +151,5 @@ def _heading(quaternion: Array) -> NDArray[np.float64]:
 
 def _with_heading(quaternion: Array, heading: Array) -> Array:
     """The same tilt with another heading, where that is known: a turn about the vertical from the left."""
-    half = 0.5 * np.where(np.isfinite(heading), heading - _heading(quaternion), 0.0)
-    c, s = np.cos(half), np.sin(half)
-    w, x, y, z = quaternion.T
-    return np.column_stack([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])
+    turn_rad = np.where(np.isfinite(heading), heading - _heading(quaternion), 0.0)
+    return np.column_stack(turned_about_down(tuple(quaternion.T), turn_rad))

@@ -15,7 +15,6 @@ from flownav.mavlink.framing import HEADER_1, HEADER_2, MAVLINK_2
 
 REAL32 = 9  # MAV_PARAM_TYPE
 INTEGERS = {1: "<B", 2: "<b", 3: "<H", 4: "<h", 5: "<I", 6: "<i"}  # MAV_PARAM_TYPE: its bytes
-NAME_BYTES = 16
 
 
 class Value(NamedTuple):

@@ -2,7 +2,7 @@
 
 A navigator is fed with a delay, so that readings of old instants find their place; what is sent, and what an autopilot
 flies on, must be of now. One step is `carried`, the very law that moves the filter (`estimation.motion.strapdown`), on
-one lane here and on the simulator's.
+one lane here and on the simulator's; its covariance is moved by that motion's own transition and noise.
 """
 
 from __future__ import annotations
@@ -12,8 +12,20 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import ONE_LANE, Lanes, Work, compiled, equation, kernel, pointer
-from flownav.estimation.motion import strapdown
-from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, POSITION, QUATERNION, STATE, VELOCITY
+from flownav.estimation.covariance import pack, unpack
+from flownav.estimation.law import parameters
+from flownav.estimation.motion import add_motion_noise, errors_in_motion, strapdown
+from flownav.estimation.states import (
+    ACCEL_BIAS,
+    GYRO_BIAS,
+    PLACES,
+    POSITION,
+    QUATERNION,
+    ROWS_BY_NAME,
+    STATE,
+    STATES,
+    VELOCITY,
+)
 from flownav.measurement import Array
 from flownav.navigation.inertial import Motion, motion_between, remembered
 from flownav.navigation.memory import CLOCK, load_imu
@@ -131,3 +143,23 @@ def state_at(work: Array, settings: Array, imu: Array, t_s: float) -> Array:
     out = np.empty(AHEAD)
     ahead(work, settings, imu, t_s, out)
     return out
+
+
+def covariance_at(work: Array, t_s: float, position_walk_m_rt_s: float) -> Array:
+    """The covariance of one lane's states at t_s, (STATES, STATES): one step of the filter's law from its clock.
+
+    The force, the attitude and the noise are those of the filter's last step.
+    """
+    names, _ = parameters(errors_in_motion.law)
+    held = {name: work[ROWS_BY_NAME[name]] for name in names if name not in PLACES}
+    dt_s = max(t_s - work[CLOCK], 0.0)
+    covariance = unpack(work, ONE_LANE, 0, STATES)
+    for _ in range(2):  # F P, and then F (F P)'
+        errors = {name: covariance[PLACES[name]] for name in names if name in PLACES}
+        for name, row in errors_in_motion.law(**errors, **held, dt_s=dt_s)._asdict().items():
+            covariance[PLACES[name]] = row
+        covariance = covariance.T
+    rows = work.copy()
+    pack(rows, ONE_LANE, 0, STATES, covariance)
+    add_motion_noise(rows, ONE_LANE, dt_s, position_walk_m_rt_s)
+    return unpack(rows, ONE_LANE, 0, STATES)

@@ -11,7 +11,7 @@ from flownav.estimation.covariance import consider, consider_none, variance_of
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, level
 from flownav.estimation.laws.geometry import component
 from flownav.estimation.states import ATTITUDE, CONSIDERS, FLOW_LAG, GYRO_BIAS, INS_ERROR, MEASURED
-from flownav.frames import Quaternion, heading_from_quaternion, quaternion_product, rotation_from_quaternion
+from flownav.frames import Quaternion, conjugate, heading_from_quaternion, quaternion_product, rotation_from_quaternion
 from flownav.navigation.heading import HeadingVerdict, conclude_heading, offered_heading
 from flownav.navigation.memory import LEVEL_READ, MEMORY, share, shared
 from flownav.navigation.offers import conclude, observe_innovation
@@ -189,7 +189,7 @@ def judge_bridged(reading: Reading, start: StartMemory, imu: ImuMemory, m: Bridg
     """The attitude that the filter would have, had it turned over the gap as the read one did."""
     sound, read = read_attitude(reading, start.started)
     crosses = imu.gap > 0.0 and bool(np.isfinite(m.own_w)) and sound
-    back = (m.read_w, -m.read_x, -m.read_y, -m.read_z)
+    back = conjugate((m.read_w, m.read_x, m.read_y, m.read_z))
     turned = quaternion_product((m.own_w, m.own_x, m.own_y, m.own_z), quaternion_product(back, read))
     before = component((m.variance_n, m.variance_e, m.variance_d), axis)
     return offered_attitude(turned, before + BRIDGE_SIGMA_RAD**2, crosses)

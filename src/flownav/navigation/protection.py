@@ -34,7 +34,7 @@ from flownav.estimation.hypotheses import (
 )
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import POSITION
-from flownav.frames import to_body
+from flownav.frames import angular_flow, to_body
 from flownav.navigation.flow_noise import LONGEST_STEP_S
 from flownav.navigation.memory import (
     DRIFT_SINCE,
@@ -130,7 +130,7 @@ def seen_by(
     """What the sensor's two channels are to read by the filter [rad/s or m/s]."""
     v = load_velocity(work, lanes, lane)
     u, v, _ = to_body(rotation_of(work, lanes, lane), v.north_m_s, v.east_m_s, v.down_m_s)
-    return m.turning_x - v / range_m if angular else u, m.turning_y + u / range_m if angular else v
+    return angular_flow(u, v, m.turning_x, m.turning_y, range_m) if angular else (u, v)
 
 
 @equation

@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flownav.compile import equation
+from flownav.frames import angular_flow
 from flownav.optics.projection import Pose
 
 
@@ -65,4 +66,5 @@ def image_rate_rad_s(
 
     The ground falls back as the camera goes ahead, and comes forward as the nose goes up.
     """
-    return -forward_m_s / height_m - rate_q_rad_s, -right_m_s / height_m + rate_p_rad_s
+    flow_x, flow_y = angular_flow(forward_m_s, right_m_s, rate_p_rad_s, rate_q_rad_s, height_m)
+    return -flow_y, flow_x

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import ONE_LANE, Lanes, Unit, Work, equation, lane_access, stepping, unit
+from flownav.compile import ONE_LANE, Lanes, Unit, Work, equation, lane_access, runge_kutta, stepping, unit
 from flownav.errors import InputError
 from flownav.estimation.covariance import place
 from flownav.estimation.states import (
@@ -29,6 +29,7 @@ from flownav.estimation.states import (
     STATES,
     VELOCITY,
 )
+from flownav.frames import of_unit_length
 from flownav.measurement import Array, Sensor
 from flownav.navigation.memory import CLOCK, GROUND_SEEN, START, WRITTEN, load_reading, share, shared
 from flownav.navigation.records import Reading as Row
@@ -206,7 +207,7 @@ class EquationVehicle:
         """The function that is compiled: (work, dt [s]) and lanes; see `simulation.plan.OwnParts`."""
         rate, seen, begun = self.rate, self.seen, self.state
         load, store = lane_access(type(self.state), layout.HELICOPTER)
-        stepped = stepping(type(self.state))
+        _, step = runge_kutta(stepping(type(self.state)))
 
         def step_own(work: Work, dt: float, lanes: Lanes) -> None:
             for lane in range(len(lanes)):
@@ -214,12 +215,7 @@ class EquationVehicle:
                     for i in range(RIGID, len(begun)):
                         work[(layout.HELICOPTER + i) * len(lanes) + lane] = begun[i]
                 x, u, around = load(work, lanes, lane), load_controls(work, lanes, lane), load_around(work, lanes, lane)
-                k1 = rate(x, u, around)
-                k2 = rate(stepped(x, k1, 0.5 * dt), u, around)
-                k3 = rate(stepped(x, k2, 0.5 * dt), u, around)
-                k4 = rate(stepped(x, k3, dt), u, around)
-                after = stepped(stepped(stepped(stepped(x, k1, dt / 6.0), k2, dt / 3.0), k3, dt / 3.0), k4, dt / 6.0)
-                store(work, lanes, lane, after)
+                store(work, lanes, lane, step(rate, x, dt, u, around))
                 unit_attitude(work, lanes, lane)
                 out = seen(load(work, lanes, lane), u, around)
                 store_loads(work, lanes, lane, Loads(out.thrust_n, out.contact_force_n, out.power_w))
@@ -254,6 +250,6 @@ def unit_attitude(work: Work, lanes: Lanes, lane: int) -> None:
     row = layout.HELICOPTER + 6
     w, x = work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane]
     y, z = work[(row + 2) * len(lanes) + lane], work[(row + 3) * len(lanes) + lane]
-    shrink = 1.0 / np.sqrt(w * w + x * x + y * y + z * z)
+    unit = of_unit_length((w, x, y, z))
     for i in range(4):
-        work[(row + i) * len(lanes) + lane] *= shrink
+        work[(row + i) * len(lanes) + lane] = unit[i]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import ONE_LANE
+from flownav.compile import ONE_LANE, runge_kutta
 from flownav.control.guidance import reference_at
 from flownav.errors import InputError
 from flownav.measurement import Array
@@ -29,6 +29,7 @@ from flownav.vehicle.state import Controls
 RIGID = 13
 load_error, _ = PLANT.access(AttitudeError)
 ATTITUDE = slice(6, 10)
+_, timed_step = runge_kutta(lambda timed, rate, dt_s: timed + rate * dt_s)  # the time [s], then the vehicle's state
 
 
 class OwnVehicle:
@@ -56,16 +57,11 @@ class OwnVehicle:
     def _moved(self, dt_s: float, controls: Controls, around: Around) -> Array:
         """One classical fourth-order step; the quaternion is brought back to unit length."""
 
-        def rate(late_s: float, state: Array) -> Array:
-            found = self._part.derivative(self._t_s + late_s, state, controls, around)
-            return self._checked("derivative", found, len(self._state))
+        def rate(timed: Array) -> Array:
+            found = self._part.derivative(float(timed[0]), timed[1:], controls, around)
+            return np.append(1.0, self._checked("derivative", found, len(self._state)))
 
-        state, half_s = self._state, 0.5 * dt_s
-        k1 = rate(0.0, state)
-        k2 = rate(half_s, state + half_s * k1)
-        k3 = rate(half_s, state + half_s * k2)
-        k4 = rate(dt_s, state + dt_s * k3)
-        after = state + dt_s / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+        after: Array = timed_step(rate, np.append(self._t_s, self._state), dt_s)[1:]
         after[ATTITUDE] /= np.linalg.norm(after[ATTITUDE])
         return after
 

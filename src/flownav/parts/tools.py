@@ -9,7 +9,7 @@ import math
 
 import numpy as np
 
-from flownav.frames import GRAVITY_M_S2, rotation_from_quaternion
+from flownav.frames import GRAVITY_M_S2, quaternion_product, rotation_from_quaternion, velocity_from_flow
 from flownav.measurement import Array
 from flownav.navigation.told import FlowSettings, GpsSettings, NavigatorSettings
 from flownav.parts.protocols import Imu, Reading
@@ -28,12 +28,8 @@ def turned(quaternion: Array, angle_frd_rad: Array) -> Array:
     """The attitude turned on by a rotation vector (3,) in body axes [rad], of unit length."""
     angle = float(np.linalg.norm(angle_frd_rad))
     scale = 0.5 if angle < 1e-9 else math.sin(0.5 * angle) / angle
-    w, (x, y, z) = math.cos(0.5 * angle), scale * np.asarray(angle_frd_rad)
-    a, b, c, d = quaternion
-    after = np.array([
-        a * w - b * x - c * y - d * z, a * x + b * w + c * z - d * y,
-        a * y - b * z + c * w + d * x, a * z + b * y - c * x + d * w,
-    ])  # fmt: skip
+    turn = (math.cos(0.5 * angle), *(scale * np.asarray(angle_frd_rad)))
+    after = np.array(quaternion_product(tuple(quaternion), turn))
     return np.asarray(after / np.linalg.norm(after))
 
 
@@ -63,7 +59,8 @@ def flow_velocity(reading: Reading, range_m: float, s: FlowSettings, turning_rad
     carried = reading.value[4:6] if len(reading.value) > 4 else np.full(2, np.nan)
     turning = np.where(np.isfinite(carried), carried, turning_rad_s)
     seen_x, seen_y = reading.value[:2] - turning
-    return np.array([seen_y * range_m / s.flow_gain_x, -seen_x * range_m / s.flow_gain_y])
+    forward_m_s, right_m_s = velocity_from_flow(seen_x, seen_y, range_m)
+    return np.array([forward_m_s / s.flow_gain_x, right_m_s / s.flow_gain_y])
 
 
 class AttitudeFollower:

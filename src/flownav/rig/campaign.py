@@ -9,7 +9,6 @@ from concurrent.futures import ThreadPoolExecutor
 from flownav.rig.experiment import RigLog, RigSettings, check, run_experiment
 
 PAPER_HEIGHTS_M = (0.6, 0.8, 1.0, 1.5)
-PAPER_RUNS = 7
 
 
 def run_campaign(

@@ -6,10 +6,12 @@ positive towards +x. The paper's equations 13 to 15 are kept as printed (z upwar
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, kernel
+from flownav.compile import equation, kernel, runge_kutta, stepping
 from flownav.optics.projection import Pose
 
 GRAVITY_M_S2 = 9.81
@@ -44,6 +46,23 @@ def swing_acceleration(
     return push_rad_s2 - gravity_rad_s2 - 2.0 * damping_1_s * rate_rad_s
 
 
+class Rod(NamedTuple):
+    """A rod that swings: its angle [rad] and how fast it turns [rad/s]."""
+
+    angle_rad: float
+    rate_rad_s: float
+
+
+_, classical_step = runge_kutta(stepping(Rod))
+
+
+@equation
+def rate_of_swing(rod: Rod, push_rad_s2: float, length_m: float, damping_1_s: float) -> Rod:
+    """How fast a free rod's angle and its rate change [rad/s, rad/s²]."""
+    angle_rad, rate_rad_s = rod
+    return Rod(rate_rad_s, swing_acceleration(angle_rad, rate_rad_s, push_rad_s2, length_m, damping_1_s))
+
+
 @equation
 def servo_acceleration(angle_rad: float, rate_rad_s: float, wanted_rad: float, servo_rad_s: float) -> float:
     """A motor at the pivot that holds the rod to an angle, critically damped, gravity cancelled [rad/s²]."""
@@ -65,20 +84,10 @@ def sensor_pose(angle_rad: float, length_m: float, height_m: float, along_x: boo
 @kernel
 def swing(push_rad_s2, length_m, damping_1_s, angle_rad, rate_rad_s):  # type: ignore[no-untyped-def]
     """Free swing after a push, fourth-order Runge-Kutta; one value a step of STEP_S, from rest."""
-    theta, omega = 0.0, 0.0
-    h = STEP_S
+    rod = Rod(0.0, 0.0)
     for k in range(len(push_rad_s2)):
-        angle_rad[k], rate_rad_s[k] = theta, omega
-        u = push_rad_s2[k]
-        a1 = swing_acceleration(theta, omega, u, length_m, damping_1_s)
-        w2 = omega + 0.5 * h * a1
-        a2 = swing_acceleration(theta + 0.5 * h * omega, w2, u, length_m, damping_1_s)
-        w3 = omega + 0.5 * h * a2
-        a3 = swing_acceleration(theta + 0.5 * h * w2, w3, u, length_m, damping_1_s)
-        w4 = omega + h * a3
-        a4 = swing_acceleration(theta + h * w3, w4, u, length_m, damping_1_s)
-        theta += h * (omega + 2.0 * w2 + 2.0 * w3 + w4) / 6.0
-        omega += h * (a1 + 2.0 * a2 + 2.0 * a3 + a4) / 6.0
+        angle_rad[k], rate_rad_s[k] = rod.angle_rad, rod.rate_rad_s
+        rod = classical_step(rate_of_swing, rod, STEP_S, push_rad_s2[k], length_m, damping_1_s)
 
 
 @kernel

@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.frames import rotation_from_quaternion, to_earth, turned_about_down
 from flownav.measurement import Array, Sensor, Stream
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Column, Table
 from flownav.scoring.alignment import Alignment, align, velocity_of
 from flownav.scoring.outage import difference_at, horizontal_rms
+from flownav.text import finite_or_none
 
 LEAST_ROWS = 10
 
@@ -72,9 +73,7 @@ def _moved(estimate: Table, placed: Alignment) -> Table:
     """An estimate with its position and attitude in another frame; velocity, in body axes, stays."""
     table = {**estimate, **dict(zip(POSITION_NED, placed.moved(columns_of(estimate, POSITION_NED)).T, strict=True))}
     if set(QUATERNION) <= estimate.keys():
-        w, x, y, z = columns_of(estimate, QUATERNION).T
-        c, s = np.cos(0.5 * placed.yaw_rad), np.sin(0.5 * placed.yaw_rad)
-        turned = (c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w)
+        turned = turned_about_down(tuple(columns_of(estimate, QUATERNION).T), placed.yaw_rad)
         table |= dict(zip(QUATERNION, turned, strict=True))
     return table
 
@@ -87,7 +86,7 @@ def _errors(against: str | None, error: Array, velocity_rms: float, yaw_rad: flo
         "horizontal_rms_m": float(np.sqrt(np.mean(horizontal**2))) if enough else None,
         "horizontal_max_m": float(horizontal.max()) if enough else None,
         "vertical_rms_m": float(np.sqrt(np.mean(error[:, 2] ** 2))) if enough else None,
-        "velocity_rms_m_s": velocity_rms if np.isfinite(velocity_rms) else None,
+        "velocity_rms_m_s": finite_or_none(velocity_rms),
         "yaw_rad": yaw_rad if enough else None,
     }
 

@@ -6,15 +6,16 @@ one order, so a flight scores the same bytes alone and in any block.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import kernel
+from flownav.compile import equation, kernel, larger, magnitude
 from flownav.scoring.landings import crashed, succeeded, touchdown_of_flight, touchdown_of_flights
 from flownav.scoring.percentiles import spread
 from flownav.scoring.touchdown import TOUCHDOWN_COLUMNS
+from flownav.text import finite_or_none
 
 STATES = ("x", "y", "z", "u", "v", "w")
 STATISTICS = ("mean_error", "std_error", "rms_error", "max_error")
@@ -30,6 +31,44 @@ MAX_POSITION_ERROR = len(STATES) * len(STATISTICS)
 Array = NDArray[np.float64]
 
 
+class ErrorSums(NamedTuple):
+    """Of one state: sum, sum of squares, largest magnitude, running mean and sum of squares about it."""
+
+    total: float
+    squares: float
+    largest: float
+    mean: float
+    about_mean: float
+
+
+@equation
+def with_error(sums: ErrorSums, error: float, count: float) -> ErrorSums:
+    """One more error, the `count`-th.
+
+    B. P. Welford, "Note on a method for calculating corrected sums of squares and products", Technometrics 4 (1962).
+    """
+    off = error - sums.mean
+    mean = sums.mean + off / count
+    return ErrorSums(
+        sums.total + error, sums.squares + error * error, larger(sums.largest, magnitude(error)), mean,
+        sums.about_mean + off * (error - mean),
+    )  # fmt: skip
+
+
+@equation
+def statistics_of(sums: ErrorSums, count: float) -> tuple[float, float, float, float]:
+    """Mean, standard deviation about it, RMS and largest magnitude, as STATISTICS has them; NaN of no error."""
+    if count == 0.0:
+        return np.nan, np.nan, np.nan, np.nan
+    spread, square = sums.about_mean / count, sums.squares / count
+    return sums.total / count, np.sqrt(spread), np.sqrt(square), sums.largest
+
+
+@equation
+def _sums_of(kept: Array) -> ErrorSums:
+    return ErrorSums(kept[0], kept[1], kept[2], kept[3], kept[4])
+
+
 @kernel
 def error_statistics(estimate: Array, truth: Array, counted: Array) -> Array:
     """Mean, standard deviation, RMS and largest absolute error over the steps that count.
@@ -39,31 +78,23 @@ def error_statistics(estimate: Array, truth: Array, counted: Array) -> Array:
     paper's "difference in standard deviation").
     """
     epochs, states, lanes = estimate.shape
-    total, squares, largest = np.zeros((states, lanes)), np.zeros((states, lanes)), np.zeros((states, lanes))
-    count = np.zeros(lanes)
+    sums, count = np.zeros((states, lanes, 5)), np.zeros(lanes)
     for k in range(epochs):
         for lane in range(lanes):
             if counted[k, lane] > 0.0:
                 count[lane] += 1.0
                 for state in range(states):
-                    error = estimate[k, state, lane] - truth[k, state, lane]
-                    total[state, lane] += error
-                    squares[state, lane] += error * error
-                    largest[state, lane] = max(largest[state, lane], abs(error))
-    spread = np.zeros((states, lanes))
-    for k in range(epochs):
-        for lane in range(lanes):
-            if counted[k, lane] > 0.0:
-                for state in range(states):
-                    error = estimate[k, state, lane] - truth[k, state, lane]
-                    spread[state, lane] += (error - total[state, lane] / count[lane]) ** 2
+                    now = with_error(
+                        _sums_of(sums[state, lane]), estimate[k, state, lane] - truth[k, state, lane], count[lane]
+                    )
+                    for i in range(5):
+                        sums[state, lane, i] = now[i]
     result = np.empty((lanes, states, 4))
     for lane in range(lanes):
         for state in range(states):
-            result[lane, state, 0] = total[state, lane] / count[lane]
-            result[lane, state, 1] = np.sqrt(spread[state, lane] / count[lane])
-            result[lane, state, 2] = np.sqrt(squares[state, lane] / count[lane])
-            result[lane, state, 3] = largest[state, lane] if count[lane] > 0.0 else np.nan
+            found = statistics_of(_sums_of(sums[state, lane]), count[lane])
+            for i in range(4):
+                result[lane, state, i] = found[i]
     return result
 
 
@@ -86,7 +117,7 @@ def touchdown_rows(rows: Array) -> Array:
 def scores_of_flight(row: Array) -> dict[str, Any]:
     """One flight's row of scores as the JSON of `flownav fly`; what is NaN is null."""
     landing = touchdown_rows(row[None, :])
-    said = _nested(lambda column: _finite(float(row[column])))
+    said = _nested(lambda column: finite_or_none(float(row[column])))
     return said | {"touchdown": touchdown_of_flight(landing[0]), "crashed": bool(crashed(landing)[0])}
 
 
@@ -104,7 +135,3 @@ def _nested(number: Any) -> dict[str, Any]:
         for i, state in enumerate(STATES)
     }
     return {"states": states, "max_position_error_m": number(MAX_POSITION_ERROR)}
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None

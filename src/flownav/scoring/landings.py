@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from flownav.scoring.percentiles import percentile_with_interval, share_with_interval, spread
 from flownav.scoring.touchdown import CONTACT, LIMITED_BY, REST, TOUCHDOWN_COLUMNS, names_of
+from flownav.text import finite_or_none
 
 Array = NDArray[np.float64]
 
@@ -49,7 +50,7 @@ def touchdown_of_flight(row: Array) -> dict[str, Any] | None:
     if not np.isfinite(row[CONTACT_DISTANCE]) and not broken and not row[ALOFT]:
         return None
     said: dict[str, Any] = {
-        group: _or_none({name: _finite(row[column_of(group, name)]) for name in names})
+        group: _or_none({name: finite_or_none(row[column_of(group, name)]) for name in names})
         for group, names in (("contact", CONTACT), ("rest", REST), ("limited_by", LIMITED_BY))
     }
     landed, times = bool(succeeded(row[None, :])[0]), int(row[GO_AROUNDS])
@@ -101,7 +102,7 @@ def radius(rows: Array, distance: int) -> dict[str, Any]:
     """R95 and its 95 % interval [m]; null where it is infinite."""
     away = np.where(np.isfinite(rows[:, distance]) & ~crashed(rows), rows[:, distance], np.inf)
     value, low, high = percentile_with_interval(away, R_SHARE)
-    return {"r95_m": _finite(value), "r95_interval_m": [_finite(low), _finite(high)]}
+    return {"r95_m": finite_or_none(value), "r95_interval_m": [finite_or_none(low), finite_or_none(high)]}
 
 
 def success(rows: Array) -> dict[str, float]:
@@ -115,11 +116,7 @@ def _spreads(rows: Array, group: str, names: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _largest(values: Array) -> float | None:
-    return _finite(percentile_with_interval(values, R_SHARE)[0]) if len(values) else None
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+    return finite_or_none(percentile_with_interval(values, R_SHARE)[0]) if len(values) else None
 
 
 def _or_none(values: dict[str, float | None]) -> dict[str, float | None] | None:

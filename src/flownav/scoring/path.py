@@ -17,6 +17,7 @@ from flownav.scoring.alignment import Alignment, align, velocity_of
 from flownav.scoring.autopilot import columns_of, velocity_ned
 from flownav.scoring.drift import Motion, Window, end_drift
 from flownav.scoring.outage import OutageError, difference_at, horizontal_rms, outage_error
+from flownav.text import finite_or_none
 
 
 class Path(NamedTuple):
@@ -96,7 +97,7 @@ def outage_of(path: Path, known: References, t0: float, t1: float) -> OutageErro
 
 def outage_entry(error: OutageError) -> dict[str, float | None]:
     """An outage as JSON has it; null where the window could not be scored."""
-    return {name: _number(value) for name, value in error._asdict().items()}
+    return {name: finite_or_none(value) for name, value in error._asdict().items()}
 
 
 def velocity_rms(path: Path, known: References) -> float | None:
@@ -106,7 +107,7 @@ def velocity_rms(path: Path, known: References) -> float | None:
     t_s, value = known.speeds
     finite = np.isfinite(value[:, :2]).all(axis=1)
     instants = t_s[finite] - known.gps_delay_s
-    return _number(horizontal_rms(path.t_s, path.velocity_ne, instants, value[finite, :2]))
+    return finite_or_none(horizontal_rms(path.t_s, path.velocity_ne, instants, value[finite, :2]))
 
 
 def truth_alignment(path: Path, truth: Table | None) -> Alignment | None:
@@ -135,7 +136,7 @@ def truth_scores(path: Path, known: References) -> dict[str, Any] | None:
         "horizontal_rms_m": float(np.sqrt(squares.mean())),
         "horizontal_max_m": float(np.sqrt(squares.max())),
         "vertical_rms_m": float(np.sqrt(np.mean(error[:, 2] ** 2))),
-        "velocity_rms_m_s": _number(horizontal_rms(path.t_s, path.velocity_ne, t_s, velocity[:, :2])),
+        "velocity_rms_m_s": finite_or_none(horizontal_rms(path.t_s, path.velocity_ne, t_s, velocity[:, :2])),
     }
 
 
@@ -144,7 +145,3 @@ def end_drift_of(estimate: Motion, known: References) -> float | None:
     if known.truth is None:
         return None
     return end_drift(estimate, truth_motion(known.truth, known.heading), known.flight_s)
-
-
-def _number(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -13,12 +13,12 @@ wrong it had the pad's place, and estimate how far it has drifted since.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import kernel
+from flownav.compile import equation, kernel
 from flownav.frames import rotation_from_quaternion, to_earth
 
 Array = NDArray[np.float64]
@@ -63,6 +63,7 @@ TOUCHDOWN_COLUMNS = (
     "go_arounds",
     "aloft",
 )
+COLUMNS = len(TOUCHDOWN_COLUMNS)
 
 
 class Limits(NamedTuple):
@@ -109,28 +110,194 @@ def motion_of(
     )
 
 
+class Moving(NamedTuple):
+    """What one epoch shows of a flight: as `Motion`, of one lane, with how wrong was what was flown on (north, east).
+
+    seen: the pad's place was to be seen or noted. away: it goes around.
+    """
+
+    place_n: float
+    place_e: float
+    height_m: float
+    sink_m_s: float
+    lateral_m_s: float
+    tilt_deg: float
+    yaw_deg_s: float
+    flown_n: float
+    flown_e: float
+    touches: bool
+    seen: bool
+    away: bool
+
+
+class Course(NamedTuple):
+    """What must be remembered of the epochs so far."""
+
+    contact: float  # its epoch, of the first since the last go-around; -1: none
+    untouched: float  # epochs without contact
+    still: float  # epochs at rest on the ground
+    sink_m_s: float  # of the last epoch, with the five that follow
+    lateral_m_s: float
+    tilt_deg: float
+    yaw_deg_s: float
+    place_n: float
+    place_e: float
+    seen_n: float  # error of what was flown on when the pad was last seen
+    seen_e: float
+    over_grounded: float  # 1: rolled over on the ground
+    over_since: float  # 1: rolled over since the contact
+    low: float  # 1: was below the ground
+    away: float
+    go_arounds: float
+
+
+class Touch(NamedTuple):
+    """The first contact: place, errors of what was flown on then and when the pad was last seen, motion before it."""
+
+    place_n: float
+    place_e: float
+    error_n: float
+    error_e: float
+    seen_n: float
+    seen_e: float
+    sink_m_s: float
+    lateral_m_s: float
+    tilt_deg: float
+    yaw_deg_s: float
+
+
+@equation
+def nothing_yet() -> Course:
+    """Before the first epoch."""
+    return Course(-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@equation
+def no_touch() -> Touch:
+    """Before any contact."""
+    return Touch(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@equation
+def lands(touches: bool, untouched: float) -> bool:
+    """Whether a contact after so many epochs without one is one after being airborne."""
+    return touches and untouched >= AIRBORNE_EPOCHS
+
+
+@equation
+def followed(c: Course, touch: Touch, epoch: int, s: Moving) -> tuple[Course, Touch]:
+    """What is remembered with one epoch more."""
+    seen_n, seen_e = (s.flown_n, s.flown_e) if epoch == 0 else (c.seen_n, c.seen_e)
+    met = c.contact < 0.0 and not s.away and lands(s.touches, c.untouched)
+    contact = -1.0 if s.away else (float(epoch) if met else c.contact)
+    first = Touch(
+        s.place_n, s.place_e, s.flown_n, s.flown_e, seen_n, seen_e, c.sink_m_s, c.lateral_m_s, c.tilt_deg, c.yaw_deg_s
+    )
+    untouched = float(epoch + 1) if s.away else (0.0 if s.touches else c.untouched + 1.0)
+    still = s.touches and s.lateral_m_s < STILL_M_S and s.yaw_deg_s < STILL_DEG_S
+    over = s.tilt_deg > ROLLED_OVER_DEG
+    begins = s.away and c.away == 0.0 and epoch > 0
+    now = Course(
+        contact, untouched, c.still + 1.0 if still else 0.0, s.sink_m_s, s.lateral_m_s, s.tilt_deg, s.yaw_deg_s,
+        s.place_n, s.place_e, s.flown_n if s.seen else seen_n, s.flown_e if s.seen else seen_e,
+        1.0 if over and s.touches else c.over_grounded, 0.0 if contact < 0.0 else (1.0 if over else c.over_since),
+        c.low if s.height_m > 0.0 else 1.0,  # a motion that is no number is no flight either
+        1.0 if s.away else 0.0, c.go_arounds + 1.0 if begins else c.go_arounds,
+    )  # fmt: skip
+    return now, first if met else touch
+
+
+@equation
+def put_touchdown(
+    c: Course, t: Touch, contact_s: float, rest_s: float, last_s: float, may_land_after_s: float, limits: Any,
+    row: Any, first: int, place: int,
+) -> None:  # fmt: skip
+    """The touchdown after the last epoch into row[first:, place], by TOUCHDOWN_COLUMNS; what did not happen is NaN.
+
+    contact_s, rest_s, last_s: when it touched, when it came to rest, the last epoch's time. limits: with the fields of
+    `Limits`. A contact before `may_land_after_s` is a crash and no touchdown; so is none what a go-around follows.
+    """
+    early = c.contact >= 0.0 and contact_s < may_land_after_s
+    touched = c.contact >= 0.0 and not early
+    rests = touched and c.still >= STILL_EPOCHS
+    slide_m = hypotenuse(c.place_n - t.place_n, c.place_e - t.place_e)
+    at_contact = (
+        contact_s, t.place_n, t.place_e, hypotenuse(t.place_n, t.place_e), t.sink_m_s, t.lateral_m_s,
+        t.tilt_deg, t.yaw_deg_s,
+    )  # fmt: skip
+    at_rest = (rest_s, c.place_n, c.place_e, hypotenuse(c.place_n, c.place_e), c.tilt_deg, slide_m)
+    parts = (
+        hypotenuse(t.error_n - t.seen_n, t.error_e - t.seen_e),
+        hypotenuse(t.place_n + t.error_n, t.place_e + t.error_e),
+        hypotenuse(t.seen_n, t.seen_e),
+    )
+    for i in range(8):
+        row[first + i, place] = at_contact[i] if touched else np.nan
+    for i in range(6):
+        row[first + 8 + i, place] = at_rest[i] if rests else np.nan
+    for i in range(3):
+        row[first + 14 + i, place] = parts[i] if touched else np.nan
+    bits = 1.0 if early else 0.0
+    if touched:
+        bits += 2.0 if t.sink_m_s > limits.max_sink_rate_m_s else 0.0
+        bits += 4.0 if t.lateral_m_s > limits.max_lateral_speed_m_s else 0.0
+        bits += 8.0 if t.tilt_deg > limits.max_tilt_deg else 0.0
+        bits += 16.0 if t.yaw_deg_s > limits.max_yaw_rate_deg_s else 0.0
+        bits += 32.0 if slide_m > limits.max_slide_m else 0.0
+    bits += 64.0 if c.over_grounded > 0.0 or c.over_since > 0.0 else 0.0
+    bits += 128.0 if c.low > 0.0 else 0.0
+    row[first + 17, place] = 1.0 if may_land_after_s < last_s else 0.0
+    row[first + 18, place] = bits
+    row[first + 19, place] = c.go_arounds
+    row[first + 20, place] = 1.0 if not touched and c.go_arounds > 0.0 else 0.0
+
+
+@equation
+def hypotenuse(a: float, b: float) -> float:
+    """Length of a vector of two components."""
+    length: float = np.sqrt(a * a + b * b)
+    return length
+
+
+if TOUCHDOWN_COLUMNS[17:] != ("expected", "broken", "go_arounds", "aloft"):
+    raise AssertionError("put_touchdown writes TOUCHDOWN_COLUMNS by their places")
+
+
 @kernel
 def first_contact(on_ground: Array) -> NDArray[np.int64]:
     """The epoch of each lane's first ground contact after being airborne, -1 where there is none; (lanes,)."""
     epochs, lanes = on_ground.shape
     found = np.full(lanes, -1)
     for lane in range(lanes):
-        without_contact = 0
+        untouched = 0.0
         for k in range(epochs):
-            touching = on_ground[k, lane] > 0.0
-            if touching and without_contact >= AIRBORNE_EPOCHS:
+            touches = on_ground[k, lane] > 0.0
+            if lands(touches, untouched):
                 found[lane] = k
                 break
-            without_contact = 0 if touching else without_contact + 1
+            untouched = 0.0 if touches else untouched + 1.0
     return found
 
 
-def rest_epoch(motion: Motion) -> NDArray[np.int64]:
-    """From which epoch on each lane stays still on the ground until the flight's end, at least a second; else -1."""
-    still = (motion.lateral_m_s < STILL_M_S) & (motion.yaw_rate_deg_s < STILL_DEG_S) & (motion.on_ground > 0.0)
-    epochs = len(still)
-    stays = np.where(still.all(axis=0), epochs, np.argmin(still[::-1], axis=0))
-    return np.asarray(np.where(stays >= STILL_EPOCHS, epochs - stays, -1), np.int64)
+@kernel
+def fold(t_s: Array, motion: Motion, flown: Array, seen: Array, away: Array, limits: Limits, after_s: float) -> Array:
+    """The touchdowns of `touchdowns`, (len(TOUCHDOWN_COLUMNS), lanes)."""
+    epochs, lanes = motion.on_ground.shape
+    rows = np.empty((COLUMNS, lanes))
+    for lane in range(lanes):
+        course, touch = nothing_yet(), no_touch()
+        for k in range(epochs):
+            shown = Moving(
+                motion.place_m[k, 0, lane], motion.place_m[k, 1, lane], motion.cg_height_m[k, lane],
+                motion.sink_m_s[k, lane], motion.lateral_m_s[k, lane], motion.tilt_deg[k, lane],
+                motion.yaw_rate_deg_s[k, lane], flown[k, 0, lane], flown[k, 1, lane],
+                motion.on_ground[k, lane] > 0.0, seen[k, lane] > 0.0, away[k, lane] > 0.0,
+            )  # fmt: skip
+            course, touch = followed(course, touch, k, shown)
+        contact_s = t_s[max(int(course.contact), 0)]
+        rest_s = t_s[min(epochs - int(course.still), epochs - 1)]
+        put_touchdown(course, touch, contact_s, rest_s, t_s[epochs - 1], after_s, limits, rows, 0, lane)
+    return rows
 
 
 def touchdowns(
@@ -140,81 +307,17 @@ def touchdowns(
     """Rows of TOUCHDOWN_COLUMNS, (lanes, len(TOUCHDOWN_COLUMNS)); what did not happen is NaN.
 
     flown_error (epochs, 2, lanes): position that was flown on less the truth; pad_seen (epochs, lanes) 0/1: the pad's
-    place was to be seen or noted; away (epochs, lanes) 0/1: the vehicle goes around. A contact before
-    `may_land_after_s` is a crash and no touchdown; so is none what a go-around follows.
+    place was to be seen or noted; away (epochs, lanes) 0/1: the vehicle goes around.
     """
-    lane = np.arange(motion.on_ground.shape[1])
-    contact = first_contact(motion.on_ground * after_last(away))
-    early = (contact >= 0) & (t_s[contact] < may_land_after_s)
-    touched = (contact >= 0) & ~early
-    at, before = np.maximum(contact, 0), np.maximum(contact - 1, 0)
-    place, end = motion.place_m[at, :, lane], motion.place_m[-1].T
-    rest = np.where(touched, rest_epoch(motion), -1)
-    slide = np.hypot(*(end - place).T)
-    seen = last_seen(pad_seen, at)
-    error, at_pad = flown_error[at, :, lane], flown_error[seen, :, lane]
-    guidance = place + error
-    columns = {
-        "contact.t_s": t_s[at],
-        "contact.north_m": place[:, 0],
-        "contact.east_m": place[:, 1],
-        "contact.distance_m": np.hypot(*place.T),
-        "contact.sink_rate_m_s": motion.sink_m_s[before, lane],
-        "contact.lateral_speed_m_s": motion.lateral_m_s[before, lane],
-        "contact.tilt_deg": motion.tilt_deg[before, lane],
-        "contact.yaw_rate_deg_s": motion.yaw_rate_deg_s[before, lane],
-        "limited_by.estimate_m": np.hypot(*(error - at_pad).T),
-        "limited_by.guidance_m": np.hypot(*guidance.T),
-        "limited_by.pad_m": np.hypot(*at_pad.T),
-    }
-    at_rest = {
-        "rest.t_s": t_s[np.maximum(rest, 0)],
-        "rest.north_m": end[:, 0],
-        "rest.east_m": end[:, 1],
-        "rest.distance_m": np.hypot(*end.T),
-        "rest.tilt_deg": motion.tilt_deg[-1],
-        "rest.slide_m": slide,
-    }
-    found = {name: np.where(touched, values, np.nan) for name, values in columns.items()}
-    found |= {name: np.where(rest >= 0, values, np.nan) for name, values in at_rest.items()}
-    found["expected"] = np.full(len(lane), float(may_land_after_s < t_s[-1]))
-    found["go_arounds"] = (np.diff(away, axis=0) > 0.0).sum(axis=0).astype(float)
-    found["aloft"] = np.where(touched, 0.0, (found["go_arounds"] > 0.0).astype(float))
-    found["broken"] = broken(motion, found, np.where(touched, slide, 0.0), contact, early, limits)
-    return np.column_stack([found[name] for name in TOUCHDOWN_COLUMNS])
+    block = Motion(*map(_plain, motion))
+    told = Limits(*map(float, limits))
+    rows = fold(_plain(t_s), block, _plain(flown_error), _plain(pad_seen), _plain(away), told, float(may_land_after_s))
+    return np.ascontiguousarray(rows.T)
 
 
-def after_last(away: Array) -> Array:
-    """1 from the epoch after a lane last went around, and all along where it never did (epochs, lanes)."""
-    later = np.cumsum(away[::-1], axis=0)[::-1]
-    return np.asarray((later <= 0.0).astype(float))
-
-
-def last_seen(pad_seen: Array, contact: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The last epoch before each lane's contact at which the pad was to be seen; 0 where it never was."""
-    before = (np.arange(len(pad_seen))[:, None] < contact) & (pad_seen > 0.0)
-    last = len(before) - 1 - np.argmax(before[::-1], axis=0)
-    return np.asarray(np.where(before.any(axis=0), last, 0), np.int64)
-
-
-def broken(
-    motion: Motion, found: dict[str, Array], slide_m: Array, contact: NDArray[np.int64], early: NDArray[np.bool_],
-    limits: Limits,
-) -> Array:  # fmt: skip
-    """What each lane broke, as bits of BROKEN; 0: no crash."""
-    since = (np.arange(len(motion.on_ground))[:, None] >= contact) & (contact >= 0)
-    over = (motion.tilt_deg > ROLLED_OVER_DEG) & (since | (motion.on_ground > 0.0))
-    wrong = (
-        early,
-        found["contact.sink_rate_m_s"] > limits.max_sink_rate_m_s,
-        found["contact.lateral_speed_m_s"] > limits.max_lateral_speed_m_s,
-        found["contact.tilt_deg"] > limits.max_tilt_deg,
-        found["contact.yaw_rate_deg_s"] > limits.max_yaw_rate_deg_s,
-        slide_m > limits.max_slide_m,
-        over.any(axis=0),
-        ~(motion.cg_height_m > 0.0).all(axis=0),  # a motion that is no number is no flight either
-    )
-    return np.asarray(sum((1 << bit) * flag.astype(float) for bit, flag in enumerate(wrong)), float)
+def _plain(values: Array) -> Array:
+    """Numbers as the kernel takes them, whatever holds them."""
+    return np.ascontiguousarray(values, float)
 
 
 def names_of(bits: float) -> list[str]:

@@ -27,7 +27,6 @@ from flownav.frames import Rotation
 from flownav.sensors.second_order import hold_step
 
 PERIOD_S = 0.004  # inside the sensor
-PUBLISH_PERIOD_S = 0.02
 SMALLEST_RANGE_M = 0.01  # keeps divisions finite when the lens touches the ground
 SMALLEST_COSINE = 0.1  # the same for a ray that grazes the ground
 NOISE_DEGREE = 8

@@ -27,7 +27,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import clamp, equation, larger, magnitude
-from flownav.frames import Rotation
+from flownav.frames import Rotation, angular_flow
 from flownav.sensors.chance import factor, spell
 from flownav.sensors.flow import SMALLEST_RANGE_M, FlowParameters, engagement, flow_noise_sigma, pattern_reach
 from flownav.sensors.geometry import in_turned_axes
@@ -234,8 +234,12 @@ def step_flow_camera(
     gain = flow_gain(truth.height_m, unit, p)
     sigma = unit.noise * flow_noise_sigma(truth.height_m, flow) * per_m * (p.low_texture_noise if low else 1.0)
     stray = p.outlier_sigma_rad_s if n.outlier > p.outlier_above else 0.0
-    flow_x = rate_x - gain * vel_y * per_m + sigma * n.noise_x + stray * n.outlier_x
-    flow_y = rate_y + gain * vel_x * per_m + sigma * n.noise_y + stray * n.outlier_y
+    # the velocity is over the range already: what is seen from a metre away
+    flow_x, flow_y = angular_flow(gain * vel_x * per_m, gain * vel_y * per_m, rate_x, rate_y, 1.0)
+    flow_x, flow_y = (
+        flow_x + sigma * n.noise_x + stray * n.outlier_x,
+        flow_y + sigma * n.noise_y + stray * n.outlier_y,
+    )
     fastest = flow.max_flow_rad_s
     sees = (s.engaged > 0.5) & (texture >= p.least_texture)
     height_share = clamp(truth.height_m / flow.max_height_m, 0.0, 1.0)

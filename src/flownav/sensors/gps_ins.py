@@ -14,10 +14,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from flownav.compile import equation
-from flownav.frames import Quaternion, quaternion_product
+from flownav.frames import Quaternion, of_unit_length, quaternion_product
 from flownav.sensors.gauss_markov import gauss_markov
 from flownav.sensors.quantisation import quantised
 
@@ -129,9 +127,7 @@ def attitude_with_error(attitude: Quaternion, roll_rad: float, pitch_rad: float,
     """
     heading = (1.0, 0.0, 0.0, 0.5 * heading_rad)
     tilt = (1.0, 0.5 * roll_rad, 0.5 * pitch_rad, 0.0)
-    w, x, y, z = quaternion_product(quaternion_product(heading, attitude), tilt)
-    shrink = 1.0 / np.sqrt(w * w + x * x + y * y + z * z)
-    return w * shrink, x * shrink, y * shrink, z * shrink
+    return of_unit_length(quaternion_product(quaternion_product(heading, attitude), tilt))
 
 
 @equation

@@ -15,7 +15,7 @@ from flownav.compile import Lanes, Work, equation, invoke, larger, procedure
 from flownav.control.go_around import Knowledge
 from flownav.control.guidance import Reference
 from flownav.estimation.consistency import normalised_error
-from flownav.frames import quaternion_product, rotation_from_quaternion, to_body, to_earth
+from flownav.frames import conjugate, quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.navigation.ahead import Carried, carried, coasted, state_of
 from flownav.navigation.memory import load_reading, load_start
 from flownav.navigation.records import GroundMemory, Reading, StartMemory, SuspicionMemory
@@ -276,5 +276,7 @@ def hand_to_autopilot(
         state.pos_n, state.pos_e, state.pos_d, state.u, state.v, state.w, state.qw, state.qx, state.qy, state.qz
     )
     flown = said if handed else truth
-    turn = quaternion_product((flown.qw, flown.qx, flown.qy, flown.qz), (state.qw, -state.qx, -state.qy, -state.qz))
+    turn = quaternion_product(
+        (flown.qw, flown.qx, flown.qy, flown.qz), conjugate((state.qw, state.qx, state.qy, state.qz))
+    )
     return HandedOver(noted if notes else place, flown, AttitudeError(*turn))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, Work, equation
+from flownav.compile import STAGES, Lanes, Work, equation
 from flownav.simulation import layout
 from flownav.simulation.layout import (
     load_around,
@@ -38,7 +38,7 @@ from flownav.vehicle.helicopter import (
 )
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.rotor import main_rotor, refine_induced_velocity, speed_ratio, tail_rotor, thrustless_inflow
-from flownav.vehicle.state import Controls, HelicopterState, Inflow, Outputs, add_scaled, normalised
+from flownav.vehicle.state import Controls, HelicopterState, Inflow, Outputs, after_stage, normalised
 
 
 class LinearTruth(NamedTuple):
@@ -66,33 +66,33 @@ def runge_kutta_step(work: Work, lanes: Lanes, dt: float, onboard: Onboard | Non
         store_sum(work, lanes, lane, state)
         air = moving_air(work, lanes, lane, state)
         induced = solved_inflow(state, air, blade_angles(state, vehicle), vehicle, onboard)
-        add_stage(work, lanes, lane, state, air, induced, dt / 6.0, 0.5 * dt, vehicle, onboard)
-    for stage in range(3):
-        weight = dt / 3.0 if stage < 2 else dt / 6.0
-        reach = 0.5 * dt if stage < 1 else dt
+        add_stage(work, lanes, lane, state, air, induced, 0, dt, vehicle, onboard)
+    for stage in range(1, STAGES):
         for lane in range(len(lanes)):
             state, vehicle = load_stage(work, lanes, lane), vehicle_as_is(work, lanes, lane)
             air, guess = moving_air(work, lanes, lane, state), load_inflow(work, lanes, lane)
             induced = refined_inflow(guess, state, air, blade_angles(state, vehicle), vehicle, onboard)
-            add_stage(work, lanes, lane, state, air, induced, weight, reach, vehicle, onboard)
+            add_stage(work, lanes, lane, state, air, induced, stage, dt, vehicle, onboard)
     for lane in range(len(lanes)):
         store_helicopter(work, lanes, lane, normalised(load_sum(work, lanes, lane)))
 
 
 @equation
 def add_stage(
-    work: Work, lanes: Lanes, lane: int, state: HelicopterState, air: AirMotion, induced: Inflow, weight: float,
-    reach: float, vehicle: VehicleParameters, onboard: Onboard | None,
+    work: Work, lanes: Lanes, lane: int, state: HelicopterState, air: AirMotion, induced: Inflow, stage: int,
+    dt: float, vehicle: VehicleParameters, onboard: Onboard | None,
 ) -> None:  # fmt: skip
-    """A stage's rate into the weighted sum, and the next stage's state `reach` from the step's start."""
+    """A stage's rate into the step's sum, and the next stage's state (`after_stage`)."""
     store_inflow(work, lanes, lane, induced)
     controls, around = load_controls(work, lanes, lane), load_around(work, lanes, lane)
     if onboard is None:
         rate = derivative_at_inflow(state, controls, air, attitude(state), induced, around, vehicle)
     else:
         rate = derivative_at_tail(state, controls, air, attitude(state), induced.tail, around, vehicle)
-    store_sum(work, lanes, lane, add_scaled(load_sum(work, lanes, lane), rate, weight))
-    store_stage(work, lanes, lane, add_scaled(load_helicopter(work, lanes, lane), rate, reach))
+    start, total = load_helicopter(work, lanes, lane), load_sum(work, lanes, lane)
+    total, following = after_stage(stage, start, total, rate, dt)
+    store_sum(work, lanes, lane, total)
+    store_stage(work, lanes, lane, following)
 
 
 @equation

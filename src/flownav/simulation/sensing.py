@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from flownav.compile import Lanes, Work, equation
-from flownav.frames import quaternion_product, rotation_from_quaternion, to_body, to_earth
-from flownav.sensors.angular_flow import angular_flow
+from flownav.frames import (
+    angular_flow,
+    conjugate,
+    of_unit_length,
+    quaternion_product,
+    rotation_from_quaternion,
+    to_body,
+    to_earth,
+)
 from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, engage_flow, read_flow, start_flow
 from flownav.sensors.gps_ins import (
     GpsInsParameters,
@@ -127,12 +132,12 @@ def true_imu(state: HelicopterState, before: Before, vehicle: VehicleParameters,
     accel_e = (now.vel_e_m_s - before.vel_e_m_s) / period_s
     accel_d = (now.vel_d_m_s - before.vel_d_m_s) / period_s
     w, x, y, z = before.qw, before.qx, before.qy, before.qz
-    turn = quaternion_product((w, -x, -y, -z), (state.qw, state.qx, state.qy, state.qz))
+    turn = quaternion_product(conjugate((w, x, y, z)), (state.qw, state.qx, state.qy, state.qz))
     half_square = turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3]
     per_s = 2.0 * (1.0 + half_square / 6.0) / period_s
     w, x, y, z = w + state.qw, x + state.qx, y + state.qy, z + state.qz
-    shrink = 1.0 / np.sqrt(w * w + x * x + y * y + z * z)
-    middle = rotation_from_quaternion(w * shrink, x * shrink, y * shrink, z * shrink)
+    w, x, y, z = of_unit_length((w, x, y, z))
+    middle = rotation_from_quaternion(w, x, y, z)
     force_x, force_y, force_z = to_body(middle, accel_n, accel_e, accel_d - vehicle.gravity_m_s2)
     return Integrated(ImuReading(per_s * turn[1], per_s * turn[2], per_s * turn[3], force_x, force_y, force_z), now)
 

@@ -15,6 +15,7 @@ from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import Replay, outage_summary, outage_table, replay
+from flownav.text import finite_or_none
 from flownav.validation.drawn import Flight
 from flownav.validation.figures import figures_of
 from flownav.validation.flights import AssumedVehicle, ValidationFile, Window
@@ -137,15 +138,11 @@ def row_of(log: str, figure: str, flown: float, simulated: list[float]) -> Row:
     """The row of one figure; simulated flights that do not know it are left out."""
     known = np.array([value for value in simulated if np.isfinite(value)])
     if not len(known):
-        return Row(log, figure, _known(flown), None, None, None)
-    return Row(log, figure, _known(flown), float(np.median(known)), float(known.min()), float(known.max()))
+        return Row(log, figure, finite_or_none(flown), None, None, None)
+    return Row(log, figure, finite_or_none(flown), float(np.median(known)), float(known.min()), float(known.max()))
 
 
 def _sizes(low: float, high: float) -> tuple[float, float]:
     """Least and largest size of what lies between two numbers."""
     smaller, larger = sorted((abs(low), abs(high)))
     return (0.0 if low <= 0.0 <= high else smaller), larger
-
-
-def _known(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None

@@ -36,14 +36,13 @@ from flownav.vehicle.rotor import (
     torque,
 )
 from flownav.vehicle.skids import support, with_friction, with_support
-from flownav.vehicle.state import Controls, HelicopterState, Inflow, Outputs, RotorLoads, add_scaled, normalised
+from flownav.vehicle.state import Controls, HelicopterState, Inflow, Outputs, RotorLoads, classical_step, normalised
 
 __all__ = [
     "Controls",
     "HelicopterState",
     "Inflow",
     "Outputs",
-    "add_scaled",
     "derivative",
     "derivative_at_inflow",
     "derivative_in_balance",
@@ -271,9 +270,4 @@ def step(
     state: HelicopterState, controls: Controls, around: Around, dt: float, vehicle: VehicleParameters
 ) -> HelicopterState:
     """The state `dt` seconds later by the classical Runge-Kutta method, controls and surroundings held."""
-    first = derivative(state, controls, around, vehicle)
-    second = derivative(add_scaled(state, first, 0.5 * dt), controls, around, vehicle)
-    third = derivative(add_scaled(state, second, 0.5 * dt), controls, around, vehicle)
-    fourth = derivative(add_scaled(state, third, dt), controls, around, vehicle)
-    middle = add_scaled(add_scaled(state, first, dt / 6.0), second, dt / 3.0)
-    return normalised(add_scaled(add_scaled(middle, third, dt / 3.0), fourth, dt / 6.0))
+    return normalised(classical_step(derivative, state, dt, controls, around, vehicle))

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from flownav.compile import equation, magnitude, passing, replacing, stepping
-from flownav.frames import Quaternion
+from flownav.compile import equation, magnitude, passing, replacing, runge_kutta, stepping
+from flownav.frames import Quaternion, of_unit_length
 
 
 class HelicopterState(NamedTuple):
@@ -82,7 +80,7 @@ class Outputs(NamedTuple):
     contact_force_n: float
 
 
-add_scaled = stepping(HelicopterState)  # state + rate·dt
+after_stage, classical_step = runge_kutta(stepping(HelicopterState))
 
 
 NEGLIGIBLE = 1e-100  # what decays below it is zero: arithmetic on subnormal numbers is a hundred times slower
@@ -97,8 +95,7 @@ def settled(value: float) -> float:
 @equation
 def unit_attitude(state: Any) -> Quaternion:
     """The quaternion of a state, of either kind of vehicle, brought back to unit length."""
-    scale = 1.0 / np.sqrt(state.qw * state.qw + state.qx * state.qx + state.qy * state.qy + state.qz * state.qz)
-    return state.qw * scale, state.qx * scale, state.qy * scale, state.qz * scale
+    return of_unit_length((state.qw, state.qx, state.qy, state.qz))
 
 
 _STILL = {"pos_n", "pos_e", "pos_d", "qw", "qx", "qy", "qz", "speed"}  # what does not decay

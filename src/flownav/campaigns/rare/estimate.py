@@ -18,6 +18,7 @@ from flownav.campaigns.rare.subset import WALK
 from flownav.errors import InputError
 from flownav.scoring.touchdown import Limits
 from flownav.simulation.assemble import Setup
+from flownav.text import finite_or_none
 
 FEWEST_FLIGHTS, MOST_FLIGHTS = 2000, 100_000
 USUAL_FLIGHTS = 512  # that say what a usual touchdown is
@@ -51,7 +52,7 @@ class Rare:
     def as_json(self) -> dict[str, Any]:
         """All of it but the flight, which is a file of its own."""
         own = {name: getattr(self, name) for name in ("event", "probability", "low", "high", "cv", "flights")}
-        likely = {"inputs": self.inputs, "noise": self.noise, "response": _finite(self.branch_response)}
+        likely = {"inputs": self.inputs, "noise": self.noise, "response": finite_or_none(self.branch_response)}
         return own | {"confidence": CONFIDENCE, "parts": self.parts, "likely": likely}
 
 
@@ -87,9 +88,8 @@ def estimate_rare(
     said = [_said(*each) for each in zip(responses, found, flown, strict=True)]
     inputs, noise = ([], []) if probability == 0.0 else differences(space, found)
     branch, at = (None, None) if probability == 0.0 else most_likely(space, responses, found, inputs)
-    return Rare(
-        str(event), probability, low, high, _finite(cv), USUAL_FLIGHTS + sum(flown), said, inputs, noise, branch, at
-    )
+    flights, spread = USUAL_FLIGHTS + sum(flown), finite_or_none(cv)
+    return Rare(str(event), probability, low, high, spread, flights, said, inputs, noise, branch, at)
 
 
 def _respond(
@@ -132,10 +132,6 @@ def most_likely(
 
 def _said(response: Response, found: Found, flights: int) -> dict[str, Any]:
     """One part of the event."""
-    numbers = {"probability": found.probability, "low": found.low, "high": found.high, "cv": _finite(found.cv)}
-    levels = [{"level": _finite(level), "share": _finite(share)} for level, share in found.levels]
+    numbers = {"probability": found.probability, "low": found.low, "high": found.high, "cv": finite_or_none(found.cv)}
+    levels = [{"level": finite_or_none(level), "share": finite_or_none(share)} for level, share in found.levels]
     return {"part": response.name, "response": response.words, **numbers, "flights": flights, "levels": levels}
-
-
-def _finite(value: float | None) -> float | None:
-    return None if value is None or not np.isfinite(value) else float(value)

@@ -9,21 +9,15 @@ import numpy as np
 from flownav.compile import equation, larger
 from flownav.estimation.law import law
 from flownav.estimation.laws.geometry import LEAST_UPRIGHT, component
-from flownav.frames import Quaternion, Vector, rotation_from_quaternion
+from flownav.frames import Quaternion, Vector, conjugate, quaternion_product, rotation_from_quaternion
 
 
 @equation
 def turn_between(read: Quaternion, own: Quaternion) -> Vector:
     """theta of q_read = (1, theta/2) q_own, for small angles [rad], earth NED."""
-    rw, rx, ry, rz = read
-    qw, qx, qy, qz = own
-    w = rw * qw + rx * qx + ry * qy + rz * qz
+    w, x, y, z = quaternion_product(read, conjugate(own))
     twice = 2.0 if w.real >= 0.0 else -2.0
-    return (
-        twice * (-rw * qx + rx * qw - ry * qz + rz * qy),
-        twice * (-rw * qy + rx * qz + ry * qw - rz * qx),
-        twice * (-rw * qz - rx * qy + ry * qx + rz * qw),
-    )
+    return twice * x, twice * y, twice * z
 
 
 class OnAttitude(NamedTuple):

@@ -4,9 +4,31 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from flownav.compile import equation
 from flownav.estimation.law import law
-from flownav.estimation.laws.geometry import body_axis, component, cross, lens_range
-from flownav.frames import rotation_from_quaternion
+from flownav.estimation.laws.geometry import along_axis, component, cross, lens_range
+from flownav.frames import flow_about, rotation_from_quaternion
+
+
+class Angular(NamedTuple):
+    """A velocity over a range as angular flow [rad/s], and its slopes on velocity, range and scale."""
+
+    value: float
+    by_speed: float
+    by_range: float
+    by_scale: float
+
+
+@equation
+def scaled_flow(axis: int, across_m_s: float, flow_scale: float, range_m: float) -> Angular:
+    """(1 + scale) times `frames.flow_about`."""
+    by_speed = flow_about(axis, 1.0 + flow_scale, range_m)
+    return Angular(
+        by_speed * across_m_s,
+        by_speed,
+        -by_speed * across_m_s / range_m,
+        flow_about(axis, across_m_s, range_m),
+    )
 
 
 class OnFlowRate(NamedTuple):
@@ -41,19 +63,16 @@ def flow_rate(
     """
     rotation = rotation_from_quaternion(qw, qx, qy, qz)
     body = 1 if axis == 0 else 0
-    direction = body_axis(rotation, body)
-    turn = cross(direction, (vel_n, vel_e, vel_d))
     swing = component(cross((rate_x, rate_y, rate_z), (forward_m, right_m, below_m)), body)
-    along = direction[0] * vel_n + direction[1] * vel_e + direction[2] * vel_d + swing
+    direction, along, turn = along_axis(rotation, body, (vel_n, vel_e, vel_d), swing)
     range_m, by_height, by_north, by_east = lens_range(rotation, ground - pos_d, (0.0, 0.0, lens_below_m))
-    sign = -1.0 if axis == 0 else 1.0
-    per_speed = sign * (1.0 + flow_scale) / range_m
-    by_range = -per_speed * along / range_m
-    return per_speed * along - gyro_share * gyro_bias, OnFlowRate(
-        vel_n=per_speed * direction[0], vel_e=per_speed * direction[1], vel_d=per_speed * direction[2],
-        tilt_n=per_speed * turn[0] + by_range * by_north, tilt_e=per_speed * turn[1] + by_range * by_east,
-        heading=per_speed * turn[2], flow_scale=sign * along / range_m,
-        pos_d=-by_range * by_height, ground=by_range * by_height, gyro_bias=-gyro_share,
+    flow = scaled_flow(axis, along, flow_scale, range_m)
+    return flow.value - gyro_share * gyro_bias, OnFlowRate(
+        vel_n=flow.by_speed * direction[0], vel_e=flow.by_speed * direction[1], vel_d=flow.by_speed * direction[2],
+        tilt_n=flow.by_speed * turn[0] + flow.by_range * by_north,
+        tilt_e=flow.by_speed * turn[1] + flow.by_range * by_east,
+        heading=flow.by_speed * turn[2], flow_scale=flow.by_scale,
+        pos_d=-flow.by_range * by_height, ground=flow.by_range * by_height, gyro_bias=-gyro_share,
     )  # fmt: skip
 
 
@@ -76,10 +95,9 @@ def body_velocity(
     *, forward_m: float, right_m: float, below_m: float,
 ) -> tuple[float, OnBodyVelocity]:  # fmt: skip
     """z = (1 + scale)(R_BE v + w x l) [m/s]: metric flow, one body axis (0 forward, 1 right, 2 down)."""
-    direction = body_axis(rotation_from_quaternion(qw, qx, qy, qz), axis)
-    turn = cross(direction, (vel_n, vel_e, vel_d))
+    rotation = rotation_from_quaternion(qw, qx, qy, qz)
     swing = component(cross((rate_x, rate_y, rate_z), (forward_m, right_m, below_m)), axis)
-    along = direction[0] * vel_n + direction[1] * vel_e + direction[2] * vel_d + swing
+    direction, along, turn = along_axis(rotation, axis, (vel_n, vel_e, vel_d), swing)
     scale = 1.0 + flow_scale
     return scale * along, OnBodyVelocity(
         vel_n=scale * direction[0], vel_e=scale * direction[1], vel_d=scale * direction[2],
@@ -107,14 +125,12 @@ def lagged_flow_rate(
     """`flow_rate` of a sensor whose dynamics are states: gain x1, swing and all, over the range of now."""
     rotation = rotation_from_quaternion(qw, qx, qy, qz)
     range_m, by_height, by_north, by_east = lens_range(rotation, ground - pos_d, (0.0, 0.0, lens_below_m))
-    sign = -1.0 if axis == 0 else 1.0
-    along = gain * (lag_v1 if axis == 0 else lag_u1)
-    per_speed = sign * (1.0 + flow_scale) / range_m
-    by_range = -per_speed * along / range_m
-    return per_speed * along, OnLaggedFlowRate(
-        lag_u1=0.0 if axis == 0 else gain * per_speed, lag_v1=gain * per_speed if axis == 0 else 0.0,
-        flow_scale=sign * along / range_m, tilt_n=by_range * by_north, tilt_e=by_range * by_east,
-        pos_d=-by_range * by_height, ground=by_range * by_height,
+    flow = scaled_flow(axis, gain * (lag_v1 if axis == 0 else lag_u1), flow_scale, range_m)
+    slope = gain * flow.by_speed
+    return flow.value, OnLaggedFlowRate(
+        lag_u1=0.0 if axis == 0 else slope, lag_v1=slope if axis == 0 else 0.0, flow_scale=flow.by_scale,
+        tilt_n=flow.by_range * by_north, tilt_e=flow.by_range * by_east,
+        pos_d=-flow.by_range * by_height, ground=flow.by_range * by_height,
     )  # fmt: skip
 
 

@@ -36,6 +36,14 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 
 @equation
+def along_axis(rotation: Rotation, axis: int, velocity: Vector, swing_m_s: float) -> tuple[Vector, float, Vector]:
+    """A body axis, a velocity NED [m/s] along it with what turning adds there, and its slope on the attitude error."""
+    direction = body_axis(rotation, axis)
+    along_m_s = direction[0] * velocity[0] + direction[1] * velocity[1] + direction[2] * velocity[2] + swing_m_s
+    return direction, along_m_s, cross(direction, velocity)
+
+
+@equation
 def turning(arm: Vector, axis: int) -> Vector:
     """The derivative on the attitude error of one earth component of a vector that turns with the body.
 

@@ -65,7 +65,8 @@ from flownav.navigation.memory import (
     share,
     shared,
 )
-from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, Output, position_variance, write_event
+from flownav.navigation.rows import position_variance
+from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, Output, write_event
 
 SIGMAS = 4.0  # of the filter's own error, where nothing fails
 SIGMAS_BESIDE = 2.0  # of it, beside a fault

@@ -19,7 +19,8 @@ from flownav.estimation.states import GROUND, PAD, POSITION, QUATERNION, STATE, 
 from flownav.frames import quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.navigation.ahead import carried, coasted, state_of
 from flownav.navigation.memory import PAD_KNOWN, READING, SUSPECTED, load_ground, load_start
-from flownav.navigation.tape import Output, body_velocity_variance
+from flownav.navigation.rows import body_velocity_variance
+from flownav.navigation.tape import Output
 from flownav.simulation import layout
 from flownav.simulation.layout import load_helicopter, load_known, store_known
 from flownav.simulation.ring import FIELDS, FIRST, hand_over

@@ -14,6 +14,7 @@ from flownav.estimation.states import ATTITUDE, GYRO_BIAS, STATE_NAMES, STATES, 
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
 from flownav.measurement import Sensor
+from flownav.navigation.rows import EstimateRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.record import FILTER_STATES, TABLES, TILTS, VELOCITY_NED, Record
 from flownav.replays.bundle import to_record
@@ -397,12 +398,12 @@ def test_every_state_of_the_filter_is_in_the_record_with_its_deviation(log):
     states, estimate = record.tables["states"], record.tables["estimate"]
     assert ("t_s", *TABLES["states"]) == tuple(states)
     assert (states["t_s"] == estimate["t_s"]).all()
-    first, spread = FILTER_STATES.index("baro_m"), len(FILTER_STATES)
-    assert (states["baro_m"] == run.estimate[:, 23 + first]).all()
-    assert (states["std_baro_m"] == run.estimate[:, 23 + spread + first]).all()
+    said, baro = EstimateRow.of(run.estimate), FILTER_STATES.index("baro_m")
+    assert (states["baro_m"] == said.states[:, baro]).all()
+    assert (states["std_baro_m"] == said.std_states[:, baro]).all()
     assert states["baro_m"][-1] == pytest.approx(12.0, abs=0.5)
     assert 0.0 < states["std_baro_m"][-1] < 4.0
-    assert (states["std_heading_rad"] == run.estimate[:, 22]).all()
+    assert (states["std_heading_rad"] == said.std_tilt_ned_rad[:, 2]).all()
 
 
 def test_truth_is_turned_onto_the_estimate(log, flight):

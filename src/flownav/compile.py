@@ -26,7 +26,7 @@ from flownav.compiling.bundles import FlatAccess, flat_access, lane_access, pass
 from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
 from flownav.compiling.progress import announce_compilation
-from flownav.compiling.rows import columns_of, gathering, places_of, row_store, width_of
+from flownav.compiling.rows import columns_of, gathering, places_of, row_store, row_view, width_of
 from flownav.compiling.runner import NoDeviceError, Runner, device_runner
 from flownav.compiling.scalars import bits_from_float, clamp, float_from_bits, larger, magnitude, smaller
 from flownav.compiling.strided import WARP, strided
@@ -70,6 +70,7 @@ __all__ = [
     "procedure",
     "replacing",
     "row_store",
+    "row_view",
     "smaller",
     "stepping",
     "strided",

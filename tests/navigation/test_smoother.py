@@ -18,6 +18,7 @@ from flownav.frames import quaternion_product
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
 from flownav.measurement import Sensor
+from flownav.navigation.entries import CORRECTED, DECAYED, FORGOTTEN, NOTED, PREDICTED
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import CLOCK, ERRORS_CLOCK, load_start
@@ -26,15 +27,10 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import part_of, smooth
 from flownav.navigation.tape import (
     BARO_FOUND,
-    CORRECTED,
-    DECAYED,
     ENTRIES,
     ESTIMATES,
-    FORGOTTEN,
     GROUND_FOUND,
-    NOTED,
     NOTES,
-    PREDICTED,
     empty_tape,
     new_tape,
 )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import linecache
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -25,14 +25,18 @@ def write_function(name: str, source: str, scope: dict[str, Any]) -> Callable[..
     return function
 
 
-def lane_access(bundle: type, row: int | None) -> tuple[Callable[..., Any], Callable[..., Any]]:
+def lane_access(bundle: type, row: int | Sequence[int] | None) -> tuple[Callable[..., Any], Callable[..., Any]]:
     """`load(work, lanes, lane)` and `store(work, lanes, lane, value)` of a named tuple kept in a lane buffer.
 
     `bundle` is a NamedTuple class of scalars, `row` the constant row of its first field. Field `i` of lane
-    `k` lies at `(row + i) * len(lanes) + k`. row None: both take it, `load(work, lanes, row, lane)`.
+    `k` lies at `(row + i) * len(lanes) + k`. row None: both take it, `load(work, lanes, row, lane)`; a sequence: the
+    row of each field.
     """
     fields: tuple[str, ...] = bundle._fields  # type: ignore[attr-defined]
-    at = [f"work[{f'(row + {i})' if row is None else row + i} * len(lanes) + lane]" for i in range(len(fields))]
+    rows: Sequence[int | str] = [f"(row + {i})" for i in range(len(fields))]
+    if row is not None:
+        rows = range(row, row + len(fields)) if isinstance(row, int) else row
+    at = [f"work[{place} * len(lanes) + lane]" for place in rows]
     told = "work, lanes, lane" if row is not None else "work, lanes, row, lane"
     stores = "\n".join(f"    {place} = value.{name}" for place, name in zip(at, fields, strict=True))
     scope: dict[str, Any] = {"bundle": bundle}

@@ -43,8 +43,11 @@ def columns_of(record: type, rows: NDArray[np.float64]) -> Any:
     return record(*(rows[:, at] if count == 1 else rows[:, at : at + count] for at, count in each))
 
 
-def row_store(record: type) -> Callable[..., None]:
-    """`store(table, lanes, row, lane, value)`: a record as one lane's row of a flat table (rows, width, lanes)."""
+def row_store(record: type, width: int | None = None) -> Callable[..., None]:
+    """`store(table, lanes, row, lane, value)`: a record as one lane's row of a flat table (rows, width, lanes).
+
+    width: of the table's rows where they are wider than the record.
+    """
     fields: tuple[str, ...] = record._fields  # type: ignore[attr-defined]
     numbers = [
         f"value.{name}" if count == 1 else f"value.{name}[{i}]"
@@ -52,9 +55,16 @@ def row_store(record: type) -> Callable[..., None]:
         for i in range(count)
     ]
     stores = (f"    table[(first + {i}) * len(lanes) + lane] = {number}\n" for i, number in enumerate(numbers))
-    first = f"    first = row * {len(numbers)}\n"
+    first = f"    first = row * {width or len(numbers)}\n"
     source = "def store(table, lanes, row, lane, value):\n" + first + "".join(stores)
     return equation(write_function("store", source, {}))
+
+
+def row_view(record: type) -> Callable[[NDArray[np.float64]], Any]:
+    """`view(row)`: one row (width,) by name, a number or, of a field of several, the part of the array."""
+    each = zip(places_of(record), counts_of(record), strict=True)
+    parts = ", ".join(f"row[{at}]" if count == 1 else f"row[{at} : {at + count}]" for at, count in each)
+    return equation(write_function("view", f"def view(row):\n    return record({parts})\n", {"record": record}))
 
 
 def gathering(one: Callable[..., Any], indices: range) -> Callable[..., tuple[Any, ...]]:

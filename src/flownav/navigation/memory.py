@@ -98,6 +98,8 @@ STILL_CLOCK = _rows.take(1)  # the end of the last window [s]
 DRIFT_SINCE = _rows.take(1)  # from when a drift of GPS is sought [s]
 LEVEL_READ = _rows.take(1)  # when an external attitude was last taken for level [s]
 LAST = _rows.take(max(Sensor) + 1)  # of each sensor, the newest instant [s]
+OWN_ROWS = 512
+OWN = _rows.take(OWN_ROWS)  # the memory of a filter of somebody else's in the navigator's place (`parts.equations`)
 WORK_ROWS = _rows.next
 
 load_reading, store_reading = lane_access(Reading, READING)

@@ -17,6 +17,7 @@ from flownav.compile import Lanes, Work, equation, pointer, procedure
 from flownav.estimation.hypotheses import NAMES as FAULTS
 from flownav.estimation.states import STATES
 from flownav.measurement import Array, EventQueue, Sensor
+from flownav.navigation.entries import ENTRY
 from flownav.navigation.memory import REASON
 from flownav.navigation.reasons import SILENT
 from flownav.navigation.rows import (
@@ -66,12 +67,6 @@ EVENT_NAMES = (
     ("filter", "cleared", "that fault is no more suspected"),
     ("heading", "refuted", "flow and accelerometer contradict what is read as heading: it was off by this much [rad]"),
 )
-# kinds of journal entry, and where their numbers stand in it
-PREDICTED, CORRECTED, FORGOTTEN, NOTED, DECAYED = 0.0, 1.0, 2.0, 3.0, 4.0
-STEP, MIDDLE_AT, FORCE_AT = 1, 2, 11  # a prediction: dt [s], R_EB in its middle (9), specific force NED (3)
-INNOVATION_AT, VARIANCE_AT, JACOBIAN_AT, GAIN_AT = 1, 2, 3, 3 + STATES  # a correction: nu, S, h, K
-STATE_AT = 1  # a reset: which
-ENTRY = 3 + 2 * STATES
 # places in `used`
 ESTIMATES, OFFERED_ROWS, ENTRIES, NOTES, FIRST_EVENTS = 0, 1, 2, 3, 4
 

@@ -14,6 +14,7 @@ import numpy as np
 from flownav.compile import ONE_LANE, Lanes, Work, equation, kernel, pointer
 from flownav.estimation.law import compiled
 from flownav.estimation.motion import strapdown
+from flownav.estimation.named import AccelBias, Attitude, GyroBias, Inertial, PositionNed, VelocityNed
 from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, POSITION, QUATERNION, STATE, VELOCITY
 from flownav.measurement import Array
 from flownav.navigation.inertial import Motion, motion_between, remembered
@@ -73,10 +74,14 @@ def state_of(work: Work, lanes: Lanes, lane: int) -> Carried:
 def carried(s: Carried, between: Motion, dt_s: float) -> Carried:
     """The state dt later; between: what the IMU read over that time, biases and all (`inertial.motion_between`)."""
     moved = _strapdown(
-        s.pos_n, s.pos_e, s.pos_d, s.vel_n, s.vel_e, s.vel_d, s.qw, s.qx, s.qy, s.qz,
-        between[0], between[1], between[2], between[3], between[4], between[5],
-        s.gyro_bias_x, s.gyro_bias_y, s.gyro_bias_z, s.accel_bias_x, s.accel_bias_y, s.accel_bias_z, dt_s,
-    )  # fmt: skip
+        PositionNed(s.pos_n, s.pos_e, s.pos_d),
+        VelocityNed(s.vel_n, s.vel_e, s.vel_d),
+        Attitude(s.qw, s.qx, s.qy, s.qz),
+        Inertial(between[0], between[1], between[2], between[3], between[4], between[5]),
+        GyroBias(s.gyro_bias_x, s.gyro_bias_y, s.gyro_bias_z),
+        AccelBias(s.accel_bias_x, s.accel_bias_y, s.accel_bias_z),
+        dt_s,
+    )
     return Carried(
         moved.pos_n, moved.pos_e, moved.pos_d, moved.vel_n, moved.vel_e, moved.vel_d,
         moved.qw, moved.qx, moved.qy, moved.qz,

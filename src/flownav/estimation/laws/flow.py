@@ -8,8 +8,8 @@ from flownav.compile import Lanes, Work, equation
 from flownav.estimation.law import law
 from flownav.estimation.laws.geometry import body_axis, component, cross, lens_range
 from flownav.estimation.motion import rotation_of
+from flownav.estimation.named import Attitude, BodyRate, FlowMount, GyroLeft, Height, Lever, VelocityNed, rotation_by
 from flownav.estimation.states import GROUND, POSITION, STATE
-from flownav.frames import rotation_from_quaternion
 
 
 @equation
@@ -36,10 +36,8 @@ class OnFlowRate(NamedTuple):
 
 @law
 def flow_rate(
-    axis: int, vel_n: float, vel_e: float, vel_d: float, pos_d: float, ground: float, flow_scale: float,
-    qw: float, qx: float, qy: float, qz: float, rate_x: float, rate_y: float, rate_z: float,
-    gyro_bias: float, gyro_share: float,
-    *, forward_m: float, right_m: float, below_m: float, lens_below_m: float,
+    axis: int, vel: VelocityNed, height: Height, flow_scale: float, q: Attitude, rate: BodyRate, gyro: GyroLeft,
+    *, mount: FlowMount,
 ) -> tuple[float, OnFlowRate]:  # fmt: skip
     """Flow less rotation: z_x = -(1 + scale) v/r - k b_x (axis 0), z_y = (1 + scale) u/r - k b_y (axis 1) [rad/s].
 
@@ -49,21 +47,22 @@ def flow_rate(
     l = (forward, right, below), body FRD (0 where no gyro tells w); r is the distance along body down from a lens
     `lens_below_m` below the IMU to level ground.
     """
-    rotation = rotation_from_quaternion(qw, qx, qy, qz)
+    rotation = rotation_by(q)
     body = 1 if axis == 0 else 0
     direction = body_axis(rotation, body)
-    turn = cross(direction, (vel_n, vel_e, vel_d))
-    swing = component(cross((rate_x, rate_y, rate_z), (forward_m, right_m, below_m)), body)
-    along = direction[0] * vel_n + direction[1] * vel_e + direction[2] * vel_d + swing
-    range_m, by_height, by_north, by_east = lens_range(rotation, ground - pos_d, (0.0, 0.0, lens_below_m))
+    turn = cross(direction, vel)
+    swing = component(cross(rate, (mount.forward_m, mount.right_m, mount.below_m)), body)
+    along = direction[0] * vel.vel_n + direction[1] * vel.vel_e + direction[2] * vel.vel_d + swing
+    lens = (0.0, 0.0, mount.lens_below_m)
+    range_m, by_height, by_north, by_east = lens_range(rotation, height.ground - height.pos_d, lens)
     sign = -1.0 if axis == 0 else 1.0
     per_speed = sign * (1.0 + flow_scale) / range_m
     by_range = -per_speed * along / range_m
-    return per_speed * along - gyro_share * gyro_bias, OnFlowRate(
+    return per_speed * along - gyro.gyro_share * gyro.gyro_bias, OnFlowRate(
         vel_n=per_speed * direction[0], vel_e=per_speed * direction[1], vel_d=per_speed * direction[2],
         tilt_n=per_speed * turn[0] + by_range * by_north, tilt_e=per_speed * turn[1] + by_range * by_east,
         heading=per_speed * turn[2], flow_scale=sign * along / range_m,
-        pos_d=-by_range * by_height, ground=by_range * by_height, gyro_bias=-gyro_share,
+        pos_d=-by_range * by_height, ground=by_range * by_height, gyro_bias=-gyro.gyro_share,
     )  # fmt: skip
 
 
@@ -81,15 +80,13 @@ class OnBodyVelocity(NamedTuple):
 
 @law
 def body_velocity(
-    axis: int, vel_n: float, vel_e: float, vel_d: float, flow_scale: float,
-    qw: float, qx: float, qy: float, qz: float, rate_x: float, rate_y: float, rate_z: float,
-    *, forward_m: float, right_m: float, below_m: float,
-) -> tuple[float, OnBodyVelocity]:  # fmt: skip
+    axis: int, vel: VelocityNed, flow_scale: float, q: Attitude, rate: BodyRate, *, lever: Lever
+) -> tuple[float, OnBodyVelocity]:
     """z = (1 + scale)(R_BE v + w x l) [m/s]: metric flow, one body axis (0 forward, 1 right, 2 down)."""
-    direction = body_axis(rotation_from_quaternion(qw, qx, qy, qz), axis)
-    turn = cross(direction, (vel_n, vel_e, vel_d))
-    swing = component(cross((rate_x, rate_y, rate_z), (forward_m, right_m, below_m)), axis)
-    along = direction[0] * vel_n + direction[1] * vel_e + direction[2] * vel_d + swing
+    direction = body_axis(rotation_by(q), axis)
+    turn = cross(direction, vel)
+    swing = component(cross(rate, lever), axis)
+    along = direction[0] * vel.vel_n + direction[1] * vel.vel_e + direction[2] * vel.vel_d + swing
     scale = 1.0 + flow_scale
     return scale * along, OnBodyVelocity(
         vel_n=scale * direction[0], vel_e=scale * direction[1], vel_d=scale * direction[2],
@@ -111,12 +108,12 @@ class OnLaggedFlowRate(NamedTuple):
 
 @law
 def lagged_flow_rate(
-    axis: int, lag_u1: float, lag_v1: float, flow_scale: float, pos_d: float, ground: float,
-    qw: float, qx: float, qy: float, qz: float, *, gain: float, lens_below_m: float,
+    axis: int, lag_u1: float, lag_v1: float, flow_scale: float, height: Height, q: Attitude,
+    *, gain: float, lens_below_m: float,
 ) -> tuple[float, OnLaggedFlowRate]:  # fmt: skip
     """`flow_rate` of a sensor whose dynamics are states: gain x1, swing and all, over the range of now."""
-    rotation = rotation_from_quaternion(qw, qx, qy, qz)
-    range_m, by_height, by_north, by_east = lens_range(rotation, ground - pos_d, (0.0, 0.0, lens_below_m))
+    lens = (0.0, 0.0, lens_below_m)
+    range_m, by_height, by_north, by_east = lens_range(rotation_by(q), height.ground - height.pos_d, lens)
     sign = -1.0 if axis == 0 else 1.0
     along = gain * (lag_v1 if axis == 0 else lag_u1)
     per_speed = sign * (1.0 + flow_scale) / range_m

@@ -42,6 +42,7 @@ from flownav.navigation.tape import (
     ENTRIES,
     ESTIMATES,
     NOTES,
+    Journal,
     Tape,
     empty_tape,
     output_of,
@@ -115,19 +116,18 @@ def _repeated(part: EventQueue, running: Running, before: Mark, after: Mark) -> 
 
 def _go_back(tape: Tape, t_s: Array, told: FilterSettings, later: Backward, work: Array, found: Tape) -> None:
     """Backward through a tape's journal; each of its estimates, the last first, smoothed onto the tape `found`."""
-    journal = tape.journal
-    go_back(
-        journal.entry, journal.state, journal.covariance, np.ascontiguousarray(t_s), told, later.vector, later.matrix,
-        work, found.estimate.reshape(-1), room_of(found), found.used,
-    )  # fmt: skip
+    estimate = found.estimate.reshape(-1)
+    go_back(tape.journal, np.ascontiguousarray(t_s), told, later, work, estimate, room_of(found), found.used)
 
 
 @kernel
 def go_back(
-    entry: Array, state: Array, covariance: Array, t_s: Array, told: FilterSettings, vector: Array, matrix: Array,
-    work: Array, found: Array, room: NDArray[np.int64], used: NDArray[np.int64],
+    journal: Journal, t_s: Array, told: FilterSettings, later: Backward, work: Array, found: Array,
+    room: NDArray[np.int64], used: NDArray[np.int64],
 ) -> None:  # fmt: skip
     """Backward through a journal, lambda and Lambda with it; t_s: the instants of its estimates."""
+    entry, state, covariance = journal
+    vector, matrix = later
     output = output_of(found, found, found, found, found, found, room, used)
     estimate = len(t_s)
     for row in range(len(entry) - 1, -1, -1):

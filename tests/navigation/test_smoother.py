@@ -22,7 +22,7 @@ from flownav.navigation.entries import CORRECTED, DECAYED, FORGOTTEN, NOTED, PRE
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import CLOCK, ERRORS_CLOCK, load_start
-from flownav.navigation.rows import EstimateRow
+from flownav.navigation.rows import EstimateRow, EventRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import part_of, smooth
 from flownav.navigation.tape import (
@@ -153,7 +153,7 @@ def steps_of(prepared, queue) -> tuple[list[Step], np.ndarray, list[int]]:
         started, events = load_start(on.work, ONE_LANE, 0).started, len(on.tape.events())
         before, estimates = on.work.copy(), int(on.tape.used[ESTIMATES])
         run(part_of(queue, k, k + 1), on)
-        happened = on.tape.events()[events:, 1]
+        happened = EventRow.of(on.tape.events()).kind[events:]
         if started:
             assert on.clock_s == before[CLOCK] or queue.sensor[k] == Sensor.IMU
             reset = [state for kind, state in ((GROUND_FOUND, GROUND), (BARO_FOUND, BARO)) if kind in happened]

@@ -16,7 +16,6 @@ from flownav.logs.log import Log
 from flownav.logs.open_log import open_flight, open_log
 from flownav.logs.plausible import LARGEST
 from flownav.measurement import EventQueue
-from flownav.navigation.rows import EstimateRow
 from flownav.record import Record
 from flownav.replays.bundle import to_record
 from flownav.replays.fed import as_fed
@@ -49,7 +48,7 @@ def replayed(path: Path) -> Replay:
 def assert_finite(flown: Replay) -> None:
     """What a replay promises of whatever it was fed."""
     assert np.isfinite(flown.estimate).all()
-    assert np.all(np.diff(EstimateRow.of(flown.estimate).t_s) >= 0.0)
+    assert np.all(np.diff(flown.said.t_s) >= 0.0)
     flown.scores()
 
 

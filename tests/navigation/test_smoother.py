@@ -277,7 +277,7 @@ def test_over_many_flights_it_errs_less_than_the_filter_and_as_much_as_it_says(c
 
 def test_it_never_says_that_it_knows_less_than_the_filter(flown):
     assert flown.smoothed is not None
-    smoothed, filtered = EstimateRow.of(flown.smoothed), EstimateRow.of(flown.estimate)
+    smoothed, filtered = EstimateRow.of(flown.smoothed), flown.said
     assert (smoothed.t_s == filtered.t_s).all()
     assert all(np.isfinite(getattr(smoothed, name)).all() for name in UNPROTECTED)
     assert (smoothed.std_pos_ned_m <= filtered.std_pos_ned_m * (1.0 + 1e-9)).all()

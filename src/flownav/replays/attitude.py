@@ -9,7 +9,6 @@ import numpy as np
 from flownav.errors import InputError
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor, Stream
-from flownav.navigation.rows import EstimateRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import FLOW, ReplayOptions, prepare
 from flownav.replays.session import replay
@@ -31,7 +30,7 @@ def with_attitude(log: Log, axes: Array | None = None) -> tuple[Log, str]:
             f"{log.path}: neither attitude nor IMU; one of them turns the reference into the sensor's axes"
         )
     options = ReplayOptions() if axes is None else ReplayOptions(identified=turned_sensor(log, axes))
-    found = EstimateRow.of(replay(log, options, NavigatorSettingsFile()).estimate)
+    found = replay(log, options, NavigatorSettingsFile()).said
     known = np.isfinite(found.quaternion).all(axis=1)
     attitude = Stream.of(Sensor.ATTITUDE, found.t_s[known], found.quaternion[known])
     return replace(log, streams={**log.streams, Sensor.ATTITUDE: attitude}), FOUND

@@ -13,7 +13,6 @@ from flownav.frames import rotation_from_quaternion
 from flownav.logs.rates import attitude_at
 from flownav.measurement import COLUMNS, Array, Sensor
 from flownav.navigation.flags import flagged, flags_of
-from flownav.navigation.rows import EstimateRow, InnovationRow
 from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.replays.autopilot import autopilot_path
@@ -36,7 +35,7 @@ DOWN = "pos_d_m"
 def to_record(replay: Replay, scores: dict[str, Any], command: list[str] | str) -> Record:
     """The record of a replay. `scores` go into its manifest; `command` is what the user typed or called."""
     record = Record(_manifest(replay, scores, command))
-    estimate, said = replay.estimate, EstimateRow.of(replay.estimate)
+    estimate, said = replay.estimate, replay.said
     record.add("estimate", estimate_table(estimate))
     record.add("states", states_table(estimate))
     if replay.smoothed is not None:
@@ -152,7 +151,7 @@ def _events(replay: Replay) -> dict[str, Any]:
 
 def _losses(replay: Replay, sensor: Sensor) -> list[tuple[float, str, str, str, float]]:
     """When nothing of a sensor was fused for long: lost, with how long, and back."""
-    offered = InnovationRow.of(replay.innovation)
+    offered = replay.offered
     t_s = offered.t_s[(offered.sensor == sensor) & (offered.reason == Reason.FUSED)]
     events = []
     for row in np.flatnonzero(np.diff(t_s) > LOST_AFTER_S):

@@ -80,17 +80,25 @@ class Replay:
         """What became of each component: rows of `navigation.rows.InnovationRow`."""
         return self.written.innovation
 
+    @property
+    def said(self) -> EstimateRow[Array]:
+        """The columns of the estimates."""
+        return EstimateRow.of(self.estimate)
+
+    @property
+    def offered(self) -> InnovationRow[Array]:
+        """The columns of what became of each component."""
+        return InnovationRow.of(self.innovation)
+
     @cached_property
     def attitude(self) -> Stream:
         """The estimated attitude."""
-        said = EstimateRow.of(self.estimate)
-        return Stream.of(Sensor.ATTITUDE, said.t_s, said.quaternion)
+        return Stream.of(Sensor.ATTITUDE, self.said.t_s, self.said.quaternion)
 
     @cached_property
     def findings(self) -> list[Finding]:
         """What is wrong with the log, as far as its sensors show, and whether anything was fused at all."""
-        offered = InnovationRow.of(self.innovation)
-        fused = offered.sensor[offered.reason == Reason.FUSED]
+        fused = self.offered.sensor[self.offered.reason == Reason.FUSED]
         found = findings({Sensor.ATTITUDE: self.attitude, **self.prepared.streams}, self.options.gps_outages_s)
         if not np.isin(fused, HORIZONTAL).any():
             what = "horizontal was fused" if len(fused) else "was fused"

@@ -17,7 +17,7 @@ from flownav.compare.like_for_like import Window
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
-from flownav.navigation.rows import EstimateRow, InnovationRow
+from flownav.navigation.rows import InnovationRow
 from flownav.replays.judged import TESTED
 from flownav.replays.prepare import FLOW, ReplayOptions
 from flownav.replays.session import Replay
@@ -193,7 +193,7 @@ def _truth_errors(flown: Replay, windows: Sequence[Window]) -> Array:
         return np.full(len(windows), np.nan)
     t_s, position = np.asarray(truth["t_s"], float), flown.truth_position
     moving = placed.turned(velocity_of(t_s, position))[:, :2]
-    found, said = [], EstimateRow.of(flown.estimate)
+    found, said = [], flown.said
     for t0, t1 in windows:
         inside = (t_s >= t0) & (t_s < t1) & np.isfinite(moving).all(axis=1)
         error = difference_at(said.t_s, said.vel_ned_m_s[:, :2], t_s[inside], moving[inside])

@@ -85,11 +85,10 @@ def figures_of(flown: Replay) -> dict[str, float]:
 
 def innovation_figures(flown: Replay) -> dict[str, float]:
     """By sensor: NIS a degree of freedom, whether white (1 or 0), lag-one correlation, share of slow power."""
-    offered = InnovationRow.of(flown.innovation)
-    tested = np.isin(offered.reason, TESTED)
+    tested = np.isin(flown.offered.reason, TESTED)
     found: dict[str, float] = {}
     for sensor in flown.log.streams:
-        rows = InnovationRow.of(flown.innovation[tested & (offered.sensor == sensor)])
+        rows = InnovationRow.of(flown.innovation[tested & (flown.offered.sensor == sensor)])
         component, news, variance = rows.component, rows.innovation, rows.innovation_variance
         judged = consistency_of(component, news, variance)
         if judged is None:

@@ -64,7 +64,7 @@ def scenarios() -> dict[str, Scenario]:
     found["carried"] = load_scenario(str(shipped("samples/flight.toml")))
     found["landing, paper"] = with_filter(found["landing"], "paper")
     found["takeoff, paper"] = with_filter(found["takeoff"], "paper")
-    for vehicle in ("quad_450", "hexa_550"):
+    for vehicle in ("quad-450", "hexa-550"):
         found[f"landing, {vehicle}"] = with_vehicle(found["landing"], vehicle)
     return found
 

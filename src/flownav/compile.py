@@ -26,6 +26,7 @@ from flownav.compiling.bundles import FlatAccess, flat_access, lane_access, pass
 from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
 from flownav.compiling.progress import announce_compilation
+from flownav.compiling.records import Layout, OnLanes, compiled, dressed
 from flownav.compiling.rows import columns_of, gathering, places_of, row_store, row_view, width_of
 from flownav.compiling.runner import NoDeviceError, Runner, device_runner
 from flownav.compiling.scalars import bits_from_float, clamp, float_from_bits, larger, magnitude, smaller
@@ -45,7 +46,9 @@ __all__ = [
     "WARP",
     "FlatAccess",
     "Lanes",
+    "Layout",
     "NoDeviceError",
+    "OnLanes",
     "Runner",
     "Unit",
     "Work",
@@ -54,7 +57,9 @@ __all__ = [
     "clamp",
     "columns_of",
     "compile_beside",
+    "compiled",
     "device_runner",
+    "dressed",
     "equation",
     "flat_access",
     "float_from_bits",

@@ -24,7 +24,7 @@ from flownav.scoring.touchdown import Limits
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
 from flownav.simulation.draws import KEYED_EPOCHS, Noise
-from flownav.simulation.engine import Branches, buffers_of, fly_into
+from flownav.simulation.engine import Branches, Instead, buffers_of, fly_into
 from flownav.simulation.ensemble import believed
 from flownav.simulation.history import columns
 from flownav.simulation.noise import normal_pair
@@ -65,7 +65,7 @@ def found(setup, fewer):
 
 def flown(flight, branches=None, lanes=LANES):
     buffers = buffers_of(flight, lanes, flight.plan.epochs, written=False)
-    fly_into(flight, SEED, 0, lanes, buffers, branches=branches)
+    fly_into(flight, SEED, 0, lanes, buffers, instead=Instead(branches))
     return buffers.history
 
 

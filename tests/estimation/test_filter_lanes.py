@@ -23,7 +23,7 @@ from flownav.estimation.covariance import (
 from flownav.estimation.error_models import propagate_errors, propagate_gauss_markov, propagate_walks
 from flownav.estimation.lag import lag_ends, lag_starts
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading
-from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow, lens_range_of
+from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.laws.height import baro_altitude, range_along_boresight
 from flownav.estimation.laws.pad import pad_fix
@@ -114,7 +114,6 @@ def every_step(buffer, lanes, settings, lag):  # type: ignore[no-untyped-def]
         add_noise_lane(work, lanes, 5, lane, 0.1)
         forget_lane(work, lanes, n, PAD, lane, 4.0)
         total += variance_of(work, lanes, 3, lane) + covariance_of(work, lanes, 7, 2, lane)
-        total += lens_range_of(work, lanes, lane, 0.1)
     return total
 
 

@@ -17,8 +17,8 @@ from flownav.compile import ONE_LANE
 from flownav.estimation import laws
 from flownav.estimation.law import Observation, Parameter, Signature
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading, level
-from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow, lagged_flow_rate, lens_range_of
-from flownav.estimation.laws.geometry import LEAST_RANGE_M
+from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow, lagged_flow_rate
+from flownav.estimation.laws.geometry import LEAST_RANGE_M, lens_range
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.laws.height import baro_altitude, range_along_boresight
 from flownav.estimation.laws.pad import pad_fix, sight
@@ -48,7 +48,7 @@ from flownav.estimation.states import (
     VELOCITY,
     VELOCITY_LAG,
 )
-from flownav.frames import GRAVITY_M_S2, quaternion_from_euler
+from flownav.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion
 
 LENS = {"forward_m": 0.31, "right_m": -0.12, "below_m": 0.1}
 AXES, CHANNELS = (0, 1, 2), (0, 1)
@@ -243,7 +243,7 @@ def test_range_is_measured_along_body_down_from_the_lens_to_level_ground():
     filter_.x[POSITION + 2], filter_.x[GROUND] = -5.0, 1.0
     slant = 6.0 / (np.cos(0.3) * np.cos(0.4)) - 0.1
     assert predicted(filter_, range_along_boresight, below_m=0.1) == pytest.approx(slant, rel=1e-14)
-    assert lens_range_of(filter_.work, ONE_LANE, 0, 0.1) == pytest.approx(slant, rel=1e-14)
+    assert lens_range(rotation_from_quaternion(*filter_.q), 6.0, (0.0, 0.0, 0.1))[0] == pytest.approx(slant, rel=1e-14)
 
 
 @EXAMPLES
@@ -308,7 +308,7 @@ def test_flow_on_the_ground_says_nothing_of_height():
     filter_.x[VELOCITY : VELOCITY + 3] = 0.3, 0.2, 0.0
     case = Case(flow_rate, (0,), {**NO_LEVER, "lens_below_m": 0.1})
     assert_jacobian(filter_, case, 0)
-    assert lens_range_of(filter_.work, ONE_LANE, 0, 0.1) == LEAST_RANGE_M
+    assert lens_range(rotation_from_quaternion(*filter_.q), 0.0, (0.0, 0.0, 0.1))[0] == LEAST_RANGE_M
     flow_rate(filter_.work, ONE_LANE, 0, **case.scalars)
     assert filter_.jacobian[[POSITION + 2, GROUND]] == pytest.approx(0.0)
 

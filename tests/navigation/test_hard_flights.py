@@ -7,12 +7,13 @@ import math
 import numpy as np
 import pytest
 
+from flownav.compile import ONE_LANE
 from flownav.estimation.gating import Reason
 from flownav.estimation.states import FLOW_SCALE, GYRO_BIAS
 from flownav.measurement import EventQueue, Sensor, merge
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import run, start_navigator
-from flownav.navigation.memory import CONTACT
+from flownav.navigation.memory import load_stand
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.still import MOVES, RESTS, SHAKEN
 from flownav.navigation.tape import new_tape
@@ -229,5 +230,5 @@ def test_a_hover_that_a_low_range_takes_for_the_ground_teaches_no_gyro_and_holds
     shaking = np.random.default_rng(9).normal(0.0, 1.0, imu.value.shape) * ([0.05] * 3 + [0.5] * 3)
     found = navigate(flown.changed(Sensor.IMU, value=imu.value + shaking))
     assert SHAKEN in found.events("filter", "standing")[:, 1]
-    assert np.isnan(found.on.work[CONTACT])
+    assert np.isnan(load_stand(found.on.work, ONE_LANE, 0).contact_m)
     assert found.sigma(GYRO_BIAS + 2) > 5e-3

@@ -8,20 +8,23 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from flownav.navigation.attitude import heading_variance, judge_attitude, magnetic_heading
-from flownav.navigation.flow_judge import View, judge_flow, turning_of
+from flownav.estimation.states import BARO
+from flownav.navigation.attitude import read_attitude
+from flownav.navigation.flow_judge import judge_look, turning_of
 from flownav.navigation.flow_noise import alike, flow_variance, followed_agreement, lasting_doubt, wrong_since
-from flownav.navigation.gps import judge_gps, judge_rejections
-from flownav.navigation.height import Height, judge_baro, judge_range, range_variance, repeats
+from flownav.navigation.gps import judge_fix, judge_rejections
+from flownav.navigation.heading import heading_variance, magnetic_heading
+from flownav.navigation.height import judge_baro, range_variance, range_verdict, repeats
 from flownav.navigation.inertial import motion_between, said_by, sound
-from flownav.navigation.offers import usable, usable_in_flight
-from flownav.navigation.place import component_of, judge_pad
+from flownav.navigation.offers import component_of, usable, usable_in_flight
+from flownav.navigation.place import judge_pad
 from flownav.navigation.reasons import (
     BEFORE_START,
     FUSED,
     INNOVATION_GATE,
     NEAR_GROUND,
     NO_DATA,
+    NO_HEADING,
     NO_HEIGHT,
     NOT_FINITE,
     OUT_OF_RANGE,
@@ -31,22 +34,31 @@ from flownav.navigation.reasons import (
     TILTED,
 )
 from flownav.navigation.records import (
+    BaroMemory,
     FlowMemory,
+    GpsMemory,
     HeadingMemory,
     ImuMemory,
+    Look,
     RangeMemory,
     Reading,
     RejectionMemory,
+    StartMemory,
 )
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.told import NO_HEADING, Equipment
+from flownav.navigation.tape import BARO_FOUND
+from flownav.navigation.told import NO_HEADING as HEADLESS
+from flownav.navigation.told import Equipment
+from flownav.navigation.verdicts import Event, Height, Offer, Position, Reset
 from flownav.navigation.vibration import followed_vibration, vibration_beyond, with_reading
 
 NAN = math.nan
-FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
+FITTED = Equipment(True, False, HEADLESS, False, -math.inf)
 TOLD = NavigatorSettingsFile().settings(FITTED)
 FRESH_FLOW = FlowMemory(-math.inf, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -math.inf, 0.0)
-SEEN = View(2.0, True, 1.0)
+SEEN = Look(0.0, 0.0, 2.0, known=1.0, upright=1.0)
+KEPT, SEARCHED = HeadingMemory(sought=0.0), HeadingMemory(sought=1.0)
+RUNS = StartMemory(started=1.0)
 
 
 def told(**keys):
@@ -75,25 +87,30 @@ def test_what_is_said_of_any_reading_stands_in_this_order():
 
 
 # -- GPS -----------------------------------------------------------------------------------------------------
+def judged_fix(fix: Reading, axis: int, *, level_ratio: float = 0.0, position: bool = True, alone: bool = False):
+    memory = GpsMemory(level_ratio=level_ratio)
+    return judge_fix.law(fix, StartMemory(1.0), memory, axis=axis, position=position, alone=alone, s=TOLD.gps)
+
+
 def test_the_noise_of_a_fix_is_its_white_part_and_a_share_of_what_it_states():
     s = TOLD.gps
     fix = reading(1.0, 2.0, 3.0, variance=(4.0, 9.0, 16.0))
     white = (s.gps_white_sigma_m, s.gps_white_sigma_m, s.gps_white_sigma_down_m)
     for axis in range(3):
-        reason, variance = judge_gps(fix, axis, True, 1.0, 0.0, s)
-        assert (reason, variance) == (FUSED, pytest.approx(white[axis] ** 2 + 0.09 * (axis + 2) ** 2))
-    unsaid = judge_gps(reading(1.0, 2.0, 3.0), 2, False, 1.0, 0.0, s)
-    assert unsaid == (FUSED, pytest.approx(s.gps_velocity_white_down_m_s**2))
-    assert judge_gps(reading(1.0, 2.0, 3.0), 0, False, 1.0, 0.0, s)[1] == pytest.approx(s.gps_velocity_white_m_s**2)
+        variance = pytest.approx(white[axis] ** 2 + 0.09 * (axis + 2) ** 2)
+        assert judged_fix(fix, axis) == (axis + 1.0, variance, FUSED)
+    unsaid = reading(1.0, 2.0, 3.0)
+    for axis, sigma in ((2, s.gps_velocity_white_down_m_s), (0, s.gps_velocity_white_m_s)):
+        assert judged_fix(unsaid, axis, position=False) == (axis + 1.0, pytest.approx(sigma**2), FUSED)
 
 
 def test_a_fix_that_jumps_along_one_axis_is_refused_along_both_and_keeps_its_height():
     fix = reading(1.0, 2.0, 3.0)
-    assert [judge_gps(fix, axis, True, 1.0, 1.1, TOLD.gps)[0] for axis in range(3)] == [
-        INNOVATION_GATE, INNOVATION_GATE, FUSED
-    ]  # fmt: skip
-    assert judge_gps(fix, 0, True, 1.0, 1.0, TOLD.gps)[0] == FUSED
-    assert judge_gps(reading(1.0, 2.0, 3.0, withheld=1.0), 0, True, 1.0, 1.1, TOLD.gps)[0] == OUTAGE
+    spoilt = [judged_fix(fix, axis, level_ratio=1.1).reason for axis in range(3)]
+    assert spoilt == [INNOVATION_GATE, INNOVATION_GATE, FUSED]
+    assert judged_fix(fix, 0, level_ratio=1.1, alone=True).reason == FUSED
+    assert judged_fix(fix, 0, level_ratio=1.0).reason == FUSED
+    assert judged_fix(reading(1.0, 2.0, 3.0, withheld=1.0), 0, level_ratio=1.1).reason == OUTAGE
 
 
 def test_gps_is_believed_once_it_was_refused_often_and_for_long():
@@ -134,7 +151,7 @@ def test_a_metric_flow_is_as_sure_as_the_range_that_scaled_it():
 
 @pytest.mark.parametrize(("change", "view", "reason"), [
     ({}, SEEN, FUSED),
-    ({}, SEEN._replace(known=False), NO_HEIGHT),
+    ({}, SEEN._replace(known=0.0), NO_HEIGHT),
     ({}, SEEN._replace(upright=math.cos(0.81)), TILTED),
     ({}, SEEN._replace(upright=math.cos(0.79)), FUSED),
     ({}, SEEN._replace(range_m=0.29), NEAR_GROUND),
@@ -146,17 +163,21 @@ def test_a_metric_flow_is_as_sure_as_the_range_that_scaled_it():
 ])  # fmt: skip
 def test_verdicts_on_flow(change, view, reason):
     seen = reading(0.2, -0.3, 0.0, 0.0, 0.0, 0.0, **change)
-    assert judge_flow(seen, True, 0.0, 0.0, 1.0, view, told(flow_min_height_m=0.3).flow) == reason
+    s = told(flow_min_height_m=0.3).flow
+    assert judge_look.law(seen, RUNS, KEPT, view, angular=True, s=s) == view._replace(reason=reason)
+    waiting = NO_HEADING if reason == FUSED else reason  # that the heading is sought is said of what may be fused
+    assert judge_look.law(seen, RUNS, SEARCHED, view, angular=True, s=s).reason == waiting
 
 
 def test_flow_that_no_sensor_measures_and_flow_that_is_no_number():
     judged = [
-        judge_flow(reading(x, y, 0.0, 0.0), True, turning, 0.0, 1.0, SEEN, TOLD.flow)
+        judge_look.law(reading(x, y), RUNS, KEPT, SEEN._replace(turning_x=turning), angular=True, s=TOLD.flow).reason
         for x, y, turning in ((10.0, 0.0, 0.0), (0.0, -9.85, 0.0), (9.7, -9.7, 0.0), (NAN, 0.0, 0.0), (0.0, 0.0, NAN))
     ]
     assert judged == [OUT_OF_RANGE, OUT_OF_RANGE, FUSED, NOT_FINITE, NOT_FINITE]
-    metric = judge_flow(reading(20.0, 0.0), False, NAN, NAN, 1.0, SEEN._replace(known=False), TOLD.flow)
-    assert metric == FUSED  # it needs no turning and no height, and its limit is another
+    blind = SEEN._replace(turning_x=NAN, turning_y=NAN, known=0.0)
+    metric = judge_look.law(reading(20.0, 0.0), RUNS, KEPT, blind, angular=False, s=TOLD.flow)
+    assert metric.reason == FUSED  # it needs no turning and no height, and its limit is another
 
 
 def test_the_turning_is_taken_from_the_imu_less_the_filters_bias_or_from_the_sensor_less_its_own():
@@ -209,8 +230,8 @@ def test_innovations_are_alike_where_they_are_wrong_in_the_same_way_and_not_wher
 # -- height --------------------------------------------------------------------------------------------------
 def test_a_range_states_its_variance_or_has_a_floor_and_a_share():
     m, height = range_memory(), Height(-2.0, 0.1, 1.0)
-    stated = judge_range(reading(2.0, variance=(0.25,)), 1.0, 1.0, height, False, m, TOLD.height)
-    modelled = judge_range(reading(2.0), 1.0, 1.0, height, False, m, TOLD.height)
+    stated = range_verdict(reading(2.0, variance=(0.25,)), 1.0, 1.0, height, False, m, TOLD.height)
+    modelled = range_verdict(reading(2.0), 1.0, 1.0, height, False, m, TOLD.height)
     assert stated[:2] == (FUSED, 0.25)
     assert modelled[:2] == (FUSED, pytest.approx(0.05**2 + 0.04**2))
 
@@ -226,7 +247,7 @@ def range_memory(**parts) -> RangeMemory:
 ])  # fmt: skip
 def test_verdicts_on_a_range(range_m, upright, reason):
     height = Height(-2.0, 0.1, upright)
-    assert judge_range(reading(range_m), 1.0, 1.0, height, False, range_memory(), TOLD.height)[0] == reason
+    assert range_verdict(reading(range_m), 1.0, 1.0, height, False, range_memory(), TOLD.height)[0] == reason
 
 
 def test_a_range_that_repeats_itself_weighs_ever_less_and_is_stuck_once_the_vehicle_has_moved():
@@ -235,7 +256,7 @@ def test_a_range_that_repeats_itself_weighs_ever_less_and_is_stuck_once_the_vehi
         m, reasons, variances = range_memory(taken_s=9.9), [], []
         for t_s in (10.0, 10.2, 10.4, 10.5, 10.6):
             height = Height(-2.0 if t_s == 10.0 else -2.0 - climb_m, 0.1, 1.0)
-            reason, variance, m = judge_range(reading(2.0), t_s, 1.0, height, False, m, TOLD.height)
+            reason, variance, m = range_verdict(reading(2.0), t_s, 1.0, height, False, m, TOLD.height)
             reasons.append(reason)
             variances.append(variance)
         assert reasons == verdicts
@@ -243,7 +264,7 @@ def test_a_range_that_repeats_itself_weighs_ever_less_and_is_stuck_once_the_vehi
         assert variances[0] == pytest.approx(fresh)
         assert variances[2] == pytest.approx(fresh + 0.4**2)  # 1 m/s may have gone unseen
         assert (m.last_m, m.same_s, m.down_m) == (2.0, 10.0, -2.0)
-    reason, variance, m = judge_range(reading(2.001), 10.7, 1.0, height, False, m, TOLD.height)
+    reason, variance, m = range_verdict(reading(2.001), 10.7, 1.0, height, False, m, TOLD.height)
     assert (reason, m.same_s) == (FUSED, 10.7)
     assert variance < 0.005
 
@@ -254,7 +275,7 @@ def test_a_range_that_says_the_same_from_the_first_on_or_for_long_is_no_news():
     for memory, refused_from in ((range_memory(), 0.5), (range_memory(taken_s=9.9), 2.0)):
         m, reasons = memory, {}
         for t_s in np.arange(10.0, 12.6, 0.1):
-            reasons[t_s], _, m = judge_range(reading(2.0), float(t_s), 1.0, height, False, m, TOLD.height)
+            reasons[t_s], _, m = range_verdict(reading(2.0), float(t_s), 1.0, height, False, m, TOLD.height)
         stuck = [t_s - 10.0 for t_s, reason in reasons.items() if reason == STUCK]
         assert min(stuck) == pytest.approx(refused_from, abs=0.11)
         assert len(stuck) == sum(t_s - 10.0 >= min(stuck) for t_s in reasons)
@@ -272,17 +293,25 @@ def test_the_only_range_is_believed_until_the_height_travels():
 
 
 def test_pressure_height():
-    assert judge_baro(reading(100.0), 1.0, TOLD.height) == (FUSED, 1.0)
-    assert judge_baro(reading(100.0, variance=(0.04,)), 1.0, TOLD.height) == (FUSED, 0.04)
-    assert judge_baro(reading(100.0), 0.0, TOLD.height)[0] == SILENT
+    def judged(given: Reading, known: float = 1.0, started: float = 1.0):
+        start = StartMemory(*[started, *StartMemory()[1:]])
+        return judge_baro.law(given, start, Position(0.0, 0.0, -3.0), BaroMemory(known), s=TOLD.height)
+
+    assert judged(reading(100.0)) == (BaroMemory(1.0), (-1, 97.0, 1e4), (-1, 97.0), Offer(100.0, 1.0, FUSED))
+    assert judged(reading(100.0, variance=(0.04,))).offer == Offer(100.0, 0.04, FUSED)
+    assert judged(reading(100.0), started=0.0).offer.reason == SILENT
+    first = judged(reading(100.0), known=0.0)
+    assert (first.baro, first.reset, first.found) == (BaroMemory(1.0), Reset(BARO, 97.0, 1e4), Event(BARO_FOUND, 97.0))
+    assert judged(reading(NAN), known=0.0).baro == BaroMemory(0.0)
 
 
 # -- attitude and heading --------------------------------------------------------------------------------------
 def test_a_quaternion_of_any_sensible_length_is_one():
-    assert judge_attitude(reading(0.0, 0.6, 0.0, 0.8), 1.0) == (FUSED, pytest.approx(1.0))
-    assert judge_attitude(reading(0.0, 0.1, 0.0, 0.1), 1.0)[0] == NOT_FINITE
-    assert judge_attitude(reading(3.0, 0.0, 0.0, 0.0), 1.0)[0] == NOT_FINITE
-    assert judge_attitude(reading(NAN, 0.0, 0.0, 0.0), 1.0)[0] == NOT_FINITE
+    assert read_attitude(reading(0.0, 0.6, 0.0, 0.8), 1.0) == (True, pytest.approx((0.0, 0.6, 0.0, 0.8)))
+    assert read_attitude(reading(0.9, 0.0, 0.0, -1.2), 1.0) == (True, pytest.approx((0.6, 0.0, 0.0, -0.8)))
+    assert not read_attitude(reading(0.0, 0.6, 0.0, 0.8), 0.0)[0]
+    for bad in ((0.0, 0.1, 0.0, 0.1), (3.0, 0.0, 0.0, 0.0), (NAN, 0.0, 0.0, 0.0)):
+        assert not read_attitude(reading(*bad), 1.0)[0]
 
 
 def test_headings_whose_error_lasts_count_once_in_its_time():

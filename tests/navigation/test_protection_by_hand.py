@@ -41,19 +41,14 @@ from flownav.estimation.states import (
 )
 from flownav.navigation.memory import (
     DRIFT_SINCE,
-    FLOW_SPEED,
-    GPS_FUSED,
-    LEFT_OVER,
-    LENS_RANGE,
+    MEMORY,
     PROTECTION,
-    PUZZLED_AT,
     SCALE_DOUBT,
     SUSPECTED,
-    TURNED_BEFORE,
-    TURNING,
     load_flow,
     new_work,
     store_flow,
+    store_look,
 )
 from flownav.navigation.protection import (
     CLEAR,
@@ -73,7 +68,13 @@ from flownav.navigation.protection import (
     sign_drift,
     sign_flow,
 )
+from flownav.navigation.records import FlowSignMemory, GpsMemory, Look, SuspicionMemory
 from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, empty_tape, output_of, room_of
+
+FLOW_SPEED = MEMORY.row(FlowSignMemory, "speed_m_s")
+TURNED_BEFORE = MEMORY.row(FlowSignMemory, "turning_x")
+LEFT_OVER = MEMORY.row(SuspicionMemory, "left_over_m")
+PUZZLED_AT = MEMORY.row(SuspicionMemory, "puzzled_s")
 
 
 @pytest.fixture
@@ -127,8 +128,8 @@ def test_an_innovation_tells_of_a_fault_by_its_part_of_it(work):
 @pytest.mark.parametrize("angular", [True, False])
 def test_what_a_unit_of_each_fault_adds_to_a_flow(work, angular):
     """2 m/s forward and 1 m/s to the right, 4 m up, turning by 0.1 rad/s about x."""
-    work[STATE + VELOCITY], work[STATE + VELOCITY + 1], work[LENS_RANGE] = 2.0, 1.0, 4.0
-    work[TURNED_BEFORE], work[TURNING] = 0.1, 0.2
+    work[STATE + VELOCITY], work[STATE + VELOCITY + 1], work[TURNED_BEFORE] = 2.0, 1.0, 0.1
+    store_look(work, ONE_LANE, 0, Look(turning_x=0.2, range_m=4.0))
     read = (0.1 - 0.25, 0.5) if angular else (2.0, 1.0)
     store_flow(work, ONE_LANE, 0, load_flow(work, ONE_LANE, 0)._replace(taken_s=9.9))
     for component in range(2):
@@ -221,7 +222,7 @@ class Minded:
             *(table.reshape(-1) for table in (tape.estimate, tape.innovation, tape.event)),
             *(table.reshape(-1) for table in tape.journal), room_of(tape), tape.used,
         )  # fmt: skip
-        work[GPS_FUSED] = np.inf
+        work[MEMORY.row(GpsMemory, "told_s")] = np.inf
 
     def at(self, t_s, dt_s=1e-9):
         mind_faults(self.work, ONE_LANE, t_s, dt_s, self.output)
@@ -272,7 +273,7 @@ def test_what_was_told_and_what_is_left_over_fade(work):
 def test_while_a_reversed_flow_is_possible_what_is_left_over_grows_by_twice_the_way(work, evidence, doubted, unheld):
     minded = Minded(work)
     work[FLOW_SPEED] = 3.0
-    work[GPS_FUSED] = -np.inf if unheld else np.inf
+    work[MEMORY.row(GpsMemory, "told_s")] = -np.inf if unheld else np.inf
     if doubted:
         store_flow(work, ONE_LANE, 0, load_flow(work, ONE_LANE, 0)._replace(doubted=1.0))
     evident(work, FLOW_REVERSED, 0.3, evidence)

@@ -140,7 +140,7 @@ def test_a_quiet_imu_is_not_believed_against_a_height_or_a_speed(seen):
 # -- what is watched -----------------------------------------------------------------------------------------
 def watched(watch, *readings: Reading) -> np.ndarray:
     work = new_work(ONE_LANE)
-    open_windows(work, ONE_LANE, 0)
+    open_windows(work, ONE_LANE)
     for one in readings:
         store_reading(work, ONE_LANE, 0, one)
         watch(work, ONE_LANE)
@@ -182,7 +182,7 @@ def test_angular_flow_is_a_velocity_by_the_latest_range():
 def test_open_windows_know_nothing():
     work = watched(watch_imu, reading(*BIAS.tolist(), *GRAVITY.tolist()))
     set_lane(work, ONE_LANE, STILL_CLOCK, 0, 1.0)
-    open_windows(work, ONE_LANE, 0)
+    open_windows(work, ONE_LANE)
     assert (load_imu_window(work, ONE_LANE, 0), load_seen_window(work, ONE_LANE, 0)) == (EMPTY, UNSEEN)
     fresh = new_work(ONE_LANE)
     assert (load_imu_window(fresh, ONE_LANE, 0), load_seen_window(fresh, ONE_LANE, 0)) == (EMPTY, UNSEEN)

@@ -10,7 +10,15 @@ import pytest
 from flownav.compile import ONE_LANE
 from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE, NOISE
 from flownav.navigation.flow_noise import LARGEST_CHANGE, LARGEST_EXCESS, MEAN_CHANGE, SMALLEST_EXCESS, followed_excess
-from flownav.navigation.memory import ACCEL_FACTOR, REASON, load_noise, new_work, set_lane, store_echo, store_noise
+from flownav.navigation.memory import (
+    REASON,
+    load_noise,
+    load_whiteness,
+    new_work,
+    store_echo,
+    store_noise,
+    store_whiteness,
+)
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT
 from flownav.navigation.records import EchoMemory, FlowMemory, NoiseMemory, WhitenessMemory
 from flownav.navigation.settings import NavigatorSettingsFile
@@ -75,16 +83,16 @@ def test_a_block_of_many_readings_has_the_variance_of_one_and_the_next_begins_em
 
 
 def factors(innovations, reason=FUSED, axis=0, stray=0.0, variance=1.0, hz=20.0, start=1.0) -> np.ndarray:
-    """ACCEL_FACTOR of an axis after each innovation."""
+    """The accelerometer's factor along an axis after each innovation."""
     work = new_work(ONE_LANE)
-    set_lane(work, ONE_LANE, ACCEL_FACTOR + axis, 0, start)
+    store_whiteness(work, ONE_LANE, axis, 0, FRESH._replace(factor=start))
     store_echo(work, ONE_LANE, 0, EchoMemory(2.0, 0.0, 2.0, 0.0, stray))
     work[[REASON, INNOVATION_VARIANCE]] = reason, variance
     found = []
     for k, innovation in enumerate(innovations):
         work[INNOVATION] = innovation
         watch_whiteness(work, ONE_LANE, k / hz, axis)
-        found.append(work[ACCEL_FACTOR + axis])
+        found.append(load_whiteness(work, ONE_LANE, axis, 0).factor)
     return np.array(found)
 
 
@@ -126,7 +134,7 @@ def test_level_it_is_as_noisy_as_along_the_worse_axis_and_down_by_itself():
     for axis, factors_ in ((0, (7.0, 1.0)), (1, (7.0, 1.0)), (2, (1.0, 7.0))):
         work = new_work(ONE_LANE)
         assert accel_factors(work, ONE_LANE, 0) == (1.0, 1.0)
-        set_lane(work, ONE_LANE, ACCEL_FACTOR + axis, 0, 7.0)
+        store_whiteness(work, ONE_LANE, axis, 0, FRESH._replace(factor=7.0))
         assert accel_factors(work, ONE_LANE, 0) == factors_
 
 

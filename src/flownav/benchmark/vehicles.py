@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,11 @@ from flownav.benchmark.timing import best_of
 from flownav.campaigns.local import fly_many
 from flownav.compile import LANES, Lanes, Work, kernel, pointer, procedure, unit
 from flownav.navigation.take import UNIT_SIGNATURE
-from flownav.navigation.tape import room_of
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
-from flownav.simulation.draws import plain_noise
-from flownav.simulation.engine import Buffers, buffers_of, fly_into
+from flownav.simulation.block import Buffers
+from flownav.simulation.engine import Instead, buffers_of, fly_into
 from flownav.simulation.ensemble import believed
-from flownav.simulation.flight import fly_block
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import ATTITUDE_STEPS, PHYSICS_S, PHYSICS_STEPS, Flight
 from flownav.simulation.scenario import load_scenario, with_vehicle
@@ -89,13 +87,7 @@ deaf_lanes = unit(take_nothing, UNIT_SIGNATURE, lanes=LANES)
 
 def fly_untaken(flight: Flight, b: Buffers) -> None:
     """A block on the truth whose readings nobody takes."""
-    b.nav[:] = 0.0
-    fly: Any = fly_block
-    fly(
-        flight, packed_truth([believed(flight)] * len(LANES)), 1, 0, plain_noise(len(LANES)), LANES, b.work, b.nav,
-        deaf_lanes.address, b.tape.estimate.reshape(-1), b.tape.innovation.reshape(-1), b.tape.event.reshape(-1),
-        b.fed.reshape(-1), np.array([*room_of(b.tape), 0]), b.tape.used, b.history,
-    )  # fmt: skip
+    fly_into(flight, 1, 0, LANES, b, None, Instead(take=deaf_lanes.address))
 
 
 @kernel

@@ -28,14 +28,14 @@ def write_function(name: str, source: str, scope: dict[str, Any]) -> Callable[..
 def lane_access(bundle: type, row: int | Sequence[int] | None) -> tuple[Callable[..., Any], Callable[..., Any]]:
     """`load(work, lanes, lane)` and `store(work, lanes, lane, value)` of a named tuple kept in a lane buffer.
 
-    `bundle` is a NamedTuple class of scalars, `row` the constant row of its first field. Field `i` of lane
-    `k` lies at `(row + i) * len(lanes) + k`. row None: both take it, `load(work, lanes, row, lane)`; a sequence: the
-    row of each field.
+    `bundle` is a NamedTuple class of scalars, `row` the constant row of its first field, or those of each. Field `i`
+    of lane `k` lies at `(row + i) * len(lanes) + k`. row None: both take it, `load(work, lanes, row, lane)`.
     """
     fields: tuple[str, ...] = bundle._fields  # type: ignore[attr-defined]
-    rows: Sequence[int | str] = [f"(row + {i})" for i in range(len(fields))]
-    if row is not None:
-        rows = range(row, row + len(fields)) if isinstance(row, int) else row
+    if row is None:
+        rows = [f"(row + {i})" for i in range(len(fields))]
+    else:
+        rows = [str(place) for place in (range(row, row + len(fields)) if isinstance(row, int) else row)]
     at = [f"work[{place} * len(lanes) + lane]" for place in rows]
     told = "work, lanes, lane" if row is not None else "work, lanes, row, lane"
     stores = "\n".join(f"    {place} = value.{name}" for place, name in zip(at, fields, strict=True))

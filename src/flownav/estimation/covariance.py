@@ -293,6 +293,22 @@ def forget_lane(work: Work, lanes: Lanes, n: int, state: int, lane: int, varianc
     work[at(state, state) * len(lanes) + lane] = variance
 
 
+@procedure
+def begin_lane(work: Work, lanes: Lanes, lane: int, sigma: Work, first: int) -> None:
+    """x = 0 and a diagonal P of one lane, of the STATES standard deviations that lie at `first` in sigma."""
+    for j in range(STATES):
+        work[(STATE + j) * len(lanes) + lane] = 0.0
+        for i in range(j):
+            work[at(i, j) * len(lanes) + lane] = 0.0
+        work[at(j, j) * len(lanes) + lane] = sigma[first + j] * sigma[first + j]
+
+
+@equation
+def set_variance(work: Work, lanes: Lanes, state: int, lane: int, variance: float) -> None:
+    """P_ii of a lane is this; its correlations stay."""
+    work[at(state, state) * len(lanes) + lane] = variance
+
+
 @equation
 def variance_of(work: Work, lanes: Lanes, state: int, lane: int) -> float:
     """P_ii of a lane."""

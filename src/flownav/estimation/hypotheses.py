@@ -67,6 +67,19 @@ def size_of(information: float, score: float, prior_sigma: float) -> Size:
 
 
 @equation
+def followed(work: Work, lanes: Lanes) -> int:
+    """How many faults are followed."""
+    return int(work[HYPOTHESES * len(lanes)])
+
+
+@equation
+def size_told(work: Work, lanes: Lanes, fault: int, lane: int, prior_sigma: float) -> Size:
+    """What innovations tell of a fault's size in a lane."""
+    information, score = work[(INFORMATION + fault) * len(lanes) + lane], work[(SCORE + fault) * len(lanes) + lane]
+    return size_of(information, score, prior_sigma)
+
+
+@equation
 def effect_of(work: Work, lanes: Lanes, n: int, fault: int, state: int, lane: int) -> float:
     """s: what one unit of a fault has done to a state's error in a lane."""
     value: float = work[at(state, n + fault) * len(lanes) + lane]
@@ -76,7 +89,7 @@ def effect_of(work: Work, lanes: Lanes, n: int, fault: int, state: int, lane: in
 @procedure
 def push(work: Work, lanes: Lanes, n: int, dt_s: float) -> None:
     """What a steady specific force along body x or y does to the velocity over a step: s_v <- s_v - dt R_EB e."""
-    if work[HYPOTHESES * len(lanes)] > 0.0:
+    if followed(work, lanes) > 0:
         for axis in range(2):
             for i in range(3):
                 for lane in range(len(lanes)):
@@ -87,7 +100,7 @@ def push(work: Work, lanes: Lanes, n: int, dt_s: float) -> None:
 @procedure
 def weigh(work: Work, lanes: Lanes, n: int, color: float) -> None:
     """What the innovation that was just fused tells of each fault; color: how many readings err alike, in effect."""
-    for k in range(int(work[HYPOTHESES * len(lanes)])):
+    for k in range(followed(work, lanes)):
         for lane in range(len(lanes)):
             fused = work[ACCEPTED * len(lanes) + lane] > 0.0
             variance = color * work[INNOVATION_VARIANCE * len(lanes) + lane] if fused else 1.0
@@ -102,7 +115,7 @@ def weigh(work: Work, lanes: Lanes, n: int, color: float) -> None:
 @procedure
 def fade(work: Work, lanes: Lanes, factor: float) -> None:
     """What was told long ago is told of another fault: J <- factor J, d <- factor d."""
-    for k in range(int(work[HYPOTHESES * len(lanes)])):
+    for k in range(followed(work, lanes)):
         for lane in range(len(lanes)):
             work[(INFORMATION + k) * len(lanes) + lane] *= factor
             work[(SCORE + k) * len(lanes) + lane] *= factor

@@ -12,10 +12,9 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from types import FunctionType
 from typing import Any, NamedTuple, Protocol, cast, get_args, get_type_hints
 
-from flownav.compile import equation, procedure, write_function
+from flownav.compile import compiled, dressed, write_function
 from flownav.estimation.states import (
     COEFFICIENT,
     INNOVATION,
@@ -134,11 +133,8 @@ class Signature(NamedTuple):
     def generated(self, name: str, lines: list[str]) -> Callable[..., Any]:
         """The function of these lines, under the law's name, with the law beside it."""
         scope = {p.record.__name__: p.record for p in (*self.reads, *self.passed) if p.record is not None}
-        found: Any = write_function(name, "\n".join(lines) + "\n", {"law": compiled(self.function), **scope})
-        found.__name__ = found.__qualname__ = self.function.__name__
-        found.__doc__, found.__module__ = self.function.__doc__, self.function.__module__
-        found.law, found.__defaults__ = self.function, self._defaults() or None
-        return cast(Callable[..., Any], procedure(found))
+        found = write_function(name, "\n".join(lines) + "\n", {"law": compiled(self.function), **scope})
+        return dressed(found, self.function, self._defaults())
 
     def _defaults(self) -> tuple[float, ...]:
         """Of the scalars that a caller may leave out, which are the last."""
@@ -171,10 +167,3 @@ def place(name: str) -> str:
     if name not in PLACES:
         raise NameError(f"a Jacobian names '{name}', which is no state")
     return f"{PLACES[name]}.0"
-
-
-def compiled(function: Any) -> Callable[..., Any]:
-    """The law as an equation. Numba knows no keyword-only parameters, so they become ordinary ones."""
-    code = function.__code__
-    plain = code.replace(co_argcount=code.co_argcount + code.co_kwonlyargcount, co_kwonlyargcount=0)
-    return equation(FunctionType(plain, function.__globals__, function.__name__, None, function.__closure__))

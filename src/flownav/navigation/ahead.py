@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import ONE_LANE, Lanes, Work, equation, kernel, pointer
-from flownav.estimation.law import compiled
+from flownav.compile import ONE_LANE, Lanes, Work, compiled, equation, kernel, pointer
 from flownav.estimation.motion import strapdown
 from flownav.estimation.named import AccelBias, Attitude, GyroBias, Inertial, PositionNed, VelocityNed
 from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, POSITION, QUATERNION, STATE, VELOCITY

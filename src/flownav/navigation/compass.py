@@ -8,25 +8,16 @@ nothing is done.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure, smaller
-from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, FORCE, STATE
-from flownav.navigation.course import LEAST_TRAVEL_M, judge_course, turn_between, turn_heading, with_gps
-from flownav.navigation.journal import reset_state
-from flownav.navigation.memory import (
-    COMPASS_OFF,
-    PUSH,
-    SOUGHT,
-    load_course,
-    load_push,
-    load_reading,
-    store_course,
-    store_push,
-)
-from flownav.navigation.offers import is_heard
-from flownav.navigation.records import CourseMemory, PushMemory, Reading
-from flownav.navigation.tape import COMPASS_REFUTED, Output, write_event
+from flownav.compile import equation, replacing, smaller
+from flownav.estimation.states import ACCEL_BIAS, ATTITUDE
+from flownav.navigation.course import LEAST_TRAVEL_M, is_velocity, judge_course, turn_between, turn_heading, with_gps
+from flownav.navigation.records import CourseMemory, HeadingMemory, PushMemory, Reading
+from flownav.navigation.tape import COMPASS_REFUTED
+from flownav.navigation.verdicts import Attitude, Event, Force, Reset, on_lanes
 
 BLOCK_S = 0.8  # over which a change of GPS velocity is more than its noise
 LARGE_RAD = 0.8  # 46 degrees; less the deviation and the gate deal with, and less may be either witness
@@ -37,6 +28,10 @@ FADING_S = 20.0
 ONCE_MORE_M = 1.0  # of travel tells the heading again, once the compass is not heard
 FREED_TILT_RAD = 0.1
 FREED_ACCEL_M_S2 = 0.5
+
+with_push = replacing(PushMemory, "push_n", "push_e")
+with_sums = replacing(CourseMemory, "along", "across", "gps", "flow")
+dismissed = replacing(HeadingMemory, "refuted", "sought")
 
 
 @equation
@@ -64,10 +59,7 @@ def with_change(reading: Reading, t_s: float, m: PushMemory) -> PushMemory:
 def faded(t_s: float, m: CourseMemory) -> CourseMemory:
     """The sums of the course, of which what is long ago counts less."""
     kept = np.exp(-smaller(t_s - m.gps_s, FADING_S) / FADING_S)
-    return CourseMemory(
-        kept * m.along, kept * m.across, kept * m.gps, kept * m.flow, m.travel_m, m.gps_s, m.flow_s, m.north_m_s,
-        m.east_m_s,
-    )  # fmt: skip
+    return with_sums(m, along=kept * m.along, across=kept * m.across, gps=kept * m.gps, flow=kept * m.flow)
 
 
 @equation
@@ -86,42 +78,50 @@ def refuted(course: CourseMemory, push: PushMemory) -> tuple[bool, float]:
     return flow_knows and own_knows and abs(by_flow) > LARGE_RAD and abs(apart) < ALIKE_RAD, by_flow
 
 
-@procedure
-def note_push(work: Work, lanes: Lanes, dt_s: float) -> None:
+# -- on lanes -----------------------------------------------------------------------------------------------
+@on_lanes
+def note_push(force: Force, m: PushMemory, *, dt_s: float) -> PushMemory:
     """What the step that was just made adds to the velocity, by the filter's own heading."""
-    for i in range(2):
-        for lane in range(len(lanes)):
-            work[(PUSH + i) * len(lanes) + lane] += dt_s * work[(FORCE + i) * len(lanes) + lane]
+    return with_push(m, push_n=m.push_n + dt_s * force.north_m_s2, push_e=m.push_e + dt_s * force.east_m_s2)
 
 
-@procedure
-def check_compass(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
-    """At a GPS velocity: where both witnesses refute the compass, the heading is turned and the compass dismissed."""
-    for lane in range(len(lanes)):
-        reading = load_reading(work, lanes, lane)
-        heard = is_heard(reading) and bool(np.isfinite(reading.value_0 + reading.value_1))
-        if not heard or work[COMPASS_OFF * len(lanes) + lane] > 0.0:
-            continue
-        course = with_gps(reading, t_s, faded(t_s, load_course(work, lanes, lane)))
-        push = with_change(reading, t_s, load_push(work, lanes, lane))
-        store_course(work, lanes, lane, course)
-        store_push(work, lanes, lane, push)
-        wrong, error_rad = refuted(course, push)
-        if wrong:
-            turn_heading(work, lanes, lane, error_rad, o)
-            for i in range(2):
-                reset_state(work, lanes, lane, ATTITUDE + i, FREED_TILT_RAD * FREED_TILT_RAD, o)
-                work[(STATE + ACCEL_BIAS + i) * len(lanes) + lane] = 0.0
-                reset_state(work, lanes, lane, ACCEL_BIAS + i, FREED_ACCEL_M_S2 * FREED_ACCEL_M_S2, o)
-            work[COMPASS_OFF * len(lanes) + lane] = 1.0
-            work[SOUGHT * len(lanes) + lane] = 1.0  # what was summed up while the compass pulled is not exact
-            store_course(
-                work,
-                lanes,
-                lane,
-                CourseMemory(0.0, 0.0, 0.0, 0.0, LEAST_TRAVEL_M - ONCE_MORE_M, t_s, -np.inf, 0.0, 0.0),
-            )
-            write_event(lanes, lane, t_s, COMPASS_REFUTED, error_rad, o)
+class CompassVerdict(NamedTuple):
+    """What the two witnesses say of the compass, and what is set free where they refute it."""
+
+    course: CourseMemory
+    push: PushMemory
+    heading: HeadingMemory
+    attitude: Attitude
+    freed: tuple[Reset, Reset, Reset, Reset, Reset]
+    refuted: Event
 
 
-assert PushMemory._fields[:2] == ("push_n", "push_e")
+@on_lanes
+def check_compass(
+    reading: Reading, heading: HeadingMemory, own: Attitude, course: CourseMemory, push: PushMemory, *, t_s: float
+) -> CompassVerdict:
+    """At a GPS velocity: where both witnesses refute the compass, the heading is turned and the compass dismissed.
+
+    What was summed up while the compass pulled is not exact: the heading is sought once more, over ONCE_MORE_M.
+    """
+    counts = is_velocity(reading) and heading.refuted == 0.0
+    followed = with_gps(reading, t_s, faded(t_s, course))
+    pushed = with_change(reading, t_s, push)
+    refutes, error_rad = refuted(followed, pushed)
+    wrong = counts and refutes
+    begun = CourseMemory(0.0, 0.0, 0.0, 0.0, LEAST_TRAVEL_M - ONCE_MORE_M, t_s, -np.inf, 0.0, 0.0)
+    turned, turned_reset = turn_heading(own, error_rad, wrong)
+    return CompassVerdict(
+        begun if wrong else (followed if counts else course),
+        pushed if counts else push,
+        dismissed(heading, refuted=1.0 if wrong else heading.refuted, sought=1.0 if wrong else heading.sought),
+        turned,
+        (
+            turned_reset,
+            Reset(ATTITUDE if wrong else -1, np.nan, FREED_TILT_RAD * FREED_TILT_RAD),
+            Reset(ACCEL_BIAS if wrong else -1, 0.0, FREED_ACCEL_M_S2 * FREED_ACCEL_M_S2),
+            Reset(ATTITUDE + 1 if wrong else -1, np.nan, FREED_TILT_RAD * FREED_TILT_RAD),
+            Reset(ACCEL_BIAS + 1 if wrong else -1, 0.0, FREED_ACCEL_M_S2 * FREED_ACCEL_M_S2),
+        ),
+        Event(COMPASS_REFUTED if wrong else -1, error_rad),
+    )

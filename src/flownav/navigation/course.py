@@ -8,17 +8,17 @@ the heading (`take.consider_datum`), and the flow, by whose variance so large a 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure
-from flownav.estimation.motion import rotation_of
-from flownav.estimation.states import ATTITUDE, QUATERNION
-from flownav.frames import heading_cosine_sine, quaternion_product, velocity_from_flow
-from flownav.navigation.journal import reset_state
-from flownav.navigation.memory import LENS_RANGE, SOUGHT, TURNING, load_course, load_reading, store_course
+from flownav.compile import equation, replacing
+from flownav.estimation.states import ATTITUDE
+from flownav.frames import heading_cosine_sine, quaternion_product, rotation_from_quaternion, velocity_from_flow
 from flownav.navigation.offers import is_heard
-from flownav.navigation.records import CourseMemory, Reading
-from flownav.navigation.tape import HEADING_FOUND, Output, write_event
+from flownav.navigation.records import CourseMemory, HeadingMemory, Look, Reading
+from flownav.navigation.tape import HEADING_FOUND
+from flownav.navigation.verdicts import Attitude, Event, Reset, on_lanes
 
 LEAST_TRAVEL_M = 2.0
 LEAST_SPEED_M_S = 0.3
@@ -27,16 +27,21 @@ LATEST_S = 0.25  # a flow older than this is of another motion
 FOUND_RAD = 0.1
 SLOWLY_S = 0.3  # the flow's velocity is smoothed as a receiver smooths its own
 
+with_sought = replacing(HeadingMemory, "sought")
+with_velocity = replacing(CourseMemory, "flow_s", "north_m_s", "east_m_s")
+
 
 @equation
 def with_flow(north_m_s: float, east_m_s: float, t_s: float, m: CourseMemory) -> CourseMemory:
     """The flow's velocity by the filter's own heading, smoothed."""
     step_s = t_s - m.flow_s
     share = step_s / (SLOWLY_S + step_s) if step_s < 1.0 else 1.0
-    return CourseMemory(
-        m.along, m.across, m.gps, m.flow, m.travel_m, m.gps_s, t_s,
-        m.north_m_s + share * (north_m_s - m.north_m_s), m.east_m_s + share * (east_m_s - m.east_m_s),
-    )  # fmt: skip
+    return with_velocity(
+        m,
+        flow_s=t_s,
+        north_m_s=m.north_m_s + share * (north_m_s - m.north_m_s),
+        east_m_s=m.east_m_s + share * (east_m_s - m.east_m_s),
+    )
 
 
 @equation
@@ -70,51 +75,62 @@ def judge_course(m: CourseMemory) -> tuple[bool, float]:
     return m.travel_m >= LEAST_TRAVEL_M and likeness >= LEAST_LIKENESS, error_rad
 
 
-@procedure
-def note_flow_course(work: Work, lanes: Lanes, t_s: float, angular: bool, sought: bool) -> None:
-    """The flow reading at hand, whose turning and range stand in their rows. sought: only where a heading is."""
-    for lane in range(len(lanes)):
-        if sought and work[SOUGHT * len(lanes) + lane] == 0.0:
-            continue
-        reading = load_reading(work, lanes, lane)
-        range_m = work[LENS_RANGE * len(lanes) + lane]
-        x = reading.value_0 - (work[TURNING * len(lanes) + lane] if angular else 0.0)
-        y = reading.value_1 - (work[(TURNING + 1) * len(lanes) + lane] if angular else 0.0)
-        u, v = velocity_from_flow(x, y, range_m) if angular else (x, y)
-        rotation = rotation_of(work, lanes, lane)
-        cosine, sine = heading_cosine_sine(rotation)
-        if is_heard(reading) and np.isfinite(u + v):
-            after = with_flow(cosine * u - sine * v, sine * u + cosine * v, t_s, load_course(work, lanes, lane))
-            store_course(work, lanes, lane, after)
+@equation
+def is_velocity(reading: Reading) -> bool:
+    """Whether a GPS velocity is heard, and tells north and east."""
+    return is_heard(reading) and bool(np.isfinite(reading.value_0 + reading.value_1))
 
 
-@procedure
-def find_heading(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
-    """At a GPS velocity: where the way says how the heading errs, the heading and the velocity are turned by it."""
-    for lane in range(len(lanes)):
-        reading = load_reading(work, lanes, lane)
-        unknown = work[SOUGHT * len(lanes) + lane] > 0.0
-        heard = is_heard(reading)
-        if not unknown or not heard or not np.isfinite(reading.value_0 + reading.value_1):
-            continue
-        m = with_gps(reading, t_s, load_course(work, lanes, lane))
-        store_course(work, lanes, lane, m)
-        found, error_rad = judge_course(m)
-        if found:
-            turn_heading(work, lanes, lane, error_rad, o)
-            work[SOUGHT * len(lanes) + lane] = 0.0
-            write_event(lanes, lane, t_s, HEADING_FOUND, error_rad, o)
-
-
-@procedure
-def turn_heading(work: Work, lanes: Lanes, lane: int, by_rad: float, o: Output) -> None:
-    """The heading of one lane turned, and sure to FOUND_RAD; what was correlated with it is not any more."""
+@equation
+def turn_heading(own: Attitude, by_rad: float, turns: bool) -> tuple[Attitude, Reset]:
+    """The attitude with its heading turned, and that sure to FOUND_RAD; its correlations are lost."""
     turn = (np.cos(0.5 * by_rad), 0.0, 0.0, np.sin(0.5 * by_rad))
-    before = (
-        work[QUATERNION * len(lanes) + lane], work[(QUATERNION + 1) * len(lanes) + lane],
-        work[(QUATERNION + 2) * len(lanes) + lane], work[(QUATERNION + 3) * len(lanes) + lane],
-    )  # fmt: skip
-    after = quaternion_product(turn, before)
-    for i in range(4):
-        work[(QUATERNION + i) * len(lanes) + lane] = after[i]
-    reset_state(work, lanes, lane, ATTITUDE + 2, FOUND_RAD * FOUND_RAD, o)
+    w, x, y, z = quaternion_product(turn, (own.w, own.x, own.y, own.z))
+    return (
+        Attitude(w if turns else own.w, x if turns else own.x, y if turns else own.y, z if turns else own.z),
+        Reset(ATTITUDE + 2 if turns else -1, np.nan, FOUND_RAD * FOUND_RAD),
+    )
+
+
+# -- on lanes -----------------------------------------------------------------------------------------------
+@on_lanes
+def note_flow_course(
+    reading: Reading, heading: HeadingMemory, look: Look, own: Attitude, m: CourseMemory, *, t_s: float,
+    angular: bool, sought: bool,
+) -> CourseMemory:  # fmt: skip
+    """The flow's velocity by a reading whose turning and range are known. sought: only where a heading is."""
+    x = reading.value_0 - (look.turning_x if angular else 0.0)
+    y = reading.value_1 - (look.turning_y if angular else 0.0)
+    u, v = velocity_from_flow(x, y, look.range_m) if angular else (x, y)
+    cosine, sine = heading_cosine_sine(rotation_from_quaternion(own.w, own.x, own.y, own.z))
+    counts = (not sought or heading.sought > 0.0) and is_heard(reading) and bool(np.isfinite(u + v))
+    return with_flow(cosine * u - sine * v, sine * u + cosine * v, t_s, m) if counts else m
+
+
+class FoundHeading(NamedTuple):
+    """What the way says of the heading."""
+
+    course: CourseMemory
+    heading: HeadingMemory
+    attitude: Attitude
+    reset: Reset
+    found: Event
+
+
+@on_lanes
+def find_heading(
+    reading: Reading, heading: HeadingMemory, own: Attitude, m: CourseMemory, *, t_s: float
+) -> FoundHeading:
+    """At a GPS velocity: where the way says how the heading errs, the heading and the velocity are turned by it."""
+    counts = heading.sought > 0.0 and is_velocity(reading)
+    after = with_gps(reading, t_s, m)
+    knows, error_rad = judge_course(after)
+    found = counts and knows
+    turned, reset = turn_heading(own, error_rad, found)
+    return FoundHeading(
+        after if counts else m,
+        with_sought(heading, sought=0.0 if found else heading.sought),
+        turned,
+        reset,
+        Event(HEADING_FOUND if found else -1, error_rad),
+    )

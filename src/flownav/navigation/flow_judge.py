@@ -7,23 +7,39 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import equation, larger, replacing, smaller
+from flownav.estimation.laws.geometry import lens_range
 from flownav.navigation.flow_noise import LONGEST_STEP_S
+from flownav.navigation.height import MANY_STRAYS
+from flownav.navigation.memory import holds
 from flownav.navigation.offers import usable_in_flight
-from flownav.navigation.reasons import FUSED, NEAR_GROUND, NO_HEIGHT, OUT_OF_RANGE, TILTED
-from flownav.navigation.records import FlowMemory, Reading
+from flownav.navigation.reasons import FUSED, NEAR_GROUND, NO_HEADING, NO_HEIGHT, OUT_OF_RANGE, SILENT, TILTED
+from flownav.navigation.records import (
+    EchoMemory,
+    FlowMemory,
+    GpsMemory,
+    GroundMemory,
+    HeadingMemory,
+    Look,
+    RangeMemory,
+    Reading,
+    StartMemory,
+)
 from flownav.navigation.told import FlowSettings
+from flownav.navigation.verdicts import Biases, GroundBelow, GyroShare, HeldBack, on_lanes
 
+with_turning = replacing(Look, "turning_x", "turning_y")
+with_reason = replacing(Look, "reason")
 with_gyro = replacing(FlowMemory, "bias_x", "bias_y", "bias_count")
 
+LARGEST_SPREAD = 0.5  # of the height over the ground, of which flow makes no speed
+UNKNOWN_RANGE_M = 2.0
 NEAR_LIMIT = 0.98  # a sensor that has reached its limit reads the limit, whatever the flow
 
 
-class View(NamedTuple):
-    """The ground that the lens sees: the range along the boresight by the filter, whether that is well known, R_33."""
-
-    range_m: float
-    known: bool
-    upright: float
+@equation
+def gyro_share(reading: Reading) -> float:
+    """By how much the filter's gyro bias is in the turning: the IMU told it, or is what the sensor's gyro follows."""
+    return 1.0 if np.isfinite(reading.value_4 + reading.value_5) else 0.0
 
 
 @equation
@@ -51,16 +67,73 @@ def turning_of(
     return x, y, after
 
 
-@equation
-def judge_flow(
-    reading: Reading, angular: bool, turning_x: float, turning_y: float, started: float, view: View, s: FlowSettings
-) -> int:
-    """The verdict on a flow reading as a whole."""
-    turning = turning_x + turning_y if angular else 0.0
-    reason = usable_in_flight(reading, reading.value_0 + reading.value_1 + turning, 0.0, started)
-    reason = NO_HEIGHT if reason == FUSED and angular and not view.known else reason
+# -- what was seen ------------------------------------------------------------------------------------------
+@on_lanes
+def see_ground(
+    below: GroundBelow, ranged: RangeMemory, echo: EchoMemory, ground: GroundMemory, *, t_s: float, s: FlowSettings
+) -> Look:
+    """The ground that the lens sees, and whether a range tells the height over it; the rest is not known yet."""
+    range_m = lens_range(below.rotation, below.height_m, (0.0, 0.0, s.flow_below_m))[0]
+    spread_m = np.sqrt(larger(below.variance, 0.0))
+    known = ground.known > 0.0 and spread_m <= LARGEST_SPREAD * range_m
+    disputed = np.isfinite(ranged.refused_s) or echo.stray > MANY_STRAYS
+    told = t_s - ranged.taken_s <= s.height_hold_s and not disputed
+    return Look(
+        turning_x=0.0,
+        turning_y=0.0,
+        range_m=range_m if known else UNKNOWN_RANGE_M,
+        known=1.0 if known else 0.0,
+        upright=below.rotation[8],
+        unranged=0.0 if told else 1.0,
+        reason=SILENT,
+    )
+
+
+class Turning(NamedTuple):
+    """What became of the turning that a flow reading saw."""
+
+    look: Look
+    flow: FlowMemory
+    share: GyroShare
+
+
+@on_lanes
+def see_turning(
+    reading: Reading,
+    start: StartMemory,
+    biases: Biases,
+    look: Look,
+    m: FlowMemory,
+    *,
+    t_s: float,
+    gyro_is_imu: bool,
+    s: FlowSettings,
+) -> Turning:
+    """The turning that an angular flow saw; a sensor's own gyro is followed."""
+    x, y, after = turning_of(reading, t_s, biases.gyro_x, biases.gyro_y, gyro_is_imu, m, s)
+    follows = start.started > 0.0 and reading.arrived > 0.0
+    return Turning(
+        with_turning(look, turning_x=x, turning_y=y), after if follows else m, GyroShare(gyro_share(reading))
+    )
+
+
+@on_lanes
+def judge_look(
+    reading: Reading, start: StartMemory, heading: HeadingMemory, look: Look, *, angular: bool, s: FlowSettings
+) -> Look:
+    """The verdict on the whole reading; flow turns with the heading, and waits until that is found."""
+    turning = look.turning_x + look.turning_y if angular else 0.0
+    reason = usable_in_flight(reading, reading.value_0 + reading.value_1 + turning, 0.0, start.started)
+    reason = NO_HEIGHT if reason == FUSED and angular and look.known == 0.0 else reason
     fast = angular and larger(abs(reading.value_0), abs(reading.value_1)) >= NEAR_LIMIT * s.flow_limit_rad_s
     reason = OUT_OF_RANGE if reason == FUSED and fast else reason
-    reason = TILTED if reason == FUSED and view.upright < np.cos(s.tilt_limit_rad) else reason
-    near = view.known and view.range_m * view.upright <= s.flow_min_height_m  # `lens_range_of` is at least 0.05
-    return NEAR_GROUND if reason == FUSED and near else reason
+    reason = TILTED if reason == FUSED and look.upright < np.cos(s.tilt_limit_rad) else reason
+    near = look.known > 0.0 and look.range_m * look.upright <= s.flow_min_height_m  # `lens_range` is at least 0.05
+    reason = NEAR_GROUND if reason == FUSED and near else reason
+    return with_reason(look, reason=NO_HEADING if reason == FUSED and heading.sought > 0.0 else reason)
+
+
+@on_lanes
+def hold_back(gps: GpsMemory, m: FlowMemory, *, t_s: float) -> HeldBack:
+    """A flow that is wrong again and again is tested and not fused while GPS holds."""
+    return HeldBack(1.0 if holds(gps, t_s) and np.isfinite(m.wrong_s) else 0.0)

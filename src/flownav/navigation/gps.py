@@ -2,77 +2,112 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, larger, procedure, smaller
+from flownav.compile import Lanes, Work, equation, larger, procedure, replacing, smaller
 from flownav.estimation.covariance import covariance_of, expect, states_of, variance_of
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.laws.still import pad_below
-from flownav.estimation.states import (
-    FORCE,
-    GPS_FAST,
-    GPS_SLOW,
-    GPS_VELOCITY,
-    INNOVATION,
-    INNOVATION_VARIANCE,
-    NOISE,
-    OFFERED,
-    PAD,
-    POSITION,
-    STATE,
-    VELOCITY,
-)
+from flownav.estimation.states import GPS_FAST, GPS_SLOW, GPS_VELOCITY, PAD, POSITION, STATE, VELOCITY
 from flownav.measurement import Sensor
-from flownav.navigation.journal import reset_state
-from flownav.navigation.memory import (
-    GPS_FUSED,
-    GPS_MOVED,
-    LEVEL_RATIO,
-    PAD_BESIDE,
-    PAD_KNOWN,
-    REASON,
-    STEADY_FORCE,
-    load_flow,
-    load_reading,
-    load_rejection,
-    load_start,
-    store_rejection,
-)
-from flownav.navigation.offers import conclude, fuse_offered, note_aid, note_height, put, usable
+from flownav.navigation.memory import MEMORY, of_lane
+from flownav.navigation.offers import component_of, conclude, fuse_offered, note_aid, note_height, usable
 from flownav.navigation.packed import load_gps_settings
 from flownav.navigation.protection import sign_drift
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT
-from flownav.navigation.records import Reading, RejectionMemory
-from flownav.navigation.tape import GPS_RESET, Output, write_event
+from flownav.navigation.records import (
+    FlowMemory,
+    GpsMemory,
+    PadMemory,
+    Reading,
+    RejectionMemory,
+    StartMemory,
+    SteadyForce,
+)
+from flownav.navigation.tape import GPS_RESET, Output
 from flownav.navigation.told import GpsSettings
 from flownav.navigation.trust import OF_GPS, follow_noise, scale_noise
+from flownav.navigation.verdicts import Event, Force, Offer, Reset, Tested, on_lanes
 
 LEAST_REJECTIONS = 5
 SOON_S = 1.0
 UNKNOWN_PAD_M = 100.0
 LEAST_PAD_VARIANCE_M2 = 1e-6
 
+with_ratio = replacing(GpsMemory, "level_ratio")
+with_reset = replacing(GpsMemory, "told_s", "moved_n_m", "moved_e_m")
+
+
+# -- what the filter says -------------------------------------------------------------------------------------
+class AlongAxis(NamedTuple):
+    """What the filter says along an axis, NED: position [m], velocity [m/s], and how far off the pad is [m, m2]."""
+
+    position_m: float
+    velocity_m_s: float
+    pad_off_m: float
+    pad_variance: float
+
 
 @equation
-def judge_gps(
-    reading: Reading, axis: int, position: bool, started: float, level_ratio: float, s: GpsSettings
-) -> tuple[int, float]:
-    """Verdict and variance of one axis: the white part of a fix's noise, and a share of the accuracy that it states.
+def along_axis(work: Work, lanes: Lanes, axis: int, lane: int) -> AlongAxis:
+    """What the filter says along an axis of a lane."""
+    position_m = of_lane(work, lanes, STATE + POSITION + axis, lane)
+    both = variance_of(work, lanes, POSITION + axis, lane) + variance_of(work, lanes, PAD + axis, lane)
+    variance = both - 2.0 * covariance_of(work, lanes, PAD + axis, POSITION + axis, lane)
+    return AlongAxis(
+        position_m,
+        of_lane(work, lanes, STATE + VELOCITY + axis, lane),
+        of_lane(work, lanes, STATE + PAD + axis, lane) - position_m,
+        larger(variance, LEAST_PAD_VARIANCE_M2),
+    )
 
-    North and east come of one fix, and a jump along one axis spoils both.
+
+MEMORY.derive(AlongAxis, along_axis, "axis")
+
+
+# -- one axis of a fix ----------------------------------------------------------------------------------------
+@on_lanes
+def judge_fix(
+    reading: Reading, start: StartMemory, m: GpsMemory, *, axis: int, position: bool, alone: bool, s: GpsSettings
+) -> Offer:
+    """One axis of a fix: the variance is the white part of its noise, and a share of the accuracy that it states.
+
+    North and east come of one fix, and a jump along one axis spoils both; alone: whatever the other axis says.
     """
-    value = reading.value_0 if axis == 0 else (reading.value_1 if axis == 1 else reading.value_2)
-    stated = reading.variance_0 if axis == 0 else (reading.variance_1 if axis == 1 else reading.variance_2)
+    value, stated = component_of(reading, axis)
     white_position = s.gps_white_sigma_down_m if axis == 2 else s.gps_white_sigma_m
     white_velocity = s.gps_velocity_white_down_m_s if axis == 2 else s.gps_velocity_white_m_s
     white = white_position if position else white_velocity
     share = s.gps_white_share * s.gps_white_share * (stated if np.isfinite(stated) else 0.0)
     variance = white * white + share
-    reason = usable(reading, value, variance, started)
-    spoilt = reason == FUSED and axis < 2 and level_ratio > 1.0
-    return INNOVATION_GATE if spoilt else reason, variance
+    reason = usable(reading, value, variance, start.started)
+    spoilt = reason == FUSED and axis < 2 and m.level_ratio > 1.0 and not alone
+    return Offer(value, variance, INNOVATION_GATE if spoilt else reason)
 
 
+@equation
+def test_ratio(tested: Tested, gate_sigma: float) -> float:
+    """The square of the innovation over what the gate lets pass."""
+    return tested.innovation * tested.innovation / (gate_sigma * gate_sigma * tested.total)
+
+
+@on_lanes
+def compare_level(tested: Tested, m: GpsMemory, *, axis: int, s: GpsSettings) -> GpsMemory:
+    """The larger test ratio of north and east, once both are compared; 0 where the fix cannot be offered."""
+    before = m.level_ratio if axis > 0 else 0.0
+    ratio = test_ratio(tested, s.gate_sigma)
+    return with_ratio(m, level_ratio=ratio if tested.reason == FUSED and ratio > before else before)
+
+
+@on_lanes
+def smooth_force(steady: SteadyForce) -> Force:
+    """A receiver's lag is of the motion, not of the vibration."""
+    return Force(steady.north_m_s2, steady.east_m_s2, steady.down_m_s2)
+
+
+# -- a fix that is refused ------------------------------------------------------------------------------------
 @equation
 def judge_rejections(
     refused: bool, soon: bool, t_s: float, m: RejectionMemory, s: GpsSettings
@@ -88,145 +123,108 @@ def judge_rejections(
     return reset, RejectionMemory(count if refused and not reset else 0.0, since_s)
 
 
+@equation
+def gone_to_gps(
+    value: float, noise: float, axis: int, position: bool, goes: bool, s: GpsSettings
+) -> tuple[Reset, Reset, Reset]:
+    """A state goes to the fix, and the fix's lasting errors are forgotten: a position's two, or a velocity's."""
+    slow = s.gps_slow_sigma_down_m if axis == 2 else s.gps_slow_sigma_m
+    fast = s.gps_fast_sigma_down_m if axis == 2 else s.gps_fast_sigma_m
+    velocity = s.gps_velocity_sigma_down_m_s if axis == 2 else s.gps_velocity_sigma_m_s
+    first = slow if position else velocity
+    lasting = slow * slow + fast * fast if position else velocity * velocity
+    return (
+        Reset((GPS_SLOW if position else GPS_VELOCITY) + axis if goes else -1, 0.0, first * first),
+        Reset(GPS_FAST + axis if goes and position else -1, 0.0, fast * fast),
+        Reset((POSITION if position else VELOCITY) + axis if goes else -1, value, lasting + noise),
+    )
+
+
+class FixFate(NamedTuple):
+    """What follows from the fate of a fix along an axis. pad_goes: the pad is tied to the vehicle anew."""
+
+    rejection: RejectionMemory
+    gps: GpsMemory
+    goes: tuple[Reset, Reset, Reset]
+    told: Event
+    pad: Reset
+    tie: Offer
+    pad_goes: bool
+
+
+@on_lanes
+def judge_fate(
+    tested: Tested, reading: Reading, along: AlongAxis, flow: FlowMemory, pad: PadMemory, m: RejectionMemory,
+    gps: GpsMemory, *, t_s: float, axis: int, position: bool, s: GpsSettings,
+) -> FixFate:  # fmt: skip
+    """After the test: where GPS has been refused again and again for a state, the filter is wrong: it goes to GPS.
+
+    An axis that is refused for the other's sake alone does not count. Where the position goes, the pad goes along:
+    flow, which nobody doubts, tells how far it is from there.
+    """
+    value, _ = component_of(reading, axis)
+    heard = reading.arrived > 0.0
+    doubted = flow.doubted > 0.0 or bool(np.isfinite(flow.wrong_s))
+    refused = tested.reason == INNOVATION_GATE and test_ratio(tested, s.gate_sigma) > 1.0
+    reset, after = judge_rejections(refused, doubted or not position, t_s, m, s)
+    goes = heard and reset
+    by = value - (along.position_m if position else along.velocity_m_s)
+    moved = by if goes and position else 0.0  # whether GPS jumped or the filter was wrong, nobody knows
+    pad_goes = goes and position and not doubted and pad.known > 0.0
+    return FixFate(
+        after if heard else m,
+        with_reset(
+            gps,
+            told_s=t_s if axis < 2 and tested.reason == FUSED else gps.told_s,
+            moved_n_m=gps.moved_n_m + (moved if axis == 0 else 0.0),
+            moved_e_m=gps.moved_e_m + (moved if axis == 1 else 0.0),
+        ),
+        gone_to_gps(value, tested.variance, axis, position, goes, s),
+        Event(GPS_RESET if goes else -1, by),
+        Reset(PAD + axis if pad_goes else -1, value + along.pad_off_m, UNKNOWN_PAD_M * UNKNOWN_PAD_M),
+        Offer(
+            along.pad_off_m if pad_goes else 0.0,
+            along.pad_variance if pad_goes else 1.0,
+            FUSED if pad_goes else SILENT,
+        ),
+        pad_goes,
+    )
+
+
+# -- the way of a fix -------------------------------------------------------------------------------------------
 @procedure
 def take_gps(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
     """Position or velocity with its lasting errors; where it is refused for long, a reset."""
     s = load_gps_settings(p)
     position = sensor == Sensor.GPS_POSITION
-    note_level_ratio(work, lanes, position, s)
+    if not position:
+        smooth_force(work, lanes)
+    for axis in range(2):
+        offer_axis(work, lanes, axis, position, True, s)
+        expect(work, lanes, states_of(lanes), True)
+        compare_level(work, lanes, axis, s)
     for axis in range(3):
-        place = OF_GPS + axis + (0 if position else 3)
+        state = axis if position else 3 + axis
         offer_axis(work, lanes, axis, position, False, s)
-        scale_noise(work, lanes, place)
+        scale_noise(work, lanes, OF_GPS + state)
         if position:
             sign_drift(work, lanes, t_s, axis)
         conclude(work, lanes, t_s, sensor, axis, s.gate_sigma, o)
-        follow_noise(work, lanes, t_s, place, s.gate_sigma)
+        follow_noise(work, lanes, t_s, OF_GPS + state, s.gate_sigma)
         if axis < 2:
             note_aid(work, lanes, t_s, o)
-            for lane in range(len(lanes)):
-                before_s = work[GPS_FUSED * len(lanes) + lane]
-                work[GPS_FUSED * len(lanes) + lane] = t_s if work[REASON * len(lanes) + lane] == FUSED else before_s
         elif position:
             note_height(work, lanes, t_s)
-        mind_rejections(work, lanes, t_s, axis, position, s, o)
+        if judge_fate(work, lanes, t_s, axis, position, s, state, o):
+            pad_below(work, lanes, axis)
+            fuse_offered(work, lanes, s.gate_sigma, o)
 
 
 @procedure
 def offer_axis(work: Work, lanes: Lanes, axis: int, position: bool, alone: bool, s: GpsSettings) -> None:
-    """One axis of a fix, judged and put before its law. alone: whatever the other axes say."""
-    for lane in range(len(lanes)):
-        reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
-        value = reading.value_0 if axis == 0 else (reading.value_1 if axis == 1 else reading.value_2)
-        ratio = 0.0 if alone else work[LEVEL_RATIO * len(lanes) + lane]
-        reason, variance = judge_gps(reading, axis, position, started, ratio, s)
-        put(work, lanes, lane, value, variance, reason)
+    """One axis of a fix, judged and put before its law."""
+    judge_fix(work, lanes, axis, position, alone, s)
     if position:
         gps_position(work, lanes, axis, s.gps_forward_m, s.gps_right_m, s.gps_below_m)
     else:
-        for lane in range(len(lanes)):  # the receiver's lag is of the motion, not of the vibration
-            steady = work[(STEADY_FORCE + axis) * len(lanes) + lane]
-            work[(FORCE + axis) * len(lanes) + lane] = steady
         gps_velocity(work, lanes, axis, s.gps_forward_m, s.gps_right_m, s.gps_below_m)
-
-
-@procedure
-def note_level_ratio(work: Work, lanes: Lanes, position: bool, s: GpsSettings) -> None:
-    """LEVEL_RATIO: the larger test ratio of north and east, 0 where the fix cannot be offered."""
-    for lane in range(len(lanes)):
-        work[LEVEL_RATIO * len(lanes) + lane] = 0.0
-    for axis in range(2):
-        offer_axis(work, lanes, axis, position, True, s)
-        for lane in range(len(lanes)):
-            work[OFFERED * len(lanes) + lane] = 0.0
-        expect(work, lanes, states_of(lanes), True)
-        for lane in range(len(lanes)):
-            innovation = work[INNOVATION * len(lanes) + lane]
-            variance = work[INNOVATION_VARIANCE * len(lanes) + lane]
-            ratio = innovation * innovation / (s.gate_sigma * s.gate_sigma * variance)
-            judged = work[REASON * len(lanes) + lane] == FUSED
-            before = work[LEVEL_RATIO * len(lanes) + lane]
-            work[LEVEL_RATIO * len(lanes) + lane] = ratio if judged and ratio > before else before
-
-
-@procedure
-def mind_rejections(work: Work, lanes: Lanes, t_s: float, axis: int, position: bool, s: GpsSettings, o: Output) -> None:
-    """Where GPS has been refused again and again for a state, the filter is wrong: that state goes to GPS.
-
-    An axis that is refused for the other's sake alone does not count.
-    """
-    place = axis if position else 3 + axis
-    moved = False
-    for lane in range(len(lanes)):
-        ratio = work[INNOVATION * len(lanes) + lane] ** 2
-        ratio /= s.gate_sigma * s.gate_sigma * work[INNOVATION_VARIANCE * len(lanes) + lane]
-        refused = work[REASON * len(lanes) + lane] == INNOVATION_GATE and ratio > 1.0
-        heard = load_reading(work, lanes, lane).arrived > 0.0
-        memory = load_rejection(work, lanes, place, lane)
-        flow = load_flow(work, lanes, lane)
-        doubted = flow.doubted > 0.0 or np.isfinite(flow.wrong_s)
-        reset, after = judge_rejections(refused, doubted or not position, t_s, memory, s)
-        if heard:
-            store_rejection(work, lanes, place, lane, after)
-        work[PAD_BESIDE * len(lanes) + lane] = np.nan
-        if heard and reset:
-            if position and not doubted and work[PAD_KNOWN * len(lanes) + lane] > 0.0:
-                note_pad(work, lanes, lane, axis)
-                moved = True
-            go_to_gps(work, lanes, lane, t_s, axis, position, s, o)
-    if moved:
-        take_pad_along(work, lanes, axis, s, o)
-
-
-@equation
-def note_pad(work: Work, lanes: Lanes, lane: int, axis: int) -> None:
-    """PAD_BESIDE: where the pad is from the vehicle along an axis, and the variance of that."""
-    beside = work[(STATE + PAD + axis) * len(lanes) + lane] - work[(STATE + POSITION + axis) * len(lanes) + lane]
-    both = variance_of(work, lanes, POSITION + axis, lane) + variance_of(work, lanes, PAD + axis, lane)
-    variance = both - 2.0 * covariance_of(work, lanes, PAD + axis, POSITION + axis, lane)
-    work[PAD_BESIDE * len(lanes) + lane] = beside
-    work[(PAD_BESIDE + 1) * len(lanes) + lane] = larger(variance, LEAST_PAD_VARIANCE_M2)
-
-
-@procedure
-def take_pad_along(work: Work, lanes: Lanes, axis: int, s: GpsSettings, o: Output) -> None:
-    """Where the position went to GPS, the pad goes along: flow, which nobody doubts, tells how far it is from there."""
-    for lane in range(len(lanes)):
-        beside, pad = work[PAD_BESIDE * len(lanes) + lane], STATE + PAD + axis
-        goes = np.isfinite(beside)
-        if goes:
-            work[pad * len(lanes) + lane] = work[(STATE + POSITION + axis) * len(lanes) + lane] + beside
-            reset_state(work, lanes, lane, PAD + axis, UNKNOWN_PAD_M * UNKNOWN_PAD_M, o)
-        variance = work[(PAD_BESIDE + 1) * len(lanes) + lane]
-        put(work, lanes, lane, beside if goes else 0.0, variance if goes else 1.0, FUSED if goes else SILENT)
-    pad_below(work, lanes, axis)
-    fuse_offered(work, lanes, s.gate_sigma, o)
-
-
-@procedure
-def go_to_gps(
-    work: Work, lanes: Lanes, lane: int, t_s: float, axis: int, position: bool, s: GpsSettings, o: Output
-) -> None:
-    """One state of one lane goes to the fix, its lasting errors are forgotten."""
-    reading = load_reading(work, lanes, lane)
-    value = reading.value_0 if axis == 0 else (reading.value_1 if axis == 1 else reading.value_2)
-    noise = work[NOISE * len(lanes) + lane]
-    if position:
-        slow = s.gps_slow_sigma_down_m if axis == 2 else s.gps_slow_sigma_m
-        fast = s.gps_fast_sigma_down_m if axis == 2 else s.gps_fast_sigma_m
-        work[(STATE + GPS_SLOW + axis) * len(lanes) + lane] = 0.0
-        work[(STATE + GPS_FAST + axis) * len(lanes) + lane] = 0.0
-        reset_state(work, lanes, lane, GPS_SLOW + axis, slow * slow, o)
-        reset_state(work, lanes, lane, GPS_FAST + axis, fast * fast, o)
-        reset_state(work, lanes, lane, POSITION + axis, slow * slow + fast * fast + noise, o)
-    else:
-        lasting = s.gps_velocity_sigma_down_m_s if axis == 2 else s.gps_velocity_sigma_m_s
-        work[(STATE + GPS_VELOCITY + axis) * len(lanes) + lane] = 0.0
-        reset_state(work, lanes, lane, GPS_VELOCITY + axis, lasting * lasting, o)
-        reset_state(work, lanes, lane, VELOCITY + axis, lasting * lasting + noise, o)
-    state = STATE + (POSITION if position else VELOCITY) + axis
-    before = work[state * len(lanes) + lane]
-    work[state * len(lanes) + lane] = value
-    if position and axis < 2:  # whether GPS jumped or the filter was wrong, nobody knows
-        work[(GPS_MOVED + axis) * len(lanes) + lane] += value - before
-    write_event(lanes, lane, t_s, GPS_RESET, value - before, o)

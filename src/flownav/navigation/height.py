@@ -6,45 +6,43 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure, smaller
-from flownav.estimation.covariance import expect, variance_of
+from flownav.compile import Lanes, Work, equation, procedure, replacing, smaller
+from flownav.estimation.covariance import expect
 from flownav.estimation.hypotheses import RANGE_OFFSET, sign_all
 from flownav.estimation.laws.height import baro_altitude, range_along_boresight
-from flownav.estimation.motion import rotation_of
-from flownav.estimation.states import (
-    BARO,
-    GROUND,
-    INNOVATION,
-    INNOVATION_VARIANCE,
-    NOISE,
-    OFFERED,
-    POSITION,
-    STATE,
-    STATES,
-    VELOCITY,
-)
-from flownav.navigation.journal import reset_state
-from flownav.navigation.memory import (
-    BARO_KNOWN,
-    REASON,
-    load_aid,
-    load_echo,
-    load_ground,
-    load_range,
-    load_reading,
-    load_start,
-    store_echo,
-    store_ground,
-    store_range,
-)
-from flownav.navigation.offers import conclude, fuse_offered, note_height, put, usable_in_flight
+from flownav.estimation.states import BARO, GROUND, STATES
+from flownav.navigation.offers import conclude, fuse_offered, note_height, usable_in_flight
 from flownav.navigation.packed import load_height_settings
 from flownav.navigation.reasons import DATUM, FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT, STUCK, TILTED
-from flownav.navigation.records import EchoMemory, GroundMemory, RangeMemory, Reading
-from flownav.navigation.tape import BARO_FOUND, GROUND_FOUND, GROUND_RESET, RANGE_STUCK, Output, write_event
+from flownav.navigation.records import (
+    AidMemory,
+    BaroMemory,
+    EchoMemory,
+    GroundMemory,
+    ImuMemory,
+    RangeMemory,
+    Reading,
+    StartMemory,
+)
+from flownav.navigation.tape import BARO_FOUND, GROUND_FOUND, GROUND_RESET, RANGE_STUCK, Output
 from flownav.navigation.told import HeightSettings
 from flownav.navigation.trust import OF_BARO, OF_RANGE, follow_noise, scale_noise, watch_whiteness
-from flownav.navigation.vibration import doubt_imu
+from flownav.navigation.verdicts import (
+    NO_EVENT,
+    NO_RESET,
+    Doubt,
+    Event,
+    Fate,
+    Height,
+    Noise,
+    Offer,
+    Offered,
+    Position,
+    Reset,
+    Tested,
+    on_lanes,
+)
+from flownav.navigation.vibration import doubted_imu
 
 UNKNOWN_M = 100.0
 DOUBTING_S = 0.05  # a range that alone tells the height and is refused so long is believed, not the accelerometer
@@ -62,12 +60,11 @@ SERVED_S = 1.0  # before it began to repeat itself, that a range was fused
 ALONE = 5.0  # times the travel, where nothing else tells the height
 
 
-class Height(NamedTuple):
-    """What the filter says of a lane's height: down and its speed's standard deviation, and R_33."""
-
-    pos_d_m: float
-    speed_sigma_m_s: float
-    upright: float
+with_value = replacing(RangeMemory, "last_m", "same_s", "down_m")
+with_report = replacing(RangeMemory, "said_s")
+with_taken = replacing(RangeMemory, "taken_s", "refused_s")
+with_refusal = replacing(RangeMemory, "refused_s", "doubted")
+without_candidate = replacing(GroundMemory, "candidate_m", "since_s", "first_m", "agreeing", "varied")
 
 
 @equation
@@ -103,7 +100,7 @@ def repeats(t_s: float, m: RangeMemory, height: Height, alone: bool, s: HeightSe
 
 
 @equation
-def judge_range(
+def range_verdict(
     reading: Reading, t_s: float, started: float, height: Height, alone: bool, m: RangeMemory, s: HeightSettings
 ) -> tuple[int, float, RangeMemory]:
     """Verdict, variance and what is remembered of one range [m] along the boresight."""
@@ -117,16 +114,7 @@ def judge_range(
     news = range_m != m.last_m
     stuck = reason == FUSED and not news and repeats(t_s, m, height, alone, s)
     variance = variance if news or alone else repeated_variance(variance, t_s - m.same_s)
-    heard = reason == FUSED
-    after = RangeMemory(
-        m.taken_s,
-        m.refused_s,
-        range_m if heard and news else m.last_m,
-        t_s if heard and news else m.same_s,
-        height.pos_d_m if heard and news else m.down_m,
-        m.said_s,
-        m.doubted,
-    )
+    after = with_value(m, last_m=range_m, same_s=t_s, down_m=height.pos_d_m) if reason == FUSED and news else m
     return STUCK if stuck else reason, variance, after
 
 
@@ -177,151 +165,199 @@ def judge_ground(below_m: float, range_m: float, t_s: float, alone: bool, g: Gro
     )
 
 
-@procedure
-def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
-    """Height over the ground below. Where range is refused for long, the ground has a step."""
-    s = load_height_settings(p)
-    for lane in range(len(lanes)):
-        reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
-        height = height_of(work, lanes, lane)
-        alone = t_s - load_aid(work, lanes, lane).height_s > s.height_hold_s
-        reason, variance, m = judge_range(reading, t_s, started, height, alone, load_range(work, lanes, lane), s)
-        if reason == STUCK and abs(height.pos_d_m - m.down_m) >= s.range_stuck_travel_m and m.said_s != m.same_s:
-            write_event(lanes, lane, t_s, RANGE_STUCK, reading.value_0, o)
-            m = RangeMemory(m.taken_s, m.refused_s, m.last_m, m.same_s, m.down_m, m.same_s, m.doubted)
-        store_range(work, lanes, lane, m)
-        if reason == FUSED:
-            echo = followed_echo(reading.value_0, height.pos_d_m, load_echo(work, lanes, lane))
-            store_echo(work, lanes, lane, echo)
-        if reason == FUSED and load_ground(work, lanes, lane).known == 0.0:
-            found = seek_ground(work, lanes, lane, t_s, reading, height, alone, s, GROUND_FOUND, o)
-            reason = FUSED if found else DATUM
-        put(work, lanes, lane, reading.value_0, variance, reason)
-    range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
-    scale_noise(work, lanes, OF_RANGE)
-    weigh_strays(work, lanes)
-    sign_all(work, lanes, RANGE_OFFSET, 1.0)
-    conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
-    watch_whiteness(work, lanes, t_s, 2)
-    follow_noise(work, lanes, t_s, OF_RANGE, s.gate_sigma)
-    again = False
-    for lane in range(len(lanes)):
-        again = mind_refusals(work, lanes, lane, t_s, s, o) or again
-    if again:  # the ground was found anew: the reading that said so is fused
-        range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
-        fuse_offered(work, lanes, s.gate_sigma, o)
+# -- the rangefinder's way --------------------------------------------------------------------------------------
+class Sought(NamedTuple):
+    """A ground that is sought: whether ranges agree on a new one, and then where it is."""
+
+    found: bool
+    ground: GroundMemory
+    reset: Reset
+    event: Event
 
 
-@procedure
-def weigh_strays(work: Work, lanes: Lanes) -> None:
-    """NOISE of a range among strays, in the lanes where there are any."""
-    any_strays = False
-    for lane in range(len(lanes)):
-        any_strays = any_strays or load_echo(work, lanes, lane).stray > FEW_STRAYS
-        work[OFFERED * len(lanes) + lane] = 0.0
-    if not any_strays:
-        return
-    expect(work, lanes, STATES, True)
-    for lane in range(len(lanes)):
-        stray = load_echo(work, lanes, lane).stray
-        innovation, total = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]
-        variance = work[NOISE * len(lanes) + lane]
-        weighed = stray_variance(innovation, total, variance, stray)
-        work[NOISE * len(lanes) + lane] = weighed if stray > FEW_STRAYS else variance
-
-
-@procedure
-def seek_ground(
-    work: Work, lanes: Lanes, lane: int, t_s: float, reading: Reading, height: Height, alone: bool, s: HeightSettings,
-    kind: np.int_, o: Output,
-) -> bool:  # fmt: skip
+@equation
+def sought_ground(
+    reading: Reading, t_s: float, height: Height, alone: bool, g: GroundMemory, kind: np.int_, s: HeightSettings
+) -> Sought:
     """Note a range that would mean a new ground; where enough agree, the ground is unknown but for the newest of them,
     which is about to be fused.
     """
     below_m = height.pos_d_m + (reading.value_0 + s.range_below_m) * height.upright
-    confirmed, g = judge_ground(below_m, reading.value_0, t_s, alone, load_ground(work, lanes, lane))
-    if confirmed:
-        work[(STATE + GROUND) * len(lanes) + lane] = below_m
-        reset_state(work, lanes, lane, GROUND, UNKNOWN_M * UNKNOWN_M, o)
-        write_event(lanes, lane, t_s, kind, below_m, o)
-        store_ground(work, lanes, lane, GroundMemory(1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
-        m = load_range(work, lanes, lane)
-        store_range(work, lanes, lane, RangeMemory(t_s, np.nan, m.last_m, m.same_s, m.down_m, m.said_s, m.doubted))
-    else:
-        store_ground(work, lanes, lane, g)
-    return bool(confirmed)
+    found, after = judge_ground(below_m, reading.value_0, t_s, alone, g)
+    return Sought(
+        found,
+        GroundMemory(1.0, 0.0, 0.0, 0.0, 0.0, 0.0) if found else after,
+        Reset(GROUND if found else -1, below_m, UNKNOWN_M * UNKNOWN_M),
+        Event(kind if found else -1, below_m),
+    )
 
 
-@equation
-def height_of(work: Work, lanes: Lanes, lane: int) -> Height:
-    """What the filter says of a lane's height."""
-    return Height(
-        work[(STATE + POSITION + 2) * len(lanes) + lane],
-        np.sqrt(variance_of(work, lanes, VELOCITY + 2, lane)),
-        rotation_of(work, lanes, lane)[8],
+class RangeVerdict(NamedTuple):
+    """What becomes of a range."""
+
+    range: RangeMemory
+    echo: EchoMemory
+    stuck: Event
+    ground: GroundMemory
+    reset: Reset
+    found: Event
+    offer: Offer
+
+
+@on_lanes
+def judge_range(
+    reading: Reading, start: StartMemory, height: Height, aid: AidMemory, m: RangeMemory, echo: EchoMemory,
+    g: GroundMemory, *, t_s: float, s: HeightSettings,
+) -> RangeVerdict:  # fmt: skip
+    """A range along the boresight: whether it may be fused, whether it is stuck, and the first ground that it finds."""
+    alone = t_s - aid.height_s > s.height_hold_s
+    reason, variance, m = range_verdict(reading, t_s, start.started, height, alone, m, s)
+    still = reason == STUCK and abs(height.pos_d_m - m.down_m) >= s.range_stuck_travel_m and m.said_s != m.same_s
+    m = with_report(m, said_s=m.same_s) if still else m
+    heard = reason == FUSED
+    echo = followed_echo(reading.value_0, height.pos_d_m, echo) if heard else echo
+    sought = sought_ground(reading, t_s, height, alone, g, GROUND_FOUND, s)
+    seeks = heard and g.known == 0.0
+    found = seeks and sought.found
+    return RangeVerdict(
+        with_taken(m, taken_s=t_s, refused_s=np.nan) if found else m,
+        echo,
+        Event(RANGE_STUCK if still else -1, reading.value_0),
+        sought.ground if seeks else g,
+        sought.reset if found else NO_RESET,
+        sought.event if found else NO_EVENT,
+        Offer(reading.value_0, variance, DATUM if seeks and not found else reason),
+    )
+
+
+class Strays(NamedTuple):
+    """Whether there are strays in any lane; nothing is offered while they are weighed."""
+
+    offered: Offered
+    any: bool
+
+
+@on_lanes
+def look_for_strays(echo: EchoMemory) -> Strays:
+    """Whether strays are so many that a range must be weighed."""
+    return Strays(Offered(0.0), echo.stray > FEW_STRAYS)
+
+
+@on_lanes
+def weighed_range(tested: Tested, echo: EchoMemory) -> Noise:
+    """The variance of a range among strays."""
+    weighed = stray_variance(tested.innovation, tested.total, tested.variance, echo.stray)
+    return Noise(weighed if echo.stray > FEW_STRAYS else tested.variance)
+
+
+class Refusal(NamedTuple):
+    """What follows from the fate of a range. again: the ground was found anew, and the reading is offered once more."""
+
+    fate: Fate
+    range: RangeMemory
+    ground: GroundMemory
+    imu: ImuMemory
+    doubts: tuple[Doubt, Doubt, Doubt]
+    doubted: Event
+    reset: Reset
+    found: Event
+    again: bool
+
+
+@on_lanes
+def judge_refusal(
+    tested: Tested, reading: Reading, height: Height, aid: AidMemory, m: RangeMemory, echo: EchoMemory,
+    g: GroundMemory, imu: ImuMemory, *, t_s: float, s: HeightSettings,
+) -> Refusal:  # fmt: skip
+    """After the test: a range that is refused first makes the accelerometer doubted, then the ground new.
+
+    A streak of refusals ends where the sensor says something else. The ground is found anew where ranges agree on it
+    for long, and where they do not, its candidate is followed.
+    """
+    fused, refused = tested.reason == FUSED, tested.reason == INNOVATION_GATE
+    strays = echo.stray > MANY_STRAYS
+    since_s = m.refused_s if np.isfinite(m.refused_s) else t_s
+    doubted_before = m.doubted if np.isfinite(m.refused_s) else 0.0
+    lasting_s = t_s - since_s
+    alone = t_s - aid.height_s > s.height_hold_s
+    doubts = refused and alone and doubted_before == 0.0 and not strays and lasting_s >= DOUBTING_S
+    by_m = tested.innovation if doubts else 0.0
+    imu_after, doubt_event, freed = doubted_imu(by_m, doubts, imu)  # once: at each, a short echo would be believed too
+    sought = sought_ground(reading, t_s, height, False, g, GROUND_RESET, s)
+    seeks = refused and g.known > 0.0 and not strays
+    again = seeks and lasting_s >= s.ground_reset_s and sought.found
+    waits = seeks and (lasting_s < s.ground_reset_s or not sought.found)
+    ends = fused or tested.reason == OUT_OF_RANGE
+    ground = without_candidate(g, 0.0, 0.0, 0.0, 0.0, 0.0) if ends else g
+    below_m = height.pos_d_m + (reading.value_0 + s.range_below_m) * height.upright
+    followed = judge_ground(below_m, reading.value_0, t_s, False, g)[1]
+    after = with_taken(m, taken_s=t_s if fused else m.taken_s, refused_s=np.nan) if ends else m
+    after = with_refusal(m, refused_s=since_s, doubted=1.0 if doubts else doubted_before) if refused else after
+    return Refusal(
+        Fate(FUSED if again else SILENT),
+        with_taken(after, taken_s=t_s, refused_s=np.nan) if again else after,
+        sought.ground if again else (followed if waits else ground),
+        imu_after,
+        freed,
+        doubt_event,
+        sought.reset if again else NO_RESET,
+        sought.event if again else NO_EVENT,
+        again,
     )
 
 
 @procedure
-def mind_refusals(work: Work, lanes: Lanes, lane: int, t_s: float, s: HeightSettings, o: Output) -> bool:
-    """After the test: a range that is refused first makes the accelerometer doubted, then the ground new.
-
-    A streak of refusals ends where the sensor says something else. True where the ground of this lane was found anew,
-    and the reading is to be offered once more.
-    """
-    reason = work[REASON * len(lanes) + lane]
-    m, g = load_range(work, lanes, lane), load_ground(work, lanes, lane)
-    work[REASON * len(lanes) + lane] = SILENT  # of the second offer, unless the ground is new
-    if reason == FUSED or reason == OUT_OF_RANGE:  # noqa: SIM109
-        taken_s = t_s if reason == FUSED else m.taken_s
-        store_range(work, lanes, lane, RangeMemory(taken_s, np.nan, m.last_m, m.same_s, m.down_m, m.said_s, m.doubted))
-        store_ground(work, lanes, lane, GroundMemory(g.known, 0.0, 0.0, 0.0, 0.0, 0.0))
-    if reason != INNOVATION_GATE:
-        return False
-    first = not np.isfinite(m.refused_s)
-    since_s = t_s if first else m.refused_s
-    doubted = 0.0 if first else m.doubted
-    alone = t_s - load_aid(work, lanes, lane).height_s > s.height_hold_s
-    strays = load_echo(work, lanes, lane).stray > MANY_STRAYS
-    if alone and doubted == 0.0 and not strays and t_s - since_s >= DOUBTING_S:
-        doubt_imu(work, lanes, lane, t_s, work[INNOVATION * len(lanes) + lane], o)
-        doubted = 1.0  # once: doubted at each reading, a short echo would be believed too
-    store_range(work, lanes, lane, RangeMemory(m.taken_s, since_s, m.last_m, m.same_s, m.down_m, m.said_s, doubted))
-    if g.known == 0.0 or strays:
-        return False
-    reading, height = load_reading(work, lanes, lane), height_of(work, lanes, lane)
-    if t_s - since_s < s.ground_reset_s:
-        below_m = height.pos_d_m + (reading.value_0 + s.range_below_m) * height.upright
-        store_ground(work, lanes, lane, judge_ground(below_m, reading.value_0, t_s, False, g)[1])
-        return False
-    found = seek_ground(work, lanes, lane, t_s, reading, height, False, s, GROUND_RESET, o)
-    if found:
-        work[REASON * len(lanes) + lane] = FUSED
-    return found
+def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
+    """Height over the ground below. Where range is refused for long, the ground has a step."""
+    s = load_height_settings(p)
+    judge_range(work, lanes, t_s, s, o)
+    range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
+    scale_noise(work, lanes, OF_RANGE)
+    if look_for_strays(work, lanes):
+        expect(work, lanes, STATES, True)
+        weighed_range(work, lanes)
+    sign_all(work, lanes, RANGE_OFFSET, 1.0)
+    conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
+    watch_whiteness(work, lanes, t_s, 2)
+    follow_noise(work, lanes, t_s, OF_RANGE, s.gate_sigma)
+    if judge_refusal(work, lanes, t_s, s, o):  # the ground was found anew: the reading that said so is fused
+        range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
+        fuse_offered(work, lanes, s.gate_sigma, o)
 
 
-@equation
-def judge_baro(reading: Reading, started: float, s: HeightSettings) -> tuple[int, float]:
-    """Verdict and variance of a pressure altitude [m]."""
+# -- the barometer's way ----------------------------------------------------------------------------------------
+class BaroVerdict(NamedTuple):
+    """What becomes of a pressure height."""
+
+    baro: BaroMemory
+    reset: Reset
+    found: Event
+    offer: Offer
+
+
+@on_lanes
+def judge_baro(
+    reading: Reading, start: StartMemory, position: Position, m: BaroMemory, *, s: HeightSettings
+) -> BaroVerdict:
+    """Height from pressure [m]; the first reading finds the offset."""
     stated = reading.variance_0
     variance = stated if np.isfinite(stated) else s.baro_sigma_m * s.baro_sigma_m
-    return usable_in_flight(reading, reading.value_0, variance, started), variance
+    reason = usable_in_flight(reading, reading.value_0, variance, start.started)
+    first = reason == FUSED and m.known == 0.0
+    offset_m = reading.value_0 + position.down_m
+    return BaroVerdict(
+        BaroMemory(1.0 if first else m.known),
+        Reset(BARO if first else -1, offset_m, UNKNOWN_M * UNKNOWN_M),
+        Event(BARO_FOUND if first else -1, offset_m),
+        Offer(reading.value_0, variance, reason),
+    )
 
 
 @procedure
 def take_baro(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
-    """Height from pressure; the first reading finds the offset."""
+    """Height from pressure."""
     s = load_height_settings(p)
-    for lane in range(len(lanes)):
-        reading, started = load_reading(work, lanes, lane), load_start(work, lanes, lane).started
-        reason, variance = judge_baro(reading, started, s)
-        if reason == FUSED and work[BARO_KNOWN * len(lanes) + lane] == 0.0:
-            offset = reading.value_0 + work[(STATE + POSITION + 2) * len(lanes) + lane]
-            work[(STATE + BARO) * len(lanes) + lane] = offset
-            reset_state(work, lanes, lane, BARO, UNKNOWN_M * UNKNOWN_M, o)
-            work[BARO_KNOWN * len(lanes) + lane] = 1.0
-            write_event(lanes, lane, t_s, BARO_FOUND, offset, o)
-        put(work, lanes, lane, reading.value_0, variance, reason)
+    judge_baro(work, lanes, t_s, s, o)
     baro_altitude(work, lanes, 0)
     scale_noise(work, lanes, OF_BARO)
     conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)

@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure
-from flownav.estimation.states import ACCEL_NOISE, FORCE, GYRO_NOISE, IMU
-from flownav.navigation.memory import (
-    CLOCK,
-    MOVING,
-    OWED,
-    SPENT,
-    STEADY_FORCE,
-    load_imu,
-    load_reading,
-    load_start,
-    shared,
-    store_imu,
+from flownav.compile import equation, replacing
+from flownav.navigation.records import (
+    ImuMemory,
+    MotionStep,
+    OwedMotion,
+    Reading,
+    SpentMotion,
+    StartMemory,
+    SteadyForce,
 )
-from flownav.navigation.records import ImuMemory, Reading
-from flownav.navigation.tape import IMU_LOST, Output, write_event
-from flownav.navigation.told import Equipment, ImuSettings
-from flownav.navigation.trust import accel_factors
+from flownav.navigation.tape import IMU_LOST
+from flownav.navigation.told import ImuSettings
+from flownav.navigation.trust import AccelFactors
+from flownav.navigation.verdicts import AppliedMotion, Event, Force, MotionNoise, on_lanes
 from flownav.navigation.vibration import followed_vibration, with_reading
 
 LEAST_STEP_S = 0.002  # a shorter step is not made to pay what is owed
 STEADY_S = 0.1
+with_motion = replacing(ImuMemory, "vibration", "gap")
 Motion = tuple[float, float, float, float, float, float]  # body rate [rad/s] and specific force [m/s2], body FRD
 
 
@@ -66,82 +65,99 @@ def motion_between(before: Motion, now: Motion, integrates: float) -> Motion:
     )
 
 
-@procedure
-def choose_motion(
-    work: Work, lanes: Lanes, t_s: float, heard: bool, fitted: Equipment, s: ImuSettings, o: Output
-) -> None:
-    """MOVING, and the IMU's rows, for the step to t_s: the readings at its ends, the newest reading, or none.
+class Paid(NamedTuple):
+    """One axis of a step: what moves the filter, and what of it is spent and owed after it."""
 
-    heard: an inertial reading is at hand. After a gap it knows nothing of the gap, which is coasted. Where no time
-    passes there is no gap.
-    """
-    step_s = t_s - shared(work, lanes, CLOCK)
-    for lane in range(len(lanes)):
-        m, started = load_imu(work, lanes, lane), load_start(work, lanes, lane).started > 0.0
-        fresh = fitted.use_imu and t_s - m.read_s <= s.imu_stale_s
-        reading = load_reading(work, lanes, lane)
-        now = heard and sound(reading)
-        if now and not fresh and np.isfinite(m.read_s) and started:
-            write_event(lanes, lane, t_s, IMU_LOST, t_s - m.read_s, o)
-        between = motion_between(remembered(m), said_by(reading), s.imu_integrates)
-        moving = fresh and started
-        pay(work, lanes, lane, step_s, t_s - m.read_s, now, moving, between, remembered(m))
-        vibration = followed_vibration(reading, m, t_s - m.read_s) if now and fresh else m.vibration
-        work[MOVING * len(lanes) + lane] = 1.0 if moving else 0.0
-        told = accel_factors(work, lanes, lane)[0] * s.accel_noise_m_s2_rt_hz
-        accel = told if moving else s.coasting_accel_m_s2_rt_hz
-        gyro = s.gyro_noise_rad_s_rt_hz if moving else s.coasting_rate_rad_s_rt_hz
-        work[ACCEL_NOISE * len(lanes) + lane] = accel * accel
-        work[GYRO_NOISE * len(lanes) + lane] = gyro * gyro
-        gap = 1.0 if step_s > 0.0 and started and not moving else m.gap
-        store_imu(
-            work, lanes, lane,
-            ImuMemory(
-                m.read_s, m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z, vibration, m.doubt_m_s2, gap
-            ),
-        )  # fmt: skip
+    value: float
+    spent: float
+    owed: float
 
 
 @equation
-def pay(
-    work: Work, lanes: Lanes, lane: int, step_s: float, period_s: float, now: bool, moving: bool, between: Motion,
-    held: Motion,
-) -> None:  # fmt: skip
-    """The IMU's rows of one lane for a step of step_s, such that the integral over each inertial period is as read.
+def paid(
+    between: float, held: float, spent: float, owed: float, step_s: float, period_s: float, now: bool, moving: bool
+) -> Paid:
+    """What moves the filter over step_s such that the integral over each inertial period is as read.
 
     Between two inertial readings the filter stops at other sensors' instants, moved there by the reading that it holds.
     What that spent is taken off what the next reading says of its whole period, and the rest is paid over the rest of
     the period, or, where that is too short, over the step after it. Without this, vibration that an IMU integrates
     over its period would enter the velocity cut into pieces, as a random walk.
     """
-    payable = step_s >= LEAST_STEP_S
-    for i in range(6):
-        spent = work[(SPENT + i) * len(lanes) + lane] if moving else 0.0
-        owed = work[(OWED + i) * len(lanes) + lane] if moving else 0.0
-        usual = between[i] if now else held[i]
-        total = between[i] * period_s - spent + owed if now else usual * step_s + owed
-        value = total / step_s if payable and moving else usual
-        left = total - value * step_s
-        work[(IMU + i) * len(lanes) + lane] = value
-        work[(OWED + i) * len(lanes) + lane] = left if moving else 0.0
-        work[(SPENT + i) * len(lanes) + lane] = 0.0 if now or not moving else spent + usual * step_s
+    spent = spent if moving else 0.0
+    owed = owed if moving else 0.0
+    usual = between if now else held
+    total = between * period_s - spent + owed if now else usual * step_s + owed
+    value = total / step_s if step_s >= LEAST_STEP_S and moving else usual
+    left = total - value * step_s
+    return Paid(value, 0.0 if now or not moving else spent + usual * step_s, left if moving else 0.0)
 
 
-@procedure
-def steady_force(work: Work, lanes: Lanes, dt_s: float) -> None:
-    """STEADY_FORCE follows the specific force of the step that was just made."""
+class StepMotion(NamedTuple):
+    """What moves the filter over a step, and how sure that is."""
+
+    step: MotionStep
+    applied: AppliedMotion
+    spent: SpentMotion
+    owed: OwedMotion
+    noise: MotionNoise
+    imu: ImuMemory
+    lost: Event
+
+
+@on_lanes
+def judge_motion(
+    reading: Reading, start: StartMemory, m: ImuMemory, spent: SpentMotion, owed: OwedMotion, doubt: AccelFactors, *,
+    t_s: float, step_s: float, heard: bool, use_imu: bool, s: ImuSettings,
+) -> StepMotion:  # fmt: skip
+    """What moves the filter over the step to t_s: the readings at its ends, the newest reading, or none.
+
+    heard: an inertial reading is at hand. After a gap it knows nothing of the gap, which is coasted. Where no time
+    passes there is no gap.
+    """
+    started = start.started > 0.0
+    period_s = t_s - m.read_s
+    fresh = use_imu and period_s <= s.imu_stale_s
+    now = heard and sound(reading)
+    loses = now and not fresh and np.isfinite(m.read_s) and started
+    held = remembered(m)
+    between = motion_between(held, said_by(reading), s.imu_integrates)
+    moving = fresh and started
+    p = paid(between[0], held[0], spent.gyro_x, owed.gyro_x, step_s, period_s, now, moving)
+    q = paid(between[1], held[1], spent.gyro_y, owed.gyro_y, step_s, period_s, now, moving)
+    r = paid(between[2], held[2], spent.gyro_z, owed.gyro_z, step_s, period_s, now, moving)
+    x = paid(between[3], held[3], spent.accel_x, owed.accel_x, step_s, period_s, now, moving)
+    y = paid(between[4], held[4], spent.accel_y, owed.accel_y, step_s, period_s, now, moving)
+    z = paid(between[5], held[5], spent.accel_z, owed.accel_z, step_s, period_s, now, moving)
+    accel = doubt.level * s.accel_noise_m_s2_rt_hz if moving else s.coasting_accel_m_s2_rt_hz
+    gyro = s.gyro_noise_rad_s_rt_hz if moving else s.coasting_rate_rad_s_rt_hz
+    return StepMotion(
+        MotionStep(1.0 if moving else 0.0),
+        AppliedMotion(p.value, q.value, r.value, x.value, y.value, z.value),
+        SpentMotion(p.spent, q.spent, r.spent, x.spent, y.spent, z.spent),
+        OwedMotion(p.owed, q.owed, r.owed, x.owed, y.owed, z.owed),
+        MotionNoise(accel * accel, gyro * gyro),
+        with_motion(
+            m,
+            vibration=followed_vibration(reading, m, period_s) if now and fresh else m.vibration,
+            gap=1.0 if step_s > 0.0 and started and not moving else m.gap,
+        ),
+        Event(IMU_LOST if loses else -1, period_s),
+    )
+
+
+@on_lanes
+def steady_force(before: SteadyForce, force: Force, *, dt_s: float) -> SteadyForce:
+    """The specific force of the step that was just made, followed."""
     share = dt_s / (STEADY_S + dt_s)
-    for i in range(3):
-        for lane in range(len(lanes)):
-            before = work[(STEADY_FORCE + i) * len(lanes) + lane]
-            force = work[(FORCE + i) * len(lanes) + lane]
-            work[(STEADY_FORCE + i) * len(lanes) + lane] = before + share * (force - before)
+    return SteadyForce(
+        before.north_m_s2 + share * (force.north_m_s2 - before.north_m_s2),
+        before.east_m_s2 + share * (force.east_m_s2 - before.east_m_s2),
+        before.down_m_s2 + share * (force.down_m_s2 - before.down_m_s2),
+    )
 
 
-@procedure
-def keep_imu(work: Work, lanes: Lanes, t_s: float) -> None:
+@on_lanes
+def keep_imu(reading: Reading, start: StartMemory, m: ImuMemory, *, t_s: float) -> ImuMemory:
     """The reading at hand stands for what follows, until the next."""
-    for lane in range(len(lanes)):
-        reading, m = load_reading(work, lanes, lane), load_imu(work, lanes, lane)
-        if sound(reading) and load_start(work, lanes, lane).started > 0.0:
-            store_imu(work, lanes, lane, with_reading(reading, t_s, m))
+    return with_reading(reading, t_s, m) if sound(reading) and start.started > 0.0 else m

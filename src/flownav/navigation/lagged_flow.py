@@ -9,6 +9,7 @@ from flownav.estimation.covariance import forget_lane
 from flownav.estimation.lag import FlowLag, lag_of_step
 from flownav.estimation.laws.flow import lagged_flow, lagged_flow_rate
 from flownav.estimation.states import FLOW_LAG, STATE, STATES_WITH_LAG
+from flownav.navigation.memory import set_lane
 from flownav.navigation.told import FlowSettings
 
 
@@ -37,5 +38,5 @@ def start_lag(work: Work, lanes: Lanes, lag: bool | None, lane: int, sigma_m_s: 
         for i in range(4):
             state = FLOW_LAG + i
             sigma = sigma_m_s / (s.flow_lag_c_1_s2 if i % 2 == 0 else np.sqrt(s.flow_lag_c_1_s2))
-            work[(STATE + state) * len(lanes) + lane] = 0.0
+            set_lane(work, lanes, STATE + state, lane, 0.0)
             forget_lane(work, lanes, STATES_WITH_LAG, state, lane, sigma * sigma)

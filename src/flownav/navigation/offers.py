@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure
+from flownav.compile import Lanes, Work, equation, procedure, replacing
 from flownav.estimation.covariance import expect, settle, states_of
 from flownav.estimation.hypotheses import weigh
-from flownav.estimation.states import ACCEPTED, MEASURED, NOISE, OFFERED
+from flownav.estimation.states import ACCEPTED, MEASURED, NOISE
 from flownav.measurement import Sensor
 from flownav.navigation.journal import note_correction
-from flownav.navigation.memory import CLOCK, LAST, OBSERVATION, REASON, load_aid, load_reading, share, shared, store_aid
+from flownav.navigation.memory import CLOCK, LAST, OBSERVATION, REASON, share, shared
 from flownav.navigation.reasons import (
     BEFORE_START,
     DUPLICATE,
@@ -23,18 +25,16 @@ from flownav.navigation.reasons import (
     SILENT,
 )
 from flownav.navigation.records import AidMemory, Reading
-from flownav.navigation.tape import (
-    AIDED_AGAIN,
-    DEAD_RECKONING,
-    POSITION_INVALID,
-    Output,
-    write_event,
-    write_offer,
-)
+from flownav.navigation.tape import AIDED_AGAIN, DEAD_RECKONING, POSITION_INVALID, Output, write_offer
 from flownav.navigation.told import AidSettings
+from flownav.navigation.verdicts import Accepted, Event, Fate, Noise, Observation, Offered, Tested, on_lanes
 
 CLOCK_SLACK_S = 1e-6
 COLOR = 4.0  # so many readings after one another err alike
+
+with_aid = replacing(AidMemory, "aided_s", "flag")
+with_flag = replacing(AidMemory, "flag")
+with_height = replacing(AidMemory, "height_s")
 
 
 # -- checks -----------------------------------------------------------------------------------------------
@@ -42,6 +42,14 @@ COLOR = 4.0  # so many readings after one another err alike
 def is_heard(reading: Reading) -> bool:
     """Whether a reading is there for one who only listens: it arrived, has data and is not withheld."""
     return reading.arrived > 0.0 and reading.quality > 0.0 and reading.withheld == 0.0
+
+
+@equation
+def component_of(reading: Reading, component: int) -> tuple[float, float]:
+    """A reading's value and stated variance of component 0, 1 or 2."""
+    value = reading.value_0 if component == 0 else (reading.value_1 if component == 1 else reading.value_2)
+    stated = reading.variance_0 if component == 0 else (reading.variance_1 if component == 1 else reading.variance_2)
+    return value, stated
 
 
 @equation
@@ -56,8 +64,22 @@ def usable(reading: Reading, value: float, variance: float, started: float) -> i
 
 @equation
 def usable_in_flight(reading: Reading, value: float, variance: float, started: float) -> int:
-    """The same, of a sensor of which nothing is said before the start."""
+    """What `usable` says, of a sensor of which nothing is said before the start."""
     return SILENT if started == 0.0 else usable(reading, value, variance, started)
+
+
+class LeftBehind(NamedTuple):
+    """What is written down of a reading that comes too late to be taken."""
+
+    fate: Fate
+    observation: Observation
+    noise: Noise
+
+
+@on_lanes
+def leave_behind(reading: Reading, *, reason: int) -> LeftBehind:
+    """Nothing of the reading but that it came, and why it is not taken."""
+    return LeftBehind(Fate(reason if reading.arrived > 0.0 else SILENT), Observation(reading.value_0), Noise(np.nan))
 
 
 @procedure
@@ -77,11 +99,7 @@ def too_old(work: Work, lanes: Lanes, t_s: float, sensor: int, o: Output) -> boo
         share(work, lanes, LAST + sensor, t_s)
         return False
     if sensor != Sensor.IMU:
-        for lane in range(len(lanes)):
-            reading = load_reading(work, lanes, lane)
-            work[REASON * len(lanes) + lane] = reason if reading.arrived > 0.0 else SILENT
-            work[OBSERVATION * len(lanes) + lane] = reading.value_0
-            work[NOISE * len(lanes) + lane] = np.nan
+        leave_behind(work, lanes, reason)
         write_offer(work, lanes, t_s, sensor, 0, o)
     return True
 
@@ -96,6 +114,12 @@ def put(work: Work, lanes: Lanes, lane: int, measured: float, variance: float, r
     work[REASON * len(lanes) + lane] = reason
 
 
+@on_lanes
+def observe_innovation(tested: Tested) -> Observation:
+    """The difference that a law finds is what is written down of an attitude."""
+    return Observation(tested.innovation)
+
+
 @procedure
 def conclude(work: Work, lanes: Lanes, t_s: float, sensor: int, component: int, gate_sigma: float, o: Output) -> None:
     """Test, fuse and write down the component whose law stands in the observation rows; REASON says what became of it.
@@ -106,55 +130,72 @@ def conclude(work: Work, lanes: Lanes, t_s: float, sensor: int, component: int, 
     write_offer(work, lanes, t_s, sensor, component, o)
 
 
+@on_lanes
+def offer_what_is_sound(fate: Fate) -> Offered:
+    """Offered to the filter where the judge found nothing against it."""
+    return Offered(1.0 if fate.reason == FUSED else 0.0)
+
+
+@on_lanes
+def note_refusal(fate: Fate, tested: Accepted) -> Fate:
+    """INNOVATION_GATE where what was offered was not fused."""
+    return Fate(INNOVATION_GATE if fate.reason == FUSED and tested.accepted == 0.0 else fate.reason)
+
+
 @procedure
 def fuse_offered(work: Work, lanes: Lanes, gate_sigma: float, o: Output) -> None:
     """Test and fuse the component in the lanes whose REASON is FUSED; INNOVATION_GATE where it does not pass."""
-    for lane in range(len(lanes)):
-        work[OFFERED * len(lanes) + lane] = 1.0 if work[REASON * len(lanes) + lane] == FUSED else 0.0
+    offer_what_is_sound(work, lanes)
     expect(work, lanes, states_of(lanes), o.room[1] > 0)
     settle(work, lanes, states_of(lanes), gate_sigma)
     weigh(work, lanes, states_of(lanes), COLOR)
-    for lane in range(len(lanes)):
-        reason = work[REASON * len(lanes) + lane]
-        refused = reason == FUSED and work[ACCEPTED * len(lanes) + lane] == 0.0
-        work[REASON * len(lanes) + lane] = INNOVATION_GATE if refused else reason
-    if len(lanes) == 1 and work[ACCEPTED] > 0.0:
+    note_refusal(work, lanes)
+    if len(lanes) == 1 and shared(work, lanes, ACCEPTED) > 0.0:
         note_correction(work, lanes, o)
 
 
 # -- horizontal aid ---------------------------------------------------------------------------------------
-@procedure
-def note_aid(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
-    """Something horizontal was fused in the lanes whose REASON is FUSED."""
-    for lane in range(len(lanes)):
-        if work[REASON * len(lanes) + lane] == FUSED:
-            aid = load_aid(work, lanes, lane)
-            if aid.flag > 0.0:
-                write_event(lanes, lane, t_s, AIDED_AGAIN, t_s - aid.aided_s, o)
-            store_aid(work, lanes, lane, AidMemory(t_s, 0.0, aid.height_s, aid.landed))
+class Aided(NamedTuple):
+    """The aid at hand noted, and that the position is told again."""
+
+    aid: AidMemory
+    again: Event
 
 
-@procedure
-def note_height(work: Work, lanes: Lanes, t_s: float) -> None:
-    """Something other than the range told the height in the lanes whose REASON is FUSED."""
-    for lane in range(len(lanes)):
-        aid = load_aid(work, lanes, lane)
-        told = work[REASON * len(lanes) + lane] == FUSED
-        height_s = t_s if told else aid.height_s
-        store_aid(work, lanes, lane, AidMemory(aid.aided_s, aid.flag, height_s, aid.landed))
+@on_lanes
+def note_aid(fate: Fate, aid: AidMemory, *, t_s: float) -> Aided:
+    """Something horizontal was fused in the lanes whose reason is FUSED."""
+    fused = fate.reason == FUSED
+    again = Event(AIDED_AGAIN if fused and aid.flag > 0.0 else -1, t_s - aid.aided_s)
+    return Aided(with_aid(aid, aided_s=t_s, flag=0.0) if fused else aid, again)
 
 
-@procedure
-def note_aid_age(work: Work, lanes: Lanes, t_s: float, s: AidSettings, o: Output) -> None:
-    """Flag dead reckoning, and then an invalid position, where no horizontal aid has been fused for long."""
-    for lane in range(len(lanes)):
-        aid = load_aid(work, lanes, lane)
-        age_s = t_s - aid.aided_s  # NaN before the start: no flag
-        flag = aid.flag
-        if flag == 0.0 and age_s > s.dead_reckoning_s:
-            flag = 1.0
-            write_event(lanes, lane, t_s, DEAD_RECKONING, age_s, o)
-        if flag == 1.0 and age_s > s.invalid_s:
-            flag = 2.0
-            write_event(lanes, lane, t_s, POSITION_INVALID, age_s, o)
-        store_aid(work, lanes, lane, AidMemory(aid.aided_s, flag, aid.height_s, aid.landed))
+@on_lanes
+def note_height(fate: Fate, aid: AidMemory, *, t_s: float) -> AidMemory:
+    """Something other than the range told the height in the lanes whose reason is FUSED."""
+    return with_height(aid, height_s=t_s if fate.reason == FUSED else aid.height_s)
+
+
+class AidAge(NamedTuple):
+    """What follows from how long ago the last aid was."""
+
+    aid: AidMemory
+    reckoning: Event
+    invalid: Event
+
+
+@on_lanes
+def note_aid_age(aid: AidMemory, *, t_s: float, s: AidSettings) -> AidAge:
+    """Dead reckoning, and then an invalid position, where no horizontal aid has been fused for long.
+
+    Before the start the age is NaN, and nothing is flagged.
+    """
+    age_s = t_s - aid.aided_s
+    reckons = aid.flag == 0.0 and age_s > s.dead_reckoning_s
+    flag = 1.0 if reckons else aid.flag
+    invalid = flag == 1.0 and age_s > s.invalid_s
+    return AidAge(
+        with_flag(aid, flag=2.0 if invalid else flag),
+        Event(DEAD_RECKONING if reckons else -1, age_s),
+        Event(POSITION_INVALID if invalid else -1, age_s),
+    )

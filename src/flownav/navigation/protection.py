@@ -9,11 +9,9 @@ docs/explanation/integrity.md measures how often the error is beyond the level.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, larger, procedure, smaller
+from flownav.compile import Lanes, Work, equation, larger, procedure, replacing, smaller
 from flownav.estimation.covariance import covariance_of, states_of
 from flownav.estimation.hypotheses import (
     COUNT,
@@ -28,45 +26,37 @@ from flownav.estimation.hypotheses import (
     begin_lane_anew,
     effect_of,
     fade,
+    followed,
     larger_axis,
     sign,
     sign_all,
-    size_of,
+    size_told,
 )
 from flownav.estimation.motion import rotation_of
-from flownav.estimation.states import (
-    HYPOTHESES,
-    INFORMATION,
-    POSITION,
-    SCORE,
-    STATE,
-    VELOCITY,
-)
+from flownav.estimation.states import POSITION
 from flownav.frames import to_body
 from flownav.navigation.flow_noise import LONGEST_STEP_S
 from flownav.navigation.memory import (
     DRIFT_SINCE,
-    FLOW_BEFORE,
-    FLOW_SPEED,
-    GPS_MOVED,
-    LEFT_OVER,
-    LENS_RANGE,
-    PROTECTION,
-    PUZZLED_AT,
+    MEMORY,
     SCALE_DOUBT,
-    SUSPECTED,
-    SUSPECTED_AT,
-    TURNED_BEFORE,
-    TURNING,
     held_by_gps,
     load_flow,
+    load_gps,
+    load_look,
+    load_sign,
+    load_suspicion,
     of_lane,
-    set_lane,
     share,
     shared,
+    store_levels,
+    store_sign,
+    store_suspicion,
 )
+from flownav.navigation.records import FlowSignMemory, Levels, SuspicionMemory
 from flownav.navigation.rows import position_variance
 from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, Output, write_event
+from flownav.navigation.verdicts import Position, Velocity
 
 SIGMAS = 4.0  # of the filter's own error, where nothing fails
 SIGMAS_BESIDE = 2.0  # of it, beside a fault
@@ -76,14 +66,13 @@ EXCLUDED = 8.0  # standard deviations from a fault that is there or is not
 PUZZLING = 9.0  # evidence for a fault that is there or is not, after which it may be there for long
 DRIFT_S = 20.0  # a drift of GPS is sought from the start of such a window
 SUSPECT, CLEAR = 24.0, 5.0  # evidence that says so, and that says so no more
+load_position, _ = MEMORY.access(Position)
+load_velocity, _ = MEMORY.access(Velocity)
+with_x, with_y = replacing(FlowSignMemory, "read_x"), replacing(FlowSignMemory, "read_y")
+with_turning = replacing(FlowSignMemory, "turning_x", "turning_y", "speed_m_s")
+with_left_over = replacing(SuspicionMemory, "left_over_m")
+
 HELD_S = 10.0  # so long a suspicion lasts at least: what the fault did is still there
-
-
-class Levels(NamedTuple):
-    """Protection levels [m]."""
-
-    horizontal_m: float
-    vertical_m: float
 
 
 @equation
@@ -115,44 +104,60 @@ def sign_flow(work: Work, lanes: Lanes, t_s: float, component: int, angular: boo
     before, so that the gyro's noise, which is in the innovation too, does not pass for a fault (an instrumental
     variable: Young, Recursive Estimation and Time-Series Analysis, 2011, chapter 6).
     """
-    if work[HYPOTHESES * len(lanes)] == 0.0:
+    if followed(work, lanes) == 0:
         return
     for lane in range(len(lanes)):
-        u, v, _ = to_body(
-            rotation_of(work, lanes, lane),
-            work[(STATE + VELOCITY) * len(lanes) + lane],
-            work[(STATE + VELOCITY + 1) * len(lanes) + lane],
-            work[(STATE + VELOCITY + 2) * len(lanes) + lane],
-        )
-        range_m = work[LENS_RANGE * len(lanes) + lane]
-        turning_x = work[TURNED_BEFORE * len(lanes) + lane]
-        turning_y = work[(TURNED_BEFORE + 1) * len(lanes) + lane]
-        read_x = turning_x - v / range_m if angular else u
-        read_y = turning_y + u / range_m if angular else v
-        own, other = (read_x, read_y) if component == 0 else (read_y, read_x)
-        last = FLOW_BEFORE + min(component, 1)
+        look, m = load_look(work, lanes, lane), load_sign(work, lanes, lane)
+        own, other = read_by(seen_by(work, lanes, lane, look.range_m, m, angular), component)
         since_s = t_s - load_flow(work, lanes, lane).taken_s
-        slope = (own - work[last * len(lanes) + lane]) / since_s
+        slope = (own - (m.read_x if component == 0 else m.read_y)) / since_s
         lately = since_s > 0.0 and since_s < LONGEST_STEP_S
-        level = component < 2 and np.isfinite(own + other)
+        level = component < 2 and bool(np.isfinite(own + other))
         sign(work, lanes, FLOW_SCALE, lane, own if level else 0.0)
         sign(work, lanes, FLOW_SWAPPED, lane, other - own if level else 0.0, -1.0)
         sign(work, lanes, FLOW_REVERSED, lane, -2.0 * own if level else 0.0, -1.0)
         sign(work, lanes, FLOW_AGE, lane, -slope if level and lately else 0.0)
-        work[last * len(lanes) + lane] = own if level else work[last * len(lanes) + lane]
-        if component == 1:
-            speed = np.sqrt(own * own + other * other) * (range_m if angular else 1.0)
-            work[FLOW_SPEED * len(lanes) + lane] = speed if level else 0.0
-            for i in range(2):
-                turned = work[(TURNING + i) * len(lanes) + lane]
-                work[(TURNED_BEFORE + i) * len(lanes) + lane] = turned if np.isfinite(turned) else 0.0
+        m = with_x(m, read_x=own) if level and component == 0 else m
+        m = with_y(m, read_y=own) if level and component != 0 else m
+        per = look.range_m if angular else 1.0
+        m = followed_sign(m, own, other, level, per, look.turning_x, look.turning_y) if component == 1 else m
+        store_sign(work, lanes, lane, m)
+
+
+@equation
+def seen_by(
+    work: Work, lanes: Lanes, lane: int, range_m: float, m: FlowSignMemory, angular: bool
+) -> tuple[float, float]:
+    """What the sensor's two channels are to read by the filter [rad/s or m/s]."""
+    v = load_velocity(work, lanes, lane)
+    u, v, _ = to_body(rotation_of(work, lanes, lane), v.north_m_s, v.east_m_s, v.down_m_s)
+    return m.turning_x - v / range_m if angular else u, m.turning_y + u / range_m if angular else v
+
+
+@equation
+def read_by(read: tuple[float, float], component: int) -> tuple[float, float]:
+    """The component's own channel, and the other."""
+    return (read[0], read[1]) if component == 0 else (read[1], read[0])
+
+
+@equation
+def followed_sign(
+    m: FlowSignMemory, own: float, other: float, level: bool, range_m: float, turned_x: float, turned_y: float
+) -> FlowSignMemory:
+    """Speed and turning of the reading at hand, for the next."""
+    speed = np.sqrt(own * own + other * other) * range_m
+    return with_turning(
+        m,
+        turning_x=turned_x if np.isfinite(turned_x) else 0.0,
+        turning_y=turned_y if np.isfinite(turned_y) else 0.0,
+        speed_m_s=speed if level else 0.0,
+    )
 
 
 @equation
 def size_in(work: Work, lanes: Lanes, fault: int, lane: int) -> Size:
     """What is known of a fault's size in a lane."""
-    information, score = work[(INFORMATION + fault) * len(lanes) + lane], work[(SCORE + fault) * len(lanes) + lane]
-    return size_of(information, score, prior_sigma(fault))
+    return size_told(work, lanes, fault, lane, prior_sigma(fault))
 
 
 @equation
@@ -175,8 +180,9 @@ def level_effect(work: Work, lanes: Lanes, fault: int, lane: int) -> float:
 def leave_over(work: Work, lanes: Lanes, lane: int, fault: int) -> None:
     """What a fault may have done to the position, before it is sought anew: root sum square with what was."""
     done_m = level_effect(work, lanes, fault, lane) * largest_size(fault, size_in(work, lanes, fault, lane))
-    before_m = of_lane(work, lanes, LEFT_OVER, lane)
-    set_lane(work, lanes, LEFT_OVER, lane, np.sqrt(before_m * before_m + done_m * done_m))
+    m = load_suspicion(work, lanes, lane)
+    left_m = np.sqrt(m.left_over_m * m.left_over_m + done_m * done_m)
+    store_suspicion(work, lanes, lane, with_left_over(m, left_over_m=left_m))
 
 
 @procedure
@@ -196,9 +202,8 @@ def sign_drift(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
 @equation
 def levels(work: Work, lanes: Lanes, lane: int) -> Levels:
     """The protection levels of a lane at its instant."""
-    doubt = work[SCALE_DOUBT * len(lanes) + lane]
-    north_m = doubt * work[(STATE + POSITION) * len(lanes) + lane]
-    east_m = doubt * work[(STATE + POSITION + 1) * len(lanes) + lane]
+    doubt, position = of_lane(work, lanes, SCALE_DOUBT, lane), load_position(work, lanes, lane)
+    north_m, east_m = doubt * position.north_m, doubt * position.east_m
     own_m = larger_axis(
         position_variance(work, lanes, 0, lane),
         position_variance(work, lanes, 1, lane),
@@ -206,26 +211,24 @@ def levels(work: Work, lanes: Lanes, lane: int) -> Levels:
     )
     down_m = np.sqrt(larger(position_variance(work, lanes, 2, lane), 0.0))
     horizontal_m, vertical_m = SIGMAS * own_m, SIGMAS * down_m
-    for k in range(int(work[HYPOTHESES * len(lanes)])):
+    for k in range(followed(work, lanes)):
         largest = largest_size(k, size_in(work, lanes, k, lane))
         down = effect_of(work, lanes, states_of(lanes), k, POSITION + 2, lane)
         horizontal_m = larger(horizontal_m, SIGMAS_BESIDE * own_m + level_effect(work, lanes, k, lane) * largest)
         vertical_m = larger(vertical_m, SIGMAS_BESIDE * down_m + abs(down) * largest)
-    north_m, east_m = work[GPS_MOVED * len(lanes) + lane], work[(GPS_MOVED + 1) * len(lanes) + lane]
-    moved_m = np.sqrt(north_m * north_m + east_m * east_m)
-    left_m = SIGMAS_BESIDE * own_m + work[LEFT_OVER * len(lanes) + lane] + moved_m
+    gps = load_gps(work, lanes, lane)
+    moved_m = np.sqrt(gps.moved_n_m * gps.moved_n_m + gps.moved_e_m * gps.moved_e_m)
+    left_m = SIGMAS_BESIDE * own_m + load_suspicion(work, lanes, lane).left_over_m + moved_m
     return Levels(larger(horizontal_m, left_m), vertical_m)
 
 
 @procedure
 def set_levels(work: Work, lanes: Lanes) -> None:
-    """PROTECTION: the levels of every lane at this instant."""
-    if work[HYPOTHESES * len(lanes)] == 0.0:
+    """The levels of every lane at this instant."""
+    if followed(work, lanes) == 0:
         return
     for lane in range(len(lanes)):
-        found = levels(work, lanes, lane)
-        set_lane(work, lanes, PROTECTION, lane, found.horizontal_m)
-        set_lane(work, lanes, PROTECTION + 1, lane, found.vertical_m)
+        store_levels(work, lanes, lane, levels(work, lanes, lane))
 
 
 @equation
@@ -239,36 +242,49 @@ def exclude(work: Work, lanes: Lanes, lane: int, fault: int) -> None:
         begin_lane_anew(work, lanes, states_of(lanes), fault, lane)
 
 
+@equation
+def judge_suspicion(
+    m: SuspicionMemory, worst: float, which: int, puzzled: bool, travel_m: float, kept: float, t_s: float
+) -> SuspicionMemory:
+    """What is suspected, by the evidence of the worst fault; what was left over fades, and grows while flow puzzles."""
+    suspects = m.suspected == 0.0 and worst > SUSPECT
+    clears = m.suspected > 0.0 and worst < CLEAR and t_s - m.suspected_s > HELD_S
+    puzzled_s = t_s if puzzled else m.puzzled_s
+    left_over_m = m.left_over_m * kept
+    return SuspicionMemory(
+        which + 1.0 if suspects else (0.0 if clears else m.suspected),
+        t_s if suspects else m.suspected_s,
+        puzzled_s,
+        left_over_m + travel_m if t_s - puzzled_s < HELD_S else left_over_m,
+    )
+
+
 @procedure
 def mind_faults(work: Work, lanes: Lanes, t_s: float, dt_s: float, o: Output) -> None:
     """Say which fault is suspected, and when none is any more; what was told of them fades."""
-    if work[HYPOTHESES * len(lanes)] == 0.0:
+    if followed(work, lanes) == 0:
         return
     kept = np.exp(-dt_s / MEMORY_S)
     fade(work, lanes, kept)
     for lane in range(len(lanes)):
-        work[LEFT_OVER * len(lanes) + lane] *= kept
         worst, which, worst_flow = 0.0, 0, 0.0
-        for k in range(int(work[HYPOTHESES * len(lanes)])):
+        for k in range(followed(work, lanes)):
             found = size_in(work, lanes, k, lane)
             evidence = found.evidence if abs(found.size) > least_size(k) else 0.0
             which = k if evidence > worst else which
             worst = larger(worst, evidence)
             worst_flow = larger(worst_flow, found.evidence if k >= FLOW_SWAPPED else 0.0)
-        before = of_lane(work, lanes, SUSPECTED, lane)
-        if before == 0.0 and worst > SUSPECT:
-            set_lane(work, lanes, SUSPECTED, lane, which + 1.0)
-            set_lane(work, lanes, SUSPECTED_AT, lane, t_s)
-            write_event(lanes, lane, t_s, FAULT_SUSPECTED, which, o)
-        elif before > 0.0 and worst < CLEAR and t_s - of_lane(work, lanes, SUSPECTED_AT, lane) > HELD_S:
-            set_lane(work, lanes, SUSPECTED, lane, 0.0)
-            write_event(lanes, lane, t_s, FAULT_CLEARED, before - 1.0, o)
+        before = load_suspicion(work, lanes, lane)
         unheld = not held_by_gps(work, lanes, lane, t_s)
-        if worst_flow > PUZZLING or (unheld and load_flow(work, lanes, lane).doubted > 0.0):
-            set_lane(work, lanes, PUZZLED_AT, lane, t_s)
-        if t_s - of_lane(work, lanes, PUZZLED_AT, lane) < HELD_S:
-            work[LEFT_OVER * len(lanes) + lane] += 2.0 * dt_s * work[FLOW_SPEED * len(lanes) + lane]
-        for k in range(FLOW_SWAPPED, int(work[HYPOTHESES * len(lanes)])):
+        puzzled = worst_flow > PUZZLING or (unheld and load_flow(work, lanes, lane).doubted > 0.0)
+        speed_m_s = load_sign(work, lanes, lane).speed_m_s
+        after = judge_suspicion(before, worst, which, puzzled, 2.0 * dt_s * speed_m_s, kept, t_s)
+        store_suspicion(work, lanes, lane, after)
+        if before.suspected == 0.0 and after.suspected > 0.0:
+            write_event(lanes, lane, t_s, FAULT_SUSPECTED, which, o)
+        elif before.suspected > 0.0 and after.suspected == 0.0:
+            write_event(lanes, lane, t_s, FAULT_CLEARED, before.suspected - 1.0, o)
+        for k in range(FLOW_SWAPPED, followed(work, lanes)):
             exclude(work, lanes, lane, k)
 
 

@@ -1,7 +1,11 @@
-"""What a navigator remembers of each lane, subject by subject, as named records; `memory` says where they lie."""
+"""What a navigator remembers of each lane, subject by subject, as named records; `memory` says where they lie.
+
+A field's default is what it is before anything was heard.
+"""
 
 from __future__ import annotations
 
+from math import inf, nan
 from typing import NamedTuple
 
 
@@ -12,18 +16,18 @@ class Reading(NamedTuple):
     stated. quality: 0..255. arrived: 0 in a lane whose sensor stayed silent. withheld: 1 where the user takes it away.
     """
 
-    value_0: float
-    value_1: float
-    value_2: float
-    value_3: float
-    value_4: float
-    value_5: float
-    variance_0: float
-    variance_1: float
-    variance_2: float
-    quality: float
-    arrived: float
-    withheld: float
+    value_0: float = 0.0
+    value_1: float = 0.0
+    value_2: float = 0.0
+    value_3: float = 0.0
+    value_4: float = 0.0
+    value_5: float = 0.0
+    variance_0: float = 0.0
+    variance_1: float = 0.0
+    variance_2: float = 0.0
+    quality: float = 0.0
+    arrived: float = 0.0
+    withheld: float = 0.0
 
 
 class StartMemory(NamedTuple):
@@ -31,28 +35,30 @@ class StartMemory(NamedTuple):
     specific force [m/s2] of so many readings, and the mean square of an axis about it [m2/s4].
     """
 
-    started: float
-    attitude_s: float
-    qw: float
-    qx: float
-    qy: float
-    qz: float
-    force_x: float
-    force_y: float
-    force_z: float
-    readings: float
-    shaken: float
+    started: float = 0.0
+    attitude_s: float = -inf
+    qw: float = 1.0
+    qx: float = 0.0
+    qy: float = 0.0
+    qz: float = 0.0
+    force_x: float = 0.0
+    force_y: float = 0.0
+    force_z: float = 0.0
+    readings: float = 0.0
+    shaken: float = 0.0
 
 
 class AidMemory(NamedTuple):
     """aided_s: when something horizontal was fused last; flag: 0, 1 dead reckoning, 2 invalid; height_s: when something
-    other than the range told the height; landed: 1 on the ground.
+    other than the range told the height; landed: 1 on the ground; aided: 1 where something horizontal was fused lately
+    as an external attitude was read.
     """
 
-    aided_s: float
-    flag: float
-    height_s: float
-    landed: float
+    aided_s: float = nan
+    flag: float = 0.0
+    height_s: float = -inf
+    landed: float = 0.0
+    aided: float = 0.0
 
 
 class ImuMemory(NamedTuple):
@@ -60,16 +66,16 @@ class ImuMemory(NamedTuple):
     [m2/s4]; how far the accelerometer is doubted along body down [m/s2]; gap: 1 after a stretch without readings.
     """
 
-    read_s: float
-    gyro_x: float
-    gyro_y: float
-    gyro_z: float
-    accel_x: float
-    accel_y: float
-    accel_z: float
-    vibration: float
-    doubt_m_s2: float
-    gap: float
+    read_s: float = -inf
+    gyro_x: float = 0.0
+    gyro_y: float = 0.0
+    gyro_z: float = 0.0
+    accel_x: float = 0.0
+    accel_y: float = 0.0
+    accel_z: float = 0.0
+    vibration: float = 0.0
+    doubt_m_s2: float = 0.0
+    gap: float = 0.0
 
 
 class RangeMemory(NamedTuple):
@@ -78,13 +84,13 @@ class RangeMemory(NamedTuple):
     doubted: 1 once the accelerometer was doubted for it.
     """
 
-    taken_s: float
-    refused_s: float
-    last_m: float
-    same_s: float
-    down_m: float
-    said_s: float
-    doubted: float
+    taken_s: float = -inf
+    refused_s: float = nan
+    last_m: float = nan
+    same_s: float = nan
+    down_m: float = 0.0
+    said_s: float = nan
+    doubted: float = 0.0
 
 
 class EchoMemory(NamedTuple):
@@ -92,11 +98,17 @@ class EchoMemory(NamedTuple):
     confirms.
     """
 
-    newest_m: float
-    newest_down_m: float
-    older_m: float
-    older_down_m: float
-    stray: float
+    newest_m: float = nan
+    newest_down_m: float = 0.0
+    older_m: float = nan
+    older_down_m: float = 0.0
+    stray: float = 0.0
+
+
+class BaroMemory(NamedTuple):
+    """known: 1 once the pressure height of the local origin was found."""
+
+    known: float = 0.0
 
 
 class GroundMemory(NamedTuple):
@@ -105,12 +117,12 @@ class GroundMemory(NamedTuple):
     varied: 1 where these were not all the same to the last digit.
     """
 
-    known: float
-    candidate_m: float
-    since_s: float
-    first_m: float
-    agreeing: float
-    varied: float
+    known: float = 0.0
+    candidate_m: float = 0.0
+    since_s: float = 0.0
+    first_m: float = 0.0
+    agreeing: float = 0.0
+    varied: float = 0.0
 
 
 class FlowMemory(NamedTuple):
@@ -120,39 +132,74 @@ class FlowMemory(NamedTuple):
     usual: the quality that it usually has.
     """
 
-    taken_s: float
-    excess: float
-    bias_x: float
-    bias_y: float
-    bias_count: float
-    ratio: float
-    doubted: float
-    likeness: float
-    wrong_s: float
-    usual: float
+    taken_s: float = -inf
+    excess: float = 1.0
+    bias_x: float = 0.0
+    bias_y: float = 0.0
+    bias_count: float = 0.0
+    ratio: float = 1.0
+    doubted: float = 0.0
+    likeness: float = 0.0
+    wrong_s: float = -inf
+    usual: float = 0.0
+
+
+class FlowInnovation(NamedTuple):
+    """A component's innovation at the flow reading before [rad/s or m/s]."""
+
+    innovation: float = 0.0
+
+
+class Look(NamedTuple):
+    """What the flow reading at hand saw: the vehicle's turning [rad/s]; the range from the lens to the ground along the
+    boresight by the filter [m], and known: 1 where that is well known; R_33; unranged: 1 where no range tells the
+    height of the flow now: none lately, or a disputed one, or strays; and the verdict on the whole reading (`reasons`).
+    """
+
+    turning_x: float = 0.0
+    turning_y: float = 0.0
+    range_m: float = 0.0
+    known: float = 0.0
+    upright: float = 0.0
+    unranged: float = 0.0
+    reason: float = 0.0
+
+
+class StandMemory(NamedTuple):
+    """does: what the vehicle did in the last window, `still.MOVES`, SHAKEN or RESTS; contact_m: the range when it
+    rested last, NaN where it has not.
+    """
+
+    does: float = 0.0
+    contact_m: float = nan
 
 
 class HeadingMemory(NamedTuple):
-    """read_s: when a heading was read last; field_rad: direction of the level magnetic field in the filter's frame."""
+    """read_s: when a heading was read last; field_rad: direction of the level magnetic field in the filter's frame;
+    refuted: 1 once what is read as heading was found to be wrong; sought: 1 while a heading that no sensor reads is to
+    be found from the course.
+    """
 
-    read_s: float
-    field_rad: float
+    read_s: float = -inf
+    field_rad: float = nan
+    refuted: float = 0.0
+    sought: float = 0.0
 
 
 class BridgeMemory(NamedTuple):
     """The filter's attitude at the last attitude reading before a gap of the IMU, that reading, and the variances."""
 
-    own_w: float
-    own_x: float
-    own_y: float
-    own_z: float
-    read_w: float
-    read_x: float
-    read_y: float
-    read_z: float
-    variance_n: float
-    variance_e: float
-    variance_d: float
+    own_w: float = nan
+    own_x: float = nan
+    own_y: float = nan
+    own_z: float = nan
+    read_w: float = nan
+    read_x: float = nan
+    read_y: float = nan
+    read_z: float = nan
+    variance_n: float = nan
+    variance_e: float = nan
+    variance_d: float = nan
 
 
 class SpikeMemory(NamedTuple):
@@ -160,16 +207,16 @@ class SpikeMemory(NamedTuple):
     and accelerometer [m/s2]; the newest reading, spike or not; and the step in which the last jump was judged [s].
     """
 
-    refused: float
-    gyro_rad_s: float
-    accel_m_s2: float
-    gyro_x: float
-    gyro_y: float
-    gyro_z: float
-    accel_x: float
-    accel_y: float
-    accel_z: float
-    reach_s: float
+    refused: float = 0.0
+    gyro_rad_s: float = 0.0
+    accel_m_s2: float = 0.0
+    gyro_x: float = 0.0
+    gyro_y: float = 0.0
+    gyro_z: float = 0.0
+    accel_x: float = 0.0
+    accel_y: float = 0.0
+    accel_z: float = 0.0
+    reach_s: float = 0.0
 
 
 class ImuWindow(NamedTuple):
@@ -177,23 +224,23 @@ class ImuWindow(NamedTuple):
     of differences from it, and sums of their squares.
     """
 
-    readings: float
-    first_p: float
-    first_q: float
-    first_r: float
-    first_x: float
-    first_y: float
-    first_z: float
-    sum_p: float
-    sum_q: float
-    sum_r: float
-    sum_x: float
-    sum_y: float
-    sum_z: float
-    square_p: float
-    square_q: float
-    square_r: float
-    accel_square: float
+    readings: float = 0.0
+    first_p: float = 0.0
+    first_q: float = 0.0
+    first_r: float = 0.0
+    first_x: float = 0.0
+    first_y: float = 0.0
+    first_z: float = 0.0
+    sum_p: float = 0.0
+    sum_q: float = 0.0
+    sum_r: float = 0.0
+    sum_x: float = 0.0
+    sum_y: float = 0.0
+    sum_z: float = 0.0
+    square_p: float = 0.0
+    square_q: float = 0.0
+    square_r: float = 0.0
+    accel_square: float = 0.0
 
 
 class SeenWindow(NamedTuple):
@@ -201,20 +248,20 @@ class SeenWindow(NamedTuple):
     velocity [m/s] and of how many, and the fastest level velocity by GPS [m/s].
     """
 
-    range_low_m: float
-    range_high_m: float
-    flow_u_m_s: float
-    flow_v_m_s: float
-    flows: float
-    gps_m_s: float
+    range_low_m: float = 1e9
+    range_high_m: float = -1.0
+    flow_u_m_s: float = 0.0
+    flow_v_m_s: float = 0.0
+    flows: float = 0.0
+    gps_m_s: float = 0.0
 
 
 class NoiseMemory(NamedTuple):
     """factor: a component's noise over what is said of it [variance]; its innovation before, and when that was [s]."""
 
-    factor: float
-    before: float
-    heard_s: float
+    factor: float = 1.0
+    before: float = 0.0
+    heard_s: float = -inf
 
 
 class CourseMemory(NamedTuple):
@@ -222,15 +269,15 @@ class CourseMemory(NamedTuple):
     length [m]; when GPS was heard and the flow [s]; the flow's smoothed velocity by the filter's own heading [m/s].
     """
 
-    along: float
-    across: float
-    gps: float
-    flow: float
-    travel_m: float
-    gps_s: float
-    flow_s: float
-    north_m_s: float
-    east_m_s: float
+    along: float = 0.0
+    across: float = 0.0
+    gps: float = 0.0
+    flow: float = 0.0
+    travel_m: float = 0.0
+    gps_s: float = -inf
+    flow_s: float = -inf
+    north_m_s: float = 0.0
+    east_m_s: float = 0.0
 
 
 class PushMemory(NamedTuple):
@@ -238,32 +285,128 @@ class PushMemory(NamedTuple):
     velocity at its start, and when that was [s]; sums over blocks as of `CourseMemory`, of changes of velocity [m2/s2].
     """
 
-    push_n: float
-    push_e: float
-    v_n: float
-    v_e: float
-    since_s: float
-    along: float
-    across: float
-    gps: float
-    own: float
+    push_n: float = 0.0
+    push_e: float = 0.0
+    v_n: float = 0.0
+    v_e: float = 0.0
+    since_s: float = -inf
+    along: float = 0.0
+    across: float = 0.0
+    gps: float = 0.0
+    own: float = 0.0
 
 
 class WhitenessMemory(NamedTuple):
     """A block of innovations along one body axis: since when [s], their sum in standard deviations, how many. The block
-    before, the mean square of blocks, and when it ended [s].
+    before, the mean square of blocks, and when it ended [s]; factor: how many times noisier than told the accelerometer
+    is along that axis.
     """
 
-    since_s: float
-    total: float
-    readings: float
-    before: float
-    square: float
-    ended_s: float
+    since_s: float = 0.0
+    total: float = 0.0
+    readings: float = 0.0
+    before: float = 0.0
+    square: float = 1.0
+    ended_s: float = -inf
+    factor: float = 1.0
+
+
+class GpsMemory(NamedTuple):
+    """told_s: when GPS told north or east last; level_ratio: the larger test ratio of north and east of the fix at
+    hand; moved_n_m and moved_e_m: how far resets to GPS moved the position, back and forth added up.
+    """
+
+    told_s: float = -inf
+    level_ratio: float = 0.0
+    moved_n_m: float = 0.0
+    moved_e_m: float = 0.0
+
+
+class PadMemory(NamedTuple):
+    """known: 0 where the pad is not, or how it is: STOOD_ON, LEFT, SEEN of `place`; refusals: of fixes in a row, by
+    component; first_refused: 1 where the first component of the fix at hand was.
+    """
+
+    known: float = 0.0
+    refusals: float = 0.0
+    first_refused: float = 0.0
 
 
 class RejectionMemory(NamedTuple):
     """How often GPS was refused for one state, one after the other, and since when."""
 
-    times: float
-    since_s: float
+    times: float = 0.0
+    since_s: float = 0.0
+
+
+class MotionStep(NamedTuple):
+    """moves: 1 where the IMU moves the filter over the step at hand."""
+
+    moves: float = 0.0
+
+
+class SpentMotion(NamedTuple):
+    """What moved the filter since the last inertial reading: body rate [rad] and specific force [m/s], integrated."""
+
+    gyro_x: float = 0.0
+    gyro_y: float = 0.0
+    gyro_z: float = 0.0
+    accel_x: float = 0.0
+    accel_y: float = 0.0
+    accel_z: float = 0.0
+
+
+class OwedMotion(NamedTuple):
+    """What past readings said and no step was long enough to pay, integrated like `SpentMotion`."""
+
+    gyro_x: float = 0.0
+    gyro_y: float = 0.0
+    gyro_z: float = 0.0
+    accel_x: float = 0.0
+    accel_y: float = 0.0
+    accel_z: float = 0.0
+
+
+class SteadyForce(NamedTuple):
+    """Specific force NED [m/s2], smoothed as a GPS receiver smooths its velocity."""
+
+    north_m_s2: float = 0.0
+    east_m_s2: float = 0.0
+    down_m_s2: float = 0.0
+
+
+class FlowSignMemory(NamedTuple):
+    """What the flow sensor was to read at the reading before, by the filter [rad/s or m/s]; the turning that it saw
+    then [rad/s]; and the speed of both channels together over the ground, turning and all [m/s].
+    """
+
+    read_x: float = 0.0
+    read_y: float = 0.0
+    turning_x: float = 0.0
+    turning_y: float = 0.0
+    speed_m_s: float = 0.0
+
+
+class SuspicionMemory(NamedTuple):
+    """suspected: 0, or 1 and the number of the fault of `hypotheses` that is suspected; suspected_s: since when.
+    puzzled_s: when innovations last hinted at a flow that is reversed or swapped. left_over_m: how far off a fault may
+    have put the position before it was excluded.
+    """
+
+    suspected: float = 0.0
+    suspected_s: float = 0.0
+    puzzled_s: float = -inf
+    left_over_m: float = 0.0
+
+
+class Levels(NamedTuple):
+    """Protection levels at the last estimate [m]."""
+
+    horizontal_m: float = nan
+    vertical_m: float = nan
+
+
+class ScaleDoubt(NamedTuple):
+    """Standard deviation of a flow scale that nothing can tell; 0 where the filter learns it."""
+
+    sigma: float = 0.0

@@ -7,22 +7,17 @@ meanwhile is added to its doubt, so that flow and GPS find it anew. An IMU that 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, larger, procedure, smaller
-from flownav.estimation.covariance import add_noise_lane
+from flownav.compile import equation, larger, smaller
 from flownav.estimation.states import ATTITUDE, VELOCITY
 from flownav.navigation.inertial import sound
-from flownav.navigation.memory import (
-    READING,
-    load_imu,
-    load_reading,
-    load_spike,
-    load_start,
-    store_spike,
-)
-from flownav.navigation.records import ImuMemory, Reading, SpikeMemory
-from flownav.navigation.tape import IMU_SPIKE, Output, write_event
+from flownav.navigation.memory import MEMORY, READING
+from flownav.navigation.records import ImuMemory, Reading, SpikeMemory, StartMemory
+from flownav.navigation.tape import IMU_SPIKE
+from flownav.navigation.verdicts import Doubt, Event, on_lanes
 
 GYRO_JUMP_RAD_S, TURNING_RAD_S2 = 1.0, 200.0  # what a small vehicle does at once, and in the time between
 ACCEL_JUMP_M_S2, SHAKING_M_S3 = 10.0, 1000.0
@@ -37,7 +32,6 @@ BACK = 0.5  # of the possible jump: so near a reading must come to what was befo
 MOST_DOUBT_M_S = 1.0  # what a burst that was none may have done to the velocity
 MOST_DOUBT_RAD = 0.2  # and to the attitude
 LONE = 0.3  # of that, for one reading alone: a hard touchdown, at a low rate
-ARRIVED_AT = READING + Reading._fields.index("arrived")
 
 
 @equation
@@ -116,21 +110,41 @@ def grown(rate: float, step_s: float, most: float, s: SpikeMemory) -> float:
     return now * now - before * before if s.refused > 1.0 else now * now
 
 
-@procedure
-def drop_spikes(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
+class Arrived(NamedTuple):
+    """Whether the reading at hand arrived."""
+
+    arrived: float
+
+
+class SpikeVerdict(NamedTuple):
+    """What becomes of an inertial reading that may be a spike."""
+
+    spike: SpikeMemory
+    arrived: Arrived
+    velocity: tuple[Doubt, Doubt, Doubt]
+    attitude: tuple[Doubt, Doubt, Doubt]
+    dropped: Event
+
+
+MEMORY.name(Arrived, READING + Reading._fields.index("arrived"))
+
+
+@on_lanes
+def drop_spikes(reading: Reading, start: StartMemory, m: ImuMemory, before: SpikeMemory, *, t_s: float) -> SpikeVerdict:
     """A spike did not arrive."""
-    for lane in range(len(lanes)):
-        reading, m = load_reading(work, lanes, lane), load_imu(work, lanes, lane)
-        if sound(reading) and np.isfinite(m.read_s) and load_start(work, lanes, lane).started > 0.0:
-            step_s = t_s - m.read_s
-            spike, after = judge_spike(reading, step_s, m, load_spike(work, lanes, lane))
-            store_spike(work, lanes, lane, after)
-            if spike:
-                for i in range(3):
-                    add_noise_lane(work, lanes, VELOCITY + i, lane, doubt_of(reading, step_s, m, after))
-                    add_noise_lane(work, lanes, ATTITUDE + i, lane, turning_doubt_of(reading, step_s, m, after))
-                work[ARRIVED_AT * len(lanes) + lane] = 0.0
-                if after.refused == 1.0:
-                    write_event(
-                        lanes, lane, t_s, IMU_SPIKE, distance(reading.value_0, reading.value_1, reading.value_2), o
-                    )
+    judged = sound(reading) and np.isfinite(m.read_s) and start.started > 0.0
+    step_s = t_s - m.read_s
+    jumps, after = judge_spike(reading, step_s, m, before)
+    spike = judged and jumps
+    moved = doubt_of(reading, step_s, m, after) if spike else 0.0
+    turned = turning_doubt_of(reading, step_s, m, after) if spike else 0.0
+    return SpikeVerdict(
+        after if judged else before,
+        Arrived(0.0 if spike else reading.arrived),
+        (Doubt(VELOCITY, moved), Doubt(VELOCITY + 1, moved), Doubt(VELOCITY + 2, moved)),
+        (Doubt(ATTITUDE, turned), Doubt(ATTITUDE + 1, turned), Doubt(ATTITUDE + 2, turned)),
+        Event(
+            IMU_SPIKE if spike and after.refused == 1.0 else -1,
+            distance(reading.value_0, reading.value_1, reading.value_2),
+        ),
+    )

@@ -2,35 +2,34 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure
-from flownav.estimation.covariance import lagged, place, states_of
+from flownav.compile import Lanes, Work, equation, procedure, replacing
+from flownav.estimation.covariance import begin_lane, lagged, set_variance, states_of
 from flownav.estimation.hypotheses import COUNT, begin_lane_anew
-from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, FORCE, POSITION, QUATERNION, RATE, STATE, STATES, VELOCITY
+from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, POSITION, RATE, VELOCITY
 from flownav.frames import GRAVITY_M_S2, Quaternion, quaternion_from_euler, rotation_from_quaternion
 from flownav.measurement import Sensor
+from flownav.navigation.course import with_sought
 from flownav.navigation.lagged_flow import start_lag
-from flownav.navigation.memory import (
-    SCALE_DOUBT,
-    SOUGHT,
-    STEADY_FORCE,
-    load_aid,
-    load_heading,
-    load_imu,
-    load_reading,
-    load_start,
-    set_lane,
-    store_aid,
-    store_imu,
-    store_start,
-)
-from flownav.navigation.offers import is_heard
+from flownav.navigation.memory import MEMORY
+from flownav.navigation.offers import is_heard, with_aid
 from flownav.navigation.packed import START_SIGMA, load_filter_settings, load_flow_settings
 from flownav.navigation.place import ON_GROUND
-from flownav.navigation.records import AidMemory, Reading, StartMemory
-from flownav.navigation.tape import START, Output, write_event
+from flownav.navigation.records import (
+    AidMemory,
+    HeadingMemory,
+    ImuMemory,
+    Reading,
+    ScaleDoubt,
+    StartMemory,
+    SteadyForce,
+)
+from flownav.navigation.tape import START, Output
 from flownav.navigation.told import FROM_MAG, FROM_YAW, NO_HEADING, Equipment
+from flownav.navigation.verdicts import Attitude, Biases, Event, Force, Position, on_lanes
 from flownav.navigation.vibration import with_reading
 
 ORIGIN_SIGMA_M = 0.1  # the local origin, where the navigator's start defines it
@@ -45,139 +44,227 @@ DATUM_HEADING_RAD = 1e-3  # the start defines the frame
 UNTOLD_HEADING_RAD = 1.0  # the first heading that is told will
 LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0
 
+with_force = replacing(StartMemory, "force_x", "force_y", "force_z", "readings", "shaken")
+with_attitude = replacing(StartMemory, "attitude_s", "qw", "qx", "qy", "qz")
+with_started = replacing(StartMemory, "started")
 
+
+class Rate(NamedTuple):
+    """The body rate in the step that was just made, bias off [rad/s]."""
+
+    x_rad_s: float
+    y_rad_s: float
+    z_rad_s: float
+
+
+MEMORY.name(Rate, *(RATE + i for i in range(3)))
+_, store_attitude = MEMORY.access(Attitude)
+_, store_position = MEMORY.access(Position)
+_, store_biases = MEMORY.access(Biases)
+_, store_rate = MEMORY.access(Rate)
+_, store_force = MEMORY.access(Force)
+_, store_steady = MEMORY.access(SteadyForce)
+_, store_doubt = MEMORY.access(ScaleDoubt)
+
+
+# -- before the start -----------------------------------------------------------------------------------------
 @equation
 def levelled(reading: Reading, m: StartMemory) -> StartMemory:
     """The mean specific force [m/s2], and how it is shaken, with one reading more."""
     share = 1.0 / min(m.readings + 1.0, MOST_LEVELLING)
     x, y, z = reading.value_3 - m.force_x, reading.value_4 - m.force_y, reading.value_5 - m.force_z
     square = (x * x + y * y + z * z) / 3.0 if m.readings > 0.0 else 0.0
-    return StartMemory(
-        m.started, m.attitude_s, m.qw, m.qx, m.qy, m.qz,
-        m.force_x + share * x, m.force_y + share * y, m.force_z + share * z, m.readings + 1.0,
-        m.shaken + share * (square - m.shaken),
-    )  # fmt: skip
+    return with_force(
+        m,
+        force_x=m.force_x + share * x,
+        force_y=m.force_y + share * y,
+        force_z=m.force_z + share * z,
+        readings=m.readings + 1.0,
+        shaken=m.shaken + share * (square - m.shaken),
+    )
+
+
+@on_lanes
+def waits(m: StartMemory) -> bool:
+    """Whether any lane has not started."""
+    return m.started == 0.0
+
+
+@on_lanes
+def runs(m: StartMemory) -> bool:
+    """Whether any lane has started."""
+    return m.started > 0.0
+
+
+@on_lanes
+def note_attitude(reading: Reading, m: StartMemory, *, t_s: float) -> StartMemory:
+    """The latest attitude before the start, of unit length."""
+    w, x, y, z = reading.value_0, reading.value_1, reading.value_2, reading.value_3
+    size = np.sqrt(w**2 + x**2 + y**2 + z**2)
+    noted = m.started == 0.0 and reading.arrived > 0.0 and size > 0.5 and size < 2.0
+    after = with_attitude(m, attitude_s=t_s, qw=w / size, qx=x / size, qy=y / size, qz=z / size)
+    return after if noted else m
+
+
+class Levelled(NamedTuple):
+    """What an inertial reading before the start leaves."""
+
+    start: StartMemory
+    imu: ImuMemory
+
+
+@on_lanes
+def note_force(reading: Reading, m: StartMemory, imu: ImuMemory, *, t_s: float) -> Levelled:
+    """The latest inertial reading before the start, and the mean specific force."""
+    gyro = reading.value_0 + reading.value_1 + reading.value_2
+    finite = bool(np.isfinite(gyro + reading.value_3 + reading.value_4 + reading.value_5))
+    noted = m.started == 0.0 and reading.arrived > 0.0 and finite
+    return Levelled(levelled(reading, m) if noted else m, with_reading(reading, t_s, imu) if noted else imu)
 
 
 @procedure
 def gather(work: Work, lanes: Lanes, t_s: float, sensor: int) -> None:
     """Before the start: the latest attitude, IMU reading, and the mean specific force."""
-    for lane in range(len(lanes)):
-        m, reading = load_start(work, lanes, lane), load_reading(work, lanes, lane)
-        if m.started > 0.0 or reading.arrived == 0.0:
-            continue
+    if waits(work, lanes):
         if sensor == Sensor.ATTITUDE:
-            square = reading.value_0**2 + reading.value_1**2 + reading.value_2**2 + reading.value_3**2
-            size = np.sqrt(square)
-            if size > 0.5 and size < 2.0:
-                w, x, y, z = reading.value_0, reading.value_1, reading.value_2, reading.value_3
-                after = StartMemory(
-                    0.0,
-                    t_s,
-                    w / size,
-                    x / size,
-                    y / size,
-                    z / size,
-                    m.force_x,
-                    m.force_y,
-                    m.force_z,
-                    m.readings,
-                    m.shaken,
-                )
-                store_start(work, lanes, lane, after)
+            note_attitude(work, lanes, t_s)
         elif sensor == Sensor.IMU:
-            gyro = reading.value_0 + reading.value_1 + reading.value_2
-            if np.isfinite(gyro + reading.value_3 + reading.value_4 + reading.value_5):
-                store_imu(work, lanes, lane, with_reading(reading, t_s, load_imu(work, lanes, lane)))
-                store_start(work, lanes, lane, levelled(reading, m))
+            note_force(work, lanes, t_s)
+
+
+# -- the start ------------------------------------------------------------------------------------------------
+@equation
+def has_fix(reading: Reading, sensor: int) -> bool:
+    """Whether a fix is at hand."""
+    finite = bool(np.isfinite(reading.value_0 + reading.value_1 + reading.value_2))
+    return sensor == Sensor.GPS_POSITION and is_heard(reading) and finite
+
+
+@equation
+def starts(reading: Reading, m: StartMemory, t_s: float, sensor: int, deadline_s: float) -> bool:
+    """Whether a lane whose attitude is known starts: at a fix, or at the local origin with the first flow, pose or word
+    that the vehicle stands, where no fix came in time.
+    """
+    waiting = m.started == 0.0 and (bool(np.isfinite(m.attitude_s)) or m.readings >= LEAST_LEVELLING)
+    other = sensor == Sensor.FLOW_RATE or sensor == Sensor.FLOW_VELOCITY or sensor == Sensor.POSE
+    stands = sensor == Sensor.LANDED and reading.value_0 > ON_GROUND
+    heard = is_heard(reading) and bool(np.isfinite(reading.value_0))
+    return waiting and (has_fix(reading, sensor) or (heard and (other or stands) and t_s >= deadline_s))
+
+
+@on_lanes
+def any_starts(reading: Reading, m: StartMemory, *, t_s: float, sensor: int, deadline_s: float) -> bool:
+    """Whether any lane starts now."""
+    return starts(reading, m, t_s, sensor, deadline_s)
+
+
+class FirstState(NamedTuple):
+    """What a lane starts with beside its settings' standard deviations: its place [m], attitude, accelerometer's bias
+    [m/s2], their variances, and whether nothing tells it the flow's scale. starts: false where it does not.
+    """
+
+    starts: bool
+    position: Position
+    attitude: Attitude
+    bias_x: float
+    bias_y: float
+    position_variance: float
+    tilt_variance: float
+    heading_variance: float
+    bias_variance: float
+    untold_scale: bool
+
+
+@procedure
+def begin(work: Work, lanes: Lanes, lane: int, first: FirstState, p: Work) -> None:
+    """State and covariance of a lane that starts at its first instant. Of a motion before it nothing is known."""
+    if not first.starts:
+        return
+    begin_lane(work, lanes, lane, p, START_SIGMA)
+    store_attitude(work, lanes, lane, first.attitude)
+    start_lag(work, lanes, lagged(lanes), lane, p[START_SIGMA + VELOCITY], load_flow_settings(p))
+    store_position(work, lanes, lane, first.position)
+    store_biases(work, lanes, lane, Biases(0.0, 0.0, 0.0, first.bias_x, first.bias_y, 0.0))
+    store_rate(work, lanes, lane, Rate(0.0, 0.0, 0.0))
+    store_force(work, lanes, lane, Force(0.0, 0.0, 0.0))
+    store_steady(work, lanes, lane, SteadyForce(0.0, 0.0, 0.0))
+    for i in range(3):
+        set_variance(work, lanes, POSITION + i, lane, first.position_variance)
+        set_variance(work, lanes, ATTITUDE + i, lane, first.heading_variance if i == 2 else first.tilt_variance)
+        set_variance(work, lanes, ACCEL_BIAS + i, lane, first.bias_variance)
+    for fault in range(COUNT):
+        begin_lane_anew(work, lanes, states_of(lanes), fault, lane)
+    doubted = load_filter_settings(p).flow_scale_sigma if first.untold_scale else 0.0
+    store_doubt(work, lanes, lane, ScaleDoubt(doubted))
+
+
+MEMORY.sink(FirstState, begin, "p")
+
+
+@equation
+def heading_sigma(read: bool, lost: bool, unknown: bool, field_rad: float, heading: float) -> float:
+    """How unsure the first heading is [rad]. lost: the start does not define the frame; unknown: no sensor tells it."""
+    known = heading == NO_HEADING and not lost
+    turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
+    turned = UNKNOWN_RAD if unknown else turned
+    return UNTOLD_HEADING_RAD if heading == FROM_YAW and not np.isfinite(field_rad) else turned
+
+
+class Beginning(NamedTuple):
+    """What becomes of a lane that starts."""
+
+    first: FirstState
+    start: StartMemory
+    aid: AidMemory
+    heading: HeadingMemory
+    told: Event
+
+
+@on_lanes
+def start_lanes(
+    reading: Reading, m: StartMemory, aid: AidMemory, heading: HeadingMemory, *, t_s: float, sensor: int,
+    fitted: Equipment, bias_sigma: float,
+) -> Beginning:  # fmt: skip
+    """The first instant of the lanes that start."""
+    begins = starts(reading, m, t_s, sensor, fitted.deadline_s)
+    at_fix = has_fix(reading, sensor)
+    read, lost = bool(np.isfinite(m.attitude_s)), bool(np.isfinite(fitted.deadline_s))
+    doubt_m_s2 = np.sqrt(bias_sigma**2 + m.shaken)
+    believed = STANDING_TILT_RAD**2 / (STANDING_TILT_RAD**2 + (doubt_m_s2 / GRAVITY_M_S2) ** 2)
+    w, x, y, z = (m.qw, m.qx, m.qy, m.qz) if read else level(m, believed, heading.field_rad, fitted)
+    rotation = rotation_from_quaternion(w, x, y, z)
+    levels = not read and m.readings >= LEAST_LEVELLING
+    tilt = READ_TILT_RAD if read else STANDING_TILT_RAD * np.sqrt(1.0 - believed) + LEVELLED_FLOOR_RAD
+    unknown = fitted.heading == NO_HEADING and lost and not read
+    turned = heading_sigma(read, lost, unknown, heading.field_rad, fitted.heading)
+    spread = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M
+    fix = Position(reading.value_0, reading.value_1, reading.value_2)
+    return Beginning(
+        FirstState(
+            begins,
+            fix if at_fix else Position(0.0, 0.0, 0.0),
+            Attitude(w, x, y, z),
+            m.force_x + GRAVITY_M_S2 * rotation[6] if levels else 0.0,
+            m.force_y + GRAVITY_M_S2 * rotation[7] if levels else 0.0,
+            spread * spread,
+            tilt * tilt,
+            turned * turned,
+            doubt_m_s2 * doubt_m_s2,
+            not lost,
+        ),
+        with_started(m, started=1.0 if begins else m.started),
+        with_aid(aid, aided_s=t_s if begins else aid.aided_s, flag=0.0 if begins else aid.flag),
+        with_sought(heading, sought=(1.0 if unknown else 0.0) if begins else heading.sought),
+        Event(START if begins else -1, 1.0 if at_fix else 0.0),
+    )
 
 
 @procedure
 def try_start(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> bool:
-    """Start lanes at a fix, or at the local origin with the first flow, pose or range where no fix came in time.
-
-    Whether any lane runs.
-    """
-    running = False
-    position = sensor == Sensor.GPS_POSITION
-    other = sensor == Sensor.FLOW_RATE or sensor == Sensor.FLOW_VELOCITY or sensor == Sensor.POSE
-    for lane in range(len(lanes)):
-        m, reading = load_start(work, lanes, lane), load_reading(work, lanes, lane)
-        if m.started == 0.0 and (np.isfinite(m.attitude_s) or m.readings >= LEAST_LEVELLING):
-            heard = is_heard(reading) and bool(np.isfinite(reading.value_0))
-            at_fix = heard and position and bool(np.isfinite(reading.value_0 + reading.value_1 + reading.value_2))
-            stands = sensor == Sensor.LANDED and reading.value_0 > ON_GROUND
-            at_origin = heard and (other or stands) and t_s >= fitted.deadline_s
-            if at_fix or at_origin:
-                start_lane(work, lanes, lane, t_s, at_fix, reading, m, fitted, p)
-                write_event(lanes, lane, t_s, START, 1.0 if at_fix else 0.0, o)
-        running = running or load_start(work, lanes, lane).started > 0.0
-    return running
-
-
-@procedure
-def start_lane(
-    work: Work, lanes: Lanes, lane: int, t_s: float, at_fix: bool, reading: Reading, m: StartMemory,
-    fitted: Equipment, p: Work,
-) -> None:  # fmt: skip
-    """State and covariance of one lane at its first instant."""
-    read = bool(np.isfinite(m.attitude_s))
-    doubt_m_s2 = np.sqrt(p[START_SIGMA + ACCEL_BIAS] ** 2 + m.shaken)
-    believed = STANDING_TILT_RAD**2 / (STANDING_TILT_RAD**2 + (doubt_m_s2 / GRAVITY_M_S2) ** 2)
-    field_rad = load_heading(work, lanes, lane).field_rad
-    w, x, y, z = (m.qw, m.qx, m.qy, m.qz) if read else level(m, believed, field_rad, fitted)
-    work[QUATERNION * len(lanes) + lane] = w
-    work[(QUATERNION + 1) * len(lanes) + lane] = x
-    work[(QUATERNION + 2) * len(lanes) + lane] = y
-    work[(QUATERNION + 3) * len(lanes) + lane] = z
-    lost = bool(np.isfinite(fitted.deadline_s))
-    for j in range(STATES):
-        work[(STATE + j) * len(lanes) + lane] = 0.0
-        for i in range(j):
-            work[place(i, j) * len(lanes) + lane] = 0.0
-        sigma = p[START_SIGMA + j]
-        work[place(j, j) * len(lanes) + lane] = sigma * sigma
-    start_lag(work, lanes, lagged(lanes), lane, p[START_SIGMA + VELOCITY], load_flow_settings(p))
-    tilt = READ_TILT_RAD if read else STANDING_TILT_RAD * np.sqrt(1.0 - believed) + LEVELLED_FLOOR_RAD
-    known = fitted.heading == NO_HEADING and not lost
-    unknown = fitted.heading == NO_HEADING and lost and not read
-    turned = DATUM_HEADING_RAD if known else (READ_HEADING_RAD if read else COMPASS_HEADING_RAD)
-    turned = UNKNOWN_RAD if unknown else turned
-    set_lane(work, lanes, SOUGHT, lane, 1.0 if unknown else 0.0)
-    turned = UNTOLD_HEADING_RAD if fitted.heading == FROM_YAW and not np.isfinite(field_rad) else turned
-    spread = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M
-    for i in range(3):  # of a motion before the start nothing is known
-        work[(RATE + i) * len(lanes) + lane] = 0.0
-        work[(FORCE + i) * len(lanes) + lane] = 0.0
-        work[(STEADY_FORCE + i) * len(lanes) + lane] = 0.0
-        work[place(POSITION + i, POSITION + i) * len(lanes) + lane] = spread * spread
-        angle = turned if i == 2 else tilt
-        work[place(ATTITUDE + i, ATTITUDE + i) * len(lanes) + lane] = angle * angle
-    work[(STATE + POSITION) * len(lanes) + lane] = reading.value_0 if at_fix else 0.0
-    work[(STATE + POSITION + 1) * len(lanes) + lane] = reading.value_1 if at_fix else 0.0
-    work[(STATE + POSITION + 2) * len(lanes) + lane] = reading.value_2 if at_fix else 0.0
-    for i in range(3):
-        bias_variance = doubt_m_s2 * doubt_m_s2
-        work[place(ACCEL_BIAS + i, ACCEL_BIAS + i) * len(lanes) + lane] = bias_variance
-    if not read and m.readings >= LEAST_LEVELLING:
-        rotation = rotation_from_quaternion(w, x, y, z)
-        work[(STATE + ACCEL_BIAS) * len(lanes) + lane] = m.force_x + GRAVITY_M_S2 * rotation[6]
-        work[(STATE + ACCEL_BIAS + 1) * len(lanes) + lane] = m.force_y + GRAVITY_M_S2 * rotation[7]
-    for fault in range(COUNT):
-        begin_lane_anew(work, lanes, states_of(lanes), fault, lane)
-    doubted = 0.0 if lost else load_filter_settings(p).flow_scale_sigma
-    set_lane(work, lanes, SCALE_DOUBT, lane, doubted)
-    store_start(work, lanes, lane, started(m))
-    aid = load_aid(work, lanes, lane)
-    store_aid(work, lanes, lane, AidMemory(t_s, 0.0, aid.height_s, aid.landed))
-
-
-@equation
-def started(m: StartMemory) -> StartMemory:
-    """The filter runs."""
-    return StartMemory(
-        1.0, m.attitude_s, m.qw, m.qx, m.qy, m.qz, m.force_x, m.force_y, m.force_z, m.readings, m.shaken
-    )  # fmt: skip
+    """Start the lanes that can start. Whether any lane runs."""
+    if any_starts(work, lanes, t_s, sensor, fitted.deadline_s):
+        start_lanes(work, lanes, t_s, sensor, fitted, p[START_SIGMA + ACCEL_BIAS], p, o)
+    return bool(runs(work, lanes))
 
 
 @equation

@@ -8,35 +8,24 @@ within SHAKEN_TURN_RAD_S and what its shaking leaves in a mean. Nothing is taugh
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, larger, procedure, smaller
-from flownav.estimation.covariance import add_noise_lane, consider_none, variance_of
+from flownav.compile import Lanes, Work, equation, larger, procedure, replacing, smaller
+from flownav.estimation.covariance import consider_none
 from flownav.estimation.laws.geometry import component
 from flownav.estimation.laws.still import gyro_at_rest, velocity_itself
-from flownav.estimation.states import ACCEL_BIAS, STATE, VELOCITY
+from flownav.estimation.states import ACCEL_BIAS, VELOCITY
 from flownav.navigation.inertial import sound
-from flownav.navigation.memory import (
-    CONTACT,
-    LENS_RANGE,
-    STANDS,
-    STILL_CLOCK,
-    TURNING,
-    load_imu_window,
-    load_reading,
-    load_seen_window,
-    load_start,
-    share,
-    shared,
-    store_imu_window,
-    store_seen_window,
-)
-from flownav.navigation.offers import fuse_offered, is_heard, put
+from flownav.navigation.memory import STILL_CLOCK, share, shared
+from flownav.navigation.offers import fuse_offered, is_heard
 from flownav.navigation.packed import load_place_settings
 from flownav.navigation.reasons import FUSED, SILENT
-from flownav.navigation.records import ImuWindow, Reading, SeenWindow
-from flownav.navigation.tape import STOOD, Output, write_event
+from flownav.navigation.records import ImuWindow, Look, Reading, SeenWindow, StandMemory, StartMemory
+from flownav.navigation.tape import STOOD, Output
 from flownav.navigation.told import PlaceSettings
+from flownav.navigation.verdicts import AxisVelocity, Doubt, Event, Offer, on_lanes
 
 WINDOW_S = 0.5
 LEAST_READINGS = 5.0
@@ -51,6 +40,11 @@ SHAKEN_SIGMA_M_S, TOUCHING_SIGMA_M_S = 0.1, 0.03
 GYRO_FLOOR_RAD_S = 3e-4
 SHAKEN_TURN_RAD_S = 0.003  # on skids that give, in gusts
 MOVES, SHAKEN, RESTS = 0.0, 1.0, 2.0  # what a vehicle does: it moves, stands with its motors on, or off
+NO_READINGS, NOTHING_SEEN = ImuWindow(), SeenWindow()
+
+with_span = replacing(SeenWindow, "range_low_m", "range_high_m")
+with_flow = replacing(SeenWindow, "flow_u_m_s", "flow_v_m_s", "flows")
+with_gps = replacing(SeenWindow, "gps_m_s")
 
 
 # -- windows ------------------------------------------------------------------------------------------------
@@ -90,9 +84,7 @@ def spreads(m: ImuWindow) -> tuple[float, float]:
 @equation
 def with_range(range_m: float, m: SeenWindow) -> SeenWindow:
     """The span of the ranges with one more."""
-    return SeenWindow(
-        smaller(m.range_low_m, range_m), larger(m.range_high_m, range_m), m.flow_u_m_s, m.flow_v_m_s, m.flows, m.gps_m_s
-    )
+    return with_span(m, range_low_m=smaller(m.range_low_m, range_m), range_high_m=larger(m.range_high_m, range_m))
 
 
 @equation
@@ -117,59 +109,120 @@ def judge_standing(gyro: ImuWindow, seen: SeenWindow, contact_m: float) -> float
     return RESTS if rests else (SHAKEN if shaken else MOVES)
 
 
-# -- on lanes -----------------------------------------------------------------------------------------------
-@procedure
-def open_windows(work: Work, lanes: Lanes, lane: int) -> None:
-    """Nothing has been read in the windows of a lane."""
-    nothing = ImuWindow(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    store_imu_window(work, lanes, lane, nothing)
-    store_seen_window(work, lanes, lane, SeenWindow(1e9, -1.0, 0.0, 0.0, 0.0, 0.0))
+# -- what is watched ----------------------------------------------------------------------------------------
+class Windows(NamedTuple):
+    """The windows of a lane."""
+
+    imu: ImuWindow
+    seen: SeenWindow
 
 
-@procedure
-def watch_imu(work: Work, lanes: Lanes) -> None:
+@on_lanes
+def open_windows() -> Windows:
+    """Nothing has been read in the windows."""
+    return Windows(NO_READINGS, NOTHING_SEEN)
+
+
+@on_lanes
+def watch_imu(reading: Reading, m: ImuWindow) -> ImuWindow:
     """The inertial reading at hand goes into the window."""
-    for lane in range(len(lanes)):
-        reading = load_reading(work, lanes, lane)
-        if sound(reading):
-            store_imu_window(work, lanes, lane, with_imu(reading, load_imu_window(work, lanes, lane)))
+    return with_imu(reading, m) if sound(reading) else m
 
 
-@procedure
-def watch_range(work: Work, lanes: Lanes) -> None:
-    """And a range, whatever the filter makes of it; many sensors say 0 for nothing."""
-    for lane in range(len(lanes)):
-        reading = load_reading(work, lanes, lane)
-        if is_heard(reading) and reading.value_0 > 0.0 and np.isfinite(reading.value_0):
-            store_seen_window(work, lanes, lane, with_range(reading.value_0, load_seen_window(work, lanes, lane)))
+@on_lanes
+def watch_range(reading: Reading, m: SeenWindow) -> SeenWindow:
+    """A range goes into the window, whatever the filter makes of it; many sensors say 0 for nothing."""
+    ranged = is_heard(reading) and reading.value_0 > 0.0 and np.isfinite(reading.value_0)
+    return with_range(reading.value_0, m) if ranged else m
 
 
-@procedure
-def watch_gps_velocity(work: Work, lanes: Lanes) -> None:
-    """And the fastest level velocity of a receiver."""
-    for lane in range(len(lanes)):
-        reading, m = load_reading(work, lanes, lane), load_seen_window(work, lanes, lane)
-        speed_m_s = np.sqrt(reading.value_0**2 + reading.value_1**2)
-        if is_heard(reading) and np.isfinite(speed_m_s):
-            fastest = larger(m.gps_m_s, speed_m_s)
-            after = SeenWindow(m.range_low_m, m.range_high_m, m.flow_u_m_s, m.flow_v_m_s, m.flows, fastest)
-            store_seen_window(work, lanes, lane, after)
+@on_lanes
+def watch_gps_velocity(reading: Reading, m: SeenWindow) -> SeenWindow:
+    """The fastest level velocity of a receiver stays in the window."""
+    speed_m_s = np.sqrt(reading.value_0**2 + reading.value_1**2)
+    told = is_heard(reading) and np.isfinite(speed_m_s)
+    return with_gps(m, gps_m_s=larger(m.gps_m_s, speed_m_s)) if told else m
 
 
-@procedure
-def watch_flow(work: Work, lanes: Lanes, angular: bool) -> None:
-    """And the flow's velocity by the latest range (TURNING says what turning it saw)."""
-    for lane in range(len(lanes)):
-        reading, m = load_reading(work, lanes, lane), load_seen_window(work, lanes, lane)
-        x = reading.value_0 - (work[TURNING * len(lanes) + lane] if angular else 0.0)
-        y = reading.value_1 - (work[(TURNING + 1) * len(lanes) + lane] if angular else 0.0)
-        ranged = m.range_high_m if m.range_high_m >= 0.0 else work[LENS_RANGE * len(lanes) + lane]
-        per = ranged if angular else 1.0
-        if is_heard(reading) and np.isfinite(x + y):
-            after = SeenWindow(
-                m.range_low_m, m.range_high_m, m.flow_u_m_s + x * per, m.flow_v_m_s + y * per, m.flows + 1.0, m.gps_m_s
-            )
-            store_seen_window(work, lanes, lane, after)
+@on_lanes
+def watch_flow(reading: Reading, look: Look, m: SeenWindow, *, angular: bool) -> SeenWindow:
+    """The flow's velocity by the latest range goes into the window."""
+    x = reading.value_0 - (look.turning_x if angular else 0.0)
+    y = reading.value_1 - (look.turning_y if angular else 0.0)
+    ranged = m.range_high_m if m.range_high_m >= 0.0 else look.range_m
+    per = ranged if angular else 1.0
+    summed = with_flow(
+        m, flow_u_m_s=m.flow_u_m_s + x * per, flow_v_m_s=m.flow_v_m_s + y * per, flows=m.flows + 1.0
+    )  # fmt: skip
+    return summed if is_heard(reading) and np.isfinite(x + y) else m
+
+
+# -- the end of a window ------------------------------------------------------------------------------------
+class Stand(NamedTuple):
+    """What a vehicle does; whether it stands, in any lane."""
+
+    stand: StandMemory
+    event: Event
+    any: bool
+
+
+@on_lanes
+def judge_stand(start: StartMemory, gyro: ImuWindow, seen: SeenWindow, m: StandMemory) -> Stand:
+    """What the vehicle did in the window, and the range where it rests."""
+    does = judge_standing(gyro, seen, m.contact_m)
+    lower = does == SHAKEN and seen.range_high_m < NEAR_M and not m.contact_m <= seen.range_high_m
+    touched = seen.range_high_m >= 0.0 and (does == RESTS or lower)
+    news = start.started > 0.0 and (does > MOVES) != (m.does > MOVES)
+    return Stand(
+        StandMemory(does, seen.range_high_m if touched else m.contact_m),
+        Event(STOOD if news else -1, does),
+        does > MOVES,
+    )
+
+
+@equation
+def touches(m: StandMemory, seen: SeenWindow) -> bool:
+    """Whether a vehicle whose motors run has the ground below it: its range is the lowest that was seen."""
+    return m.does == SHAKEN and seen.range_high_m <= m.contact_m + STEADY_RANGE_M
+
+
+class Rest(NamedTuple):
+    """A velocity of 0, and what is doubted before it is offered."""
+
+    velocity: Doubt
+    accel: tuple[Doubt, Doubt, Doubt]
+    offer: Offer
+
+
+@on_lanes
+def offer_rest(
+    start: StartMemory, seen: SeenWindow, m: StandMemory, velocity: AxisVelocity, *, axis: int, s: PlaceSettings
+) -> Rest:
+    """No velocity along an axis. One that the gate would not let go at rest is what is wrong, and so is the
+    accelerometer that made it.
+    """
+    level = axis < 2 and touches(m, seen)  # a range that is stuck in descent looks like standing
+    least = TOUCHING_SIGMA_M_S if level else SHAKEN_SIGMA_M_S
+    sigma = s.still_sigma_m_s if m.does == RESTS else least
+    stands = start.started > 0.0 and m.does > MOVES
+    square = velocity.speed_m_s * velocity.speed_m_s
+    beyond = square > 0.5 * s.gate_sigma * s.gate_sigma * (velocity.variance + sigma * sigma)
+    freed = stands and m.does == RESTS and beyond
+    accel = (velocity.speed_m_s / WINDOW_S) ** 2 if freed else 0.0
+    return Rest(
+        Doubt(VELOCITY + axis, square if freed else 0.0),
+        (Doubt(ACCEL_BIAS, accel), Doubt(ACCEL_BIAS + 1, accel), Doubt(ACCEL_BIAS + 2, accel)),
+        Offer(0.0, sigma * sigma, FUSED if stands else SILENT),
+    )
+
+
+@on_lanes
+def offer_bias(start: StartMemory, gyro: ImuWindow, seen: SeenWindow, m: StandMemory, *, axis: int) -> Offer:
+    """The gyro's mean is its bias: of one whose motors run only where it touches the ground for certain."""
+    mean, square = turning_of(gyro, axis)
+    least = GYRO_FLOOR_RAD_S if m.does == RESTS else SHAKEN_TURN_RAD_S
+    teaches = start.started > 0.0 and (m.does == RESTS or touches(m, seen))
+    return Offer(mean, square / larger(gyro.readings, 1.0) + least * least, FUSED if teaches else SILENT)
 
 
 @procedure
@@ -178,68 +231,20 @@ def stand_still(work: Work, lanes: Lanes, t_s: float, p: Work, o: Output) -> Non
     if t_s - shared(work, lanes, STILL_CLOCK) < WINDOW_S:
         return
     share(work, lanes, STILL_CLOCK, t_s)
-    s = load_place_settings(p)
-    any_stands = False
-    for lane in range(len(lanes)):
-        gyro, seen = load_imu_window(work, lanes, lane), load_seen_window(work, lanes, lane)
-        contact_m = work[CONTACT * len(lanes) + lane]
-        does = judge_standing(gyro, seen, contact_m)
-        before = work[STANDS * len(lanes) + lane]
-        if load_start(work, lanes, lane).started > 0.0 and (does > MOVES) != (before > MOVES):
-            write_event(lanes, lane, t_s, STOOD, does, o)
-        work[STANDS * len(lanes) + lane] = does
-        lower = does == SHAKEN and seen.range_high_m < NEAR_M and not contact_m <= seen.range_high_m
-        if seen.range_high_m >= 0.0 and (does == RESTS or lower):
-            work[CONTACT * len(lanes) + lane] = seen.range_high_m
-        any_stands = any_stands or does > MOVES
-    if any_stands:
-        learn_standing(work, lanes, s, o)
-    for lane in range(len(lanes)):
-        open_windows(work, lanes, lane)
-
-
-@equation
-def touches(work: Work, lanes: Lanes, lane: int) -> bool:
-    """Whether a vehicle whose motors run has the ground below it: its range is the lowest that was seen."""
-    seen = load_seen_window(work, lanes, lane)
-    shaken: bool = work[STANDS * len(lanes) + lane] == SHAKEN
-    return shaken and seen.range_high_m <= work[CONTACT * len(lanes) + lane] + STEADY_RANGE_M
-
-
-@equation
-def free_resting(work: Work, lanes: Lanes, axis: int, lane: int, gate_sigma: float, variance: float) -> None:
-    """A velocity that the gate would not let go at rest is what is wrong, and so is the accelerometer that made it."""
-    speed_m_s = work[(STATE + VELOCITY + axis) * len(lanes) + lane]
-    known = variance_of(work, lanes, VELOCITY + axis, lane) + variance
-    if speed_m_s * speed_m_s > 0.5 * gate_sigma * gate_sigma * known:
-        add_noise_lane(work, lanes, VELOCITY + axis, lane, speed_m_s * speed_m_s)
-        for i in range(3):
-            add_noise_lane(work, lanes, ACCEL_BIAS + i, lane, (speed_m_s / WINDOW_S) ** 2)
+    if judge_stand(work, lanes, t_s, o):
+        learn_standing(work, lanes, load_place_settings(p), o)
+    open_windows(work, lanes)
 
 
 @procedure
 def learn_standing(work: Work, lanes: Lanes, s: PlaceSettings, o: Output) -> None:
-    """No velocity, and the gyro's bias: of one whose motors run only where it touches the ground for certain."""
+    """No velocity, and the gyro's bias."""
     for axis in range(3):
-        for lane in range(len(lanes)):
-            does, started = work[STANDS * len(lanes) + lane], load_start(work, lanes, lane).started
-            level = axis < 2 and touches(work, lanes, lane)  # a range that is stuck in descent looks like standing
-            least = TOUCHING_SIGMA_M_S if level else SHAKEN_SIGMA_M_S
-            sigma = s.still_sigma_m_s if does == RESTS else least
-            stands = started > 0.0 and does > MOVES
-            if stands and does == RESTS:
-                free_resting(work, lanes, axis, lane, s.gate_sigma, sigma * sigma)
-            put(work, lanes, lane, 0.0, sigma * sigma, FUSED if stands else SILENT)
+        offer_rest(work, lanes, axis, s)
         velocity_itself(work, lanes, axis)
         fuse_offered(work, lanes, s.gate_sigma, o)
     consider_none(work, lanes)
     for axis in range(3):
-        for lane in range(len(lanes)):
-            does, started = work[STANDS * len(lanes) + lane], load_start(work, lanes, lane).started
-            m = load_imu_window(work, lanes, lane)
-            mean, square = turning_of(m, axis)
-            least = GYRO_FLOOR_RAD_S if does == RESTS else SHAKEN_TURN_RAD_S
-            teaches = started > 0.0 and (does == RESTS or touches(work, lanes, lane))
-            put(work, lanes, lane, mean, square / larger(m.readings, 1.0) + least * least, FUSED if teaches else SILENT)
+        offer_bias(work, lanes, axis)
         gyro_at_rest(work, lanes, axis)
         fuse_offered(work, lanes, s.gate_sigma, o)

@@ -17,22 +17,23 @@ from flownav.estimation.lag import predict_with_lag
 from flownav.estimation.motion import hold_still, predict
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, STATES, VELOCITY
 from flownav.measurement import Sensor
-from flownav.navigation.attitude import take_attitude, take_mag, take_yaw
+from flownav.navigation.attitude import take_attitude
 from flownav.navigation.compass import check_compass, note_push
 from flownav.navigation.course import find_heading, note_flow_course
 from flownav.navigation.flow import take_flow
 from flownav.navigation.gps import take_gps
+from flownav.navigation.heading import take_mag, take_yaw
 from flownav.navigation.height import take_baro, take_range
-from flownav.navigation.inertial import choose_motion, keep_imu, steady_force
+from flownav.navigation.inertial import judge_motion, keep_imu, steady_force
 from flownav.navigation.journal import note_decay, note_estimate, note_prediction, reset_state
 from flownav.navigation.lagged_flow import flow_lag
 from flownav.navigation.memory import (
     CLOCK,
     ERRORS_CLOCK,
-    MOVING,
     SOUGHT,
     WRITTEN,
     load_start,
+    load_step,
     share,
     shared,
 )
@@ -71,7 +72,8 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
     if running:
         if heard:
             drop_spikes(work, lanes, t_s, o)
-        choose_motion(work, lanes, t_s, heard, fitted, load_imu_settings(p), o)
+        step_s = t_s - shared(work, lanes, CLOCK)
+        judge_motion(work, lanes, t_s, step_s, heard, fitted.use_imu, load_imu_settings(p), o)
         advance(work, lanes, lagged(lanes), t_s, p, o)
         if heard:
             keep_imu(work, lanes, t_s)
@@ -193,7 +195,7 @@ def advance(work: Work, lanes: Lanes, lag: bool | None, t_s: float, p: Work, o: 
     dt_s = ahead_s / steps
     for _ in range(steps):
         for lane in range(len(lanes)):
-            if work[MOVING * len(lanes) + lane] == 0.0:
+            if load_step(work, lanes, lane).moves == 0.0:
                 hold_still(work, lanes, lane)
         if lag is not None:
             predict_with_lag(work, lanes, dt_s, settings, flow_lag(load_flow_settings(p), dt_s))

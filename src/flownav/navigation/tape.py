@@ -166,7 +166,7 @@ def output_of(
 
 
 @procedure
-def write_event(lanes: Lanes, lane: int, t_s: float, kind: np.int_, value: float, o: Output) -> None:
+def write_event(lanes: Lanes, lane: int, t_s: float, kind: np.int_ | int, value: float, o: Output) -> None:
     """A happening in one lane."""
     row = o.used[FIRST_EVENTS + lane]
     if row < o.room[2]:

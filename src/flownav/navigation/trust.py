@@ -8,22 +8,15 @@ likeness over blocks of time, and not their size, moves the accelerometer's nois
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flownav.compile import Lanes, Work, clamp, equation, larger, procedure
-from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE, NOISE
-from flownav.navigation.memory import (
-    ACCEL_FACTOR,
-    REASON,
-    held_by_gps,
-    load_echo,
-    load_noise,
-    load_whiteness,
-    store_noise,
-    store_whiteness,
-)
+from flownav.compile import Lanes, Work, clamp, equation, larger, replacing
+from flownav.navigation.memory import MEMORY, holds, load_whiteness
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE
-from flownav.navigation.records import NoiseMemory, WhitenessMemory
+from flownav.navigation.records import EchoMemory, GpsMemory, NoiseMemory, WhitenessMemory
+from flownav.navigation.verdicts import Noise, Tested, on_lanes
 
 BLOCK_S = 0.1
 LONGEST_BLOCK_S = 1.0  # readings further apart say nothing of each other
@@ -38,14 +31,15 @@ SMALLEST_OF_BARO = 0.1  # wash and gusts last
 OF_RANGE, OF_BARO, OF_GPS = 0, 1, 2
 STRAYS = 0.02  # a share of ranges that say nothing
 
+with_sum = replacing(WhitenessMemory, "since_s", "total", "readings")
+with_factor = replacing(WhitenessMemory, "factor")
+
 
 @equation
 def with_innovation(innovation: float, variance: float, t_s: float, m: WhitenessMemory) -> WhitenessMemory:
     """The block's sum of innovations, in standard deviations of one; the first begins at its instant."""
-    return WhitenessMemory(
-        t_s if m.readings == 0.0 else m.since_s, m.total + innovation / np.sqrt(variance), m.readings + 1.0, m.before,
-        m.square, m.ended_s,
-    )  # fmt: skip
+    since_s, total = t_s if m.readings == 0.0 else m.since_s, m.total + innovation / np.sqrt(variance)
+    return with_sum(m, since_s=since_s, total=total, readings=m.readings + 1.0)
 
 
 @equation
@@ -55,33 +49,46 @@ def block_ended(t_s: float, m: WhitenessMemory) -> tuple[float, WhitenessMemory]
     apart = t_s - m.ended_s > LONGEST_BLOCK_S
     square = m.square + (block * block - m.square) / FOLLOWING_BLOCKS
     likeness = 0.0 if apart else clamp(block * m.before / larger(square, 1.0), -1.0, 1.0)
-    return likeness, WhitenessMemory(t_s, 0.0, 0.0, block, square, t_s)
-
-
-@procedure
-def watch_whiteness(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
-    """After the test of a component along body axis 0, 1 or 2: how alike its innovations are moves ACCEL_FACTOR."""
-    for lane in range(len(lanes)):
-        reason = work[REASON * len(lanes) + lane]
-        strays = axis == 2 and load_echo(work, lanes, lane).stray > STRAYS
-        held = held_by_gps(work, lanes, lane, t_s)  # then a flow that is refused is what is wrong
-        refused = reason == INNOVATION_GATE and axis < 2 and not held  # a refused echo is as alike as a wrong height
-        if strays or not (reason == FUSED or refused):
-            continue
-        m = load_whiteness(work, lanes, axis, lane)
-        innovation, variance = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]
-        if m.readings > 0.0 and t_s - m.since_s >= BLOCK_S - 1e-3:
-            likeness, m = block_ended(t_s, m)
-            factor = work[(ACCEL_FACTOR + axis) * len(lanes) + lane] * np.exp(PACE * (likeness - LIKENESS_ALLOWED))
-            work[(ACCEL_FACTOR + axis) * len(lanes) + lane] = clamp(factor, 1.0, LARGEST_FACTOR)
-        store_whiteness(work, lanes, axis, lane, with_innovation(innovation, variance, t_s, m))
+    return likeness, WhitenessMemory(t_s, 0.0, 0.0, block, square, t_s, m.factor)
 
 
 @equation
-def accel_factors(work: Work, lanes: Lanes, lane: int) -> tuple[float, float]:
+def followed_factor(t_s: float, m: WhitenessMemory) -> WhitenessMemory:
+    """A new block, and the factor by how alike those before it are."""
+    likeness, after = block_ended(t_s, m)
+    factor = m.factor * np.exp(PACE * (likeness - LIKENESS_ALLOWED))
+    return with_factor(after, factor=clamp(factor, 1.0, LARGEST_FACTOR))
+
+
+@on_lanes
+def watch_whiteness(
+    tested: Tested, echo: EchoMemory, gps: GpsMemory, m: WhitenessMemory, *, t_s: float, axis: int
+) -> WhitenessMemory:
+    """After the test of a component along body axis 0, 1 or 2: how alike its innovations are moves the factor."""
+    strays = axis == 2 and echo.stray > STRAYS
+    unheld = not holds(gps, t_s)  # else a flow that is refused is what is wrong
+    refused = tested.reason == INNOVATION_GATE and axis < 2 and unheld  # a refused echo is as alike as a wrong height
+    counts = not strays and (tested.reason == FUSED or refused)
+    ends = counts and m.readings > 0.0 and t_s - m.since_s >= BLOCK_S - 1e-3
+    block = followed_factor(t_s, m) if ends else m
+    return with_innovation(tested.innovation, tested.total, t_s, block) if counts else m
+
+
+class AccelFactors(NamedTuple):
     """How many times the accelerometer's noise is what it was said to be: level, in the worse axis, and down."""
-    level = larger(work[ACCEL_FACTOR * len(lanes) + lane], work[(ACCEL_FACTOR + 1) * len(lanes) + lane])
-    return level, work[(ACCEL_FACTOR + 2) * len(lanes) + lane]
+
+    level: float
+    down: float
+
+
+@equation
+def accel_factors(work: Work, lanes: Lanes, lane: int) -> AccelFactors:
+    """How far a lane's accelerometer is trusted."""
+    forward, right = load_whiteness(work, lanes, 0, lane), load_whiteness(work, lanes, 1, lane)
+    return AccelFactors(larger(forward.factor, right.factor), load_whiteness(work, lanes, 2, lane).factor)
+
+
+MEMORY.derive(AccelFactors, accel_factors)
 
 
 # -- a sensor's own noise -----------------------------------------------------------------------------------
@@ -101,22 +108,19 @@ def followed_noise(
     return NoiseMemory(clamp(factor, smallest, LARGEST_NOISE), innovation, t_s)
 
 
-@procedure
-def scale_noise(work: Work, lanes: Lanes, place: int) -> None:
-    """NOISE as it was followed, before the test."""
-    for lane in range(len(lanes)):
-        work[NOISE * len(lanes) + lane] *= load_noise(work, lanes, place, lane).factor
+@on_lanes
+def scale_noise(noise: Noise, m: NoiseMemory) -> Noise:
+    """Before the test: the noise of the component of a place, as it was followed."""
+    return Noise(noise.variance * m.factor)
 
 
-@procedure
-def follow_noise(work: Work, lanes: Lanes, t_s: float, place: int, gate_sigma: float) -> None:
-    """And after it."""
+@on_lanes
+def follow_noise(
+    tested: Tested, echo: EchoMemory, m: NoiseMemory, *, t_s: float, place: int, gate_sigma: float
+) -> NoiseMemory:
+    """After the test: a component that was fused teaches its noise."""
     smallest = SMALLEST_OF_BARO if place == OF_BARO else SMALLEST_NOISE
-    for lane in range(len(lanes)):
-        strays = place == OF_RANGE and load_echo(work, lanes, lane).stray > STRAYS
-        if work[REASON * len(lanes) + lane] == FUSED and not strays:
-            innovation, total = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]
-            noise, m = work[NOISE * len(lanes) + lane], load_noise(work, lanes, place, lane)
-            store_noise(
-                work, lanes, place, lane, followed_noise(innovation, total, noise, smallest, gate_sigma, t_s, m)
-            )
+    strays = place == OF_RANGE and echo.stray > STRAYS
+    if tested.reason != FUSED or strays:
+        return m
+    return followed_noise(tested.innovation, tested.total, tested.variance, smallest, gate_sigma, t_s, m)

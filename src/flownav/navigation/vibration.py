@@ -7,21 +7,24 @@ limit, so that range, barometer or GPS keep the velocity.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flownav.compile import Lanes, Work, clamp, equation, larger, procedure, smaller
-from flownav.estimation.covariance import add_noise_lane
-from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS, POSITION, STATE, VELOCITY
-from flownav.navigation.memory import MOVING, load_imu, load_start, store_imu
-from flownav.navigation.records import ImuMemory, Reading
-from flownav.navigation.tape import IMU_DOUBTED, Output, write_event
+from flownav.compile import clamp, equation, larger, replacing, smaller
+from flownav.estimation.states import ACCEL_BIAS, POSITION, VELOCITY
+from flownav.navigation.records import ImuMemory, MotionStep, Reading, StartMemory
+from flownav.navigation.tape import IMU_DOUBTED
 from flownav.navigation.told import ImuSettings
-from flownav.navigation.trust import accel_factors
+from flownav.navigation.trust import AccelFactors
+from flownav.navigation.verdicts import Biases, Doubt, Event, on_lanes
 
 FOLLOWING_S = 1.0
 DOUBT_M_S2 = 2.0  # of an accelerometer that the range contradicts
 DOUBT_LASTS_S = 60.0
 FREED_WALK_M_S2_RT_S = 0.02  # of a bias, for each time that the accelerometer is noisier than told
+with_doubt = replacing(ImuMemory, "doubt_m_s2")
+
 SURE = 3.0  # standard deviations that a limit leaves room for
 DOUBTED_SPEED_M_S = 1.0  # what it may have done to the velocity
 
@@ -49,74 +52,73 @@ def vibration_beyond(m: ImuMemory, s: ImuSettings) -> float:
     return larger(np.sqrt(m.vibration) - s.vibration_free_m_s2, 0.0)
 
 
-@procedure
-def doubt_imu(work: Work, lanes: Lanes, lane: int, t_s: float, contradiction_m: float, o: Output) -> None:
-    """The range contradicts the motion that the accelerometer made: height, velocity and bias are set free."""
-    m = load_imu(work, lanes, lane)
-    if m.doubt_m_s2 < 0.5 * DOUBT_M_S2:
-        write_event(lanes, lane, t_s, IMU_DOUBTED, contradiction_m, o)
-    doubted = ImuMemory(
-        m.read_s, m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z, m.vibration, DOUBT_M_S2, m.gap
+@equation
+def doubted_imu(
+    contradiction_m: float, doubted: bool, m: ImuMemory
+) -> tuple[ImuMemory, Event, tuple[Doubt, Doubt, Doubt]]:
+    """The range contradicts the motion that the accelerometer made: height, velocity and bias are set free.
+
+    The memory, what is said of it, and the doubts; where not doubted, all as before.
+    """
+    says = doubted and m.doubt_m_s2 < 0.5 * DOUBT_M_S2
+    freed = (
+        Doubt(POSITION + 2, contradiction_m * contradiction_m if doubted else 0.0),
+        Doubt(VELOCITY + 2, DOUBTED_SPEED_M_S * DOUBTED_SPEED_M_S if doubted else 0.0),
+        Doubt(ACCEL_BIAS + 2, DOUBT_M_S2 * DOUBT_M_S2 if doubted else 0.0),
     )
-    store_imu(work, lanes, lane, doubted)
-    add_noise_lane(work, lanes, POSITION + 2, lane, contradiction_m * contradiction_m)
-    add_noise_lane(work, lanes, VELOCITY + 2, lane, DOUBTED_SPEED_M_S * DOUBTED_SPEED_M_S)
-    add_noise_lane(work, lanes, ACCEL_BIAS + 2, lane, DOUBT_M_S2 * DOUBT_M_S2)
+    after = with_doubt(m, doubt_m_s2=DOUBT_M_S2 if doubted else m.doubt_m_s2)
+    return after, Event(IMU_DOUBTED if says else -1, contradiction_m), freed
 
 
-@procedure
-def add_vibration_noise(work: Work, lanes: Lanes, dt_s: float, s: ImuSettings) -> None:
+class Shaken(NamedTuple):
+    """What vibration does over a step."""
+
+    imu: ImuMemory
+    doubts: tuple[Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt, Doubt]
+
+
+@on_lanes
+def add_vibration_noise(m: ImuMemory, step: MotionStep, factor: AccelFactors, *, dt_s: float, s: ImuSettings) -> Shaken:
     """Velocity and accelerometer bias are less sure by what vibration may have made of them; a doubt is vertical.
 
     Only in lanes that the IMU moves.
     """
-    for lane in range(len(lanes)):
-        moved_s = dt_s if work[MOVING * len(lanes) + lane] > 0.0 else 0.0
-        m = load_imu(work, lanes, lane)
-        doubt = (1.0 - smaller(moved_s / DOUBT_LASTS_S, 1.0)) * m.doubt_m_s2
-        faded = ImuMemory(
-            m.read_s, m.gyro_x, m.gyro_y, m.gyro_z, m.accel_x, m.accel_y, m.accel_z, m.vibration, doubt, m.gap
-        )
-        store_imu(work, lanes, lane, faded)
-        beyond = vibration_beyond(m, s)
-        level = s.vibration_walk_per_rt_s * beyond
-        down = s.vibration_walk_per_rt_s * larger(beyond, doubt)
-        shaken = m.vibration * moved_s * moved_s if beyond > 0.0 else 0.0
-        freed, freed_down = accel_factors(work, lanes, lane)
-        told = s.accel_noise_m_s2_rt_hz * s.accel_noise_m_s2_rt_hz
-        for i in range(3):
-            walk = FREED_WALK_M_S2_RT_S * ((freed_down if i == 2 else freed) - 1.0)
-            add_noise_lane(work, lanes, ACCEL_BIAS + i, lane, walk * walk * moved_s)
-        shaken_down = larger(freed_down * freed_down - freed * freed, 0.0) * told * moved_s
-        add_noise_lane(work, lanes, VELOCITY + 2, lane, shaken_down)
-        add_noise_lane(work, lanes, ACCEL_BIAS, lane, level * level * moved_s)
-        add_noise_lane(work, lanes, ACCEL_BIAS + 1, lane, level * level * moved_s)
-        add_noise_lane(work, lanes, ACCEL_BIAS + 2, lane, down * down * moved_s)
-        for i in range(3):
-            add_noise_lane(work, lanes, VELOCITY + i, lane, shaken)
+    moved_s = dt_s if step.moves > 0.0 else 0.0
+    doubt = (1.0 - smaller(moved_s / DOUBT_LASTS_S, 1.0)) * m.doubt_m_s2
+    beyond = vibration_beyond(m, s)
+    level = s.vibration_walk_per_rt_s * beyond
+    down = s.vibration_walk_per_rt_s * larger(beyond, doubt)
+    shaken = m.vibration * moved_s * moved_s if beyond > 0.0 else 0.0
+    told = s.accel_noise_m_s2_rt_hz * s.accel_noise_m_s2_rt_hz
+    walk, walk_down = FREED_WALK_M_S2_RT_S * (factor.level - 1.0), FREED_WALK_M_S2_RT_S * (factor.down - 1.0)
+    return Shaken(
+        with_doubt(m, doubt_m_s2=doubt),
+        (
+            Doubt(ACCEL_BIAS, walk * walk * moved_s),
+            Doubt(ACCEL_BIAS + 1, walk * walk * moved_s),
+            Doubt(ACCEL_BIAS + 2, walk_down * walk_down * moved_s),
+            Doubt(VELOCITY + 2, larger(factor.down * factor.down - factor.level * factor.level, 0.0) * told * moved_s),
+            Doubt(ACCEL_BIAS, level * level * moved_s),
+            Doubt(ACCEL_BIAS + 1, level * level * moved_s),
+            Doubt(ACCEL_BIAS + 2, down * down * moved_s),
+            Doubt(VELOCITY, shaken),
+            Doubt(VELOCITY + 1, shaken),
+            Doubt(VELOCITY + 2, shaken),
+        ),
+    )
 
 
-@procedure
-def limit_biases(work: Work, lanes: Lanes, s: ImuSettings) -> None:
-    """Hold both biases to what such sensors, and this vibration, can make: the last resort."""
-    for lane in range(len(lanes)):
-        m = load_imu(work, lanes, lane)
-        beyond = vibration_beyond(m, s)
-        level = s.accel_bias_limit_m_s2 + s.vibration_bias_share * beyond
-        down = s.accel_bias_limit_m_s2 + s.vibration_bias_share * larger(beyond, m.doubt_m_s2)
-        freed, freed_down = accel_factors(work, lanes, lane)
-        at_start = SURE * np.sqrt(load_start(work, lanes, lane).shaken)
-        level += (freed - 1.0) * s.accel_bias_limit_m_s2 + at_start
-        down += (freed_down - 1.0) * s.accel_bias_limit_m_s2 + at_start
-        hold(work, lanes, lane, ACCEL_BIAS, level)
-        hold(work, lanes, lane, ACCEL_BIAS + 1, level)
-        hold(work, lanes, lane, ACCEL_BIAS + 2, down)
-        for i in range(3):
-            hold(work, lanes, lane, GYRO_BIAS + i, s.gyro_bias_limit_rad_s)
-
-
-@equation
-def hold(work: Work, lanes: Lanes, lane: int, state: int, limit: float) -> None:
-    """One state of one lane held between -limit and limit."""
-    value = work[(STATE + state) * len(lanes) + lane]
-    work[(STATE + state) * len(lanes) + lane] = clamp(value, -limit, limit)
+@on_lanes
+def limit_biases(m: ImuMemory, start: StartMemory, factor: AccelFactors, b: Biases, *, s: ImuSettings) -> Biases:
+    """Both biases held to what such sensors, and this vibration, can make: the last resort."""
+    beyond = vibration_beyond(m, s)
+    level = s.accel_bias_limit_m_s2 + s.vibration_bias_share * beyond
+    down = s.accel_bias_limit_m_s2 + s.vibration_bias_share * larger(beyond, m.doubt_m_s2)
+    at_start = SURE * np.sqrt(start.shaken)
+    level += (factor.level - 1.0) * s.accel_bias_limit_m_s2 + at_start
+    down += (factor.down - 1.0) * s.accel_bias_limit_m_s2 + at_start
+    turning = s.gyro_bias_limit_rad_s
+    return Biases(
+        clamp(b.gyro_x, -turning, turning), clamp(b.gyro_y, -turning, turning), clamp(b.gyro_z, -turning, turning),
+        clamp(b.accel_x, -level, level), clamp(b.accel_y, -level, level), clamp(b.accel_z, -down, down),
+    )  # fmt: skip

@@ -25,7 +25,7 @@ from flownav.parts.sensing import OwnReadings
 from flownav.parts.taking import Taker
 from flownav.record import Record
 from flownav.simulation.assemble import Setup
-from flownav.simulation.engine import Flown, buffers_of, fly_into
+from flownav.simulation.engine import Flown, Instead, buffers_of, fly_into
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.fault import SensorFault
 from flownav.simulation.history import column
@@ -142,7 +142,7 @@ def fly_parts(
             stepped = fast.address if fast else (vehicle.called.address if vehicle else 0)
             flight = flight._replace(own=OwnParts(stepped, controller.called.address if controller else 0))
         faults = None if fault is None else [fault]
-        fly_into(flight, seed, index, ONE_LANE, b, ensemble, faults=faults, instead=instead)
+        fly_into(flight, seed, index, ONE_LANE, b, ensemble, Instead(faults=faults, take=instead))
     mistakes.tell()
     if parts.filter is not None:
         require_started(flight, b.history, name_of(parts.filter))

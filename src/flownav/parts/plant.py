@@ -12,12 +12,22 @@ from flownav.parts.calling import Called, Mistakes, name_of
 from flownav.parts.protocols import Controller, Flown, VehicleModel
 from flownav.simulation import layout
 from flownav.simulation.epoch import own_attitude
-from flownav.simulation.layout import load_around, load_autopilot, load_controls, load_helicopter, store_controls
+from flownav.simulation.layout import (
+    PLANT,
+    load_around,
+    load_autopilot,
+    load_controls,
+    load_helicopter,
+    store_controls,
+    store_loads,
+)
 from flownav.simulation.plan import ATTITUDE_S, Flight
+from flownav.simulation.records import AttitudeError, Loads
 from flownav.vehicle.around import Around
 from flownav.vehicle.state import Controls
 
 RIGID = 13
+load_error, _ = PLANT.access(AttitudeError)
 ATTITUDE = slice(6, 10)
 
 
@@ -41,8 +51,7 @@ class OwnVehicle:
         seen = self._part.outputs(self._t_s, self._state, controls, around)
         if not np.isfinite(tuple(seen)).all():
             raise InputError(f"vehicle {name_of(self._part)}: outputs() gave {tuple(seen)}; finite ones are needed")
-        self._work[layout.THRUST], self._work[layout.CONTACT] = seen.thrust_n, seen.contact_force_n
-        self._work[layout.POWER] = seen.power_w
+        store_loads(self._work, ONE_LANE, 0, Loads(seen.thrust_n, seen.contact_force_n, seen.power_w))
 
     def _moved(self, dt_s: float, controls: Controls, around: Around) -> Array:
         """One classical fourth-order step; the quaternion is brought back to unit length."""
@@ -86,7 +95,7 @@ class OwnController:
         seen = work[layout.ESTIMATE : layout.ESTIMATE + 9]
         home = work[layout.HOME : layout.HOME + 3]
         flown = Flown(
-            seen[:3] - home, seen[3:6].copy(), np.array(own_attitude(work, ONE_LANE, 0)),
+            seen[:3] - home, seen[3:6].copy(), np.array(own_attitude(state, load_error(work, ONE_LANE, 0))),
             np.array([state.p, state.q, state.r]), seen[6:9].copy(),
         )  # fmt: skip
         flying = load_autopilot(work, ONE_LANE, 0).flying > 0.0

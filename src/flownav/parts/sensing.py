@@ -13,7 +13,7 @@ from flownav.navigation.memory import READING
 from flownav.navigation.take import UNIT_SIGNATURE
 from flownav.parts.calling import Called, Mistakes, name_of
 from flownav.parts.protocols import SensorModel, Truth, Values
-from flownav.simulation.engine import Buffers
+from flownav.simulation.block import Buffers
 from flownav.simulation.navigating import TRUTH, Timetable, first_truth
 from flownav.simulation.sensing import EPOCH_S
 

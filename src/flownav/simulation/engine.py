@@ -20,6 +20,7 @@ from flownav.navigation.take import navigator_unit
 from flownav.navigation.tape import COMPONENTS, Tape, empty_tape, room_of
 from flownav.navigation.told import carries_lag
 from flownav.simulation import layout
+from flownav.simulation.block import Block, Buffers
 from flownav.simulation.draws import Noise, plain_noise
 from flownav.simulation.ensemble import Ensemble, believed
 from flownav.simulation.fault import SensorFault
@@ -53,14 +54,19 @@ class Branches(NamedTuple):
     noise: Noise
 
 
-class Buffers(NamedTuple):
-    """The scratch of one block."""
+class Instead(NamedTuple):
+    """What a block meets that its flights' numbers do not say.
 
-    work: Array
-    nav: Array
-    tape: Tape
-    fed: Array
-    history: Array
+    faults: of each lane's sensors, for a flight that `fails`. take: the address of what takes readings in place of the
+    navigator, with a unit's interface (`navigation.take.UNIT_SIGNATURE`), of as many lanes.
+    """
+
+    branches: Branches | None = None
+    faults: Sequence[SensorFault] | None = None
+    take: int | None = None
+
+
+NOTHING_ELSE = Instead()
 
 
 def buffers_of(flight: Flight, lanes: tuple[int, ...], epochs: int, *, written: bool) -> Buffers:
@@ -75,48 +81,49 @@ def buffers_of(flight: Flight, lanes: tuple[int, ...], epochs: int, *, written: 
             components = int(sum(COMPONENTS.get(Sensor(kind), 0) for kind in table.sensor))
             tape = empty_tape(epochs + 2, components, 4 * epochs + 8, len(lanes))
             fed = np.zeros((table.readings, FIELDS, len(lanes)))
-    return Buffers(np.empty(rows * len(lanes)), nav, tape, fed, np.empty((epochs, len(HISTORY), len(lanes))))
+    room = np.array([*room_of(tape), len(fed)])
+    return Buffers(np.empty(rows * len(lanes)), nav, tape, fed, room, np.empty((epochs, len(HISTORY), len(lanes))))
 
 
 def fly_into(
-    flight: Flight, seed: int, first: int, lanes: tuple[int, ...], b: Buffers, ensemble: Ensemble | None = None, *,
-    faults: Sequence[SensorFault] | None = None, branches: Branches | None = None, compiled: bool = True,
-    instead: int | None = None,
+    flight: Flight, seed: int, first: int, lanes: tuple[int, ...], b: Buffers, ensemble: Ensemble | None = None,
+    instead: Instead = NOTHING_ELSE, *, compiled: bool = True,
 ) -> None:  # fmt: skip
     """Fly a block into its buffers, each lane as the flight's sheets say, as the ensemble draws it or as its branch is.
 
-    faults: of each lane's sensors, for a flight that `fails`. instead: the address of what takes readings in place of
-    the navigator, with a unit's interface (`navigation.take.UNIT_SIGNATURE`).
     compiled False: in plain Python (tests; it is a thousand times slower). InputError as `Ensemble.truths`.
     """
-    truths: Sequence[Truth] = [believed(flight)] * len(lanes)
-    if branches is not None:
-        truths = branches.truths
-    elif ensemble is not None:
-        truths = ensemble.truths(seed, first, len(lanes))
-    noise = plain_noise(len(lanes)) if branches is None else branches.noise
-    if faults is not None:
-        truths = [truth._replace(fault=fault) for truth, fault in zip(truths, faults, strict=True)]
+    truths = truths_of(flight, seed, first, len(lanes), ensemble, instead)
+    noise = plain_noise(len(lanes)) if instead.branches is None else instead.branches.noise
     if len(b.nav):
         followed = len(b.tape.estimate) > 0 or flight.plan.minds_faults  # nobody else reads levels or suspicions
         b.nav[:] = new_work(lanes, faults=followed)
     b.tape.used[:] = 0
-    room = np.array([*room_of(b.tape), len(b.fed)])
-    told = flight, packed_truth(truths), seed, first, noise, lanes, b.work, b.nav
-    written = (
-        b.tape.estimate.reshape(-1), b.tape.innovation.reshape(-1), b.tape.event.reshape(-1), b.fed.reshape(-1), room,
-        b.tape.used, b.history,
-    )  # fmt: skip
+    told = flight, packed_truth(truths), Block(b.work, lanes, seed, first, noise), b
     take: Any = 0
-    if instead is not None:
-        take = instead
+    if instead.take is not None:
+        take = instead.take
     elif flight.onboard is not None:
         unit = navigator_unit(lanes, carries_lag(load_flow_settings(flight.settings)))
         if compiled:
-            compile_beside(unit, fly_block, *told, take, *written)
+            compile_beside(unit, fly_block, *told, take)
         take = unit.address if compiled else unit.python
     fly: Any = fly_block if compiled else cast(Any, fly_block).py_func
-    fly(*told, take, *written)
+    fly(*told, take)
+
+
+def truths_of(
+    flight: Flight, seed: int, first: int, lanes: int, ensemble: Ensemble | None, instead: Instead
+) -> Sequence[Truth]:
+    """What the vehicle, the wind and the sensors of each lane are. InputError as `Ensemble.truths`."""
+    truths: Sequence[Truth] = [believed(flight)] * lanes
+    if instead.branches is not None:
+        truths = instead.branches.truths
+    elif ensemble is not None:
+        truths = ensemble.truths(seed, first, lanes)
+    if instead.faults is not None:
+        truths = [truth._replace(fault=fault) for truth, fault in zip(truths, instead.faults, strict=True)]
+    return truths
 
 
 def fly_written(
@@ -126,7 +133,7 @@ def fly_written(
     """A block of `len(lanes)` flights from number `first` on, with everything that the navigator was fed and wrote."""
     buffers = buffers_of(flight, lanes, flight.plan.epochs, written=True)
     with announce_compilation("single-flight" if len(lanes) == 1 else "batch"):
-        fly_into(flight, seed, first, lanes, buffers, ensemble, faults=faults, branches=branches)
+        fly_into(flight, seed, first, lanes, buffers, ensemble, Instead(branches, faults))
     return Flown(buffers.history, buffers.tape, buffers.fed)
 
 
@@ -140,27 +147,22 @@ def fly_one(flight: Flight, seed: int, index: int = 0, ensemble: Ensemble | None
 
 def fly_blocks(
     flight: Flight, seed: int, first: int, flights: int, judge: Callable[[Array], Result], threads: int | None = None,
-    ensemble: Ensemble | None = None, faults: Callable[[int], SensorFault] | None = None,
-    branches: Callable[[int], Branches] | None = None, instead: int | None = None,
+    ensemble: Ensemble | None = None, instead: Callable[[int], Instead] = lambda start: NOTHING_ELSE,
 ) -> Iterator[tuple[int, Result]]:  # fmt: skip
     """Fly `flights` flights from number `first` on; yields (flights in the block, judge(its history)) in order.
 
     `judge` takes a block's history (epochs, len(HISTORY), flights in the block), which is overwritten afterwards:
-    memory does not grow with the number of flights. faults: of each flight's sensors by its number, for a flight that
-    `fails`. branches: of a place in the order of flights, what the `len(LANES)` flights from there on fly in place of
-    what their numbers name; all count their streams from `first`. instead: as of `fly_into`, of `len(LANES)` lanes.
+    memory does not grow with the number of flights. instead: of a place in the order of flights, what the `len(LANES)`
+    flights from there on meet; branches count their streams from `first`.
     """
     own = threading.local()
 
     def fly(start: int) -> tuple[int, Result]:
         if not hasattr(own, "buffers"):
             own.buffers = buffers_of(flight, LANES, flight.plan.epochs, written=False)
-        if branches is None:
-            numbers = range(first + start, first + start + len(LANES))
-            failing = None if faults is None else [faults(number) for number in numbers]
-            fly_into(flight, seed, first + start, LANES, own.buffers, ensemble, faults=failing, instead=instead)
-        else:
-            fly_into(flight, seed, first, LANES, own.buffers, branches=branches(start))
+        met = instead(start)
+        number = first if met.branches is not None else first + start
+        fly_into(flight, seed, number, LANES, own.buffers, ensemble, met)
         left = min(len(LANES), flights - start)
         return left, judge(own.buffers.history[:, :, :left])
 

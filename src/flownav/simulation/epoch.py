@@ -2,36 +2,26 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, invoke, procedure
+from flownav.compile import Lanes, Work, equation, invoke, procedure, replacing
 from flownav.control.autopilot import AutopilotState, Estimate, inner_loop, landing_logic, outer_loop
 from flownav.control.gains import AutopilotGains
+from flownav.control.go_around import Knowledge
 from flownav.control.guidance import Reference
-from flownav.frames import GRAVITY_M_S2, Quaternion, Rotation, quaternion_product, rotation_from_quaternion
+from flownav.frames import GRAVITY_M_S2, Quaternion, quaternion_product, rotation_from_quaternion
 from flownav.measurement import Sensor
-from flownav.sensors.beam import ground_height
-from flownav.sensors.flow import misread, step_flow
-from flownav.sensors.gps_ins import attitude_with_error
+from flownav.navigation.records import Reading
+from flownav.sensors.beam import Ground, ground_height
+from flownav.sensors.flow import FlowParameters, FlowState, misread, step_flow
+from flownav.sensors.gps_ins import GpsInsErrors, attitude_with_error
 from flownav.sensors.rangefinder import slant_range
-from flownav.simulation import layout
-from flownav.simulation.failing import strike
-from flownav.simulation.layout import (
-    flow_as_is,
-    ground_as_is,
-    load_autopilot,
-    load_estimate,
-    load_flow,
-    load_gps_errors,
-    load_helicopter,
-    load_known,
-    store_autopilot,
-    store_controls,
-    store_flow,
-    store_true_imu,
-    vehicle_as_is,
-)
-from flownav.simulation.navigating import Timetable, keep_inertial
+from flownav.simulation.block import Block, Progress
+from flownav.simulation.failing import Taken, strike
+from flownav.simulation.layout import PAPERS, PLANT
+from flownav.simulation.navigating import Timetable, inertial_row, keep_inertial
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import (
     ATTITUDE_S,
@@ -43,43 +33,44 @@ from flownav.simulation.plan import (
     OwnParts,
 )
 from flownav.simulation.plant import LinearTruth, linear_step
-from flownav.simulation.ring import FIELDS, FIRST
+from flownav.simulation.records import AttitudeError, Estimated, Felt, Home, Landed, Loads, PaperInput
 from flownav.simulation.sampling import read_inertial
 from flownav.simulation.sensing import EPOCH_S, lens_height, true_imu
 from flownav.simulation.vehicles import observe_vehicle, step_vehicle
-from flownav.vehicle.state import Controls
+from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.state import Controls, HelicopterState
+
+over_home = replacing(Estimate, "pos_n", "pos_e", "pos_d")
 
 
-@equation
-def estimate_for_autopilot(work: Work, lanes: Lanes, flight: Flight) -> None:
+@PLANT.on_lanes
+def estimate_for_autopilot(state: HelicopterState, said: Estimated, felt: Felt, *, on_truth: bool) -> Estimate:
     """What the outer loop flies on: the filter's estimate or the truth, and the force that the IMU felt."""
-    source = layout.HELICOPTER if flight.plan.fly_on_truth else layout.ESTIMATED
-    for component in range(3):
-        for lane in range(len(lanes)):
-            value = work[(layout.FELT + component) * len(lanes) + lane]
-            work[(layout.ESTIMATE + 6 + component) * len(lanes) + lane] = value
-    for component in range(6):
-        for lane in range(len(lanes)):
-            value = work[(source + component) * len(lanes) + lane]
-            work[(layout.ESTIMATE + component) * len(lanes) + lane] = value
+    return Estimate(
+        state.pos_n if on_truth else said.pos_n_m,
+        state.pos_e if on_truth else said.pos_e_m,
+        state.pos_d if on_truth else said.pos_d_m,
+        state.u if on_truth else said.vel_u_m_s,
+        state.v if on_truth else said.vel_v_m_s,
+        state.w if on_truth else said.vel_w_m_s,
+        felt.mean_x_m_s2,
+        felt.mean_y_m_s2,
+        felt.mean_z_m_s2,
+    )
 
 
 @equation
 def note_home(work: Work, lanes: Lanes, epoch: int, reference: Reference, flight: Flight) -> None:
     """Where the estimate puts the pad: noted at the start and for as long as the skids stay on it before take-off."""
-    for lane in range(len(lanes)):
-        parked = epoch * EPOCH_S < flight.plan.takeoff_at_s and flight.plan.starts_on_ground
-        waiting = flight.plan.home_at_start and (epoch == 0 or parked)
-        estimate = load_estimate(work, lanes, lane)
-        home_n, home_e, home_d = (
-            estimate.pos_n - reference.pos_n,
-            estimate.pos_e - reference.pos_e,
-            estimate.pos_d - reference.pos_d,
-        )
-        row = layout.HOME
-        work[row * len(lanes) + lane] = home_n if waiting else work[row * len(lanes) + lane]
-        work[(row + 1) * len(lanes) + lane] = home_e if waiting else work[(row + 1) * len(lanes) + lane]
-        work[(row + 2) * len(lanes) + lane] = home_d if waiting else work[(row + 2) * len(lanes) + lane]
+    parked = epoch * EPOCH_S < flight.plan.takeoff_at_s and flight.plan.starts_on_ground
+    if flight.plan.home_at_start and (epoch == 0 or parked):
+        put_home(work, lanes, reference)
+
+
+@PLANT.on_lanes
+def put_home(estimate: Estimate, *, reference: Reference) -> Home:
+    """Where the estimate puts the pad, if the vehicle is where its path says."""
+    return Home(estimate.pos_n - reference.pos_n, estimate.pos_e - reference.pos_e, estimate.pos_d - reference.pos_d)
 
 
 @equation
@@ -87,56 +78,43 @@ def command(
     work: Work, lanes: Lanes, t_s: float, reference: Reference, flight: Flight, onboard: Onboard | None
 ) -> None:
     """Landing logic and outer loop; the filter's inputs for the coming epoch."""
-    plan, gains = flight.plan, flight.gains
-    may_fly = 1.0 if t_s >= plan.takeoff_at_s else 0.0
-    may_land = 1.0 if t_s >= plan.may_land_after_s else 0.0
-    threshold = CONTACT_SHARE * flight.vehicle.mass_kg * flight.vehicle.gravity_m_s2
-    for lane in range(len(lanes)):
-        rotation = flown_attitude(work, lanes, lane)
-        estimate = load_estimate(work, lanes, lane)
-        relative = Estimate(
-            estimate.pos_n - work[layout.HOME * len(lanes) + lane],
-            estimate.pos_e - work[(layout.HOME + 1) * len(lanes) + lane],
-            estimate.pos_d - work[(layout.HOME + 2) * len(lanes) + lane],
-            estimate.u,
-            estimate.v,
-            estimate.w,
-            estimate.force_x,
-            estimate.force_y,
-            estimate.force_z,
-        )
-        if onboard is None:
-            contact = work[layout.CONTACT * len(lanes) + lane]
-        else:  # the skid switch is all that the autopilot knows of its skids
-            contact = 2.0 * threshold * work[layout.LANDED * len(lanes) + lane]
-        state = landing_logic(load_autopilot(work, lanes, lane), contact, threshold, may_fly, may_land, EPOCH_S)
-        known = load_known(work, lanes, lane)
-        after = outer_loop(state, reference, relative, known, rotation, gains, may_land, EPOCH_S)
-        store_autopilot(work, lanes, lane, after)
+    may_fly = 1.0 if t_s >= flight.plan.takeoff_at_s else 0.0
+    may_land = 1.0 if t_s >= flight.plan.may_land_after_s else 0.0
+    threshold_n = CONTACT_SHARE * flight.vehicle.mass_kg * flight.vehicle.gravity_m_s2
+    mind_skids(work, lanes, may_fly, may_land, threshold_n, onboard)
+    follow_path(work, lanes, may_land, reference, flight.gains)
 
 
-@equation
-def flown_attitude(work: Work, lanes: Lanes, lane: int) -> Rotation:
-    """R_EB that the outer loop takes the vehicle to have: what the filter, or the INS, says."""
-    row = layout.ESTIMATED_ATTITUDE
-    return rotation_from_quaternion(
-        work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane], work[(row + 2) * len(lanes) + lane],
-        work[(row + 3) * len(lanes) + lane],
+@PLANT.on_lanes
+def mind_skids(
+    before: AutopilotState, loads: Loads, skids: Landed, *, may_fly: float, may_land: float, threshold_n: float,
+    onboard: Onboard | None,
+) -> AutopilotState:  # fmt: skip
+    """The landing logic. With sensors of its own, the skid switch is all that the autopilot knows of its skids."""
+    contact_n = loads.contact_n if onboard is None else 2.0 * threshold_n * skids.landed
+    return landing_logic(before, contact_n, threshold_n, may_fly, may_land, EPOCH_S)
+
+
+@PLANT.on_lanes
+def follow_path(
+    before: AutopilotState, estimate: Estimate, home: Home, said: Estimated, known: Knowledge, *, may_land: float,
+    reference: Reference, gains: AutopilotGains,
+) -> AutopilotState:  # fmt: skip
+    """The outer loop, at the attitude that the filter, or the INS, says."""
+    relative = over_home(
+        estimate, pos_n=estimate.pos_n - home.north_m, pos_e=estimate.pos_e - home.east_m,
+        pos_d=estimate.pos_d - home.down_m,
     )  # fmt: skip
+    rotation = rotation_from_quaternion(said.qw, said.qx, said.qy, said.qz)
+    return outer_loop(before, reference, relative, known, rotation, gains, may_land, EPOCH_S)
 
 
-@equation
-def note_inputs(work: Work, lanes: Lanes, gains: AutopilotGains) -> None:
+@PLANT.on_lanes
+def note_inputs(autopilot: AutopilotState, controls: Controls, *, gains: AutopilotGains) -> PaperInput:
     """U of the paper's filter: collective and pedal as perturbations from trim; zero where the skids touch."""
-    for lane in range(len(lanes)):
-        autopilot = load_autopilot(work, lanes, lane)
-        flying = autopilot.flying > 0.0 and autopilot.contact_time_s == 0.0
-        col = work[(layout.CONTROLS + 2) * len(lanes) + lane] - gains.collective_trim_rad
-        ped = work[(layout.CONTROLS + 3) * len(lanes) + lane] - gains.pedal_trim_rad
-        work[layout.INPUT * len(lanes) + lane] = 0.0
-        work[(layout.INPUT + 1) * len(lanes) + lane] = 0.0
-        work[(layout.INPUT + 2) * len(lanes) + lane] = col if flying else 0.0
-        work[(layout.INPUT + 3) * len(lanes) + lane] = ped if flying else 0.0
+    flying = autopilot.flying > 0.0 and autopilot.contact_time_s == 0.0
+    col, ped = controls.col - gains.collective_trim_rad, controls.ped - gains.pedal_trim_rad
+    return PaperInput(0.0, 0.0, col if flying else 0.0, ped if flying else 0.0)
 
 
 @equation
@@ -147,47 +125,45 @@ def steer(
     if own is not None and own.steer != 0:
         invoke(own.steer, work)
     else:
-        steer_blades(work, lanes, flight, linear, onboard)
+        steer_blades(work, lanes, flight.gains, linear, onboard)
 
 
-@equation
-def steer_blades(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None, onboard: Onboard | None) -> None:
+class Steered(NamedTuple):
+    """The attitude loop's state and what it asks for."""
+
+    autopilot: AutopilotState
+    controls: Controls
+
+
+@PLANT.on_lanes
+def steer_blades(
+    state: HelicopterState, before: AutopilotState, errors: GpsInsErrors, error: AttitudeError, *,
+    gains: AutopilotGains, linear: LinearTruth | None, onboard: Onboard | None,
+) -> Steered:  # fmt: skip
     """The attitude loop: blade angles for the next 4 ms, on the flown attitude and the flybarless unit's gyros."""
-    for lane in range(len(lanes)):
-        state = load_helicopter(work, lanes, lane)
-        if onboard is None:
-            qw, qx, qy, qz = ins_attitude(work, lanes, lane)
-        else:
-            qw, qx, qy, qz = own_attitude(work, lanes, lane)
-        rotation = rotation_from_quaternion(qw, qx, qy, qz)
-        after, lon, lat, col, ped = inner_loop(
-            load_autopilot(work, lanes, lane), rotation, state.p, state.q, state.r, flight.gains, ATTITUDE_S
-        )
-        store_autopilot(work, lanes, lane, after)
-        if linear is None:
-            store_controls(work, lanes, lane, Controls(lon, lat, col, ped))
-        else:
-            store_controls(work, lanes, lane, Controls(lon, lat, col, pedal_sideways(after, flight.gains, linear)))
+    if onboard is None:
+        qw, qx, qy, qz = ins_attitude(state, errors)
+    else:
+        qw, qx, qy, qz = own_attitude(state, error)
+    rotation = rotation_from_quaternion(qw, qx, qy, qz)
+    after, lon, lat, col, ped = inner_loop(before, rotation, state.p, state.q, state.r, gains, ATTITUDE_S)
+    if linear is not None:
+        ped = pedal_sideways(after, gains, linear)
+    return Steered(after, Controls(lon, lat, col, ped))
 
 
 @equation
-def ins_attitude(work: Work, lanes: Lanes, lane: int) -> Quaternion:
+def ins_attitude(state: HelicopterState, error: GpsInsErrors) -> Quaternion:
     """The paper's INS: the true attitude with its errors of this epoch."""
-    state, error = load_helicopter(work, lanes, lane), load_gps_errors(work, lanes, lane)
     return attitude_with_error(
         (state.qw, state.qx, state.qy, state.qz), error.roll_rad, error.pitch_rad, error.heading_rad
     )
 
 
 @equation
-def own_attitude(work: Work, lanes: Lanes, lane: int) -> Quaternion:
+def own_attitude(state: HelicopterState, error: AttitudeError) -> Quaternion:
     """The navigator's attitude of this epoch, turned on since then as the flybarless unit's gyros say."""
-    state, row = load_helicopter(work, lanes, lane), layout.ATTITUDE_ERROR
-    error = (
-        work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane], work[(row + 2) * len(lanes) + lane],
-        work[(row + 3) * len(lanes) + lane],
-    )  # fmt: skip
-    return quaternion_product(error, (state.qw, state.qx, state.qy, state.qz))
+    return quaternion_product((error.w, error.x, error.y, error.z), (state.qw, state.qx, state.qy, state.qz))
 
 
 @equation
@@ -196,20 +172,19 @@ def pedal_sideways(state: AutopilotState, gains: AutopilotGains, linear: LinearT
     return gains.pedal_trim_rad + GRAVITY_M_S2 * (state.roll_sine - gains.roll_trim_sine) / linear.lateral_per_pedal
 
 
-@equation
-def follow_flow(work: Work, lanes: Lanes, flight: Flight) -> None:
+@PAPERS.on_lanes
+def follow_flow(
+    state: HelicopterState, before: FlowState, flow: FlowParameters, ground: Ground, vehicle: VehicleParameters,
+    loads: Loads, *, lens_below_cg_m: float,
+) -> FlowState:  # fmt: skip
     """The flow sensor's own dynamics, 4 ms on."""
-    for lane in range(len(lanes)):
-        state = load_helicopter(work, lanes, lane)
-        cosine = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)[8]
-        over = lens_height(state, cosine, flight.sensors.lens_below_cg_m)
-        over -= ground_height(state.pos_n, state.pos_e, ground_as_is(work, lanes, lane))
-        distance = slant_range(over, cosine)
-        thrust = work[layout.THRUST * len(lanes) + lane] / vehicle_as_is(work, lanes, lane).mass_kg
-        before, flow = load_flow(work, lanes, lane), flow_as_is(work, lanes, lane)
-        seen_u, seen_v = misread(state.u, state.v, state.w, state.p, state.q, distance, flow)
-        after = step_flow(before, seen_u, seen_v, state.w, distance, thrust, flow)
-        store_flow(work, lanes, lane, after)
+    cosine = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)[8]
+    over = lens_height(state, cosine, lens_below_cg_m)
+    over -= ground_height(state.pos_n, state.pos_e, ground)
+    distance = slant_range(over, cosine)
+    thrust = loads.thrust_n / vehicle.mass_kg
+    seen_u, seen_v = misread(state.u, state.v, state.w, state.p, state.q, distance, flow)
+    return step_flow(before, seen_u, seen_v, state.w, distance, thrust, flow)
 
 
 @equation
@@ -233,7 +208,7 @@ def advance(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None
     """From one epoch to the next."""
     for _ in range(ATTITUDE_STEPS):
         steer(work, lanes, flight, linear, None, None)
-        follow_flow(work, lanes, flight)
+        follow_flow(work, lanes, flight.sensors.lens_below_cg_m)
         if linear is None:
             for _ in range(PHYSICS_STEPS):
                 step_vehicle(work, lanes, PHYSICS_S, flight.rotors, None)
@@ -242,45 +217,58 @@ def advance(work: Work, lanes: Lanes, flight: Flight, linear: LinearTruth | None
             linear_step(work, lanes, linear)
 
 
+@equation
+def inertial_parts(onboard: Onboard) -> int:
+    """Inertial readings of an epoch."""
+    return ATTITUDE_STEPS * PHYSICS_STEPS // onboard.inertial_steps
+
+
 @procedure
 def advance_sensing(
-    work: Work, lanes: Lanes, seed: int, first: int, epoch: int, taken: int, heard: int, flight: Flight,
-    onboard: Onboard, table: Timetable, fails: bool | None, own: OwnParts | None,
-) -> None:  # fmt: skip
+    b: Block, flight: Flight, onboard: Onboard, table: Timetable, epoch: int, at: Progress, own: OwnParts | None
+) -> None:
     """From one epoch to the next, with an inertial reading at the end of each of its periods."""
-    period_s = onboard.inertial_steps * PHYSICS_S
+    work, lanes = b.work, b.lanes
     for step in range(ATTITUDE_STEPS * PHYSICS_STEPS):
         if step % PHYSICS_STEPS == 0:
             steer(work, lanes, flight, None, onboard, own)
-            follow_flow(work, lanes, flight)
+            follow_flow(work, lanes, flight.sensors.lens_below_cg_m)
         move(work, lanes, PHYSICS_S, flight, onboard, own)
         if (step + 1) % PHYSICS_STEPS == 0:
             observe(work, lanes, flight, onboard, own)
         if (step + 1) % onboard.inertial_steps == 0:
-            for lane in range(len(lanes)):
-                gravity_m_s2 = vehicle_as_is(work, lanes, lane).gravity_m_s2
-                truth = true_imu(work, lanes, lane, period_s, gravity_m_s2)
-                store_true_imu(work, lanes, lane, truth)
             part = (step + 1) // onboard.inertial_steps - 1
-            slot = (taken + part) % table.slots
-            read_inertial(work, lanes, seed, first, epoch, part, slot, onboard)
-            if fails is not None:
-                t_s = epoch * EPOCH_S + (step + 1) * PHYSICS_S
-                strike(work, lanes, seed, first, epoch, t_s, slot, Sensor.IMU, 8 + part, 0)
-            keep_inertial(work, lanes, slot, heard + part, period_s, table)
-            feel(work, lanes, slot, part, ATTITUDE_STEPS * PHYSICS_STEPS // onboard.inertial_steps)
+            hear(b, onboard, table, epoch, at, part, flight.fails)
 
 
 @equation
-def feel(work: Work, lanes: Lanes, slot: int, part: int, parts: int) -> None:
-    """Take the accelerometer's reading in a slot, the `part`-th of `parts` of this epoch, into their mean.
+def hear(b: Block, onboard: Onboard, table: Timetable, epoch: int, at: Progress, part: int, fails: bool | None) -> None:
+    """The inertial reading of the epoch's `part`-th period, which ends now."""
+    work, lanes, period_s = b.work, b.lanes, onboard.inertial_steps * PHYSICS_S
+    true_imu(work, lanes, period_s)
+    slot = (at.taken + part) % table.slots
+    read_inertial(work, lanes, b.seed, b.first, epoch, part, slot, onboard)
+    if fails is not None:
+        t_s = epoch * EPOCH_S + (part + 1) * onboard.inertial_steps * PHYSICS_S
+        strike(work, lanes, b.seed, b.first, Taken(epoch, t_s, slot, Sensor.IMU, 8 + part, 0))
+    keep_inertial(work, lanes, slot, inertial_row(at.heard + part, period_s, table))
+    feel(work, lanes, part, inertial_parts(onboard), slot)
+
+
+@PLANT.on_lanes
+def feel(before: Felt, reading: Reading, *, part: int, parts: int) -> Felt:
+    """The mean of the accelerometer's readings of this epoch with the one in a slot, the `part`-th of `parts`.
 
     One that reads nothing leaves what it read last.
     """
-    for i in range(3):
-        for lane in range(len(lanes)):
-            before = work[(layout.FELT + i) * len(lanes) + lane] if part > 0 else 0.0
-            reading = work[(FIRST + slot * FIELDS + 3 + i) * len(lanes) + lane]
-            last = reading if np.isfinite(reading) else work[(layout.LAST_FELT + i) * len(lanes) + lane]
-            work[(layout.LAST_FELT + i) * len(lanes) + lane] = last
-            work[(layout.FELT + i) * len(lanes) + lane] = before + last / parts
+    x = reading.value_3 if np.isfinite(reading.value_3) else before.last_x_m_s2
+    y = reading.value_4 if np.isfinite(reading.value_4) else before.last_y_m_s2
+    z = reading.value_5 if np.isfinite(reading.value_5) else before.last_z_m_s2
+    return Felt(
+        (before.mean_x_m_s2 if part > 0 else 0.0) + x / parts,
+        (before.mean_y_m_s2 if part > 0 else 0.0) + y / parts,
+        (before.mean_z_m_s2 if part > 0 else 0.0) + z / parts,
+        x,
+        y,
+        z,
+    )

@@ -18,8 +18,9 @@ from flownav.navigation.records import Reading
 from flownav.simulation import layout
 from flownav.simulation.draws import FAULT_CHANNEL, draw
 from flownav.simulation.fault import SensorFault
-from flownav.simulation.layout import fault_as_is
-from flownav.simulation.ring import FIELDS, FIRST, put_slot, reading_at, store_row
+from flownav.simulation.layout import PLANT, fault_as_is
+from flownav.simulation.records import HeldRange
+from flownav.simulation.ring import FIELDS, load_slot, put_slot, reading_at, store_row
 
 SQRT_2 = math.sqrt(2.0)
 
@@ -35,6 +36,7 @@ class FaultNormals(NamedTuple):
     sixth: float
 
 
+load_held, store_held = PLANT.access(HeldRange)
 load_normals, _ = lane_access(FaultNormals, layout.FAULT_NORMALS)
 
 
@@ -94,24 +96,33 @@ def failed(read: Reading, earlier: Reading, held: float, since_s: float, n: Faul
     )
 
 
+class Taken(NamedTuple):
+    """A reading that was just put into a slot. channel: of its noise; number: among those of its sensor."""
+
+    epoch: int
+    t_s: float
+    slot: int
+    sensor: int
+    channel: int
+    number: int
+
+
 @procedure
-def strike(
-    work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, t_s: float, slot: int, sensor: int, channel: int,
-    count: int,
-) -> None:  # fmt: skip
-    """The reading in a slot as each lane's fault has it. channel: of its noise; count: the reading's number."""
-    draw(work, lanes, layout.FAULT_NORMALS, 6, seed, flight, epoch, FAULT_CHANNEL + 3 * channel)
+def strike(work: Work, lanes: Lanes, seed: int, flight: int, taken: Taken) -> None:
+    """The reading in a slot as each lane's fault has it."""
+    sensor, slot, t_s = taken.sensor, taken.slot, taken.t_s
+    draw(work, lanes, layout.FAULT_NORMALS, 6, seed, flight, taken.epoch, FAULT_CHANNEL + 3 * taken.channel)
     for lane in range(len(lanes)):
-        fault, read = fault_as_is(work, lanes, lane), reading_at(work, lanes, FIRST + slot * FIELDS, lane)
+        fault, read = fault_as_is(work, lanes, lane), load_slot(work, lanes, slot, lane)
         struck, on = strikes(sensor, fault), t_s >= fault.begins_s and t_s < fault.ends_s
         earlier = read
         if sensor == Sensor.FLOW_RATE:
-            earlier = remember(work, lanes, lane, read, count, int(fault.late_readings))
-        row = layout.FAULT_HELD
+            earlier = remember(work, lanes, lane, read, taken.number, int(fault.late_readings))
+        held = load_held(work, lanes, lane)
         if sensor == Sensor.RANGE and t_s < fault.begins_s and read.arrived > 0.0:
-            work[row * len(lanes) + lane] = read.value_0
-        held = work[row * len(lanes) + lane]
-        after = failed(read, earlier, held, t_s - fault.begins_s, load_normals(work, lanes, lane), fault)
+            held = HeldRange(read.value_0)
+        store_held(work, lanes, lane, held)
+        after = failed(read, earlier, held.range_m, t_s - fault.begins_s, load_normals(work, lanes, lane), fault)
         put_slot(work, lanes, slot, lane, after if struck and on else read)
 
 

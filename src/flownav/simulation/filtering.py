@@ -2,26 +2,41 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, Work, equation
+from flownav.compile import Lanes, Work, equation, replacing
 from flownav.estimation import paper_filter
 from flownav.estimation.kalman import start
 from flownav.estimation.paper_filter import STATES, PaperModel
+from flownav.sensors.gps_ins import NavSolution
 from flownav.simulation import layout
+from flownav.simulation.layout import PLANT
+from flownav.simulation.records import Estimated, Measured, PaperState, PaperVariance, Spread
+from flownav.vehicle.state import HelicopterState
+
+at_position = replacing(PaperState, "pos_n_m", "pos_e_m", "pos_d_m")
+with_attitude = replacing(Estimated, "qw", "qx", "qy", "qz")
 
 
 @equation
 def start_filter(work: Work, lanes: Lanes, variance: NDArray[np.float64], start_known: bool) -> None:
     """x: the known start, or the first GPS position; velocity zero. P = diag(variance)."""
     start(work, lanes, layout.FILTER, STATES, variance)
-    for component in range(3):
-        for lane in range(len(lanes)):
-            known = work[(layout.HELICOPTER + component) * len(lanes) + lane]
-            measured = work[(layout.MEASURED + component) * len(lanes) + lane]
-            position = known if start_known else measured
-            work[(layout.FILTER.state + component) * len(lanes) + lane] = position
+    start_position(work, lanes, start_known)
+
+
+@PLANT.on_lanes
+def start_position(x: PaperState, state: HelicopterState, measured: Measured, *, start_known: bool) -> PaperState:
+    """The filter's state at the known start, or at the first GPS position."""
+    return at_position(
+        x,
+        pos_n_m=state.pos_n if start_known else measured.pos_n_m,
+        pos_e_m=state.pos_e if start_known else measured.pos_e_m,
+        pos_d_m=state.pos_d if start_known else measured.pos_d_m,
+    )
 
 
 @equation
@@ -32,25 +47,32 @@ def run_filter(work: Work, lanes: Lanes, epoch: int, paper: PaperModel | None) -
     """
     if paper is not None:
         run_paper_filter(work, lanes, epoch, paper)
+        say_state(work, lanes)
     say_ins_attitude(work, lanes)
 
 
 @equation
-def say_ins_attitude(work: Work, lanes: Lanes) -> None:
-    """A filter without an attitude of its own says the INS's."""
-    for i in range(4):
-        for lane in range(len(lanes)):
-            work[(layout.ESTIMATED_ATTITUDE + i) * len(lanes) + lane] = work[(layout.GPS + 6 + i) * len(lanes) + lane]
-
-
-@equation
 def run_paper_filter(work: Work, lanes: Lanes, epoch: int, model: PaperModel) -> None:
-    """Equations 24-30; the estimate is the state."""
+    """Equations 24-30."""
     if epoch > 0:
         paper_filter.predict(work, lanes, layout.FILTER, layout.INPUT, model)
     paper_filter.update(work, lanes, layout.FILTER, layout.MEASURED, layout.ARRIVED, layout.INNOVATION, model)
-    for i in range(STATES):
-        diagonal = layout.FILTER.covariance + i * (STATES + 1)
-        for lane in range(len(lanes)):
-            work[(layout.ESTIMATED + i) * len(lanes) + lane] = work[(layout.FILTER.state + i) * len(lanes) + lane]
-            work[(layout.VARIANCE + i) * len(lanes) + lane] = work[diagonal * len(lanes) + lane]
+
+
+class Stated(NamedTuple):
+    """What the filter says."""
+
+    estimated: Estimated
+    spread: Spread
+
+
+@PLANT.on_lanes
+def say_state(said: Estimated, x: PaperState, variance: PaperVariance) -> Stated:
+    """The estimate is the state."""
+    return Stated(Estimated(*x, said.qw, said.qx, said.qy, said.qz), Spread(*variance))
+
+
+@PLANT.on_lanes
+def say_ins_attitude(said: Estimated, gps: NavSolution) -> Estimated:
+    """A filter without an attitude of its own says the INS's."""
+    return with_attitude(said, qw=gps.qw, qx=gps.qx, qy=gps.qy, qz=gps.qz)

@@ -7,20 +7,25 @@ batch, and both are the same bytes. Rates: physics 500 Hz (Runge-Kutta), flow dy
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from flownav.compile import Lanes, Work, equation, invoke, kernel, pointer
 from flownav.control.autopilot import grounded, hovering
 from flownav.control.guidance import Reference, reference_at
-from flownav.navigation.tape import Output, output_of
+from flownav.navigation.tape import output_of
 from flownav.simulation import layout
-from flownav.simulation.draws import Noise, key_lanes, put_start
+from flownav.simulation.block import Aboard, Block, Buffers, Progress
+from flownav.simulation.draws import key_lanes, put_start
 from flownav.simulation.epoch import (
     advance,
     advance_sensing,
     command,
     estimate_for_autopilot,
+    inertial_parts,
     note_home,
     note_inputs,
 )
@@ -34,11 +39,13 @@ from flownav.simulation.navigating import (
     feed_due,
     hand_to_autopilot,
     note_knowledge,
+    note_normalised_error,
     note_truth,
     put_on_truth,
+    truth_row,
 )
 from flownav.simulation.onboard import Onboard
-from flownav.simulation.plan import ATTITUDE_STEPS, NOTHING, PHYSICS_S, PHYSICS_STEPS, START_STEP, Flight, OwnParts
+from flownav.simulation.plan import NOTHING, PHYSICS_S, START_STEP, Flight, OwnParts
 from flownav.simulation.sampling import sample
 from flownav.simulation.sensing import EPOCH_S, draw_epoch, sense, start_sensors
 from flownav.simulation.surroundings import draw_recirculation, start_surroundings, surround
@@ -47,24 +54,21 @@ from flownav.simulation.vehicles import observe_vehicle, place
 
 
 @equation
-def draw_start(
-    work: Work, lanes: Lanes, seed: int, first: int, flight: Flight, onboard: Onboard | None, noise: Noise
-) -> None:
+def draw_start(b: Block, flight: Flight, onboard: Onboard | None) -> None:
     """Every normal before the first epoch."""
-    key_lanes(work, lanes, noise.streams, 0)
-    draw_epoch(work, lanes, seed, first, START_STEP, flight.plan.draws)
-    draw_recirculation(work, lanes, seed, first, START_STEP, flight.plan.draws.recirculation)
+    key_lanes(b.work, b.lanes, b.noise.streams, 0)
+    draw_epoch(b.work, b.lanes, b.seed, b.first, START_STEP, flight.plan.draws)
+    draw_recirculation(b.work, b.lanes, b.seed, b.first, START_STEP, flight.plan.draws.recirculation)
     if onboard is not None:
-        draw_units(work, lanes, seed, first, START_STEP + 4)
-    put_start(work, lanes, noise.start)
+        draw_units(b.work, b.lanes, b.seed, b.first, START_STEP + 4)
+    put_start(b.work, b.lanes, b.noise.start)
 
 
 @equation
-def start_block(
-    work: Work, lanes: Lanes, seed: int, first: int, flight: Flight, onboard: Onboard | None, noise: Noise
-) -> None:
+def start_block(b: Block, flight: Flight, onboard: Onboard | None) -> None:
     """Vehicle, surroundings, sensors and autopilot before the first epoch."""
-    draw_start(work, lanes, seed, first, flight, onboard, noise)
+    draw_start(b, flight, onboard)
+    work, lanes = b.work, b.lanes
     for lane in range(len(lanes)):
         place(work, lanes, lane, flight.plan.start, flight.rotors)
         autopilot = grounded(flight.gains) if flight.plan.starts_on_ground else hovering(flight.gains)
@@ -86,29 +90,28 @@ def observe_start(work: Work, lanes: Lanes, flight: Flight, onboard: Onboard | N
 
 
 @equation
-def surround_now(work: Work, lanes: Lanes, seed: int, first: int, epoch: int, t_s: float, flight: Flight) -> None:
-    """Air, ground and engine of this epoch."""
+def begin_epoch(b: Block, epoch: int, flight: Flight) -> Reference:
+    """Noise, air, ground and engine of this epoch; where the path wants the vehicle."""
+    t_s = epoch * EPOCH_S
+    key_lanes(b.work, b.lanes, b.noise.streams, epoch)
+    draw_epoch(b.work, b.lanes, b.seed, b.first, epoch, flight.plan.draws)
     engine = 0.0 if t_s >= flight.plan.engine_cut_s else 1.0
-    surround(work, lanes, seed, first, epoch, flight.rotors, flight.plan.draws.recirculation, engine)
+    surround(b.work, b.lanes, b.seed, b.first, epoch, flight.rotors, flight.plan.draws.recirculation, engine)
+    return reference_at(flight.path, t_s)
 
 
 @equation
-def decide_on_paper(
-    work: Work, lanes: Lanes, seed: int, first: int, noise: Noise, epoch: int, flight: Flight
-) -> Reference:
+def decide_on_paper(b: Block, epoch: int, flight: Flight) -> Reference:
     """One epoch of the paper's sensors and its filter, or of no filter at all, up to what the autopilot asks for."""
-    t_s = epoch * EPOCH_S
-    reference = reference_at(flight.path, t_s)
-    key_lanes(work, lanes, noise.streams, epoch)
-    draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
-    surround_now(work, lanes, seed, first, epoch, t_s, flight)
+    work, lanes = b.work, b.lanes
+    reference = begin_epoch(b, epoch, flight)
     sense(work, lanes, epoch, flight.sensors)
     if epoch == 0:
         start_filter(work, lanes, flight.initial_variance, flight.plan.start_known)
     run_filter(work, lanes, epoch, flight.paper)
-    estimate_for_autopilot(work, lanes, flight)
+    estimate_for_autopilot(work, lanes, flight.plan.fly_on_truth)
     note_home(work, lanes, epoch, reference, flight)
-    command(work, lanes, t_s, reference, flight, None)
+    command(work, lanes, epoch * EPOCH_S, reference, flight, None)
     return reference
 
 
@@ -119,103 +122,105 @@ def advance_on_paper(work: Work, lanes: Lanes, flight: Flight) -> None:
     note_inputs(work, lanes, flight.gains)
 
 
-@equation
-def fly_on_paper(
-    work: Work, lanes: Lanes, seed: int, first: int, noise: Noise, flight: Flight, history: NDArray[np.float64]
-) -> None:
-    """Every epoch with the paper's sensors and its filter, or with no filter at all."""
-    for epoch in range(flight.plan.epochs):
-        reference = decide_on_paper(work, lanes, seed, first, noise, epoch, flight)
-        write_history(work, lanes, epoch, reference, history)
-        advance_on_paper(work, lanes, flight)
+def epochs_on_paper(note: Callable[..., None]) -> Callable[..., None]:
+    """An equation: every epoch with the paper's sensors and its filter, or with no filter at all.
 
+    note(work, lanes, epoch, reference, flight, onboard, into) keeps what an epoch shows.
+    """
 
-@equation
-def inertial_parts(onboard: Onboard) -> int:
-    """Inertial readings of an epoch."""
-    return ATTITUDE_STEPS * PHYSICS_STEPS // onboard.inertial_steps
+    @equation
+    def fly_epochs(b: Block, flight: Flight, into: Any) -> None:
+        for epoch in range(flight.plan.epochs):
+            reference = decide_on_paper(b, epoch, flight)
+            note(b.work, b.lanes, epoch, reference, flight, None, into)
+            advance_on_paper(b.work, b.lanes, flight)
+
+    return fly_epochs
 
 
 @equation
 def decide_navigated(
-    work: Work, nav: Work, lanes: Lanes, seed: int, first: int, noise: Noise, epoch: int, taken: int, following: int,
-    heard: int, flight: Flight, onboard: Onboard, table: Timetable, take: int, settings: Work, o: Output, fed: Work,
-) -> tuple[int, int, Reference]:  # fmt: skip
-    """One epoch of the vehicle's own sensors and the navigator, up to what the autopilot asks for.
-
-    taken: the next slot's number; following: that of the next reading that the navigator takes; heard: how many
-    inertial readings there were. Returns the first two as they are then.
-    """
-    t_s, period_s = epoch * EPOCH_S, onboard.inertial_steps * PHYSICS_S
+    b: Block, aboard: Aboard, flight: Flight, onboard: Onboard, table: Timetable, epoch: int, at: Progress
+) -> tuple[Progress, Reference]:
+    """One epoch of the vehicle's own sensors and the navigator, up to what the autopilot asks for."""
+    work, lanes, nav, t_s = b.work, b.lanes, aboard.nav, epoch * EPOCH_S
     ahead = table.horizon_epochs * inertial_parts(onboard)
-    reference = reference_at(flight.path, t_s)
-    key_lanes(work, lanes, noise.streams, epoch)
-    draw_epoch(work, lanes, seed, first, epoch, flight.plan.draws)
-    surround_now(work, lanes, seed, first, epoch, t_s, flight)
-    taken = sample(work, lanes, seed, first, epoch, table.slots, taken, onboard, flight.fails)
-    note_truth(work, lanes, epoch, table)
-    following = feed_due(work, nav, lanes, epoch, following, take, settings, o, fed, table)
-    carry_ahead(work, nav, lanes, heard, ahead if heard >= ahead else heard, period_s, table)
-    compare_at_horizon(work, nav, lanes, epoch, table)
+    reference = begin_epoch(b, epoch, flight)
+    taken = sample(work, lanes, b.seed, b.first, epoch, table.slots, at.taken, onboard, flight.fails)
+    note_truth(work, lanes, truth_row(epoch, table))
+    following = feed_due(work, lanes, epoch, at.following, aboard, table)
+    ahead = ahead if at.heard >= ahead else at.heard
+    carry_ahead(work, nav, lanes, at.heard, ahead, onboard.inertial_steps * PHYSICS_S, table)
+    reached, then = epoch >= table.horizon_epochs, truth_row(epoch - table.horizon_epochs, table)
+    compare_at_horizon(work, lanes, reached, nav, then)
+    note_normalised_error(work, nav, lanes, reached, then)
     if flight.plan.along_truth:
-        put_on_truth(work, nav, lanes, epoch, table)
-    note_knowledge(work, nav, lanes)
-    waiting = t_s < flight.plan.handover_s
-    hand_to_autopilot(work, nav, lanes, waiting, flight.plan.home_at_start, reference)
-    estimate_for_autopilot(work, lanes, flight)
+        put_on_truth(work, lanes, reached, nav, then)
+    note_knowledge(work, lanes, nav)
+    hand_to_autopilot(work, lanes, t_s < flight.plan.handover_s, flight.plan.home_at_start, reference, nav)
+    estimate_for_autopilot(work, lanes, flight.plan.fly_on_truth)
     command(work, lanes, t_s, reference, flight, onboard)
-    return taken, following, reference
+    return Progress(taken, following, at.heard), reference
+
+
+def epochs_navigated(note: Callable[..., None]) -> Callable[..., None]:
+    """An equation: every epoch with the vehicle's own sensors and the navigator, on whose estimate of now it is flown.
+
+    note: as of `epochs_on_paper`.
+    """
+
+    @equation
+    def fly_epochs(b: Block, aboard: Aboard, flight: Flight, onboard: Onboard, table: Timetable, into: Any) -> None:
+        parts, at = inertial_parts(onboard), Progress(0, 0, 0)
+        for epoch in range(flight.plan.epochs):
+            at, reference = decide_navigated(b, aboard, flight, onboard, table, epoch, at)
+            note(b.work, b.lanes, epoch, reference, flight, onboard, into)
+            advance_sensing(b, flight, onboard, table, epoch, at, flight.own)
+            at = Progress(at.taken + parts, at.following, at.heard + parts)
+
+    return fly_epochs
 
 
 @equation
-def fly_navigated(
-    work: Work, nav: Work, lanes: Lanes, seed: int, first: int, noise: Noise, flight: Flight, onboard: Onboard,
-    table: Timetable, take: int, settings: Work, o: Output, fed: Work, history: NDArray[np.float64],
+def note_history(
+    work: Work, lanes: Lanes, epoch: int, reference: Reference, flight: Flight, onboard: Onboard | None,
+    history: NDArray[np.float64],
 ) -> None:  # fmt: skip
-    """Every epoch with the vehicle's own sensors and the navigator, on whose estimate of now the autopilot flies."""
-    parts = inertial_parts(onboard)
-    taken, following, heard = 0, 0, 0
-    for epoch in range(flight.plan.epochs):
-        taken, following, reference = decide_navigated(
-            work, nav, lanes, seed, first, noise, epoch, taken, following, heard, flight, onboard, table, take,
-            settings, o, fed,
-        )  # fmt: skip
-        write_history(work, lanes, epoch, reference, history)
-        advance_sensing(work, lanes, seed, first, epoch, taken, heard, flight, onboard, table, flight.fails, flight.own)
-        taken += parts
-        heard += parts
+    """What an epoch shows, into the flights' history."""
+    write_history(work, lanes, epoch, reference, history)
+
+
+fly_on_paper = epochs_on_paper(note_history)
+fly_navigated = epochs_navigated(note_history)
 
 
 @equation
 def fly(
-    work: Work, nav: Work, lanes: Lanes, seed: int, first: int, noise: Noise, flight: Flight, onboard: Onboard | None,
-    table: Timetable | None, take: int, settings: Work, o: Output, fed: Work, history: NDArray[np.float64],
+    b: Block, aboard: Aboard, flight: Flight, onboard: Onboard | None, table: Timetable | None,
+    history: NDArray[np.float64],
 ) -> None:  # fmt: skip
     """A block of flights, whichever filter flies; the compiler drops the branch of the other."""
-    start_block(work, lanes, seed, first, flight, onboard, noise)
+    start_block(b, flight, onboard)
     if onboard is None:
-        fly_on_paper(work, lanes, seed, first, noise, flight, history)
+        fly_on_paper(b, flight, history)
     elif table is not None:
-        fly_navigated(work, nav, lanes, seed, first, noise, flight, onboard, table, take, settings, o, fed, history)
+        fly_navigated(b, aboard, flight, onboard, table, history)
 
 
 @kernel
-def fly_block(
-    flight: Flight, truth: NDArray[np.float64], seed: int, first: int, noise: Noise, lanes: Lanes,
-    work: NDArray[np.float64], nav: NDArray[np.float64], take: int, estimate: NDArray[np.float64],
-    innovation: NDArray[np.float64], event: NDArray[np.float64], fed: NDArray[np.float64], room: NDArray[np.int64],
-    used: NDArray[np.int64], history: NDArray[np.float64],
-) -> None:  # fmt: skip
-    """Fly `len(lanes)` flights, numbers `first` and up, of a campaign `seed`, in the noise of these or in another.
+def fly_block(flight: Flight, truth: NDArray[np.float64], block: Block, buffers: Buffers, take: int) -> None:
+    """Fly the flights of a block, whose lane buffer is scratch, zeroed here.
 
-    truth: `truth.packed_truth` of the lanes. work (rows of `engine.buffers_of`, times lanes) is scratch, zeroed here;
-    nav: a navigator that has heard nothing (`navigation.memory.new_work`), taken at the address `take`; its tape and
-    what it is fed flattened; history (epochs, len(HISTORY), len(lanes)) is filled.
+    truth: `truth.packed_truth` of the lanes. Of the buffers the navigator, taken at the address `take`, has heard
+    nothing; tape, what it is fed and history are filled.
     """
-    work[:] = 0.0
-    work[layout.AS_IS_BEGIN * len(lanes) : layout.AS_IS_END * len(lanes)] = truth
-    o = output_of(estimate, innovation, event, NOTHING, NOTHING, NOTHING, room, used)
-    fly(
-        pointer(work), pointer(nav), lanes, seed, first, noise, flight, flight.onboard, flight.table, take,
-        pointer(flight.settings), o, pointer(fed), history,
+    lanes, tape = block.lanes, buffers.tape
+    block.work[:] = 0.0
+    block.work[layout.AS_IS_BEGIN * len(lanes) : layout.AS_IS_END * len(lanes)] = truth
+    o = output_of(
+        tape.estimate.reshape(-1), tape.innovation.reshape(-1), tape.event.reshape(-1), NOTHING, NOTHING, NOTHING,
+        buffers.room, tape.used,
     )  # fmt: skip
+    b = Block(pointer(block.work), lanes, block.seed, block.first, block.noise)
+    aboard = Aboard(pointer(buffers.nav), take, pointer(flight.settings), o, pointer(buffers.fed.reshape(-1)))
+    fly(b, aboard, flight, flight.onboard, flight.table, buffers.history)

@@ -12,17 +12,21 @@ from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY
 from flownav.sensors.beam import ground_height
 from flownav.simulation import layout
-from flownav.simulation.layout import ground_as_is, load_autopilot, load_helicopter
+from flownav.simulation.layout import PLANT, ground_as_is, load_autopilot, load_helicopter
+from flownav.simulation.records import Spread
+
+load_spread, _ = PLANT.access(Spread)
 
 # columns and the rows of the lane buffer that they copy
 _COPIED: tuple[tuple[str, tuple[str, ...], int], ...] = (
     ("truth", (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, *TABLES["truth"][10:13]), layout.HELICOPTER),
-    ("truth", ("thrust_n", "contact_n"), layout.THRUST),
+    ("truth", ("thrust_n", "contact_n"), layout.LOADS),
     ("estimate", (*POSITION_NED, *VELOCITY_BODY, *QUATERNION), layout.ESTIMATED),
     ("estimate", ("nees",), layout.NEES),
     ("gps", ("pos_n_m", "pos_e_m", "pos_d_m", "vel_n_m_s", "vel_e_m_s", "vel_d_m_s", *QUATERNION), layout.GPS),
-    ("flow", (*VELOCITY_BODY, "engaged"), layout.FLOW_READING),
-    ("flow", ("sigma_m_s",), layout.FLOW_SIGMA),
+    ("flow", VELOCITY_BODY, layout.FLOW_READING),
+    ("flow", ("engaged",), layout.SEES_FLOW),
+    ("flow", ("sigma_m_s",), layout.FLOW_READING + 3),
     ("measured", (*POSITION_NED, *VELOCITY_BODY), layout.MEASURED),
     ("measured", ("velocity_arrived",), layout.ARRIVED + 3),
     ("range", ("range_m", "valid"), layout.RANGE),
@@ -68,9 +72,9 @@ def write_history(work: Work, lanes: Lanes, epoch: int, reference: Reference, hi
         for lane in range(len(lanes)):
             history[epoch, k, lane] = work[row * len(lanes) + lane]
     for lane in range(len(lanes)):
+        spread = load_spread(work, lanes, lane)
         for i in range(STATES):
-            variance = work[(layout.VARIANCE + i) * len(lanes) + lane]
-            history[epoch, COPIED + i, lane] = np.sqrt(max(variance, 0.0))
+            history[epoch, COPIED + i, lane] = np.sqrt(max(spread[i], 0.0))
         history[epoch, COPIED + 6, lane] = reference.pos_n
         history[epoch, COPIED + 7, lane] = reference.pos_e
         history[epoch, COPIED + 8, lane] = reference.pos_d

@@ -8,6 +8,7 @@ from flownav.compile import Lanes, Work, equation, procedure, replacing
 from flownav.control.autopilot import AutopilotState
 from flownav.control.go_around import Knowledge
 from flownav.frames import rotation_from_quaternion
+from flownav.navigation.records import Reading
 from flownav.optics.shutter import image_rate_rad_s
 from flownav.sensors.pad_camera import read_pad_camera, stated_fix
 from flownav.sensors.skid_switch import step_skid_switch
@@ -18,10 +19,11 @@ from flownav.simulation.draws import (
     draw,
 )
 from flownav.simulation.layout import (
+    PLANT,
     late_as_is,
     load_autopilot,
     load_helicopter,
-    load_known,
+    load_loads,
     load_pad_normals,
     load_pad_unit,
     load_skid,
@@ -29,7 +31,6 @@ from flownav.simulation.layout import (
     load_skid_unit,
     pad_as_is,
     skid_as_is,
-    store_known,
     store_skid,
 )
 from flownav.simulation.onboard import (
@@ -40,8 +41,10 @@ from flownav.simulation.onboard import (
     earlier,
     place_of,
 )
-from flownav.simulation.ring import FIELDS, FIRST, put_slot, reading_at, reading_of
+from flownav.simulation.records import Landed
+from flownav.simulation.ring import put_slot, reading_of
 
+_, store_landed = PLANT.access(Landed)
 with_unseen = replacing(Knowledge, "pad_unseen_s")
 
 
@@ -74,14 +77,10 @@ def read_pad(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot:
         put_slot(work, lanes, slot, lane, reading)
 
 
-@equation
-def note_seen(work: Work, lanes: Lanes, slot: int) -> None:
+@PLANT.on_lanes
+def note_seen(known: Knowledge, reading: Reading) -> Knowledge:
     """Whether the camera saw the pad in the frame that is in a slot now."""
-    for lane in range(len(lanes)):
-        arrived = reading_at(work, lanes, FIRST + slot * FIELDS, lane).arrived
-        known = load_known(work, lanes, lane)
-        unseen_s = 0.0 if arrived > 0.0 else known.pad_unseen_s
-        store_known(work, lanes, lane, with_unseen(known, pad_unseen_s=unseen_s))
+    return with_unseen(known, pad_unseen_s=0.0 if reading.arrived > 0.0 else known.pad_unseen_s)
 
 
 @procedure
@@ -89,13 +88,13 @@ def read_skid(work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot
     """The skid switch, and what the vehicle says of it: on the ground, not about to fly, and settled."""
     draw(work, lanes, layout.SKID_NORMALS, 2, seed, flight, epoch, SKID_CHANNEL)
     for lane in range(len(lanes)):
-        load_n = work[layout.CONTACT * len(lanes) + lane]
+        load_n = load_loads(work, lanes, lane).contact_n
         after, read = step_skid_switch(
             load_skid(work, lanes, lane), load_skid_unit(work, lanes, lane), load_n,
             load_skid_normals(work, lanes, lane), skid_as_is(work, lanes, lane),
         )  # fmt: skip
         store_skid(work, lanes, lane, after)
-        work[layout.LANDED * len(lanes) + lane] = read.landed
+        store_landed(work, lanes, lane, Landed(read.landed))
         landed = 1.0 if at_rest(read.landed, load_autopilot(work, lanes, lane)) else 0.0
         reading = reading_of(landed, 0.0, 0.0, np.nan, np.nan, np.nan, read.quality, read.arrived)
         put_slot(work, lanes, slot, lane, reading)

@@ -6,15 +6,14 @@ that kernels see them as compile-time numbers.
 
 from __future__ import annotations
 
-from flownav.compile import lane_access
+from flownav.compile import Layout, lane_access
 from flownav.control.autopilot import AutopilotState, Estimate
 from flownav.control.go_around import Knowledge
 from flownav.estimation.kalman import kalman_row_count, kalman_rows
-from flownav.estimation.paper_filter import INPUTS, STATES
-from flownav.estimation.states import Rows
+from flownav.estimation.paper_filter import STATES
 from flownav.navigation.records import Reading
 from flownav.sensors.barometer import BarometerNormals, BarometerStartNormals, BarometerState, BarometerUnit
-from flownav.sensors.flow import FlowState
+from flownav.sensors.flow import FlowParameters, FlowReading, FlowState
 from flownav.sensors.flow_camera import FlowCameraNormals, FlowCameraStartNormals, FlowCameraState, FlowCameraUnit
 from flownav.sensors.gps_ins import GpsInsErrors, GpsInsNormals, NavSolution
 from flownav.sensors.gps_receiver import (
@@ -28,9 +27,32 @@ from flownav.sensors.inertial import InertialNormals, InertialStartNormals, Iner
 from flownav.sensors.magnetometer import MagnetometerNormals, MagnetometerUnit
 from flownav.sensors.pad_camera import PadCameraNormals, PadCameraUnit
 from flownav.sensors.range_sensor import RangeSensorNormals, RangeSensorState, RangeSensorUnit
-from flownav.sensors.rangefinder import RangefinderState
+from flownav.sensors.rangefinder import RangefinderState, RangeReading
 from flownav.sensors.skid_switch import SkidSwitchNormals, SkidSwitchState, SkidSwitchUnit
 from flownav.simulation.recirculation import RecirculationState
+from flownav.simulation.records import (
+    Arrived,
+    AttitudeError,
+    Before,
+    Estimated,
+    Felt,
+    FlowNormals,
+    HeldRange,
+    Home,
+    HorizonError,
+    InertialThen,
+    Landed,
+    Loads,
+    Measured,
+    Nees,
+    PadPlace,
+    PaperInput,
+    PaperState,
+    PaperVariance,
+    RotorSpeed,
+    Spread,
+    TruthThen,
+)
 from flownav.simulation.truth import PARTS, SIZES
 from flownav.simulation.wind import WindNormals, WindState
 from flownav.vehicle.around import Around
@@ -38,47 +60,45 @@ from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.multirotor_state import MultirotorState, Six
 from flownav.vehicle.state import Controls, HelicopterState, Inflow
 
-_rows = Rows()
+PLANT = _rows = Layout()
 
 # what this flight's vehicle, wind and sensors are (`simulation.truth`)
 AS_IS = {part: _rows.take(SIZES[part]) for part in PARTS}
 AS_IS_BEGIN, AS_IS_END = AS_IS["vehicle"], _rows.next
 
 # the plant
-HELICOPTER = _rows.take(len(HelicopterState._fields))  # or the multirotor, whose first fields are the same
+HELICOPTER = _rows.keep(HelicopterState)  # or the multirotor, whose first fields are the same
 ROTOR_SPEED = HELICOPTER + HelicopterState._fields.index("speed")
+_rows.name(RotorSpeed, ROTOR_SPEED)
 STAGE = _rows.take(len(HelicopterState._fields))  # the state of a Runge-Kutta stage
 SUM = _rows.take(len(HelicopterState._fields))  # the weighted sum of stage rates
 INFLOW = _rows.take(len(Inflow._fields))
-CONTROLS = _rows.take(len(Controls._fields))
-WIND = _rows.take(len(WindState._fields))
-AROUND = _rows.take(len(Around._fields))
-RECIRCULATION = _rows.take(len(RecirculationState._fields))
-THRUST = _rows.take(1)  # main rotor thrust [N]
-CONTACT = _rows.take(1)  # total skid load [N]
-POWER = _rows.take(1)  # of the main rotor [W]
-PREVIOUS_VELOCITY = _rows.take(3)  # NED velocity one epoch ago [m/s]
-PREVIOUS_ATTITUDE = _rows.take(4)  # attitude one epoch ago
+CONTROLS = _rows.keep(Controls)
+WIND = _rows.keep(WindState)
+AROUND = _rows.keep(Around)
+RECIRCULATION = _rows.keep(RecirculationState)
+LOADS = _rows.keep(Loads)
+THRUST, CONTACT, POWER = LOADS, LOADS + 1, LOADS + 2
+_rows.keep(Before)
 
 # the sensors
-GPS_ERRORS = _rows.take(len(GpsInsErrors._fields))
+_rows.keep(GpsInsErrors)
 GPS_HELD = _rows.take(len(NavSolution._fields))
-GPS = _rows.take(len(NavSolution._fields))  # the reading
-FLOW = _rows.take(len(FlowState._fields))
-RANGEFINDER = _rows.take(len(RangefinderState._fields))
-FLOW_READING = _rows.take(4)  # u, v, w [m/s], and whether the sensor is engaged
-SEES_FLOW = FLOW_READING + 3  # of the navigator's camera: whether its last reading says anything
-FLOW_SIGMA = _rows.take(1)  # of the published flow velocity [m/s]
-RANGE = _rows.take(2)  # the latest reading [m] and whether it is valid
+GPS = _rows.keep(NavSolution)  # the reading
+_rows.keep(FlowState)
+_rows.keep(RangefinderState)
+FLOW_READING = _rows.keep(FlowReading)
+SEES_FLOW = FLOW_READING + FlowReading._fields.index("engaged")  # of the navigator's camera: its last reading says so
+RANGE = _rows.keep(RangeReading)
 
 STREAM = _rows.take(1)  # of the lane's noise, from its block's first flight on; the bits of a whole number
 
 # standard normals of the epoch: pairs in the order of drawing
 START_NORMALS = _rows.next  # from here to START_END what is drawn before the first epoch
-GPS_NORMALS = _rows.take(len(GpsInsNormals._fields))
+GPS_NORMALS = _rows.keep(GpsInsNormals)
 GPS_JITTER = GPS_NORMALS + GpsInsNormals._fields.index("jitter_n")
-FLOW_NORMALS = _rows.take(4)  # u, v, w, range
-WIND_NORMALS = _rows.take(len(WindNormals._fields) + len(WindNormals._fields) % 2)
+FLOW_NORMALS = _rows.keep(FlowNormals)
+WIND_NORMALS = _rows.keep(WindNormals)
 NORMALS_END = _rows.next
 RECIRCULATION_NORMALS = _rows.take(len(RecirculationState._fields) + len(RecirculationState._fields) % 2)
 # and those of every unit before the flight, and of its state
@@ -98,10 +118,11 @@ START_END = _rows.next
 
 # the paper's filter: state and covariance, inputs and measurements
 FILTER = kalman_rows(_rows.take(kalman_row_count(STATES)), STATES)
-INPUT = _rows.take(INPUTS)
-MEASURED = _rows.take(STATES)
-ARRIVED = _rows.take(STATES)
-SCORED = STATES
+_rows.name(PaperState, *range(FILTER.state, FILTER.state + STATES))
+_rows.name(PaperVariance, *(FILTER.covariance + i * (STATES + 1) for i in range(STATES)))
+INPUT = _rows.keep(PaperInput)
+MEASURED = _rows.keep(Measured)
+ARRIVED = _rows.keep(Arrived)
 INNOVATION = _rows.take(2 * STATES)  # of each component, then their variances
 
 # the sensors that feed the navigator: each unit as it was drawn for this flight, its state, its normals
@@ -127,56 +148,63 @@ PAD_NORMALS = _rows.take(len(PadCameraNormals._fields))
 SKID_UNIT = _rows.take(len(SkidSwitchUnit._fields))
 SKID = _rows.take(len(SkidSwitchState._fields))
 SKID_NORMALS = _rows.take(len(SkidSwitchNormals._fields))
-TRUE_IMU = _rows.take(len(ImuReading._fields))  # means over the last inertial period
-KNOWN = _rows.take(len(Knowledge._fields))  # what the vehicle knows of its landing
-FELT = _rows.take(3)  # specific force that the IMU read, body FRD, mean over the last epoch [m/s2]
+_rows.keep(ImuReading)  # means over the last inertial period
+_rows.keep(Knowledge)
+_rows.keep(Felt)
 EXPOSED = _rows.take(5)  # since the last flow: sums of the true rate (3) and of what the gyro read about x and y
-LAST_FELT = _rows.take(3)  # the last that the accelerometer read
 FAULT_NORMALS = _rows.take(6)
-FAULT_HELD = _rows.take(1)  # the range before a fault [m]
+_rows.keep(HeldRange)
 EARLIER_READINGS = 8
 FAULT_EARLIER = _rows.take(len(Reading._fields) * EARLIER_READINGS)  # the last readings of flow
-LANDED = _rows.take(1)  # what the skid switch says
+_rows.keep(Landed)
 # what the vehicle makes of the navigator: carried on to now
-PLACE = _rows.take(3)  # of the pad in the navigator's frame, as far as the vehicle knows it [m]
-ATTITUDE_ERROR = _rows.take(4)  # rotation from the true attitude to the one that is flown on, earth axes
-HORIZON_ERROR = _rows.take(6)  # position NED and body velocity at the horizon, less the truth then
-ELIMINATION = _rows.take(6 + 36)  # scratch of the normalised error
-HANDED_OVER = _rows.take(1)  # 1 once the autopilot flies on the estimate
-
-# what the filter says, whichever flies: position NED and body velocity, and their variances
-ESTIMATED = _rows.take(STATES)
-ESTIMATED_ATTITUDE = _rows.take(4)
-VARIANCE = _rows.take(STATES)
-NEES = _rows.take(1)  # of position and velocity NED; 0 where the filter does not say
-
+_rows.keep(PadPlace)
+_rows.keep(AttitudeError)
+HORIZON_ERROR = _rows.keep(HorizonError)
+# what the filter says, whichever flies
+ESTIMATED = _rows.keep(Estimated)
+_rows.keep(Spread)
+NEES = _rows.keep(Nees)
 # the autopilot
-ESTIMATE = _rows.take(len(Estimate._fields))  # what it flies on
-HOME = _rows.take(3)  # estimated position of the pad [m]
-AUTOPILOT = _rows.take(len(AutopilotState._fields))
+ESTIMATE = _rows.keep(Estimate)  # what it flies on
+HOME = _rows.keep(Home)
+AUTOPILOT = _rows.keep(AutopilotState)
 
 ROWS = _rows.next
+# behind the rows: readings on their way (`ring`), and what is remembered for as long as the horizon is
+_rows.keep(Reading, 0, "slot")
+load_slot, put_slot = PLANT.access(Reading)
+_rows.anywhere(TruthThen, "truth_row")
+load_inertial_then, store_inertial_then = _rows.anywhere(InertialThen, "inertial_row")
 
-load_helicopter, store_helicopter = lane_access(HelicopterState, HELICOPTER)
+_rows.name(MultirotorParameters, *range(AS_IS["vehicle"], AS_IS["vehicle"] + len(MultirotorParameters._fields)))
+for _part in ("vehicle", "wind", "ground", "recirculation", "late", "fault"):
+    PLANT.name(PARTS[_part], *range(AS_IS[_part], AS_IS[_part] + SIZES[_part])[: len(PARTS[_part]._fields)])
+PAPERS = Layout(below=PLANT)  # with what belongs to the paper's flow sensor alone
+PAPERS.name(FlowParameters, *range(AS_IS["flow"], AS_IS["flow"] + SIZES["flow"]))
+
+load_helicopter, store_helicopter = PLANT.access(HelicopterState)
 load_stage, store_stage = lane_access(HelicopterState, STAGE)
 load_sum, store_sum = lane_access(HelicopterState, SUM)
 load_multirotor, store_multirotor = lane_access(MultirotorState, HELICOPTER)
 load_multirotor_stage, store_multirotor_stage = lane_access(MultirotorState, STAGE)
 load_roots, store_roots = lane_access(Six, SUM)  # of the shares of thrust that the mixer asks for
 load_inflow, store_inflow = lane_access(Inflow, INFLOW)
-load_controls, store_controls = lane_access(Controls, CONTROLS)
-load_wind, store_wind = lane_access(WindState, WIND)
-load_around, store_around = lane_access(Around, AROUND)
-load_recirculation, store_recirculation = lane_access(RecirculationState, RECIRCULATION)
+load_controls, store_controls = PLANT.access(Controls)
+load_loads, store_loads = PLANT.access(Loads)
+load_estimated, store_estimated = PLANT.access(Estimated)
+load_wind, store_wind = PLANT.access(WindState)
+load_around, store_around = PLANT.access(Around)
+load_recirculation, store_recirculation = PLANT.access(RecirculationState)
 load_recirculation_normals, _ = lane_access(RecirculationState, RECIRCULATION_NORMALS)
-load_gps_errors, store_gps_errors = lane_access(GpsInsErrors, GPS_ERRORS)
+load_gps_errors, store_gps_errors = PLANT.access(GpsInsErrors)
 load_gps_held, store_gps_held = lane_access(NavSolution, GPS_HELD)
-load_gps, store_gps = lane_access(NavSolution, GPS)
-load_flow, store_flow = lane_access(FlowState, FLOW)
-load_rangefinder, store_rangefinder = lane_access(RangefinderState, RANGEFINDER)
-load_true_imu, store_true_imu = lane_access(ImuReading, TRUE_IMU)
-load_gps_normals, _ = lane_access(GpsInsNormals, GPS_NORMALS)
-load_wind_normals, _ = lane_access(WindNormals, WIND_NORMALS)
+load_gps, store_gps = PLANT.access(NavSolution)
+load_flow, store_flow = PLANT.access(FlowState)
+load_rangefinder, store_rangefinder = PLANT.access(RangefinderState)
+load_true_imu, _ = PLANT.access(ImuReading)
+load_gps_normals, _ = PLANT.access(GpsInsNormals)
+load_wind_normals, _ = PLANT.access(WindNormals)
 load_inertial_unit, store_inertial_unit = lane_access(InertialUnit, INERTIAL_UNIT)
 load_inertial, store_inertial = lane_access(InertialState, INERTIAL)
 load_inertial_normals, _ = lane_access(InertialNormals, INERTIAL_NORMALS)
@@ -199,9 +227,9 @@ load_pad_normals, _ = lane_access(PadCameraNormals, PAD_NORMALS)
 load_skid_unit, store_skid_unit = lane_access(SkidSwitchUnit, SKID_UNIT)
 load_skid, store_skid = lane_access(SkidSwitchState, SKID)
 load_skid_normals, _ = lane_access(SkidSwitchNormals, SKID_NORMALS)
-load_known, store_known = lane_access(Knowledge, KNOWN)
-load_estimate, store_estimate = lane_access(Estimate, ESTIMATE)
-load_autopilot, store_autopilot = lane_access(AutopilotState, AUTOPILOT)
+load_known, store_known = PLANT.access(Knowledge)
+load_estimate, store_estimate = PLANT.access(Estimate)
+load_autopilot, store_autopilot = PLANT.access(AutopilotState)
 vehicle_as_is, _ = lane_access(PARTS["vehicle"], AS_IS["vehicle"])  # of a multirotor its first fields only
 multirotor_as_is, _ = lane_access(MultirotorParameters, AS_IS["vehicle"])
 wind_as_is, _ = lane_access(PARTS["wind"], AS_IS["wind"])

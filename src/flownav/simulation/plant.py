@@ -18,11 +18,13 @@ from flownav.simulation.layout import (
     load_sum,
     store_helicopter,
     store_inflow,
+    store_loads,
     store_stage,
     store_sum,
     vehicle_as_is,
 )
 from flownav.simulation.onboard import Onboard
+from flownav.simulation.records import Loads
 from flownav.vehicle.airframe import AirMotion, air_motion, attitude, tail_sideslip
 from flownav.vehicle.helicopter import (
     blade_angles,
@@ -172,6 +174,4 @@ def observe_balanced(work: Work, lanes: Lanes) -> None:
 @equation
 def note_outputs(work: Work, lanes: Lanes, lane: int, seen: Outputs) -> None:
     """What sensors and scores read of the plant."""
-    work[layout.THRUST * len(lanes) + lane] = seen.thrust_n
-    work[layout.CONTACT * len(lanes) + lane] = seen.contact_force_n
-    work[layout.POWER * len(lanes) + lane] = seen.power_w
+    store_loads(work, lanes, lane, Loads(seen.thrust_n, seen.contact_force_n, seen.power_w))

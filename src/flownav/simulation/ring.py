@@ -10,25 +10,17 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.compile import Lanes, Work, equation, lane_access
-from flownav.navigation.memory import READING
+from flownav.navigation.memory import store_reading
 from flownav.navigation.records import Reading
 from flownav.simulation import layout
+from flownav.simulation.layout import load_slot, put_slot
+
+__all__ = ["FIELDS", "FIRST", "hand_over", "load_slot", "put_slot", "reading_at", "reading_of", "store_row"]
 
 FIELDS = len(Reading._fields)
 FIRST = layout.ROWS
 
 reading_at, store_row = lane_access(Reading, None)
-
-
-def work_rows(slots: int) -> int:
-    """Rows of a lane buffer with so many slots."""
-    return FIRST + slots * FIELDS
-
-
-@equation
-def put_slot(work: Work, lanes: Lanes, slot: int, lane: int, reading: Reading) -> None:
-    """One lane's reading into a slot."""
-    store_row(work, lanes, FIRST + slot * FIELDS, lane, reading)
 
 
 @equation
@@ -45,7 +37,5 @@ def reading_of(
 @equation
 def hand_over(work: Work, nav: Work, lanes: Lanes, slot: int) -> None:
     """A slot's readings become the reading at hand of the navigator's buffer."""
-    row = FIRST + slot * FIELDS
-    for i in range(FIELDS):
-        for lane in range(len(lanes)):
-            nav[(READING + i) * len(lanes) + lane] = work[(row + i) * len(lanes) + lane]
+    for lane in range(len(lanes)):
+        store_reading(nav, lanes, lane, load_slot(work, lanes, slot, lane))

@@ -25,7 +25,7 @@ from flownav.simulation.draws import (
     RECEIVER_CHANNEL,
     draw,
 )
-from flownav.simulation.failing import strike
+from flownav.simulation.failing import Taken, strike
 from flownav.simulation.landing_sensors import note_seen, read_pad, read_skid
 from flownav.simulation.layout import (
     baro_as_is,
@@ -135,7 +135,8 @@ def strike_one(
     work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot: int, sensor: int, channel: int, clock: Clock
 ) -> None:
     """A reading that was just taken as each lane's fault has it."""
-    strike(work, lanes, seed, flight, epoch, epoch * EPOCH_S, slot, sensor, channel, epoch // clock.every)
+    taken = Taken(epoch, epoch * EPOCH_S, slot, sensor, channel, epoch // clock.every)
+    strike(work, lanes, seed, flight, taken)
 
 
 @procedure

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from flownav.compile import Lanes, Work, equation, procedure, replacing
@@ -11,24 +13,24 @@ from flownav.simulation import layout
 from flownav.simulation.draws import RECIRCULATION_CHANNEL, draw
 from flownav.simulation.ground import under_rotor
 from flownav.simulation.layout import (
-    ground_as_is,
-    load_around,
-    load_helicopter,
+    PLANT,
     load_recirculation,
     load_recirculation_normals,
-    load_wind,
-    load_wind_normals,
-    multirotor_as_is,
     recirculation_as_is,
     store_around,
     store_recirculation,
-    store_wind,
-    vehicle_as_is,
-    wind_as_is,
 )
-from flownav.simulation.recirculation import recirculated, step_recirculation
-from flownav.simulation.wind import WindVelocity, start_wind, step_wind
+from flownav.simulation.recirculation import (
+    RecirculationParameters,
+    RecirculationState,
+    recirculated,
+    step_recirculation,
+)
+from flownav.simulation.records import Loads
+from flownav.simulation.wind import WindNormals, WindParameters, WindState, WindVelocity, start_wind, step_wind
 from flownav.vehicle.around import CALM, Around
+from flownav.vehicle.multirotor_parameters import MultirotorParameters
+from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.state import HelicopterState
 
 Four = tuple[float, float, float, float]
@@ -44,11 +46,16 @@ def start_surroundings(work: Work, lanes: Lanes, rotors: tuple[int, ...] | None)
     in their rows.
     """
     for lane in range(len(lanes)):
-        gusts = start_wind(load_wind_normals(work, lanes, lane), wind_as_is(work, lanes, lane))
-        store_wind(work, lanes, lane, gusts)
         store_recirculation(work, lanes, lane, load_recirculation_normals(work, lanes, lane))
         store_around(work, lanes, lane, CALM)
+    first_gusts(work, lanes)
     lay_ground(work, lanes, rotors)
+
+
+@PLANT.on_lanes
+def first_gusts(normals: WindNormals, wind: WindParameters) -> WindState:
+    """Gusts from their stationary distribution."""
+    return start_wind(normals, wind)
 
 
 @procedure
@@ -59,29 +66,53 @@ def surround(
     """The surroundings of this step of the noise counter; engine: 1 runs, 0 is cut."""
     draw_recirculation(work, lanes, seed, first, step, recirculates)
     lay_ground(work, lanes, rotors)
+    blow(work, lanes, engine)
     for lane in range(len(lanes)):
-        state, ground = load_helicopter(work, lanes, lane), ground_as_is(work, lanes, lane)
-        wind, normals = wind_as_is(work, lanes, lane), load_wind_normals(work, lanes, lane)
-        height = -state.pos_d - ground_height(state.pos_n, state.pos_e, ground)
-        after, air = step_wind(load_wind(work, lanes, lane), height, normals, wind)
-        store_wind(work, lanes, lane, after)
-        p, here = recirculation_as_is(work, lanes, lane), load_around(work, lanes, lane)
-        wake = step_recirculation(
-            load_recirculation(work, lanes, lane), load_recirculation_normals(work, lanes, lane), p
-        )
-        store_recirculation(work, lanes, lane, wake)
-        cosine = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)[8]
-        plane = here.slope_n * state.pos_n + here.slope_e * state.pos_e
-        hub = p.hub_above_cg_m * cosine - state.pos_d - plane - here.rotor_1_m
-        air = recirculated(air, wake, hub, work[layout.THRUST * len(lanes) + lane], p)
-        store_around(
-            work, lanes, lane,
-            _in_air(
-                here, wind_n_m_s=air.wind_n_m_s, wind_e_m_s=air.wind_e_m_s, wind_d_m_s=air.wind_d_m_s,
-                turn_n_rad_s=air.turn_n_rad_s, turn_e_rad_s=air.turn_e_rad_s, turn_d_rad_s=air.turn_d_rad_s,
-                engine=engine,
-            ),
-        )  # fmt: skip
+        normals, wake = load_recirculation_normals(work, lanes, lane), load_recirculation(work, lanes, lane)
+        p = recirculation_as_is(work, lanes, lane)
+        store_recirculation(work, lanes, lane, step_recirculation(wake, normals, p))
+    come_back(work, lanes)
+
+
+class Air(NamedTuple):
+    """The gusts, and the air that they leave around the vehicle."""
+
+    gusts: WindState
+    around: Around
+
+
+@PLANT.on_lanes
+def blow(
+    state: HelicopterState, ground: Ground, gusts: WindState, normals: WindNormals, wind: WindParameters, here: Around,
+    *, engine: float,
+) -> Air:  # fmt: skip
+    """The wind at the vehicle's height."""
+    height = -state.pos_d - ground_height(state.pos_n, state.pos_e, ground)
+    after, air = step_wind(gusts, height, normals, wind)
+    return Air(after, in_air(here, air, engine))
+
+
+@PLANT.on_lanes
+def come_back(
+    state: HelicopterState, wake: RecirculationState, p: RecirculationParameters, here: Around, loads: Loads
+) -> Around:
+    """The air with what comes back of the vehicle's own wake."""
+    cosine = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)[8]
+    plane = here.slope_n * state.pos_n + here.slope_e * state.pos_e
+    hub = p.hub_above_cg_m * cosine - state.pos_d - plane - here.rotor_1_m
+    air = WindVelocity(
+        here.wind_n_m_s, here.wind_e_m_s, here.wind_d_m_s, here.turn_n_rad_s, here.turn_e_rad_s, here.turn_d_rad_s
+    )
+    return in_air(here, recirculated(air, wake, hub, loads.thrust_n, p), here.engine)
+
+
+@equation
+def in_air(here: Around, air: WindVelocity, engine: float) -> Around:
+    """The surroundings with this air, and this engine."""
+    return _in_air(
+        here, wind_n_m_s=air.wind_n_m_s, wind_e_m_s=air.wind_e_m_s, wind_d_m_s=air.wind_d_m_s,
+        turn_n_rad_s=air.turn_n_rad_s, turn_e_rad_s=air.turn_e_rad_s, turn_d_rad_s=air.turn_d_rad_s, engine=engine,
+    )  # fmt: skip
 
 
 @equation
@@ -91,42 +122,37 @@ def draw_recirculation(work: Work, lanes: Lanes, seed: int, first: int, step: in
         draw(work, lanes, layout.RECIRCULATION_NORMALS, 4, seed, first, step, RECIRCULATION_CHANNEL)
 
 
-@equation
-def lay_ground(work: Work, lanes: Lanes, rotors: tuple[int, ...] | None) -> None:
-    """The ground's plane, and what lies over it under each foot and each rotor."""
-    for lane in range(len(lanes)):
-        state, ground = load_helicopter(work, lanes, lane), ground_as_is(work, lanes, lane)
-        here = load_around(work, lanes, lane)
-        rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
-        cosine = 1.0 / np.sqrt(1.0 + ground.slope_n * ground.slope_n + ground.slope_e * ground.slope_e)
-        if rotors is None:
-            vehicle = vehicle_as_is(work, lanes, lane)
-            feet = under_feet(
-                state, rotation, vehicle.skid_half_length_m, vehicle.skid_half_track_m, vehicle.cg_above_skid_m, ground
-            )
-            hub = vehicle.hub_above_cg_m
-            one = under_place(state, rotation, 0.0, 0.0, -hub, vehicle.main_radius_m, ground)
-            under = (one, 0.0, 0.0, 0.0, 0.0, 0.0)
-        else:
-            x = multirotor_as_is(work, lanes, lane)
-            feet = under_feet(state, rotation, x.skid_half_length_m, x.skid_half_track_m, x.cg_above_skid_m, ground)
-            up, r = -x.rotors_above_cg_m, x.radius_m
-            under = (
-                under_place(state, rotation, x.x_1_m, x.y_1_m, up, r, ground),
-                under_place(state, rotation, x.x_2_m, x.y_2_m, up, r, ground),
-                under_place(state, rotation, x.x_3_m, x.y_3_m, up, r, ground),
-                under_place(state, rotation, x.x_4_m, x.y_4_m, up, r, ground),
-                under_place(state, rotation, x.x_5_m, x.y_5_m, up, r, ground),
-                under_place(state, rotation, x.x_6_m, x.y_6_m, up, r, ground),
-            )
-        store_around(
-            work, lanes, lane,
-            _over_ground(
-                here, slope_n=ground.slope_n, slope_e=ground.slope_e, cosine=cosine, foot_1_m=feet[0], foot_2_m=feet[1],
-                foot_3_m=feet[2], foot_4_m=feet[3], rotor_1_m=under[0], rotor_2_m=under[1], rotor_3_m=under[2],
-                rotor_4_m=under[3], rotor_5_m=under[4], rotor_6_m=under[5],
-            ),
-        )  # fmt: skip
+@PLANT.on_lanes
+def lay_ground(
+    state: HelicopterState, ground: Ground, here: Around, vehicle: VehicleParameters, x: MultirotorParameters, *,
+    rotors: tuple[int, ...] | None,
+) -> Around:  # fmt: skip
+    """The ground's plane, and what lies over it under each foot and each rotor. rotors: of a multirotor, x."""
+    rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
+    cosine = 1.0 / np.sqrt(1.0 + ground.slope_n * ground.slope_n + ground.slope_e * ground.slope_e)
+    if rotors is None:
+        feet = under_feet(
+            state, rotation, vehicle.skid_half_length_m, vehicle.skid_half_track_m, vehicle.cg_above_skid_m, ground
+        )
+        hub = vehicle.hub_above_cg_m
+        one = under_place(state, rotation, 0.0, 0.0, -hub, vehicle.main_radius_m, ground)
+        under = (one, 0.0, 0.0, 0.0, 0.0, 0.0)
+    else:
+        feet = under_feet(state, rotation, x.skid_half_length_m, x.skid_half_track_m, x.cg_above_skid_m, ground)
+        up, r = -x.rotors_above_cg_m, x.radius_m
+        under = (
+            under_place(state, rotation, x.x_1_m, x.y_1_m, up, r, ground),
+            under_place(state, rotation, x.x_2_m, x.y_2_m, up, r, ground),
+            under_place(state, rotation, x.x_3_m, x.y_3_m, up, r, ground),
+            under_place(state, rotation, x.x_4_m, x.y_4_m, up, r, ground),
+            under_place(state, rotation, x.x_5_m, x.y_5_m, up, r, ground),
+            under_place(state, rotation, x.x_6_m, x.y_6_m, up, r, ground),
+        )
+    return _over_ground(
+        here, slope_n=ground.slope_n, slope_e=ground.slope_e, cosine=cosine, foot_1_m=feet[0], foot_2_m=feet[1],
+        foot_3_m=feet[2], foot_4_m=feet[3], rotor_1_m=under[0], rotor_2_m=under[1], rotor_3_m=under[2],
+        rotor_4_m=under[3], rotor_5_m=under[4], rotor_6_m=under[5],
+    )  # fmt: skip
 
 
 @equation

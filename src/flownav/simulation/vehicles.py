@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from flownav.compile import Lanes, Work, equation
 from flownav.simulation import layout
-from flownav.simulation.layout import vehicle_as_is
+from flownav.simulation.layout import PLANT, vehicle_as_is
 from flownav.simulation.multirotor_plant import midpoint_step, observe_multirotor
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plant import observe_balanced, observe_plant, runge_kutta_step
+from flownav.simulation.records import RotorSpeed
 from flownav.vehicle.kinds import AnyState
+
+_, store_rotor_speed = PLANT.access(RotorSpeed)
 
 
 @equation
@@ -17,7 +20,7 @@ def place(work: Work, lanes: Lanes, lane: int, state: AnyState, rotors: tuple[in
     for field in range(len(state)):
         work[(layout.HELICOPTER + field) * len(lanes) + lane] = state[field]
     if rotors is None:
-        work[layout.ROTOR_SPEED * len(lanes) + lane] = vehicle_as_is(work, lanes, lane).main_speed_rad_s
+        store_rotor_speed(work, lanes, lane, RotorSpeed(vehicle_as_is(work, lanes, lane).main_speed_rad_s))
 
 
 @equation

@@ -12,21 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.compile import ONE_LANE, WARP, Lanes, Work, equation, pointer, procedure, strided
+from flownav.control.guidance import Reference
 from flownav.navigation.take import navigate
-from flownav.navigation.tape import Output, output_of
+from flownav.navigation.tape import output_of
 from flownav.scoring.running import RUNNING_ROWS, Shown, begin_scores, note_shown, write_scores
 from flownav.sensors.beam import ground_height
 from flownav.simulation import layout
+from flownav.simulation.block import Aboard, Block
 from flownav.simulation.draws import Noise
-from flownav.simulation.epoch import advance_sensing
-from flownav.simulation.flight import (
-    advance_on_paper,
-    decide_navigated,
-    decide_on_paper,
-    inertial_parts,
-    start_block,
+from flownav.simulation.flight import epochs_navigated, epochs_on_paper, start_block
+from flownav.simulation.layout import (
+    ground_as_is,
+    load_autopilot,
+    load_estimated,
+    load_helicopter,
+    load_loads,
 )
-from flownav.simulation.layout import ground_as_is, load_autopilot, load_helicopter
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import Flight
 from flownav.simulation.sensing import EPOCH_S
@@ -64,11 +65,9 @@ def fly_paper_flight(
     home: the epoch to whose errors horizontal ones are relative; -1: to none. scores (RUNNING_COLUMNS, flights).
     """
     own, row = begin_flight(work, rows, truth, flights, thread), rows - RUNNING_ROWS
-    start_block(own, ONE_LANE, seed, first + thread, flight, None, noise)
-    for epoch in range(flight.plan.epochs):
-        decide_on_paper(own, ONE_LANE, seed, first + thread, noise, epoch, flight)
-        note_epoch(own, row, epoch, home, flight, None)
-        advance_on_paper(own, ONE_LANE, flight)
+    block = Block(own, ONE_LANE, seed, first + thread, noise)
+    start_block(block, flight, None)
+    score_on_paper(block, flight, (row, home))
     finish(own, row, flight, scores, thread)
 
 
@@ -91,28 +90,11 @@ def fly_navigated_flight(
     for i in range(TAPE_COUNTS):
         counted[i] = 0
     o = output_of(nothing, nothing, nothing, nothing, nothing, nothing, room, counted)
-    settings, fed = pointer(flight.settings), pointer(nothing)
-    start_block(own, ONE_LANE, seed, first + thread, flight, flight.onboard, noise)
-    fly_on(own, mind, seed, first + thread, noise, flight, flight.onboard, flight.table, take, settings, o, fed, row)
+    aboard = Aboard(mind, take, pointer(flight.settings), o, pointer(nothing))
+    block = Block(own, ONE_LANE, seed, first + thread, noise)
+    start_block(block, flight, flight.onboard)
+    score_navigated(block, aboard, flight, flight.onboard, flight.table, (row, -1))
     finish(own, row, flight, scores, thread)
-
-
-@equation
-def fly_on(
-    work: Work, nav: Work, seed: int, number: int, noise: Noise, flight: Flight, onboard: Any, table: Any, take: Any,
-    settings: Work, o: Output, fed: Work, row: int,
-) -> None:  # fmt: skip
-    """Every epoch of flight `number`, as `simulation.flight.fly_navigated`; its scores lie from `row` on."""
-    taken, following, heard = 0, 0, 0
-    for epoch in range(flight.plan.epochs):
-        taken, following, _ = decide_navigated(
-            work, nav, ONE_LANE, seed, number, noise, epoch, taken, following, heard, flight, onboard, table, take,
-            settings, o, fed,
-        )  # fmt: skip
-        note_epoch(work, row, epoch, -1, flight, onboard)
-        advance_sensing(work, ONE_LANE, seed, number, epoch, taken, heard, flight, onboard, table, flight.fails, None)
-        taken += inertial_parts(onboard)
-        heard += inertial_parts(onboard)
 
 
 @procedure
@@ -127,24 +109,32 @@ def take_here(
 
 # -- scores -------------------------------------------------------------------------------------------------------
 @equation
-def note_epoch(work: Work, row: int, epoch: int, home: int, flight: Flight, onboard: Onboard | None) -> None:
-    """What this epoch shows, into the scores of this flight."""
-    state, says = load_helicopter(work, ONE_LANE, 0), layout.ESTIMATED
+def note_epoch(
+    work: Work, lanes: Lanes, epoch: int, reference: Reference, flight: Flight, onboard: Onboard | None,
+    into: tuple[int, int],
+) -> None:  # fmt: skip
+    """What this epoch shows, into the scores of this flight. into: their first row; the epoch of `home`."""
+    row, home = into
+    state, says = load_helicopter(work, ONE_LANE, 0), load_estimated(work, ONE_LANE, 0)
     ground_m = ground_height(state.pos_n, state.pos_e, ground_as_is(work, ONE_LANE, 0))
-    grounded, t_s = work[layout.CONTACT] > 0.0, epoch * EPOCH_S
-    error_n, error_e = work[says] - state.pos_n, work[says + 1] - state.pos_e
+    grounded, t_s = load_loads(work, ONE_LANE, 0).contact_n > 0.0, epoch * EPOCH_S
+    error_n, error_e = says.pos_n_m - state.pos_n, says.pos_e_m - state.pos_e
     flies = not flight.plan.fly_on_truth
     counts = is_counted(onboard, grounded, t_s, flight.plan.handover_s)
     shown = Shown(
         state.pos_n, state.pos_e, state.pos_d, state.u, state.v, state.w, state.qw, state.qx, state.qy, state.qz,
         state.r, ground_m, grounded, load_autopilot(work, ONE_LANE, 0).away > 0.0,
-        error_n, error_e, work[says + 2] - state.pos_d, work[says + 3] - state.u, work[says + 4] - state.v,
-        work[says + 5] - state.w,
+        error_n, error_e, says.pos_d_m - state.pos_d, says.vel_u_m_s - state.u, says.vel_v_m_s - state.v,
+        says.vel_w_m_s - state.w,
         error_n if flies else 0.0, error_e if flies else 0.0,
         counts, not grounded and epoch >= home, sees_pad(onboard, -state.pos_d, epoch, home, flight.plan.handover_s),
         epoch == home,
     )  # fmt: skip
     note_shown(work, ONE_LANE, row, 0, epoch, shown, flight.vehicle.cg_above_skid_m)
+
+
+score_on_paper = epochs_on_paper(note_epoch)
+score_navigated = epochs_navigated(note_epoch)
 
 
 @equation

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from flownav.campaigns.engines.engine import Part
 from flownav.campaigns.plan import Ready
 from flownav.campaigns.rows import rows_of
-from flownav.simulation.engine import fly_blocks
+from flownav.compile import LANES
+from flownav.simulation.engine import Instead, fly_blocks
 from flownav.simulation.plan import Flight
 
 Array = NDArray[np.float64]
@@ -48,10 +49,13 @@ class Local:
             return rows_of(flight, history)
 
         have = 0
-        first, faults = parts[0].first, cell.faults(seed)
-        for flown, block in fly_blocks(
-            flight, seed, first, total, judge, self.threads, cell.ensemble, faults, instead=self.instead
-        ):
+        first, fault = parts[0].first, cell.faults(seed)
+
+        def instead(start: int) -> Instead:
+            numbers = range(first + start, first + start + len(LANES))
+            return Instead(faults=fault and [fault(number) for number in numbers], take=self.instead)
+
+        for flown, block in fly_blocks(flight, seed, first, total, judge, self.threads, cell.ensemble, instead):
             held.append(block)
             have += flown
             on_progress(flown)

@@ -15,7 +15,7 @@ from flownav.compile import LANES
 from flownav.simulation import layout
 from flownav.simulation.assemble import Setup
 from flownav.simulation.draws import KEYED_EPOCHS, Noise
-from flownav.simulation.engine import Branches, fly_blocks
+from flownav.simulation.engine import Branches, Instead, fly_blocks
 from flownav.simulation.ensemble import Ensemble, believed
 from flownav.simulation.plan import Flight
 from flownav.simulation.sources import starts_of
@@ -60,12 +60,12 @@ class Space:
         """The rows of these flights in their order, (flights, len(measures.ROW_COLUMNS))."""
         values, count = self.values(inputs), len(inputs)
 
-        def branches(start: int) -> Branches:
+        def branches(start: int) -> Instead:
             index = np.minimum(np.arange(start, start + len(LANES)), count - 1)
             own = {name: [column[k] for k in index] for name, column in values.items()}
-            return self.block(own, inputs[index, len(self.dispersed) :], streams[index])
+            return Instead(self.block(own, inputs[index, len(self.dispersed) :], streams[index]))
 
-        flown = fly_blocks(self.flight, self.seed, 0, count, self._judge, threads, branches=branches)
+        flown = fly_blocks(self.flight, self.seed, 0, count, self._judge, threads, instead=branches)
         return np.concatenate([block for _, block in flown])
 
     def usual(self, count: int, threads: int | None = None) -> Array:

@@ -4,19 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import Lanes, Work, equation
 from flownav.estimation.law import law
 from flownav.estimation.laws.geometry import body_axis, component, cross, lens_range
-from flownav.estimation.motion import rotation_of
 from flownav.estimation.named import Attitude, BodyRate, FlowMount, GyroLeft, Height, Lever, VelocityNed, rotation_by
-from flownav.estimation.states import GROUND, POSITION, STATE
-
-
-@equation
-def lens_range_of(work: Work, lanes: Lanes, lane: int, lens_below_m: float) -> float:
-    """The range from the lens that a lane's state implies [m], at least `geometry.LEAST_RANGE_M`."""
-    height_m = work[(STATE + GROUND) * len(lanes) + lane] - work[(STATE + POSITION + 2) * len(lanes) + lane]
-    return lens_range(rotation_of(work, lanes, lane), height_m, (0.0, 0.0, lens_below_m))[0]
 
 
 class OnFlowRate(NamedTuple):

@@ -1,0 +1,120 @@
+"""Headings: what becomes of one that is read, a magnetometer's, and one that comes from elsewhere."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import Lanes, Work, equation, larger, procedure, replacing
+from flownav.estimation.hypotheses import HEADING_OFF, sign_all
+from flownav.estimation.laws.attitude import heading
+from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.navigation.offers import conclude, is_heard, usable_in_flight
+from flownav.navigation.packed import load_attitude_settings
+from flownav.navigation.reasons import FUSED, NO_HEADING, SILENT
+from flownav.navigation.records import HeadingMemory, Reading, StartMemory
+from flownav.navigation.tape import Output
+from flownav.navigation.told import FROM_YAW, AttitudeSettings, Equipment
+from flownav.navigation.verdicts import Attitude, Offer, on_lanes
+
+LEAST_FIELD_GAUSS = 1e-3
+LEAST_STEP_S = 1e-3
+
+with_time = replacing(HeadingMemory, "read_s")
+with_field = replacing(HeadingMemory, "field_rad")
+
+
+@equation
+def heading_variance(t_s: float, m: HeadingMemory, s: AttitudeSettings) -> float:
+    """Variance of one heading [rad2] whose error lasts for many: 2 sigma^2 tau/dt, at least sigma^2."""
+    step_s = larger(t_s - m.read_s, LEAST_STEP_S)
+    return s.heading_noise_rad * s.heading_noise_rad * larger(1.0, 2.0 * s.heading_time_s / step_s)
+
+
+class HeadingVerdict(NamedTuple):
+    """What becomes of a heading."""
+
+    heading: HeadingMemory
+    offer: Offer
+
+
+@equation
+def offered_heading(
+    t_s: float, read_rad: float, stated: float, reason: int, m: HeadingMemory, s: AttitudeSettings
+) -> HeadingVerdict:
+    """A heading with the variance that is stated, or modelled from how often it is read."""
+    modelled = not np.isfinite(stated)
+    refuted = reason == FUSED and m.refuted > 0.0
+    verdict = NO_HEADING if refuted else reason
+    return HeadingVerdict(
+        with_time(m, read_s=t_s if modelled and verdict != SILENT else m.read_s),
+        Offer(read_rad, heading_variance(t_s, m, s) if modelled else stated, verdict),
+    )
+
+
+@equation
+def magnetic_heading(forward_n: float, forward_e: float, declination_rad: float, m: HeadingMemory) -> float:
+    """The heading that the latest level field and the filter's tilt give, from true north [rad]."""
+    angle: float = np.arctan2(forward_e, forward_n) - m.field_rad + declination_rad
+    return angle
+
+
+@on_lanes
+def judge_field(
+    reading: Reading, start: StartMemory, own: Attitude, m: HeadingMemory, *, t_s: float, declination_rad: float,
+    s: AttitudeSettings,
+) -> HeadingVerdict:  # fmt: skip
+    """A magnetometer: the level field points to magnetic north."""
+    running = start.started > 0.0
+    rotation = rotation_from_quaternion(
+        own.w if running else start.qw,
+        own.x if running else start.qx,
+        own.y if running else start.qy,
+        own.z if running else start.qz,
+    )
+    north, east, _ = to_earth(rotation, reading.value_0, reading.value_1, reading.value_2)
+    level = np.sqrt(north * north + east * east)
+    seen = reading.arrived > 0.0 and level > LEAST_FIELD_GAUSS
+    after = with_field(m, field_rad=np.arctan2(east, north) if seen else m.field_rad)
+    reason = usable_in_flight(reading, level, 0.0, start.started)
+    read_rad = magnetic_heading(rotation[0], rotation[3], declination_rad, after)
+    return offered_heading(t_s, read_rad, np.nan, reason if seen else SILENT, after, s)
+
+
+@on_lanes
+def judge_yaw(
+    reading: Reading, start: StartMemory, m: HeadingMemory, *, t_s: float, told: bool, s: AttitudeSettings
+) -> HeadingVerdict:
+    """An external heading; before the start it is noted as the angle to north, as that of a level field is.
+
+    told: the filter's first heading is to be this one.
+    """
+    reason = usable_in_flight(reading, reading.value_0, 0.0, start.started)
+    noted = told and start.started == 0.0 and is_heard(reading) and bool(np.isfinite(reading.value_0))
+    after = with_field(m, field_rad=-reading.value_0 if noted else m.field_rad)
+    return offered_heading(t_s, reading.value_0, reading.variance_0, reason, after, s)
+
+
+@procedure
+def conclude_heading(work: Work, lanes: Lanes, t_s: float, sensor: int, s: AttitudeSettings, o: Output) -> None:
+    """The heading that was judged, tested and fused."""
+    heading(work, lanes, 0)
+    sign_all(work, lanes, HEADING_OFF, 1.0)
+    conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
+
+
+@procedure
+def take_mag(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> None:
+    """A magnetometer."""
+    s = load_attitude_settings(p)
+    judge_field(work, lanes, t_s, fitted.declination_rad, s)
+    conclude_heading(work, lanes, t_s, sensor, s, o)
+
+
+@procedure
+def take_yaw(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipment, p: Work, o: Output) -> None:
+    """An external heading."""
+    s = load_attitude_settings(p)
+    judge_yaw(work, lanes, t_s, fitted.heading == FROM_YAW, s)
+    conclude_heading(work, lanes, t_s, sensor, s, o)

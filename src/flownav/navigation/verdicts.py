@@ -1,0 +1,303 @@
+"""What a judge returns beside its memory, and what takes it: an offer to the filter, an event, a state reset, a doubt.
+
+A judge is `judge(reading, what the filter says, memory, settings) -> verdict` on one lane's records, decorated with
+`on_lanes`: the loop over lanes, the loads and the stores are generated, and each part of a verdict goes where it
+belongs. Nothing is left in rows for a later function to find.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import Lanes, Work, equation
+from flownav.estimation.covariance import add_noise_lane, covariance_of, variance_of
+from flownav.estimation.motion import rotation_of
+from flownav.estimation.states import (
+    ACCEL_BIAS,
+    ACCEL_NOISE,
+    ACCEPTED,
+    FORCE,
+    GROUND,
+    GYRO_BIAS,
+    GYRO_NOISE,
+    GYRO_SHARE,
+    HELD_BACK,
+    IMU,
+    INNOVATION,
+    INNOVATION_VARIANCE,
+    MEASURED,
+    NOISE,
+    OFFERED,
+    POSITION,
+    QUATERNION,
+    STATE,
+    VELOCITY,
+)
+from flownav.frames import Rotation
+from flownav.navigation.journal import reset_state
+from flownav.navigation.memory import MEMORY, OBSERVATION, REASON
+from flownav.navigation.tape import Output, write_event
+
+
+# -- what a judge is given of the filter ----------------------------------------------------------------------
+class Position(NamedTuple):
+    """The filter's position, local NED [m]."""
+
+    north_m: float
+    east_m: float
+    down_m: float
+
+
+class Velocity(NamedTuple):
+    """The filter's velocity, NED [m/s]."""
+
+    north_m_s: float
+    east_m_s: float
+    down_m_s: float
+
+
+class Attitude(NamedTuple):
+    """The filter's attitude: a quaternion, body to earth."""
+
+    w: float
+    x: float
+    y: float
+    z: float
+
+
+class Biases(NamedTuple):
+    """What the filter says of the gyro's biases [rad/s] and the accelerometer's [m/s2], body FRD."""
+
+    gyro_x: float
+    gyro_y: float
+    gyro_z: float
+    accel_x: float
+    accel_y: float
+    accel_z: float
+
+
+class Force(NamedTuple):
+    """The specific force of the step that was just made, biases off, NED [m/s2]."""
+
+    north_m_s2: float
+    east_m_s2: float
+    down_m_s2: float
+
+
+class AppliedMotion(NamedTuple):
+    """What moves the filter over the next step: gyro [rad/s] and specific force [m/s2], body FRD, biases and all."""
+
+    gyro_x: float
+    gyro_y: float
+    gyro_z: float
+    accel_x: float
+    accel_y: float
+    accel_z: float
+
+
+class MotionNoise(NamedTuple):
+    """White noise of what moves the filter: variance densities [(m/s2)^2/Hz], [(rad/s)^2/Hz]."""
+
+    accel: float
+    gyro: float
+
+
+class Height(NamedTuple):
+    """What the filter says of its height: down and its speed's standard deviation, and R_33."""
+
+    pos_d_m: float
+    speed_sigma_m_s: float
+    upright: float
+
+
+class Tested(NamedTuple):
+    """What became of the component that was offered last: its fate (`reasons`), innovation, h P h' + R, and R."""
+
+    reason: float
+    innovation: float
+    total: float
+    variance: float
+
+
+class GroundBelow(NamedTuple):
+    """What the filter says of the ground below: the height over it [m], the variance of that [m2], and R_EB."""
+
+    height_m: float
+    variance: float
+    rotation: Rotation
+
+
+class AxisVelocity(NamedTuple):
+    """One axis of the filter's velocity, NED [m/s], and its variance."""
+
+    speed_m_s: float
+    variance: float
+
+
+# -- what a judge returns ---------------------------------------------------------------------------------------
+class Offer(NamedTuple):
+    """One component for the filter: its value and variance; reason: FUSED where it may be tested, or why not."""
+
+    measured: float
+    variance: float
+    reason: int
+
+
+class Observation(NamedTuple):
+    """What is written down as measured, where that is not what the law reads."""
+
+    value: float
+
+
+class Accepted(NamedTuple):
+    """1 where the component that was offered last was fused."""
+
+    accepted: float
+
+
+class Fate(NamedTuple):
+    """The reason alone: FUSED where what lies in the observation's rows is offered."""
+
+    reason: float
+
+
+class Noise(NamedTuple):
+    """The variance alone, of the component that is about to be tested."""
+
+    variance: float
+
+
+class Offered(NamedTuple):
+    """Above 0 in the lanes that offer the component at hand to the filter."""
+
+    offered: float
+
+
+class Measured(NamedTuple):
+    """What the law is held against, where that is not what was offered."""
+
+    measured: float
+
+
+class GyroShare(NamedTuple):
+    """By how much the filter's bias of the gyro is in the flow reading at hand."""
+
+    share: float
+
+
+class HeldBack(NamedTuple):
+    """Above 0 in the lanes that test readings and fuse none."""
+
+    held: float
+
+
+class Event(NamedTuple):
+    """A happening of `tape.EVENT_NAMES`; kind below 0: nothing happened."""
+
+    kind: np.int_ | int
+    value: float
+
+
+class Reset(NamedTuple):
+    """A state that loses its correlations: its place, value (NaN: it stays) and variance; place below 0: none."""
+
+    state: int
+    value: float
+    variance: float
+
+
+class Doubt(NamedTuple):
+    """A state that is less sure by this variance; 0: as sure as before."""
+
+    state: int
+    variance: float
+
+
+NO_EVENT = Event(-1, 0.0)
+NO_RESET = Reset(-1, 0.0, 0.0)
+
+
+@equation
+def height_of(work: Work, lanes: Lanes, lane: int) -> Height:
+    """What the filter says of a lane's height."""
+    return Height(
+        work[(STATE + POSITION + 2) * len(lanes) + lane],
+        np.sqrt(variance_of(work, lanes, VELOCITY + 2, lane)),
+        rotation_of(work, lanes, lane)[8],
+    )
+
+
+@equation
+def ground_below(work: Work, lanes: Lanes, lane: int) -> GroundBelow:
+    """What the filter says of the ground below a lane's vehicle."""
+    height_m = work[(STATE + GROUND) * len(lanes) + lane] - work[(STATE + POSITION + 2) * len(lanes) + lane]
+    both = variance_of(work, lanes, POSITION + 2, lane) + variance_of(work, lanes, GROUND, lane)
+    variance = both - 2.0 * covariance_of(work, lanes, POSITION + 2, GROUND, lane)
+    return GroundBelow(height_m, variance, rotation_of(work, lanes, lane))
+
+
+@equation
+def axis_velocity(work: Work, lanes: Lanes, axis: int, lane: int) -> AxisVelocity:
+    """One axis of a lane's velocity."""
+    speed_m_s = work[(STATE + VELOCITY + axis) * len(lanes) + lane]
+    return AxisVelocity(speed_m_s, variance_of(work, lanes, VELOCITY + axis, lane))
+
+
+@equation
+def offer(work: Work, lanes: Lanes, lane: int, given: Offer) -> None:
+    """Put a component before its law; `conclude` follows."""
+    work[MEASURED * len(lanes) + lane] = given.measured
+    work[OBSERVATION * len(lanes) + lane] = given.measured
+    work[NOISE * len(lanes) + lane] = given.variance
+    work[REASON * len(lanes) + lane] = given.reason
+
+
+@equation
+def tell(work: Work, lanes: Lanes, lane: int, event: Event, t_s: float, o: Output) -> None:
+    """Write an event down."""
+    if event.kind >= 0:
+        write_event(lanes, lane, t_s, event.kind, event.value, o)
+
+
+@equation
+def reset(work: Work, lanes: Lanes, lane: int, given: Reset, o: Output) -> None:
+    """Reset a state."""
+    if given.state >= 0:
+        before = work[(STATE + given.state) * len(lanes) + lane]
+        work[(STATE + given.state) * len(lanes) + lane] = before if np.isnan(given.value) else given.value
+        reset_state(work, lanes, lane, given.state, given.variance, o)
+
+
+@equation
+def doubt(work: Work, lanes: Lanes, lane: int, given: Doubt) -> None:
+    """Add to a state's variance."""
+    add_noise_lane(work, lanes, given.state, lane, given.variance)
+
+
+MEMORY.name(Position, *(STATE + POSITION + i for i in range(3)))
+MEMORY.name(Velocity, *(STATE + VELOCITY + i for i in range(3)))
+MEMORY.name(Biases, *(STATE + GYRO_BIAS + i for i in range(3)), *(STATE + ACCEL_BIAS + i for i in range(3)))
+MEMORY.name(Force, *(FORCE + i for i in range(3)))
+MEMORY.name(AppliedMotion, *(IMU + i for i in range(6)))
+MEMORY.name(MotionNoise, ACCEL_NOISE, GYRO_NOISE)
+MEMORY.name(Attitude, *(QUATERNION + i for i in range(4)))
+MEMORY.name(Observation, OBSERVATION)
+MEMORY.name(Accepted, ACCEPTED)
+MEMORY.name(Tested, REASON, INNOVATION, INNOVATION_VARIANCE, NOISE)
+MEMORY.name(Fate, REASON)
+MEMORY.name(Noise, NOISE)
+MEMORY.name(Offered, OFFERED)
+MEMORY.name(Measured, MEASURED)
+MEMORY.name(GyroShare, GYRO_SHARE)
+MEMORY.name(HeldBack, HELD_BACK)
+MEMORY.derive(Height, height_of)
+MEMORY.derive(GroundBelow, ground_below)
+MEMORY.derive(AxisVelocity, axis_velocity, "axis")
+MEMORY.sink(Offer, offer)
+MEMORY.sink(Event, tell, "t_s", "o")
+MEMORY.sink(Reset, reset, "o")
+MEMORY.sink(Doubt, doubt)
+
+on_lanes = MEMORY.on_lanes

@@ -1,0 +1,214 @@
+"""What the simulator keeps of each lane beside the states of vehicle, sensors and autopilot, as named records.
+
+`layout` says where they lie. Position and velocity over the ground are local NED, attitude is body to earth, and
+`forward`, `right` and `below` (of velocities u, v, w) are body FRD.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class RotorSpeed(NamedTuple):
+    """Of a helicopter's main rotor."""
+
+    speed_rad_s: float
+
+
+class Loads(NamedTuple):
+    """What sensors and scores read of the vehicle: the main rotor's thrust, or of all, load on the skids, power."""
+
+    thrust_n: float
+    contact_n: float
+    power_w: float
+
+
+class Before(NamedTuple):
+    """Velocity and attitude at the end of the last inertial period."""
+
+    vel_n_m_s: float
+    vel_e_m_s: float
+    vel_d_m_s: float
+    qw: float
+    qx: float
+    qy: float
+    qz: float
+
+
+class FlowNormals(NamedTuple):
+    """Standard normals of the paper's flow sensor and its sonar."""
+
+    u: float
+    v: float
+    w: float
+    range: float
+
+
+class Measured(NamedTuple):
+    """The measurement of the paper's filter."""
+
+    pos_n_m: float
+    pos_e_m: float
+    pos_d_m: float
+    vel_u_m_s: float
+    vel_v_m_s: float
+    vel_w_m_s: float
+
+
+class Arrived(NamedTuple):
+    """1 where a component of that measurement came."""
+
+    pos_n: float
+    pos_e: float
+    pos_d: float
+    vel_u: float
+    vel_v: float
+    vel_w: float
+
+
+class PaperInput(NamedTuple):
+    """The input of the paper's filter: perturbations of the blade angles from trim."""
+
+    lon_rad: float
+    lat_rad: float
+    col_rad: float
+    ped_rad: float
+
+
+class PaperState(NamedTuple):
+    """The state of the paper's filter."""
+
+    pos_n_m: float
+    pos_e_m: float
+    pos_d_m: float
+    vel_u_m_s: float
+    vel_v_m_s: float
+    vel_w_m_s: float
+
+
+class PaperVariance(NamedTuple):
+    """The diagonal of its covariance."""
+
+    pos_n_m2: float
+    pos_e_m2: float
+    pos_d_m2: float
+    vel_u_m2_s2: float
+    vel_v_m2_s2: float
+    vel_w_m2_s2: float
+
+
+class Felt(NamedTuple):
+    """Specific force that the IMU read, body FRD: the mean over the epoch so far, and the last that it read."""
+
+    mean_x_m_s2: float
+    mean_y_m_s2: float
+    mean_z_m_s2: float
+    last_x_m_s2: float
+    last_y_m_s2: float
+    last_z_m_s2: float
+
+
+class Landed(NamedTuple):
+    """What the skid switch says: 1 on the ground."""
+
+    landed: float
+
+
+class HeldRange(NamedTuple):
+    """The range before a fault."""
+
+    range_m: float
+
+
+class TruthThen(NamedTuple):
+    """The truth at a remembered instant."""
+
+    pos_n_m: float
+    pos_e_m: float
+    pos_d_m: float
+    vel_n_m_s: float
+    vel_e_m_s: float
+    vel_d_m_s: float
+    qw: float
+    qx: float
+    qy: float
+    qz: float
+
+
+class InertialThen(NamedTuple):
+    """A remembered inertial reading: body rate and specific force."""
+
+    rate_x_rad_s: float
+    rate_y_rad_s: float
+    rate_z_rad_s: float
+    force_x_m_s2: float
+    force_y_m_s2: float
+    force_z_m_s2: float
+
+
+class PadPlace(NamedTuple):
+    """Where the pad is in the navigator's frame, as far as the vehicle knows."""
+
+    north_m: float
+    east_m: float
+    down_m: float
+
+
+class Estimated(NamedTuple):
+    """What the filter says, whichever flies: position over the pad, body velocity and attitude."""
+
+    pos_n_m: float
+    pos_e_m: float
+    pos_d_m: float
+    vel_u_m_s: float
+    vel_v_m_s: float
+    vel_w_m_s: float
+    qw: float
+    qx: float
+    qy: float
+    qz: float
+
+
+class Spread(NamedTuple):
+    """The variances that it states."""
+
+    pos_n_m2: float
+    pos_e_m2: float
+    pos_d_m2: float
+    vel_u_m2_s2: float
+    vel_v_m2_s2: float
+    vel_w_m2_s2: float
+
+
+class Nees(NamedTuple):
+    """Its normalised error squared, of position and velocity NED; 0 where the filter does not say."""
+
+    nees: float
+
+
+class HorizonError(NamedTuple):
+    """The navigator's position and body velocity at its horizon, less the truth then."""
+
+    pos_n_m: float
+    pos_e_m: float
+    pos_d_m: float
+    vel_u_m_s: float
+    vel_v_m_s: float
+    vel_w_m_s: float
+
+
+class AttitudeError(NamedTuple):
+    """The rotation from the true attitude to the one that is flown on, earth axes."""
+
+    w: float
+    x: float
+    y: float
+    z: float
+
+
+class Home(NamedTuple):
+    """Where the estimate puts the pad."""
+
+    north_m: float
+    east_m: float
+    down_m: float

@@ -1,0 +1,100 @@
+"""What the simulator reads of the navigator, as records of the navigator's buffer, which laws are told as `nav`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flownav.compile import Lanes, Layout, Work, equation
+from flownav.estimation.covariance import covariance_of, variance_of
+from flownav.estimation.motion import rotation_of
+from flownav.estimation.states import GROUND, PAD, POSITION, QUATERNION, STATE
+from flownav.navigation.memory import MEMORY, PAD_KNOWN
+from flownav.navigation.rows import body_velocity_variance
+from flownav.navigation.verdicts import Position, Velocity
+from flownav.simulation.layout import PLANT
+
+__all__ = ["Attitude", "GroundSaid", "PadSaid", "PadVariance", "Position", "StatedVariance", "Velocity"]
+
+
+class Attitude(NamedTuple):
+    """The filter's attitude, body to earth."""
+
+    w: float
+    x: float
+    y: float
+    z: float
+
+
+class PadSaid(NamedTuple):
+    """Where the pad is, NED; known above 0 where it has been seen or stood upon."""
+
+    known: float
+    north_m: float
+    east_m: float
+
+
+class GroundSaid(NamedTuple):
+    """Where the ground below is."""
+
+    down_m: float
+
+
+class StatedVariance(NamedTuple):
+    """The variances of position NED and of body velocity."""
+
+    pos_n_m2: float
+    pos_e_m2: float
+    pos_d_m2: float
+    vel_u_m2_s2: float
+    vel_v_m2_s2: float
+    vel_w_m2_s2: float
+
+
+class PadVariance(NamedTuple):
+    """Variances of the position NED, and of that over the pad."""
+
+    own_n_m2: float
+    own_e_m2: float
+    over_n_m2: float
+    over_e_m2: float
+
+
+@equation
+def stated_variance(nav: Work, lanes: Lanes, lane: int) -> StatedVariance:
+    """What the filter states of its position and body velocity."""
+    r = rotation_of(nav, lanes, lane)
+    return StatedVariance(
+        variance_of(nav, lanes, POSITION, lane),
+        variance_of(nav, lanes, POSITION + 1, lane),
+        variance_of(nav, lanes, POSITION + 2, lane),
+        body_velocity_variance(nav, lanes, lane, r[0], r[3], r[6]),
+        body_velocity_variance(nav, lanes, lane, r[1], r[4], r[7]),
+        body_velocity_variance(nav, lanes, lane, r[2], r[5], r[8]),
+    )
+
+
+@equation
+def pad_variance(nav: Work, lanes: Lanes, lane: int) -> PadVariance:
+    """What the filter states of its position, and of that over the pad."""
+    north, east = variance_of(nav, lanes, POSITION, lane), variance_of(nav, lanes, POSITION + 1, lane)
+    return PadVariance(north, east, north + of_pad(nav, lanes, 0, lane), east + of_pad(nav, lanes, 1, lane))
+
+
+@equation
+def of_pad(nav: Work, lanes: Lanes, axis: int, lane: int) -> float:
+    """What the pad's place adds to the variance of the position over it, along north (0) or east (1)."""
+    beside = covariance_of(nav, lanes, POSITION + axis, PAD + axis, lane)
+    pad: float = variance_of(nav, lanes, PAD + axis, lane) - 2.0 * beside
+    return pad
+
+
+_NAVIGATOR = Layout(below=MEMORY)
+_NAVIGATOR.name(Attitude, *range(QUATERNION, QUATERNION + 4))
+_NAVIGATOR.name(PadSaid, PAD_KNOWN, STATE + PAD, STATE + PAD + 1)
+_NAVIGATOR.name(GroundSaid, STATE + GROUND)
+_NAVIGATOR.derive(StatedVariance, stated_variance)
+_NAVIGATOR.derive(PadVariance, pad_variance)
+
+_BOTH = Layout(below=PLANT)
+_BOTH.beside(_NAVIGATOR, "nav")
+on_both = _BOTH.on_lanes

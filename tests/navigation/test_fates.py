@@ -1,0 +1,297 @@
+"""What follows from a reading's fate, as functions of plain records: resets, aids, a pad, a compass, a start."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GPS_FAST, GPS_SLOW, GPS_VELOCITY, PAD, POSITION, VELOCITY
+from flownav.measurement import Sensor
+from flownav.navigation import verdicts
+from flownav.navigation.compass import check_compass
+from flownav.navigation.course import FOUND_RAD, LEAST_TRAVEL_M, find_heading
+from flownav.navigation.gps import UNKNOWN_PAD_M, AlongAxis, compare_level, judge_fate
+from flownav.navigation.offers import note_aid, note_aid_age, note_height
+from flownav.navigation.place import (
+    LEFT,
+    MANY_STRAYS,
+    SEEN,
+    STOOD_ON,
+    Pad,
+    count_refusals,
+    find_pad,
+    judge_sight,
+    stand_on_pad,
+)
+from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT
+from flownav.navigation.records import (
+    AidMemory,
+    CourseMemory,
+    FlowMemory,
+    GpsMemory,
+    HeadingMemory,
+    PadMemory,
+    PushMemory,
+    Reading,
+    RejectionMemory,
+    StartMemory,
+)
+from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.start import start_lanes
+from flownav.navigation.tape import (
+    AIDED_AGAIN,
+    COMPASS_REFUTED,
+    DEAD_RECKONING,
+    GPS_RESET,
+    HEADING_FOUND,
+    PAD_FOUND,
+    POSITION_INVALID,
+)
+from flownav.navigation.told import NO_HEADING, Equipment
+from flownav.navigation.verdicts import Attitude, Fate, Offer, Position
+
+NAN = math.nan
+FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
+TOLD = NavigatorSettingsFile().settings(FITTED)
+RUNS = StartMemory(1.0)
+NORTH = Attitude(1.0, 0.0, 0.0, 0.0)
+QUARTER = Attitude(math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
+BESIDE = Position(1.0, 2.0, -3.0)
+
+
+def reading(*values: float, arrived=1.0) -> Reading:
+    return Reading(*values, *[NAN] * (6 - len(values)), NAN, NAN, NAN, 255.0, arrived, 0.0)
+
+
+def placed(resets) -> list[tuple[int, float]]:
+    """Places and values of the states that are reset."""
+    return [(reset.state, reset.value) for reset in resets if reset.state >= 0]
+
+
+# -- GPS -----------------------------------------------------------------------------------------------------
+REFUSED = verdicts.Tested(INNOVATION_GATE, 1e3, 1.0, 0.25)
+OFTEN = RejectionMemory(30.0, 0.0)
+
+
+def fate(tested=REFUSED, axis=1, position=True, flow=None, pad=0.0, arrived=1.0):
+    return judge_fate.law(
+        tested, reading(10.0, 20.0, 30.0, arrived=arrived), AlongAxis(2.0, 3.0, 0.5, 0.04), flow or FlowMemory(),
+        PadMemory(pad), OFTEN, GpsMemory(moved_n_m=1.0, moved_e_m=2.0), t_s=99.0, axis=axis, position=position,
+        s=TOLD.gps,
+    )  # fmt: skip
+
+
+def test_a_position_that_is_refused_for_long_goes_to_the_fix_and_its_lasting_errors_are_forgotten():
+    s, found = TOLD.gps, fate()
+    assert placed(found.goes) == [(GPS_SLOW + 1, 0.0), (GPS_FAST + 1, 0.0), (POSITION + 1, 20.0)]
+    lasting = s.gps_slow_sigma_m**2 + s.gps_fast_sigma_m**2
+    assert found.goes[2].variance == pytest.approx(lasting + 0.25)
+    assert found.told == (GPS_RESET, 18.0)
+    assert (found.gps.moved_n_m, found.gps.moved_e_m) == (1.0, 20.0)
+    assert found.rejection.times == 0.0
+
+
+def test_a_velocity_that_is_refused_for_long_goes_to_the_fix_and_moves_no_position():
+    found = fate(axis=2, position=False)
+    assert placed(found.goes) == [(GPS_VELOCITY + 2, 0.0), (VELOCITY + 2, 30.0)]
+    assert found.goes[2].variance == pytest.approx(TOLD.gps.gps_velocity_sigma_down_m_s**2 + 0.25)
+    assert found.told == (GPS_RESET, 27.0)
+    assert (found.gps.moved_n_m, found.gps.moved_e_m) == (1.0, 2.0)
+
+
+def test_an_axis_that_is_refused_for_the_others_sake_alone_does_not_count():
+    found = fate(verdicts.Tested(INNOVATION_GATE, 0.1, 1.0, 0.25))
+    assert placed(found.goes) == []
+    assert found.rejection.times == 0.0
+    assert fate(arrived=0.0).rejection == OFTEN
+
+
+@pytest.mark.parametrize(("pad", "flow", "goes"), [
+    (LEFT, FlowMemory(), True), (0.0, FlowMemory(), False), (LEFT, FlowMemory(doubted=1.0), False),
+    (LEFT, FlowMemory(wrong_s=98.0), False),
+])  # fmt: skip
+def test_the_pad_goes_along_with_the_position_where_it_is_known_and_nobody_doubts_the_flow(pad, flow, goes):
+    found = fate(pad=pad, flow=flow)
+    assert found.pad_goes == goes
+    assert found.pad == ((PAD + 1, 20.5, UNKNOWN_PAD_M**2) if goes else (-1, 20.5, UNKNOWN_PAD_M**2))
+    assert found.tie == (Offer(0.5, 0.04, FUSED) if goes else Offer(0.0, 1.0, SILENT))
+
+
+def test_gps_tells_where_north_or_east_is_fused():
+    for axis, reason, told_s in ((0, FUSED, 99.0), (1, FUSED, 99.0), (2, FUSED, -math.inf), (0, SILENT, -math.inf)):
+        assert fate(verdicts.Tested(reason, 0.0, 1.0, 1.0), axis=axis).gps.told_s == told_s
+
+
+def test_the_level_ratio_is_the_larger_of_north_and_east_of_one_fix():
+    def ratio(innovation: float, axis: int, before: float, reason: int = FUSED) -> float:
+        tested = verdicts.Tested(reason, innovation * TOLD.gps.gate_sigma, 1.0, 1.0)
+        return float(compare_level.law(tested, GpsMemory(level_ratio=before), axis=axis, s=TOLD.gps).level_ratio)
+
+    assert ratio(2.0, 0, 9.0) == pytest.approx(4.0)  # that of the fix before does not count
+    assert ratio(1.0, 1, 4.0) == 4.0
+    assert ratio(3.0, 1, 4.0) == pytest.approx(9.0)
+    assert ratio(3.0, 1, 4.0, SILENT) == 4.0
+
+
+# -- aids ----------------------------------------------------------------------------------------------------
+def test_an_aid_ends_dead_reckoning_and_says_after_how_long():
+    fresh = AidMemory(4.0, 2.0, 1.0, 1.0)
+    aided = note_aid.law(Fate(FUSED), fresh, t_s=9.0)
+    assert (aided.aid, aided.again) == (AidMemory(9.0, 0.0, 1.0, 1.0), (AIDED_AGAIN, 5.0))
+    assert note_aid.law(Fate(INNOVATION_GATE), fresh, t_s=9.0).aid == fresh
+    assert note_aid.law(Fate(FUSED), AidMemory(4.0), t_s=9.0).again.kind < 0
+    assert note_height.law(Fate(FUSED), fresh, t_s=9.0) == fresh._replace(height_s=9.0)
+    assert note_height.law(Fate(SILENT), fresh, t_s=9.0) == fresh
+
+
+def test_what_is_not_aided_reckons_and_is_then_invalid():
+    s, told, aid = TOLD.aid, [], AidMemory(0.0)
+    for t_s in (0.5 * s.dead_reckoning_s, s.dead_reckoning_s + 0.1, s.dead_reckoning_s + 0.2, s.invalid_s + 0.1):
+        found = note_aid_age.law(aid, t_s=t_s, s=s)
+        told += [event.kind for event in (found.reckoning, found.invalid) if event.kind >= 0]
+        aid = found.aid
+    assert told == [DEAD_RECKONING, POSITION_INVALID]
+    assert aid.flag == 2.0
+    assert note_aid_age.law(AidMemory(), t_s=1e9, s=s).aid.flag == 0.0  # not before the start
+    at_once = note_aid_age.law(AidMemory(0.0), t_s=1e9, s=s)
+    assert (at_once.reckoning.kind, at_once.invalid.kind) == (DEAD_RECKONING, POSITION_INVALID)
+
+
+# -- the pad -------------------------------------------------------------------------------------------------
+def test_a_pad_that_a_camera_sees_first_is_found_where_it_is():
+    s = TOLD.place._replace(pad_forward_m=0.5, pad_right_m=0.0, pad_below_m=0.0)
+    found = find_pad.law(reading(0.0, 0.0, 4.0), RUNS, BESIDE, QUARTER, PadMemory(LEFT), s=s)
+    assert found.pad.known == SEEN
+    assert placed(found.place) == [
+        (PAD, pytest.approx(1.0)),
+        (PAD + 1, pytest.approx(2.5)),
+        (PAD + 2, pytest.approx(1.0)),
+    ]
+    assert found.found == (PAD_FOUND, pytest.approx(math.sqrt(1.0 + 6.25 + 1.0)))
+    for other in (PadMemory(SEEN), PadMemory(0.0)):
+        again = find_pad.law(reading(0.0, 0.0, 4.0 * other.known), RUNS, BESIDE, QUARTER, other, s=s)
+        assert (again.pad, placed(again.place), again.found.kind) == (other, [], -1)
+
+
+def test_the_law_of_a_pad_fix_reads_all_of_it():
+    judged = judge_sight.law(reading(0.1, -0.2, 4.0), RUNS, component=1, s=TOLD.place)
+    assert (judged.offer.measured, judged.offer.reason, judged.sight) == (-0.2, FUSED, (0.1, -0.2, 4.0))
+
+
+def test_a_pad_that_is_seen_elsewhere_again_and_again_is_not_where_it_was_seen_first():
+    m = PadMemory(SEEN)
+    for k in range(int(MANY_STRAYS)):
+        assert m.known == SEEN
+        m = count_refusals.law(Fate(INNOVATION_GATE), m, component=k % 2)
+    assert m == PadMemory(LEFT, 0.0, 0.0)
+
+
+def test_a_whole_fix_ends_the_count_and_half_of_one_does_not():
+    m = PadMemory(SEEN, 3.0)
+    half = count_refusals.law(Fate(FUSED), m, component=0)
+    assert half.refusals == 3.0
+    assert count_refusals.law(Fate(FUSED), half, component=1).refusals == 0.0
+    first = count_refusals.law(Fate(INNOVATION_GATE), m, component=0)
+    assert (first.refusals, first.first_refused) == (4.0, 1.0)
+    assert count_refusals.law(Fate(FUSED), first, component=1) == PadMemory(SEEN, 4.0, 0.0)
+
+
+@pytest.mark.parametrize(("known", "off_m", "landed", "after", "moves", "stands"), [
+    (0.0, 5.0, 1.0, STOOD_ON, True, True),
+    (0.0, 5.0, 0.0, 0.0, False, False),
+    (STOOD_ON, 0.05, 1.0, STOOD_ON, False, True),
+    (STOOD_ON, 0.15, 1.0, STOOD_ON, True, True),  # carried about
+    (STOOD_ON, 0.15, 0.0, LEFT, False, False),
+    (LEFT, 5.0, 1.0, LEFT, False, False),
+    (SEEN, 5.0, 1.0, SEEN, False, False),
+])  # fmt: skip
+def test_the_place_of_take_off_is_the_pad_until_a_camera_sees_one(known, off_m, landed, after, moves, stands):
+    pad = Pad(BESIDE.north_m + off_m, BESIDE.east_m, BESIDE.down_m)
+    found = stand_on_pad.law(reading(landed), RUNS, BESIDE, pad, PadMemory(known))
+    assert (found.pad.known, found.stands) == (after, stands)
+    assert placed(found.place) == ([(PAD, 1.0), (PAD + 1, 2.0), (PAD + 2, -3.0)] if moves else [])
+
+
+# -- a heading that is wrong, or sought ------------------------------------------------------------------------
+FLOWN = CourseMemory(0.0, 90.0, 90.0, 90.0, 2.0 * LEAST_TRAVEL_M, 9.9, 9.9, 1.0, 0.0)  # v is w, a quarter turn on
+PUSHED = PushMemory(0.0, 0.0, 0.0, 0.0, 9.9, 0.0, 4.0, 4.0, 4.0)
+
+
+def test_where_the_way_says_how_the_heading_errs_it_is_turned_and_sought_no_more():
+    found = find_heading.law(reading(0.0, 1.0, 0.0), HeadingMemory(sought=1.0), NORTH, FLOWN, t_s=10.0)
+    assert found.attitude == pytest.approx(QUARTER)
+    assert (found.heading.sought, found.found) == (0.0, (HEADING_FOUND, pytest.approx(0.5 * math.pi)))
+    assert found.reset.state == ATTITUDE + 2
+    assert math.isnan(found.reset.value)
+    assert found.reset.variance == FOUND_RAD**2
+
+
+def test_a_heading_that_is_not_sought_stays_and_so_does_one_whose_way_was_short():
+    known = find_heading.law(reading(0.0, 1.0, 0.0), HeadingMemory(), NORTH, FLOWN, t_s=10.0)
+    assert known == (FLOWN, HeadingMemory(), NORTH, known.reset, known.found)
+    assert (known.reset.state, known.found.kind) == (-1, -1)
+    short = FLOWN._replace(travel_m=0.5 * LEAST_TRAVEL_M)
+    waits = find_heading.law(reading(0.0, 1.0, 0.0), HeadingMemory(sought=1.0), NORTH, short, t_s=10.0)
+    assert (waits.attitude, waits.heading.sought, waits.found.kind) == (NORTH, 1.0, -1)
+    assert waits.course.travel_m > short.travel_m
+
+
+def test_a_compass_that_both_witnesses_refute_is_dismissed_and_the_heading_sought_once_more():
+    found = check_compass.law(reading(0.0, 1.0, 0.0), HeadingMemory(), NORTH, FLOWN, PUSHED, t_s=10.0)
+    assert found.refuted == (COMPASS_REFUTED, pytest.approx(0.5 * math.pi))
+    assert (found.heading.refuted, found.heading.sought) == (1.0, 1.0)
+    assert found.attitude == pytest.approx(QUARTER)
+    assert [reset.state for reset in found.freed] == [ATTITUDE + 2, ATTITUDE, ACCEL_BIAS, ATTITUDE + 1, ACCEL_BIAS + 1]
+    assert [reset.value for reset in found.freed if reset.state >= ACCEL_BIAS] == [0.0, 0.0]
+    assert 0.0 < found.course.travel_m < LEAST_TRAVEL_M
+
+
+def test_one_witness_alone_refutes_no_compass():
+    other = PUSHED._replace(across=-4.0)
+    for push, heading in ((other, HeadingMemory()), (PUSHED, HeadingMemory(refuted=1.0))):
+        found = check_compass.law(reading(0.0, 1.0, 0.0), heading, NORTH, FLOWN, push, t_s=10.0)
+        assert (found.heading, found.attitude, found.refuted.kind) == (heading, NORTH, -1)
+        assert {reset.state for reset in found.freed} == {-1}
+    assert found.course == FLOWN  # one that was refuted is not asked again
+
+
+# -- the start -------------------------------------------------------------------------------------------------
+STANDS = StartMemory(force_z=-9.80665, readings=20.0)
+
+
+def begun(m=STANDS, sensor=Sensor.GPS_POSITION, fitted=FITTED, values=(1.0, 2.0, -3.0)):
+    return start_lanes.law(
+        reading(*values), m, AidMemory(flag=2.0), HeadingMemory(), t_s=5.0, sensor=sensor, fitted=fitted, bias_sigma=0.1
+    )
+
+
+def test_a_lane_starts_at_a_fix_or_at_the_origin():
+    at_fix = begun()
+    assert at_fix.first.starts
+    assert at_fix.first.position == (1.0, 2.0, -3.0)
+    assert (at_fix.start.started, at_fix.aid.aided_s, at_fix.aid.flag, at_fix.told.value) == (1.0, 5.0, 0.0, 1.0)
+    at_origin = begun(sensor=Sensor.FLOW_RATE)
+    assert at_origin.first.starts
+    assert (at_origin.first.position, at_origin.told.value) == ((0.0, 0.0, 0.0), 0.0)
+
+
+@pytest.mark.parametrize(("m", "sensor", "values"), [
+    (STANDS._replace(started=1.0), Sensor.GPS_POSITION, (1.0, 2.0, -3.0)),
+    (STANDS._replace(readings=4.0), Sensor.GPS_POSITION, (1.0, 2.0, -3.0)),
+    (STANDS, Sensor.GPS_POSITION, (1.0, 2.0, NAN)),
+    (STANDS, Sensor.RANGE, (1.0, 0.0, 0.0)),
+    (STANDS, Sensor.LANDED, (0.0, 0.0, 0.0)),
+])  # fmt: skip
+def test_a_lane_that_runs_knows_no_attitude_or_reads_no_place_does_not_start(m, sensor, values):
+    waits = begun(m, sensor, values=values)
+    assert not waits.first.starts
+    assert (waits.start, waits.aid, waits.heading, waits.told.kind) == (m, AidMemory(flag=2.0), HeadingMemory(), -1)
+
+
+def test_a_heading_is_sought_where_none_is_read_and_the_start_does_not_define_it():
+    lost = FITTED._replace(deadline_s=2.0)
+    assert begun(fitted=lost).heading.sought == 1.0
+    assert begun().heading.sought == 0.0
+    assert begun(STANDS._replace(attitude_s=4.0), fitted=lost).heading.sought == 0.0
+    assert (begun().first.untold_scale, begun(fitted=lost).first.untold_scale) == (True, False)

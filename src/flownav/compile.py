@@ -27,6 +27,7 @@ from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
 from flownav.compiling.progress import announce_compilation
 from flownav.compiling.records import Layout, OnLanes, compiled, dressed
+from flownav.compiling.rows import columns_of, gathering, places_of, row_store, row_view, width_of
 from flownav.compiling.runge_kutta import STAGES, runge_kutta
 from flownav.compiling.runner import NoDeviceError, Runner, device_runner
 from flownav.compiling.scalars import bits_from_float, clamp, float_from_bits, larger, magnitude, smaller
@@ -56,6 +57,7 @@ __all__ = [
     "announce_compilation",
     "bits_from_float",
     "clamp",
+    "columns_of",
     "compile_beside",
     "compiled",
     "device_runner",
@@ -63,19 +65,24 @@ __all__ = [
     "equation",
     "flat_access",
     "float_from_bits",
+    "gathering",
     "invoke",
     "kernel",
     "lane_access",
     "larger",
     "magnitude",
     "passing",
+    "places_of",
     "pointer",
     "procedure",
     "replacing",
+    "row_store",
+    "row_view",
     "runge_kutta",
     "smaller",
     "stepping",
     "strided",
     "unit",
+    "width_of",
     "write_function",
 ]

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 from flownav.control.gains import AutopilotGains
 from flownav.control.go_around import (
     SEARCH_M_S,
+    Approach,
     GoAround,
     Knowledge,
     climb_out,
@@ -53,9 +54,8 @@ def minded(
     """The state after `for_s` seconds of the same."""
     state, landing = before, more.get("landing", True)
     for _ in range(round(more.get("for_s", DT_S) / DT_S)):
-        state = mind_landing(
-            state, known, beside_m**2, speed_m_s**2, height_m, waited_s, searched_s, landing, gains, DT_S
-        )
+        now = Approach(beside_m**2, speed_m_s**2, height_m, waited_s, searched_s, landing)
+        state = mind_landing(state, known, now, gains, DT_S)
     return state
 
 

@@ -29,6 +29,7 @@ from flownav.compile import ONE_LANE
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.lag import FlowLag, lag_ends, lag_over, lag_starts, seen_velocity
 from flownav.estimation.motion import predict
+from flownav.estimation.named import VelocityNed
 from flownav.estimation.states import (
     ACCEL_NOISE,
     FLOW_LAG,
@@ -111,7 +112,7 @@ def test_what_the_sensor_sees_has_its_derivative_above_and_below_its_floor(filte
     def seen(run: Filter, channel: int):
         rotation = tuple(rotation_of(run.q).ravel())
         height = run.x[GROUND] - run.x[POSITION + 2]
-        found = seen_velocity(rotation, *run.x[3:6], height, channel, lag.sonar_floor_m, lag.lens_below_m)
+        found = seen_velocity(rotation, VelocityNed(*run.x[3:6]), height, channel, lag.sonar_floor_m, lag.lens_below_m)
         run.work[INNOVATION] = -found.value
         return found
 

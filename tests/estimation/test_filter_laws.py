@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from filters import Filter, N, filter_at, filters, innovation_gradient, product, random_covariance
 from flownav.compile import ONE_LANE
 from flownav.estimation import laws
-from flownav.estimation.law import Observation
+from flownav.estimation.law import Observation, Parameter, Signature
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading, level
 from flownav.estimation.laws.flow import body_velocity, flow_rate, lagged_flow, lagged_flow_rate
 from flownav.estimation.laws.geometry import LEAST_RANGE_M, lens_range
@@ -196,9 +196,16 @@ def test_a_law_called_with_numbers_says_what_its_observation_does(name):
     rows |= {f"measured_{i}": filter_.reading[i] for i in range(8)}
     rows |= {"measured": filter_.reading[0], "force": filter_.work[FORCE + axis]}
     rows |= {"gyro_share": filter_.work[GYRO_SHARE]}
-    names = list(case.law.law.__code__.co_varnames[: case.law.law.__code__.co_argcount])
-    found, jacobian = case.law.law(*(rows[name] for name in names), **case.scalars)
-    reads = any(name.startswith("measured") for name in names)
+    rows |= case.scalars
+    takes = Signature.of(case.law.law)
+
+    def told(parameter: Parameter) -> Any:
+        numbers = [rows[name] for name in parameter.names if name in rows]  # the others have defaults
+        return numbers[0] if parameter.record is None else parameter.record(*numbers)
+
+    passed = {parameter.name: told(parameter) for parameter in takes.passed}
+    found, jacobian = case.law.law(*map(told, takes.reads), **passed)
+    reads = any(name.startswith("measured") for name in takes.names)
     assert filter_.work[INNOVATION] == (found if reads else filter_.reading[0] - found)
     count = int(filter_.work[OBSERVED])
     assert filter_.rows(COEFFICIENT, count).tolist() == list(jacobian)

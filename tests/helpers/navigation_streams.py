@@ -15,8 +15,9 @@ from flownav.frames import GRAVITY_M_S2
 from flownav.measurement import EventQueue, Sensor, Stream, merge
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator
+from flownav.navigation.rows import EXTRA_STATES, EstimateRow, EventRow, InnovationRow
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.tape import EVENT_NAMES, FIRST_EXTRA, new_tape
+from flownav.navigation.tape import EVENT_NAMES, new_tape
 from flownav.navigation.told import NO_STATED_NOISE, Equipment, FlowNoise
 
 FIELD_GAUSS = np.array([0.21, 0.0, 0.43])
@@ -114,7 +115,15 @@ class Navigated:
 
     @property
     def t_s(self) -> np.ndarray:
-        return self.estimate[:, 0]
+        return self.said.t_s
+
+    @property
+    def said(self) -> EstimateRow[np.ndarray]:
+        return EstimateRow.of(self.estimate)
+
+    @property
+    def offered(self) -> InnovationRow[np.ndarray]:
+        return InnovationRow.of(self.offers)
 
     @property
     def estimate(self) -> np.ndarray:
@@ -126,23 +135,23 @@ class Navigated:
 
     @property
     def error(self) -> np.ndarray:
-        return self.estimate[:, 1:4] - self.flown.at(self.t_s, self.flown.position)
+        return self.said.pos_ned_m - self.flown.at(self.t_s, self.flown.position)
 
     @property
     def velocity_error(self) -> np.ndarray:
-        return self.estimate[:, 17:20] - self.flown.at(self.t_s, self.flown.velocity)
+        return self.said.vel_ned_m_s - self.flown.at(self.t_s, self.flown.velocity)
 
     @property
     def yaw_error(self) -> np.ndarray:
-        w, x, y, z = self.estimate[:, 7:11].T
+        w, x, y, z = self.said.quaternion.T
         yaw = np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
         difference = yaw - np.interp(self.t_s, self.flown.t_s, self.flown.yaw)
         return np.arctan2(np.sin(difference), np.cos(difference))
 
     def column(self, state: int, count: int = 1) -> np.ndarray:
         """States from GYRO_BIAS on, as the estimates have them, (n, count)."""
-        first = 23 + state - FIRST_EXTRA
-        return self.estimate[:, first : first + count]
+        first = EXTRA_STATES.index(state)
+        return self.said.states[:, first : first + count]
 
     def state(self, index: int) -> float:
         return float(self.on.work[STATE + index])
@@ -151,15 +160,15 @@ class Navigated:
         return float(np.sqrt(variance_of(self.on.work, ONE_LANE, index, 0)))
 
     def reasons(self, sensor: Sensor) -> dict[str, int]:
-        rows = self.offers[self.offers[:, 1] == sensor, 8].astype(int)
+        rows = self.offered.reason[self.offered.sensor == sensor].astype(int)
         return {Reason(code).label: int(np.count_nonzero(rows == code)) for code in np.unique(rows)}
 
     def events(self, source: str, kind: str) -> np.ndarray:
         """Rows t_s, value of one kind of event."""
-        rows = self.on.tape.events()
+        happened = EventRow.of(self.on.tape.events())
         codes = [code for code, (s, k, _) in enumerate(EVENT_NAMES) if (s, k) == (source, kind)]
         assert codes, (source, kind)
-        return rows[rows[:, 1] == codes[0]][:, [0, 2]]
+        return np.column_stack([happened.t_s, happened.value])[happened.kind == codes[0]]
 
 
 def equipment(flown: Flown, queue: EventQueue, **settings) -> Equipment:

@@ -14,7 +14,8 @@ import pytest
 from flownav.compile import LANES, ONE_LANE, equation, unit
 from flownav.errors import InputError
 from flownav.estimation import covariance
-from flownav.estimation.lag import lag_of_step, lag_over, move_lag
+from flownav.estimation.lag import Lagged, LagLens, LagMove, lag_of_step, lag_over, move_lag
+from flownav.estimation.named import Attitude, BodyRate, Height, VelocityNed
 from flownav.estimation.states import FLOW_LAG, STATE
 from flownav.logs.open_log import open_flight
 from flownav.measurement import Sensor
@@ -138,10 +139,10 @@ def test_the_dynamics_over_a_step_of_any_length_are_those_of_the_matrix_exponent
 
 def test_the_lens_swings_with_the_vehicle():
     """Level and heading north, a turn of 2 rad/s moves a lens 0.5 m ahead and 0.25 m to the right of the IMU."""
-    still, level, silent = (0.0,) * 4, (1.0, 0.0, 0.0, 0.0), {"f11": 0.0, "f12": 0.0, "f21": 0.0, "f22": 0.0}
     moved = move_lag.law(
-        *still, 3.0, 4.0, 0.0, -2.0, 0.0, *level, 0.0, 0.0, 2.0, **silent, gain_1=1.0, gain_2=0.0,
-        sonar_floor_m=0.0, lens_below_m=0.1, forward_m=0.5, right_m=0.25, below_m=0.1,
+        Lagged(*(0.0,) * 4), VelocityNed(3.0, 4.0, 0.0), Height(-2.0, 0.0), Attitude(1.0, 0.0, 0.0, 0.0),
+        BodyRate(0.0, 0.0, 2.0),
+        move=LagMove(0.0, 0.0, 0.0, 0.0, 1.0, 0.0), lens=LagLens(0.0, 0.1, 0.5, 0.25, 0.1),
     )  # fmt: skip
     assert tuple(moved) == (3.0 - 2.0 * 0.25, 0.0, 4.0 + 2.0 * 0.5, 0.0)
 

@@ -147,7 +147,7 @@ def echoing(lasts_s: float) -> Navigated:
 def test_a_refused_range_does_not_keep_the_flow_waiting():
     flown = echoing(1.0)
     assert flown.reasons(Sensor.RANGE)["innovation_gate"] > 50
-    rows = flown.offers[(flown.offers[:, 1] == Sensor.FLOW_RATE) & (flown.offers[:, 0] > 1.0)]
+    rows = flown.offers[(flown.offered.sensor == Sensor.FLOW_RATE) & (flown.offered.t_s > 1.0)]
     assert set(rows[:, 8]) == {Reason.FUSED}
     assert np.abs(flown.error[:, :2]).max() < 1.0
 
@@ -200,17 +200,17 @@ def away(t_s: np.ndarray) -> np.ndarray:
 def test_without_a_fix_the_doubt_of_the_flows_scale_is_stated_by_the_way_from_the_start():
     flown = fly(away, 20.0)
     alone = navigate(flown.only(*OWN))
-    way_m = alone.estimate[:, 1]
+    way_m = alone.said.pos_ned_m[:, 0]
     scale = alone.column(FLOW_SCALE)
     assert scale.max() == scale.min() == 0.0
     assert alone.sigma(FLOW_SCALE) == 0.0
     assert way_m[-1] > 25.0
-    stated = alone.estimate[:, 11]
+    stated = alone.said.std_pos_ned_m[:, 0]
     assert np.all(stated >= 0.1 * way_m)
     assert stated[-1] == pytest.approx(math.hypot(0.1 * way_m[-1], alone.sigma(0)), rel=1e-5)
-    assert alone.estimate[-1, 12] == pytest.approx(alone.sigma(1), abs=0.01)  # east it did not go
+    assert alone.said.std_pos_ned_m[-1, 1] == pytest.approx(alone.sigma(1), abs=0.01)  # east it did not go
     fixed = navigate(flown)
-    assert fixed.estimate[-1, 11] == pytest.approx(fixed.sigma(0), rel=1e-3)
+    assert fixed.said.std_pos_ned_m[-1, 0] == pytest.approx(fixed.sigma(0), rel=1e-3)
     assert 0.0 < fixed.sigma(FLOW_SCALE) < 0.1
 
 
@@ -220,7 +220,7 @@ def test_the_scales_doubt_covers_a_lens_that_scales_wrongly():
     run_ = navigate(flown.changed(Sensor.FLOW_RATE, value=stream.value * [1.1, 1.1, 1.0, 1.0, 1.0, 1.0]))
     off = np.abs(run_.error[:, 0] - run_.error[0, 0])
     assert off[-1] > 2.0
-    assert np.all(off < 2.0 * run_.estimate[:, 11])
+    assert np.all(off < 2.0 * run_.said.std_pos_ned_m[:, 0])
 
 
 def test_a_hover_that_a_low_range_takes_for_the_ground_teaches_no_gyro_and_holds_no_velocity():

@@ -16,6 +16,7 @@ from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import READING, load_start, new_work
 from flownav.navigation.packed import pack
 from flownav.navigation.records import Reading
+from flownav.navigation.rows import EventRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.take import navigate_lanes
 from flownav.navigation.tape import COMPONENTS, EVENT_NAMES, Tape, empty_tape, new_tape, room_of
@@ -148,7 +149,7 @@ def test_each_of_sixteen_lanes_is_what_it_is_alone(seed, fitted, without):
         for name in ("events", "offers", "estimates"):
             together, single = plain(getattr(tape, name)(lane)), plain(getattr(on.tape, name)())
             assert together.tobytes() == single.tobytes(), f"lane {lane}: {name}, {differing(together, single)}"
-        seen.update(on.tape.events()[:, 1].astype(int).tolist())
+        seen.update(EventRow.of(on.tape.events()).kind.astype(int).tolist())
         if load_start(on.work, (0,), 0).started:
             state = work.reshape(-1, LANES_WIDE)[STATE : QUATERNION + 4, lane]
             assert state.tobytes() == on.work[STATE : QUATERNION + 4].tobytes()

@@ -27,7 +27,7 @@ def test_it_starts_level_from_the_accelerometer_alone():
     for sensor in (*GPS, Sensor.FLOW_RATE):  # later than the accelerometer's first readings
         flown = flown.cut(sensor, 0.0, 0.5)
     run = navigate(flown)
-    w, x, y, _ = run.estimate[0, 7:11]
+    w, x, y, _ = run.said.quaternion[0]
     believed = 0.07**2 / (0.07**2 + (0.2 / GRAVITY_M_S2) ** 2)
     assert believed > 0.9
     assert 2 * np.arctan2(x, w) == pytest.approx(believed * roll, abs=1e-3)
@@ -136,9 +136,10 @@ def test_pad_fixes_pull_the_position_to_centimetres():
     fixes = np.column_stack([0 * t_s, 0 * t_s, 0 * t_s + 2.0])
     run = navigate(flown.added(Stream.of(Sensor.PAD, t_s, fixes, variance=np.full((len(t_s), 3), 1e-6))))
     late = run.t_s > 5.0
-    from_pad = run.estimate[late, 1:4] - run.column(PAD, 3)[late]
+    from_pad = run.said.pos_ned_m[late] - run.column(PAD, 3)[late]
     assert np.abs(from_pad - [0.0, 0.0, -2.0]).max() < 0.01
-    assert run.sigma(PAD) == pytest.approx(run.estimate[-1, 11], rel=0.01)  # in the earth it is no better known
+    in_earth_m = run.said.std_pos_ned_m[-1, 0]
+    assert run.sigma(PAD) == pytest.approx(in_earth_m, rel=0.01)  # it is no better known there
     assert run.sigma(PAD) > 0.2
     assert len(run.events("pad", "found")) == 1
     assert run.reasons(Sensor.PAD) == {"fused": 870}
@@ -153,7 +154,7 @@ def test_a_pad_first_seen_where_there_is_none_is_found_where_it_is(wrong_first, 
     fixes[:wrong_first, axis], fixes[200, 1] = 1.0, -1.0
     run = navigate(flown.added(Stream.of(Sensor.PAD, t_s, fixes, variance=np.full((len(t_s), 3), 1e-6))))
     late = run.t_s > 3.0
-    from_pad = run.estimate[late, 1:4] - run.column(PAD, 3)[late]
+    from_pad = run.said.pos_ned_m[late] - run.column(PAD, 3)[late]
     assert np.abs(from_pad - [0.0, 0.0, -2.0]).max() < 0.02
     assert len(run.events("pad", "found")) == 2
     assert run.reasons(Sensor.PAD)["innovation_gate"] <= 16
@@ -164,7 +165,7 @@ def test_an_external_pose_is_enough():
     t_s = np.arange(0.2, 20.0, 0.05)
     run = navigate(flown.added(Stream.of(Sensor.POSE, t_s, flown.at(t_s, flown.position - flown.position[1000]))))
     truth = flown.at(run.t_s, flown.position - flown.position[1000])
-    assert np.abs(run.estimate[:, 1:4] - truth).max() < 0.1
+    assert np.abs(run.said.pos_ned_m - truth).max() < 0.1
     assert np.abs(run.velocity_error[run.t_s > 10.0]).max() < 0.05
     assert run.events("filter", "start")[:, 1] == pytest.approx([0.0])
 

@@ -10,6 +10,7 @@ from flownav.estimation.gating import Reason
 from flownav.estimation.states import IMU
 from flownav.measurement import EventQueue, Sensor, Stream, merge
 from flownav.navigation.memory import load_imu
+from flownav.navigation.rows import EventRow
 from flownav.navigation.tape import COMPASS_REFUTED, EVENT_NAMES, FAULT_CLEARED, FAULT_SUSPECTED, HEADING_FOUND
 from navigation_streams import Flown, Navigated, circle, fly, navigate, still
 
@@ -91,7 +92,7 @@ def test_what_is_no_number_is_counted_and_never_fused(hover, sensor, bad):
     assert np.isfinite(load_imu(run.on.work, ONE_LANE, 0)).all()
     late = run.t_s > 5.0
     assert np.abs(run.error[late]).max() < 0.1
-    rows = run.offers[run.offers[:, 1] == sensor]
+    rows = run.offers[run.offered.sensor == sensor]
     fused = rows[rows[:, 8] == Reason.FUSED]
     assert np.isfinite(fused).all()
     if sensor not in (Sensor.IMU, Sensor.MAG, Sensor.ATTITUDE, Sensor.LANDED):
@@ -126,14 +127,14 @@ def jumping(hover: Flown) -> Navigated:
 
 def test_a_gps_jump_of_20_m_is_refused_and_after_7_s_accepted(hover):
     run = jumping(hover)
-    before = run.estimate[np.searchsorted(run.t_s, 9.99), 1]
-    during = run.estimate[(run.t_s >= 10.0) & (run.t_s < 12.0), 1]
+    before = run.said.pos_ned_m[np.searchsorted(run.t_s, 9.99), 0]
+    during = run.said.pos_ned_m[(run.t_s >= 10.0) & (run.t_s < 12.0), 0]
     assert np.abs(during - before).max() < 0.01
     reset = run.events("gps", "reset")
     assert len(reset) == 1
     assert reset[0] == pytest.approx([17.0, 20.0], abs=0.21)
     assert run.reasons(Sensor.GPS_POSITION)["innovation_gate"] == 2 * 36  # both axes of a fix
-    assert run.estimate[-1, 1] == pytest.approx(20.0, abs=0.5)
+    assert run.said.pos_ned_m[-1, 0] == pytest.approx(20.0, abs=0.5)
 
 
 def blind(hover: Flown) -> Navigated:
@@ -189,7 +190,7 @@ def test_a_step_of_the_ground_is_accepted_after_1_s(hover):
     assert len(resets) == 1
     assert resets[0] == pytest.approx([11.45, -1.2], abs=0.06)
     assert np.abs(run.error[:, 2]).max() < 0.1
-    assert np.count_nonzero(run.offers[run.offers[:, 1] == Sensor.RANGE, 8] == Reason.INNOVATION_GATE) < 25
+    assert np.count_nonzero(run.offered.reason[run.offered.sensor == Sensor.RANGE] == Reason.INNOVATION_GATE) < 25
 
 
 def test_flow_is_not_fused_below_its_least_height():
@@ -209,7 +210,7 @@ def test_flow_and_range_are_not_taken_at_a_steep_tilt(hover):
     run = navigate(hover.changed(Sensor.IMU, value=value).only(Sensor.IMU, Sensor.FLOW_RATE, Sensor.RANGE))
     assert run.reasons(Sensor.RANGE)["tilted"] > 150
     for sensor, instead in ((Sensor.FLOW_RATE, {"tilted", "no_height"}), (Sensor.RANGE, {"tilted"})):
-        late = run.offers[(run.offers[:, 1] == sensor) & (run.offers[:, 0] >= 10.9), 8].astype(int)
+        late = run.offered.reason[(run.offered.sensor == sensor) & (run.offered.t_s >= 10.9)].astype(int)
         assert Reason(late[0]).label == "tilted"
         assert {Reason(code).label for code in late} == instead  # without a range the height is lost in the end
 
@@ -225,11 +226,11 @@ def test_an_echo_is_not_believed_where_the_range_alone_tells_the_height(hover):
     stream = flown.streams[Sensor.RANGE]
     echo = (stream.t_s >= 10.0) & (stream.t_s < 10.3)
     run = navigate(flown.changed(Sensor.RANGE, value=np.where(echo[:, None], 2.0 * stream.value, stream.value)))
-    rows = run.offers[run.offers[:, 1] == Sensor.RANGE]
+    rows = run.offers[run.offered.sensor == Sensor.RANGE]
     heard = (rows[:, 0] >= 10.0 - 1e-6) & (rows[:, 0] < 10.3 - 1e-6)
     assert np.count_nonzero(heard) == 6
     assert np.sqrt(rows[heard, 6]).min() > 15.0  # metres
-    assert np.ptp(run.estimate[run.t_s > 9.0, 3]) < 0.02
+    assert np.ptp(run.said.pos_ned_m[run.t_s > 9.0, 2]) < 0.02
     assert len(run.events("imu", "doubted")) == len(run.events("range", "reset")) == 0
 
 
@@ -289,7 +290,7 @@ def test_every_event_has_its_case(hover):
             navigate(fly(circle, 10.0).cut(Sensor.IMU, 5.0, 6.0)),
             navigate(fly(circle, 10.0).without(Sensor.ATTITUDE, Sensor.MAG)))  # fmt: skip
     for run in runs:
-        seen.update(run.on.tape.events()[:, 1].astype(int).tolist())
+        seen.update(EventRow.of(run.on.tape.events()).kind.astype(int).tolist())
     flow = {k for k, (source, _, _) in enumerate(EVENT_NAMES) if source == "flow"}  # tests/test_faults_navigator.py
     heading = {int(HEADING_FOUND), int(COMPASS_REFUTED)}  # tests/replays/test_unknown_heading.py
     faults = {int(FAULT_SUSPECTED), int(FAULT_CLEARED)}  # tests/navigation/test_protection.py

@@ -38,6 +38,7 @@ from flownav.measurement import Sensor, merge
 from flownav.navigation.flags import Flag, flagged, flags_of
 from flownav.navigation.loop import run, start_navigator
 from flownav.navigation.protection import EXCLUDED, HELD_S, least_size, levels, prior_sigma
+from flownav.navigation.rows import EstimateRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import part_of
 from flownav.navigation.tape import (
@@ -45,12 +46,12 @@ from flownav.navigation.tape import (
     DEAD_RECKONING,
     FAULT_CLEARED,
     FAULT_SUSPECTED,
-    LEVELS_AT,
     new_tape,
 )
 from navigation_streams import Flown, Navigated, circle, equipment, fly, navigate
 
 FLOWN = fly(circle, 30.0)
+UNPROTECTED = [name for name in EstimateRow._fields if name != "protection_m"]
 OWN = (Sensor.IMU, Sensor.FLOW_RATE, Sensor.RANGE)
 
 
@@ -115,8 +116,8 @@ def test_following_faults_changes_no_bit_of_the_estimate():
     on = start_navigator(equipment(flown, queue), NavigatorSettingsFile(), new_tape(queue))
     on.work[HYPOTHESES] = 0.0
     run(queue, on)
-    alone = on.tape.estimates()
-    assert alone[:, :LEVELS_AT].tobytes() == followed.estimate[:, :LEVELS_AT].tobytes()
+    alone = EstimateRow.of(on.tape.estimates())
+    assert all(getattr(alone, name).tobytes() == getattr(followed.said, name).tobytes() for name in UNPROTECTED)
     assert on.tape.offers().tobytes() == followed.offers.tobytes()
     assert followed.on.work[HYPOTHESES] == COUNT
 
@@ -182,7 +183,7 @@ def test_the_error_stays_within_the_level_or_something_is_said(name, seed):
         found = navigate(flown.only(*sensors))
         off = np.hypot(*(found.error - found.error[0])[:, :2].T)
         said = flagged(found.t_s, flags_of(found.on.tape.events()))
-        beyond = (off > found.estimate[:, LEVELS_AT]) & ~said
+        beyond = (off > found.said.protection_m[:, 0]) & ~said
         assert beyond.mean() < 0.02, (name, sensors)
 
 
@@ -191,10 +192,11 @@ def test_a_flight_without_faults_raises_no_suspicion_and_has_levels_of_use(senso
     for seed in (1, 2, 3):
         found = navigate(noisy(FLOWN, seed).only(*sensors))
         assert len(found.events("filter", "suspects")) == 0
-        assert np.isfinite(found.estimate[:, LEVELS_AT:]).all()
-        sigma = found.estimate[:, 11:13].max(axis=1)
-        assert (found.estimate[:, LEVELS_AT] >= 4.0 * sigma * 0.999).all()
-        assert np.median(found.estimate[:, LEVELS_AT]) < 20.0
+        levels_m = found.said.protection_m
+        assert np.isfinite(levels_m).all()
+        sigma = found.said.std_pos_ned_m[:, :2].max(axis=1)
+        assert (levels_m[:, 0] >= 4.0 * sigma * 0.999).all()
+        assert np.median(levels_m[:, 0]) < 20.0
 
 
 def test_a_reversed_flow_is_suspected_by_name_and_the_suspicion_lasts():
@@ -242,7 +244,7 @@ def test_a_flow_that_is_right_again_is_trusted_5_s_later():
     late = flown.streams[Sensor.FLOW_RATE].t_s >= 16.0
     value = np.where(late[:, None], flown.streams[Sensor.FLOW_RATE].value, wrong.streams[Sensor.FLOW_RATE].value)
     found = navigate(flown.changed(Sensor.FLOW_RATE, value=value))
-    flow = found.offers[found.offers[:, 1] == Sensor.FLOW_RATE]
+    flow = found.offers[found.offered.sensor == Sensor.FLOW_RATE]
     again_s = flow[(flow[:, 0] > 16.0) & (flow[:, 8] == Reason.FUSED), 0].min()
     assert 20.5 < again_s < 23.0
     assert (flow[flow[:, 0] > again_s, 8] == Reason.FUSED).all()

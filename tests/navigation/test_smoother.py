@@ -18,24 +18,19 @@ from flownav.frames import quaternion_product
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
 from flownav.measurement import Sensor
+from flownav.navigation.entries import CORRECTED, DECAYED, FORGOTTEN, NOTED, PREDICTED
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import CLOCK, ERRORS_CLOCK, load_start
+from flownav.navigation.rows import EstimateRow, EventRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import part_of, smooth
 from flownav.navigation.tape import (
     BARO_FOUND,
-    CORRECTED,
-    DECAYED,
     ENTRIES,
     ESTIMATES,
-    EXTRA_STATES,
-    FORGOTTEN,
     GROUND_FOUND,
-    LEVELS_AT,
-    NOTED,
     NOTES,
-    PREDICTED,
     empty_tape,
     new_tape,
 )
@@ -45,6 +40,7 @@ from flownav.replays.session import Replay, replay
 from replay_logs import SyntheticLog, log_of_flight
 from smoother_oracles import dense_decay, dense_transition, smoother_gain
 
+UNPROTECTED = [name for name in EstimateRow._fields if name != "protection_m"]  # a smoother has no levels
 SETTINGS = NavigatorSettingsFile(flow_lasting_s=0.0)  # or a correction ends with noise, which `Step` does not know
 STATIONARY = SETTINGS.start_sigma(has_heading=True, compass=True)  # of the Gauss-Markov errors
 CUT = ((8.0, 26.0),)
@@ -157,7 +153,7 @@ def steps_of(prepared, queue) -> tuple[list[Step], np.ndarray, list[int]]:
         started, events = load_start(on.work, ONE_LANE, 0).started, len(on.tape.events())
         before, estimates = on.work.copy(), int(on.tape.used[ESTIMATES])
         run(part_of(queue, k, k + 1), on)
-        happened = on.tape.events()[events:, 1]
+        happened = EventRow.of(on.tape.events()).kind[events:]
         if started:
             assert on.clock_s == before[CLOCK] or queue.sensor[k] == Sensor.IMU
             reset = [state for kind, state in ((GROUND_FOUND, GROUND), (BARO_FOUND, BARO)) if kind in happened]
@@ -188,16 +184,19 @@ def test_a_whole_run_of_the_navigator_is_smoothed_as_by_dense_rts(clean):
     early = len(path) - len(found)  # that of the start
     assert early <= 1 < 300 < len(path)
     largest = 0.0
-    for own, better, (wanted, spread) in zip(filtered[early:], path[early:], found[::-1], strict=True):
+    for row, (wanted, spread) in enumerate(found[::-1], early):
+        own, better = (EstimateRow(*(column[row] for column in EstimateRow.of(rows))) for rows in (filtered, path))
         sigma = np.sqrt(np.diag(spread))
         scale = np.maximum(sigma, 1e-6)
-        shift = np.concatenate([better[1:4] - own[1:4], better[17:20] - own[17:20]])
-        turn = quaternion_product(tuple(better[7:11]), (own[7], -own[8], -own[9], -own[10]))
-        extra = slice(23, 23 + EXTRA_STATES)
-        shift = np.concatenate([shift, 2.0 * np.array(turn[1:]) / turn[0], better[extra] - own[extra]])
+        w, x, y, z = own.quaternion
+        turn = quaternion_product(tuple(better.quaternion), (w, -x, -y, -z))
+        shift = np.concatenate([
+            better.pos_ned_m - own.pos_ned_m, better.vel_ned_m_s - own.vel_ned_m_s,
+            2.0 * np.array(turn[1:]) / turn[0], better.states - own.states,
+        ])  # fmt: skip
         assert (np.abs(shift - wanted) < 1e-5 * scale).all()
         largest = max(largest, float(np.abs(shift / scale).max()))
-        said = np.concatenate([better[[11, 12, 13, 20, 21, 22]], better[23 + EXTRA_STATES : LEVELS_AT]])
+        said = np.concatenate([better.std_pos_ned_m, better.std_tilt_ned_rad, better.std_states])
         assert said == pytest.approx(np.concatenate([sigma[:3], sigma[6:9], sigma[9:]]), rel=1e-9)
     assert largest > 0.01
 
@@ -237,19 +236,24 @@ def test_with_nothing_after_it_the_last_estimate_is_the_filters(log):
     prepared, queue = queue_of(log, 6.0)
     on = navigator(prepared, queue)
     run(queue, on)
-    last_s = on.tape.estimates()[-1, 0]
+    filtered = EstimateRow.of(on.tape.estimates())
+    last_s = filtered.t_s[-1]
     written = np.flatnonzero(queue.t_s == last_s)[0] + 1
     cut = part_of(queue, 0, written)
     on = navigator(prepared, cut)
     path = smooth(cut, on)
-    assert path[-1, 0] == last_s
-    assert path[-1, :LEVELS_AT] == pytest.approx(on.tape.estimates()[-1, :LEVELS_AT], rel=1e-12, abs=1e-15)
+    smoothed = EstimateRow.of(path)
+    assert smoothed.t_s[-1] == last_s
+    for name in UNPROTECTED:
+        assert getattr(smoothed, name)[-1] == pytest.approx(getattr(filtered, name)[-1], rel=1e-12, abs=1e-15)
 
 
 def errors(path: np.ndarray, flight: SyntheticLog) -> np.ndarray:
     """Position and NED velocity less the truth, (n, 6)."""
     truth = np.column_stack([flight.position, flight.velocity])
-    return path[:, [1, 2, 3, 17, 18, 19]] - np.column_stack([np.interp(path[:, 0], flight.t_s, c) for c in truth.T])
+    said = EstimateRow.of(path)
+    wanted = np.column_stack([np.interp(said.t_s, flight.t_s, c) for c in truth.T])
+    return np.column_stack([said.pos_ned_m, said.vel_ned_m_s]) - wanted
 
 
 def test_over_many_flights_it_errs_less_than_the_filter_and_as_much_as_it_says(clean, flight):
@@ -260,10 +264,10 @@ def test_over_many_flights_it_errs_less_than_the_filter_and_as_much_as_it_says(c
         flown = replay(spoiled(clean, 100 + seed), ReplayOptions(gps_outages_s=CUT), SETTINGS, smoothed=True)
         assert flown.smoothed is not None
         for name, path in (("filtered", flown.estimate), ("smoothed", flown.smoothed)):
-            rows = np.searchsorted(path[:, 0], np.arange(2.0, 28.0, 2.0))
+            rows = np.searchsorted(EstimateRow.of(path).t_s, np.arange(2.0, 28.0, 2.0))
             off = errors(path, flight)[rows]
             squares[name].append(off**2)
-            normalised[name].append(off[:, :3] ** 2 / path[rows, 11:14] ** 2)
+            normalised[name].append(off[:, :3] ** 2 / EstimateRow.of(path[rows]).std_pos_ned_m ** 2)
     filtered, smoothed = (np.mean(squares[name], axis=(0, 1)) for name in ("filtered", "smoothed"))
     assert (smoothed[:3] < filtered[:3]).all()
     assert (smoothed[3:] < 0.6 * filtered[3:]).all()
@@ -273,19 +277,20 @@ def test_over_many_flights_it_errs_less_than_the_filter_and_as_much_as_it_says(c
 
 def test_it_never_says_that_it_knows_less_than_the_filter(flown):
     assert flown.smoothed is not None
-    assert (flown.smoothed[:, 0] == flown.estimate[:, 0]).all()
-    assert np.isfinite(flown.smoothed[:, :LEVELS_AT]).all()
-    for column in (11, 12, 13, 20, 21, 22):
-        assert (flown.smoothed[:, column] <= flown.estimate[:, column] * (1.0 + 1e-9)).all()
-    assert np.linalg.norm(flown.smoothed[:, 7:11], axis=1) == pytest.approx(1.0, abs=1e-12)
+    smoothed, filtered = EstimateRow.of(flown.smoothed), flown.said
+    assert (smoothed.t_s == filtered.t_s).all()
+    assert all(np.isfinite(getattr(smoothed, name)).all() for name in UNPROTECTED)
+    assert (smoothed.std_pos_ned_m <= filtered.std_pos_ned_m * (1.0 + 1e-9)).all()
+    assert (smoothed.std_tilt_ned_rad <= filtered.std_tilt_ned_rad * (1.0 + 1e-9)).all()
+    assert np.linalg.norm(smoothed.quaternion, axis=1) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_the_middle_of_an_outage_is_known_from_both_sides(flown):
     """Without flow the filter's spread grows to the end of the cut; the smoothed one's is largest inside it."""
     alone = replay(flown.log, ReplayOptions(gps_outages_s=CUT, use_flow=False), SETTINGS, smoothed=True)
     assert alone.smoothed is not None
-    inside = (alone.estimate[:, 0] > 8.0) & (alone.estimate[:, 0] < 25.5)
-    before, after = alone.estimate[inside, 11], alone.smoothed[inside, 11]
+    inside = (alone.attitude.t_s > 8.0) & (alone.attitude.t_s < 25.5)
+    before, after = (EstimateRow.of(rows[inside]).std_pos_ned_m[:, 0] for rows in (alone.estimate, alone.smoothed))
     assert before.argmax() > 0.98 * len(before)
     assert 0.2 * len(after) < after.argmax() < 0.8 * len(after)
     assert after.max() < 0.5 * before.max()

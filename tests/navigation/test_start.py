@@ -12,7 +12,6 @@ from flownav.frames import GRAVITY_M_S2
 from flownav.measurement import Sensor
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.start import STANDING_TILT_RAD, level, levelled
-from flownav.navigation.tape import FIRST_EXTRA
 from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
 from navigation_streams import Navigated, fly, navigate, still
 
@@ -104,19 +103,18 @@ def believed_of(shaking_m_s2: float) -> float:
 def test_a_shaken_vehicle_takes_itself_for_level_and_its_force_for_a_bias(shaking_m_s2):
     roll = 0.1
     run = started(shaking_m_s2, roll)
-    first = run.estimate[0]
     believed = believed_of(shaking_m_s2)
-    assert angles(first[7:11])[0] == pytest.approx(believed * roll, rel=0.1, abs=1e-3)
+    assert angles(run.said.quaternion[0])[0] == pytest.approx(believed * roll, rel=0.1, abs=1e-3)
     left = GRAVITY_M_S2 * (math.sin(believed * roll) - math.sin(roll))
-    assert first[23 + ACCEL_BIAS + 1 - FIRST_EXTRA] == pytest.approx(left, rel=0.1, abs=5e-3)
-    assert first[23 + GYRO_BIAS - FIRST_EXTRA] == pytest.approx(0.0, abs=1e-3)
+    assert run.column(ACCEL_BIAS + 1)[0, 0] == pytest.approx(left, rel=0.1, abs=5e-3)
+    assert run.column(GYRO_BIAS)[0, 0] == pytest.approx(0.0, abs=1e-3)
 
 
 def test_what_is_left_of_the_tilts_doubt_is_stated_and_covers_the_truth():
     for shaking_m_s2 in (0.0, 0.5, 3.0):
-        first = started(shaking_m_s2, 0.1).estimate[0]
-        off = abs(angles(first[7:11])[0] - 0.1)
-        assert first[20] == pytest.approx(
+        first = started(shaking_m_s2, 0.1).said
+        off = abs(angles(first.quaternion[0])[0] - 0.1)
+        assert first.std_tilt_ned_rad[0, 0] == pytest.approx(
             STANDING_TILT_RAD * math.sqrt(1.0 - believed_of(shaking_m_s2)) + 0.005, rel=0.1
         )
-        assert off < 3.0 * first[20]
+        assert off < 3.0 * first.std_tilt_ned_rad[0, 0]

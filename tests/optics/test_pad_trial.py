@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from flownav.cli import pad as pad_command
 from flownav.errors import InputError
 from flownav.optics.lens import field_angle_rad
-from flownav.optics.pad_datasheet import datasheet
+from flownav.optics.pad_datasheet import Assumed, datasheet
 from flownav.optics.pad_statistics import (
     NoiseLaw,
     beta_of,
@@ -161,8 +161,8 @@ def test_heights_at_which_most_are_missed_are_out_of_range() -> None:
 def test_the_datasheet_says_what_was_measured(tmp_path: Path) -> None:
     laws, _ = laws_of(made())
     text = datasheet(
-        laws, CAMERAS["wide120"], "wide120", PadTarget(1.0, "nested"), 0.4, "flownav pad",
-        rate_hz=10.0, latency_s=0.08, jitter_s=0.02, lens_m=(0.12, 0.0, 0.14),
+        laws, CAMERAS["wide120"], "wide120", PadTarget(1.0, "nested"),
+        Assumed(rate_hz=10.0, latency_s=0.08, jitter_s=0.02, lens_m=(0.12, 0.0, 0.14), mounting_deg=0.4), "flownav pad",
     )  # fmt: skip
     (tmp_path / "pad.toml").write_text(text, encoding="utf-8")
     sheet = PadCameraSheet.read(tmp_path / "pad.toml")

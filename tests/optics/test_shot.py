@@ -12,7 +12,7 @@ from flownav.optics.pad_target import PadTarget
 from flownav.optics.pad_truth import fix_error, truth_of
 from flownav.optics.projection import pose_looking_down
 from flownav.optics.scene import Gloss, Scene, Shadow, clear
-from flownav.optics.shot import Ground, Optic, blur_width_px, shoot, view_of
+from flownav.optics.shot import Ground, Optic, Shot, blur_width_px, shoot, view_of
 from flownav.optics.shutter import FlightMotion
 
 TAG = PadTarget(0.2)
@@ -25,7 +25,8 @@ QUIET = Exposure(0.004, 1.0, 200.0, 0.0, 0.0)
 
 def shot(optic=OPTIC, pose=None, motion=STILL, exposure=QUIET, scene=None, target=TAG):  # type: ignore[no-untyped-def]
     pose = pose or pose_looking_down(height_m=0.6)
-    return shoot(target, optic, view_of(optic), PLAIN, scene or clear(), pose, motion, exposure, 1, 0).astype(float)
+    taken = Shot(target, optic, view_of(optic), exposure, 1)
+    return shoot(taken, PLAIN, scene or clear(), pose, motion, 0).astype(float)
 
 
 def left_edge(row: np.ndarray) -> tuple[float, float]:

@@ -93,7 +93,7 @@ def test_what_has_no_room_is_told():
     from collections import namedtuple
 
     large = namedtuple("large", [f"x{i}" for i in range(700)])
-    with pytest.raises(InputError, match="its memory has 700 numbers; at most 660"):
+    with pytest.raises(InputError, match="its memory has 700 numbers; at most 512"):
         EquationFilter("large", large(*range(700)), step, say)
     small = namedtuple("small", ["x", "y"])
     with pytest.raises(InputError, match="its state has 2 numbers; 13 to 26"):

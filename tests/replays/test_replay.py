@@ -14,6 +14,7 @@ from flownav.estimation.states import ATTITUDE, GYRO_BIAS, STATE_NAMES, STATES, 
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
 from flownav.measurement import Sensor
+from flownav.navigation.rows import EventRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.record import FILTER_STATES, TABLES, TILTS, VELOCITY_NED, Record
 from flownav.replays.bundle import to_record
@@ -40,7 +41,7 @@ def flown(log: Log, settings=None, **options) -> Replay:
 
 def error_of(run: Replay, flight: SyntheticLog) -> np.ndarray:
     """Estimate minus truth: position and NED velocity (n, 6)."""
-    t_s = run.estimate[:, 0]
+    t_s = run.said.t_s
     truth = np.column_stack([flight.position, flight.velocity])
     return run.estimate[:, [1, 2, 3, 17, 18, 19]] - np.column_stack([np.interp(t_s, flight.t_s, c) for c in truth.T])
 
@@ -87,7 +88,7 @@ def test_other_rates_clocks_and_sensors_find_it_too(tmp_path, rates):
     error = np.abs(error_of(run, flight))
     assert error[:, :2].max() < 0.05
     assert error[:, 2].max() < 0.06
-    assert error[run.estimate[:, 0] > start + 4.0, 2].max() < 0.02  # the ground is found
+    assert error[run.said.t_s > start + 4.0, 2].max() < 0.02  # the ground is found
 
 
 def test_without_flow_the_same_cut_is_lost(log, flight):
@@ -107,7 +108,7 @@ def test_flow_scale_acts_on_its_axis_alone(log, scale, axis):
     trusting = NavigatorSettingsFile(flow_scale_sigma=0.0)
     plain_run = flown(log, trusting, gps_outages_s=CUT)
     scaled = flown(log, trusting, gps_outages_s=CUT, flow_scale=scale)
-    late = plain_run.estimate[:, 0] > 30.0
+    late = plain_run.said.t_s > 30.0
     slopes = [
         np.polyfit(plain_run.estimate[late, 4 + column], scaled.estimate[late, 4 + column], 1)[0] for column in (1, 0)
     ]
@@ -159,9 +160,9 @@ def test_range_spikes_and_gaps_are_ridden_out(log, flight):
                        quality=stream.quality[keep])  # fmt: skip
     run = flown(hurt, gps_outages_s=CUT)
     assert np.abs(error_of(run, flight))[:, :2].max() < 0.15
-    assert np.abs(error_of(run, flight))[run.estimate[:, 0] > 4.0, 2].max() < 0.03
-    assert len(run.written.event[run.written.event[:, 1] == 2]) == 0  # no new ground
-    rows = run.innovation[run.innovation[:, 1] == Sensor.RANGE]
+    assert np.abs(error_of(run, flight))[run.said.t_s > 4.0, 2].max() < 0.03
+    assert len(run.written.event[EventRow.of(run.written.event).kind == 2]) == 0  # no new ground
+    rows = run.innovation[run.offered.sensor == Sensor.RANGE]
     far = rows[(np.abs(rows[:, 5]) > 1.0) & (rows[:, 8] == Reason.FUSED)]
     assert np.all(np.abs(far[:, 5]) < 0.3 * np.sqrt(far[:, 6]))  # what is not refused weighs next to nothing
 
@@ -205,7 +206,7 @@ def test_noisy_flow_is_believed_less(log):
     clean, noisy = flown(log), flown(with_stream(log, Sensor.FLOW_RATE, value=value))
 
     def late_variance(run):
-        rows = run.innovation[(run.innovation[:, 1] == Sensor.FLOW_RATE) & (run.innovation[:, 0] > 30)]
+        rows = run.innovation[(run.offered.sensor == Sensor.FLOW_RATE) & (run.offered.t_s > 30)]
         return np.median(rows[:, 6])
 
     assert late_variance(noisy) > 10 * late_variance(clean)
@@ -253,28 +254,28 @@ def test_a_single_gps_glitch_is_gated(log, flight):
 @pytest.mark.parametrize("gone", [(Sensor.IMU,), (Sensor.BARO, Sensor.MAG), (Sensor.GPS_VELOCITY,)])
 def test_sensors_that_are_missing_cost_little(log, flight, gone):
     run = flown(without(log, *gone), gps_outages_s=CUT)
-    late = run.estimate[:, 0] > 12.0
+    late = run.said.t_s > 12.0
     assert np.abs(error_of(run, flight))[late, :2].max() < 0.25
 
 
 def test_a_slow_imu_is_as_good_as_none_and_no_worse(log, flight):
     run = flown(thinned(log, Sensor.IMU, 25), gps_outages_s=CUT)
-    assert np.abs(error_of(run, flight))[run.estimate[:, 0] > 12.0, :2].max() < 0.25
+    assert np.abs(error_of(run, flight))[run.said.t_s > 12.0, :2].max() < 0.25
 
 
 def test_without_gps_the_filter_starts_with_the_flow_at_the_local_origin(log, flight):
     run = flown(without(log, Sensor.GPS_POSITION, Sensor.GPS_VELOCITY))
-    assert run.estimate[0, 1:3] == pytest.approx([0, 0], abs=0.01)
+    assert run.said.pos_ned_m[0, :2] == pytest.approx([0, 0], abs=0.01)
     assert np.abs(error_of(run, flight))[:, :2].max() < 0.1  # blind below 0.3 m, with a first tilt known to 2 degrees
-    assert np.abs(error_of(run, flight))[run.estimate[:, 0] > 12.0, :2].max() < 0.05
+    assert np.abs(error_of(run, flight))[run.said.t_s > 12.0, :2].max() < 0.05
     assert run.scores()["velocity_rms_m_s"] is None
     assert run.scores()["outages"] == []
 
 
 def test_a_cut_from_the_start_still_starts(log, flight):
     run = flown(log, gps_outages_s=((-1.0, 30.0),))
-    assert run.estimate[0, 0] == pytest.approx(NavigatorSettingsFile().start_wait_s, abs=0.5)
-    assert np.abs(error_of(run, flight))[run.estimate[:, 0] > 50.0, :2].max() < 0.5
+    assert run.said.t_s[0] == pytest.approx(NavigatorSettingsFile().start_wait_s, abs=0.5)
+    assert np.abs(error_of(run, flight))[run.said.t_s > 50.0, :2].max() < 0.5
 
 
 def test_flow_without_range_is_rejected_for_want_of_height(log):
@@ -334,7 +335,7 @@ def test_a_cut_withholds_position_and_velocity_and_nothing_else(log):
     run = flown(log, gps_outages_s=((20.0, 30.0),))
     assert reasons(run, Sensor.GPS_POSITION)["outage"] == 3 * 50
     assert reasons(run, Sensor.GPS_VELOCITY)["outage"] == 3 * 50
-    withheld = run.innovation[run.innovation[:, 8] == Reason.OUTAGE]
+    withheld = run.innovation[run.offered.reason == Reason.OUTAGE]
     assert withheld[:, 0].min() == pytest.approx(20.0 - 0.22)
     assert withheld[:, 0].max() < 30.0 - 0.22
 
@@ -397,12 +398,12 @@ def test_every_state_of_the_filter_is_in_the_record_with_its_deviation(log):
     states, estimate = record.tables["states"], record.tables["estimate"]
     assert ("t_s", *TABLES["states"]) == tuple(states)
     assert (states["t_s"] == estimate["t_s"]).all()
-    first, spread = FILTER_STATES.index("baro_m"), len(FILTER_STATES)
-    assert (states["baro_m"] == run.estimate[:, 23 + first]).all()
-    assert (states["std_baro_m"] == run.estimate[:, 23 + spread + first]).all()
+    said, baro = run.said, FILTER_STATES.index("baro_m")
+    assert (states["baro_m"] == said.states[:, baro]).all()
+    assert (states["std_baro_m"] == said.std_states[:, baro]).all()
     assert states["baro_m"][-1] == pytest.approx(12.0, abs=0.5)
     assert 0.0 < states["std_baro_m"][-1] < 4.0
-    assert (states["std_heading_rad"] == run.estimate[:, 22]).all()
+    assert (states["std_heading_rad"] == said.std_tilt_ned_rad[:, 2]).all()
 
 
 def test_truth_is_turned_onto_the_estimate(log, flight):

@@ -11,6 +11,7 @@ from flownav.estimation.gating import Reason
 from flownav.frames import rotation_from_quaternion
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.measurement import Sensor
+from flownav.navigation.rows import EventRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import COMPASS_REFUTED, HEADING_FOUND
 from flownav.replays.prepare import ReplayOptions
@@ -53,14 +54,15 @@ def test_all_of_36_headings_are_found_within_3_m_and_2_deg(unheaded, flight):
         run = replay(turned(unheaded, float(by_rad)), ReplayOptions(), NavigatorSettingsFile())
         (found,) = [event for event in run.written.event if event[1] == HEADING_FOUND]
         assert np.interp(found[0], flight.t_s, way_m) < 3.0
-        t_s = run.estimate[:, 0]
+        t_s = run.said.t_s
         error = yaw_of(run.estimate) - FIRST_YAW_RAD - YAW_RATE_RAD_S * t_s - by_rad
         error = np.abs((error + np.pi) % (2.0 * np.pi) - np.pi)
         assert np.degrees(error[t_s > found[0] + 0.1].max()) < 2.0
         cosine, sine = np.cos(by_rad), np.sin(by_rad)
         north, east = (np.interp(t_s, flight.t_s, column) for column in flight.position[:, :2].T)
         off_m = np.hypot(
-            run.estimate[:, 1] - cosine * north + sine * east, run.estimate[:, 2] - sine * north - cosine * east
+            run.said.pos_ned_m[:, 0] - cosine * north + sine * east,
+            run.said.pos_ned_m[:, 1] - sine * north - cosine * east,
         )
         assert off_m.max() < 0.3
 
@@ -68,7 +70,7 @@ def test_all_of_36_headings_are_found_within_3_m_and_2_deg(unheaded, flight):
 def test_no_flow_is_fused_before(unheaded):
     run = replay(turned(unheaded, 2.0), ReplayOptions(), NavigatorSettingsFile())
     found_s = next(event[0] for event in run.written.event if event[1] == HEADING_FOUND)
-    flow = run.innovation[run.innovation[:, 1] == Sensor.FLOW_RATE]
+    flow = run.innovation[run.offered.sensor == Sensor.FLOW_RATE]
     assert not (flow[flow[:, 0] < found_s, 8] == 0).any()
     assert (flow[flow[:, 0] > found_s, 8] == 0).mean() > 0.95
 
@@ -101,7 +103,7 @@ def magnet_turned(log, by_rad: float):
 
 
 def heading_error(run, by_rad: float) -> np.ndarray:
-    error = yaw_of(run.estimate) - FIRST_YAW_RAD - YAW_RATE_RAD_S * run.estimate[:, 0] - by_rad
+    error = yaw_of(run.estimate) - FIRST_YAW_RAD - YAW_RATE_RAD_S * run.said.t_s - by_rad
     return np.degrees(np.abs((error + np.pi) % (2.0 * np.pi) - np.pi))
 
 
@@ -115,13 +117,13 @@ def test_a_compass_that_is_90_deg_wrong_is_refuted_whatever_the_heading(compasse
         (refuted,), (found,) = events[events[:, 1] == COMPASS_REFUTED], events[events[:, 1] == HEADING_FOUND]
         assert refuted[0] < found[0]
         assert np.interp(found[0], flight.t_s, way_m) < 3.5
-        assert heading_error(run, by_rad)[run.estimate[:, 0] > found[0] + 0.1].max() < 8.0
-        mag = run.innovation[run.innovation[:, 1] == Sensor.MAG]
+        assert heading_error(run, by_rad)[run.said.t_s > found[0] + 0.1].max() < 8.0
+        mag = run.innovation[run.offered.sensor == Sensor.MAG]
         assert (mag[mag[:, 0] > refuted[0], 8] == Reason.NO_HEADING).all()
 
 
 def test_one_that_is_right_is_not(compassed):
     for by_rad in (0.0, 2.0, 4.0):
         run = replay(magnet_turned(turned(compassed, by_rad), -by_rad), ReplayOptions(), NavigatorSettingsFile())
-        assert not (run.written.event[:, 1] == COMPASS_REFUTED).any()
+        assert not (EventRow.of(run.written.event).kind == COMPASS_REFUTED).any()
         assert heading_error(run, by_rad)[-100:].max() < 1.0

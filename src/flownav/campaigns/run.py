@@ -85,7 +85,7 @@ def _fly_cell(plan: Plan, cell: int, engine: Engine, store: Store, data: Dataset
     values: list[Array] = []
     for look in looks(plan.flights) if stop else [plan.flights]:
         known = sum(map(len, values))
-        for part, rows in _parts_until(plan, cell, known, look, ready, engine, store, data, done):
+        for part, rows in _parts_until(plan, cell, range(known, look), ready, engine, store, data, done):
             values.append(values_of(figure, rows))
             if part.number % 8 == 0:
                 done.estimate(np.concatenate(values))
@@ -96,12 +96,11 @@ def _fly_cell(plan: Plan, cell: int, engine: Engine, store: Store, data: Dataset
 
 
 def _parts_until(
-    plan: Plan, cell: int, first: int, end: int, ready: Ready, engine: Engine, store: Store, data: Dataset,
-    done: Counted,
-) -> Iterator[tuple[Part, Array]]:  # fmt: skip
-    """The parts of a cell's flights `first` to `end - 1`: those of the folder, then those that were missing, flown."""
-    own = plan.cells[cell].first
-    parts = [Part(start // PART, own + start, min(PART, end - start)) for start in range(first, end, PART)]
+    plan: Plan, cell: int, flights: range, ready: Ready, engine: Engine, store: Store, data: Dataset, done: Counted
+) -> Iterator[tuple[Part, Array]]:
+    """The parts of a cell's flights: those of the folder, then those that were missing, flown."""
+    own, end = plan.cells[cell].first, flights.stop
+    parts = [Part(start // PART, own + start, min(PART, end - start)) for start in range(flights.start, end, PART)]
     missing = []
     for part in parts:
         if store.rows_in(cell, part.number) == part.flights:

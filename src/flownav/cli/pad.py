@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +15,7 @@ from flownav.text import finite
 
 if TYPE_CHECKING:
     from flownav.optics.pad_target import PadTarget
+    from flownav.optics.pad_trial import Trials
 
 HEIGHTS = ["0.15,0.175,0.2,0.3,0.5,1,2,3,4"]
 SPEEDS = ["0.1,0.5,1.5"]
@@ -73,6 +75,7 @@ def command(
     from flownav.cli.lists import numbers
     from flownav.cli.output import folder_place, place, require_between
     from flownav.optics.pad_target import PadTarget, checked, print_target
+    from flownav.optics.pad_trial import Trials
 
     target = checked(PadTarget(side, pattern, code))
     if print_to is not None:
@@ -98,7 +101,8 @@ def command(
         frames_in = None if pictures is None else folder_place(pictures)
         at_m = sorted(set(numbers("--heights", heights, 0.05, 50.0)))
         at_m_s = sorted(set(numbers("--speeds", speeds, 0.0, 50.0)))
-        facts = _measured(target, camera, focus, at_m, at_m_s, flights, count, tilt, seed, frames_in)
+        trials = Trials(at_m, at_m_s, flights, count, math.radians(tilt), seed)
+        facts = _measured(target, camera, focus, trials, tilt, frames_in)
         if datasheet is not None:
             facts["datasheet"] = _write_datasheet(datasheet, facts, target, camera, focus, mounting)
         _show(_plain(facts), as_json, _print_measured)
@@ -155,33 +159,25 @@ def _measured(
     target: PadTarget,
     camera_name: str,
     focus_m: float | None,
-    heights_m: list[float],
-    speeds_m_s: list[float],
-    flights: int,
-    count: int,
+    trials: Trials,
     tilt_deg: float,
-    seed: int,
     pictures: Path | None,
 ) -> dict[str, Any]:
-    import math
-
     from flownav.cli.output import progress
     from flownav.compile import announce_compilation
     from flownav.optics.pad_statistics import laws_of
     from flownav.optics.pad_trial import camera_named, fly_cameras
 
     trial, shown = camera_named(camera_name, focus_m), target.inner  # the outer is the same tag, five times as large
-    with announce_compilation("pad"), progress("flights", flights) as advance:
-        frames = fly_cameras(
-            trial, shown, heights_m, speeds_m_s, flights, count, math.radians(tilt_deg), seed, advance, pictures
-        )
+    with announce_compilation("pad"), progress("flights", trials.flights) as advance:
+        frames = fly_cameras(trial, shown, trials, advance, pictures)
     laws, cells = laws_of(frames)
     return {
         "target": target._asdict(),
         "camera": {"name": camera_name, "focal_m": trial.camera.focal_m, "focus_m": trial.camera.focus_m},
         "tilt_deg": tilt_deg,
-        "seed": seed,
-        "flights": flights,
+        "seed": trials.seed,
+        "flights": trials.flights,
         "cells": [cell._asdict() for cell in cells],
         "laws": laws,
     }
@@ -198,17 +194,16 @@ def _write_datasheet(
     out: Path, facts: dict[str, Any], target: PadTarget, camera_name: str, focus_m: float | None, mounting_deg: float
 ) -> str:
     from flownav.guard import written_whole
-    from flownav.optics.pad_datasheet import datasheet
+    from flownav.optics.pad_datasheet import Assumed, datasheet
     from flownav.optics.pad_trial import camera_named
     from flownav.provenance import command_line
     from flownav.sensors.pad_camera_sheet import load_pad_camera_sheet
 
-    assumed = load_pad_camera_sheet()
-    text = datasheet(
-        facts["laws"], camera_named(camera_name, focus_m), camera_name, target, mounting_deg, command_line(),
-        rate_hz=assumed.rate_hz, latency_s=assumed.latency_s, jitter_s=assumed.jitter_s,
-        lens_m=(assumed.lens.forward_m, assumed.lens.right_m, assumed.lens.down_m),
-    )  # fmt: skip
+    sheet = load_pad_camera_sheet()
+    lens_m = (float(sheet.lens.forward_m), float(sheet.lens.right_m), float(sheet.lens.down_m))
+    assumed = Assumed(float(sheet.rate_hz), float(sheet.latency_s), float(sheet.jitter_s), lens_m, mounting_deg)
+    trial = camera_named(camera_name, focus_m)
+    text = datasheet(facts["laws"], trial, camera_name, target, assumed, command_line())
     with written_whole(out) as temporary:
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
     load_pad_camera_sheet(out)

@@ -10,7 +10,7 @@ from flownav.compare.like_for_like import Window
 from flownav.compare.rows import AUTOPILOT, DEAD_RECKONING, FLOWNAV, Entrant, Row, default_windows, rows_of
 from flownav.compare.tracks import Track, of_estimate, of_table
 from flownav.logs.log import Log
-from flownav.measurement import Sensor, Stream
+from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import FLOW, ReplayOptions, check_windows
@@ -76,10 +76,11 @@ def _reckoned(flown: Replay, windows: list[Window]) -> list[Entrant]:
 def dead_reckoning_of(flown: Replay) -> Track | None:
     """By the logged attitude, or the filter's where the log has none; rotation taken off as the replay does."""
     streams = flown.prepared.streams
-    own = Stream.of(Sensor.ATTITUDE, flown.estimate[:, 0], flown.estimate[:, 7:11])
     for sensor in FLOW:
         if sensor in streams:
-            return dead_reckoned(streams[sensor], streams.get(Sensor.RANGE), streams.get(Sensor.ATTITUDE, own))
+            return dead_reckoned(
+                streams[sensor], streams.get(Sensor.RANGE), streams.get(Sensor.ATTITUDE, flown.attitude)
+            )
     return None
 
 

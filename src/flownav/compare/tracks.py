@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.measurement import Array
+from flownav.navigation.rows import EstimateRow
 from flownav.navigation.tables import estimate_table
 from flownav.record import QUATERNION, VELOCITY_BODY, Table
 from flownav.scoring.autopilot import columns_of
@@ -32,7 +33,7 @@ class Track(NamedTuple):
 
 def of_estimate(rows: Array) -> Track:
     """Of a replay: rows of a tape's estimate."""
-    return Track(motion_of(estimate_table(rows)), rows[:, 17:19])
+    return Track(motion_of(estimate_table(rows)), EstimateRow.of(rows).vel_ned_m_s[:, :2])
 
 
 def of_table(table: Table) -> Track:

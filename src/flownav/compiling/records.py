@@ -230,11 +230,9 @@ def compiled(function: Any) -> Callable[..., Any]:
     return equation(FunctionType(plain, function.__globals__, function.__name__, None, function.__closure__))
 
 
-def dressed(generated: Any, function: Any) -> Callable[..., Any]:
-    """The generated function under the law's name, a procedure, with the law beside it."""
+def dressed(generated: Any, function: Any, defaults: tuple[float, ...] = ()) -> Callable[..., Any]:
+    """The generated function under the law's name, a procedure, the law beside it; defaults: of its last arguments."""
     generated.__name__ = generated.__qualname__ = function.__name__
     generated.__doc__, generated.__module__ = function.__doc__, function.__module__
-    generated.law = function
-    if function.__kwdefaults__:  # the last ones
-        generated.__defaults__ = tuple(function.__kwdefaults__.values())
+    generated.law, generated.__defaults__ = function, defaults or None
     return cast(Callable[..., Any], procedure(generated))

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from flownav.compile import clamp, equation, magnitude, replacing, smaller
 from flownav.control.gains import AutopilotGains
 from flownav.control.gate import descent_limit, misaligned, skids_beside
-from flownav.control.go_around import GoAround, Knowledge, climb_out, mind_landing, search_offset, seeks
+from flownav.control.go_around import Approach, GoAround, Knowledge, climb_out, mind_landing, search_offset, seeks
 from flownav.control.guidance import Reference
 from flownav.frames import GRAVITY_M_S2, Rotation, heading_cosine_sine, to_earth
 
@@ -129,18 +129,25 @@ def unexplained_acceleration(estimate: Estimate, rotation: Rotation, gains: Auto
     return forward + GRAVITY_M_S2 * pitch, right - GRAVITY_M_S2 * roll
 
 
+class Steered(NamedTuple):
+    """Velocity still to be gained, forward along the heading, to its right and down [m/s]; whether the pad is looked
+    for; since when the vehicle waits at the gate or aloft [s]; and what becomes of the landing.
+    """
+
+    forward: float
+    right: float
+    down: float
+    looking: bool
+    waited_s: float
+    around: GoAround
+
+
 @equation
-def outer_loop(
-    state: AutopilotState,
-    reference: Reference,
-    estimate: Estimate,
-    known: Knowledge,
-    rotation: Rotation,
-    gains: AutopilotGains,
-    may_land: float,
-    dt: float,
-) -> AutopilotState:
-    """Position and velocity errors to tilt and collective commands (50 Hz)."""
+def steer(
+    state: AutopilotState, reference: Reference, estimate: Estimate, known: Knowledge, rotation: Rotation,
+    gains: AutopilotGains, may_land: float, dt: float,
+) -> Steered:  # fmt: skip
+    """Position errors to velocities, through the gate before the touchdown and the way round."""
     skids_n, skids_e = skids_beside(rotation, gains)
     off_n, off_e = reference.pos_n - estimate.pos_n - skids_n, reference.pos_e - estimate.pos_e - skids_e
     height_m = gains.pad_pos_d_m - estimate.pos_d
@@ -157,10 +164,8 @@ def outer_loop(
     est_n, est_e, est_d = to_earth(rotation, estimate.u, estimate.v, estimate.w)
     landing = state.flying > 0.0 and may_land > 0.0 and state.contact_time_s == 0.0
     off_m2, speed_m2_s2 = off_n * off_n + off_e * off_e, est_n * est_n + est_e * est_e
-    around = mind_landing(
-        GoAround(state.away, state.go_arounds, state.since_s), known, off_m2, speed_m2_s2, height_m, state.waited_s,
-        state.searched_s, landing, gains, dt,
-    )  # fmt: skip
+    now = Approach(off_m2, speed_m2_s2, height_m, state.waited_s, state.searched_s, landing)
+    around = mind_landing(GoAround(state.away, state.go_arounds, state.since_s), known, now, gains, dt)
     away = around.away > 0.0
     waiting = known.pad_found > 0.0 and misaligned(off_n, off_e, est_n, est_e, height_m, state.waited_s, gains)
     gate_m = gains.search_height_m if looking else gains.align_height_m
@@ -169,8 +174,18 @@ def outer_loop(
     waited_s = state.waited_s + dt if (waiting and landing) or away else state.waited_s
 
     error_forward, error_right = along_heading(rotation, vel_n - est_n, vel_e - est_e)
-    error_down = vel_d - est_d
+    return Steered(error_forward, error_right, vel_d - est_d, looking, waited_s, around)
 
+
+@equation
+def outer_loop(
+    state: AutopilotState, reference: Reference, estimate: Estimate, known: Knowledge, rotation: Rotation,
+    gains: AutopilotGains, may_land: float, dt: float,
+) -> AutopilotState:  # fmt: skip
+    """Position and velocity errors to tilt and collective commands (50 Hz)."""
+    error_forward, error_right, error_down, looking, waited_s, around = steer(
+        state, reference, estimate, known, rotation, gains, may_land, dt
+    )
     felt_forward, felt_right = unexplained_acceleration(estimate, rotation, gains)
     gust_forward = felt_forward + gains.gust_decay_forward * (state.gust_forward - felt_forward)
     gust_right = felt_right + gains.gust_decay_right * (state.gust_right - felt_right)

@@ -101,16 +101,23 @@ def adrift(known: Knowledge, beside_m2: float, speed_m2_s2: float, height_m: flo
     return known.pad_found > 0.0 and low and off
 
 
-@equation
-def mind_landing(
-    before: GoAround, known: Knowledge, beside_m2: float, speed_m2_s2: float, height_m: float, waited_s: float,
-    searched_s: float, landing: bool, gains: AutopilotGains, dt: float,
-) -> GoAround:  # fmt: skip
-    """One period of the outer loop further.
-
-    beside_m2: distance of the skids' middle from the pad's, squared [m2]; speed_m2_s2: over the ground, squared;
-    height_m: of the skids; waited_s: at the gate, or aloft; landing: flies, may land, no weight on the skids.
+class Approach(NamedTuple):
+    """Where a landing is: distance of the skids' middle from the pad's and speed over the ground, both squared; height
+    of the skids; since when it waits at the gate, or aloft, and searches; landing: flies, may land, no weight on skids.
     """
+
+    beside_m2: float
+    speed_m2_s2: float
+    height_m: float
+    waited_s: float
+    searched_s: float
+    landing: bool
+
+
+@equation
+def mind_landing(before: GoAround, known: Knowledge, now: Approach, gains: AutopilotGains, dt: float) -> GoAround:
+    """One period of the outer loop further."""
+    beside_m2, speed_m2_s2, height_m, waited_s, searched_s, landing = now
     in_doubt_s = before.since_s + dt if before.away == 0.0 and unsure(known, gains) else 0.0
     settling = height_m > gains.commit_height_m and height_m < gains.land_height_m
     shut = waited_s > gains.align_wait_s or searched_s > gains.search_wait_s

@@ -19,9 +19,10 @@ from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.law import step
 from flownav.estimation.laws.geometry import along_axis, cross, lens_range
 from flownav.estimation.motion import predict
+from flownav.estimation.named import Attitude, BodyRate, Height, Tilt, VelocityNed, rotation_by
 from flownav.estimation.states import STATES_WITH_LAG
 from flownav.estimation.transition import transition
-from flownav.frames import Rotation, rotation_from_quaternion
+from flownav.frames import Rotation
 
 
 class FlowLag(NamedTuple):
@@ -101,16 +102,26 @@ class Seen(NamedTuple):
     height: float
 
 
+class LagLens(NamedTuple):
+    """Of `FlowLag`: the floor of the sensor's own sonar, the lens's depth, and its lever from the IMU, body FRD [m]."""
+
+    sonar_floor_m: float
+    lens_below_m: float
+    forward_m: float
+    right_m: float
+    below_m: float
+
+
 @equation
 def seen_velocity(
-    rotation: Rotation, vel_n: float, vel_e: float, vel_d: float, height_m: float, channel: int,
-    sonar_floor_m: float, lens_below_m: float, swing_m_s: float = 0.0,
+    rotation: Rotation, vel: VelocityNed, height_m: float, channel: int, sonar_floor_m: float, lens_below_m: float,
+    swing_m_s: float = 0.0,
 ) -> Seen:  # fmt: skip
     """What channel 0 (forward) or 1 (right) sees of the velocity: o (e . v + swing), o = floor/range below the floor.
 
     swing_m_s: what turning adds at the lens.
     """
-    e, along, turn = along_axis(rotation, channel, (vel_n, vel_e, vel_d), swing_m_s)
+    e, along, turn = along_axis(rotation, channel, vel, swing_m_s)
     range_m, by_height, by_north, by_east = lens_range(rotation, height_m, (0.0, 0.0, lens_below_m))
     low = range_m.real < sonar_floor_m
     over = sonar_floor_m / range_m if low else 1.0
@@ -132,108 +143,111 @@ class Lagged(NamedTuple):
     lag_v2: float
 
 
+class LagMove(NamedTuple):
+    """x <- F x + g m of one channel."""
+
+    f11: float
+    f12: float
+    f21: float
+    f22: float
+    gain_1: float
+    gain_2: float
+
+
+@equation
+def moved_lag(x: Lagged, u: float, v: float, move: LagMove) -> Lagged:
+    """x <- F x + g m of both channels, which see u and v."""
+    return Lagged(
+        move.f11 * x.lag_u1 + move.f12 * x.lag_u2 + move.gain_1 * u,
+        move.f21 * x.lag_u1 + move.f22 * x.lag_u2 + move.gain_2 * u,
+        move.f11 * x.lag_v1 + move.f12 * x.lag_v2 + move.gain_1 * v,
+        move.f21 * x.lag_v1 + move.f22 * x.lag_v2 + move.gain_2 * v,
+    )
+
+
 @step
 def move_lag(
-    lag_u1: float, lag_u2: float, lag_v1: float, lag_v2: float, vel_n: float, vel_e: float, vel_d: float,
-    pos_d: float, ground: float, qw: float, qx: float, qy: float, qz: float,
-    rate_x: float, rate_y: float, rate_z: float,
-    *, f11: float, f12: float, f21: float, f22: float, gain_1: float, gain_2: float,
-    sonar_floor_m: float, lens_below_m: float, forward_m: float, right_m: float, below_m: float,
-) -> Lagged:  # fmt: skip
+    x: Lagged, vel: VelocityNed, height: Height, q: Attitude, rate: BodyRate, *, move: LagMove, lens: LagLens
+) -> Lagged:
     """x <- F x + g m of both channels, with the velocity that the state now has and the last step's turning."""
-    rotation = rotation_from_quaternion(qw, qx, qy, qz)
-    swing = cross((rate_x, rate_y, rate_z), (forward_m, right_m, below_m))
-    height_m = ground - pos_d
-    u = seen_velocity(rotation, vel_n, vel_e, vel_d, height_m, 0, sonar_floor_m, lens_below_m, swing[0]).value
-    v = seen_velocity(rotation, vel_n, vel_e, vel_d, height_m, 1, sonar_floor_m, lens_below_m, swing[1]).value
-    return Lagged(
-        f11 * lag_u1 + f12 * lag_u2 + gain_1 * u, f21 * lag_u1 + f22 * lag_u2 + gain_2 * u,
-        f11 * lag_v1 + f12 * lag_v2 + gain_1 * v, f21 * lag_v1 + f22 * lag_v2 + gain_2 * v,
-    )  # fmt: skip
+    rotation, floor_m, below_m = rotation_by(q), lens.sonar_floor_m, lens.lens_below_m
+    swing = cross(rate, (lens.forward_m, lens.right_m, lens.below_m))
+    height_m = height.ground - height.pos_d
+    u = seen_velocity(rotation, vel, height_m, 0, floor_m, below_m, swing[0]).value
+    v = seen_velocity(rotation, vel, height_m, 1, floor_m, below_m, swing[1]).value
+    return moved_lag(x, u, v, move)
 
 
-class Drive(NamedTuple):
-    """Rows in which one step's derivatives of the seen velocities lie."""
+class Slopes(NamedTuple):
+    """The derivatives of the velocities that are seen forward (u) and right (v), which lie in rows between laws."""
 
-    drive_0: float
-    drive_1: float
-    drive_2: float
-    drive_3: float
-    drive_4: float
-    drive_5: float
-    drive_6: float
-    drive_7: float
-    drive_8: float
-    drive_9: float
-    drive_10: float
-    drive_11: float
-    drive_12: float
-    drive_13: float
+    u_by_vel_n: float
+    u_by_vel_e: float
+    u_by_vel_d: float
+    u_by_tilt_n: float
+    u_by_tilt_e: float
+    u_by_heading: float
+    u_by_height: float
+    v_by_vel_n: float
+    v_by_vel_e: float
+    v_by_vel_d: float
+    v_by_tilt_n: float
+    v_by_tilt_e: float
+    v_by_heading: float
+    v_by_height: float
 
 
 @step
-def set_drive(
-    vel_n: float, vel_e: float, vel_d: float, pos_d: float, ground: float,
-    qw: float, qx: float, qy: float, qz: float, *, sonar_floor_m: float, lens_below_m: float,
-) -> Drive:  # fmt: skip
+def set_slopes(vel: VelocityNed, height: Height, q: Attitude, *, sonar_floor_m: float, lens_below_m: float) -> Slopes:
     """The derivatives of both seen velocities on velocity, attitude error and height."""
-    rotation = rotation_from_quaternion(qw, qx, qy, qz)
-    u = seen_velocity(rotation, vel_n, vel_e, vel_d, ground - pos_d, 0, sonar_floor_m, lens_below_m)
-    v = seen_velocity(rotation, vel_n, vel_e, vel_d, ground - pos_d, 1, sonar_floor_m, lens_below_m)
-    return Drive(
+    rotation, height_m = rotation_by(q), height.ground - height.pos_d
+    u = seen_velocity(rotation, vel, height_m, 0, sonar_floor_m, lens_below_m)
+    v = seen_velocity(rotation, vel, height_m, 1, sonar_floor_m, lens_below_m)
+    return Slopes(
         u.vel[0], u.vel[1], u.vel[2], u.turn[0], u.turn[1], u.turn[2], u.height,
         v.vel[0], v.vel[1], v.vel[2], v.turn[0], v.turn[1], v.turn[2], v.height,
     )  # fmt: skip
 
 
 @transition
-def errors_in_lag(
-    lag_u1: float, lag_u2: float, lag_v1: float, lag_v2: float, vel_n: float, vel_e: float, vel_d: float,
-    tilt_n: float, tilt_e: float, heading: float, pos_d: float, ground: float,
-    drive_0: float, drive_1: float, drive_2: float, drive_3: float, drive_4: float, drive_5: float, drive_6: float,
-    drive_7: float, drive_8: float, drive_9: float, drive_10: float, drive_11: float, drive_12: float, drive_13: float,
-    *, f11: float, f12: float, f21: float, f22: float, gain_1: float, gain_2: float,
-) -> Lagged:  # fmt: skip
-    """dx <- F dx + g dm, with the derivatives that `set_drive` left."""
-    height = ground - pos_d
+def errors_in_lag(x: Lagged, vel: VelocityNed, tilt: Tilt, height: Height, slopes: Slopes, *, move: LagMove) -> Lagged:
+    """dx <- F dx + g dm, with the derivatives that `set_slopes` left."""
+    s, above = slopes, height.ground - height.pos_d
     u = (
-        drive_0 * vel_n + drive_1 * vel_e + drive_2 * vel_d
-        + drive_3 * tilt_n + drive_4 * tilt_e + drive_5 * heading + drive_6 * height
+        s.u_by_vel_n * vel.vel_n + s.u_by_vel_e * vel.vel_e + s.u_by_vel_d * vel.vel_d
+        + s.u_by_tilt_n * tilt.tilt_n + s.u_by_tilt_e * tilt.tilt_e + s.u_by_heading * tilt.heading
+        + s.u_by_height * above
     )  # fmt: skip
     v = (
-        drive_7 * vel_n + drive_8 * vel_e + drive_9 * vel_d
-        + drive_10 * tilt_n + drive_11 * tilt_e + drive_12 * heading + drive_13 * height
+        s.v_by_vel_n * vel.vel_n + s.v_by_vel_e * vel.vel_e + s.v_by_vel_d * vel.vel_d
+        + s.v_by_tilt_n * tilt.tilt_n + s.v_by_tilt_e * tilt.tilt_e + s.v_by_heading * tilt.heading
+        + s.v_by_height * above
     )  # fmt: skip
-    return Lagged(
-        f11 * lag_u1 + f12 * lag_u2 + gain_1 * u, f21 * lag_u1 + f22 * lag_u2 + gain_2 * u,
-        f11 * lag_v1 + f12 * lag_v2 + gain_1 * v, f21 * lag_v1 + f22 * lag_v2 + gain_2 * v,
-    )  # fmt: skip
+    return moved_lag(x, u, v, move)
 
 
 @procedure
-def lag_step(
-    work: Work, lanes: Lanes, f11: float, f12: float, f21: float, f22: float, gain_1: float, gain_2: float,
-    lag: FlowLag,
-) -> None:  # fmt: skip
+def lag_step(work: Work, lanes: Lanes, m: LagMove, lag: FlowLag) -> None:
     """x <- F x + g m, state and covariance."""
-    set_drive(work, lanes, lag.sonar_floor_m, lag.lens_below_m)
+    set_slopes(work, lanes, lag.sonar_floor_m, lag.lens_below_m)
     move_lag(
-        work, lanes, f11, f12, f21, f22, gain_1, gain_2, lag.sonar_floor_m, lag.lens_below_m,
+        work, lanes, m.f11, m.f12, m.f21, m.f22, m.gain_1, m.gain_2, lag.sonar_floor_m, lag.lens_below_m,
         lag.forward_m, lag.right_m, lag.below_m,
     )  # fmt: skip
-    errors_in_lag(work, lanes, columns_of(work, lanes, STATES_WITH_LAG), f11, f12, f21, f22, gain_1, gain_2)
+    n = columns_of(work, lanes, STATES_WITH_LAG)
+    errors_in_lag(work, lanes, n, m.f11, m.f12, m.f21, m.f22, m.gain_1, m.gain_2)
 
 
 @equation
 def lag_starts(work: Work, lanes: Lanes, lag: FlowLag) -> None:
     """What the velocity at the start of a prediction leaves in the sensor at its end."""
-    lag_step(work, lanes, lag.f11, lag.f12, lag.f21, lag.f22, lag.start_1, lag.start_2, lag)
+    lag_step(work, lanes, LagMove(lag.f11, lag.f12, lag.f21, lag.f22, lag.start_1, lag.start_2), lag)
 
 
 @equation
 def lag_ends(work: Work, lanes: Lanes, lag: FlowLag) -> None:
     """What the velocity at the end of a prediction adds."""
-    lag_step(work, lanes, 1.0, 0.0, 0.0, 1.0, lag.end_1, lag.end_2, lag)
+    lag_step(work, lanes, LagMove(1.0, 0.0, 0.0, 1.0, lag.end_1, lag.end_2), lag)
 
 
 @procedure

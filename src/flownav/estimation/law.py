@@ -4,14 +4,15 @@ A law says which scalars it reads by the names of its parameters, and which stat
 by the fields of the NamedTuple that its return annotation names. From these names the code is written that loads each
 scalar of one lane, calls the law, and stores what it returns: straight-line code in a loop over lanes, which LLVM
 vectorises. Names are those of `states.ROWS_BY_NAME`; a vector's (`states.VECTOR_ROWS`) means its component `axis`.
-Keyword-only parameters are passed by the caller, the same for all lanes.
+A parameter that is annotated with a NamedTuple is a record of such scalars: its fields are their names (`named`).
+Keyword-only parameters, and fields of such records, are passed by the caller, the same for all lanes.
 """
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from typing import Any, Protocol, cast, get_args, get_type_hints
+from typing import Any, NamedTuple, Protocol, cast, get_args, get_type_hints
 
 from flownav.compile import compiled, dressed, write_function
 from flownav.estimation.states import (
@@ -51,46 +52,96 @@ def law(function: Callable[..., tuple[Any, Any]]) -> Observation:
     The innovation of the former is row MEASURED less the prediction. The Jacobian is that of the prediction on the
     error states, in both cases; its fields are states' names.
     """
-    names, scalars = parameters(function)
+    takes = Signature.of(function)
     jacobian = get_args(get_type_hints(function)["return"])[1]
     if len(jacobian._fields) > MOST_OBSERVED:
         raise ValueError(f"{function.__name__} reads more than {MOST_OBSERVED} states")
-    reads = any(name.startswith("measured") for name in names)
+    reads = any(name.startswith("measured") for name in takes.names)
     noted = [f"work[{OBSERVED} * len(lanes)] = {len(jacobian._fields)}.0"]
     noted += [f"work[{OBSERVED + 1 + i} * len(lanes)] = {place(name)}" for i, name in enumerate(jacobian._fields)]
     stored = [f"work[{INNOVATION} * len(lanes) + lane] = {'' if reads else at(MEASURED) + ' - '}found"]
     stored += [f"{at(COEFFICIENT + i)} = jacobian.{name}" for i, name in enumerate(jacobian._fields)]
     source = (
-        [f"def observe({', '.join(['work', 'lanes', 'axis', *scalars])}):"]
+        [f"def observe({', '.join(['work', 'lanes', 'axis', *takes.scalars])}):"]
         + [f"    {line}" for line in noted]
-        + ["    for lane in range(len(lanes)):", f"        found, jacobian = law({arguments(names, scalars)})"]
+        + ["    for lane in range(len(lanes)):", f"        found, jacobian = {takes.call(value_of)}"]
         + [f"        {line}" for line in stored]
     )
-    observe = write_function("observe", "\n".join(source) + "\n", {"law": compiled(function)})
-    return cast(Observation, dressed(observe, function))
+    return cast(Observation, takes.generated("observe", source))
 
 
 def step(function: Callable[..., Any]) -> Step:
     """A law that replaces rows: its result is a NamedTuple whose fields name them."""
-    names, scalars = parameters(function)
+    takes = Signature.of(function)
     result = get_type_hints(function)["return"]
     source = (
-        [f"def move({', '.join(['work', 'lanes', *scalars])}):", "    for lane in range(len(lanes)):"]
-        + [f"        found = law({arguments(names, scalars)})"]
+        [f"def move({', '.join(['work', 'lanes', *takes.scalars])}):", "    for lane in range(len(lanes)):"]
+        + [f"        found = {takes.call(value_of)}"]
         + [f"        {at(ROWS_BY_NAME[name])} = found.{name}" for name in result._fields]
     )
-    move = write_function("move", "\n".join(source) + "\n", {"law": compiled(function)})
-    return cast(Step, dressed(move, function))
+    return cast(Step, takes.generated("move", source))
 
 
 # -- from names to source -----------------------------------------------------------------------------------
-def parameters(function: Callable[..., Any]) -> tuple[list[str], list[str]]:
-    """The names of what a law reads and of what its caller passes."""
-    found = inspect.signature(function).parameters.values()
-    return (
-        [p.name for p in found if p.kind is not p.KEYWORD_ONLY],
-        [p.name for p in found if p.kind is p.KEYWORD_ONLY],
-    )
+class Parameter(NamedTuple):
+    """What a law takes by one name: a number, or a record of numbers that have names of their own."""
+
+    name: str
+    record: Any = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of its numbers."""
+        return (self.name,) if self.record is None else tuple(self.record._fields)
+
+    def given(self, value: Callable[[str], str]) -> str:
+        """Source of what the law is given; value: source of a number by its name."""
+        numbers = ", ".join(map(value, self.names))
+        return numbers if self.record is None else f"{self.record.__name__}({numbers})"
+
+
+class Signature(NamedTuple):
+    """A law, what it reads, and what its caller passes."""
+
+    function: Any
+    reads: tuple[Parameter, ...]
+    passed: tuple[Parameter, ...]
+
+    @classmethod
+    def of(cls, function: Callable[..., Any]) -> Signature:
+        """By its parameters and their annotations."""
+        hints, found = get_type_hints(function), inspect.signature(function).parameters.values()
+        records = {name: hint for name, hint in hints.items() if hasattr(hint, "_fields")}
+        every = [(p.kind is p.KEYWORD_ONLY, Parameter(p.name, records.get(p.name))) for p in found]
+        return cls(function, tuple(p for passed, p in every if not passed), tuple(p for passed, p in every if passed))
+
+    @property
+    def names(self) -> list[str]:
+        """Of the scalars that it reads."""
+        return [name for parameter in self.reads for name in parameter.names]
+
+    @property
+    def scalars(self) -> list[str]:
+        """The names of those that its caller passes."""
+        return [name for parameter in self.passed for name in parameter.names]
+
+    def call(self, value: Callable[[str], str]) -> str:
+        """Source of a call; value: of a scalar that it reads, by its name."""
+        read = [parameter.given(value) for parameter in self.reads]
+        return f"law({', '.join([*read, *(f'{p.name}={p.given(str)}' for p in self.passed)])})"
+
+    def generated(self, name: str, lines: list[str]) -> Callable[..., Any]:
+        """The function of these lines, under the law's name, with the law beside it."""
+        scope = {p.record.__name__: p.record for p in (*self.reads, *self.passed) if p.record is not None}
+        found = write_function(name, "\n".join(lines) + "\n", {"law": compiled(self.function), **scope})
+        return dressed(found, self.function, self._defaults())
+
+    def _defaults(self) -> tuple[float, ...]:
+        """Of the scalars that a caller may leave out, which are the last."""
+        known: dict[str, float] = dict(self.function.__kwdefaults__ or {})
+        for parameter in self.passed:
+            known |= {} if parameter.record is None else parameter.record._field_defaults
+        return tuple(known[name] for name in self.scalars if name in known)
 
 
 def at(row: int | str) -> str:
@@ -116,8 +167,3 @@ def place(name: str) -> str:
     if name not in PLACES:
         raise NameError(f"a Jacobian names '{name}', which is no state")
     return f"{PLACES[name]}.0"
-
-
-def arguments(names: list[str], scalars: list[str]) -> str:
-    """The arguments of a call of the law."""
-    return ", ".join([*(value_of(name) for name in names), *(f"{name}={name}" for name in scalars)])

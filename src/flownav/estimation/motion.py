@@ -14,6 +14,17 @@ from flownav.estimation.covariance import add_noise, at, columns_of
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.hypotheses import push
 from flownav.estimation.law import step
+from flownav.estimation.named import (
+    AccelBias,
+    Attitude,
+    ForceNed,
+    GyroBias,
+    Inertial,
+    Middle,
+    PositionNed,
+    Tilt,
+    VelocityNed,
+)
 from flownav.estimation.states import (
     ACCEL_BIAS,
     ACCEL_NOISE,
@@ -109,26 +120,26 @@ class Moved(NamedTuple):
 
 @step
 def strapdown(
-    pos_n: float, pos_e: float, pos_d: float, vel_n: float, vel_e: float, vel_d: float,
-    qw: float, qx: float, qy: float, qz: float,
-    gyro_x: float, gyro_y: float, gyro_z: float, accel_x: float, accel_y: float, accel_z: float,
-    gyro_bias_x: float, gyro_bias_y: float, gyro_bias_z: float,
-    accel_bias_x: float, accel_bias_y: float, accel_bias_z: float,
+    pos: PositionNed, vel: VelocityNed, attitude: Attitude, imu: Inertial, gyro_bias: GyroBias, accel_bias: AccelBias,
     *, dt_s: float,
 ) -> Moved:  # fmt: skip
     """q <- q exp(w dt), v <- v + (R_mid f + g) dt, p <- p + mean v dt, with w and f the readings less their biases."""
-    p, q, r = gyro_x - gyro_bias_x, gyro_y - gyro_bias_y, gyro_z - gyro_bias_z
+    p, q = imu.gyro_x - gyro_bias.gyro_bias_x, imu.gyro_y - gyro_bias.gyro_bias_y
+    r = imu.gyro_z - gyro_bias.gyro_bias_z
     x, y, z = dt_s * p, dt_s * q, dt_s * r
-    middle = turned((qw, qx, qy, qz), 0.5 * x, 0.5 * y, 0.5 * z)
-    after = turned((qw, qx, qy, qz), x, y, z)
+    middle = turned(attitude, 0.5 * x, 0.5 * y, 0.5 * z)
+    after = turned(attitude, x, y, z)
     rotation = rotation_from_quaternion(middle[0], middle[1], middle[2], middle[3])
-    force = to_earth(rotation, accel_x - accel_bias_x, accel_y - accel_bias_y, accel_z - accel_bias_z)
+    force = to_earth(
+        rotation, imu.accel_x - accel_bias.accel_bias_x, imu.accel_y - accel_bias.accel_bias_y,
+        imu.accel_z - accel_bias.accel_bias_z,
+    )  # fmt: skip
     accel_d = force[2] + GRAVITY_M_S2
     return Moved(
-        pos_n=pos_n + dt_s * (vel_n + 0.5 * dt_s * force[0]),
-        pos_e=pos_e + dt_s * (vel_e + 0.5 * dt_s * force[1]),
-        pos_d=pos_d + dt_s * (vel_d + 0.5 * dt_s * accel_d),
-        vel_n=vel_n + dt_s * force[0], vel_e=vel_e + dt_s * force[1], vel_d=vel_d + dt_s * accel_d,
+        pos_n=pos.pos_n + dt_s * (vel.vel_n + 0.5 * dt_s * force[0]),
+        pos_e=pos.pos_e + dt_s * (vel.vel_e + 0.5 * dt_s * force[1]),
+        pos_d=pos.pos_d + dt_s * (vel.vel_d + 0.5 * dt_s * accel_d),
+        vel_n=vel.vel_n + dt_s * force[0], vel_e=vel.vel_e + dt_s * force[1], vel_d=vel.vel_d + dt_s * accel_d,
         qw=after[0], qx=after[1], qy=after[2], qz=after[3],
         rate_x=p, rate_y=q, rate_z=r,
         force_n=force[0], force_e=force[1], force_d=force[2],
@@ -154,33 +165,30 @@ class MotionErrors(NamedTuple):
 
 @transition
 def errors_in_motion(
-    pos_n: float, pos_e: float, pos_d: float, vel_n: float, vel_e: float, vel_d: float,
-    tilt_n: float, tilt_e: float, heading: float,
-    gyro_bias_x: float, gyro_bias_y: float, gyro_bias_z: float,
-    accel_bias_x: float, accel_bias_y: float, accel_bias_z: float,
-    force_n: float, force_e: float, force_d: float,
-    middle_0: float, middle_1: float, middle_2: float, middle_3: float, middle_4: float, middle_5: float,
-    middle_6: float, middle_7: float, middle_8: float,
-    *, dt_s: float,
+    pos: PositionNed, vel: VelocityNed, tilt: Tilt, gyro_bias: GyroBias, accel_bias: AccelBias,
+    force: ForceNed, middle: Middle, *, dt_s: float,
 ) -> MotionErrors:  # fmt: skip
     """theta' = -R dbg, dv' = theta x (R f) - R dba, dp' = dv, by the middle of the step: second order in dt.
 
     The attitude error turns velocity as it is in the middle, and position goes with the mean velocity.
     """
-    rotation = (middle_0, middle_1, middle_2, middle_3, middle_4, middle_5, middle_6, middle_7, middle_8)
-    turn_n, turn_e, turn_d = to_earth(rotation, gyro_bias_x, gyro_bias_y, gyro_bias_z)
-    push_n, push_e, push_d = to_earth(rotation, accel_bias_x, accel_bias_y, accel_bias_z)
+    turn_n, turn_e, turn_d = to_earth(middle, gyro_bias.gyro_bias_x, gyro_bias.gyro_bias_y, gyro_bias.gyro_bias_z)
+    push_n, push_e, push_d = to_earth(middle, accel_bias.accel_bias_x, accel_bias.accel_bias_y, accel_bias.accel_bias_z)
     half_s = 0.5 * dt_s
-    middle_n, middle_e, middle_d = tilt_n - half_s * turn_n, tilt_e - half_s * turn_e, heading - half_s * turn_d
-    after_n = vel_n + dt_s * (middle_e * force_d - middle_d * force_e - push_n)
-    after_e = vel_e + dt_s * (middle_d * force_n - middle_n * force_d - push_e)
-    after_d = vel_d + dt_s * (middle_n * force_e - middle_e * force_n - push_d)
+    half_n, half_e, half_d = (
+        tilt.tilt_n - half_s * turn_n,
+        tilt.tilt_e - half_s * turn_e,
+        tilt.heading - half_s * turn_d,
+    )
+    after_n = vel.vel_n + dt_s * (half_e * force.force_d - half_d * force.force_e - push_n)
+    after_e = vel.vel_e + dt_s * (half_d * force.force_n - half_n * force.force_d - push_e)
+    after_d = vel.vel_d + dt_s * (half_n * force.force_e - half_e * force.force_n - push_d)
     return MotionErrors(
-        pos_n=pos_n + half_s * (vel_n + after_n),
-        pos_e=pos_e + half_s * (vel_e + after_e),
-        pos_d=pos_d + half_s * (vel_d + after_d),
+        pos_n=pos.pos_n + half_s * (vel.vel_n + after_n),
+        pos_e=pos.pos_e + half_s * (vel.vel_e + after_e),
+        pos_d=pos.pos_d + half_s * (vel.vel_d + after_d),
         vel_n=after_n, vel_e=after_e, vel_d=after_d,
-        tilt_n=tilt_n - dt_s * turn_n, tilt_e=tilt_e - dt_s * turn_e, heading=heading - dt_s * turn_d,
+        tilt_n=tilt.tilt_n - dt_s * turn_n, tilt_e=tilt.tilt_e - dt_s * turn_e, heading=tilt.heading - dt_s * turn_d,
     )  # fmt: skip
 
 

@@ -13,6 +13,8 @@ Row r of lane k lies at `work[r * len(lanes) + k]`. The filter's rows are the fi
 
 from __future__ import annotations
 
+from itertools import product
+
 POSITION = 0  # 3, local NED [m]
 VELOCITY = 3  # 3, NED [m/s]
 ATTITUDE = 6  # 3, rotation error, earth NED [rad]
@@ -67,6 +69,10 @@ VECTORS = {
 }  # fmt: skip
 
 
+# what the velocity that a flow sensor with dynamics sees depends on
+SEEN_BY = ("vel_n", "vel_e", "vel_d", "tilt_n", "tilt_e", "heading", "height")
+
+
 class Rows:
     """Hands out consecutive rows of a lane buffer."""
 
@@ -116,7 +122,7 @@ CROSS = _rows.take(COLUMNS)  # P h'
 GAIN = _rows.take(COLUMNS)  # K
 REST = _rows.take(COLUMNS)  # P h' - K S/2
 SCRATCH = _rows.take(MOST_SOURCES * MOST_SOURCES)  # a transition's own block of P, both triangles
-DRIVE = _rows.take(14)  # derivatives of what a flow sensor with dynamics sees
+SLOPES = _rows.take(2 * len(SEEN_BY))  # derivatives of what a flow sensor with dynamics sees, forward and right
 # the packed upper triangle of P, column by column, and beside it a column for each hypothesis: last, so that a compiler
 # sees that no element is another row
 COVARIANCE = _rows.take(COLUMNS * (COLUMNS + 1) // 2)
@@ -132,7 +138,7 @@ ROWS_BY_NAME = {
     **{f"force_{axis}": FORCE + i for i, axis in enumerate("ned")},
     **{f"middle_{i}": MIDDLE + i for i in range(9)},
     **{f"measured_{i}": MEASURED + i for i in range(8)},
-    **{f"drive_{i}": DRIVE + i for i in range(14)},
+    **{f"{seen}_by_{name}": SLOPES + i for i, (seen, name) in enumerate(product("uv", SEEN_BY))},
     "measured": MEASURED,
     "accel_noise": ACCEL_NOISE,
     "gyro_noise": GYRO_NOISE,

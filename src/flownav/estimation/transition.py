@@ -12,8 +12,7 @@ from functools import partial
 from itertools import combinations_with_replacement, pairwise
 from typing import Any, NamedTuple, Protocol, cast, get_type_hints
 
-from flownav.compile import compiled, dressed, write_function
-from flownav.estimation.law import at, parameters, value_of
+from flownav.estimation.law import Signature, at, value_of
 from flownav.estimation.states import COVARIANCE, MOST_SOURCES, PLACES, SCRATCH, SHORT_NAMES
 
 
@@ -31,18 +30,17 @@ def transition(function: Callable[..., Any]) -> Transition:
 
     The law must be linear in the states that it reads, and it must read what it changes.
     """
-    names, scalars = parameters(function)
-    sources = sorted(PLACES[name] for name in names if name in PLACES)
+    takes = Signature.of(function)
+    sources = sorted(PLACES[name] for name in takes.names if name in PLACES)
     targets = [PLACES[name] for name in get_type_hints(function)["return"]._fields]
     if not set(targets) <= set(sources):
         raise NameError(f"{function.__name__} changes states that it does not read")
     if len(sources) > MOST_SOURCES:
         raise ValueError(f"{function.__name__} reads more than {MOST_SOURCES} states")
-    plan = _Plan(names, scalars, sources, targets)
-    lines = [f"def move(work, lanes, n{''.join(f', {name}' for name in scalars)}):"]
+    plan = _Plan(takes, sources, targets)
+    lines = [f"def move({', '.join(['work', 'lanes', 'n', *takes.scalars])}):"]
     lines += [*plan.columns_beside(), *plan.block_out(), *plan.block_moved(), *plan.block_back()]
-    move = write_function("move", "\n".join(lines) + "\n", {"law": compiled(function)})
-    return cast(Transition, dressed(move, function))
+    return cast(Transition, takes.generated("move", lines))
 
 
 class _Plan(NamedTuple):
@@ -52,8 +50,7 @@ class _Plan(NamedTuple):
     `SCRATCH + column * width + row`, rows and columns counted along `sources`.
     """
 
-    names: list[str]
-    scalars: list[str]
+    takes: Signature
     sources: list[int]
     targets: list[int]
 
@@ -95,11 +92,10 @@ class _Plan(NamedTuple):
 
     def _called(self, where: Callable[[int], str]) -> list[str]:
         """The law called on errors that lie at `where`; what becomes of them is put there."""
-        given = [where(PLACES[name]) if name in PLACES else value_of(name) for name in self.names]
-        passed = [f"{name}={name}" for name in self.scalars]
+        call = self.takes.call(lambda name: where(PLACES[name]) if name in PLACES else value_of(name))
         return [
             "        for lane in range(len(lanes)):",
-            f"            found = law({', '.join([*given, *passed])})",
+            f"            found = {call}",
             *(f"            {where(state)} = found.{SHORT_NAMES[state]}" for state in self.targets),
         ]
 

@@ -21,6 +21,7 @@ from flownav.faults.catalogue import Fault
 from flownav.faults.laws import law_of
 from flownav.faults.table import BASE, CLIMB_M_S, NO_FAULT, RESTING_S, SETTLING_S, SINK_M_S, TAKEOFF_S, durations_of
 from flownav.measurement import Array, Sensor
+from flownav.navigation.rows import InnovationRow
 from flownav.navigation.tape import EVENT_NAMES
 from flownav.parameter_files import check
 from flownav.record import POSITION_NED
@@ -228,9 +229,10 @@ def first_refusals(
 ) -> float | None:
     """When more readings of the struck sensors than ever before in a second had been refused, or it was said."""
     t0_s, t1_s = window_s
-    refused = np.isin(offers[:, 1], [int(sensor) for sensor in sensors]) & (offers[:, 8] != Reason.FUSED)
-    refused &= offers[:, 8] != Reason.DATUM
-    times = offers[refused, 0] + horizon_s
+    offered = InnovationRow.of(offers)
+    refused = np.isin(offered.sensor, [int(sensor) for sensor in sensors]) & (offered.reason != Reason.FUSED)
+    refused &= offered.reason != Reason.DATUM
+    times = offered.t_s[refused] + horizon_s
     count = np.arange(len(times)) - np.searchsorted(times, times - WITHIN_S, side="right") + 1
     usual = count[times < t0_s].max(initial=0)
     after = times[(times >= t0_s) & (times < t1_s) & (count > usual)]

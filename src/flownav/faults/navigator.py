@@ -17,9 +17,10 @@ from flownav.measurement import Array, EventQueue, Sensor, Stream
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.flags import flags_of
 from flownav.navigation.loop import Running, run, start_navigator
+from flownav.navigation.rows import EstimateRow, InnovationRow
 from flownav.navigation.settings_of import Told
 from flownav.navigation.tables import Written, written_on
-from flownav.navigation.tape import EVENT_NAMES, LEVELS_AT, new_tape
+from flownav.navigation.tape import EVENT_NAMES, new_tape
 from flownav.replays.prepare import Prepared, ReplayOptions, prepare
 from flownav.sensors.identified import IdentifiedFlow
 from flownav.simulation.assemble import Setup
@@ -77,15 +78,15 @@ def _flow_as_it_is(streams: Mapping[Sensor, Stream]) -> IdentifiedFlow | None:
 # -- what came of it ---------------------------------------------------------------------------------------
 def navigated(written: Written, prepared: Prepared) -> Navigated:
     """What was written as the judges of faults take it. A state that is no number has no standard deviation either."""
-    estimate = written.estimate
+    said = EstimateRow.of(written.estimate)
     return Navigated(
-        estimate[:, 0],
-        estimate[:, 1:4],
-        estimate[:, 11:14],
+        said.t_s,
+        said.pos_ned_m,
+        said.std_pos_ned_m,
         offers_of(written.innovation, prepared),
         tuple(Event(t_s, *EVENT_NAMES[int(kind)][:2]) for t_s, kind, _ in written.event.tolist()),
         flags_of(written.event),
-        estimate[:, LEVELS_AT:],
+        said.protection_m,
     )
 
 
@@ -94,14 +95,15 @@ def offers_of(rows: Array, prepared: Prepared) -> Offers:
     delay_s = np.zeros(max(Sensor) + 1)
     for sensor, known_s in prepared.delays_s.items():
         delay_s[sensor] = known_s
-    sensors, reasons = rows[:, 1].astype(int), rows[:, 8].astype(int)
+    offered = InnovationRow.of(rows)
+    sensors, reasons = offered.sensor.astype(int), offered.reason.astype(int)
     labels = np.array([reason.label for reason in Reason])
     ahead_s = {sensor: stream.t_s[stamped_ahead(stream)] for sensor, stream in prepared.streams.items()}
     refused = sum(len(times) for times in ahead_s.values())
     return Offers(
-        np.concatenate([rows[:, 0] + delay_s[sensors], *ahead_s.values()]),
+        np.concatenate([offered.t_s + delay_s[sensors], *ahead_s.values()]),
         np.concatenate([sensors, *(np.full(len(times), int(sensor)) for sensor, times in ahead_s.items())]),
-        np.concatenate([rows[:, 2].astype(int), np.zeros(refused, int)]),
+        np.concatenate([offered.component.astype(int), np.zeros(refused, int)]),
         np.concatenate([np.isin(reasons, TAKEN_IN), np.zeros(refused, bool)]),
         np.concatenate([labels[reasons], np.full(refused, Reason.AHEAD.label)]),
     )

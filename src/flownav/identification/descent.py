@@ -13,7 +13,7 @@ import numpy as np
 
 from flownav.identification.experiment import Experiment
 from flownav.identification.grid import lay_grid
-from flownav.identification.response import delayed, response
+from flownav.identification.response import Input, Tried, delayed, response
 from flownav.measurement import Array
 
 DELAY_RANGE_S = (-0.1, 0.6)
@@ -92,15 +92,14 @@ def linearise(run: Experiment, structure: Structure, point: Point, nuisance: Arr
     width = structure.parameters + n + 2
     if n and _stiffness(point) * run.longest_step_s > STIFFEST:
         return Linearised(np.zeros((0, width)), np.full((width, width), np.inf))
+    given = Input(run.t_u, run.u, structure.held)
     grid = lay_grid(run.t_u, run.t_y, point.delay_s, run.between)
     columns, sums = np.empty((len(run.t_y) if whole else 1, width)), np.zeros((width, width))
     if n:
-        response(
-            (0,) * n, run.t_u, run.u, structure.held, grid, point.log_a, point.gain, structure.delay,
-            nuisance, run.y, columns, sums,
-        )  # fmt: skip
+        tried = Tried(point.log_a, point.gain, structure.delay, nuisance)
+        response((0,) * n, given, grid, tried, run.y, columns, sums)
     else:
-        delayed(run.t_u, run.u, structure.held, grid, point.gain, float(nuisance[0]), run.y, columns, sums)
+        delayed(given, grid, point.gain, float(nuisance[0]), run.y, columns, sums)
     return Linearised(columns, _with_prior(sums, structure, nuisance))
 
 

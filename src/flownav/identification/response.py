@@ -20,6 +20,8 @@ Inside, time is scaled by the model's own rate a_n^(1/n), which makes a_n one an
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from flownav.compile import equation, kernel
@@ -179,18 +181,35 @@ def _mirror(sums: Array) -> None:
             sums[j, i] = sums[i, j]
 
 
+class Input(NamedTuple):
+    """Samples of the input (n,) at their instants [s]; held: constant from one to the next, not in a straight line."""
+
+    t_u: Array
+    u: Array
+    held: bool
+
+
+class Tried(NamedTuple):
+    """A model: log a_1 .. log a_n, gain, whether its delay is sought.
+
+    own (n + 1,): x, x', .. at the first input sample, in the output's unit and its rates, then the offset.
+    """
+
+    coefficients: Array
+    gain: float
+    with_delay: bool
+    own: Array
+
+
 @kernel
-def response(
-    of: Order, t_u: Array, u: Array, held: bool, grid: Grid, coefficients: Array, gain: float, with_delay: bool,
-    own: Array, y: Array, columns: Array, sums: Array,
-) -> None:  # fmt: skip
+def response(of: Order, given: Input, grid: Grid, tried: Tried, y: Array, columns: Array, sums: Array) -> None:
     """Derivatives of the model's output at the readings of a grid, its error, and all their products.
 
-    t_u [s], u (n,): input samples; coefficients (n,): log a_1 .. log a_n; own (n + 1,): x, x', .. at the first
-    input sample, in the output's unit and its rates, then the offset; y (m,): the readings. Columns: by log a_1 ..
-    log a_n, gain, delay [s] (where with_delay), start and offset; then y less the output. columns: (m, k) takes
-    them all, (1, k) only the last. sums (k, k), zero on entry: columns' columns.
+    y (m,): the readings. Columns: by log a_1 .. log a_n, gain, delay [s] (where with_delay), start and offset; then y
+    less the output. columns: (m, k) takes them all, (1, k) only the last. sums (k, k), zero on entry: columns' columns.
     """
+    t_u, u, held = given
+    coefficients, gain, with_delay, own = tried
     order = len(of)
     rate = np.exp(coefficients[order - 1] / order)
     a, unit = np.empty(order), np.empty(order)
@@ -267,10 +286,9 @@ def response(
 
 
 @kernel
-def delayed(
-    t_u: Array, u: Array, held: bool, grid: Grid, gain: float, offset: float, y: Array, columns: Array, sums: Array
-) -> None:
+def delayed(given: Input, grid: Grid, gain: float, offset: float, y: Array, columns: Array, sums: Array) -> None:
     """As `response` for a model without dynamics, y(t) = K u(t - T) + y0; columns: gain, delay, offset, error."""
+    t_u, u, held = given
     for row in range(len(y)):
         at, at_row = grid.sample[row], row if len(columns) > 1 else 0
         slope = 0.0

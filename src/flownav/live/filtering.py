@@ -17,6 +17,7 @@ from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, 
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import load_start
+from flownav.navigation.rows import EventRow
 from flownav.navigation.tables import written_on
 from flownav.navigation.tape import COMPONENTS, GPS_RESET, START, empty_tape
 from flownav.navigation.told import Equipment
@@ -44,7 +45,7 @@ class Keeper(Protocol):
 
 
 class Outcome(NamedTuple):
-    """What the last batch brought: innovations (m, 9) and events (k, 3) of the tape."""
+    """What the last batch brought: rows of the tape's innovation and event."""
 
     innovation: Array
     event: Array
@@ -119,7 +120,7 @@ class Filtering:
         written = written_on(on.tape)
         outcome = Outcome(written.innovation, written.event)
         self._keeper.written(*written)
-        self.jumps += sum(kind in JUMPS for kind in outcome.event[:, 1].tolist())
+        self.jumps += sum(kind in JUMPS for kind in EventRow.of(outcome.event).kind.tolist())
         return outcome
 
     def imu_after(self, t_s: float) -> Array:

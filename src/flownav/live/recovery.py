@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import mmap
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
+from flownav.compile import columns_of, width_of
 from flownav.errors import InputError
 from flownav.logs.journal import MAGIC, Block, Damage, blocks
 from flownav.measurement import COLUMNS, MAX_VALUES, Array, Sensor
+from flownav.navigation.rows import ESTIMATE_COLUMNS, EVENT_COLUMNS, INNOVATION_COLUMNS
 from flownav.navigation.tables import (
     Happening,
     estimate_table,
@@ -19,12 +21,34 @@ from flownav.navigation.tables import (
     innovation_table,
     states_table,
 )
-from flownav.navigation.tape import ESTIMATE_COLUMNS, OFFER_COLUMNS
 from flownav.record import FED, POSITION_NED, QUATERNION, VELOCITY_BODY, Record, Table
 
-WIDTHS = {"fed": len(FED), "estimate": ESTIMATE_COLUMNS, "innovation": len(OFFER_COLUMNS), "event": 3, "truth": 14}
-SEGMENT = FED.index("segment")
+T_S, SEGMENT = FED.index("t_s"), FED.index("segment")
 NAN = float("nan")
+Value = TypeVar("Value")
+
+
+class TruthRow(NamedTuple, Generic[Value]):
+    """What a simulator said of the truth, as a journal keeps it; place: latitude, longitude [deg], altitude [m]."""
+
+    t_s: Value
+    place_deg_m: Annotated[Value, 3]
+    vel_ned_m_s: Annotated[Value, 3]
+    quaternion: Annotated[Value, 4]
+    rate_frd_rad_s: Annotated[Value, 3]
+
+
+class OriginRow(NamedTuple, Generic[Value]):
+    """Where the local frame's origin lies, from an instant on."""
+
+    since_s: Value
+    place_deg_m: Annotated[Value, 3]
+
+
+WIDTHS = {
+    "fed": len(FED), "estimate": ESTIMATE_COLUMNS, "innovation": INNOVATION_COLUMNS, "event": EVENT_COLUMNS,
+    "truth": width_of(TruthRow),
+}  # fmt: skip
 
 
 class Recovered(NamedTuple):
@@ -48,7 +72,7 @@ class _Story(NamedTuple):
 
     head: dict[str, Any]
     segments: dict[int, dict[str, Any]]
-    origins: Array  # (n, 4): from when [s], latitude, longitude [deg], altitude [m]
+    origins: Array  # rows of `OriginRow`
     notes: list[Happening]
     facts: dict[str, Any]
     end: dict[str, Any] | None
@@ -114,7 +138,7 @@ def _story(whole: list[Block], journal: Path) -> _Story:
     return _Story(
         head,
         {int(number): dict(equipment) for number, equipment in listed("segments")},
-        np.array(listed("origins"), float).reshape(-1, 4),
+        np.array(listed("origins"), float).reshape(-1, width_of(OriginRow)),
         [(float(t), str(who), str(what), str(more), float(value)) for t, who, what, more, value in listed("notes")],
         dict(ends[-1]["facts"] if ends else facts[-1] if facts else {}),
         dict(ends[-1]) if ends else None,
@@ -138,7 +162,7 @@ def _manifest(story: _Story) -> dict[str, Any]:
     return {
         "kind": "live",
         "filter": "landing",
-        "duration_s": float(fed[-1, 0] - fed[0, 0]) if len(fed) else 0.0,
+        "duration_s": float(fed[-1, T_S] - fed[0, T_S]) if len(fed) else 0.0,
         "parameters": {
             **story.head["parameters"],
             **({"origin_lat_lon_deg_alt_m": origins[-1][1:]} if origins else {}),
@@ -170,7 +194,7 @@ def _fill(record: Record, story: _Story, found: Recovered) -> None:
 
 def _events(story: _Story, found: Recovered) -> dict[str, Any]:
     events = happenings(story.rows["event"]) + story.notes
-    times_s = [*(event[0] for event in events), *story.rows["fed"][-1:, 0].tolist()]
+    times_s = [*(event[0] for event in events), *story.rows["fed"][-1:, T_S].tolist()]
     last_s = max((t_s for t_s in times_s if t_s == t_s), default=0.0)
     lost = int((story.end or {}).get("notes_lost", 0))
     if lost:
@@ -195,15 +219,17 @@ def _readings(sensor: Sensor, rows: Array) -> Table:
 
 
 def _truth(rows: Array, origins: Array) -> Table:
-    """Position in the local frame of its time, velocity in body axes. origins (n, 4), the first holds before it too."""
+    """Position in the local frame of its time, velocity in body axes; the first of the origins holds before it too."""
     import pymap3d
 
     from flownav.frames import rotation_from_quaternion, to_body
 
-    since = np.maximum(np.searchsorted(np.nan_to_num(origins[:, 0], nan=-np.inf), rows[:, 0], side="right") - 1, 0)
-    position = pymap3d.geodetic2ned(*rows[:, 1:4].T, *origins[since, 1:].T)
-    rotation = rotation_from_quaternion(*rows[:, 7:11].T)
-    body = to_body(rotation, *rows[:, 4:7].T)
+    said: TruthRow[Array] = columns_of(TruthRow, rows)
+    origin: OriginRow[Array] = columns_of(OriginRow, origins)
+    since = np.searchsorted(np.nan_to_num(origin.since_s, nan=-np.inf), said.t_s, side="right")
+    place = origin.place_deg_m[np.maximum(since - 1, 0)]
+    position = pymap3d.geodetic2ned(*said.place_deg_m.T, *place.T)
+    body = to_body(rotation_from_quaternion(*said.quaternion.T), *said.vel_ned_m_s.T)
     names = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, "rate_p_rad_s", "rate_q_rad_s", "rate_r_rad_s")
-    columns = (*position, *body, *rows[:, 7:11].T, *rows[:, 11:14].T)
-    return {"t_s": rows[:, 0], **dict(zip(names, map(np.asarray, columns), strict=True))}
+    columns = (*position, *body, *said.quaternion.T, *said.rate_frd_rad_s.T)
+    return {"t_s": said.t_s, **dict(zip(names, map(np.asarray, columns), strict=True))}

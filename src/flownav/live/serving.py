@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from flownav.estimation.gating import Reason
 from flownav.measurement import Sensor
+from flownav.navigation.rows import InnovationRow
 from flownav.navigation.serving import HORIZONTAL, REFUSALS
 
 WATCHED = (*HORIZONTAL, Sensor.RANGE)
@@ -41,14 +42,14 @@ class Serving:
             before = Refused(t_s, t_s, 0, why)
         self._spells[sensor] = Refused(before.since_s, max(t_s, before.until_s), before.readings + 1, why)
 
-    def judged(self, innovation: Iterable[Sequence[float]]) -> None:
-        """What became of readings in the navigator: rows of the tape's innovations, 9 numbers each."""
-        for row in innovation:
-            sensor, component, reason = Sensor(int(row[1])), int(row[2]), int(row[8])
+    def judged(self, offered: Iterable[InnovationRow[float]]) -> None:
+        """What became of readings in the navigator."""
+        for row in offered:
+            sensor, component, reason = Sensor(int(row.sensor)), int(row.component), int(row.reason)
             if reason == Reason.FUSED and component < 2:
                 self._spells.pop(sensor, None)
             elif reason in REFUSALS and component == 0:
-                self.refused(sensor, row[0], Reason(reason).label)
+                self.refused(sensor, row.t_s, Reason(reason).label)
 
     def landed(self, on_ground: bool) -> None:
         """What the autopilot says of the ground."""

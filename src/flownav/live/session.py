@@ -28,6 +28,7 @@ from flownav.mavlink.outgoing import Estimate
 from flownav.mavlink.state_messages import TrueState, hil_state_quaternion, sim_state
 from flownav.measurement import Measurement, Sensor
 from flownav.navigation.feed import SLOWEST_IMU_HZ
+from flownav.navigation.rows import InnovationRow
 from flownav.navigation.serving import HORIZONTAL
 
 SECOND = 1.0
@@ -239,10 +240,14 @@ class Session:
         released = self.hearing.horizon.release(until_s, BATCH)
         if released:
             outcome = self.filtering.feed(released)
-            rows = outcome.innovation.tolist()
-            for row in rows:
-                self.innovations[int(row[1]), int(row[2])] = (row[5], row[7], int(row[8]))
-            self.hearing.serving.judged(rows)
+            offered = [InnovationRow(*row) for row in outcome.innovation.tolist()]
+            for row in offered:
+                self.innovations[int(row.sensor), int(row.component)] = (
+                    row.innovation,
+                    row.test_ratio,
+                    int(row.reason),
+                )
+            self.hearing.serving.judged(offered)
         return len(released) == BATCH
 
     def _watch(self, t_s: float) -> None:

@@ -89,18 +89,19 @@ def _check_order(rows: Rows) -> None:
 
 
 def gps_streams(
-    t_s: Array, fix_type: Array, lat_deg: Array, lon_deg: Array, alt_m: Array, velocity_ned_m_s: Array, *,
+    t_s: Array, fix_type: Array, place_deg_m: tuple[Array, Array, Array], velocity_ned_m_s: Array, *,
     position_variance: Array | None = None, velocity_variance: Array | None = None, delay_s: float = 0.0,
 ) -> tuple[list[Stream], Origin | None]:  # fmt: skip
     """Velocity, then position about the first fix, and that fix; nothing where no fix is 3-D (fix_type 3).
 
-    All (n,) but velocity and variances (n, 3), north, east, down; velocity is NaN where the receiver has none.
+    place_deg_m: latitude, longitude, altitude. All (n,) but velocity and variances (n, 3), north, east, down; velocity
+    is NaN where the receiver has none.
     """
     count = len(t_s)
     variances = [
         np.full((count, 3), np.nan) if each is None else each for each in (position_variance, velocity_variance)
     ]
-    columns = {"lat_deg": lat_deg, "lon_deg": lon_deg, "alt_m": alt_m}
+    columns = dict(zip(("lat_deg", "lon_deg", "alt_m"), place_deg_m, strict=True))
     columns |= {f"vel_{k}": velocity_ned_m_s[:, k] for k in range(3)}
     columns |= {f"var_{which}_{k}": variance[:, k] for which, variance in enumerate(variances) for k in range(3)}
     fixes = Rows(np.asarray(t_s, float), {name: np.asarray(column, float) for name, column in columns.items()})

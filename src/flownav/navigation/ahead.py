@@ -13,8 +13,9 @@ import numpy as np
 
 from flownav.compile import ONE_LANE, Lanes, Work, compiled, equation, kernel, pointer
 from flownav.estimation.covariance import pack, unpack
-from flownav.estimation.law import parameters
+from flownav.estimation.law import Signature
 from flownav.estimation.motion import add_motion_noise, errors_in_motion, strapdown
+from flownav.estimation.named import AccelBias, Attitude, GyroBias, Inertial, PositionNed, VelocityNed
 from flownav.estimation.states import (
     ACCEL_BIAS,
     GYRO_BIAS,
@@ -84,10 +85,14 @@ def state_of(work: Work, lanes: Lanes, lane: int) -> Carried:
 def carried(s: Carried, between: Motion, dt_s: float) -> Carried:
     """The state dt later; between: what the IMU read over that time, biases and all (`inertial.motion_between`)."""
     moved = _strapdown(
-        s.pos_n, s.pos_e, s.pos_d, s.vel_n, s.vel_e, s.vel_d, s.qw, s.qx, s.qy, s.qz,
-        between[0], between[1], between[2], between[3], between[4], between[5],
-        s.gyro_bias_x, s.gyro_bias_y, s.gyro_bias_z, s.accel_bias_x, s.accel_bias_y, s.accel_bias_z, dt_s,
-    )  # fmt: skip
+        PositionNed(s.pos_n, s.pos_e, s.pos_d),
+        VelocityNed(s.vel_n, s.vel_e, s.vel_d),
+        Attitude(s.qw, s.qx, s.qy, s.qz),
+        Inertial(between[0], between[1], between[2], between[3], between[4], between[5]),
+        GyroBias(s.gyro_bias_x, s.gyro_bias_y, s.gyro_bias_z),
+        AccelBias(s.accel_bias_x, s.accel_bias_y, s.accel_bias_z),
+        dt_s,
+    )
     return Carried(
         moved.pos_n, moved.pos_e, moved.pos_d, moved.vel_n, moved.vel_e, moved.vel_d,
         moved.qw, moved.qx, moved.qy, moved.qz,
@@ -150,13 +155,14 @@ def covariance_at(work: Array, t_s: float, position_walk_m_rt_s: float) -> Array
 
     The force, the attitude and the noise are those of the filter's last step.
     """
-    names, _ = parameters(errors_in_motion.law)
-    held = {name: work[ROWS_BY_NAME[name]] for name in names if name not in PLACES}
+    told = Signature.of(errors_in_motion.law)
+    held = {name: work[ROWS_BY_NAME[name]] for name in told.names if name not in PLACES}
     dt_s = max(t_s - work[CLOCK], 0.0)
     covariance = unpack(work, ONE_LANE, 0, STATES)
     for _ in range(2):  # F P, and then F (F P)'
-        errors = {name: covariance[PLACES[name]] for name in names if name in PLACES}
-        for name, row in errors_in_motion.law(**errors, **held, dt_s=dt_s)._asdict().items():
+        errors = held | {name: covariance[PLACES[name]] for name in told.names if name in PLACES}
+        records = [parameter.record(*(errors[name] for name in parameter.names)) for parameter in told.reads]
+        for name, row in errors_in_motion.law(*records, dt_s=dt_s)._asdict().items():
             covariance[PLACES[name]] = row
         covariance = covariance.T
     rows = work.copy()

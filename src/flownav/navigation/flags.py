@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.measurement import Array
+from flownav.navigation.rows import EventRow
 from flownav.navigation.tape import (
     AIDED_AGAIN,
     DEAD_RECKONING,
@@ -37,11 +38,11 @@ class Flag(NamedTuple):
 
 
 def flags_of(happened: Array) -> tuple[Flag, ...]:
-    """The warnings of rows of a tape's events, (k, 3)."""
-    flags = []
+    """The warnings of rows of a tape's events."""
+    flags, events = [], EventRow.of(happened)
     for t_s, kind, _ in happened.tolist():
         if int(kind) in RAISING:
-            down = happened[(happened[:, 1] == RAISING[int(kind)]) & (happened[:, 0] >= t_s), 0]
+            down = events.t_s[(events.kind == RAISING[int(kind)]) & (events.t_s >= t_s)]
             flags.append(Flag(t_s, float(down.min(initial=np.inf)), *EVENT_NAMES[int(kind)][:2]))
     return tuple(flags)
 

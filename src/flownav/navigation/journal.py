@@ -5,7 +5,7 @@ A journal of no rows is written nowhere and only counts; that is what a run with
 
 from __future__ import annotations
 
-from flownav.compile import Lanes, Work, procedure
+from flownav.compile import ONE_LANE, Lanes, Work, gathering, procedure
 from flownav.estimation.covariance import covariance_of, forget_lane, states_of
 from flownav.estimation.states import (
     ACCEPTED,
@@ -20,75 +20,71 @@ from flownav.estimation.states import (
     STATE,
     STATES,
 )
-from flownav.navigation.tape import (
+from flownav.navigation.entries import (
     CORRECTED,
+    CORRECTION,
     DECAYED,
-    ENTRIES,
     ENTRY,
-    FORCE_AT,
     FORGOTTEN,
-    GAIN_AT,
-    INNOVATION_AT,
-    JACOBIAN_AT,
-    MIDDLE_AT,
     NOTED,
-    NOTES,
     PREDICTED,
-    STATE_AT,
-    STEP,
-    VARIANCE_AT,
-    Output,
+    CorrectionEntry,
+    DecayEntry,
+    PredictionEntry,
+    ResetEntry,
+    store_correction,
+    store_decay,
+    store_prediction,
+    store_reset,
 )
+from flownav.navigation.rows import row_of
+from flownav.navigation.tape import ENTRIES, NOTES, Output
+
+NO_STATES = (0.0,) * STATES
+load_middle = gathering(row_of, range(MIDDLE, MIDDLE + 9))
+load_force = gathering(row_of, range(FORCE, FORCE + 3))
+load_gain = gathering(row_of, range(GAIN, GAIN + STATES))
 
 
 @procedure
-def next_entry(kind: float, o: Output) -> int:
-    """Where a new entry begins; -1 where the journal has no such row."""
+def next_entry(o: Output) -> int:
+    """The row of a new entry; -1 where the journal has no such row."""
     row = o.used[ENTRIES]
     o.used[ENTRIES] = row + 1
-    if row >= o.room[3]:
-        return -1
-    o.entry[row * ENTRY] = kind
-    return int(row * ENTRY)
+    return int(row) if row < o.room[3] else -1
 
 
 @procedure
 def note_prediction(work: Work, lanes: Lanes, dt_s: float, o: Output) -> None:
     """The prediction that was just made."""
-    first = next_entry(PREDICTED, o)
-    if first < 0:
-        return
-    o.entry[first + STEP] = dt_s
-    for i in range(9):
-        o.entry[first + MIDDLE_AT + i] = work[(MIDDLE + i) * len(lanes)]
-    for i in range(3):
-        o.entry[first + FORCE_AT + i] = work[(FORCE + i) * len(lanes)]
+    row = next_entry(o)
+    if row >= 0:
+        entry = PredictionEntry(PREDICTED, dt_s, load_middle(work, lanes, 0), load_force(work, lanes, 0))
+        store_prediction(o.entry, ONE_LANE, row, 0, entry)
 
 
 @procedure
 def note_decay(dt_s: float, o: Output) -> None:
     """The Gauss-Markov errors went on by dt."""
-    first = next_entry(DECAYED, o)
-    if first >= 0:
-        o.entry[first + STEP] = dt_s
+    row = next_entry(o)
+    if row >= 0:
+        store_decay(o.entry, ONE_LANE, row, 0, DecayEntry(DECAYED, dt_s))
 
 
 @procedure
 def note_correction(work: Work, lanes: Lanes, o: Output) -> None:
     """The correction that was just made, if one was; its Jacobian on the states that its law named."""
-    if work[ACCEPTED * len(lanes)] == 0.0:
+    if row_of(work, lanes, ACCEPTED, 0) == 0.0:
         return
-    first = next_entry(CORRECTED, o)
-    if first < 0:
+    row = next_entry(o)
+    if row < 0:
         return
-    o.entry[first + INNOVATION_AT] = work[INNOVATION * len(lanes)]
-    o.entry[first + VARIANCE_AT] = work[INNOVATION_VARIANCE * len(lanes)]
-    for i in range(STATES):
-        o.entry[first + JACOBIAN_AT + i] = 0.0
-        o.entry[first + GAIN_AT + i] = work[(GAIN + i) * len(lanes)]
-    for i in range(int(work[OBSERVED * len(lanes)])):
-        state = int(work[(OBSERVED + 1 + i) * len(lanes)])
-        o.entry[first + JACOBIAN_AT + state] = work[(COEFFICIENT + i) * len(lanes)]
+    innovation, variance = row_of(work, lanes, INNOVATION, 0), row_of(work, lanes, INNOVATION_VARIANCE, 0)
+    entry = CorrectionEntry(CORRECTED, innovation, variance, NO_STATES, load_gain(work, lanes, 0))
+    store_correction(o.entry, ONE_LANE, row, 0, entry)
+    for i in range(int(row_of(work, lanes, OBSERVED, 0))):
+        state = int(row_of(work, lanes, OBSERVED + 1 + i, 0))
+        o.entry[row * ENTRY + CORRECTION.jacobian + state] = row_of(work, lanes, COEFFICIENT + i, 0)
 
 
 @procedure
@@ -96,22 +92,24 @@ def reset_state(work: Work, lanes: Lanes, lane: int, state: int, variance: float
     """A state of one lane loses its correlations and gets this variance."""
     forget_lane(work, lanes, states_of(lanes), state, lane, variance)
     if len(lanes) == 1:
-        first = next_entry(FORGOTTEN, o)
-        if first >= 0:
-            o.entry[first + STATE_AT] = state
+        row = next_entry(o)
+        if row >= 0:
+            store_reset(o.entry, ONE_LANE, row, 0, ResetEntry(FORGOTTEN, state))
 
 
 @procedure
 def note_estimate(work: Work, lanes: Lanes, o: Output) -> None:
     """State, attitude and covariance of the estimate that was just written."""
-    next_entry(NOTED, o)
+    entry = next_entry(o)
+    if entry >= 0:
+        o.entry[entry * ENTRY] = NOTED
     row = o.used[NOTES]
     o.used[NOTES] = row + 1
     if row >= o.room[4]:
         return
     for i in range(STATES):
-        o.state[row * (STATES + 4) + i] = work[(STATE + i) * len(lanes)]
+        o.state[row * (STATES + 4) + i] = row_of(work, lanes, STATE + i, 0)
         for j in range(STATES):
             o.covariance[(row * STATES + i) * STATES + j] = covariance_of(work, lanes, i, j, 0)
     for i in range(4):
-        o.state[row * (STATES + 4) + STATES + i] = work[(QUATERNION + i) * len(lanes)]
+        o.state[row * (STATES + 4) + STATES + i] = row_of(work, lanes, QUATERNION + i, 0)

@@ -94,6 +94,8 @@ STILL_CLOCK = MEMORY.take(1)  # the end of the last window [s]
 DRIFT_SINCE = MEMORY.take(1)  # from when a drift of GPS is sought [s]
 LEVEL_READ = MEMORY.take(1)  # when an external attitude was last taken for level [s]
 LAST = MEMORY.take(max(Sensor) + 1)  # of each sensor, the newest instant [s]
+OWN_ROWS = 512
+OWN = MEMORY.take(OWN_ROWS)  # the memory of a filter of somebody else's in the navigator's place (`parts.equations`)
 WORK_ROWS = MEMORY.next
 
 load_reading, store_reading = MEMORY.access(Reading)

@@ -54,7 +54,8 @@ from flownav.navigation.memory import (
     store_suspicion,
 )
 from flownav.navigation.records import FlowSignMemory, Levels, SuspicionMemory
-from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, Output, position_variance, write_event
+from flownav.navigation.rows import position_variance
+from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, Output, write_event
 from flownav.navigation.verdicts import Position, Velocity
 
 SIGMAS = 4.0  # of the filter's own error, where nothing fails

@@ -25,25 +25,24 @@ from flownav.estimation.smoother import (
 )
 from flownav.estimation.states import CONSIDERS, QUATERNION, STATE, STATES
 from flownav.measurement import Array, EventQueue
+from flownav.navigation.entries import (
+    CORRECTED,
+    DECAYED,
+    FORGOTTEN,
+    PREDICTED,
+    view_correction,
+    view_decay,
+    view_prediction,
+    view_reset,
+)
 from flownav.navigation.loop import Running, run
 from flownav.navigation.memory import SCALE_DOUBT, new_work, store_start
 from flownav.navigation.records import StartMemory
 from flownav.navigation.tape import (
-    CORRECTED,
-    DECAYED,
     ENTRIES,
     ESTIMATES,
-    FORCE_AT,
-    FORGOTTEN,
-    GAIN_AT,
-    INNOVATION_AT,
-    JACOBIAN_AT,
-    MIDDLE_AT,
     NOTES,
-    PREDICTED,
-    STATE_AT,
-    STEP,
-    VARIANCE_AT,
+    Journal,
     Tape,
     empty_tape,
     output_of,
@@ -117,35 +116,33 @@ def _repeated(part: EventQueue, running: Running, before: Mark, after: Mark) -> 
 
 def _go_back(tape: Tape, t_s: Array, told: FilterSettings, later: Backward, work: Array, found: Tape) -> None:
     """Backward through a tape's journal; each of its estimates, the last first, smoothed onto the tape `found`."""
-    journal = tape.journal
-    go_back(
-        journal.entry, journal.state, journal.covariance, np.ascontiguousarray(t_s), told, later.vector, later.matrix,
-        work, found.estimate.reshape(-1), room_of(found), found.used,
-    )  # fmt: skip
+    estimate = found.estimate.reshape(-1)
+    go_back(tape.journal, np.ascontiguousarray(t_s), told, later, work, estimate, room_of(found), found.used)
 
 
 @kernel
 def go_back(
-    entry: Array, state: Array, covariance: Array, t_s: Array, told: FilterSettings, vector: Array, matrix: Array,
-    work: Array, found: Array, room: NDArray[np.int64], used: NDArray[np.int64],
+    journal: Journal, t_s: Array, told: FilterSettings, later: Backward, work: Array, found: Array,
+    room: NDArray[np.int64], used: NDArray[np.int64],
 ) -> None:  # fmt: skip
     """Backward through a journal, lambda and Lambda with it; t_s: the instants of its estimates."""
+    entry, state, covariance = journal
+    vector, matrix = later
     output = output_of(found, found, found, found, found, found, room, used)
     estimate = len(t_s)
     for row in range(len(entry) - 1, -1, -1):
         line = entry[row]
         kind = line[0]
         if kind == PREDICTED:
-            back_over_prediction(
-                vector, matrix, line[STEP], line[MIDDLE_AT : MIDDLE_AT + 9], line[FORCE_AT : FORCE_AT + 3]
-            )
+            p = view_prediction(line)
+            back_over_prediction(vector, matrix, p.dt_s, p.middle, p.force_ned_m_s2)
         elif kind == DECAYED:
-            back_over_decay(vector, matrix, line[STEP], told)
+            back_over_decay(vector, matrix, view_decay(line).dt_s, told)
         elif kind == CORRECTED:
-            jacobian, gain = line[JACOBIAN_AT : JACOBIAN_AT + STATES], line[GAIN_AT : GAIN_AT + STATES]
-            back_over_correction(vector, matrix, jacobian, gain, line[INNOVATION_AT], line[VARIANCE_AT])
+            c = view_correction(line)
+            back_over_correction(vector, matrix, c.jacobian, c.gain, c.innovation, c.variance)
         elif kind == FORGOTTEN:
-            back_over_reset(vector, matrix, int(line[STATE_AT]))
+            back_over_reset(vector, matrix, int(view_reset(line).state))
         else:
             estimate -= 1
             put_smoothed(state[estimate], covariance[estimate], vector, matrix, work)

@@ -8,7 +8,8 @@ import numpy as np
 
 from flownav.estimation.gating import Reason
 from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor
-from flownav.navigation.tape import EVENT_NAMES, EXTRA_STATES, LEVELS_AT, Tape
+from flownav.navigation.rows import EstimateRow, InnovationRow
+from flownav.navigation.tape import EVENT_NAMES, Tape
 from flownav.record import (
     FED,
     FILTER_STATES,
@@ -25,7 +26,7 @@ Happening = tuple[float, str, str, str, float]  # time [s], source, kind, what t
 
 
 class Written(NamedTuple):
-    """What one lane's navigator wrote: estimate (n, ESTIMATE_COLUMNS), innovation (m, OFFERS), event (k, 3)."""
+    """What one lane's navigator wrote: rows of a tape's estimate, innovation and event (`navigation.rows`)."""
 
     estimate: Array
     innovation: Array
@@ -39,38 +40,55 @@ def written_on(tape: Tape, lane: int = 0) -> Written:
 
 def estimate_table(rows: Array) -> Table:
     """Rows of a tape's estimate: position, body velocity, attitude, standard deviations, protection levels."""
-    names = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)))
-    followed = bool(np.isfinite(rows[:, LEVELS_AT:]).any())  # a smoother has none
-    levels = dict(zip(PROTECTION_LEVELS, rows[:, LEVELS_AT:].T, strict=True)) if followed else {}
-    return {"t_s": rows[:, 0], **dict(zip(names, rows[:, 1:17].T, strict=True)), **levels}
+    said = EstimateRow.of(rows)
+    followed = bool(np.isfinite(said.protection_m).any())  # a smoother has none
+    return {
+        "t_s": said.t_s,
+        **_named(POSITION_NED, said.pos_ned_m),
+        **_named(VELOCITY_BODY, said.vel_frd_m_s),
+        **_named(QUATERNION, said.quaternion),
+        **_named(_stds(POSITION_NED), said.std_pos_ned_m),
+        **_named(_stds(VELOCITY_BODY), said.std_vel_frd_m_s),
+        **(_named(PROTECTION_LEVELS, said.protection_m) if followed else {}),
+    }
 
 
 def states_table(rows: Array) -> Table:
     """The rest of the same rows: every other state with its standard deviation."""
-    spreads = rows[:, 23 + EXTRA_STATES : LEVELS_AT].T
+    said = EstimateRow.of(rows)
     return {
-        "t_s": rows[:, 0],
-        **dict(zip(VELOCITY_NED, rows[:, 17:20].T, strict=True)),
-        **dict(zip((f"std_{name}" for name in TILTS), rows[:, 20:23].T, strict=True)),
-        **dict(zip(FILTER_STATES, rows[:, 23 : 23 + EXTRA_STATES].T, strict=True)),
-        **dict(zip((f"std_{name}" for name in FILTER_STATES), spreads, strict=True)),
+        "t_s": said.t_s,
+        **_named(VELOCITY_NED, said.vel_ned_m_s),
+        **_named(_stds(TILTS), said.std_tilt_ned_rad),
+        **_named(FILTER_STATES, said.states),
+        **_named(_stds(FILTER_STATES), said.std_states),
     }
+
+
+def _named(names: tuple[str, ...], columns: Array) -> Table:
+    """Columns (n, len(names)) by their names in a record."""
+    return dict(zip(names, columns.T, strict=True))
+
+
+def _stds(names: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(f"std_{name}" for name in names)
 
 
 def innovation_table(rows: Array) -> Table:
     """Rows of a tape's innovation, one for each offered component; `t_s` is the instant that the reading describes."""
-    sensor, component, reason = rows[:, 1].astype(int), rows[:, 2].astype(int), rows[:, 8].astype(int)
+    offered = InnovationRow.of(rows)
+    sensor, component, reason = (column.astype(int) for column in (offered.sensor, offered.component, offered.reason))
     sensor_names = np.array(["", *(s.name.lower() for s in Sensor)])
     reasons = np.array([r.label for r in Reason])
     return {
-        "t_s": rows[:, 0],
+        "t_s": offered.t_s,
         "sensor": sensor_names[sensor],
         "component": _component_names()[sensor, component],
-        "observation": rows[:, 3],
-        "observation_variance": rows[:, 4],
-        "innovation": rows[:, 5],
-        "innovation_variance": rows[:, 6],
-        "test_ratio": rows[:, 7],
+        "observation": offered.observation,
+        "observation_variance": offered.observation_variance,
+        "innovation": offered.innovation,
+        "innovation_variance": offered.innovation_variance,
+        "test_ratio": offered.test_ratio,
         "fused": reason == Reason.FUSED,
         "reason": reasons[reason],
     }

@@ -14,37 +14,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.compile import Lanes, Work, equation, pointer, procedure
-from flownav.estimation.covariance import covariance_of, variance_of
 from flownav.estimation.hypotheses import NAMES as FAULTS
-from flownav.estimation.motion import rotation_of
-from flownav.estimation.states import (
-    ATTITUDE,
-    GYRO_BIAS,
-    INNOVATION,
-    INNOVATION_VARIANCE,
-    NOISE,
-    POSITION,
-    QUATERNION,
-    STATE,
-    STATES,
-    TEST_RATIO,
-    VELOCITY,
-)
-from flownav.frames import to_body
+from flownav.estimation.states import STATES
 from flownav.measurement import Array, EventQueue, Sensor
-from flownav.navigation.memory import OBSERVATION, PROTECTION, REASON, SCALE_DOUBT, load_start
-from flownav.navigation.reasons import BEFORE_START, DUPLICATE, LATE, SILENT
+from flownav.navigation.entries import ENTRY
+from flownav.navigation.memory import REASON
+from flownav.navigation.reasons import SILENT
+from flownav.navigation.rows import (
+    ESTIMATE_COLUMNS,
+    EVENT_COLUMNS,
+    INNOVATION_COLUMNS,
+    EstimateRow,
+    EventRow,
+    InnovationRow,
+    estimate_row,
+    innovation_row,
+    store_estimate,
+    store_event,
+    store_innovation,
+)
 
-OFFER_COLUMNS = ("t_s", "sensor", "component", "observation", "observation_variance", "innovation",
-                 "innovation_variance", "test_ratio", "reason")  # fmt: skip
-OFFERS = len(OFFER_COLUMNS)
-# t, position 3, body velocity 3, quaternion 4, position and body velocity std 6, NED velocity 3, attitude std 3; then
-# the states from GYRO_BIAS on, and their standard deviations; protection levels, horizontal and vertical
-FIRST_EXTRA = GYRO_BIAS
-EXTRA_STATES = STATES - FIRST_EXTRA
-LEVELS_AT = 23 + 2 * EXTRA_STATES
-ESTIMATE_COLUMNS = LEVELS_AT + 2
-EVENT_COLUMNS = 3
 ESTIMATE_PERIOD_S = 0.02
 COMPONENTS = {Sensor.GPS_POSITION: 3, Sensor.GPS_VELOCITY: 3, Sensor.FLOW_RATE: 2, Sensor.FLOW_VELOCITY: 3,
               Sensor.RANGE: 1, Sensor.BARO: 1, Sensor.MAG: 1, Sensor.YAW: 1, Sensor.ATTITUDE: 6, Sensor.POSE: 3,
@@ -78,12 +67,6 @@ EVENT_NAMES = (
     ("filter", "cleared", "that fault is no more suspected"),
     ("heading", "refuted", "flow and accelerometer contradict what is read as heading: it was off by this much [rad]"),
 )
-# kinds of journal entry, and where their numbers stand in it
-PREDICTED, CORRECTED, FORGOTTEN, NOTED, DECAYED = 0.0, 1.0, 2.0, 3.0, 4.0
-STEP, MIDDLE_AT, FORCE_AT = 1, 2, 11  # a prediction: dt [s], R_EB in its middle (9), specific force NED (3)
-INNOVATION_AT, VARIANCE_AT, JACOBIAN_AT, GAIN_AT = 1, 2, 3, 3 + STATES  # a correction: nu, S, h, K
-STATE_AT = 1  # a reset: which
-ENTRY = 3 + 2 * STATES
 # places in `used`
 ESTIMATES, OFFERED_ROWS, ENTRIES, NOTES, FIRST_EVENTS = 0, 1, 2, 3, 4
 
@@ -99,8 +82,8 @@ class Journal(NamedTuple):
 class Tape(NamedTuple):
     """Rows that a run writes, and how many of each it used.
 
-    estimate (n, ESTIMATE_COLUMNS, lanes), innovation (m, OFFERS, lanes), event (k, 3, lanes); used: estimates,
-    components, journal entries, journal estimates, then happenings of each lane.
+    estimate (n, ESTIMATE_COLUMNS, lanes), innovation (m, INNOVATION_COLUMNS, lanes), event (k, EVENT_COLUMNS, lanes);
+    used: estimates, components, journal entries, journal estimates, then happenings of each lane.
     """
 
     estimate: Array
@@ -112,15 +95,15 @@ class Tape(NamedTuple):
     def estimates(self, lane: int = 0) -> Array:
         """The estimates of one lane, (n, ESTIMATE_COLUMNS)."""
         rows = self.estimate[: self.used[ESTIMATES], :, lane]
-        return np.ascontiguousarray(rows[np.isfinite(rows[:, 0])])
+        return np.ascontiguousarray(rows[np.isfinite(EstimateRow.of(rows).t_s)])
 
     def offers(self, lane: int = 0) -> Array:
-        """What became of each component in one lane, (m, OFFERS)."""
+        """What became of each component in one lane, (m, INNOVATION_COLUMNS)."""
         rows = self.innovation[: self.used[OFFERED_ROWS], :, lane]
-        return np.ascontiguousarray(rows[rows[:, OFFERS - 1] != SILENT])
+        return np.ascontiguousarray(rows[InnovationRow.of(rows).reason != SILENT])
 
     def events(self, lane: int = 0) -> Array:
-        """The happenings of one lane, (k, 3): time, kind, value."""
+        """The happenings of one lane, (k, EVENT_COLUMNS)."""
         return np.ascontiguousarray(self.event[: self.used[FIRST_EVENTS + lane], :, lane])
 
 
@@ -141,7 +124,7 @@ def empty_tape(estimates: int, components: int, events: int, lanes: int = 1, jou
     """A tape with this many rows, which take memory once they are written; journal: its entries and estimates."""
     return Tape(
         np.zeros((estimates, ESTIMATE_COLUMNS, lanes)),
-        np.zeros((components, OFFERS, lanes)),
+        np.zeros((components, INNOVATION_COLUMNS, lanes)),
         np.zeros((events, EVENT_COLUMNS, lanes)),
         Journal(
             np.zeros((journal[0], ENTRY)), np.zeros((journal[1], STATES + 4)), np.zeros((journal[1], STATES, STATES))
@@ -187,10 +170,7 @@ def write_event(lanes: Lanes, lane: int, t_s: float, kind: np.int_ | int, value:
     """A happening in one lane."""
     row = o.used[FIRST_EVENTS + lane]
     if row < o.room[2]:
-        first = row * EVENT_COLUMNS
-        o.event[first * len(lanes) + lane] = t_s
-        o.event[(first + 1) * len(lanes) + lane] = kind
-        o.event[(first + 2) * len(lanes) + lane] = value
+        store_event(o.event, lanes, row, lane, EventRow(t_s, kind, value))
         o.used[FIRST_EVENTS + lane] = row + 1
 
 
@@ -206,74 +186,16 @@ def write_offer(work: Work, lanes: Lanes, t_s: float, sensor: int, component: in
     if not said:
         return
     o.used[OFFERED_ROWS] = row + 1
-    first = row * OFFERS
     for lane in range(len(lanes)):
-        reason = work[REASON * len(lanes) + lane]
-        tested = reason != BEFORE_START and reason != DUPLICATE and reason != LATE
-        o.innovation[first * len(lanes) + lane] = t_s
-        o.innovation[(first + 1) * len(lanes) + lane] = sensor
-        o.innovation[(first + 2) * len(lanes) + lane] = component
-        o.innovation[(first + 3) * len(lanes) + lane] = work[OBSERVATION * len(lanes) + lane]
-        o.innovation[(first + 4) * len(lanes) + lane] = work[NOISE * len(lanes) + lane]
-        o.innovation[(first + 5) * len(lanes) + lane] = work[INNOVATION * len(lanes) + lane] if tested else np.nan
-        variance = work[INNOVATION_VARIANCE * len(lanes) + lane]
-        o.innovation[(first + 6) * len(lanes) + lane] = variance if tested else np.nan
-        o.innovation[(first + 7) * len(lanes) + lane] = work[TEST_RATIO * len(lanes) + lane] if tested else np.nan
-        o.innovation[(first + 8) * len(lanes) + lane] = reason
+        store_innovation(o.innovation, lanes, row, lane, innovation_row(work, lanes, lane, t_s, sensor, component))
 
 
 @procedure
 def write_estimate(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
-    """State, attitude and standard deviations at an instant; see ESTIMATE_COLUMNS. NaN for a lane not started."""
+    """State, attitude and standard deviations at an instant."""
     row = o.used[ESTIMATES]
     if row >= o.room[0]:
         return
     o.used[ESTIMATES] = row + 1
-    first = row * ESTIMATE_COLUMNS
     for lane in range(len(lanes)):
-        started = load_start(work, lanes, lane).started > 0.0
-        rotation = rotation_of(work, lanes, lane)
-        velocity = to_body(
-            rotation,
-            work[(STATE + VELOCITY) * len(lanes) + lane],
-            work[(STATE + VELOCITY + 1) * len(lanes) + lane],
-            work[(STATE + VELOCITY + 2) * len(lanes) + lane],
-        )
-        o.estimate[first * len(lanes) + lane] = t_s if started else np.nan
-        for i in range(3):
-            place = first + i
-            o.estimate[(place + 1) * len(lanes) + lane] = work[(STATE + POSITION + i) * len(lanes) + lane]
-            o.estimate[(place + 4) * len(lanes) + lane] = velocity[i]
-            o.estimate[(place + 11) * len(lanes) + lane] = np.sqrt(position_variance(work, lanes, i, lane))
-            o.estimate[(place + 17) * len(lanes) + lane] = work[(STATE + VELOCITY + i) * len(lanes) + lane]
-            o.estimate[(place + 20) * len(lanes) + lane] = np.sqrt(variance_of(work, lanes, ATTITUDE + i, lane))
-            variance = body_velocity_variance(work, lanes, lane, rotation[i], rotation[3 + i], rotation[6 + i])
-            o.estimate[(place + 14) * len(lanes) + lane] = np.sqrt(variance)
-        for i in range(4):
-            o.estimate[(first + 7 + i) * len(lanes) + lane] = work[(QUATERNION + i) * len(lanes) + lane]
-        for i in range(2):
-            level_m = work[(PROTECTION + i) * len(lanes) + lane]
-            o.estimate[(first + LEVELS_AT + i) * len(lanes) + lane] = level_m
-        for i in range(EXTRA_STATES):
-            value = work[(STATE + FIRST_EXTRA + i) * len(lanes) + lane]
-            spread = np.sqrt(max(variance_of(work, lanes, FIRST_EXTRA + i, lane), 0.0))
-            o.estimate[(first + 23 + i) * len(lanes) + lane] = value
-            o.estimate[(first + 23 + EXTRA_STATES + i) * len(lanes) + lane] = spread
-
-
-@equation
-def position_variance(work: Work, lanes: Lanes, axis: int, lane: int) -> float:
-    """Of position [m2]; level, with what a flow scale that nothing tells makes of the way from the start."""
-    unknown_m = work[SCALE_DOUBT * len(lanes) + lane] * work[(STATE + POSITION + axis) * len(lanes) + lane]
-    return variance_of(work, lanes, POSITION + axis, lane) + (unknown_m * unknown_m if axis < 2 else 0.0)
-
-
-@equation
-def body_velocity_variance(work: Work, lanes: Lanes, lane: int, north: float, east: float, down: float) -> float:
-    """e' P_vv e of one body axis e in earth NED [m2/s2]."""
-    axis = (north, east, down)
-    variance = 0.0
-    for j in range(3):
-        for k in range(3):
-            variance += axis[j] * covariance_of(work, lanes, VELOCITY + j, VELOCITY + k, lane) * axis[k]
-    return max(variance, 0.0)
+        store_estimate(o.estimate, lanes, row, lane, estimate_row(work, lanes, lane, t_s))

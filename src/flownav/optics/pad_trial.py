@@ -38,7 +38,7 @@ from flownav.optics.pad_target import GROUND_REFLECTANCE, PadTarget
 from flownav.optics.pad_truth import Truth, fix_error, is_wrong, truth_of
 from flownav.optics.projection import Pose, ground_point, pose_looking_down
 from flownav.optics.scene import Scene, drawn_scene, in_shadow_of_vehicle
-from flownav.optics.shot import Ground, Optic, View, ground_at, shoot, view_of
+from flownav.optics.shot import Ground, Optic, Shot, View, ground_at, shoot, view_of
 from flownav.optics.shutter import FlightMotion, image_rate_rad_s
 
 Array = NDArray[np.float64]
@@ -147,7 +147,8 @@ def camera_flight(trial: TrialCamera, target: PadTarget, seed: int, flight: int)
 def take_frame(flown: CameraFlight, land: Ground, pose: Pose, motion: FlightMotion, frame: int) -> NDArray[np.uint8]:
     """The frame (height, width) as the sensor gives it."""
     scene = in_shadow_of_vehicle(flown.scene, pose)
-    return shoot(flown.target, flown.optic, flown.view, land, scene, pose, motion, flown.exposure, flown.seed, frame)
+    shot = Shot(flown.target, flown.optic, flown.view, flown.exposure, flown.seed)
+    return shoot(shot, land, scene, pose, motion, frame)
 
 
 def look(flown: CameraFlight, frame: NDArray[np.uint8], body_from_camera: Array | None = None) -> PadSearch:
@@ -221,15 +222,27 @@ def tried(
         )  # fmt: skip
 
 
+class Trials(NamedTuple):
+    """Heights and speeds at which every flight takes so many frames, and the standard deviation of its tilt."""
+
+    heights_m: Sequence[float]
+    speeds_m_s: Sequence[float]
+    flights: int
+    frames: int
+    tilt_rad: float
+    seed: int
+
+
 def fly_cameras(
-    trial: TrialCamera, target: PadTarget, heights_m: Sequence[float], speeds_m_s: Sequence[float], flights: int,
-    count: int, tilt_rad: float, seed: int, on_progress: Callable[[int], None] = lambda done: None,
+    trial: TrialCamera, target: PadTarget, trials: Trials, on_progress: Callable[[int], None] = lambda done: None,
     pictures: Path | None = None,
 ) -> list[TrialFrame]:  # fmt: skip
     """Every flight's frames at every height and speed; the same whatever the number of threads.
 
     pictures: a folder that gets the first frame of each flight and height. InputError where it cannot be written.
     """
+
+    heights_m, speeds_m_s, flights, count, tilt_rad, seed = trials
 
     def fly(flight: int) -> list[TrialFrame]:
         flown = camera_flight(trial, target, seed, flight)

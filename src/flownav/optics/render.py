@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from flownav.compile import equation, kernel
 from flownav.errors import InputError
 from flownav.optics.camera import (
     Camera,
+    Exposure,
     box_transfer,
     effective_focal_px,
     exposed,
@@ -151,13 +153,28 @@ def digitise(image, exposure, bank, frame, grey):  # type: ignore[no-untyped-def
             grey[row, column] = np.uint8(min(max(level + half, least), most))
 
 
+class Raster(NamedTuple):
+    """A pad as reflectance, and the side of one of its texels."""
+
+    reflectance: NDArray[np.float32]
+    texel_m: float
+
+
+class Chip(NamedTuple):
+    """What digitises an image: exposure, and normals for its noise."""
+
+    exposure: Exposure
+    bank: NDArray[np.float32]
+
+
 @kernel
-def take_raster_frame(raster, texel_m, opened, closed, focal_px, exposure, bank, frame, image, grey):  # type: ignore[no-untyped-def]
+def take_raster_frame(raster, opened, closed, focal_px, chip, frame, image, grey):  # type: ignore[no-untyped-def]
     """One frame of a raster pad, exposed while the camera moved from pose `opened` to pose `closed`."""
     image[:] = np.float32(0.0)
-    add_view(raster, texel_m, between(opened, closed, 0.5 - GAUSS_POINT), focal_px, np.float32(0.5), image)
-    add_view(raster, texel_m, between(opened, closed, 0.5 + GAUSS_POINT), focal_px, np.float32(0.5), image)
-    digitise(image, exposure, bank, frame, grey)
+    for part in (0.5 - GAUSS_POINT, 0.5 + GAUSS_POINT):
+        pose = between(opened, closed, part)
+        add_view(raster.reflectance, raster.texel_m, pose, focal_px, np.float32(0.5), image)
+    digitise(image, chip.exposure, chip.bank, frame, grey)
 
 
 @equation
@@ -205,7 +222,7 @@ def film(
     if len(closing) != len(poses):
         raise InputError(f"film: {len(poses)} poses but {len(closing)} closing poses; give as many of both")
     exposure, focal_px = exposed(camera, light_named(light)), effective_focal_px(camera)
-    bank = noise_bank(seed, camera.width_px)
+    chip = Chip(exposure, noise_bank(seed, camera.width_px))
     image = np.zeros((camera.height_px, camera.width_px), np.float32)
     frames = np.empty((len(poses), camera.height_px, camera.width_px), np.uint8)
     raster, scale = np.zeros((0, 0), np.float32), np.zeros((2, 2))
@@ -214,7 +231,7 @@ def film(
         now = footprint(opened, focal_px)
         if np.abs(now - scale).max() > SCALE_TOLERANCE * np.abs(now).max():
             raster, scale = seen(pad, camera, opened), now
-        take_raster_frame(raster, pad.texel_m, opened, closed, focal_px, exposure, bank, k, image, frames[k])
+        take_raster_frame(Raster(raster, pad.texel_m), opened, closed, focal_px, chip, k, image, frames[k])
     return frames
 
 

@@ -111,28 +111,51 @@ def blur_width_px(optic: Optic, pose: Pose, motion: FlightMotion, exposure_s: fl
     return float(np.hypot(*rate)) * exposure_s * optic.lens.focal_px
 
 
+class Board(NamedTuple):
+    """A target's raster and its texel; half the board's side; over which length the raster gives way to the ground."""
+
+    raster: NDArray[np.float32]
+    texel_m: float
+    half_m: float
+    blend_m: float
+
+
+class Shutter(NamedTuple):
+    """How long a row is exposed, in how many parts that is sampled, and the time from the first row to the last."""
+
+    exposure_s: float
+    parts: int
+    readout_s: float
+
+
 @equation
-def reflected(board, board_texel_m, board_reach_m, blend_m, land, land_texel_m, x_m, y_m, nearness):  # type: ignore[no-untyped-def]
-    """Reflectance of a place: the board's raster, beyond it the ground's; nearness 1 below, 0 at the horizon."""
+def reflected(board: Board, reach_m: float, land: Ground, x_m: float, y_m: float, nearness: float) -> float:
+    """Reflectance of a place: the board's raster as far as it reaches, beyond it the ground's.
+
+    nearness: 1 below, 0 at the horizon.
+    """
     off = max(abs(x_m), abs(y_m))
-    own = clamp((board_reach_m - off) / blend_m, 0.0, 1.0)
+    own = clamp((reach_m - off) / board.blend_m, 0.0, 1.0)
     level = 0.0
     if own < 1.0:
-        far = sampled(land, x_m / land_texel_m, y_m / land_texel_m)
+        far = sampled(land.raster, x_m / land.texel_m, y_m / land.texel_m)
         level += (1.0 - own) * (GROUND_REFLECTANCE + (far - GROUND_REFLECTANCE) * nearness)
     if own > 0.0:
-        level += own * sampled(board, x_m / board_texel_m - 0.5, y_m / board_texel_m - 0.5)
+        level += own * sampled(board.raster, x_m / board.texel_m - 0.5, y_m / board.texel_m - 0.5)
     return level
 
 
 @kernel
-def expose(  # type: ignore[no-untyped-def]
-    board, board_texel_m, board_half_m, blend_m, land, land_texel_m, rays, falloff, pose, motion, exposure_s, readout_s,
-    shadows, covers, gloss, parts, image,
-):  # fmt: skip
+def expose(
+    board: Board, land: Ground, view: View, pose: Pose, motion: FlightMotion, shutter: Shutter, scene: Scene,
+    image: NDArray[np.float32],
+) -> None:  # fmt: skip
     """Fills `image` (height, width) with the light that every pixel collects, as reflectance."""
     height, width = image.shape
-    reach_m = 0.5 * board.shape[0] * board_texel_m
+    rays, falloff = view
+    exposure_s, parts, readout_s = shutter
+    shadows, covers, gloss = scene
+    reach_m = 0.5 * board.raster.shape[0] * board.texel_m
     image[:] = 0.0
     for row in range(height):
         for part in range(parts):
@@ -144,34 +167,39 @@ def expose(  # type: ignore[no-untyped-def]
                 if down > HORIZON:
                     x_m, y_m, _ = ground_point(then, x, y, 1.0)
                     near = down * down / (1.0 + x * x + y * y)
-                    light = reflected(board, board_texel_m, reach_m, blend_m, land, land_texel_m, x_m, y_m, near)
+                    light = reflected(board, reach_m, land, x_m, y_m, near)
                     for k in range(len(covers)):
                         if covered(Cover(covers[k, 0], covers[k, 1], covers[k, 2], covers[k, 3]), x_m, y_m):
                             light = covers[k, 3]
                     for k in range(len(shadows)):
                         s = shadows[k]
                         light *= lit(Shadow(s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7]), x_m, y_m)
-                    if gloss.strength > 0.0 and max(abs(x_m), abs(y_m)) < board_half_m:
+                    if gloss.strength > 0.0 and max(abs(x_m), abs(y_m)) < board.half_m:
                         ahead = then.r11 * x + then.r12 * y + then.r13
                         aside = then.r21 * x + then.r22 * y + then.r23
                         light += mirrored(gloss, ahead, aside, down)
                 image[row, column] += falloff[row, column] * light / parts + gloss.veil / parts
 
 
-def shoot(
-    target: PadTarget, optic: Optic, view: View, land: Ground, scene: Scene, pose: Pose, motion: FlightMotion,
-    exposure: Exposure, seed: int, frame: int,
-) -> NDArray[np.uint8]:  # fmt: skip
-    """The frame (height, width) uint8 that is of `pose`; `seed` and `frame` name the sensor's noise."""
+class Shot(NamedTuple):
+    """What a camera takes: a target by an optic, its view and exposure; the seed names the sensor's noise."""
+
+    target: PadTarget
+    optic: Optic
+    view: View
+    exposure: Exposure
+    seed: int
+
+
+def shoot(shot: Shot, land: Ground, scene: Scene, pose: Pose, motion: FlightMotion, frame: int) -> NDArray[np.uint8]:
+    """The frame (height, width) uint8 that is of `pose`; its number names the sensor's noise beside the seed."""
+    target, optic, view, exposure, seed = shot
     board = board_seen(target, optic, pose, seed)
     blur_px = blur_width_px(optic, pose, motion, exposure.time_s)
     parts = int(np.clip(np.ceil(2.0 * blur_px), LEAST_PARTS, MOST_PARTS))
     image = np.zeros(view.falloff.shape, np.float32)
-    half_m, blend_m = 0.5 * target.board_m, BLEND_M * target.side_m
-    expose(
-        board.reflectance, board.texel_m, half_m, blend_m, land.raster, land.texel_m, view.rays, view.falloff, pose,
-        motion, exposure.time_s, optic.readout_s, scene.shadows, scene.covers, scene.gloss, parts, image,
-    )  # fmt: skip
+    laid = Board(board.reflectance, board.texel_m, 0.5 * target.board_m, BLEND_M * target.side_m)
+    expose(laid, land, view, pose, motion, Shutter(exposure.time_s, parts, optic.readout_s), scene, image)
     grey: Any = np.empty(image.shape, np.uint8)
     digitise(image, exposure, noise_bank(seed, optic.camera.width_px), frame, grey)
     return np.asarray(grey)

@@ -17,33 +17,19 @@ from numpy.typing import NDArray
 from flownav.compile import ONE_LANE, Lanes, Unit, Work, equation, lane_access, runge_kutta, stepping, unit
 from flownav.errors import InputError
 from flownav.estimation.covariance import place
-from flownav.estimation.states import (
-    ACCEL_BIAS,
-    COLUMNS,
-    COVARIANCE,
-    GROUND,
-    GYRO_BIAS,
-    POSITION,
-    QUATERNION,
-    STATE,
-    STATES,
-    VELOCITY,
-)
+from flownav.estimation.states import ACCEL_BIAS, GROUND, GYRO_BIAS, POSITION, QUATERNION, STATE, VELOCITY
 from flownav.frames import of_unit_length
 from flownav.measurement import Array, Sensor
-from flownav.navigation.memory import CLOCK, GROUND_SEEN, START, WRITTEN, load_reading, share, shared
+from flownav.navigation.memory import CLOCK, GROUND_SEEN, OWN, OWN_ROWS, START, WRITTEN, load_reading, share, shared
 from flownav.navigation.records import Reading as Row
 from flownav.navigation.take import UNIT_SIGNATURE
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, output_of, write_estimate
 from flownav.parts.protocols import Estimate, Imu, Innovation, Outputs, Reading, Told
 from flownav.simulation import layout
-from flownav.simulation.layout import load_around, load_controls, store_loads
-from flownav.simulation.records import Loads
+from flownav.simulation.layout import load_around, load_controls
 from flownav.vehicle.around import Around
 from flownav.vehicle.state import Controls
 
-FIRST = COVARIANCE + STATES * (STATES + 1) // 2  # rows of the covariance that a filter of one's own leaves alone
-ROOM = COLUMNS * (COLUMNS + 1) // 2 - STATES * (STATES + 1) // 2
 RIGID = 13
 NAN = math.nan
 
@@ -81,21 +67,20 @@ class Said(NamedTuple):
     ground_d: float = 0.0
 
 
-@equation
-def put_said(work: Work, lanes: Lanes, lane: int, said: Said) -> None:
-    """What a filter says into the rows that the simulator and the tape read."""
-    for i in range(3):
-        work[(STATE + POSITION + i) * len(lanes) + lane] = said[1 + i]
-        work[(STATE + VELOCITY + i) * len(lanes) + lane] = said[4 + i]
-        work[place(POSITION + i, POSITION + i) * len(lanes) + lane] = said[11 + i]
-        work[place(VELOCITY + i, VELOCITY + i) * len(lanes) + lane] = said[14 + i]
-        work[(STATE + GYRO_BIAS + i) * len(lanes) + lane] = said[17 + i]
-        work[(STATE + ACCEL_BIAS + i) * len(lanes) + lane] = said[20 + i]
-    for i in range(4):
-        work[(QUATERNION + i) * len(lanes) + lane] = said[7 + i]
-    work[START * len(lanes) + lane] = said[0]
-    work[GROUND_SEEN * len(lanes) + lane] = said[23]
-    work[(STATE + GROUND) * len(lanes) + lane] = said[24]
+# the rows that simulator and tape read what a filter says from, field by field
+SAID_ROWS = (
+    START,
+    *range(STATE + POSITION, STATE + POSITION + 3),
+    *range(STATE + VELOCITY, STATE + VELOCITY + 3),
+    *range(QUATERNION, QUATERNION + 4),
+    *(place(POSITION + axis, POSITION + axis) for axis in range(3)),
+    *(place(VELOCITY + axis, VELOCITY + axis) for axis in range(3)),
+    *range(STATE + GYRO_BIAS, STATE + GYRO_BIAS + 3),
+    *range(STATE + ACCEL_BIAS, STATE + ACCEL_BIAS + 3),
+    GROUND_SEEN,
+    STATE + GROUND,
+)
+_, put_said = lane_access(Said, SAID_ROWS)
 
 
 class EquationFilter:
@@ -109,8 +94,8 @@ class EquationFilter:
     def __init__(
         self, name: str, memory: Any, step: Callable[[Any, float, int, Row], Any], say: Callable[[Any], Said]
     ) -> None:
-        if len(memory) > ROOM:
-            raise InputError(f"filter {name}: its memory has {len(memory)} numbers; at most {ROOM} have room")
+        if len(memory) > OWN_ROWS:
+            raise InputError(f"filter {name}: its memory has {len(memory)} numbers; at most {OWN_ROWS} have room")
         self.name, self.memory, self.step, self.say = name, memory, step, say
         self._now, self._row = memory, Row(*([NAN] * len(Row._fields)))
 
@@ -118,7 +103,7 @@ class EquationFilter:
     def unit_source(self) -> Callable[..., None]:
         """The function that is compiled: `navigation.take.UNIT_SIGNATURE` and lanes."""
         step, say, initial = self.step, self.say, self.memory
-        load, store = lane_access(type(self.memory), FIRST)
+        load, store = lane_access(type(self.memory), OWN)
 
         def take_own(
             work: Work, p: Work, estimate: Work, innovation: Work, event: Work, entry: Work, state: Work,
@@ -217,8 +202,7 @@ class EquationVehicle:
                 x, u, around = load(work, lanes, lane), load_controls(work, lanes, lane), load_around(work, lanes, lane)
                 store(work, lanes, lane, step(rate, x, dt, u, around))
                 unit_attitude(work, lanes, lane)
-                out = seen(load(work, lanes, lane), u, around)
-                store_loads(work, lanes, lane, Loads(out.thrust_n, out.contact_force_n, out.power_w))
+                store_outputs(work, lanes, lane, seen(load(work, lanes, lane), u, around))
 
         return step_own
 
@@ -244,12 +228,22 @@ class EquationVehicle:
         return self.seen(type(self.state)(*state), controls, around)
 
 
+class Turned(NamedTuple):
+    """An attitude, body to earth."""
+
+    qw: float
+    qx: float
+    qy: float
+    qz: float
+
+
+_, store_outputs = lane_access(Outputs, (layout.THRUST, layout.CONTACT, layout.POWER))
+load_attitude, store_attitude = lane_access(Turned, layout.HELICOPTER + 6)
+
+
 @equation
 def unit_attitude(work: Work, lanes: Lanes, lane: int) -> None:
     """The quaternion brought back to unit length."""
-    row = layout.HELICOPTER + 6
-    w, x = work[row * len(lanes) + lane], work[(row + 1) * len(lanes) + lane]
-    y, z = work[(row + 2) * len(lanes) + lane], work[(row + 3) * len(lanes) + lane]
-    unit = of_unit_length((w, x, y, z))
-    for i in range(4):
-        work[(row + i) * len(lanes) + lane] = unit[i]
+    q = load_attitude(work, lanes, lane)
+    w, x, y, z = of_unit_length((q.qw, q.qx, q.qy, q.qz))
+    store_attitude(work, lanes, lane, Turned(w, x, y, z))

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -18,8 +19,9 @@ from flownav.frames import rotation_from_quaternion
 from flownav.measurement import COLUMNS, MAX_VALUES, Array, Sensor
 from flownav.navigation.memory import CLOCK, GROUND_SEEN, PAD_KNOWN, READING, START
 from flownav.navigation.place import SEEN
+from flownav.navigation.rows import EXTRA_STATES, EstimateRow, InnovationRow
 from flownav.navigation.take import UNIT_SIGNATURE
-from flownav.navigation.tape import ESTIMATE_COLUMNS, ESTIMATE_PERIOD_S, ESTIMATES, LEVELS_AT, OFFERED_ROWS, Tape
+from flownav.navigation.tape import ESTIMATE_PERIOD_S, ESTIMATES, OFFERED_ROWS, Tape
 from flownav.parts.calling import Called, Mistakes, name_of
 from flownav.parts.protocols import Estimate, Filter, Imu, Innovation, Reading, Told
 
@@ -98,15 +100,22 @@ class Taker:
         used, room = self.tape.used, len(self.tape.estimate)
         if used[ESTIMATES] >= room:
             return
-        row = np.full(ESTIMATE_COLUMNS, np.nan)
         rotation = np.reshape(rotation_from_quaternion(*numbers["quaternion"]), (3, 3))
-        row[0], row[1:4], row[4:7] = t_s, numbers["pos_ned_m"], rotation.T @ numbers["vel_ned_m_s"]
-        row[7:11], row[11:14] = numbers["quaternion"], numbers["std_pos_ned_m"]
-        row[14:17] = np.sqrt((rotation.T**2) @ numbers["std_vel_ned_m_s"] ** 2)
-        row[17:20] = numbers["vel_ned_m_s"]
-        row[23:29] = np.concatenate([numbers["gyro_bias_rad_s"], numbers["accel_bias_m_s2"]])
-        row[LEVELS_AT:] = np.nan
-        self.tape.estimate[used[ESTIMATES], :, 0] = row
+        biases = numbers["gyro_bias_rad_s"], numbers["accel_bias_m_s2"]
+        row: EstimateRow[Any] = EstimateRow(
+            t_s=t_s,
+            pos_ned_m=numbers["pos_ned_m"],
+            vel_frd_m_s=rotation.T @ numbers["vel_ned_m_s"],
+            quaternion=numbers["quaternion"],
+            std_pos_ned_m=numbers["std_pos_ned_m"],
+            std_vel_frd_m_s=np.sqrt((rotation.T**2) @ numbers["std_vel_ned_m_s"] ** 2),
+            vel_ned_m_s=numbers["vel_ned_m_s"],
+            std_tilt_ned_rad=np.full(3, np.nan),
+            states=np.concatenate([*biases, np.full(len(EXTRA_STATES) - 6, np.nan)]),
+            std_states=np.full(len(EXTRA_STATES), np.nan),
+            protection_m=np.full(2, np.nan),
+        )
+        self.tape.estimate[used[ESTIMATES], :, 0] = np.hstack(row)
         used[ESTIMATES] += 1
 
     def _offer(self, t_s: float, sensor: Sensor, news: Iterable[Innovation]) -> None:
@@ -118,7 +127,7 @@ class Taker:
                 return
             ratio = each.innovation**2 / (25.0 * each.variance) if each.variance > 0.0 else math.nan
             reason = Reason.FUSED if each.fused else Reason.INNOVATION_GATE
-            self.tape.innovation[used[OFFERED_ROWS], :, 0] = (
+            self.tape.innovation[used[OFFERED_ROWS], :, 0] = InnovationRow(
                 t_s, sensor, each.component, each.observation, each.observation_variance, each.innovation,
                 each.variance, ratio, reason,
             )  # fmt: skip

@@ -30,9 +30,9 @@ def with_attitude(log: Log, axes: Array | None = None) -> tuple[Log, str]:
             f"{log.path}: neither attitude nor IMU; one of them turns the reference into the sensor's axes"
         )
     options = ReplayOptions() if axes is None else ReplayOptions(identified=turned_sensor(log, axes))
-    found = replay(log, options, NavigatorSettingsFile()).estimate
-    known = np.isfinite(found[:, 7:11]).all(axis=1)
-    attitude = Stream.of(Sensor.ATTITUDE, found[known, 0], found[known, 7:11])
+    found = replay(log, options, NavigatorSettingsFile()).said
+    known = np.isfinite(found.quaternion).all(axis=1)
+    attitude = Stream.of(Sensor.ATTITUDE, found.t_s[known], found.quaternion[known])
     return replace(log, streams={**log.streams, Sensor.ATTITUDE: attitude}), FOUND
 
 

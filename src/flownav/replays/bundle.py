@@ -11,7 +11,7 @@ import numpy as np
 from flownav.estimation.gating import Reason
 from flownav.frames import rotation_from_quaternion
 from flownav.logs.rates import attitude_at
-from flownav.measurement import COLUMNS, Array, Sensor, Stream
+from flownav.measurement import COLUMNS, Array, Sensor
 from flownav.navigation.flags import flagged, flags_of
 from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
 from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
@@ -35,7 +35,7 @@ DOWN = "pos_d_m"
 def to_record(replay: Replay, scores: dict[str, Any], command: list[str] | str) -> Record:
     """The record of a replay. `scores` go into its manifest; `command` is what the user typed or called."""
     record = Record(_manifest(replay, scores, command))
-    estimate = replay.estimate
+    estimate, said = replay.estimate, replay.said
     record.add("estimate", estimate_table(estimate))
     record.add("states", states_table(estimate))
     if replay.smoothed is not None:
@@ -49,9 +49,9 @@ def to_record(replay: Replay, scores: dict[str, Any], command: list[str] | str) 
         record.add("truth", _truth(replay))
     for name, table in _references(replay).items():
         record.add(name, table)
-    warned = flagged(estimate[:, 0], flags_of(replay.written.event))
-    record.add("judging", {"t_s": estimate[:, 0], "flagged": warned.astype(float)})
-    own = autopilot_path(replay.log, replay.options.gps_delay_s, estimate[:, 0], estimate[:, 1:4])
+    warned = flagged(said.t_s, flags_of(replay.written.event))
+    record.add("judging", {"t_s": said.t_s, "flagged": warned.astype(float)})
+    own = autopilot_path(replay.log, replay.options.gps_delay_s, said.t_s, said.pos_ned_m)
     if own is not None:
         record.add("autopilot", own)
     record.add("innovation", innovation_table(replay.innovation))
@@ -124,8 +124,7 @@ def _truth(replay: Replay) -> dict[str, Array]:
     assert truth is not None
     position = placed.moved(replay.truth_position)
     velocity = placed.turned(velocity_of(truth["t_s"], replay.truth_position))
-    own = Stream.of(Sensor.ATTITUDE, replay.estimate[:, 0], replay.estimate[:, 7:11])
-    rotation = rotation_from_quaternion(*attitude_at(own, truth["t_s"]).T)
+    rotation = rotation_from_quaternion(*attitude_at(replay.attitude, truth["t_s"]).T)
     body = {
         name: sum(rotation[3 * row + column] * velocity[:, row] for row in range(3))
         for column, name in enumerate(VELOCITY_BODY)
@@ -152,8 +151,8 @@ def _events(replay: Replay) -> dict[str, Any]:
 
 def _losses(replay: Replay, sensor: Sensor) -> list[tuple[float, str, str, str, float]]:
     """When nothing of a sensor was fused for long: lost, with how long, and back."""
-    rows = replay.innovation
-    t_s = rows[(rows[:, 1] == sensor) & (rows[:, 8] == Reason.FUSED), 0]
+    offered = replay.offered
+    t_s = offered.t_s[(offered.sensor == sensor) & (offered.reason == Reason.FUSED)]
     events = []
     for row in np.flatnonzero(np.diff(t_s) > LOST_AFTER_S):
         length = float(t_s[row + 1] - t_s[row])

@@ -13,8 +13,8 @@ from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.flags import flagged, flags_of
+from flownav.navigation.rows import EstimateRow, InnovationRow
 from flownav.navigation.tables import Written, estimate_table
-from flownav.navigation.tape import LEVELS_AT
 from flownav.replays.airborne import airborne_of
 from flownav.scoring.consistency import consistency_of
 from flownav.scoring.coverage import coverage_of
@@ -29,12 +29,13 @@ MAY_BE_LEFT_OUT = ((Sensor.GPS_VELOCITY, 2), (Sensor.FLOW_VELOCITY, 2), (Sensor.
 
 
 def consistency_scores(innovation: Array) -> dict[str, dict[str, Any]]:
-    """By sensor, of the components that were held against their prediction; innovation (m, tape.OFFERS)."""
-    tested = innovation[np.isin(innovation[:, 8], TESTED)]
+    """By sensor, of the components that were held against their prediction; innovation: rows of a tape's."""
+    offered = InnovationRow.of(innovation)
+    tested = np.isin(offered.reason, TESTED)
     found = {}
     for sensor in Sensor:
-        _, _, component, _, _, news, variance, _, _ = tested[tested[:, 1] == sensor].T
-        judged = consistency_of(component, news, variance)
+        rows = InnovationRow.of(innovation[tested & (offered.sensor == sensor)])
+        judged = consistency_of(rows.component, rows.innovation, rows.innovation_variance)
         if judged is not None:
             found[sensor.name.lower()] = judged._asdict()
     return found
@@ -45,18 +46,19 @@ def told(innovation: Array) -> Array:
 
     A component is left out where it is NaN and another of the same reading is not.
     """
-    t_s, observed = innovation[:, 0], innovation[:, 3]
+    offered = InnovationRow.of(innovation)
+    silent = np.isnan(offered.observation)
     kept = np.ones(len(innovation), bool)
     for sensor, component in MAY_BE_LEFT_OUT:
-        of_sensor = innovation[:, 1] == sensor
-        beside = np.isin(t_s, t_s[of_sensor & np.isfinite(observed)])
-        left_out = (innovation[:, 2] == component) & np.isnan(observed) & (innovation[:, 8] == Reason.NOT_FINITE)
+        of_sensor = offered.sensor == sensor
+        beside = np.isin(offered.t_s, offered.t_s[of_sensor & np.isfinite(offered.observation)])
+        left_out = (offered.component == component) & silent & (offered.reason == Reason.NOT_FINITE)
         kept &= ~(of_sensor & beside & left_out)
     return np.asarray(innovation[kept])
 
 
 def reading_scores(innovation: Array, streams: Mapping[Sensor, Stream]) -> dict[str, dict[str, Any]]:
-    """By sensor, what became of whole readings, where `rejected` counts components; innovation (m, tape.OFFERS).
+    """By sensor, what became of whole readings, where `rejected` counts components; innovation: rows of a tape's.
 
     offered to the filter; fused: with every component, or with some of them (in_part); rejected: readings that lost
     one component or more, by reason, with the rows that the reader threw away.
@@ -64,8 +66,8 @@ def reading_scores(innovation: Array, streams: Mapping[Sensor, Stream]) -> dict[
     found = {}
     innovation = told(innovation)
     for sensor, stream in streams.items():
-        offers = innovation[innovation[:, 1] == sensor]
-        reading, reason = _readings(offers), offers[:, 8].astype(int)
+        offers = InnovationRow.of(innovation[InnovationRow.of(innovation).sensor == sensor])
+        reading, reason = _readings(offers), offers.reason.astype(int)
         count = int(reading[-1]) + 1 if len(reading) else 0
         components = np.bincount(reading, minlength=count)
         fused = np.bincount(reading, weights=reason == Reason.FUSED, minlength=count)
@@ -81,11 +83,11 @@ def reading_scores(innovation: Array, streams: Mapping[Sensor, Stream]) -> dict[
     return found
 
 
-def _readings(offers: Array) -> NDArray[np.int_]:
+def _readings(offers: InnovationRow[Array]) -> NDArray[np.int_]:
     """The number of the reading that each component of one sensor belongs to: components of one count up."""
-    if not len(offers):
+    if not len(offers.t_s):
         return np.zeros(0, int)
-    begins = (np.diff(offers[:, 0]) != 0.0) | (np.diff(offers[:, 2]) <= 0.0)
+    begins = (np.diff(offers.t_s) != 0.0) | (np.diff(offers.component) <= 0.0)
     return np.concatenate([[0], np.cumsum(begins)]).astype(int)
 
 
@@ -102,4 +104,5 @@ def protection_scores(log: Log, written: Written) -> dict[str, Any] | None:
         if log.truth is None
         else drift_of(motion_of(estimate_table(rows)), truth_motion(log.truth, log.heading_truth), airborne_of(log))
     )
-    return protection_of(rows[:, 0], rows[:, LEVELS_AT:], flagged(rows[:, 0], flags_of(written.event)), drift)
+    said = EstimateRow.of(rows)
+    return protection_of(said.t_s, said.protection_m, flagged(said.t_s, flags_of(written.event)), drift)

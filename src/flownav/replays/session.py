@@ -18,6 +18,7 @@ from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.feed import SLOWEST_IMU_HZ, equipment_of
 from flownav.navigation.loop import Instead, run, start_navigator
+from flownav.navigation.rows import EstimateRow, InnovationRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import smooth
 from flownav.navigation.tables import Written, estimate_table, written_on
@@ -71,20 +72,34 @@ class Replay:
 
     @property
     def estimate(self) -> Array:
-        """The navigator's estimates (n, ESTIMATE_COLUMNS)."""
+        """The navigator's estimates: rows of `navigation.rows.EstimateRow`."""
         return self.written.estimate
 
     @property
     def innovation(self) -> Array:
-        """What became of each component (m, OFFERS)."""
+        """What became of each component: rows of `navigation.rows.InnovationRow`."""
         return self.written.innovation
+
+    @property
+    def said(self) -> EstimateRow[Array]:
+        """The columns of the estimates."""
+        return EstimateRow.of(self.estimate)
+
+    @property
+    def offered(self) -> InnovationRow[Array]:
+        """The columns of what became of each component."""
+        return InnovationRow.of(self.innovation)
+
+    @cached_property
+    def attitude(self) -> Stream:
+        """The estimated attitude."""
+        return Stream.of(Sensor.ATTITUDE, self.said.t_s, self.said.quaternion)
 
     @cached_property
     def findings(self) -> list[Finding]:
         """What is wrong with the log, as far as its sensors show, and whether anything was fused at all."""
-        fused = self.innovation[self.innovation[:, 8] == Reason.FUSED, 1]
-        own = Stream.of(Sensor.ATTITUDE, self.estimate[:, 0], self.estimate[:, 7:11])
-        found = findings({Sensor.ATTITUDE: own, **self.prepared.streams}, self.options.gps_outages_s)
+        fused = self.offered.sensor[self.offered.reason == Reason.FUSED]
+        found = findings({Sensor.ATTITUDE: self.attitude, **self.prepared.streams}, self.options.gps_outages_s)
         if not np.isin(fused, HORIZONTAL).any():
             what = "horizontal was fused" if len(fused) else "was fused"
             text = f"nothing {what}: the path is dead reckoning on attitude and accelerometer alone"
@@ -123,8 +138,8 @@ class Replay:
     def rejected(self) -> dict[str, dict[str, int]]:
         """What was not fused, by sensor and reason: rows by the reader, components by the filter, added up."""
         counts = {}
-        offered = told(self.innovation)
-        sensors, reasons = offered[:, 1].astype(int), offered[:, 8].astype(int)
+        offered = InnovationRow.of(told(self.innovation))
+        sensors, reasons = offered.sensor.astype(int), offered.reason.astype(int)
         for sensor, stream in self.log.streams.items():
             numbers = np.bincount(reasons[sensors == sensor], minlength=len(Reason))
             found = {r.label: int(numbers[r]) for r in Reason if numbers[r] and r not in NO_REJECTION}

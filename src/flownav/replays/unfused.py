@@ -9,6 +9,7 @@ import numpy as np
 
 from flownav.estimation.gating import Reason
 from flownav.measurement import Array, Sensor, Stream
+from flownav.navigation.rows import InnovationRow
 from flownav.navigation.serving import HORIZONTAL, REFUSALS
 from flownav.replays.sentinel import Finding
 
@@ -18,14 +19,14 @@ LATE = Reason.LATE.label  # what a live session's horizon left out never came to
 
 
 def unfused(innovation: Array, streams: Mapping[Sensor, Stream]) -> list[Finding]:
-    """One finding for each; innovation (m, tape.OFFERS). Readings that were cut or know nothing do not count."""
-    found = []
+    """One finding for each; innovation: rows of a tape's. Readings that were cut or know nothing do not count."""
+    found, offered = [], InnovationRow.of(innovation)
     for sensor in HORIZONTAL:
-        rows = innovation[(innovation[:, 1] == sensor) & (innovation[:, 2] < 2)]
+        rows = InnovationRow.of(innovation[(offered.sensor == sensor) & (offered.component < 2)])
         if sensor not in streams:
             continue
-        fused = len(np.unique(rows[rows[:, 8] == Reason.FUSED, 0]))
-        first = rows[(rows[:, 2] == 0) & np.isin(rows[:, 8], REFUSALS), 8].astype(int)
+        fused = len(np.unique(rows.t_s[rows.reason == Reason.FUSED]))
+        first = rows.reason[(rows.component == 0) & np.isin(rows.reason, REFUSALS)].astype(int)
         why = Counter(Reason(reason).label for reason in first.tolist())
         why[LATE] += streams[sensor].rejected.get(LATE, 0)
         if why.total() >= LEAST_READINGS and fused < LEAST_SHARE * (fused + why.total()):

@@ -8,12 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.compile import kernel
-from flownav.optics.block_matching import fits, match, matching_of, workspace
+from flownav.optics.block_matching import Matching, Workspace, fits, match, matching_of, workspace
 from flownav.optics.camera import Camera, Exposure, effective_focal_px
 from flownav.optics.firmware import Firmware
 from flownav.optics.pad import Pad
 from flownav.optics.projection import pose_looking_down
-from flownav.optics.render import digitise, noise_bank, seen, stripe_harmonics, stripe_row, take_raster_frame
+from flownav.optics.render import (
+    Chip,
+    Raster,
+    digitise,
+    noise_bank,
+    seen,
+    stripe_harmonics,
+    stripe_row,
+    take_raster_frame,
+)
 from flownav.rig.pendulum import sensor_pose
 
 Array = NDArray[np.float64]
@@ -28,11 +37,43 @@ class Rod(NamedTuple):
     x0_m: float
 
 
+class Swing(NamedTuple):
+    """A rod's angles as each frame's exposure opens and closes (n,), and the camera's focal length."""
+
+    opened_rad: Array
+    closed_rad: Array
+    rod: Rod
+    focal_px: float
+
+
+class Stripes(NamedTuple):
+    """A pad of stripes: their period, and the harmonics of its brightness."""
+
+    pitch_m: float
+    harmonics: Array
+
+
+class Matcher(NamedTuple):
+    """The firmware's search: its settings and its scratch, with the two frames that it holds against each other."""
+
+    settings: Matching
+    work: Workspace
+    frames: NDArray[np.uint8]
+
+
+class Film(NamedTuple):
+    """What comes of it: flow (n-1, 2) and quality (n-1)."""
+
+    flow_px: Array
+    quality: NDArray[np.int64]
+
+
 @kernel
-def film_of_stripes(  # type: ignore[no-untyped-def]
-    opened_rad, closed_rad, rod, focal_px, pitch_m, harmonics, exposure, bank, settings, work, frames, flow_px, quality
-):
-    """Flow (n-1, 2) and quality (n-1) of frames exposed from angle `opened_rad[k]` to `closed_rad[k]`."""
+def film_of_stripes(swing: Swing, stripes: Stripes, chip: Chip, matcher: Matcher, film: Film) -> None:
+    """Flow and quality of frames over stripes."""
+    opened_rad, closed_rad, rod, focal_px = swing
+    pitch_m, harmonics = stripes
+    settings, work, frames = matcher
     size = frames.shape[1]
     row, image = np.empty(size), np.empty((size, size), np.float32)
     for k in range(len(opened_rad)):
@@ -44,26 +85,26 @@ def film_of_stripes(  # type: ignore[no-untyped-def]
         for i in range(size):
             for j in range(size):
                 image[i, j] = np.float32(row[j] if rod.along_x else row[i])
-        digitise(image, exposure, bank, k, frames[k % 2])
+        digitise(image, chip.exposure, chip.bank, k, frames[k % 2])
         if k > 0:
             x, y, good = match(frames[(k - 1) % 2].ravel(), frames[k % 2].ravel(), size, settings, work)
-            flow_px[k - 1, 0], flow_px[k - 1, 1], quality[k - 1] = x, y, good
+            film.flow_px[k - 1, 0], film.flow_px[k - 1, 1], film.quality[k - 1] = x, y, good
 
 
 @kernel
-def film_of_raster(  # type: ignore[no-untyped-def]
-    opened_rad, closed_rad, rod, focal_px, raster, texel_m, exposure, bank, settings, work, frames, flow_px, quality
-):
-    """The same over a pad that is a raster, blurred beforehand as it is seen from the height at rest."""
+def film_of_raster(swing: Swing, raster: Raster, chip: Chip, matcher: Matcher, film: Film) -> None:
+    """Flow and quality of frames over a raster, blurred beforehand as it is seen from the height at rest."""
+    opened_rad, closed_rad, rod, focal_px = swing
+    settings, work, frames = matcher
     size = frames.shape[1]
     image = np.empty((size, size), np.float32)
     for k in range(len(opened_rad)):
         first = sensor_pose(opened_rad[k], rod.length_m, rod.height_m, rod.along_x, rod.x0_m)
         last = sensor_pose(closed_rad[k], rod.length_m, rod.height_m, rod.along_x, rod.x0_m)
-        take_raster_frame(raster, texel_m, first, last, focal_px, exposure, bank, k, image, frames[k % 2])
+        take_raster_frame(raster, first, last, focal_px, chip, k, image, frames[k % 2])
         if k > 0:
             x, y, good = match(frames[(k - 1) % 2].ravel(), frames[k % 2].ravel(), size, settings, work)
-            flow_px[k - 1, 0], flow_px[k - 1, 1], quality[k - 1] = x, y, good
+            film.flow_px[k - 1, 0], film.flow_px[k - 1, 1], film.quality[k - 1] = x, y, good
 
 
 def film_swing(
@@ -81,13 +122,14 @@ def film_swing(
     if camera.height_px != size or not fits(size, size, firmware):
         raise ValueError(f"a square frame that firmware {firmware.name} can search is needed, not {size} px")
     frames = np.zeros((2, size, size), np.uint8)
-    flow, quality = np.zeros((len(opened_rad) - 1, 2)), np.zeros(len(opened_rad) - 1, np.int64)
-    rest = (exposure, noise_bank(seed, size), matching_of(firmware), workspace(size, size, firmware))
-    ways = (opened_rad, closed_rad, rod, effective_focal_px(camera))
+    film = Film(np.zeros((len(opened_rad) - 1, 2)), np.zeros(len(opened_rad) - 1, np.int64))
+    swing = Swing(opened_rad, closed_rad, rod, effective_focal_px(camera))
+    chip = Chip(exposure, noise_bank(seed, size))
+    matcher = Matcher(matching_of(firmware), workspace(size, size, firmware), frames)
     if pad.stripe_pitch_m > 0.0:
         harmonics = stripe_harmonics(pad.stripe_pitch_m, camera, rod.height_m)
-        film_of_stripes(*ways, pad.stripe_pitch_m, harmonics, *rest, frames, flow, quality)
+        film_of_stripes(swing, Stripes(pad.stripe_pitch_m, harmonics), chip, matcher, film)
     else:
         view = pose_looking_down(height_m=rod.height_m, yaw_rad=0.0 if rod.along_x else -0.5 * np.pi)
-        film_of_raster(*ways, seen(pad, camera, view), pad.texel_m, *rest, frames, flow, quality)
-    return flow, quality
+        film_of_raster(swing, Raster(seen(pad, camera, view), pad.texel_m), chip, matcher, film)
+    return film.flow_px, film.quality

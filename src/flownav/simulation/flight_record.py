@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.measurement import COLUMNS, MAX_VALUES, Sensor
-from flownav.navigation.loop import STATED
+from flownav.measurement import COLUMNS, Sensor
+from flownav.navigation.records import Reading
 from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
 from flownav.provenance import command_line, provenance
 from flownav.record import FED, POSITION_NED, PROTECTION_LEVELS, QUATERNION, TABLES, VELOCITY_BODY, Record, Table
@@ -133,17 +133,12 @@ def fed_rows(setup: Setup, flown: Flown, lane: int) -> Array:
     schedule = setup.fitted.schedule
     taken = int(np.searchsorted(schedule.epoch, setup.flight.plan.epochs))
     rows = np.full((taken, len(FED)), np.nan)
-    fed = flown.fed[:taken, :, lane]
     columns = {
+        **dict(zip(Reading._fields, flown.fed[:taken, :, lane].T, strict=True)),
         "t_s": schedule.t_s[:taken],
         "arrival_s": schedule.t_s[:taken] + setup.fitted.ages_s[schedule.sensor[:taken]],
         "sensor": schedule.sensor[:taken].astype(float),
-        "quality": fed[:, MAX_VALUES + STATED],
-        "arrived": fed[:, MAX_VALUES + STATED + 1],
-        "withheld": fed[:, MAX_VALUES + STATED + 2],
         "segment": np.zeros(taken),
-        **{f"value_{i}": fed[:, i] for i in range(MAX_VALUES)},
-        **{f"variance_{i}": fed[:, MAX_VALUES + i] for i in range(STATED)},
     }
     for name, column in columns.items():
         rows[:, FED.index(name)] = column

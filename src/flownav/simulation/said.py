@@ -9,7 +9,7 @@ from flownav.estimation.covariance import covariance_of, variance_of
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import GROUND, PAD, POSITION, QUATERNION, STATE
 from flownav.navigation.memory import MEMORY, PAD_KNOWN
-from flownav.navigation.tape import body_velocity_variance
+from flownav.navigation.rows import body_velocity_variance
 from flownav.navigation.verdicts import Position, Velocity
 from flownav.simulation.layout import PLANT
 

@@ -11,11 +11,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.compare.like_for_like import Window
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
+from flownav.navigation.rows import InnovationRow
 from flownav.replays.judged import TESTED
 from flownav.replays.prepare import FLOW, ReplayOptions
 from flownav.replays.session import Replay
@@ -109,12 +111,14 @@ def _tempered(gain: Array) -> Array:
 def densities(innovation: Array, windows: Sequence[Window]) -> tuple[Array, Array]:
     """Mean log density by window and sensor (w, SENSORS), NaN without a reading, and how many readings (w, SENSORS).
 
-    innovation (m, tape.OFFERS). Readings that were fused or gated are summed over STRETCH_S first: where the filter's
+    innovation: rows of a tape's. Readings that were fused or gated are summed over STRETCH_S first: where the filter's
     model holds, innovations are white and their sum has the sum of their variances; an error that lasts is seen for
     what it is, and a noise that was stated large because its error lasts is not called pessimistic. A reading that was
     withheld is predicted over the whole cut, and counts by itself.
     """
-    t_s, sensor, component, _, _, news, variance, _, reason = innovation.T
+    offered = InnovationRow.of(innovation)
+    t_s, sensor, component, reason = offered.t_s, offered.sensor, offered.component, offered.reason
+    news, variance = offered.innovation, offered.innovation_variance
     window = _window_of(t_s, windows)
     known = (window >= 0) & np.isfinite(news) & (variance > 0.0) & ~np.isin(sensor, UNSCORED)
     tested, withheld = known & np.isin(reason, TESTED), known & (reason == Reason.OUTAGE)
@@ -140,7 +144,7 @@ def densities(innovation: Array, windows: Sequence[Window]) -> tuple[Array, Arra
         return (total + alone) / (cells + single), count.reshape(shape).sum(axis=(1, 3)) + single
 
 
-def _window_of(t_s: Array, windows: Sequence[Window]) -> Array:
+def _window_of(t_s: Array, windows: Sequence[Window]) -> NDArray[np.int_]:
     """The number of the window in which each instant (n,) lies, -1 outside all; windows in order of time."""
     starts, ends = np.array([w[0] for w in windows]), np.array([w[1] for w in windows])
     number = np.searchsorted(starts, t_s, side="right") - 1
@@ -172,9 +176,10 @@ def path_errors(flown: Replay, windows: Sequence[Window]) -> tuple[Array, float]
 
 def _flow_errors(innovation: Array, windows: Sequence[Window]) -> Array:
     """Of flow that was withheld, its difference from what was expected of it [rad/s]."""
-    t_s, sensor, news, reason = innovation[:, [0, 1, 5, 8]].T
-    cut = np.isin(sensor, FLOW) & (reason == Reason.OUTAGE) & np.isfinite(news)
-    window = np.where(cut, _window_of(t_s, windows), -1)
+    offered = InnovationRow.of(innovation)
+    news = offered.innovation
+    cut = np.isin(offered.sensor, FLOW) & (offered.reason == Reason.OUTAGE) & np.isfinite(news)
+    window = np.where(cut, _window_of(offered.t_s, windows), -1)
     chosen = window >= 0
     squares = np.bincount(window[chosen], news[chosen] ** 2, len(windows))
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -188,9 +193,9 @@ def _truth_errors(flown: Replay, windows: Sequence[Window]) -> Array:
         return np.full(len(windows), np.nan)
     t_s, position = np.asarray(truth["t_s"], float), flown.truth_position
     moving = placed.turned(velocity_of(t_s, position))[:, :2]
-    found = []
+    found, said = [], flown.said
     for t0, t1 in windows:
         inside = (t_s >= t0) & (t_s < t1) & np.isfinite(moving).all(axis=1)
-        error = difference_at(flown.estimate[:, 0], flown.estimate[:, 17:19], t_s[inside], moving[inside])
+        error = difference_at(said.t_s, said.vel_ned_m_s[:, :2], t_s[inside], moving[inside])
         found.append(np.sqrt(np.mean(np.sum(error**2, axis=1))) if len(error) else np.nan)
     return np.array(found)

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import butter, sosfiltfilt, welch
-from scipy.spatial.transform import Rotation
 
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
+from flownav.navigation.rows import EstimateRow, EventRow, InnovationRow
 from flownav.navigation.tape import EVENT_NAMES
 from flownav.replays.judged import TESTED
 from flownav.replays.session import Replay
 from flownav.scoring.consistency import consistency_of, lag_one
-from flownav.validation.path import ground_of
+from flownav.validation.path import DOWN, ground_of, rotation_of
 from flownav.validation.rates import rate_hz
 
 AIRBORNE_M = 0.5  # of the range sensor over the ground
@@ -39,20 +39,25 @@ GYRO, ACCEL = slice(0, 3), slice(3, 6)
 class Smoothed:
     """A replay's smoothed estimate at given times."""
 
-    rows: Array
+    rows: Array  # of `navigation.rows.EstimateRow`
+
+    @property
+    def said(self) -> EstimateRow[Array]:
+        """The columns."""
+        return EstimateRow.of(self.rows)
 
     def velocity_frd(self, t_s: Array) -> Array:
         """(n, 3) body velocity [m/s]."""
-        return np.column_stack([np.interp(t_s, self.rows[:, 0], column) for column in self.rows[:, 4:7].T])
+        return np.column_stack([np.interp(t_s, self.said.t_s, column) for column in self.said.vel_frd_m_s.T])
 
     def height_m(self, t_s: Array) -> Array:
         """Over the ground [m]."""
-        return np.asarray(np.interp(t_s, self.rows[:, 0], ground_of(self.rows) - self.rows[:, 3]))
+        return np.asarray(np.interp(t_s, self.said.t_s, ground_of(self.rows) - self.said.pos_ned_m[:, DOWN]))
 
     def tilt_cosine(self, t_s: Array) -> Array:
         """Of the angle between body z and the vertical."""
-        quaternion = self.rows[:, [8, 9, 10, 7]]
-        return np.asarray(np.interp(t_s, self.rows[:, 0], Rotation.from_quat(quaternion).as_matrix()[:, 2, 2]))
+        rotation = rotation_of(self.said).as_matrix()
+        return np.asarray(np.interp(t_s, self.said.t_s, rotation[:, DOWN, DOWN]))
 
 
 class FlowFit(NamedTuple):
@@ -80,10 +85,11 @@ def figures_of(flown: Replay) -> dict[str, float]:
 
 def innovation_figures(flown: Replay) -> dict[str, float]:
     """By sensor: NIS a degree of freedom, whether white (1 or 0), lag-one correlation, share of slow power."""
-    rows = flown.innovation[np.isin(flown.innovation[:, 8], TESTED)]
+    tested = np.isin(flown.offered.reason, TESTED)
     found: dict[str, float] = {}
     for sensor in flown.log.streams:
-        _, _, component, _, _, news, variance, _, _ = rows[rows[:, 1] == sensor].T
+        rows = InnovationRow.of(flown.innovation[tested & (flown.offered.sensor == sensor)])
+        component, news, variance = rows.component, rows.innovation, rows.innovation_variance
         judged = consistency_of(component, news, variance)
         if judged is None:
             continue
@@ -106,7 +112,8 @@ def _mean(values: list[float]) -> float:
 
 def event_figures(flown: Replay) -> dict[str, float]:
     """How often the navigator called its heading refuted."""
-    kinds = [EVENT_NAMES[int(kind)][:2] for kind in flown.written.event[:, 1] if int(kind) < len(EVENT_NAMES)]
+    happened = EventRow.of(flown.written.event)
+    kinds = [EVENT_NAMES[int(kind)][:2] for kind in happened.kind if int(kind) < len(EVENT_NAMES)]
     return {"heading_refuted_times": float(kinds.count(("heading", "refuted")))}
 
 
@@ -186,7 +193,7 @@ def range_figures(log: Log, smoothed: Smoothed) -> dict[str, float]:
 
 def beyond_reach(t_s: Array, smoothed: Smoothed) -> dict[str, float]:
     """Readings a second where there is no echo to hear, of a flight that goes there for LEAST_HIGH_S."""
-    rows_s = smoothed.rows[:, 0]
+    rows_s = smoothed.said.t_s
     high = smoothed.height_m(rows_s) > BEYOND_M
     high_s = float(np.sum(np.diff(rows_s)[high[1:]]))
     if high_s < LEAST_HIGH_S:
@@ -202,7 +209,7 @@ def barometer_figures(log: Log, smoothed: Smoothed) -> dict[str, float]:
     stream = log.streams.get(Sensor.BARO)
     if stream is None:
         return {}
-    off_m = stream.value[:, 0] - np.interp(stream.t_s, smoothed.rows[:, 0], -smoothed.rows[:, 3])
+    off_m = stream.value[:, 0] - np.interp(stream.t_s, smoothed.said.t_s, -smoothed.said.pos_ned_m[:, DOWN])
     window = max(int(BAROMETER_S * rate_hz(stream)), 1)
     if len(off_m) <= 2 * window:
         return {}

@@ -24,6 +24,7 @@ from flownav.errors import InputError
 from flownav.frames import GRAVITY_M_S2
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
+from flownav.navigation.rows import EstimateRow
 from flownav.navigation.tables import states_table
 from flownav.replays.session import Replay
 from flownav.validation.flights import AssumedVehicle
@@ -35,6 +36,7 @@ LEAST_HEIGHT_M = 0.1  # of the lens, standing
 LIFTED_M = 0.5  # over the standing height, at which the vehicle leans on the wind in full
 MOST_DRAG_1_S = 2.0
 LEAST_FLIGHT_S = 30.0
+DOWN, SCALAR_LAST = 2, [1, 2, 3, 0]
 GRAVITY_NED = np.array([0.0, 0.0, GRAVITY_M_S2])
 
 
@@ -109,18 +111,19 @@ def path_of(flown: Replay, vehicle: AssumedVehicle) -> FlownPath:
     """The path of a smoothed replay. InputError where it is too short to be flown again."""
     if flown.smoothed is None:
         raise ValueError("a smoothed replay is needed")
-    rows = flown.smoothed[np.concatenate([np.diff(flown.smoothed[:, 0]) > 0.0, [True]])]
-    start, end = float(rows[0, 0]), float(rows[-1, 0])
+    rows = flown.smoothed[np.concatenate([np.diff(EstimateRow.of(flown.smoothed).t_s) > 0.0, [True]])]
+    said = EstimateRow.of(rows)
+    start, end = float(said.t_s[0]), float(said.t_s[-1])
     if end - start < LEAST_FLIGHT_S:
         raise InputError(
             f"{flown.log.path}: {end - start:.0f} s are too short; {LEAST_FLIGHT_S:g} s of flight are needed"
         )
-    ned = rows[:, 1:4].copy()
-    ned[:, 2] = np.minimum(ned[:, 2] - ground_of(rows), -LEAST_HEIGHT_M)
-    heading = np.unwrap(Rotation.from_quat(rows[:, [8, 9, 10, 7]]).as_euler("ZYX")[:, 0])
+    ned = said.pos_ned_m.copy()
+    ned[:, DOWN] = np.minimum(ned[:, DOWN] - ground_of(rows), -LEAST_HEIGHT_M)
+    heading = np.unwrap(rotation_of(said).as_euler("ZYX")[:, 0])
     grid_s = np.arange(start, end, 1.0 / GRID_HZ)
     sections = butter(4, vehicle.path_bandwidth_hz, fs=GRID_HZ, output="sos")
-    on_grid = np.column_stack([np.interp(grid_s, rows[:, 0], column) for column in (*ned.T, heading)])
+    on_grid = np.column_stack([np.interp(grid_s, said.t_s, column) for column in (*ned.T, heading)])
     smooth = sosfiltfilt(sections, on_grid, axis=0)[::KNOT_EVERY]
     knots_s = grid_s[::KNOT_EVERY]
     standing_m = float(-np.max(smooth[:, 2]))
@@ -133,13 +136,18 @@ def path_of(flown: Replay, vehicle: AssumedVehicle) -> FlownPath:
     )
 
 
+def rotation_of(said: EstimateRow[Array]) -> Rotation:
+    """The attitudes, body to earth."""
+    return Rotation.from_quat(said.quaternion[:, SCALAR_LAST])
+
+
 def ground_of(rows: Array) -> Array:
     """The ground's depth in the filter's frame [m], (n,); before it is found, where it was first found."""
     states = states_table(rows)
     ground = np.asarray(states["ground_d_m"], float)
     known = np.flatnonzero(np.asarray(states["std_ground_d_m"], float) > SETTLED_SIGMA_M)
     if not len(known):
-        return np.full_like(ground, np.max(rows[:, 3]) + LEAST_HEIGHT_M)
+        return np.full_like(ground, np.max(EstimateRow.of(rows).pos_ned_m[:, DOWN]) + LEAST_HEIGHT_M)
     return np.asarray(np.where(np.arange(len(ground)) < known[0], ground[known[0]], ground))
 
 
@@ -151,10 +159,11 @@ def lean_of(log: Log, rows: Array) -> Lean:
     imu = log.streams.get(Sensor.IMU)
     if imu is None:
         return Lean(0.0, 0.0, 0.0)
-    t_s = np.arange(rows[0, 0], rows[-1, 0], 0.2)
-    nearest = np.clip(np.searchsorted(rows[:, 0], t_s), 0, len(rows) - 1)
-    attitude = Rotation.from_quat(rows[nearest][:, [8, 9, 10, 7]])
-    velocity = attitude.inv().apply(rows[nearest, 17:20])
+    instants_s = EstimateRow.of(rows).t_s
+    t_s = np.arange(instants_s[0], instants_s[-1], 0.2)
+    said = EstimateRow.of(rows[np.clip(np.searchsorted(instants_s, t_s), 0, len(rows) - 1)])
+    attitude = rotation_of(said)
+    velocity = attitude.inv().apply(said.vel_ned_m_s)
     north, east = (attitude.inv().apply(axis) for axis in np.eye(3)[:2])
     summed = np.vstack([np.zeros(3), np.cumsum(imu.value[:, 3:6], axis=0)])
     first, last = np.searchsorted(imu.t_s, t_s - 0.1), np.searchsorted(imu.t_s, t_s + 0.1)

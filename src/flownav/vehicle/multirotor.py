@@ -35,18 +35,35 @@ class RotorLoads(NamedTuple):
 NO_LOADS = RotorLoads(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+class Rotor(NamedTuple):
+    """One rotor: speed; place forward and right of the centre of gravity; sense 1: it turns to the left; the ground
+    under it over the centre of gravity, normal to the ground's plane.
+    """
+
+    speed: float
+    x_m: float
+    y_m: float
+    sense: float
+    ground_m: float
+
+
+class RotorAir(NamedTuple):
+    """The air that all rotors have: its motion, and squares of its speed in the rotors' plane and level."""
+
+    motion: AirMotion
+    inplane_sq: float
+    horizontal_sq: float
+
+
 @equation
 def with_rotor(
-    loads: RotorLoads, speed: float, x_m: float, y_m: float, sense: float, inplane_sq: float, horizontal_sq: float,
-    ground_m: float, normal: Vector, air: AirMotion, vehicle: MultirotorParameters,
-) -> RotorLoads:  # fmt: skip
-    """The loads and one rotor's at a place; sense 1: it turns to the left. Each has its own air and its own ground.
-
-    ground_m: of the ground under this rotor over the centre of gravity, normal to the ground's plane.
-    """
-    axial = air.w + air.p * y_m - air.q * x_m
+    loads: RotorLoads, rotor: Rotor, air: RotorAir, normal: Vector, vehicle: MultirotorParameters
+) -> RotorLoads:
+    """The loads and one rotor's. Each has its own air and its own ground."""
+    speed, x_m, y_m, sense, ground_m = rotor
+    axial = air.motion.w + air.motion.p * y_m - air.motion.q * x_m
     height = vehicle.rotors_above_cg_m * normal[2] - ground_m - normal[0] * x_m - normal[1] * y_m
-    one = propeller_load(speed, inplane_sq, axial, horizontal_sq, height, vehicle)
+    one = propeller_load(speed, air.inplane_sq, axial, air.horizontal_sq, height, vehicle)
     return RotorLoads(
         loads.thrust_n + one.thrust_n,
         loads.drag_n_s_m + one.drag_n_s_m,
@@ -68,15 +85,15 @@ def rotor_loads(
     flat_sq = inplane_sq + air.w * air.w - sinking * sinking
     x, a, c = vehicle, around, around.cosine
     one, two, three, four = below_m + a.rotor_1_m, below_m + a.rotor_2_m, below_m + a.rotor_3_m, below_m + a.rotor_4_m
-    loads = NO_LOADS
-    loads = with_rotor(loads, speeds.one, x.x_1_m, x.y_1_m, 1.0, inplane_sq, flat_sq, c * one, normal, air, x)
-    loads = with_rotor(loads, speeds.two, x.x_2_m, x.y_2_m, -1.0, inplane_sq, flat_sq, c * two, normal, air, x)
-    loads = with_rotor(loads, speeds.three, x.x_3_m, x.y_3_m, 1.0, inplane_sq, flat_sq, c * three, normal, air, x)
-    loads = with_rotor(loads, speeds.four, x.x_4_m, x.y_4_m, -1.0, inplane_sq, flat_sq, c * four, normal, air, x)
+    loads, flow = NO_LOADS, RotorAir(air, inplane_sq, flat_sq)
+    loads = with_rotor(loads, Rotor(speeds.one, x.x_1_m, x.y_1_m, 1.0, c * one), flow, normal, x)
+    loads = with_rotor(loads, Rotor(speeds.two, x.x_2_m, x.y_2_m, -1.0, c * two), flow, normal, x)
+    loads = with_rotor(loads, Rotor(speeds.three, x.x_3_m, x.y_3_m, 1.0, c * three), flow, normal, x)
+    loads = with_rotor(loads, Rotor(speeds.four, x.x_4_m, x.y_4_m, -1.0, c * four), flow, normal, x)
     if hexa:
         five, six = below_m + a.rotor_5_m, below_m + a.rotor_6_m
-        loads = with_rotor(loads, speeds.five, x.x_5_m, x.y_5_m, 1.0, inplane_sq, flat_sq, c * five, normal, air, x)
-        loads = with_rotor(loads, speeds.six, x.x_6_m, x.y_6_m, -1.0, inplane_sq, flat_sq, c * six, normal, air, x)
+        loads = with_rotor(loads, Rotor(speeds.five, x.x_5_m, x.y_5_m, 1.0, c * five), flow, normal, x)
+        loads = with_rotor(loads, Rotor(speeds.six, x.x_6_m, x.y_6_m, -1.0, c * six), flow, normal, x)
     return loads
 
 

@@ -9,7 +9,8 @@ import numpy as np
 from flownav.compile import equation, larger
 from flownav.estimation.law import law
 from flownav.estimation.laws.geometry import LEAST_UPRIGHT, component
-from flownav.frames import Quaternion, Vector, conjugate, quaternion_product, rotation_from_quaternion
+from flownav.estimation.named import Attitude, InsError, ReadAttitude, rotation_by
+from flownav.frames import Quaternion, Vector, conjugate, quaternion_product
 
 
 @equation
@@ -30,20 +31,17 @@ class OnAttitude(NamedTuple):
 
 
 @law
-def attitude(
-    axis: int, ins_roll: float, ins_pitch: float, ins_heading: float, qw: float, qx: float, qy: float, qz: float,
-    measured_0: float, measured_1: float, measured_2: float, measured_3: float,
-) -> tuple[float, OnAttitude]:  # fmt: skip
+def attitude(axis: int, ins: InsError, q: Attitude, read: ReadAttitude) -> tuple[float, OnAttitude]:
     """An external attitude's rotation from the filter's, about one earth axis [rad].
 
     q_read q^-1 = theta + R (e_roll, e_pitch, 0) + (0, 0, e_heading), small angles; the quaternion is what is measured.
     """
-    rotation = rotation_from_quaternion(qw, qx, qy, qz)
-    turn = turn_between((measured_0, measured_1, measured_2, measured_3), (qw, qx, qy, qz))
+    rotation = rotation_by(q)
+    turn = turn_between(read, q)
     by_roll = component((rotation[0], rotation[3], rotation[6]), axis)
     by_pitch = component((rotation[1], rotation[4], rotation[7]), axis)
     by_heading = 1.0 if axis == 2 else 0.0
-    error = by_roll * ins_roll + by_pitch * ins_pitch + by_heading * ins_heading
+    error = by_roll * ins.ins_roll + by_pitch * ins.ins_pitch + by_heading * ins.ins_heading
     return component(turn, axis) - error, OnAttitude(1.0, by_roll, by_pitch, by_heading)
 
 
@@ -57,15 +55,13 @@ class OnLevel(NamedTuple):
 
 
 @law
-def level(
-    axis: int, ins_roll: float, ins_pitch: float, qw: float, qx: float, qy: float, qz: float
-) -> tuple[float, OnLevel]:
+def level(axis: int, ins_roll: float, ins_pitch: float, q: Attitude) -> tuple[float, OnLevel]:
     """Where an external attitude puts down, body forward (axis 0) and right (1): d = R' e_d - e x R' e_d.
 
     Its heading has no part in it. e = (e_roll, e_pitch, 0), small angles; R' (e_d - theta x e_d) for a true
     R = (I + [theta]x) R_filter.
     """
-    rotation = rotation_from_quaternion(qw, qx, qy, qz)
+    rotation = rotation_by(q)
     forward, right, down = rotation[6], rotation[7], rotation[8]
     by_n, by_e = rotation[5], -rotation[2]  # what tilting does to the third
     if axis == 0:
@@ -82,12 +78,9 @@ class OnOwnAttitude(NamedTuple):
 
 
 @law
-def bridged_attitude(
-    axis: int, qw: float, qx: float, qy: float, qz: float,
-    measured_0: float, measured_1: float, measured_2: float, measured_3: float,
-) -> tuple[float, OnOwnAttitude]:  # fmt: skip
+def bridged_attitude(axis: int, q: Attitude, read: ReadAttitude) -> tuple[float, OnOwnAttitude]:
     """q_read q^-1 = theta about one earth axis [rad]: an attitude that has white noise alone."""
-    turn = turn_between((measured_0, measured_1, measured_2, measured_3), (qw, qx, qy, qz))
+    turn = turn_between(read, q)
     return component(turn, axis), OnOwnAttitude(1.0)
 
 
@@ -104,15 +97,14 @@ class OnHeading(NamedTuple):
 
 @law
 def heading(
-    axis: int, ins_heading: float, compass_sin: float, compass_cos: float,
-    qw: float, qx: float, qy: float, qz: float, measured: float,
-) -> tuple[float, OnHeading]:  # fmt: skip
+    axis: int, ins_heading: float, compass_sin: float, compass_cos: float, q: Attitude, measured: float
+) -> tuple[float, OnHeading]:
     """z = psi + A + B sin psi + C cos psi [rad], wrapped to half a turn: a compass, or a heading from elsewhere.
 
     A is the slow error of the heading (declination, mounting); B and C are the deviation that hard iron makes, which
     turns with the vehicle (0 of anything but a compass). psi = atan2(R_21, R_11).
     """
-    rotation = rotation_from_quaternion(qw, qx, qy, qz)
+    rotation = rotation_by(q)
     forward_n, forward_e, forward_d = rotation[0], rotation[3], rotation[6]
     level = larger(forward_n * forward_n + forward_e * forward_e, LEAST_UPRIGHT * LEAST_UPRIGHT)
     cosine, sine = forward_n / np.sqrt(level), forward_e / np.sqrt(level)

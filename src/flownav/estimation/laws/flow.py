@@ -7,7 +7,8 @@ from typing import NamedTuple
 from flownav.compile import equation
 from flownav.estimation.law import law
 from flownav.estimation.laws.geometry import along_axis, component, cross, lens_range
-from flownav.frames import flow_about, rotation_from_quaternion
+from flownav.estimation.named import Attitude, BodyRate, FlowMount, GyroLeft, Height, Lever, VelocityNed, rotation_by
+from flownav.frames import flow_about
 
 
 class Angular(NamedTuple):
@@ -48,10 +49,8 @@ class OnFlowRate(NamedTuple):
 
 @law
 def flow_rate(
-    axis: int, vel_n: float, vel_e: float, vel_d: float, pos_d: float, ground: float, flow_scale: float,
-    qw: float, qx: float, qy: float, qz: float, rate_x: float, rate_y: float, rate_z: float,
-    gyro_bias: float, gyro_share: float,
-    *, forward_m: float, right_m: float, below_m: float, lens_below_m: float,
+    axis: int, vel: VelocityNed, height: Height, flow_scale: float, q: Attitude, rate: BodyRate, gyro: GyroLeft,
+    *, mount: FlowMount,
 ) -> tuple[float, OnFlowRate]:  # fmt: skip
     """Flow less rotation: z_x = -(1 + scale) v/r - k b_x (axis 0), z_y = (1 + scale) u/r - k b_y (axis 1) [rad/s].
 
@@ -61,18 +60,19 @@ def flow_rate(
     l = (forward, right, below), body FRD (0 where no gyro tells w); r is the distance along body down from a lens
     `lens_below_m` below the IMU to level ground.
     """
-    rotation = rotation_from_quaternion(qw, qx, qy, qz)
+    rotation = rotation_by(q)
     body = 1 if axis == 0 else 0
-    swing = component(cross((rate_x, rate_y, rate_z), (forward_m, right_m, below_m)), body)
-    direction, along, turn = along_axis(rotation, body, (vel_n, vel_e, vel_d), swing)
-    range_m, by_height, by_north, by_east = lens_range(rotation, ground - pos_d, (0.0, 0.0, lens_below_m))
+    swing = component(cross(rate, (mount.forward_m, mount.right_m, mount.below_m)), body)
+    direction, along, turn = along_axis(rotation, body, vel, swing)
+    lens = (0.0, 0.0, mount.lens_below_m)
+    range_m, by_height, by_north, by_east = lens_range(rotation, height.ground - height.pos_d, lens)
     flow = scaled_flow(axis, along, flow_scale, range_m)
-    return flow.value - gyro_share * gyro_bias, OnFlowRate(
+    return flow.value - gyro.gyro_share * gyro.gyro_bias, OnFlowRate(
         vel_n=flow.by_speed * direction[0], vel_e=flow.by_speed * direction[1], vel_d=flow.by_speed * direction[2],
         tilt_n=flow.by_speed * turn[0] + flow.by_range * by_north,
         tilt_e=flow.by_speed * turn[1] + flow.by_range * by_east,
         heading=flow.by_speed * turn[2], flow_scale=flow.by_scale,
-        pos_d=-flow.by_range * by_height, ground=flow.by_range * by_height, gyro_bias=-gyro_share,
+        pos_d=-flow.by_range * by_height, ground=flow.by_range * by_height, gyro_bias=-gyro.gyro_share,
     )  # fmt: skip
 
 
@@ -90,14 +90,11 @@ class OnBodyVelocity(NamedTuple):
 
 @law
 def body_velocity(
-    axis: int, vel_n: float, vel_e: float, vel_d: float, flow_scale: float,
-    qw: float, qx: float, qy: float, qz: float, rate_x: float, rate_y: float, rate_z: float,
-    *, forward_m: float, right_m: float, below_m: float,
-) -> tuple[float, OnBodyVelocity]:  # fmt: skip
+    axis: int, vel: VelocityNed, flow_scale: float, q: Attitude, rate: BodyRate, *, lever: Lever
+) -> tuple[float, OnBodyVelocity]:
     """z = (1 + scale)(R_BE v + w x l) [m/s]: metric flow, one body axis (0 forward, 1 right, 2 down)."""
-    rotation = rotation_from_quaternion(qw, qx, qy, qz)
-    swing = component(cross((rate_x, rate_y, rate_z), (forward_m, right_m, below_m)), axis)
-    direction, along, turn = along_axis(rotation, axis, (vel_n, vel_e, vel_d), swing)
+    swing = component(cross(rate, lever), axis)
+    direction, along, turn = along_axis(rotation_by(q), axis, vel, swing)
     scale = 1.0 + flow_scale
     return scale * along, OnBodyVelocity(
         vel_n=scale * direction[0], vel_e=scale * direction[1], vel_d=scale * direction[2],
@@ -119,12 +116,12 @@ class OnLaggedFlowRate(NamedTuple):
 
 @law
 def lagged_flow_rate(
-    axis: int, lag_u1: float, lag_v1: float, flow_scale: float, pos_d: float, ground: float,
-    qw: float, qx: float, qy: float, qz: float, *, gain: float, lens_below_m: float,
+    axis: int, lag_u1: float, lag_v1: float, flow_scale: float, height: Height, q: Attitude,
+    *, gain: float, lens_below_m: float,
 ) -> tuple[float, OnLaggedFlowRate]:  # fmt: skip
     """`flow_rate` of a sensor whose dynamics are states: gain x1, swing and all, over the range of now."""
-    rotation = rotation_from_quaternion(qw, qx, qy, qz)
-    range_m, by_height, by_north, by_east = lens_range(rotation, ground - pos_d, (0.0, 0.0, lens_below_m))
+    lens = (0.0, 0.0, lens_below_m)
+    range_m, by_height, by_north, by_east = lens_range(rotation_by(q), height.ground - height.pos_d, lens)
     flow = scaled_flow(axis, gain * (lag_v1 if axis == 0 else lag_u1), flow_scale, range_m)
     slope = gain * flow.by_speed
     return flow.value, OnLaggedFlowRate(

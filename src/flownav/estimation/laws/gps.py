@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 from flownav.estimation.law import law
 from flownav.estimation.laws.geometry import component, cross, turning
-from flownav.frames import GRAVITY_M_S2, rotation_from_quaternion, to_earth
+from flownav.estimation.named import Attitude, BodyRate, Lever, rotation_by
+from flownav.frames import GRAVITY_M_S2, to_earth
 
 
 class OnPosition(NamedTuple):
@@ -22,14 +23,13 @@ class OnPosition(NamedTuple):
 
 @law
 def gps_position(
-    axis: int, pos: float, gps_slow: float, gps_fast: float, qw: float, qx: float, qy: float, qz: float,
-    *, forward_m: float, right_m: float, below_m: float,
-) -> tuple[float, OnPosition]:  # fmt: skip
+    axis: int, pos: float, gps_slow: float, gps_fast: float, q: Attitude, *, lever: Lever
+) -> tuple[float, OnPosition]:
     """z = p + R l + slow + fast error [m], the antenna at l = (forward, right, below), body FRD.
 
     Groves 2013, section 14.3.1, with the receiver's correlated errors as states.
     """
-    arm = to_earth(rotation_from_quaternion(qw, qx, qy, qz), forward_m, right_m, below_m)
+    arm = to_earth(rotation_by(q), lever.forward_m, lever.right_m, lever.below_m)
     turn = turning(arm, axis)
     predicted = pos + component(arm, axis) + gps_slow + gps_fast
     return predicted, OnPosition(1.0, 1.0, 1.0, turn[0], turn[1], turn[2])
@@ -48,9 +48,8 @@ class OnVelocity(NamedTuple):
 
 @law
 def gps_velocity(
-    axis: int, vel: float, gps_velocity: float, velocity_lag: float, force: float,
-    qw: float, qx: float, qy: float, qz: float, rate_x: float, rate_y: float, rate_z: float,
-    *, forward_m: float, right_m: float, below_m: float,
+    axis: int, vel: float, gps_velocity: float, velocity_lag: float, force: float, q: Attitude, rate: BodyRate,
+    *, lever: Lever,
 ) -> tuple[float, OnVelocity]:  # fmt: skip
     """z = v + R (w x l) + error - lag a [m/s]: receivers smooth their velocity, so that it is older than they say.
 
@@ -58,8 +57,8 @@ def gps_velocity(
     are left out of the Jacobian.
     """
     accel = force + (GRAVITY_M_S2 if axis == 2 else 0.0)
-    swing = cross((rate_x, rate_y, rate_z), (forward_m, right_m, below_m))
-    arm = to_earth(rotation_from_quaternion(qw, qx, qy, qz), swing[0], swing[1], swing[2])
+    swing = cross(rate, lever)
+    arm = to_earth(rotation_by(q), swing[0], swing[1], swing[2])
     turn = turning(arm, axis)
     predicted = vel + component(arm, axis) + gps_velocity - velocity_lag * accel
     return predicted, OnVelocity(1.0, 1.0, -accel, turn[0], turn[1], turn[2])

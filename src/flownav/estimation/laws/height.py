@@ -7,7 +7,7 @@ from typing import NamedTuple
 from flownav.compile import larger
 from flownav.estimation.law import law
 from flownav.estimation.laws.geometry import LEAST_UPRIGHT
-from flownav.frames import rotation_from_quaternion
+from flownav.estimation.named import Attitude, Beam, Height, rotation_by
 
 
 class OnRange(NamedTuple):
@@ -20,23 +20,20 @@ class OnRange(NamedTuple):
 
 
 @law
-def range_along_boresight(
-    axis: int, pos_d: float, ground: float, qw: float, qx: float, qy: float, qz: float,
-    *, below_m: float, forward_m: float = 0.0, right_m: float = 0.0,
-) -> tuple[float, OnRange]:  # fmt: skip
+def range_along_boresight(axis: int, height: Height, q: Attitude, *, lens: Beam) -> tuple[float, OnRange]:
     """z = (h - R_31 x - R_32 y)/R_33 - z_lens [m], h = ground - p_d: along body down, over level ground.
 
     The rangefinder's lens is at (x, y, z_lens) = (forward, right, below), body FRD. theta turns R_3j by
     theta_n R_2j - theta_e R_1j.
     """
-    rotation = rotation_from_quaternion(qw, qx, qy, qz)
+    rotation = rotation_by(q)
     upright = larger(rotation[8], LEAST_UPRIGHT)
-    drop = ground - pos_d - rotation[6] * forward_m - rotation[7] * right_m
+    drop = height.ground - height.pos_d - rotation[6] * lens.forward_m - rotation[7] * lens.right_m
     slope = drop / (upright * upright)
-    return drop / upright - below_m, OnRange(
+    return drop / upright - lens.below_m, OnRange(
         pos_d=-1.0 / upright, ground=1.0 / upright,
-        tilt_n=-slope * rotation[5] - (rotation[3] * forward_m + rotation[4] * right_m) / upright,
-        tilt_e=slope * rotation[2] + (rotation[0] * forward_m + rotation[1] * right_m) / upright,
+        tilt_n=-slope * rotation[5] - (rotation[3] * lens.forward_m + rotation[4] * lens.right_m) / upright,
+        tilt_e=slope * rotation[2] + (rotation[0] * lens.forward_m + rotation[1] * lens.right_m) / upright,
     )  # fmt: skip
 
 

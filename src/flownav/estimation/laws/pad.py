@@ -9,7 +9,8 @@ import numpy as np
 from flownav.compile import equation
 from flownav.estimation.law import law
 from flownav.estimation.laws.geometry import cross
-from flownav.frames import Vector, rotation_from_quaternion, to_body, to_earth
+from flownav.estimation.named import Attitude, Beam, PadNed, PositionNed, ReadSight, rotation_by
+from flownav.frames import Vector, to_body, to_earth
 
 
 @equation
@@ -42,10 +43,8 @@ class OnPad(NamedTuple):
 
 @law
 def pad_fix(
-    axis: int, pos_n: float, pos_e: float, pos_d: float, pad_n: float, pad_e: float, pad_d: float,
-    qw: float, qx: float, qy: float, qz: float, measured_0: float, measured_1: float, measured_2: float,
-    *, below_m: float, forward_m: float = 0.0, right_m: float = 0.0,
-) -> tuple[float, OnPad]:  # fmt: skip
+    axis: int, pos: PositionNed, pad: PadNed, q: Attitude, read: ReadSight, *, lens: Beam
+) -> tuple[float, OnPad]:
     """The pad's place across (axis 0, 1) and along (2) the measured line of sight [m].
 
     Measured are the tangents forward and right and the distance. e . m for the triad e of the measured sight and
@@ -53,16 +52,19 @@ def pad_fix(
     lever of the attitude error is the measured m, which is better than the predicted one when a fix is the first for
     long.
     """
-    rotation = rotation_from_quaternion(qw, qx, qy, qz)
-    direction, along = sight(measured_0, measured_1, axis), sight(measured_0, measured_1, 2)
-    ahead, side, down = to_body(rotation, pad_n - pos_n, pad_e - pos_e, pad_d - pos_d)
-    predicted = direction[0] * (ahead - forward_m) + direction[1] * (side - right_m) + direction[2] * (down - below_m)
-    seen = measured_2 if axis == 2 else 0.0
+    rotation, distance_m = rotation_by(q), read.measured_2
+    direction, along = sight(read.measured_0, read.measured_1, axis), sight(read.measured_0, read.measured_1, 2)
+    ahead, side, down = to_body(rotation, pad.pad_n - pos.pos_n, pad.pad_e - pos.pos_e, pad.pad_d - pos.pos_d)
+    forward, right, below = ahead - lens.forward_m, side - lens.right_m, down - lens.below_m
+    predicted = direction[0] * forward + direction[1] * right + direction[2] * below
+    seen = distance_m if axis == 2 else 0.0
     e = to_earth(rotation, direction[0], direction[1], direction[2])
     to_pad = to_earth(
         rotation,
-        measured_2 * along[0] + forward_m, measured_2 * along[1] + right_m, measured_2 * along[2] + below_m,
-    )  # fmt: skip
+        distance_m * along[0] + lens.forward_m,
+        distance_m * along[1] + lens.right_m,
+        distance_m * along[2] + lens.below_m,
+    )
     turn = cross(e, to_pad)
     return seen - predicted, OnPad(
         pos_n=-e[0], pos_e=-e[1], pos_d=-e[2], pad_n=e[0], pad_e=e[1], pad_d=e[2],

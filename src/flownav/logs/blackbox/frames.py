@@ -7,6 +7,7 @@ main frames wait for the next whole one (I). betaflight/blackbox-log-viewer, src
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,70 @@ FRAME_I, FRAME_P, FRAME_S, FRAME_G, FRAME_H, FRAME_E = 73, 80, 83, 71, 72, 69
 LONGEST_FRAME = 1024
 LEAST_FRAME = 8  # bytes of a main or a GPS frame, on average, at the least
 SYNC_BEEP, ADJUSTMENT, RESUME, DISARM, FLIGHT_MODE, LOG_END = 0, 13, 14, 15, 30, 255
+LAST = -2  # the log ends here
 MIN_THROTTLE, BATTERY, MIN_MOTOR = 0, 1, 2  # places in `levels`
+
+
+class Coding(NamedTuple):
+    """How the fields of one kind of frame are predicted and written."""
+
+    predictors: Numbers
+    encodings: Numbers
+
+
+class Kinds(NamedTuple):
+    """Of main frames, whole and by difference, slow ones, GPS and home."""
+
+    i: Coding
+    p: Coding
+    s: Coding
+    g: Coding
+    h: Coding
+
+
+class Places(NamedTuple):
+    """Fields among those of their frame; -1: there is none."""
+
+    time: int
+    motor: int
+    gps_time: int
+
+
+class Earlier(NamedTuple):
+    """The frame before one, and the one before that."""
+
+    last: Numbers
+    before: Numbers
+
+
+class Base(NamedTuple):
+    """What else values are counted from: the header's levels, home, the main frames' clock. part: scratch."""
+
+    levels: Numbers
+    home: Numbers
+    clock: int
+    part: Numbers
+
+
+class Memory(NamedTuple):
+    """The main frames at hand, last and before that; the last slow frame, fix and home."""
+
+    last: Numbers
+    before: Numbers
+    now: Numbers
+    slow: Numbers
+    fix: Numbers
+    place: Numbers
+
+
+class Kept(NamedTuple):
+    """What is kept: main (most, fields taken) int32, clocks (most,) of the main frames' times, unwrapped, and gps
+    (most, fields + 1) with the time last.
+    """
+
+    main: NDArray[np.int32]
+    clocks: Numbers
+    gps: Numbers
 
 
 @dataclass(frozen=True)
@@ -44,12 +108,12 @@ def read_frames(content: Bytes, header: Header, wanted: frozenset[str]) -> Frame
         int(header.number("minthrottle", 1000.0)), int(header.number("vbatref", 0.0)),
         int(motor) if motor.isdigit() and len(motor) < 6 else 0,
     ], np.int64)  # fmt: skip
-    i, p, s, g, h = kinds
+    i, _, _, g, _ = kinds
+    codings = Kinds(*(Coding(kind.predictors, kind.encodings) for kind in kinds))
+    places = Places(i.place("time"), i.place("motor[0]"), g.place("time"))
     rows, fixes, damaged = decode(
-        content, header.first_byte, header.end_byte, i.predictors, i.encodings, p.predictors, p.encodings, s.predictors,
-        s.encodings, g.predictors, g.encodings, h.predictors, h.encodings, i.place("time"), i.place("motor[0]"),
-        g.place("time"), levels, taken, main, clock, gps,
-    )  # fmt: skip
+        content, header.first_byte, header.end_byte, codings, places, levels, taken, Kept(main, clock, gps)
+    )
     columns = {kinds[0].names[k]: main[:rows, place].astype(np.int64) for place, k in enumerate(taken.tolist())}
     columns["time"] = clock[:rows].copy()
     fixed = {name: gps[:fixes, k].copy() for k, name in enumerate(kinds[3].names)}
@@ -58,13 +122,12 @@ def read_frames(content: Bytes, header: Header, wanted: frozenset[str]) -> Frame
 
 @kernel
 def frame_values(
-    content: Bytes, pos: int, end: int, predictors: Numbers, encodings: Numbers, last: Numbers, before: Numbers,
-    levels: Numbers, home: Numbers, clock: int, motor: int, out: Numbers, part: Numbers,
-) -> int:  # fmt: skip
-    """The values of one frame into `out`; the place after it, -1 where its bytes end before.
-
-    last, before: the frame before this one and the one before that. part (AT_MOST,): scratch.
-    """
+    content: Bytes, pos: int, end: int, coding: Coding, earlier: Earlier, base: Base, motor: int, out: Numbers
+) -> int:
+    """The values of one frame into `out`; the place after it, -1 where its bytes end before."""
+    predictors, encodings = coding
+    last, before = earlier
+    levels, home, clock, part = base
     k, fields = 0, len(predictors)
     end = min(end, pos + LONGEST_FRAME)
     while k < fields:
@@ -127,7 +190,7 @@ def event_end(content: Bytes, pos: int, end: int) -> int:
         _, pos = signed_vb(content, pos + 1, end)
         return pos
     elif kind == LOG_END:
-        return -2
+        return LAST
     else:
         return -1
     for _ in range(numbers):
@@ -137,52 +200,62 @@ def event_end(content: Bytes, pos: int, end: int) -> int:
 
 
 @kernel
-def decode(
-    content: Bytes, start: int, end: int, i_predictors: Numbers, i_encodings: Numbers, p_predictors: Numbers,
-    p_encodings: Numbers, s_predictors: Numbers, s_encodings: Numbers, g_predictors: Numbers, g_encodings: Numbers,
-    h_predictors: Numbers, h_encodings: Numbers, time: int, motor: int, gps_time: int, levels: Numbers,
-    taken: Numbers, main: NDArray[np.int32], clocks: Numbers, gps: Numbers,
-) -> tuple[int, int, int]:  # fmt: skip
-    """All frames from `start` to `end`: how many main rows, GPS rows, and bytes of no frame.
+def frame_end(content: Bytes, pos: int, end: int, kinds: Kinds, m: Memory, base: Base, motor: int) -> int:
+    """Where the frame at `pos` ends, with its values in the memory; -1 where it is none, LAST where the log ends."""
+    kind, pos = int(content[pos]), pos + 1
+    if kind == FRAME_I:
+        return frame_values(content, pos, end, kinds.i, Earlier(m.last, m.before), base, motor, m.now)
+    if kind == FRAME_P:
+        return frame_values(content, pos, end, kinds.p, Earlier(m.last, m.before), base, motor, m.now)
+    if kind == FRAME_S and len(kinds.s.predictors):
+        return frame_values(content, pos, end, kinds.s, Earlier(m.slow, m.slow), base, -1, m.slow)
+    if kind == FRAME_G and len(kinds.g.predictors):
+        return frame_values(content, pos, end, kinds.g, Earlier(m.fix, m.fix), base, -1, m.fix)
+    if kind == FRAME_H and len(kinds.h.predictors):
+        return frame_values(content, pos, end, kinds.h, Earlier(m.place, m.place), base, -1, m.place)
+    return event_end(content, pos, end) if kind == FRAME_E else -1
 
-    main (most, len(taken)) int32, clocks (most,) of the main frames' times, unwrapped; gps (most, fields + 1) with
-    the time last.
-    """
-    fields = len(i_predictors)
-    last, before, now = np.zeros(fields, np.int64), np.zeros(fields, np.int64), np.zeros(fields, np.int64)
-    slow = np.zeros(max(len(s_predictors), 1), np.int64)
-    fix = np.zeros(max(len(g_predictors), 1), np.int64)
-    place = np.zeros(max(len(h_predictors), 2), np.int64)
-    home = np.zeros(2, np.int64)
-    part = np.zeros(AT_MOST, np.int64)
+
+@kernel
+def blank_memory(kinds: Kinds) -> Memory:
+    """Nothing but zeros."""
+    fields = len(kinds.i.predictors)
+    return Memory(
+        np.zeros(fields, np.int64),
+        np.zeros(fields, np.int64),
+        np.zeros(fields, np.int64),
+        np.zeros(max(len(kinds.s.predictors), 1), np.int64),
+        np.zeros(max(len(kinds.g.predictors), 1), np.int64),
+        np.zeros(max(len(kinds.h.predictors), 2), np.int64),
+    )
+
+
+@kernel
+def put_behind(m: Memory, whole: bool) -> None:
+    """The main frame at hand becomes the last one, and that the one before; whole: it stands for both."""
+    for k in range(len(m.now)):
+        m.before[k] = m.now[k] if whole else m.last[k]
+        m.last[k] = m.now[k]
+
+
+@kernel
+def decode(
+    content: Bytes, start: int, end: int, kinds: Kinds, places: Places, levels: Numbers, taken: Numbers, kept: Kept
+) -> tuple[int, int, int]:
+    """All frames from `start` to `end`: how many main rows, GPS rows, and bytes of no frame; taken: fields to keep."""
+    m, fixed = blank_memory(kinds), len(kinds.g.predictors)
+    home, part = np.zeros(2, np.int64), np.zeros(AT_MOST, np.int64)
     rows, fixes, damaged = 0, 0, 0
     sound, homed = False, True
-    for k in range(len(g_predictors)):  # positions counted from a home that is not told yet are none
-        homed = homed and g_predictors[k] != 7 and g_predictors[k] != 12
+    for k in range(fixed):  # positions counted from a home that is not told yet are none
+        homed = homed and kinds.g.predictors[k] != 7 and kinds.g.predictors[k] != 12
     clock, high = 0, 0  # the last main frame's time as it is written, and what its 32 bits have lost
     pos = start
-    while pos < end and rows < len(main):
+    while pos < end and rows < len(kept.main):
         kind = int(content[pos])
-        after = -1
-        if kind == FRAME_I:
-            after = frame_values(content, pos + 1, end, i_predictors, i_encodings, last, before, levels, home, clock,
-                                 motor, now, part)  # fmt: skip
-        elif kind == FRAME_P:
-            after = frame_values(content, pos + 1, end, p_predictors, p_encodings, last, before, levels, home, clock,
-                                 motor, now, part)  # fmt: skip
-        elif kind == FRAME_S and len(s_predictors):
-            after = frame_values(content, pos + 1, end, s_predictors, s_encodings, slow, slow, levels, home, clock, -1,
-                                 slow, part)  # fmt: skip
-        elif kind == FRAME_G and len(g_predictors):
-            after = frame_values(content, pos + 1, end, g_predictors, g_encodings, fix, fix, levels, home, clock, -1,
-                                 fix, part)  # fmt: skip
-        elif kind == FRAME_H and len(h_predictors):
-            after = frame_values(content, pos + 1, end, h_predictors, h_encodings, place, place, levels, home, clock,
-                                 -1, place, part)  # fmt: skip
-        elif kind == FRAME_E:
-            after = event_end(content, pos + 1, end)
-            if after == -2:
-                break
+        after = frame_end(content, pos, end, kinds, m, Base(levels, home, clock, part), places.motor)
+        if after == LAST:
+            break
         whole = after >= 0
         if whole and after < end:
             mark = int(content[after])
@@ -194,30 +267,23 @@ def decode(
             continue
         pos = after
         if kind in (FRAME_I, FRAME_P):
-            if kind == FRAME_I:
-                sound = True
-                for k in range(fields):
-                    before[k] = now[k]
-                    last[k] = now[k]
-            else:
-                for k in range(fields):
-                    before[k] = last[k]
-                    last[k] = now[k]
-            if time >= 0 and sound:
-                told = now[time] & 0xFFFFFFFF
+            sound = sound or kind == FRAME_I
+            put_behind(m, kind == FRAME_I)
+            if places.time >= 0 and sound:
+                told = m.now[places.time] & 0xFFFFFFFF
                 if told < (clock & 0xFFFFFFFF) - 0x80000000:
                     high += 1 << 32
                 clock = told
                 for k in range(len(taken)):
-                    main[rows, k] = now[taken[k]]
-                clocks[rows] = clock + high
+                    kept.main[rows, k] = m.now[taken[k]]
+                kept.clocks[rows] = clock + high
                 rows += 1
         elif kind == FRAME_H:
-            home[0], home[1] = place[0], place[1]
+            home[0], home[1] = m.place[0], m.place[1]
             homed = True
-        elif kind == FRAME_G and fixes < len(gps) and sound and homed:
-            for k in range(len(g_predictors)):
-                gps[fixes, k] = fix[k]
-            gps[fixes, len(g_predictors)] = ((fix[gps_time] & 0xFFFFFFFF) if gps_time >= 0 else clock) + high
+        elif kind == FRAME_G and fixes < len(kept.gps) and sound and homed:
+            for k in range(fixed):
+                kept.gps[fixes, k] = m.fix[k]
+            kept.gps[fixes, fixed] = ((m.fix[places.gps_time] & 0xFFFFFFFF) if places.gps_time >= 0 else clock) + high
             fixes += 1
     return rows, fixes, damaged

@@ -210,8 +210,9 @@ def _gps(header: Header, frames: Frames, start_us: int) -> tuple[list[Stream], O
         velocity = np.column_stack([speed * np.cos(course), speed * np.sin(course), unknown])
     sigma = CM * np.column_stack([fixes.get(name, unknown) for name in ("GPS_eph", "GPS_eph", "GPS_epv")])
     return gps_streams(
-        US * (fixes["time"] - start_us), fix_type, DEG_E7 * fixes["GPS_coord[0]"], DEG_E7 * fixes["GPS_coord[1]"],
-        altitude, velocity, position_variance=sigma**2,
+        US * (fixes["time"] - start_us), fix_type,
+        (DEG_E7 * fixes["GPS_coord[0]"], DEG_E7 * fixes["GPS_coord[1]"], altitude),
+        velocity, position_variance=sigma**2,
     )  # fmt: skip
 
 

@@ -110,7 +110,9 @@ def _gps(roles: dict[str, Gathered], clock: Clock) -> tuple[list[Stream], Origin
     if "gps_velocity" in roles:
         velocity = _nearest(roles["gps_velocity"], clock, t_s)
     fix_type = np.where(status >= 0, 3.0, 0.0)
-    return gps_streams(t_s, fix_type, lat, lon, alt, velocity, position_variance=variance, delay_s=clock.delay_s(topic))
+    return gps_streams(
+        t_s, fix_type, (lat, lon, alt), velocity, position_variance=variance, delay_s=clock.delay_s(topic)
+    )
 
 
 def _nearest(topic: Gathered, clock: Clock, t_s: Array) -> Array:

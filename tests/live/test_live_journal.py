@@ -30,7 +30,10 @@ from flownav.record import Record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
+from journal_turns import Turns
 from live_ends import ORIGIN, Hover, Wire
+
+HUNG_S = 120.0  # whatever takes so long hangs
 
 
 def assert_replays_to_the_bit(path):
@@ -45,24 +48,23 @@ def assert_replays_to_the_bit(path):
     return record
 
 
-def wait_for(condition, within_s=10.0):
-    until_s = time.monotonic() + within_s
+def wait_for(condition):
+    until_s = time.monotonic() + HUNG_S
     while not condition():
         assert time.monotonic() < until_s
         time.sleep(0.01)
 
 
 @pytest.fixture
-def journal(tmp_path):
+def turns(monkeypatch):
+    """The writer's turns are the test's."""
+    return Turns(monkeypatch)
+
+
+@pytest.fixture
+def journal(tmp_path, turns):
     """The journal of a flight of 6 s that was killed, as it lies there."""
-    recorder = Recorder(tmp_path / "flight.fnr", Options())
-    wire = Wire(Hover(), Options(), recorder)
-    for _ in range(6):
-        wire.fly(1.0)
-        time.sleep(0.25)  # a block each
-    recorder.leave()
-    wire.close()
-    return recorder.journal
+    return turns.killed(tmp_path / "flight.fnr", 6.0)
 
 
 def test_a_journal_without_an_end_is_recovered_and_replays_to_the_bit(journal):
@@ -108,13 +110,12 @@ def test_a_damaged_block_in_the_middle_is_said_and_the_rest_is_kept(journal):
     assert len(replay(log, *as_fed(log, ReplayOptions(), None)).estimate) > 100
 
 
-def test_rows_of_a_navigator_that_is_lost_are_left_out(tmp_path):
+def test_rows_of_a_navigator_that_is_lost_are_left_out(tmp_path, turns):
     recorder = Recorder(tmp_path / "restart.fnr", Options())
     wire = Wire(Hover(), Options(), recorder)
-    wire.fly(4.0)
-    time.sleep(0.5)
+    turns.fly(wire, recorder, 4.0)
     wire.vehicle.boot_s = 1.0 - wire.t_s  # it reboots
-    wire.fly(4.0)
+    turns.fly(wire, recorder, 4.0)
     recorder.leave()
     wire.close()
     data = recorder.journal.read_bytes()
@@ -132,17 +133,13 @@ def test_rows_of_a_navigator_that_is_lost_are_left_out(tmp_path):
     assert len(replay(log, *as_fed(log, ReplayOptions(), None)).estimate) > 50
 
 
-def test_the_head_is_found_again_when_the_first_is_damaged(tmp_path, monkeypatch):
-    monkeypatch.setattr(writing, "HEAD_EVERY_S", 0.3)
-    recorder = Recorder(tmp_path / "a.fnr", Options())
-    wire = Wire(Hover(), Options(), recorder).fly(4.0)
-    time.sleep(0.8)
-    recorder.leave()
-    wire.close()
-    data = bytearray(recorder.journal.read_bytes())
+def test_the_head_is_found_again_when_the_first_is_damaged(tmp_path, turns, monkeypatch):
+    monkeypatch.setattr(writing, "HEAD_EVERY_S", 1.5)
+    journal = turns.killed(tmp_path / "a.fnr", 4.0)
+    data = bytearray(journal.read_bytes())
     data[len(MAGIC) + 40] ^= 1
-    recorder.journal.write_bytes(bytes(data))
-    assert recovered(recorder.journal).record.manifest["parameters"]["gps_delay_s"] == Options().gps_delay_s
+    journal.write_bytes(bytes(data))
+    assert recovered(journal).record.manifest["parameters"]["gps_delay_s"] == Options().gps_delay_s
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04", MAGIC, MAGIC + b"x" * 500])
@@ -231,20 +228,18 @@ def full_disk(monkeypatch, after=20_000):
     monkeypatch.setattr(writing.os, "write", write)
 
 
-def test_a_full_disk_ends_the_recording_and_not_the_session(tmp_path, monkeypatch):
+def test_a_full_disk_ends_the_recording_and_not_the_session(tmp_path, turns, monkeypatch):
     full_disk(monkeypatch, 200_000)
     said = []
     recorder = Recorder(tmp_path / "flight.fnr", Options(), failed=said.append)
     wire = Wire(Hover(), Options(), recorder)
-    for _ in range(4):
-        wire.fly(1.0)
-        time.sleep(0.25)
-    wait_for(lambda: recorder.reason)
+    turns.fly(wire, recorder, 4.0)
     before = wire.session.sent
+    assert recorder.reason
     wire.fly(2.0)
     assert wire.session.sent >= before + 90
     assert recorder.reason == "No space left on device"
-    wait_for(lambda: said == [recorder.reason])
+    assert said == [recorder.reason]
     finished = recorder.finish({"sent": 1})
     wire.close()
     assert finished.reason == recorder.reason
@@ -283,11 +278,8 @@ def test_a_disk_that_does_not_answer_holds_nobody_up(tmp_path, monkeypatch):
     monkeypatch.setattr(writing.os, "fsync", hangs)
     monkeypatch.setattr(writing, "MOST_WAITING", 200_000)
     monkeypatch.setattr(writing, "LAST_WAIT_S", 0.1)
-    assert asked.wait(5.0)
-    wire = Wire(Hover(), Options(), recorder)
-    before_s = time.monotonic()
-    wire.fly(8.0)
-    assert time.monotonic() - before_s < 8.0
+    assert asked.wait(HUNG_S)
+    wire = Wire(Hover(), Options(), recorder).fly(8.0)  # comes to an end
     assert recorder.reason == "the disk does not keep up"
     assert wire.session.sent > 200
     finished = recorder.finish({})
@@ -303,22 +295,34 @@ def test_a_disk_that_is_full_at_the_start_is_said_at_once(tmp_path, monkeypatch)
     assert not list(tmp_path.iterdir())
 
 
-def test_at_most_a_second_is_not_on_the_disk(tmp_path, monkeypatch):
+def test_at_most_a_second_is_not_on_the_disk(tmp_path, turns, monkeypatch):
     synced = []
     real = os.fsync
     monkeypatch.setattr(
-        writing.os, "fsync", lambda file: (real(file), synced.append((time.monotonic(), os.fstat(file).st_size)))
+        writing.os, "fsync", lambda file: (real(file), synced.append((turns.now_s, os.fstat(file).st_size)))
     )
-    recorder = Recorder(tmp_path / "flight.fnr", Options())
-    wire = Wire(Hover(), Options(), recorder)
-    for _ in range(30):
-        wire.fly(0.1)
-        time.sleep(0.1)
-    recorder.leave()
-    wire.close()
+    turns.killed(tmp_path / "flight.fnr", 3.0)
     times_s = [at_s for at_s, _ in synced]
-    assert max(b - a for a, b in itertools.pairwise(times_s)) < 0.9
+    assert max(b - a for a, b in itertools.pairwise(times_s)) < 0.8
+    assert times_s[-1] - times_s[0] > 2.0
     assert len({size for _, size in synced}) >= 3
+
+
+@pytest.mark.real_time
+def test_what_is_handed_over_is_written_and_forced_to_the_disk_by_itself(tmp_path, monkeypatch):
+    """By the writer's own thread: nobody ends the recording."""
+    sizes = []
+    real = os.fsync
+    monkeypatch.setattr(writing.os, "fsync", lambda file: (real(file), sizes.append(os.fstat(file).st_size)))
+    recorder = Recorder(tmp_path / "flight.fnr", Options())
+    begun = recorder.size
+    wire = Wire(Hover(), Options(), recorder).fly(3.0)
+    wait_for(lambda: sizes[-1] > begun + 10_000)
+    written = recorder.size
+    wire.fly(1.0)
+    wait_for(lambda: sizes[-1] > written)
+    wire.close()
+    recorder.leave()
 
 
 def test_a_journal_that_appears_meanwhile_is_not_taken(tmp_path, monkeypatch):

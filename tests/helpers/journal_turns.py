@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import threading
 from types import SimpleNamespace
 from typing import Any
@@ -59,3 +61,17 @@ class Turns:
         self.fly(Wire(Hover(), Options(), recorder), recorder, seconds).close()
         recorder.leave()
         return recorder.journal
+
+
+def full_disk(monkeypatch: pytest.MonkeyPatch, after: int) -> None:
+    """Writing fails with ENOSPC once so many bytes are written, in the middle of a block."""
+    real, left = os.write, [after]
+
+    def write(file: int, data: memoryview) -> int:
+        if left[0] <= 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        count = real(file, data[: left[0]])
+        left[0] -= count
+        return count
+
+    monkeypatch.setattr(writing.os, "write", write)

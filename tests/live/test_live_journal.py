@@ -30,7 +30,7 @@ from flownav.record import Record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
-from journal_turns import Turns
+from journal_turns import Turns, full_disk
 from live_ends import ORIGIN, Hover, Wire
 
 HUNG_S = 120.0  # whatever takes so long hangs
@@ -212,20 +212,6 @@ def test_what_is_no_file_is_not_recorded_to(tmp_path):
     os.close(place.file)
     assert place.record.name == "flight-1.fnr"
     assert not (tmp_path / "elsewhere").exists()
-
-
-def full_disk(monkeypatch, after=20_000):
-    """Writing fails with ENOSPC once so many bytes are written, in the middle of a block."""
-    real, left = os.write, [after]
-
-    def write(file, data):
-        if left[0] <= 0:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        count = real(file, data[: left[0]])
-        left[0] -= count
-        return count
-
-    monkeypatch.setattr(writing.os, "write", write)
 
 
 def test_a_full_disk_ends_the_recording_and_not_the_session(tmp_path, turns, monkeypatch):

@@ -25,7 +25,7 @@ def has_ipv6():
 needs_ipv6 = pytest.mark.skipif(not has_ipv6(), reason="this machine has no IPv6")
 
 
-def until(what, seconds=3.0):
+def until(what, seconds=120.0):  # what takes longer hangs
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         if found := what():

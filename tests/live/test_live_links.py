@@ -115,6 +115,7 @@ def test_tcp_connects_over_ipv6():
     server.close()
 
 
+@pytest.mark.real_time
 def test_a_peer_that_is_gone_does_not_stop_us_and_is_found_again():
     """A call that nobody answers waited for a second, twice every second."""
     with socket.socket() as server:
@@ -131,13 +132,13 @@ def test_a_peer_that_is_gone_does_not_stop_us_and_is_found_again():
             caller.connect_ex(address)
             crowd.append(caller)
         accepted.close()
-        longest_s = 0.0
+        taken_s = []
         for _ in range(300):
             before_s = time.monotonic()
             link.read()
-            longest_s = max(longest_s, time.monotonic() - before_s)
+            taken_s.append(time.monotonic() - before_s)
             time.sleep(0.005)
-        assert longest_s < 0.2
+        assert sorted(taken_s)[-5] < 0.2  # five calls are begun
         assert link.counts["reconnected"] == 0
         server.settimeout(0.001)
         waiting = []
@@ -148,7 +149,7 @@ def test_a_peer_that_is_gone_does_not_stop_us_and_is_found_again():
                 waiting.append(server.accept()[0])
             return link.counts["reconnected"]
 
-        assert until(found, 15.0) == 1
+        assert until(found) == 1
         for end in (*crowd, *waiting):
             end.close()
         link.close()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import random
 import signal
 import subprocess
@@ -162,6 +161,38 @@ def command_of(folder, flights):
     ]  # fmt: skip
 
 
+# A campaign that kills itself in place of putting its so-manieth file where it belongs.
+DIES = """
+import os, signal, sys
+from flownav.cli import main
+
+replace, left = os.replace, int(sys.argv.pop(1))
+
+def replace_or_die(*names):
+    global left
+    left -= 1
+    if not left:
+        os.kill(os.getpid(), signal.SIGKILL)
+    replace(*names)
+
+os.replace = replace_or_die
+main()
+"""
+
+
+def test_killed_while_it_writes_it_goes_on_with_the_same_bytes(tmp_path):
+    """At its plan, at its second part, at what it writes after the flights; half-written files lie about."""
+    arguments = command_of(tmp_path / "killed", 3 * PART)[3:]
+    for file in (1, 3, 5):
+        dying = [sys.executable, "-c", DIES, str(file), *arguments]
+        assert subprocess.run(dying, capture_output=True).returncode == -signal.SIGKILL
+        assert [path for path in (tmp_path / "killed").rglob("*.part")]
+    done = subprocess.run([*command_of(tmp_path / "killed", 3 * PART)], check=True, capture_output=True)
+    assert json.loads(done.stdout)["flights"] == 3 * PART
+    subprocess.run(command_of(tmp_path / "whole", 3 * PART), check=True, capture_output=True)
+    assert files_in(tmp_path / "killed") == files_in(tmp_path / "whole")
+
+
 def killed_and_gone_on(folder, flights, kills, seed):
     """Run a campaign, kill it so many times after it has written something, and let it end."""
     rng = random.Random(seed)
@@ -172,12 +203,13 @@ def killed_and_gone_on(folder, flights, kills, seed):
         while len(Dataset(folder).parts(0)) <= had and run.poll() is None and time.monotonic() < deadline:
             time.sleep(0.002)
         time.sleep(rng.uniform(0.0, 0.05))
-        os.kill(run.pid, signal.SIGKILL)
+        run.kill()  # which may have ended by now
         run.wait()
     subprocess.run(command_of(folder, flights), check=True, capture_output=True)
 
 
-def test_killed_twice_it_ends_with_the_same_bytes(tmp_path):
+@pytest.mark.real_time
+def test_killed_twice_at_any_time_it_ends_with_the_same_bytes(tmp_path):
     killed_and_gone_on(tmp_path / "killed", 6 * PART, 2, 1)
     subprocess.run(command_of(tmp_path / "whole", 6 * PART), check=True, capture_output=True)
     assert files_in(tmp_path / "killed") == files_in(tmp_path / "whole")

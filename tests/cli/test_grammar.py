@@ -10,10 +10,11 @@ import sys
 import time
 
 import pytest
+import typer
 import typer.main
 
 import flownav
-from flownav.cli import app, choices
+from flownav.cli import app, choices, running
 from places import DOCS
 
 APP = typer.main.get_command(app)
@@ -158,11 +159,25 @@ def test_the_version_is_printed(tmp_path):
 
 
 def test_nobody_heard_is_a_bad_verdict(tmp_path):
-    done = run("live", "udp:14987", "--duration", "0.5", "--json", cwd=tmp_path)
+    done = run("live", "udp:0", "--duration", "0.5", "--json", cwd=tmp_path)
     assert done.returncode == 1
     assert "no autopilot was heard" in done.stderr
 
 
+def test_a_command_that_is_broken_off_is_exit_status_130(monkeypatch):
+    stops = typer.Typer()
+
+    @stops.command()
+    def command():
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(sys, "argv", ["flownav"])
+    with pytest.raises(SystemExit) as left:
+        running.run(stops)
+    assert left.value.code == 130
+
+
+@pytest.mark.real_time
 def test_ctrl_c_is_exit_status_130(tmp_path):
     done = subprocess.Popen(
         [sys.executable, "-m", "flownav", "rig", "--runs", "200", "--out", "rig"],
@@ -173,7 +188,7 @@ def test_ctrl_c_is_exit_status_130(tmp_path):
         while not (tmp_path / "rig").exists() and time.monotonic() < until_s:
             time.sleep(0.05)
         done.send_signal(signal.SIGINT)
-        assert done.wait(60.0) == 130
+        assert done.wait(120.0) == 130
     finally:
         done.kill()
 

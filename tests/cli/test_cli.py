@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import re
 import socket
-import subprocess
-import sys
 from collections import Counter
 from contextlib import suppress
 from functools import partial
@@ -16,18 +14,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from command import run
 from flownav.api import telling
 from flownav.cli import app
 from flownav.live.loop import run_vehicle
 from flownav.parameter_files import shipped
 from flownav.record import Record
 from virtual_link import Clock, VirtualLink
-
-
-def run(*arguments, cwd):
-    return subprocess.run(
-        [sys.executable, "-m", "flownav", *map(str, arguments)], cwd=cwd, capture_output=True, text=True, check=False
-    )
 
 
 def one_line_error(done):

@@ -10,7 +10,7 @@ demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr --force
 
 test: $(VENV)/.ready-test
-	PYTHONHASHSEED=0 $(BIN)/python -m pytest -m "not slow and not real_time" -n 2 --dist loadfile -p no:benchmark
+	PYTHONHASHSEED=0 $(BIN)/python -m pytest -m "not slow and not real_time" -n 2 --dist loadfile --no-loadscope-reorder -p no:benchmark
 
 test-real-time: $(VENV)/.ready-test
 	$(BIN)/python -m pytest -m real_time -p no:benchmark

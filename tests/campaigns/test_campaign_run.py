@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from command import run as typed
 from flownav.campaigns.again import record_again
 from flownav.campaigns.engines.engine import Part
 from flownav.campaigns.engines.local import Local, neighbours
@@ -154,11 +155,15 @@ def test_parts_that_follow_each_other_are_flown_together():
 
 
 # -- kills ------------------------------------------------------------------------------------------------------------
-def command_of(folder, flights):
+def campaign_of(folder, flights):
     return [
-        sys.executable, "-m", "flownav", "campaign", "landing", "--set", "filter.name=paper",
-        "--set", "flight.duration_s=6", "--flights", str(flights), "--records", "1", "--out", str(folder), "--json",
+        "campaign", "landing", "--set", "filter.name=paper", "--set", "flight.duration_s=6",
+        "--flights", str(flights), "--records", "1", "--out", str(folder), "--json",
     ]  # fmt: skip
+
+
+def command_of(folder, flights):
+    return [sys.executable, "-m", "flownav", *campaign_of(folder, flights)]
 
 
 # A campaign that kills itself in place of putting its so-manieth file where it belongs.
@@ -182,14 +187,13 @@ main()
 
 def test_killed_while_it_writes_it_goes_on_with_the_same_bytes(tmp_path):
     """At its plan, at its second part, at what it writes after the flights; half-written files lie about."""
-    arguments = command_of(tmp_path / "killed", 3 * PART)[3:]
     for file in (1, 3, 5):
-        dying = [sys.executable, "-c", DIES, str(file), *arguments]
+        dying = [sys.executable, "-c", DIES, str(file), *campaign_of(tmp_path / "killed", 3 * PART)]
         assert subprocess.run(dying, capture_output=True).returncode == -signal.SIGKILL
-        assert [path for path in (tmp_path / "killed").rglob("*.part")]
-    done = subprocess.run([*command_of(tmp_path / "killed", 3 * PART)], check=True, capture_output=True)
-    assert json.loads(done.stdout)["flights"] == 3 * PART
-    subprocess.run(command_of(tmp_path / "whole", 3 * PART), check=True, capture_output=True)
+        assert list((tmp_path / "killed").rglob("*.part"))
+    for name in ("killed", "whole"):
+        done = typed(*campaign_of(tmp_path / name, 3 * PART))
+        assert json.loads(done.stdout)["flights"] == 3 * PART
     assert files_in(tmp_path / "killed") == files_in(tmp_path / "whole")
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 import gc
 import json
 import signal
-import subprocess
-import sys
 import threading
 import time
 import tracemalloc
@@ -16,6 +14,7 @@ import numpy as np
 import pymap3d
 import pytest
 
+from command import run as typed
 from flownav.campaigns.local import fly_recorded
 from flownav.errors import InputError
 from flownav.faults.flight_log import log_of
@@ -306,12 +305,7 @@ def test_a_sensor_that_was_heard_and_hardly_fused_is_a_bad_verdict_of_the_replay
     said = [finding.text for finding in run.findings if finding.unfused]
     assert len(said) == 2
     assert said[0].startswith("gps_position was heard and hardly fused (")
-    result = subprocess.run(
-        [sys.executable, "-m", "flownav", "replay", str(path), "--out", str(tmp_path / "again.fnr"), "--report"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    result = typed("replay", path, "--out", tmp_path / "again.fnr", "--report")
     assert result.returncode == 1
     assert "hardly fused" in result.stderr
     assert_same_bits(path)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import errno
 import itertools
 import os
-import subprocess
-import sys
 import threading
 import time
 
@@ -31,6 +29,7 @@ from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
 from journal_turns import Turns, full_disk
+from live_command import run_live
 from live_ends import ORIGIN, Hover, Wire
 
 HUNG_S = 120.0  # whatever takes so long hangs
@@ -345,31 +344,30 @@ def test_truth_lies_in_the_frame_of_its_time(tmp_path):
     assert record.manifest["parameters"]["origin_lat_lon_deg_alt_m"] == [47.0, 8.0, 410.0]
 
 
-def test_the_command_numbers_its_record_and_replaces_one_only_where_it_may(tmp_path):
+def test_the_command_numbers_its_record_and_replaces_one_only_where_it_may(tmp_path, monkeypatch):
     """A companion that starts flownav anew with the same line must fly."""
     path = tmp_path / "flight.fnr"
     recorder = Recorder(path, Options())
     wire = Wire(Hover(), Options(), recorder).fly(3.0)
     wire.close()
     assert recorder.finish({}).record == path
-    command = [sys.executable, "-m", "flownav", "live", "udp:0", "--duration", "0.3", "--json", "--record"]
 
-    def said(*more):
-        done = subprocess.run([*command, *more], capture_output=True, text=True, check=False)
-        return done.returncode, done.stderr
+    def refused(*more):
+        done = run_live(monkeypatch, "--duration", "0.3", "--json", "--record", *more)
+        return type(done.exception), f"{done.stderr}{done.exception}"
 
     before = path.read_bytes()
-    status, words = said(str(path))
-    assert status == 1  # nobody was heard
+    kind, words = refused(path)
+    assert kind is VerdictError  # nobody was heard
     assert "flight-1.fnr" in words
-    status, words = said(str(path), "--force")
-    assert status == 1
+    kind, words = refused(path, "--force")
+    assert kind is VerdictError
     assert "was not written" not in words
     assert path.read_bytes() == before
     notes = tmp_path / "notes.fnr"
     notes.write_text("flownav flew well")
-    status, words = said(str(notes), "--force")
-    assert status == 2
+    kind, words = refused(notes, "--force")
+    assert kind is InputError
     assert "is no record" in words
     assert notes.read_text() == "flownav flew well"
 

@@ -4,13 +4,19 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-gpu test-slow long-log fuzz mutants league integrity rare validate weigh digests report-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
+.PHONY: demo test test-real-time test-random test-gpu test-slow long-log fuzz mutants league integrity rare validate weigh digests report-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr --force
 
 test: $(VENV)/.ready-test
-	$(BIN)/python -m pytest -m "not slow" -n 2 --dist loadfile -p no:benchmark
+	PYTHONHASHSEED=0 $(BIN)/python -m pytest -m "not slow and not real_time" -n 2 --dist loadfile --no-loadscope-reorder -p no:benchmark
+
+test-real-time: $(VENV)/.ready-test
+	$(BIN)/python -m pytest -m real_time -p no:benchmark
+
+test-random: $(VENV)/.ready-test
+	$(BIN)/python -m pytest -m "hypothesis and not slow" --hypothesis-profile=random -p no:benchmark
 
 test-gpu: $(VENV)/.ready-test $(VENV)/.ready-gpu
 	$(BIN)/python -m pytest -p no:benchmark tests/campaigns/test_cuda_compiled.py

@@ -8,11 +8,17 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+import compile_once
 from places import SHARED
 
 # a loaded machine draws slowly, and says nothing of the test by that
-hypothesis.settings.register_profile("flownav", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow])
+UNHURRIED = hypothesis.settings(deadline=None, print_blob=True, suppress_health_check=[hypothesis.HealthCheck.too_slow])
+hypothesis.settings.register_profile("flownav", UNHURRIED, derandomize=True)  # every run draws the same
+hypothesis.settings.register_profile("random", UNHURRIED)  # `make test-random` draws anew
 hypothesis.settings.load_profile("flownav")
+
+if "PYTEST_XDIST_WORKER" in os.environ:
+    compile_once.begin()
 
 
 def _folder(variable: str, name: str) -> Path:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import random
 import signal
 import subprocess
@@ -15,6 +14,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from command import run as typed
 from flownav.campaigns.again import record_again
 from flownav.campaigns.engines.engine import Part
 from flownav.campaigns.engines.local import Local, neighbours
@@ -155,11 +155,46 @@ def test_parts_that_follow_each_other_are_flown_together():
 
 
 # -- kills ------------------------------------------------------------------------------------------------------------
-def command_of(folder, flights):
+def campaign_of(folder, flights):
     return [
-        sys.executable, "-m", "flownav", "campaign", "landing", "--set", "filter.name=paper",
-        "--set", "flight.duration_s=6", "--flights", str(flights), "--records", "1", "--out", str(folder), "--json",
+        "campaign", "landing", "--set", "filter.name=paper", "--set", "flight.duration_s=6",
+        "--flights", str(flights), "--records", "1", "--out", str(folder), "--json",
     ]  # fmt: skip
+
+
+def command_of(folder, flights):
+    return [sys.executable, "-m", "flownav", *campaign_of(folder, flights)]
+
+
+# A campaign that kills itself in place of putting its so-manieth file where it belongs.
+DIES = """
+import os, signal, sys
+from flownav.cli import main
+
+replace, left = os.replace, int(sys.argv.pop(1))
+
+def replace_or_die(*names):
+    global left
+    left -= 1
+    if not left:
+        os.kill(os.getpid(), signal.SIGKILL)
+    replace(*names)
+
+os.replace = replace_or_die
+main()
+"""
+
+
+def test_killed_while_it_writes_it_goes_on_with_the_same_bytes(tmp_path):
+    """At its plan, at its second part, at what it writes after the flights; half-written files lie about."""
+    for file in (1, 3, 5):
+        dying = [sys.executable, "-c", DIES, str(file), *campaign_of(tmp_path / "killed", 3 * PART)]
+        assert subprocess.run(dying, capture_output=True).returncode == -signal.SIGKILL
+        assert list((tmp_path / "killed").rglob("*.part"))
+    for name in ("killed", "whole"):
+        done = typed(*campaign_of(tmp_path / name, 3 * PART))
+        assert json.loads(done.stdout)["flights"] == 3 * PART
+    assert files_in(tmp_path / "killed") == files_in(tmp_path / "whole")
 
 
 def killed_and_gone_on(folder, flights, kills, seed):
@@ -172,12 +207,13 @@ def killed_and_gone_on(folder, flights, kills, seed):
         while len(Dataset(folder).parts(0)) <= had and run.poll() is None and time.monotonic() < deadline:
             time.sleep(0.002)
         time.sleep(rng.uniform(0.0, 0.05))
-        os.kill(run.pid, signal.SIGKILL)
+        run.kill()  # which may have ended by now
         run.wait()
     subprocess.run(command_of(folder, flights), check=True, capture_output=True)
 
 
-def test_killed_twice_it_ends_with_the_same_bytes(tmp_path):
+@pytest.mark.real_time
+def test_killed_twice_at_any_time_it_ends_with_the_same_bytes(tmp_path):
     killed_and_gone_on(tmp_path / "killed", 6 * PART, 2, 1)
     subprocess.run(command_of(tmp_path / "whole", 6 * PART), check=True, capture_output=True)
     assert files_in(tmp_path / "killed") == files_in(tmp_path / "whole")

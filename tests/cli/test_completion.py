@@ -15,7 +15,7 @@ def completed(line: str, cwd) -> list[str]:
     asked = {"_FLOWNAV_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
     done = subprocess.run(
         [sys.executable, "-m", "flownav"], capture_output=True, text=True, env={**os.environ, **asked}, cwd=cwd,
-        timeout=60, check=False,
+        timeout=120, check=False,
     )  # fmt: skip
     assert done.stderr == ""
     return done.stdout.split()

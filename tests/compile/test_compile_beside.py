@@ -14,6 +14,7 @@ import pytest
 from flownav.compiling import beside, closure
 from flownav.compiling.units import unit
 
+HUNG_S = 120.0  # whatever takes so long hangs
 PARTS = """
 from flownav.compile import invoke, kernel, pointer, unit
 
@@ -116,10 +117,10 @@ def test_another_process_that_cannot_be_started_is_done_without(place):
 
 def test_an_interrupted_program_leaves_no_process(place):
     script = place / "slow"
-    script.write_text(f"#!/bin/sh\necho $$ > {place}/pid.part\nmv {place}/pid.part {place}/pid\nexec sleep 100\n")
+    script.write_text(f"#!/bin/sh\necho $$ > {place}/pid.part\nmv {place}/pid.part {place}/pid\nexec sleep 1000\n")
     script.chmod(0o755)
     with started(place, str(place / "program.py"), OTHER=str(script)) as program:
-        until = time.monotonic() + 60.0
+        until = time.monotonic() + HUNG_S
         while not (place / "pid").exists():
             assert time.monotonic() < until
             time.sleep(0.05)
@@ -127,7 +128,7 @@ def test_an_interrupted_program_leaves_no_process(place):
             assert time.monotonic() < until
             program.send_signal(signal.SIGINT)
             time.sleep(0.5)
-        program.communicate(timeout=60.0)
+        program.communicate(timeout=HUNG_S)
     assert program.returncode != 0
     with pytest.raises(ProcessLookupError):
         os.kill(int((place / "pid").read_text()), 0)
@@ -135,7 +136,7 @@ def test_an_interrupted_program_leaves_no_process(place):
 
 def test_the_other_process_ends_with_its_parent(place):
     with started(place, "-m", "flownav.compiling.beside", "parts", "SHIFT") as other:
-        assert other.wait(60.0) == 1
+        assert other.wait(HUNG_S) == 1
     assert left_over(place) == []
 
 

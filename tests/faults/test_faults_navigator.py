@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from command import run
 from flownav.cli.faults import navigator
 from flownav.errors import InputError
 from flownav.faults.arrival import WAIT_S, Restamped, arrival_of, as_fed, stamped_ahead
@@ -140,10 +139,6 @@ def test_without_a_start_the_navigator_says_so():
 
 
 def test_the_command_prints_one_object_and_ends_with_0(tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-m", "flownav", "faults", "--faults", "gps_jump", "--heights", "0.5", "--durations", "1",
-         "--json"],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+    done = run("faults", "--faults", "gps_jump", "--heights", "0.5", "--durations", "1", "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert [row["fault"] for row in json.loads(done.stdout)["rows"]] == ["none", "gps_jump"]

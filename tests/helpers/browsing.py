@@ -30,6 +30,7 @@ class Visit:
     def __init__(self, browser: Any, path: Path, width: int, **options: Any) -> None:
         self.width = width
         self.context = browser.new_context(viewport={"width": width, "height": 850}, **options)
+        self.context.set_default_timeout(120_000)
         self.page = self.context.new_page()
         self.errors: list[str] = []
         self.requests: list[str] = []
@@ -45,7 +46,7 @@ class Visit:
 
     def until(self, condition: str) -> None:
         """Wait for a condition; asked from here, since the page's policy lets nothing evaluate text inside it."""
-        give_up = time.monotonic() + 60.0
+        give_up = time.monotonic() + 120.0
         while not self.page.evaluate(condition):
             assert time.monotonic() < give_up, condition
             self.page.wait_for_timeout(50)

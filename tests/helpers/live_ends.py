@@ -1,10 +1,10 @@
-"""A small autopilot that hovers, and its wire to a session: real UDP sockets on loopback, a clock of the test's own."""
+"""A small autopilot that hovers, and its wire to a session: datagrams in memory, on a clock of the test's own."""
 
 from __future__ import annotations
 
 import math
 import random
-import socket
+from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -79,6 +79,38 @@ class Hover:
         return [bytes(message.pack(self.mav)) for message in messages]
 
 
+class Datagrams:
+    """A socket of a net in memory: what is sent to its address is there at once and in order, on any machine."""
+
+    def __init__(self, net: dict[Any, Datagrams], to: Any = None) -> None:
+        self._net, self._to = net, to
+        self._address = ("127.0.0.1", 50_000 + len(net))
+        self._waiting: deque[tuple[bytes, Any]] = deque()
+        net[self._address] = self
+
+    def getsockname(self) -> Any:
+        return self._address
+
+    def sendto(self, content: bytes, address: Any) -> int:
+        self._net[address]._waiting.append((content, self._address))
+        return len(content)
+
+    def send(self, content: bytes) -> int:
+        return self.sendto(content, self._to)
+
+    def recvfrom(self, most: int) -> tuple[bytes, Any]:
+        if not self._waiting:
+            raise BlockingIOError
+        content, sender = self._waiting.popleft()
+        return content[:most], sender
+
+    def recv(self, most: int) -> bytes:
+        return self.recvfrom(most)[0]
+
+    def close(self) -> None:
+        self._waiting.clear()
+
+
 class Wire:
     """A session behind a UDP link, and a vehicle's socket. `heard` are the messages that the vehicle received."""
 
@@ -87,7 +119,10 @@ class Wire:
         self.session = Session(options or Options(), keeper or NoRecorder(), START_S, UNIX_S)
         link = open_link("udp:0")
         assert isinstance(link, UdpLink)
+        link.close()
         self.link = link
+        self._net: dict[Any, Datagrams] = {}
+        self.link._socket = Datagrams(self._net)
         self.socket = self.another()
         self.heard: list[Any] = []
         self.heard_s: list[float] = []
@@ -95,13 +130,9 @@ class Wire:
         self.last: tuple[bytes, ...] = ()
         self._coder = coder()
 
-    def another(self) -> socket.socket:
+    def another(self) -> Datagrams:
         """A socket that talks to the session."""
-        made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        made.bind(("127.0.0.1", 0))
-        made.connect(("127.0.0.1", self.link.port))
-        made.setblocking(False)
-        return made
+        return Datagrams(self._net, self.link._socket.getsockname())
 
     @property
     def now_s(self) -> float:

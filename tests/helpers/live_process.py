@@ -13,6 +13,7 @@ from flownav.live.link import open_link
 from live_ends import Hover
 
 ODOMETRY = 331
+HUNG_S = 120.0  # whatever takes so long hangs
 
 
 def free_port() -> int:
@@ -42,7 +43,7 @@ class LiveProcess:
         self.process.wait()
         self.link.close()
 
-    def fly(self, more: int, within_s: float = 60.0) -> LiveProcess:
+    def fly(self, more: int, within_s: float = HUNG_S) -> LiveProcess:
         """Talk until so many more estimates have come back."""
         until_s, wanted = time.monotonic() + within_s, self.told + more
         while self.told < wanted:
@@ -58,4 +59,4 @@ class LiveProcess:
     def end(self, number: int) -> tuple[str, str]:
         """Send a signal and wait; what it printed."""
         self.process.send_signal(number)
-        return self.process.communicate(timeout=30)
+        return self.process.communicate(timeout=HUNG_S)

@@ -217,6 +217,37 @@ def test_any_finite_data_give_a_model_or_one_line(values, steps, order):
     assert "\n" not in message
 
 
+def hardly_moved(which):
+    """Runs that say nothing of a delay, or of anything: times [s], input, reading, structure."""
+    t_s = 0.1 * np.arange(1, 81)
+    wandering = np.cumsum(np.random.default_rng(4).standard_normal(80))
+    once = np.where(np.arange(80) == 78, 1.5, 0.0)
+    about_a_million = 1e6 + 1e-4 * np.random.default_rng(1).standard_normal(80)
+    return {
+        "a held input, which no small delay changes": (t_s, 0.2 * np.arange(80), wandering, Structure(0, held=True)),
+        "an input that moves when all is read": (t_s, once, wandering, Structure(0, held=True)),
+        "an input of nearly no spread": (t_s, about_a_million, 1.0 + 0.03 * (t_s > 7.0), Structure(0, held=True)),
+        "an input that moves once, before the readings": (t_s, 1e-5 * (t_s > 0.15), wandering, Structure(0)),
+    }[which]
+
+
+@pytest.mark.parametrize(
+    "which",
+    [
+        "a held input, which no small delay changes",
+        "an input that moves when all is read",
+        "an input of nearly no spread",
+        "an input that moves once, before the readings",
+    ],
+)
+def test_what_hardly_moved_gives_a_model_that_knows_it_and_no_warning(which):
+    t_s, u, y, structure = hardly_moved(which)
+    found = fit([experiment("log", t_s, u, t_s, y)], structure)
+    assert np.isfinite(found.covariance).all()
+    assert (np.diag(found.covariance) >= np.diag(found.white_covariance)).all()
+    assert found.covariance.max() > 1e3  # it is told that the delay is not known
+
+
 # -- held-out data -------------------------------------------------------------------------------------------
 def known(seed, noise=0.02, gain=1.1, count=1500):
     t_s = np.arange(count) * 0.01

@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 
+from command import run
 from flownav.parameter_files import shipped
 from flownav.sensors.datasheet import load_sensor
 from rig_logs import swing, write_csv
 
 INTERVAL = {"value", "low", "high"}
-
-
-def run(*arguments, cwd):
-    return subprocess.run(
-        [sys.executable, "-m", "flownav", *map(str, arguments)], cwd=cwd, capture_output=True, text=True, check=False
-    )
 
 
 def identified(log, cwd, *options):

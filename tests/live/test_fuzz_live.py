@@ -20,7 +20,7 @@ from live_ends import START_S, STEP_S, UNIX_S, Hover
 
 PIECES = 25  # damaged datagrams in one session
 FLOWN_S = 2.5
-LONGEST_STEP_S = 1.0
+LONGEST_STEP_S = 1.0  # of the processor
 MOST_BYTES = 32 << 20
 SENT = ("ODOMETRY", "VISION_POSITION_ESTIMATE", "LANDING_TARGET")
 KEY = bytes(range(32))
@@ -53,14 +53,14 @@ def fly_damaged(seed: int) -> None:
             arriving = mutate_piece(piece, earlier, random) if step in struck else [piece]
             earlier = piece
             for each in arriving:
-                begun = time.perf_counter()
+                begun = time.thread_time()
                 session.take(each, now_s, whole=whole)
-                assert time.perf_counter() - begun < LONGEST_STEP_S
+                assert time.thread_time() - begun < LONGEST_STEP_S
         if step in struck and random.random() < 0.2:
             now_s += random.choice((0.05, 0.5, 3.0))  # nothing came for a while
-        begun = time.perf_counter()
+        begun = time.thread_time()
         session.tick(now_s)
-        assert time.perf_counter() - begun < LONGEST_STEP_S
+        assert time.thread_time() - begun < LONGEST_STEP_S
         assert len(session.outbox) <= 1024
         while session.outbox:
             message = hears.decode(bytearray(session.outbox.popleft()))

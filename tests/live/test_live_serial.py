@@ -1,6 +1,8 @@
-"""A session over a serial line of a baud rate, in real time: what is asked for fits, and nothing waits."""
+"""A session over a serial line of a baud rate: what is asked for fits, and nothing waits."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +14,10 @@ from flownav.live.simulated import SimulatedVehicle
 from flownav.live.warm import warm_up
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
-from serial_line import fly_over, options_of
+from serial_line import fly_over, fly_virtually, options_of
+
+BAUDS = (57_600, 115_200, 921_600)
+FLOWN_S = 11.0
 
 
 @pytest.fixture(scope="module")
@@ -22,17 +27,40 @@ def flight():
     return log_of(fly_recorded(setup, 1), setup), setup
 
 
-@pytest.mark.parametrize("baud", [57_600, 115_200])
-def test_a_slow_line_carries_what_is_asked_of_it(flight, baud):
-    log, setup = flight
-    flown = fly_over(baud, SimulatedVehicle(log), 11.0, options_of(setup, baud))
+def assert_it_fits(flown, baud):
     assert not flown.damaged
-    assert flown.lost == 0
     assert flown.received_bytes_s < 0.85 * baud / 10
     assert flown.written_bytes_s < 0.85 * baud / 10
-    assert flown.estimate_hz > 0.8 * plan(0, baud / 10, "odometry").estimate_hz
-    assert np.percentile(flown.reading_age_s, 95) < 0.1
-    assert np.percentile(flown.estimate_age_s, 95) < 0.1
-    assert flown.most_backlog_s < 0.3
+    assert flown.error_m < 2.0
+
+
+@pytest.mark.parametrize("baud", BAUDS)
+def test_a_line_carries_what_is_asked_of_it(flight, baud):
+    log, setup = flight
+    flown = fly_virtually(baud, SimulatedVehicle(log), FLOWN_S, options_of(setup, baud))
+    assert_it_fits(flown, baud)
     assert flown.session.reason == ""
-    assert flown.session.dropped.get("link: lost", 0) < 400  # before the rates were asked for
+    assert flown.lost == 0
+    assert flown.estimate_hz > 0.9 * min(50.0, plan(0, baud / 10, "odometry").estimate_hz)
+    assert flown.reading_age_s.max() < 0.1
+    assert flown.estimate_age_s.max() < 0.1
+    assert flown.most_backlog_s < 0.1
+
+
+def test_a_slow_line_that_everything_is_asked_of_loses_frames_and_grows_old(flight):
+    """What the plan is for; and that the line above is one that can lose."""
+    log, setup = flight
+    asked = replace(options_of(setup, 57_600), capacity_bytes_s=None)
+    flown = fly_virtually(57_600, SimulatedVehicle(log), FLOWN_S, asked)
+    assert flown.lost > 100
+    assert np.median(flown.reading_age_s) > 0.1
+
+
+@pytest.mark.real_time
+@pytest.mark.parametrize("baud", BAUDS)
+def test_a_real_line_carries_what_is_asked_of_it(flight, baud):
+    """Over a pseudo-terminal. How many frames and how much time a loaded machine loses is the benchmark's."""
+    log, setup = flight
+    flown = fly_over(baud, SimulatedVehicle(log), FLOWN_S, options_of(setup, baud))
+    assert_it_fits(flown, baud)
+    assert flown.estimate_hz > 0.2 * min(50.0, plan(0, baud / 10, "odometry").estimate_hz)

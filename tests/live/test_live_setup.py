@@ -9,6 +9,7 @@ import struct
 import threading
 import time
 from collections import Counter
+from functools import partial
 
 import pytest
 from hypothesis import given
@@ -18,8 +19,10 @@ from typer.testing import CliRunner
 from fake_autopilot import ARDUPILOT, PX4, FakeAutopilot, FakeLink
 from flownav.cli import app
 from flownav.errors import InputError
+from flownav.live import link as live_link
 from flownav.live.link import parse_url
 from flownav.live.options import SENDINGS
+from flownav.live.setup import talk
 from flownav.live.setup.check import check
 from flownav.live.setup.exchange import TRIES, read
 from flownav.live.setup.knowledge import MAKES, knowledge_of
@@ -372,6 +375,43 @@ def test_reading_ends_although_much_never_answers():
     assert link.now_s - began_s < 21.0
 
 
+# -- the command ------------------------------------------------------------------------------------------
+@pytest.fixture
+def command(monkeypatch):
+    """The command, a fake autopilot at the other end of whatever link it opens, on the link's own clock."""
+
+    def run(autopilot, url, *arguments):
+        link = FakeLink(autopilot)
+        monkeypatch.setattr(live_link, "open_link", lambda url: link)
+        monkeypatch.setattr(talk, "Talk", partial(Talk, clock=link.clock, wait=link.wait))
+        return CliRunner().invoke(app, ["live", url, *arguments])
+
+    return run
+
+
+def test_the_command_prints_the_table_and_its_status_is_the_verdict(command):
+    good = command(FakeAutopilot(ARDUPILOT, ardupilot()), "udp:0", "--setup")
+    assert good.exit_code == 0, good.output
+    for words in ("EK3_SRC2_POSXY", "ExternalNav", "MAV_CMD_SET_EKF_SOURCE_SET", "ArduPilot fits", "not healthy"):
+        assert words in good.output
+    bad = command(FakeAutopilot(PX4, px4(EKF2_EV_CTRL=0), tells_unknown=True), "udp:0", "--setup", "--json")
+    assert bad.exit_code == 1
+    facts = json.loads(bad.output)
+    found = next(entry for entry in facts["parameters"] if entry["name"] == "EKF2_EV_CTRL")
+    assert (found["has"], found["status"], found["set_to"]) == (0.0, "wrong", 5.0)
+    assert facts["make"] == "PX4"
+    assert not facts["fits"]
+
+
+def test_the_command_writes_over_a_serial_port(command):
+    autopilot = FakeAutopilot(ARDUPILOT, ardupilot(VISO_TYPE=0), tells_unknown=True)
+    done = command(autopilot, "serial:/dev/ttyS1:115200", "--setup", "--write")
+    assert done.exit_code == 0, done.output
+    assert "written: VISO_TYPE 0 -> 1" in done.output
+    assert "SERIAL2" in done.output
+    assert autopilot.parameters["VISO_TYPE"] == 1
+
+
 # -- the command, over real links -------------------------------------------------------------------------
 def speak(autopilot, take, give, stop):
     """The autopilot's end of a real link: until `stop`."""
@@ -417,21 +457,15 @@ def over_udp(autopilot, *arguments):
         return commanded(autopilot, take, give, f"udp:{port}", *arguments)
 
 
-def test_the_command_prints_the_table_and_its_status_is_the_verdict():
+@pytest.mark.real_time
+def test_over_udp():
     good = over_udp(FakeAutopilot(ARDUPILOT, ardupilot()), "--setup")
     assert good.exit_code == 0, good.output
-    for words in ("EK3_SRC2_POSXY", "ExternalNav", "MAV_CMD_SET_EKF_SOURCE_SET", "ArduPilot fits", "not healthy"):
-        assert words in good.output
-    bad = over_udp(FakeAutopilot(PX4, px4(EKF2_EV_CTRL=0), tells_unknown=True), "--setup", "--json")
-    assert bad.exit_code == 1
-    facts = json.loads(bad.output)
-    found = next(entry for entry in facts["parameters"] if entry["name"] == "EKF2_EV_CTRL")
-    assert (found["has"], found["status"], found["set_to"]) == (0.0, "wrong", 5.0)
-    assert facts["make"] == "PX4"
-    assert not facts["fits"]
+    assert "ArduPilot fits" in good.output
 
 
-def test_the_command_writes_over_a_serial_port():
+@pytest.mark.real_time
+def test_over_a_serial_port():
     ours, port = os.openpty()
     os.set_blocking(ours, False)
 
@@ -457,9 +491,10 @@ def test_the_command_writes_over_a_serial_port():
     assert autopilot.parameters["VISO_TYPE"] == 1
 
 
+@pytest.mark.real_time
 def test_over_tcp():
     with socket.create_server(("127.0.0.1", 0)) as server:
-        server.settimeout(5.0)
+        server.settimeout(120.0)
         held = []
 
         def take():

@@ -53,7 +53,10 @@ def run(script: Path) -> nbformat.NotebookNode:
     notebook = read(script)
     began_s = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="flownav-tutorial-") as folder:
-        client = NotebookClient(notebook, timeout=CELL_LIMIT_S, resources={"metadata": {"path": folder}})
+        client = NotebookClient(
+            notebook, timeout=CELL_LIMIT_S, startup_timeout=CELL_LIMIT_S, iopub_timeout=CELL_LIMIT_S,
+            resources={"metadata": {"path": folder}},
+        )  # fmt: skip
         client.extra_arguments = [f"--IPKernelApp.exec_lines={PLAIN}", "--log-level=ERROR"]
         try:
             client.execute(env=_surroundings())

@@ -24,6 +24,7 @@ START_WEIGHT = 1e-4  # of the belief that a run starts at rest, against one read
 START_TIME_S = 0.1  # unit of a start's rates
 SMALLEST_EIGENVALUE = 1e-14
 SMALLEST_DIAGONAL = 1e-100  # beside the largest: far below what any data give, far above what overflows
+LEAST_DIAGONAL = 1e-60  # where there is nothing beside it: of data that move by LEAST_MOTION it is more
 STIFFEST = 100.0  # rate x step of a model that is tried: faster ones cannot be told from none
 LARGEST_PRODUCT = 1e60  # of an unstable model: it has no cost
 
@@ -172,9 +173,9 @@ def _scaled(matrix: Array) -> tuple[Array, Array, Array]:
     Neither a scale nor an eigenvalue is nothing beside the largest: what a matrix does not hold is very uncertain.
     """
     diagonal = np.diag(matrix)
-    scale = np.sqrt(np.maximum(diagonal, max(SMALLEST_DIAGONAL * float(diagonal.max(initial=0.0)), 1e-150)))
+    scale = np.sqrt(np.maximum(diagonal, max(SMALLEST_DIAGONAL * float(diagonal.max(initial=0.0)), LEAST_DIAGONAL)))
     values, vectors = np.linalg.eigh(matrix / np.outer(scale, scale))
-    return scale, np.maximum(values, SMALLEST_EIGENVALUE * max(values[-1], 1e-300)), vectors
+    return scale, np.maximum(values, SMALLEST_EIGENVALUE * max(values[-1], 1.0)), vectors
 
 
 def _own_steps(normal: Normal, step: Array) -> list[Array]:

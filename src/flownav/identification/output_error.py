@@ -18,6 +18,7 @@ from flownav.errors import InputError
 from flownav.identification import starting_points
 from flownav.identification.descent import (
     DELAY_RANGE_S,
+    SMALLEST_EIGENVALUE,
     State,
     begin,
     by_cost,
@@ -122,9 +123,7 @@ def _finish(runs: Sequence[Experiment], structure: Structure, state: State) -> F
             shared, own, residual = np.split(part.columns, [structure.parameters, -1], axis=1)
             projected = shared - own @ (inner @ across.T)
             meat += coloured_information(projected, residual[:, 0]) * float(residual.var())
-        sandwich = inverse @ meat @ inverse
-        keep = np.sqrt(np.maximum(1.0, np.diag(white) / np.maximum(np.diag(sandwich), 1e-300)))
-        covariance = sandwich * np.outer(keep, keep)
+        covariance = _at_least(white, inverse @ meat @ inverse, tested.readings_per_independent)
     predictions = tuple(run.y - residual for run, residual in zip(runs, residuals, strict=True))
     fits = tuple(fit_percent(run.y, predicted) for run, predicted in zip(runs, predictions, strict=True))
     spread = sum(float(np.sum((run.y - run.y.mean()) ** 2)) for run in runs)
@@ -147,6 +146,18 @@ def _finish(runs: Sequence[Experiment], structure: Structure, state: State) -> F
         state.cost,
         free,
     )
+
+
+def _at_least(white: Array, sandwich: Array, readings_per_independent: float) -> Array:
+    """The sandwich, no parameter surer than with white residuals.
+
+    Of parameters that the data hardly hold it is rounding, and no covariance: then white's, of fewer readings.
+    """
+    sure, coloured = np.diag(white), np.diag(sandwich)
+    if np.any(coloured <= SMALLEST_EIGENVALUE * sure):
+        return white * readings_per_independent
+    keep = np.sqrt(np.maximum(1.0, sure / coloured))
+    return np.asarray(sandwich * np.outer(keep, keep))
 
 
 def simulate(run: Experiment, structure: Structure, point: Point) -> Array:

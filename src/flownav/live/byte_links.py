@@ -21,6 +21,8 @@ UNHEARD_MS = 5000  # a peer that acknowledges nothing for so long is gone
 class ByteLink(Link):
     """A stream of bytes: a frame is put in line whole, and what the other side takes is sent."""
 
+    clock = staticmethod(time.monotonic)
+
     def __init__(self, address: Address, capacity_bytes_s: float | None = None) -> None:
         super().__init__(address)
         self._address = address
@@ -42,7 +44,7 @@ class ByteLink(Link):
 
     def _flush(self) -> None:
         try:
-            self.written += self._outgoing.flush(self._taken, time.monotonic())
+            self.written += self._outgoing.flush(self._taken, self.clock())
         except OSError:
             self._broken()
 
@@ -137,7 +139,7 @@ class TcpLink(ByteLink):
         if self._tries % 100:
             return
         family, address = self._peer
-        self._calling, self._called_s = socket.socket(family, socket.SOCK_STREAM), time.monotonic()
+        self._calling, self._called_s = socket.socket(family, socket.SOCK_STREAM), self.clock()
         self._calling.setblocking(False)
         if self._calling.connect_ex(address) not in (0, errno.EINPROGRESS):
             self._given_up()
@@ -149,7 +151,7 @@ class TcpLink(ByteLink):
                 self._given_up()
             else:
                 self._connection, self._calling = self._made(calling), None
-        elif time.monotonic() - self._called_s > RECONNECT_S:
+        elif self.clock() - self._called_s > RECONNECT_S:
             self._given_up()
 
     def _given_up(self) -> None:

@@ -38,6 +38,7 @@ class Writer:
         self._taken, self._done = 0, 0  # bytes of rows; each is counted up by one thread only
         self._number = 0
         self._ended = threading.Event()
+        self._synced_s = self._head_s = time.monotonic()
         self._put({"head": head}, {})  # OSError here is the caller's: nothing flies yet
         os.fsync(file)
         self._thread = threading.Thread(target=self._run, name="journal", daemon=True)
@@ -72,27 +73,28 @@ class Writer:
 
     # -- the thread -------------------------------------------------------------------------------------------
     def _run(self) -> None:
-        synced_s = head_s = time.monotonic()
+        ended = False
+        while not ended:
+            last = self._ended.wait(WRITE_S)
+            ended = self.turn(time.monotonic(), last=last) or last
+
+    def turn(self, now_s: float, *, last: bool = False) -> bool:
+        """Write what has come and force it to the disk where that is due; whether writing has stopped for good."""
         try:
-            while not self.reason:
-                ended = self._ended.wait(WRITE_S)
-                now_s = time.monotonic()
-                if now_s - head_s >= HEAD_EVERY_S:
-                    head_s = now_s
-                    self._put({"head": self._head}, {})
-                self._write()
-                if ended or now_s - synced_s >= SYNC_S:
-                    synced_s = now_s
-                    os.fsync(self._file)
-                if ended:
-                    return
+            if now_s - self._head_s >= HEAD_EVERY_S:
+                self._head_s = now_s
+                self._put({"head": self._head}, {})
+            self._write()
+            if last or now_s - self._synced_s >= SYNC_S:
+                self._synced_s = now_s
+                os.fsync(self._file)
         except OSError as error:
             self._stop(error.strerror or str(error))
         except Exception as error:  # whatever it is, the flight goes on
             self._stop(f"{type(error).__name__}: {error}")
-        finally:
-            if self.reason:
-                self._failed(self.reason)
+        if stopped := bool(self.reason):
+            self._failed(self.reason)
+        return stopped
 
     def _write(self) -> None:
         """One block of all that has come."""

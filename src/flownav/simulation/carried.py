@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
 
+from flownav.compile import depends_also
 from flownav.measurement import Sensor
 from flownav.sensors.barometer import BarometerReading, draw_barometer, start_barometer, step_barometer
 from flownav.sensors.barometer_sheet import BarometerSheet
@@ -178,6 +179,9 @@ def carry(sensor: CarriedSensor) -> None:
     """One more sensor for every vehicle, read after the others; before anything of the simulator is imported."""
     if _fixed:
         raise RuntimeError(f"{sensor.name}: what vehicles carry is known once the simulator is imported")
+    says = [said.say for said in sensor.says]
+    laws = [law for law in (sensor.draw, sensor.start, sensor.step, *sensor.see, sensor.heard, *says) if law]
+    depends_also(__name__, laws, f"{sensor.name} {sensor.channels} {sensor.late} {sensor.lever}")
     _table.append(sensor)
 
 

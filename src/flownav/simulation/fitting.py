@@ -21,7 +21,7 @@ from flownav.sensors.sheet import Lever, SensorSheet
 from flownav.sensors.sheets import SensorSheets
 from flownav.simulation.carried import BLADES, CarriedSensor, Carrier
 from flownav.simulation.navigating import Timetable
-from flownav.simulation.onboard import ALWAYS, PHYSICS_PERIOD_S, Fitting, Onboard, Place
+from flownav.simulation.onboard import ALWAYS, NEVER, PHYSICS_PERIOD_S, Fitting, Onboard, Place
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.schedule import Schedule, Timing, schedule_of
 from flownav.simulation.truth import CARRIED, Carried
@@ -95,11 +95,13 @@ def refitted(
 
 # -- datasheets -----------------------------------------------------------------------------------------------
 def sheets_of(scenario: Scenario, flow_sensor: FlowSensor, vehicle: AnyVehicle) -> SensorSheets:
-    """Every sheet as the scenario wants it. InputError as the sheets' loaders say."""
+    """Every sheet as the scenario wants it, where it names one or one ships. InputError as the sheets' loaders say."""
     lens_down_m = vehicle.cg_above_skid_m - scenario.vehicle.lens_above_skid_m
+    files = {one.name: getattr(scenario.sensors, one.name) for one in CARRIED}
     sheets = {
-        one.name: one.wanted(scenario, one.sheet.read(getattr(scenario.sensors, one.name)), lens_down_m)
+        one.name: one.wanted(scenario, one.sheet.read(files[one.name]), lens_down_m)
         for one in CARRIED
+        if files[one.name] or one.sheet.shipped_file
     }
     return CarriedSheets.model_construct(**sheets, flow_sensor=flow_sensor, magnetic_field=MagneticField())
 
@@ -129,11 +131,13 @@ def onboard_of(scenario: Scenario, sheets: SensorSheets, flow: FlowParameters, v
 
 
 def fitting_of(scenario: Scenario, one: CarriedSensor, sheet: SensorSheet | None, on: Carrier) -> Fitting:
-    """One sensor as its sheet says; where the vehicle has none, the shipped sheet's, whose clock never comes."""
-    known = one.sheet.read() if sheet is None else sheet
+    """One sensor as its sheet says; where the vehicle has none, zeros and a clock that never comes."""
+    if sheet is None:
+        nothing = one.parameters(*[0.0] * len(one.parameters._fields))
+        return Fitting(nothing, NEVER, Place(0.0, 0.0, 0.0) if one.lever else None)
     readings = len(one.says) if one.readings is None else one.readings(scenario)
-    clock = clock_of(known, one.phase, 0 if sheet is None else readings) if one.on_epochs else ALWAYS
-    return Fitting(one.coefficients(known, on), clock, place_of(getattr(known, one.lever)) if one.lever else None)
+    clock = clock_of(sheet, one.phase, readings) if one.on_epochs else ALWAYS
+    return Fitting(one.coefficients(sheet, on), clock, place_of(getattr(sheet, one.lever)) if one.lever else None)
 
 
 def place_of(lens: Lever) -> Place:

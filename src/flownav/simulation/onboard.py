@@ -28,7 +28,7 @@ class Clock(NamedTuple):
     first: int
 
 
-ALWAYS = Clock(fitted=1, every=1, first=0)
+ALWAYS, NEVER = Clock(fitted=1, every=1, first=0), Clock(fitted=0, every=1, first=0)
 
 
 class Place(NamedTuple):

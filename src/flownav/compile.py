@@ -23,6 +23,7 @@ from typing import Any
 
 from flownav.compiling.beside import compile_beside
 from flownav.compiling.bundles import FlatAccess, flat_access, lane_access, passing, replacing, stepping, write_function
+from flownav.compiling.cache import depends_also
 from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
 from flownav.compiling.progress import announce_compilation
@@ -60,6 +61,7 @@ __all__ = [
     "columns_of",
     "compile_beside",
     "compiled",
+    "depends_also",
     "device_runner",
     "dressed",
     "equation",

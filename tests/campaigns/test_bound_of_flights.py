@@ -14,10 +14,11 @@ from flownav.estimation.bound import posterior_bound
 from flownav.measurement import Sensor
 from flownav.simulation.assemble import assemble
 from flownav.simulation.fitting import refitted, timetable_of
+from flownav.simulation.onboard import without
 from flownav.simulation.scenario import load_scenario, with_filter
 
 IMU_S, GPS_EVERY = 0.01, 2
-BESIDE = ("camera_clock", "range_clock", "baro_clock")
+BESIDE = ("flow_camera", "range_sensor", "barometer")
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +28,7 @@ def hover():
     flight = scenario.flight.model_copy(update={"duration_s": 8.0})
     setup = assemble(scenario.model_copy(update={"flight": flight}))
     onboard = setup.fitted.onboard
-    fewer = onboard._replace(**{clock: getattr(onboard, clock)._replace(fitted=0) for clock in BESIDE})
+    fewer = without(onboard, *BESIDE)
     fitted = refitted(setup.fitted, setup.flight.plan.epochs, onboard=fewer)
     table = timetable_of(fitted.schedule)
     return replace(setup, fitted=fitted, flight=setup.flight._replace(onboard=fewer, table=table))

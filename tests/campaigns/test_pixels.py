@@ -60,7 +60,7 @@ def test_the_pad_is_found_in_most_frames(flown) -> None:
 def test_every_frame_of_the_flown_path_gives_what_the_flight_was_flown_on(flown) -> None:
     """The loop is closed exactly: rendering anew along the last flight changes nothing."""
     chosen, seen, _, history = flown
-    clock, table = seen.flight.onboard.pad_clock, seen.flight.onboard.pad_seen.reshape(-1, PAD_SEEN)
+    clock, table = seen.flight.onboard.carried.pad_camera.clock, seen.flight.onboard.pad_seen.reshape(-1, PAD_SEEN)
     motion, eye = history[:, columns("truth", MOTION), 0], eye_of(chosen, 1, 0, None)
     rendered = 0
     for k in range(0, len(table), 7):
@@ -84,8 +84,8 @@ def test_the_navigator_was_fed_what_was_seen_and_its_path_differs_from_the_model
     by_model = fly_one(chosen.flight, 1)
     taken = taken_epochs(chosen)[np.flatnonzero(table[:, 3] > 0.0)[0]]
     place = columns("truth", MOTION[:3])
-    np.testing.assert_array_equal(by_model[: chosen.flight.onboard.pad_clock.first, place],
-                                  history[: chosen.flight.onboard.pad_clock.first, place])  # fmt: skip
+    np.testing.assert_array_equal(by_model[: chosen.flight.onboard.carried.pad_camera.clock.first, place],
+                                  history[: chosen.flight.onboard.carried.pad_camera.clock.first, place])  # fmt: skip
     assert np.abs(by_model[taken + 50 :, place] - history[taken + 50 :, place]).max() > 1e-5
 
 

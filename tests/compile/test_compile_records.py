@@ -47,3 +47,27 @@ def test_a_law_may_return_a_tuple_of_records():
     step(work, (0, 0), 0.5, 2)
     assert layout.access(Place)[0](work, (0, 0), 1) == Place(0.5, 2.0)
     assert [layout.access(Count)[0](work, (0, 0), axis, 1).count for axis in range(3)] == [0.0, 0.0, 1.0]
+
+
+class Apart(NamedTuple):
+    apart_m: float
+
+
+def test_what_is_seen_is_computed_from_records_and_from_what_is_told():
+    layout, work = laid_out()
+    above = Layout(layout.next, below=layout)
+
+    def apart(place: Place, count: Count, *, scale: float) -> Apart:
+        """How far apart, so often."""
+        return Apart(scale * count.count * (place.east_m - place.north_m))
+
+    above.see(apart)
+
+    @above.on_lanes
+    def go(seen: Apart) -> Place:
+        """There."""
+        return Place(seen.apart_m, 0.0)
+
+    layout.access(Count)[1](work, (0, 0), 1, 1, Count(3.0))
+    go(work, (0, 0), scale=10.0, axis=1)
+    assert [layout.access(Place)[0](work, (0, 0), lane).north_m for lane in range(2)] == [0.0, 60.0]

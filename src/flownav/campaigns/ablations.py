@@ -20,6 +20,7 @@ from flownav.sensors.flow import flow_noise_sigma
 from flownav.sensors.noise_law import constant_noise
 from flownav.simulation.assemble import Setup
 from flownav.simulation.fitting import Fitted, refitted, timetable_of
+from flownav.simulation.onboard import without
 from flownav.simulation.plan import Flight
 from flownav.simulation.schedule import Timing
 
@@ -40,10 +41,10 @@ def ablations(setup: Setup) -> dict[str, Flight]:
     }
     if setup.scenario.gps.model != "white":
         variants["GPS error states"] = _with(setup, told=without_gps_states(told))
-    variants["barometer"] = _without(setup, "baro_clock")
+    variants["barometer"] = _without(setup, "barometer")
     if setup.scenario.pad_fix is not None:
-        variants["pad fix"] = _without(setup, "pad_clock")
-    variants["flow"] = _without(setup, "camera_clock")
+        variants["pad fix"] = _without(setup, "pad_camera")
+    variants["flow"] = _without(setup, "flow_camera")
     return variants
 
 
@@ -54,11 +55,10 @@ def _with(setup: Setup, **changed: Any) -> Flight:
     return setup.flight._replace(onboard=other.onboard, table=timetable_of(other.schedule), settings=other.settings)
 
 
-def _without(setup: Setup, clock: str) -> Flight:
-    """The flight of a vehicle that does not carry the sensor of this clock; the horizon stays."""
+def _without(setup: Setup, sensor: str) -> Flight:
+    """The flight of a vehicle that does not carry this sensor; the horizon stays."""
     assert setup.fitted is not None
-    onboard = setup.fitted.onboard
-    return _with(setup, onboard=onboard._replace(**{clock: getattr(onboard, clock)._replace(fitted=0)}))
+    return _with(setup, onboard=without(setup.fitted.onboard, sensor))
 
 
 def ageless(carried: Fitted) -> Timing:

@@ -59,9 +59,10 @@ def pad_to_be_seen(flight: Flight, t_s: Array, cg_height_m: Array) -> Array:
     notes its home.
     """
     onboard = flight.onboard
-    if onboard is not None and onboard.pad_clock.fitted:
-        lens_m = cg_height_m - onboard.pad_place.down_m
-        return np.asarray((lens_m >= onboard.pad.min_height_m) & (lens_m <= onboard.pad.max_height_m), float)
+    if onboard is not None and onboard.carried.pad_camera.clock.fitted:
+        camera = onboard.carried.pad_camera
+        lens_m = cg_height_m - camera.place.down_m
+        return np.asarray((lens_m >= camera.p.min_height_m) & (lens_m <= camera.p.max_height_m), float)
     last_s = flight.plan.handover_s if onboard is not None else (home_epoch(flight) or 0) * EPOCH_S
     return np.asarray(np.broadcast_to((t_s <= last_s)[:, None], cg_height_m.shape), float)
 

@@ -92,7 +92,7 @@ def fly_on_pixels(
     """
     eye, flight = eye_of(setup, seed, index, ensemble), setup.flight
     assert flight.onboard is not None
-    clock, taken = flight.onboard.pad_clock, taken_epochs(setup)
+    clock, taken = flight.onboard.carried.pad_camera.clock, taken_epochs(setup)
     epochs = np.arange(clock.first, flight.plan.epochs, clock.every)[: len(taken)]
     seen = np.zeros((len(epochs), PAD_SEEN))
     frames: list[PixelFrame] = []
@@ -124,9 +124,9 @@ def eye_of(setup: Setup, seed: int, index: int, ensemble: Ensemble | None) -> Ey
     rng = np.random.default_rng([seed, index, 31])
     turn = mounting_rad(sheet, flown) * rng.standard_normal(3)
     late = PUNCTUAL if ensemble is None else ensemble.truths(seed, index, 1)[0].late
-    place = setup.flight.onboard.pad_place if setup.flight.onboard is not None else (0.0, 0.0, 0.0)
+    place = setup.flight.onboard.carried.pad_camera.place if setup.flight.onboard is not None else (0.0, 0.0, 0.0)
     return Eye(
-        flown, Rotation.from_rotvec(turn).as_matrix(), np.array(place), late.pad_s,
+        flown, Rotation.from_rotvec(turn).as_matrix(), np.array(place), late.pad_camera,
         ABOVE_RANGE * float(sheet.max_height_m) * float(sheet.ratio),
     )  # fmt: skip
 

@@ -47,7 +47,7 @@ class SensorFailure:
     def law(self, flight: Flight, seed: int, number: int) -> SensorFault:
         """One flight's fault."""
         assert flight.onboard is not None  # `_failure` asked
-        period_s = flight.onboard.camera_clock.every * EPOCH_S
+        period_s = flight.onboard.carried.flow_camera.clock.every * EPOCH_S
         return law_of_flight(FAULTS[self.name], (self.begins_s, self.ends_s), seed, number, period_s)
 
 

@@ -20,7 +20,7 @@ import re
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 from typing import Any, cast
 
@@ -141,6 +141,13 @@ def _mark_used(path: Path) -> None:
 
 
 STORE = Store(cache_folder(), SHIPPED)
+
+
+def depends_also(module: str, laws: Collection[Callable[..., Any]], said: str) -> None:
+    """Whatever is compiled from a module is, in this process, also made of these laws, and of what is said."""
+    generated = " ".join(law.__code__.co_filename for law in laws if law.__code__.co_filename.startswith("<flownav"))
+    others = {law.__module__ for law in laws if not law.__code__.co_filename.startswith("<flownav")}
+    STORE.sources.extend(module, others, f"{said} {generated}")
 
 
 class KernelCache(_Cache):

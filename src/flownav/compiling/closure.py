@@ -47,6 +47,13 @@ class Sources:
         self._known: dict[str, Source] | None = None
         self._learnt = False
         self._stamps: dict[frozenset[str], str | None] = {}
+        self._more: dict[str, tuple[str, frozenset[str]]] = {}
+
+    def extend(self, module: str, more: Iterable[str], said: str) -> None:
+        """From now on a module also has in it what these others have, and what is said; in this process only."""
+        text, others = self._more.get(module, ("", frozenset()))
+        self._more[module] = f"{text} {said}", others | set(more)
+        self._stamps.clear()
 
     def closure(self, modules: Iterable[str]) -> dict[str, str]:
         """The modules in the import closure of these, each with the hash of its code."""
@@ -57,8 +64,9 @@ class Sources:
             file = source_file(module)
             if module not in found and module not in WITHOUT_CODE and file is not None:
                 source = self._read(file, module)
-                found[module] = source.digest
-                waiting += source.imports
+                text, more = self._more.get(module, ("", ()))
+                found[module] = source.digest + text
+                waiting += [*source.imports, *more]
         self._remember()
         return found
 
@@ -71,7 +79,8 @@ class Sources:
         if wanted not in self._stamps:
             found = self.closure(wanted)
             listing = "\n".join(f"{name} {found[name]}" for name in sorted(found))
-            known = wanted <= set(found) and not any(map(_changed_since_start, found))
+            needed = wanted.union(*(more for module, (_, more) in self._more.items() if module in found))
+            known = needed <= set(found) and not any(map(_changed_since_start, found))
             self._stamps[wanted] = hashlib.sha256(listing.encode()).hexdigest() if known else None
         return self._stamps[wanted]
 

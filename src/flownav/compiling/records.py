@@ -31,13 +31,13 @@ class OnLanes(Protocol):
 
 
 class _Kept(NamedTuple):
-    """How a record is loaded and stored. which: the name of the number that says which of several it is, or ""; buffer:
-    the name of the lane buffer in which it lies.
+    """How a record is loaded and stored. told: what its access is told, which of several it is perhaps; buffer: the
+    name of the lane buffer in which it lies.
     """
 
     load: Callable[..., Any]
     store: Callable[..., Any] | None
-    which: str
+    told: tuple[str, ...]
     buffer: str = "work"
 
 
@@ -71,7 +71,8 @@ class Layout:
         """
         size = len(record._fields)
         first = self.take(count * size)
-        self._kept[record] = _Kept(*(_several(record, first) if index else lane_access(record, first)), index)
+        access = _several(record, first) if index else lane_access(record, first)
+        self._kept[record] = _Kept(*access, (index,) if index else ())
         self._rows[record] = range(first, first + size)
         defaults = record._field_defaults
         self._fresh.append((first, tuple(defaults.get(name, 0.0) for name in record._fields) * count))
@@ -80,15 +81,22 @@ class Layout:
     def name(self, record: Any, *rows: int) -> None:
         """Rows that exist already are the fields of a record."""
         self._rows[record] = rows
-        self._kept[record] = _Kept(*lane_access(record, rows), "")
+        self._kept[record] = _Kept(*lane_access(record, rows), ())
 
-    def derive(self, record: Any, found: Callable[..., Any], index: str = "") -> None:
-        """A record that is not stored: `found(work, lanes, lane)` or `found(work, lanes, index, lane)` computes it."""
-        self._kept[record] = _Kept(found, None, index)
+    def derive(self, record: Any, found: Callable[..., Any], *told: str) -> None:
+        """A record that is not stored: `found(work, lanes, *told, lane)` computes it."""
+        self._kept[record] = _Kept(found, None, told)
+
+    def see(self, law: Callable[..., Any]) -> None:
+        """A record that is not stored: what a law returns of other records of this layout, and of what it is told."""
+        plan = _Plan(self, law)
+        passed = plan.passed(law)
+        source = f"def found({', '.join(['work', 'lanes', *plan.told, 'lane'])}):\n    return law({passed})\n"
+        self.derive(get_type_hints(law)["return"], equation(write_function("found", source, plan.scope)), *plan.told)
 
     def anywhere(self, record: Any, row: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
         """A record whose first row the caller tells by the name `row`; its access, `load(work, lanes, row, lane)`."""
-        self._kept[record] = _Kept(*lane_access(record, None), row)
+        self._kept[record] = _Kept(*lane_access(record, None), (row,))
         return self.access(record)
 
     def beside(self, layout: Layout, buffer: str) -> None:
@@ -176,10 +184,17 @@ class _Plan:
         kept = self.layout._record(kind, f"{self.name}, parameter {name}")
         return f"{self.known(kept.load)}({self.place(kept)})"
 
+    def passed(self, function: Callable[..., Any]) -> str:
+        """What the law is called with, in one lane."""
+        kinds = get_type_hints(function)
+        return ", ".join(
+            p.name if p.kind is p.KEYWORD_ONLY else self.loaded(kinds[p.name], p.name) for p in parameters(function)
+        )
+
     def place(self, kept: _Kept) -> str:
         """Where a record lies, as arguments of a call."""
         buffer = self.also((kept.buffer,)) if kept.buffer != "work" else "work, "
-        return f"{buffer}lanes, {self.also((kept.which,)) if kept.which else ''}lane"
+        return f"{buffer}lanes, {self.also(kept.told)}lane"
 
     def put(self, kind: Any, value: str) -> list[str]:
         """Lines that store what was returned, or hand it to its sink."""
@@ -201,10 +216,8 @@ class _Plan:
 def _generated(layout: Layout, function: Callable[..., Any]) -> OnLanes:
     if function.__kwdefaults__:
         raise TypeError(f"{function.__name__}: what the caller tells has no defaults")
-    plan, kinds = _Plan(layout, function), get_type_hints(function)
-    passed = [p.name if p.kind is p.KEYWORD_ONLY else plan.loaded(kinds[p.name], p.name) for p in parameters(function)]
-    lines = [f"found = law({', '.join(passed)})"]
-    result = kinds["return"]
+    plan, result = _Plan(layout, function), get_type_hints(function)["return"]
+    lines = [f"found = law({plan.passed(function)})"]
     if not hasattr(result, "_fields") or result in layout._kept or result in layout._sinks:
         lines += plan.put(result, "found")
     else:

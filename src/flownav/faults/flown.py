@@ -162,7 +162,7 @@ def _fly(
     flight = setup.flight._replace(fails=True)
     assert setup.fitted is not None  # `BASE` flies on the navigator
     assert flight.onboard is not None
-    horizon_s, period_s = setup.fitted.schedule.horizon_s, flight.onboard.camera_clock.every * EPOCH_S
+    horizon_s, period_s = setup.fitted.schedule.horizon_s, flight.onboard.carried.flow_camera.clock.every * EPOCH_S
     for first in range(0, flights, len(LANES)):
         laws = [law_of_flight(fault, window_s, seed, first + lane, period_s) for lane in range(len(LANES))]
         flown = fly_written(flight, seed, first, LANES, ensemble, laws)

@@ -16,9 +16,9 @@ from flownav.sensors.chance import spell_levels
 
 
 class SensorSheet(ParameterModel):
-    """The head of a datasheet; `shipped_file` is the one that serves where no path is given."""
+    """The head of a datasheet; `shipped_file` is the one that serves where no path is given, or there is none."""
 
-    shipped_file: ClassVar[str]
+    shipped_file: ClassVar[str] = ""
 
     schema_version: Literal[1]
     name: str

@@ -13,14 +13,9 @@ from flownav.simulation.noise import normal_pair
 
 Array = NDArray[np.float64]
 
-# channels of the noise counter, pairs of normals; below 40 lie those of wind and of the paper's sensors
+# channels of the noise counter, pairs of normals; below lie those of wind and of the paper's sensors, from 40 on those
+# of the sensors that a vehicle carries (`carried`)
 RECIRCULATION_CHANNEL = 36
-INERTIAL_CHANNEL, RECEIVER_CHANNEL, CAMERA_CHANNEL, RANGE_CHANNEL = 40, 110, 120, 130
-BARO_CHANNEL, MAG_CHANNEL, PAD_CHANNEL, SKID_CHANNEL = 136, 138, 142, 148
-FAULT_CHANNEL = 150
-(INERTIAL_START, RECEIVER_START, CAMERA_START, RANGE_START, BARO_START, MAG_START, PAD_START, SKID_START) = (
-    160, 175, 183, 190, 192, 196, 205, 208,
-)  # fmt: skip
 
 KEYED_EPOCHS = 2  # a lane's noise stream may change from one so many epochs to the next: 40 ms
 

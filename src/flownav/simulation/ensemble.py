@@ -20,10 +20,11 @@ from flownav.sensors.sheets import SensorSheets
 from flownav.simulation.dispersion import Design, Distribution, drawn, uniforms
 from flownav.simulation.fault import SOUND
 from flownav.simulation.fitting import onboard_of
+from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import Flight
 from flownav.simulation.recirculation import RecirculationParameters, RecirculationSettings
 from flownav.simulation.scenario import Scenario
-from flownav.simulation.truth import PARTS, PUNCTUAL, Lateness, Truth
+from flownav.simulation.truth import LATE, NAMES, PARTS, PUNCTUAL, SIZES, Carried, Truth
 from flownav.vehicle.kinds import AnyFile, AnyVehicle, as_the_paper_has_it, disc_of, flattened
 from flownav.vehicle.loading import VehicleDescription
 from flownav.vehicle.multirotor_schema import MultirotorFile
@@ -32,10 +33,7 @@ from flownav.vehicle.schema import VehicleFile
 Array = NDArray[np.float64]
 
 WORLD = ("vehicle", "wind", "ground", "recirculation")
-SENSORS = ("inertial", "receiver", "camera", "ranger", "baro", "mag", "pad", "skid")
-LATE = {"gps_receiver": "receiver_s", "flow_camera": "flow_s", "range_sensor": "range_s", "pad_camera": "pad_s"}
-SHEETS = ("inertial", "gps_receiver", "flow_camera", "flow_sensor", "range_sensor", "barometer", "magnetometer",
-          "magnetic_field", "pad_camera", "skid_switch")  # fmt: skip
+SHEETS = (*NAMES, "flow_sensor", "magnetic_field")
 # these are the timetable's, the scenario's or the judge's, one for all flights
 SHARED = (
     "rate_hz",
@@ -59,13 +57,19 @@ def believed(flight: Flight) -> Truth:
     """The truth of a flight that is what its datasheets say; the sensors that it has not are zeros."""
     onboard = flight.onboard
     if onboard is None:
-        sensors = {part: PARTS[part](*([0.0] * len(PARTS[part]._fields))) for part in (*SENSORS, "camera_flow")}
+        none = {part: PARTS[part](*([0.0] * SIZES[part])) for part in (*NAMES, "camera_flow")}
+        sensors = {"camera_flow": none.pop("camera_flow"), "carried": Carried(**none)}
     else:
-        sensors = {part: getattr(onboard, part) for part in SENSORS} | {"camera_flow": onboard.flow}
+        sensors = sensed_by(onboard)
     return Truth(
         vehicle=flight.vehicle, wind=flight.wind, ground=flight.ground, recirculation=flight.recirculation,
         flow=flight.sensors.flow, late=PUNCTUAL, fault=SOUND, **sensors,
     )  # fmt: skip
+
+
+def sensed_by(onboard: Onboard) -> dict[str, Any]:
+    """The parts of a truth that are of the sensors that feed the navigator."""
+    return {"camera_flow": onboard.flow, "carried": Carried(*(one.p for one in onboard.carried))}
 
 
 def flown(scenario: Scenario, file: AnyFile) -> AnyVehicle:
@@ -178,15 +182,15 @@ class Ensemble:
         if self.sheets is not None:
             sheets = self.sheets.model_copy(update={name: models[name] for name in touched if name in SHEETS})
             onboard = onboard_of(self.scenario, sheets, found.get("flow", self.flight.sensors.flow), vehicle)
-            found |= {part: getattr(onboard, part) for part in SENSORS} | {"camera_flow": onboard.flow}
+            found |= sensed_by(onboard)
             found["late"] = self._lateness(touched)
         return self.base._replace(**found)
 
-    def _lateness(self, touched: Mapping[str, Mapping[str, float]]) -> Lateness:
+    def _lateness(self, touched: Mapping[str, Mapping[str, float]]) -> Any:
         """How much older than stated each sensor's readings are."""
         late = {
-            field: touched[sheet]["latency_s"] - float(self.contents[sheet]["latency_s"])
-            for sheet, field in LATE.items()
+            sheet: touched[sheet]["latency_s"] - float(self.contents[sheet]["latency_s"])
+            for sheet in LATE
             if "latency_s" in touched.get(sheet, {})
         }
         return PUNCTUAL._replace(**late)

@@ -34,7 +34,7 @@ from flownav.simulation.plan import (
 )
 from flownav.simulation.plant import LinearTruth, linear_step
 from flownav.simulation.records import AttitudeError, Estimated, Felt, Home, Landed, Loads, PaperInput
-from flownav.simulation.sampling import read_inertial
+from flownav.simulation.sampling import INERTIAL_FAULT, read_inertial
 from flownav.simulation.sensing import EPOCH_S, lens_height, true_imu
 from flownav.simulation.vehicles import observe_vehicle, step_vehicle
 from flownav.vehicle.parameters import VehicleParameters
@@ -250,7 +250,7 @@ def hear(b: Block, onboard: Onboard, table: Timetable, epoch: int, at: Progress,
     read_inertial(work, lanes, b.seed, b.first, epoch, part, slot, onboard)
     if fails is not None:
         t_s = epoch * EPOCH_S + (part + 1) * onboard.inertial_steps * PHYSICS_S
-        strike(work, lanes, b.seed, b.first, Taken(epoch, t_s, slot, Sensor.IMU, 8 + part, 0))
+        strike(work, lanes, b.seed, b.first, Taken(epoch, t_s, slot, Sensor.IMU, INERTIAL_FAULT + 3 * part, 0))
     keep_inertial(work, lanes, slot, inertial_row(at.heard + part, period_s, table))
     feel(work, lanes, part, inertial_parts(onboard), slot)
 

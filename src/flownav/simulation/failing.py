@@ -16,7 +16,7 @@ from flownav.compile import Lanes, Work, equation, lane_access, procedure
 from flownav.measurement import Sensor
 from flownav.navigation.records import Reading
 from flownav.simulation import layout
-from flownav.simulation.draws import FAULT_CHANNEL, draw
+from flownav.simulation.draws import draw
 from flownav.simulation.fault import SensorFault
 from flownav.simulation.layout import PLANT, fault_as_is
 from flownav.simulation.records import HeldRange
@@ -97,7 +97,7 @@ def failed(read: Reading, earlier: Reading, held: float, since_s: float, n: Faul
 
 
 class Taken(NamedTuple):
-    """A reading that was just put into a slot. channel: of its noise; number: among those of its sensor."""
+    """A reading that was just put into a slot. channel: of its noise, the first; number: among those of its sensor."""
 
     epoch: int
     t_s: float
@@ -111,7 +111,7 @@ class Taken(NamedTuple):
 def strike(work: Work, lanes: Lanes, seed: int, flight: int, taken: Taken) -> None:
     """The reading in a slot as each lane's fault has it."""
     sensor, slot, t_s = taken.sensor, taken.slot, taken.t_s
-    draw(work, lanes, layout.FAULT_NORMALS, 6, seed, flight, taken.epoch, FAULT_CHANNEL + 3 * taken.channel)
+    draw(work, lanes, layout.FAULT_NORMALS, 6, seed, flight, taken.epoch, taken.channel)
     for lane in range(len(lanes)):
         fault, read = fault_as_is(work, lanes, lane), load_slot(work, lanes, slot, lane)
         struck, on = strikes(sensor, fault), t_s >= fault.begins_s and t_s < fault.ends_s

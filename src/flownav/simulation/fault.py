@@ -21,7 +21,7 @@ class SensorFault(NamedTuple):
     velocity: float = 0.0
     flow: float = 0.0
     range: float = 0.0
-    others: float = 0.0  # barometer, compass, pad camera
+    others: float = 0.0  # of no own column here
     skids: float = 0.0  # the switch, as the navigator hears it; the autopilot has it by wire
     lost: float = 0.0  # 1: nothing arrives
     m_xx: float = 1.0

@@ -6,35 +6,25 @@ that kernels see them as compile-time numbers.
 
 from __future__ import annotations
 
+from typing import Any
+
 from flownav.compile import Layout, lane_access
 from flownav.control.autopilot import AutopilotState, Estimate
 from flownav.control.go_around import Knowledge
 from flownav.estimation.kalman import kalman_row_count, kalman_rows
 from flownav.estimation.paper_filter import STATES
 from flownav.navigation.records import Reading
-from flownav.sensors.barometer import BarometerNormals, BarometerStartNormals, BarometerState, BarometerUnit
 from flownav.sensors.flow import FlowParameters, FlowReading, FlowState
-from flownav.sensors.flow_camera import FlowCameraNormals, FlowCameraStartNormals, FlowCameraState, FlowCameraUnit
 from flownav.sensors.gps_ins import GpsInsErrors, GpsInsNormals, NavSolution
-from flownav.sensors.gps_receiver import (
-    GpsReceiverNormals,
-    GpsReceiverStartNormals,
-    GpsReceiverState,
-    GpsReceiverUnit,
-)
 from flownav.sensors.imu import ImuReading
-from flownav.sensors.inertial import InertialNormals, InertialStartNormals, InertialState, InertialUnit
-from flownav.sensors.magnetometer import MagnetometerNormals, MagnetometerUnit
-from flownav.sensors.pad_camera import PadCameraNormals, PadCameraUnit
-from flownav.sensors.range_sensor import RangeSensorNormals, RangeSensorState, RangeSensorUnit
 from flownav.sensors.rangefinder import RangefinderState, RangeReading
-from flownav.sensors.skid_switch import SkidSwitchNormals, SkidSwitchState, SkidSwitchUnit
 from flownav.simulation.recirculation import RecirculationState
 from flownav.simulation.records import (
     Arrived,
     AttitudeError,
     Before,
     Estimated,
+    Exposed,
     Felt,
     FlowNormals,
     HeldRange,
@@ -50,17 +40,31 @@ from flownav.simulation.records import (
     PaperState,
     PaperVariance,
     RotorSpeed,
+    SeesFlow,
     Spread,
     TruthThen,
 )
-from flownav.simulation.truth import PARTS, SIZES
+from flownav.simulation.seeing import attitude_of
+from flownav.simulation.truth import CARRIED, PARTS, SIZES
 from flownav.simulation.wind import WindNormals, WindState
 from flownav.vehicle.around import Around
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.multirotor_state import MultirotorState, Six
 from flownav.vehicle.state import Controls, HelicopterState, Inflow
 
+
+def size_of(record: Any) -> int:
+    """How many rows a record takes; none where there is none."""
+    return 0 if record is None else len(record._fields)
+
+
+def in_pairs(record: Any) -> int:
+    """How many rows the normals of a record take, which are drawn in pairs."""
+    return size_of(record) + size_of(record) % 2
+
+
 PLANT = _rows = Layout()
+BY_CHANNEL = sorted(CARRIED, key=lambda sensor: sensor.channels.reading)  # the order of their rows
 
 # what this flight's vehicle, wind and sensors are (`simulation.truth`)
 AS_IS = {part: _rows.take(SIZES[part]) for part in PARTS}
@@ -88,7 +92,8 @@ GPS = _rows.keep(NavSolution)  # the reading
 _rows.keep(FlowState)
 _rows.keep(RangefinderState)
 FLOW_READING = _rows.keep(FlowReading)
-SEES_FLOW = FLOW_READING + FlowReading._fields.index("engaged")  # of the navigator's camera: its last reading says so
+SEES_FLOW = FLOW_READING + FlowReading._fields.index("engaged")
+_rows.name(SeesFlow, SEES_FLOW)
 RANGE = _rows.keep(RangeReading)
 
 STREAM = _rows.take(1)  # of the lane's noise, from its block's first flight on; the bits of a whole number
@@ -101,19 +106,11 @@ FLOW_NORMALS = _rows.keep(FlowNormals)
 WIND_NORMALS = _rows.keep(WindNormals)
 NORMALS_END = _rows.next
 RECIRCULATION_NORMALS = _rows.take(len(RecirculationState._fields) + len(RecirculationState._fields) % 2)
-# and those of every unit before the flight, and of its state
-INERTIAL_DRAWN = _rows.take(len(InertialUnit._fields) + len(InertialUnit._fields) % 2)
-INERTIAL_BEGUN = _rows.take(len(InertialStartNormals._fields))
-RECEIVER_DRAWN = _rows.take(len(GpsReceiverUnit._fields))
-RECEIVER_BEGUN = _rows.take(len(GpsReceiverStartNormals._fields))
-CAMERA_DRAWN = _rows.take(len(FlowCameraUnit._fields))
-CAMERA_BEGUN = _rows.take(len(FlowCameraStartNormals._fields))
-RANGE_DRAWN = _rows.take(len(RangeSensorUnit._fields))
-BARO_DRAWN = _rows.take(len(BarometerUnit._fields))
-BARO_BEGUN = _rows.take(len(BarometerStartNormals._fields))
-MAG_DRAWN = _rows.take(len(MagnetometerUnit._fields))
-PAD_DRAWN = _rows.take(len(PadCameraUnit._fields))
-SKID_DRAWN = _rows.take(len(SkidSwitchUnit._fields))
+# and those of every carried unit, which become the unit as it is on this flight, and of its state
+UNIT, BEGUN = {}, {}
+for _one in BY_CHANNEL:
+    UNIT[_one.name] = _rows.take(in_pairs(_one.unit))
+    BEGUN[_one.name] = _rows.take(in_pairs(_one.begun))
 START_END = _rows.next
 
 # the paper's filter: state and covariance, inputs and measurements
@@ -125,33 +122,15 @@ MEASURED = _rows.keep(Measured)
 ARRIVED = _rows.keep(Arrived)
 INNOVATION = _rows.take(2 * STATES)  # of each component, then their variances
 
-# the sensors that feed the navigator: each unit as it was drawn for this flight, its state, its normals
-INERTIAL_UNIT = _rows.take(len(InertialUnit._fields))
-INERTIAL = _rows.take(len(InertialState._fields))
-INERTIAL_NORMALS = _rows.take(len(InertialNormals._fields))
-RECEIVER_UNIT = _rows.take(len(GpsReceiverUnit._fields))
-RECEIVER = _rows.take(len(GpsReceiverState._fields))
-RECEIVER_NORMALS = _rows.take(len(GpsReceiverNormals._fields))
-CAMERA_UNIT = _rows.take(len(FlowCameraUnit._fields))
-CAMERA = _rows.take(len(FlowCameraState._fields))
-CAMERA_NORMALS = _rows.take(len(FlowCameraNormals._fields))
-RANGE_UNIT = _rows.take(len(RangeSensorUnit._fields))
-RANGER = _rows.take(len(RangeSensorState._fields))
-RANGE_NORMALS = _rows.take(len(RangeSensorNormals._fields))
-BARO_UNIT = _rows.take(len(BarometerUnit._fields))
-BARO = _rows.take(len(BarometerState._fields))
-BARO_NORMALS = _rows.take(len(BarometerNormals._fields))
-MAG_UNIT = _rows.take(len(MagnetometerUnit._fields))
-MAG_NORMALS = _rows.take(len(MagnetometerNormals._fields))
-PAD_UNIT = _rows.take(len(PadCameraUnit._fields))
-PAD_NORMALS = _rows.take(len(PadCameraNormals._fields))
-SKID_UNIT = _rows.take(len(SkidSwitchUnit._fields))
-SKID = _rows.take(len(SkidSwitchState._fields))
-SKID_NORMALS = _rows.take(len(SkidSwitchNormals._fields))
+# the sensors that feed the navigator: the state of each, the normals of its reading
+STATE, NORMALS = {}, {}
+for _one in BY_CHANNEL:
+    STATE[_one.name] = _rows.take(size_of(_one.state))
+    NORMALS[_one.name] = _rows.take(in_pairs(_one.normals))
 _rows.keep(ImuReading)  # means over the last inertial period
 _rows.keep(Knowledge)
 _rows.keep(Felt)
-EXPOSED = _rows.take(5)  # since the last flow: sums of the true rate (3) and of what the gyro read about x and y
+_rows.keep(Exposed)
 FAULT_NORMALS = _rows.take(6)
 _rows.keep(HeldRange)
 EARLIER_READINGS = 8
@@ -178,10 +157,13 @@ _rows.anywhere(TruthThen, "truth_row")
 load_inertial_then, store_inertial_then = _rows.anywhere(InertialThen, "inertial_row")
 
 _rows.name(MultirotorParameters, *range(AS_IS["vehicle"], AS_IS["vehicle"] + len(MultirotorParameters._fields)))
-for _part in ("vehicle", "wind", "ground", "recirculation", "late", "fault"):
+for _part in ("vehicle", "wind", "ground", "recirculation", "fault"):
     PLANT.name(PARTS[_part], *range(AS_IS[_part], AS_IS[_part] + SIZES[_part])[: len(PARTS[_part]._fields)])
 PAPERS = Layout(below=PLANT)  # with what belongs to the paper's flow sensor alone
 PAPERS.name(FlowParameters, *range(AS_IS["flow"], AS_IS["flow"] + SIZES["flow"]))
+CARRIERS = Layout(below=PLANT)  # with what belongs to the sensors that a vehicle carries
+CARRIERS.name(FlowParameters, *range(AS_IS["camera_flow"], AS_IS["camera_flow"] + SIZES["camera_flow"]))
+CARRIERS.see(attitude_of)
 
 load_helicopter, store_helicopter = PLANT.access(HelicopterState)
 load_stage, store_stage = lane_access(HelicopterState, STAGE)
@@ -205,28 +187,6 @@ load_rangefinder, store_rangefinder = PLANT.access(RangefinderState)
 load_true_imu, _ = PLANT.access(ImuReading)
 load_gps_normals, _ = PLANT.access(GpsInsNormals)
 load_wind_normals, _ = PLANT.access(WindNormals)
-load_inertial_unit, store_inertial_unit = lane_access(InertialUnit, INERTIAL_UNIT)
-load_inertial, store_inertial = lane_access(InertialState, INERTIAL)
-load_inertial_normals, _ = lane_access(InertialNormals, INERTIAL_NORMALS)
-load_receiver_unit, store_receiver_unit = lane_access(GpsReceiverUnit, RECEIVER_UNIT)
-load_receiver, store_receiver = lane_access(GpsReceiverState, RECEIVER)
-load_receiver_normals, _ = lane_access(GpsReceiverNormals, RECEIVER_NORMALS)
-load_camera_unit, store_camera_unit = lane_access(FlowCameraUnit, CAMERA_UNIT)
-load_camera, store_camera = lane_access(FlowCameraState, CAMERA)
-load_camera_normals, _ = lane_access(FlowCameraNormals, CAMERA_NORMALS)
-load_range_unit, store_range_unit = lane_access(RangeSensorUnit, RANGE_UNIT)
-load_ranger, store_ranger = lane_access(RangeSensorState, RANGER)
-load_range_normals, _ = lane_access(RangeSensorNormals, RANGE_NORMALS)
-load_baro_unit, store_baro_unit = lane_access(BarometerUnit, BARO_UNIT)
-load_baro, store_baro = lane_access(BarometerState, BARO)
-load_baro_normals, _ = lane_access(BarometerNormals, BARO_NORMALS)
-load_mag_unit, store_mag_unit = lane_access(MagnetometerUnit, MAG_UNIT)
-load_mag_normals, _ = lane_access(MagnetometerNormals, MAG_NORMALS)
-load_pad_unit, store_pad_unit = lane_access(PadCameraUnit, PAD_UNIT)
-load_pad_normals, _ = lane_access(PadCameraNormals, PAD_NORMALS)
-load_skid_unit, store_skid_unit = lane_access(SkidSwitchUnit, SKID_UNIT)
-load_skid, store_skid = lane_access(SkidSwitchState, SKID)
-load_skid_normals, _ = lane_access(SkidSwitchNormals, SKID_NORMALS)
 load_known, store_known = PLANT.access(Knowledge)
 load_estimate, _ = PLANT.access(Estimate)
 load_autopilot, store_autopilot = PLANT.access(AutopilotState)
@@ -236,14 +196,4 @@ wind_as_is, _ = lane_access(PARTS["wind"], AS_IS["wind"])
 ground_as_is, _ = lane_access(PARTS["ground"], AS_IS["ground"])
 recirculation_as_is, _ = lane_access(PARTS["recirculation"], AS_IS["recirculation"])
 flow_as_is, _ = lane_access(PARTS["flow"], AS_IS["flow"])
-late_as_is, _ = lane_access(PARTS["late"], AS_IS["late"])
-inertial_as_is, _ = lane_access(PARTS["inertial"], AS_IS["inertial"])
-receiver_as_is, _ = lane_access(PARTS["receiver"], AS_IS["receiver"])
-camera_flow_as_is, _ = lane_access(PARTS["camera_flow"], AS_IS["camera_flow"])
-camera_as_is, _ = lane_access(PARTS["camera"], AS_IS["camera"])
-ranger_as_is, _ = lane_access(PARTS["ranger"], AS_IS["ranger"])
-baro_as_is, _ = lane_access(PARTS["baro"], AS_IS["baro"])
-mag_as_is, _ = lane_access(PARTS["mag"], AS_IS["mag"])
-pad_as_is, _ = lane_access(PARTS["pad"], AS_IS["pad"])
 fault_as_is, _ = lane_access(PARTS["fault"], AS_IS["fault"])
-skid_as_is, _ = lane_access(PARTS["skid"], AS_IS["skid"])

@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, Work, equation
+from flownav.compile import equation
 from flownav.frames import rotation_from_quaternion, to_earth
-from flownav.sensors.barometer import BarometerParameters, BarometerTruth
-from flownav.sensors.beam import BeamHit, Ground, beam_distance, ground_height
+from flownav.sensors.beam import BeamHit, Ground, beam_distance
 from flownav.sensors.flow import FlowParameters
-from flownav.sensors.flow_camera import FlowCameraParameters
-from flownav.sensors.gps_receiver import GpsReceiverParameters, GpsReceiverTruth
-from flownav.sensors.inertial import InertialParameters
-from flownav.sensors.magnetometer import MagnetometerParameters
-from flownav.sensors.pad_camera import PadCameraParameters
-from flownav.sensors.range_sensor import RangeSensorParameters
-from flownav.sensors.skid_switch import SkidSwitchParameters
-from flownav.simulation import layout
-from flownav.simulation.layout import ground_as_is, load_helicopter
 from flownav.vehicle.state import HelicopterState
 
 EPOCH_S = 0.02
@@ -31,11 +21,14 @@ SETTLED_S = 2.0  # the skids take the weight as the collective goes down
 
 
 class Clock(NamedTuple):
-    """When a sensor reads: every so many epochs from the first on; fitted 0: the vehicle has none."""
+    """When a sensor reads: every so many epochs from the first on; fitted: how many readings it then gives, or none."""
 
     fitted: int
     every: int
     first: int
+
+
+ALWAYS, NEVER = Clock(fitted=1, every=1, first=0), Clock(fitted=0, every=1, first=0)
 
 
 class Place(NamedTuple):
@@ -46,34 +39,31 @@ class Place(NamedTuple):
     down_m: float
 
 
-class Onboard(NamedTuple):
-    """Every sensor's coefficients, clock and place."""
+class Fitting(NamedTuple):
+    """One sensor as it is carried. p: coefficients by its datasheet; place: of its lens, None where it has none."""
 
-    inertial: InertialParameters
+    p: Any
+    clock: Clock
+    place: Place | None
+
+
+class Onboard(NamedTuple):
+    """Every sensor as it is carried, and what they look at. carried: a `Fitting` by each sensor's name."""
+
+    carried: Any
     inertial_steps: int  # physics steps an inertial period
-    receiver: GpsReceiverParameters
-    receiver_clock: Clock
-    receiver_offers_velocity: int
     flow: FlowParameters
-    camera: FlowCameraParameters
-    camera_clock: Clock
-    camera_place: Place
-    ranger: RangeSensorParameters
-    range_clock: Clock
-    range_place: Place
-    baro: BarometerParameters
-    baro_clock: Clock
-    mag: MagnetometerParameters
-    mag_clock: Clock
-    pad: PadCameraParameters
-    pad_clock: Clock
-    pad_place: Place
     pad_seen: NDArray[np.float64]  # what was seen in rendered frames, rows of PAD_SEEN flattened; empty: by the model
-    skid: SkidSwitchParameters
-    skid_clock: Clock
     rotor_above_cg_m: float
     texture_everywhere: float  # 0: only the pad has texture
     pad_half_size_m: float
+
+
+def without(onboard: Onboard, *names: str) -> Onboard:
+    """The same vehicle that does not carry these sensors."""
+    fittings = {name: getattr(onboard.carried, name) for name in names}
+    gone = {name: one._replace(clock=one.clock._replace(fitted=0)) for name, one in fittings.items()}
+    return onboard._replace(carried=onboard.carried._replace(**gone))
 
 
 @equation
@@ -90,17 +80,6 @@ def earlier(state: HelicopterState, late_s: float) -> HelicopterState:
 
 
 @equation
-def receiver_truth(state: HelicopterState, late_s: float) -> GpsReceiverTruth:
-    """How the vehicle moves, as its GPS receiver feels it; late_s: how much older its fixes are than it says."""
-    rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
-    vel_n, vel_e, vel_d = to_earth(rotation, state.u, state.v, state.w)
-    return GpsReceiverTruth(
-        state.pos_n - late_s * vel_n, state.pos_e - late_s * vel_e, state.pos_d - late_s * vel_d, vel_n, vel_e, vel_d,
-        state.p, state.q, state.r,
-    )  # fmt: skip
-
-
-@equation
 def place_of(state: HelicopterState, place: Place) -> tuple[float, float, float]:
     """Where a lens is, NED [m]."""
     rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
@@ -114,11 +93,3 @@ def beam_of(state: HelicopterState, place: Place, ground: Ground) -> BeamHit:
     rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
     north, east, down = place_of(state, place)
     return beam_distance(north, east, -down, rotation, ground)
-
-
-@equation
-def baro_truth(work: Work, lanes: Lanes, lane: int, s: Onboard) -> BarometerTruth:
-    """Altitude, height of the rotor over the ground, and its thrust."""
-    state = load_helicopter(work, lanes, lane)
-    over = s.rotor_above_cg_m - state.pos_d - ground_height(state.pos_n, state.pos_e, ground_as_is(work, lanes, lane))
-    return BarometerTruth(-state.pos_d, over, work[layout.THRUST * len(lanes) + lane])

@@ -114,6 +114,28 @@ class Landed(NamedTuple):
     landed: float
 
 
+class SeesFlow(NamedTuple):
+    """1 where the last reading of the navigator's camera says anything."""
+
+    sees: float
+
+
+class Exposed(NamedTuple):
+    """Sums since the last flow: of the true rate, and of what the gyro read about x and y."""
+
+    rate_p_rad_s: float
+    rate_q_rad_s: float
+    rate_r_rad_s: float
+    gyro_x_rad_s: float
+    gyro_y_rad_s: float
+
+
+class Late(NamedTuple):
+    """How much older than its datasheet says a sensor's readings are; 0 before the first epoch."""
+
+    late_s: float
+
+
 class HeldRange(NamedTuple):
     """The range before a fault."""
 

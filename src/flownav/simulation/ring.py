@@ -7,31 +7,18 @@ order of sampling and emptied in the order of the instants that the readings des
 
 from __future__ import annotations
 
-import numpy as np
-
 from flownav.compile import Lanes, Work, equation, lane_access
 from flownav.navigation.memory import store_reading
 from flownav.navigation.records import Reading
 from flownav.simulation import layout
 from flownav.simulation.layout import load_slot, put_slot
 
-__all__ = ["FIELDS", "FIRST", "hand_over", "load_slot", "put_slot", "reading_at", "reading_of", "store_row"]
+__all__ = ["FIELDS", "FIRST", "hand_over", "load_slot", "put_slot", "reading_at", "store_row"]
 
 FIELDS = len(Reading._fields)
 FIRST = layout.ROWS
 
 reading_at, store_row = lane_access(Reading, None)
-
-
-@equation
-def reading_of(
-    value_0: float, value_1: float, value_2: float, variance_0: float, variance_1: float, variance_2: float,
-    quality: float, arrived: float,
-) -> Reading:  # fmt: skip
-    """A reading of up to three values, with the variances that it states (NaN where it states none)."""
-    return Reading(
-        value_0, value_1, value_2, np.nan, np.nan, np.nan, variance_0, variance_1, variance_2, quality, arrived, 0.0
-    )
 
 
 @equation

@@ -10,12 +10,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, ValidationInfo, create_model, field_validator
 
 from flownav.errors import InputError
 from flownav.parameter_files import Number, ParameterModel, load, shipped
 from flownav.sensors.datasheet import FlowSettings
 from flownav.sensors.settings import GpsInsSettings, PadFixSettings, RangefinderSettings
+from flownav.simulation.carried import carried_sensors
 from flownav.simulation.dispersion import SHIPPED as SHIPPED_DISPERSION
 from flownav.simulation.dispersion import DispersionSection
 from flownav.simulation.ground import GroundSettings
@@ -136,21 +137,18 @@ class EventSection(ParameterModel):
     kind: Literal["engine cut"]
 
 
-class SensorsSection(ParameterModel):
+_by_channel = sorted(carried_sensors(), key=lambda sensor: sensor.channels.reading)
+_files: dict[str, Any] = {sensor.name: (str | None, None) for sensor in _by_channel}
+_SheetFiles: Any = create_model("_SheetFiles", __base__=ParameterModel, **_files)
+
+
+class SensorsSection(_SheetFiles):
     """The datasheets of what the vehicle carries for its navigator; the shipped ones unless named.
 
     `gps`, `rangefinder` and `pad_fix` of the scenario stand above what the sheets say. texture: whether flow finds it
     everywhere or on the pad alone.
     """
 
-    inertial: str | None = None
-    gps_receiver: str | None = None
-    flow_camera: str | None = None
-    range_sensor: str | None = None
-    barometer: str | None = None
-    magnetometer: str | None = None
-    pad_camera: str | None = None
-    skid_switch: str | None = None
     texture: Literal["everywhere", "pad"] = "everywhere"
 
 

@@ -10,6 +10,7 @@ flight is what was read and whether it arrived.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +18,10 @@ from numpy.typing import NDArray
 
 from flownav.measurement import Sensor
 from flownav.simulation.onboard import EPOCH_S, PHYSICS_PERIOD_S, Clock, Onboard
+from flownav.simulation.truth import CARRIED
 
 JITTER_KEY = 20251121  # of the timetable's own generator: it is part of the scenario, not of a seed
+KEYS_A_KIND = 256  # of several sensors of one kind each has its own jitter
 SLACK_S = 1e-9
 
 
@@ -80,12 +83,9 @@ def sampled_readings(
     Each sensor's jitter is drawn for itself: a vehicle without another sensor has the same.
     """
     parts: list[tuple[NDArray[np.float64], int, NDArray[np.int64]]] = []
-    for sensor, clock in clocks(sensors):
-        if clock.fitted == 0:
-            continue
+    for sensor, key, clock in clocks(sensors):
         due = np.arange(clock.first, epochs, clock.every, dtype=np.int64)
-        of = Sensor.GPS_POSITION if sensor == Sensor.GPS_VELOCITY else sensor  # the two come together
-        drawn = np.random.Generator(np.random.Philox(key=[JITTER_KEY, int(of)])).random(len(due))
+        drawn = np.random.Generator(np.random.Philox(key=[JITTER_KEY, key])).random(len(due))
         late_s = timing[sensor].jitter_s * (2.0 * drawn - 1.0)
         hidden_s = timing[sensor].latency_s - stated[sensor].latency_s
         t_s = np.asarray(due * EPOCH_S - stated[sensor].lag_s + late_s + hidden_s, np.float64)
@@ -100,18 +100,16 @@ def sampled_readings(
     return np.concatenate([t_s for t_s, _, _ in parts])[order], kinds[order], epoch[order]
 
 
-def clocks(sensors: Onboard) -> list[tuple[Sensor, Clock]]:
-    """Every sensor but the inertial one, in the order in which `sampling.sample` reads them."""
-    velocity = sensors.receiver_clock._replace(
-        fitted=sensors.receiver_clock.fitted if sensors.receiver_offers_velocity else 0
-    )
-    return [
-        (Sensor.GPS_POSITION, sensors.receiver_clock),
-        (Sensor.GPS_VELOCITY, velocity),
-        (Sensor.BARO, sensors.baro_clock),
-        (Sensor.MAG, sensors.mag_clock),
-        (Sensor.RANGE, sensors.range_clock),
-        (Sensor.FLOW_RATE, sensors.camera_clock),
-        (Sensor.PAD, sensors.pad_clock),
-        (Sensor.LANDED, sensors.skid_clock),
-    ]
+def clocks(sensors: Onboard) -> list[tuple[Sensor, int, Clock]]:
+    """Every reading of a fitted sensor but the inertial one, in the order in which `sampling.sample` takes them.
+
+    Its kind, the key of its jitter, and its clock. What a sensor says at one time arrives together.
+    """
+    found, seen = [], Counter[Sensor]()
+    for sensor in CARRIED:
+        clock, first = getattr(sensors.carried, sensor.name).clock, sensor.says[0].kind
+        key = int(first) + KEYS_A_KIND * seen[first]
+        seen[first] += 1
+        if sensor.on_epochs:
+            found += [(said.kind, key, clock) for said in sensor.says[: clock.fitted]]
+    return found

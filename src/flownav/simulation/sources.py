@@ -10,18 +10,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.sensors.barometer import BarometerNormals, BarometerStartNormals, BarometerUnit
-from flownav.sensors.flow_camera import FlowCameraNormals, FlowCameraStartNormals, FlowCameraUnit
 from flownav.sensors.gps_ins import GpsInsNormals
-from flownav.sensors.gps_receiver import GpsReceiverNormals, GpsReceiverStartNormals, GpsReceiverUnit
-from flownav.sensors.inertial import InertialNormals, InertialStartNormals, InertialUnit
-from flownav.sensors.magnetometer import MagnetometerNormals, MagnetometerUnit
-from flownav.sensors.pad_camera import PadCameraNormals, PadCameraUnit
-from flownav.sensors.range_sensor import RangeSensorNormals, RangeSensorUnit
-from flownav.sensors.skid_switch import SkidSwitchNormals, SkidSwitchUnit
 from flownav.simulation import draws, layout
+from flownav.simulation.carried import CarriedSensor
 from flownav.simulation.noise import CHANNELS_PER_STEP, threefry
-from flownav.simulation.onboard import EPOCH_S, PHYSICS_PERIOD_S, Clock, Onboard
+from flownav.simulation.onboard import ALWAYS, EPOCH_S, PHYSICS_PERIOD_S, Clock, Onboard
 from flownav.simulation.plan import Flight
 from flownav.simulation.recirculation import RecirculationState
 from flownav.simulation.sensing import RANGE_EPOCHS
@@ -29,7 +22,6 @@ from flownav.simulation.wind import WindNormals
 
 Array = NDArray[np.float64]
 
-ALWAYS = Clock(fitted=1, every=1, first=0)
 SPARE = "spare"  # a field that makes a count even, and is drawn for nothing
 
 
@@ -71,20 +63,17 @@ def starts_of(flight: Flight) -> list[Start]:
 
 def _units(s: Onboard) -> list[tuple[str, Any, int]]:
     """The units that the vehicle carries: what each is, and how it starts."""
-    units: list[tuple[str, Clock, tuple[tuple[Any, int], ...]]] = [
-        ("inertial", ALWAYS,
-         ((InertialUnit, layout.INERTIAL_DRAWN), (InertialStartNormals, layout.INERTIAL_BEGUN))),
-        ("gps_receiver", s.receiver_clock,
-         ((GpsReceiverUnit, layout.RECEIVER_DRAWN), (GpsReceiverStartNormals, layout.RECEIVER_BEGUN))),
-        ("flow_camera", s.camera_clock,
-         ((FlowCameraUnit, layout.CAMERA_DRAWN), (FlowCameraStartNormals, layout.CAMERA_BEGUN))),
-        ("range_sensor", s.range_clock, ((RangeSensorUnit, layout.RANGE_DRAWN),)),
-        ("barometer", s.baro_clock, ((BarometerUnit, layout.BARO_DRAWN), (BarometerStartNormals, layout.BARO_BEGUN))),
-        ("magnetometer", s.mag_clock, ((MagnetometerUnit, layout.MAG_DRAWN),)),
-        ("pad_camera", s.pad_clock, ((PadCameraUnit, layout.PAD_DRAWN),)),
-        ("skid_switch", s.skid_clock, ((SkidSwitchUnit, layout.SKID_DRAWN),)),
-    ]  # fmt: skip
-    return [(name, bundle, row) for name, clock, own in units if clock.fitted for bundle, row in own]
+    return [
+        (sensor.name, record, rows[sensor.name])
+        for sensor in fitted_to(s)
+        for record, rows in ((sensor.unit, layout.UNIT), (sensor.begun, layout.BEGUN))
+        if record is not None
+    ]
+
+
+def fitted_to(s: Onboard) -> list[CarriedSensor]:
+    """The sensors that the vehicle carries, in the order of their channels."""
+    return [sensor for sensor in layout.BY_CHANNEL if getattr(s.carried, sensor.name).clock.fitted]
 
 
 def sources_of(flight: Flight) -> list[Source]:
@@ -115,21 +104,14 @@ def sources_of(flight: Flight) -> list[Source]:
 
 
 def _readings(s: Onboard) -> list[tuple[str, tuple[str, ...], int, Clock]]:
-    """The readings of the sensors that the vehicle carries."""
-    parts = round(EPOCH_S / (s.inertial_steps * PHYSICS_PERIOD_S))
-    inertial = [
-        ("inertial", InertialNormals._fields, draws.INERTIAL_CHANNEL + 6 * part, ALWAYS) for part in range(parts)
-    ]
-    others = (
-        ("gps_receiver", GpsReceiverNormals._fields, draws.RECEIVER_CHANNEL, s.receiver_clock),
-        ("flow_camera", FlowCameraNormals._fields, draws.CAMERA_CHANNEL, s.camera_clock),
-        ("range_sensor", RangeSensorNormals._fields, draws.RANGE_CHANNEL, s.range_clock),
-        ("barometer", BarometerNormals._fields, draws.BARO_CHANNEL, s.baro_clock),
-        ("magnetometer", MagnetometerNormals._fields, draws.MAG_CHANNEL, s.mag_clock),
-        ("pad_camera", PadCameraNormals._fields, draws.PAD_CHANNEL, s.pad_clock),
-        ("skid_switch", SkidSwitchNormals._fields, draws.SKID_CHANNEL, s.skid_clock),
-    )
-    return [*inertial, *(one for one in others if one[3].fitted)]
+    """The readings of the sensors that the vehicle carries; the inertial unit gives several an epoch."""
+    found = []
+    for sensor in fitted_to(s):
+        fields, clock = sensor.normals._fields, getattr(s.carried, sensor.name).clock
+        parts = 1 if sensor.on_epochs else round(EPOCH_S / (s.inertial_steps * PHYSICS_PERIOD_S))
+        pairs = layout.in_pairs(sensor.normals) // 2
+        found += [(sensor.name, fields, sensor.channels.reading + pairs * part, clock) for part in range(parts)]
+    return found
 
 
 def normals_of(seed: int, streams: NDArray[np.uint64], steps: NDArray[np.uint64], channel: int) -> Array:

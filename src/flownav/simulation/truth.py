@@ -6,22 +6,16 @@ Each flight has a `Truth` of its own, which lies in its lane's rows of the buffe
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import namedtuple
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.sensors.barometer import BarometerParameters
 from flownav.sensors.beam import Ground
 from flownav.sensors.flow import FlowParameters
-from flownav.sensors.flow_camera import FlowCameraParameters
-from flownav.sensors.gps_receiver import GpsReceiverParameters
-from flownav.sensors.inertial import InertialParameters
-from flownav.sensors.magnetometer import MagnetometerParameters
-from flownav.sensors.pad_camera import PadCameraParameters
-from flownav.sensors.range_sensor import RangeSensorParameters
-from flownav.sensors.skid_switch import SkidSwitchParameters
+from flownav.simulation.carried import carried_sensors
 from flownav.simulation.fault import SensorFault
 from flownav.simulation.recirculation import RecirculationParameters
 from flownav.simulation.wind import WindParameters
@@ -32,40 +26,34 @@ from flownav.vehicle.parameters import VehicleParameters
 Array = NDArray[np.float64]
 
 
-class Lateness(NamedTuple):
-    """How much older readings are on arrival than their datasheets say [s]; negative: they are younger."""
+CARRIED = carried_sensors()
+NAMES, LATE = [one.name for one in CARRIED], [one.name for one in CARRIED if one.late]
 
-    receiver_s: float
-    flow_s: float
-    range_s: float
-    pad_s: float
-
-
-PUNCTUAL = Lateness(0.0, 0.0, 0.0, 0.0)
+# one of something for each carried sensor, and how much older than stated readings may be on arrival [s]
+Carried: Any = namedtuple("Carried", NAMES)  # type: ignore[misc]
+Lateness: Any = namedtuple("Lateness", LATE)  # type: ignore[misc]
+PUNCTUAL: Any = Lateness(*([0.0] * len(LATE)))
 
 
 class Truth(NamedTuple):
-    """Every number that may differ from flight to flight; `flow` is the paper's metric sensor, `camera_flow` ours."""
+    """Every number that may differ from flight to flight; `flow` is the paper's metric sensor, `camera_flow` ours.
+
+    late: a `Lateness`; carried: the coefficients of each sensor, a `Carried`.
+    """
 
     vehicle: AnyVehicle
     wind: WindParameters
     ground: Ground
     recirculation: RecirculationParameters
     flow: FlowParameters
-    late: Lateness
-    inertial: InertialParameters
-    receiver: GpsReceiverParameters
+    late: Any
     camera_flow: FlowParameters
-    camera: FlowCameraParameters
-    ranger: RangeSensorParameters
-    baro: BarometerParameters
-    mag: MagnetometerParameters
-    pad: PadCameraParameters
-    skid: SkidSwitchParameters
     fault: SensorFault
+    carried: Any
 
 
-PARTS: dict[str, Any] = get_type_hints(Truth) | {"vehicle": VehicleParameters}
+PARTS: dict[str, Any] = get_type_hints(Truth) | {"vehicle": VehicleParameters, "late": Lateness}
+PARTS = {part: kind for part, kind in PARTS.items() if part != "carried"} | {o.name: o.parameters for o in CARRIED}
 LARGEST_VEHICLE = max(len(VehicleParameters._fields), len(MultirotorParameters._fields))
 SIZES = {part: len(kind._fields) for part, kind in PARTS.items()} | {"vehicle": LARGEST_VEHICLE}
 TRUTH_ROWS = sum(SIZES.values())
@@ -73,11 +61,15 @@ TRUTH_ROWS = sum(SIZES.values())
 
 def packed_truth(truths: Sequence[Truth]) -> Array:
     """The truths of a block's lanes as its buffer takes them, (TRUTH_ROWS, lanes) flattened."""
-    columns = [
-        [*truth.vehicle, *[0.0] * (LARGEST_VEHICLE - len(truth.vehicle)), *(x for part in truth[1:] for x in part)]
-        for truth in truths
-    ]
-    rows = np.array(columns, np.float64).T
+    rows = np.array([list(_numbers(truth)) for truth in truths], np.float64).T
     if rows.shape[0] != TRUTH_ROWS:
         raise ValueError(f"a truth has {TRUTH_ROWS} numbers, not {rows.shape[0]}")
     return np.ascontiguousarray(rows).reshape(-1)
+
+
+def _numbers(truth: Truth) -> Iterator[float]:
+    """Every number of a truth in the order of PARTS; those that a vehicle has fewer than the largest are zeros."""
+    yield from truth.vehicle
+    yield from [0.0] * (LARGEST_VEHICLE - len(truth.vehicle))
+    for part in (*truth[1:-1], *truth.carried):
+        yield from part

@@ -7,9 +7,10 @@ equations are those that the simulator flies (`flownav.sensors`), called reading
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 from scipy.signal import lfilter
@@ -19,30 +20,30 @@ from flownav.frames import Rotation as Matrix
 from flownav.frames import rotation_from_quaternion
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor, Stream
-from flownav.sensors import barometer as baro
-from flownav.sensors import flow as flow_dynamics
-from flownav.sensors import flow_camera as camera
-from flownav.sensors import gps_receiver as receiver
-from flownav.sensors import inertial
-from flownav.sensors import magnetometer as mag
-from flownav.sensors import range_sensor as ranger
+from flownav.sensors.barometer import BarometerTruth
 from flownav.sensors.beam import LEVEL, BeamHit, beam_distance
 from flownav.sensors.datasheet import FlowSettings
 from flownav.sensors.earth_field import declination_rad
+from flownav.sensors.flow import PERIOD_S as FLOW_STEP_S
+from flownav.sensors.flow import FlowParameters
+from flownav.sensors.flow_camera import FlowCameraTruth, step_flow_camera
 from flownav.sensors.gauss_markov import gauss_markov_coefficients
 from flownav.sensors.gps_ins import attitude_with_error
+from flownav.sensors.gps_receiver import GpsReceiverTruth
 from flownav.sensors.imu import ImuReading
+from flownav.sensors.inertial import InertialParameters, step_inertial
 from flownav.sensors.magnetometer_sheet import MagneticField
 from flownav.sensors.settings import GpsInsSettings
 from flownav.sensors.sheet import SensorSheet
 from flownav.sensors.sheets import SensorSheets
+from flownav.simulation.truth import CARRIED
 from flownav.validation.drawn import Flight, drawn_sheets, kept_of, sheets_of
 from flownav.validation.flights import AssumedVehicle
 from flownav.validation.path import FlownPath
 from flownav.validation.rates import rate_hz
 
 COARSEST_UNSEEN_M = 0.05  # steps of a recorded position below it are the receiver's, not the log's
-FLOW_STEP_S = flow_dynamics.PERIOD_S
+Seen = dict[Any, Any]  # records by their kinds
 
 
 class Scene(NamedTuple):
@@ -75,6 +76,36 @@ def simulated_log(log: Log, path: FlownPath, flight: Flight, vehicle: AssumedVeh
 
 
 # -- one sensor each ------------------------------------------------------------------------------------------
+def readings(
+    scene: Scene, name: str, drawn: str, p: Any, seen: Sequence[Seen], step: Callable[..., Any] | None = None
+) -> list[Any]:
+    """What a carried sensor reads of what it sees, one reading after the other, by the equations of its row.
+
+    drawn: the name of its draws; p: its coefficients; step: its equation, where the row's takes more than the sensor's.
+    """
+    one = next(sensor for sensor in CARRIED if sensor.name == name)
+    step, values, kept = step or one.step, [], {one.parameters: p}
+    kept[one.unit] = lawful(one.draw, kept | {one.unit: one.unit(*_once(scene, f"{drawn} unit", one.unit))})
+    if one.start is not None:
+        begun = {} if one.begun is None else {one.begun: one.begun(*_once(scene, f"{drawn} start", one.begun))}
+        kept[one.state] = lawful(one.start, kept | begun | seen[0])
+    normals = scene.flight.normals(drawn, len(seen), len(one.normals._fields)).tolist()
+    for now, of_this in zip(seen, normals, strict=True):
+        read = lawful(step, kept | now | {one.normals: one.normals(*of_this)})
+        if one.state is not None:
+            kept[one.state], read = read
+        values.append(read)
+    return values
+
+
+def lawful(law: Callable[..., Any], records: Seen) -> Any:
+    """What a law says of the records that its parameters are annotated with."""
+    return law(*(records[kind] for name, kind in hints_of(law).items() if name != "return"))
+
+
+hints_of = lru_cache(get_type_hints)
+
+
 def _inertial(scene: Scene) -> list[Stream]:
     """Means over the IMU's own period; the log holds every n-th of them."""
     stream, sheet = scene.log.streams[Sensor.IMU], scene.sheets.inertial
@@ -84,17 +115,12 @@ def _inertial(scene: Scene) -> list[Stream]:
     p = every_nth(sheet.parameters(vehicle.rotor_speed_rad_s * (1.0 + off), vehicle.blades), kept)
     t_s = scene.instants_s(stream, sheet, "inertial")
     motion = np.column_stack([scene.path.turn_rad_s(t_s, period_s), scene.path.force_m_s2(t_s, period_s)])
-    unit = inertial.draw_inertial(inertial.InertialUnit(*_once(scene, "inertial unit", 28)), p)
-    state = inertial.start_inertial(inertial.InertialStartNormals(*_once(scene, "inertial start", 10)), p)
-    normals = scene.flight.normals("inertial", len(t_s), 12).tolist()
-    values = []
-    for truth, drawn in zip(motion.tolist(), normals, strict=True):
-        state, read = inertial.step_inertial(state, unit, ImuReading(*truth), inertial.InertialNormals(*drawn), p)
-        values.append(read[:6])
+    seen = [{ImuReading: ImuReading(*truth)} for truth in motion.tolist()]
+    values = [read[:6] for read in readings(scene, "inertial", "inertial", p, seen, step_inertial)]
     return [Stream.of(Sensor.IMU, stream.t_s, np.array(values))]
 
 
-def every_nth(p: inertial.InertialParameters, n: int) -> inertial.InertialParameters:
+def every_nth(p: InertialParameters, n: int) -> InertialParameters:
     """Coefficients of a unit of whose readings every n-th is kept: biases walk and tones turn n periods a step."""
     rev, blade = (complex(c, s) ** n for c, s in ((p.rev_cosine, p.rev_sine), (p.blade_cosine, p.blade_sine)))
     return p._replace(
@@ -107,29 +133,22 @@ def _receiver(scene: Scene) -> list[Stream]:
     """Position and velocity; positions in the steps of the log, where those are coarser than the receiver's."""
     stream, sheet = scene.log.streams[Sensor.GPS_POSITION], scene.sheets.gps_receiver
     assert sheet is not None
-    p = sheet.parameters()
     t_s = scene.instants_s(stream, sheet, "receiver")
     motion = np.column_stack([
         scene.path.position_m(t_s), scene.path.velocity_m_s(t_s), scene.path.turn_rad_s(t_s, sheet.period_s)
     ]).tolist()  # fmt: skip
-    rotations = rotations_of(scene.path.attitude(t_s))
-    unit = receiver.draw_gps_receiver(receiver.GpsReceiverUnit(*_once(scene, "receiver unit", 4)), p)
-    first = receiver.GpsReceiverTruth(*motion[0])
-    start = receiver.GpsReceiverStartNormals(*_once(scene, "receiver start", 10))
-    state = receiver.start_gps_receiver(first, rotations[0], start, p)
-    normals = scene.flight.normals("receiver", len(t_s), 16).tolist()
-    values = []
-    for truth, rotation, drawn in zip(motion, rotations, normals, strict=True):
-        state, read = receiver.step_gps_receiver(
-            state, unit, receiver.GpsReceiverTruth(*truth), rotation, receiver.GpsReceiverNormals(*drawn), p
-        )
-        values.append((*read[:6], read.arrived))
-    readings = np.array(values)
-    arrived = readings[:, 6] > 0.5
-    position = stepped(readings[:, :3], stream.value)[arrived]
+    turned = rotations_of(scene.path.attitude(t_s))
+    seen = [
+        {GpsReceiverTruth: GpsReceiverTruth(*truth), Matrix: rotation}
+        for truth, rotation in zip(motion, turned, strict=True)
+    ]
+    fixes = readings(scene, "gps_receiver", "receiver", sheet.parameters(), seen)
+    values = np.array([(*read[:6], read.arrived) for read in fixes])
+    arrived = values[:, 6] > 0.5
+    position = stepped(values[:, :3], stream.value)[arrived]
     found = [Stream.of(Sensor.GPS_POSITION, stream.t_s[arrived], position)]
     if Sensor.GPS_VELOCITY in scene.log.streams:
-        found.insert(0, Stream.of(Sensor.GPS_VELOCITY, stream.t_s[arrived], readings[arrived, 3:6]))
+        found.insert(0, Stream.of(Sensor.GPS_VELOCITY, stream.t_s[arrived], values[arrived, 3:6]))
     return found
 
 
@@ -156,31 +175,22 @@ def _camera(scene: Scene) -> list[Stream]:
     assert sheet is not None
     assert file is not None
     dynamics = FlowSettings(shake=False).parameters(file)._replace(sonar_floor_m=0.0)
-    p = sheet.parameters()
     t_s = scene.instants_s(stream, sheet, "camera")
     attitude = scene.path.attitude(t_s)
     cosine = attitude.as_matrix()[:, 2, 2]
     height_m = -scene.path.position_m(t_s)[:, 2]
-    seen = seen_velocity(scene.path, dynamics, t_s)
+    speed = seen_velocity(scene.path, dynamics, t_s)
     rates = scene.path.turn_rad_s(t_s, float(sheet.exposure_s))
-    unit = camera.draw_flow_camera(camera.FlowCameraUnit(*_once(scene, "camera unit", 10)), p)
-    state = camera.start_flow_camera(camera.FlowCameraStartNormals(*_once(scene, "camera start", 2)), p)
-    normals = scene.flight.normals("camera", len(t_s), 12).tolist()
-    truths = np.column_stack([seen, rates, height_m / cosine, height_m, cosine, np.ones(len(t_s))]).tolist()
-    values = []
-    for truth, drawn in zip(truths, normals, strict=True):
-        state, read = camera.step_flow_camera(
-            state, unit, camera.FlowCameraTruth(*truth), camera.FlowCameraNormals(*drawn), dynamics, p
-        )
-        values.append(read)
-    readings = np.array(values)
-    arrived = readings[:, 5] > 0.5
-    value = readings[:, :4].copy()
+    truths = np.column_stack([speed, rates, height_m / cosine, height_m, cosine, np.ones(len(t_s))]).tolist()
+    seen = [{FlowCameraTruth: FlowCameraTruth(*truth), FlowParameters: dynamics} for truth in truths]
+    values = np.array(readings(scene, "flow_camera", "camera", sheet.parameters(), seen, step_flow_camera))
+    arrived = values[:, 5] > 0.5
+    value = values[:, :4].copy()
     value[~np.isfinite(stream.value)] = np.nan  # a sensor without gyro has none here either
-    return [Stream.of(Sensor.FLOW_RATE, stream.t_s[arrived], value[arrived], quality=readings[arrived, 4])]
+    return [Stream.of(Sensor.FLOW_RATE, stream.t_s[arrived], value[arrived], quality=values[arrived, 4])]
 
 
-def seen_velocity(path: FlownPath, dynamics: flow_dynamics.FlowParameters, t_s: Array) -> Array:
+def seen_velocity(path: FlownPath, dynamics: FlowParameters, t_s: Array) -> Array:
     """Body velocity (n, 3) as the identified dynamics make it, from rest at the path's start."""
     grid_s = np.arange(path.span_s[0], path.span_s[1], FLOW_STEP_S)
     velocity = path.body_velocity_m_s(grid_s)
@@ -196,18 +206,10 @@ def _ranger(scene: Scene) -> list[Stream]:
     """Distances along body z to level ground; readings without an echo are not logged, as in the CSV folders."""
     stream, sheet = scene.log.streams[Sensor.RANGE], scene.sheets.range_sensor
     assert sheet is not None
-    p = sheet.parameters()
-    t_s = scene.instants_s(stream, sheet, "ranger")
-    hits = hits_of(scene.path, t_s)
-    unit = ranger.draw_range_sensor(ranger.RangeSensorUnit(*_once(scene, "ranger unit", 2)), p)
-    state = ranger.start_range_sensor(hits[0], p)
-    values = []
-    for hit, drawn in zip(hits, scene.flight.normals("ranger", len(t_s), 6).tolist(), strict=True):
-        state, read = ranger.step_range_sensor(state, unit, hit, ranger.RangeSensorNormals(*drawn), p)
-        values.append(read)
-    readings = np.array(values)
-    heard = (readings[:, 1] > 0.0) & (readings[:, 2] > 0.5)
-    return [Stream.of(Sensor.RANGE, stream.t_s[heard], readings[heard, :1])]
+    seen = [{BeamHit: hit} for hit in hits_of(scene.path, scene.instants_s(stream, sheet, "ranger"))]
+    values = np.array(readings(scene, "range_sensor", "ranger", sheet.parameters(), seen))
+    heard = (values[:, 1] > 0.0) & (values[:, 2] > 0.5)
+    return [Stream.of(Sensor.RANGE, stream.t_s[heard], values[heard, :1])]
 
 
 def hits_of(path: FlownPath, t_s: Array) -> list[BeamHit]:
@@ -224,14 +226,9 @@ def _barometer(scene: Scene) -> list[Stream]:
     p = sheet.parameters(scene.vehicle.rotor_radius_m, AIR_DENSITY_KG_M3)
     t_s = scene.instants_s(stream, sheet, "barometer")
     height_m = -scene.path.position_m(t_s)[:, 2]
-    truths = [baro.BarometerTruth(h - height_m[0], h, scene.vehicle.thrust_n) for h in height_m.tolist()]
-    unit = baro.draw_barometer(baro.BarometerUnit(*_once(scene, "barometer unit", 4)), p)
-    start = baro.BarometerStartNormals(*_once(scene, "barometer start", 2))
-    state = baro.start_barometer(truths[0], unit, start, p)
-    values = []
-    for truth, drawn in zip(truths, scene.flight.normals("barometer", len(t_s), 2).tolist(), strict=True):
-        state, read = baro.step_barometer(state, unit, truth, baro.BarometerNormals(*drawn), p)
-        values.append(read.alt_m)
+    thrust_n = scene.vehicle.thrust_n
+    seen = [{BarometerTruth: BarometerTruth(h - height_m[0], h, thrust_n)} for h in height_m.tolist()]
+    values = [read.alt_m for read in readings(scene, "barometer", "barometer", p, seen)]
     return [Stream.of(Sensor.BARO, stream.t_s, np.array(values))]
 
 
@@ -241,13 +238,9 @@ def _magnetometer(scene: Scene) -> list[Stream]:
     assert sheet is not None
     p = sheet.parameters(scene.sheets.magnetic_field)
     t_s = scene.instants_s(stream, sheet, "magnetometer")
-    unit = mag.draw_magnetometer(mag.MagnetometerUnit(*_once(scene, "magnetometer unit", 16)), p)
-    normals = scene.flight.normals("magnetometer", len(t_s), 4).tolist()
     power_w = scene.vehicle.hover_power_w
-    values = [
-        mag.read_magnetometer(unit, rotation, power_w, mag.MagnetometerNormals(*drawn), p)[:3]
-        for rotation, drawn in zip(rotations_of(scene.path.attitude(t_s)), normals, strict=True)
-    ]
+    seen: list[Seen] = [{Matrix: rotation, float: power_w} for rotation in rotations_of(scene.path.attitude(t_s))]
+    values = [read[:3] for read in readings(scene, "magnetometer", "magnetometer", p, seen)]
     return [Stream.of(Sensor.MAG, stream.t_s, np.array(values))]
 
 
@@ -286,9 +279,9 @@ SENSED: dict[Sensor, Callable[[Scene], list[Stream]]] = {
 }
 
 
-def _once(scene: Scene, name: str, count: int) -> list[float]:
-    """Standard normals of what is drawn once a flight."""
-    drawn: list[float] = scene.flight.normals(name, 1, count)[0].tolist()
+def _once(scene: Scene, name: str, record: Any) -> list[float]:
+    """Standard normals of what is drawn once a flight, one for each field of a record."""
+    drawn: list[float] = scene.flight.normals(name, 1, len(record._fields))[0].tolist()
     return drawn
 
 

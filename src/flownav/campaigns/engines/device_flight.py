@@ -148,9 +148,9 @@ def sees_pad(onboard: Onboard | None, cg_height_m: float, epoch: int, home: int,
     """Whether the pad's place was to be seen or noted, as `campaign.local.pad_to_be_seen`."""
     if onboard is None:
         return epoch <= (home if home > 0 else 0)
-    lens_m = cg_height_m - onboard.pad_place.down_m
-    inside = lens_m >= onboard.pad.min_height_m and lens_m <= onboard.pad.max_height_m
-    return inside if onboard.pad_clock.fitted else epoch * EPOCH_S <= handover_s
+    lens_m = cg_height_m - onboard.carried.pad_camera.place.down_m
+    inside = lens_m >= onboard.carried.pad_camera.p.min_height_m and lens_m <= onboard.carried.pad_camera.p.max_height_m
+    return inside if onboard.carried.pad_camera.clock.fitted else epoch * EPOCH_S <= handover_s
 
 
 @equation

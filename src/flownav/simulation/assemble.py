@@ -75,12 +75,7 @@ class Setup:
 
 def assemble(scenario: Scenario) -> Setup:
     """Read, check, trim and discretise everything a scenario names. InputError as the loaders say."""
-    if scenario.truth == "linear" and scenario.wind.speed_20ft_m_s > 0.0:
-        raise InputError(f'{scenario.name}: truth = "linear" has no air to move; remove [wind], or fly "nonlinear"')
-    if scenario.truth == "linear" and (scenario.ground != GroundSettings() or scenario.event):
-        raise InputError(f'{scenario.name}: truth = "linear" has no ground and no engine; remove [ground], [[event]]')
-    if scenario.truth == "linear" and scenario.filter.name != "paper":
-        raise InputError(f'{scenario.name}: truth = "linear" has no forces for an IMU to feel; fly the "paper" filter')
+    _require_what_is_linear(scenario)
     own_file = vehicle_file(Path(scenario.vehicle.file)) if scenario.vehicle.file else None
     sensor_file = Path(scenario.flow_sensor) if scenario.flow_sensor else None
     file, sensor, paper = read_vehicle(own_file), load_sensor(sensor_file), load_paper_model()
@@ -113,10 +108,7 @@ def assemble(scenario: Scenario) -> Setup:
     parameters: dict[str, Any] = {
         "scenario": scenario.model_dump(),
         "flow_sensor": sensor.model_dump(exclude={"identified_models"}),
-        "vehicle": {
-            entry.key: {"value": entry.value, "uncertainty": entry.uncertainty, "source": entry.source}
-            for entry in described.entries
-        },
+        "vehicle": _values_of(described),
         "autopilot_gains": flight.gains._asdict(),
     }
     if scenario.truth == "nonlinear":
@@ -131,6 +123,26 @@ def assemble(scenario: Scenario) -> Setup:
         parameters["horizon_s"] = carried.schedule.horizon_s
     inputs = tuple(path for path in (own_file, sensor_file) if path)
     return Setup(scenario, sensor, flight, carried, hover, inputs, parameters, file, described, dispersion)
+
+
+def _values_of(described: VehicleDescription) -> dict[str, Any]:
+    """Value, uncertainty and source of each number of a vehicle, by its key."""
+    return {
+        entry.key: {"value": entry.value, "uncertainty": entry.uncertainty, "source": entry.source}
+        for entry in described.entries
+    }
+
+
+def _require_what_is_linear(scenario: Scenario) -> None:
+    """InputError where the paper's linear truth is asked for what it has not."""
+    if scenario.truth != "linear":
+        return
+    if scenario.wind.speed_20ft_m_s > 0.0:
+        raise InputError(f'{scenario.name}: truth = "linear" has no air to move; remove [wind], or fly "nonlinear"')
+    if scenario.ground != GroundSettings() or scenario.event:
+        raise InputError(f'{scenario.name}: truth = "linear" has no ground and no engine; remove [ground], [[event]]')
+    if scenario.filter.name != "paper":
+        raise InputError(f'{scenario.name}: truth = "linear" has no forces for an IMU to feel; fly the "paper" filter')
 
 
 def _require_paper_helicopter(scenario: Scenario, vehicle: AnyVehicle) -> None:

@@ -18,6 +18,7 @@ from flownav.simulation.records import Estimated, Measured, PaperState, PaperVar
 from flownav.vehicle.state import HelicopterState
 
 at_position = replacing(PaperState, "pos_n_m", "pos_e_m", "pos_d_m")
+with_motion = replacing(Estimated, *PaperState._fields)
 with_attitude = replacing(Estimated, "qw", "qx", "qy", "qz")
 
 
@@ -69,7 +70,11 @@ class Stated(NamedTuple):
 @PLANT.on_lanes
 def say_state(said: Estimated, x: PaperState, variance: PaperVariance) -> Stated:
     """The estimate is the state."""
-    return Stated(Estimated(*x, said.qw, said.qx, said.qy, said.qz), Spread(*variance))
+    estimated = with_motion(
+        said, pos_n_m=x.pos_n_m, pos_e_m=x.pos_e_m, pos_d_m=x.pos_d_m, vel_u_m_s=x.vel_u_m_s, vel_v_m_s=x.vel_v_m_s,
+        vel_w_m_s=x.vel_w_m_s,
+    )  # fmt: skip
+    return Stated(estimated, Spread(*variance))
 
 
 @PLANT.on_lanes

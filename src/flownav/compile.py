@@ -23,6 +23,19 @@ from typing import Any
 
 from flownav.compiling.beside import compile_beside
 from flownav.compiling.bundles import FlatAccess, flat_access, lane_access, passing, replacing, stepping, write_function
+from flownav.compiling.elementary import (
+    arccos,
+    arcsin,
+    arctan2,
+    cos,
+    cosh,
+    cosine_of_eighth,
+    exp,
+    log_of_unit,
+    sin,
+    sine_of_eighth,
+    sinh,
+)
 from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
 from flownav.compiling.progress import announce_compilation
@@ -49,22 +62,33 @@ __all__ = [
     "Unit",
     "Work",
     "announce_compilation",
+    "arccos",
+    "arcsin",
+    "arctan2",
     "bits_from_float",
     "clamp",
     "compile_beside",
+    "cos",
+    "cosh",
+    "cosine_of_eighth",
     "device_runner",
     "equation",
+    "exp",
     "flat_access",
     "float_from_bits",
     "invoke",
     "kernel",
     "lane_access",
     "larger",
+    "log_of_unit",
     "magnitude",
     "passing",
     "pointer",
     "procedure",
     "replacing",
+    "sin",
+    "sine_of_eighth",
+    "sinh",
     "smaller",
     "stepping",
     "strided",

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, kernel
+from flownav.compile import equation, exp, kernel
 from flownav.identification.grid import Grid, Steps
 from flownav.measurement import Array
 
@@ -192,11 +192,13 @@ def response(
     them all, (1, k) only the last. sums (k, k), zero on entry: columns' columns.
     """
     order = len(of)
-    rate = np.exp(coefficients[order - 1] / order)
+    rate = exp(coefficients[order - 1] / order)
     a, unit = np.empty(order), np.empty(order)
+    power = 1.0
     for i in range(order):
-        a[i] = np.exp(coefficients[i]) * rate ** -(i + 1.0)
-        unit[i] = rate ** -float(i)
+        unit[i] = power
+        power = power / rate
+        a[i] = exp(coefficients[i]) * power
     width = 2 * order + 2
     work = np.zeros((2, width))
     between = _matrices(grid.between, rate, of, a, held, work)

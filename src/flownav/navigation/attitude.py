@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, larger, procedure
+from flownav.compile import Lanes, Work, arctan2, equation, larger, procedure
 from flownav.estimation.covariance import consider, consider_none, variance_of
 from flownav.estimation.hypotheses import HEADING_OFF, sign_all
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading, level
@@ -236,7 +236,7 @@ def put_heading(
 @equation
 def magnetic_heading(forward_n: float, forward_e: float, declination_rad: float, m: HeadingMemory) -> float:
     """The heading that the latest level field and the filter's tilt give, from true north [rad]."""
-    angle: float = np.arctan2(forward_e, forward_n) - m.field_rad + declination_rad
+    angle: float = arctan2(forward_e, forward_n) - m.field_rad + declination_rad
     return angle
 
 
@@ -253,7 +253,7 @@ def take_mag(work: Work, lanes: Lanes, t_s: float, sensor: int, fitted: Equipmen
         level = np.sqrt(north * north + east * east)
         m = load_heading(work, lanes, lane)
         seen = reading.arrived > 0.0 and level > LEAST_FIELD_GAUSS
-        m = HeadingMemory(m.read_s, np.arctan2(east, north) if seen else m.field_rad)
+        m = HeadingMemory(m.read_s, arctan2(east, north) if seen else m.field_rad)
         store_heading(work, lanes, lane, m)
         reason = usable_in_flight(reading, level, 0.0, started)
         read = magnetic_heading(rotation[0], rotation[3], fitted.declination_rad, m)

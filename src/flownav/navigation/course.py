@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure
+from flownav.compile import Lanes, Work, arctan2, cos, equation, procedure, sin
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import ATTITUDE, QUATERNION
 from flownav.frames import heading_cosine_sine, quaternion_product, velocity_from_flow
@@ -60,7 +60,7 @@ def turn_between(along: float, across: float, power: float) -> tuple[float, floa
     product of those of their squares.
     """
     likeness = np.sqrt((along * along + across * across) / power) if power > 0.0 else 0.0
-    return likeness, np.arctan2(across, along)
+    return likeness, arctan2(across, along)
 
 
 @equation
@@ -109,7 +109,7 @@ def find_heading(work: Work, lanes: Lanes, t_s: float, o: Output) -> None:
 @procedure
 def turn_heading(work: Work, lanes: Lanes, lane: int, by_rad: float, o: Output) -> None:
     """The heading of one lane turned, and sure to FOUND_RAD; what was correlated with it is not any more."""
-    turn = (np.cos(0.5 * by_rad), 0.0, 0.0, np.sin(0.5 * by_rad))
+    turn = (cos(0.5 * by_rad), 0.0, 0.0, sin(0.5 * by_rad))
     before = (
         work[QUATERNION * len(lanes) + lane], work[(QUATERNION + 1) * len(lanes) + lane],
         work[(QUATERNION + 2) * len(lanes) + lane], work[(QUATERNION + 3) * len(lanes) + lane],

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, larger, replacing, smaller
+from flownav.compile import cos, equation, exp, larger, replacing, smaller
 from flownav.navigation.flow_noise import LONGEST_STEP_S
 from flownav.navigation.offers import usable_in_flight
 from flownav.navigation.reasons import FUSED, NEAR_GROUND, NO_HEIGHT, OUT_OF_RANGE, TILTED
@@ -42,7 +42,7 @@ def turning_of(
     follows = imu_here and not by_imu and bool(np.isfinite(own_x + own_y)) and reading.quality != 0.0
     count = m.bias_count + 1.0 if follows else m.bias_count
     step_s = smaller(larger(t_s - m.taken_s, 0.0), LONGEST_STEP_S)
-    share = larger(1.0 - np.exp(-step_s / s.flow_gyro_time_s), 1.0 / larger(count, 1.0)) if follows else 0.0
+    share = larger(1.0 - exp(-step_s / s.flow_gyro_time_s), 1.0 / larger(count, 1.0)) if follows else 0.0
     bias_own_x = m.bias_x + share * (own_x - imu_x - m.bias_x) if follows else m.bias_x
     bias_own_y = m.bias_y + share * (own_y - imu_y - m.bias_y) if follows else m.bias_y
     after = with_gyro(m, bias_x=bias_own_x, bias_y=bias_own_y, bias_count=count)
@@ -61,6 +61,6 @@ def judge_flow(
     reason = NO_HEIGHT if reason == FUSED and angular and not view.known else reason
     fast = angular and larger(abs(reading.value_0), abs(reading.value_1)) >= NEAR_LIMIT * s.flow_limit_rad_s
     reason = OUT_OF_RANGE if reason == FUSED and fast else reason
-    reason = TILTED if reason == FUSED and view.upright < np.cos(s.tilt_limit_rad) else reason
+    reason = TILTED if reason == FUSED and view.upright < cos(s.tilt_limit_rad) else reason
     near = view.known and view.range_m * view.upright <= s.flow_min_height_m  # `lens_range_of` is at least 0.05
     return NEAR_GROUND if reason == FUSED and near else reason

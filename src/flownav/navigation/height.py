@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure, smaller
+from flownav.compile import Lanes, Work, cos, equation, exp, procedure, smaller
 from flownav.estimation.covariance import expect, variance_of
 from flownav.estimation.hypotheses import RANGE_OFFSET, sign_all
 from flownav.estimation.laws.height import baro_altitude, range_along_boresight
@@ -113,7 +113,7 @@ def judge_range(
     reason = usable_in_flight(reading, range_m, variance, started)
     within = range_m >= s.range_min_m and range_m <= s.range_max_m
     reason = OUT_OF_RANGE if reason == FUSED and not within else reason
-    reason = TILTED if reason == FUSED and height.upright < np.cos(s.tilt_limit_rad) else reason
+    reason = TILTED if reason == FUSED and height.upright < cos(s.tilt_limit_rad) else reason
     news = range_m != m.last_m
     stuck = reason == FUSED and not news and repeats(t_s, m, height, alone, s)
     variance = variance if news or alone else repeated_variance(variance, t_s - m.same_s)
@@ -152,7 +152,7 @@ def stray_variance(innovation: float, total: float, variance: float, stray: floa
     section 3.4), and a gain beta K is that of the variance R + S (1/beta - 1).
     """
     p = smaller(STRAY_SHARE * stray, 0.95)
-    likely = (1.0 - p) * np.exp(-0.5 * innovation * innovation / total) / np.sqrt(2.0 * np.pi * total)
+    likely = (1.0 - p) * exp(-0.5 * innovation * innovation / total) / np.sqrt(2.0 * np.pi * total)
     weighed: float = variance + total * p / (STRAY_SPAN_M * likely + 1e-6)
     return weighed
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, larger, procedure, smaller
+from flownav.compile import Lanes, Work, equation, exp, larger, procedure, smaller
 from flownav.estimation.covariance import covariance_of, states_of
 from flownav.estimation.hypotheses import (
     COUNT,
@@ -243,7 +243,7 @@ def mind_faults(work: Work, lanes: Lanes, t_s: float, dt_s: float, o: Output) ->
     """Say which fault is suspected, and when none is any more; what was told of them fades."""
     if work[HYPOTHESES * len(lanes)] == 0.0:
         return
-    kept = np.exp(-dt_s / MEMORY_S)
+    kept = exp(-dt_s / MEMORY_S)
     fade(work, lanes, kept)
     for lane in range(len(lanes)):
         work[LEFT_OVER * len(lanes) + lane] *= kept

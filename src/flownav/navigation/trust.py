@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, clamp, equation, larger, procedure
+from flownav.compile import Lanes, Work, clamp, equation, exp, larger, procedure
 from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE, NOISE
 from flownav.navigation.memory import (
     ACCEL_FACTOR,
@@ -72,7 +72,7 @@ def watch_whiteness(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
         innovation, variance = work[INNOVATION * len(lanes) + lane], work[INNOVATION_VARIANCE * len(lanes) + lane]
         if m.readings > 0.0 and t_s - m.since_s >= BLOCK_S - 1e-3:
             likeness, m = block_ended(t_s, m)
-            factor = work[(ACCEL_FACTOR + axis) * len(lanes) + lane] * np.exp(PACE * (likeness - LIKENESS_ALLOWED))
+            factor = work[(ACCEL_FACTOR + axis) * len(lanes) + lane] * exp(PACE * (likeness - LIKENESS_ALLOWED))
             work[(ACCEL_FACTOR + axis) * len(lanes) + lane] = clamp(factor, 1.0, LARGEST_FACTOR)
         store_whiteness(work, lanes, axis, lane, with_innovation(innovation, variance, t_s, m))
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, equation, lane_access, larger, magnitude
+from flownav.compile import Lanes, arccos, equation, lane_access, larger, magnitude
 from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, STATES, STATISTICS
 from flownav.scoring.touchdown import (
@@ -237,14 +237,14 @@ def write_touchdown(
     touched = c.contact >= 0.0 and not early
     rests = touched and c.still >= STILL_EPOCHS
     slide_m = hypotenuse(c.place_n - t.place_n, c.place_e - t.place_e)
-    tilt_deg, yaw_deg_s = np.degrees(np.arccos(within_one(t.upright))), np.degrees(t.yaw_rad_s)
+    tilt_deg, yaw_deg_s = np.degrees(arccos(within_one(t.upright))), np.degrees(t.yaw_rad_s)
     at_contact = (
         c.contact * epoch_s, t.place_n, t.place_e, hypotenuse(t.place_n, t.place_e), t.sink_m_s, t.lateral_m_s,
         tilt_deg, yaw_deg_s,
     )  # fmt: skip
     at_rest = (
         (epochs - c.still) * epoch_s, c.place_n, c.place_e, hypotenuse(c.place_n, c.place_e),
-        np.degrees(np.arccos(within_one(c.upright))), slide_m,
+        np.degrees(arccos(within_one(c.upright))), slide_m,
     )  # fmt: skip
     parts = (
         hypotenuse(t.error_n - t.seen_n, t.error_e - t.seen_e),

@@ -212,8 +212,10 @@ def fly_block(
     nav: a navigator that has heard nothing (`navigation.memory.new_work`), taken at the address `take`; its tape and
     what it is fed flattened; history (epochs, len(HISTORY), len(lanes)) is filled.
     """
-    work[:] = 0.0
-    work[layout.AS_IS_BEGIN * len(lanes) : layout.AS_IS_END * len(lanes)] = truth
+    for i in range(work.size):
+        work[i] = 0.0
+    for i in range(truth.size):
+        work[layout.AS_IS_BEGIN * len(lanes) + i] = truth[i]
     o = output_of(estimate, innovation, event, NOTHING, NOTHING, NOTHING, room, used)
     fly(
         pointer(work), pointer(nav), lanes, seed, first, noise, flight, flight.onboard, flight.table, take,

@@ -24,6 +24,19 @@ from typing import Any
 from flownav.compiling.beside import compile_beside
 from flownav.compiling.bundles import FlatAccess, flat_access, lane_access, passing, replacing, stepping, write_function
 from flownav.compiling.cache import depends_also
+from flownav.compiling.elementary import (
+    arccos,
+    arcsin,
+    arctan2,
+    cos,
+    cosh,
+    cosine_of_eighth,
+    exp,
+    log_of_unit,
+    sin,
+    sine_of_eighth,
+    sinh,
+)
 from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
 from flownav.compiling.progress import announce_compilation
@@ -56,15 +69,22 @@ __all__ = [
     "Unit",
     "Work",
     "announce_compilation",
+    "arccos",
+    "arcsin",
+    "arctan2",
     "bits_from_float",
     "clamp",
     "columns_of",
     "compile_beside",
     "compiled",
+    "cos",
+    "cosh",
+    "cosine_of_eighth",
     "depends_also",
     "device_runner",
     "dressed",
     "equation",
+    "exp",
     "flat_access",
     "float_from_bits",
     "gathering",
@@ -72,6 +92,7 @@ __all__ = [
     "kernel",
     "lane_access",
     "larger",
+    "log_of_unit",
     "magnitude",
     "passing",
     "places_of",
@@ -81,6 +102,9 @@ __all__ = [
     "row_store",
     "row_view",
     "runge_kutta",
+    "sin",
+    "sine_of_eighth",
+    "sinh",
     "smaller",
     "stepping",
     "strided",

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from flownav.compile import equation
+from flownav.compile import arcsin, arctan2, cos, equation, sin
 
 GRAVITY_M_S2 = 9.80665  # standard gravity
+TURN_RAD = 6.283185307179586
 
 Scalar = Any  # a float, a complex number, or an array of them, element by element
 Vector = tuple[float, float, float]
@@ -87,7 +88,7 @@ def of_unit_length(q: Quaternion) -> Quaternion:
 @equation
 def turned_about_down(q: Quaternion, angle_rad: Scalar) -> Quaternion:
     """The attitude turned by an angle about the earth's down [rad], clockwise seen from above."""
-    return quaternion_product((np.cos(0.5 * angle_rad), 0.0, 0.0, np.sin(0.5 * angle_rad)), q)
+    return quaternion_product((cos(0.5 * angle_rad), 0.0, 0.0, sin(0.5 * angle_rad)), q)
 
 
 @equation
@@ -104,9 +105,9 @@ def quaternion_rate(w: float, x: float, y: float, z: float, p: float, q: float, 
 @equation
 def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quaternion:
     """Unit quaternion of Z-Y-X Euler angles [rad]."""
-    cr, sr = np.cos(0.5 * roll), np.sin(0.5 * roll)
-    cp, sp = np.cos(0.5 * pitch), np.sin(0.5 * pitch)
-    cy, sy = np.cos(0.5 * yaw), np.sin(0.5 * yaw)
+    cr, sr = cos(0.5 * roll), sin(0.5 * roll)
+    cp, sp = cos(0.5 * pitch), sin(0.5 * pitch)
+    cy, sy = cos(0.5 * yaw), sin(0.5 * yaw)
     return (
         cr * cp * cy + sr * sp * sy,
         sr * cp * cy - cr * sp * sy,
@@ -119,16 +120,23 @@ def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quaternion:
 def euler_from_quaternion(w: float, x: float, y: float, z: float) -> Vector:
     """Roll, pitch, yaw [rad] of a unit quaternion; pitch is held to +-90 degrees."""
     return (
-        np.arctan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
-        np.arcsin(min(1.0, max(-1.0, 2.0 * (w * y - x * z)))),
+        arctan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+        arcsin(min(1.0, max(-1.0, 2.0 * (w * y - x * z)))),
         heading_from_quaternion(w, x, y, z),
     )
 
 
 @equation
+def within_half_turn(angle_rad: float) -> float:
+    """The angle less whole turns, from -pi to pi."""
+    within: float = angle_rad - TURN_RAD * np.rint(angle_rad / TURN_RAD)
+    return within
+
+
+@equation
 def heading_from_quaternion(w: Scalar, x: Scalar, y: Scalar, z: Scalar) -> Scalar:
     """Yaw [rad] of a unit quaternion."""
-    return np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+    return arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
 
 
 @equation

@@ -1,7 +1,7 @@
 """Code for a CUDA device, run on the CPU: what numba-cuda hands to NVVM, compiled for this processor instead.
 
 The same functions, types and lowering as on a device, thread by thread; NVVM, the assembler and the launch are left
-out. The device's math library is the C library here, so that only its last bits differ.
+out. Of the device's math library only exact functions are asked for, which are this processor's instructions.
 """
 
 from __future__ import annotations
@@ -98,7 +98,7 @@ def _for_host(text: str) -> str:
 
 
 def _stand_ins(modules: list[str]) -> str:
-    """The thread's number, and the device's math functions by those of the C library."""
+    """The thread's number, and the device's math functions by this processor's instructions."""
     lines = [
         f"@{THREAD} = global i32 0",
         f"define i32 @flownav_tid() {{\n %t = load i32, i32* @{THREAD}\n ret i32 %t\n}}",
@@ -111,7 +111,8 @@ def _stand_ins(modules: list[str]) -> str:
             declared[name] = told.count("double")
     for name, count in sorted(declared.items()):
         taken = ", ".join(f"double %x{i}" for i in range(count))
-        there = f"llvm.{name}.f64" if name in INTRINSICS else name
+        assert name in INTRINSICS, f"the device's library computes {name}"
+        there = f"llvm.{name}.f64"
         lines.append(f"declare double @{there}({', '.join(['double'] * count)})")
         lines.append(f"define double @__nv_{name}({taken}) {{\n %y = call double @{there}({taken})\n ret double %y\n}}")
     return "\n".join(lines) + "\n"

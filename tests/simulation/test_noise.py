@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from flownav.compile import LANES, ONE_LANE, bits_from_float, float_from_bits, kernel
-from flownav.simulation.noise import log_of_unit, normal_pair, sine_cosine_of_eighth, threefry
+from flownav.simulation.noise import normal_pair, threefry
 
 
 @kernel
@@ -22,16 +22,6 @@ def draw(pairs, lanes, seed, flight, first_step, channel):
     for step in range(len(pairs)):
         for lane in range(len(lanes)):
             pairs[step, 0, lane], pairs[step, 1, lane] = normal_pair(seed, flight + lane, first_step + step, channel)
-
-
-@kernel
-def logarithm(u):
-    return log_of_unit(u)
-
-
-@kernel
-def sine_cosine(r):
-    return sine_cosine_of_eighth(r)
 
 
 def normals(count, *, lanes=ONE_LANE, seed=1, flight=0, first_step=0, channel=0):
@@ -86,18 +76,6 @@ def test_a_flight_draws_the_same_numbers_alone_and_in_any_lane():
 
 def test_a_later_start_continues_the_same_numbers():
     assert np.array_equal(normals(100)[40:], normals(60, first_step=40))
-
-
-@settings(deadline=None)
-@given(st.floats(min_value=2.0**-52, max_value=1.0))
-def test_logarithm_is_right_to_the_last_digit(u):
-    assert logarithm(u) == pytest.approx(np.log(u), rel=3e-16, abs=3e-16)
-
-
-@settings(deadline=None)
-@given(st.floats(min_value=-np.pi / 4, max_value=np.pi / 4))
-def test_sine_and_cosine_are_right(r):
-    assert sine_cosine(r) == pytest.approx((np.sin(r), np.cos(r)), abs=3e-16)
 
 
 @settings(deadline=None)

@@ -4,12 +4,13 @@ numba-cuda (extra `gpu`) is imported where it is used and nowhere else. Nothing 
 for a compute capability that is named, so that it can be made and looked at on any machine.
 
 Floating-point contraction is off (`-fma=0`: every product and every sum is rounded by itself, as on the CPU), so
-that additions, products, quotients and roots are the CPU's to the last bit; only what the math library computes
-(exp, sin, cos, atan2) may differ, in its last bits.
+that additions, products, quotients and roots are the CPU's to the last bit, and so are sines and exponentials, which
+are made of them (`elementary`).
 """
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -98,7 +99,9 @@ def teach_equations() -> None:
     context.refresh()
     for function, inlined in EQUATIONS.items():
         if function not in _Taught.functions:
-            _Taught.functions[function] = cuda.jit(device=True, forceinline=inlined, lto=False)(function)
+            _Taught.functions[function] = cuda.jit(device=True, forceinline=inlined, lto=False)(
+                inspect.unwrap(function)
+            )
             _say(context, function, types.Dispatcher(_Taught.functions[function]))
 
 
@@ -145,7 +148,7 @@ def _teach_once() -> None:
         return builder.fcmp_ordered("==", size, context.get_constant(types.float64, math.inf))
 
     known = ufuncs.ufunc_db()
-    for name in ("sqrt", "exp", "floor", "ceil"):
+    for name in ("sqrt", "floor", "ceil"):
         known.setdefault(getattr(np, name), {})["d->d"] = of_math(getattr(math, name))
     known.setdefault(np.absolute, {})["d->d"] = of_math(math.fabs)
     known.setdefault(np.rint, {})["d->d"] = rounded

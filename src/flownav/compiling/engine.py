@@ -9,7 +9,7 @@ import numba
 from numba.core.dispatcher import _FunctionCompiler  # type: ignore[attr-defined]
 from numba.core.errors import NumbaError
 from numba.core.registry import CPUDispatcher
-from numba.extending import register_jitable
+from numba.extending import overload, register_jitable
 
 from flownav.compiling import target
 from flownav.compiling.cache import KernelCache
@@ -36,6 +36,14 @@ def equation(function: Function) -> Function:
     """A scalar law: plain Python where Python calls it, compiled and inlined where a kernel does."""
     EQUATIONS[function] = True
     return register_jitable(forceinline=True, **UNWRAPPED)(function)
+
+
+def stands_for(law: Callable[..., Any], function: Function) -> Function:
+    """A function that Python calls as it is, where kernels inline the law (what it wraps)."""
+    EQUATIONS[function] = True
+    options: Any = {"forceinline": True, **UNWRAPPED}
+    overload(function, jit_options=options, strict=False)(lambda *_: law)
+    return function
 
 
 def procedure(function: Function) -> Function:

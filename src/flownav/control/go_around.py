@@ -13,9 +13,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from flownav.compile import clamp, equation, larger, smaller
+from flownav.compile import clamp, cos, equation, larger, sin, smaller
 from flownav.control.gains import AutopilotGains
 
 REACHED_M = 0.5  # of the height to which it climbs, and beside the pad
@@ -66,7 +64,7 @@ def search_offset(searched_s: float, gains: AutopilotGains) -> tuple[float, floa
     """North and east of where the pad was thought to be, after so long a search [m]: out, then round."""
     radius = smaller(SEARCH_M_S * searched_s, gains.search_radius_m)
     turned = SEARCH_M_S * searched_s / larger(gains.search_radius_m, SEARCH_MARGIN_M)
-    return radius * np.cos(turned), radius * np.sin(turned)
+    return radius * cos(turned), radius * sin(turned)
 
 
 @equation

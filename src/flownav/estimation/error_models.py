@@ -11,9 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from flownav.compile import Lanes, Work, equation, procedure
+from flownav.compile import Lanes, Work, equation, exp, procedure
 from flownav.estimation.covariance import add_noise, decay
 from flownav.estimation.states import (
     ACCEL_BIAS,
@@ -97,6 +95,6 @@ def propagate_gauss_markov(work: Work, lanes: Lanes, n: int, dt_s: float, settin
 @equation
 def forget_slowly(work: Work, lanes: Lanes, n: int, state: int, sigma: float, tau_s: float, dt_s: float) -> None:
     """x <- exp(-dt/tau) x, with the noise that keeps its standard deviation at sigma."""
-    factor = np.exp(-dt_s / tau_s)
+    factor = exp(-dt_s / tau_s)
     decay(work, lanes, n, state, factor)
     add_noise(work, lanes, state, sigma * sigma * (1.0 - factor * factor))

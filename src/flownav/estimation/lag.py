@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure
+from flownav.compile import Lanes, Work, cos, cosh, equation, exp, procedure, sin, sinh
 from flownav.estimation.covariance import columns_of
 from flownav.estimation.discretise import discretised
 from flownav.estimation.error_models import FilterSettings
@@ -79,10 +79,10 @@ def lag_of_step(b_1_s: float, c_1_s2: float, dt_s: float, forward_m: float, righ
     square = c_1_s2 - half * half
     rate = np.sqrt(abs(square))
     turn = rate * dt_s
-    cosine = np.cos(turn) if square > 0.0 else np.cosh(turn)
-    sine = np.sin(turn) if square > 0.0 else np.sinh(turn)
+    cosine = cos(turn) if square > 0.0 else cosh(turn)
+    sine = sin(turn) if square > 0.0 else sinh(turn)
     slope = sine / rate if turn > SLOW_TURN else dt_s
-    fade = np.exp(-half * dt_s)
+    fade = exp(-half * dt_s)
     f11, f12 = fade * (cosine + half * slope), fade * slope
     f21, f22 = -c_1_s2 * fade * slope, fade * (cosine - half * slope)
     held_1, held_2 = (1.0 - f22 - b_1_s * f12) / c_1_s2, f12

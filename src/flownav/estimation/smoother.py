@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, kernel
+from flownav.compile import equation, exp, kernel
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.states import (
     ACCEL_BIAS,
@@ -75,11 +75,11 @@ def decay_factors(dt_s: float, settings: FilterSettings) -> Array:
     """What `error_models.propagate_gauss_markov` multiplies each state by, (STATES,): less than 1 for such errors."""
     factor = np.ones(STATES)
     for i in range(3):
-        factor[GPS_SLOW + i] = np.exp(-dt_s / settings.gps_slow_tau_s)
-        factor[GPS_FAST + i] = np.exp(-dt_s / settings.gps_fast_tau_s)
-        factor[GPS_VELOCITY + i] = np.exp(-dt_s / settings.gps_velocity_tau_s)
+        factor[GPS_SLOW + i] = exp(-dt_s / settings.gps_slow_tau_s)
+        factor[GPS_FAST + i] = exp(-dt_s / settings.gps_fast_tau_s)
+        factor[GPS_VELOCITY + i] = exp(-dt_s / settings.gps_velocity_tau_s)
         tau_s = settings.ins_heading_tau_s if i == 2 else settings.ins_tilt_tau_s
-        factor[INS_ERROR + i] = np.exp(-dt_s / tau_s)
+        factor[INS_ERROR + i] = exp(-dt_s / tau_s)
     return factor
 
 

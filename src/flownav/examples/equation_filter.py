@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, replacing
+from flownav.compile import arctan2, cos, equation, replacing, sin
 from flownav.frames import GRAVITY_M_S2, quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.measurement import Sensor
 from flownav.navigation.records import Reading
@@ -56,8 +56,8 @@ with_heading = replacing(Memory, "qw", "qx", "qy", "qz", "compass_s")
 def turned(m: Memory, x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """The attitude turned on by a small rotation vector in body axes [rad], of unit length."""
     half = 0.5 * np.sqrt(x * x + y * y + z * z) + 1e-12
-    s = 0.5 * np.sin(half) / half
-    return quaternion_product((m.qw, m.qx, m.qy, m.qz), (np.cos(half), s * x, s * y, s * z))
+    s = 0.5 * sin(half) / half
+    return quaternion_product((m.qw, m.qx, m.qy, m.qz), (cos(half), s * x, s * y, s * z))
 
 
 @equation
@@ -142,7 +142,7 @@ def by_compass(m: Memory, t_s: float, r: Reading) -> Memory:
     k = share_of(m.compass_s, t_s, HEADING_S)
     rotation = rotation_from_quaternion(m.qw, m.qx, m.qy, m.qz)
     north, east, _ = to_earth(rotation, r.value_0, r.value_1, r.value_2)
-    x, y, z = to_body(rotation, 0.0, 0.0, -k * np.arctan2(east, north))
+    x, y, z = to_body(rotation, 0.0, 0.0, -k * arctan2(east, north))
     q = turned(m, x, y, z)
     return with_heading(m, qw=q[0], qx=q[1], qy=q[2], qz=q[3], compass_s=t_s)
 

@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, kernel
+from flownav.compile import equation, exp, kernel
 from flownav.identification.grid import Grid, Steps
 from flownav.measurement import Array
 
@@ -211,11 +211,13 @@ def response(of: Order, given: Input, grid: Grid, tried: Tried, y: Array, column
     t_u, u, held = given
     coefficients, gain, with_delay, own = tried
     order = len(of)
-    rate = np.exp(coefficients[order - 1] / order)
+    rate = exp(coefficients[order - 1] / order)
     a, unit = np.empty(order), np.empty(order)
+    power = 1.0
     for i in range(order):
-        a[i] = np.exp(coefficients[i]) * rate ** -(i + 1.0)
-        unit[i] = rate ** -float(i)
+        unit[i] = power
+        power = power / rate
+        a[i] = exp(coefficients[i]) * power
     width = 2 * order + 2
     work = np.zeros((2, width))
     between = _matrices(grid.between, rate, of, a, held, work)

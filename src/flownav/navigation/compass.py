@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, replacing, smaller
+from flownav.compile import equation, exp, replacing, smaller
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE
+from flownav.frames import within_half_turn
 from flownav.navigation.course import LEAST_TRAVEL_M, is_velocity, judge_course, turn_between, turn_heading, with_gps
 from flownav.navigation.records import CourseMemory, HeadingMemory, PushMemory, Reading
 from flownav.navigation.tape import COMPASS_REFUTED
@@ -41,7 +42,7 @@ def with_change(reading: Reading, t_s: float, m: PushMemory) -> PushMemory:
     step_s = t_s - m.since_s
     begins = not step_s < 2.0 * BLOCK_S
     ends = step_s >= BLOCK_S and not begins
-    kept = np.exp(-step_s / FADING_S) if ends else 1.0
+    kept = exp(-step_s / FADING_S) if ends else 1.0
     d_n, d_e = v_n - m.v_n, v_e - m.v_e
     weight = 1.0 if ends else 0.0
     anew = begins or ends
@@ -58,7 +59,7 @@ def with_change(reading: Reading, t_s: float, m: PushMemory) -> PushMemory:
 @equation
 def faded(t_s: float, m: CourseMemory) -> CourseMemory:
     """The sums of the course, of which what is long ago counts less."""
-    kept = np.exp(-smaller(t_s - m.gps_s, FADING_S) / FADING_S)
+    kept = exp(-smaller(t_s - m.gps_s, FADING_S) / FADING_S)
     return with_sums(m, along=kept * m.along, across=kept * m.across, gps=kept * m.gps, flow=kept * m.flow)
 
 
@@ -74,7 +75,7 @@ def refuted(course: CourseMemory, push: PushMemory) -> tuple[bool, float]:
     """Whether both witnesses say that the heading is wrong by a large angle, and that by the flow [rad]."""
     flow_knows, by_flow = judge_course(course)
     own_knows, by_own = judge_push(push)
-    apart = np.arctan2(np.sin(by_flow - by_own), np.cos(by_flow - by_own))
+    apart = within_half_turn(by_flow - by_own)
     return flow_knows and own_knows and abs(by_flow) > LARGE_RAD and abs(apart) < ALIKE_RAD, by_flow
 
 

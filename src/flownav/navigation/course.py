@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, replacing
+from flownav.compile import arctan2, cos, equation, replacing, sin
 from flownav.estimation.states import ATTITUDE
 from flownav.frames import heading_cosine_sine, quaternion_product, rotation_from_quaternion, velocity_from_flow
 from flownav.navigation.reasons import is_heard
@@ -65,7 +65,7 @@ def turn_between(along: float, across: float, power: float) -> tuple[float, floa
     product of those of their squares.
     """
     likeness = np.sqrt((along * along + across * across) / power) if power > 0.0 else 0.0
-    return likeness, np.arctan2(across, along)
+    return likeness, arctan2(across, along)
 
 
 @equation
@@ -84,7 +84,7 @@ def is_velocity(reading: Reading) -> bool:
 @equation
 def turn_heading(own: Attitude, by_rad: float, turns: bool) -> tuple[Attitude, Reset]:
     """The attitude with its heading turned, and that sure to FOUND_RAD; its correlations are lost."""
-    turn = (np.cos(0.5 * by_rad), 0.0, 0.0, np.sin(0.5 * by_rad))
+    turn = (cos(0.5 * by_rad), 0.0, 0.0, sin(0.5 * by_rad))
     w, x, y, z = quaternion_product(turn, (own.w, own.x, own.y, own.z))
     return (
         Attitude(w if turns else own.w, x if turns else own.x, y if turns else own.y, z if turns else own.z),

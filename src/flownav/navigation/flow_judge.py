@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, larger, replacing, smaller
+from flownav.compile import cos, equation, exp, larger, replacing, smaller
 from flownav.estimation.laws.geometry import lens_range
 from flownav.navigation.flow_noise import LONGEST_STEP_S
 from flownav.navigation.height import MANY_STRAYS
@@ -66,7 +66,7 @@ def turning_of(
     follows = imu_here and not by_imu and bool(np.isfinite(own_x + own_y)) and reading.quality != 0.0
     count = m.bias_count + 1.0 if follows else m.bias_count
     step_s = smaller(larger(t_s - m.taken_s, 0.0), LONGEST_STEP_S)
-    share = larger(1.0 - np.exp(-step_s / s.flow_gyro_time_s), 1.0 / larger(count, 1.0)) if follows else 0.0
+    share = larger(1.0 - exp(-step_s / s.flow_gyro_time_s), 1.0 / larger(count, 1.0)) if follows else 0.0
     bias_own_x = m.bias_x + share * (own_x - imu_x - m.bias_x) if follows else m.bias_x
     bias_own_y = m.bias_y + share * (own_y - imu_y - m.bias_y) if follows else m.bias_y
     after = with_gyro(m, bias_x=bias_own_x, bias_y=bias_own_y, bias_count=count)
@@ -135,7 +135,7 @@ def judge_look(
     reason = NO_HEIGHT if reason == FUSED and angular and look.known == 0.0 else reason
     fast = angular and larger(abs(reading.value_0), abs(reading.value_1)) >= NEAR_LIMIT * s.flow_limit_rad_s
     reason = OUT_OF_RANGE if reason == FUSED and fast else reason
-    reason = TILTED if reason == FUSED and look.upright < np.cos(s.tilt_limit_rad) else reason
+    reason = TILTED if reason == FUSED and look.upright < cos(s.tilt_limit_rad) else reason
     near = look.known > 0.0 and look.range_m * look.upright <= s.flow_min_height_m  # `lens_range` is at least 0.05
     reason = NEAR_GROUND if reason == FUSED and near else reason
     return with_reason(look, reason=NO_HEADING if reason == FUSED and heading.sought > 0.0 else reason)

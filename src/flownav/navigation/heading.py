@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, larger, procedure, replacing
+from flownav.compile import Lanes, Work, arctan2, equation, larger, procedure, replacing
 from flownav.estimation.hypotheses import HEADING_OFF, sign_all
 from flownav.estimation.laws.attitude import heading
 from flownav.frames import rotation_from_quaternion, to_earth
@@ -56,7 +56,7 @@ def offered_heading(
 @equation
 def magnetic_heading(forward_n: float, forward_e: float, declination_rad: float, m: HeadingMemory) -> float:
     """The heading that the latest level field and the filter's tilt give, from true north [rad]."""
-    angle: float = np.arctan2(forward_e, forward_n) - m.field_rad + declination_rad
+    angle: float = arctan2(forward_e, forward_n) - m.field_rad + declination_rad
     return angle
 
 
@@ -76,7 +76,7 @@ def judge_field(
     north, east, _ = to_earth(rotation, reading.value_0, reading.value_1, reading.value_2)
     level = np.sqrt(north * north + east * east)
     seen = reading.arrived > 0.0 and level > LEAST_FIELD_GAUSS
-    after = with_field(m, field_rad=np.arctan2(east, north) if seen else m.field_rad)
+    after = with_field(m, field_rad=arctan2(east, north) if seen else m.field_rad)
     reason = usable_in_flight(reading, level, 0.0, start.started)
     read_rad = magnetic_heading(rotation[0], rotation[3], declination_rad, after)
     return offered_heading(t_s, read_rad, np.nan, reason if seen else SILENT, after, s)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure, replacing, smaller
+from flownav.compile import Lanes, Work, cos, equation, procedure, replacing, smaller
 from flownav.estimation.hypotheses import RANGE_OFFSET
 from flownav.estimation.laws.height import baro_altitude, range_along_boresight
 from flownav.estimation.states import BARO, GROUND
@@ -116,7 +116,7 @@ def range_verdict(
     reason = usable_in_flight(reading, range_m, variance, started)
     within = range_m >= s.range_min_m and range_m <= s.range_max_m
     reason = OUT_OF_RANGE if reason == FUSED and not within else reason
-    reason = TILTED if reason == FUSED and height.upright < np.cos(s.tilt_limit_rad) else reason
+    reason = TILTED if reason == FUSED and height.upright < cos(s.tilt_limit_rad) else reason
     news = range_m != m.last_m
     stuck = reason == FUSED and not news and repeats(t_s, m, height, alone, s)
     variance = variance if news or alone else repeated_variance(variance, t_s - m.same_s)

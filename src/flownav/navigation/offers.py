@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure, replacing, smaller
+from flownav.compile import Lanes, Work, equation, exp, procedure, replacing, smaller
 from flownav.estimation.covariance import expect, settle, states_of
 from flownav.estimation.hypotheses import weigh
 from flownav.measurement import Sensor
@@ -123,7 +123,7 @@ def stray_variance(innovation: float, total: float, variance: float, stray: floa
     section 3.4), and a gain beta K is that of the variance R + S (1/beta - 1).
     """
     p = smaller(STRAY_SHARE * stray, 0.95)
-    likely = (1.0 - p) * np.exp(-0.5 * innovation * innovation / total) / np.sqrt(2.0 * np.pi * total)
+    likely = (1.0 - p) * exp(-0.5 * innovation * innovation / total) / np.sqrt(2.0 * np.pi * total)
     weighed: float = variance + total * p / (STRAY_SPAN_M * likely + 1e-6)
     return weighed
 

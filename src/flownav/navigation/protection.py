@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, larger, procedure, replacing, smaller
+from flownav.compile import Lanes, Work, equation, exp, larger, procedure, replacing, smaller
 from flownav.estimation.covariance import covariance_of, states_of
 from flownav.estimation.hypotheses import (
     COUNT,
@@ -264,7 +264,7 @@ def mind_faults(work: Work, lanes: Lanes, t_s: float, dt_s: float, o: Output) ->
     """Say which fault is suspected, and when none is any more; what was told of them fades."""
     if followed(work, lanes) == 0:
         return
-    kept = np.exp(-dt_s / MEMORY_S)
+    kept = exp(-dt_s / MEMORY_S)
     fade(work, lanes, kept)
     for lane in range(len(lanes)):
         worst, which, worst_flow = 0.0, 0, 0.0

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure, replacing
+from flownav.compile import Lanes, Work, arctan2, equation, procedure, replacing
 from flownav.estimation.covariance import begin_lane, lagged, set_variance, states_of
 from flownav.estimation.hypotheses import COUNT, begin_lane_anew
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, POSITION, RATE, VELOCITY
@@ -275,8 +275,8 @@ def level(m: StartMemory, believed: float, field_rad: float, fitted: Equipment) 
 
     The field was noted in the axes of a vehicle that takes itself to be level and to head north.
     """
-    roll = believed * np.arctan2(-m.force_y, -m.force_z)
-    pitch = believed * np.arctan2(m.force_x, np.sqrt(m.force_y * m.force_y + m.force_z * m.force_z))
+    roll = believed * arctan2(-m.force_y, -m.force_z)
+    pitch = believed * arctan2(m.force_x, np.sqrt(m.force_y * m.force_y + m.force_z * m.force_z))
     heard = (fitted.heading == FROM_MAG or fitted.heading == FROM_YAW) and bool(np.isfinite(field_rad))
     north_rad = fitted.declination_rad if fitted.heading == FROM_MAG else 0.0
     return quaternion_from_euler(roll, pitch, north_rad - field_rad if heard else 0.0)

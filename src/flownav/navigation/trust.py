@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, clamp, equation, larger, replacing
+from flownav.compile import Lanes, Work, clamp, equation, exp, larger, replacing
 from flownav.navigation.memory import MEMORY, holds, load_whiteness
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE
 from flownav.navigation.records import EchoMemory, GpsMemory, NoiseMemory, WhitenessMemory
@@ -56,7 +56,7 @@ def block_ended(t_s: float, m: WhitenessMemory) -> tuple[float, WhitenessMemory]
 def followed_factor(t_s: float, m: WhitenessMemory) -> WhitenessMemory:
     """A new block, and the factor by how alike those before it are."""
     likeness, after = block_ended(t_s, m)
-    factor = m.factor * np.exp(PACE * (likeness - LIKENESS_ALLOWED))
+    factor = m.factor * exp(PACE * (likeness - LIKENESS_ALLOWED))
     return with_factor(after, factor=clamp(factor, 1.0, LARGEST_FACTOR))
 
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, kernel
+from flownav.compile import cos, equation, kernel, sin
 from flownav.errors import InputError
 from flownav.optics.camera import (
     Camera,
@@ -91,12 +91,12 @@ def stripe_row(pose, along_x, focal_px, pitch_m, harmonics, blur_px, row):  # ty
         offset = n - middle
         x_m = ground_point(pose, offset if along_x else 0.0, 0.0 if along_x else offset, focal_px)[0]
         phase = 2.0 * np.pi * (x_m / pitch_m - np.floor(x_m / pitch_m))
-        this, before = np.sin(phase), -np.sin(phase)
-        twice = 2.0 * np.cos(2.0 * phase)
+        this, before = sin(phase), -sin(phase)
+        twice = 2.0 * cos(2.0 * phase)
         total = 0.5 * (WHITE + BLACK)
         for i in range(len(harmonics)):
             smear = np.pi * harmonics[i, 1] * blur_px
-            total += harmonics[i, 2] * this * (np.sin(smear) / smear if smear > 1e-6 else 1.0)
+            total += harmonics[i, 2] * this * (sin(smear) / smear if smear > 1e-6 else 1.0)
             this, before = twice * this - before, this
         row[n] = total
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import clamp, equation
+from flownav.compile import clamp, equation, exp
 from flownav.optics.projection import Pose
 
 Array = NDArray[np.float64]
@@ -95,7 +95,7 @@ def mirrored(g: Gloss, x: float, y: float, z: float) -> float:
     size = np.sqrt(x * x + y * y + z * z)
     cosine = clamp((x * g.sun_x + y * g.sun_y - z * g.sun_z) / size, -1.0, 1.0)
     angle_squared = 2.0 * (1.0 - cosine)
-    level: float = g.strength * np.exp(-0.5 * angle_squared / (g.width_rad * g.width_rad))
+    level: float = g.strength * exp(-0.5 * angle_squared / (g.width_rad * g.width_rad))
     return level
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, kernel, runge_kutta, stepping
+from flownav.compile import cos, equation, kernel, runge_kutta, sin, stepping
 from flownav.optics.projection import Pose
 
 GRAVITY_M_S2 = 9.81
@@ -21,13 +21,13 @@ STEP_S = 0.5e-3
 @equation
 def sensor_place(angle_rad: float, length_m: float, height_m: float) -> tuple[float, float]:
     """Equations 12 and 13: x = l sin(theta), z = d + l - l cos(theta) [m]; d is the height at rest."""
-    return length_m * np.sin(angle_rad), height_m + length_m - length_m * np.cos(angle_rad)
+    return length_m * sin(angle_rad), height_m + length_m - length_m * cos(angle_rad)
 
 
 @equation
 def sensor_velocity(angle_rad: float, rate_rad_s: float, length_m: float) -> tuple[float, float]:
     """Equations 14 and 15: vx = l cos(theta) theta', vz = l sin(theta) theta' [m/s]."""
-    return length_m * np.cos(angle_rad) * rate_rad_s, length_m * np.sin(angle_rad) * rate_rad_s
+    return length_m * cos(angle_rad) * rate_rad_s, length_m * sin(angle_rad) * rate_rad_s
 
 
 @equation
@@ -42,7 +42,7 @@ def swing_acceleration(
     angle_rad: float, rate_rad_s: float, push_rad_s2: float, length_m: float, damping_1_s: float
 ) -> float:
     """theta'' = -(g/l) sin(theta) - 2 sigma theta' + push: amplitude falls as exp(-sigma t) [rad/s²]."""
-    gravity_rad_s2: float = GRAVITY_M_S2 / length_m * np.sin(angle_rad)
+    gravity_rad_s2: float = GRAVITY_M_S2 / length_m * sin(angle_rad)
     return push_rad_s2 - gravity_rad_s2 - 2.0 * damping_1_s * rate_rad_s
 
 
@@ -76,7 +76,7 @@ def sensor_pose(angle_rad: float, length_m: float, height_m: float, along_x: boo
     Its x axis lies along the swing, or its y axis where `along_x` is false; `x0_m` is where on the pad it hangs.
     """
     x_m, z_m = sensor_place(angle_rad, length_m, height_m)
-    sine, cosine = np.sin(angle_rad), np.cos(angle_rad)
+    sine, cosine = sin(angle_rad), cos(angle_rad)
     c, s = (1.0, 0.0) if along_x else (0.0, -1.0)  # the camera's turn about its own axis: 0 or -90 degrees
     return Pose(x_m + x0_m, 0.0, z_m, cosine * c, -cosine * s, sine, s, c, 0.0, -sine * c, sine * s, cosine)
 

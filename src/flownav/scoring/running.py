@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, equation, lane_access, larger, magnitude
+from flownav.compile import Lanes, arccos, equation, lane_access, larger, magnitude
 from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.scoring.errors import (
     MAX_POSITION_ERROR,
@@ -126,7 +126,7 @@ def moving_of(s: Shown, cg_above_skid_m: float) -> Moving:
     rotation = rotation_from_quaternion(s.qw, s.qx, s.qy, s.qz)
     vel_n, vel_e, vel_d = to_earth(rotation, s.u, s.v, s.w)
     place_n, place_e = s.pos_n + cg_above_skid_m * rotation[2], s.pos_e + cg_above_skid_m * rotation[5]
-    tilt_deg, yaw_deg_s = np.degrees(np.arccos(within_one(rotation[8]))), np.degrees(magnitude(s.yaw_rate_rad_s))
+    tilt_deg, yaw_deg_s = np.degrees(arccos(within_one(rotation[8]))), np.degrees(magnitude(s.yaw_rate_rad_s))
     return Moving(
         place_n, place_e, -s.pos_d - s.ground_m, vel_d, hypotenuse(vel_n, vel_e), tilt_deg, yaw_deg_s,
         s.flown_n, s.flown_e, s.touches, s.seen, s.away,

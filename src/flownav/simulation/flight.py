@@ -214,13 +214,15 @@ def fly_block(flight: Flight, truth: NDArray[np.float64], block: Block, buffers:
     truth: `truth.packed_truth` of the lanes. Of the buffers the navigator, taken at the address `take`, has heard
     nothing; tape, what it is fed and history are filled.
     """
-    lanes, tape = block.lanes, buffers.tape
-    block.work[:] = 0.0
-    block.work[layout.AS_IS_BEGIN * len(lanes) : layout.AS_IS_END * len(lanes)] = truth
+    lanes, tape, work = block.lanes, buffers.tape, block.work
+    for i in range(work.size):
+        work[i] = 0.0
+    for i in range(truth.size):
+        work[layout.AS_IS_BEGIN * len(lanes) + i] = truth[i]
     o = output_of(
         tape.estimate.reshape(-1), tape.innovation.reshape(-1), tape.event.reshape(-1), NOTHING, NOTHING, NOTHING,
         buffers.room, tape.used,
     )  # fmt: skip
-    b = Block(pointer(block.work), lanes, block.seed, block.first, block.noise)
+    b = Block(pointer(work), lanes, block.seed, block.first, block.noise)
     aboard = Aboard(pointer(buffers.nav), take, pointer(flight.settings), o, pointer(buffers.fed.reshape(-1)))
     fly(b, aboard, flight, flight.onboard, flight.table, buffers.history)

@@ -35,10 +35,9 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from flownav.compile import equation, larger, smaller
+from flownav.compile import equation, larger, log_of_unit, smaller
 from flownav.parameter_files import Number, ParameterModel
 from flownav.sensors.gauss_markov import gauss_markov, gauss_markov_coefficients
-from flownav.simulation.noise import log_of_unit
 
 PERIOD_S = 0.02
 FOOT_M = 0.3048

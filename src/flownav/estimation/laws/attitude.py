@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, larger
+from flownav.compile import arctan2, equation, larger
 from flownav.estimation.law import law
 from flownav.estimation.laws.geometry import LEAST_UPRIGHT, component
 from flownav.estimation.named import Attitude, InsError, ReadAttitude, rotation_by
-from flownav.frames import Quaternion, Vector, conjugate, quaternion_product
+from flownav.frames import Quaternion, Vector, conjugate, quaternion_product, within_half_turn
 
 
 @equation
@@ -108,10 +108,10 @@ def heading(
     forward_n, forward_e, forward_d = rotation[0], rotation[3], rotation[6]
     level = larger(forward_n * forward_n + forward_e * forward_e, LEAST_UPRIGHT * LEAST_UPRIGHT)
     cosine, sine = forward_n / np.sqrt(level), forward_e / np.sqrt(level)
-    predicted = np.arctan2(forward_e, forward_n) + ins_heading + compass_sin * sine + compass_cos * cosine
+    predicted = arctan2(forward_e, forward_n) + ins_heading + compass_sin * sine + compass_cos * cosine
     difference = measured - predicted
     by_heading = 1.0 + compass_sin * cosine - compass_cos * sine
-    return np.arctan2(np.sin(difference), np.cos(difference)), OnHeading(
+    return within_half_turn(difference), OnHeading(
         tilt_n=-by_heading * forward_d * forward_n / level, tilt_e=-by_heading * forward_d * forward_e / level,
         heading=by_heading, ins_heading=1.0, compass_sin=sine, compass_cos=cosine,
     )  # fmt: skip

@@ -13,10 +13,11 @@ from flownav.certification.cells import words_of as words_of_cell
 from flownav.parameter_files import shipped
 from flownav.provenance import hash_of
 from flownav.sensors.datasheet import DEFAULT_SENSOR
+from flownav.simulation.carried import carried_sensors
 from flownav.simulation.dispersion import SHIPPED as SHIPPED_DISPERSION
 from flownav.simulation.dispersion import SHIPPED_FILE, Distribution
 from flownav.simulation.scenario import SHIPPED as SHIPPED_SCENARIOS
-from flownav.simulation.scenario import Scenario, SensorsSection
+from flownav.simulation.scenario import Scenario
 from flownav.vehicle.loading import vehicle_file
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
 
@@ -127,11 +128,12 @@ def _files_of(scenario: Scenario) -> Iterable[Path]:
     dispersion = scenario.dispersion.file
     yield shipped(SHIPPED_FILE) if dispersion == SHIPPED_DISPERSION else Path(dispersion)
     if scenario.filter.name == "landing":
-        for name in SensorsSection.model_fields:
-            if name == "texture" or (name == "pad_camera" and scenario.pad_fix is None):
+        for sensor in sorted(carried_sensors(), key=lambda one: one.channels.reading):
+            own = getattr(scenario.sensors, sensor.name)
+            if sensor.name == "pad_camera" and scenario.pad_fix is None:
                 continue
-            own = getattr(scenario.sensors, name)
-            yield Path(own) if own else shipped(f"sensors/{name}.toml")
+            if own or sensor.sheet.shipped_file:
+                yield Path(own) if own else shipped(f"sensors/{sensor.sheet.shipped_file}")
 
 
 def hashes(files: Sequence[Path], beside: Path | None = None) -> dict[str, str]:

@@ -20,8 +20,8 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads ELF objec
 
 # what is one instruction, exact, or no function of floats
 EXACT = {
-    "abs", "ceil", "degrees", "empty", "empty_like", "float32", "floor", "full", "inf", "int64", "isfinite", "isinf", "isnan",
-    "nan", "ones", "pi", "rint", "sqrt", "sum", "uint16", "uint64", "uint8", "zeros",
+    "abs", "ceil", "degrees", "empty", "empty_like", "float32", "floor", "full", "inf", "int64", "isfinite", "isinf",
+    "isnan", "nan", "ones", "pi", "rint", "sqrt", "sum", "uint16", "uint64", "uint8", "zeros",
 }  # fmt: skip
 PLAIN_C_LIBRARY = "glibc.cpu.hwcaps=-FMA,-FMA_Usable,-AVX2,-AVX2_Usable"
 FLIGHT = """

@@ -28,6 +28,7 @@ from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT
 from flownav.navigation.records import (
     AidMemory,
     CourseMemory,
+    FixMemory,
     FlowMemory,
     GpsMemory,
     HeadingMemory,
@@ -77,8 +78,8 @@ OFTEN = RejectionMemory(30.0, 0.0)
 def fate(tested=REFUSED, axis=1, position=True, flow=None, pad=0.0, arrived=1.0):
     return judge_fate.law(
         tested, reading(10.0, 20.0, 30.0, arrived=arrived), AlongAxis(2.0, 3.0, 0.5, 0.04), flow or FlowMemory(),
-        PadMemory(pad), OFTEN, GpsMemory(moved_n_m=1.0, moved_e_m=2.0), t_s=99.0, axis=axis, position=position,
-        s=TOLD.gps,
+        FixMemory(OFTEN, GpsMemory(moved_n_m=1.0, moved_e_m=2.0), PadMemory(pad)), t_s=99.0,
+        place=axis if position else 3 + axis, s=TOLD.gps,
     )  # fmt: skip
 
 
@@ -88,8 +89,8 @@ def test_a_position_that_is_refused_for_long_goes_to_the_fix_and_its_lasting_err
     lasting = s.gps_slow_sigma_m**2 + s.gps_fast_sigma_m**2
     assert found.goes[2].variance == pytest.approx(lasting + 0.25)
     assert found.told == (GPS_RESET, 18.0)
-    assert (found.gps.moved_n_m, found.gps.moved_e_m) == (1.0, 20.0)
-    assert found.rejection.times == 0.0
+    assert (found.memory.gps.moved_n_m, found.memory.gps.moved_e_m) == (1.0, 20.0)
+    assert found.memory.rejection.times == 0.0
 
 
 def test_a_velocity_that_is_refused_for_long_goes_to_the_fix_and_moves_no_position():
@@ -97,14 +98,14 @@ def test_a_velocity_that_is_refused_for_long_goes_to_the_fix_and_moves_no_positi
     assert placed(found.goes) == [(GPS_VELOCITY + 2, 0.0), (VELOCITY + 2, 30.0)]
     assert found.goes[2].variance == pytest.approx(TOLD.gps.gps_velocity_sigma_down_m_s**2 + 0.25)
     assert found.told == (GPS_RESET, 27.0)
-    assert (found.gps.moved_n_m, found.gps.moved_e_m) == (1.0, 2.0)
+    assert (found.memory.gps.moved_n_m, found.memory.gps.moved_e_m) == (1.0, 2.0)
 
 
 def test_an_axis_that_is_refused_for_the_others_sake_alone_does_not_count():
     found = fate(verdicts.Tested(INNOVATION_GATE, 0.1, 1.0, 0.25))
     assert placed(found.goes) == []
-    assert found.rejection.times == 0.0
-    assert fate(arrived=0.0).rejection == OFTEN
+    assert found.memory.rejection.times == 0.0
+    assert fate(arrived=0.0).memory.rejection == OFTEN
 
 
 @pytest.mark.parametrize(("pad", "flow", "goes"), [
@@ -120,7 +121,7 @@ def test_the_pad_goes_along_with_the_position_where_it_is_known_and_nobody_doubt
 
 def test_gps_tells_where_north_or_east_is_fused():
     for axis, reason, told_s in ((0, FUSED, 99.0), (1, FUSED, 99.0), (2, FUSED, -math.inf), (0, SILENT, -math.inf)):
-        assert fate(verdicts.Tested(reason, 0.0, 1.0, 1.0), axis=axis).gps.told_s == told_s
+        assert fate(verdicts.Tested(reason, 0.0, 1.0, 1.0), axis=axis).memory.gps.told_s == told_s
 
 
 def test_the_level_ratio_is_the_larger_of_north_and_east_of_one_fix():

@@ -127,10 +127,10 @@ class Layout:
     def on_lanes(self, function: Callable[..., Any]) -> OnLanes:
         """A function of one lane's records made a procedure on all lanes.
 
-        Its positional parameters are annotated with records of this layout; its keyword-only ones are told by the
-        caller, the same for all lanes, as are an index and what sinks need: `run(work, lanes, t_s, *others, o)`, the
-        others as the function has them, then other buffers and indices. It returns a record, a tuple of records, or a
-        named tuple of records, of such tuples and of truths.
+        Its positional parameters are annotated with records of this layout, or with named tuples of them; its
+        keyword-only ones are told by the caller, the same for all lanes, as are an index and what sinks need:
+        `run(work, lanes, t_s, *others, o)`, the others as the function has them, then other buffers and indices. It
+        returns a record, or a tuple or a named tuple of records, of truths and of such tuples.
         """
         return _generated(self, function)
 
@@ -180,7 +180,10 @@ class _Plan:
         return name
 
     def loaded(self, kind: Any, name: str) -> str:
-        """An expression for a record of one lane."""
+        """An expression for a record of one lane, or for a record of such records."""
+        if kind not in self.layout._kept and _is_of_records(kind):
+            parts = get_type_hints(kind)
+            return f"{self.known(kind)}({', '.join(self.loaded(parts[part], name) for part in kind._fields)})"
         kept = self.layout._record(kind, f"{self.name}, parameter {name}")
         return f"{self.known(kept.load)}({self.place(kept)})"
 
@@ -207,22 +210,25 @@ class _Plan:
             sink = self.layout._sinks[kind]
             needs = self.also(sink.needs)
             return [f"{self.known(sink.take)}(work, lanes, lane, {value}, {needs})"]
+        if kind not in self.layout._kept and _is_of_records(kind):
+            parts = get_type_hints(kind)
+            return [line for name in kind._fields for line in self.put(parts[name], f"{value}.{name}")]
         kept = self.layout._record(kind, f"{self.name} returns {value}")
         if kept.store is None:
             raise TypeError(f"{self.name} returns {kind}, which is computed and cannot be stored")
         return [f"{self.known(kept.store)}({self.place(kept)}, {value})"]
 
 
+def _is_of_records(kind: Any) -> bool:
+    """Whether a named tuple has fields that are no numbers."""
+    return hasattr(kind, "_fields") and not {float, int} & set(get_type_hints(kind).values())
+
+
 def _generated(layout: Layout, function: Callable[..., Any]) -> OnLanes:
     if function.__kwdefaults__:
         raise TypeError(f"{function.__name__}: what the caller tells has no defaults")
     plan, result = _Plan(layout, function), get_type_hints(function)["return"]
-    lines = [f"found = law({plan.passed(function)})"]
-    if not hasattr(result, "_fields") or result in layout._kept or result in layout._sinks:
-        lines += plan.put(result, "found")
-    else:
-        fields = get_type_hints(result)
-        lines += [line for name in result._fields for line in plan.put(fields[name], f"found.{name}")]
+    lines = [f"found = law({plan.passed(function)})", *plan.put(result, "found")]
     told = sorted(plan.told, key=lambda name: (name != "t_s", name == "o"))  # as the house has them
     source = [f"def run({', '.join(['work', 'lanes', *told])}):"]
     source += [f"    {truth} = False" for truth in plan.truths]

@@ -18,9 +18,9 @@ from flownav.navigation.packed import load_gps_settings
 from flownav.navigation.protection import sign_drift
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT, component_of, usable
 from flownav.navigation.records import (
+    FixMemory,
     FlowMemory,
     GpsMemory,
-    PadMemory,
     Reading,
     RejectionMemory,
     StartMemory,
@@ -143,8 +143,7 @@ def gone_to_gps(
 class FixFate(NamedTuple):
     """What follows from the fate of a fix along an axis. pad_goes: the pad is tied to the vehicle anew."""
 
-    rejection: RejectionMemory
-    gps: GpsMemory
+    memory: FixMemory
     goes: tuple[Reset, Reset, Reset]
     told: Event
     pad: Reset
@@ -154,14 +153,16 @@ class FixFate(NamedTuple):
 
 @on_lanes
 def judge_fate(
-    tested: Tested, reading: Reading, along: AlongAxis, flow: FlowMemory, pad: PadMemory, m: RejectionMemory,
-    gps: GpsMemory, *, t_s: float, axis: int, position: bool, s: GpsSettings,
+    tested: Tested, reading: Reading, along: AlongAxis, flow: FlowMemory, memory: FixMemory,
+    *, t_s: float, place: int, s: GpsSettings,
 ) -> FixFate:  # fmt: skip
     """After the test: where GPS has been refused again and again for a state, the filter is wrong: it goes to GPS.
 
     An axis that is refused for the other's sake alone does not count. Where the position goes, the pad goes along:
     flow, which nobody doubts, tells how far it is from there.
     """
+    m, gps, pad = memory
+    position, axis = place < 3, place if place < 3 else place - 3
     value, _ = component_of(reading, axis)
     heard = reading.arrived > 0.0
     doubted = flow.doubted > 0.0 or bool(np.isfinite(flow.wrong_s))
@@ -172,12 +173,15 @@ def judge_fate(
     moved = by if goes and position else 0.0  # whether GPS jumped or the filter was wrong, nobody knows
     pad_goes = goes and position and not doubted and pad.known > 0.0
     return FixFate(
-        after if heard else m,
-        with_reset(
-            gps,
-            told_s=t_s if axis < 2 and tested.reason == FUSED else gps.told_s,
-            moved_n_m=gps.moved_n_m + (moved if axis == 0 else 0.0),
-            moved_e_m=gps.moved_e_m + (moved if axis == 1 else 0.0),
+        FixMemory(
+            after if heard else m,
+            with_reset(
+                gps,
+                told_s=t_s if axis < 2 and tested.reason == FUSED else gps.told_s,
+                moved_n_m=gps.moved_n_m + (moved if axis == 0 else 0.0),
+                moved_e_m=gps.moved_e_m + (moved if axis == 1 else 0.0),
+            ),
+            pad,
         ),
         gone_to_gps(value, tested.variance, axis, position, goes, s),
         Event(GPS_RESET if goes else -1, by),
@@ -215,7 +219,7 @@ def take_gps(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Outp
             note_aid(work, lanes, t_s, o)
         elif position:
             note_height(work, lanes, t_s)
-        if judge_fate(work, lanes, t_s, axis, position, s, state, o):
+        if judge_fate(work, lanes, t_s, state, s, axis, o):
             pad_below(work, lanes, axis)
             fuse_offered(work, lanes, s.gate_sigma, o)
 

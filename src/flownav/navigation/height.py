@@ -30,6 +30,7 @@ from flownav.navigation.records import (
     ImuMemory,
     NoiseMemory,
     RangeMemory,
+    RangingMemory,
     Reading,
     StartMemory,
 )
@@ -187,10 +188,8 @@ def sought_ground(
 class RangeVerdict(NamedTuple):
     """What becomes of a range."""
 
-    range: RangeMemory
-    echo: EchoMemory
+    memory: RangingMemory
     stuck: Event
-    ground: GroundMemory
     reset: Reset
     found: Event
     offset: Sign
@@ -199,10 +198,11 @@ class RangeVerdict(NamedTuple):
 
 @on_lanes
 def judge_range(
-    reading: Reading, start: StartMemory, height: Height, aid: AidMemory, m: RangeMemory, echo: EchoMemory,
-    g: GroundMemory, noise: NoiseMemory, *, t_s: float, s: HeightSettings,
+    reading: Reading, start: StartMemory, height: Height, aid: AidMemory, memory: RangingMemory, noise: NoiseMemory,
+    *, t_s: float, s: HeightSettings,
 ) -> RangeVerdict:  # fmt: skip
     """A range along the boresight: whether it may be fused, whether it is stuck, and the first ground that it finds."""
+    m, echo, g = memory
     alone = t_s - aid.height_s > s.height_hold_s
     reason, variance, m = range_verdict(reading, t_s, start.started, height, alone, m, s)
     still = reason == STUCK and abs(height.pos_d_m - m.down_m) >= s.range_stuck_travel_m and m.said_s != m.same_s
@@ -213,10 +213,10 @@ def judge_range(
     seeks = heard and g.known == 0.0
     found = seeks and sought.found
     return RangeVerdict(
-        with_taken(m, taken_s=t_s, refused_s=np.nan) if found else m,
-        echo,
+        RangingMemory(
+            with_taken(m, taken_s=t_s, refused_s=np.nan) if found else m, echo, sought.ground if seeks else g
+        ),
         Event(RANGE_STUCK if still else -1, reading.value_0),
-        sought.ground if seeks else g,
         sought.reset if found else NO_RESET,
         sought.event if found else NO_EVENT,
         Sign(RANGE_OFFSET, 1.0),
@@ -228,8 +228,7 @@ class Refusal(NamedTuple):
     """What follows from the fate of a range. again: the ground was found anew, and the reading is offered once more."""
 
     fate: Fate
-    range: RangeMemory
-    ground: GroundMemory
+    memory: RangingMemory
     imu: ImuMemory
     doubts: tuple[Doubt, Doubt, Doubt]
     doubted: Event
@@ -240,14 +239,15 @@ class Refusal(NamedTuple):
 
 @on_lanes
 def judge_refusal(
-    tested: Tested, reading: Reading, height: Height, aid: AidMemory, m: RangeMemory, echo: EchoMemory,
-    g: GroundMemory, imu: ImuMemory, *, t_s: float, s: HeightSettings,
+    tested: Tested, reading: Reading, height: Height, aid: AidMemory, memory: RangingMemory, imu: ImuMemory,
+    *, t_s: float, s: HeightSettings,
 ) -> Refusal:  # fmt: skip
     """After the test: a range that is refused first makes the accelerometer doubted, then the ground new.
 
     A streak of refusals ends where the sensor says something else. The ground is found anew where ranges agree on it
     for long, and where they do not, its candidate is followed.
     """
+    m, echo, g = memory
     fused, refused = tested.reason == FUSED, tested.reason == INNOVATION_GATE
     strays = echo.stray > MANY_STRAYS
     since_s = m.refused_s if np.isfinite(m.refused_s) else t_s
@@ -269,8 +269,11 @@ def judge_refusal(
     after = with_refusal(m, refused_s=since_s, doubted=1.0 if doubts else doubted_before) if refused else after
     return Refusal(
         Fate(FUSED if again else SILENT),
-        with_taken(after, taken_s=t_s, refused_s=np.nan) if again else after,
-        sought.ground if again else (followed if waits else ground),
+        RangingMemory(
+            with_taken(after, taken_s=t_s, refused_s=np.nan) if again else after,
+            echo,
+            sought.ground if again else (followed if waits else ground),
+        ),
         imu_after,
         freed,
         doubt_event,

@@ -9,6 +9,7 @@ import numpy as np
 from flownav.compile import equation, replacing
 from flownav.navigation.records import (
     ImuMemory,
+    MotionMemory,
     MotionStep,
     OwedMotion,
     Reading,
@@ -98,26 +99,25 @@ class StepMotion(NamedTuple):
 
     step: MotionStep
     applied: AppliedMotion
-    spent: SpentMotion
-    owed: OwedMotion
+    memory: MotionMemory
     noise: MotionNoise
-    imu: ImuMemory
     lost: Event
 
 
 @on_lanes
 def judge_motion(
-    reading: Reading, start: StartMemory, m: ImuMemory, spent: SpentMotion, owed: OwedMotion, doubt: AccelFactors, *,
-    t_s: float, step_s: float, heard: bool, use_imu: bool, s: ImuSettings,
+    reading: Reading, start: StartMemory, memory: MotionMemory, doubt: AccelFactors,
+    *, t_s: float, step_s: float, heard: bool, s: ImuSettings,
 ) -> StepMotion:  # fmt: skip
     """What moves the filter over the step to t_s: the readings at its ends, the newest reading, or none.
 
-    heard: an inertial reading is at hand. After a gap it knows nothing of the gap, which is coasted. Where no time
-    passes there is no gap.
+    heard: an inertial reading is at hand; where none ever is, none stands for the step. After a gap it knows nothing of
+    the gap, which is coasted. Where no time passes there is no gap.
     """
+    m, spent, owed = memory
     started = start.started > 0.0
     period_s = t_s - m.read_s
-    fresh = use_imu and period_s <= s.imu_stale_s
+    fresh = period_s <= s.imu_stale_s
     now = heard and sound(reading)
     loses = now and not fresh and np.isfinite(m.read_s) and started
     held = remembered(m)
@@ -134,14 +134,16 @@ def judge_motion(
     return StepMotion(
         MotionStep(1.0 if moving else 0.0),
         AppliedMotion(p.value, q.value, r.value, x.value, y.value, z.value),
-        SpentMotion(p.spent, q.spent, r.spent, x.spent, y.spent, z.spent),
-        OwedMotion(p.owed, q.owed, r.owed, x.owed, y.owed, z.owed),
-        MotionNoise(accel * accel, gyro * gyro),
-        with_motion(
-            m,
-            vibration=followed_vibration(reading, m, period_s) if now and fresh else m.vibration,
-            gap=1.0 if step_s > 0.0 and started and not moving else m.gap,
+        MotionMemory(
+            with_motion(
+                m,
+                vibration=followed_vibration(reading, m, period_s) if now and fresh else m.vibration,
+                gap=1.0 if step_s > 0.0 and started and not moving else m.gap,
+            ),
+            SpentMotion(p.spent, q.spent, r.spent, x.spent, y.spent, z.spent),
+            OwedMotion(p.owed, q.owed, r.owed, x.owed, y.owed, z.owed),
         ),
+        MotionNoise(accel * accel, gyro * gyro),
         Event(IMU_LOST if loses else -1, period_s),
     )
 

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.compile import ONE_LANE, Work, equation, invoke, kernel, pointer
 from flownav.measurement import MAX_VALUES, Array, EventQueue
@@ -15,7 +14,7 @@ from flownav.navigation.packed import pack
 from flownav.navigation.records import Reading
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.take import navigator_unit
-from flownav.navigation.tape import Tape, room_of
+from flownav.navigation.tape import Output, Tape, room_of
 from flownav.navigation.told import (
     FROM_ATTITUDE,
     FROM_MAG,
@@ -70,28 +69,25 @@ def run(queue: EventQueue, on: Running, *, compiled: bool = True, instead: int |
         take = unit.address if compiled else unit.python
     entry: Any = feed_all
     feed = entry if compiled else entry.py_func
-    journal = on.tape.journal
-    feed(
-        take, queue.t_s, queue.sensor, queue.value, queue.variance, queue.quality, queue.withheld,
-        queue.arrived, on.work, on.settings,
-        on.tape.estimate.reshape(-1), on.tape.innovation.reshape(-1), on.tape.event.reshape(-1),
-        journal.entry.reshape(-1), journal.state.reshape(-1), journal.covariance.reshape(-1), room_of(on.tape),
-        on.tape.used,
+    tape, journal = on.tape, on.tape.journal
+    written = Output(
+        tape.estimate.reshape(-1), tape.innovation.reshape(-1), tape.event.reshape(-1), journal.entry.reshape(-1),
+        journal.state.reshape(-1), journal.covariance.reshape(-1), room_of(tape), tape.used,
     )  # fmt: skip
+    feed(take, queue, on.work, on.settings, written)
 
 
 @kernel
-def feed_all(
-    take: Any, t_s: Array, sensor: NDArray[np.int64], value: Array, variance: Array, quality: Array, withheld: Array,
-    arrived: Array, work: Work, settings: Work, estimate: Work, innovation: Work, event: Work, entry: Work, state: Work,
-    covariance: Work, room: NDArray[np.int64], used: NDArray[np.int64],
-) -> None:  # fmt: skip
+def feed_all(take: Any, queue: EventQueue, work: Work, settings: Work, o: Output) -> None:
     """Reading by reading into the rows of READING, and on to the navigator at the address `take`."""
-    for k in range(len(t_s)):
-        put_reading(pointer(work), value[k], variance[k], quality[k], arrived[k], withheld[k])
+    for k in range(len(queue.t_s)):
+        put_reading(
+            pointer(work), queue.value[k], queue.variance[k], queue.quality[k], queue.arrived[k], queue.withheld[k]
+        )
         invoke(
-            take, pointer(work), pointer(settings), pointer(estimate), pointer(innovation), pointer(event),
-            pointer(entry), pointer(state), pointer(covariance), pointer(room), pointer(used), t_s[k], sensor[k],
+            take, pointer(work), pointer(settings), pointer(o.estimate), pointer(o.innovation), pointer(o.event),
+            pointer(o.entry), pointer(o.state), pointer(o.covariance), pointer(o.room), pointer(o.used),
+            queue.t_s[k], queue.sensor[k],
         )  # fmt: skip
 
 

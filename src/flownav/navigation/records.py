@@ -410,3 +410,28 @@ class ScaleDoubt(NamedTuple):
     """Standard deviation of a flow scale that nothing can tell; 0 where the filter learns it."""
 
     sigma: float = 0.0
+
+
+# -- what belongs together of several records ------------------------------------------------------------------
+class RangingMemory(NamedTuple):
+    """All that is remembered of ranges."""
+
+    range: RangeMemory
+    echo: EchoMemory
+    ground: GroundMemory
+
+
+class MotionMemory(NamedTuple):
+    """All that is remembered of inertial readings from step to step."""
+
+    imu: ImuMemory
+    spent: SpentMotion
+    owed: OwedMotion
+
+
+class FixMemory(NamedTuple):
+    """All that is remembered of GPS, and of the pad that goes along with it."""
+
+    rejection: RejectionMemory
+    gps: GpsMemory
+    pad: PadMemory

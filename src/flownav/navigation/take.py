@@ -72,7 +72,7 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
         if heard:
             drop_spikes(work, lanes, t_s, o)
         step_s = t_s - shared(work, lanes, CLOCK)
-        judge_motion(work, lanes, t_s, step_s, heard, fitted.use_imu, load_imu_settings(p), o)
+        judge_motion(work, lanes, t_s, step_s, heard, load_imu_settings(p), o)
         advance(work, lanes, lagged(lanes), t_s, p, o)
         if heard:
             keep_imu(work, lanes, t_s)

@@ -14,7 +14,7 @@ from flownav.frames import Rotation, Vector, to_earth
 
 
 class LensPose(NamedTuple):
-    """A lens north and east of the pad's centre and above what it looks at [m], and R_EB of the body that carries it."""
+    """A lens north and east of the pad's centre and above what it looks at [m], and R_EB of the body it is on."""
 
     north_m: float
     east_m: float

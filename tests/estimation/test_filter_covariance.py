@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from filters import Filter, N, cross_matrix, filter_at, random_covariance
 from flownav.compile import LANES, ONE_LANE
+from flownav.estimation.attitude_error import fold_attitude
 from flownav.estimation.covariance import (
     add_noise,
     add_noise_lane,
@@ -18,18 +19,16 @@ from flownav.estimation.covariance import (
     covariance_of,
     decay,
     expect,
-    fold_attitude,
     forget_lane,
-    pack,
     place,
     settle,
-    unpack,
     variance_of,
 )
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.gating import Reason
 from flownav.estimation.lag import FlowLag
 from flownav.estimation.laws.pad import pad_fix
+from flownav.estimation.packed import pack, unpack
 from flownav.estimation.states import (
     ACCEPTED,
     ATTITUDE,

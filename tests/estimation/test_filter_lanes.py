@@ -17,7 +17,6 @@ from flownav.estimation.covariance import (
     forget_lane,
     fuse,
     settle,
-    unpack,
     variance_of,
 )
 from flownav.estimation.error_models import propagate_errors, propagate_gauss_markov, propagate_walks
@@ -29,6 +28,7 @@ from flownav.estimation.laws.height import baro_altitude, range_along_boresight
 from flownav.estimation.laws.pad import pad_fix
 from flownav.estimation.laws.still import gyro_at_rest, pad_below, position_itself, velocity_itself
 from flownav.estimation.motion import hold_still, predict
+from flownav.estimation.packed import unpack
 from flownav.estimation.states import (
     ACCEPTED,
     FLOW_LAG,

@@ -9,9 +9,10 @@ import numpy as np
 from hypothesis import strategies as st
 
 from flownav.compile import ONE_LANE
-from flownav.estimation.covariance import fuse, pack, unpack
+from flownav.estimation.covariance import fuse
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.lag import FlowLag
+from flownav.estimation.packed import pack, unpack
 from flownav.estimation.states import (
     ACCEL_BIAS,
     ACCEL_NOISE,

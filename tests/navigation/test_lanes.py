@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flownav.compile import LANES, LANES_WIDE
-from flownav.estimation.covariance import unpack
+from flownav.estimation.packed import unpack
 from flownav.estimation.states import QUATERNION, STATE, STATES
 from flownav.frames import GRAVITY_M_S2
 from flownav.measurement import MAX_VALUES, EventQueue, Sensor, Stream, merge

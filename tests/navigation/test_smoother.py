@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from flownav.cli.replay import command
 from flownav.compile import ONE_LANE
-from flownav.estimation.covariance import unpack
+from flownav.estimation.packed import unpack
 from flownav.estimation.states import ATTITUDE, BARO, CONSIDERS, FORCE, GROUND, MIDDLE, QUATERNION, STATE, STATES
 from flownav.frames import quaternion_product
 from flownav.logs.csv_folder import read_csv_folder

@@ -7,7 +7,7 @@ import pytest
 
 from flownav.scoring.consistency import largest_horizontal_error
 from flownav.scoring.errors import SCORE_COLUMNS, score_block
-from flownav.scoring.running import RUNNING_COLUMNS, RUNNING_ROWS, Shown, begin_scores, note_shown, write_scores
+from flownav.scoring.running import RUNNING_COLUMNS, RUNNING_ROWS, Shown, Terms, begin_scores, note_shown, write_scores
 from flownav.scoring.touchdown import Limits, motion_of, touchdowns
 
 EPOCH_S, ABOVE_SKID_M, EPOCHS, LANES = 0.02, 0.4, 260, (0,) * 12
@@ -57,8 +57,9 @@ def kept_as_they_fly(f, home, may_land_after_s):
                 bool(f["seen"][k, lane]), k == home,
             )  # fmt: skip
             note_shown(work, LANES, 0, lane, k, shown, ABOVE_SKID_M)
+    terms = Terms(EPOCHS, EPOCH_S, may_land_after_s, LIMITS)
     for lane in range(len(LANES)):
-        write_scores(work, LANES, 0, lane, EPOCHS, EPOCH_S, may_land_after_s, LIMITS, scores, lane)
+        write_scores(work, LANES, 0, lane, terms, scores, lane)
     return scores.T
 
 

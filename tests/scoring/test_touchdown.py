@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from flownav.scoring.course import first_contact
 from flownav.scoring.landings import (
     CONTACT_DISTANCE,
     succeeded,
@@ -18,7 +19,6 @@ from flownav.scoring.touchdown import (
     TOUCHDOWN_COLUMNS,
     Limits,
     Motion,
-    first_contact,
     motion_of,
     touchdowns,
 )

@@ -28,6 +28,7 @@ from flownav.sensors.flow_camera import (
     step_flow_camera,
 )
 from flownav.sensors.flow_camera_sheet import FlowCameraSheet, load_flow_camera_sheet
+from flownav.sensors.geometry import LensPose
 from sensor_normals import draws, moved_by, silent
 
 SHEET = load_flow_camera_sheet()
@@ -243,9 +244,9 @@ def test_the_cameras_gyro_has_scale_bias_and_walk() -> None:
 def test_texture_may_be_on_the_pad_alone() -> None:
     upright = tuple(float(x) for x in np.eye(3).ravel())
     image = 2.0 * FLOW.half_fov_tangent  # half a side at 2 m
-    assert pad_texture(0.0, 0.0, 2.0, upright, 1.01 * image, FLOW) == 1.0
-    assert pad_texture(0.0, 0.0, 2.0, upright, 0.99 * image, FLOW) == 0.0
-    assert pad_texture(0.5, 0.0, 2.0, upright, 0.5, FLOW) == 0.0
+    assert pad_texture(LensPose(0.0, 0.0, 2.0, upright), 1.01 * image, FLOW) == 1.0
+    assert pad_texture(LensPose(0.0, 0.0, 2.0, upright), 0.99 * image, FLOW) == 0.0
+    assert pad_texture(LensPose(0.5, 0.0, 2.0, upright), 0.5, FLOW) == 0.0
 
 
 def test_what_the_datasheet_refuses() -> None:

@@ -9,7 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation as Turn
 
 from flownav.errors import InputError
+from flownav.frames import Rotation
 from flownav.parameter_files import check
+from flownav.sensors.geometry import LensPose
 from flownav.sensors.pad_camera import (
     PadCameraNormals,
     PadCameraParameters,
@@ -50,6 +52,12 @@ ROTATION = tuple(float(x) for x in TURN.as_matrix().ravel())
 LENS = np.array([0.4, -0.3, -2.0])
 
 
+def pose(ned_m: np.ndarray, rotation: Rotation) -> LensPose:
+    """A lens at a place from the pad's centre, NED."""
+    north, east, down = map(float, ned_m)
+    return LensPose(north, east, -down, rotation)
+
+
 def read(
     n: PadCameraNormals = QUIET,
     unit: PadCameraUnit = PERFECT,
@@ -58,7 +66,7 @@ def read(
     p: PadCameraParameters = P,
     told: PadCameraParameters | None = None,
 ) -> PadCameraReading:
-    return read_pad_camera(unit, *map(float, lens), ROTATION, rate, n, p, p if told is None else told)
+    return read_pad_camera(unit, pose(lens, ROTATION), rate, n, p, p if told is None else told)
 
 
 def test_a_perfect_camera_sees_where_the_pad_is() -> None:
@@ -104,10 +112,7 @@ def test_noise_grows_with_height_and_image_rate_and_is_stated_so(height: float, 
     lens = np.array([0.0, 0.0, -height])
     level = tuple(float(x) for x in np.eye(3).ravel())
     readings = np.array(
-        [
-            read_pad_camera(PERFECT, *map(float, lens), level, rate, n, LAW, LAW)
-            for n in draws(PadCameraNormals, 6000, 3)
-        ]
+        [read_pad_camera(PERFECT, pose(lens, level), rate, n, LAW, LAW) for n in draws(PadCameraNormals, 6000, 3)]
     )
     across = math.sqrt(1e-3**2 + (5e-4 * height) ** 2 + (2e-3 * rate) ** 2)
     along = math.sqrt(3e-3**2 + (4e-3 * height) ** 2 + (5e-3 * rate) ** 2)
@@ -123,7 +128,7 @@ def test_a_mark_far_to_the_side_looks_as_small_as_from_its_reach_above() -> None
     level = tuple(float(x) for x in np.eye(3).ravel())
 
     def at(north: float, height: float, p: PadCameraParameters) -> PadCameraReading:
-        return read_pad_camera(PERFECT, north, 0.0, -height, level, 0.0, QUIET, p, p)
+        return read_pad_camera(PERFECT, LensPose(north, 0.0, height, level), 0.0, QUIET, p, p)
 
     assert [at(x, 2.0, LAW).arrived for x in (1.40, 1.42)] == [1.0, 0.0]  # (4 + 2)/2 = 3 m
     aside, above = at(1.3, 2.0, LAW), at(0.0, reach_of(1.3, 0.0, 2.0), LAW)
@@ -137,7 +142,7 @@ def test_a_larger_mark_round_it_serves_where_the_inner_does_not() -> None:
     nested = LAW._replace(side_m=0.25, ratio=5.0)
 
     def at(height: float, p: PadCameraParameters) -> PadCameraReading:
-        return read_pad_camera(PERFECT, 0.0, 0.0, -height, level, 0.0, QUIET, p, p)
+        return read_pad_camera(PERFECT, LensPose(0.0, 0.0, height, level), 0.0, QUIET, p, p)
 
     share = [at(h, nested).distance_variance_m2 / h**2 for h in (2.9, 3.1, 14.5)]
     assert share[1] < 0.5 * share[0] == pytest.approx(0.5 * share[2])  # of the outer at 3.1 m as of the inner at 0.62

@@ -62,11 +62,10 @@ def test_step_response_of_every_identified_model_is_exact(a: float, b: float, c:
     period, steps = 0.004, 250
     hold = second_order_hold(b, c, period)
     _, continuous = control.step_response(control.tf([a], [1.0, b, c]), np.arange(steps) * period)
-    advance = hold_step
     x1 = x2 = 0.0
     for k in range(steps):
         assert a * x1 == pytest.approx(continuous[k], abs=1e-12)
-        x1, x2 = advance(x1, x2, 1.0, *hold)
+        x1, x2 = hold_step(x1, x2, 1.0, hold)
 
 
 # underdamped, overdamped, critically damped, and undamped

@@ -12,14 +12,15 @@ from scipy.spatial.transform import Rotation
 
 from flownav.frames import quaternion_from_euler, rotation_from_quaternion
 from flownav.sensors.datasheet import FlowSettings, load_sensor
-from flownav.sensors.flow import engage_flow, engagement, pattern_reach, start_flow
+from flownav.sensors.flow import start_flow
+from flownav.sensors.flow_engagement import engage_flow, engagement, pattern_reach
+from flownav.sensors.geometry import LensPose
 
 SENSOR = load_sensor()
 P = FlowSettings().parameters(SENSOR)
 LIMITS = SENSOR.limits
 T = SENSOR.optics.half_fov_tangent
 LEVEL = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-reach, engaged, engage = pattern_reach, engagement, engage_flow
 
 position, height = st.floats(-1.0, 1.0), st.floats(0.1, 3.4)
 tilt, heading = st.floats(-0.4, 0.4), st.floats(-math.pi, math.pi)
@@ -31,25 +32,27 @@ def attitude(roll: float, pitch: float, yaw: float) -> tuple[float, ...]:
 
 def test_the_image_is_5_5_degrees_wide_and_covers_29_cm_at_3_m() -> None:
     assert math.degrees(2.0 * math.atan(T)) == pytest.approx(5.5, abs=0.02)
-    assert 2.0 * reach(0.0, 0.0, 3.0, LEVEL, T) == pytest.approx(0.288, abs=1e-3)
+    assert 2.0 * pattern_reach(LensPose(0.0, 0.0, 3.0, LEVEL), T) == pytest.approx(0.288, abs=1e-3)
 
 
 def test_a_one_metre_pad_leaves_the_image_after_36_cm_of_drift_at_3_m() -> None:
-    assert reach(0.355, 0.0, 3.0, LEVEL, T) < 0.5 < reach(0.357, 0.0, 3.0, LEVEL, T)
-    assert reach(0.0, -0.357, 3.0, LEVEL, T) > 0.5
+    assert pattern_reach(LensPose(0.355, 0.0, 3.0, LEVEL), T) < 0.5 < pattern_reach(LensPose(0.357, 0.0, 3.0, LEVEL), T)
+    assert pattern_reach(LensPose(0.0, -0.357, 3.0, LEVEL), T) > 0.5
 
 
 def test_an_image_turned_by_45_degrees_needs_a_larger_pad() -> None:
-    straight = reach(0.0, 0.0, 3.0, LEVEL, T)
-    assert reach(0.0, 0.0, 3.0, attitude(0.0, 0.0, math.pi / 4.0), T) == pytest.approx(math.sqrt(2.0) * straight)
-    assert reach(0.0, 0.0, 3.0, attitude(0.0, 0.0, math.pi / 2.0), T) == pytest.approx(straight)
+    straight = pattern_reach(LensPose(0.0, 0.0, 3.0, LEVEL), T)
+    assert pattern_reach(LensPose(0.0, 0.0, 3.0, attitude(0.0, 0.0, math.pi / 4.0)), T) == pytest.approx(
+        math.sqrt(2.0) * straight
+    )
+    assert pattern_reach(LensPose(0.0, 0.0, 3.0, attitude(0.0, 0.0, math.pi / 2.0)), T) == pytest.approx(straight)
 
 
 def test_tilt_moves_the_view_to_the_side_of_the_lowered_lens() -> None:
     nose_up = attitude(0.0, 0.1, 0.0)  # the boresight swings forward, north
     centre_m = 3.0 * math.tan(0.1)
-    assert reach(0.0, 0.0, 3.0, nose_up, T) > centre_m
-    assert reach(-centre_m, 0.0, 3.0, nose_up, T) < 0.15
+    assert pattern_reach(LensPose(0.0, 0.0, 3.0, nose_up), T) > centre_m
+    assert pattern_reach(LensPose(-centre_m, 0.0, 3.0, nose_up), T) < 0.15
 
 
 @given(n=position, e=position, h=height, roll=tilt, pitch=tilt, yaw=heading)
@@ -59,7 +62,9 @@ def test_reach_is_the_farthest_image_corner_on_the_ground(
     corners = np.array([[a * T, b * T, 1.0] for a in (-1, 1) for b in (-1, 1)])
     rays = Rotation.from_euler("ZYX", [yaw, pitch, roll]).apply(corners)
     ground = np.array([n, e]) + h * rays[:, :2] / rays[:, 2:]
-    assert reach(n, e, h, attitude(roll, pitch, yaw), T) == pytest.approx(np.abs(ground).max(), rel=1e-12)
+    assert pattern_reach(LensPose(n, e, h, attitude(roll, pitch, yaw)), T) == pytest.approx(
+        np.abs(ground).max(), rel=1e-12
+    )
 
 
 @given(n=position, e=position, h=height, roll=tilt, pitch=tilt, yaw=heading, a=st.floats(-1, 1), b=st.floats(-1, 1))
@@ -68,13 +73,13 @@ def test_no_point_of_the_image_lies_beyond_the_reach(
 ) -> None:
     ray = Rotation.from_euler("ZYX", [yaw, pitch, roll]).apply([a * T, b * T, 1.0])
     point = np.array([n, e]) + h * ray[:2] / ray[2]
-    assert np.abs(point).max() <= reach(n, e, h, attitude(roll, pitch, yaw), T) + 1e-12
+    assert np.abs(point).max() <= pattern_reach(LensPose(n, e, h, attitude(roll, pitch, yaw)), T) + 1e-12
 
 
 def judge(before: float, **changes: float) -> float:
     """Engagement of a sensor well inside every limit but for the changes."""
     at = {"height": 1.0, "cosine": 1.0, "reach": 0.2, "half": 0.5, "flow_x": 0.0, "flow_y": 0.0} | changes
-    return engaged(before, at["height"], at["cosine"], at["reach"], at["half"], at["flow_x"], at["flow_y"], P)
+    return engagement(before, at["height"], at["cosine"], at["reach"], at["half"], at["flow_x"], at["flow_y"], P)
 
 
 def test_inside_every_limit_the_sensor_engages() -> None:
@@ -113,17 +118,17 @@ def test_the_same_holds_near_the_ground_and_for_tilt() -> None:
 def test_a_larger_pad_and_having_been_engaged_never_hurt(
     before: float, h: float, r: float, half: float, more: float, flow: float
 ) -> None:
-    now = engaged(before, h, 1.0, r, half, flow, 0.0, P)
+    now = engagement(before, h, 1.0, r, half, flow, 0.0, P)
     assert now in (0.0, 1.0)
-    assert engaged(before, h, 1.0, r, half + more, flow, 0.0, P) >= now
-    assert engaged(1.0, h, 1.0, r, half, flow, 0.0, P) >= now
+    assert engagement(before, h, 1.0, r, half + more, flow, 0.0, P) >= now
+    assert engagement(1.0, h, 1.0, r, half, flow, 0.0, P) >= now
 
 
 def test_a_descent_engages_once_and_keeps_the_lag_untouched() -> None:
     state = start_flow(0.1, 0.2, 0.3, 9.81, P)
     history = []
     for lens_height_m in np.arange(6.0, 0.2, -0.01):
-        after = engage(state, 0.1, 0.0, float(lens_height_m), LEVEL, 0.0, 0.0, 0.5, P)
+        after = engage_flow(state, LensPose(0.1, 0.0, float(lens_height_m), LEVEL), 0.0, 0.0, 0.5, P)
         assert after[:-1] == state[:-1]
         history.append(after.engaged)
         state = after

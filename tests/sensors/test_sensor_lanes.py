@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from flownav.compile import LANES, ONE_LANE, equation, kernel, lane_access
 from flownav.frames import rotation_from_quaternion
 from flownav.sensors.datasheet import FlowSettings, load_sensor
-from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, engage_flow, read_flow, start_flow, step_flow
+from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, read_flow, start_flow, step_flow
+from flownav.sensors.flow_engagement import engage_flow
+from flownav.sensors.geometry import LensPose
 from flownav.sensors.gps_ins import (
     GpsInsErrors,
     GpsInsNormals,
@@ -110,7 +112,7 @@ def step_lane(work, lanes, lane, suite):
         flow = step_flow(
             flow, truth.vel_n_m_s, truth.vel_e_m_s, truth.vel_d_m_s, slant_range(height, rotation[8]), 9.0, suite.flow
         )
-    flow = engage_flow(flow, truth.pos_n_m, truth.pos_e_m, height, rotation, 0.1, 0.1, 0.5, suite.flow)
+    flow = engage_flow(flow, LensPose(truth.pos_n_m, truth.pos_e_m, height, rotation), 0.1, 0.1, 0.5, suite.flow)
     store_flow(work, lanes, lane, flow)
     reading = read_flow(
         flow, height, sonar.rate_m_s, work[n * len(lanes) + lane], work[(n + 1) * len(lanes) + lane],

@@ -38,6 +38,7 @@ from flownav.sensors.flow_camera import (
     start_flow_camera,
     step_flow_camera,
 )
+from flownav.sensors.geometry import LensPose
 from flownav.sensors.gps_receiver import (
     GpsReceiverNormals,
     GpsReceiverParameters,
@@ -223,7 +224,8 @@ def step_lane(work, lanes, lane, suite):
     put_gps(work, lanes, lane, gps)
     out_gps(work, lanes, lane, fix)
     height = -truth.pos_d_m
-    texture = pad_texture(truth.pos_n_m, truth.pos_e_m, height, rotation, 0.8, suite.flow)
+    lens = LensPose(truth.pos_n_m, truth.pos_e_m, height, rotation)
+    texture = pad_texture(lens, 0.8, suite.flow)
     seen = FlowCameraTruth(
         truth.vel_n_m_s, truth.vel_e_m_s, truth.vel_d_m_s, force.gyro_x_rad_s, force.gyro_y_rad_s, force.gyro_z_rad_s,
         hit.distance_m, height, rotation[8], texture,
@@ -249,10 +251,7 @@ def step_lane(work, lanes, lane, suite):
         unit_mag(work, lanes, lane), rotation, 1300.0, n_mag(work, lanes, lane), suite.magnetometer
     )
     out_mag(work, lanes, lane, field)
-    pad = read_pad_camera(
-        unit_pad(work, lanes, lane), truth.pos_n_m, truth.pos_e_m, truth.pos_d_m, rotation, 0.3,
-        n_pad(work, lanes, lane), suite.pad, suite.pad,
-    )  # fmt: skip
+    pad = read_pad_camera(unit_pad(work, lanes, lane), lens, 0.3, n_pad(work, lanes, lane), suite.pad, suite.pad)
     out_pad(work, lanes, lane, pad)
     skid, landed = step_skid_switch(
         s_skid(work, lanes, lane), unit_skid(work, lanes, lane), 40.0 - 20.0 * height, n_skid(work, lanes, lane),

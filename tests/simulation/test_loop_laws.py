@@ -9,7 +9,7 @@ from flownav.control.autopilot import Estimate
 from flownav.control.go_around import Knowledge
 from flownav.control.guidance import Reference
 from flownav.estimation.consistency import normalised_error
-from flownav.estimation.covariance import pack
+from flownav.estimation.packed import pack
 from flownav.estimation.states import STATE, STATES
 from flownav.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
 from flownav.navigation.memory import new_work

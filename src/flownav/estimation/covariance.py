@@ -10,13 +10,10 @@ from __future__ import annotations
 
 from typing import cast
 
-import numpy as np
-from numpy.typing import NDArray
-
 from flownav.compile import Lanes, Work, equation, procedure
+from flownav.estimation.attitude_error import fold_attitude
 from flownav.estimation.states import (
     ACCEPTED,
-    ATTITUDE,
     COEFFICIENT,
     CONSIDERED,
     CONSIDERS,
@@ -31,7 +28,6 @@ from flownav.estimation.states import (
     NOISE,
     OBSERVED,
     OFFERED,
-    QUATERNION,
     REST,
     SHARE,
     SIGNATURE,
@@ -40,7 +36,6 @@ from flownav.estimation.states import (
     STATES_WITH_LAG,
     TEST_RATIO,
 )
-from flownav.frames import of_unit_length, quaternion_product
 
 LARGEST_VARIANCE = 1e30
 
@@ -228,32 +223,6 @@ def consider_none(work: Work, lanes: Lanes) -> None:
     work[CONSIDERED * len(lanes)] = 0.0
 
 
-@procedure
-def fold_attitude(work: Work, lanes: Lanes) -> None:
-    """The correction of the attitude error into the quaternion: q <- (1, theta/2) q, of unit length; theta <- 0.
-
-    A lane without a correction keeps every bit.
-    """
-    for lane in range(len(lanes)):
-        north = work[(STATE + ATTITUDE) * len(lanes) + lane]
-        east = work[(STATE + ATTITUDE + 1) * len(lanes) + lane]
-        down = work[(STATE + ATTITUDE + 2) * len(lanes) + lane]
-        turn = (1.0, 0.5 * north, 0.5 * east, 0.5 * down)
-        qw = work[QUATERNION * len(lanes) + lane]
-        qx = work[(QUATERNION + 1) * len(lanes) + lane]
-        qy = work[(QUATERNION + 2) * len(lanes) + lane]
-        qz = work[(QUATERNION + 3) * len(lanes) + lane]
-        w, x, y, z = of_unit_length(quaternion_product(turn, (qw, qx, qy, qz)))
-        corrected = turn[1] != 0.0 or turn[2] != 0.0 or turn[3] != 0.0
-        work[QUATERNION * len(lanes) + lane] = w if corrected else qw
-        work[(QUATERNION + 1) * len(lanes) + lane] = x if corrected else qx
-        work[(QUATERNION + 2) * len(lanes) + lane] = y if corrected else qy
-        work[(QUATERNION + 3) * len(lanes) + lane] = z if corrected else qz
-        work[(STATE + ATTITUDE) * len(lanes) + lane] = 0.0 if corrected else north
-        work[(STATE + ATTITUDE + 1) * len(lanes) + lane] = 0.0 if corrected else east
-        work[(STATE + ATTITUDE + 2) * len(lanes) + lane] = 0.0 if corrected else down
-
-
 # -- single states --------------------------------------------------------------------------------------------
 @equation
 def add_noise(work: Work, lanes: Lanes, state: int, variance: float) -> None:
@@ -318,19 +287,3 @@ def covariance_of(work: Work, lanes: Lanes, i: int, j: int, lane: int) -> float:
     """P_ij of a lane."""
     value: float = work[place(i, j) * len(lanes) + lane]
     return value
-
-
-# -- for Python's callers ---------------------------------------------------------------------------------------
-def unpack(work: NDArray[np.float64], lanes: Lanes, lane: int, n: int) -> NDArray[np.float64]:
-    """P of a lane, (n, n)."""
-    column, row = np.tril_indices(n)
-    packed = work[at(0, 0) * len(lanes) + lane :: len(lanes)][: len(row)]
-    full = np.zeros((n, n), work.dtype)
-    full[row, column] = full[column, row] = packed
-    return full
-
-
-def pack(work: NDArray[np.float64], lanes: Lanes, lane: int, n: int, covariance: NDArray[np.float64]) -> None:
-    """Put a symmetric P, (n, n), into a lane."""
-    column, row = np.tril_indices(n)
-    work[at(0, 0) * len(lanes) + lane :: len(lanes)][: len(row)] = covariance[row, column]

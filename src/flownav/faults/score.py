@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from flownav.faults.navigated import Navigated
 from flownav.measurement import Array, Sensor, Stream
 from flownav.record import POSITION_NED, Table
-from flownav.scoring.touchdown import first_contact
+from flownav.scoring.course import first_contact
 from flownav.text import finite_or_none
 
 SIGMAS = 3.0

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import ONE_LANE, Lanes, Work, compiled, equation, kernel, pointer
-from flownav.estimation.covariance import pack, unpack
 from flownav.estimation.law import Signature
 from flownav.estimation.motion import add_motion_noise, errors_in_motion, strapdown
 from flownav.estimation.named import AccelBias, Attitude, GyroBias, Inertial, PositionNed, VelocityNed
+from flownav.estimation.packed import pack, unpack
 from flownav.estimation.states import (
     ACCEL_BIAS,
     GYRO_BIAS,

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from flownav.compile import ONE_LANE, kernel, pointer
 from flownav.errors import InputError
-from flownav.estimation.covariance import at, fold_attitude
+from flownav.estimation.attitude_error import fold_attitude
+from flownav.estimation.covariance import at
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.smoother import (
     back_over_correction,

@@ -221,7 +221,7 @@ def reading(dynamics: Dynamics, log: RigLog) -> Array:
     step = second_order_hold(dynamics.b_1_s, dynamics.c_1_s2, float(log.time_s[1] - log.time_s[0]))
     velocity, state = np.zeros(len(u)), (0.0, 0.0)
     for k, value in enumerate(held.tolist(), 1):
-        state = hold_step(*state, value, *step)
+        state = hold_step(*state, value, step)
         velocity[k] = state[0]
     return dynamics.a_1_s2 * velocity
 

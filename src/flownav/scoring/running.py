@@ -1,7 +1,7 @@
 """The scores of a flight kept as it flies, for flights whose history nobody keeps: rows of a lane buffer.
 
 The same columns as `errors.score_block` and `touchdown.touchdowns` compute from histories, by the same laws of one
-epoch (`errors.with_error`, `touchdown.followed`).
+epoch (`errors.with_error`, `course.followed`).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from flownav.compile import Lanes, arccos, equation, lane_access, larger, magnitude
 from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.scoring.course import Course, Moving, Touch, followed, nothing_yet
 from flownav.scoring.errors import (
     MAX_POSITION_ERROR,
     SCORE_COLUMNS,
@@ -22,7 +23,7 @@ from flownav.scoring.errors import (
     statistics_of,
     with_error,
 )
-from flownav.scoring.touchdown import Course, Moving, Touch, followed, hypotenuse, nothing_yet, put_touchdown
+from flownav.scoring.touchdown import COLUMNS, Timing, hypotenuse, judged
 
 Rows = NDArray[np.float64]
 
@@ -133,15 +134,20 @@ def moving_of(s: Shown, cg_above_skid_m: float) -> Moving:
     )  # fmt: skip
 
 
-@equation
-def write_scores(
-    work: Rows, lanes: Lanes, row: int, lane: int, epochs: int, epoch_s: float, may_land_after_s: float,
-    limits: Any, scores: Any, flight: int,
-) -> None:  # fmt: skip
-    """A lane's row after its last epoch, into scores[:, flight] (RUNNING_COLUMNS, flights).
-
-    limits: of its touchdown, with the fields of `touchdown.Limits`.
+class Terms(NamedTuple):
+    """What a flight is judged by: its epochs, their length, when it is to land, and with the fields of
+    `touchdown.Limits` what its touchdown may be.
     """
+
+    epochs: int
+    epoch_s: float
+    may_land_after_s: float
+    limits: Any
+
+
+@equation
+def write_scores(work: Rows, lanes: Lanes, row: int, lane: int, terms: Terms, scores: Any, flight: int) -> None:
+    """A lane's row after its last epoch, into scores[:, flight] (RUNNING_COLUMNS, flights)."""
     h = load_horizontal(work, lanes, row + HORIZONTAL, lane)
     worst = -1.0
     for state in range(6):
@@ -153,9 +159,11 @@ def write_scores(
     scores[MAX_POSITION_ERROR, flight] = worst if h.steps > 0.0 else np.nan
     scores[RUNNING_COLUMNS - 1, flight] = np.sqrt(h.largest_sq) if h.largest_sq >= 0.0 else np.nan
     c, t = load_course(work, lanes, row + COURSE, lane), load_touch(work, lanes, row + TOUCH, lane)
-    contact_s, rest_s, last_s = c.contact * epoch_s, (epochs - c.still) * epoch_s, (epochs - 1) * epoch_s
-    first = MAX_POSITION_ERROR + 1
-    put_touchdown(c, t, contact_s, rest_s, last_s, may_land_after_s, limits, scores, first, flight)
+    epochs, epoch_s = terms.epochs, terms.epoch_s
+    when = Timing(c.contact * epoch_s, (epochs - c.still) * epoch_s, (epochs - 1) * epoch_s, terms.may_land_after_s)
+    touchdown = judged(c, t, when, terms.limits)
+    for i in range(COLUMNS):
+        scores[MAX_POSITION_ERROR + 1 + i, flight] = touchdown[i]
 
 
 @equation

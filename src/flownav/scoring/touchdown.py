@@ -20,13 +20,11 @@ from numpy.typing import NDArray
 
 from flownav.compile import equation, kernel
 from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.scoring.course import Course, Moving, Touch, followed, no_touch, nothing_yet
 
 Array = NDArray[np.float64]
 
-AIRBORNE_EPOCHS = 25  # half a second without contact: skids flutter at lift-off
 STILL_EPOCHS = 50  # a second
-STILL_M_S, STILL_DEG_S = 0.02, 2.0
-ROLLED_OVER_DEG = 30.0  # beyond what any of our skids stands on
 
 CONTACT = (
     "t_s",
@@ -64,6 +62,7 @@ TOUCHDOWN_COLUMNS = (
     "aloft",
 )
 COLUMNS = len(TOUCHDOWN_COLUMNS)
+NO_CONTACT, NO_REST, NO_PARTS = (np.nan,) * len(CONTACT), (np.nan,) * len(REST), (np.nan,) * len(LIMITED_BY)
 
 
 class Limits(NamedTuple):
@@ -110,133 +109,36 @@ def motion_of(
     )
 
 
-class Moving(NamedTuple):
-    """What one epoch shows of a flight: as `Motion`, of one lane, with how wrong was what was flown on (north, east).
+class Timing(NamedTuple):
+    """When it touched, came to rest and was last seen, were it to have done so, and when it was to land [s]."""
 
-    seen: the pad's place was to be seen or noted. away: it goes around.
+    contact_s: float
+    rest_s: float
+    last_s: float
+    may_land_after_s: float
+
+
+@equation
+def judged(c: Course, t: Touch, when: Timing, limits: Any) -> tuple[float, ...]:
+    """The touchdown after the last epoch, by TOUCHDOWN_COLUMNS; what did not happen is NaN.
+
+    limits: with the fields of `Limits`. A contact before `may_land_after_s` is a crash and no touchdown; so is none
+    what a go-around follows.
     """
-
-    place_n: float
-    place_e: float
-    height_m: float
-    sink_m_s: float
-    lateral_m_s: float
-    tilt_deg: float
-    yaw_deg_s: float
-    flown_n: float
-    flown_e: float
-    touches: bool
-    seen: bool
-    away: bool
-
-
-class Course(NamedTuple):
-    """What must be remembered of the epochs so far."""
-
-    contact: float  # its epoch, of the first since the last go-around; -1: none
-    untouched: float  # epochs without contact
-    still: float  # epochs at rest on the ground
-    sink_m_s: float  # of the last epoch, with the five that follow
-    lateral_m_s: float
-    tilt_deg: float
-    yaw_deg_s: float
-    place_n: float
-    place_e: float
-    seen_n: float  # error of what was flown on when the pad was last seen
-    seen_e: float
-    over_grounded: float  # 1: rolled over on the ground
-    over_since: float  # 1: rolled over since the contact
-    low: float  # 1: was below the ground
-    away: float
-    go_arounds: float
-
-
-class Touch(NamedTuple):
-    """The first contact: place, errors of what was flown on then and when the pad was last seen, motion before it."""
-
-    place_n: float
-    place_e: float
-    error_n: float
-    error_e: float
-    seen_n: float
-    seen_e: float
-    sink_m_s: float
-    lateral_m_s: float
-    tilt_deg: float
-    yaw_deg_s: float
-
-
-@equation
-def nothing_yet() -> Course:
-    """Before the first epoch."""
-    return Course(-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-@equation
-def no_touch() -> Touch:
-    """Before any contact."""
-    return Touch(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-@equation
-def lands(touches: bool, untouched: float) -> bool:
-    """Whether a contact after so many epochs without one is one after being airborne."""
-    return touches and untouched >= AIRBORNE_EPOCHS
-
-
-@equation
-def followed(c: Course, touch: Touch, epoch: int, s: Moving) -> tuple[Course, Touch]:
-    """What is remembered with one epoch more."""
-    seen_n, seen_e = (s.flown_n, s.flown_e) if epoch == 0 else (c.seen_n, c.seen_e)
-    met = c.contact < 0.0 and not s.away and lands(s.touches, c.untouched)
-    contact = -1.0 if s.away else (float(epoch) if met else c.contact)
-    first = Touch(
-        s.place_n, s.place_e, s.flown_n, s.flown_e, seen_n, seen_e, c.sink_m_s, c.lateral_m_s, c.tilt_deg, c.yaw_deg_s
-    )
-    untouched = float(epoch + 1) if s.away else (0.0 if s.touches else c.untouched + 1.0)
-    still = s.touches and s.lateral_m_s < STILL_M_S and s.yaw_deg_s < STILL_DEG_S
-    over = s.tilt_deg > ROLLED_OVER_DEG
-    begins = s.away and c.away == 0.0 and epoch > 0
-    now = Course(
-        contact, untouched, c.still + 1.0 if still else 0.0, s.sink_m_s, s.lateral_m_s, s.tilt_deg, s.yaw_deg_s,
-        s.place_n, s.place_e, s.flown_n if s.seen else seen_n, s.flown_e if s.seen else seen_e,
-        1.0 if over and s.touches else c.over_grounded, 0.0 if contact < 0.0 else (1.0 if over else c.over_since),
-        c.low if s.height_m > 0.0 else 1.0,  # a motion that is no number is no flight either
-        1.0 if s.away else 0.0, c.go_arounds + 1.0 if begins else c.go_arounds,
-    )  # fmt: skip
-    return now, first if met else touch
-
-
-@equation
-def put_touchdown(
-    c: Course, t: Touch, contact_s: float, rest_s: float, last_s: float, may_land_after_s: float, limits: Any,
-    row: Any, first: int, place: int,
-) -> None:  # fmt: skip
-    """The touchdown after the last epoch into row[first:, place], by TOUCHDOWN_COLUMNS; what did not happen is NaN.
-
-    contact_s, rest_s, last_s: when it touched, when it came to rest, the last epoch's time. limits: with the fields of
-    `Limits`. A contact before `may_land_after_s` is a crash and no touchdown; so is none what a go-around follows.
-    """
-    early = c.contact >= 0.0 and contact_s < may_land_after_s
+    early = c.contact >= 0.0 and when.contact_s < when.may_land_after_s
     touched = c.contact >= 0.0 and not early
     rests = touched and c.still >= STILL_EPOCHS
     slide_m = hypotenuse(c.place_n - t.place_n, c.place_e - t.place_e)
     at_contact = (
-        contact_s, t.place_n, t.place_e, hypotenuse(t.place_n, t.place_e), t.sink_m_s, t.lateral_m_s,
+        when.contact_s, t.place_n, t.place_e, hypotenuse(t.place_n, t.place_e), t.sink_m_s, t.lateral_m_s,
         t.tilt_deg, t.yaw_deg_s,
     )  # fmt: skip
-    at_rest = (rest_s, c.place_n, c.place_e, hypotenuse(c.place_n, c.place_e), c.tilt_deg, slide_m)
+    at_rest = (when.rest_s, c.place_n, c.place_e, hypotenuse(c.place_n, c.place_e), c.tilt_deg, slide_m)
     parts = (
         hypotenuse(t.error_n - t.seen_n, t.error_e - t.seen_e),
         hypotenuse(t.place_n + t.error_n, t.place_e + t.error_e),
         hypotenuse(t.seen_n, t.seen_e),
     )
-    for i in range(8):
-        row[first + i, place] = at_contact[i] if touched else np.nan
-    for i in range(6):
-        row[first + 8 + i, place] = at_rest[i] if rests else np.nan
-    for i in range(3):
-        row[first + 14 + i, place] = parts[i] if touched else np.nan
     bits = 1.0 if early else 0.0
     if touched:
         bits += 2.0 if t.sink_m_s > limits.max_sink_rate_m_s else 0.0
@@ -246,10 +148,10 @@ def put_touchdown(
         bits += 32.0 if slide_m > limits.max_slide_m else 0.0
     bits += 64.0 if c.over_grounded > 0.0 or c.over_since > 0.0 else 0.0
     bits += 128.0 if c.low > 0.0 else 0.0
-    row[first + 17, place] = 1.0 if may_land_after_s < last_s else 0.0
-    row[first + 18, place] = bits
-    row[first + 19, place] = c.go_arounds
-    row[first + 20, place] = 1.0 if not touched and c.go_arounds > 0.0 else 0.0
+    expected = 1.0 if when.may_land_after_s < when.last_s else 0.0
+    aloft = 1.0 if not touched and c.go_arounds > 0.0 else 0.0
+    found = (at_contact if touched else NO_CONTACT) + (at_rest if rests else NO_REST)
+    return found + (parts if touched else NO_PARTS) + (expected, bits, c.go_arounds, aloft)
 
 
 @equation
@@ -257,26 +159,6 @@ def hypotenuse(a: float, b: float) -> float:
     """Length of a vector of two components."""
     length: float = np.sqrt(a * a + b * b)
     return length
-
-
-if TOUCHDOWN_COLUMNS[17:] != ("expected", "broken", "go_arounds", "aloft"):
-    raise AssertionError("put_touchdown writes TOUCHDOWN_COLUMNS by their places")
-
-
-@kernel
-def first_contact(on_ground: Array) -> NDArray[np.int64]:
-    """The epoch of each lane's first ground contact after being airborne, -1 where there is none; (lanes,)."""
-    epochs, lanes = on_ground.shape
-    found = np.full(lanes, -1)
-    for lane in range(lanes):
-        untouched = 0.0
-        for k in range(epochs):
-            touches = on_ground[k, lane] > 0.0
-            if lands(touches, untouched):
-                found[lane] = k
-                break
-            untouched = 0.0 if touches else untouched + 1.0
-    return found
 
 
 @kernel
@@ -296,7 +178,9 @@ def fold(t_s: Array, motion: Motion, flown: Array, seen: Array, away: Array, lim
             course, touch = followed(course, touch, k, shown)
         contact_s = t_s[max(int(course.contact), 0)]
         rest_s = t_s[min(epochs - int(course.still), epochs - 1)]
-        put_touchdown(course, touch, contact_s, rest_s, t_s[epochs - 1], after_s, limits, rows, 0, lane)
+        found = judged(course, touch, Timing(contact_s, rest_s, t_s[epochs - 1], after_s), limits)
+        for i in range(COLUMNS):
+            rows[i, lane] = found[i]
     return rows
 
 

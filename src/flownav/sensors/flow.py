@@ -22,13 +22,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger, magnitude
-from flownav.frames import Rotation
-from flownav.sensors.second_order import hold_step
+from flownav.compile import clamp, equation, larger
+from flownav.sensors.second_order import SecondOrderHold, hold_step
 
 PERIOD_S = 0.004  # inside the sensor
 SMALLEST_RANGE_M = 0.01  # keeps divisions finite when the lens touches the ground
-SMALLEST_COSINE = 0.1  # the same for a ray that grazes the ground
 NOISE_DEGREE = 8
 
 
@@ -170,17 +168,15 @@ def step_flow(
     u1, u2 = _lag(state.u1, state.u2, seen_u, p)
     v1, v2 = _lag(state.v1, state.v2, seen_v, p)
     w1, w2 = _lag(state.w1, state.w2, seen_w, p)
-    mount_m, mount_m_s = hold_step(
-        state.mount_m, state.mount_m_s, thrust_m_s2,
-        p.mount_f11, p.mount_f12, p.mount_f21, p.mount_f22, p.mount_g1, p.mount_g2,
-    )  # fmt: skip
+    mount = SecondOrderHold(p.mount_f11, p.mount_f12, p.mount_f21, p.mount_f22, p.mount_g1, p.mount_g2)
+    mount_m, mount_m_s = hold_step(state.mount_m, state.mount_m_s, thrust_m_s2, mount)
     return FlowState(u1, u2, v1, v2, w1, w2, mount_m, mount_m_s, state.engaged)
 
 
 @equation
 def _lag(x1: float, x2: float, seen_m_s: float, p: FlowParameters) -> tuple[float, float]:
     """One channel of the identified dynamics, 4 ms on."""
-    return hold_step(x1, x2, seen_m_s, p.lag_f11, p.lag_f12, p.lag_f21, p.lag_f22, p.lag_g1, p.lag_g2)
+    return hold_step(x1, x2, seen_m_s, SecondOrderHold(p.lag_f11, p.lag_f12, p.lag_f21, p.lag_f22, p.lag_g1, p.lag_g2))
 
 
 @equation
@@ -221,87 +217,3 @@ def read_flow(
         sigma,
         state.engaged,
     )
-
-
-# -- engagement ------------------------------------------------------------------------------------------
-@equation
-def _corner_reach(
-    pos_n_m: float, pos_e_m: float, height_m: float, rotation: Rotation, right: float, forward: float
-) -> float:
-    """Distance of one image corner's ground point from the pad's centre: the larger of |north| and |east|.
-
-    The corner's ray is (forward, right, 1) in the body.
-    """
-    north = rotation[0] * forward + rotation[1] * right + rotation[2]
-    east = rotation[3] * forward + rotation[4] * right + rotation[5]
-    down = rotation[6] * forward + rotation[7] * right + rotation[8]
-    length = height_m / larger(down, SMALLEST_COSINE)
-    return larger(magnitude(pos_n_m + length * north), magnitude(pos_e_m + length * east))
-
-
-@equation
-def pattern_reach(
-    pos_n_m: float, pos_e_m: float, height_m: float, rotation: Rotation, half_fov_tangent: float
-) -> float:
-    """Half the side of the smallest pad (square, its sides north and east) that fills the whole image [m].
-
-    pos_n_m, pos_e_m: the lens from the pad's centre. The four corners of the image are projected through the
-    attitude R_EB on to level ground, so tilt, heading and footprint are exact (finite while tilt < 84 degrees).
-    """
-    t = half_fov_tangent
-    front = larger(
-        _corner_reach(pos_n_m, pos_e_m, height_m, rotation, t, t),
-        _corner_reach(pos_n_m, pos_e_m, height_m, rotation, -t, t),
-    )
-    back = larger(
-        _corner_reach(pos_n_m, pos_e_m, height_m, rotation, t, -t),
-        _corner_reach(pos_n_m, pos_e_m, height_m, rotation, -t, -t),
-    )
-    return larger(front, back)
-
-
-@equation
-def engagement(
-    engaged: float,
-    height_m: float,
-    tilt_cosine: float,
-    reach_m: float,
-    pad_half_size_m: float,
-    flow_x_rad_s: float,
-    flow_y_rad_s: float,
-    p: FlowParameters,
-) -> float:
-    """1 where the sensor can see and follow the pattern, else 0.
-
-    Height between its limits, tilt and flow rate below theirs, and the pattern filling the image. A sensor that
-    is engaged stays so up to the limits; one that is not must first be inside them by the fraction `hysteresis`.
-    """
-    was = engaged > 0.5
-    inside = 1.0 if was else 1.0 - p.hysteresis
-    lowest_m = p.min_height_m if was else p.min_height_m * (1.0 + p.hysteresis)
-    lowest_cosine = p.min_tilt_cosine if was else p.engaging_tilt_cosine
-    flow_rad_s = larger(magnitude(flow_x_rad_s), magnitude(flow_y_rad_s))
-    in_height = (height_m >= lowest_m) & (height_m <= p.max_height_m * inside)
-    in_motion = (tilt_cosine >= lowest_cosine) & (flow_rad_s <= p.max_flow_rad_s * inside)
-    in_view = reach_m <= pad_half_size_m * inside
-    return 1.0 if in_height & in_motion & in_view else 0.0
-
-
-@equation
-def engage_flow(
-    state: FlowState,
-    pos_n_m: float,
-    pos_e_m: float,
-    height_m: float,
-    rotation: Rotation,
-    flow_x_rad_s: float,
-    flow_y_rad_s: float,
-    pad_half_size_m: float,
-    p: FlowParameters,
-) -> FlowState:
-    """The state with `engaged` judged anew from the lens's true position over the pad, attitude and flow."""
-    reach_m = pattern_reach(pos_n_m, pos_e_m, height_m, rotation, p.half_fov_tangent)
-    engaged = engagement(state.engaged, height_m, rotation[8], reach_m, pad_half_size_m, flow_x_rad_s, flow_y_rad_s, p)
-    return FlowState(
-        state.u1, state.u2, state.v1, state.v2, state.w1, state.w2, state.mount_m, state.mount_m_s, engaged
-    )  # fmt: skip

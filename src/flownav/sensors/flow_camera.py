@@ -14,10 +14,11 @@ is switched off there). w are the mean body rates over the exposure. On top of t
 - noise of the sensor file's law, in m/s over the range, more where there is little texture; outliers;
 - saturation at the fastest flow that the image search can follow.
 
-**Seeing.** Height and tilt within the sensor file's limits (`flow.engagement`, with its hysteresis), and texture; where
-it cannot see, quality and flow are 0. Texture is what the scenario says it is (1 everywhere, or 1 on the pad and 0
-beside it: `pad_texture`); spells of low texture come on their own. **Quality** falls with the square of the height
-over the greatest and of the flow over the fastest, by the texture, and it is noisy: it says little about one reading.
+**Seeing.** Height and tilt within the sensor file's limits (`flow_engagement.engagement`, with its hysteresis), and
+texture; where it cannot see, quality and flow are 0. Texture is what the scenario says it is (1 everywhere, or 1 on the
+pad and 0 beside it: `pad_texture`); spells of low texture come on their own. **Quality** falls with the square of the
+height over the greatest and of the flow over the fastest, by the texture, and it is noisy: it says little about one
+reading.
 """
 
 from __future__ import annotations
@@ -27,10 +28,11 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import clamp, equation, larger, magnitude
-from flownav.frames import Rotation, angular_flow
+from flownav.frames import angular_flow
 from flownav.sensors.chance import factor, spell
-from flownav.sensors.flow import SMALLEST_RANGE_M, FlowParameters, engagement, flow_noise_sigma, pattern_reach
-from flownav.sensors.geometry import in_turned_axes
+from flownav.sensors.flow import SMALLEST_RANGE_M, FlowParameters, flow_noise_sigma
+from flownav.sensors.flow_engagement import engagement, pattern_reach
+from flownav.sensors.geometry import LensPose, in_turned_axes
 
 
 class FlowCameraParameters(NamedTuple):
@@ -179,12 +181,9 @@ def flow_gain(height_m: float, unit: FlowCameraUnit, p: FlowCameraParameters) ->
 
 
 @equation
-def pad_texture(
-    pos_n_m: float, pos_e_m: float, height_m: float, rotation: Rotation, pad_half_size_m: float, flow: FlowParameters
-) -> float:
+def pad_texture(lens: LensPose, pad_half_size_m: float, flow: FlowParameters) -> float:
     """1 where a pad with its centre at the origin fills the image, else 0: texture where only the pad has any."""
-    reach_m = pattern_reach(pos_n_m, pos_e_m, height_m, rotation, flow.half_fov_tangent)
-    return 1.0 if reach_m <= pad_half_size_m else 0.0
+    return 1.0 if pattern_reach(lens, flow.half_fov_tangent) <= pad_half_size_m else 0.0
 
 
 @equation

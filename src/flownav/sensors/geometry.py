@@ -7,8 +7,19 @@ degree (Titterton, Weston, Strapdown Inertial Navigation Technology, 2nd ed., se
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from flownav.compile import equation
 from flownav.frames import Rotation, Vector, to_earth
+
+
+class LensPose(NamedTuple):
+    """A lens north and east of the pad's centre and above what it looks at [m], and R_EB of the body it is on."""
+
+    north_m: float
+    east_m: float
+    height_m: float
+    rotation: Rotation
 
 
 @equation

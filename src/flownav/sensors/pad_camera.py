@@ -32,9 +32,8 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import clamp, equation, larger
-from flownav.frames import Rotation
 from flownav.sensors.chance import factor
-from flownav.sensors.geometry import turned_rotation
+from flownav.sensors.geometry import LensPose, turned_rotation
 from flownav.sensors.pad_fix import SMALLEST_DEPTH_M, PadFixNormals, PadFixParameters, read_pad
 
 
@@ -143,12 +142,10 @@ def reach_of(north_m: float, east_m: float, height_m: float) -> float:
 
 
 @equation
-def inner_serves(
-    lens_n_m: float, lens_e_m: float, lens_d_m: float, rotation: Rotation, reach_m: float, p: PadCameraParameters
-) -> bool:
+def inner_serves(lens: LensPose, reach_m: float, p: PadCameraParameters) -> bool:
     """Whether the mark itself is whole in view and near enough, else the larger one round it has to serve."""
     seen = read_pad(
-        lens_n_m, lens_e_m, lens_d_m, rotation, PadFixNormals(0.0, 0.0, 0.0, 0.0),
+        lens.north_m, lens.east_m, -lens.height_m, lens.rotation, PadFixNormals(0.0, 0.0, 0.0, 0.0),
         PadFixParameters(
             1.0, 0.0, 0.0, p.min_height_m, p.max_height_m, p.half_view_forward_tangent, p.half_view_right_tangent,
             p.side_m,
@@ -159,29 +156,22 @@ def inner_serves(
 
 @equation
 def read_pad_camera(
-    unit: PadCameraUnit,
-    lens_n_m: float,
-    lens_e_m: float,
-    lens_d_m: float,
-    rotation: Rotation,
-    image_rate_rad_s: float,
-    n: PadCameraNormals,
-    p: PadCameraParameters,
+    unit: PadCameraUnit, lens: LensPose, image_rate_rad_s: float, n: PadCameraNormals, p: PadCameraParameters,
     told: PadCameraParameters,
-) -> PadCameraReading:
-    """One frame of a lens at (n, e, d) from the pad's centre, attitude R_EB; image_rate_rad_s: of the ground below.
+) -> PadCameraReading:  # fmt: skip
+    """One frame of a lens, its height that above the pad; image_rate_rad_s: of the ground below.
 
     p: the camera as it is; told: as its datasheet has it.
     """
-    height_m = -lens_d_m
-    reach_m = reach_of(lens_n_m, lens_e_m, height_m)
+    north_m, east_m, height_m, rotation = lens
+    reach_m = reach_of(north_m, east_m, height_m)
     turned = turned_rotation(rotation, unit.turned_x, unit.turned_y, unit.turned_z)
-    inner_sees = inner_serves(lens_n_m, lens_e_m, lens_d_m, turned, reach_m, p)
+    inner_sees = inner_serves(LensPose(north_m, east_m, height_m, turned), reach_m, p)
     size = 1.0 if inner_sees else p.ratio
     shown_m = reach_m / size
     distance_sigma = distance_noise(p, shown_m, image_rate_rad_s)
     fix = read_pad(
-        lens_n_m, lens_e_m, lens_d_m, turned, PadFixNormals(n.forward, n.right, n.distance, 0.0),
+        north_m, east_m, -height_m, turned, PadFixNormals(n.forward, n.right, n.distance, 0.0),
         PadFixParameters(
             1.0, angle_noise(p, shown_m, image_rate_rad_s), distance_sigma, p.min_height_m * size,
             p.max_height_m * size, p.half_view_forward_tangent, p.half_view_right_tangent, p.side_m * size,

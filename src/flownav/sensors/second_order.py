@@ -27,11 +27,9 @@ class SecondOrderHold(NamedTuple):
 
 
 @equation
-def hold_step(
-    x1: float, x2: float, u: float, f11: float, f12: float, f21: float, f22: float, g1: float, g2: float
-) -> tuple[float, float]:
+def hold_step(x1: float, x2: float, u: float, hold: SecondOrderHold) -> tuple[float, float]:
     """x[k+1] = F x[k] + G u[k]."""
-    return f11 * x1 + f12 * x2 + g1 * u, f21 * x1 + f22 * x2 + g2 * u
+    return hold.f11 * x1 + hold.f12 * x2 + hold.g1 * u, hold.f21 * x1 + hold.f22 * x2 + hold.g2 * u
 
 
 def second_order_hold(b: float, c: float, period_s: float) -> SecondOrderHold:

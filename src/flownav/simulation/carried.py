@@ -149,8 +149,8 @@ _table: list[CarriedSensor] = [
     ),
     CarriedSensor(
         "flow_camera", FlowCameraSheet, (Said(Sensor.FLOW_RATE, None),),
-        draw_flow_camera, start_flow_camera, seeing.look, (seeing.see_flow,), Channels(120, 183, 165),
-        phase=1, late=True, lever="lens", wanted=wanted.camera_sheet,
+        draw_flow_camera, start_flow_camera, seeing.look, (seeing.mean_rates, seeing.see_flow),
+        Channels(120, 183, 165), phase=1, late=True, lever="lens", wanted=wanted.camera_sheet,
     ),
     CarriedSensor(
         "pad_camera", PadCameraSheet,

@@ -66,29 +66,35 @@ def runge_kutta_step(work: Work, lanes: Lanes, dt: float, onboard: Onboard | Non
         store_sum(work, lanes, lane, state)
         air = moving_air(work, lanes, lane, state)
         induced = solved_inflow(state, air, blade_angles(state, vehicle), vehicle, onboard)
-        add_stage(work, lanes, lane, state, air, induced, 0, dt, vehicle, onboard)
+        store_inflow(work, lanes, lane, induced)
+        add_stage(work, lanes, lane, rate_at_inflow(work, lanes, lane, state, air, induced, vehicle, onboard), 0, dt)
     for stage in range(1, STAGES):
         for lane in range(len(lanes)):
             state, vehicle = load_stage(work, lanes, lane), vehicle_as_is(work, lanes, lane)
             air, guess = moving_air(work, lanes, lane, state), load_inflow(work, lanes, lane)
             induced = refined_inflow(guess, state, air, blade_angles(state, vehicle), vehicle, onboard)
-            add_stage(work, lanes, lane, state, air, induced, stage, dt, vehicle, onboard)
+            store_inflow(work, lanes, lane, induced)
+            rate = rate_at_inflow(work, lanes, lane, state, air, induced, vehicle, onboard)
+            add_stage(work, lanes, lane, rate, stage, dt)
     for lane in range(len(lanes)):
         store_helicopter(work, lanes, lane, normalised(load_sum(work, lanes, lane)))
 
 
 @equation
-def add_stage(
-    work: Work, lanes: Lanes, lane: int, state: HelicopterState, air: AirMotion, induced: Inflow, stage: int,
-    dt: float, vehicle: VehicleParameters, onboard: Onboard | None,
-) -> None:  # fmt: skip
-    """A stage's rate into the step's sum, and the next stage's state (`after_stage`)."""
-    store_inflow(work, lanes, lane, induced)
+def rate_at_inflow(
+    work: Work, lanes: Lanes, lane: int, state: HelicopterState, air: AirMotion, induced: Inflow,
+    vehicle: VehicleParameters, onboard: Onboard | None,
+) -> HelicopterState:  # fmt: skip
+    """The rate of a state under this lane's controls, at these induced velocities."""
     controls, around = load_controls(work, lanes, lane), load_around(work, lanes, lane)
     if onboard is None:
-        rate = derivative_at_inflow(state, controls, air, attitude(state), induced, around, vehicle)
-    else:
-        rate = derivative_at_tail(state, controls, air, attitude(state), induced.tail, around, vehicle)
+        return derivative_at_inflow(state, controls, air, attitude(state), induced, around, vehicle)
+    return derivative_at_tail(state, controls, air, attitude(state), induced.tail, around, vehicle)
+
+
+@equation
+def add_stage(work: Work, lanes: Lanes, lane: int, rate: HelicopterState, stage: int, dt: float) -> None:
+    """A stage's rate into the step's sum, and the next stage's state (`after_stage`)."""
     start, total = load_helicopter(work, lanes, lane), load_sum(work, lanes, lane)
     total, following = after_stage(stage, start, total, rate, dt)
     store_sum(work, lanes, lane, total)

@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from flownav.compile import Lanes, OnLanes, Work, equation, procedure, write_function
+from flownav.compile import OnLanes, equation, procedure, write_function
 from flownav.simulation.carriage import CARRIAGES, Carriage
 from flownav.simulation.draws import draw
 from flownav.simulation.failing import Taken, strike
@@ -23,12 +23,9 @@ def due(clock: Clock, epoch: int) -> bool:
 
 
 @equation
-def strike_one(
-    work: Work, lanes: Lanes, seed: int, flight: int, epoch: int, slot: int, sensor: int, channel: int, clock: Clock
-) -> None:
-    """A reading that was just taken as each lane's fault has it."""
-    taken = Taken(epoch, epoch * EPOCH_S, slot, sensor, channel, epoch // clock.every)
-    strike(work, lanes, seed, flight, taken)
+def taken_now(epoch: int, slot: int, sensor: int, channel: int, clock: Clock) -> Taken:
+    """A reading that a sensor has just put into a slot; channel: of what its fault would draw."""
+    return Taken(epoch, epoch * EPOCH_S, slot, sensor, channel, epoch // clock.every)
 
 
 def called(run: OnLanes) -> str:
@@ -56,14 +53,15 @@ def turn(number: int, one: Carriage, scope: dict[str, Any]) -> list[str]:
     ]
     for k, said in enumerate(sensor.says):
         place, channel = f"(taken + {k}) % slots" if k else "slot", sensor.channels.fault + 3 * k
-        strikes = f"strike_one(work, lanes, seed, flight, epoch, {place}, {int(said.kind)}, {channel}, clock)"
+        reading = f"taken_now(epoch, {place}, {int(said.kind)}, {channel}, clock)"
+        strikes = f"strike(work, lanes, seed, flight, {reading})"
         lines += [f"        if clock.fitted > {k}:", f"            {strikes}"] if k else [f"        {strikes}"]
     lines += [f"    {heard}({called(one.heard)})"] if one.heard else []
     return [*lines, "    taken += clock.fitted"]
 
 
 def _sample() -> Callable[..., Any]:
-    scope: dict[str, Any] = {"due": due, "draw": draw, "strike_one": strike_one}
+    scope: dict[str, Any] = {"due": due, "draw": draw, "strike": strike, "taken_now": taken_now}
     lines = ["def sample(work, lanes, seed, flight, epoch, slots, taken, s, fails):"]
     for number, one in enumerate(CARRIAGES.values()):
         if one.sensor.on_epochs:

@@ -25,6 +25,7 @@ from flownav.sensors.flow_camera import (
     pad_texture,
     step_flow_camera,
 )
+from flownav.sensors.geometry import LensPose
 from flownav.sensors.gps_receiver import GpsReceiverTruth
 from flownav.sensors.imu import ImuReading
 from flownav.sensors.inertial import (
@@ -124,40 +125,54 @@ class Looked(NamedTuple):
     exposed: Exposed
 
 
-@equation
-def share_of(fitting: Fitting, s: Onboard) -> float:
-    """What part of the exposure an IMU's period is."""
-    return s.inertial_steps * PHYSICS_PERIOD_S / (fitting.clock.every * EPOCH_S)
+class MeanRates(NamedTuple):
+    """How the vehicle turned while the flow camera exposed, and how its own gyro said that it did [rad/s]."""
+
+    p: float
+    q: float
+    r: float
+    gyro_x: float
+    gyro_y: float
+
+
+def mean_rates(exposed: Exposed, fitting: Fitting, *, s: Onboard) -> MeanRates:
+    """Means over the exposure, of which every period of the IMU is a share."""
+    share = s.inertial_steps * PHYSICS_PERIOD_S / (fitting.clock.every * EPOCH_S)
+    return MeanRates(
+        share * exposed.rate_p_rad_s,
+        share * exposed.rate_q_rad_s,
+        share * exposed.rate_r_rad_s,
+        share * exposed.gyro_x_rad_s,
+        share * exposed.gyro_y_rad_s,
+    )
 
 
 def see_flow(
-    state: HelicopterState, rotation: Rotation, flow: FlowState, sensor: FlowParameters, late: Late, ground: Ground,
-    fitting: Fitting, place: Place, exposed: Exposed, *, s: Onboard,
+    state: HelicopterState, flow: FlowState, sensor: FlowParameters, late: Late, ground: Ground, place: Place,
+    turned: MeanRates, *, s: Onboard,
 ) -> FlowCameraTruth:  # fmt: skip
     """What passes under the lens, through the identified dynamics, and the mean rate of the exposure."""
-    share, late_s = share_of(fitting, s), late.late_s
+    late_s, rotation = late.late_s, attitude_of(state)
     hit = beam_of(state, place, ground)
     north, east, down = place_of(state, place)
     height_m = -down - ground_height(north, east, ground)
-    on_pad = pad_texture(north, east, height_m, rotation, s.pad_half_size_m, sensor)
+    on_pad = pad_texture(LensPose(north, east, height_m, rotation), s.pad_half_size_m, sensor)
     return FlowCameraTruth(
         sensor.gain * (flow.u1 - late_s * flow.u2), sensor.gain * (flow.v1 - late_s * flow.v2),
         sensor.gain * (flow.w1 - late_s * flow.w2),
-        share * exposed.rate_p_rad_s, share * exposed.rate_q_rad_s, share * exposed.rate_r_rad_s,
-        hit.distance_m, height_m, rotation[8], 1.0 if s.texture_everywhere > 0.5 else on_pad,
+        turned.p, turned.q, turned.r, hit.distance_m, height_m, rotation[8],
+        1.0 if s.texture_everywhere > 0.5 else on_pad,
     )  # fmt: skip
 
 
 def look(
     state: FlowCameraState, unit: FlowCameraUnit, truth: FlowCameraTruth, n: FlowCameraNormals, sensor: FlowParameters,
-    p: FlowCameraParameters, exposed: Exposed, fitting: Fitting, *, s: Onboard,
+    p: FlowCameraParameters, turned: MeanRates,
 ) -> Looked:  # fmt: skip
     """Angular flow over the exposure, with the sensor's own gyro and the vehicle's over the same time beside it."""
     after, read = step_flow_camera(state, unit, truth, n, sensor, p)
-    share = share_of(fitting, s)
     said = Reading(
-        read.flow_x_rad_s, read.flow_y_rad_s, read.gyro_x_rad_s, read.gyro_y_rad_s,
-        share * exposed.gyro_x_rad_s, share * exposed.gyro_y_rad_s,
+        read.flow_x_rad_s, read.flow_y_rad_s, read.gyro_x_rad_s, read.gyro_y_rad_s, turned.gyro_x, turned.gyro_y,
         np.nan, np.nan, np.nan, read.quality, read.arrived, 0.0,
     )  # fmt: skip
     return Looked(after, said, SeesFlow(1.0 if read.quality > 0.0 else 0.0), Exposed(0.0, 0.0, 0.0, 0.0, 0.0))
@@ -165,11 +180,9 @@ def look(
 
 # -- pad camera ---------------------------------------------------------------------------------------------------
 class OverPad(NamedTuple):
-    """A lens from the pad's centre, NED [m], and how fast the ground straight below passes [rad/s]."""
+    """A lens, its height that above the pad, and how fast the ground straight below passes [rad/s]."""
 
-    lens_n_m: float
-    lens_e_m: float
-    lens_d_m: float
+    lens: LensPose
     image_rate_rad_s: float
 
 
@@ -178,16 +191,17 @@ def see_pad(state: HelicopterState, late: Late, place: Place) -> OverPad:
     north, east, down = place_of(earlier(state, late.late_s), place)
     above = -down if -down > LEAST_HEIGHT_M else LEAST_HEIGHT_M
     ahead, aside = image_rate_rad_s(state.u, state.v, state.p, state.q, above)
-    return OverPad(north, east, down, np.sqrt(ahead * ahead + aside * aside))
+    lens = LensPose(north, east, -down, attitude_of(state))
+    return OverPad(lens, np.sqrt(ahead * ahead + aside * aside))
 
 
 def look_for_pad(
-    unit: PadCameraUnit, lens: OverPad, rotation: Rotation, n: PadCameraNormals, p: PadCameraParameters,
-    fitting: Fitting, *, s: Onboard, epoch: int,
+    unit: PadCameraUnit, over: OverPad, n: PadCameraNormals, p: PadCameraParameters, fitting: Fitting, *, s: Onboard,
+    epoch: int,
 ) -> PadCameraReading:  # fmt: skip
     """A fix of the pad: by the model, or what was seen in this frame where the flight's frames were rendered."""
-    rate, known = lens.image_rate_rad_s, fitting.p
-    fix = read_pad_camera(unit, lens.lens_n_m, lens.lens_e_m, lens.lens_d_m, rotation, rate, n, p, known)
+    rate, known = over.image_rate_rad_s, fitting.p
+    fix = read_pad_camera(unit, over.lens, rate, n, p, known)
     seen = (epoch - fitting.clock.first) // fitting.clock.every * PAD_SEEN
     if seen + PAD_SEEN <= len(s.pad_seen):
         shown_m = s.pad_seen[seen + 3]

@@ -14,7 +14,9 @@ from flownav.frames import (
     to_body,
     to_earth,
 )
-from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, engage_flow, read_flow, start_flow
+from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, read_flow, start_flow
+from flownav.sensors.flow_engagement import engage_flow
+from flownav.sensors.geometry import LensPose
 from flownav.sensors.gps_ins import (
     GpsInsParameters,
     GpsInsState,
@@ -225,8 +227,9 @@ def read_flow_sensor(
     distance = height if height > 0.05 else 0.05
     lens_n = state.pos_n + rotation[2] * lens_below_cg_m
     lens_e = state.pos_e + rotation[5] * lens_below_cg_m
+    lens = LensPose(lens_n, lens_e, height, rotation)
     flow_x, flow_y = angular_flow(state.u, state.v, state.p, state.q, distance)
-    flow = engage_flow(before, lens_n, lens_e, height, rotation, flow_x, flow_y, pad_half_size_m, sensor)
+    flow = engage_flow(before, lens, flow_x, flow_y, pad_half_size_m, sensor)
     return Flowed(flow, read_flow(flow, height, sonar.rate_m_s, n.u, n.v, n.w, sensor))
 
 

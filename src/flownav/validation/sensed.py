@@ -7,10 +7,9 @@ equations are those that the simulator flies (`flownav.sensors`), called reading
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
-from typing import Any, NamedTuple, get_type_hints
+from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import lfilter
@@ -36,14 +35,13 @@ from flownav.sensors.magnetometer_sheet import MagneticField
 from flownav.sensors.settings import GpsInsSettings
 from flownav.sensors.sheet import SensorSheet
 from flownav.sensors.sheets import SensorSheets
-from flownav.simulation.truth import CARRIED
 from flownav.validation.drawn import Flight, drawn_sheets, kept_of, sheets_of
 from flownav.validation.flights import AssumedVehicle
 from flownav.validation.path import FlownPath
 from flownav.validation.rates import rate_hz
+from flownav.validation.readings import Seen, readings
 
 COARSEST_UNSEEN_M = 0.05  # steps of a recorded position below it are the receiver's, not the log's
-Seen = dict[Any, Any]  # records by their kinds
 
 
 class Scene(NamedTuple):
@@ -76,36 +74,6 @@ def simulated_log(log: Log, path: FlownPath, flight: Flight, vehicle: AssumedVeh
 
 
 # -- one sensor each ------------------------------------------------------------------------------------------
-def readings(
-    scene: Scene, name: str, drawn: str, p: Any, seen: Sequence[Seen], step: Callable[..., Any] | None = None
-) -> list[Any]:
-    """What a carried sensor reads of what it sees, one reading after the other, by the equations of its row.
-
-    drawn: the name of its draws; p: its coefficients; step: its equation, where the row's takes more than the sensor's.
-    """
-    one = next(sensor for sensor in CARRIED if sensor.name == name)
-    step, values, kept = step or one.step, [], {one.parameters: p}
-    kept[one.unit] = lawful(one.draw, kept | {one.unit: one.unit(*_once(scene, f"{drawn} unit", one.unit))})
-    if one.start is not None:
-        begun = {} if one.begun is None else {one.begun: one.begun(*_once(scene, f"{drawn} start", one.begun))}
-        kept[one.state] = lawful(one.start, kept | begun | seen[0])
-    normals = scene.flight.normals(drawn, len(seen), len(one.normals._fields)).tolist()
-    for now, of_this in zip(seen, normals, strict=True):
-        read = lawful(step, kept | now | {one.normals: one.normals(*of_this)})
-        if one.state is not None:
-            kept[one.state], read = read
-        values.append(read)
-    return values
-
-
-def lawful(law: Callable[..., Any], records: Seen) -> Any:
-    """What a law says of the records that its parameters are annotated with."""
-    return law(*(records[kind] for name, kind in hints_of(law).items() if name != "return"))
-
-
-hints_of = lru_cache(get_type_hints)
-
-
 def _inertial(scene: Scene) -> list[Stream]:
     """Means over the IMU's own period; the log holds every n-th of them."""
     stream, sheet = scene.log.streams[Sensor.IMU], scene.sheets.inertial
@@ -116,7 +84,7 @@ def _inertial(scene: Scene) -> list[Stream]:
     t_s = scene.instants_s(stream, sheet, "inertial")
     motion = np.column_stack([scene.path.turn_rad_s(t_s, period_s), scene.path.force_m_s2(t_s, period_s)])
     seen = [{ImuReading: ImuReading(*truth)} for truth in motion.tolist()]
-    values = [read[:6] for read in readings(scene, "inertial", "inertial", p, seen, step_inertial)]
+    values = [read[:6] for read in readings(scene.flight, "inertial", "inertial", p, seen, step_inertial)]
     return [Stream.of(Sensor.IMU, stream.t_s, np.array(values))]
 
 
@@ -142,7 +110,7 @@ def _receiver(scene: Scene) -> list[Stream]:
         {GpsReceiverTruth: GpsReceiverTruth(*truth), Matrix: rotation}
         for truth, rotation in zip(motion, turned, strict=True)
     ]
-    fixes = readings(scene, "gps_receiver", "receiver", sheet.parameters(), seen)
+    fixes = readings(scene.flight, "gps_receiver", "receiver", sheet.parameters(), seen)
     values = np.array([(*read[:6], read.arrived) for read in fixes])
     arrived = values[:, 6] > 0.5
     position = stepped(values[:, :3], stream.value)[arrived]
@@ -183,7 +151,7 @@ def _camera(scene: Scene) -> list[Stream]:
     rates = scene.path.turn_rad_s(t_s, float(sheet.exposure_s))
     truths = np.column_stack([speed, rates, height_m / cosine, height_m, cosine, np.ones(len(t_s))]).tolist()
     seen = [{FlowCameraTruth: FlowCameraTruth(*truth), FlowParameters: dynamics} for truth in truths]
-    values = np.array(readings(scene, "flow_camera", "camera", sheet.parameters(), seen, step_flow_camera))
+    values = np.array(readings(scene.flight, "flow_camera", "camera", sheet.parameters(), seen, step_flow_camera))
     arrived = values[:, 5] > 0.5
     value = values[:, :4].copy()
     value[~np.isfinite(stream.value)] = np.nan  # a sensor without gyro has none here either
@@ -207,7 +175,7 @@ def _ranger(scene: Scene) -> list[Stream]:
     stream, sheet = scene.log.streams[Sensor.RANGE], scene.sheets.range_sensor
     assert sheet is not None
     seen = [{BeamHit: hit} for hit in hits_of(scene.path, scene.instants_s(stream, sheet, "ranger"))]
-    values = np.array(readings(scene, "range_sensor", "ranger", sheet.parameters(), seen))
+    values = np.array(readings(scene.flight, "range_sensor", "ranger", sheet.parameters(), seen))
     heard = (values[:, 1] > 0.0) & (values[:, 2] > 0.5)
     return [Stream.of(Sensor.RANGE, stream.t_s[heard], values[heard, :1])]
 
@@ -228,7 +196,7 @@ def _barometer(scene: Scene) -> list[Stream]:
     height_m = -scene.path.position_m(t_s)[:, 2]
     thrust_n = scene.vehicle.thrust_n
     seen = [{BarometerTruth: BarometerTruth(h - height_m[0], h, thrust_n)} for h in height_m.tolist()]
-    values = [read.alt_m for read in readings(scene, "barometer", "barometer", p, seen)]
+    values = [read.alt_m for read in readings(scene.flight, "barometer", "barometer", p, seen)]
     return [Stream.of(Sensor.BARO, stream.t_s, np.array(values))]
 
 
@@ -240,7 +208,7 @@ def _magnetometer(scene: Scene) -> list[Stream]:
     t_s = scene.instants_s(stream, sheet, "magnetometer")
     power_w = scene.vehicle.hover_power_w
     seen: list[Seen] = [{Matrix: rotation, float: power_w} for rotation in rotations_of(scene.path.attitude(t_s))]
-    values = [read[:3] for read in readings(scene, "magnetometer", "magnetometer", p, seen)]
+    values = [read[:3] for read in readings(scene.flight, "magnetometer", "magnetometer", p, seen)]
     return [Stream.of(Sensor.MAG, stream.t_s, np.array(values))]
 
 
@@ -277,12 +245,6 @@ SENSED: dict[Sensor, Callable[[Scene], list[Stream]]] = {
     Sensor.MAG: _magnetometer,
     Sensor.ATTITUDE: _attitude,
 }
-
-
-def _once(scene: Scene, name: str, record: Any) -> list[float]:
-    """Standard normals of what is drawn once a flight, one for each field of a record."""
-    drawn: list[float] = scene.flight.normals(name, 1, len(record._fields))[0].tolist()
-    return drawn
 
 
 def rotations_of(attitude: Rotation) -> list[Matrix]:

@@ -6,6 +6,8 @@ it flies; in `derivative_in_balance`, the paper's, the rotor keeps its speed and
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from flownav.compile import equation
 from flownav.frames import Rotation, Vector, quaternion_rate, to_earth
 from flownav.vehicle.actuators import acceleration, blade_angle, collective_servo, cyclic_servo, pedal_servo
@@ -54,6 +56,15 @@ __all__ = [
     "step",
     "tail_power",
 ]
+
+
+class Rotors(NamedTuple):
+    """How both rotors work: angles of the blades, induced velocities, loads, and what these make of the main one."""
+
+    blades: Controls
+    induced: Inflow
+    loads: RotorLoads
+    turning: Turning
 
 
 @equation
@@ -131,16 +142,17 @@ def near_ground(
 
 @equation
 def forces_and_moments(
-    state: HelicopterState, rotation: Rotation, air: AirMotion, loads: RotorLoads, turning: Turning, induced: Inflow,
-    around: Around, vehicle: VehicleParameters,
+    state: HelicopterState, rotation: Rotation, air: AirMotion, rotors: Rotors, around: Around,
+    vehicle: VehicleParameters,
 ) -> Wrench:  # fmt: skip
     """All forces and moments about the centre of gravity (block 3), the ground's last: friction answers the rest."""
     down = (rotation[6], rotation[7], rotation[8])
-    lift = near_ground(state, down, air, induced.main, around, vehicle) * loads.lift_n
+    induced = rotors.induced
+    lift = near_ground(state, down, air, induced.main, around, vehicle) * rotors.loads.lift_n
     ratio = speed_ratio(state.speed, vehicle)
     free = flight_wrench(
-        main_rotor_wrench(lift, turning.torque_n_m, state.a1, state.b1, air, ratio, vehicle),
-        tail_side_force(loads.tail_n, induced.tail, air, vehicle),
+        main_rotor_wrench(lift, rotors.turning.torque_n_m, state.a1, state.b1, air, ratio, vehicle),
+        tail_side_force(rotors.loads.tail_n, induced.tail, air, vehicle),
         tail_plane_force(induced.main, air, vehicle),
         fuselage_drag(induced.main, air, vehicle),
         down,
@@ -153,15 +165,16 @@ def forces_and_moments(
 
 @equation
 def rates_of(
-    state: HelicopterState, controls: Controls, air: AirMotion, rotation: Rotation, blades: Controls,
-    loads: RotorLoads, turning: Turning, induced: Inflow, around: Around, vehicle: VehicleParameters,
+    state: HelicopterState, controls: Controls, air: AirMotion, rotation: Rotation, rotors: Rotors, around: Around,
+    vehicle: VehicleParameters,
 ) -> HelicopterState:  # fmt: skip
-    """The rates of the state while the rotors carry these loads and the main rotor changes as `turning` says.
+    """The rates of the state while the rotors work like this.
 
     A gradient of the gusts acts on the blades as cyclic does: p_g/Ω tilts the disc back, q_g/Ω to the left.
     """
     velocity, rates = (state.u, state.v, state.w), (state.p, state.q, state.r)
-    total = forces_and_moments(state, rotation, air, loads, turning, induced, around, vehicle)
+    blades, induced, _, turning = rotors
+    total = forces_and_moments(state, rotation, air, rotors, around, vehicle)
     main = main_rotor(vehicle, speed_ratio(state.speed, vehicle))
     tilt = vehicle.flap_response * blowback(
         blades.col, air.u * air.u + air.v * air.v, air.w, induced.main, vehicle.main_lift_solidity, main.tip_speed_m_s
@@ -200,7 +213,8 @@ def derivative_at_inflow(
     """The rates at given induced velocities while the rotor keeps its speed (held ones: the paper's frozen inflow)."""
     blades = blade_angles(state, vehicle)
     loads = rotor_loads(state, air, blades, induced, vehicle)
-    return rates_of(state, controls, air, rotation, blades, loads, held_turning(loads), induced, around, vehicle)
+    rotors = Rotors(blades, induced, loads, held_turning(loads))
+    return rates_of(state, controls, air, rotation, rotors, around, vehicle)
 
 
 @equation
@@ -222,8 +236,8 @@ def derivative_at_tail(
     """The rates of the state at the tail rotor's induced velocity."""
     blades, induced = blade_angles(state, vehicle), Inflow(state.inflow, tail_m_s)
     loads = rotor_loads(state, air, blades, induced, vehicle)
-    turning = turning_of(state, air, loads, around.engine, vehicle)
-    return rates_of(state, controls, air, rotation, blades, loads, turning, induced, around, vehicle)
+    rotors = Rotors(blades, induced, loads, turning_of(state, air, loads, around.engine, vehicle))
+    return rates_of(state, controls, air, rotation, rotors, around, vehicle)
 
 
 @equation

@@ -15,7 +15,7 @@ from flownav.compile import ONE_LANE, WARP, Lanes, Work, equation, pointer, proc
 from flownav.control.guidance import Reference
 from flownav.navigation.take import navigate
 from flownav.navigation.tape import output_of
-from flownav.scoring.running import RUNNING_ROWS, Shown, begin_scores, note_shown, write_scores
+from flownav.scoring.running import RUNNING_ROWS, Shown, Terms, begin_scores, note_shown, write_scores
 from flownav.sensors.beam import ground_height
 from flownav.simulation import layout
 from flownav.simulation.block import Aboard, Block
@@ -157,4 +157,5 @@ def sees_pad(onboard: Onboard | None, cg_height_m: float, epoch: int, home: int,
 def finish(work: Work, row: int, flight: Flight, scores: Array, thread: int) -> None:
     """The flight's column of scores."""
     plan = flight.plan
-    write_scores(work, ONE_LANE, row, 0, plan.epochs, EPOCH_S, plan.may_land_after_s, flight.limits, scores, thread)
+    terms = Terms(plan.epochs, EPOCH_S, plan.may_land_after_s, flight.limits)
+    write_scores(work, ONE_LANE, row, 0, terms, scores, thread)

@@ -1,0 +1,24 @@
+"""The packed covariance of a lane as a matrix and back, for Python's callers."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.compile import Lanes
+from flownav.estimation.covariance import at
+
+
+def unpack(work: NDArray[np.float64], lanes: Lanes, lane: int, n: int) -> NDArray[np.float64]:
+    """P of a lane, (n, n)."""
+    column, row = np.tril_indices(n)
+    packed = work[at(0, 0) * len(lanes) + lane :: len(lanes)][: len(row)]
+    full = np.zeros((n, n), work.dtype)
+    full[row, column] = full[column, row] = packed
+    return full
+
+
+def pack(work: NDArray[np.float64], lanes: Lanes, lane: int, n: int, covariance: NDArray[np.float64]) -> None:
+    """Put a symmetric P, (n, n), into a lane."""
+    column, row = np.tril_indices(n)
+    work[at(0, 0) * len(lanes) + lane :: len(lanes)][: len(row)] = covariance[row, column]

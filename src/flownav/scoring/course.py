@@ -1,0 +1,129 @@
+"""The course of a flight as its touchdown asks for it: what is remembered of its epochs, and of its first contact."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.compile import equation, kernel
+
+Array = NDArray[np.float64]
+
+AIRBORNE_EPOCHS = 25  # half a second without contact: skids flutter at lift-off
+STILL_M_S, STILL_DEG_S = 0.02, 2.0
+ROLLED_OVER_DEG = 30.0  # beyond what any of our skids stands on
+
+
+class Moving(NamedTuple):
+    """What one epoch shows of a flight: its motion (`touchdown.Motion`), and how wrong was what was flown on.
+
+    seen: the pad's place was to be seen or noted. away: it goes around.
+    """
+
+    place_n: float
+    place_e: float
+    height_m: float
+    sink_m_s: float
+    lateral_m_s: float
+    tilt_deg: float
+    yaw_deg_s: float
+    flown_n: float
+    flown_e: float
+    touches: bool
+    seen: bool
+    away: bool
+
+
+class Course(NamedTuple):
+    """What must be remembered of the epochs so far."""
+
+    contact: float  # its epoch, of the first since the last go-around; -1: none
+    untouched: float  # epochs without contact
+    still: float  # epochs at rest on the ground
+    sink_m_s: float  # of the last epoch, with the five that follow
+    lateral_m_s: float
+    tilt_deg: float
+    yaw_deg_s: float
+    place_n: float
+    place_e: float
+    seen_n: float  # error of what was flown on when the pad was last seen
+    seen_e: float
+    over_grounded: float  # 1: rolled over on the ground
+    over_since: float  # 1: rolled over since the contact
+    low: float  # 1: was below the ground
+    away: float
+    go_arounds: float
+
+
+class Touch(NamedTuple):
+    """The first contact: place, errors of what was flown on then and when the pad was last seen, motion before it."""
+
+    place_n: float
+    place_e: float
+    error_n: float
+    error_e: float
+    seen_n: float
+    seen_e: float
+    sink_m_s: float
+    lateral_m_s: float
+    tilt_deg: float
+    yaw_deg_s: float
+
+
+@equation
+def nothing_yet() -> Course:
+    """Before the first epoch."""
+    return Course(-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@equation
+def no_touch() -> Touch:
+    """Before any contact."""
+    return Touch(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@equation
+def lands(touches: bool, untouched: float) -> bool:
+    """Whether a contact after so many epochs without one is one after being airborne."""
+    return touches and untouched >= AIRBORNE_EPOCHS
+
+
+@equation
+def followed(c: Course, touch: Touch, epoch: int, s: Moving) -> tuple[Course, Touch]:
+    """What is remembered with one epoch more."""
+    seen_n, seen_e = (s.flown_n, s.flown_e) if epoch == 0 else (c.seen_n, c.seen_e)
+    met = c.contact < 0.0 and not s.away and lands(s.touches, c.untouched)
+    contact = -1.0 if s.away else (float(epoch) if met else c.contact)
+    first = Touch(
+        s.place_n, s.place_e, s.flown_n, s.flown_e, seen_n, seen_e, c.sink_m_s, c.lateral_m_s, c.tilt_deg, c.yaw_deg_s
+    )
+    untouched = float(epoch + 1) if s.away else (0.0 if s.touches else c.untouched + 1.0)
+    still = s.touches and s.lateral_m_s < STILL_M_S and s.yaw_deg_s < STILL_DEG_S
+    over = s.tilt_deg > ROLLED_OVER_DEG
+    begins = s.away and c.away == 0.0 and epoch > 0
+    now = Course(
+        contact, untouched, c.still + 1.0 if still else 0.0, s.sink_m_s, s.lateral_m_s, s.tilt_deg, s.yaw_deg_s,
+        s.place_n, s.place_e, s.flown_n if s.seen else seen_n, s.flown_e if s.seen else seen_e,
+        1.0 if over and s.touches else c.over_grounded, 0.0 if contact < 0.0 else (1.0 if over else c.over_since),
+        c.low if s.height_m > 0.0 else 1.0,  # a motion that is no number is no flight either
+        1.0 if s.away else 0.0, c.go_arounds + 1.0 if begins else c.go_arounds,
+    )  # fmt: skip
+    return now, first if met else touch
+
+
+@kernel
+def first_contact(on_ground: Array) -> NDArray[np.int64]:
+    """The epoch of each lane's first ground contact after being airborne, -1 where there is none; (lanes,)."""
+    epochs, lanes = on_ground.shape
+    found = np.full(lanes, -1)
+    for lane in range(lanes):
+        untouched = 0.0
+        for k in range(epochs):
+            touches = on_ground[k, lane] > 0.0
+            if lands(touches, untouched):
+                found[lane] = k
+                break
+            untouched = 0.0 if touches else untouched + 1.0
+    return found

@@ -205,6 +205,11 @@ def test_choices_replace_the_files_own(tmp_path, choice):
         (("vehicle", "none.toml"), "none.toml: no such file"),
         (("replay", "nowhere"), "nowhere"),
         (("bench", "--flights", "1"), "--flights 1: must be from 16 to"),
+        (("rig", "--seed", "2147483648"), "--seed 2147483648: must be from 0 to 2147483647"),
+        (("pad", "--seed", "-1"), "--seed -1: must be from 0 to"),
+        (("flow", "frames", "--fps", "0"), "--fps 0.0: must be from 0.001 to"),
+        (("flow", "frames", "--fps", "30", "--range", "0"), "--range 0.0: must be from 0.01 to"),
+        (("fly", "landing", "--speed", "0"), "--speed 0.0: must be from 0.01 to 100.0"),
     ],
 )
 def test_a_mistake_is_one_line_and_status_2(tmp_path, arguments, message):

@@ -43,7 +43,6 @@ def command(
 
     require_between("--flights", flights, 1, 1_000_000)
     require_between("--ablations", ablations, 0, 1_000_000)
-    require_between("--seed", seed, 0, 2**63 - 1)
     asked = words("--cases", cases) if cases else ["all"]
     chosen = CASES if "all" in asked else tuple(asked)
     path = None if out is None else place(out, vehicle, force=force)

@@ -9,129 +9,126 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import SAMPLINGS, SCENARIOS, TRUTH_MODELS, argument, one_of
-from flownav.cli.options import EngineOption, FilterOption, JsonOption, SeedOption, VehicleOption, out_option
-from flownav.cli.output import emit
+from flownav.cli.choices import SAMPLINGS, SCENARIOS, TRUTH_MODELS, argument, one_of, option
+from flownav.cli.options import (
+    KEPT,
+    EngineOption,
+    FilterOption,
+    JsonOption,
+    RecordsOption,
+    SeedOption,
+    VehicleOption,
+    out_option,
+)
+from flownav.cli.output import emit, require_between
 from flownav.errors import InputError
 
 if TYPE_CHECKING:
+    from flownav.api.scenario import Scenario
     from flownav.campaigns.engines.engine import Engine
     from flownav.campaigns.plan import Plan
 
 
+ScenariosArgument = Annotated[
+    list[str], argument("SCENARIO", "What is flown", *SCENARIOS, beside="a scenario's FILE.toml")
+]
+FLIGHTS_OF = "Flights of each cell; with --until or --rare the most."
+FlightsOption = Annotated[int | None, option("N", FLIGHTS_OF, unset="1000; with --until or --rare 100000")]
+UNTIL = 'Stop when an interval is narrow enough: "r95_m width <= 0.005".'
+SWEEP = "Fly every value of a key of the scenario, wind.speed_20ft_m_s=0:12:2 or =a,b,c; may be repeated."
+SetOption = Annotated[
+    list[str] | None, option("KEY=VALUE", "Another value in the scenario: filter.name=paper.", "--set")
+]
+SamplingOption = Annotated[
+    str, typer.Option(help="How the dispersed inputs are spread over the flights.", **one_of(*SAMPLINGS))
+]
+MODELS = "Each flight's vehicle, wind and sensors drawn, as the datasheets say, or both."
+OutOption = Annotated[
+    Path | None, out_option(f"The folder; {KEPT}", "out/SCENARIO_campaign; with --rare SCENARIO_rare")
+]
+FLIGHT = "Fly this flight again and write its record: K, CELL:K, or --rare's rare_flight.json."
+RARE = 'How probable this is, to 1e-6: "touchdown.horizontal_m > 1", "crash".'
+
+
 def command(
-    scenarios: Annotated[
-        list[str],
-        argument("SCENARIO", "What is flown", *SCENARIOS, beside="a scenario's FILE.toml"),
-    ],
-    flights: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            help="Flights of each cell; with --until or --rare the most.",
-            show_default="1000; with --until or --rare 100000",
-        ),
-    ] = None,
-    until: Annotated[
-        str | None,
-        typer.Option(metavar="RULE", help='Stop when an interval is narrow enough: "r95_m width <= 0.005".'),
-    ] = None,
-    sweep: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="KEY=VALUES",
-            help="Fly every value of a key of the scenario, wind.speed_20ft_m_s=0:12:2 or =a,b,c; may be repeated.",
-        ),
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Another value in the scenario: filter.name=paper."),
-    ] = None,
-    sampling: Annotated[
-        str, typer.Option(help="How the dispersed inputs are spread over the flights.", **one_of(*SAMPLINGS))
-    ] = "plain",
-    truth_model: Annotated[
-        str,
-        typer.Option(
-            help="Each flight's vehicle, wind and sensors drawn, as the datasheets say, or both.",
-            **one_of(*TRUTH_MODELS),
-        ),
-    ] = "ensemble",
+    scenarios: ScenariosArgument,
+    flights: FlightsOption = None,
+    until: Annotated[str | None, option("RULE", UNTIL)] = None,
+    sweep: Annotated[list[str] | None, option("KEY=VALUES", SWEEP)] = None,
+    set_: SetOption = None,
+    sampling: SamplingOption = "plain",
+    truth_model: Annotated[str, typer.Option(help=MODELS, **one_of(*TRUTH_MODELS))] = "ensemble",
     filter_name: FilterOption = None,
     vehicle: VehicleOption = None,
     seed: SeedOption = 1,
     engine: EngineOption = "local",
-    out: Annotated[
-        Path | None,
-        out_option(
-            "The folder; flights that are there are kept",
-            "out/SCENARIO_campaign; with --rare SCENARIO_rare",
-        ),
-    ] = None,
-    records: Annotated[
-        int, typer.Option(metavar="N", help="Write records and reports of so many of the worst flights.")
-    ] = 1,
-    flight: Annotated[
-        str | None,
-        typer.Option(
-            metavar="K",
-            help="Fly this flight again and write its record: K, CELL:K, or --rare's rare_flight.json.",
-        ),
-    ] = None,
-    rare: Annotated[
-        str | None,
-        typer.Option(metavar="EVENT", help='How probable this is, to 1e-6: "touchdown.horizontal_m > 1", "crash".'),
-    ] = None,
+    out: OutOption = None,
+    records: RecordsOption = 1,
+    flight: Annotated[str | None, option("K", FLIGHT)] = None,
+    rare: Annotated[str | None, option("EVENT", RARE)] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Fly a scenario many times: radii, shares and percentiles with intervals, a dataset, the worst flights."""
-    from flownav.api.campaigning import FLIGHTS, FLIGHTS_UNTIL, MOST_SEED, plan_of
+    from flownav.api.campaigning import plan_of
     from flownav.api.parts import split
-    from flownav.api.scenario import Scenario
     from flownav.campaigns.engines.named import engine_named, require_engine
-    from flownav.campaigns.plan import MOST_FLIGHTS
     from flownav.campaigns.summary import WORST
-    from flownav.cli.output import require_between
-    from flownav.guard import an_input
+    from flownav.cli.campaign_rare import fly_again, fly_rare
     from flownav.parts.engine import OwnPartsEngine, identities
 
-    if flight is not None and flights is None:
-        flights = _planned_flights(out)
-    most = FLIGHTS if until is None and rare is None else FLIGHTS_UNTIL
-    flights = flights if flights is not None else most
-    require_between("--flights", flights, 1, MOST_FLIGHTS)
-    require_between("--seed", seed, 0, MOST_SEED)
+    planned = _planned_flights(out) if flight is not None else None
+    count = _flights_of(flights, planned, until=not (until is None and rare is None))
     require_between("--records", records, 0, WORST)
     require_engine(engine)
     parts, ours, _ = split(filter_name, (), None, None)
     if parts.any and (engine != "local" or rare is not None):
         raise InputError(f"--filter {filter_name}: is flown by this process; leave out --engine and --rare")
-    chosen = [Scenario.load(name).changed(filter=ours, vehicle=vehicle) for name in scenarios]
-    for name in (*scenarios, vehicle):
-        if name is not None and Path(name).exists():
-            an_input(Path(name))
+    chosen = _scenarios(scenarios, ours, vehicle)
     plan = plan_of(
-        chosen, flights=flights, seed=seed, sweep=_once("--sweep", map(_swept, sweep or ())),
+        chosen, flights=count, seed=seed, sweep=_once("--sweep", map(_swept, sweep or ())),
         changes=_once("--set", map(_set, set_ or ())), sampling=sampling, truth_model=truth_model, until=until,
     )  # fmt: skip
     plan = replace(plan, parts=identities(parts))
     flies = OwnPartsEngine(parts) if parts.any else None
-    names = "_".join(dict.fromkeys(each.name for each in chosen))[:100]
     if rare is not None and engine != "local":
         raise InputError(f"--rare: flies on this machine's cores only; leave out --engine {engine}")
-    folder = out or Path("out") / f"{names}_campaign"
     if rare is not None:
-        from flownav.cli.campaign_rare import fly_rare
+        return fly_rare(plan, rare, _folder(out, chosen, "rare"), as_json)
+    if flight is not None and flight.endswith(".json"):
+        return fly_again(plan, Path(flight), as_json)
+    folder = _folder(out, chosen, "campaign")
+    if flight is not None:
+        return _again(plan, flight, folder, as_json, flies)
+    _fly(plan, flies or engine_named(engine), folder, records, as_json)
 
-        fly_rare(plan, rare, out or Path("out") / f"{names}_rare", as_json)
-    elif flight is not None and flight.endswith(".json"):
-        from flownav.cli.campaign_rare import fly_again
 
-        fly_again(plan, Path(flight), as_json)
-    elif flight is not None:
-        _again(plan, flight, folder, as_json, flies)
-    else:
-        _fly(plan, flies or engine_named(engine), folder, records, as_json)
+def _flights_of(asked: int | None, planned: int | None, *, until: bool) -> int:
+    """How many flights a cell has: as asked, as its folder's plan has them, or by default; with a rule the most."""
+    from flownav.api.campaigning import FLIGHTS, FLIGHTS_UNTIL
+    from flownav.campaigns.plan import MOST_FLIGHTS
+
+    default = FLIGHTS_UNTIL if until else FLIGHTS
+    count = next((each for each in (asked, planned) if each is not None), default)
+    require_between("--flights", count, 1, MOST_FLIGHTS)
+    return count
+
+
+def _scenarios(names: list[str], filter_name: str | None, vehicle: str | None) -> list[Scenario]:
+    """The scenarios with their filter and vehicle. InputError where one cannot be, or a file is none to read."""
+    from flownav.api.scenario import Scenario
+    from flownav.guard import an_input
+
+    chosen = [Scenario.load(name).changed(filter=filter_name, vehicle=vehicle) for name in names]
+    for name in (*names, vehicle):
+        if name is not None and Path(name).exists():
+            an_input(Path(name))
+    return chosen
+
+
+def _folder(asked: Path | None, scenarios: list[Scenario], kind: str) -> Path:
+    """Where the flights lie."""
+    names = "_".join(dict.fromkeys(each.name for each in scenarios))[:100]
+    return asked or Path("out") / f"{names}_{kind}"
 
 
 def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) -> None:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flownav.campaigns.engines.named import engine_named, require_engine
-from flownav.cli.choices import REQUIREMENTS, argument
-from flownav.cli.options import EngineOption, JsonOption, VehicleOption, out_option
+from flownav.cli.choices import REQUIREMENTS, argument, option
+from flownav.cli.options import KEPT, EngineOption, JsonOption, RecordsOption, VehicleOption, out_option
 from flownav.cli.output import emit
 from flownav.errors import InputError
 
@@ -19,27 +19,23 @@ if TYPE_CHECKING:
     from flownav.campaigns.requirement import Requirement
 
 
+RequirementArgument = Annotated[
+    str, argument("REQUIREMENT", "What to show", *REQUIREMENTS, beside="a requirement's FILE.toml")
+]
+RankingOption = Annotated[
+    int, option("N", "Rows of the ranking of inputs, a power of 2, for each input; 0: none.", "--ranking")
+]
+
+
 def command(
-    requirement: Annotated[
-        str,
-        argument("REQUIREMENT", "What to show", *REQUIREMENTS, beside="a requirement's FILE.toml"),
-    ],
+    requirement: RequirementArgument,
     plan_only: Annotated[bool, typer.Option("--plan", help="Only say how many flights are needed.")] = False,
-    flights: Annotated[
-        int | None, typer.Option(metavar="N", help="How many flights.", show_default="as many as the requirement needs")
-    ] = None,
-    ranking: Annotated[
-        int,
-        typer.Option(metavar="N", help="Rows of the ranking of inputs, a power of 2, for each input; 0: none."),
-    ] = 64,
-    records: Annotated[
-        int, typer.Option(metavar="N", help="Write records and reports of so many of the worst flights.")
-    ] = 3,
+    flights: Annotated[int | None, option("N", "How many flights.", unset="as many as the requirement needs")] = None,
+    ranking: RankingOption = 64,
+    records: RecordsOption = 3,
     vehicle: VehicleOption = None,
     engine: EngineOption = "local",
-    out: Annotated[
-        Path | None, out_option("The folder; flights that are there are kept", "out/NAME_certificate")
-    ] = None,
+    out: Annotated[Path | None, out_option(f"The folder; {KEPT}", "out/NAME_certificate")] = None,
     as_json: JsonOption = False,
 ) -> None:
     """Fly what a requirement asks for: pass, fail or not shown, with its risk; exit status 1 unless it passes."""

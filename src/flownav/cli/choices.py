@@ -1,6 +1,6 @@
-"""The words that options choose from, so that --help lists them, a wrong one is refused in a line, and shells complete.
+"""What options take: words to choose from, which --help lists and shells complete, and numbers within a range.
 
-They stand here because a shell's completion may load nothing heavy; tests hold them against the rooms that they are of.
+The words stand here because a shell's completion may load nothing heavy; tests hold them against their rooms.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ from typing import Any
 
 import typer
 
+from flownav.cli.output import require_between
 from flownav.errors import InputError
 
+Range = tuple[float, float]
 SCENARIOS = ("takeoff", "landing", "gusty", "pad_return", "approach")
 REQUIREMENTS = ("takeoff", "landing", "pad_return", "approach", "approach_8_m_s")
 VEHICLES = ("maxi-joker-3", "quad-450", "hexa-550")
@@ -79,6 +81,21 @@ def one_of(
 
     metavar = "|".join((*names, *([beside] if beside else [])))
     return {"metavar": metavar, "callback": checked, "autocompletion": complete}
+
+
+def option(takes: str, what: str, *names: str, unset: str | bool = True, within: Range | None = None) -> Any:
+    """An option that takes a value: what its help calls the value, what it is, and its names (else the parameter's).
+
+    unset: what holds where it has no default and is not given, for the help. within: the numbers that it may be.
+    """
+
+    def checked(context: typer.Context, parameter: typer.CallbackParam, given: Any) -> Any:
+        if within is not None and given is not None and not context.resilient_parsing:
+            require_between(_name_of(parameter), given, *within)
+        return given
+
+    callback = None if within is None else checked
+    return typer.Option(*names, metavar=takes, help=what, show_default=unset, callback=callback)
 
 
 def argument(name: str, what: str, *names: str, beside: str = "", default: bool | str = False) -> Any:

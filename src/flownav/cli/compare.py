@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flownav.cli.choices import option
 from flownav.cli.options import LOG_KINDS, ForceOption, JsonOption, SensorOption, out_option
 from flownav.cli.output import emit
 
@@ -26,30 +27,27 @@ SHORT = (
 TITLE = "rms errors where all estimators of a log have rows; end drift; GPS cuts"
 
 
+LogsOrRecords = Annotated[
+    list[Path],
+    typer.Argument(metavar="LOG", help=f"Logs, each {LOG_KINDS}; or two and more records.", show_default=False),
+]
+WithOption = Annotated[
+    list[str] | None,
+    option("FILE.toml", f"Settings of the navigator, or `{DEFAULT}`; may be repeated.", "--with", unset=DEFAULT),
+]
+WINDOWS = "Windows of LENGTH from T0 to T1 [s] in which GPS is withheld."
+OutagesOption = Annotated[str | None, option("T0:T1:LENGTH", WINDOWS, unset="whole minutes of the flight")]
+
+
 def command(
-    logs: Annotated[
-        list[Path],
-        typer.Argument(metavar="LOG", help=f"Logs, each {LOG_KINDS}; or two and more records.", show_default=False),
-    ],
-    settings: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--with", metavar="FILE.toml", help=f"Settings of the navigator, or `{DEFAULT}`; may be repeated.",
-            show_default=DEFAULT,
-        ),
-    ] = None,
+    logs: LogsOrRecords,
+    settings: WithOption = None,
     sensor: SensorOption = None,
-    outages: Annotated[
-        str | None,
-        typer.Option(
-            "--outages", metavar="T0:T1:LENGTH", help="Windows of LENGTH from T0 to T1 [s] in which GPS is withheld.",
-            show_default="whole minutes of the flight",
-        ),
-    ] = None,
+    outages: OutagesOption = None,
     out: Annotated[Path | None, out_option("The comparison (HTML)")] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
-) -> None:  # fmt: skip
+) -> None:
     """Score every log by every setting, beside dead reckoning and its autopilot; or lay records over each other."""
     from flownav.cli.output import place, progress
     from flownav.cli.replay import numbers
@@ -61,8 +59,7 @@ def command(
     from flownav.replays.session import table_windows
 
     if len(logs) > 1 and all(path.suffix == ".fnr" for path in logs) and not (settings or sensor or outages):
-        _records(logs, None if out is None else place(out, *logs, force=force), as_json=as_json)
-        return
+        return _records(logs, None if out is None else place(out, *logs, force=force), as_json=as_json)
     option = f"--outages {outages}"
     asked = table_windows(*numbers("--outages", outages, ":", 3, "T0:T1:LENGTH"), option="--outages") if outages else []
     path = None if out is None else place(out, *logs, *(settings or []), sensor, force=force)

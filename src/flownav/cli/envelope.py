@@ -7,8 +7,9 @@ from typing import Annotated, Any
 
 import typer
 
+from flownav.cli.choices import option
 from flownav.cli.options import (
-    ENSEMBLE,
+    EnsembleOption,
     ForceOption,
     JsonOption,
     ScenarioArgument,
@@ -23,16 +24,12 @@ SPEEDS_M_S = ["2,4,6,8,10"]
 
 def command(
     scenario: ScenarioArgument,
-    speeds: Annotated[
-        list[str], typer.Option("--speeds", metavar="M/S", help="Wind speeds at 20 ft [m/s], repeated or with commas.")
-    ] = SPEEDS_M_S,
-    directions: Annotated[
-        int, typer.Option(metavar="N", help="How many directions the wind blows from, from north on.")
-    ] = 8,
+    speeds: Annotated[list[str], option("M/S", "Wind speeds at 20 ft [m/s], repeated or with commas.")] = SPEEDS_M_S,
+    directions: Annotated[int, option("N", "How many directions the wind blows from, from north on.")] = 8,
     vehicle: VehicleOption = None,
-    flights: Annotated[int, typer.Option(metavar="N", help="Flights of each speed and direction.")] = 32,
+    flights: Annotated[int, option("N", "Flights of each speed and direction.")] = 32,
     seed: SeedOption = 1,
-    ensemble: Annotated[bool, typer.Option("--ensemble/--matched", help=ENSEMBLE)] = True,
+    ensemble: EnsembleOption = True,
     out: Annotated[Path | None, out_option("The page (HTML)", "out/SCENARIO_envelope.html")] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
@@ -47,7 +44,6 @@ def command(
 
     require_between("--flights", flights, 1, 1_000_000)
     require_between("--directions", directions, 1, 360)
-    require_between("--seed", seed, 0, 2**63 - 1)
     chosen_speeds = sorted(set(numbers("--speeds", speeds, 0.1, 30.0)))
     chosen = with_vehicle(load_scenario(scenario), vehicle)
     last_s = chosen.flight.may_land_after_s

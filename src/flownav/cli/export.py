@@ -7,35 +7,28 @@ from typing import Annotated
 
 import typer
 
-from flownav.cli.choices import FORMATS, one_of
+from flownav.cli.choices import FORMATS, one_of, option
 from flownav.cli.options import ForceOption, JsonOption, RecordArgument, out_option
 from flownav.cli.output import emit
+
+FRAME = "The frame of tum and euroc: ned (body FRD), enu (body FLU)."
+FrameOption = Annotated[str | None, typer.Option(help=FRAME, show_default="ned", **one_of("ned", "enu"))]
+MergeOption = Annotated[
+    Path | None, option("ORIGINAL.ulg", "With ulog: into a copy of the log that was replayed.", "--merge")
+]
+OriginOption = Annotated[
+    str | None, option("LAT,LON,ALT", "With kml, gpx: where the record's origin lies [deg, m].", "--origin")
+]
 
 
 def command(
     record: RecordArgument,
     to: Annotated[str, typer.Option("--to", help="The format.", show_default=False, **one_of(*FORMATS))],
-    out: Annotated[
-        Path | None,
-        out_option("The file, or the folder of parquet and csv", "beside the record"),
-    ] = None,
+    out: Annotated[Path | None, out_option("The file, or the folder of parquet and csv", "beside the record")] = None,
     force: ForceOption = False,
-    frame: Annotated[
-        str | None,
-        typer.Option(
-            help="The frame of tum and euroc: ned (body FRD), enu (body FLU).",
-            show_default="ned",
-            **one_of("ned", "enu"),
-        ),
-    ] = None,
-    merge: Annotated[
-        Path | None,
-        typer.Option("--merge", metavar="ORIGINAL.ulg", help="With ulog: into a copy of the log that was replayed."),
-    ] = None,
-    origin: Annotated[
-        str | None,
-        typer.Option("--origin", metavar="LAT,LON,ALT", help="With kml, gpx: where the record's origin lies [deg, m]."),
-    ] = None,
+    frame: FrameOption = None,
+    merge: MergeOption = None,
+    origin: OriginOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Write a record for other tools: Foxglove, evo, spreadsheets, data frames, PlotJuggler, Google Earth, maps."""

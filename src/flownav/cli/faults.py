@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import FAULTS, one_of
-from flownav.cli.options import ENSEMBLE, JsonOption, SeedOption, VehicleOption
+from flownav.cli.choices import FAULTS, one_of, option
+from flownav.cli.options import EnsembleOption, JsonOption, SeedOption, VehicleOption
 from flownav.cli.output import emit
 from flownav.errors import InputError
 
@@ -24,35 +24,31 @@ WIDE = 144  # columns that the table takes
 HOVERS_M, LASTING_S = ["0.5,1.5,3"], {False: "5,20", True: "2,5"}
 
 
+FaultsOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="NAME",
+        help=f"Which faults, repeated or with commas: {', '.join(FAULTS)}.",
+        show_default="all that can be flown",
+        autocompletion=one_of(*FAULTS)["autocompletion"],
+    ),
+]
+LastingOption = Annotated[
+    list[str] | None,
+    option("S", "How long a fault lasts [s], repeated or with commas.", unset="5,20; with --offline 2,5"),
+]
+OfflineOption = Annotated[
+    bool, typer.Option("--offline", help="Put the faults into the log of one flight that is flown on the truth.")
+]
+
+
 def command(
-    faults: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--faults",
-            metavar="NAME",
-            help=f"Which faults, repeated or with commas: {', '.join(FAULTS)}.",
-            show_default="all that can be flown",
-            autocompletion=one_of(*FAULTS)["autocompletion"],
-        ),
-    ] = None,
-    heights: Annotated[
-        list[str],
-        typer.Option("--heights", metavar="M", help="Skids above the pad in hover [m], repeated or with commas."),
-    ] = HOVERS_M,
-    durations: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--durations",
-            metavar="S",
-            help="How long a fault lasts [s], repeated or with commas.",
-            show_default="5,20; with --offline 2,5",
-        ),
-    ] = None,
-    flights: Annotated[int, typer.Option(metavar="N", help="Flights of each row.")] = DEFAULT_FLIGHTS,
-    ensemble: Annotated[bool, typer.Option("--ensemble/--matched", help=ENSEMBLE)] = True,
-    offline: Annotated[
-        bool, typer.Option("--offline", help="Put the faults into the log of one flight that is flown on the truth.")
-    ] = False,
+    faults: FaultsOption = None,
+    heights: Annotated[list[str], option("M", "Skids above the pad in hover [m], repeated or with commas.")] = HOVERS_M,
+    durations: LastingOption = None,
+    flights: Annotated[int, option("N", "Flights of each row.")] = DEFAULT_FLIGHTS,
+    ensemble: EnsembleOption = True,
+    offline: OfflineOption = False,
     vehicle: VehicleOption = None,
     seed: SeedOption = 1,
     as_json: JsonOption = False,
@@ -63,7 +59,6 @@ def command(
     from flownav.faults.catalogue import faults_named
     from flownav.faults.laws import NOT_FLOWN
 
-    require_between("--seed", seed, 0, 2**63 - 1)
     require_between("--flights", flights, *FLIGHTS)
     named = words("--faults", faults) if faults else [name for name in FAULTS if offline or name not in NOT_FLOWN]
     chosen = faults_named(named)
@@ -75,13 +70,8 @@ def command(
         raise InputError("--flights, --matched: are of flights in the closed loop; leave them out with --offline")
     if offline:
         rows = _logged(chosen, heights_m, lasting_s, seed, vehicle)
-        _say(
-            rows,
-            facts | {"closed_loop": False},
-            as_json,
-            lambda: _show(rows, f"Failing sensors in a log{name}, seed {seed}"),
-        )
-        return
+        heading = f"Failing sensors in a log{name}, seed {seed}"
+        return _say(rows, facts | {"closed_loop": False}, as_json, lambda: _show(rows, heading))
     if absent := [fault.name for fault in chosen if fault.name in NOT_FLOWN]:
         raise InputError(f"--faults {absent[0]}: a receiver's queue sorts that out before its navigator; try --offline")
     flown = _flown(chosen, heights_m, lasting_s, flights, seed, vehicle, not ensemble)

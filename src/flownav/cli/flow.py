@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from flownav.cli.choices import option
 from flownav.cli.options import FirmwareOption, JsonOption
 from flownav.cli.output import emit
 
@@ -14,55 +15,41 @@ if TYPE_CHECKING:
     from flownav.optics.flow import FlowSeries
 
 
+FramesArgument = Annotated[
+    list[Path], typer.Argument(help="A folder of pictures, pictures in order, or one video.", show_default=False)
+]
+FocalOption = Annotated[float, option("PX", "Focal length [px]; the PX4FLOW's is 666.67.", within=(1.0, 1e6))]
+RANGE = "Distance to the ground [m]; adds velocities."
+RangeOption = Annotated[float | None, option("M", RANGE, "--range", unset=False, within=(0.01, 10_000.0))]
+RATES = "CSV with columns rate_x_rad_s, rate_y_rad_s, rate_z_rad_s, a row a frame: compensates rotation."
+WindowOption = Annotated[int | None, option("PX", "Use the middle PX x PX pixels only.", unset=False)]
+BinOption = Annotated[int, option("PX", "Average PX x PX pixels into one first.", "--bin", within=(1, 64))]
+
+
 def command(
-    frames: Annotated[
-        list[Path], typer.Argument(help="A folder of pictures, pictures in order, or one video.", show_default=False)
-    ],
-    fps: Annotated[float, typer.Option(metavar="HZ", help="Frames a second.", show_default=False)],
-    focal: Annotated[float, typer.Option(metavar="PX", help="Focal length [px]; the PX4FLOW's is 666.67.")] = 666.67,
-    distance: Annotated[
-        float | None,
-        typer.Option("--range", metavar="M", help="Distance to the ground [m]; adds velocities.", show_default=False),
-    ] = None,
-    rates: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.csv",
-            help="CSV with columns rate_x_rad_s, rate_y_rad_s, rate_z_rad_s, a row a frame: compensates rotation.",
-            show_default=False,
-        ),
-    ] = None,
+    frames: FramesArgument,
+    fps: Annotated[float, option("HZ", "Frames a second.", unset=False, within=(1e-3, 1e6))],
+    focal: FocalOption = 666.67,
+    distance: RangeOption = None,
+    rates: Annotated[Path | None, option("FILE.csv", RATES, unset=False)] = None,
     firmware: FirmwareOption = "2014-12",
-    window: Annotated[
-        int | None, typer.Option(metavar="PX", help="Use the middle PX x PX pixels only.", show_default=False)
-    ] = None,
-    bin_by: Annotated[int, typer.Option("--bin", metavar="PX", help="Average PX x PX pixels into one first.")] = 1,
+    window: WindowOption = None,
+    bin_by: BinOption = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Flow and quality from each frame to the next, with the historical firmware of your choice."""
-    from flownav.cli.output import require_between
     from flownav.compile import announce_compilation
     from flownav.optics.flow import flow_of_frames
     from flownav.optics.frame_files import read_frames
     from flownav.optics.frame_window import binned, middle
 
-    require_between("--fps", fps, 1e-3, 1e6)
-    require_between("--focal", focal, 1.0, 1e6)
-    require_between("--bin", bin_by, 1, 64)
-    if distance is not None:
-        require_between("--range", distance, 0.01, 10_000.0)
     turned = _rates(rates) if rates else None
     grey = binned(read_frames(frames), bin_by)
     if window is not None:
         grey = middle(grey, window)
     with announce_compilation("flow"):
         series = flow_of_frames(
-            grey,
-            fps,
-            focal_px=focal / bin_by,
-            rates_rad_s=turned,
-            range_m=distance,
-            firmware=firmware,
+            grey, fps, focal_px=focal / bin_by, rates_rad_s=turned, range_m=distance, firmware=firmware
         )
     facts = _facts(series, len(grey), grey.shape[2], grey.shape[1], fps, focal / bin_by, firmware)
     if as_json:

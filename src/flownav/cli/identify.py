@@ -7,43 +7,35 @@ from typing import Annotated
 
 import typer
 
-from flownav.cli.choices import AUTOPILOTS, ORDERS, REFERENCES, one_of
+from flownav.cli.choices import AUTOPILOTS, ORDERS, REFERENCES, one_of, option
 from flownav.cli.options import FlowInstanceOption, ForceOption, JsonOption, out_option
 from flownav.cli.output import emit
 
+LogsArgument = Annotated[
+    list[Path],
+    typer.Argument(metavar="LOG", help="Rig folders or their CSV files, or one flight's log.", show_default=False),
+]
+OrderOption = Annotated[
+    str, typer.Option(help="The model's order; delay is gain and latency alone.", **one_of(*ORDERS))
+]
+HEIGHTS = "Sensor's height [m], one for all logs or one each; repeated or with commas."
+ReferenceOption = Annotated[
+    str, typer.Option(help="What it is held against: of a rig, of a flight.", **one_of(*REFERENCES))
+]
+ForOption = Annotated[
+    str | None, typer.Option("--for", help="Also write this autopilot's parameters.", **one_of(*AUTOPILOTS))
+]
+BASE = "The sensor file for what no log shows (optics, limits)."
+
 
 def command(
-    logs: Annotated[
-        list[Path],
-        typer.Argument(metavar="LOG", help="Rig folders or their CSV files, or one flight's log.", show_default=False),
-    ],
-    order: Annotated[
-        str, typer.Option(help="The model's order; delay is gain and latency alone.", **one_of(*ORDERS))
-    ] = "auto",
-    heights: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--heights",
-            metavar="M",
-            help="Sensor's height [m], one for all logs or one each; repeated or with commas.",
-            show_default="as the log says",
-        ),
-    ] = None,
-    reference: Annotated[
-        str, typer.Option(help="What it is held against: of a rig, of a flight.", **one_of(*REFERENCES))
-    ] = "auto",
+    logs: LogsArgument,
+    order: OrderOption = "auto",
+    heights: Annotated[list[str] | None, option("M", HEIGHTS, unset="as the log says")] = None,
+    reference: ReferenceOption = "auto",
     flow_instance: FlowInstanceOption = None,
-    autopilot: Annotated[
-        str | None, typer.Option("--for", help="Also write this autopilot's parameters.", **one_of(*AUTOPILOTS))
-    ] = None,
-    base: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE.toml",
-            help="The sensor file for what no log shows (optics, limits).",
-            show_default="the paper's sensor",
-        ),
-    ] = None,
+    autopilot: ForOption = None,
+    base: Annotated[Path | None, option("FILE.toml", BASE, unset="the paper's sensor")] = None,
     out: Annotated[Path | None, out_option("The sensor file (TOML)", "out/LOG.toml")] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,

@@ -5,14 +5,15 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import LINKS, SENDINGS, one_of
+from flownav.cli.choices import LINKS, SENDINGS, one_of, option
 from flownav.cli.options import (
     ForceOption,
     GpsDelayOption,
@@ -21,123 +22,85 @@ from flownav.cli.options import (
     SettingsOption,
     SigningKeyOption,
 )
-from flownav.cli.output import emit
+from flownav.cli.output import emit, require_between, require_recordable
 
 if TYPE_CHECKING:
     from flownav.live.loop import Latency
     from flownav.live.options import Options
+    from flownav.live.recorder import Recorder
     from flownav.live.session import Session
+
+
+UrlArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="URL",
+        help="udp:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:PORT or serial:DEVICE[:BAUD].",
+        show_default=False,
+        autocompletion=one_of(*LINKS)["autocompletion"],
+    ),
+]
+SendOption = Annotated[str, typer.Option(help="As which message the estimate is sent.", **one_of(*SENDINGS))]
+RECORD = "The record; `flownav replay` reproduces it."
+RecordOption = Annotated[Path | None, option("PATH", RECORD, "--out", "--record", unset="none is written")]
+NUMBERS = (1, 255)  # of a MAVLink system, and of a component
+SYSTEM, COMPONENT = "Listen to this system only.", "Listen to this component only."
+SystemOption = Annotated[int | None, option("N", SYSTEM, unset="the first autopilot's", within=NUMBERS)]
+ComponentOption = Annotated[int | None, option("N", COMPONENT, unset="the autopilot's", within=NUMBERS)]
+LIMIT = "Send no longer than this without a horizontal aid (dead reckoning) [s]."
+SIGMA = "Send while one standard deviation of the position is below this [m]."
+PROTECTION = "Send while the horizontal protection level is below this [m]."
+UNFUSED = "Send nothing once a horizontal sensor is heard but not fused for so long [s]."
+UnfusedOption = Annotated[float, option("S", UNFUSED, within=(1.0, float("inf")))]
+ACCEPT = "Who else may send a message, 0 for any; may be repeated."
+AcceptOption = Annotated[list[str] | None, option("MESSAGE=SYSTEM.COMPONENT", ACCEPT)]
+DURATION = "End after so many seconds."
+DurationOption = Annotated[float | None, option("S", DURATION, unset="at Ctrl-C", within=(0.1, 1e6))]
+CapacityOption = Annotated[
+    float | None,
+    option("BYTES/S", "What the link carries each way.", unset="a serial port's by its baud rate", within=(500.0, 1e9)),
+]
+SETUP = "Only read the vehicle's parameters, and say what must change for --send."
+WRITE = "With --setup: write what must change, never while armed."
+SOURCES = "With --setup: ArduPilot's source set for flownav."
+SourceSetOption = Annotated[int | None, option("1..3", SOURCES, unset="a free one", within=(1, 3))]
 
 
 def command(
-    url: Annotated[
-        str,
-        typer.Argument(
-            metavar="URL",
-            help="udp:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:PORT or serial:DEVICE[:BAUD].",
-            show_default=False,
-            autocompletion=one_of(*LINKS)["autocompletion"],
-        ),
-    ],
+    url: UrlArgument,
     sensor: SensorOption = None,
-    send: Annotated[str, typer.Option(help="As which message the estimate is sent.", **one_of(*SENDINGS))] = "odometry",
-    record: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            "--record",
-            metavar="PATH",
-            help="The record; `flownav replay` reproduces it.",
-            show_default="none is written",
-        ),
-    ] = None,
+    send: SendOption = "odometry",
+    record: RecordOption = None,
     force: ForceOption = False,
     signing_key: SigningKeyOption = None,
-    system: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Listen to this system only.", show_default="the first autopilot's"),
-    ] = None,
-    component: Annotated[
-        int | None, typer.Option(metavar="N", help="Listen to this component only.", show_default="the autopilot's")
-    ] = None,
+    system: SystemOption = None,
+    component: ComponentOption = None,
     gps_delay: GpsDelayOption = 0.22,
     settings: SettingsOption = None,
-    send_limit: Annotated[
-        float, typer.Option(metavar="S", help="Send no longer than this without a horizontal aid (dead reckoning) [s].")
-    ] = 1.5,
-    send_sigma: Annotated[
-        float, typer.Option(metavar="M", help="Send while one standard deviation of the position is below this [m].")
-    ] = 5.0,
-    send_protection: Annotated[
-        float, typer.Option(metavar="M", help="Send while the horizontal protection level is below this [m].")
-    ] = 20.0,
-    unfused: Annotated[
-        float,
-        typer.Option(metavar="S", help="Send nothing once a horizontal sensor is heard but not fused for so long [s]."),
-    ] = 5.0,
-    accept: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="MESSAGE=SYSTEM.COMPONENT", help="Who else may send a message, 0 for any; may be repeated."
-        ),
-    ] = None,
-    duration: Annotated[
-        float | None, typer.Option(metavar="S", help="End after so many seconds.", show_default="at Ctrl-C")
-    ] = None,
-    capacity: Annotated[
-        float | None,
-        typer.Option(
-            metavar="BYTES/S", help="What the link carries each way.", show_default="a serial port's by its baud rate"
-        ),
-    ] = None,
-    setup: Annotated[
-        bool,
-        typer.Option("--setup", help="Only read the vehicle's parameters, and say what must change for --send."),
-    ] = False,
-    write: Annotated[
-        bool, typer.Option("--write", help="With --setup: write what must change, never while armed.")
-    ] = False,
-    source_set: Annotated[
-        int | None,
-        typer.Option(
-            metavar="1..3", help="With --setup: ArduPilot's source set for flownav.", show_default="a free one"
-        ),
-    ] = None,
+    send_limit: Annotated[float, option("S", LIMIT, within=(0.1, 60.0))] = 1.5,
+    send_sigma: Annotated[float, option("M", SIGMA, within=(0.01, 1000.0))] = 5.0,
+    send_protection: Annotated[float, option("M", PROTECTION, within=(0.01, 1000.0))] = 20.0,
+    unfused: UnfusedOption = 5.0,
+    accept: AcceptOption = None,
+    duration: DurationOption = None,
+    capacity: CapacityOption = None,
+    setup: Annotated[bool, typer.Option("--setup", help=SETUP)] = False,
+    write: Annotated[bool, typer.Option("--write", help=WRITE)] = False,
+    source_set: SourceSetOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Navigate a vehicle that is connected by MAVLink: fuse its sensors, send the estimate, show and record it."""
-    from dataclasses import replace
-
-    from flownav.cli.output import require_between, require_recordable
-    from flownav.errors import InputError, VerdictError
-    from flownav.live.display import on_terminal
-    from flownav.live.link import open_link, parse_url
-    from flownav.live.loop import Latency, run_session, stoppable
+    from flownav.cli.live_setup import run as run_setup
+    from flownav.errors import InputError
+    from flownav.live.link import parse_url
     from flownav.live.options import Limits
-    from flownav.live.priority import run_as_others, run_before_others
     from flownav.live.reception import accepted_by
-    from flownav.live.recorder import NoRecorder, Recorder, told_every_second
-    from flownav.live.screen import Screen
-    from flownav.live.session import Session
-    from flownav.live.traffic import traffic_facts
-    from flownav.live.warm import warm_up
+    from flownav.mavlink.signing import load_key
 
-    for option, number in (("--system", system), ("--component", component)):
-        require_between(option, 1 if number is None else number, 1, 255)
     require_between("--gps-delay", gps_delay, 0.0, 1.0)
-    require_between("--send-limit", send_limit, 0.1, 60.0)
-    require_between("--send-sigma", send_sigma, 0.01, 1000.0)
-    require_between("--send-protection", send_protection, 0.01, 1000.0)
-    require_between("--unfused", unfused, 1.0, float("inf"))
-    require_between("--duration", 1.0 if duration is None else duration, 0.1, 1e6)
-    require_between("--capacity", 1000.0 if capacity is None else capacity, 500.0, 1e9)
-    require_between("--source-set", 1 if source_set is None else source_set, 1, 3)
+    if setup and record is not None:
+        raise InputError("--out: --setup flies nothing; leave one of the two away")
     if setup:
-        from flownav.cli.live_setup import run as run_setup
-        from flownav.mavlink.signing import load_key
-
-        if record is not None:
-            raise InputError("--out: --setup flies nothing; leave one of the two away")
         key = load_key(signing_key) if signing_key else None
         return run_setup(
             url, send, write=write, source_set=source_set, system=system, component=component, key=key, as_json=as_json
@@ -146,31 +109,44 @@ def command(
         raise InputError("--write and --source-set go with --setup only")
     if record is not None:
         require_recordable(record, sensor, signing_key, settings, force=force)
-    limits = Limits(dead_reckoning_s=send_limit, sigma_m=send_sigma, protection_m=send_protection, unfused_s=unfused)
     options = replace(
         _options(send, system, component, signing_key, gps_delay, sensor, settings),
-        limits=limits,
+        limits=Limits(dead_reckoning_s=send_limit, sigma_m=send_sigma, protection_m=send_protection, unfused_s=unfused),
         accept=accepted_by(accept or []),
         capacity_bytes_s=capacity or parse_url(url).capacity_bytes_s,
     )
+    _navigate(url, options, record, duration, force=force, as_json=as_json)
+
+
+def _navigate(
+    url: str, options: Options, record: Path | None, duration_s: float | None, *, force: bool, as_json: bool
+) -> None:
+    """Navigate until asked to end, and say what came of it. VerdictError where nobody was heard or kept."""
+    from flownav.errors import VerdictError
+    from flownav.live.display import on_terminal
+    from flownav.live.link import open_link
+    from flownav.live.loop import Latency, run_session, stoppable
+    from flownav.live.priority import run_as_others, run_before_others
+    from flownav.live.recorder import NoRecorder, told_every_second
+    from flownav.live.screen import Screen
+    from flownav.live.session import Session
+    from flownav.live.traffic import traffic_facts
+    from flownav.live.warm import warm_up
+
     warm_up()
-    link = open_link(url)
-    link.capacity_bytes_s = options.capacity_bytes_s
     shown = not as_json and sys.stdout.isatty()
-    recorder = Recorder(record, options, force=force, failed=_say_once(shown)) if record is not None else None
-    if recorder is not None and recorder.notice:
-        print(f"flownav: {recorder.notice}", file=sys.stderr)
-    scheduling = run_before_others()
-    now_s, latency = time.monotonic(), Latency()
-    session = Session(options, recorder or NoRecorder(), now_s, time.time())
-    end_s = float("inf") if duration is None else now_s + duration
+    with closing(open_link(url)) as link, _recording(url, record, options, force=force, shown=shown) as recorder:
+        link.capacity_bytes_s = options.capacity_bytes_s
+        scheduling = run_before_others()
+        now_s, latency = time.monotonic(), Latency()
+        session = Session(options, recorder or NoRecorder(), now_s, time.time())
+        end_s = float("inf") if duration_s is None else now_s + duration_s
 
-    def facts_now() -> dict[str, Any]:
-        lasted_s = time.monotonic() - now_s
-        own = _facts(session, latency, lasted_s) | {"traffic": traffic_facts(link, session, lasted_s)}
-        return own | {"link": dict(link.counts), "scheduling": scheduling}
+        def facts_now() -> dict[str, Any]:
+            lasted_s = time.monotonic() - now_s
+            own = _facts(session, latency, lasted_s) | {"traffic": traffic_facts(link, session, lasted_s)}
+            return own | {"link": dict(link.counts), "scheduling": scheduling}
 
-    try:
         with stoppable() as asked:
             with on_terminal(Screen(session, latency, url, recorder, scheduling, link).view, shown=shown) as display:
                 shows = [display.show, *([told_every_second(recorder, facts_now)] if recorder is not None else [])]
@@ -179,17 +155,6 @@ def command(
             facts = facts_now()
             heard = session.reception.vehicle is not None
             finished = recorder.finish(facts, heard=heard) if recorder is not None else None
-    except BaseException as error:
-        if recorder is not None:
-            recorder.leave()
-            print(
-                f"flownav: {recorder.journal} holds the session; `flownav recover {recorder.journal}`", file=sys.stderr
-            )
-        if isinstance(error, KeyboardInterrupt):
-            raise VerdictError(f"{url}: broken off") from error
-        raise
-    finally:
-        link.close()
     if finished is not None:
         facts |= finished.facts()
     if not display.stuck:
@@ -198,6 +163,27 @@ def command(
         raise VerdictError(f"{url}: no autopilot was heard in {facts['duration_s']:.1f} s; see that it sends there")
     if finished is not None and finished.reason:
         raise VerdictError(finished.verdict())
+
+
+@contextmanager
+def _recording(url: str, path: Path | None, options: Options, *, force: bool, shown: bool) -> Iterator[Recorder | None]:
+    """The recorder, where a record is asked for; when the session breaks off, its journal stays and is named."""
+    from flownav.errors import VerdictError
+    from flownav.live.recorder import Recorder
+
+    recorder = Recorder(path, options, force=force, failed=_say_once(shown)) if path is not None else None
+    if recorder is not None and recorder.notice:
+        print(f"flownav: {recorder.notice}", file=sys.stderr)
+    try:
+        yield recorder
+    except BaseException as error:
+        if recorder is not None:
+            recorder.leave()
+            how = f"{recorder.journal} holds the session; `flownav recover {recorder.journal}`"
+            print(f"flownav: {how}", file=sys.stderr)
+        if isinstance(error, KeyboardInterrupt):
+            raise VerdictError(f"{url}: broken off") from error
+        raise
 
 
 def _options(

@@ -7,38 +7,45 @@ from typing import Annotated, Any
 
 import typer
 
-from flownav.cli.choices import ENGINES, FILTERS, FIRMWARES, SCENARIOS, VEHICLES, argument, installed_filters, one_of
+from flownav.cli.choices import (
+    ENGINES,
+    FILTERS,
+    FIRMWARES,
+    SCENARIOS,
+    VEHICLES,
+    argument,
+    installed_filters,
+    one_of,
+    option,
+)
 
 JsonOption = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
 ForceOption = Annotated[
     bool, typer.Option("--force", help="Replace what flownav wrote there before; without, the name is numbered.")
 ]
+KEPT = "flights that are there are kept"
 ENSEMBLE = "Draw each flight's vehicle, wind and sensors about their datasheets, or fly them as the datasheets say."
+EnsembleOption = Annotated[bool, typer.Option("--ensemble/--matched", help=ENSEMBLE)]
 ReportOption = Annotated[bool, typer.Option("--report/--no-report", help="Write the HTML report beside the record.")]
-SeedOption = Annotated[int, typer.Option("--seed", metavar="N", help="Seed of the noise; the same seed, same result.")]
+SEED = ("N", "Seed of the noise; the same seed, same result.", "--seed")
+SeedOption = Annotated[int, option(*SEED, within=(0, 2**63 - 1))]
+RigSeedOption = Annotated[int, option(*SEED, within=(0, 2**31 - 1))]  # the rig draws from 32 bits
 SensorOption = Annotated[
-    Path | None,
-    typer.Option("--sensor", metavar="FILE.toml", help="A flow sensor file, as `flownav identify` writes it."),
+    Path | None, option("FILE.toml", "A flow sensor file, as `flownav identify` writes it.", "--sensor")
 ]
 SettingsOption = Annotated[
-    Path | None,
-    typer.Option("--settings", metavar="FILE.toml", help="Settings of the navigator, as `flownav tune` writes them."),
+    Path | None, option("FILE.toml", "Settings of the navigator, as `flownav tune` writes them.", "--settings")
 ]
-FlowInstanceOption = Annotated[
-    int | None, typer.Option("--flow-instance", metavar="N", help="Which of a log's several flow sensors.")
-]
+FlowInstanceOption = Annotated[int | None, option("N", "Which of a log's several flow sensors.", "--flow-instance")]
 TopicOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--topic", metavar="ROLE=TOPIC", help="Of a ROS bag: which topic serves as what. May be given several times."
-    ),
+    option("ROLE=TOPIC", "Of a ROS bag: which topic serves as what. May be given several times.", "--topic"),
 ]
-GpsDelayOption = Annotated[
-    float, typer.Option("--gps-delay", metavar="S", help="How old a GPS reading is when it arrives [s].")
-]
+GpsDelayOption = Annotated[float, option("S", "How old a GPS reading is when it arrives [s].", "--gps-delay")]
 SigningKeyOption = Annotated[
-    Path | None, typer.Option("--signing-key", metavar="FILE", help="MAVLink 2 signing key: 32 bytes or 64 digits.")
+    Path | None, option("FILE", "MAVLink 2 signing key: 32 bytes or 64 digits.", "--signing-key")
 ]
+RecordsOption = Annotated[int, option("N", "Write records and reports of so many of the worst flights.", "--records")]
 VehicleOption = Annotated[
     str | None, typer.Option("--vehicle", help="The vehicle that flies.", **one_of(*VEHICLES, beside="FILE.toml"))
 ]

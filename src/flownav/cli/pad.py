@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import CAMERAS, PATTERNS, one_of
+from flownav.cli.choices import CAMERAS, PATTERNS, one_of, option
 from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
 from flownav.cli.output import emit
 from flownav.text import finite
@@ -22,90 +22,80 @@ SPEEDS = ["0.1,0.5,1.5"]
 WIDE = 110  # columns of the table of what was measured
 
 
+FramesArgument = Annotated[
+    list[Path] | None,
+    typer.Argument(help="Your pictures: a folder, pictures, or one video. None: measure.", show_default=False),
+]
+SideOption = Annotated[float, option("M", "Side of the tag's black square, or of a plain pad [m].")]
+FOCAL = "Focal length of your pictures [px], undistorted."
+FocalOption = Annotated[float | None, option("PX", FOCAL, unset=False, within=(1.0, 1e6))]
+IMAGE_X = "Where the pictures' right is, clockwise from body forward."
+FOCUS = "Where its lens is focused [m]."
+FocusOption = Annotated[float | None, option("M", FOCUS, unset="as built", within=(0.05, 1000.0))]
+HeightsOption = Annotated[list[str], option("M", "Heights to measure at [m], repeated or with commas.")]
+SpeedsOption = Annotated[list[str], option("M/S", "Speeds over ground [m/s], repeated or with commas.")]
+FlightsOption = Annotated[int, option("N", "Cameras, each on a flight of its own.", within=(2, 100_000))]
+CountOption = Annotated[int, option("N", "Frames a flight, height and speed.", "--frames", within=(1, 100_000))]
+TiltOption = Annotated[float, option("DEG", "Greatest tilt.", "--tilt-deg", within=(0.0, 45.0))]
+MOUNTING = "How well it is mounted, for the datasheet."
+MountingOption = Annotated[float, option("DEG", MOUNTING, "--mounting-deg", within=(0.0, 5.0))]
+PICTURES = "A folder for one frame of each flight and height."
+PrintOption = Annotated[
+    Path | None, option("PATH", "Only write the target as a PNG of true size.", "--print", unset=False)
+]
+
+
 def command(
-    frames: Annotated[
-        list[Path] | None,
-        typer.Argument(help="Your pictures: a folder, pictures, or one video. None: measure.", show_default=False),
-    ] = None,
-    side: Annotated[
-        float, typer.Option(metavar="M", help="Side of the tag's black square, or of a plain pad [m].")
-    ] = 0.2,
+    frames: FramesArgument = None,
+    side: SideOption = 0.2,
     pattern: Annotated[str, typer.Option(help="What is printed on the pad.", **one_of(*PATTERNS))] = "tag",
-    code: Annotated[int, typer.Option(metavar="N", help="Which tag of AprilTag 36h11, 0 to 15.")] = 0,
-    focal: Annotated[
-        float | None,
-        typer.Option(metavar="PX", help="Focal length of your pictures [px], undistorted.", show_default=False),
-    ] = None,
-    image_x: Annotated[
-        float,
-        typer.Option("--image-x-deg", metavar="DEG", help="Where the pictures' right is, clockwise from body forward."),
-    ] = 0.0,
+    code: Annotated[int, option("N", "Which tag of AprilTag 36h11, 0 to 15.")] = 0,
+    focal: FocalOption = None,
+    image_x: Annotated[float, option("DEG", IMAGE_X, "--image-x-deg")] = 0.0,
     camera: Annotated[str, typer.Option(help="The camera to measure with.", **one_of(*CAMERAS))] = "wide120",
-    focus: Annotated[
-        float | None, typer.Option(metavar="M", help="Where its lens is focused [m].", show_default="as built")
-    ] = None,
-    heights: Annotated[
-        list[str], typer.Option("--heights", metavar="M", help="Heights to measure at [m], repeated or with commas.")
-    ] = HEIGHTS,
-    speeds: Annotated[
-        list[str], typer.Option("--speeds", metavar="M/S", help="Speeds over ground [m/s], repeated or with commas.")
-    ] = SPEEDS,
-    flights: Annotated[int, typer.Option(metavar="N", help="Cameras, each on a flight of its own.")] = 24,
-    count: Annotated[int, typer.Option("--frames", metavar="N", help="Frames a flight, height and speed.")] = 2,
-    tilt: Annotated[float, typer.Option("--tilt-deg", metavar="DEG", help="Greatest tilt.")] = 15.0,
-    mounting: Annotated[
-        float, typer.Option("--mounting-deg", metavar="DEG", help="How well it is mounted, for the datasheet.")
-    ] = 0.4,
+    focus: FocusOption = None,
+    heights: HeightsOption = HEIGHTS,
+    speeds: SpeedsOption = SPEEDS,
+    flights: FlightsOption = 24,
+    count: CountOption = 2,
+    tilt: TiltOption = 15.0,
+    mounting: MountingOption = 0.4,
     seed: SeedOption = 1,
     out: Annotated[Path | None, out_option("The datasheet (TOML), which a scenario's [sensors] name")] = None,
     force: ForceOption = False,
-    pictures: Annotated[
-        Path | None,
-        typer.Option(metavar="PATH", help="A folder for one frame of each flight and height.", show_default=False),
-    ] = None,
-    print_to: Annotated[
-        Path | None,
-        typer.Option(
-            "--print", metavar="PATH", help="Only write the target as a PNG of true size.", show_default=False
-        ),
-    ] = None,
+    pictures: Annotated[Path | None, option("PATH", PICTURES, unset=False)] = None,
+    print_to: PrintOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Where the pad is from the lens: angles, distance, heading; and how well, by height."""
     from flownav.cli.lists import numbers
-    from flownav.cli.output import folder_place, place, require_between
-    from flownav.optics.pad_target import PadTarget, checked, print_target
+    from flownav.cli.output import folder_place, place
+    from flownav.optics.pad_target import PadTarget, checked
     from flownav.optics.pad_trial import Trials
 
     target = checked(PadTarget(side, pattern, code))
     if print_to is not None:
-        picture = place(print_to, force=force)
-        print_target(target, picture)
-        facts: dict[str, Any] = {"target": target._asdict(), "picture": str(picture)}
-        _show(facts, as_json, lambda _: typer.echo(f"{picture}: print it at 100 %, and measure its side"))
-    elif frames:
-        from flownav.errors import InputError
+        return _print_target(target, place(print_to, force=force), as_json)
+    if frames:
+        return _show(_found(frames, target, focal, image_x), as_json, _print_found)
+    datasheet = None if out is None else place(out, force=force)
+    frames_in = None if pictures is None else folder_place(pictures)
+    at_m = sorted(set(numbers("--heights", heights, 0.05, 50.0)))
+    at_m_s = sorted(set(numbers("--speeds", speeds, 0.0, 50.0)))
+    trials = Trials(at_m, at_m_s, flights, count, math.radians(tilt), seed)
+    facts = _measured(target, camera, focus, trials, tilt, frames_in)
+    if datasheet is not None:
+        facts["datasheet"] = _write_datasheet(datasheet, facts, target, camera, focus, mounting)
+    _show(_plain(facts), as_json, _print_measured)
 
-        if focal is None:
-            raise InputError("--focal: pictures need their focal length in pixels")
-        require_between("--focal", focal, 1.0, 1e6)
-        _show(_found(frames, target, focal, image_x), as_json, _print_found)
-    else:
-        require_between("--frames", count, 1, 100_000)
-        require_between("--flights", flights, 2, 100_000)
-        require_between("--tilt-deg", tilt, 0.0, 45.0)
-        require_between("--mounting-deg", mounting, 0.0, 5.0)
-        if focus is not None:
-            require_between("--focus", focus, 0.05, 1000.0)
-        datasheet = None if out is None else place(out, force=force)
-        frames_in = None if pictures is None else folder_place(pictures)
-        at_m = sorted(set(numbers("--heights", heights, 0.05, 50.0)))
-        at_m_s = sorted(set(numbers("--speeds", speeds, 0.0, 50.0)))
-        trials = Trials(at_m, at_m_s, flights, count, math.radians(tilt), seed)
-        facts = _measured(target, camera, focus, trials, tilt, frames_in)
-        if datasheet is not None:
-            facts["datasheet"] = _write_datasheet(datasheet, facts, target, camera, focus, mounting)
-        _show(_plain(facts), as_json, _print_measured)
+
+def _print_target(target: PadTarget, picture: Path, as_json: bool) -> None:
+    """The target as a picture of its true size."""
+    from flownav.optics.pad_target import print_target
+
+    print_target(target, picture)
+    facts: dict[str, Any] = {"target": target._asdict(), "picture": str(picture)}
+    _show(facts, as_json, lambda _: typer.echo(f"{picture}: print it at 100 %, and measure its side"))
 
 
 def _show(facts: dict[str, Any], as_json: bool, printer: Any) -> None:
@@ -116,13 +106,16 @@ def _show(facts: dict[str, Any], as_json: bool, printer: Any) -> None:
 
 
 # -- a user's own pictures ------------------------------------------------------------------------------------------
-def _found(frames: list[Path], target: PadTarget, focal_px: float, image_x_deg: float) -> dict[str, Any]:
+def _found(frames: list[Path], target: PadTarget, focal_px: float | None, image_x_deg: float) -> dict[str, Any]:
     import numpy as np
 
     from flownav.compile import announce_compilation
+    from flownav.errors import InputError
     from flownav.optics.frame_files import read_frames
     from flownav.optics.pad_fix import find_pad
 
+    if focal_px is None:
+        raise InputError("--focal: pictures need their focal length in pixels")
     grey = read_frames(frames)
     c, s = np.cos(np.radians(image_x_deg)), np.sin(np.radians(image_x_deg))
     axes = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

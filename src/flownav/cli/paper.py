@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from flownav.cli.choices import TABLES, one_of
-from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
+from flownav.cli.options import ForceOption, JsonOption, RigSeedOption, out_option
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ def command(
     out: Annotated[Path | None, out_option("The page (HTML)", "out/paper.html, or out/paper-tableN.html")] = None,
     force: ForceOption = False,
     flights: Annotated[int, typer.Option(metavar="N", help="Flights for each of Tables 5 and 6.")] = 200,
-    seed: SeedOption = 1,
+    seed: RigSeedOption = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Reproduce the paper: Tables 1 to 3 from the synthetic rig, 5 and 6 from flights, on one HTML page."""
@@ -31,7 +31,6 @@ def command(
     from flownav.paper.reproduction import TABLES as ALL_TABLES
 
     require_between("--flights", flights, 1, 1_000_000)
-    require_between("--seed", seed, 0, 2**31 - 1)
     page = place(out or Path("out") / ("paper.html" if table is None else f"paper-table{table}.html"), force=force)
     made = _reproduced((int(table),) if table else ALL_TABLES, seed, flights)
     from flownav.paper.page import write_page

@@ -7,65 +7,49 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import AXES, EXCITATIONS, LIGHTS, RIG_PADS, one_of
-from flownav.cli.options import FirmwareOption, ForceOption, JsonOption, SeedOption, out_option
+from flownav.cli.choices import AXES, EXCITATIONS, LIGHTS, RIG_PADS, one_of, option
+from flownav.cli.options import FirmwareOption, ForceOption, JsonOption, RigSeedOption, out_option
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
-    from flownav.rig.experiment import RigLog
-
+    from flownav.rig.experiment import RigLog, RigSettings
 
 HEIGHTS_M = ["0.6"]
+OutOption = Annotated[Path | None, out_option("The folder, with a folder in it for each of several runs", "out/rig")]
+HEIGHT = "Sensor's height above the pad at rest [m], repeated or with commas."
+HeightOption = Annotated[list[str], option("M", HEIGHT, "--height", "--heights")]
+ExcitationOption = Annotated[str, typer.Option(help="How it is swung; swing is the paper's.", **one_of(*EXCITATIONS))]
+PadOption = Annotated[
+    str, typer.Option(help="What it looks at; MM is the stripes' width.", **one_of(*RIG_PADS, beside="FILE:WIDTH_M"))
+]
+GYRO_LATE = "How much older the gyro is than the flow [s]; below 0 the flow is older."
 
 
 def command(
-    out: Annotated[
-        Path | None, out_option("The folder, with a folder in it for each of several runs", "out/rig")
-    ] = None,
+    out: OutOption = None,
     force: ForceOption = False,
-    height: Annotated[
-        list[str],
-        typer.Option(
-            "--height",
-            "--heights",
-            metavar="M",
-            help="Sensor's height above the pad at rest [m], repeated or with commas.",
-        ),
-    ] = HEIGHTS_M,
-    runs: Annotated[int, typer.Option(metavar="N", help="Runs at each height.")] = 1,
-    duration: Annotated[float, typer.Option(metavar="S", help="Length of a run [s].")] = 25.0,
-    excitation: Annotated[str, typer.Option(help="How it is swung; swing is the paper's.", **one_of(*EXCITATIONS))] = (
-        "swing"
-    ),
-    pad: Annotated[
-        str,
-        typer.Option(help="What it looks at; MM is the stripes' width.", **one_of(*RIG_PADS, beside="FILE:WIDTH_M")),
-    ] = "stripes",
+    height: HeightOption = HEIGHTS_M,
+    runs: Annotated[int, option("N", "Runs at each height.")] = 1,
+    duration: Annotated[float, option("S", "Length of a run [s].")] = 25.0,
+    excitation: ExcitationOption = "swing",
+    pad: PadOption = "stripes",
     light: Annotated[str, typer.Option(help="How bright it is.", **one_of(*LIGHTS))] = "normal",
     firmware: FirmwareOption = "2013-09",
     along: Annotated[str, typer.Option(help="The camera's axis along the swing.", **one_of(*AXES))] = "x",
-    pivot_height: Annotated[float, typer.Option(metavar="M", help="Pivot above the pad [m].")] = 2.1,
-    start_angle: Annotated[float, typer.Option(metavar="RAD", help="Amplitude of the swing [rad].")] = 0.0912,
-    refocus: Annotated[float, typer.Option(metavar="0..1", help="1: lens focused at each height; 0: at 0.6 m.")] = 1.0,
-    chain_delay: Annotated[float, typer.Option(metavar="S", help="Serial and logging chain [s].")] = 0.07,
-    gyro_late: Annotated[
-        float,
-        typer.Option(metavar="S", help="How much older the gyro is than the flow [s]; below 0 the flow is older."),
-    ] = 0.0,
-    sonar_late: Annotated[float, typer.Option(metavar="S", help="From the sonar's trigger to its reading [s].")] = 0.05,
-    seed: SeedOption = 1,
+    pivot_height: Annotated[float, option("M", "Pivot above the pad [m].")] = 2.1,
+    start_angle: Annotated[float, option("RAD", "Amplitude of the swing [rad].")] = 0.0912,
+    refocus: Annotated[float, option("0..1", "1: lens focused at each height; 0: at 0.6 m.")] = 1.0,
+    chain_delay: Annotated[float, option("S", "Serial and logging chain [s].")] = 0.07,
+    gyro_late: Annotated[float, option("S", GYRO_LATE)] = 0.0,
+    sonar_late: Annotated[float, option("S", "From the sonar's trigger to its reading [s].")] = 0.05,
+    seed: RigSeedOption = 1,
     as_json: JsonOption = False,
 ) -> None:
     """Swing a PX4FLOW over a pad beside an encoder and log both: rig.csv and rig.toml, a folder a run."""
     from flownav.cli.lists import numbers
-    from flownav.cli.output import folder_place, progress, require_between
-    from flownav.compile import announce_compilation
-    from flownav.provenance import command_line
-    from flownav.rig.campaign import run_campaign
+    from flownav.cli.output import folder_place
     from flownav.rig.experiment import RigSettings
-    from flownav.rig.log_folder import check_rig_folder, run_folders, write_rig_folder
 
-    require_between("--seed", seed, 0, 2**31 - 1)
     heights = numbers("--height", height, 0.01, 100.0)
     settings = RigSettings(
         height_m=heights[0],
@@ -84,18 +68,30 @@ def command(
         runs=runs,
         seed=seed,
     )
-    folder = folder_place(out or Path("out/rig"), force=force)
-    rows, folders = [], list(run_folders(folder, len(heights) * runs))
-    for each in folders:
-        check_rig_folder(each)
-    with announce_compilation("rig"), progress("Swinging", len(heights) * runs) as advance:
-        for log, each in zip(run_campaign(settings, heights, advance), folders, strict=True):
-            write_rig_folder(log, each, command_line())
-            rows.append(_facts(log, each))
+    rows = _swung(settings, heights, folder_place(out or Path("out/rig"), force=force))
     if as_json:
         emit({"seed": seed, "firmware": firmware, "pad": pad, "excitation": excitation, "runs": rows})
     else:
         _print(rows)
+
+
+def _swung(settings: RigSettings, heights_m: list[float], folder: Path) -> list[dict[str, Any]]:
+    """Every run at every height, written in a folder of its own; what each was."""
+    from flownav.cli.output import progress
+    from flownav.compile import announce_compilation
+    from flownav.provenance import command_line
+    from flownav.rig.campaign import run_campaign
+    from flownav.rig.log_folder import check_rig_folder, run_folders, write_rig_folder
+
+    count = len(heights_m) * settings.runs
+    rows, folders = [], list(run_folders(folder, count))
+    for each in folders:
+        check_rig_folder(each)
+    with announce_compilation("rig"), progress("Swinging", count) as advance:
+        for log, each in zip(run_campaign(settings, heights_m, advance), folders, strict=True):
+            write_rig_folder(log, each, command_line())
+            rows.append(_facts(log, each))
+    return rows
 
 
 def _facts(log: RigLog, folder: Path) -> dict[str, Any]:

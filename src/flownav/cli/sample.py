@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flownav.cli.choices import SAMPLES, argument
-from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
+from flownav.cli.options import ForceOption, JsonOption, RigSeedOption, out_option
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ def command(
     ] = None,
     list_only: Annotated[bool, typer.Option("--list", help="Only say what there is; write nothing.")] = False,
     out: Annotated[Path | None, out_option("The folder to write into", "samples")] = None,
-    seed: SeedOption = 1,
+    seed: RigSeedOption = 1,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -30,13 +30,11 @@ def command(
     from importlib.util import find_spec
 
     from flownav.cli.lists import words
-    from flownav.cli.output import require_between
     from flownav.errors import InputError
     from flownav.samples.kinds import SAMPLES as MADE
     from flownav.samples.kinds import sample_of
     from flownav.samples.writing import write_samples
 
-    require_between("--seed", seed, 0, 2**31 - 1)
     folder = out or Path("samples")
     asked = [sample_of(kind) for kind in (words("KIND", kinds) if kinds else [])]
     if list_only:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from flownav.cli.choices import option
 from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
 from flownav.cli.output import emit
 
@@ -17,17 +18,16 @@ MOST_FLIGHTS = 1000
 WIDE = 130  # columns that the table takes
 
 
+DATA = "The folder that holds the logs."
+FileOption = Annotated[
+    Path | None, option("FILE.toml", "Which logs and outages.", "--file", unset="three outdoor flights")
+]
+
+
 def command(
-    data: Annotated[
-        Path, typer.Option(metavar="PATH", envvar="FLOWNAV_DATA", help="The folder that holds the logs.")
-    ] = Path("../shared/data"),
-    flights_file: Annotated[
-        Path | None,
-        typer.Option(
-            "--file", metavar="FILE.toml", help="Which logs and outages.", show_default="three outdoor flights"
-        ),
-    ] = None,
-    flights: Annotated[int, typer.Option(metavar="N", help="Simulated flights of each log.")] = 8,
+    data: Annotated[Path, typer.Option(metavar="PATH", envvar="FLOWNAV_DATA", help=DATA)] = Path("../shared/data"),
+    flights_file: FileOption = None,
+    flights: Annotated[int, option("N", "Simulated flights of each log.")] = 8,
     seed: SeedOption = 1,
     out: Annotated[Path | None, out_option("The page (Markdown)")] = None,
     force: ForceOption = False,
@@ -36,13 +36,12 @@ def command(
     """Hold the simulator against recorded flights: outage drift, innovations, noise, as flown and as simulated."""
     from flownav.cli.output import place, progress, require_between
     from flownav.errors import InputError, VerdictError
-    from flownav.guard import an_input
+    from flownav.guard import an_input, written_whole
     from flownav.validation.flights import load_flights
     from flownav.validation.job import replays_of, validate
     from flownav.validation.page import page
 
     require_between("--flights", flights, 1, MOST_FLIGHTS)
-    require_between("--seed", seed, 0, 2**63 - 1)
     path = None if out is None else place(out, data, flights_file, force=force)
     if not an_input(data).is_dir():
         raise InputError(f"{data}: no such folder; give the folder of logs by --data or FLOWNAV_DATA")
@@ -50,19 +49,12 @@ def command(
     with progress("Validating", replays_of(recorded, flights)) as advance:
         rows = validate(data, recorded, seed, flights, advance)
     if path is not None:
-        from flownav.guard import written_whole
-
         with written_whole(path) as temporary:
             text = page(rows, seed, flights, recorded.vehicle.path_bandwidth_hz)
             temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
     if as_json:
-        facts = {
-            "seed": seed,
-            "flights": flights,
-            "rows": [row.as_json() for row in rows],
-            "out": str(path) if path else None,
-        }
-        emit(facts)
+        facts = {"seed": seed, "flights": flights, "rows": [row.as_json() for row in rows]}
+        emit(facts | {"out": str(path) if path else None})
     else:
         _show(rows)
     kind = [row for row in rows if row.decides and row.verdict == "too kind"]

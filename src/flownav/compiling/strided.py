@@ -36,12 +36,9 @@ def strided(array: NDArray[np.float64], first: int) -> Any:
 
 def teach_strided_pointers() -> None:
     """Make numba-cuda compile `strided`, and what it gives."""
-    import operator
-
     from llvmlite import ir
     from numba.core import types
-    from numba.cuda.extending import core_models, lower_builtin, register_model
-    from numba.cuda.typing.templates import AbstractTemplate, infer_global, signature
+    from numba.cuda.extending import core_models, register_model
 
     class StridedType(types.Type):
         """An address of float64s that lie WARP apart."""
@@ -49,12 +46,21 @@ def teach_strided_pointers() -> None:
         def __init__(self) -> None:
             super().__init__(name=f"strided({WARP})")
 
-    kind = StridedType()
-
     @register_model(StridedType)
     class _Model(core_models.PrimitiveModel):  # type: ignore[misc]
         def __init__(self, manager: Any, told: Any) -> None:
             super().__init__(manager, told, ir.DoubleType().as_pointer())
+
+    _teach_types(StridedType())
+    _teach_code(StridedType)
+
+
+def _teach_types(kind: Any) -> None:
+    """What `strided` gives, and what is read from it and written to it."""
+    import operator
+
+    from numba.core import types
+    from numba.cuda.typing.templates import AbstractTemplate, infer_global, signature
 
     @infer_global(strided)
     class _Strided(AbstractTemplate):  # type: ignore[misc]
@@ -67,15 +73,24 @@ def teach_strided_pointers() -> None:
     class _Load(AbstractTemplate):  # type: ignore[misc]
         def generic(self, args: Any, kws: Any) -> Any:
             pointer, index = args
-            fits = isinstance(pointer, StridedType) and isinstance(index, types.Integer)
+            fits = pointer == kind and isinstance(index, types.Integer)
             return signature(types.float64, pointer, types.int64) if fits else None
 
     @infer_global(operator.setitem)
     class _Store(AbstractTemplate):  # type: ignore[misc]
         def generic(self, args: Any, kws: Any) -> Any:
             pointer, index, _value = args
-            fits = isinstance(pointer, StridedType) and isinstance(index, types.Integer)
+            fits = pointer == kind and isinstance(index, types.Integer)
             return signature(types.none, pointer, types.int64, types.float64) if fits else None
+
+
+def _teach_code(strided_type: Any) -> None:
+    """The instructions: an address, a load, a store."""
+    import operator
+
+    from llvmlite import ir
+    from numba.core import types
+    from numba.cuda.extending import lower_builtin
 
     def lower_address(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         data = context.make_array(sig.args[0])(context, builder, value=args[0]).data
@@ -92,5 +107,5 @@ def teach_strided_pointers() -> None:
         return context.get_dummy_value()
 
     lower_builtin(strided, types.Array, types.Integer)(lower_address)
-    lower_builtin(operator.getitem, StridedType, types.Integer)(lower_load)
-    lower_builtin(operator.setitem, StridedType, types.Integer, types.Float)(lower_store)
+    lower_builtin(operator.getitem, strided_type, types.Integer)(lower_load)
+    lower_builtin(operator.setitem, strided_type, types.Integer, types.Float)(lower_store)

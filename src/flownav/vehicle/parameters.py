@@ -6,7 +6,7 @@ import math
 from typing import NamedTuple
 
 from flownav.vehicle.multirotor_schema import MultirotorFile
-from flownav.vehicle.schema import Actuator, VehicleFile
+from flownav.vehicle.schema import Actuator, MainRotor, TailRotor, VehicleFile
 
 ROTOR_INERTIA = 1.15  # of all that turns with the main rotor, over that of its blades, where a file says none
 
@@ -129,26 +129,19 @@ def of_either_kind(file: VehicleFile | MultirotorFile) -> dict[str, float]:
 def flatten(file: VehicleFile) -> VehicleParameters:
     """The checked file as the flat bundle, angles in radians, rotor constants derived."""
     main, tail, rho = file.main_rotor, file.tail_rotor, file.environment.air_density_kg_m3
-    main_area = main.blade_count * main.chord_m * main.radius_m
-    tail_area = tail.blade_count * tail.chord_m * tail.radius_m
-    main_tip = main.speed_rad_s * main.radius_m
     tail_speed = tail.gear_ratio * main.speed_rad_s
-    tail_tip = tail_speed * tail.radius_m
-    main_solidity = main_area / (math.pi * main.radius_m**2)
-    tail_solidity = tail_area / (math.pi * tail.radius_m**2)
+    main_area = _blade_area_m2(main)
+    main_tip = main.speed_rad_s * main.radius_m
     lock_number = rho * main.lift_slope_per_rad * main.chord_m * main.radius_m**4 / main.blade_flap_inertia_kg_m2
     inertia = file.drive.rotor_inertia_kg_m2 or ROTOR_INERTIA * main.blade_count * main.blade_flap_inertia_kg_m2
     return VehicleParameters(
         **of_either_kind(file),
+        **_rotor("main", main, main.speed_rad_s, rho),
+        **_rotor("tail", tail, tail_speed, rho),
         main_radius_m=main.radius_m,
         main_speed_rad_s=main.speed_rad_s,
-        main_tip_speed_m_s=main_tip,
-        main_inflow_speed_m_s=main.lift_slope_per_rad * main_solidity * main_tip / (8.0 * main.wake_efficiency),
-        main_thrust_slope_n_s_m=rho * main.lift_slope_per_rad * main_area * main_tip / 4.0,
-        main_thrust_limit_n=rho * main_area * main_tip**2 * main.stall_blade_loading,
-        main_profile_torque_n_m=rho * main_area * main.radius_m * main_tip**2 * main.profile_drag_coefficient / 8.0,
         main_inplane_drag_n_s_m=rho * main_area * main_tip * main.profile_drag_coefficient / 4.0,
-        main_lift_solidity=main.lift_slope_per_rad * main_solidity,
+        main_lift_solidity=main.lift_slope_per_rad * _solidity(main),
         main_disc_kg_m=2.0 * rho * math.pi * main.radius_m**2 * main.wake_efficiency,
         per_main_speed_s_rad=1.0 / main.speed_rad_s,
         per_inflow_mass_1_kg=1.0 / (main.inflow_mass_factor * rho * math.pi * main.radius_m**3),
@@ -158,11 +151,6 @@ def flatten(file: VehicleFile) -> VehicleParameters:
         flap_response=main.flap_response,
         tail_speed_rad_s=tail_speed,
         tail_gear=tail.gear_ratio,
-        tail_tip_speed_m_s=tail_tip,
-        tail_inflow_speed_m_s=tail.lift_slope_per_rad * tail_solidity * tail_tip / (8.0 * tail.wake_efficiency),
-        tail_thrust_slope_n_s_m=rho * tail.lift_slope_per_rad * tail_area * tail_tip / 4.0,
-        tail_thrust_limit_n=rho * tail_area * tail_tip**2 * tail.stall_blade_loading,
-        tail_profile_torque_n_m=rho * tail_area * tail.radius_m * tail_tip**2 * tail.profile_drag_coefficient / 8.0,
         tail_fin_blockage=tail.fin_blockage,
         tail_behind_cg_m=tail.behind_cg_m,
         tail_above_cg_m=tail.above_cg_m,
@@ -187,6 +175,26 @@ def flatten(file: VehicleFile) -> VehicleParameters:
 def without_slop(vehicle: VehicleParameters) -> VehicleParameters:
     """The vehicle whose servos answer every error: linear about a trim, and the paper's."""
     return vehicle._replace(cyclic_dead_band_rad=0.0, collective_dead_band_rad=0.0, pedal_dead_band_rad=0.0)
+
+
+def _blade_area_m2(rotor: MainRotor | TailRotor) -> float:
+    return rotor.blade_count * rotor.chord_m * rotor.radius_m
+
+
+def _solidity(rotor: MainRotor | TailRotor) -> float:
+    return _blade_area_m2(rotor) / (math.pi * rotor.radius_m**2)
+
+
+def _rotor(name: str, rotor: MainRotor | TailRotor, speed_rad_s: float, rho: float) -> dict[str, float]:
+    """What is derived of both rotors alike, as `VehicleParameters` has it."""
+    area, slope, tip = _blade_area_m2(rotor), rotor.lift_slope_per_rad, speed_rad_s * rotor.radius_m
+    return {
+        f"{name}_tip_speed_m_s": tip,
+        f"{name}_inflow_speed_m_s": slope * _solidity(rotor) * tip / (8.0 * rotor.wake_efficiency),
+        f"{name}_thrust_slope_n_s_m": rho * slope * area * tip / 4.0,
+        f"{name}_thrust_limit_n": rho * area * tip**2 * rotor.stall_blade_loading,
+        f"{name}_profile_torque_n_m": rho * area * rotor.radius_m * tip**2 * rotor.profile_drag_coefficient / 8.0,
+    }
 
 
 def _actuator(name: str, servo: Actuator) -> dict[str, float]:

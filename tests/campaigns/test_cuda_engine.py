@@ -13,6 +13,7 @@ from flownav.campaigns.engines.engine import Part
 from flownav.campaigns.measures import ROW_COLUMNS
 from flownav.campaigns.plan import Ready, ready_of
 from flownav.errors import InputError
+from flownav.simulation import layout
 from flownav.simulation.fault import SOUND
 from flownav.simulation.truth import TRUTH_ROWS
 
@@ -115,5 +116,5 @@ def test_each_flight_has_its_own_fault(cells):
     with truths_of_cell(cell, 10, 3, 4) as truths:
         packed = truths(5, 3)
     assert packed.shape == (TRUTH_ROWS, 3)
-    bias = TRUTH_ROWS - len(SOUND) + SOUND._fields.index("bias_0")
+    bias = layout.AS_IS["fault"] - layout.AS_IS_BEGIN + SOUND._fields.index("bias_0")
     assert packed[bias].tolist() == [50.0, 60.0, 70.0]

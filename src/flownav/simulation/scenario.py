@@ -138,7 +138,10 @@ class EventSection(ParameterModel):
 
 
 _by_channel = sorted(carried_sensors(), key=lambda sensor: sensor.channels.reading)
-_files: dict[str, Any] = {sensor.name: (str | None, None) for sensor in _by_channel}
+_files: dict[str, Any] = {
+    sensor.name: (str | None, Field(None, description="its datasheet, a TOML file; the shipped one unless named"))
+    for sensor in _by_channel
+}
 _SheetFiles: Any = create_model("_SheetFiles", __base__=ParameterModel, **_files)
 
 

@@ -17,7 +17,10 @@ from flownav.compiling.device import call_instead, lowered
 from flownav.compiling.launch import argument_type, flattened, per_thread, told_names, with_arrays
 
 CAPABILITY = (9, 0)
-INTRINSICS = {"sqrt", "fabs", "floor", "ceil", "rint", "trunc"}
+INTRINSICS = {name: name for name in ("sqrt", "fabs", "floor", "ceil", "rint", "trunc")} | {
+    "fmax": "maxnum",
+    "fmin": "minnum",
+}
 THREAD = "flownav_thread"
 
 
@@ -112,7 +115,7 @@ def _stand_ins(modules: list[str]) -> str:
     for name, count in sorted(declared.items()):
         taken = ", ".join(f"double %x{i}" for i in range(count))
         assert name in INTRINSICS, f"the device's library computes {name}"
-        there = f"llvm.{name}.f64"
+        there = f"llvm.{INTRINSICS[name]}.f64"
         lines.append(f"declare double @{there}({', '.join(['double'] * count)})")
         lines.append(f"define double @__nv_{name}({taken}) {{\n %y = call double @{there}({taken})\n ret double %y\n}}")
     return "\n".join(lines) + "\n"

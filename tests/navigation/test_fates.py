@@ -12,6 +12,7 @@ from flownav.navigation import verdicts
 from flownav.navigation.compass import check_compass
 from flownav.navigation.course import FOUND_RAD, LEAST_TRAVEL_M, find_heading
 from flownav.navigation.gps import UNKNOWN_PAD_M, AlongAxis, compare_level, judge_fate
+from flownav.navigation.motion_records import CourseMemory, PushMemory
 from flownav.navigation.offers import note_aid, note_aid_age, note_height
 from flownav.navigation.place import (
     LEFT,
@@ -27,13 +28,11 @@ from flownav.navigation.place import (
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT
 from flownav.navigation.records import (
     AidMemory,
-    CourseMemory,
     FixMemory,
     FlowMemory,
     GpsMemory,
     HeadingMemory,
     PadMemory,
-    PushMemory,
     Reading,
     RejectionMemory,
     StartMemory,

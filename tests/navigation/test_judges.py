@@ -16,6 +16,7 @@ from flownav.navigation.gps import judge_fix, judge_rejections
 from flownav.navigation.heading import heading_variance, magnetic_heading
 from flownav.navigation.height import judge_baro, range_variance, range_verdict, repeats
 from flownav.navigation.inertial import motion_between, said_by, sound
+from flownav.navigation.motion_records import ImuMemory
 from flownav.navigation.place import judge_pad
 from flownav.navigation.reasons import (
     BEFORE_START,
@@ -40,7 +41,6 @@ from flownav.navigation.records import (
     FlowMemory,
     GpsMemory,
     HeadingMemory,
-    ImuMemory,
     Look,
     NoiseMemory,
     RangeMemory,

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from flownav.measurement import Sensor
-from flownav.navigation.records import ImuMemory, Reading, SpikeMemory
+from flownav.navigation.motion_records import ImuMemory, SpikeMemory
+from flownav.navigation.records import Reading
 from flownav.navigation.spikes import (
     BURST_S,
     LONE,

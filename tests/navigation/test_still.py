@@ -9,7 +9,8 @@ import pytest
 
 from flownav.compile import ONE_LANE
 from flownav.navigation.memory import STILL_CLOCK, load_imu_window, load_seen_window, new_work, set_lane, store_reading
-from flownav.navigation.records import ImuWindow, Reading, SeenWindow
+from flownav.navigation.motion_records import ImuWindow, SeenWindow
+from flownav.navigation.records import Reading
 from flownav.navigation.still import (
     CONTACT_M,
     MOVES,

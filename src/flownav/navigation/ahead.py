@@ -11,25 +11,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import ONE_LANE, Lanes, Work, compiled, equation, kernel, pointer
+from flownav.compile import ONE_LANE, compiled, equation, kernel, pointer
 from flownav.estimation.law import Signature
 from flownav.estimation.motion import add_motion_noise, errors_in_motion, strapdown
 from flownav.estimation.named import AccelBias, Attitude, GyroBias, Inertial, PositionNed, VelocityNed
 from flownav.estimation.packed import pack, unpack
 from flownav.estimation.states import (
-    ACCEL_BIAS,
-    GYRO_BIAS,
     PLACES,
-    POSITION,
-    QUATERNION,
     ROWS_BY_NAME,
-    STATE,
     STATES,
-    VELOCITY,
 )
 from flownav.measurement import Array
 from flownav.navigation.inertial import Motion, motion_between, remembered
-from flownav.navigation.memory import CLOCK, load_imu
+from flownav.navigation.memory import CLOCK, MEMORY, load_imu
 from flownav.navigation.packed import load_equipment, load_imu_settings
 
 AHEAD = 13  # position NED [m], velocity NED [m/s], quaternion body to earth, body rate [rad/s]
@@ -58,27 +52,8 @@ class Carried(NamedTuple):
     accel_bias_z: float
 
 
-@equation
-def state_of(work: Work, lanes: Lanes, lane: int) -> Carried:
-    """The filter's own, of one lane."""
-    return Carried(
-        work[(STATE + POSITION) * len(lanes) + lane],
-        work[(STATE + POSITION + 1) * len(lanes) + lane],
-        work[(STATE + POSITION + 2) * len(lanes) + lane],
-        work[(STATE + VELOCITY) * len(lanes) + lane],
-        work[(STATE + VELOCITY + 1) * len(lanes) + lane],
-        work[(STATE + VELOCITY + 2) * len(lanes) + lane],
-        work[QUATERNION * len(lanes) + lane],
-        work[(QUATERNION + 1) * len(lanes) + lane],
-        work[(QUATERNION + 2) * len(lanes) + lane],
-        work[(QUATERNION + 3) * len(lanes) + lane],
-        work[(STATE + GYRO_BIAS) * len(lanes) + lane],
-        work[(STATE + GYRO_BIAS + 1) * len(lanes) + lane],
-        work[(STATE + GYRO_BIAS + 2) * len(lanes) + lane],
-        work[(STATE + ACCEL_BIAS) * len(lanes) + lane],
-        work[(STATE + ACCEL_BIAS + 1) * len(lanes) + lane],
-        work[(STATE + ACCEL_BIAS + 2) * len(lanes) + lane],
-    )
+MEMORY.name(Carried, *(ROWS_BY_NAME[name] for name in Carried._fields))
+state_of, _ = MEMORY.access(Carried)
 
 
 @equation

@@ -14,10 +14,11 @@ from flownav.estimation.states import ATTITUDE, CONSIDERS, FLOW_LAG, GYRO_BIAS, 
 from flownav.frames import Quaternion, conjugate, heading_from_quaternion, quaternion_product, rotation_from_quaternion
 from flownav.navigation.heading import HeadingVerdict, conclude_heading, offered_heading
 from flownav.navigation.memory import LEVEL_READ, MEMORY, share, shared
+from flownav.navigation.motion_records import BridgeMemory, ImuMemory
 from flownav.navigation.offers import conclude, observe_innovation
 from flownav.navigation.packed import load_attitude_settings
 from flownav.navigation.reasons import FUSED, SILENT, usable_in_flight
-from flownav.navigation.records import AidMemory, BridgeMemory, HeadingMemory, ImuMemory, Reading, StartMemory
+from flownav.navigation.records import AidMemory, HeadingMemory, Reading, StartMemory
 from flownav.navigation.tape import Output
 from flownav.navigation.told import FROM_ATTITUDE, AttitudeSettings, Equipment
 from flownav.navigation.verdicts import Attitude, Offer, on_lanes

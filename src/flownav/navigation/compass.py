@@ -16,7 +16,8 @@ from flownav.compile import equation, exp, replacing, smaller
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE
 from flownav.frames import within_half_turn
 from flownav.navigation.course import LEAST_TRAVEL_M, is_velocity, judge_course, turn_between, turn_heading, with_gps
-from flownav.navigation.records import CourseMemory, HeadingMemory, PushMemory, Reading
+from flownav.navigation.motion_records import CourseMemory, PushMemory
+from flownav.navigation.records import HeadingMemory, Reading
 from flownav.navigation.tape import COMPASS_REFUTED
 from flownav.navigation.verdicts import Attitude, Event, Force, Reset, on_lanes
 

@@ -15,8 +15,9 @@ import numpy as np
 from flownav.compile import arctan2, cos, equation, replacing, sin
 from flownav.estimation.states import ATTITUDE
 from flownav.frames import heading_cosine_sine, quaternion_product, rotation_from_quaternion, velocity_from_flow
+from flownav.navigation.motion_records import CourseMemory
 from flownav.navigation.reasons import is_heard
-from flownav.navigation.records import CourseMemory, HeadingMemory, Look, Reading
+from flownav.navigation.records import HeadingMemory, Look, Reading
 from flownav.navigation.tape import HEADING_FOUND
 from flownav.navigation.verdicts import Attitude, Event, Reset, on_lanes
 

@@ -33,13 +33,7 @@ from flownav.navigation.offers import conclude, note_aid
 from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.protection import sign_flow
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT, component_of
-from flownav.navigation.records import (
-    FlowInnovation,
-    FlowMemory,
-    GpsMemory,
-    Look,
-    Reading,
-)
+from flownav.navigation.records import FlowInnovation, FlowMemory, GpsMemory, Look, Reading
 from flownav.navigation.still import watch_flow
 from flownav.navigation.tape import FLOW_DOUBTED, FLOW_TRUSTED, Output
 from flownav.navigation.told import FlowSettings

@@ -13,19 +13,12 @@ from flownav.estimation.laws.still import pad_below
 from flownav.estimation.states import GPS_FAST, GPS_SLOW, GPS_VELOCITY, PAD, POSITION, STATE, VELOCITY
 from flownav.measurement import Sensor
 from flownav.navigation.memory import MEMORY, of_lane
+from flownav.navigation.motion_records import SteadyForce
 from flownav.navigation.offers import conclude, fuse_offered, note_aid, note_height
 from flownav.navigation.packed import load_gps_settings
 from flownav.navigation.protection import sign_drift
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT, component_of, usable
-from flownav.navigation.records import (
-    FixMemory,
-    FlowMemory,
-    GpsMemory,
-    Reading,
-    RejectionMemory,
-    StartMemory,
-    SteadyForce,
-)
+from flownav.navigation.records import FixMemory, FlowMemory, GpsMemory, Reading, RejectionMemory, StartMemory
 from flownav.navigation.tape import GPS_RESET, Output
 from flownav.navigation.told import GpsSettings
 from flownav.navigation.trust import OF_GPS, follow_noise, scale_noise

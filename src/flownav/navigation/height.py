@@ -10,6 +10,7 @@ from flownav.compile import Lanes, Work, cos, equation, procedure, replacing, sm
 from flownav.estimation.hypotheses import RANGE_OFFSET
 from flownav.estimation.laws.height import baro_altitude, range_along_boresight
 from flownav.estimation.states import BARO, GROUND
+from flownav.navigation.motion_records import ImuMemory
 from flownav.navigation.offers import conclude, fuse_offered, note_height, weigh_strays
 from flownav.navigation.packed import load_height_settings
 from flownav.navigation.reasons import (
@@ -27,7 +28,6 @@ from flownav.navigation.records import (
     BaroMemory,
     EchoMemory,
     GroundMemory,
-    ImuMemory,
     NoiseMemory,
     RangeMemory,
     RangingMemory,

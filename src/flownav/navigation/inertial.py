@@ -7,16 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import equation, replacing
-from flownav.navigation.records import (
-    ImuMemory,
-    MotionMemory,
-    MotionStep,
-    OwedMotion,
-    Reading,
-    SpentMotion,
-    StartMemory,
-    SteadyForce,
-)
+from flownav.navigation.motion_records import ImuMemory, MotionMemory, MotionStep, OwedMotion, SpentMotion, SteadyForce
+from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.tape import IMU_LOST
 from flownav.navigation.told import ImuSettings
 from flownav.navigation.trust import AccelFactors

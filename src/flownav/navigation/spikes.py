@@ -15,7 +15,8 @@ from flownav.compile import equation, larger, smaller
 from flownav.estimation.states import ATTITUDE, VELOCITY
 from flownav.navigation.inertial import sound
 from flownav.navigation.memory import MEMORY, READING
-from flownav.navigation.records import ImuMemory, Reading, SpikeMemory, StartMemory
+from flownav.navigation.motion_records import ImuMemory, SpikeMemory
+from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.tape import IMU_SPIKE
 from flownav.navigation.verdicts import Doubt, Event, on_lanes
 

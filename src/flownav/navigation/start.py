@@ -15,19 +15,12 @@ from flownav.measurement import Sensor
 from flownav.navigation.course import with_sought
 from flownav.navigation.lagged_flow import start_lag
 from flownav.navigation.memory import MEMORY
+from flownav.navigation.motion_records import ImuMemory, SteadyForce
 from flownav.navigation.offers import with_aid
 from flownav.navigation.packed import START_SIGMA, load_filter_settings, load_flow_settings
 from flownav.navigation.place import ON_GROUND
 from flownav.navigation.reasons import is_heard
-from flownav.navigation.records import (
-    AidMemory,
-    HeadingMemory,
-    ImuMemory,
-    Reading,
-    ScaleDoubt,
-    StartMemory,
-    SteadyForce,
-)
+from flownav.navigation.records import AidMemory, HeadingMemory, Reading, ScaleDoubt, StartMemory
 from flownav.navigation.tape import START, Output
 from flownav.navigation.told import FROM_MAG, FROM_YAW, NO_HEADING, Equipment
 from flownav.navigation.verdicts import Attitude, Biases, Event, Force, Position, on_lanes

@@ -19,10 +19,11 @@ from flownav.estimation.laws.still import gyro_at_rest, velocity_itself
 from flownav.estimation.states import ACCEL_BIAS, VELOCITY
 from flownav.navigation.inertial import sound
 from flownav.navigation.memory import STILL_CLOCK, share, shared
+from flownav.navigation.motion_records import ImuWindow, SeenWindow, StandMemory
 from flownav.navigation.offers import fuse_offered
 from flownav.navigation.packed import load_place_settings
 from flownav.navigation.reasons import FUSED, SILENT, is_heard
-from flownav.navigation.records import ImuWindow, Look, Reading, SeenWindow, StandMemory, StartMemory
+from flownav.navigation.records import Look, Reading, StartMemory
 from flownav.navigation.tape import STOOD, Output
 from flownav.navigation.told import PlaceSettings
 from flownav.navigation.verdicts import AxisVelocity, Doubt, Event, Offer, on_lanes

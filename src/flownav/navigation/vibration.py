@@ -13,7 +13,8 @@ import numpy as np
 
 from flownav.compile import clamp, equation, larger, replacing, smaller
 from flownav.estimation.states import ACCEL_BIAS, POSITION, VELOCITY
-from flownav.navigation.records import ImuMemory, MotionStep, Reading, StartMemory
+from flownav.navigation.motion_records import ImuMemory, MotionStep
+from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.tape import IMU_DOUBTED
 from flownav.navigation.told import ImuSettings
 from flownav.navigation.trust import AccelFactors

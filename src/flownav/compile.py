@@ -44,7 +44,7 @@ from flownav.compiling.records import Layout, OnLanes, compiled, dressed
 from flownav.compiling.rows import columns_of, gathering, places_of, row_store, row_view, width_of
 from flownav.compiling.runge_kutta import STAGES, runge_kutta
 from flownav.compiling.runner import NoDeviceError, Runner, device_runner
-from flownav.compiling.scalars import bits_from_float, clamp, float_from_bits, larger, magnitude, smaller
+from flownav.compiling.scalars import bits_from_float, clamp, float_from_bits, larger, magnitude, smaller, squared
 from flownav.compiling.strided import WARP, strided
 from flownav.compiling.units import Unit, unit
 
@@ -106,6 +106,7 @@ __all__ = [
     "sine_of_eighth",
     "sinh",
     "smaller",
+    "squared",
     "stepping",
     "strided",
     "unit",

@@ -26,6 +26,12 @@ def smaller(a: float, b: float) -> float:
 
 
 @equation
+def squared(a: float) -> float:
+    """a·a: on a CUDA device a power is computed by a library, to other bits."""
+    return a * a
+
+
+@equation
 def magnitude(a: float) -> float:
     """|a| as an analytic function of a: -a where the real part is negative."""
     return a if a.real >= 0.0 else -a

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import Lanes, Work, equation, exp, procedure
+from flownav.compile import Lanes, Work, equation, exp, procedure, squared
 from flownav.estimation.covariance import add_noise, decay
 from flownav.estimation.states import (
     ACCEL_BIAS,
@@ -69,11 +69,11 @@ def propagate_errors(work: Work, lanes: Lanes, n: int, dt_s: float, settings: Fi
 def propagate_walks(work: Work, lanes: Lanes, dt_s: float, settings: FilterSettings) -> None:
     """Random walks, dt on. They must not lag behind the motion, which reads the biases."""
     for axis in range(3):
-        add_noise(work, lanes, GYRO_BIAS + axis, settings.gyro_walk_rad_s_rt_s**2 * dt_s)
-        add_noise(work, lanes, ACCEL_BIAS + axis, settings.accel_walk_m_s2_rt_s**2 * dt_s)
-        add_noise(work, lanes, PAD + axis, settings.pad_walk_m_rt_s**2 * dt_s)
-    add_noise(work, lanes, GROUND, settings.ground_walk_m_rt_s**2 * dt_s)
-    add_noise(work, lanes, BARO, settings.baro_walk_m_rt_s**2 * dt_s)
+        add_noise(work, lanes, GYRO_BIAS + axis, squared(settings.gyro_walk_rad_s_rt_s) * dt_s)
+        add_noise(work, lanes, ACCEL_BIAS + axis, squared(settings.accel_walk_m_s2_rt_s) * dt_s)
+        add_noise(work, lanes, PAD + axis, squared(settings.pad_walk_m_rt_s) * dt_s)
+    add_noise(work, lanes, GROUND, squared(settings.ground_walk_m_rt_s) * dt_s)
+    add_noise(work, lanes, BARO, squared(settings.baro_walk_m_rt_s) * dt_s)
 
 
 @procedure

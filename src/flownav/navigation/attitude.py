@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure, replacing
+from flownav.compile import Lanes, Work, equation, procedure, replacing, squared
 from flownav.estimation.covariance import consider, consider_none, variance_of
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, level
 from flownav.estimation.laws.geometry import component
@@ -65,7 +65,9 @@ AIDED = MEMORY.row(AidMemory, "aided")
 @equation
 def read_attitude(reading: Reading, started: float) -> tuple[bool, Quaternion]:
     """Whether a quaternion that was read is one, and may be taken; and it, of unit length."""
-    size = np.sqrt(reading.value_0**2 + reading.value_1**2 + reading.value_2**2 + reading.value_3**2)
+    size = np.sqrt(
+        squared(reading.value_0) + squared(reading.value_1) + squared(reading.value_2) + squared(reading.value_3)
+    )
     sound = usable_in_flight(reading, size, 0.0, started) == FUSED and size > 0.5 and size < 2.0
     return sound, (reading.value_0 / size, reading.value_1 / size, reading.value_2 / size, reading.value_3 / size)
 
@@ -193,7 +195,7 @@ def judge_bridged(reading: Reading, start: StartMemory, imu: ImuMemory, m: Bridg
     back = conjugate((m.read_w, m.read_x, m.read_y, m.read_z))
     turned = quaternion_product((m.own_w, m.own_x, m.own_y, m.own_z), quaternion_product(back, read))
     before = component((m.variance_n, m.variance_e, m.variance_d), axis)
-    return offered_attitude(turned, before + BRIDGE_SIGMA_RAD**2, crosses)
+    return offered_attitude(turned, before + squared(BRIDGE_SIGMA_RAD), crosses)
 
 
 @on_lanes

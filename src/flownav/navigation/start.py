@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, arctan2, equation, procedure, replacing
+from flownav.compile import Lanes, Work, arctan2, equation, procedure, replacing, squared
 from flownav.estimation.covariance import begin_lane, lagged, set_variance, states_of
 from flownav.estimation.hypotheses import COUNT, begin_lane_anew
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, POSITION, RATE, VELOCITY
@@ -94,7 +94,7 @@ def runs(m: StartMemory) -> bool:
 def note_attitude(reading: Reading, m: StartMemory, *, t_s: float) -> StartMemory:
     """The latest attitude before the start, of unit length."""
     w, x, y, z = reading.value_0, reading.value_1, reading.value_2, reading.value_3
-    size = np.sqrt(w**2 + x**2 + y**2 + z**2)
+    size = np.sqrt(squared(w) + squared(x) + squared(y) + squared(z))
     noted = m.started == 0.0 and reading.arrived > 0.0 and size > 0.5 and size < 2.0
     after = with_attitude(m, attitude_s=t_s, qw=w / size, qx=x / size, qy=y / size, qz=z / size)
     return after if noted else m
@@ -223,8 +223,8 @@ def start_lanes(
     begins = starts(reading, m, t_s, sensor, fitted.deadline_s)
     at_fix = has_fix(reading, sensor)
     read, lost = bool(np.isfinite(m.attitude_s)), bool(np.isfinite(fitted.deadline_s))
-    doubt_m_s2 = np.sqrt(bias_sigma**2 + m.shaken)
-    believed = STANDING_TILT_RAD**2 / (STANDING_TILT_RAD**2 + (doubt_m_s2 / GRAVITY_M_S2) ** 2)
+    doubt_m_s2 = np.sqrt(squared(bias_sigma) + m.shaken)
+    believed = squared(STANDING_TILT_RAD) / (squared(STANDING_TILT_RAD) + squared(doubt_m_s2 / GRAVITY_M_S2))
     w, x, y, z = (m.qw, m.qx, m.qy, m.qz) if read else level(m, believed, heading.field_rad, fitted)
     rotation = rotation_from_quaternion(w, x, y, z)
     levels = not read and m.readings >= LEAST_LEVELLING

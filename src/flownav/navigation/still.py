@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, larger, procedure, replacing, smaller
+from flownav.compile import Lanes, Work, equation, larger, procedure, replacing, smaller, squared
 from flownav.estimation.covariance import consider_none
 from flownav.estimation.laws.geometry import component
 from flownav.estimation.laws.still import gyro_at_rest, velocity_itself
@@ -78,7 +78,7 @@ def spreads(m: ImuWindow) -> tuple[float, float]:
     """Rms of the turning [rad/s] and of the specific force [m/s2] about their means over a window, all axes."""
     n = larger(m.readings, 1.0)
     gyro = turning_of(m, 0)[1] + turning_of(m, 1)[1] + turning_of(m, 2)[1]
-    accel = m.accel_square / n - (m.sum_x**2 + m.sum_y**2 + m.sum_z**2) / (n * n)
+    accel = m.accel_square / n - (squared(m.sum_x) + squared(m.sum_y) + squared(m.sum_z)) / (n * n)
     return np.sqrt(gyro), np.sqrt(larger(accel, 0.0))
 
 
@@ -95,14 +95,14 @@ def judge_standing(gyro: ImuWindow, seen: SeenWindow, contact_m: float) -> float
     contact_m: the range when it rested before; NaN where that is not known.
     """
     turning, shaking = spreads(gyro)
-    turn = np.sqrt(turning_of(gyro, 0)[0] ** 2 + turning_of(gyro, 1)[0] ** 2 + turning_of(gyro, 2)[0] ** 2)
+    turn = np.sqrt(squared(turning_of(gyro, 0)[0]) + squared(turning_of(gyro, 1)[0]) + squared(turning_of(gyro, 2)[0]))
     left = 3.0 * turning / np.sqrt(larger(gyro.readings, 1.0))  # of shaking in a mean, at most
     enough = gyro.readings >= LEAST_READINGS and turn < RESTING_TURN_RAD_S + left
     ranged = seen.range_high_m >= 0.0
     touching = seen.range_high_m <= larger(CONTACT_M, contact_m + STEADY_RANGE_M if np.isfinite(contact_m) else 0.0)
     steady = seen.range_high_m - seen.range_low_m <= STEADY_RANGE_M
     flows = larger(seen.flows, 1.0)
-    flow_m_s = np.sqrt(seen.flow_u_m_s**2 + seen.flow_v_m_s**2) / flows
+    flow_m_s = np.sqrt(squared(seen.flow_u_m_s) + squared(seen.flow_v_m_s)) / flows
     unmoved = seen.gps_m_s < RESTING_GPS_M_S
     quiet = turning < QUIET_GYRO_RAD_S and shaking < QUIET_ACCEL_M_S2
     rests = enough and quiet and unmoved and flow_m_s < RESTING_FLOW_M_S and ((touching and steady) or not ranged)
@@ -140,7 +140,7 @@ def watch_range(reading: Reading, m: SeenWindow) -> SeenWindow:
 @on_lanes
 def watch_gps_velocity(reading: Reading, m: SeenWindow) -> SeenWindow:
     """The fastest level velocity of a receiver stays in the window."""
-    speed_m_s = np.sqrt(reading.value_0**2 + reading.value_1**2)
+    speed_m_s = np.sqrt(squared(reading.value_0) + squared(reading.value_1))
     told = is_heard(reading) and np.isfinite(speed_m_s)
     return with_gps(m, gps_m_s=larger(m.gps_m_s, speed_m_s)) if told else m
 
@@ -209,7 +209,7 @@ def offer_rest(
     square = velocity.speed_m_s * velocity.speed_m_s
     beyond = square > 0.5 * s.gate_sigma * s.gate_sigma * (velocity.variance + sigma * sigma)
     freed = stands and m.does == RESTS and beyond
-    accel = (velocity.speed_m_s / WINDOW_S) ** 2 if freed else 0.0
+    accel = squared(velocity.speed_m_s / WINDOW_S) if freed else 0.0
     return Rest(
         Doubt(VELOCITY + axis, square if freed else 0.0),
         (Doubt(ACCEL_BIAS, accel), Doubt(ACCEL_BIAS + 1, accel), Doubt(ACCEL_BIAS + 2, accel)),

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger, smaller
+from flownav.compile import clamp, equation, larger, smaller, squared
 from flownav.frames import Vector
 from flownav.vehicle.airframe import Wrench
 from flownav.vehicle.around import Around
@@ -100,7 +100,7 @@ def with_friction(free: Wrench, feet: Support, velocity: Vector, rates: Vector, 
     need_x = stop_x * (1.0 / (per_mass + z * z * per_jy))
     need_y = stop_y * (1.0 / (per_mass + z * z * per_jx))
     limit = vehicle.skid_friction_coefficient * feet.normal_n
-    arm = np.sqrt(vehicle.skid_half_length_m**2 + vehicle.skid_half_track_m**2)
+    arm = np.sqrt(squared(vehicle.skid_half_length_m) + squared(vehicle.skid_half_track_m))
     x, y = clamp(need_x, -limit, limit), clamp(need_y, -limit, limit)
     torque = clamp(free.n + r * (vehicle.inertia_zz_kg_m2 * per_time), -limit * arm, limit * arm)
     return Wrench(free.x - x, free.y - y, free.z, free.l + z * y, free.m - z * x, free.n - torque)

@@ -10,11 +10,12 @@ import pytest
 
 from flownav.estimation.states import BARO
 from flownav.navigation.attitude import read_attitude
+from flownav.navigation.baro import judge_baro
 from flownav.navigation.flow_judge import judge_look, turning_of
 from flownav.navigation.flow_noise import alike, flow_variance, followed_agreement, lasting_doubt, wrong_since
 from flownav.navigation.gps import judge_fix, judge_rejections
 from flownav.navigation.heading import heading_variance, magnetic_heading
-from flownav.navigation.height import judge_baro, range_variance, range_verdict, repeats
+from flownav.navigation.height import range_variance, range_verdict, repeats
 from flownav.navigation.inertial import motion_between, said_by, sound
 from flownav.navigation.motion_records import ImuMemory
 from flownav.navigation.place import judge_pad

@@ -1,4 +1,4 @@
-"""Height readings: the rangefinder over ground whose level is a state, and the barometer with its offset."""
+"""Ranges: height over ground whose level is a state."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import numpy as np
 
 from flownav.compile import Lanes, Work, cos, equation, procedure, replacing, smaller
 from flownav.estimation.hypotheses import RANGE_OFFSET
-from flownav.estimation.laws.height import baro_altitude, range_along_boresight
-from flownav.estimation.states import BARO, GROUND
+from flownav.estimation.laws.height import range_along_boresight
+from flownav.estimation.states import GROUND
 from flownav.navigation.motion_records import ImuMemory
-from flownav.navigation.offers import conclude, fuse_offered, note_height, weigh_strays
+from flownav.navigation.offers import conclude, fuse_offered, weigh_strays
 from flownav.navigation.packed import load_height_settings
 from flownav.navigation.reasons import (
     DATUM,
@@ -25,7 +25,6 @@ from flownav.navigation.reasons import (
 )
 from flownav.navigation.records import (
     AidMemory,
-    BaroMemory,
     EchoMemory,
     GroundMemory,
     NoiseMemory,
@@ -34,9 +33,9 @@ from flownav.navigation.records import (
     Reading,
     StartMemory,
 )
-from flownav.navigation.tape import BARO_FOUND, GROUND_FOUND, GROUND_RESET, RANGE_STUCK, Output
+from flownav.navigation.tape import GROUND_FOUND, GROUND_RESET, RANGE_STUCK, Output
 from flownav.navigation.told import HeightSettings
-from flownav.navigation.trust import OF_BARO, OF_RANGE, follow_noise, watch_whiteness
+from flownav.navigation.trust import OF_RANGE, follow_noise, watch_whiteness
 from flownav.navigation.verdicts import (
     NO_EVENT,
     NO_RESET,
@@ -45,7 +44,6 @@ from flownav.navigation.verdicts import (
     Fate,
     Height,
     Offer,
-    Position,
     Reset,
     Sign,
     Tested,
@@ -296,42 +294,3 @@ def take_range(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Ou
     if judge_refusal(work, lanes, t_s, s, o):  # the ground was found anew: the reading that said so is fused
         range_along_boresight(work, lanes, 0, s.range_below_m, s.range_forward_m, s.range_right_m)
         fuse_offered(work, lanes, s.gate_sigma, o)
-
-
-# -- the barometer's way ----------------------------------------------------------------------------------------
-class BaroVerdict(NamedTuple):
-    """What becomes of a pressure height."""
-
-    baro: BaroMemory
-    reset: Reset
-    found: Event
-    offer: Offer
-
-
-@on_lanes
-def judge_baro(
-    reading: Reading, start: StartMemory, position: Position, m: BaroMemory, noise: NoiseMemory, *, s: HeightSettings
-) -> BaroVerdict:
-    """Height from pressure [m]; the first reading finds the offset."""
-    stated = reading.variance_0
-    variance = stated if np.isfinite(stated) else s.baro_sigma_m * s.baro_sigma_m
-    reason = usable_in_flight(reading, reading.value_0, variance, start.started)
-    first = reason == FUSED and m.known == 0.0
-    offset_m = reading.value_0 + position.down_m
-    return BaroVerdict(
-        BaroMemory(1.0 if first else m.known),
-        Reset(BARO if first else -1, offset_m, UNKNOWN_M * UNKNOWN_M),
-        Event(BARO_FOUND if first else -1, offset_m),
-        Offer(reading.value_0, variance * noise.factor, reason),
-    )
-
-
-@procedure
-def take_baro(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
-    """Height from pressure."""
-    s = load_height_settings(p)
-    judge_baro(work, lanes, t_s, s, OF_BARO, o)
-    baro_altitude(work, lanes, 0)
-    conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
-    follow_noise(work, lanes, t_s, OF_BARO, s.gate_sigma)
-    note_height(work, lanes, t_s)

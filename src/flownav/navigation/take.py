@@ -18,12 +18,13 @@ from flownav.estimation.motion import hold_still, predict
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, STATES, VELOCITY
 from flownav.measurement import Sensor
 from flownav.navigation.attitude import take_attitude
+from flownav.navigation.baro import take_baro
 from flownav.navigation.compass import check_compass, note_push
 from flownav.navigation.course import find_heading, note_flow_course, seeks
 from flownav.navigation.flow import take_flow
 from flownav.navigation.gps import take_gps
 from flownav.navigation.heading import take_mag, take_yaw
-from flownav.navigation.height import take_baro, take_range
+from flownav.navigation.height import take_range
 from flownav.navigation.inertial import judge_motion, keep_imu, steady_force
 from flownav.navigation.journal import note_decay, note_estimate, note_prediction, reset_state
 from flownav.navigation.lagged_flow import flow_lag

@@ -1,0 +1,59 @@
+"""Pressure heights: the barometer with its offset, which the first reading finds."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.compile import Lanes, Work, procedure
+from flownav.estimation.laws.height import baro_altitude
+from flownav.estimation.states import BARO
+from flownav.navigation.offers import conclude, note_height
+from flownav.navigation.packed import load_height_settings
+from flownav.navigation.reasons import FUSED, usable_in_flight
+from flownav.navigation.records import BaroMemory, NoiseMemory, Reading, StartMemory
+from flownav.navigation.tape import BARO_FOUND, Output
+from flownav.navigation.told import HeightSettings
+from flownav.navigation.trust import OF_BARO, follow_noise
+from flownav.navigation.verdicts import Event, Offer, Position, Reset, on_lanes
+
+UNKNOWN_M = 100.0
+
+
+class BaroVerdict(NamedTuple):
+    """What becomes of a pressure height."""
+
+    baro: BaroMemory
+    reset: Reset
+    found: Event
+    offer: Offer
+
+
+@on_lanes
+def judge_baro(
+    reading: Reading, start: StartMemory, position: Position, m: BaroMemory, noise: NoiseMemory, *, s: HeightSettings
+) -> BaroVerdict:
+    """Height from pressure [m]; the first reading finds the offset."""
+    stated = reading.variance_0
+    variance = stated if np.isfinite(stated) else s.baro_sigma_m * s.baro_sigma_m
+    reason = usable_in_flight(reading, reading.value_0, variance, start.started)
+    first = reason == FUSED and m.known == 0.0
+    offset_m = reading.value_0 + position.down_m
+    return BaroVerdict(
+        BaroMemory(1.0 if first else m.known),
+        Reset(BARO if first else -1, offset_m, UNKNOWN_M * UNKNOWN_M),
+        Event(BARO_FOUND if first else -1, offset_m),
+        Offer(reading.value_0, variance * noise.factor, reason),
+    )
+
+
+@procedure
+def take_baro(work: Work, lanes: Lanes, t_s: float, sensor: int, p: Work, o: Output) -> None:
+    """Height from pressure."""
+    s = load_height_settings(p)
+    judge_baro(work, lanes, t_s, s, OF_BARO, o)
+    baro_altitude(work, lanes, 0)
+    conclude(work, lanes, t_s, sensor, 0, s.gate_sigma, o)
+    follow_noise(work, lanes, t_s, OF_BARO, s.gate_sigma)
+    note_height(work, lanes, t_s)

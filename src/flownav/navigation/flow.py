@@ -75,28 +75,22 @@ def offer_component(
     angular: bool,
     s: FlowSettings,
 ) -> FlowOffer:
-    """One component without turning and gain error, with its variance. A down velocity that no sensor has is NaN.
-
-    All that is said of the noise is said of what the sensor reports: the sensor file's law, which is of the residuals
-    about gain times velocity, the settings, and a variance that a reading states. So the gain is taken off both.
-    """
+    """One component without turning and gain error, with its variance. A down velocity that no sensor has is NaN."""
     raw, listed = component_of(reading, component)
     turning = look.turning_x if component == 0 else look.turning_y
     along_x = component == (1 if angular else 0)  # flow_y shows the speed forward
     gain = s.flow_gain_x if along_x else (1.0 if component == 2 else s.flow_gain_y)
-    reported = (raw - turning) if angular else raw
-    observation = reported / gain
-    speed = reported * look.range_m if angular else reported
+    observation = ((raw - turning) if angular else raw) / gain
+    speed = observation * look.range_m if angular else observation
     per_speed = 1.0 / (look.range_m * look.range_m) if angular else 1.0
     stated = np.nan if angular else listed
     noise = m.excess * flow_variance(look.range_m, speed, reading.quality, angular, s)
     model = per_speed * (noise + blind_variance(look.range_m, reading.quality, m.usual, t_s - m.taken_s, s))
-    variance = (stated if np.isfinite(stated) else model) / (gain * gain)
     absent = component == 2 and not np.isfinite(raw)
     # the law has the gyro's bias, which the turning does not
     left = gyro_share(reading) * (biases.gyro_x if component == 0 else biases.gyro_y) if angular else 0.0
     return FlowOffer(
-        Offer(observation, variance, SILENT if absent else int(look.reason)),
+        Offer(observation, stated if np.isfinite(stated) else model, SILENT if absent else int(look.reason)),
         Measured(observation - left),
     )
 

@@ -35,9 +35,7 @@ class GpsSettings(NamedTuple):
 
 
 class FlowNoise(NamedTuple):
-    """A sensor file's noise against height [m/s], of what the sensor reports: `sensors.flow.flow_noise_sigma`'s
-    polynomial; used where `stated`.
-    """
+    """A sensor file's noise against height [m/s]: `sensors.flow.flow_noise_sigma`'s polynomial; used where `stated`."""
 
     stated: float
     noise_low_m: float

@@ -124,7 +124,7 @@ def test_a_jump_of_gps_is_noticed_and_the_pad_stays_where_flow_has_it(rows):
 
 def test_flow_of_the_wrong_sign_is_told_and_does_not_carry_the_vehicle_off_for_good(rows):
     row = rows["flow_sign", 20.0]
-    assert row["said"]["flights"] >= 15  # one of the sixteen errs by 2 m at most, which tells nobody
+    assert row["said"]["flights"] == 16
     assert row["largest_error_m"] < 25.0  # 84 m where a refused GPS velocity had to wait for 7 s
     assert row["landed"] + row["went_around"] + row["crashed"] == 16
 

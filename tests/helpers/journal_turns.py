@@ -36,29 +36,32 @@ class NoThread:
 class Turns:
     """A recorder made while it lasts writes each WRITE_S of the flight, and when it ends."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.now_s, self.stopped = START_S, False
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, start_s: float = START_S) -> None:
+        self.now_s, self.stopped = start_s, False
+        self._writer: Any = None
 
         def thread(target: Any, **named: object) -> NoThread:
+            self._writer, self.stopped = target.__self__, False
             return NoThread(self, target)
 
         monkeypatch.setattr(writing, "threading", SimpleNamespace(Thread=thread, Event=threading.Event))
         monkeypatch.setattr(writing, "time", SimpleNamespace(monotonic=lambda: self.now_s))
 
-    def fly(self, wire: Wire, recorder: Recorder, seconds: float) -> Wire:
+    def fly(self, wire: Wire, seconds: float) -> Wire:
         """The vehicle talks for so long, and the writer has its turns."""
 
-        def turn() -> None:
-            if not self.stopped and wire.now_s - self.now_s >= writing.WRITE_S:
-                self.now_s = wire.now_s
-                self.stopped = recorder._writer.turn(self.now_s)
+        return wire.fly(seconds, beside=lambda: self.until(wire.now_s))
 
-        return wire.fly(seconds, beside=turn)
+    def until(self, now_s: float) -> None:
+        """The writer has its turn where one is due by an instant."""
+        if self._writer is not None and not self.stopped and now_s - self.now_s >= writing.WRITE_S:
+            self.now_s = now_s
+            self.stopped = self._writer.turn(now_s)
 
     def killed(self, record: Any, seconds: float) -> Any:
         """The journal of a flight that was killed, as it lies there."""
         recorder = Recorder(record, Options())
-        self.fly(Wire(Hover(), Options(), recorder), recorder, seconds).close()
+        self.fly(Wire(Hover(), Options(), recorder), seconds).close()
         recorder.leave()
         return recorder.journal
 

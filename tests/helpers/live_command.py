@@ -13,6 +13,7 @@ from typer.testing import CliRunner, Result
 from flownav.cli import app
 from flownav.cli import live as command
 from flownav.live import link, loop, priority
+from journal_turns import Turns
 from live_ends import STEP_S, Hover
 from virtual_link import UNIX_S, Clock, VirtualLink
 
@@ -40,7 +41,13 @@ def run_live(
     """The command's result. vehicle: None where nobody speaks; planned: what happens at `at_5` s."""
     clock = Clock()
     happens = {float(name.removeprefix("at_")): what for name, what in planned.items()}
-    told = Told(vehicle, happens) if vehicle is not None else (lambda now_s: [])
+    frames = Told(vehicle, happens) if vehicle is not None else (lambda now_s: [])
+    turns = Turns(patched, clock.now_s)
+
+    def told(now_s: float) -> list[bytes]:
+        turns.until(now_s)
+        return frames(now_s)
+
     patched.setattr(command, "time", SimpleNamespace(monotonic=clock, time=lambda: UNIX_S))
     patched.setattr(link, "open_link", lambda url: VirtualLink(clock, told))
     patched.setattr(loop, "run_session", partial(loop.run_session, clock=clock))

@@ -112,9 +112,9 @@ def test_a_damaged_block_in_the_middle_is_said_and_the_rest_is_kept(journal):
 def test_rows_of_a_navigator_that_is_lost_are_left_out(tmp_path, turns):
     recorder = Recorder(tmp_path / "restart.fnr", Options())
     wire = Wire(Hover(), Options(), recorder)
-    turns.fly(wire, recorder, 4.0)
+    turns.fly(wire, 4.0)
     wire.vehicle.boot_s = 1.0 - wire.t_s  # it reboots
-    turns.fly(wire, recorder, 4.0)
+    turns.fly(wire, 4.0)
     recorder.leave()
     wire.close()
     data = recorder.journal.read_bytes()
@@ -218,7 +218,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_session(tmp_path, turns, mon
     said = []
     recorder = Recorder(tmp_path / "flight.fnr", Options(), failed=said.append)
     wire = Wire(Hover(), Options(), recorder)
-    turns.fly(wire, recorder, 4.0)
+    turns.fly(wire, 4.0)
     before = wire.session.sent
     assert recorder.reason
     wire.fly(2.0)

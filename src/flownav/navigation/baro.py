@@ -16,9 +16,7 @@ from flownav.navigation.records import BaroMemory, NoiseMemory, Reading, StartMe
 from flownav.navigation.tape import BARO_FOUND, Output
 from flownav.navigation.told import HeightSettings
 from flownav.navigation.trust import OF_BARO, follow_noise
-from flownav.navigation.verdicts import Event, Offer, Position, Reset, on_lanes
-
-UNKNOWN_M = 100.0
+from flownav.navigation.verdicts import UNKNOWN_M, Event, Offer, Position, Reset, on_lanes
 
 
 class BaroVerdict(NamedTuple):

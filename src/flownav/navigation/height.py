@@ -39,6 +39,7 @@ from flownav.navigation.trust import OF_RANGE, follow_noise, watch_whiteness
 from flownav.navigation.verdicts import (
     NO_EVENT,
     NO_RESET,
+    UNKNOWN_M,
     Doubt,
     Event,
     Fate,
@@ -51,7 +52,6 @@ from flownav.navigation.verdicts import (
 )
 from flownav.navigation.vibration import doubted_imu
 
-UNKNOWN_M = 100.0
 DOUBTING_S = 0.05  # a range that alone tells the height and is refused so long is believed, not the accelerometer
 AGREEMENT_M, AGREEMENT_SHARE = 0.2, 0.05  # ranges of one ground agree so far
 LEAST_AGREEING = 3.0

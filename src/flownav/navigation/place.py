@@ -26,11 +26,10 @@ from flownav.navigation.reasons import (
 from flownav.navigation.records import AidMemory, PadMemory, Reading, StartMemory
 from flownav.navigation.tape import PAD_FOUND, Output
 from flownav.navigation.told import PlaceSettings
-from flownav.navigation.verdicts import Attitude, Event, Fate, Offer, Position, Reset, on_lanes
+from flownav.navigation.verdicts import UNKNOWN_M, Attitude, Event, Fate, Offer, Position, Reset, on_lanes
 
 LEAST_PAD_DISTANCE_M = 0.05
 MANY_STRAYS = 6.0  # refused components of fixes, no whole fix fused between
-UNKNOWN_M = 100.0
 ON_GROUND = 0.5
 STANDING_SIGMA_M = 0.005
 CARRIED_M = 0.1

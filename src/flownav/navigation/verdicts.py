@@ -223,6 +223,8 @@ class Doubt(NamedTuple):
     variance: float
 
 
+UNKNOWN_M = 100.0  # the doubt of a ground, an origin or a pad that is about to be found
+
 NO_EVENT = Event(-1, 0.0)
 NO_RESET = Reset(-1, 0.0, 0.0)
 

@@ -7,22 +7,13 @@ from typing import NamedTuple
 from flownav.compile import Lanes, Layout, Work, equation
 from flownav.estimation.covariance import covariance_of, variance_of
 from flownav.estimation.motion import rotation_of
-from flownav.estimation.states import GROUND, PAD, POSITION, QUATERNION, STATE
+from flownav.estimation.states import GROUND, PAD, POSITION, STATE
 from flownav.navigation.memory import MEMORY, PAD_KNOWN
 from flownav.navigation.rows import body_velocity_variance
-from flownav.navigation.verdicts import Position, Velocity
+from flownav.navigation.verdicts import Attitude, Position, Velocity
 from flownav.simulation.layout import PLANT
 
 __all__ = ["Attitude", "GroundSaid", "PadSaid", "PadVariance", "Position", "StatedVariance", "Velocity"]
-
-
-class Attitude(NamedTuple):
-    """The filter's attitude, body to earth."""
-
-    w: float
-    x: float
-    y: float
-    z: float
 
 
 class PadSaid(NamedTuple):
@@ -89,7 +80,6 @@ def of_pad(nav: Work, lanes: Lanes, axis: int, lane: int) -> float:
 
 
 _NAVIGATOR = Layout(below=MEMORY)
-_NAVIGATOR.name(Attitude, *range(QUATERNION, QUATERNION + 4))
 _NAVIGATOR.name(PadSaid, PAD_KNOWN, STATE + PAD, STATE + PAD + 1)
 _NAVIGATOR.name(GroundSaid, STATE + GROUND)
 _NAVIGATOR.derive(StatedVariance, stated_variance)

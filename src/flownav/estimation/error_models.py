@@ -79,22 +79,23 @@ def propagate_walks(work: Work, lanes: Lanes, dt_s: float, settings: FilterSetti
 @procedure
 def propagate_gauss_markov(work: Work, lanes: Lanes, n: int, dt_s: float, settings: FilterSettings) -> None:
     """Gauss-Markov errors, dt on."""
+    slowly, fast = exp(-dt_s / settings.gps_slow_tau_s), exp(-dt_s / settings.gps_fast_tau_s)
+    speed = exp(-dt_s / settings.gps_velocity_tau_s)
+    tilt, heading = exp(-dt_s / settings.ins_tilt_tau_s), exp(-dt_s / settings.ins_heading_tau_s)
     for axis in range(3):
         down = axis == 2
-        slow = settings.gps_slow_sigma_down_m if down else settings.gps_slow_sigma_m
-        fast = settings.gps_fast_sigma_down_m if down else settings.gps_fast_sigma_m
-        turn = settings.ins_heading_sigma_rad if down else settings.ins_tilt_sigma_rad
-        turn_tau_s = settings.ins_heading_tau_s if down else settings.ins_tilt_tau_s
-        forget_slowly(work, lanes, n, GPS_SLOW + axis, slow, settings.gps_slow_tau_s, dt_s)
-        forget_slowly(work, lanes, n, GPS_FAST + axis, fast, settings.gps_fast_tau_s, dt_s)
-        speed = settings.gps_velocity_sigma_down_m_s if down else settings.gps_velocity_sigma_m_s
-        forget_slowly(work, lanes, n, GPS_VELOCITY + axis, speed, settings.gps_velocity_tau_s, dt_s)
-        forget_slowly(work, lanes, n, INS_ERROR + axis, turn, turn_tau_s, dt_s)
+        sigma = settings.gps_slow_sigma_down_m if down else settings.gps_slow_sigma_m
+        forget(work, lanes, n, GPS_SLOW + axis, sigma, slowly)
+        sigma = settings.gps_fast_sigma_down_m if down else settings.gps_fast_sigma_m
+        forget(work, lanes, n, GPS_FAST + axis, sigma, fast)
+        sigma = settings.gps_velocity_sigma_down_m_s if down else settings.gps_velocity_sigma_m_s
+        forget(work, lanes, n, GPS_VELOCITY + axis, sigma, speed)
+        sigma = settings.ins_heading_sigma_rad if down else settings.ins_tilt_sigma_rad
+        forget(work, lanes, n, INS_ERROR + axis, sigma, heading if down else tilt)
 
 
 @equation
-def forget_slowly(work: Work, lanes: Lanes, n: int, state: int, sigma: float, tau_s: float, dt_s: float) -> None:
-    """x <- exp(-dt/tau) x, with the noise that keeps its standard deviation at sigma."""
-    factor = exp(-dt_s / tau_s)
+def forget(work: Work, lanes: Lanes, n: int, state: int, sigma: float, factor: float) -> None:
+    """x <- factor x, factor = exp(-dt/tau), with the noise that keeps its standard deviation at sigma."""
     decay(work, lanes, n, state, factor)
     add_noise(work, lanes, state, sigma * sigma * (1.0 - factor * factor))

@@ -78,6 +78,7 @@ class Tree:
 
 
 def main() -> None:
+    """The command."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("other", type=Path, nargs="?", default=HERE, help="the other tree's src folder")
     parser.add_argument("--rounds", type=int, default=6, help="how often the processes are started")

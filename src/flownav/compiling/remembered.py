@@ -6,12 +6,12 @@ All of this is only in force inside `remembering()`, and changes no result.
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from functools import cache
-from typing import Any
+from typing import Any, cast
 
-from numba.core import base, errors, event, ir, types
+from numba.core import base, errors, event, ir, targetconfig, types
 from numba.core.runtime.context import NRTContext
 
 OPERATORS = frozenset(function for function in vars(operator).values() if callable(function))
@@ -90,6 +90,18 @@ def _is_counted(models: Any, kind: Any) -> bool:
     return bool(models[kind].contains_nrt_meminfo())
 
 
+def _option_values(self: Any) -> dict[str, Any]:
+    """The compiler's options, which Numba compares and hashes at every lookup, property by property."""
+    values: dict[str, Any] = _defaults(cast(Hashable, type(self))) | self._values
+    return values
+
+
+@cache
+def _defaults(config: Hashable) -> dict[str, Any]:
+    options: dict[str, Any] = vars(config)["options"]
+    return {name: option.default for name, option in options.items()}
+
+
 def _no_timer(*_: Any) -> Any:
     """Numba times its locks at every call of LLVM, for a note on each kernel that nobody reads."""
     return nullcontext()
@@ -104,4 +116,5 @@ PATCHES: tuple[tuple[Any, str, Any], ...] = (
     (ir.Inst, "_rec_list_vars", _variables),
     (NRTContext, "get_meminfos", _counted_parts),
     (event, "install_timer", _no_timer),
+    (targetconfig.TargetConfig, "values", _option_values),
 )

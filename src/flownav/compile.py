@@ -41,7 +41,7 @@ from flownav.compiling.engine import LANES_WIDE, equation, kernel, procedure
 from flownav.compiling.pointers import invoke, pointer
 from flownav.compiling.progress import announce_compilation
 from flownav.compiling.records import Layout, OnLanes, compiled, dressed
-from flownav.compiling.rows import columns_of, gathering, places_of, row_store, row_view, width_of
+from flownav.compiling.rows import columns_of, gathering, places_of, row_of, row_store, row_view, width_of
 from flownav.compiling.runge_kutta import STAGES, runge_kutta
 from flownav.compiling.runner import NoDeviceError, Runner, device_runner
 from flownav.compiling.scalars import bits_from_float, clamp, float_from_bits, larger, magnitude, smaller, squared
@@ -99,6 +99,7 @@ __all__ = [
     "pointer",
     "procedure",
     "replacing",
+    "row_of",
     "row_store",
     "row_view",
     "runge_kutta",

@@ -67,6 +67,13 @@ def row_view(record: type) -> Callable[[NDArray[np.float64]], Any]:
     return equation(write_function("view", f"def view(row):\n    return record({parts})\n", {"record": record}))
 
 
+@equation
+def row_of(work: Any, lanes: tuple[int, ...], row: int, lane: int) -> float:
+    """What stands in a row of a lane."""
+    value: float = work[row * len(lanes) + lane]
+    return value
+
+
 def gathering(one: Callable[..., Any], indices: range) -> Callable[..., tuple[Any, ...]]:
     """`gathered(work, lanes, lane)`: the tuple of one(work, lanes, index, lane), index by index."""
     each = "".join(f"one(work, lanes, {index}, lane), " for index in indices)

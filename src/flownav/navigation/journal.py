@@ -5,7 +5,7 @@ A journal of no rows is written nowhere and only counts; that is what a run with
 
 from __future__ import annotations
 
-from flownav.compile import ONE_LANE, Lanes, Work, gathering, procedure
+from flownav.compile import ONE_LANE, Lanes, Work, gathering, procedure, row_of
 from flownav.estimation.covariance import covariance_of, forget_lane, states_of
 from flownav.estimation.states import (
     ACCEPTED,
@@ -37,7 +37,6 @@ from flownav.navigation.entries import (
     store_prediction,
     store_reset,
 )
-from flownav.navigation.rows import row_of
 from flownav.navigation.tape import ENTRIES, NOTES, Output
 
 NO_STATES = (0.0,) * STATES

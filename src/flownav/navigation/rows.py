@@ -9,7 +9,7 @@ from typing import Annotated, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, columns_of, equation, gathering, row_store, width_of
+from flownav.compile import Lanes, Work, columns_of, equation, gathering, row_of, row_store, width_of
 from flownav.estimation.covariance import covariance_of, variance_of
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import (
@@ -120,13 +120,6 @@ def innovation_row(
 
 
 # -- the estimate ------------------------------------------------------------------------------------------
-@equation
-def row_of(work: Work, lanes: Lanes, row: int, lane: int) -> float:
-    """What stands in a row of a lane."""
-    value: float = work[row * len(lanes) + lane]
-    return value
-
-
 @equation
 def position_variance(work: Work, lanes: Lanes, axis: int, lane: int) -> float:
     """Of position [m2]; level, with what a flow scale that nothing tells makes of the way from the start."""

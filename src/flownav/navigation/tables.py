@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.estimation.gating import Reason
-from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor
+from flownav.measurement import MAX_VALUES, Array, EventQueue, Sensor
 from flownav.navigation.rows import EstimateRow, InnovationRow
-from flownav.navigation.tape import EVENT_NAMES, Tape
+from flownav.navigation.tape import EVENT_NAMES, OBSERVES, Tape
 from flownav.record import (
     FED,
     FILTER_STATES,
@@ -97,14 +97,8 @@ def innovation_table(rows: Array) -> Table:
 def _component_names() -> Array:
     """What each component of a sensor observes, by sensor number and component."""
     names = np.full((max(Sensor) + 1, 3), "", dtype="U16")
-    for sensor in (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_VELOCITY, Sensor.POSE, Sensor.PAD):
-        names[sensor] = COLUMNS[sensor]
-    names[Sensor.LANDED] = COLUMNS[Sensor.GPS_VELOCITY]
-    names[Sensor.ATTITUDE] = ("tilt_n_rad", "tilt_e_rad", "heading_rad")
-    names[Sensor.MAG] = names[Sensor.YAW] = "heading_rad"
-    names[Sensor.FLOW_RATE, :2] = COLUMNS[Sensor.FLOW_RATE][:2]
-    names[Sensor.RANGE] = COLUMNS[Sensor.RANGE]
-    names[Sensor.BARO] = COLUMNS[Sensor.BARO]
+    for sensor, observed in OBSERVES.items():
+        names[sensor, : len(observed)] = observed
     return names
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from flownav.compile import Lanes, Work, equation, pointer, procedure
 from flownav.estimation.hypotheses import NAMES as FAULTS
 from flownav.estimation.states import STATES
-from flownav.measurement import Array, EventQueue, Sensor
+from flownav.measurement import COLUMNS, Array, EventQueue, Sensor
 from flownav.navigation.entries import ENTRY
 from flownav.navigation.memory import REASON
 from flownav.navigation.reasons import SILENT
@@ -35,9 +35,15 @@ from flownav.navigation.rows import (
 )
 
 ESTIMATE_PERIOD_S = 0.02
-COMPONENTS = {Sensor.GPS_POSITION: 3, Sensor.GPS_VELOCITY: 3, Sensor.FLOW_RATE: 2, Sensor.FLOW_VELOCITY: 3,
-              Sensor.RANGE: 1, Sensor.BARO: 1, Sensor.MAG: 1, Sensor.YAW: 1, Sensor.ATTITUDE: 6, Sensor.POSE: 3,
-              Sensor.PAD: 3, Sensor.LANDED: 3}  # fmt: skip
+OBSERVES: dict[Sensor, tuple[str, ...]] = {  # of each sensor's reading, what the filter is offered
+    **{sensor: names for sensor, names in COLUMNS.items() if sensor != Sensor.IMU},
+    Sensor.FLOW_RATE: COLUMNS[Sensor.FLOW_RATE][:2],
+    Sensor.MAG: ("heading_rad",),
+    Sensor.YAW: ("heading_rad",),
+    Sensor.ATTITUDE: ("tilt_n_rad", "tilt_e_rad", "heading_rad"),
+    Sensor.LANDED: COLUMNS[Sensor.GPS_VELOCITY],
+}
+COMPONENTS = {sensor: len(names) for sensor, names in OBSERVES.items()} | {Sensor.ATTITUDE: 6}  # its tilts twice
 EVENTS_A_READING = 4
 
 # Kinds of happening: source, kind, what the value is. NumPy numbers them, because Numba compiles a function anew for

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.compiling.engine import equation
+from flownav.compiling.spelled import load_spelled, replaced_spelled, store_spelled
 
 
 def write_function(name: str, source: str, scope: dict[str, Any]) -> Callable[..., Any]:
@@ -32,17 +33,15 @@ def lane_access(bundle: type, row: int | Sequence[int] | None) -> tuple[Callable
     of lane `k` lies at `(row + i) * len(lanes) + k`. row None: both take it, `load(work, lanes, row, lane)`.
     """
     fields: tuple[str, ...] = bundle._fields  # type: ignore[attr-defined]
-    if row is None:
-        rows = [f"(row + {i})" for i in range(len(fields))]
-    else:
-        rows = [str(place) for place in (range(row, row + len(fields)) if isinstance(row, int) else row)]
-    at = [f"work[{place} * len(lanes) + lane]" for place in rows]
+    rows = None if row is None else tuple(range(row, row + len(fields)) if isinstance(row, int) else row)
+    places = [f"(row + {i})" for i in range(len(fields))] if rows is None else list(map(str, rows))
+    at = [f"work[{place} * len(lanes) + lane]" for place in places]
     told = "work, lanes, lane" if row is not None else "work, lanes, row, lane"
     stores = "\n".join(f"    {place} = value.{name}" for place, name in zip(at, fields, strict=True))
     scope: dict[str, Any] = {"bundle": bundle}
     load = write_function("load", f"def load({told}):\n    return bundle({', '.join(at)})\n", scope)
     store = write_function("store", f"def store({told}, value):\n{stores}\n", scope)
-    return equation(load), equation(store)
+    return load_spelled(load, bundle, rows), store_spelled(store, bundle, rows)
 
 
 Bundle = TypeVar("Bundle", bound=tuple[Any, ...])
@@ -56,7 +55,7 @@ def replacing(bundle: type[Bundle], *names: str) -> Callable[..., Bundle]:
     fields = _known(bundle, names)
     values = ", ".join(name if name in names else f"value.{name}" for name in fields)
     source = f"def replaced(value, {', '.join(names)}):\n    return bundle({values})\n"
-    return equation(write_function("replaced", source, {"bundle": bundle}))
+    return replaced_spelled(write_function("replaced", source, {"bundle": bundle}), bundle, names)
 
 
 def passing(bundle: type[Bundle], through: Callable[..., float], *names: str) -> Callable[[Bundle], Bundle]:

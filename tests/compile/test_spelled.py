@@ -1,0 +1,65 @@
+"""Access to records in kernels, spelled out as instructions: what plain Python does with them, and what is refused."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numba.core.errors import TypingError
+
+from flownav.compile import LANES, ONE_LANE, kernel, lane_access, pointer, replacing
+
+
+class Record(NamedTuple):
+    first: float
+    second: float
+    third: float
+
+
+class Other(NamedTuple):
+    first: float
+    third: float
+
+
+load, store = lane_access(Record, 2)
+load_scattered, store_scattered = lane_access(Record, (7, 1, 5))
+load_told, store_told = lane_access(Record, None)
+with_two = replacing(Record, "third", "first")
+
+
+@kernel
+def turned(buffer, lanes, row):
+    work = pointer(buffer)
+    for lane in range(len(lanes)):
+        r = load(work, lanes, lane)
+        s = load_scattered(work, lanes, lane)
+        t = load_told(work, lanes, row, lane)
+        store_scattered(work, lanes, lane, with_two(r, first=t.second, third=s.first + lane))
+        store_told(work, lanes, row, lane, Record(s.third, True, 3))
+        store(work, lanes, lane, t)
+
+
+@kernel
+def misplaced(buffer, lanes):
+    store(pointer(buffer), lanes, 0, Other(1.0, 2.0))
+
+
+@pytest.mark.parametrize("lanes", [ONE_LANE, LANES])
+def test_a_kernel_reads_and_writes_what_plain_python_does(lanes):
+    start = np.random.default_rng(1).normal(size=12 * len(lanes))
+    compiled, plain = start.copy(), start.copy()
+    turned(compiled, lanes, 9)
+    turned.py_func(plain, lanes, 9)
+    np.testing.assert_array_equal(compiled, plain)
+    assert np.count_nonzero(compiled != start) == 9 * len(lanes)
+
+
+def test_a_record_of_another_kind_is_not_stored():
+    with pytest.raises(TypingError):
+        misplaced(np.zeros(12), ONE_LANE)
+
+
+def test_a_field_that_there_is_not_is_refused():
+    with pytest.raises(ValueError, match="Record has no fourth"):
+        replacing(Record, "fourth")

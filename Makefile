@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
-.PHONY: demo test test-real-time test-random test-gpu test-slow long-log fuzz mutants league integrity rare validate weigh digests report-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
+.PHONY: demo test test-real-time test-random test-gpu test-slow long-log fuzz mutants league integrity rare validate weigh digests pairs report-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
 
 demo: $(VENV)/.ready
 	$(BIN)/flownav fly landing --out out/landing.fnr --force
@@ -50,6 +50,9 @@ weigh: $(VENV)/.ready
 
 digests: $(VENV)/.ready
 	$(BIN)/python tools/digests.py $(DIGESTS)
+
+pairs: $(VENV)/.ready
+	$(BIN)/python tools/pairs.py $(OTHER)
 
 report-size: $(VENV)/.ready-test
 	$(BIN)/python tools/report_size.py $(RECORDS)

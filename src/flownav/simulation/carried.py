@@ -34,7 +34,6 @@ from flownav.simulation import seeing, wanted
 from flownav.simulation.seeing import told
 
 if TYPE_CHECKING:
-    from flownav.simulation.scenario import Scenario
     from flownav.vehicle.kinds import AnyVehicle, RotorFacts
 
 BLADES = 2.0  # of the main rotor
@@ -85,8 +84,8 @@ class CarriedSensor(NamedTuple):
     late: bool = False
     lever: str = ""
     heard: Callable[..., Any] | None = None
-    wanted: Callable[[Scenario, Any, float], Any] = wanted.as_filed
-    readings: Callable[[Scenario], int] | None = None  # how many of `says` it gives; None: all
+    wanted: Callable[[wanted.Wishes, Any, float], Any] = wanted.as_filed
+    readings: Callable[[wanted.Wishes], int] | None = None  # how many of `says` it gives; None: all
     coefficients: Callable[[Any, Carrier], Any] = lambda sheet, _: sheet.parameters()
 
     @property

@@ -152,6 +152,15 @@ def test_the_version_is_printed(tmp_path):
     assert (done.returncode, done.stdout) == (0, f"flownav {flownav.__version__}\n")
 
 
+@pytest.fixture
+def interruptible():
+    """SIGINT is an interrupt, also where who started the tests in the background had it ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_a_command_that_is_broken_off_is_exit_status_130(monkeypatch):
     stops = typer.Typer()
 

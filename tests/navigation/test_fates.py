@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from flownav.estimation.named import Attitude, PositionNed
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GPS_FAST, GPS_SLOW, GPS_VELOCITY, PAD, POSITION, VELOCITY
 from flownav.measurement import Sensor
 from flownav.navigation import verdicts
@@ -49,7 +50,7 @@ from flownav.navigation.tape import (
     POSITION_INVALID,
 )
 from flownav.navigation.told import NO_HEADING, Equipment
-from flownav.navigation.verdicts import Attitude, Fate, Offer, Position
+from flownav.navigation.verdicts import Fate, Offer
 
 NAN = math.nan
 FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
@@ -57,7 +58,7 @@ TOLD = NavigatorSettingsFile().settings(FITTED)
 RUNS = StartMemory(1.0)
 NORTH = Attitude(1.0, 0.0, 0.0, 0.0)
 QUARTER = Attitude(math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
-BESIDE = Position(1.0, 2.0, -3.0)
+BESIDE = PositionNed(1.0, 2.0, -3.0)
 
 
 def reading(*values: float, arrived=1.0) -> Reading:
@@ -207,7 +208,7 @@ def test_a_whole_fix_ends_the_count_and_half_of_one_does_not():
     (SEEN, 5.0, 1.0, SEEN, False, False),
 ])  # fmt: skip
 def test_the_place_of_take_off_is_the_pad_until_a_camera_sees_one(known, off_m, landed, after, moves, stands):
-    pad = Pad(BESIDE.north_m + off_m, BESIDE.east_m, BESIDE.down_m)
+    pad = Pad(BESIDE.pos_n + off_m, BESIDE.pos_e, BESIDE.pos_d)
     found = stand_on_pad.law(reading(landed), RUNS, BESIDE, pad, PadMemory(known))
     assert (found.pad.known, found.stands) == (after, stands)
     assert placed(found.place) == ([(PAD, 1.0), (PAD + 1, 2.0), (PAD + 2, -3.0)] if moves else [])

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from flownav.estimation.named import PositionNed
 from flownav.estimation.states import BARO
 from flownav.navigation.attitude import read_attitude
 from flownav.navigation.baro import judge_baro
@@ -53,7 +54,7 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import BARO_FOUND
 from flownav.navigation.told import NO_HEADING as HEADLESS
 from flownav.navigation.told import Equipment
-from flownav.navigation.verdicts import Event, Height, Offer, Position, Reset
+from flownav.navigation.verdicts import Event, Height, Offer, Reset
 from flownav.navigation.vibration import followed_vibration, vibration_beyond, with_reading
 
 NAN = math.nan
@@ -300,7 +301,7 @@ def test_pressure_height():
     def judged(given: Reading, known: float = 1.0, started: float = 1.0, factor: float = 1.0):
         start = StartMemory(*[started, *StartMemory()[1:]])
         return judge_baro.law(
-            given, start, Position(0.0, 0.0, -3.0), BaroMemory(known), NoiseMemory(factor), s=TOLD.height
+            given, start, PositionNed(0.0, 0.0, -3.0), BaroMemory(known), NoiseMemory(factor), s=TOLD.height
         )
 
     assert judged(reading(100.0)) == (BaroMemory(1.0), (-1, 97.0, 1e4), (-1, 97.0), Offer(100.0, 1.0, FUSED))

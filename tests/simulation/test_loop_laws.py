@@ -22,9 +22,9 @@ from flownav.simulation.said import (
     GroundSaid,
     PadSaid,
     PadVariance,
-    Position,
+    PositionNed,
     StatedVariance,
-    Velocity,
+    VelocityNed,
 )
 from flownav.simulation.sensing import motion_of, true_imu
 from flownav.vehicle.state import HelicopterState
@@ -67,7 +67,7 @@ def test_errors_at_the_horizon_are_said_once_the_navigator_runs_and_the_horizon_
     state = turned(STILL._replace(pos_n=1.0, u=2.0), 0.0, 0.0, 0.5)
     then = note_truth.law(state)
     told = (
-        Position(1.5, 0.0, 0.0), Velocity(then.vel_n_m_s, then.vel_e_m_s, 0.25), Attitude(*then[6:]),
+        PositionNed(1.5, 0.0, 0.0), VelocityNed(then.vel_n_m_s, then.vel_e_m_s, 0.25), Attitude(*then[6:]),
         StatedVariance(1.0, 2.0, 3.0, 4.0, 5.0, 6.0), then,
     )  # fmt: skip
     found = compare_at_horizon.law(RUNS, *told, reached=True)

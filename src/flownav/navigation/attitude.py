@@ -10,6 +10,7 @@ from flownav.compile import Lanes, Work, equation, procedure, replacing, squared
 from flownav.estimation.covariance import consider, consider_none, variance_of
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, level
 from flownav.estimation.laws.geometry import component
+from flownav.estimation.named import Attitude
 from flownav.estimation.states import ATTITUDE, CONSIDERS, FLOW_LAG, GYRO_BIAS, INS_ERROR, MEASURED
 from flownav.frames import Quaternion, conjugate, heading_from_quaternion, quaternion_product, rotation_from_quaternion
 from flownav.navigation.heading import HeadingVerdict, conclude_heading, offered_heading
@@ -21,7 +22,7 @@ from flownav.navigation.reasons import FUSED, SILENT, usable_in_flight
 from flownav.navigation.records import AidMemory, HeadingMemory, Reading, StartMemory
 from flownav.navigation.tape import Output
 from flownav.navigation.told import FROM_ATTITUDE, AttitudeSettings, Equipment
-from flownav.navigation.verdicts import Attitude, Offer, on_lanes
+from flownav.navigation.verdicts import Offer, on_lanes
 
 BRIDGE_SIGMA_RAD = 0.02
 
@@ -181,7 +182,7 @@ def note_bridge(
     sound, read = read_attitude(reading, start.started)
     gap = imu.gap > 0.0
     noted = BridgeMemory(
-        own.w, own.x, own.y, own.z, read[0], read[1], read[2], read[3],
+        own.qw, own.qx, own.qy, own.qz, read[0], read[1], read[2], read[3],
         variance.about_n, variance.about_e, variance.about_d,
     )  # fmt: skip
     return BridgeHead(noted if sound and not gap else m, sound and gap)

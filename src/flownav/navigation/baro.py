@@ -8,6 +8,7 @@ import numpy as np
 
 from flownav.compile import Lanes, Work, procedure
 from flownav.estimation.laws.height import baro_altitude
+from flownav.estimation.named import PositionNed
 from flownav.estimation.states import BARO
 from flownav.navigation.offers import conclude, note_height
 from flownav.navigation.packed import load_height_settings
@@ -16,7 +17,7 @@ from flownav.navigation.records import BaroMemory, NoiseMemory, Reading, StartMe
 from flownav.navigation.tape import BARO_FOUND, Output
 from flownav.navigation.told import HeightSettings
 from flownav.navigation.trust import OF_BARO, follow_noise
-from flownav.navigation.verdicts import UNKNOWN_M, Event, Offer, Position, Reset, on_lanes
+from flownav.navigation.verdicts import UNKNOWN_M, Event, Offer, Reset, on_lanes
 
 
 class BaroVerdict(NamedTuple):
@@ -30,14 +31,14 @@ class BaroVerdict(NamedTuple):
 
 @on_lanes
 def judge_baro(
-    reading: Reading, start: StartMemory, position: Position, m: BaroMemory, noise: NoiseMemory, *, s: HeightSettings
+    reading: Reading, start: StartMemory, position: PositionNed, m: BaroMemory, noise: NoiseMemory, *, s: HeightSettings
 ) -> BaroVerdict:
     """Height from pressure [m]; the first reading finds the offset."""
     stated = reading.variance_0
     variance = stated if np.isfinite(stated) else s.baro_sigma_m * s.baro_sigma_m
     reason = usable_in_flight(reading, reading.value_0, variance, start.started)
     first = reason == FUSED and m.known == 0.0
-    offset_m = reading.value_0 + position.down_m
+    offset_m = reading.value_0 + position.pos_d
     return BaroVerdict(
         BaroMemory(1.0 if first else m.known),
         Reset(BARO if first else -1, offset_m, UNKNOWN_M * UNKNOWN_M),

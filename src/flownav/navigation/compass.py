@@ -13,13 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import equation, exp, replacing, smaller
+from flownav.estimation.named import Attitude
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE
 from flownav.frames import within_half_turn
 from flownav.navigation.course import LEAST_TRAVEL_M, is_velocity, judge_course, turn_between, turn_heading, with_gps
 from flownav.navigation.motion_records import CourseMemory, PushMemory
 from flownav.navigation.records import HeadingMemory, Reading
 from flownav.navigation.tape import COMPASS_REFUTED
-from flownav.navigation.verdicts import Attitude, Event, Force, Reset, on_lanes
+from flownav.navigation.verdicts import Event, Force, Reset, on_lanes
 
 BLOCK_S = 0.8  # over which a change of GPS velocity is more than its noise
 LARGE_RAD = 0.8  # 46 degrees; less the deviation and the gate deal with, and less may be either witness

@@ -13,13 +13,14 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.compile import arctan2, cos, equation, replacing, sin
+from flownav.estimation.named import Attitude, rotation_by
 from flownav.estimation.states import ATTITUDE
-from flownav.frames import heading_cosine_sine, quaternion_product, rotation_from_quaternion, velocity_from_flow
+from flownav.frames import heading_cosine_sine, quaternion_product, velocity_from_flow
 from flownav.navigation.motion_records import CourseMemory
 from flownav.navigation.reasons import is_heard
 from flownav.navigation.records import HeadingMemory, Look, Reading
 from flownav.navigation.tape import HEADING_FOUND
-from flownav.navigation.verdicts import Attitude, Event, Reset, on_lanes
+from flownav.navigation.verdicts import Event, Reset, on_lanes
 
 LEAST_TRAVEL_M = 2.0
 LEAST_SPEED_M_S = 0.3
@@ -86,9 +87,9 @@ def is_velocity(reading: Reading) -> bool:
 def turn_heading(own: Attitude, by_rad: float, turns: bool) -> tuple[Attitude, Reset]:
     """The attitude with its heading turned, and that sure to FOUND_RAD; its correlations are lost."""
     turn = (cos(0.5 * by_rad), 0.0, 0.0, sin(0.5 * by_rad))
-    w, x, y, z = quaternion_product(turn, (own.w, own.x, own.y, own.z))
+    w, x, y, z = quaternion_product(turn, (own.qw, own.qx, own.qy, own.qz))
     return (
-        Attitude(w if turns else own.w, x if turns else own.x, y if turns else own.y, z if turns else own.z),
+        Attitude(w if turns else own.qw, x if turns else own.qx, y if turns else own.qy, z if turns else own.qz),
         Reset(ATTITUDE + 2 if turns else -1, np.nan, FOUND_RAD * FOUND_RAD),
     )
 
@@ -109,7 +110,7 @@ def note_flow_course(
     x = reading.value_0 - (look.turning_x if angular else 0.0)
     y = reading.value_1 - (look.turning_y if angular else 0.0)
     u, v = velocity_from_flow(x, y, look.range_m) if angular else (x, y)
-    cosine, sine = heading_cosine_sine(rotation_from_quaternion(own.w, own.x, own.y, own.z))
+    cosine, sine = heading_cosine_sine(rotation_by(own))
     counts = (not sought or heading.sought > 0.0) and is_heard(reading) and bool(np.isfinite(u + v))
     return with_flow(cosine * u - sine * v, sine * u + cosine * v, t_s, m) if counts else m
 

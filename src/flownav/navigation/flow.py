@@ -9,6 +9,7 @@ import numpy as np
 from flownav.compile import Lanes, Work, equation, procedure, replacing, smaller
 from flownav.estimation.covariance import consider
 from flownav.estimation.laws.flow import body_velocity, flow_rate
+from flownav.estimation.named import VelocityNed
 from flownav.estimation.states import ATTITUDE, COMPASS, GROUND, GYRO_BIAS, INS_ERROR, POSITION, VELOCITY
 from flownav.measurement import Sensor
 from flownav.navigation.flow_judge import gyro_share, hold_back, judge_look, see_ground, see_turning
@@ -38,18 +39,7 @@ from flownav.navigation.still import watch_flow
 from flownav.navigation.tape import FLOW_DOUBTED, FLOW_TRUSTED, Output
 from flownav.navigation.told import FlowSettings
 from flownav.navigation.trust import watch_whiteness
-from flownav.navigation.verdicts import (
-    NO_EVENT,
-    Biases,
-    Doubt,
-    Event,
-    HeldBack,
-    Measured,
-    Offer,
-    Tested,
-    Velocity,
-    on_lanes,
-)
+from flownav.navigation.verdicts import NO_EVENT, Biases, Doubt, Event, HeldBack, Measured, Offer, Tested, on_lanes
 
 with_agreement = replacing(FlowMemory, "excess", "ratio", "likeness")
 with_verdict = replacing(FlowMemory, "taken_s", "doubted", "wrong_s", "usual")
@@ -141,11 +131,11 @@ def free_velocity(
 # -- a reading as a whole -----------------------------------------------------------------------------------
 @on_lanes
 def walk_alone(
-    look: Look, velocity: Velocity, gps: GpsMemory, m: FlowMemory, *, t_s: float, s: FlowSettings
+    look: Look, velocity: VelocityNed, gps: GpsMemory, m: FlowMemory, *, t_s: float, s: FlowSettings
 ) -> tuple[Doubt, Doubt]:
     """Where no GPS holds the position, it is less sure by what lasts of the flow's error since the reading before."""
     step_s = smaller(t_s - m.taken_s, LONGEST_STEP_S)
-    north, east = velocity.north_m_s, velocity.east_m_s
+    north, east = velocity.vel_n, velocity.vel_e
     walk = lasting_walk(look.range_m, np.sqrt(north * north + east * east), s)
     variance = walk * step_s if look.reason == FUSED and not holds(gps, t_s) else 0.0
     return Doubt(POSITION, variance), Doubt(POSITION + 1, variance)

@@ -9,6 +9,7 @@ import numpy as np
 from flownav.compile import Lanes, Work, arctan2, equation, larger, procedure, replacing
 from flownav.estimation.hypotheses import HEADING_OFF, sign_all
 from flownav.estimation.laws.attitude import heading
+from flownav.estimation.named import Attitude
 from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.navigation.offers import conclude
 from flownav.navigation.packed import load_attitude_settings
@@ -16,7 +17,7 @@ from flownav.navigation.reasons import FUSED, NO_HEADING, SILENT, is_heard, usab
 from flownav.navigation.records import HeadingMemory, Reading, StartMemory
 from flownav.navigation.tape import Output
 from flownav.navigation.told import FROM_YAW, AttitudeSettings, Equipment
-from flownav.navigation.verdicts import Attitude, Offer, on_lanes
+from flownav.navigation.verdicts import Offer, on_lanes
 
 LEAST_FIELD_GAUSS = 1e-3
 LEAST_STEP_S = 1e-3
@@ -68,10 +69,10 @@ def judge_field(
     """A magnetometer: the level field points to magnetic north."""
     running = start.started > 0.0
     rotation = rotation_from_quaternion(
-        own.w if running else start.qw,
-        own.x if running else start.qx,
-        own.y if running else start.qy,
-        own.z if running else start.qz,
+        own.qw if running else start.qw,
+        own.qx if running else start.qx,
+        own.qy if running else start.qy,
+        own.qz if running else start.qz,
     )
     north, east, _ = to_earth(rotation, reading.value_0, reading.value_1, reading.value_2)
     level = np.sqrt(north * north + east * east)

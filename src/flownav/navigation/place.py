@@ -9,8 +9,9 @@ import numpy as np
 from flownav.compile import Lanes, Work, equation, procedure, replacing
 from flownav.estimation.laws.pad import pad_fix
 from flownav.estimation.laws.still import pad_below, position_itself, velocity_itself
+from flownav.estimation.named import Attitude, PositionNed, rotation_by
 from flownav.estimation.states import MEASURED, PAD, STATE
-from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.frames import to_earth
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.offers import conclude, fuse_offered, note_aid, note_height
 from flownav.navigation.packed import load_place_settings
@@ -26,7 +27,7 @@ from flownav.navigation.reasons import (
 from flownav.navigation.records import AidMemory, PadMemory, Reading, StartMemory
 from flownav.navigation.tape import PAD_FOUND, Output
 from flownav.navigation.told import PlaceSettings
-from flownav.navigation.verdicts import UNKNOWN_M, Attitude, Event, Fate, Offer, Position, Reset, on_lanes
+from flownav.navigation.verdicts import UNKNOWN_M, Event, Fate, Offer, Reset, on_lanes
 
 LEAST_PAD_DISTANCE_M = 0.05
 MANY_STRAYS = 6.0  # refused components of fixes, no whole fix fused between
@@ -122,16 +123,16 @@ class FoundPad(NamedTuple):
 
 @on_lanes
 def find_pad(
-    reading: Reading, start: StartMemory, position: Position, attitude: Attitude, m: PadMemory, *, s: PlaceSettings
+    reading: Reading, start: StartMemory, position: PositionNed, attitude: Attitude, m: PadMemory, *, s: PlaceSettings
 ) -> FoundPad:
     """A pad that no camera has seen is unknown but for this fix, which is about to be fused."""
     reason, _ = judge_pad(reading, 0, start.started, s)
     found = reason == FUSED and m.known < SEEN
-    rotation = rotation_from_quaternion(attitude.w, attitude.x, attitude.y, attitude.z)
+    rotation = rotation_by(attitude)
     depth = reading.value_2 / np.sqrt(reading.value_0 * reading.value_0 + reading.value_1 * reading.value_1 + 1.0)
     ahead, side = reading.value_0 * depth + s.pad_forward_m, reading.value_1 * depth + s.pad_right_m
     off_n, off_e, off_d = to_earth(rotation, ahead, side, depth + s.pad_below_m)
-    north_m, east_m, down_m = position.north_m + off_n, position.east_m + off_e, position.down_m + off_d
+    north_m, east_m, down_m = position.pos_n + off_n, position.pos_e + off_e, position.pos_d + off_d
     return FoundPad(
         with_known(m, known=SEEN if found else m.known),
         pad_at(north_m, east_m, down_m, found),
@@ -207,21 +208,21 @@ class Standing(NamedTuple):
 
 
 @on_lanes
-def stand_on_pad(reading: Reading, start: StartMemory, position: Position, pad: Pad, m: PadMemory) -> Standing:
+def stand_on_pad(reading: Reading, start: StartMemory, position: PositionNed, pad: Pad, m: PadMemory) -> Standing:
     """The place of take-off is the pad until a camera sees one: a state tied to the vehicle's own while it stands, so
     that what GPS later tells of the one it tells of the other, and the way back is known better than either. A
     vehicle that is carried about before its flight takes the pad along.
     """
     sound = usable(reading, reading.value_0, 0.0, start.started) == FUSED
     landed = sound and reading.value_0 > ON_GROUND
-    off_n, off_e = pad.north_m - position.north_m, pad.east_m - position.east_m
+    off_n, off_e = pad.north_m - position.pos_n, pad.east_m - position.pos_e
     carried = m.known == STOOD_ON and off_n * off_n + off_e * off_e > CARRIED_M * CARRIED_M
     anew = landed and (m.known == 0.0 or carried)
     known = STOOD_ON if anew else m.known
     known = LEFT if sound and not landed and known == STOOD_ON else known
     return Standing(
         with_known(m, known=known),
-        pad_at(position.north_m, position.east_m, position.down_m, anew),
+        pad_at(position.pos_n, position.pos_e, position.pos_d, anew),
         landed and known == STOOD_ON,
     )
 

@@ -33,6 +33,7 @@ from flownav.estimation.hypotheses import (
     size_told,
 )
 from flownav.estimation.motion import rotation_of
+from flownav.estimation.named import PositionNed, VelocityNed
 from flownav.estimation.states import POSITION
 from flownav.frames import angular_flow, to_body
 from flownav.navigation.flow_noise import LONGEST_STEP_S
@@ -56,7 +57,6 @@ from flownav.navigation.memory import (
 from flownav.navigation.records import FlowSignMemory, Levels, SuspicionMemory
 from flownav.navigation.rows import position_variance
 from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, Output, write_event
-from flownav.navigation.verdicts import Position, Velocity
 
 SIGMAS = 4.0  # of the filter's own error, where nothing fails
 SIGMAS_BESIDE = 2.0  # of it, beside a fault
@@ -66,8 +66,8 @@ EXCLUDED = 8.0  # standard deviations from a fault that is there or is not
 PUZZLING = 9.0  # evidence for a fault that is there or is not, after which it may be there for long
 DRIFT_S = 20.0  # a drift of GPS is sought from the start of such a window
 SUSPECT, CLEAR = 24.0, 5.0  # evidence that says so, and that says so no more
-load_position, _ = MEMORY.access(Position)
-load_velocity, _ = MEMORY.access(Velocity)
+load_position, _ = MEMORY.access(PositionNed)
+load_velocity, _ = MEMORY.access(VelocityNed)
 with_x, with_y = replacing(FlowSignMemory, "read_x"), replacing(FlowSignMemory, "read_y")
 with_turning = replacing(FlowSignMemory, "turning_x", "turning_y", "speed_m_s")
 with_left_over = replacing(SuspicionMemory, "left_over_m")

@@ -9,6 +9,7 @@ import numpy as np
 from flownav.compile import Lanes, Work, arctan2, equation, procedure, replacing, squared
 from flownav.estimation.covariance import begin_lane, lagged, set_variance, states_of
 from flownav.estimation.hypotheses import COUNT, begin_lane_anew
+from flownav.estimation.named import Attitude, PositionNed
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, POSITION, RATE, VELOCITY
 from flownav.frames import GRAVITY_M_S2, Quaternion, quaternion_from_euler, rotation_from_quaternion
 from flownav.measurement import Sensor
@@ -23,7 +24,7 @@ from flownav.navigation.reasons import is_heard
 from flownav.navigation.records import AidMemory, HeadingMemory, Reading, ScaleDoubt, StartMemory
 from flownav.navigation.tape import START, Output
 from flownav.navigation.told import FROM_MAG, FROM_YAW, NO_HEADING, Equipment
-from flownav.navigation.verdicts import Attitude, Biases, Event, Force, Position, on_lanes
+from flownav.navigation.verdicts import Biases, Event, Force, on_lanes
 from flownav.navigation.vibration import with_reading
 
 ORIGIN_SIGMA_M = 0.1  # the local origin, where the navigator's start defines it
@@ -53,7 +54,7 @@ class Rate(NamedTuple):
 
 MEMORY.name(Rate, *(RATE + i for i in range(3)))
 _, store_attitude = MEMORY.access(Attitude)
-_, store_position = MEMORY.access(Position)
+_, store_position = MEMORY.access(PositionNed)
 _, store_biases = MEMORY.access(Biases)
 _, store_rate = MEMORY.access(Rate)
 _, store_force = MEMORY.access(Force)
@@ -158,7 +159,7 @@ class FirstState(NamedTuple):
     """
 
     starts: bool
-    position: Position
+    position: PositionNed
     attitude: Attitude
     bias_x: float
     bias_y: float
@@ -232,11 +233,11 @@ def start_lanes(
     unknown = fitted.heading == NO_HEADING and lost and not read
     turned = heading_sigma(read, lost, unknown, heading.field_rad, fitted.heading)
     spread = LOST_SIGMA_M if lost else ORIGIN_SIGMA_M
-    fix = Position(reading.value_0, reading.value_1, reading.value_2)
+    fix = PositionNed(reading.value_0, reading.value_1, reading.value_2)
     return Beginning(
         FirstState(
             begins,
-            fix if at_fix else Position(0.0, 0.0, 0.0),
+            fix if at_fix else PositionNed(0.0, 0.0, 0.0),
             Attitude(w, x, y, z),
             m.force_x + GRAVITY_M_S2 * rotation[6] if levels else 0.0,
             m.force_y + GRAVITY_M_S2 * rotation[7] if levels else 0.0,

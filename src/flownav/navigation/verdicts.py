@@ -15,6 +15,7 @@ from flownav.compile import Lanes, Work, equation
 from flownav.estimation.covariance import add_noise_lane, covariance_of, variance_of
 from flownav.estimation.hypotheses import sign
 from flownav.estimation.motion import rotation_of
+from flownav.estimation.named import Attitude, PositionNed, VelocityNed
 from flownav.estimation.states import (
     ACCEL_BIAS,
     ACCEL_NOISE,
@@ -43,31 +44,6 @@ from flownav.navigation.tape import Output, write_event
 
 
 # -- what a judge is given of the filter ----------------------------------------------------------------------
-class Position(NamedTuple):
-    """The filter's position, local NED [m]."""
-
-    north_m: float
-    east_m: float
-    down_m: float
-
-
-class Velocity(NamedTuple):
-    """The filter's velocity, NED [m/s]."""
-
-    north_m_s: float
-    east_m_s: float
-    down_m_s: float
-
-
-class Attitude(NamedTuple):
-    """The filter's attitude: a quaternion, body to earth."""
-
-    w: float
-    x: float
-    y: float
-    z: float
-
-
 class Biases(NamedTuple):
     """What the filter says of the gyro's biases [rad/s] and the accelerometer's [m/s2], body FRD."""
 
@@ -292,8 +268,8 @@ def doubt(work: Work, lanes: Lanes, lane: int, given: Doubt) -> None:
     add_noise_lane(work, lanes, given.state, lane, given.variance)
 
 
-MEMORY.name(Position, *(STATE + POSITION + i for i in range(3)))
-MEMORY.name(Velocity, *(STATE + VELOCITY + i for i in range(3)))
+MEMORY.name(PositionNed, *(STATE + POSITION + i for i in range(3)))
+MEMORY.name(VelocityNed, *(STATE + VELOCITY + i for i in range(3)))
 MEMORY.name(Biases, *(STATE + GYRO_BIAS + i for i in range(3)), *(STATE + ACCEL_BIAS + i for i in range(3)))
 MEMORY.name(Force, *(FORCE + i for i in range(3)))
 MEMORY.name(AppliedMotion, *(IMU + i for i in range(6)))

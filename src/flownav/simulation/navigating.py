@@ -38,9 +38,9 @@ from flownav.simulation.said import (
     GroundSaid,
     PadSaid,
     PadVariance,
-    Position,
+    PositionNed,
     StatedVariance,
-    Velocity,
+    VelocityNed,
     on_both,
 )
 from flownav.vehicle.state import HelicopterState
@@ -131,20 +131,20 @@ class Compared(NamedTuple):
 
 @on_both
 def compare_at_horizon(
-    start: StartMemory, position: Position, velocity: Velocity, attitude: Attitude, stated: StatedVariance,
+    start: StartMemory, position: PositionNed, velocity: VelocityNed, attitude: Attitude, stated: StatedVariance,
     then: TruthThen, *, reached: bool,
 ) -> Compared:  # fmt: skip
     """Errors of the navigator where it stands, and their variances. reached: the horizon is past the start."""
     running = start.started > 0.0 and reached
-    own = rotation_from_quaternion(attitude.w, attitude.x, attitude.y, attitude.z)
+    own = rotation_from_quaternion(attitude.qw, attitude.qx, attitude.qy, attitude.qz)
     true = rotation_from_quaternion(then.qw, then.qx, then.qy, then.qz)
-    said = to_body(own, velocity.north_m_s, velocity.east_m_s, velocity.down_m_s)
+    said = to_body(own, velocity.vel_n, velocity.vel_e, velocity.vel_d)
     was = to_body(true, then.vel_n_m_s, then.vel_e_m_s, then.vel_d_m_s)
     return Compared(
         HorizonError(
-            position.north_m - then.pos_n_m if running else np.nan,
-            position.east_m - then.pos_e_m if running else np.nan,
-            position.down_m - then.pos_d_m if running else np.nan,
+            position.pos_n - then.pos_n_m if running else np.nan,
+            position.pos_e - then.pos_e_m if running else np.nan,
+            position.pos_d - then.pos_d_m if running else np.nan,
             said[0] - was[0] if running else np.nan,
             said[1] - was[1] if running else np.nan,
             said[2] - was[2] if running else np.nan,
@@ -166,23 +166,24 @@ def note_normalised_error(work: Work, nav: Work, lanes: Lanes, reached: bool, ro
 class OnTruth(NamedTuple):
     """Where the navigator is put."""
 
-    position: Position
-    velocity: Velocity
+    position: PositionNed
+    velocity: VelocityNed
     attitude: Attitude
 
 
 @on_both
 def put_on_truth(
-    start: StartMemory, position: Position, velocity: Velocity, attitude: Attitude, then: TruthThen, *, reached: bool
-) -> OnTruth:
+    start: StartMemory, position: PositionNed, velocity: VelocityNed, attitude: Attitude, then: TruthThen,
+    *, reached: bool,
+) -> OnTruth:  # fmt: skip
     """The navigator's position, velocity and attitude become the truth at its horizon, for Jacobians to be taken there.
 
     Its covariance is then that of the posterior Cramér-Rao bound along this flight (`estimation.bound`), for its model.
     """
     running = start.started > 0.0 and reached
     return OnTruth(
-        Position(then.pos_n_m, then.pos_e_m, then.pos_d_m) if running else position,
-        Velocity(then.vel_n_m_s, then.vel_e_m_s, then.vel_d_m_s) if running else velocity,
+        PositionNed(then.pos_n_m, then.pos_e_m, then.pos_d_m) if running else position,
+        VelocityNed(then.vel_n_m_s, then.vel_e_m_s, then.vel_d_m_s) if running else velocity,
         Attitude(then.qw, then.qx, then.qy, then.qz) if running else attitude,
     )
 

@@ -130,7 +130,7 @@ def seen_by(
 ) -> tuple[float, float]:
     """What the sensor's two channels are to read by the filter [rad/s or m/s]."""
     v = load_velocity(work, lanes, lane)
-    u, v, _ = to_body(rotation_of(work, lanes, lane), v.north_m_s, v.east_m_s, v.down_m_s)
+    u, v, _ = to_body(rotation_of(work, lanes, lane), v.vel_n, v.vel_e, v.vel_d)
     return angular_flow(u, v, m.turning_x, m.turning_y, range_m) if angular else (u, v)
 
 
@@ -203,7 +203,7 @@ def sign_drift(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
 def levels(work: Work, lanes: Lanes, lane: int) -> Levels:
     """The protection levels of a lane at its instant."""
     doubt, position = of_lane(work, lanes, SCALE_DOUBT, lane), load_position(work, lanes, lane)
-    north_m, east_m = doubt * position.north_m, doubt * position.east_m
+    north_m, east_m = doubt * position.pos_n, doubt * position.pos_e
     own_m = larger_axis(
         position_variance(work, lanes, 0, lane),
         position_variance(work, lanes, 1, lane),

@@ -13,11 +13,14 @@ from flownav.estimation.states import FLOW_SCALE, GYRO_BIAS
 from flownav.measurement import EventQueue, Sensor, merge
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import run, start_navigator
-from flownav.navigation.memory import load_stand
+from flownav.navigation.memory import MEMORY
+from flownav.navigation.motion_records import StandMemory
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.still import MOVES, RESTS, SHAKEN
 from flownav.navigation.tape import new_tape
 from navigation_streams import FIELD_GAUSS, Flown, Navigated, body_axes, circle, fly, navigate, still
+
+load_stand, _ = MEMORY.access(StandMemory)
 
 OWN = (Sensor.IMU, Sensor.FLOW_RATE, Sensor.RANGE)  # a vehicle without GPS, compass and barometer
 STANDS_S = 6.0

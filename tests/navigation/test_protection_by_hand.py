@@ -39,17 +39,7 @@ from flownav.estimation.states import (
     STATES,
     VELOCITY,
 )
-from flownav.navigation.memory import (
-    DRIFT_SINCE,
-    MEMORY,
-    PROTECTION,
-    SCALE_DOUBT,
-    SUSPECTED,
-    load_flow,
-    new_work,
-    store_flow,
-    store_look,
-)
+from flownav.navigation.memory import DRIFT_SINCE, MEMORY, PROTECTION, SCALE_DOUBT, SUSPECTED, load_flow, new_work
 from flownav.navigation.protection import (
     CLEAR,
     DRIFT_S,
@@ -68,8 +58,11 @@ from flownav.navigation.protection import (
     sign_drift,
     sign_flow,
 )
-from flownav.navigation.records import FlowSignMemory, GpsMemory, Look, SuspicionMemory
+from flownav.navigation.records import FlowMemory, FlowSignMemory, GpsMemory, Look, SuspicionMemory
 from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, empty_tape, output_of, room_of
+
+_, store_flow = MEMORY.access(FlowMemory)
+_, store_look = MEMORY.access(Look)
 
 FLOW_SPEED = MEMORY.row(FlowSignMemory, "speed_m_s")
 TURNED_BEFORE = MEMORY.row(FlowSignMemory, "turning_x")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flownav.compile import ONE_LANE
-from flownav.navigation.memory import STILL_CLOCK, load_imu_window, load_seen_window, new_work, set_lane, store_reading
+from flownav.navigation.memory import MEMORY, STILL_CLOCK, new_work, set_lane, store_reading
 from flownav.navigation.motion_records import ImuWindow, SeenWindow
 from flownav.navigation.records import Reading
 from flownav.navigation.still import (
@@ -28,6 +28,9 @@ from flownav.navigation.still import (
     with_imu,
     with_range,
 )
+
+load_imu_window, _ = MEMORY.access(ImuWindow)
+load_seen_window, _ = MEMORY.access(SeenWindow)
 
 NAN = math.nan
 EMPTY = ImuWindow(*[0.0] * len(ImuWindow._fields))

@@ -10,15 +10,7 @@ import pytest
 from flownav.compile import ONE_LANE
 from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE, NOISE
 from flownav.navigation.flow_noise import LARGEST_CHANGE, LARGEST_EXCESS, MEAN_CHANGE, SMALLEST_EXCESS, followed_excess
-from flownav.navigation.memory import (
-    REASON,
-    load_noise,
-    load_whiteness,
-    new_work,
-    store_echo,
-    store_noise,
-    store_whiteness,
-)
+from flownav.navigation.memory import MEMORY, REASON, load_whiteness, new_work
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE, OUT_OF_RANGE, SILENT
 from flownav.navigation.records import EchoMemory, FlowMemory, NoiseMemory, WhitenessMemory
 from flownav.navigation.settings import NavigatorSettingsFile
@@ -40,6 +32,10 @@ from flownav.navigation.trust import (
     watch_whiteness,
     with_innovation,
 )
+
+_, store_echo = MEMORY.access(EchoMemory)
+_, store_whiteness = MEMORY.access(WhitenessMemory)
+load_noise, store_noise = MEMORY.access(NoiseMemory)
 
 TOLD = NavigatorSettingsFile().settings(Equipment(True, False, NO_HEADING, False, -math.inf))
 FRESH = WhitenessMemory(0.0, 0.0, 0.0, 0.0, 1.0, -math.inf)

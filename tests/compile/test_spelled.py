@@ -41,6 +41,12 @@ def turned(buffer, lanes, row):
 
 
 @kernel
+def turned_array(buffer, lanes):
+    for lane in range(len(lanes)):
+        store(buffer, lanes, lane, load_scattered(buffer, lanes, lane))
+
+
+@kernel
 def misplaced(buffer, lanes):
     store(pointer(buffer), lanes, 0, Other(1.0, 2.0))
 
@@ -53,6 +59,12 @@ def test_a_kernel_reads_and_writes_what_plain_python_does(lanes):
     turned.py_func(plain, lanes, 9)
     np.testing.assert_array_equal(compiled, plain)
     assert np.count_nonzero(compiled != start) == 9 * len(lanes)
+
+
+def test_an_array_serves_as_its_address_does():
+    buffer = np.random.default_rng(2).normal(size=(12, 3))
+    turned_array(buffer.reshape(-1), (0,) * 3)
+    np.testing.assert_array_equal(buffer[[2, 3, 4]], buffer[[7, 1, 5]])
 
 
 def test_a_record_of_another_kind_is_not_stored():

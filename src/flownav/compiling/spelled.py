@@ -26,7 +26,7 @@ def load_spelled(function: Callable[..., Any], bundle: type, rows: tuple[int, ..
         return signature(kind, work, lanes, *(types.intp for _ in places))
 
     def lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        at = [builder.load(place) for place in _places(builder, sig, args[0], args[2:], rows, len(fields))]
+        at = [builder.load(place) for place in _places(context, builder, sig, args[0], args[2:], rows, len(fields))]
         return context.make_tuple(builder, kind, at)
 
     return _spelled(function, _on_work(typed), lowered)
@@ -43,7 +43,7 @@ def store_spelled(function: Callable[..., Any], bundle: type, rows: tuple[int, .
         return signature(types.none, work, lanes, *(types.intp for _ in places), value)
 
     def lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        at = _places(builder, sig, args[0], args[2:-1], rows, len(fields))
+        at = _places(context, builder, sig, args[0], args[2:-1], rows, len(fields))
         for i, (place, kind) in enumerate(zip(at, sig.args[-1], strict=True)):
             number = context.cast(builder, builder.extract_value(args[-1], i), kind, types.float64)
             builder.store(number, place)
@@ -73,21 +73,25 @@ def replaced_spelled(function: Callable[..., Any], bundle: type, names: tuple[st
     return _spelled(function, typed, lowered)
 
 
-def _places(builder: Any, sig: Any, work: Any, told: Any, rows: tuple[int, ...] | None, count: int) -> list[Any]:
+def _places(
+    context: Any, builder: Any, sig: Any, work: Any, told: Any, rows: tuple[int, ...] | None, count: int
+) -> list[Any]:
     """Where each field of a lane stands, as addresses."""
-    width, integer = sig.args[1].count, told[-1].type
+    kind, width, integer = sig.args[0], sig.args[1].count, told[-1].type
+    begin = work if isinstance(kind, types.CPointer) else context.make_array(kind)(context, builder, value=work).data
     if rows is None:
         first = builder.add(builder.mul(told[0], integer(width)), told[-1])
-        return [builder.gep(work, [builder.add(first, integer(i * width))]) for i in range(count)]
-    return [builder.gep(work, [builder.add(told[-1], integer(row * width))]) for row in rows]
+        return [builder.gep(begin, [builder.add(first, integer(i * width))]) for i in range(count)]
+    return [builder.gep(begin, [builder.add(told[-1], integer(row * width))]) for row in rows]
 
 
 def _on_work(typed: Callable[..., Any]) -> Callable[..., Any]:
-    """The type of a function whose first argument is a lane buffer's address."""
+    """The type of a function whose first argument is a lane buffer: the address of float64s, or an array of them."""
 
     def of_call(args: Any, kws: Any) -> Any:
-        known = not kws and isinstance(args[0], types.CPointer) and args[0].dtype == types.float64
-        return typed(*args) if known else None
+        work = args[0]
+        known = isinstance(work, types.CPointer) or (isinstance(work, types.Array) and work.layout == "C")
+        return typed(*args) if known and not kws and work.dtype == types.float64 else None
 
     return of_call
 

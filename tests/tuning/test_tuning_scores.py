@@ -10,6 +10,7 @@ import pytest
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.measurement import COLUMNS, Sensor, Stream
+from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
 from flownav.tuning.scores import (
     LEAST_SHARE,
@@ -17,6 +18,7 @@ from flownav.tuning.scores import (
     SENSORS,
     Scores,
     _flow_errors,
+    as_reported,
     densities,
     gains_of,
     reference_name,
@@ -84,6 +86,21 @@ def test_only_what_lies_in_a_window_and_was_predicted_counts():
     assert value[1, Sensor.RANGE] == pytest.approx(-0.125)
     assert readings.sum() == readings[1, Sensor.RANGE] == 1
     assert np.isnan(value[0]).all()
+
+
+GAINS = NavigatorSettingsFile(flow_gain_x=2.0, flow_gain_y=0.5)
+
+
+@pytest.mark.parametrize(("sensor", "component", "gain"), [
+    (Sensor.FLOW_RATE, 0, 0.5), (Sensor.FLOW_RATE, 1, 2.0),  # flow_y shows the speed forward
+    (Sensor.FLOW_VELOCITY, 0, 2.0), (Sensor.FLOW_VELOCITY, 1, 0.5), (Sensor.FLOW_VELOCITY, 2, 1.0),
+    (Sensor.RANGE, 0, 1.0),
+])  # fmt: skip
+def test_flow_is_scored_as_it_is_reported_whatever_gain_the_filter_takes_off(white, sensor, component, gain):
+    as_seen, one = (offers(white[:200] / g, (0.3 / g) ** 2, sensor=sensor, component=component) for g in (gain, 1.0))
+    reported = as_reported(as_seen, GAINS)
+    assert density(reported, sensor=sensor) == pytest.approx(density(one, sensor=sensor))
+    np.testing.assert_array_equal(np.delete(reported, (5, 6), axis=1), np.delete(as_seen, (5, 6), axis=1))
 
 
 def scores(density=0.0, readings=100.0, error=1.0):

@@ -18,6 +18,7 @@ from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
 from flownav.navigation.rows import InnovationRow
+from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.judged import TESTED
 from flownav.replays.prepare import FLOW, ReplayOptions
 from flownav.replays.session import Replay
@@ -86,7 +87,7 @@ def with_cuts(log: Log, options: ReplayOptions, windows: Sequence[Window]) -> Re
 
 def scores_of(flown: Replay, windows: Sequence[Window]) -> Scores:
     """A run with `with_cuts` in these windows."""
-    density, readings = densities(flown.innovation, windows)
+    density, readings = densities(as_reported(flown.innovation, flown.settings), windows)
     error, floor = path_errors(flown, windows)
     return Scores(density, readings, 0.5 * np.log(error**2 + floor**2), error)
 
@@ -108,6 +109,22 @@ def _tempered(gain: Array) -> Array:
 
 
 # -- predictions -------------------------------------------------------------------------------------------
+def as_reported(innovation: Array, settings: NavigatorSettingsFile) -> Array:
+    """Rows of a tape with the innovations of flow as the sensor reports it, and not divided by its gain.
+
+    Densities by several gains are comparable there alone: divided by a larger gain, every error is smaller.
+    """
+    offered = InnovationRow.of(innovation)
+    forward = np.where(offered.sensor == Sensor.FLOW_RATE, 1, 0)  # flow_y shows the speed forward
+    along = np.where(offered.component == forward, settings.flow_gain_x, settings.flow_gain_y)
+    gain = np.where(np.isin(offered.sensor, FLOW) & (offered.component < 2), along, 1.0)
+    reported = innovation.copy()
+    row = InnovationRow.of(reported)
+    row.innovation[:] *= gain
+    row.innovation_variance[:] *= gain**2
+    return reported
+
+
 def densities(innovation: Array, windows: Sequence[Window]) -> tuple[Array, Array]:
     """Mean log density by window and sensor (w, SENSORS), NaN without a reading, and how many readings (w, SENSORS).
 

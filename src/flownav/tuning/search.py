@@ -45,10 +45,12 @@ def search(trials: Trials, settings: NavigatorSettingsFile) -> Found:
     kept, steps, best = list(range(len(limits))), STEPS, np.zeros(len(limits))
     while True:
         best = _climb(trials, best, kept, steps, limits)
-        intervals = [_interval(trials, best, k, limits[k]) if best[k] else None for k in range(len(limits))]
-        told = [k for k in kept if _moved(intervals[k]) and _worth(trials, best, k) >= WORTH]
+        tops = [_top(trials, best, k, limits[k]) if best[k] else None for k in range(len(limits))]
+        told = [k for k in kept if _moved(tops[k]) and _worth(trials, best, k) >= WORTH]
         if len(told) == np.count_nonzero(best):
-            return Found(best, intervals)
+            return Found(
+                np.array([top.place if top else 0.0 for top in tops]), [top.interval if top else None for top in tops]
+            )
         best = np.where(np.isin(np.arange(len(limits)), told), best, 0.0)
         kept, steps = told, STEPS[1:]
 
@@ -93,9 +95,16 @@ def _at(factors: Array, k: int, factor: float) -> Array:
 
 
 # -- how sure ---------------------------------------------------------------------------------------------
-def _moved(interval: tuple[float, float] | None) -> bool:
+class Top(NamedTuple):
+    """Where one factor's profile has its top, and the 95 % interval of that place."""
+
+    place: float
+    interval: tuple[float, float]
+
+
+def _moved(top: Top | None) -> bool:
     """Whether an interval excludes the start."""
-    return interval is not None and (interval[0] > 0.0 or interval[1] < 0.0)
+    return top is not None and (top.interval[0] > 0.0 or top.interval[1] < 0.0)
 
 
 def _worth(trials: Trials, best: Array, k: int) -> float:
@@ -103,24 +112,26 @@ def _worth(trials: Trials, best: Array, k: int) -> float:
     return objective(trials, best) - objective(trials, _at(best, k, 0.0))
 
 
-def _interval(trials: Trials, best: Array, k: int, limits: tuple[float, float]) -> tuple[float, float]:
-    """95 % interval of one factor, the others standing: the limits where its profile has no top.
+def _top(trials: Trials, best: Array, k: int, limits: tuple[float, float]) -> Top:
+    """What the windows alone say of one factor, the others standing: the search's own place is a whole number of steps
+    from the start, and drawn to it by the prior. Where the profile has no top: that place, and the limits.
 
     By the sandwich of an M-estimator (Huber, Robust Statistics, 1981, section 6.3): the slope of the mean over windows
     when they are drawn anew, over the curvature of the profile, which is a parabola by least squares.
     """
-    span, prior = _step(trials, k, STEPS[0]), 1.0 / trials.knobs[k].spread ** 2
+    span = _step(trials, k, STEPS[0])
     places = np.unique(np.clip(best[k] + span * np.array(PLACES), *limits))
     flown = [trials.gains(_at(best, k, float(place))) for place in places]
     by_log = [np.array([gains[log].total for gains in flown]).T for log in range(len(trials.courses))]
     parabola = np.linalg.pinv(np.vander(places - best[k], 3))  # rows: curvature / 2, slope, value
-    windows = _windows(flown[0])
-    curvature = 2.0 * float(parabola[0] @ np.mean([values.mean(axis=0) for values in by_log], axis=0)) - prior / windows
+    mean = np.mean([values.mean(axis=0) for values in by_log], axis=0)
+    curvature = 2.0 * float(parabola[0] @ mean)
     if curvature >= 0.0:
-        return limits
-    slopes = resampled(by_log, MEASURED) @ parabola[1]
-    low, high = interval_of((slopes - slopes.mean()) / -curvature, windows)
-    return max(float(best[k]) + low, limits[0]), min(float(best[k]) + high, limits[1])
+        return Top(float(best[k]), limits)
+    slope, drawn = float(parabola[1] @ mean), resampled(by_log, MEASURED) @ parabola[1]
+    ends = interval_of(best[k] - drawn / curvature, _windows(flown[0]))
+    place, low, high = np.clip([best[k] - slope / curvature, *ends], *limits)
+    return Top(float(place), (float(low), float(high)))
 
 
 def _windows(gains: Sequence[Gains]) -> int:

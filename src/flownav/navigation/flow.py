@@ -37,9 +37,20 @@ from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT, component
 from flownav.navigation.records import FlowInnovation, FlowMemory, GpsMemory, Look, Reading
 from flownav.navigation.still import watch_flow
 from flownav.navigation.tape import FLOW_DOUBTED, FLOW_TRUSTED, Output
-from flownav.navigation.told import FlowSettings
+from flownav.navigation.told import FlowSettings, carries_lag
 from flownav.navigation.trust import watch_whiteness
-from flownav.navigation.verdicts import NO_EVENT, Biases, Doubt, Event, HeldBack, Measured, Offer, Tested, on_lanes
+from flownav.navigation.verdicts import (
+    NO_EVENT,
+    Biases,
+    Doubt,
+    Event,
+    GyroShare,
+    HeldBack,
+    Measured,
+    Offer,
+    Tested,
+    on_lanes,
+)
 
 with_agreement = replacing(FlowMemory, "excess", "ratio", "likeness")
 with_verdict = replacing(FlowMemory, "taken_s", "doubted", "wrong_s", "usual")
@@ -47,10 +58,11 @@ with_verdict = replacing(FlowMemory, "taken_s", "doubted", "wrong_s", "usual")
 
 # -- one component ------------------------------------------------------------------------------------------
 class FlowOffer(NamedTuple):
-    """A component of flow: what is offered, and what its law is held against."""
+    """A component of flow: what is offered, what its law is held against, and the gyro's bias in that."""
 
     offer: Offer
     measured: Measured
+    share: GyroShare
 
 
 @on_lanes
@@ -65,23 +77,30 @@ def offer_component(
     angular: bool,
     s: FlowSettings,
 ) -> FlowOffer:
-    """One component without turning and gain error, with its variance. A down velocity that no sensor has is NaN."""
+    """One component without turning and gain error, with its variance. A down velocity that no sensor has is NaN.
+
+    All that is said of the noise is said of what the sensor reports: the sensor file's law, which is of the residuals
+    about gain times velocity, the settings, and a variance that a reading states. So the gain is taken off both.
+    """
     raw, listed = component_of(reading, component)
     turning = look.turning_x if component == 0 else look.turning_y
     along_x = component == (1 if angular else 0)  # flow_y shows the speed forward
     gain = s.flow_gain_x if along_x else (1.0 if component == 2 else s.flow_gain_y)
-    observation = ((raw - turning) if angular else raw) / gain
-    speed = observation * look.range_m if angular else observation
+    reported = (raw - turning) if angular else raw
+    observation = reported / gain
+    speed = reported * look.range_m if angular else reported
     per_speed = 1.0 / (look.range_m * look.range_m) if angular else 1.0
     stated = np.nan if angular else listed
     noise = m.excess * flow_variance(look.range_m, speed, reading.quality, angular, s)
     model = per_speed * (noise + blind_variance(look.range_m, reading.quality, m.usual, t_s - m.taken_s, s))
+    variance = (stated if np.isfinite(stated) else model) / (gain * gain)
     absent = component == 2 and not np.isfinite(raw)
-    # the law has the gyro's bias, which the turning does not
-    left = gyro_share(reading) * (biases.gyro_x if component == 0 else biases.gyro_y) if angular else 0.0
+    # the law of a sensor without states of its own has the gyro's bias, which the turning does not
+    share = gyro_share(reading) / gain if angular and not carries_lag(s) else 0.0
     return FlowOffer(
-        Offer(observation, stated if np.isfinite(stated) else model, SILENT if absent else int(look.reason)),
-        Measured(observation - left),
+        Offer(observation, variance, SILENT if absent else int(look.reason)),
+        Measured(observation - share * (biases.gyro_x if component == 0 else biases.gyro_y)),
+        GyroShare(share),
     )
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from flownav.compile import cos, equation, exp, larger, replacing, smaller
@@ -33,7 +31,7 @@ from flownav.navigation.records import (
     StartMemory,
 )
 from flownav.navigation.told import FlowSettings
-from flownav.navigation.verdicts import Biases, GroundBelow, GyroShare, HeldBack, on_lanes
+from flownav.navigation.verdicts import Biases, GroundBelow, HeldBack, on_lanes
 
 with_turning = replacing(Look, "turning_x", "turning_y")
 with_reason = replacing(Look, "reason")
@@ -97,14 +95,6 @@ def see_ground(
     )
 
 
-class Turning(NamedTuple):
-    """What became of the turning that a flow reading saw."""
-
-    look: Look
-    flow: FlowMemory
-    share: GyroShare
-
-
 @on_lanes
 def see_turning(
     reading: Reading,
@@ -116,13 +106,11 @@ def see_turning(
     t_s: float,
     gyro_is_imu: bool,
     s: FlowSettings,
-) -> Turning:
+) -> tuple[Look, FlowMemory]:
     """The turning that an angular flow saw; a sensor's own gyro is followed."""
     x, y, after = turning_of(reading, t_s, biases.gyro_x, biases.gyro_y, gyro_is_imu, m, s)
     follows = start.started > 0.0 and reading.arrived > 0.0
-    return Turning(
-        with_turning(look, turning_x=x, turning_y=y), after if follows else m, GyroShare(gyro_share(reading))
-    )
+    return with_turning(look, turning_x=x, turning_y=y), after if follows else m
 
 
 @on_lanes

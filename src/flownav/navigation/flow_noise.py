@@ -1,4 +1,6 @@
-"""The noise of a flow reading: what the sensor file or the settings say, and what the innovations show."""
+"""The noise of a flow reading: what the sensor file or the settings say of what the sensor reports, and what the
+innovations show, as a factor.
+"""
 
 from __future__ import annotations
 
@@ -23,10 +25,11 @@ BETTER_S, WORSE_S = 1.0, 30.0
 
 @equation
 def flow_variance(range_m: float, speed_m_s: float, quality: float, angular: bool, s: FlowSettings) -> float:
-    """Variance of a flow velocity [m2/s2]: the sensor file's noise at this height, or (sigma_flow r)^2 + floor^2.
+    """Variance of a flow velocity as the sensor reports it [m2/s2], its gain and all: the sensor file's noise at this
+    height, or (sigma_flow r)^2 + floor^2.
 
     sigma_flow goes with the quality (as PX4's EKF2). A metric sensor multiplied by a range of its own, whose error
-    scales its velocity.
+    scales its velocity. speed_m_s: as reported.
     """
     low, good = s.flow_low_quality_sigma_rad_s, s.flow_sigma_rad_s
     sigma = (low + (good - low) * quality / FULL_QUALITY) * range_m
@@ -45,7 +48,7 @@ def blindness(quality: float, usual: float) -> float:
 
 @equation
 def blind_variance(range_m: float, quality: float, usual: float, step_s: float, s: FlowSettings) -> float:
-    """What is added where a sensor sees less than half as well as it usually does [m2/s2].
+    """What is added where a sensor sees less than half as well as it usually does [m2/s2], of what it reports.
 
     Ground without texture is read as ground that stands still, however often it is read: such an error lasts, and does
     not average out as noise does.

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from flownav.compile import equation
 from flownav.estimation.error_models import FilterSettings
 
 # headings: none, a magnetometer's, an external attitude's, what is told as one
@@ -35,7 +36,9 @@ class GpsSettings(NamedTuple):
 
 
 class FlowNoise(NamedTuple):
-    """A sensor file's noise against height [m/s]: `sensors.flow.flow_noise_sigma`'s polynomial; used where `stated`."""
+    """A sensor file's noise against height [m/s], of what the sensor reports: `sensors.flow.flow_noise_sigma`'s
+    polynomial; used where `stated`.
+    """
 
     stated: float
     noise_low_m: float
@@ -83,6 +86,7 @@ class FlowSettings(NamedTuple):
     noise: FlowNoise
 
 
+@equation
 def carries_lag(s: FlowSettings) -> bool:
     """Whether the sensor's own dynamics are states of the filter."""
     return s.flow_lag_c_1_s2 > 0.0

@@ -67,6 +67,14 @@ def test_an_array_serves_as_its_address_does():
     np.testing.assert_array_equal(buffer[[2, 3, 4]], buffer[[7, 1, 5]])
 
 
+def test_what_is_no_flat_array_or_may_not_be_written_is_no_lane_buffer():
+    sealed = np.zeros(12)
+    sealed.flags.writeable = False
+    for wrong in (np.zeros((12, 1)), np.zeros(24)[::2], np.zeros(12, np.float32), sealed):
+        with pytest.raises(TypingError):
+            turned_array(wrong, ONE_LANE)
+
+
 def test_a_record_of_another_kind_is_not_stored():
     with pytest.raises(TypingError):
         misplaced(np.zeros(12), ONE_LANE)

@@ -9,6 +9,7 @@ from flownav.control.autopilot import Estimate
 from flownav.control.go_around import Knowledge
 from flownav.control.guidance import Reference
 from flownav.estimation.consistency import normalised_error
+from flownav.estimation.named import Attitude, PositionNed, VelocityNed
 from flownav.estimation.packed import pack
 from flownav.estimation.states import STATE, STATES
 from flownav.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
@@ -17,15 +18,7 @@ from flownav.navigation.records import GroundMemory, Reading, StartMemory, Suspi
 from flownav.simulation.epoch import feel, put_home
 from flownav.simulation.navigating import compare_at_horizon, find_place, hand_to_autopilot, note_knowledge, note_truth
 from flownav.simulation.records import Estimated, Felt, Loads, PadPlace
-from flownav.simulation.said import (
-    Attitude,
-    GroundSaid,
-    PadSaid,
-    PadVariance,
-    PositionNed,
-    StatedVariance,
-    VelocityNed,
-)
+from flownav.simulation.said import GroundSaid, PadSaid, PadVariance, StatedVariance
 from flownav.simulation.sensing import motion_of, true_imu
 from flownav.vehicle.state import HelicopterState
 

@@ -90,7 +90,8 @@ def _on_work(typed: Callable[..., Any]) -> Callable[..., Any]:
 
     def of_call(args: Any, kws: Any) -> Any:
         work = args[0]
-        known = isinstance(work, types.CPointer) or (isinstance(work, types.Array) and work.layout == "C")
+        flat = isinstance(work, types.Array) and work.layout == "C" and work.ndim == 1
+        known = isinstance(work, types.CPointer) or (flat and work.mutable)
         return typed(*args) if known and not kws and work.dtype == types.float64 else None
 
     return of_call

@@ -37,7 +37,7 @@ from flownav.navigation.reasons import FUSED, INNOVATION_GATE, SILENT, component
 from flownav.navigation.records import FlowInnovation, FlowMemory, GpsMemory, Look, Reading
 from flownav.navigation.still import watch_flow
 from flownav.navigation.tape import FLOW_DOUBTED, FLOW_TRUSTED, Output
-from flownav.navigation.told import FlowSettings, carries_lag
+from flownav.navigation.told import FlowSettings, carries_lag, flow_gain
 from flownav.navigation.trust import watch_whiteness
 from flownav.navigation.verdicts import (
     NO_EVENT,
@@ -84,8 +84,7 @@ def offer_component(
     """
     raw, listed = component_of(reading, component)
     turning = look.turning_x if component == 0 else look.turning_y
-    along_x = component == (1 if angular else 0)  # flow_y shows the speed forward
-    gain = s.flow_gain_x if along_x else (1.0 if component == 2 else s.flow_gain_y)
+    gain = flow_gain(component, angular, s.flow_gain_x, s.flow_gain_y)
     reported = (raw - turning) if angular else raw
     observation = reported / gain
     speed = reported * look.range_m if angular else reported

@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, larger, procedure, replacing, smaller
+from flownav.compile import Lanes, Work, equation, larger, procedure, replacing, row_of, smaller
 from flownav.estimation.covariance import covariance_of, expect, states_of, variance_of
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.laws.still import pad_below
 from flownav.estimation.states import GPS_FAST, GPS_SLOW, GPS_VELOCITY, PAD, POSITION, STATE, VELOCITY
 from flownav.measurement import Sensor
-from flownav.navigation.memory import MEMORY, of_lane
+from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import SteadyForce
 from flownav.navigation.offers import conclude, fuse_offered, note_aid, note_height
 from flownav.navigation.packed import load_gps_settings
@@ -46,13 +46,13 @@ class AlongAxis(NamedTuple):
 @equation
 def along_axis(work: Work, lanes: Lanes, axis: int, lane: int) -> AlongAxis:
     """What the filter says along an axis of a lane."""
-    position_m = of_lane(work, lanes, STATE + POSITION + axis, lane)
+    position_m = row_of(work, lanes, STATE + POSITION + axis, lane)
     both = variance_of(work, lanes, POSITION + axis, lane) + variance_of(work, lanes, PAD + axis, lane)
     variance = both - 2.0 * covariance_of(work, lanes, PAD + axis, POSITION + axis, lane)
     return AlongAxis(
         position_m,
-        of_lane(work, lanes, STATE + VELOCITY + axis, lane),
-        of_lane(work, lanes, STATE + PAD + axis, lane) - position_m,
+        row_of(work, lanes, STATE + VELOCITY + axis, lane),
+        row_of(work, lanes, STATE + PAD + axis, lane) - position_m,
         larger(variance, LEAST_PAD_VARIANCE_M2),
     )
 

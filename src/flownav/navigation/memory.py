@@ -10,7 +10,18 @@ import numpy as np
 
 from flownav.compile import Lanes, Layout, Work, equation
 from flownav.estimation.hypotheses import COUNT as FAULTS_FOLLOWED
-from flownav.estimation.states import CONSIDERS, FILTER_ROWS, HYPOTHESES, MOST_HYPOTHESES, QUATERNION, SHARE
+from flownav.estimation.named import Attitude, PositionNed, VelocityNed
+from flownav.estimation.states import (
+    CONSIDERS,
+    FILTER_ROWS,
+    HYPOTHESES,
+    MOST_HYPOTHESES,
+    POSITION,
+    QUATERNION,
+    SHARE,
+    STATE,
+    VELOCITY,
+)
 from flownav.measurement import Array, Sensor
 from flownav.navigation.motion_records import (
     BridgeMemory,
@@ -52,6 +63,9 @@ from flownav.navigation.records import (
 UNHELD_S = 1.0  # without a fix of GPS, nothing but flow tells the velocity
 
 MEMORY = Layout(FILTER_ROWS)
+MEMORY.name(PositionNed, *(STATE + POSITION + i for i in range(3)))
+MEMORY.name(VelocityNed, *(STATE + VELOCITY + i for i in range(3)))
+MEMORY.name(Attitude, *(QUATERNION + i for i in range(4)))
 READING = MEMORY.keep(Reading)
 START = MEMORY.keep(StartMemory)
 MEMORY.keep(AidMemory)
@@ -154,13 +168,6 @@ def shared(work: Work, lanes: Lanes, row: int) -> float:
 def share(work: Work, lanes: Lanes, row: int, value: float) -> None:
     """Set a scalar that all lanes share."""
     work[row * len(lanes)] = value
-
-
-@equation
-def of_lane(work: Work, lanes: Lanes, row: int, lane: int) -> float:
-    """One row's value in a lane."""
-    value: float = work[row * len(lanes) + lane]
-    return value
 
 
 @equation

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, exp, larger, procedure, replacing, smaller
+from flownav.compile import Lanes, Work, equation, exp, larger, procedure, replacing, row_of, smaller
 from flownav.estimation.covariance import covariance_of, states_of
 from flownav.estimation.hypotheses import (
     COUNT,
@@ -47,7 +47,6 @@ from flownav.navigation.memory import (
     load_look,
     load_sign,
     load_suspicion,
-    of_lane,
     share,
     shared,
     store_levels,
@@ -202,7 +201,7 @@ def sign_drift(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
 @equation
 def levels(work: Work, lanes: Lanes, lane: int) -> Levels:
     """The protection levels of a lane at its instant."""
-    doubt, position = of_lane(work, lanes, SCALE_DOUBT, lane), load_position(work, lanes, lane)
+    doubt, position = row_of(work, lanes, SCALE_DOUBT, lane), load_position(work, lanes, lane)
     north_m, east_m = doubt * position.pos_n, doubt * position.pos_e
     own_m = larger_axis(
         position_variance(work, lanes, 0, lane),

@@ -87,6 +87,14 @@ class FlowSettings(NamedTuple):
 
 
 @equation
+def flow_gain(component: int, angular: bool, gain_x: float, gain_y: float) -> float:
+    """Reported over true, of a component of flow: gain_x of the speed forward, which flow_y shows where it is angular;
+    1 of a velocity down.
+    """
+    return gain_x if component == (1 if angular else 0) else (1.0 if component == 2 else gain_y)
+
+
+@equation
 def carries_lag(s: FlowSettings) -> bool:
     """Whether the sensor's own dynamics are states of the filter."""
     return s.flow_lag_c_1_s2 > 0.0

@@ -15,7 +15,6 @@ from flownav.compile import Lanes, Work, equation
 from flownav.estimation.covariance import add_noise_lane, covariance_of, variance_of
 from flownav.estimation.hypotheses import sign
 from flownav.estimation.motion import rotation_of
-from flownav.estimation.named import Attitude, PositionNed, VelocityNed
 from flownav.estimation.states import (
     ACCEL_BIAS,
     ACCEL_NOISE,
@@ -33,7 +32,6 @@ from flownav.estimation.states import (
     NOISE,
     OFFERED,
     POSITION,
-    QUATERNION,
     STATE,
     VELOCITY,
 )
@@ -268,13 +266,10 @@ def doubt(work: Work, lanes: Lanes, lane: int, given: Doubt) -> None:
     add_noise_lane(work, lanes, given.state, lane, given.variance)
 
 
-MEMORY.name(PositionNed, *(STATE + POSITION + i for i in range(3)))
-MEMORY.name(VelocityNed, *(STATE + VELOCITY + i for i in range(3)))
 MEMORY.name(Biases, *(STATE + GYRO_BIAS + i for i in range(3)), *(STATE + ACCEL_BIAS + i for i in range(3)))
 MEMORY.name(Force, *(FORCE + i for i in range(3)))
 MEMORY.name(AppliedMotion, *(IMU + i for i in range(6)))
 MEMORY.name(MotionNoise, ACCEL_NOISE, GYRO_NOISE)
-MEMORY.name(Attitude, *(QUATERNION + i for i in range(4)))
 MEMORY.name(Observation, OBSERVATION)
 MEMORY.name(Accepted, ACCEPTED)
 MEMORY.name(Tested, REASON, INNOVATION, INNOVATION_VARIANCE, NOISE)

@@ -15,6 +15,7 @@ from flownav.compile import Lanes, Work, equation, invoke, larger, procedure
 from flownav.control.go_around import Knowledge
 from flownav.control.guidance import Reference
 from flownav.estimation.consistency import normalised_error
+from flownav.estimation.named import Attitude, PositionNed, VelocityNed
 from flownav.frames import conjugate, quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.navigation.ahead import Carried, carried, coasted, state_of
 from flownav.navigation.memory import load_reading, load_start
@@ -33,16 +34,7 @@ from flownav.simulation.records import (
     TruthThen,
 )
 from flownav.simulation.ring import FIELDS, FIRST, hand_over, store_row
-from flownav.simulation.said import (
-    Attitude,
-    GroundSaid,
-    PadSaid,
-    PadVariance,
-    PositionNed,
-    StatedVariance,
-    VelocityNed,
-    on_both,
-)
+from flownav.simulation.said import GroundSaid, PadSaid, PadVariance, StatedVariance, on_both
 from flownav.vehicle.state import HelicopterState
 
 EPOCH_S = 0.02

@@ -7,13 +7,10 @@ from typing import NamedTuple
 from flownav.compile import Lanes, Layout, Work, equation
 from flownav.estimation.covariance import covariance_of, variance_of
 from flownav.estimation.motion import rotation_of
-from flownav.estimation.named import Attitude, PositionNed, VelocityNed
 from flownav.estimation.states import GROUND, PAD, POSITION, STATE
 from flownav.navigation.memory import MEMORY, PAD_KNOWN
 from flownav.navigation.rows import body_velocity_variance
 from flownav.simulation.layout import PLANT
-
-__all__ = ["Attitude", "GroundSaid", "PadSaid", "PadVariance", "PositionNed", "StatedVariance", "VelocityNed"]
 
 
 class PadSaid(NamedTuple):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from flownav.logs.log import Log
 from flownav.measurement import Array, Sensor
 from flownav.navigation.rows import InnovationRow
 from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.navigation.told import flow_gain
 from flownav.replays.judged import TESTED
 from flownav.replays.prepare import FLOW, ReplayOptions
 from flownav.replays.session import Replay
@@ -114,14 +116,13 @@ def as_reported(innovation: Array, settings: NavigatorSettingsFile) -> Array:
 
     Densities by several gains are comparable there alone: divided by a larger gain, every error is smaller.
     """
-    offered = InnovationRow.of(innovation)
-    forward = np.where(offered.sensor == Sensor.FLOW_RATE, 1, 0)  # flow_y shows the speed forward
-    along = np.where(offered.component == forward, settings.flow_gain_x, settings.flow_gain_y)
-    gain = np.where(np.isin(offered.sensor, FLOW) & (offered.component < 2), along, 1.0)
     reported = innovation.copy()
     row = InnovationRow.of(reported)
-    row.innovation[:] *= gain
-    row.innovation_variance[:] *= gain**2
+    for sensor, component in product(FLOW, range(2)):
+        gain = flow_gain(component, sensor == Sensor.FLOW_RATE, settings.flow_gain_x, settings.flow_gain_y)
+        told = (row.sensor == sensor) & (row.component == component)
+        row.innovation[told] *= gain
+        row.innovation_variance[told] *= gain**2
     return reported
 
 

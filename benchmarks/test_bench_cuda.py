@@ -17,7 +17,7 @@ from flownav.campaigns.engines.device_flight import take_here
 from flownav.campaigns.engines.drawn import truths_of
 from flownav.campaigns.local import fly_many
 from flownav.campaigns.rows import rows_of
-from flownav.compile import NoDeviceError, device_runner
+from flownav.core.compile import NoDeviceError, device_runner
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_blocks
 from flownav.simulation.plan import ATTITUDE_STEPS, PHYSICS_STEPS
@@ -102,7 +102,7 @@ def test_device_beside_the_cpu(runner, name, capsys):
 
 @pytest.mark.parametrize("block", [32, 64, 128])
 def test_block(runner, block, capsys):
-    from flownav.compiling.launch import Gpu
+    from flownav.core.compiling.launch import Gpu
 
     flight = assemble(with_filter(load_scenario("landing"), "paper")).flight
     rate = rate_on(Cuda(Gpu(take_here, block=block)), flight, min(FLIGHTS, 2 * AT_ONCE))

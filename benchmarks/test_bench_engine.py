@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
 
-from flownav.benchmark.filter_loop import ROWS, run_paper_filter
-from flownav.compile import LANES, ONE_LANE
+from flownav.core.compile import LANES, ONE_LANE
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import buffers_of, fly_into
 from flownav.simulation.scenario import load_scenario, with_filter
+from flownav.studies.benchmark.filter_loop import ROWS, run_paper_filter
 
 STEPS = 1000
 

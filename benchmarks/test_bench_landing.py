@@ -14,7 +14,10 @@ import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
 
-from flownav.benchmark.filter_parts import (
+from flownav.core.compile import LANES, ONE_LANE
+from flownav.estimation.lag import FlowLag
+from flownav.estimation.states import STATES, STATES_WITH_LAG
+from flownav.studies.benchmark.filter_parts import (
     SETTINGS,
     correct_often,
     decay_often,
@@ -25,10 +28,7 @@ from flownav.benchmark.filter_parts import (
     predict_often,
     standing,
 )
-from flownav.benchmark.landing_loop import ATTITUDE_VARIANCE, SCALARS, run_landing_filter
-from flownav.compile import LANES, ONE_LANE
-from flownav.estimation.lag import FlowLag
-from flownav.estimation.states import STATES, STATES_WITH_LAG
+from flownav.studies.benchmark.landing_loop import ATTITUDE_VARIANCE, SCALARS, run_landing_filter
 
 GROUP = f"landing filter: predict, and {SCALARS} corrections of {STATES} states"
 PARTS = f"landing filter of {STATES} states: its parts"

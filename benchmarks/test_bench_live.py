@@ -21,6 +21,7 @@ from pathlib import Path
 
 import pytest
 
+from flownav.core.measurement import Sensor
 from flownav.live.link import MOST_READS, Piece, UdpLink, open_link, parse_url
 from flownav.live.loop import Latency, run_session
 from flownav.live.options import Options
@@ -28,7 +29,6 @@ from flownav.live.priority import run_before_others
 from flownav.live.recorder import Recorder
 from flownav.live.session import Session
 from flownav.live.warm import warm_up
-from flownav.measurement import Sensor
 
 DURATION_S = float(os.environ.get("FLOWNAV_LIVE_BENCH_S", "20"))
 PRIORITY = os.environ.get("FLOWNAV_LIVE_PRIORITY", "1") != "0"

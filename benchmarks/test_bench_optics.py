@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flownav.optics.block_matching import TILE, corners
-from flownav.optics.camera import Camera, effective_focal_px
-from flownav.optics.firmware import VERSIONS
-from flownav.optics.flow import raw_flow
-from flownav.optics.pad import texture
-from flownav.optics.projection import CameraMotion, motion_field, pose_looking_down
-from flownav.optics.render import film
+from flownav.lab.optics.block_matching import TILE, corners
+from flownav.lab.optics.camera import Camera, effective_focal_px
+from flownav.lab.optics.firmware import VERSIONS
+from flownav.lab.optics.flow import raw_flow
+from flownav.lab.optics.pad import texture
+from flownav.lab.optics.projection import CameraMotion, motion_field, pose_looking_down
+from flownav.lab.optics.render import film
 
 HEIGHT_M, FPS, FRAMES = 0.8, 250.0, 1000
 ASKED_FPS = 5000.0

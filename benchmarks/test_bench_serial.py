@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from flownav.campaigns.faults.flight_log import log_of
 from flownav.campaigns.local import fly_recorded
-from flownav.faults.flight_log import log_of
 from flownav.live.recorder import NoRecorder
 from flownav.live.session import Session
 from flownav.live.simulated import BOOT_S, SimulatedVehicle

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flownav.files import natural_order
+from flownav.core.files import natural_order
 
 
 def test_numbers_in_names_count_by_their_value():

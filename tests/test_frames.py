@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav import frames
+from flownav.core import frames
 
 to_quaternion, to_euler = frames.quaternion_from_euler, frames.euler_from_quaternion
 to_rotation, quaternion_rate = frames.rotation_from_quaternion, frames.quaternion_rate

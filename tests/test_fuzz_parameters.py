@@ -12,10 +12,10 @@ from pydantic import BaseModel
 
 from flownav.campaigns.requirement import load_requirement
 from flownav.campaigns.requirement import scenario_of as required
-from flownav.identification.rig_log import Rig
+from flownav.core.parameter_files import load, shipped
+from flownav.lab.identification.rig_log import Rig
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import settings_of
-from flownav.parameter_files import load, shipped
 from flownav.sensors.barometer_sheet import load_barometer_sheet
 from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.flow_camera_sheet import load_flow_camera_sheet
@@ -27,7 +27,7 @@ from flownav.sensors.range_sensor_sheet import load_range_sensor_sheet
 from flownav.sensors.skid_switch_sheet import load_skid_switch_sheet
 from flownav.simulation.dispersion import DispersionFile
 from flownav.simulation.scenario import load_scenario
-from flownav.validation.flights import load_flights
+from flownav.studies.validation.flights import load_flights
 from flownav.vehicle.loading import load_vehicle
 from flownav.vehicle.paper_model import load_paper_model
 from fuzzing import FIRST_SEED, MUTANTS, assert_promise

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from flownav import guard
 from flownav.cli.output import place, record_place
-from flownav.errors import InputError
-from flownav.guard import a_run, an_input, an_output, folder_written_whole, written_whole
+from flownav.core import guard
+from flownav.core.errors import InputError
+from flownav.core.guard import a_run, an_input, an_output, folder_written_whole, written_whole
+from flownav.core.parameter_files import read_toml
+from flownav.core.record import Record
+from flownav.lab.optics.frame_files import read_grey
+from flownav.lab.rig.log_folder import check_rig_folder
 from flownav.logs.open_log import open_log
 from flownav.mavlink.signing import load_key
-from flownav.optics.frame_files import read_grey
-from flownav.parameter_files import read_toml
-from flownav.record import Record
-from flownav.rig.log_folder import check_rig_folder
 from replay_logs import log_of_flight
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.measurement import COLUMNS, MAX_VALUES, Sensor, Stream, merge
+from flownav.core.measurement import COLUMNS, MAX_VALUES, Sensor, Stream, merge
 
 TIMES = st.lists(st.floats(0.0, 100.0), max_size=20).map(sorted)
 UNITS = ("_m", "_m_s", "_rad_s", "_m_s2", "_gauss", "_rad")

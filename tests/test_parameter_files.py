@@ -7,8 +7,8 @@ import re
 
 import pytest
 
-from flownav.errors import InputError
-from flownav.parameter_files import Number, ParameterModel, load, shipped
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 from flownav.vehicle.feasibility import require_feasible
 from flownav.vehicle.loading import describe_vehicle, load_vehicle
 from flownav.vehicle.paper_model import load_paper_model

@@ -8,8 +8,8 @@ import zipfile
 import numpy as np
 import pytest
 
-from flownav.errors import InputError
-from flownav.record import SCHEMA_VERSION, Record
+from flownav.core.errors import InputError
+from flownav.core.record import SCHEMA_VERSION, Record
 
 
 def test_a_table_needs_time_and_equal_lengths():

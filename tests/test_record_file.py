@@ -17,10 +17,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.record import Record
+from flownav.core.record_file import ALWAYS_BYTES, GROWTH, MOST_BYTES, MOST_MANIFEST, _allowed
 from flownav.logs.open_log import open_flight
-from flownav.record import Record
-from flownav.record_file import ALWAYS_BYTES, GROWTH, MOST_BYTES, MOST_MANIFEST, _allowed
 
 MOST_MB = 300  # the library and pyarrow take 140; 500 are asked for
 T_S = np.arange(5.0)
@@ -243,8 +243,8 @@ def made_directory_bomb(path):
 LOAD = """
 import sys
 from pathlib import Path
-from flownav.record import Record
-from flownav.errors import InputError
+from flownav.core.record import Record
+from flownav.core.errors import InputError
 try:
     Record.load(Path(sys.argv[1]))
     print("read")

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from flownav.text import finite, finite_or_none
+from flownav.core.text import finite, finite_or_none
 
 
 @pytest.mark.parametrize("value", [None, math.nan, math.inf, -math.inf, np.float64("nan")])

@@ -14,7 +14,7 @@ import sys
 from pathlib import Path
 
 from flownav.cli import app
-from flownav.errors import VerdictError
+from flownav.core.errors import VerdictError
 
 COMMANDS = (
     "fly landing --seed 3 --out landing.fnr",
@@ -46,10 +46,10 @@ def main(folder: Path) -> None:
 
 def smooth_and_warm() -> None:
     """The kernels of `replay --smooth`, of `info` and of `live`, which want a log or a link."""
-    from flownav.faults.flight_log import log_of
+    from flownav.campaigns.faults.flight_log import log_of
+    from flownav.core.record import Record
     from flownav.live.warm import warm_up
     from flownav.navigation.settings import NavigatorSettingsFile
-    from flownav.record import Record
     from flownav.replays.prepare import ReplayOptions
     from flownav.replays.session import replay
     from flownav.simulation.assemble import assemble
@@ -62,7 +62,7 @@ def smooth_and_warm() -> None:
 
 def units_of_the_navigator() -> None:
     """Also those that only a sensor with dynamics of its own flies on: every unit is compiled for the other level."""
-    from flownav.compile import LANES, ONE_LANE
+    from flownav.core.compile import LANES, ONE_LANE
     from flownav.navigation.take import navigator_unit
 
     for lanes in (ONE_LANE, LANES):

@@ -20,8 +20,8 @@ from cuda import pathfinder
 from flownav.campaigns.engines.cuda import Cuda
 from flownav.campaigns.engines.device_flight import take_here
 from flownav.campaigns.engines.drawn import truths_of
-from flownav.compiling.device import call_instead, lowered
-from flownav.compiling.launch import argument_type, per_thread, told_names
+from flownav.core.compiling.device import call_instead, lowered
+from flownav.core.compiling.launch import argument_type, per_thread, told_names
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario, with_filter
 

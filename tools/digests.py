@@ -25,18 +25,18 @@ from flownav.campaigns.engines.named import engine_named
 from flownav.campaigns.plan import planned
 from flownav.campaigns.run import run_campaign
 from flownav.campaigns.store import Store
-from flownav.compare.league import logs_in
-from flownav.compile import LANES, ONE_LANE
-from flownav.errors import InputError
-from flownav.files import written_whole
+from flownav.core.compile import LANES, ONE_LANE
+from flownav.core.errors import InputError
+from flownav.core.files import written_whole
+from flownav.core.parameter_files import shipped
 from flownav.logs.open_log import open_flight
-from flownav.parameter_files import shipped
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_written
 from flownav.simulation.scenario import Scenario, load_scenario, with_filter, with_vehicle
+from flownav.studies.compare.league import logs_in
 
 Case = tuple[str, Callable[[], str]]
 

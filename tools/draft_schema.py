@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from flownav.schemas import DRAFT
+from flownav.core.schemas import DRAFT
 
 FOLDER = Path(__file__).resolve().parents[1] / "src" / "flownav" / "schemas"
 COUNTS = (

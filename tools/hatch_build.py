@@ -12,7 +12,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 
 class CarriedKernels(BuildHookInterface):
-    """Puts the kernels to where `flownav.compiling.cache.SHIPPED` looks for them."""
+    """Puts the kernels to where `flownav.core.compiling.cache.SHIPPED` looks for them."""
 
     PLUGIN_NAME = "custom"
 

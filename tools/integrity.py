@@ -9,8 +9,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from flownav.errors import FlownavError
-from flownav.faults.integrity import (
+from flownav.campaigns.faults.integrity import (
     CLEAN_SEEDS,
     FAULTY_SEEDS,
     FIRST_SEED,
@@ -21,10 +20,11 @@ from flownav.faults.integrity import (
     fly,
     rows_of,
 )
-from flownav.faults.integrity_page import placed, section
-from flownav.faults.navigator import navigator_told
-from flownav.faults.table import BASE, flight_at
-from flownav.files import written_whole
+from flownav.campaigns.faults.integrity_page import placed, section
+from flownav.campaigns.faults.navigator import navigator_told
+from flownav.campaigns.faults.table import BASE, flight_at
+from flownav.core.errors import FlownavError
+from flownav.core.files import written_whole
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 

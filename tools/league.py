@@ -8,9 +8,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from flownav.compare.league import logs_in, page, play
-from flownav.errors import FlownavError
-from flownav.files import written_whole
+from flownav.core.errors import FlownavError
+from flownav.core.files import written_whole
+from flownav.studies.compare.league import logs_in, page, play
 
 
 def main(folder: Path, out: Path) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.record import QUATERNION
+from flownav.core.record import QUATERNION
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_one
 from flownav.simulation.history import column

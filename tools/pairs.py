@@ -22,11 +22,11 @@ HERE = Path(__file__).parents[1] / "src"
 
 def works() -> dict[str, Callable[[], object]]:
     """What is timed, by name; kernels are compiled by a first call."""
-    from flownav.benchmark.recorded import navigator_run, recorded_flight
-    from flownav.compile import LANES
+    from flownav.core.compile import LANES
     from flownav.simulation.assemble import assemble
     from flownav.simulation.engine import buffers_of, fly_into, fly_one
     from flownav.simulation.scenario import load_scenario, with_filter
+    from flownav.studies.benchmark.recorded import navigator_run, recorded_flight
 
     found: dict[str, Callable[[], object]] = {}
     for name in ("paper", "landing"):

@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from flownav.record import Record
+from flownav.core.record import Record
 from flownav.report.html import write_report
 
 VISITS = 5

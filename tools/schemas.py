@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from flownav.schemas.generated import generated
+from file_schemas import generated
 
 FOLDER = Path(__file__).resolve().parents[1] / "src" / "flownav" / "schemas"
 

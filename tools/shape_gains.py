@@ -10,7 +10,7 @@ from pathlib import Path
 
 from flownav.control.design import gains_for
 from flownav.control.shaping import AXES, Shape, axis_of, drift_m, least_margins, shape_in, shaped
-from flownav.errors import FlownavError
+from flownav.core.errors import FlownavError
 from flownav.vehicle.kinds import hover_of
 from flownav.vehicle.loading import load_vehicle
 

@@ -16,7 +16,7 @@
 # %%
 from typing import NamedTuple
 
-from flownav.compile import equation
+from flownav.core.compile import equation
 from flownav.sensors.beam import BeamHit
 
 
@@ -99,7 +99,7 @@ from pathlib import Path
 
 from pydantic import Field
 
-from flownav.parameter_files import Number
+from flownav.core.parameter_files import Number
 from flownav.sensors.sheet import Lever, SensorSheet
 
 
@@ -147,7 +147,7 @@ lens = { forward_m = -0.1, down_m = 0.15 }
 # `carry` adds it before the simulator is imported.
 
 # %%
-from flownav.measurement import Sensor
+from flownav.core.measurement import Sensor
 from flownav.simulation.carried import CarriedSensor, Channels, Said, carry
 from flownav.simulation.seeing import see_beam, told
 
@@ -208,6 +208,6 @@ f"{distances.sum()} offered, {taken['fused'][distances].sum():.0f} fused"
 # %% [markdown]
 # ## A new kind of reading
 #
-# A reading that no judge knows, such as an airspeed, also needs its kind in `flownav/measurement.py` (a number of its
+# A reading that no judge knows, such as an airspeed, also needs its kind in `flownav/core/measurement.py` (a number of its
 # own and the names of its columns) and, to be fused, a judge and a law of its own in `flownav/navigation/`. Until then
 # the navigator passes it over, and the record has it.

@@ -13,7 +13,7 @@
 # %%
 import inspect
 
-from flownav.examples import complementary
+from flownav.parts.examples import complementary
 
 print(inspect.getsource(complementary).split('"""', 2)[2].strip())
 
@@ -29,8 +29,8 @@ print(inspect.getsource(complementary).split('"""', 2)[2].strip())
 # %%
 import flownav
 import pandas as pd
-from flownav.examples.complementary import ComplementaryFilter
-from flownav.examples.filterpy_ekf import FilterPyEkf
+from flownav.parts.examples.complementary import ComplementaryFilter
+from flownav.parts.examples.filterpy_ekf import FilterPyEkf
 
 flights = {
     "navigator": flownav.fly("pad_return", seed=2),
@@ -74,8 +74,8 @@ plt.show()
 from pathlib import Path
 
 Path("my_filter.py").write_text('''
-from flownav.examples.complementary import TIME_S, ComplementaryFilter
-from flownav.measurement import Sensor
+from flownav.parts.examples.complementary import TIME_S, ComplementaryFilter
+from flownav.core.measurement import Sensor
 
 
 class SlowGps(ComplementaryFilter):

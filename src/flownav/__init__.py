@@ -9,6 +9,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from flownav.core.version import __version__
+
 if TYPE_CHECKING:
     from flownav.api.campaign import Campaign
     from flownav.api.campaigning import campaign
@@ -20,14 +22,12 @@ if TYPE_CHECKING:
     from flownav.api.sensor import Sensor
     from flownav.api.table import Table
     from flownav.api.vehicle import Vehicle
-    from flownav.errors import FlownavError, InputError
-
-__version__ = "0.1.0"
+    from flownav.core.errors import FlownavError, InputError
 
 _PLACES = {
     "Campaign": "flownav.api.campaign",
-    "FlownavError": "flownav.errors",
-    "InputError": "flownav.errors",
+    "FlownavError": "flownav.core.errors",
+    "InputError": "flownav.core.errors",
     "Record": "flownav.api.record",
     "Scenario": "flownav.api.scenario",
     "Sensor": "flownav.api.sensor",

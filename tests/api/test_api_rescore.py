@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import flownav
-from flownav.errors import InputError
-from flownav.record import POSITION_NED, PROTECTION_LEVELS, QUATERNION, VELOCITY_BODY
+from flownav.core.errors import InputError
+from flownav.core.record import POSITION_NED, PROTECTION_LEVELS, QUATERNION, VELOCITY_BODY
 from replay_logs import log_of_flight, write_table
 
 STATES = (*POSITION_NED, *VELOCITY_BODY)

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 import flownav
 from flownav.cli import app
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from replay_logs import log_of_flight
 from rig_logs import swing
 
@@ -162,7 +162,7 @@ def test_a_replays_call_can_be_called_again(path):
 
 
 def test_a_filter_of_a_class_is_called_by_its_name_in_the_call():
-    from flownav.examples.complementary import ComplementaryFilter
+    from flownav.parts.examples.complementary import ComplementaryFilter
 
     class Mine(ComplementaryFilter):
         name = ""

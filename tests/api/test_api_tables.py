@@ -13,9 +13,9 @@ import pytest
 
 import flownav
 from flownav.api.table import unit_of
-from flownav.errors import InputError
-from flownav.measurement import COLUMNS
-from flownav.record import TABLES
+from flownav.core.errors import InputError
+from flownav.core.measurement import COLUMNS
+from flownav.core.record import TABLES
 
 DIMENSIONLESS = re.compile(
     r"q[wxyz]|on_ground|nees|test_ratio|fused|value.*|flow_scale|tan_.*|landed|quality|withheld|arrived|segment"

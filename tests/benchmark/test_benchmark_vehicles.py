@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.benchmark import vehicles as timed
-from flownav.benchmark.measures import vehicles
-from flownav.benchmark.vehicles import LANES, Parts, fly_untaken, landing_of, parts_of, plant_after
 from flownav.estimation.states import FILTER_ROWS, MOST_SOURCES, SCRATCH
 from flownav.navigation.memory import new_work
 from flownav.simulation.engine import buffers_of
 from flownav.simulation.history import column
+from flownav.studies.benchmark import vehicles as timed
+from flownav.studies.benchmark.measures import vehicles
+from flownav.studies.benchmark.vehicles import LANES, Parts, fly_untaken, landing_of, parts_of, plant_after
 from flownav.vehicle import multirotor
 from flownav.vehicle.around import CALM
 from flownav.vehicle.state import Controls

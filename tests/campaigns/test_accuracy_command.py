@@ -19,8 +19,8 @@ from flownav.campaigns.accuracy import CASES, Target, flights_of, scenario_of
 from flownav.campaigns.judged import fly_judged
 from flownav.campaigns.local import fly_many, home_epoch, known_exactly
 from flownav.cli import app
-from flownav.errors import InputError, VerdictError
-from flownav.measurement import Sensor
+from flownav.core.errors import InputError, VerdictError
+from flownav.core.measurement import Sensor
 from flownav.scoring.consistency import GROUP_FLIGHTS
 from flownav.sensors.flow import flow_noise_sigma
 from flownav.simulation.assemble import assemble

@@ -10,8 +10,8 @@ import pytest
 from flownav.campaigns.accuracy import scenario_of
 from flownav.campaigns.judged import bound_of
 from flownav.campaigns.local import fly_recorded
+from flownav.core.measurement import Sensor
 from flownav.estimation.bound import posterior_bound
-from flownav.measurement import Sensor
 from flownav.simulation.assemble import assemble
 from flownav.simulation.fitting import refitted, timetable_of
 from flownav.simulation.onboard import without

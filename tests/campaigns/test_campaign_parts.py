@@ -14,7 +14,7 @@ from flownav.campaigns.measures import MEASURES, ROW_COLUMNS, Event, event_of, h
 from flownav.campaigns.plan import changed, planned
 from flownav.campaigns.sampling import TOGETHER, Spread, design_of
 from flownav.campaigns.summary import Flight, worst_first
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.simulation.dispersion import uniforms
 from flownav.simulation.engine import in_order
 from flownav.simulation.scenario import load_scenario

@@ -24,7 +24,7 @@ from flownav.campaigns.run import run_campaign
 from flownav.campaigns.store import PART, Dataset, Store
 from flownav.campaigns.summary import inputs_of, summary_of
 from flownav.cli import app
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.simulation.scenario import load_scenario
 
 SHORT = {"filter.name": "paper", "flight.duration_s": 6.0}

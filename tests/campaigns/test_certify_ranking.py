@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import sobol_indices
 
 from flownav.campaigns.ranking import NOISE, bounded, flights_of, indices_of, points_of, rank
-from flownav.parameter_files import load, shipped
+from flownav.core.parameter_files import load, shipped
 from flownav.simulation.dispersion import SHIPPED_FILE, DispersionFile, Distribution, uniforms
 
 EVEN = {"distribution": "uniform", "loc": -np.pi, "scale": 2.0 * np.pi}

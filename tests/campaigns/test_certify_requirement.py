@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from flownav.campaigns.requirement import SHIPPED, load_requirement, needed_by, scenario_of
-from flownav.errors import InputError
-from flownav.parameter_files import shipped
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import shipped
 
 HEAD = 'schema_version = 1\nname = "mine"\nscenario = "landing"\n'
 ASKED = '[[requirement]]\nmeasure = "touchdown.horizontal_m"\nat_most = 0.5\nprobability = 0.997\n'

@@ -11,9 +11,9 @@ import pytest
 
 import device_cases
 from flownav.campaigns.engines.device_flight import take_here
-from flownav.compile import equation
-from flownav.compiling.device import compile_for_device
-from flownav.compiling.launch import argument_type, compiled, flattened, per_thread, told_names
+from flownav.core.compile import equation
+from flownav.core.compiling.device import compile_for_device
+from flownav.core.compiling.launch import argument_type, compiled, flattened, per_thread, told_names
 
 pytest.importorskip("numba_cuda", reason="numba-cuda is not installed (extra gpu)")
 pathfinder = pytest.importorskip("cuda.pathfinder", reason="numba-cuda is not installed (extra gpu)")
@@ -118,7 +118,7 @@ def test_registers_and_spills_are_told(paper, tmp_path):
 
 
 def test_code_is_kept_and_found_again(hosted, monkeypatch, tmp_path):
-    from flownav.compiling import cache, launch
+    from flownav.core.compiling import cache, launch
 
     monkeypatch.setattr(launch, "STORE", cache.Store(tmp_path, tmp_path / "none"))
     kinds = tuple(map(argument_type, (1, *(np.zeros(1) for _ in range(4)))))

@@ -12,7 +12,7 @@ from flownav.campaigns.engines.drawn import truths_of, truths_of_cell
 from flownav.campaigns.engines.engine import Part
 from flownav.campaigns.measures import ROW_COLUMNS
 from flownav.campaigns.plan import Ready, ready_of
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.simulation import layout
 from flownav.simulation.fault import SOUND
 from flownav.simulation.truth import TRUTH_ROWS

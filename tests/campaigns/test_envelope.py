@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from flownav.campaigns.envelope import directions_deg, fly_envelope, in_wind
 from flownav.campaigns.local import fly_many
 from flownav.cli import app
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.report.envelope import envelope_figure
 from flownav.scoring.errors import touchdown_rows
 from flownav.scoring.landings import succeeded

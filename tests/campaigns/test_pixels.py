@@ -19,9 +19,9 @@ from flownav.campaigns.pixels import (
     pose_of,
     taken_epochs,
 )
-from flownav.errors import InputError
-from flownav.optics.pad_truth import truth_of
-from flownav.parameter_files import check
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import check
+from flownav.lab.optics.pad_truth import truth_of
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_one
 from flownav.simulation.history import columns

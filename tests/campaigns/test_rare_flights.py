@@ -17,8 +17,8 @@ from flownav.campaigns.rare.replay import read_branch, replayed, write_branch
 from flownav.campaigns.rare.response import figures, responses_to
 from flownav.campaigns.rows import rows_of
 from flownav.cli import app
-from flownav.compile import LANES, ONE_LANE
-from flownav.errors import InputError
+from flownav.core.compile import LANES, ONE_LANE
+from flownav.core.errors import InputError
 from flownav.scoring.errors import SCORE_COLUMNS
 from flownav.scoring.touchdown import Limits
 from flownav.simulation import layout

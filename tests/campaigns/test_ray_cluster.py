@@ -13,7 +13,7 @@ from flownav.campaigns.engines import ray_cluster
 from flownav.campaigns.engines.engine import Part
 from flownav.campaigns.engines.local import Local
 from flownav.campaigns.plan import planned
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.simulation.scenario import load_scenario
 
 FLIGHTS = 64

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from browsing import CHROMIUM, QUIET, SOFTWARE_GL, Visit
+from flownav.campaigns.certification.cells import plan_of
+from flownav.campaigns.certification.certify import certify, with_ranking
+from flownav.campaigns.certification.written import write_certificate
 from flownav.campaigns.requirement import load_requirement
 from flownav.campaigns.store import Store
-from flownav.certification.cells import plan_of
-from flownav.certification.certify import certify, with_ranking
-from flownav.certification.written import write_certificate
 from requirements import ASKED, HEAD, WINDY, StandIn, write
 
 pytestmark = pytest.mark.browser

@@ -8,13 +8,13 @@ import json
 import numpy as np
 import pytest
 
+from flownav.campaigns.certification.cells import plan_of
+from flownav.campaigns.certification.certify import certify, with_ranking
+from flownav.campaigns.certification.judgement import judged
+from flownav.campaigns.certification.written import write_certificate
 from flownav.campaigns.engines.local import Local
 from flownav.campaigns.requirement import RequirementTable, load_requirement
 from flownav.campaigns.store import Store
-from flownav.certification.cells import plan_of
-from flownav.certification.certify import certify, with_ranking
-from flownav.certification.judgement import judged
-from flownav.certification.written import write_certificate
 from requirements import ASKED, HEAD, WINDY, StandIn, rows_touching, write
 
 TABLE = RequirementTable(measure="touchdown.horizontal_m", at_most=0.5, probability=0.95, confidence=0.9)

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from flownav.cli import app
-from flownav.errors import InputError, VerdictError
+from flownav.core.errors import InputError, VerdictError
 from requirements import ASKED, HEAD, WINDY, write
 
 CALM = "[set.wind]\ngusts = true\n"

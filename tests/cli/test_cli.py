@@ -17,9 +17,9 @@ from typer.testing import CliRunner
 from command import run
 from flownav.api import telling
 from flownav.cli import app
+from flownav.core.parameter_files import shipped
+from flownav.core.record import Record
 from flownav.live.loop import run_vehicle
-from flownav.parameter_files import shipped
-from flownav.record import Record
 from virtual_link import Clock, VirtualLink
 
 

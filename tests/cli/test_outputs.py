@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from flownav.cli import main
-from flownav.parameter_files import shipped
-from flownav.record import Record
+from flownav.core.parameter_files import shipped
+from flownav.core.record import Record
 from replay_logs import log_of_flight
 from ulog_files import ulog_of_flight
 

@@ -13,9 +13,9 @@ import typer
 from typer.testing import CliRunner
 
 from flownav.cli.compare import command
-from flownav.compare.league import logs_in, page, play
-from flownav.compare.rows import HEADINGS, cells, default_windows, markdown, names_of
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.studies.compare.league import logs_in, page, play
+from flownav.studies.compare.rows import HEADINGS, cells, default_windows, markdown, names_of
 from places import PROJECT
 from replay_logs import log_of_flight, write_table
 from ulog_files import ulog_of_flight

@@ -12,9 +12,9 @@ import typer
 from typer.testing import CliRunner
 
 from flownav.cli.compare import command
-from flownav.compare.records import cells, rows_of_records
-from flownav.errors import InputError
-from flownav.record import Record
+from flownav.core.errors import InputError
+from flownav.core.record import Record
+from flownav.studies.compare.records import cells, rows_of_records
 from report_records import flight, replay
 
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flownav.compare.dead_reckoning import dead_reckoned
-from flownav.compare.rows import default_windows
-from flownav.frames import quaternion_from_euler
+from flownav.core.frames import quaternion_from_euler
+from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.open_log import open_flight
-from flownav.measurement import Array, Sensor, Stream
 from flownav.replays.prepare import ReplayOptions, prepare
 from flownav.scoring.outage import outage_error
+from flownav.studies.compare.dead_reckoning import dead_reckoned
+from flownav.studies.compare.rows import default_windows
 from replay_logs import log_of_flight
 
 T_S = np.arange(0.0, 20.0, 0.05)

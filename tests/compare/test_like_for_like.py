@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flownav.compare.like_for_like import errors_of, reference_of, shared_by
-from flownav.compare.tracks import Track, of_table, says
-from flownav.frames import quaternion_from_euler
+from flownav.core.frames import quaternion_from_euler
+from flownav.core.measurement import Sensor, Stream
 from flownav.logs.log import Log
-from flownav.measurement import Sensor, Stream
 from flownav.replays.airborne import airborne_of
 from flownav.scoring.drift import Motion
+from flownav.studies.compare.like_for_like import errors_of, reference_of, shared_by
+from flownav.studies.compare.tracks import Track, of_table, says
 
 NONE = np.zeros(0)
 T_S = np.arange(0.0, 60.0, 0.1)

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import pytest
 
-from flownav.compiling import beside, closure
-from flownav.compiling.units import unit
+from flownav.core.compiling import beside, closure
+from flownav.core.compiling.units import unit
 
 HUNG_S = 120.0  # whatever takes so long hangs
 PARTS = """
-from flownav.compile import invoke, kernel, pointer, unit
+from flownav.core.compile import invoke, kernel, pointer, unit
 
 def shift(p, n):
     for i in range(n):
@@ -32,8 +32,8 @@ def apply(take, p):
 PROGRAM = """
 import os, sys
 import numpy as np
-from flownav.compile import announce_compilation, compile_beside
-from flownav.compiling.cache import STORE
+from flownav.core.compile import announce_compilation, compile_beside
+from flownav.core.compiling.cache import STORE
 from parts import SHIFT, apply
 
 os.sched_getaffinity = lambda pid: set(range(int(os.environ.get("CORES", "2"))))
@@ -135,7 +135,7 @@ def test_an_interrupted_program_leaves_no_process(place):
 
 
 def test_the_other_process_ends_with_its_parent(place):
-    with started(place, "-m", "flownav.compiling.beside", "parts", "SHIFT") as other:
+    with started(place, "-m", "flownav.core.compiling.beside", "parts", "SHIFT") as other:
         assert other.wait(HUNG_S) == 1
     assert left_over(place) == []
 

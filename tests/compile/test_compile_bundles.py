@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from flownav.compile import equation, flat_access, kernel, lane_access, passing, pointer, replacing, stepping
+from flownav.core.compile import equation, flat_access, kernel, lane_access, passing, pointer, replacing, stepping
 
 
 class Wheel(NamedTuple):

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from flownav.compiling import cache, closure
+from flownav.core.compiling import cache, closure
 
 KERNEL = """
 import sys
 import numpy as np
-from flownav.compile import announce_compilation, kernel, unit
+from flownav.core.compile import announce_compilation, kernel, unit
 from helper_law import law
 
 @kernel
@@ -36,7 +36,7 @@ if __name__ == "__main__":
     print(*p)
 """
 LAW = """
-from flownav.compile import equation
+from flownav.core.compile import equation
 
 @equation
 def law(x):
@@ -142,10 +142,10 @@ def test_a_file_whose_content_cannot_be_loaded_is_replaced(filled):
 
 def test_a_damaged_memory_of_sources_is_replaced(filled):
     memory = filled.cache / "sources.json"
-    expected = closure.Sources(memory).stamp(["flownav.frames"])
+    expected = closure.Sources(memory).stamp(["flownav.core.frames"])
     for text in ("{", "[1]", '{"a": 3}', ""):
         memory.write_text(text)
-        assert closure.Sources(memory).stamp(["flownav.frames"]) == expected
+        assert closure.Sources(memory).stamp(["flownav.core.frames"]) == expected
         assert memory.read_text().startswith('{"')
 
 
@@ -209,30 +209,32 @@ def test_what_is_not_used_for_long_is_removed(filled):
 
 def test_the_closure_holds_what_is_imported_and_no_face(tmp_path):
     found = closure.Sources(tmp_path / "sources.json").closure(["flownav.simulation.flight"])
-    assert {"flownav.simulation.layout", "flownav.vehicle.rotor", "flownav.compile", "flownav.frames"} <= set(found)
+    assert {"flownav.simulation.layout", "flownav.vehicle.rotor", "flownav.core.compile", "flownav.core.frames"} <= set(
+        found
+    )
     assert not any(name.startswith(("flownav.cli", "flownav.report", "flownav.logs")) for name in found)
 
 
 def test_what_a_process_adds_to_a_module_is_part_of_whatever_imports_it(tmp_path):
     sources = closure.Sources(tmp_path / "sources.json")
-    before, apart = sources.stamp(["flownav.simulation.flight"]), sources.stamp(["flownav.frames"])
-    sources.extend("flownav.simulation.carried", ["flownav.optics.lens"], "one more")
+    before, apart = sources.stamp(["flownav.simulation.flight"]), sources.stamp(["flownav.core.frames"])
+    sources.extend("flownav.simulation.carried", ["flownav.lab.optics.lens"], "one more")
     after = sources.stamp(["flownav.simulation.flight"])
     assert after not in (before, None)
-    assert "flownav.optics.lens" in sources.closure(["flownav.simulation.flight"])
-    assert sources.stamp(["flownav.frames"]) == apart
+    assert "flownav.lab.optics.lens" in sources.closure(["flownav.simulation.flight"])
+    assert sources.stamp(["flownav.core.frames"]) == apart
     sources.extend("flownav.simulation.carried", [], "another")
     assert sources.stamp(["flownav.simulation.flight"]) not in (before, after, None)
     sources.extend("flownav.simulation.carried", ["__main__ of a notebook"], "")  # nobody knows what is in it
     assert sources.stamp(["flownav.simulation.flight"]) is None
-    assert sources.stamp(["flownav.frames"]) == apart
+    assert sources.stamp(["flownav.core.frames"]) == apart
 
 
 @pytest.mark.parametrize(
     ("text", "imported"),
     [
-        ("import flownav.frames", ["flownav.frames"]),
-        ("from flownav import frames as f", ["flownav", "flownav.frames"]),
+        ("import flownav.core.frames", ["flownav.core.frames"]),
+        ("from flownav import frames as f", ["flownav", "flownav.core.frames"]),
         ("from .b import c", ["a.p.b", "a.p.b.c"]),
         ("from . import b", ["a.p", "a.p.b"]),
         ("from .. import b", ["a", "a.b"]),
@@ -248,6 +250,6 @@ def test_imports_are_found(text, imported):
 
 def test_a_file_changed_since_the_process_began_is_not_trusted(tmp_path, monkeypatch):
     sources = closure.Sources(tmp_path / "sources.json")
-    assert sources.stamp(["flownav.frames"]) is not None
+    assert sources.stamp(["flownav.core.frames"]) is not None
     monkeypatch.setattr(closure, "START_S", 0.0)
-    assert sources.stamp(["flownav.frames", "flownav.compile"]) is None
+    assert sources.stamp(["flownav.core.frames", "flownav.core.compile"]) is None

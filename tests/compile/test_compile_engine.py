@@ -10,14 +10,14 @@ import numba
 import numpy as np
 import pytest
 
-from flownav.compile import LANES, ONE_LANE, equation, kernel, pointer, procedure, unit
-from flownav.compiling import target
+from flownav.core.compile import LANES, ONE_LANE, equation, kernel, pointer, procedure, unit
+from flownav.core.compiling import target
 
 ROTATIONS = """
 import hashlib
 import numpy as np
-from flownav.compile import LANES, equation, kernel, pointer
-from flownav.frames import rotation_from_quaternion
+from flownav.core.compile import LANES, equation, kernel, pointer
+from flownav.core.frames import rotation_from_quaternion
 
 @equation
 def turned(w, x, y, z):

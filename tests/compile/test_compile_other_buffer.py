@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from flownav.compile import LANES, Layout, kernel, pointer
+from flownav.core.compile import LANES, Layout, kernel, pointer
 
 COUNT = len(LANES)
 

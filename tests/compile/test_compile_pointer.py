@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from flownav.compile import LANES, ONE_LANE, equation, invoke, kernel, pointer, unit
+from flownav.core.compile import LANES, ONE_LANE, equation, invoke, kernel, pointer, unit
 
 
 @equation

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Layout
+from flownav.core.compile import Layout
 
 
 class Place(NamedTuple):

@@ -5,7 +5,7 @@ from typing import Annotated, Generic, NamedTuple, TypeVar
 import numpy as np
 import pytest
 
-from flownav.compile import columns_of, equation, gathering, kernel, places_of, pointer, row_store, width_of
+from flownav.core.compile import columns_of, equation, gathering, kernel, places_of, pointer, row_store, width_of
 
 Value = TypeVar("Value")
 

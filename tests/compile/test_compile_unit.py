@@ -7,9 +7,9 @@ import ctypes
 import numpy as np
 import pytest
 
-from flownav.compile import LANES, ONE_LANE, unit
-from flownav.compiling import target
-from flownav.compiling.engine import without_surprises
+from flownav.core.compile import LANES, ONE_LANE, unit
+from flownav.core.compiling import target
+from flownav.core.compiling.engine import without_surprises
 
 SCALE = 3.0
 

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav import compile as elementary
-from flownav.compile import kernel, log_of_unit
-from flownav.compiling.elementary import LARGEST_ANGLE_RAD
+from flownav.core import compile as elementary
+from flownav.core.compile import kernel, log_of_unit
+from flownav.core.compiling.elementary import LARGEST_ANGLE_RAD
 
 DRAWS = 30_000
 SMALLEST = np.finfo(float).tiny

@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from flownav.cli import app
-from flownav.compile import LANES, ONE_LANE, kernel
+from flownav.core.compile import LANES, ONE_LANE, kernel
 from flownav.live.warm import warm_up
 from flownav.navigation.take import navigator_unit
 from machine_code import asked_for, borrowed, codes, compiled_functions, parts

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from flownav.compile import LANES, ONE_LANE, kernel, lane_access, pointer, replacing
+from flownav.core.compile import LANES, ONE_LANE, kernel, lane_access, pointer, replacing
 
 
 class Record(NamedTuple):

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import pytest
 
-from flownav.compiling import closure, shipping
+from flownav.core.compiling import closure, shipping
 from places import PROJECT
 
 PARTS = """
-from flownav.compile import LANES, ONE_LANE, kernel, unit
+from flownav.core.compile import LANES, ONE_LANE, kernel, unit
 
 def double(p, lanes):
     for lane in range(len(lanes)):
@@ -46,14 +46,14 @@ def in_python(place: Path, cache: str, level: str, *command: str) -> str:
 def test_kernels_are_compiled_for_a_level_without_being_run(tmp_path):
     (tmp_path / "parts.py").write_text(PARTS)
     assert in_python(tmp_path, "v3", "x86-64-v3", "-c", USE) == "2.0"
-    assert in_python(tmp_path, "v4", "x86-64-v4", "-m", "flownav.compiling.shipping", str(tmp_path / "v3")) == "3"
+    assert in_python(tmp_path, "v4", "x86-64-v4", "-m", "flownav.core.compiling.shipping", str(tmp_path / "v3")) == "3"
     of_v3, of_v4 = ({path.name for path in (tmp_path / level / "kernels").iterdir()} for level in ("v3", "v4"))
     assert len(of_v4) == 3
     assert not of_v3 & of_v4
     for name in of_v4:
         shutil.copy(tmp_path / "v4" / "kernels" / name, tmp_path / "v3" / "kernels")
     # what was compiled for the other level is what that level would have compiled
-    again = in_python(tmp_path, "v3", "x86-64-v4", "-m", "flownav.compiling.shipping", str(tmp_path / "v4"))
+    again = in_python(tmp_path, "v3", "x86-64-v4", "-m", "flownav.core.compiling.shipping", str(tmp_path / "v4"))
     assert again == "3"
     assert {path.name for path in (tmp_path / "v3" / "kernels").iterdir()} == of_v3 | of_v4
 
@@ -93,7 +93,7 @@ def test_everything_that_is_no_code_ships_too(plain_wheel):
     with zipfile.ZipFile(plain_wheel) as file:
         shipped = set(file.namelist())
     assert data <= shipped
-    assert {"flownav/data/samples/flight.toml", "flownav/schemas/file-sensor.json", "flownav/py.typed"} <= shipped
+    assert {"flownav/data/samples/flight.toml", "flownav/data/schemas/file-sensor.json", "flownav/py.typed"} <= shipped
     assert not any(name.startswith(("tests/", "docs/")) for name in shipped)
 
 

@@ -12,7 +12,7 @@ from flownav.control.autopilot import Estimate, grounded, hovering, inner_loop, 
 from flownav.control.gains import AutopilotGains
 from flownav.control.go_around import Knowledge
 from flownav.control.guidance import Reference, path_through, reference_at, rounded
-from flownav.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion
+from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion
 
 GAINS = AutopilotGains()
 LEVEL = rotation_from_quaternion(1.0, 0.0, 0.0, 0.0)

@@ -24,7 +24,7 @@ from flownav.control.shaping import (
     shape_in,
     with_shape,
 )
-from flownav.frames import GRAVITY_M_S2
+from flownav.core.frames import GRAVITY_M_S2
 from flownav.vehicle.loading import load_vehicle
 from flownav.vehicle.plant import INPUTS, OUTPUTS, frequency_response, hover_plant
 from flownav.vehicle.trim import trim

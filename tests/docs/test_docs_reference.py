@@ -8,8 +8,8 @@ from pydantic import BaseModel
 
 from docs_tools import reference, reference_commands, reference_keys, reference_tables, units
 from flownav.cli import app
-from flownav.measurement import COLUMNS
-from flownav.record import TABLES
+from flownav.core.measurement import COLUMNS
+from flownav.core.record import TABLES
 from flownav.simulation.scenario import Scenario
 
 

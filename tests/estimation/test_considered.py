@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from filters import Filter, N, filter_at, random_covariance
-from flownav.compile import LANES, ONE_LANE
+from flownav.core.compile import LANES, ONE_LANE
 from flownav.estimation.covariance import consider, consider_none, correct, fuse
 from flownav.estimation.packed import pack, unpack
 from flownav.estimation.states import (

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from filters import Filter, N, cross_matrix, filter_at, random_covariance
-from flownav.compile import LANES, ONE_LANE
+from flownav.core.compile import LANES, ONE_LANE
 from flownav.estimation.attitude_error import fold_attitude
 from flownav.estimation.covariance import (
     add_noise,

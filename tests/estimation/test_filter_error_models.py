@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from filters import SETTINGS, Filter, N, filter_at, random_covariance
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
 from flownav.estimation.error_models import (
     FilterSettings,
     propagate_errors,

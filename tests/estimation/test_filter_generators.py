@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from filters import Filter, N, random_covariance
-from flownav.compile import LANES, ONE_LANE
+from flownav.core.compile import LANES, ONE_LANE
 from flownav.estimation.law import law, step
 from flownav.estimation.states import (
     BARO,

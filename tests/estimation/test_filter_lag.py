@@ -25,7 +25,8 @@ from filters import (
     step_jacobian,
     transition_of,
 )
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
+from flownav.core.frames import GRAVITY_M_S2
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.lag import FlowLag, lag_ends, lag_over, lag_starts, seen_velocity
 from flownav.estimation.motion import predict
@@ -40,7 +41,6 @@ from flownav.estimation.states import (
     STATES_WITH_LAG,
     VELOCITY,
 )
-from flownav.frames import GRAVITY_M_S2
 
 A, B, C = 196.9, 14.8, 191.9
 EXAMPLES = settings(max_examples=4, deadline=None)

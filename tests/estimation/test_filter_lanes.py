@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from filters import KEPT, SETTINGS, Filter, N, filter_at, paper_lag, random_covariance
-from flownav.benchmark import landing_loop
-from flownav.benchmark.landing_loop import ARRIVED, ATTITUDE_READ, POSITION_READ, RANGE_READ, ROWS, STEP_S
-from flownav.compile import LANES, ONE_LANE, kernel, pointer
+from flownav.core.compile import LANES, ONE_LANE, kernel, pointer
+from flownav.core.frames import GRAVITY_M_S2
 from flownav.estimation.covariance import (
     add_noise_lane,
     at,
@@ -50,7 +49,8 @@ from flownav.estimation.states import (
     STATES,
     TEST_RATIO,
 )
-from flownav.frames import GRAVITY_M_S2
+from flownav.studies.benchmark import landing_loop
+from flownav.studies.benchmark.landing_loop import ARRIVED, ATTITUDE_READ, POSITION_READ, RANGE_READ, ROWS, STEP_S
 
 WIDE = len(LANES)
 NUMBERS = SETTINGS._replace(gate_sigma=1e6)  # everything is fused, whatever it says

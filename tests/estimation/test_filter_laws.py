@@ -13,7 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from filters import Filter, N, filter_at, filters, innovation_gradient, product, random_covariance
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
+from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion
 from flownav.estimation import laws
 from flownav.estimation.law import Observation, Parameter, Signature
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, heading, level
@@ -48,7 +49,6 @@ from flownav.estimation.states import (
     VELOCITY,
     VELOCITY_LAG,
 )
-from flownav.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion
 
 LENS = {"forward_m": 0.31, "right_m": -0.12, "below_m": 0.1}
 AXES, CHANNELS = (0, 1, 2), (0, 1)

@@ -28,7 +28,8 @@ from filters import (
     step_jacobian,
     transition_of,
 )
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
+from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.estimation.error_models import FilterSettings, propagate_walks
 from flownav.estimation.motion import hold_still, predict, turned
 from flownav.estimation.states import (
@@ -45,7 +46,6 @@ from flownav.estimation.states import (
     STATES,
     VELOCITY,
 )
-from flownav.frames import GRAVITY_M_S2, quaternion_from_euler
 
 GRAVITY = np.array([0.0, 0.0, GRAVITY_M_S2])
 EPOCH_S = 0.02

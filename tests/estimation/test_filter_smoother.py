@@ -7,7 +7,7 @@ import pytest
 from filterpy.kalman import KalmanFilter
 
 from filters import SETTINGS, Filter, N, transition_of
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
 from flownav.estimation.motion import errors_in_motion
 from flownav.estimation.smoother import (
     back_over_correction,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
 from flownav.estimation import kalman, paper_filter
 from flownav.estimation.paper_filter import PaperModel
 

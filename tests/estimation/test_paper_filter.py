@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
 
-from flownav.compile import LANES, ONE_LANE, kernel
+from flownav.core.compile import LANES, ONE_LANE, kernel
 from flownav.estimation import kalman, paper_filter
 from flownav.estimation.paper_filter import PaperModel
 from flownav.simulation.assemble import assemble

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from export_records import awkward
 from flownav.cli import app
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.export.formats import FORMATS
 
 NAMES = {

@@ -10,10 +10,10 @@ import pytest
 from mcap.reader import make_reader
 
 from export_records import awkward
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.frames import rotation_from_quaternion
+from flownav.core.record import POSITION_NED, QUATERNION
 from flownav.export.formats import export
-from flownav.frames import rotation_from_quaternion
-from flownav.record import POSITION_NED, QUATERNION
 from report_records import flight
 
 KINDS = {"number": (int, float), "integer": int, "string": str, "boolean": bool, "object": dict}

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.export.formats import export
 from flownav.export.ulog_messages import (
     SYNC,
@@ -25,7 +26,6 @@ from flownav.export.ulog_messages import (
     subscription,
     walk,
 )
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 
 FLAGS_AT, OFFSETS_AT = 16 + 3, 16 + 3 + 16
 

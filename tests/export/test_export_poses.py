@@ -8,12 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from export_records import awkward
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion
+from flownav.core.record import POSITION_NED, QUATERNION, Record
 from flownav.export import poses
 from flownav.export.formats import export
 from flownav.export.trajectory import Trajectory, in_enu, trajectories
-from flownav.frames import quaternion_from_euler, rotation_from_quaternion
-from flownav.record import POSITION_NED, QUATERNION, Record
 from report_records import flight, replay
 
 ENU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])

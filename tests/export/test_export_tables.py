@@ -12,10 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from export_records import awkward
+from flownav.core.files import folder_written_whole
+from flownav.core.record import Record
 from flownav.export import tables
 from flownav.export.formats import export
-from flownav.files import folder_written_whole
-from flownav.record import Record
 
 
 def read_csv(path):

@@ -8,10 +8,10 @@ from pyulog import ULog
 from pyulog.px4 import PX4ULog
 
 from export_records import awkward
+from flownav.core.frames import euler_from_quaternion
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.export.formats import export
 from flownav.export.ulog_messages import message
-from flownav.frames import euler_from_quaternion
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from report_records import flight, replay
 
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flownav.campaigns.faults.flight_log import log_of
 from flownav.campaigns.local import fly_recorded
-from flownav.faults.flight_log import log_of
-from flownav.frames import rotation_from_quaternion
-from flownav.measurement import COLUMNS, Sensor
-from flownav.parameter_files import check
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.core.frames import rotation_from_quaternion
+from flownav.core.measurement import COLUMNS, Sensor
+from flownav.core.parameter_files import check
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import Scenario, load_scenario
 

@@ -9,13 +9,13 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from flownav.campaigns.faults.catalogue import FAULTS
+from flownav.campaigns.faults.flown import flown_table, scenario_flown, window_start
+from flownav.campaigns.faults.laws import DOES, NOT_FLOWN, law_of
 from flownav.cli import faults as faults_command
-from flownav.compile import LANES
-from flownav.errors import InputError
-from flownav.faults.catalogue import FAULTS
-from flownav.faults.flown import flown_table, scenario_flown, window_start
-from flownav.faults.laws import DOES, NOT_FLOWN, law_of
-from flownav.measurement import COLUMNS, Sensor, Stream
+from flownav.core.compile import LANES
+from flownav.core.errors import InputError
+from flownav.core.measurement import COLUMNS, Sensor, Stream
 from flownav.navigation.records import Reading
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.simulation.assemble import assemble

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flownav.compile import announce_compilation
-from flownav.errors import InputError
-from flownav.faults.catalogue import FAULTS, FLOW, MEASURED, TEXTURE_NOISE_RAD_S, TEXTURE_SHARE, faults_named
-from flownav.measurement import COLUMNS, Sensor, Stream
+from flownav.campaigns.faults.catalogue import FAULTS, FLOW, MEASURED, TEXTURE_NOISE_RAD_S, TEXTURE_SHARE, faults_named
+from flownav.core.compile import announce_compilation
+from flownav.core.errors import InputError
+from flownav.core.measurement import COLUMNS, Sensor, Stream
 from places import DOCS
 
 RATES_HZ = {Sensor.RANGE: 10.0, Sensor.GPS_POSITION: 5.0, Sensor.GPS_VELOCITY: 5.0, Sensor.PAD: 10.0}
@@ -252,11 +252,11 @@ def test_out_of_order_readings_are_all_there_with_their_own_times(sensor):
 
 def test_pixels_agree_with_what_low_texture_is_taken_to_be():
     """Block matching over the pad's texture at 2 % of its contrast: the share of flow and the noise that are left."""
-    from flownav.optics.camera import Camera, effective_focal_px
-    from flownav.optics.flow import flow_of_frames
-    from flownav.optics.pad import Pad, texture
-    from flownav.optics.projection import pose_looking_down
-    from flownav.optics.render import film
+    from flownav.lab.optics.camera import Camera, effective_focal_px
+    from flownav.lab.optics.flow import flow_of_frames
+    from flownav.lab.optics.pad import Pad, texture
+    from flownav.lab.optics.projection import pose_looking_down
+    from flownav.lab.optics.render import film
 
     height_m, speed_m_s, frames, fps = 1.5, 1.0, 250, 250.0
     camera, full = Camera(focus_m=height_m), texture(5)

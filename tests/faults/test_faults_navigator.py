@@ -10,12 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from command import run
+from flownav.campaigns.faults.arrival import WAIT_S, Restamped, arrival_of, as_fed, stamped_ahead
+from flownav.campaigns.faults.catalogue import faults_named
+from flownav.campaigns.faults.table import fault_table, flight_at, window_start
 from flownav.cli.faults import navigator
-from flownav.errors import InputError
-from flownav.faults.arrival import WAIT_S, Restamped, arrival_of, as_fed, stamped_ahead
-from flownav.faults.catalogue import faults_named
-from flownav.faults.table import fault_table, flight_at, window_start
-from flownav.measurement import Sensor, Stream
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor, Stream
 
 NAMED = (
     "gps_loss", "gps_jump", "gps_clock", "flow_garbage", "flow_clock", "range_stuck_descent", "range_floor",

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flownav.faults.navigated import Event, Flag, Navigated, Offers
-from flownav.faults.score import course_of, detected_after, score, touchdown_error, unflagged, wrongly_fused
-from flownav.measurement import Sensor, Stream
+from flownav.campaigns.faults.navigated import Event, Flag, Navigated, Offers
+from flownav.campaigns.faults.score import course_of, detected_after, score, touchdown_error, unflagged, wrongly_fused
+from flownav.core.measurement import Sensor, Stream
 
 T_S = np.arange(0.0, 20.0, 0.02)
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)

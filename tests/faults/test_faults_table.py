@@ -10,12 +10,12 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from flownav.campaigns.faults.catalogue import FAULTS, faults_named
+from flownav.campaigns.faults.navigated import Event, Flag, Navigated, Offers
+from flownav.campaigns.faults.table import fault_table, flight_at, runs, window_start
 from flownav.cli import faults as faults_command
-from flownav.errors import InputError
-from flownav.faults.catalogue import FAULTS, faults_named
-from flownav.faults.navigated import Event, Flag, Navigated, Offers
-from flownav.faults.table import fault_table, flight_at, runs, window_start
-from flownav.measurement import Sensor, Stream
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor, Stream
 
 LEAP_M = 8.0
 SILENT_S = 0.5

@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flownav.errors import InputError
+from flownav.campaigns.faults import integrity
+from flownav.campaigns.faults.catalogue import FAULTS, faults_named
+from flownav.campaigns.faults.integrity import SUSPECTS, TOGETHER, Judged, cost, fly, judged, row_of, rows_of
+from flownav.campaigns.faults.integrity_page import BEGIN, END, alarms, placed, section, table
+from flownav.campaigns.faults.navigated import Flag, Navigated, Offers
+from flownav.campaigns.faults.navigator import navigator_of
+from flownav.campaigns.faults.table import BASE, DURATIONS_S, HEIGHTS_M, flight_at, runs
+from flownav.core.errors import InputError
 from flownav.estimation.hypotheses import COUNT
 from flownav.estimation.states import HYPOTHESES
-from flownav.faults import integrity
-from flownav.faults.catalogue import FAULTS, faults_named
-from flownav.faults.integrity import SUSPECTS, TOGETHER, Judged, cost, fly, judged, row_of, rows_of
-from flownav.faults.integrity_page import BEGIN, END, alarms, placed, section, table
-from flownav.faults.navigated import Flag, Navigated, Offers
-from flownav.faults.navigator import navigator_of
-from flownav.faults.table import BASE, DURATIONS_S, HEIGHTS_M, flight_at, runs
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 

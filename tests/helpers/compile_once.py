@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from flownav.compiling import beside
-from flownav.compiling.cache import KernelCache, cache_folder
+from flownav.core.compiling import beside
+from flownav.core.compiling.cache import KernelCache, cache_folder
 
 HUNG_S = 900.0  # whoever compiles for so long hangs, and is not waited for any more
 

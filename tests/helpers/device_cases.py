@@ -14,8 +14,8 @@ import numpy as np
 from flownav.campaigns.engines.cuda import Cuda
 from flownav.campaigns.engines.drawn import truths_of
 from flownav.campaigns.rows import rows_of
-from flownav.compile import equation, kernel
-from flownav.parameter_files import check
+from flownav.core.compile import equation, kernel
+from flownav.core.parameter_files import check
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.engine import fly_one
 from flownav.simulation.noise import CHANNELS_PER_STEP, ZERO, normal_pair, threefry
@@ -96,7 +96,7 @@ def noise_on_device(runner: Any) -> tuple[Any, Any]:
 def main(file: str) -> None:
     """All of it on the simulator."""
     from flownav.campaigns.engines.device_flight import take_here
-    from flownav.compile import device_runner
+    from flownav.core.compile import device_runner
 
     runner = device_runner(take_here)
     words, normals = noise_on_device(runner)

@@ -13,8 +13,8 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 
-from flownav.compiling.device import call_instead, lowered
-from flownav.compiling.launch import argument_type, flattened, per_thread, told_names, with_arrays
+from flownav.core.compiling.device import call_instead, lowered
+from flownav.core.compiling.launch import argument_type, flattened, per_thread, told_names, with_arrays
 
 CAPABILITY = (9, 0)
 INTRINSICS = {name: name for name in ("sqrt", "fabs", "floor", "ceil", "rint", "trunc")} | {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 
 
 def awkward() -> Record:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.measurement import EventQueue, Sensor, merge
+from flownav.core.measurement import EventQueue, Sensor, merge
+from flownav.core.record import Record
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tables import fed_rows, fed_table
-from flownav.record import Record
 from navigation_streams import circle, equipment, fly
 
 FLOWN = fly(circle, 12.0, 0.2)

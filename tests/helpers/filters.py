@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
+from flownav.core.frames import quaternion_from_euler
 from flownav.estimation.covariance import fuse
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.lag import FlowLag
@@ -45,7 +46,6 @@ from flownav.estimation.states import (
     VELOCITY,
     VELOCITY_LAG,
 )
-from flownav.frames import quaternion_from_euler
 from flownav.sensors.second_order import second_order_hold
 
 N = STATES_WITH_LAG

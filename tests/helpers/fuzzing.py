@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import COLUMNS, Sensor
 from flownav.logs.log import Log
 from flownav.logs.plausible import LATEST_S, LONGEST_LOG_S
-from flownav.measurement import COLUMNS, Sensor
 
 MUTANTS = int(os.environ.get("FLOWNAV_FUZZ", "500"))
 FIRST_SEED = int(os.environ.get("FLOWNAV_FUZZ_FIRST", "0"))

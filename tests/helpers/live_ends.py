@@ -8,6 +8,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from typing import Any
 
+from flownav.core.measurement import Measurement, Sensor
 from flownav.live.link import UdpLink, open_link
 from flownav.live.options import Options
 from flownav.live.recorder import NoRecorder
@@ -15,7 +16,6 @@ from flownav.live.session import Session
 from flownav.mavlink import sensors_outgoing as say
 from flownav.mavlink.dialect import coder
 from flownav.mavlink.signing import sign_outgoing
-from flownav.measurement import Measurement, Sensor
 
 ORIGIN = (47.0, 8.5, 400.0)
 HEIGHT_M = 2.0

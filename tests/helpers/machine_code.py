@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from flownav.compiling.cache import STORE
-from flownav.compiling.closure import PACKAGE
-from flownav.compiling.engine import EQUATIONS, Kernel
-from flownav.compiling.units import Unit
+from flownav.core.compiling.cache import STORE
+from flownav.core.compiling.closure import PACKAGE
+from flownav.core.compiling.engine import EQUATIONS, Kernel
+from flownav.core.compiling.units import Unit
 
 SYMBOL_TABLE, SECTION_BYTES, SYMBOL_BYTES = 2, 64, 24
 # Python's and Numba's own functions, in the wrapper and where an array is made; copying bytes computes nothing
@@ -50,7 +50,7 @@ def modules() -> list[Any]:
     names = [
         ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts)
         for path in sorted(PACKAGE.rglob("*.py"))
-        if "flownav.compile import" in path.read_text(encoding="utf-8")
+        if "flownav.core.compile import" in path.read_text(encoding="utf-8")
     ]
     return [importlib.import_module(name.removesuffix(".__init__")) for name in names]
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
+from flownav.core.frames import GRAVITY_M_S2
+from flownav.core.measurement import EventQueue, Sensor, Stream, merge
 from flownav.estimation.covariance import variance_of
 from flownav.estimation.gating import Reason
 from flownav.estimation.states import STATE
-from flownav.frames import GRAVITY_M_S2
-from flownav.measurement import EventQueue, Sensor, Stream, merge
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.rows import EXTRA_STATES, EstimateRow, EventRow, InnovationRow

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pymap3d
 
-from flownav.frames import GRAVITY_M_S2
+from flownav.core.frames import GRAVITY_M_S2
 
 ORIGIN = (47.0, 8.5, 400.0)
 GPS_DELAY_S = 0.22

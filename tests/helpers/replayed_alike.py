@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
+from flownav.core.measurement import Sensor
+from flownav.core.record import POSITION_NED, VELOCITY_BODY
 from flownav.logs.log import Log
 from flownav.logs.open_log import open_flight
-from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.record import POSITION_NED, VELOCITY_BODY
 from flownav.replays.bundle import to_record
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from flownav.record import Record
+from flownav.core.record import Record
 
 PAPER_LANDING = {
     "title": "Table 6",

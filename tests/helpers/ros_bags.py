@@ -170,7 +170,7 @@ def px4_flight(tables: dict[str, dict[str, np.ndarray]], boot_s: float = 40.0) -
         put(t, "sensor_combined", "SensorCombined", gyro_rad=f32(*(imu[f"gyro_{a}_rad_s"][k] for a in "xyz")),
             gyro_integral_dt=5000, accelerometer_timestamp_relative=0, accelerometer_integral_dt=5000,
             accelerometer_m_s2=f32(*(imu[f"accel_{a}_m_s2"][k] for a in "xyz")))  # fmt: skip
-    from flownav.frames import quaternion_from_euler
+    from flownav.core.frames import quaternion_from_euler
 
     for k, t in enumerate(attitude["t_s"]):
         q = quaternion_from_euler(*(attitude[f"{a}_rad"][k] for a in ("roll", "pitch", "yaw")))

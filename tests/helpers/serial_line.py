@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from flownav.core.measurement import Sensor
 from flownav.live.byte_links import SerialLink
 from flownav.live.link import Link, open_link, parse_url
 from flownav.live.loop import Latency, run_session, run_vehicle
@@ -26,7 +27,6 @@ from flownav.live.options import Options
 from flownav.live.recorder import NoRecorder
 from flownav.live.session import Session
 from flownav.live.simulated import BOOT_S, SimulatedVehicle
-from flownav.measurement import Sensor
 
 BUFFER_BYTES = 1024
 SETTLED_S = 5.0  # by then the rates have been asked for, and what was sent before them has passed

@@ -93,7 +93,7 @@ def in_us(t_s) -> np.ndarray:
 
 def ulog_of_flight(tables: dict[str, dict[str, np.ndarray]], *, old: bool = False) -> UlogWriter:
     """The tables of `replay_logs.log_of_flight` as PX4 logs them: today's topics, or those of ten years ago."""
-    from flownav.frames import quaternion_from_euler
+    from flownav.core.frames import quaternion_from_euler
 
     writer = UlogWriter()
     attitude, imu, gps, flow = (tables[name] for name in ("attitude", "imu", "gps", "flow"))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.identification.displacement import match
-from flownav.identification.flight import Flight
-from flownav.measurement import Sensor, Stream
+from flownav.core.measurement import Sensor, Stream
+from flownav.lab.identification.displacement import match
+from flownav.lab.identification.flight import Flight
 
 STEP_S, REFERENCE_STEP_S, DURATION_S = 0.05, 0.1, 120.0
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from flownav.identification.descent import Structure
-from flownav.identification.experiment import experiment
-from flownav.identification.output_error import DELAY_RANGE_S, fit
-from flownav.identification.quantities import coefficients, damping, gain, latency, natural_frequency, numerator
+from flownav.lab.identification.descent import Structure
+from flownav.lab.identification.experiment import experiment
+from flownav.lab.identification.output_error import DELAY_RANGE_S, fit
+from flownav.lab.identification.quantities import coefficients, damping, gain, latency, natural_frequency, numerator
 
 A, B, C = 196.9, 14.8, 191.9  # the paper's selected model
 TRUE = np.array([A / C, B / C, np.sqrt(C), B / (2.0 * np.sqrt(C))])  # gain, latency, natural frequency, damping

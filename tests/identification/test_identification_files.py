@@ -13,19 +13,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
-from flownav.errors import InputError
-from flownav.identification.autopilot_parameters import parameters, write_parameters
-from flownav.identification.descent import Structure
-from flownav.identification.findings import Findings
-from flownav.identification.height_law import QualityPoint, compare_schedules, paper_sigma, variance_by_quality
-from flownav.identification.job import identify
-from flownav.identification.orders import CANDIDATES
-from flownav.identification.rig_log import rate_of, read_runs
-from flownav.identification.sensor_file import bessel, sensor_entries, write_sensor
-from flownav.identification.sentinel import judge
-from flownav.provenance import hash_of
+from flownav.core.errors import InputError
+from flownav.core.provenance import hash_of
+from flownav.core.toml_text import to_toml
+from flownav.lab.identification.autopilot_parameters import parameters, write_parameters
+from flownav.lab.identification.descent import Structure
+from flownav.lab.identification.findings import Findings
+from flownav.lab.identification.height_law import QualityPoint, compare_schedules, paper_sigma, variance_by_quality
+from flownav.lab.identification.job import identify
+from flownav.lab.identification.orders import CANDIDATES
+from flownav.lab.identification.rig_log import rate_of, read_runs
+from flownav.lab.identification.sensor_file import bessel, sensor_entries, write_sensor
+from flownav.lab.identification.sentinel import judge
 from flownav.sensors.datasheet import FlowSettings, load_sensor
-from flownav.toml_text import to_toml
 
 A, B, C = 210.0, 16.0, 200.0  # gain 1.05, latency 80 ms
 COUNTS, ROD_M = 40_000, 1.5

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import replay_logs
-from flownav.errors import InputError
-from flownav.identification import displacement
-from flownav.identification.flight import flight
-from flownav.identification.flight_identification import identify_flight
-from flownav.identification.job import identify
-from flownav.identification.orders import CANDIDATES
-from flownav.identification.reference_motion import motion
+from flownav.core.errors import InputError
+from flownav.lab.identification import displacement
+from flownav.lab.identification.flight import flight
+from flownav.lab.identification.flight_identification import identify_flight
+from flownav.lab.identification.job import identify
+from flownav.lab.identification.orders import CANDIDATES
+from flownav.lab.identification.reference_motion import motion
 from flownav.logs.csv_folder import read_csv_folder
 
 GAIN_X, GAIN_Y = 0.85, 1.10

@@ -11,14 +11,14 @@ from typer.testing import CliRunner
 
 import replay_logs
 from flownav.cli import identify as identify_command
-from flownav.errors import InputError
-from flownav.identification.flight import flight
-from flownav.identification.flight_identification import identify_flight
-from flownav.identification.job import identify
-from flownav.identification.orders import CANDIDATES
-from flownav.identification.usable import jumps
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
+from flownav.lab.identification.flight import flight
+from flownav.lab.identification.flight_identification import identify_flight
+from flownav.lab.identification.job import identify
+from flownav.lab.identification.orders import CANDIDATES
+from flownav.lab.identification.usable import jumps
 from flownav.logs.csv_folder import read_csv_folder
-from flownav.measurement import Sensor
 from flownav.replays.airborne import airborne_of, flying_at
 
 YAW_RAD = 0.7

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from flownav.identification.descent import Point, Structure
-from flownav.identification.quantities import (
+from flownav.lab.identification.descent import Point, Structure
+from flownav.lab.identification.quantities import (
     Interval,
     coefficients,
     damping,

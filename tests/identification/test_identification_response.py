@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from flownav.errors import InputError
-from flownav.identification.descent import DELAY_RANGE_S, Point, Structure, linearise
-from flownav.identification.experiment import experiment
-from flownav.identification.grid import MOST_STEPS, distinct_steps, lay_grid
-from flownav.identification.orders import cross_validation
-from flownav.identification.output_error import fit, simulate
+from flownav.core.errors import InputError
+from flownav.lab.identification.descent import DELAY_RANGE_S, Point, Structure, linearise
+from flownav.lab.identification.experiment import experiment
+from flownav.lab.identification.grid import MOST_STEPS, distinct_steps, lay_grid
+from flownav.lab.identification.orders import cross_validation
+from flownav.lab.identification.output_error import fit, simulate
 
 POLES = (14.0, 9.0, 20.0, 30.0)
 

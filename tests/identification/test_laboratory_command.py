@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from command import run
-from flownav.parameter_files import shipped
+from flownav.core.parameter_files import shipped
 from flownav.sensors.datasheet import load_sensor
 from rig_logs import swing, write_csv
 

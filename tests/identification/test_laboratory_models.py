@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy import signal, stats
 
-from flownav.errors import InputError
-from flownav.identification.descent import Structure
-from flownav.identification.experiment import experiment
-from flownav.identification.height_law import (
+from flownav.core.errors import InputError
+from flownav.lab.identification.descent import Structure
+from flownav.lab.identification.experiment import experiment
+from flownav.lab.identification.height_law import (
     NoisePoint,
     combined,
     fit_power_law,
@@ -19,9 +19,9 @@ from flownav.identification.height_law import (
     paper_fit,
     paper_sigma,
 )
-from flownav.identification.orders import choose, parse_order
-from flownav.identification.output_error import fit
-from flownav.identification.quantities import (
+from flownav.lab.identification.orders import choose, parse_order
+from flownav.lab.identification.output_error import fit
+from flownav.lab.identification.quantities import (
     Interval,
     damping,
     excitation,
@@ -30,8 +30,8 @@ from flownav.identification.quantities import (
     natural_frequency,
     numerator,
 )
-from flownav.identification.sentinel import judge, one_axis
-from flownav.identification.statistics import chi_square_tail, fit_percent, information_criteria, whiteness
+from flownav.lab.identification.sentinel import judge, one_axis
+from flownav.lab.identification.statistics import chi_square_tail, fit_percent, information_criteria, whiteness
 
 FINE_S = 0.001
 DELAY = Structure(0)

@@ -13,12 +13,12 @@ from typer.testing import CliRunner
 
 from flownav.cli import identify, info
 from flownav.cli import replay as replay_command
-from flownav.errors import InputError
-from flownav.frames import quaternion_from_euler
-from flownav.inspection.summary import summarise
+from flownav.core.errors import InputError
+from flownav.core.frames import quaternion_from_euler
+from flownav.core.measurement import Sensor
 from flownav.logs.open_log import open_log
-from flownav.measurement import Sensor
 from flownav.scoring.autopilot import autopilot_errors
+from flownav.studies.inspection.summary import summarise
 from replay_logs import log_of_flight
 from ulog_files import ulog_of_flight
 

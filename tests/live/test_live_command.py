@@ -7,7 +7,7 @@ import signal
 
 import pytest
 
-from flownav.errors import VerdictError
+from flownav.core.errors import VerdictError
 from flownav.logs.open_log import open_flight
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions

@@ -15,9 +15,11 @@ import pymap3d
 import pytest
 
 from command import run as typed
+from flownav.campaigns.faults.flight_log import log_of
 from flownav.campaigns.local import fly_recorded
-from flownav.errors import InputError
-from flownav.faults.flight_log import log_of
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
+from flownav.core.record import Record
 from flownav.live.display import draw
 from flownav.live.link import open_link
 from flownav.live.loop import Latency, run_session, run_vehicle
@@ -29,9 +31,7 @@ from flownav.live.simulated import BOOT_S, ORIGIN_DEG_M, SimulatedVehicle
 from flownav.live.warm import warm_up
 from flownav.logs.open_log import open_flight
 from flownav.mavlink.dialect import coder
-from flownav.measurement import Sensor
 from flownav.navigation.tables import estimate_table, innovation_table, states_table
-from flownav.record import Record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay

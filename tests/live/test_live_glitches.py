@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from flownav.core.measurement import Sensor
 from flownav.live.options import Options
 from flownav.live.recorder import NoRecorder
 from flownav.mavlink import sensors_outgoing as say
-from flownav.measurement import Sensor
 from flownav.navigation.tape import IMU_SPIKE
 from live_ends import GRAVITY, Hover, Wire, reading
 

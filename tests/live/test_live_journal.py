@@ -13,8 +13,9 @@ import pytest
 from typer.testing import CliRunner
 
 from flownav.cli import app
-from flownav.errors import InputError, VerdictError
-from flownav.free_names import free_name
+from flownav.core.errors import InputError, VerdictError
+from flownav.core.free_names import free_name
+from flownav.core.record import Record
 from flownav.live import writing
 from flownav.live.journal_place import claim, is_locked
 from flownav.live.options import Options
@@ -24,7 +25,6 @@ from flownav.logs.journal import MAGIC, Block, blocks
 from flownav.logs.open_log import open_flight
 from flownav.mavlink.state_messages import TrueState
 from flownav.navigation.tables import estimate_table, innovation_table
-from flownav.record import Record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.live import byte_links
 from flownav.live.byte_links import TcpLink
 from flownav.live.link import Address, UdpLink, open_link, parse_url, same_sender

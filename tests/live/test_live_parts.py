@@ -11,7 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Measurement, Sensor
 from flownav.estimation.states import POSITION, QUATERNION, STATE, VELOCITY
 from flownav.live.byte_links import SerialLink, TcpLink
 from flownav.live.estimating import estimate_of
@@ -25,7 +26,6 @@ from flownav.live.screen import strip
 from flownav.live.sources import SILENT_S, Source, Sources
 from flownav.live.timing import VehicleClock
 from flownav.mavlink.framing import LARGEST_FRAME, StreamFrames
-from flownav.measurement import Measurement, Sensor
 from mavlink_logs import flight_log, made
 
 

@@ -13,8 +13,8 @@ import time
 
 import pytest
 
+from flownav.core.record import Record
 from flownav.logs.open_log import open_flight
-from flownav.record import Record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay

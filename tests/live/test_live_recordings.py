@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from flownav.core.measurement import Sensor
 from flownav.live.options import Limits, Options
 from flownav.live.recorder import NoRecorder
 from flownav.mavlink.dialect import coder
-from flownav.measurement import Sensor
 from recorded_link import Arrival, arrivals, play
 
 GPS_RAW_INT, TIMESYNC, COMMAND_LONG, GLOBAL_ORIGIN = 24, 111, 76, 49

@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
 from flownav.estimation.states import POSITION, STATE
 from flownav.live.answers import ODOMETRY_COMPONENT
 from flownav.live.display import draw
@@ -30,7 +31,6 @@ from flownav.mavlink import sensors_outgoing as say
 from flownav.mavlink.dialect import coder
 from flownav.mavlink.position_messages import LOCAL_FRD
 from flownav.mavlink.signing import SignatureCheck
-from flownav.measurement import Sensor
 from flownav.navigation.memory import PROTECTION
 from live_ends import HEIGHT_M, ORIGIN, START_S, UNIX_S, Hover, Wire, reading
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flownav.campaigns.faults.flight_log import log_of
 from flownav.campaigns.local import fly_recorded
-from flownav.faults.flight_log import log_of
 from flownav.live.rates import plan
 from flownav.live.simulated import SimulatedVehicle
 from flownav.live.warm import warm_up

@@ -18,7 +18,7 @@ from typer.testing import CliRunner
 
 from fake_autopilot import ARDUPILOT, PX4, FakeAutopilot, FakeLink
 from flownav.cli import app
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.live import link as live_link
 from flownav.live.link import parse_url
 from flownav.live.options import SENDINGS

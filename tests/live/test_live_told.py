@@ -8,13 +8,13 @@ from io import StringIO
 import pytest
 from rich.console import Console
 
+from flownav.core.measurement import Sensor
 from flownav.estimation.gating import Reason
 from flownav.live.display import draw
 from flownav.live.loop import Latency
 from flownav.live.options import Options
 from flownav.live.screen import Screen
 from flownav.mavlink.dialect import coder
-from flownav.measurement import Sensor
 from live_ends import HEIGHT_M, Hover, Wire
 
 

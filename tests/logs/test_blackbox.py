@@ -19,11 +19,11 @@ from blackbox_logs import (
     tag8_8svb,
     uvb,
 )
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
 from flownav.logs.blackbox.reader import read_blackbox
 from flownav.logs.blackbox.values import packed as unpacked
 from flownav.logs.open_log import log_kind, open_log
-from flownav.measurement import Sensor
 from replay_logs import SyntheticLog, log_of_flight
 from replayed_alike import apart, largest_difference
 
@@ -110,7 +110,7 @@ def test_signs_are_those_of_the_firmware(tmp_path):
     imu = read.streams[Sensor.IMU].value[0]
     assert np.allclose(imu[:3], np.radians([0.0, -20.0, 30.0]))
     assert imu[3] < 0 < -imu[5]  # gravity's reaction is up, and backwards with the nose down
-    from flownav.frames import euler_from_quaternion, velocity_from_flow
+    from flownav.core.frames import euler_from_quaternion, velocity_from_flow
 
     angles = np.degrees(euler_from_quaternion(*read.streams[Sensor.ATTITUDE].value[0]))
     assert np.allclose(angles, [0.0, -10.0, 90.0])

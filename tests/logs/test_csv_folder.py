@@ -10,10 +10,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from flownav.errors import InputError
-from flownav.frames import euler_from_quaternion
+from flownav.core.errors import InputError
+from flownav.core.frames import euler_from_quaternion
+from flownav.core.measurement import Sensor
 from flownav.logs.csv_folder import FILES, read_csv_folder
-from flownav.measurement import Sensor
 from places import DOCS
 from replay_logs import ORIGIN, log_of_flight, path, write_table
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pymavlink.DFReader import DFReader_binary
 
 from dataflash_files import HEAD, DataFlashWriter
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.logs.dataflash import DataFlash, read_columns
 from flownav.logs.dataflash.columns import text
 from flownav.logs.dataflash.formats import CODES, DIVISORS

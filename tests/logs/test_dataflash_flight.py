@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from dataflash_files import DataFlashWriter, dataflash_of, define_flight
-from flownav.errors import InputError
-from flownav.frames import euler_from_quaternion, rotation_from_quaternion, to_earth
+from flownav.core.errors import InputError
+from flownav.core.frames import euler_from_quaternion, rotation_from_quaternion, to_earth
+from flownav.core.measurement import Sensor, Stream
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.dataflash import read_dataflash
 from flownav.logs.log import Log
 from flownav.logs.rates import attitude_at
-from flownav.measurement import Sensor, Stream
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY
 from replay_logs import ORIGIN, SyntheticLog, log_of_flight
 
 REAL = Path("dataflash") / "heli_sitl_takeoff_square_land.bin"

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fed_records import FLOWN, queue_of_flight, record_of
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor, merge
 from flownav.logs.open_log import open_flight
-from flownav.measurement import Sensor, merge
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay

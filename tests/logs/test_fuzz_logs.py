@@ -22,7 +22,7 @@ from crazyflie_logs import deck_log
 from crazyflie_logs import quantised as deck_tables
 from dataflash_files import HEAD, DataFlashWriter, dataflash_of
 from fed_records import queue_of_flight, record_of
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.export.formats import export
 from flownav.logs.blackbox.reader import read_blackbox
 from flownav.logs.crazyflie_log import read_crazyflie

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from fed_records import queue_of_flight, record_of
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import EventQueue
+from flownav.core.record import Record
 from flownav.export.formats import export
 from flownav.logs.log import Log
 from flownav.logs.open_log import open_flight, open_log
 from flownav.logs.plausible import LARGEST
-from flownav.measurement import EventQueue
-from flownav.record import Record
 from flownav.replays.bundle import to_record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions

@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.logs.journal import HEADER, MAGIC, MARK, Block, Damage, block, blocks, is_journal
 from flownav.logs.open_log import open_log
 

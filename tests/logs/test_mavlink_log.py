@@ -12,7 +12,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
 from flownav.logs.absences import INSTEAD
 from flownav.logs.mavlink_flight import WANTED
 from flownav.logs.mavlink_log import read_tlog
@@ -21,7 +22,6 @@ from flownav.logs.plausible import check_plausible
 from flownav.logs.rates import attitude_rates
 from flownav.mavlink.dialect import coder
 from flownav.mavlink.signing import sign_outgoing
-from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from dataflash_files import dataflash_of
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
 from flownav.logs.open_log import log_kind, open_flight, open_log
-from flownav.measurement import Sensor
 from mavlink_logs import flight_log
 from replay_logs import log_of_flight
 from ulog_files import UlogWriter, ulog_of_flight

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from flownav.core.measurement import Sensor, Stream
 from flownav.logs.rates import attitude_at, attitude_rates, mean_over
-from flownav.measurement import Sensor, Stream
 
 
 def turned(rotations: Rotation, t_s: np.ndarray) -> Stream:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from fed_records import queue_of_flight, record_of
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
 from flownav.export.formats import export
 from flownav.logs.flu import frd, ned, ned_from_frd, ned_from_frd_of_nwu
 from flownav.logs.log import Log
@@ -17,7 +18,6 @@ from flownav.logs.open_log import log_kind, open_flight, open_log
 from flownav.logs.ros.bag import Bag
 from flownav.logs.ros.containers import messages
 from flownav.logs.ros.reader import read_ros
-from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.bundle import to_record
 from flownav.replays.prepare import ReplayOptions
@@ -110,7 +110,7 @@ def test_axes_are_turned_with_the_right_signs():
     assert np.allclose(east * np.sign(east[0]), [np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
     left = ned_from_frd_of_nwu(np.array([[np.cos(0.1), 0.0, 0.0, np.sin(0.1)]]))[0]  # 0.2 rad to the left
     assert np.allclose(left, [np.cos(0.1), 0.0, 0.0, -np.sin(0.1)])
-    from flownav.frames import euler_from_quaternion
+    from flownav.core.frames import euler_from_quaternion
 
     for angles in ((0.1, 0.2, 0.3), (-0.3, 0.1, -2.0), (0.05, -0.2, 3.0)):
         turned = ned_from_frd(np.array([enu_quaternion(*angles)]))[0]

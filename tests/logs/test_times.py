@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from fed_records import queue_of_flight, record_of
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
+from flownav.core.record import Record
+from flownav.core.text import number
 from flownav.logs.open_log import open_log
-from flownav.measurement import Sensor
-from flownav.record import Record
-from flownav.text import number
 from mavlink_logs import flight_log
 from replay_logs import SyntheticLog, log_of_flight
 from ulog_files import ulog_of_flight

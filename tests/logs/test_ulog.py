@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flownav.errors import InputError
-from flownav.frames import quaternion_from_euler
+from flownav.core.errors import InputError
+from flownav.core.frames import quaternion_from_euler
+from flownav.core.measurement import Sensor
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
 from flownav.logs.ulog import read_ulog
-from flownav.measurement import Sensor
 from replay_logs import log_of_flight
 from ulog_files import UlogWriter, in_us, ulog_of_flight
 

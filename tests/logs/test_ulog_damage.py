@@ -11,10 +11,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
 from flownav.logs.log import Log
 from flownav.logs.ulog import read_ulog
-from flownav.measurement import Sensor
 from replay_logs import log_of_flight
 from ulog_files import UlogWriter, message, ulog_of_flight
 

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flownav.frames import quaternion_from_euler, rotation_from_quaternion
+from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion
+from flownav.core.measurement import Measurement, Sensor
 from flownav.mavlink import outgoing, sensors_outgoing
 from flownav.mavlink.converted import Context
 from flownav.mavlink.dialect import coder
@@ -17,7 +18,6 @@ from flownav.mavlink.messages import measurements
 from flownav.mavlink.outgoing import Estimate
 from flownav.mavlink.position_messages import LOCAL_NED
 from flownav.mavlink.state_messages import sim_state
-from flownav.measurement import Measurement, Sensor
 from mavlink_logs import made, through_bytes
 
 MAV = coder(1, 1)

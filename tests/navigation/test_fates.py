@@ -6,9 +6,9 @@ import math
 
 import pytest
 
+from flownav.core.measurement import Sensor
 from flownav.estimation.named import Attitude, PositionNed
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GPS_FAST, GPS_SLOW, GPS_VELOCITY, PAD, POSITION, VELOCITY
-from flownav.measurement import Sensor
 from flownav.navigation import verdicts
 from flownav.navigation.compass import check_compass
 from flownav.navigation.course import FOUND_RAD, LEAST_TRAVEL_M, find_heading

@@ -11,14 +11,15 @@ import re
 import numpy as np
 import pytest
 
-from flownav.compile import LANES, ONE_LANE, equation, unit
-from flownav.errors import InputError
+from flownav.core.compile import LANES, ONE_LANE, equation, unit
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
+from flownav.core.parameter_files import shipped
 from flownav.estimation import covariance
 from flownav.estimation.lag import Lagged, LagLens, LagMove, lag_of_step, lag_over, move_lag
 from flownav.estimation.named import Attitude, BodyRate, Height, VelocityNed
 from flownav.estimation.states import FLOW_LAG, STATE
 from flownav.logs.open_log import open_flight
-from flownav.measurement import Sensor
 from flownav.navigation.loop import start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import settings_of
@@ -32,7 +33,6 @@ from flownav.navigation.take import (
 )
 from flownav.navigation.tape import new_tape
 from flownav.navigation.told import FROM_MAG, Equipment
-from flownav.parameter_files import shipped
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay

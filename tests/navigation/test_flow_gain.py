@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flownav.measurement import Sensor
+from flownav.core.measurement import Sensor
 from flownav.navigation.flow import offer_component
 from flownav.navigation.reasons import FUSED
 from flownav.navigation.records import FlowMemory, Look, Reading

@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
+from flownav.core.measurement import EventQueue, Sensor, merge
 from flownav.estimation.gating import Reason
 from flownav.estimation.states import FLOW_SCALE, GYRO_BIAS
-from flownav.measurement import EventQueue, Sensor, merge
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import run, start_navigator
 from flownav.navigation.memory import MEMORY

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from flownav.compile import LANES, LANES_WIDE
+from flownav.core.compile import LANES, LANES_WIDE
+from flownav.core.frames import GRAVITY_M_S2
+from flownav.core.measurement import MAX_VALUES, EventQueue, Sensor, Stream, merge
 from flownav.estimation.packed import unpack
 from flownav.estimation.states import QUATERNION, STATE, STATES
-from flownav.frames import GRAVITY_M_S2
-from flownav.measurement import MAX_VALUES, EventQueue, Sensor, Stream, merge
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import READING, load_start, new_work
 from flownav.navigation.packed import pack

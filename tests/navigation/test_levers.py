@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.measurement import Sensor, Stream
+from flownav.core.measurement import Sensor, Stream
 from navigation_streams import Flown, circle, fly, navigate, still
 
 AHEAD_M, RIGHT_M, TURN_RAD_S = 0.6, -0.3, 0.8

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flownav.core.frames import GRAVITY_M_S2
+from flownav.core.measurement import Sensor, Stream
 from flownav.estimation.states import ACCEL_BIAS, COMPASS, INS_ERROR, PAD, VELOCITY_LAG
-from flownav.frames import GRAVITY_M_S2
-from flownav.measurement import Sensor, Stream
 from navigation_streams import circle, fly, navigate, still
 
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
+from flownav.core.measurement import EventQueue, Sensor, Stream, merge
 from flownav.estimation.gating import Reason
 from flownav.estimation.states import IMU
-from flownav.measurement import EventQueue, Sensor, Stream, merge
 from flownav.navigation.memory import load_imu
 from flownav.navigation.rows import EventRow
 from flownav.navigation.tape import COMPASS_REFUTED, EVENT_NAMES, FAULT_CLEARED, FAULT_SUSPECTED, HEADING_FOUND

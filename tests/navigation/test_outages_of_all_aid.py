@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from test_hard_flights import OWN, added_to, from_the_ground, noisy
 
+from flownav.core.measurement import Sensor
 from flownav.estimation.states import ACCEL_BIAS, INS_ERROR
-from flownav.measurement import Sensor
 from flownav.navigation.flow_noise import blindness, followed_quality
 from flownav.navigation.still import MOVES, RESTS
 from navigation_streams import Flown, circle, fly, navigate

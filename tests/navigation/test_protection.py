@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from test_hard_flights import added_to, noisy
 
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
+from flownav.core.measurement import Sensor, merge
 from flownav.estimation.gating import Reason
 from flownav.estimation.hypotheses import (
     COUNT,
@@ -34,7 +35,6 @@ from flownav.estimation.states import (
     STATES,
     VELOCITY,
 )
-from flownav.measurement import Sensor, merge
 from flownav.navigation.flags import Flag, flagged, flags_of
 from flownav.navigation.loop import run, start_navigator
 from flownav.navigation.protection import EXCLUDED, HELD_S, least_size, levels, prior_sigma

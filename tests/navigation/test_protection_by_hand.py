@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
 from flownav.estimation.covariance import at
 from flownav.estimation.hypotheses import (
     COUNT,

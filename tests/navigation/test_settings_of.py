@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flownav.frames import GRAVITY_M_S2
+from flownav.core.frames import GRAVITY_M_S2
 from flownav.navigation.flow_noise import flow_variance
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import noise_of, of_gps_receiver, of_inertial, of_magnetometer, settings_of

@@ -11,13 +11,14 @@ import typer
 from typer.testing import CliRunner
 
 from flownav.cli.replay import command
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
+from flownav.core.frames import quaternion_product
+from flownav.core.measurement import Sensor
+from flownav.core.record import PROTECTION_LEVELS, Record
 from flownav.estimation.packed import unpack
 from flownav.estimation.states import ATTITUDE, BARO, CONSIDERS, FORCE, GROUND, MIDDLE, QUATERNION, STATE, STATES
-from flownav.frames import quaternion_product
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
-from flownav.measurement import Sensor
 from flownav.navigation.entries import CORRECTED, DECAYED, FORGOTTEN, NOTED, PREDICTED
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator
@@ -34,7 +35,6 @@ from flownav.navigation.tape import (
     empty_tape,
     new_tape,
 )
-from flownav.record import PROTECTION_LEVELS, Record
 from flownav.replays.prepare import ReplayOptions, prepare, withhold
 from flownav.replays.session import Replay, replay
 from replay_logs import SyntheticLog, log_of_flight

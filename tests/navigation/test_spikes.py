@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.measurement import Sensor
+from flownav.core.measurement import Sensor
 from flownav.navigation.motion_records import ImuMemory, SpikeMemory
 from flownav.navigation.records import Reading
 from flownav.navigation.spikes import (

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from flownav.core.frames import GRAVITY_M_S2
+from flownav.core.measurement import Sensor
 from flownav.estimation.states import ACCEL_BIAS, GYRO_BIAS
-from flownav.frames import GRAVITY_M_S2
-from flownav.measurement import Sensor
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.start import STANDING_TILT_RAD, level, levelled
 from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
 from flownav.navigation.memory import MEMORY, STILL_CLOCK, new_work, set_lane, store_reading
 from flownav.navigation.motion_records import ImuWindow, SeenWindow
 from flownav.navigation.records import Reading

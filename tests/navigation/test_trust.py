@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
 from flownav.estimation.states import INNOVATION, INNOVATION_VARIANCE, NOISE
 from flownav.navigation.flow_noise import LARGEST_CHANGE, LARGEST_EXCESS, MEAN_CHANGE, SMALLEST_EXCESS, followed_excess
 from flownav.navigation.memory import MEMORY, REASON, load_whiteness, new_work

@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import j1
 
-from flownav.errors import InputError
-from flownav.optics.camera import (
+from flownav.core.errors import InputError
+from flownav.lab.optics.camera import (
     Camera,
     box_transfer,
     defocus_px,
@@ -22,9 +22,9 @@ from flownav.optics.camera import (
     light_named,
     refocused,
 )
-from flownav.optics.pad import BLACK, WHITE, Pad, checker, pad_named, stripes, texture
-from flownav.optics.projection import CameraMotion, ground_point, image_point, motion_field, pose_looking_down
-from flownav.optics.render import film, seen, stripe_harmonics, stripe_row
+from flownav.lab.optics.pad import BLACK, WHITE, Pad, checker, pad_named, stripes, texture
+from flownav.lab.optics.projection import CameraMotion, ground_point, image_point, motion_field, pose_looking_down
+from flownav.lab.optics.render import film, seen, stripe_harmonics, stripe_row
 
 SMALL = st.floats(-0.3, 0.3)
 SPEED = st.floats(-2.0, 2.0)

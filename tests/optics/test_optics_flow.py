@@ -12,15 +12,15 @@ import typer
 from typer.testing import CliRunner
 
 from flownav.cli import flow as flow_command
-from flownav.errors import InputError
-from flownav.optics.camera import Camera, effective_focal_px
-from flownav.optics.firmware import VERSIONS, firmware_named
-from flownav.optics.flow import compensated, flow_of_frames
-from flownav.optics.frame_files import read_frames
-from flownav.optics.frame_window import binned, middle
-from flownav.optics.pad import texture
-from flownav.optics.projection import CameraMotion, motion_field, pose_looking_down
-from flownav.optics.render import film
+from flownav.core.errors import InputError
+from flownav.lab.optics.camera import Camera, effective_focal_px
+from flownav.lab.optics.firmware import VERSIONS, firmware_named
+from flownav.lab.optics.flow import compensated, flow_of_frames
+from flownav.lab.optics.frame_files import read_frames
+from flownav.lab.optics.frame_window import binned, middle
+from flownav.lab.optics.pad import texture
+from flownav.lab.optics.projection import CameraMotion, motion_field, pose_looking_down
+from flownav.lab.optics.render import film
 
 FPS = 250.0
 HEIGHT_M = 0.8

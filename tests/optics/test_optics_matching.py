@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
-from flownav.errors import InputError
-from flownav.optics.block_matching import corners
-from flownav.optics.firmware import VERSIONS, Firmware, firmware_named
-from flownav.optics.flow import flow_between, flow_of_frames, raw_flow
+from flownav.core.errors import InputError
+from flownav.lab.optics.block_matching import corners
+from flownav.lab.optics.firmware import VERSIONS, Firmware, firmware_named
+from flownav.lab.optics.flow import flow_between, flow_of_frames, raw_flow
 
 CLEAN = VERSIONS["2014-12"]
 Image = NDArray[np.uint8]

@@ -14,13 +14,13 @@ from hypothesis.extra.numpy import array_shapes, arrays
 from typer.testing import CliRunner
 
 from flownav.cli import pad as pad_command
-from flownav.errors import InputError
-from flownav.measurement import COLUMNS, Sensor
-from flownav.optics import pad_fix
-from flownav.optics.camera import Camera, effective_focal_px
-from flownav.optics.pad import Pad
-from flownav.optics.pad_fix import PadSearch, find_pad
-from flownav.optics.pad_target import (
+from flownav.core.errors import InputError
+from flownav.core.measurement import COLUMNS, Sensor
+from flownav.lab.optics import pad_fix
+from flownav.lab.optics.camera import Camera, effective_focal_px
+from flownav.lab.optics.pad import Pad
+from flownav.lab.optics.pad_fix import PadSearch, find_pad
+from flownav.lab.optics.pad_target import (
     CODES_36H11,
     PadTarget,
     code_cells,
@@ -31,10 +31,10 @@ from flownav.optics.pad_target import (
     print_target,
     printed_cells,
 )
-from flownav.optics.pad_truth import fix_error, is_wrong, truth_of
-from flownav.optics.plane_pose import homography, plane_pose
-from flownav.optics.projection import Pose, pose_looking_down
-from flownav.optics.render import film
+from flownav.lab.optics.pad_truth import fix_error, is_wrong, truth_of
+from flownav.lab.optics.plane_pose import homography, plane_pose
+from flownav.lab.optics.projection import Pose, pose_looking_down
+from flownav.lab.optics.render import film
 
 CLEAN = {"read_noise_grey": 0.0, "photon_noise_grey": 0.0}
 SMALL = Camera(200, 150, 9.6e-6, 200 * 4.8e-6 / np.tan(np.radians(30.0)), 2.8, 1.5, **CLEAN)  # 60 degrees, sharp

@@ -11,10 +11,10 @@ import typer
 from typer.testing import CliRunner
 
 from flownav.cli import pad as pad_command
-from flownav.errors import InputError
-from flownav.optics.lens import field_angle_rad
-from flownav.optics.pad_datasheet import Assumed, datasheet
-from flownav.optics.pad_statistics import (
+from flownav.core.errors import InputError
+from flownav.lab.optics.lens import field_angle_rad
+from flownav.lab.optics.pad_datasheet import Assumed, datasheet
+from flownav.lab.optics.pad_statistics import (
     NoiseLaw,
     beta_of,
     biases_and_laws,
@@ -25,9 +25,9 @@ from flownav.optics.pad_statistics import (
     missed_law,
     sigma_of,
 )
-from flownav.optics.pad_target import PadTarget
-from flownav.optics.pad_trial import CAMERAS, TrialFrame, camera_flight, camera_named, frames_at, tried
-from flownav.optics.pad_truth import truth_of
+from flownav.lab.optics.pad_target import PadTarget
+from flownav.lab.optics.pad_trial import CAMERAS, TrialFrame, camera_flight, camera_named, frames_at, tried
+from flownav.lab.optics.pad_truth import truth_of
 from flownav.sensors.pad_camera_sheet import PadCameraSheet
 
 TAG = PadTarget()

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.optics.projection import pose_looking_down
-from flownav.optics.scene import (
+from flownav.lab.optics.projection import pose_looking_down
+from flownav.lab.optics.scene import (
     SHADOW,
     SUN_RAD,
     Cover,

@@ -16,12 +16,12 @@ from typer.testing import CliRunner
 
 from browsing import CHROMIUM, QUIET, SOFTWARE_GL, Visit
 from flownav.cli import paper as paper_command
-from flownav.errors import InputError, VerdictError
+from flownav.core.errors import InputError, VerdictError
+from flownav.lab.rig.experiment import RigSettings, run_experiment
 from flownav.paper import figures_flight, findings, laboratory, published
 from flownav.paper.laboratory import Configuration
 from flownav.paper.published import HEIGHTS_M, ErrorRow
 from flownav.paper.reproduction import reproduce
-from flownav.rig.experiment import RigSettings, run_experiment
 from flownav.sensors.datasheet import Dynamics
 
 FLIGHTS = 48

@@ -9,11 +9,11 @@ import flownav.parts.protocols as own
 from flownav.api.campaigning import campaign
 from flownav.api.flying import fly
 from flownav.api.replaying import replay
-from flownav.compile import equation
-from flownav.errors import InputError
-from flownav.examples.equation_filter import Memory, equation_filter, say, step
+from flownav.core.compile import equation
+from flownav.core.errors import InputError
+from flownav.core.record import QUATERNION
 from flownav.parts.equations import EquationFilter, EquationVehicle
-from flownav.record import QUATERNION
+from flownav.parts.examples.equation_filter import Memory, equation_filter, say, step
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 from flownav.vehicle.helicopter import derivative, outputs

@@ -10,15 +10,15 @@ from typer.testing import CliRunner
 
 from flownav.campaigns.plan import planned
 from flownav.campaigns.rows import rows_of
-from flownav.errors import InputError
-from flownav.examples.complementary import ComplementaryFilter
+from flownav.core.errors import InputError
 from flownav.parts.engine import OwnPartsEngine, identities
+from flownav.parts.examples.complementary import ComplementaryFilter
 from flownav.parts.flying import fly_parts
 from flownav.parts.naming import names, part_of
 from flownav.parts.protocols import Parts
 
 MINE = """
-from flownav.examples.complementary import ComplementaryFilter
+from flownav.parts.examples.complementary import ComplementaryFilter
 
 class Mine(ComplementaryFilter):
     name = "mine"
@@ -101,8 +101,8 @@ class Tuned(ComplementaryFilter):
 
 
 def test_identities_tell_classes_numbers_and_equations_apart():
-    from flownav.examples.equation_filter import Memory, equation_filter, say, step
     from flownav.parts.equations import EquationFilter
+    from flownav.parts.examples.equation_filter import Memory, equation_filter, say, step
 
     filters = [
         ComplementaryFilter, Tuned, Tuned(2.0), Tuned(3.0), equation_filter,

@@ -8,11 +8,11 @@ import pytest
 import flownav.parts.protocols as own
 from flownav.api.flying import fly
 from flownav.api.replaying import replay
-from flownav.errors import InputError
-from flownav.examples.complementary import ComplementaryFilter
-from flownav.examples.pd_controller import PdController
-from flownav.measurement import Sensor
-from flownav.record import QUATERNION
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
+from flownav.core.record import QUATERNION
+from flownav.parts.examples.complementary import ComplementaryFilter
+from flownav.parts.examples.pd_controller import PdController
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 from flownav.vehicle.helicopter import derivative, outputs

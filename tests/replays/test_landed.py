@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flownav.core.measurement import Sensor, Stream
 from flownav.logs.log import Log
-from flownav.measurement import Sensor, Stream
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import HELD_S, ReplayOptions, held
 from flownav.replays.session import replay

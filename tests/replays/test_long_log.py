@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flownav.core.measurement import merge, merged_parts
 from flownav.logs.open_log import open_log
-from flownav.measurement import merge, merged_parts
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays import prepare
 from flownav.replays.prepare import ReplayOptions

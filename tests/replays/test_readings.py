@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from flownav.core.measurement import Sensor, Stream
 from flownav.estimation.gating import Reason
-from flownav.measurement import Sensor, Stream
 from flownav.replays.judged import reading_scores
 from flownav.replays.session import Replay
 

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
+from flownav.core.record import FILTER_STATES, TABLES, TILTS, VELOCITY_NED, Record
 from flownav.estimation.gating import Reason
 from flownav.estimation.states import ATTITUDE, GYRO_BIAS, STATE_NAMES, STATES, VELOCITY
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
-from flownav.measurement import Sensor
 from flownav.navigation.rows import EventRow
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.record import FILTER_STATES, TABLES, TILTS, VELOCITY_NED, Record
 from flownav.replays.bundle import to_record
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import Replay, outage_summary, outage_table, replay, table_windows

@@ -11,8 +11,8 @@ import typer
 from typer.testing import CliRunner
 
 from flownav.cli.replay import command
-from flownav.errors import InputError
-from flownav.record import POSITION_NED, QUATERNION, Record
+from flownav.core.errors import InputError
+from flownav.core.record import POSITION_NED, QUATERNION, Record
 from replay_logs import log_of_flight, write_table
 
 

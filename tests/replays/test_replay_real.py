@@ -7,10 +7,10 @@ from dataclasses import replace as altered
 import numpy as np
 import pytest
 
+from flownav.core.measurement import Sensor
 from flownav.estimation.gating import Reason
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
-from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.bundle import to_record
 from flownav.replays.prepare import ReplayOptions

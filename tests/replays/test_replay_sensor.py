@@ -7,10 +7,10 @@ from dataclasses import replace as altered
 import numpy as np
 import pytest
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor, Stream
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
-from flownav.measurement import Sensor, Stream
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions, prepare, put_right
 from flownav.replays.session import replay

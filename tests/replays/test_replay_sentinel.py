@@ -13,10 +13,10 @@ import typer
 from typer.testing import CliRunner
 
 from flownav.cli.replay import command
-from flownav.errors import VerdictError
+from flownav.core.errors import VerdictError
+from flownav.core.record import Record
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
-from flownav.record import Record
 from flownav.replays.prepare import ReplayOptions, prepare
 from flownav.replays.sentinel import findings
 from replay_logs import SyntheticLog, log_of_flight, write_table

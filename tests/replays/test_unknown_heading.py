@@ -7,10 +7,10 @@ from dataclasses import replace as altered
 import numpy as np
 import pytest
 
+from flownav.core.frames import rotation_from_quaternion
+from flownav.core.measurement import Sensor
 from flownav.estimation.gating import Reason
-from flownav.frames import rotation_from_quaternion
 from flownav.logs.csv_folder import read_csv_folder
-from flownav.measurement import Sensor
 from flownav.navigation.rows import EventRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tape import COMPASS_REFUTED, HEADING_FOUND

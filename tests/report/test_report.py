@@ -14,10 +14,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from flownav import files
 from flownav.cli import report as report_command
-from flownav.errors import InputError
-from flownav.record import Record
+from flownav.core import files
+from flownav.core.errors import InputError
+from flownav.core.record import Record
 from flownav.report import content
 from flownav.report.figures_innovation import innovations
 from flownav.report.figures_states import position

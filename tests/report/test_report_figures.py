@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from flownav.measurement import Sensor
-from flownav.record import Record
+from flownav.core.measurement import Sensor
+from flownav.core.record import Record
 from flownav.report.chart import Chart
 from flownav.report.content import summary, tiles
 from flownav.report.figures_errors import close_ups, flown_errors, position_error

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.record import PROTECTION_LEVELS, Record
+from flownav.core.record import PROTECTION_LEVELS, Record
 from flownav.report.figures_protection import protection
 from flownav.report.html import render, sections
 from report_records import flight, replay

@@ -13,12 +13,12 @@ import typer
 from typer.testing import CliRunner
 
 from flownav.cli import rig as rig_command
-from flownav.errors import InputError
-from flownav.optics.firmware import VERSIONS
-from flownav.rig.campaign import run_campaign
-from flownav.rig.experiment import RigLog, RigSettings, run_experiment
-from flownav.rig.instruments import gyro_at, messages, sonar_at
-from flownav.rig.log_folder import COLUMNS
+from flownav.core.errors import InputError
+from flownav.lab.optics.firmware import VERSIONS
+from flownav.lab.rig.campaign import run_campaign
+from flownav.lab.rig.experiment import RigLog, RigSettings, run_experiment
+from flownav.lab.rig.instruments import gyro_at, messages, sonar_at
+from flownav.lab.rig.log_folder import COLUMNS
 
 SHORT = RigSettings(duration_s=6.0)
 OLD = VERSIONS["2013-09"]

@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import ellipk
 
-from flownav.errors import InputError
-from flownav.optics.projection import ground_point
-from flownav.rig.encoder import COUNTS_PER_REVOLUTION, SAMPLE_S, angle_and_rate, counts_of
-from flownav.rig.excitation import EXCITATIONS, LARGEST_ANGLE_RAD, move, rod_length
-from flownav.rig.pendulum import (
+from flownav.core.errors import InputError
+from flownav.lab.optics.projection import ground_point
+from flownav.lab.rig.encoder import COUNTS_PER_REVOLUTION, SAMPLE_S, angle_and_rate, counts_of
+from flownav.lab.rig.excitation import EXCITATIONS, LARGEST_ANGLE_RAD, move, rod_length
+from flownav.lab.rig.pendulum import (
     GRAVITY_M_S2,
     STEP_S,
     half_sine,

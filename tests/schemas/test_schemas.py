@@ -9,13 +9,13 @@ from pathlib import Path
 import jsonschema
 import pytest
 import typer.main
+from file_schemas import generated
 from typer.testing import CliRunner
 
 from flownav.cli import app
-from flownav.parameter_files import shipped
-from flownav.record import Record
-from flownav.schemas import names, schema_of
-from flownav.schemas.generated import generated
+from flownav.core.parameter_files import shipped
+from flownav.core.record import Record
+from flownav.core.schemas import names, schema_of
 from replay_logs import log_of_flight
 
 COMMANDS = set(typer.main.get_command(app).commands)  # type: ignore[attr-defined]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.measurement import COLUMNS, Sensor, Stream
+from flownav.core.measurement import COLUMNS, Sensor, Stream
 from flownav.scoring.coverage import coverage_of, silences
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.measurement import Array
+from flownav.core.measurement import Array
 from flownav.scoring.drift import Motion, end_drift, flight_of
 
 NONE = np.zeros(0)

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from flownav.record import Record
+from flownav.core.record import Record
 from flownav.scoring.by_phase import rejected_mostly_in, scores_by_phase
 from flownav.scoring.phases import NAMES, Phase, phase_at, phases_of
 

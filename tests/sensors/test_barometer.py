@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from flownav.errors import InputError
-from flownav.frames import GRAVITY_M_S2
-from flownav.parameter_files import check
+from flownav.core.errors import InputError
+from flownav.core.frames import GRAVITY_M_S2
+from flownav.core.parameter_files import check
 from flownav.sensors.barometer import (
     BarometerNormals,
     BarometerStartNormals,

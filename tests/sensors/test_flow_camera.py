@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation as Turn
 
-from flownav.errors import InputError
-from flownav.frames import angular_flow
-from flownav.parameter_files import check
+from flownav.core.errors import InputError
+from flownav.core.frames import angular_flow
+from flownav.core.parameter_files import check
 from flownav.sensors.datasheet import FlowSettings, load_sensor
 from flownav.sensors.flow import flow_noise_sigma
 from flownav.sensors.flow_camera import (

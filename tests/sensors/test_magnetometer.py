@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation as Turn
 
-from flownav.errors import InputError
-from flownav.parameter_files import check
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import check
 from flownav.sensors.magnetometer import (
     MagnetometerNormals,
     MagnetometerUnit,

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation as Turn
 
-from flownav.errors import InputError
-from flownav.frames import Rotation
-from flownav.parameter_files import check
+from flownav.core.errors import InputError
+from flownav.core.frames import Rotation
+from flownav.core.parameter_files import check
 from flownav.sensors.geometry import LensPose
 from flownav.sensors.pad_camera import (
     PadCameraNormals,

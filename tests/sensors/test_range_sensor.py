@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation as Turn
 
-from flownav.errors import InputError
-from flownav.parameter_files import check, shipped
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import check, shipped
 from flownav.sensors.beam import LEVEL, BeamHit, beam_distance
 from flownav.sensors.range_sensor import (
     RangeSensorNormals,

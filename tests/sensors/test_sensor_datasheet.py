@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from flownav.errors import InputError
-from flownav.parameter_files import check, shipped
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import check, shipped
 from flownav.sensors.datasheet import FlowSettings, Noise, load_sensor
 
 TABLES = [

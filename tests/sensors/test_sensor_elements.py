@@ -13,7 +13,7 @@ import scipy.signal
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.parameter_files import shipped
+from flownav.core.parameter_files import shipped
 from flownav.sensors.gauss_markov import gauss_markov, gauss_markov_coefficients
 from flownav.sensors.quantisation import quantised, steps_per_unit
 from flownav.sensors.second_order import hold_step, second_order_hold

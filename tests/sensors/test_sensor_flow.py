@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.frames import angular_flow, velocity_from_flow
+from flownav.core.frames import angular_flow, velocity_from_flow
 from flownav.sensors.datasheet import FlowSettings, load_sensor
 from flownav.sensors.flow import (
     PERIOD_S,

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from flownav.frames import quaternion_from_euler, rotation_from_quaternion
+from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion
 from flownav.sensors.datasheet import FlowSettings, load_sensor
 from flownav.sensors.flow import start_flow
 from flownav.sensors.flow_engagement import engage_flow, engagement, pattern_reach

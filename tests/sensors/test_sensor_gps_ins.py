@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from flownav.errors import InputError
-from flownav.frames import euler_from_quaternion, quaternion_from_euler
-from flownav.parameter_files import check
+from flownav.core.errors import InputError
+from flownav.core.frames import euler_from_quaternion, quaternion_from_euler
+from flownav.core.parameter_files import check
 from flownav.sensors.gps_ins import (
     PERIOD_S,
     GpsInsNormals,

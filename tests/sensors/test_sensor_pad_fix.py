@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
+from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
 from flownav.sensors.pad_fix import PadFixNormals, PadFixParameters, PadFixReading, read_pad
 
 CAMERA = PadFixParameters(1.0, 0.003, 0.02, 0.3, 3.0, math.tan(0.6), math.tan(0.6), 0.0)

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flownav.errors import InputError
-from flownav.parameter_files import check, shipped
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import check, shipped
 from flownav.sensors.sheets import SensorSheets, shipped_sheets
 from flownav.sensors.skid_switch import (
     SkidSwitchNormals,

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flownav.compile import LANES, ONE_LANE, equation, kernel, lane_access
-from flownav.frames import rotation_from_quaternion
+from flownav.core.compile import LANES, ONE_LANE, equation, kernel, lane_access
+from flownav.core.frames import rotation_from_quaternion
 from flownav.sensors.barometer import (
     BarometerNormals,
     BarometerParameters,

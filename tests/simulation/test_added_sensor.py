@@ -19,8 +19,8 @@ laser = importlib.util.module_from_spec(spec)
 sys.modules["laser"] = laser
 spec.loader.exec_module(laser)  # carries the sensor, and flies it
 
-from flownav.compile import LANES, ONE_LANE
-from flownav.measurement import Sensor
+from flownav.core.compile import LANES, ONE_LANE
+from flownav.core.measurement import Sensor
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_written
 from flownav.simulation.scenario import load_scenario

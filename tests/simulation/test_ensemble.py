@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from flownav.compile import LANES
-from flownav.errors import InputError
-from flownav.measurement import Sensor
-from flownav.parameter_files import check, shipped
+from flownav.core.compile import LANES
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
+from flownav.core.parameter_files import check, shipped
 from flownav.simulation.assemble import assemble
 from flownav.simulation.dispersion import Distribution, drawn, uniforms
 from flownav.simulation.engine import fly_blocks, fly_one, fly_written

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flownav.campaigns.local import counted_steps, fly_many, fly_recorded, score_history
-from flownav.parameter_files import check, shipped
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.core.parameter_files import check, shipped
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, touchdown_rows
 from flownav.scoring.landings import column_of, succeeded
 from flownav.scoring.paper_tables import published

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from flownav.errors import InputError
-from flownav.parameter_files import check
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import check
 from flownav.sensors.beam import LEVEL, ground_height, roughness
 from flownav.simulation.ground import GroundSettings, share_beyond, under_rotor
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from flownav.campaigns.local import fly_many
-from flownav.compile import LANES, kernel
-from flownav.errors import InputError
-from flownav.record import POSITION_NED
+from flownav.core.compile import LANES, kernel
+from flownav.core.errors import InputError
+from flownav.core.record import POSITION_NED
 from flownav.scoring.errors import touchdown_rows
 from flownav.scoring.landings import crashed, succeeded
 from flownav.simulation import layout

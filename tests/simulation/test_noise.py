@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
 
-from flownav.compile import LANES, ONE_LANE, bits_from_float, float_from_bits, kernel
+from flownav.core.compile import LANES, ONE_LANE, bits_from_float, float_from_bits, kernel
 from flownav.simulation.noise import normal_pair, threefry
 
 

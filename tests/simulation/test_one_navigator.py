@@ -7,7 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from flownav.cli import app
-from flownav.compile import LANES, ONE_LANE
+from flownav.core.compile import LANES, ONE_LANE
+from flownav.core.record import Record
 from flownav.estimation.states import MOST_SOURCES, SCRATCH
 from flownav.logs.open_log import open_flight
 from flownav.navigation.loop import run, start_navigator
@@ -15,7 +16,6 @@ from flownav.navigation.memory import WORK_ROWS
 from flownav.navigation.tables import estimate_table, innovation_table, states_table
 from flownav.navigation.tape import empty_tape
 from flownav.navigation.told import Equipment
-from flownav.record import Record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.compile import LANES, kernel
+from flownav.core.compile import LANES, kernel
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
 from flownav.simulation.ensemble import believed

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from flownav.compile import LANES, kernel
-from flownav.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
+from flownav.core.compile import LANES, kernel
+from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
 from flownav.sensors.beam import roughness, stepped
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble

@@ -10,8 +10,8 @@ import scipy.linalg
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.errors import InputError
-from flownav.parameter_files import check
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import check
 from flownav.simulation.wind import (
     PERIOD_S,
     SQRT3,

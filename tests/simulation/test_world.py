@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from flownav.campaigns.local import score_history
-from flownav.compile import LANES
-from flownav.errors import InputError
-from flownav.parameter_files import check
+from flownav.core.compile import LANES
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import check
 from flownav.scoring.errors import SCORE_COLUMNS
 from flownav.scoring.touchdown import names_of
 from flownav.simulation.assemble import assemble

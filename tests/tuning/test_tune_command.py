@@ -13,11 +13,11 @@ import typer
 from typer.testing import CliRunner
 
 from flownav.cli import replay, tune
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.logs.open_log import open_flight
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
-from flownav.tuning import job
+from flownav.studies.tuning import job
 from replay_logs import log_of_flight, write_table
 from tuning_logs import noisy_flight
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flownav.core.measurement import COLUMNS, Sensor, Stream
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
-from flownav.measurement import COLUMNS, Sensor, Stream
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
-from flownav.tuning.scores import (
+from flownav.studies.tuning.scores import (
     LEAST_SHARE,
     LOSS,
     SENSORS,

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flownav.core.measurement import COLUMNS, Sensor, Stream
 from flownav.logs.log import Log
-from flownav.measurement import COLUMNS, Sensor, Stream
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.tuning.job import proposals
-from flownav.tuning.judge import ACCEPTED, NOT_ACCEPTED, judge, judged
-from flownav.tuning.knobs import KNOBS, MOST_NOISE, knobs_of, limits_of, rounded, turned
-from flownav.tuning.resampling import interval_of, resampled
-from flownav.tuning.scores import Gains
-from flownav.tuning.search import Found, search
+from flownav.studies.tuning.job import proposals
+from flownav.studies.tuning.judge import ACCEPTED, NOT_ACCEPTED, judge, judged
+from flownav.studies.tuning.knobs import KNOBS, MOST_NOISE, knobs_of, limits_of, rounded, turned
+from flownav.studies.tuning.resampling import interval_of, resampled
+from flownav.studies.tuning.scores import Gains
+from flownav.studies.tuning.search import Found, search
 
 SETTINGS = NavigatorSettingsFile()
 NOISES = [knob for knob in KNOBS if knob.name in ("gyro noise", "accelerometer noise", "range noise")]

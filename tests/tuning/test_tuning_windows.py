@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor, Stream
 from flownav.logs.log import Log
-from flownav.measurement import Sensor, Stream
-from flownav.tuning.windows import GAP_SHARE, LEAST_JUDGES, split_flight, split_flights
+from flownav.studies.tuning.windows import GAP_SHARE, LEAST_JUDGES, split_flight, split_flights
 
 
 def log_of(duration_s: float, landed_s: float | None = None) -> Log:

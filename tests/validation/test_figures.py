@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.validation.figures import Smoothed, fit_flow, robust_sigma, run_length, slow_share
+from flownav.studies.validation.figures import Smoothed, fit_flow, robust_sigma, run_length, slow_share
 
 RNG = np.random.default_rng(5)
 

@@ -9,15 +9,15 @@ import pytest
 from helpers.replay_logs import log_of_flight
 from scipy.spatial.transform import Rotation
 
-from flownav.errors import InputError
-from flownav.frames import GRAVITY_M_S2
+from flownav.core.errors import InputError
+from flownav.core.frames import GRAVITY_M_S2
+from flownav.core.measurement import Sensor, Stream
 from flownav.logs.csv_folder import read_csv_folder
-from flownav.measurement import Sensor, Stream
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
-from flownav.validation.flights import load_flights
-from flownav.validation.path import Lean, lean_of, path_of, upright
+from flownav.studies.validation.flights import load_flights
+from flownav.studies.validation.path import Lean, lean_of, path_of, upright
 
 VEHICLE = load_flights().vehicle
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from helpers.replay_logs import log_of_flight
 
+from flownav.core.measurement import Sensor
 from flownav.logs.csv_folder import read_csv_folder
-from flownav.measurement import Sensor
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
@@ -15,10 +15,10 @@ from flownav.sensors import flow, inertial
 from flownav.sensors.datasheet import FlowSettings, load_sensor
 from flownav.sensors.imu import ImuReading
 from flownav.sensors.inertial_sheet import load_inertial_sheet
-from flownav.validation.drawn import Flight, drawn_sheets, kept_of, sheets_of
-from flownav.validation.flights import load_flights
-from flownav.validation.path import path_of
-from flownav.validation.sensed import every_nth, field_of, seen_velocity, simulated_log, step_of, stepped
+from flownav.studies.validation.drawn import Flight, drawn_sheets, kept_of, sheets_of
+from flownav.studies.validation.flights import load_flights
+from flownav.studies.validation.path import path_of
+from flownav.studies.validation.sensed import every_nth, field_of, seen_velocity, simulated_log, step_of, stepped
 
 VEHICLE = load_flights().vehicle
 

@@ -9,14 +9,14 @@ from helpers.replay_logs import log_of_flight
 from typer.testing import CliRunner
 
 from flownav.cli import app
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
-from flownav.measurement import Sensor
-from flownav.validation.flights import load_flights
-from flownav.validation.job import Row, row_of, validate_log
-from flownav.validation.page import page
-from flownav.validation.words import MEANINGS, widened
+from flownav.studies.validation.flights import load_flights
+from flownav.studies.validation.job import Row, row_of, validate_log
+from flownav.studies.validation.page import page
+from flownav.studies.validation.words import MEANINGS, widened
 
 HEAD = 'schema_version = 1\nname = "made"\nprovenance = "made for a test"\n'
 VEHICLE = load_flights().vehicle

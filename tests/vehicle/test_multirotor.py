@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq
 
-from flownav.errors import InputError
-from flownav.parameter_files import read_toml
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import read_toml
 from flownav.vehicle import airframe, multirotor
 from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.ground_effect import multiplier

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flownav.frames import rotation_from_quaternion
+from flownav.core.frames import rotation_from_quaternion
 from flownav.vehicle import helicopter, multirotor
 from flownav.vehicle.around import CALM, below_plane, in_wind, plane_normal
 from flownav.vehicle.loading import load_vehicle

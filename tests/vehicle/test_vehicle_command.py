@@ -10,8 +10,8 @@ import typer
 from typer.testing import CliRunner
 
 from flownav.cli.vehicle import command
-from flownav.errors import InputError, VerdictError
-from flownav.parameter_files import shipped
+from flownav.core.errors import InputError, VerdictError
+from flownav.core.parameter_files import shipped
 from flownav.vehicle.loading import SHIPPED_VEHICLE
 from flownav.vehicle.paper_model import load_paper_model
 from vehicle_files import X_CELL

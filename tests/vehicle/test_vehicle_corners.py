@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from flownav.errors import InputError
-from flownav.parameter_files import shipped
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import shipped
 from flownav.vehicle.corners import ALONE, CROSSED, NOMINAL, corners
 from flownav.vehicle.loading import SHIPPED_VEHICLE, load_vehicle
 

@@ -9,7 +9,7 @@ import pytest
 
 from flownav.control.box import LEAST_GAIN_DB, LEAST_PHASE_DEG, margins_of
 from flownav.control.design import gains_for
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.vehicle import airframe, helicopter
 from flownav.vehicle.around import CALM
 from flownav.vehicle.corners import NOMINAL, corners

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.frames import quaternion_from_euler, rotation_from_quaternion, to_body
+from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_body
 from flownav.vehicle import ground_effect
 from flownav.vehicle.around import CALM
 from flownav.vehicle.helicopter import outputs

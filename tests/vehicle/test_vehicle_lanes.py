@@ -5,7 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from flownav.compile import LANES, ONE_LANE, lane_access, stepping
+from flownav.core.compile import LANES, ONE_LANE, lane_access, stepping
 from flownav.vehicle import helicopter
 from flownav.vehicle.around import in_wind
 from flownav.vehicle.helicopter import derivative, normalised

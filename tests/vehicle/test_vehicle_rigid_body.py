@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.frames import quaternion_from_euler, rotation_from_quaternion
+from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion
 from flownav.vehicle import helicopter
 from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.loading import load_vehicle

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.errors import InputError
-from flownav.frames import quaternion_from_euler
+from flownav.core.errors import InputError
+from flownav.core.frames import quaternion_from_euler
 from flownav.vehicle import helicopter, skids
 from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.loading import load_vehicle

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flownav.errors import InputError
-from flownav.frames import euler_from_quaternion, quaternion_from_euler
+from flownav.core.errors import InputError
+from flownav.core.frames import euler_from_quaternion, quaternion_from_euler
 from flownav.vehicle import helicopter
 from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.loading import load_vehicle

@@ -11,12 +11,12 @@ from typer.testing import CliRunner
 
 from export_records import awkward
 from flownav.cli import app
-from flownav.errors import InputError
-from flownav.frames import rotation_from_quaternion, to_body, to_earth
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
-from flownav.viewing.flow_arrows import flow_arrows
-from flownav.viewing.shapes import cameras, vehicle_outline
-from flownav.viewing.view import has_display, write_rrd
+from flownav.core.errors import InputError
+from flownav.core.frames import rotation_from_quaternion, to_body, to_earth
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.export.viewing.flow_arrows import flow_arrows
+from flownav.export.viewing.shapes import cameras, vehicle_outline
+from flownav.export.viewing.view import has_display, write_rrd
 from report_records import flight
 
 rr = pytest.importorskip("rerun")

@@ -132,8 +132,8 @@ def horizon() -> Figure:
 
 def gps_drifts_off() -> Figure:
     """A flight whose GPS position drifts off at 0.5 m/s from 20 s on, beside the same flight without the fault."""
-    from flownav.faults.catalogue import FAULTS
-    from flownav.faults.flown import law_of_flight, scenario_flown
+    from flownav.campaigns.faults.catalogue import FAULTS
+    from flownav.campaigns.faults.flown import law_of_flight, scenario_flown
     from flownav.parts.flying import fly_with
     from flownav.parts.protocols import Parts
     from flownav.simulation.assemble import assemble
@@ -173,7 +173,7 @@ def _folder():
 
 def _sample_replay(**options: object) -> flownav.Record:
     """The sample flight of `flownav sample ulog`, replayed."""
-    from flownav.samples.kinds import sample_of
+    from flownav.export.samples.kinds import sample_of
 
     with _folder() as folder:
         log = folder / "flight.ulg"

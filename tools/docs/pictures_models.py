@@ -75,7 +75,7 @@ def flow_noise() -> Figure:
 
 def pads() -> Figure:
     """The patterns of the optics: the paper's stripes, a random texture, a chessboard with grain."""
-    from flownav.optics.pad import checker, stripes, texture
+    from flownav.lab.optics.pad import checker, stripes, texture
 
     figure, three = axes(1, 3, 2.6)
     for axis, pad in zip(three, (stripes(), texture(), checker()), strict=True):
@@ -95,8 +95,8 @@ def pads() -> Figure:
 
 def pad_target() -> Figure:
     """The nested landing target as it is printed, and in frames of a camera from 6 m and from 2.5 m."""
-    from flownav.optics.pad_target import PadTarget, printed_cells
-    from flownav.optics.pad_trial import CAMERAS, camera_flight, camera_named, frames_at, look
+    from flownav.lab.optics.pad_target import PadTarget, printed_cells
+    from flownav.lab.optics.pad_trial import CAMERAS, camera_flight, camera_named, frames_at, look
 
     target = PadTarget(1.0, "nested", 0)
     flown = camera_flight(camera_named(next(iter(CAMERAS))), target, seed=1, flight=0)
@@ -119,7 +119,7 @@ def pad_target() -> Figure:
 
 def rig() -> Figure:
     """One run of the pendulum: the encoder's velocity and the flow sensor's, which is smaller and late."""
-    from flownav.rig.experiment import RigSettings, run_experiment
+    from flownav.lab.rig.experiment import RigSettings, run_experiment
 
     log = run_experiment(RigSettings(height_m=0.6, seed=1))
     seen = (log.time_s > 2.0) & (log.time_s < 6.0)

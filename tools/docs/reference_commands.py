@@ -28,7 +28,7 @@ def commands() -> dict[str, str]:
 
 def page() -> str:
     """The page: a table of the commands, then each with its help. RuntimeError where one refuses to tell."""
-    from flownav import __version__
+    from flownav.core.version import __version__
 
     rows = [f"| [`flownav {name}`](#flownav-{name}) | {what} |" for name, what in commands().items()]
     sections = [f"## flownav {name}\n\n```text\n{_help(name)}\n```" for name in commands()]

@@ -12,13 +12,13 @@ from pydantic.fields import FieldInfo
 from units import unit_of
 
 from flownav.campaigns.requirement import Requirement
+from flownav.core.parameter_files import ParameterModel
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.parameter_files import ParameterModel
 from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.sheets import SensorSheets
 from flownav.simulation.dispersion import DispersionFile
 from flownav.simulation.scenario import Scenario
-from flownav.validation.flights import ValidationFile
+from flownav.studies.validation.flights import ValidationFile
 from flownav.vehicle.multirotor_schema import MultirotorFile
 from flownav.vehicle.schema import VehicleFile
 

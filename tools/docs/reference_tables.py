@@ -1,4 +1,4 @@
-"""The reference of a record's tables: every table and column of `flownav.record.TABLES`, with its unit."""
+"""The reference of a record's tables: every table and column of `flownav.core.record.TABLES`, with its unit."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from itertools import groupby
 
 from units import unit_of
 
-from flownav.measurement import COLUMNS, Sensor
-from flownav.record import TABLES
+from flownav.core.measurement import COLUMNS, Sensor
+from flownav.core.record import TABLES
 
 INTRODUCTION = """# Tables of a record
 

@@ -15,7 +15,7 @@ from flownav.campaigns.engines.engine import Engine
 from flownav.campaigns.measures import measured
 from flownav.campaigns.plan import Plan
 from flownav.campaigns.store import RECORDS, REPORT, Dataset
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.parts.engine import recording_of
 
 if TYPE_CHECKING:

@@ -27,10 +27,10 @@ from flownav.campaigns.run import Progress, Watch, run_campaign
 from flownav.campaigns.sampling import SAMPLINGS, Sampling
 from flownav.campaigns.store import RECORDS, SUMMARY, Store
 from flownav.campaigns.summary import WORST, summary_of
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.provenance import called_as
 from flownav.parts.engine import OwnPartsEngine, identities
 from flownav.parts.protocols import Controller, Filter, SensorModel, VehicleModel
-from flownav.provenance import called_as
 
 FLIGHTS, FLIGHTS_UNTIL = 1000, 100_000
 TRUTH_MODELS = ("ensemble", "matched", "both")

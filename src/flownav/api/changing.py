@@ -11,9 +11,9 @@ from shutil import rmtree
 from tempfile import mkdtemp
 from typing import Any
 
-from flownav.errors import InputError
-from flownav.guard import written_whole
-from flownav.toml_text import to_toml
+from flownav.core.errors import InputError
+from flownav.core.guard import written_whole
+from flownav.core.toml_text import to_toml
 
 Entries = dict[str, Any]
 

@@ -16,9 +16,9 @@ from flownav.api.vehicle import Vehicle
 from flownav.api.words import call_of, require_from
 from flownav.campaigns.judged import BOUND_FLIGHTS, Judged, bound_of, consistency_facts, fly_judged
 from flownav.campaigns.local import fly_recorded, known_exactly, median_flight, score_history
+from flownav.core.provenance import called_as
 from flownav.parts.flying import fly_parts, fly_with, names_of
 from flownav.parts.protocols import Controller, Filter, Parts, SensorModel, VehicleModel
-from flownav.provenance import called_as
 from flownav.scoring.errors import scores_of_flights
 from flownav.scoring.paper_tables import percentile_of_paper, published
 from flownav.scoring.takeoffs import takeoff_of_flights

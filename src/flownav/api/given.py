@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from flownav.errors import InputError
-from flownav.measurement import Array
-from flownav.record import POSITION_NED, PROTECTION_LEVELS, QUATERNION, TABLES, VELOCITY_BODY, VELOCITY_NED
+from flownav.core.errors import InputError
+from flownav.core.measurement import Array
+from flownav.core.record import POSITION_NED, PROTECTION_LEVELS, QUATERNION, TABLES, VELOCITY_BODY, VELOCITY_NED
 
 KNOWN = ("t_s", *TABLES["estimate"], *VELOCITY_NED)
 NEEDED = ("t_s", *POSITION_NED)

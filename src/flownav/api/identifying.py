@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flownav.errors import InputError
-from flownav.guard import inputs_there
+from flownav.core.errors import InputError
+from flownav.core.guard import inputs_there
 
 if TYPE_CHECKING:
     from flownav.api.sensor import Sensor
@@ -46,7 +46,7 @@ def identify(
     require_logs(paths)
 
     from flownav.api.words import call_of, changed
-    from flownav.provenance import called_as
+    from flownav.core.provenance import called_as
 
     heights = [float(heights_m)] if isinstance(heights_m, int | float) else [float(height) for height in heights_m]
     options = {
@@ -70,12 +70,12 @@ def identify_logs(
 ) -> Sensor:  # fmt: skip
     """The sensor that these logs show. InputError as `identify`."""
     from flownav.api.sensor import Sensor
-    from flownav.compile import announce_compilation
-    from flownav.identification.job import identify as findings_of
-    from flownav.identification.job import name_of
-    from flownav.identification.orders import parse_order
-    from flownav.identification.sensor_file import sensor_entries
-    from flownav.provenance import command_line
+    from flownav.core.compile import announce_compilation
+    from flownav.core.provenance import command_line
+    from flownav.lab.identification.job import identify as findings_of
+    from flownav.lab.identification.job import name_of
+    from flownav.lab.identification.orders import parse_order
+    from flownav.lab.identification.sensor_file import sensor_entries
     from flownav.sensors.datasheet import load_sensor
 
     structures, base_sensor = parse_order(order), load_sensor(base)

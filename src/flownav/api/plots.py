@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.errors import InputError
-from flownav.measurement import Array
-from flownav.record import POSITION_NED, VELOCITY_BODY, Column, Record
+from flownav.core.errors import InputError
+from flownav.core.measurement import Array
+from flownav.core.record import POSITION_NED, VELOCITY_BODY, Column, Record
 from flownav.scoring.recorded import at_instants, scored_table
 
 POSITION_TITLES = ("north [m]", "east [m]", "down [m]")

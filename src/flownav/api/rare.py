@@ -14,8 +14,8 @@ from flownav.campaigns.measures import MEASURES, Event, event_of
 from flownav.campaigns.plan import Plan, lands
 from flownav.campaigns.rare.estimate import Rare, estimate_rare
 from flownav.campaigns.rare.replay import read_branch, replayed, write_branch
-from flownav.errors import InputError
-from flownav.files import written_whole
+from flownav.core.errors import InputError
+from flownav.core.files import written_whole
 
 FLIGHT, FOUND = "rare_flight.json", "rare.json"
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
 
-from flownav import record as ground
 from flownav.api.table import Table
-from flownav.errors import InputError
+from flownav.core import record as ground
+from flownav.core.errors import InputError
 
 
 class Record(ground.Record):

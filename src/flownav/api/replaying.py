@@ -11,16 +11,16 @@ from flownav.api.parts import own_filter
 from flownav.api.record import Record
 from flownav.api.sensor import Sensor
 from flownav.api.words import call_of, changed, require_path
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import check, load
+from flownav.core.provenance import called_as, command_words
 from flownav.logs.log import Log
 from flownav.logs.open_log import open_flight
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import settings_of
-from flownav.parameter_files import check, load
 from flownav.parts.calling import name_of
 from flownav.parts.protocols import Filter
 from flownav.parts.replaying import replay_with
-from flownav.provenance import called_as, command_words
 from flownav.replays.bundle import to_record
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions

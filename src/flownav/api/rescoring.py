@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.api.given import columns_of_estimate
-from flownav.errors import InputError
-from flownav.measurement import Array
-from flownav.record import POSITION_NED, Record, Table
+from flownav.core.errors import InputError
+from flownav.core.measurement import Array
+from flownav.core.record import POSITION_NED, Record, Table
 from flownav.scoring.autopilot import columns_of
 from flownav.scoring.path import path_of, truth_alignment
 from flownav.scoring.recorded import at_instants, scores_of_other

@@ -9,7 +9,7 @@ from typing import Any
 from flownav.api.changing import merged, plain_entries, saved
 from flownav.api.sensor import Sensor
 from flownav.api.vehicle import Vehicle
-from flownav.parameter_files import check
+from flownav.core.parameter_files import check
 from flownav.simulation.dispersion import SHIPPED as SHIPPED_DISPERSION
 from flownav.simulation.scenario import Scenario as File
 from flownav.simulation.scenario import load_scenario

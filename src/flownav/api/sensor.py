@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from flownav.api.changing import kept_file, merged
-from flownav.errors import InputError
-from flownav.identification.sensor_file import write_sensor
-from flownav.parameter_files import check, read_toml, shipped
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import check, read_toml, shipped
+from flownav.lab.identification.sensor_file import write_sensor
 from flownav.sensors.datasheet import DEFAULT_SENSOR, FlowSensor
 
 if TYPE_CHECKING:
-    from flownav.identification.findings import Findings
+    from flownav.lab.identification.findings import Findings
 
 PAPER = "px4flow-paper"
 
@@ -99,7 +99,7 @@ class Sensor:
             >>> flownav.Sensor.load().facts
             {}
         """
-        from flownav.identification.facts import facts_of
+        from flownav.lab.identification.facts import facts_of
 
         return {} if self.findings is None else facts_of(self.findings)
 
@@ -160,10 +160,10 @@ class Sensor:
         Example:
             >>> flownav.Sensor.load().save_parameters(folder / "sensor.params")
             Traceback (most recent call last):
-            flownav.errors.InputError: PX4FLOW, the paper's selected model: parameters follow from what \
+            flownav.core.errors.InputError: PX4FLOW, the paper's selected model: parameters follow from what \
 flownav.identify found; identify it anew
         """
-        from flownav.identification.autopilot_parameters import write_parameters
+        from flownav.lab.identification.autopilot_parameters import write_parameters
 
         if self.findings is None:
             raise InputError(f"{self.name}: parameters follow from what flownav.identify found; identify it anew")

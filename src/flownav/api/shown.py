@@ -5,7 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-from flownav.record import Record
+from flownav.core.record import Record
 
 
 def lines_of(record: Record) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING, Any
 
-from flownav.record import Column
+from flownav.core.record import Column
 
 if TYPE_CHECKING:
     import pandas
@@ -118,7 +118,7 @@ def _library(name: str) -> Any:
     """A data-frame library. InputError where it is not installed."""
     from importlib import import_module
 
-    from flownav.errors import InputError
+    from flownav.core.errors import InputError
 
     try:
         return import_module(name)

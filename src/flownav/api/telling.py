@@ -5,13 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from flownav.errors import InputError
-from flownav.faults.flight_log import log_of
+from flownav.campaigns.faults.flight_log import log_of
+from flownav.core.errors import InputError
+from flownav.core.record import Record
 from flownav.live.link import open_link
 from flownav.live.loop import run_vehicle, stoppable
 from flownav.live.simulated import SimulatedVehicle
 from flownav.mavlink.signing import load_key
-from flownav.record import Record
 from flownav.simulation.assemble import Setup
 
 

@@ -8,7 +8,7 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 LONGEST = 200  # characters of one argument
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from flownav.measurement import Sensor
+from flownav.core.measurement import Sensor
 from flownav.navigation.settings_of import Told
 from flownav.navigation.told import FlowNoise
 from flownav.sensors.flow import flow_noise_sigma

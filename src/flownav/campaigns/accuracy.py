@@ -14,6 +14,7 @@ from flownav.campaigns.local import known_exactly
 from flownav.campaigns.measures import CRASH, measured
 from flownav.campaigns.requirement import SHIPPED, Requirement, load_requirement
 from flownav.campaigns.requirement import scenario_of as scenario_required
+from flownav.core.text import finite_or_none
 from flownav.scoring.consistency import (
     BAND,
     GROUP_FLIGHTS,
@@ -32,7 +33,6 @@ from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario, with_filter
-from flownav.text import finite_or_none
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
 
 CASES = SHIPPED  # requirements by name, with what is flown and what the ensemble must keep

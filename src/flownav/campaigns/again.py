@@ -8,7 +8,7 @@ from typing import Protocol
 
 from flownav.campaigns.local import fly_recorded
 from flownav.campaigns.plan import Plan
-from flownav.record import Record
+from flownav.core.record import Record
 from flownav.simulation.assemble import Setup
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.fault import SensorFault

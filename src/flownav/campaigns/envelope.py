@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from flownav.campaigns.local import fly_many
-from flownav.parameter_files import check
+from flownav.core.parameter_files import check
 from flownav.scoring.errors import touchdown_rows
 from flownav.scoring.landings import CONTACT_DISTANCE, REST_DISTANCE, crashed, radius, success
 from flownav.simulation.assemble import Setup, assemble

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.campaigns.measures import CRASH, NOT_LANDED, measured
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.text import finite_or_none
 from flownav.scoring.percentiles import percentile_with_interval, share_with_interval
-from flownav.text import finite_or_none
 
 Array = NDArray[np.float64]
 

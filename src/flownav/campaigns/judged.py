@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from flownav.campaigns.local import counted_steps, score_history, takeoff_history
 from flownav.campaigns.rows import largest_horizontal_m
-from flownav.record import POSITION_NED, VELOCITY_BODY
+from flownav.core.record import POSITION_NED, VELOCITY_BODY
+from flownav.core.text import finite, finite_or_none
 from flownav.scoring.consistency import (
     GROUP_FLIGHTS,
     ConsistencySums,
@@ -33,7 +34,6 @@ from flownav.simulation.engine import fly_blocks
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.history import column, columns
 from flownav.simulation.plan import Flight
-from flownav.text import finite, finite_or_none
 
 Array = NDArray[np.float64]
 

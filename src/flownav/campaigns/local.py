@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, score_block, scores_of_flight
 from flownav.scoring.paper_tables import published
 from flownav.scoring.takeoffs import takeoff_of_flight, takeoffs

@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 from scipy.stats import norm
 
-from flownav.compile import announce_compilation
-from flownav.errors import InputError
-from flownav.measurement import Sensor
-from flownav.optics.pad_target import BOARD_CELLS, NESTED_CELLS, TAG_CELLS, PadTarget
-from flownav.optics.pad_trial import (
+from flownav.core.compile import announce_compilation
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
+from flownav.core.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY
+from flownav.lab.optics.pad_target import BOARD_CELLS, NESTED_CELLS, TAG_CELLS, PadTarget
+from flownav.lab.optics.pad_trial import (
     CameraFlight,
     camera_flight,
     camera_named,
@@ -33,10 +34,9 @@ from flownav.optics.pad_trial import (
     take_frame,
     whole_in_view,
 )
-from flownav.optics.pad_truth import fix_error, is_wrong, truth_of
-from flownav.optics.projection import Pose
-from flownav.optics.shutter import FlightMotion
-from flownav.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY
+from flownav.lab.optics.pad_truth import fix_error, is_wrong, truth_of
+from flownav.lab.optics.projection import Pose
+from flownav.lab.optics.shutter import FlightMotion
 from flownav.sensors.pad_camera import PadCameraParameters, angle_noise, distance_noise
 from flownav.sensors.pad_camera_sheet import PadCameraSheet
 from flownav.simulation.assemble import Setup

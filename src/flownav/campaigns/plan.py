@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal, Protocol
 
-import flownav
 from flownav.campaigns.figures import FIGURES, stop_of
 from flownav.campaigns.measures import MEASURES
 from flownav.campaigns.sampling import Sampling, design_of
-from flownav.errors import InputError
-from flownav.parameter_files import check
-from flownav.provenance import code_sha256
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import check
+from flownav.core.provenance import code_sha256
+from flownav.core.version import __version__
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.fault import SensorFault
@@ -118,7 +118,7 @@ class Plan:
         """The campaign as its folder says it; two campaigns of the same are the same flights."""
         return {
             "schema_version": SCHEMA_VERSION,
-            "flownav": flownav.__version__,
+            "flownav": __version__,
             "code_sha256": code_sha256(),
             "seed": self.seed,
             "flights": self.flights,

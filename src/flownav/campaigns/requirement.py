@@ -12,8 +12,8 @@ from typing import Any, Literal
 from pydantic import Field, field_validator, model_validator
 
 from flownav.campaigns.measures import CRASH, MEASURES, NOT_LANDED
-from flownav.errors import InputError
-from flownav.parameter_files import Number, ParameterModel, check, load, shipped
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import Number, ParameterModel, check, load, shipped
 from flownav.simulation.dispersion import Distribution, leaves
 from flownav.simulation.scenario import SHIPPED as SHIPPED_SCENARIOS
 from flownav.simulation.scenario import Scenario, load_scenario, with_vehicle

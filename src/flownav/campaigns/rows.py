@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flownav.campaigns.arrow import numbers, words
 from flownav.campaigns.local import counted_steps, home_epoch, score_history
 from flownav.campaigns.measures import ROW_COLUMNS, measured
-from flownav.record import POSITION_NED
+from flownav.core.record import POSITION_NED
 from flownav.scoring.consistency import largest_horizontal_error
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
 from flownav.scoring.landings import BROKEN, verdict_of

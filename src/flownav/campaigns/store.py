@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 from flownav.campaigns import arrow
 from flownav.campaigns.measures import ROW_COLUMNS
 from flownav.campaigns.plan import Plan
-from flownav.errors import InputError
-from flownav.files import written_whole
-from flownav.guard import an_output_folder
+from flownav.core.errors import InputError
+from flownav.core.files import written_whole
+from flownav.core.guard import an_output_folder
 from flownav.scoring.errors import SCORE_COLUMNS
 
 Array = NDArray[np.float64]

@@ -25,9 +25,9 @@ from flownav.campaigns.rows import INPUT
 from flownav.campaigns.run import LANDING, TAKEOFF
 from flownav.campaigns.store import Dataset
 from flownav.campaigns.views import convergence, envelope, sensitivity
+from flownav.core.text import finite_or_none
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
 from flownav.scoring.landings import EXPECTED
-from flownav.text import finite_or_none
 
 Array = NDArray[np.float64]
 

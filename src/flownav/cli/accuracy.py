@@ -39,7 +39,7 @@ def command(
     from flownav.campaigns.accuracy import CASES, flights_of, run_case
     from flownav.cli.lists import words
     from flownav.cli.output import place, progress, require_between
-    from flownav.errors import VerdictError
+    from flownav.core.errors import VerdictError
 
     require_between("--flights", flights, 1, 1_000_000)
     require_between("--ablations", ablations, 0, 1_000_000)
@@ -50,7 +50,7 @@ def command(
         made = [run_case(name, seed, flights, ablations, advance, vehicle) for name in chosen]
     text = markdown(made)
     if path is not None:
-        from flownav.guard import written_whole
+        from flownav.core.guard import written_whole
 
         with written_whole(path) as temporary:
             temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")

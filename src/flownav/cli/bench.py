@@ -17,8 +17,8 @@ def command(
     as_json: JsonOption = False,
 ) -> None:
     """Measure flights on both filters, lanes, the filters' steps, replay, start-up, compile time and memory."""
-    from flownav.benchmark.measures import MEASUREMENTS, measure_all
     from flownav.cli.output import progress, require_between
+    from flownav.studies.benchmark.measures import MEASUREMENTS, measure_all
 
     require_between("--flights", flights, 16, 1_000_000)
     figures = []

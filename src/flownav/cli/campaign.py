@@ -21,7 +21,7 @@ from flownav.cli.options import (
     out_option,
 )
 from flownav.cli.output import emit, require_between
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 if TYPE_CHECKING:
     from flownav.api.scenario import Scenario
@@ -116,7 +116,7 @@ def _flights_of(asked: int | None, planned: int | None, *, until: bool) -> int:
 def _scenarios(names: list[str], filter_name: str | None, vehicle: str | None) -> list[Scenario]:
     """The scenarios with their filter and vehicle. InputError where one cannot be, or a file is none to read."""
     from flownav.api.scenario import Scenario
-    from flownav.guard import an_input
+    from flownav.core.guard import an_input
 
     chosen = [Scenario.load(name).changed(filter=filter_name, vehicle=vehicle) for name in names]
     for name in (*names, vehicle):
@@ -215,7 +215,7 @@ def _swept(text: str) -> tuple[str, list[Any]]:
 
 def _value(text: str) -> Any:
     """A number, true or false, or a text."""
-    from flownav.text import number
+    from flownav.core.text import number
 
     text = text.strip()
     if text in ("true", "false"):

@@ -11,7 +11,7 @@ from flownav.campaigns.engines.named import engine_named, require_engine
 from flownav.cli.choices import REQUIREMENTS, argument, option
 from flownav.cli.options import KEPT, EngineOption, JsonOption, RecordsOption, VehicleOption, out_option
 from flownav.cli.output import emit
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 if TYPE_CHECKING:
     from flownav.campaigns.engines.engine import Engine
@@ -39,12 +39,12 @@ def command(
     as_json: JsonOption = False,
 ) -> None:
     """Fly what a requirement asks for: pass, fail or not shown, with its risk; exit status 1 unless it passes."""
+    from flownav.campaigns.certification.cells import plan_of
+    from flownav.campaigns.certification.certify import TOLD
     from flownav.campaigns.ranking import LEAST
     from flownav.campaigns.requirement import load_requirement
-    from flownav.certification.cells import plan_of
-    from flownav.certification.certify import TOLD
     from flownav.cli.output import require_between
-    from flownav.errors import VerdictError
+    from flownav.core.errors import VerdictError
 
     if flights is not None:
         require_between("--flights", flights, 1, 100_000_000)
@@ -74,11 +74,11 @@ def _fly(
     asked: Requirement, plan: Plan, engine: Engine, name: str, folder: Path, ranking: int, records: int
 ) -> dict[str, Any]:  # fmt: skip
     """Fly what the folder lacks, rank, write."""
+    from flownav.campaigns.certification.cells import require_planned
+    from flownav.campaigns.certification.certify import certify, with_ranking
+    from flownav.campaigns.certification.written import write_certificate
     from flownav.campaigns.ranking import flights_of
     from flownav.campaigns.store import Store
-    from flownav.certification.cells import require_planned
-    from flownav.certification.certify import certify, with_ranking
-    from flownav.certification.written import write_certificate
     from flownav.cli.campaign_progress import watching
     from flownav.cli.output import progress
 
@@ -96,8 +96,8 @@ def _fly(
 
 def _say_plan(asked: Requirement, as_json: bool) -> None:
     """How many flights each requirement needs, by the failures that it may have, and how many the file asks for."""
+    from flownav.campaigns.certification.judgement import PLANS
     from flownav.campaigns.requirement import needed_by
-    from flownav.certification.judgement import PLANS
 
     rows = [
         {

@@ -13,7 +13,7 @@ from typing import Any
 import typer
 
 from flownav.cli.output import require_between
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 Range = tuple[float, float]
 SCENARIOS = ("takeoff", "landing", "gusty", "pad_return", "approach")

@@ -14,7 +14,7 @@ from flownav.cli.options import LOG_KINDS, ForceOption, JsonOption, SensorOption
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
-    from flownav.compare.job import Setting
+    from flownav.studies.compare.job import Setting
 
 DEFAULT = "default"
 SHORT_RECORDS = ("against", "horizontal\n[m]", "vertical\n[m]", "velocity\n[m/s]", "touchdown\n[m]")
@@ -51,12 +51,12 @@ def command(
     """Score every log by every setting, beside dead reckoning and its autopilot; or lay records over each other."""
     from flownav.cli.output import place, progress
     from flownav.cli.replay import numbers
-    from flownav.compare.job import compare_log, windows_of
-    from flownav.compare.rows import names_of
-    from flownav.errors import InputError
+    from flownav.core.errors import InputError
+    from flownav.core.measurement import Sensor
     from flownav.logs.open_log import open_flight
-    from flownav.measurement import Sensor
     from flownav.replays.session import table_windows
+    from flownav.studies.compare.job import compare_log, windows_of
+    from flownav.studies.compare.rows import names_of
 
     if len(logs) > 1 and all(path.suffix == ".fnr" for path in logs) and not (settings or sensor or outages):
         return _records(logs, None if out is None else place(out, *logs, force=force), as_json=as_json)
@@ -81,10 +81,10 @@ def command(
 
 def _records(paths: list[Path], out: Path | None, *, as_json: bool) -> None:
     """Records beside each other, as they are: nothing is replayed."""
-    from flownav.compare.records import HEADINGS, cells, errors_in_time, rows_of_records
-    from flownav.compare.rows import names_of
-    from flownav.record import Record
+    from flownav.core.record import Record
     from flownav.report.records import write_records
+    from flownav.studies.compare.records import HEADINGS, cells, errors_in_time, rows_of_records
+    from flownav.studies.compare.rows import names_of
 
     named = list(zip(names_of(paths), [Record.load(path) for path in paths], strict=True))
     rows = rows_of_records(named)
@@ -102,15 +102,15 @@ def _records(paths: list[Path], out: Path | None, *, as_json: bool) -> None:
 
 def settings_asked(asked: list[str], sensor: Path | None) -> list[Setting]:
     """Each `--with` as what a replay takes; InputError where a file is not right, or one is named twice."""
-    from flownav.compare.job import Setting
-    from flownav.compare.rows import names_of
-    from flownav.errors import InputError
+    from flownav.core.errors import InputError
+    from flownav.core.parameter_files import load
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.navigation.settings_of import settings_of
-    from flownav.parameter_files import load
     from flownav.replays.prepare import ReplayOptions
     from flownav.sensors.datasheet import load_sensor
     from flownav.sensors.identified import identified_flow
+    from flownav.studies.compare.job import Setting
+    from flownav.studies.compare.rows import names_of
 
     twice = sorted({name for name in asked if asked.count(name) > 1})
     if twice:
@@ -129,8 +129,8 @@ def settings_asked(asked: list[str], sensor: Path | None) -> list[Setting]:
 
 def _write(rows: list[dict[str, Any]], path: Path) -> dict[str, str]:
     """The page; where it lies. InputError where it cannot."""
-    from flownav.compare.rows import HEADINGS, cells
     from flownav.report.comparison import write_comparison
+    from flownav.studies.compare.rows import HEADINGS, cells
 
     with _writing(path):
         write_comparison(HEADINGS, [cells(row) for row in rows], rows, path)
@@ -140,7 +140,7 @@ def _write(rows: list[dict[str, Any]], path: Path) -> dict[str, str]:
 @contextmanager
 def _writing(path: Path) -> Iterator[None]:
     """InputError where the page cannot be written."""
-    from flownav.errors import InputError
+    from flownav.core.errors import InputError
 
     try:
         yield
@@ -154,7 +154,7 @@ def _print_records(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from flownav.compare.records import MEASURES, cells, figure
+    from flownav.studies.compare.records import MEASURES, cells, figure
 
     console = Console(markup=False, highlight=False)
     look: dict[str, Any] = {"box": box.SIMPLE_HEAD, "show_edge": False, "padding": (0, 1, 0, 0)}
@@ -183,7 +183,7 @@ def _print(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from flownav.compare.rows import cells
+    from flownav.studies.compare.rows import cells
 
     console = Console(markup=False, highlight=False)
     table = Table(*SHORT, title=TITLE, box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))

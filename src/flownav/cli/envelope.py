@@ -38,7 +38,7 @@ def command(
     from flownav.campaigns.envelope import directions_deg, fly_envelope
     from flownav.cli.lists import numbers
     from flownav.cli.output import place, progress, require_between
-    from flownav.errors import InputError
+    from flownav.core.errors import InputError
     from flownav.report.envelope import write_envelope
     from flownav.simulation.scenario import load_scenario, with_vehicle
 

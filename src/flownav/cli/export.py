@@ -33,10 +33,10 @@ def command(
 ) -> None:
     """Write a record for other tools: Foxglove, evo, spreadsheets, data frames, PlotJuggler, Google Earth, maps."""
     from flownav.cli.output import folder_place, place, several_place
-    from flownav.errors import InputError
+    from flownav.core.errors import InputError
+    from flownav.core.record import Record
     from flownav.export.earth import origin_from
     from flownav.export.formats import FOLDERS, FRAMED, destination, export, written_files
-    from flownav.record import Record
 
     path = destination(record, to, out)
     if to in FOLDERS:

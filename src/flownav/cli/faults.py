@@ -9,13 +9,13 @@ import typer
 from flownav.cli.choices import FAULTS, one_of, option
 from flownav.cli.options import EnsembleOption, JsonOption, SeedOption, VehicleOption
 from flownav.cli.output import emit
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 if TYPE_CHECKING:
-    from flownav.faults.catalogue import Fault
-    from flownav.faults.flown import Row as FlownRow
-    from flownav.faults.navigated import Navigate
-    from flownav.faults.table import Row
+    from flownav.campaigns.faults.catalogue import Fault
+    from flownav.campaigns.faults.flown import Row as FlownRow
+    from flownav.campaigns.faults.navigated import Navigate
+    from flownav.campaigns.faults.table import Row
 
 HEIGHTS_M = (0.3, 20.0)
 DURATIONS_S = (0.1, 60.0)
@@ -54,10 +54,10 @@ def command(
     as_json: JsonOption = False,
 ) -> None:
     """Sensors that fail on a landing: whether the vehicle lands, goes around or crashes, and what is said of it."""
+    from flownav.campaigns.faults.catalogue import faults_named
+    from flownav.campaigns.faults.laws import NOT_FLOWN
     from flownav.cli.lists import numbers, words
     from flownav.cli.output import require_between
-    from flownav.faults.catalogue import faults_named
-    from flownav.faults.laws import NOT_FLOWN
 
     require_between("--flights", flights, *FLIGHTS)
     named = words("--faults", faults) if faults else [name for name in FAULTS if offline or name not in NOT_FLOWN]
@@ -92,9 +92,9 @@ def _flown(
     chosen: tuple[Fault, ...], heights_m: list[float], lasting_s: list[float], flights: int, seed: int,
     vehicle: str | None, matched: bool,
 ) -> list[FlownRow]:  # fmt: skip
+    from flownav.campaigns.faults.flown import flown_table
+    from flownav.campaigns.faults.table import runs
     from flownav.cli.output import progress
-    from flownav.faults.flown import flown_table
-    from flownav.faults.table import runs
 
     with progress("Sensors that fail in flight", runs(chosen, heights_m, lasting_s)) as advance:
         return flown_table(
@@ -106,8 +106,8 @@ def _flown(
 def _logged(
     chosen: tuple[Fault, ...], heights_m: list[float], lasting_s: list[float], seed: int, vehicle: str | None
 ) -> list[Row]:
+    from flownav.campaigns.faults.table import fault_table, runs
     from flownav.cli.output import progress
-    from flownav.faults.table import fault_table, runs
 
     with progress("Failing sensors", runs(chosen, heights_m, lasting_s)) as advance:
         return fault_table(navigator(vehicle), chosen, heights_m, lasting_s, seed, advance, vehicle)
@@ -115,8 +115,8 @@ def _logged(
 
 def navigator(vehicle: str | None = None) -> Navigate:
     """The navigator on trial, told what the datasheets of the vehicle's sensors state."""
-    from flownav.faults.navigator import navigator_of
-    from flownav.faults.table import scenario_at
+    from flownav.campaigns.faults.navigator import navigator_of
+    from flownav.campaigns.faults.table import scenario_at
     from flownav.simulation.assemble import assemble
 
     return navigator_of(assemble(scenario_at(1.0, 1.0, vehicle)))

@@ -12,7 +12,7 @@ from flownav.cli.options import FirmwareOption, JsonOption
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
-    from flownav.optics.flow import FlowSeries
+    from flownav.lab.optics.flow import FlowSeries
 
 
 FramesArgument = Annotated[
@@ -38,10 +38,10 @@ def command(
     as_json: JsonOption = False,
 ) -> None:
     """Flow and quality from each frame to the next, with the historical firmware of your choice."""
-    from flownav.compile import announce_compilation
-    from flownav.optics.flow import flow_of_frames
-    from flownav.optics.frame_files import read_frames
-    from flownav.optics.frame_window import binned, middle
+    from flownav.core.compile import announce_compilation
+    from flownav.lab.optics.flow import flow_of_frames
+    from flownav.lab.optics.frame_files import read_frames
+    from flownav.lab.optics.frame_window import binned, middle
 
     turned = _rates(rates) if rates else None
     grey = binned(read_frames(frames), bin_by)
@@ -64,9 +64,9 @@ def _rates(path: Path) -> Any:
 
     import numpy as np
 
-    from flownav.errors import InputError
-    from flownav.guard import an_input
-    from flownav.text import number
+    from flownav.core.errors import InputError
+    from flownav.core.guard import an_input
+    from flownav.core.text import number
 
     names = ("rate_x_rad_s", "rate_y_rad_s", "rate_z_rad_s")
     try:

@@ -24,7 +24,7 @@ from flownav.cli.options import (
     out_option,
 )
 from flownav.cli.output import emit
-from flownav.errors import InputError, VerdictError
+from flownav.core.errors import InputError, VerdictError
 
 if TYPE_CHECKING:
     from flownav.api.flying import Flights

@@ -48,7 +48,7 @@ def command(
     from flownav.api.identifying import identify_logs
     from flownav.cli.lists import numbers
     from flownav.cli.output import place
-    from flownav.identification.autopilot_parameters import AUTOPILOTS as SUFFIXES
+    from flownav.lab.identification.autopilot_parameters import AUTOPILOTS as SUFFIXES
 
     suffix = None if autopilot is None else SUFFIXES[autopilot]
     path = place(_sensor_path(out, logs), *logs, base, force=force, beside=(suffix,) if suffix else ())
@@ -67,8 +67,8 @@ def command(
 
 
 def _sensor_path(out: Path | None, logs: list[Path]) -> Path:
-    from flownav.errors import InputError
-    from flownav.identification.job import name_of
+    from flownav.core.errors import InputError
+    from flownav.lab.identification.job import name_of
 
     path = out or Path("out") / f"{name_of(logs)}.toml"
     if path.suffix != ".toml":

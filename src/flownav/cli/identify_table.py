@@ -7,7 +7,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from flownav.identification.findings import Findings
+from flownav.lab.identification.findings import Findings
 
 
 def show(findings: Findings, facts: dict[str, Any]) -> None:

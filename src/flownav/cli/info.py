@@ -18,10 +18,10 @@ def command(
     as_json: JsonOption = False,
 ) -> None:
     """Show what a log holds: sensors, rates, gaps, thrown-away rows, limits, signs, and what it lacks."""
-    from flownav.compile import announce_compilation
-    from flownav.inspection.summary import summarise
+    from flownav.core.compile import announce_compilation
     from flownav.logs.open_log import open_log
     from flownav.logs.ros.choice import asked_topics
+    from flownav.studies.inspection.summary import summarise
 
     read = open_log(log, flow_instance=flow_instance, topics=asked_topics(topic or []))
     with announce_compilation("inspection"):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 
 def words(option: str, given: Sequence[str]) -> list[str]:
@@ -22,7 +22,7 @@ def _parts(option: str, given: Sequence[str]) -> list[str]:
 def numbers(option: str, given: Sequence[str], low: float, high: float) -> list[float]:
     """Every number, in order. InputError where one is none, or out of range."""
     from flownav.cli.output import require_between
-    from flownav.text import number
+    from flownav.core.text import number
 
     found = []
     for word in _parts(option, given):

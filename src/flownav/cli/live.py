@@ -91,7 +91,7 @@ def command(
 ) -> None:
     """Navigate a vehicle that is connected by MAVLink: fuse its sensors, send the estimate, show and record it."""
     from flownav.cli.live_setup import run as run_setup
-    from flownav.errors import InputError
+    from flownav.core.errors import InputError
     from flownav.live.link import parse_url
     from flownav.live.options import Limits
     from flownav.live.reception import accepted_by
@@ -122,7 +122,7 @@ def _navigate(
     url: str, options: Options, record: Path | None, duration_s: float | None, *, force: bool, as_json: bool
 ) -> None:
     """Navigate until asked to end, and say what came of it. VerdictError where nobody was heard or kept."""
-    from flownav.errors import VerdictError
+    from flownav.core.errors import VerdictError
     from flownav.live.display import on_terminal
     from flownav.live.link import open_link
     from flownav.live.loop import Latency, run_session, stoppable
@@ -168,7 +168,7 @@ def _navigate(
 @contextmanager
 def _recording(url: str, path: Path | None, options: Options, *, force: bool, shown: bool) -> Iterator[Recorder | None]:
     """The recorder, where a record is asked for; when the session breaks off, its journal stays and is named."""
-    from flownav.errors import VerdictError
+    from flownav.core.errors import VerdictError
     from flownav.live.recorder import Recorder
 
     recorder = Recorder(path, options, force=force, failed=_say_once(shown)) if path is not None else None
@@ -195,11 +195,11 @@ def _options(
     sensor: Path | None,
     settings: Path | None,
 ) -> Options:
+    from flownav.core.parameter_files import load
     from flownav.live.options import Options
     from flownav.mavlink.signing import load_key
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.navigation.settings_of import settings_of
-    from flownav.parameter_files import load
     from flownav.sensors.datasheet import load_sensor
     from flownav.sensors.identified import identified_flow
 

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 if TYPE_CHECKING:
-    from flownav.record import Record
+    from flownav.core.record import Record
 
 
 @contextmanager
@@ -48,8 +48,8 @@ def place(path: Path, *inputs: str | Path | None, force: bool, beside: Sequence[
     suffixes of what is written beside it. force: what is there is replaced, if flownav wrote it. InputError, before the
     work is done, where nothing must or can be put there.
     """
-    from flownav.free_names import a_place
-    from flownav.guard import an_input
+    from flownav.core.free_names import a_place
+    from flownav.core.guard import an_input
 
     read = [an_input(Path(each)) for each in inputs if each is not None]
     found = a_place(path, read, force=force, beside=beside)
@@ -59,8 +59,8 @@ def place(path: Path, *inputs: str | Path | None, force: bool, beside: Sequence[
 
 def several_place(path: Path, *inputs: str | Path | None, force: bool) -> Path:
     """The same of files that are called after a path: NAME_estimate.tum, NAME_truth.tum, ..."""
-    from flownav.free_names import a_place_of_several
-    from flownav.guard import an_input
+    from flownav.core.free_names import a_place_of_several
+    from flownav.core.guard import an_input
 
     found = a_place_of_several(path, [an_input(Path(each)) for each in inputs if each is not None], force=force)
     _require_place(path)
@@ -72,8 +72,8 @@ def folder_place(path: Path, *inputs: str | Path | None, force: bool | None = No
 
     force: None where the command replaces no folder.
     """
-    from flownav.free_names import a_folder_place
-    from flownav.guard import an_input
+    from flownav.core.free_names import a_folder_place
+    from flownav.core.guard import an_input
 
     for each in inputs:
         if each is not None:
@@ -99,7 +99,7 @@ def told(asked: Path, found: Path, *, replaces: bool = True) -> Path:
 
 def require_recordable(path: Path, *inputs: str | Path | None, force: bool) -> None:
     """InputError where a live session's record cannot be put there; the recorder numbers it."""
-    from flownav.guard import a_record_place, an_input
+    from flownav.core.guard import a_record_place, an_input
 
     a_record_place(path, [an_input(Path(each)) for each in inputs if each is not None], force=force)
     _require_place(path)

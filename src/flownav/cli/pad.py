@@ -11,11 +11,11 @@ import typer
 from flownav.cli.choices import CAMERAS, PATTERNS, one_of, option
 from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
 from flownav.cli.output import emit
-from flownav.text import finite
+from flownav.core.text import finite
 
 if TYPE_CHECKING:
-    from flownav.optics.pad_target import PadTarget
-    from flownav.optics.pad_trial import Trials
+    from flownav.lab.optics.pad_target import PadTarget
+    from flownav.lab.optics.pad_trial import Trials
 
 HEIGHTS = ["0.15,0.175,0.2,0.3,0.5,1,2,3,4"]
 SPEEDS = ["0.1,0.5,1.5"]
@@ -70,8 +70,8 @@ def command(
     """Where the pad is from the lens: angles, distance, heading; and how well, by height."""
     from flownav.cli.lists import numbers
     from flownav.cli.output import folder_place, place
-    from flownav.optics.pad_target import PadTarget, checked
-    from flownav.optics.pad_trial import Trials
+    from flownav.lab.optics.pad_target import PadTarget, checked
+    from flownav.lab.optics.pad_trial import Trials
 
     target = checked(PadTarget(side, pattern, code))
     if print_to is not None:
@@ -91,7 +91,7 @@ def command(
 
 def _print_target(target: PadTarget, picture: Path, as_json: bool) -> None:
     """The target as a picture of its true size."""
-    from flownav.optics.pad_target import print_target
+    from flownav.lab.optics.pad_target import print_target
 
     print_target(target, picture)
     facts: dict[str, Any] = {"target": target._asdict(), "picture": str(picture)}
@@ -109,10 +109,10 @@ def _show(facts: dict[str, Any], as_json: bool, printer: Any) -> None:
 def _found(frames: list[Path], target: PadTarget, focal_px: float | None, image_x_deg: float) -> dict[str, Any]:
     import numpy as np
 
-    from flownav.compile import announce_compilation
-    from flownav.errors import InputError
-    from flownav.optics.frame_files import read_frames
-    from flownav.optics.pad_fix import find_pad
+    from flownav.core.compile import announce_compilation
+    from flownav.core.errors import InputError
+    from flownav.lab.optics.frame_files import read_frames
+    from flownav.lab.optics.pad_fix import find_pad
 
     if focal_px is None:
         raise InputError("--focal: pictures need their focal length in pixels")
@@ -157,9 +157,9 @@ def _measured(
     pictures: Path | None,
 ) -> dict[str, Any]:
     from flownav.cli.output import progress
-    from flownav.compile import announce_compilation
-    from flownav.optics.pad_statistics import laws_of
-    from flownav.optics.pad_trial import camera_named, fly_cameras
+    from flownav.core.compile import announce_compilation
+    from flownav.lab.optics.pad_statistics import laws_of
+    from flownav.lab.optics.pad_trial import camera_named, fly_cameras
 
     trial, shown = camera_named(camera_name, focus_m), target.inner  # the outer is the same tag, five times as large
     with announce_compilation("pad"), progress("flights", trials.flights) as advance:
@@ -186,10 +186,10 @@ def _plain(facts: dict[str, Any]) -> dict[str, Any]:
 def _write_datasheet(
     out: Path, facts: dict[str, Any], target: PadTarget, camera_name: str, focus_m: float | None, mounting_deg: float
 ) -> str:
-    from flownav.guard import written_whole
-    from flownav.optics.pad_datasheet import Assumed, datasheet
-    from flownav.optics.pad_trial import camera_named
-    from flownav.provenance import command_line
+    from flownav.core.guard import written_whole
+    from flownav.core.provenance import command_line
+    from flownav.lab.optics.pad_datasheet import Assumed, datasheet
+    from flownav.lab.optics.pad_trial import camera_named
     from flownav.sensors.pad_camera_sheet import load_pad_camera_sheet
 
     sheet = load_pad_camera_sheet()

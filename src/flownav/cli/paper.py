@@ -27,7 +27,7 @@ def command(
 ) -> None:
     """Reproduce the paper: Tables 1 to 3 from the synthetic rig, 5 and 6 from flights, on one HTML page."""
     from flownav.cli.output import place, require_between
-    from flownav.errors import InputError, VerdictError
+    from flownav.core.errors import InputError, VerdictError
     from flownav.paper.reproduction import TABLES as ALL_TABLES
 
     require_between("--flights", flights, 1, 1_000_000)
@@ -52,7 +52,7 @@ def command(
 def _reproduced(tables: tuple[int, ...], seed: int, flights: int) -> Reproduction:
     """The reproduction behind progress bars."""
     from flownav.cli.output import progress
-    from flownav.compile import announce_compilation
+    from flownav.core.compile import announce_compilation
     from flownav.paper.laboratory import rig_runs
     from flownav.paper.reproduction import FLIGHT_TABLES, RIG_TABLES, reproduce
 

@@ -22,8 +22,8 @@ def command(
 ) -> None:
     """Make the record of a live session that was killed, or could not write it; the journal stays."""
     from flownav.cli.output import require_recordable, told
-    from flownav.errors import InputError, VerdictError
-    from flownav.free_names import free_name
+    from flownav.core.errors import InputError, VerdictError
+    from flownav.core.free_names import free_name
     from flownav.live.journal_place import is_locked, journal_of
     from flownav.live.recovery import recovered
     from flownav.logs.journal import SUFFIX

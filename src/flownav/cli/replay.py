@@ -64,11 +64,11 @@ def command(
     from flownav.api.parts import own_filter
     from flownav.api.replaying import replay_log
     from flownav.cli.output import progress, record_place, save
-    from flownav.errors import VerdictError
+    from flownav.core.errors import VerdictError
+    from flownav.core.parameter_files import load
     from flownav.logs.open_log import open_flight
     from flownav.logs.ros.choice import asked_topics
     from flownav.navigation.settings import NavigatorSettingsFile
-    from flownav.parameter_files import load
     from flownav.replays.session import table_windows
     from flownav.sensors.datasheet import load_sensor
 
@@ -107,8 +107,8 @@ def numbers(option: str, text: str, separator: str, count: int, form: str) -> tu
     """An option's numbers; InputError where it has another form than it should."""
     from math import isfinite
 
-    from flownav.errors import InputError
-    from flownav.text import number
+    from flownav.core.errors import InputError
+    from flownav.core.text import number
 
     try:
         found = tuple(number(part) for part in text.split(separator))

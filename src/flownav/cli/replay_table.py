@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from flownav.cli.output import autopilot_errors
-from flownav.record import Record
+from flownav.core.record import Record
 from flownav.scoring.consistency import verdict
 
 

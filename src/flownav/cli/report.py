@@ -19,8 +19,8 @@ def command(
 ) -> None:
     """Write a record's report: figures, scores, events and provenance in one HTML file that works offline."""
     from flownav.cli.output import place
-    from flownav.errors import InputError
-    from flownav.record import Record
+    from flownav.core.errors import InputError
+    from flownav.core.record import Record
     from flownav.report.html import write_report
 
     page = out or record.with_suffix(".html")

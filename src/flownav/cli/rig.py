@@ -12,7 +12,7 @@ from flownav.cli.options import FirmwareOption, ForceOption, JsonOption, RigSeed
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
-    from flownav.rig.experiment import RigLog, RigSettings
+    from flownav.lab.rig.experiment import RigLog, RigSettings
 
 HEIGHTS_M = ["0.6"]
 OutOption = Annotated[Path | None, out_option("The folder, with a folder in it for each of several runs", "out/rig")]
@@ -48,7 +48,7 @@ def command(
     """Swing a PX4FLOW over a pad beside an encoder and log both: rig.csv and rig.toml, a folder a run."""
     from flownav.cli.lists import numbers
     from flownav.cli.output import folder_place
-    from flownav.rig.experiment import RigSettings
+    from flownav.lab.rig.experiment import RigSettings
 
     heights = numbers("--height", height, 0.01, 100.0)
     settings = RigSettings(
@@ -78,10 +78,10 @@ def command(
 def _swung(settings: RigSettings, heights_m: list[float], folder: Path) -> list[dict[str, Any]]:
     """Every run at every height, written in a folder of its own; what each was."""
     from flownav.cli.output import progress
-    from flownav.compile import announce_compilation
-    from flownav.provenance import command_line
-    from flownav.rig.campaign import run_campaign
-    from flownav.rig.log_folder import check_rig_folder, run_folders, write_rig_folder
+    from flownav.core.compile import announce_compilation
+    from flownav.core.provenance import command_line
+    from flownav.lab.rig.campaign import run_campaign
+    from flownav.lab.rig.log_folder import check_rig_folder, run_folders, write_rig_folder
 
     count = len(heights_m) * settings.runs
     rows, folders = [], list(run_folders(folder, count))

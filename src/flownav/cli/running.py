@@ -7,10 +7,10 @@ import sys
 
 import typer
 
-import flownav
-from flownav.compiling.progress import announce_compilation
-from flownav.errors import FlownavError, InputError
-from flownav.guard import a_run
+from flownav.core.compiling.progress import announce_compilation
+from flownav.core.errors import FlownavError, InputError
+from flownav.core.guard import a_run
+from flownav.core.version import __version__
 
 DONE, BAD_VERDICT, BAD_INPUT = 0, 1, 2  # Ctrl-C: 130, as shells have it
 
@@ -39,7 +39,7 @@ def run(app: typer.Typer) -> None:
 def say_version(asked: bool) -> None:
     """The version, and nothing else is done."""
     if asked:
-        typer.echo(f"flownav {flownav.__version__}")
+        typer.echo(f"flownav {__version__}")
         raise typer.Exit
 
 

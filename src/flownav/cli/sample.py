@@ -12,7 +12,7 @@ from flownav.cli.options import ForceOption, JsonOption, RigSeedOption, out_opti
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
-    from flownav.samples.writing import Written
+    from flownav.export.samples.writing import Written
 
 
 def command(
@@ -30,10 +30,10 @@ def command(
     from importlib.util import find_spec
 
     from flownav.cli.lists import words
-    from flownav.errors import InputError
-    from flownav.samples.kinds import SAMPLES as MADE
-    from flownav.samples.kinds import sample_of
-    from flownav.samples.writing import write_samples
+    from flownav.core.errors import InputError
+    from flownav.export.samples.kinds import SAMPLES as MADE
+    from flownav.export.samples.kinds import sample_of
+    from flownav.export.samples.writing import write_samples
 
     folder = out or Path("samples")
     asked = [sample_of(kind) for kind in (words("KIND", kinds) if kinds else [])]
@@ -56,7 +56,7 @@ def command(
 
 
 def _list(*, as_json: bool) -> None:
-    from flownav.samples.kinds import SAMPLES as MADE
+    from flownav.export.samples.kinds import SAMPLES as MADE
 
     if as_json:
         rows = [{"kind": s.kind, "name": s.name, "what": s.what, "commands": list(s.commands)} for s in MADE]

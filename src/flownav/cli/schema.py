@@ -11,7 +11,7 @@ from flownav.cli.options import JsonOption
 
 
 def _complete(incomplete: str) -> list[str]:
-    from flownav.schemas import names
+    from flownav.core.schemas import names
 
     return [name for name in names() if name.startswith(incomplete)]
 
@@ -30,7 +30,7 @@ def command(
 ) -> None:
     """Print the JSON schema of a command's --json object (by the command's name), or of a file; or list them."""
     from flownav.cli.output import emit
-    from flownav.schemas import names, schema_of
+    from flownav.core.schemas import names, schema_of
 
     if name is not None:
         typer.echo(json.dumps(schema_of(name), indent=1))

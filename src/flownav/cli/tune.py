@@ -9,7 +9,7 @@ from flownav.cli.options import ForceOption, JsonOption, LogsArgument, SensorOpt
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
-    from flownav.tuning.job import OfLog, Tuned
+    from flownav.studies.tuning.job import OfLog, Tuned
 
 
 def command(
@@ -25,13 +25,13 @@ def command(
     """Propose settings from logs: fitted on every other window of the flights, accepted only if the rest gain by it."""
     from flownav.cli.compare import DEFAULT, settings_asked
     from flownav.cli.output import place, progress
-    from flownav.errors import InputError
+    from flownav.core.errors import InputError
+    from flownav.core.parameter_files import load
+    from flownav.core.provenance import command_line
     from flownav.logs.open_log import open_flight
     from flownav.navigation.settings import NavigatorSettingsFile
-    from flownav.parameter_files import load
-    from flownav.provenance import command_line
-    from flownav.tuning.job import runs_expected, tune
-    from flownav.tuning.settings_file import write_settings
+    from flownav.studies.tuning.job import runs_expected, tune
+    from flownav.studies.tuning.settings_file import write_settings
 
     path = out or Path("out/settings.toml")
     if path.suffix != ".toml":
@@ -66,7 +66,7 @@ def _facts(tuned: Tuned) -> dict[str, Any]:
 
 
 def _log_facts(log: OfLog) -> dict[str, Any]:
-    from flownav.tuning.scores import UNITS
+    from flownav.studies.tuning.scores import UNITS
 
     return {
         "log": log.name,
@@ -86,8 +86,8 @@ def _print(tuned: Tuned, facts: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from flownav.tuning.scores import UNITS
-    from flownav.tuning.settings_file import gain_words
+    from flownav.studies.tuning.scores import UNITS
+    from flownav.studies.tuning.settings_file import gain_words
 
     console = Console(markup=False, highlight=False)
     if tuned.proposed:

@@ -12,7 +12,7 @@ from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
-    from flownav.validation.job import Row
+    from flownav.studies.validation.job import Row
 
 MOST_FLIGHTS = 1000
 WIDE = 130  # columns that the table takes
@@ -35,11 +35,11 @@ def command(
 ) -> None:
     """Hold the simulator against recorded flights: outage drift, innovations, noise, as flown and as simulated."""
     from flownav.cli.output import place, progress, require_between
-    from flownav.errors import InputError, VerdictError
-    from flownav.guard import an_input, written_whole
-    from flownav.validation.flights import load_flights
-    from flownav.validation.job import replays_of, validate
-    from flownav.validation.page import page
+    from flownav.core.errors import InputError, VerdictError
+    from flownav.core.guard import an_input, written_whole
+    from flownav.studies.validation.flights import load_flights
+    from flownav.studies.validation.job import replays_of, validate
+    from flownav.studies.validation.page import page
 
     require_between("--flights", flights, 1, MOST_FLIGHTS)
     path = None if out is None else place(out, data, flights_file, force=force)
@@ -69,7 +69,7 @@ def _show(rows: list[Row]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from flownav.validation.words import TOO_KIND, number, said, verdicts, widened
+    from flownav.studies.validation.words import TOO_KIND, number, said, verdicts, widened
 
     table = Table(title="Recorded flights, and the same paths with simulated sensors", title_justify="left")
     for name in ("log", "figure"):

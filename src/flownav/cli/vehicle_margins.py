@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flownav.cli.output import emit
-from flownav.errors import VerdictError
+from flownav.core.errors import VerdictError
 
 if TYPE_CHECKING:
     from rich.table import Table

@@ -25,9 +25,9 @@ def command(
     Without --out a window opens; on a machine without a display the file is written beside the record instead.
     """
     from flownav.cli.output import place
-    from flownav.errors import InputError
-    from flownav.record import Record
-    from flownav.viewing.view import SUFFIX, has_display, show, write_rrd
+    from flownav.core.errors import InputError
+    from flownav.core.record import Record
+    from flownav.export.viewing.view import SUFFIX, has_display, show, write_rrd
 
     beside = out is None and not has_display()
     path = record.with_suffix(SUFFIX) if beside else out

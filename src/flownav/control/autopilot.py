@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import clamp, equation, magnitude, replacing, smaller
 from flownav.control.gains import AutopilotGains
 from flownav.control.gate import descent_limit, misaligned, skids_beside
 from flownav.control.go_around import Approach, GoAround, Knowledge, climb_out, mind_landing, search_offset, seeks
 from flownav.control.guidance import Reference
-from flownav.frames import GRAVITY_M_S2, Rotation, heading_cosine_sine, to_earth
+from flownav.core.compile import clamp, equation, magnitude, replacing, smaller
+from flownav.core.frames import GRAVITY_M_S2, Rotation, heading_cosine_sine, to_earth
 
 
 class AutopilotState(NamedTuple):

@@ -13,7 +13,7 @@ from flownav.control.gains import AutopilotGains
 from flownav.control.loops import LOOPS, loop_gains
 from flownav.control.margins import Margins, margins
 from flownav.control.sampled import spectral_radius
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.vehicle.corners import corners
 from flownav.vehicle.kinds import AnyVehicle, hover_of
 from flownav.vehicle.loading import load_vehicle

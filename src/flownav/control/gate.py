@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from flownav.compile import clamp, equation, smaller
 from flownav.control.gains import AutopilotGains
-from flownav.frames import Rotation, heading_cosine_sine
+from flownav.core.compile import clamp, equation, smaller
+from flownav.core.frames import Rotation, heading_cosine_sine
 
 FORESEEN_S = 1.0  # how far ahead the last metre's gate looks
 

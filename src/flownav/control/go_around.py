@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import clamp, cos, equation, larger, sin, smaller
 from flownav.control.gains import AutopilotGains
+from flownav.core.compile import clamp, cos, equation, larger, sin, smaller
 
 REACHED_M = 0.5  # of the height to which it climbs, and beside the pad
 SEARCH_M_S = 0.8

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation
+from flownav.core.compile import equation
 
 PIECES = 8
 LEFT_STRAIGHT = 0.9

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.control.gains import AutopilotGains
-from flownav.frames import GRAVITY_M_S2
+from flownav.core.frames import GRAVITY_M_S2
 from flownav.vehicle.plant import INPUTS, OUTPUTS, Complex
 
 INNER_S = 0.004

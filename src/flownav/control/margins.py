@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.text import finite
+from flownav.core.text import finite
 from flownav.vehicle.plant import Complex
 
 Array = NDArray[np.float64]

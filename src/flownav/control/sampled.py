@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 from flownav.control.gains import AutopilotGains
 from flownav.control.loops import FLOWN, SIGNALS, Timing
-from flownav.frames import GRAVITY_M_S2
+from flownav.core.frames import GRAVITY_M_S2
 from flownav.vehicle.plant import INPUTS, OUTPUTS, LinearPlant
 
 Array = NDArray[np.float64]

@@ -22,7 +22,7 @@ from flownav.control.gains import AutopilotGains
 from flownav.control.loops import FLOWN, hold, integral
 from flownav.control.margins import margins
 from flownav.control.sampled import spectral_radius
-from flownav.frames import GRAVITY_M_S2
+from flownav.core.frames import GRAVITY_M_S2
 from flownav.vehicle.corners import corners
 from flownav.vehicle.kinds import hover_of
 from flownav.vehicle.plant import INPUTS, OUTPUTS, Complex, LinearPlant, frequency_response, gust_input, hover_plant

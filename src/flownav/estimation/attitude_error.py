@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from flownav.compile import Lanes, Work, procedure
+from flownav.core.compile import Lanes, Work, procedure
+from flownav.core.frames import of_unit_length, quaternion_product
 from flownav.estimation.states import ATTITUDE, QUATERNION, STATE
-from flownav.frames import of_unit_length, quaternion_product
 
 
 @procedure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flownav.compile import Lanes, Work, equation
+from flownav.core.compile import Lanes, Work, equation
 from flownav.estimation.covariance import covariance_of
 from flownav.estimation.states import SCRATCH, STATE
 

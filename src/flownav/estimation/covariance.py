@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import cast
 
-from flownav.compile import Lanes, Work, equation, procedure
+from flownav.core.compile import Lanes, Work, equation, procedure
 from flownav.estimation.attitude_error import fold_attitude
 from flownav.estimation.states import (
     ACCEPTED,

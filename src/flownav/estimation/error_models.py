@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import Lanes, Work, equation, exp, procedure, squared
+from flownav.core.compile import Lanes, Work, equation, exp, procedure, squared
 from flownav.estimation.covariance import add_noise, decay
 from flownav.estimation.states import (
     ACCEL_BIAS,

@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, larger, procedure
+from flownav.core.compile import Lanes, Work, equation, larger, procedure
 from flownav.estimation.covariance import at
 from flownav.estimation.states import (
     ACCEPTED,

@@ -1,6 +1,6 @@
 """The Kalman filter's linear algebra on lanes: predict, innovation, test, update.
 
-A filter of `n` states lives in a lane buffer (see `flownav.compile`): each scalar of its state and of its
+A filter of `n` states lives in a lane buffer (see `flownav.core.compile`): each scalar of its state and of its
 covariance is a row of `len(lanes)` values, at the rows that `KalmanRows` names. `n` and the rows are
 constants at the call, so that LLVM unrolls the small loops and vectorises the lane loop. Measurements are
 processed one scalar component at a time, which for uncorrelated noise is algebraically the joint update
@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, Work, equation
+from flownav.core.compile import Lanes, Work, equation
 
 
 class KalmanRows(NamedTuple):

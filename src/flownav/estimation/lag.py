@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, cos, cosh, equation, exp, procedure, sin, sinh
+from flownav.core.compile import Lanes, Work, cos, cosh, equation, exp, procedure, sin, sinh
+from flownav.core.frames import Rotation
 from flownav.estimation.covariance import columns_of
 from flownav.estimation.discretise import discretised
 from flownav.estimation.error_models import FilterSettings
@@ -22,7 +23,6 @@ from flownav.estimation.motion import predict
 from flownav.estimation.named import Attitude, BodyRate, Height, Tilt, VelocityNed, rotation_by
 from flownav.estimation.states import STATES_WITH_LAG
 from flownav.estimation.transition import transition
-from flownav.frames import Rotation
 
 
 class FlowLag(NamedTuple):

@@ -14,7 +14,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol, cast, get_args, get_type_hints
 
-from flownav.compile import compiled, dressed, write_function
+from flownav.core.compile import compiled, dressed, write_function
 from flownav.estimation.states import (
     COEFFICIENT,
     INNOVATION,

@@ -9,7 +9,16 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import Lanes, Work, equation, procedure
+from flownav.core.compile import Lanes, Work, equation, procedure
+from flownav.core.frames import (
+    GRAVITY_M_S2,
+    Quaternion,
+    Rotation,
+    of_unit_length,
+    quaternion_product,
+    rotation_from_quaternion,
+    to_earth,
+)
 from flownav.estimation.covariance import add_noise, at, columns_of
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.hypotheses import push
@@ -38,15 +47,6 @@ from flownav.estimation.states import (
     VELOCITY,
 )
 from flownav.estimation.transition import transition
-from flownav.frames import (
-    GRAVITY_M_S2,
-    Quaternion,
-    Rotation,
-    of_unit_length,
-    quaternion_product,
-    rotation_from_quaternion,
-    to_earth,
-)
 
 
 @equation

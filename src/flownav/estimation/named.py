@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation
-from flownav.frames import Rotation, rotation_from_quaternion
+from flownav.core.compile import equation
+from flownav.core.frames import Rotation, rotation_from_quaternion
 
 
 class PositionNed(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes
+from flownav.core.compile import Lanes
 from flownav.estimation.covariance import at
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, Work, equation
+from flownav.core.compile import Lanes, Work, equation
 from flownav.estimation.kalman import (
     KalmanRows,
     correct_covariance_short,

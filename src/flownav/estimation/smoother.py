@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation, exp, kernel
+from flownav.core.compile import equation, exp, kernel
+from flownav.core.measurement import Array
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.states import (
     ACCEL_BIAS,
@@ -25,7 +26,6 @@ from flownav.estimation.states import (
     STATES,
     VELOCITY,
 )
-from flownav.measurement import Array
 
 
 @equation

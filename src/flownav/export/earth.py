@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.guard import written_whole
+from flownav.core.record import POSITION_NED, Record
 from flownav.export.trajectory import trajectories
-from flownav.guard import written_whole
-from flownav.record import POSITION_NED, Record
 
 KML, GX, GPX = (
     "http://www.opengis.net/kml/2.2",

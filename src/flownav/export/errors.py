@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from flownav.core.record import POSITION_NED, Record, Table
 from flownav.export.trajectory import Trajectory
-from flownav.record import POSITION_NED, Record, Table
 
 SIGMAS = 3.0
 ERROR = ("error_n_m", "error_e_m", "error_d_m")

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.record import Record
 from flownav.export.trajectory import FRAMES
-from flownav.record import Record
 
 SUFFIXES = {
     "mcap": ".mcap", "foxglove": ".mcap", "tum": ".tum", "euroc": ".csv", "ulog": ".ulg", "kml": ".kml", "gpx": ".gpx",

@@ -11,9 +11,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from flownav.core.guard import written_whole
+from flownav.core.record import Record
 from flownav.export.mcap_file import write_mcap
-from flownav.guard import written_whole
-from flownav.record import Record
 
 LAYOUT = "foxglove_layout.json"
 Node = str | dict[str, Any]

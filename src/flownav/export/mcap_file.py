@@ -15,15 +15,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav import __version__
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.guard import written_whole
+from flownav.core.record import Record, Table
+from flownav.core.version import __version__
 from flownav.export.errors import error_table
 from flownav.export.mcap_schemas import FRAME_TRANSFORM, POSE_IN_FRAME, Schema, table_schema
 from flownav.export.stamps import Stamps, finite_rows, shift_needed_s, stamps
 from flownav.export.tables import is_text, manifest_json, texts
 from flownav.export.trajectory import ENU_FROM_NED, Trajectory, trajectories
-from flownav.guard import written_whole
-from flownav.record import Record, Table
 
 NS = 1_000_000_000
 Row = dict[str, Any]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from flownav.record import Column
+from flownav.core.record import Column
 
 Schema = dict[str, Any]
 

@@ -13,10 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
+from flownav.core.guard import written_whole
+from flownav.core.record import Record
 from flownav.export.stamps import stamps
 from flownav.export.trajectory import Trajectory, trajectories
-from flownav.guard import written_whole
-from flownav.record import Record
 
 AXES = {"ned": "earth NED, body FRD", "enu": "earth ENU, body FLU"}
 EUROC_POSE = (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.record import Record
+from flownav.core.record import Record
 
 Stamps = NDArray[np.int64]
 

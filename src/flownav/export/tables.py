@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from flownav.guard import folder_written_whole
-from flownav.record import SCHEMA_VERSION, Column, Record, Table
+from flownav.core.guard import folder_written_whole
+from flownav.core.record import SCHEMA_VERSION, Column, Record, Table
 
 
 def write_parquet(record: Record, folder: Path) -> tuple[list[Path], list[str]]:

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.errors import InputError
-from flownav.frames import quaternion_product, rotation_from_quaternion, to_earth
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.core.errors import InputError
+from flownav.core.frames import quaternion_product, rotation_from_quaternion, to_earth
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 
 Array = NDArray[np.float64]
 

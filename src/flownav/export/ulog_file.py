@@ -5,8 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-from flownav import __version__
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.guard import written_whole
+from flownav.core.provenance import hash_of
+from flownav.core.record import Record
+from flownav.core.version import __version__
 from flownav.export.stamps import finite_rows, shift_needed_s
 from flownav.export.tables import is_text
 from flownav.export.trajectory import Trajectory, trajectories
@@ -20,9 +23,6 @@ from flownav.export.ulog_topics import (
     position_topic,
     table_topic,
 )
-from flownav.guard import written_whole
-from flownav.provenance import hash_of
-from flownav.record import Record
 
 NAMED = {"estimate": "", "truth": "_groundtruth"}  # what PX4 calls the estimate and the truth of a simulation
 APART = ("estimate", "smoothed", "truth", "autopilot", "innovation", "events")

@@ -12,7 +12,7 @@ import struct
 from itertools import pairwise
 from typing import NamedTuple
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.export.ulog_messages import (
     HEADER_SIZE,
     LARGEST,

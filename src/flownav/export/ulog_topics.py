@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.frames import heading_from_quaternion
+from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record, Table
 from flownav.export.stamps import Stamps, finite_rows, stamps
 from flownav.export.tables import is_text
 from flownav.export.trajectory import Trajectory
 from flownav.export.ulog_messages import Field, Stamped, Topic, logged
-from flownav.frames import heading_from_quaternion
-from flownav.record import POSITION_NED, VELOCITY_BODY, Record, Table
 
 US = 1e6
 STD = tuple(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY))

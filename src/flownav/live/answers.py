@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from flownav.core.frames import Vector, rotation_from_quaternion, to_body
 from flownav.estimation.states import PAD, STATE
-from flownav.frames import Vector, rotation_from_quaternion, to_body
 from flownav.live.options import Options
 from flownav.live.reception import Vehicle
 from flownav.mavlink.dialect import INVALID_AUTOPILOT, PX4, Message, coder

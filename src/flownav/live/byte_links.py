@@ -10,7 +10,7 @@ import time
 from contextlib import suppress
 from typing import Any
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.live.link import EVERYWHERE_6, MOST_BYTES, Address, Link, Piece
 from flownav.live.outgoing import Outgoing
 

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
+from flownav.core.frames import Vector, heading_from_quaternion
+from flownav.core.measurement import Array
 from flownav.estimation.states import ATTITUDE, GYRO_BIAS, POSITION, VELOCITY
-from flownav.frames import Vector, heading_from_quaternion
 from flownav.live.options import Limits
 from flownav.mavlink.outgoing import Estimate
-from flownav.measurement import Array
 from flownav.navigation.ahead import covariance_at, state_at
 from flownav.navigation.loop import Running
 from flownav.navigation.memory import PROTECTION, SUSPECTED, load_aid, load_imu, load_start

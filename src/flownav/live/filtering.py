@@ -7,13 +7,13 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from flownav.compile import ONE_LANE
+from flownav.core.compile import ONE_LANE
+from flownav.core.frames import Vector
+from flownav.core.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, Stream
 from flownav.estimation.states import POSITION, STATE
-from flownav.frames import Vector
 from flownav.live.horizon import Waiting
 from flownav.live.options import Options
 from flownav.logs.rates import attitude_rates, mean_over
-from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, Stream
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import load_start

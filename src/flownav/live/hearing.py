@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 
-from flownav.frames import Vector
+from flownav.core.frames import Vector
+from flownav.core.measurement import Measurement, Sensor
 from flownav.live.filtering import FLOW
 from flownav.live.horizon import Horizon, Waiting
 from flownav.live.lags import Lags
@@ -19,7 +20,6 @@ from flownav.mavlink.converted import Context, Dropped, Pose
 from flownav.mavlink.dialect import ARDUPILOT, Message
 from flownav.mavlink.messages import instance_of, measurements
 from flownav.mavlink.position_messages import LEAST_FIX, fix_deg_m
-from flownav.measurement import Measurement, Sensor
 
 LONGEST_EXPOSURE_S = 0.2
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)

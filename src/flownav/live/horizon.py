@@ -6,7 +6,7 @@ import heapq
 from collections import Counter
 from typing import NamedTuple
 
-from flownav.measurement import Measurement
+from flownav.core.measurement import Measurement
 
 MOST_WAITING = 8192
 

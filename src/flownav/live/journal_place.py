@@ -10,8 +10,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
-from flownav.errors import InputError
-from flownav.free_names import MOST_NUMBERS, numbered
+from flownav.core.errors import InputError
+from flownav.core.free_names import MOST_NUMBERS, numbered
 from flownav.logs.journal import MAGIC, SUFFIX
 
 LOCK_WAIT_S = 1.0  # for somebody who only looks whether the journal is locked

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from flownav.measurement import Sensor
+from flownav.core.measurement import Sensor
 
 WINDOW_S = 5.0
 WINDOWS = 4  # a stream that comes in time again is waited for so many windows longer

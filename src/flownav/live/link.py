@@ -9,7 +9,7 @@ from collections import Counter
 from contextlib import suppress
 from typing import Any, NamedTuple
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 FORMS = (
     "udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:[HOST:]PORT or serial:DEVICE[:BAUD]; "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from flownav.frames import Vector
+from flownav.core.frames import Vector
 from flownav.mavlink.position_messages import local_position_m
 
 Geodetic = tuple[float, float, float]  # latitude, longitude [deg], altitude [m]

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.mavlink.dialect import INVALID_AUTOPILOT, Message, coder, dialect
 from flownav.mavlink.framing import StreamFrames
 from flownav.mavlink.signing import SignatureCheck

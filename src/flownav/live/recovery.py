@@ -8,10 +8,11 @@ from typing import Annotated, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from flownav.compile import columns_of, width_of
-from flownav.errors import InputError
+from flownav.core.compile import columns_of, width_of
+from flownav.core.errors import InputError
+from flownav.core.measurement import COLUMNS, MAX_VALUES, Array, Sensor
+from flownav.core.record import FED, POSITION_NED, QUATERNION, VELOCITY_BODY, Record, Table
 from flownav.logs.journal import MAGIC, Block, Damage, blocks
-from flownav.measurement import COLUMNS, MAX_VALUES, Array, Sensor
 from flownav.navigation.rows import ESTIMATE_COLUMNS, EVENT_COLUMNS, INNOVATION_COLUMNS
 from flownav.navigation.tables import (
     Happening,
@@ -21,7 +22,6 @@ from flownav.navigation.tables import (
     innovation_table,
     states_table,
 )
-from flownav.record import FED, POSITION_NED, QUATERNION, VELOCITY_BODY, Record, Table
 
 T_S, SEGMENT = FED.index("t_s"), FED.index("segment")
 NAN = float("nan")
@@ -222,7 +222,7 @@ def _truth(rows: Array, origins: Array) -> Table:
     """Position in the local frame of its time, velocity in body axes; the first of the origins holds before it too."""
     import pymap3d
 
-    from flownav.frames import rotation_from_quaternion, to_body
+    from flownav.core.frames import rotation_from_quaternion, to_body
 
     said: TruthRow[Array] = columns_of(TruthRow, rows)
     origin: OriginRow[Array] = columns_of(OriginRow, origins)

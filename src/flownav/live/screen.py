@@ -6,6 +6,7 @@ import math
 from collections import deque
 from typing import TYPE_CHECKING
 
+from flownav.core.measurement import COLUMNS, Sensor
 from flownav.estimation.gating import Reason
 from flownav.estimation.hypotheses import NAMES
 from flownav.live.display import View
@@ -15,7 +16,6 @@ from flownav.live.loop import Latency
 from flownav.live.session import Session
 from flownav.live.traffic import Traffic, in_words
 from flownav.mavlink.converted import OPTIONAL
-from flownav.measurement import COLUMNS, Sensor
 from flownav.navigation.memory import PROTECTION, SUSPECTED
 
 if TYPE_CHECKING:

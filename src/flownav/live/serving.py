@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
+from flownav.core.measurement import Sensor
 from flownav.estimation.gating import Reason
-from flownav.measurement import Sensor
 from flownav.navigation.rows import InnovationRow
 from flownav.navigation.serving import HORIZONTAL, REFUSALS
 

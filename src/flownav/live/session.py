@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from typing import Protocol
 
+from flownav.core.measurement import Measurement, Sensor
 from flownav.live.answers import ODOMETRY_COMPONENT, Answers
 from flownav.live.estimating import UNFUSED, WITHHELD, estimate_of, fault_of, why_withheld
 from flownav.live.filtering import BATCH, Filtering, Keeper
@@ -26,7 +27,6 @@ from flownav.mavlink.dialect import Message
 from flownav.mavlink.messages import CONVERTERS
 from flownav.mavlink.outgoing import Estimate
 from flownav.mavlink.state_messages import TrueState, hil_state_quaternion, sim_state
-from flownav.measurement import Measurement, Sensor
 from flownav.navigation.feed import SLOWEST_IMU_HZ
 from flownav.navigation.rows import InnovationRow
 from flownav.navigation.serving import HORIZONTAL

@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.frames import euler_from_quaternion, rotation_from_quaternion, to_earth
+from flownav.core.frames import euler_from_quaternion, rotation_from_quaternion, to_earth
+from flownav.core.measurement import Array, Measurement, Sensor, Stream
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY
 from flownav.logs.log import Log
 from flownav.mavlink import sensors_outgoing as say
 from flownav.mavlink.dialect import Message, coder
 from flownav.mavlink.framing import StreamFrames
 from flownav.mavlink.signing import sign_outgoing
-from flownav.measurement import Array, Measurement, Sensor, Stream
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY
 
 ORIGIN_DEG_M = (29.9765, 31.2780, 40.0)
 SYSTEM, COMPONENT = 1, 1

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from typing import NamedTuple
 
+from flownav.core.measurement import Sensor
 from flownav.mavlink.messages import PREFERENCE
-from flownav.measurement import Sensor
 
 SILENT_S = 2.0  # a source that says nothing for so long gives way
 

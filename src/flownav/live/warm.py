@@ -6,7 +6,8 @@ import gc
 
 import numpy as np
 
-from flownav.compile import announce_compilation
+from flownav.core.compile import announce_compilation
+from flownav.core.measurement import COLUMNS, Measurement, Sensor
 from flownav.live.estimating import estimate_of
 from flownav.live.filtering import Filtering
 from flownav.live.horizon import Waiting
@@ -15,7 +16,6 @@ from flownav.live.recorder import NoRecorder
 from flownav.mavlink.dialect import coder
 from flownav.mavlink.outgoing import odometry
 from flownav.mavlink.position_messages import local_position_m
-from flownav.measurement import COLUMNS, Measurement, Sensor
 
 
 def warm_up() -> None:

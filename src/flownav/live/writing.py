@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
+from flownav.core.measurement import Array
 from flownav.logs.journal import block
-from flownav.measurement import Array
 
 WRITE_S = 0.2  # how often what has come is written
 SYNC_S = 0.5  # how often it is forced to the disk

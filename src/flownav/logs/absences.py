@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from flownav.core.measurement import Sensor, Stream
 from flownav.logs.log import Absence
-from flownav.measurement import Sensor, Stream
 
 INSTEAD = {
     Sensor.ATTITUDE: Absence(

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from flownav.errors import InputError
-from flownav.guard import an_input
+from flownav.core.errors import InputError
+from flownav.core.guard import an_input
+from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
 from flownav.logs.fixes import Origin, local_position, near_the_rest, origin_of
 from flownav.logs.rows import Rows, drop_duplicates, drop_strays, longest_ordered
-from flownav.measurement import COLUMNS, Array, Sensor, Stream
 
 # what a vehicle's sensor can say at most, in the unit of `measurement.COLUMNS`; beyond it a bit or a unit is wrong
 MOST: dict[Sensor, tuple[float, ...]] = {

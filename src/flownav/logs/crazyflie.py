@@ -17,7 +17,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.logs.assembly import content_of, sha256_of
 
 MAGIC = 0xBC

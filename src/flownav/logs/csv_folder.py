@@ -12,15 +12,15 @@ from pathlib import Path
 
 import numpy as np
 
-from flownav.errors import InputError
-from flownav.frames import quaternion_from_euler
-from flownav.guard import an_input
+from flownav.core.errors import InputError
+from flownav.core.frames import quaternion_from_euler
+from flownav.core.guard import an_input
+from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.absences import absences_of
 from flownav.logs.csv_table import Column, CsvTable, read_csv_table
 from flownav.logs.fixes import local_position, near_the_rest, origin_of
 from flownav.logs.log import Log
 from flownav.logs.plausible import check_plausible
-from flownav.measurement import Array, Sensor, Stream
 
 HALF_TURN = np.pi + 0.01
 GYRO_LIMIT_RAD_S = 70.0  # twice the range of a 2000 deg/s gyro

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.logs.rows import Rows
-from flownav.measurement import Array
 
 FARTHEST_FIX_DEG = 0.5
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.frames import quaternion_product
-from flownav.measurement import Array
+from flownav.core.frames import quaternion_product
+from flownav.core.measurement import Array
 
 HALF = float(np.sqrt(0.5))
 NED_FROM_ENU = (0.0, HALF, HALF, 0.0)

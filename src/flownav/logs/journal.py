@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.measurement import Array
+from flownav.core.measurement import Array
 
 MAGIC = b"FNRJRNL1"
 SUFFIX = ".journal"

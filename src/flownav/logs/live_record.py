@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, Stream
+from flownav.core.provenance import hash_of
+from flownav.core.record import FED, FED_FIRST, Record
 from flownav.logs.log import SIMULATOR, FedSegment, Log
 from flownav.logs.plausible import check_times, check_values
-from flownav.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sensor, Stream
-from flownav.provenance import hash_of
-from flownav.record import FED, FED_FIRST, Record
 
 LATE = "late"
 KINDS = {"live": "a live session", "fly": "a simulated flight"}

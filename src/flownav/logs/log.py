@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from flownav.measurement import EventQueue, Sensor, Stream
-from flownav.record import Table
+from flownav.core.measurement import EventQueue, Sensor, Stream
+from flownav.core.record import Table
 
 TRUTH_FILE, SIMULATOR, VISUAL_ODOMETRY = "truth.csv", "the simulator", "visual odometry"
 

@@ -8,7 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.frames import Quaternion
+from flownav.core.frames import Quaternion
+from flownav.core.measurement import Array, Sensor, Stream
+from flownav.core.record import Table
 from flownav.logs.fixes import Origin, local_ned, near_the_rest
 from flownav.logs.mavlink_streams import Gathered, Source
 from flownav.logs.rates import attitude_at
@@ -29,8 +31,6 @@ from flownav.mavlink.state_messages import (
     local_position_ned,
     sim_state,
 )
-from flownav.measurement import Array, Sensor, Stream
-from flownav.record import Table
 
 AUTOPILOTS = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
 STATES: dict[str, Callable[[Message], LocalState | GlobalState | TrueState | None]] = {

@@ -9,14 +9,14 @@ import hashlib
 from collections import Counter
 from pathlib import Path
 
-from flownav.errors import InputError
-from flownav.guard import an_input
+from flownav.core.errors import InputError
+from flownav.core.guard import an_input
+from flownav.core.measurement import Sensor, Stream
 from flownav.logs.absences import absences_of
 from flownav.logs.log import SIMULATOR, Log
 from flownav.logs.mavlink_flight import STATES, Decoder, Flight, find_vehicle
 from flownav.logs.plausible import check_times, of_one_clock
 from flownav.mavlink.framing import Frame, tlog_frames
-from flownav.measurement import Sensor, Stream
 
 LACKING = {
     "attitude": "no attitude (ATTITUDE_QUATERNION, ATTITUDE)",

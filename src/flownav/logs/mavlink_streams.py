@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import COLUMNS, Array, Measurement, Sensor, Stream
 from flownav.mavlink.converted import Outcome
 from flownav.mavlink.messages import PREFERENCE
-from flownav.measurement import COLUMNS, Array, Measurement, Sensor, Stream
 
 ENOUGH_SHARE = 0.5  # a preferred source with this share of the readings of the most frequent one is taken
 FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)

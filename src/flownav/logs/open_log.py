@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from flownav.errors import InputError
-from flownav.guard import an_input
+from flownav.core.errors import InputError
+from flownav.core.guard import an_input
+from flownav.core.measurement import Sensor
 from flownav.logs.crazyflie import looks_like as looks_like_crazyflie
 from flownav.logs.journal import MAGIC as JOURNAL_MAGIC
 from flownav.logs.journal import SUFFIX as JOURNAL_SUFFIX
 from flownav.logs.log import Log
-from flownav.measurement import Sensor
 
 KNOWN = (
     "a folder of CSV files, a PX4 ULog (.ulg), an ArduPilot DataFlash log (.bin), a MAVLink telemetry log (.tlog), a "

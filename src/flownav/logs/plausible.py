@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from flownav.errors import InputError
-from flownav.frames import rotation_from_quaternion
+from flownav.core.errors import InputError
+from flownav.core.frames import rotation_from_quaternion
+from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.rates import attitude_at, attitude_rates, mean_over
-from flownav.measurement import Array, Sensor, Stream
 
 LONGEST_LOG_S = 172_800.0
 # beyond these, in a stream's own unit, a record is damaged: far more than what a live link or a simulation lets through

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.measurement import Array, Stream
+from flownav.core.measurement import Array, Stream
 
 
 def mean_over(t_s: Array, value: Array, start_s: Array, end_s: Array) -> Array:

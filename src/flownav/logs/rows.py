@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.measurement import Array
+from flownav.core.measurement import Array
 
 LATE_SHARE = 0.05  # more rows than this out of time order: not a late row here and there
 LONGEST_GAP_S = 600.0  # a few rows further away than this carry a wrong time

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.frames import rotation_from_quaternion, to_body
-from flownav.measurement import Array
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
+from flownav.core.frames import rotation_from_quaternion, to_body
+from flownav.core.measurement import Array
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
 
 
 def state_table(t_s: Array, position_ned_m: Array, velocity_ned_m_s: Array, quaternion: Array | None) -> Table:

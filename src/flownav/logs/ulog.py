@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor, Stream
+from flownav.core.record import Table
 from flownav.logs.absences import absences_of
 from flownav.logs.log import SIMULATOR, VISUAL_ODOMETRY, Absence, Log
 from flownav.logs.plausible import check_times, of_one_clock
@@ -27,8 +29,6 @@ from flownav.logs.ulog_sensors import (
     pad_stream,
 )
 from flownav.logs.ulog_topics import Topic, Topics, read_topics
-from flownav.measurement import Sensor, Stream
-from flownav.record import Table
 
 STATES = ("vehicle_land_detected",)
 TOPICS = (

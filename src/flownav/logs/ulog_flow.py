@@ -12,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.ulog_topics import MOST_VARIANCE, Topic, Topics
-from flownav.measurement import Array, Sensor, Stream
 
 FLOW_TOPICS = ("vehicle_optical_flow", "optical_flow", "sensor_optical_flow")  # the first that saw enough
 ENOUGH = 0.5  # of what the best topic saw

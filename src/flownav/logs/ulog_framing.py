@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.text import plain
 from flownav.logs.ulog_rows import AT_ONCE, DATA, Places, nothing_announced, walk_data
-from flownav.text import plain
 
 MAGIC = b"\x55\x4c\x6f\x67\x01\x12\x35"
 HEADER_SIZE = 16

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.frames import heading_from_quaternion, rotation_from_quaternion, to_body, turned_about_down
+from flownav.core.frames import heading_from_quaternion, rotation_from_quaternion, to_body, turned_about_down
+from flownav.core.measurement import Array, Sensor, Stream
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
 from flownav.logs.rates import attitude_at
 from flownav.logs.states import state_table
 from flownav.logs.ulog_topics import MOST_VARIANCE, Topic, Topics
-from flownav.measurement import Array, Sensor, Stream
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
 
 LEAST_ROWS = 2
 NED, FRD, BODY = "NED", "FRD", "body"

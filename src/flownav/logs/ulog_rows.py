@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import kernel
+from flownav.core.compile import kernel
 
 IDS = 1 << 16  # a message id has two bytes
 HEADER, ID = 3, 2  # bytes before a row: length and kind, topic

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.frames import rotation_from_quaternion, to_body
+from flownav.core.frames import rotation_from_quaternion, to_body
+from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.fixes import Origin, local_position, near_the_rest, origin_of
 from flownav.logs.rates import attitude_at
 from flownav.logs.ulog_topics import MOST_VARIANCE, Topic, Topics
-from flownav.measurement import Array, Sensor, Stream
 
 LEAST_IMU_HZ = 20.0  # slower, an inertial reading says nothing of the motion between two
 FASTEST_M_S = 150.0

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from flownav.errors import InputError
-from flownav.guard import an_input
+from flownav.core.errors import InputError
+from flownav.core.guard import an_input
+from flownav.core.measurement import Array
 from flownav.logs.rows import Rows, drop_duplicates, drop_strays, longest_ordered
 from flownav.logs.ulog_framing import Framed, frame
 from flownav.logs.ulog_rows import Bytes, Places, field_of
-from flownav.measurement import Array
 
 MOST_VARIANCE = 1e12  # stated; beyond it a bit is wrong, as in what comes by MAVLink
 LONGEST_DELAY_S = 1.0  # a sample older than this on arrival carries a wrong time

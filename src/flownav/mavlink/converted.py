@@ -6,8 +6,8 @@ import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from flownav.frames import Quaternion, Vector
-from flownav.measurement import Measurement, Sensor
+from flownav.core.frames import Quaternion, Vector
+from flownav.core.measurement import Measurement, Sensor
 
 NAN = float("nan")
 LARGEST_UNIT_ERROR = 0.05  # of a quaternion's length

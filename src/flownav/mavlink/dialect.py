@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import ModuleType
 from typing import Any
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 # MAV_AUTOPILOT: who answers a HEARTBEAT; a ground station and a camera say that they are none
 ARDUPILOT, PX4, INVALID_AUTOPILOT = 3, 12, 8

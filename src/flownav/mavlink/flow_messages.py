@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from flownav.core.measurement import Measurement, Sensor
 from flownav.mavlink.converted import NAN, Context, Dropped, Outcome, quality_of, reading
 from flownav.mavlink.dialect import Message
-from flownav.measurement import Measurement, Sensor
 
 DOWN = 25  # MAV_SENSOR_ROTATION_PITCH_270
 UNKNOWN_COVARIANCE = 255

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
-from flownav.frames import GRAVITY_M_S2, quaternion_from_euler
+from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
+from flownav.core.measurement import Sensor
 from flownav.mavlink.converted import Context, Dropped, Outcome, reading
 from flownav.mavlink.dialect import Message
-from flownav.measurement import Sensor
 
 ACCEL, GYRO, MAG, PRESSURE = 0x007, 0x038, 0x1C0, 0x200  # HIGHRES_IMU.fields_updated
 SEA_LEVEL_HPA = 1013.25

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from flownav.core.measurement import Sensor
 from flownav.mavlink import flow_messages, inertial_messages, position_messages
 from flownav.mavlink.converted import Context, Outcome, checked
 from flownav.mavlink.dialect import Message
-from flownav.measurement import Sensor
 
 CONVERTERS: dict[str, Callable[[Message, float, Context], Iterator[Outcome]]] = {
     "OPTICAL_FLOW": flow_messages.optical_flow,

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.frames import Quaternion, Vector, euler_from_quaternion, rotation_from_quaternion, to_body
+from flownav.core.frames import Quaternion, Vector, euler_from_quaternion, rotation_from_quaternion, to_body
+from flownav.core.measurement import Array
 from flownav.mavlink.dialect import Message
 from flownav.mavlink.position_messages import BODY_FRD, LOCAL_FRD, LOCAL_NED
-from flownav.measurement import Array
 
 NAN = float("nan")
 ESTIMATOR_VIO = 3  # MAV_ESTIMATOR_TYPE

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
-from flownav.frames import euler_from_quaternion, rotation_from_quaternion, to_body
+from flownav.core.frames import euler_from_quaternion, rotation_from_quaternion, to_body
+from flownav.core.measurement import Measurement, Sensor
 from flownav.mavlink.converted import LARGEST_UNIT_ERROR, NAN, Context, Dropped, Outcome, quality_of, reading
 from flownav.mavlink.dialect import Message
-from flownav.measurement import Measurement, Sensor
 
 UNKNOWN_16 = 65535
 LEAST_FIX = 3  # 3-D

@@ -9,12 +9,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from flownav.frames import Quaternion, Vector
+from flownav.core.frames import Quaternion, Vector
+from flownav.core.measurement import Measurement
 from flownav.mavlink.dialect import Message
 from flownav.mavlink.flow_messages import DOWN, UNKNOWN_COVARIANCE
 from flownav.mavlink.inertial_messages import ACCEL, GYRO, MAG, PRESSURE, pressure_hpa
 from flownav.mavlink.position_messages import UNKNOWN_16
-from flownav.measurement import Measurement
 
 HELICOPTER, GENERIC_AUTOPILOT = 4, 0  # MAV_TYPE, MAV_AUTOPILOT
 ARMED, ACTIVE, STANDBY = 128, 4, 3  # MAV_MODE_FLAG, MAV_STATE

@@ -22,8 +22,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from flownav.errors import InputError
-from flownav.guard import an_input
+from flownav.core.errors import InputError
+from flownav.core.guard import an_input
 from flownav.mavlink.framing import (
     CHECKSUM_BYTES,
     HEADER_2,

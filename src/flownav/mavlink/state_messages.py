@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from flownav.frames import Quaternion, Vector
+from flownav.core.frames import Quaternion, Vector
 from flownav.mavlink.converted import LARGEST_UNIT_ERROR
 from flownav.mavlink.dialect import Message
 

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import ONE_LANE, compiled, equation, kernel, pointer
+from flownav.core.compile import ONE_LANE, compiled, equation, kernel, pointer
+from flownav.core.measurement import Array
 from flownav.estimation.law import Signature
 from flownav.estimation.motion import add_motion_noise, errors_in_motion, strapdown
 from flownav.estimation.named import AccelBias, Attitude, GyroBias, Inertial, PositionNed, VelocityNed
@@ -21,7 +22,6 @@ from flownav.estimation.states import (
     ROWS_BY_NAME,
     STATES,
 )
-from flownav.measurement import Array
 from flownav.navigation.inertial import Motion, motion_between, remembered
 from flownav.navigation.memory import CLOCK, MEMORY, load_imu
 from flownav.navigation.packed import load_equipment, load_imu_settings

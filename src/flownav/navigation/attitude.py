@@ -6,13 +6,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure, replacing, squared
+from flownav.core.compile import Lanes, Work, equation, procedure, replacing, squared
+from flownav.core.frames import (
+    Quaternion,
+    conjugate,
+    heading_from_quaternion,
+    quaternion_product,
+    rotation_from_quaternion,
+)
 from flownav.estimation.covariance import consider, consider_none, variance_of
 from flownav.estimation.laws.attitude import attitude, bridged_attitude, level
 from flownav.estimation.laws.geometry import component
 from flownav.estimation.named import Attitude
 from flownav.estimation.states import ATTITUDE, CONSIDERS, FLOW_LAG, GYRO_BIAS, INS_ERROR, MEASURED
-from flownav.frames import Quaternion, conjugate, heading_from_quaternion, quaternion_product, rotation_from_quaternion
 from flownav.navigation.heading import HeadingVerdict, conclude_heading, offered_heading
 from flownav.navigation.memory import LEVEL_READ, MEMORY, share, shared
 from flownav.navigation.motion_records import BridgeMemory, ImuMemory

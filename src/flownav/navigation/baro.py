@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, procedure
+from flownav.core.compile import Lanes, Work, procedure
 from flownav.estimation.laws.height import baro_altitude
 from flownav.estimation.named import PositionNed
 from flownav.estimation.states import BARO

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, exp, replacing, smaller
+from flownav.core.compile import equation, exp, replacing, smaller
+from flownav.core.frames import within_half_turn
 from flownav.estimation.named import Attitude
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE
-from flownav.frames import within_half_turn
 from flownav.navigation.course import LEAST_TRAVEL_M, is_velocity, judge_course, turn_between, turn_heading, with_gps
 from flownav.navigation.motion_records import CourseMemory, PushMemory
 from flownav.navigation.records import HeadingMemory, Reading

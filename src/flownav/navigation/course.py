@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import arctan2, cos, equation, replacing, sin
+from flownav.core.compile import arctan2, cos, equation, replacing, sin
+from flownav.core.frames import heading_cosine_sine, quaternion_product, velocity_from_flow
 from flownav.estimation.named import Attitude, rotation_by
 from flownav.estimation.states import ATTITUDE
-from flownav.frames import heading_cosine_sine, quaternion_product, velocity_from_flow
 from flownav.navigation.motion_records import CourseMemory
 from flownav.navigation.reasons import is_heard
 from flownav.navigation.records import HeadingMemory, Look, Reading

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Generic, NamedTuple, TypeVar
 
-from flownav.compile import places_of, row_store, row_view, width_of
+from flownav.core.compile import places_of, row_store, row_view, width_of
 from flownav.estimation.states import STATES
 
 PREDICTED, CORRECTED, FORGOTTEN, NOTED, DECAYED = 0.0, 1.0, 2.0, 3.0, 4.0

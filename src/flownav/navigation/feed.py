@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.measurement import Array, Sensor, Stream
+from flownav.core.measurement import Array, Sensor, Stream
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import FROM_ATTITUDE, FROM_MAG, FROM_YAW, NO_HEADING, Equipment
 from flownav.sensors.earth_field import declination_rad

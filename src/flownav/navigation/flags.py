@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.measurement import Array
+from flownav.core.measurement import Array
 from flownav.navigation.rows import EventRow
 from flownav.navigation.tape import (
     AIDED_AGAIN,

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure, replacing, smaller
+from flownav.core.compile import Lanes, Work, equation, procedure, replacing, smaller
+from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import consider
 from flownav.estimation.laws.flow import body_velocity, flow_rate
 from flownav.estimation.named import VelocityNed
 from flownav.estimation.states import ATTITUDE, COMPASS, GROUND, GYRO_BIAS, INS_ERROR, POSITION, VELOCITY
-from flownav.measurement import Sensor
 from flownav.navigation.flow_judge import gyro_share, hold_back, judge_look, see_ground, see_turning
 from flownav.navigation.flow_noise import (
     DOUBTED_RATIO,

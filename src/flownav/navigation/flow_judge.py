@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import cos, equation, exp, larger, replacing, smaller
+from flownav.core.compile import cos, equation, exp, larger, replacing, smaller
 from flownav.estimation.laws.geometry import lens_range
 from flownav.navigation.flow_noise import LONGEST_STEP_S
 from flownav.navigation.height import MANY_STRAYS

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger, smaller
+from flownav.core.compile import clamp, equation, larger, smaller
 from flownav.navigation.height import range_variance
 from flownav.navigation.records import FlowMemory
 from flownav.navigation.told import FlowSettings

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, larger, procedure, replacing, row_of, smaller
+from flownav.core.compile import Lanes, Work, equation, larger, procedure, replacing, row_of, smaller
+from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import covariance_of, expect, states_of, variance_of
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.laws.still import pad_below
 from flownav.estimation.states import GPS_FAST, GPS_SLOW, GPS_VELOCITY, PAD, POSITION, STATE, VELOCITY
-from flownav.measurement import Sensor
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.motion_records import SteadyForce
 from flownav.navigation.offers import conclude, fuse_offered, note_aid, note_height

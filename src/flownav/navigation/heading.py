@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, arctan2, equation, larger, procedure, replacing
+from flownav.core.compile import Lanes, Work, arctan2, equation, larger, procedure, replacing
+from flownav.core.frames import rotation_from_quaternion, to_earth
 from flownav.estimation.hypotheses import HEADING_OFF, sign_all
 from flownav.estimation.laws.attitude import heading
 from flownav.estimation.named import Attitude
-from flownav.frames import rotation_from_quaternion, to_earth
 from flownav.navigation.offers import conclude
 from flownav.navigation.packed import load_attitude_settings
 from flownav.navigation.reasons import FUSED, NO_HEADING, SILENT, is_heard, usable_in_flight

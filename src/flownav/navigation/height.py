@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, cos, equation, procedure, replacing, smaller
+from flownav.core.compile import Lanes, Work, cos, equation, procedure, replacing, smaller
 from flownav.estimation.hypotheses import RANGE_OFFSET
 from flownav.estimation.laws.height import range_along_boresight
 from flownav.estimation.states import GROUND

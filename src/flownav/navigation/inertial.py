@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, replacing
+from flownav.core.compile import equation, replacing
 from flownav.navigation.motion_records import ImuMemory, MotionMemory, MotionStep, OwedMotion, SpentMotion, SteadyForce
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.tape import IMU_LOST

@@ -5,7 +5,7 @@ A journal of no rows is written nowhere and only counts; that is what a run with
 
 from __future__ import annotations
 
-from flownav.compile import ONE_LANE, Lanes, Work, gathering, procedure, row_of
+from flownav.core.compile import ONE_LANE, Lanes, Work, gathering, procedure, row_of
 from flownav.estimation.covariance import covariance_of, forget_lane, states_of
 from flownav.estimation.states import (
     ACCEPTED,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation
+from flownav.core.compile import Lanes, Work, equation
 from flownav.estimation.covariance import forget_lane
 from flownav.estimation.lag import FlowLag, lag_of_step
 from flownav.estimation.laws.flow import lagged_flow, lagged_flow_rate

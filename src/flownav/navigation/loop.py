@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.compile import ONE_LANE, Work, equation, invoke, kernel, pointer
-from flownav.measurement import MAX_VALUES, Array, EventQueue
+from flownav.core.compile import ONE_LANE, Work, equation, invoke, kernel, pointer
+from flownav.core.measurement import MAX_VALUES, Array, EventQueue
 from flownav.navigation.memory import CLOCK, READING, new_work
 from flownav.navigation.packed import pack
 from flownav.navigation.records import Reading

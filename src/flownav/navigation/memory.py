@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import Lanes, Layout, Work, equation
+from flownav.core.compile import Lanes, Layout, Work, equation
+from flownav.core.measurement import Array, Sensor
 from flownav.estimation.hypotheses import COUNT as FAULTS_FOLLOWED
 from flownav.estimation.named import Attitude, PositionNed, VelocityNed
 from flownav.estimation.states import (
@@ -22,7 +23,6 @@ from flownav.estimation.states import (
     STATE,
     VELOCITY,
 )
-from flownav.measurement import Array, Sensor
 from flownav.navigation.motion_records import (
     BridgeMemory,
     CourseMemory,

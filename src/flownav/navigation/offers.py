@@ -6,10 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, exp, procedure, replacing, smaller
+from flownav.core.compile import Lanes, Work, equation, exp, procedure, replacing, smaller
+from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import expect, settle, states_of
 from flownav.estimation.hypotheses import weigh
-from flownav.measurement import Sensor
 from flownav.navigation.journal import note_correction
 from flownav.navigation.memory import CLOCK, LAST, share, shared
 from flownav.navigation.reasons import (

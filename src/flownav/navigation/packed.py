@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.compile import flat_access
+from flownav.core.compile import flat_access
+from flownav.core.measurement import Array
 from flownav.estimation.error_models import FilterSettings
-from flownav.measurement import Array
 from flownav.navigation import told
 from flownav.navigation.told import NavigatorSettings
 

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, procedure, replacing
+from flownav.core.compile import Lanes, Work, equation, procedure, replacing
+from flownav.core.frames import to_earth
 from flownav.estimation.laws.pad import pad_fix
 from flownav.estimation.laws.still import pad_below, position_itself, velocity_itself
 from flownav.estimation.named import Attitude, PositionNed, rotation_by
 from flownav.estimation.states import MEASURED, PAD, STATE
-from flownav.frames import to_earth
 from flownav.navigation.memory import MEMORY
 from flownav.navigation.offers import conclude, fuse_offered, note_aid, note_height
 from flownav.navigation.packed import load_place_settings

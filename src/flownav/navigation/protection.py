@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, exp, larger, procedure, replacing, row_of, smaller
+from flownav.core.compile import Lanes, Work, equation, exp, larger, procedure, replacing, row_of, smaller
+from flownav.core.frames import angular_flow, to_body
 from flownav.estimation.covariance import covariance_of, states_of
 from flownav.estimation.hypotheses import (
     COUNT,
@@ -35,7 +36,6 @@ from flownav.estimation.hypotheses import (
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.named import PositionNed, VelocityNed
 from flownav.estimation.states import POSITION
-from flownav.frames import angular_flow, to_body
 from flownav.navigation.flow_noise import LONGEST_STEP_S
 from flownav.navigation.memory import (
     DRIFT_SINCE,

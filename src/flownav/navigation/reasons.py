@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation
+from flownav.core.compile import equation
 from flownav.estimation.gating import Reason
 from flownav.navigation.records import Reading
 

@@ -9,7 +9,9 @@ from typing import Annotated, Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, columns_of, equation, gathering, row_of, row_store, width_of
+from flownav.core.compile import Lanes, Work, columns_of, equation, gathering, row_of, row_store, width_of
+from flownav.core.frames import Rotation, Vector, to_body
+from flownav.core.measurement import Array
 from flownav.estimation.covariance import covariance_of, variance_of
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import (
@@ -25,8 +27,6 @@ from flownav.estimation.states import (
     TEST_RATIO,
     VELOCITY,
 )
-from flownav.frames import Rotation, Vector, to_body
-from flownav.measurement import Array
 from flownav.navigation.memory import OBSERVATION, PROTECTION, REASON, SCALE_DOUBT, load_start
 from flownav.navigation.reasons import BEFORE_START, DUPLICATE, LATE
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from flownav.core.measurement import Sensor
 from flownav.estimation.gating import Reason
-from flownav.measurement import Sensor
 
 HORIZONTAL = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.POSE)
 # A reading that knows nothing, or that another serves for, is no alarm; these are.

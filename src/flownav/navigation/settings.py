@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
+from flownav.core.measurement import Array
+from flownav.core.parameter_files import Number, ParameterModel
 from flownav.estimation.error_models import FilterSettings
 from flownav.estimation.states import (
     ACCEL_BIAS,
@@ -24,7 +26,6 @@ from flownav.estimation.states import (
     VELOCITY,
     VELOCITY_LAG,
 )
-from flownav.measurement import Array
 from flownav.navigation.told import (
     NO_STATED_NOISE,
     AidSettings,
@@ -38,7 +39,6 @@ from flownav.navigation.told import (
     NavigatorSettings,
     PlaceSettings,
 )
-from flownav.parameter_files import Number, ParameterModel
 
 
 class NavigatorSettingsFile(ParameterModel):

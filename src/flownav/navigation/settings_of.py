@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from flownav.frames import GRAVITY_M_S2
+from flownav.core.frames import GRAVITY_M_S2
+from flownav.core.parameter_files import check
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
-from flownav.parameter_files import check
 from flownav.sensors.barometer_sheet import BarometerSheet
 from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.flow_camera_sheet import FlowCameraSheet

@@ -12,8 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import ONE_LANE, kernel, pointer
-from flownav.errors import InputError
+from flownav.core.compile import ONE_LANE, kernel, pointer
+from flownav.core.errors import InputError
+from flownav.core.measurement import Array, EventQueue
 from flownav.estimation.attitude_error import fold_attitude
 from flownav.estimation.covariance import at
 from flownav.estimation.error_models import FilterSettings
@@ -25,7 +26,6 @@ from flownav.estimation.smoother import (
     smoothed_covariance,
 )
 from flownav.estimation.states import CONSIDERS, QUATERNION, STATE, STATES
-from flownav.measurement import Array, EventQueue
 from flownav.navigation.entries import (
     CORRECTED,
     DECAYED,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, larger, smaller
+from flownav.core.compile import equation, larger, smaller
 from flownav.estimation.states import ATTITUDE, VELOCITY
 from flownav.navigation.inertial import sound
 from flownav.navigation.memory import MEMORY, READING

@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, arctan2, equation, procedure, replacing, squared
+from flownav.core.compile import Lanes, Work, arctan2, equation, procedure, replacing, squared
+from flownav.core.frames import GRAVITY_M_S2, Quaternion, quaternion_from_euler, rotation_from_quaternion
+from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import begin_lane, lagged, set_variance, states_of
 from flownav.estimation.hypotheses import COUNT, begin_lane_anew
 from flownav.estimation.named import Attitude, PositionNed
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, POSITION, RATE, VELOCITY
-from flownav.frames import GRAVITY_M_S2, Quaternion, quaternion_from_euler, rotation_from_quaternion
-from flownav.measurement import Sensor
 from flownav.navigation.course import with_sought
 from flownav.navigation.lagged_flow import start_lag
 from flownav.navigation.memory import MEMORY

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, larger, procedure, replacing, smaller, squared
+from flownav.core.compile import Lanes, Work, equation, larger, procedure, replacing, smaller, squared
 from flownav.estimation.covariance import consider_none
 from flownav.estimation.laws.geometry import component
 from flownav.estimation.laws.still import gyro_at_rest, velocity_itself

@@ -6,11 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.estimation.gating import Reason
-from flownav.measurement import MAX_VALUES, Array, EventQueue, Sensor
-from flownav.navigation.rows import EstimateRow, InnovationRow
-from flownav.navigation.tape import EVENT_NAMES, OBSERVES, Tape
-from flownav.record import (
+from flownav.core.measurement import MAX_VALUES, Array, EventQueue, Sensor
+from flownav.core.record import (
     FED,
     FILTER_STATES,
     POSITION_NED,
@@ -21,6 +18,9 @@ from flownav.record import (
     VELOCITY_NED,
     Table,
 )
+from flownav.estimation.gating import Reason
+from flownav.navigation.rows import EstimateRow, InnovationRow
+from flownav.navigation.tape import EVENT_NAMES, OBSERVES, Tape
 
 Happening = tuple[float, str, str, str, float]  # time [s], source, kind, what the value is, value
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import LANES, ONE_LANE, Lanes, Unit, Work, equation, procedure, unit
+from flownav.core.compile import LANES, ONE_LANE, Lanes, Unit, Work, equation, procedure, unit
+from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import consider, consider_none, lagged, states_of, variance_of, with_lag
 from flownav.estimation.error_models import propagate_gauss_markov, propagate_walks
 from flownav.estimation.lag import predict_with_lag
 from flownav.estimation.motion import hold_still, predict
 from flownav.estimation.states import ACCEL_BIAS, ATTITUDE, GYRO_BIAS, POSITION, STATES, VELOCITY
-from flownav.measurement import Sensor
 from flownav.navigation.attitude import take_attitude
 from flownav.navigation.baro import take_baro
 from flownav.navigation.compass import check_compass, note_push

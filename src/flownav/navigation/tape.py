@@ -13,10 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, Work, equation, pointer, procedure
+from flownav.core.compile import Lanes, Work, equation, pointer, procedure
+from flownav.core.measurement import COLUMNS, Array, EventQueue, Sensor
 from flownav.estimation.hypotheses import NAMES as FAULTS
 from flownav.estimation.states import STATES
-from flownav.measurement import COLUMNS, Array, EventQueue, Sensor
 from flownav.navigation.entries import ENTRY
 from flownav.navigation.memory import REASON
 from flownav.navigation.reasons import SILENT

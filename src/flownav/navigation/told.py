@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation
+from flownav.core.compile import equation
 from flownav.estimation.error_models import FilterSettings
 
 # headings: none, a magnetometer's, an external attitude's, what is told as one

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, clamp, equation, exp, larger, replacing
+from flownav.core.compile import Lanes, Work, clamp, equation, exp, larger, replacing
 from flownav.navigation.memory import MEMORY, holds, load_whiteness
 from flownav.navigation.reasons import FUSED, INNOVATION_GATE
 from flownav.navigation.records import EchoMemory, GpsMemory, NoiseMemory, WhitenessMemory

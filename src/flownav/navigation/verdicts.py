@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation
+from flownav.core.compile import Lanes, Work, equation
+from flownav.core.frames import Rotation
 from flownav.estimation.covariance import add_noise_lane, covariance_of, variance_of
 from flownav.estimation.hypotheses import sign
 from flownav.estimation.motion import rotation_of
@@ -35,7 +36,6 @@ from flownav.estimation.states import (
     STATE,
     VELOCITY,
 )
-from flownav.frames import Rotation
 from flownav.navigation.journal import reset_state
 from flownav.navigation.memory import MEMORY, OBSERVATION, REASON
 from flownav.navigation.tape import Output, write_event

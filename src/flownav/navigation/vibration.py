@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger, replacing, smaller
+from flownav.core.compile import clamp, equation, larger, replacing, smaller
 from flownav.estimation.states import ACCEL_BIAS, POSITION, VELOCITY
 from flownav.navigation.motion_records import ImuMemory, MotionStep
 from flownav.navigation.records import Reading, StartMemory

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import ONE_LANE, kernel, pointer
-from flownav.measurement import Array
+from flownav.core.compile import ONE_LANE, kernel, pointer
+from flownav.core.measurement import Array
 from flownav.navigation.memory import load_imu, load_spike, new_work, store_imu, store_spike
 from flownav.navigation.records import Reading
 from flownav.navigation.spikes import judge_spike

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.measurement import Array
-from flownav.optics.camera import FIRMWARE_FOCAL_PX, Camera, effective_focal_px, refocused
-from flownav.optics.firmware import EARLY_GYRO_SCALE, firmware_named
-from flownav.optics.flow import flow_of_frames, raw_flow
-from flownav.optics.pad import BLACK, WHITE, Pad, stripes, texture
-from flownav.optics.projection import pose_looking_down
-from flownav.optics.render import film
+from flownav.core.measurement import Array
+from flownav.lab.optics.camera import FIRMWARE_FOCAL_PX, Camera, effective_focal_px, refocused
+from flownav.lab.optics.firmware import EARLY_GYRO_SCALE, firmware_named
+from flownav.lab.optics.flow import flow_of_frames, raw_flow
+from flownav.lab.optics.pad import BLACK, WHITE, Pad, stripes, texture
+from flownav.lab.optics.projection import pose_looking_down
+from flownav.lab.optics.render import film
+from flownav.lab.rig.experiment import RigLog
 from flownav.paper import plots
 from flownav.paper.laboratory import Laboratory, reading
 from flownav.paper.published import HEIGHTS_M
 from flownav.report.chart import Stack
 from flownav.report.panels import Panel
-from flownav.rig.experiment import RigLog
 
 FRAME_RATE_HZ = 250.0
 SPEED_M_S = 0.35

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from flownav.campaigns.local import fly_many, median_flight, score_history
-from flownav.compile import LANES
-from flownav.measurement import Array
-from flownav.optics.firmware import EARLY_GYRO_SCALE
+from flownav.core.compile import LANES
+from flownav.core.measurement import Array
+from flownav.core.parameter_files import check
+from flownav.core.record import Record
+from flownav.lab.optics.firmware import EARLY_GYRO_SCALE
+from flownav.lab.rig.instruments import SONAR_ECHO_S, SONAR_PERIOD_S
 from flownav.paper.lift_off import LiftOff, lift_offs
-from flownav.parameter_files import check
-from flownav.record import Record
-from flownav.rig.instruments import SONAR_ECHO_S, SONAR_PERIOD_S
 from flownav.scoring.errors import STATES, scores_of_flight, scores_of_flights
 from flownav.scoring.paper_tables import percentile_of_paper, published
 from flownav.simulation.assemble import Setup, assemble

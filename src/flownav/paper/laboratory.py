@@ -13,15 +13,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.identification.experiment import Experiment, experiment
-from flownav.identification.output_error import Fit, Structure, fit, simulate
-from flownav.identification.quantities import Excitation, excitation, latency_s
-from flownav.identification.statistics import fit_percent
-from flownav.measurement import Array
+from flownav.core.measurement import Array
+from flownav.lab.identification.experiment import Experiment, experiment
+from flownav.lab.identification.output_error import Fit, Structure, fit, simulate
+from flownav.lab.identification.quantities import Excitation, excitation, latency_s
+from flownav.lab.identification.statistics import fit_percent
+from flownav.lab.rig.campaign import run_campaign
+from flownav.lab.rig.experiment import RigLog, RigSettings
 from flownav.paper import published
 from flownav.paper.published import HEIGHTS_M, MODELS, ErrorRow
-from flownav.rig.campaign import run_campaign
-from flownav.rig.experiment import RigLog, RigSettings
 from flownav.sensors.datasheet import Dynamics
 from flownav.sensors.second_order import hold_step, second_order_hold
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.optics.firmware import EARLY_GYRO_SCALE
+from flownav.lab.optics.firmware import EARLY_GYRO_SCALE
 from flownav.paper.laboratory import Identified, Laboratory, identified
 from flownav.paper.published import HEIGHTS_M
 from flownav.paper.words import kept_together

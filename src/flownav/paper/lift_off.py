@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.measurement import Array
+from flownav.core.measurement import Array
 from flownav.scoring.percentiles import spread
 from flownav.simulation.engine import fly_blocks
 from flownav.simulation.history import column

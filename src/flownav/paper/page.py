@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from flownav import guard
+from flownav.core import guard
+from flownav.core.provenance import command_line, provenance
 from flownav.paper import figures_flight, figures_rig, figures_tables, leaks, published, rows, words
 from flownav.paper.findings import FIT_TOLERANCE, LARGEST_TOLERANCE, SAME_SPREAD, Finding
 from flownav.paper.reproduction import Reproduction
-from flownav.provenance import command_line, provenance
 from flownav.report import content
 from flownav.report import html as report
 from flownav.report.panels import Panel, Section

@@ -9,7 +9,7 @@ import csv
 import math
 from typing import NamedTuple
 
-from flownav.parameter_files import shipped
+from flownav.core.parameter_files import shipped
 from flownav.sensors.datasheet import IdentifiedModel
 
 HEIGHTS_M = (0.6, 0.8, 1.0, 1.5)

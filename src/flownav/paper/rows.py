@@ -6,6 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from flownav.lab.rig.excitation import DAMPING_1_S
+from flownav.lab.rig.pendulum import largest_speed
 from flownav.paper import published
 from flownav.paper.findings import FIT_TOLERANCE
 from flownav.paper.laboratory import Identified, Laboratory, Run, delay_s, identified
@@ -13,8 +15,6 @@ from flownav.paper.published import HEIGHTS_M, RELATION_FITS
 from flownav.paper.reproduction import Reproduction
 from flownav.report.figure_words import number
 from flownav.report.panels import listed
-from flownav.rig.excitation import DAMPING_1_S
-from flownav.rig.pendulum import largest_speed
 from flownav.sensors.datasheet import Dynamics
 
 

@@ -7,7 +7,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 KINDS = {"p": ctypes.c_void_p, "q": ctypes.c_void_p, "d": ctypes.c_double, "i": ctypes.c_int64}
 
@@ -31,7 +31,7 @@ class Mistakes:
 
 
 class Called:
-    """A Python function as a C function. signature: as of `flownav.compile.unit`, letters of KINDS."""
+    """A Python function as a C function. signature: as of `flownav.core.compile.unit`, letters of KINDS."""
 
     def __init__(self, name: str, function: Callable[..., None], signature: str, mistakes: Mistakes) -> None:
         def guarded(*arguments: Any) -> None:

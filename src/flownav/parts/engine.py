@@ -17,13 +17,13 @@ from flownav.campaigns.engines.local import Local
 from flownav.campaigns.local import fly_recorded
 from flownav.campaigns.plan import Ready
 from flownav.campaigns.rows import rows_of
-from flownav.compile import LANES, announce_compilation
-from flownav.measurement import Array
+from flownav.core.compile import LANES, announce_compilation
+from flownav.core.measurement import Array
+from flownav.core.record import Record
 from flownav.parts.calling import name_of
 from flownav.parts.equations import EquationFilter
 from flownav.parts.flying import fly_parts, fly_with, require_started
 from flownav.parts.protocols import Parts
-from flownav.record import Record
 from flownav.simulation.assemble import Setup
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.fault import SensorFault

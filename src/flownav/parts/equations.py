@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import ONE_LANE, Lanes, Unit, Work, equation, lane_access, runge_kutta, stepping, unit
-from flownav.errors import InputError
+from flownav.core.compile import ONE_LANE, Lanes, Unit, Work, equation, lane_access, runge_kutta, stepping, unit
+from flownav.core.errors import InputError
+from flownav.core.frames import of_unit_length
+from flownav.core.measurement import Array, Sensor
 from flownav.estimation.covariance import place
 from flownav.estimation.states import ACCEL_BIAS, GROUND, GYRO_BIAS, POSITION, QUATERNION, STATE, VELOCITY
-from flownav.frames import of_unit_length
-from flownav.measurement import Array, Sensor
 from flownav.navigation.memory import CLOCK, GROUND_SEEN, OWN, OWN_ROWS, START, WRITTEN, load_reading, share, shared
 from flownav.navigation.records import Reading as Row
 from flownav.navigation.take import UNIT_SIGNATURE
@@ -88,7 +88,7 @@ class EquationFilter:
 
     memory: a NamedTuple of floats, as it is before the first reading. step(memory, t_s, sensor, reading): the memory
     after a reading of an instant; reading: `flownav.navigation.records.Reading`, with `arrived` and `withheld`.
-    say(memory): a `Said`. step and say are `@equation`s; sensor is compared with `flownav.measurement.Sensor`.
+    say(memory): a `Said`. step and say are `@equation`s; sensor is compared with `flownav.core.measurement.Sensor`.
     """
 
     def __init__(

@@ -11,9 +11,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from flownav.campaigns.local import record_flown
-from flownav.compile import ONE_LANE, announce_compilation
-from flownav.errors import InputError
-from flownav.measurement import Array
+from flownav.core.compile import ONE_LANE, announce_compilation
+from flownav.core.errors import InputError
+from flownav.core.measurement import Array
+from flownav.core.record import Record
 from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.take import navigator_unit
 from flownav.navigation.told import carries_lag
@@ -23,7 +24,6 @@ from flownav.parts.plant import OwnController, OwnVehicle
 from flownav.parts.protocols import Parts, Told
 from flownav.parts.sensing import OwnReadings
 from flownav.parts.taking import Taker
-from flownav.record import Record
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import Flown, Instead, buffers_of, fly_into
 from flownav.simulation.ensemble import Ensemble

@@ -13,7 +13,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 GROUPS = {"filter": "flownav.filters", "sensor": "flownav.sensors", "vehicle": "flownav.vehicles",
           "controller": "flownav.controllers"}  # fmt: skip

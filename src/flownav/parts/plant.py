@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import ONE_LANE, runge_kutta
 from flownav.control.guidance import reference_at
-from flownav.errors import InputError
-from flownav.measurement import Array
+from flownav.core.compile import ONE_LANE, runge_kutta
+from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.parts.calling import Called, Mistakes, name_of
 from flownav.parts.protocols import Controller, Flown, VehicleModel
 from flownav.simulation import layout

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Reference
-from flownav.measurement import Sensor
+from flownav.core.measurement import Sensor
 from flownav.navigation.told import NavigatorSettings
 from flownav.vehicle.around import Around
 from flownav.vehicle.state import Controls
@@ -39,7 +39,7 @@ class Imu(NamedTuple):
 class Reading(NamedTuple):
     """One reading of a sensor other than the IMU.
 
-    t_s: the instant that it describes. value: as `flownav.measurement.COLUMNS[sensor]` names it; FLOW_RATE has two
+    t_s: the instant that it describes. value: as `flownav.core.measurement.COLUMNS[sensor]` names it; FLOW_RATE has two
     values more, the vehicle's own turning about x and y over the exposure [rad/s], NaN where unknown. variance (3,):
     as the sensor states it, NaN where it states none. quality: 0 (no data) to 255.
     """

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from flownav.compile import ONE_LANE
-from flownav.errors import InputError
+from flownav.core.compile import ONE_LANE
+from flownav.core.errors import InputError
 from flownav.logs.log import Log
 from flownav.navigation.loop import Running
 from flownav.navigation.settings import NavigatorSettingsFile

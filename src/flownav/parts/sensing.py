@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from flownav.errors import InputError
-from flownav.frames import GRAVITY_M_S2, rotation_from_quaternion
-from flownav.measurement import COLUMNS, MAX_VALUES, Array, Sensor
+from flownav.core.errors import InputError
+from flownav.core.frames import GRAVITY_M_S2, rotation_from_quaternion
+from flownav.core.measurement import COLUMNS, MAX_VALUES, Array, Sensor
 from flownav.navigation.memory import READING
 from flownav.navigation.take import UNIT_SIGNATURE
 from flownav.parts.calling import Called, Mistakes, name_of

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.frames import rotation_from_quaternion
+from flownav.core.measurement import COLUMNS, MAX_VALUES, Array, Sensor
 from flownav.estimation.covariance import place
 from flownav.estimation.gating import Reason
 from flownav.estimation.states import ACCEL_BIAS, GROUND, GYRO_BIAS, PAD, POSITION, QUATERNION, STATE, VELOCITY
-from flownav.frames import rotation_from_quaternion
-from flownav.measurement import COLUMNS, MAX_VALUES, Array, Sensor
 from flownav.navigation.memory import CLOCK, GROUND_SEEN, PAD_KNOWN, READING, START
 from flownav.navigation.place import SEEN
 from flownav.navigation.rows import EXTRA_STATES, EstimateRow, InnovationRow

@@ -1,6 +1,7 @@
 """What most filters of one's own need: rotations, a level start, the heading of a field, the velocity that flow shows.
 
-Plain NumPy on arrays of three and four; the equations are those of `flownav.frames` and of the sensors' conventions.
+Plain NumPy on arrays of three and four; the equations are those of `flownav.core.frames` and of the sensors'
+conventions.
 """
 
 from __future__ import annotations
@@ -9,8 +10,8 @@ import math
 
 import numpy as np
 
-from flownav.frames import GRAVITY_M_S2, quaternion_product, rotation_from_quaternion, velocity_from_flow
-from flownav.measurement import Array
+from flownav.core.frames import GRAVITY_M_S2, quaternion_product, rotation_from_quaternion, velocity_from_flow
+from flownav.core.measurement import Array
 from flownav.navigation.told import FlowSettings, GpsSettings, NavigatorSettings
 from flownav.parts.protocols import Imu, Reading
 

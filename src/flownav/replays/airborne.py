@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.measurement import Array, Sensor
 from flownav.logs.log import Log
-from flownav.measurement import Array, Sensor
 from flownav.scoring.drift import flight_of
 
 ON_THE_GROUND = 20  # readings of a range that starts on the ground

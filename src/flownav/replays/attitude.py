@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.log import Log
-from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import FLOW, ReplayOptions, prepare
 from flownav.replays.session import replay

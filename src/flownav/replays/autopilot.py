@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from flownav.core.measurement import Array, Sensor, Stream
+from flownav.core.record import Table
 from flownav.logs.log import Log
-from flownav.measurement import Array, Sensor, Stream
-from flownav.record import Table
 from flownav.replays.prepare import GPS
 from flownav.scoring.autopilot import autopilot_errors, in_frame_of
 

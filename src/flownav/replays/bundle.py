@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from flownav.core.frames import rotation_from_quaternion
+from flownav.core.measurement import COLUMNS, Array, Sensor
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.estimation.gating import Reason
-from flownav.frames import rotation_from_quaternion
 from flownav.logs.rates import attitude_at
-from flownav.measurement import COLUMNS, Array, Sensor
 from flownav.navigation.flags import flagged, flags_of
 from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.replays.autopilot import autopilot_path
 from flownav.replays.session import Replay
 from flownav.scoring.alignment import velocity_of

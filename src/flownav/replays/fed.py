@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import EventQueue, Sensor
+from flownav.core.parameter_files import check
 from flownav.logs.log import Log
-from flownav.measurement import EventQueue, Sensor
 from flownav.navigation.loop import Instead, run, start_navigator
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tables import Written, written_on
 from flownav.navigation.tape import tape_for
 from flownav.navigation.told import NO_STATED_NOISE, Equipment, FlowNoise
-from flownav.parameter_files import check
 from flownav.replays.prepare import Prepared, ReplayOptions, check_windows
 
 

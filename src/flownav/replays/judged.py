@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.measurement import Array, Sensor, Stream
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
-from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.flags import flagged, flags_of
 from flownav.navigation.rows import EstimateRow, InnovationRow
 from flownav.navigation.tables import Written, estimate_table

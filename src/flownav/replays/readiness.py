@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from flownav.core.measurement import Sensor
 from flownav.logs.log import Log
-from flownav.measurement import Sensor
 from flownav.navigation.feed import SLOWEST_IMU_HZ, imu_serves, rate_hz
 
 AIDS = (Sensor.GPS_POSITION, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)

@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.frames import rotation_from_quaternion, velocity_from_flow
+from flownav.core.frames import rotation_from_quaternion, velocity_from_flow
+from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
 from flownav.logs.rates import attitude_at, mean_over
-from flownav.measurement import COLUMNS, Array, Sensor, Stream
 
 MOVING_M_S = 1.0
 LEAST_MOVING_S = 10.0

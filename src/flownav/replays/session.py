@@ -11,11 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from flownav.compile import announce_compilation
-from flownav.errors import InputError
+from flownav.core.compile import announce_compilation
+from flownav.core.errors import InputError
+from flownav.core.measurement import Array, Sensor, Stream
+from flownav.core.record import POSITION_NED, Table
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
-from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.feed import SLOWEST_IMU_HZ, equipment_of
 from flownav.navigation.loop import Instead, run, start_navigator
 from flownav.navigation.rows import EstimateRow, InnovationRow
@@ -23,7 +24,6 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import smooth
 from flownav.navigation.tables import Written, estimate_table, written_on
 from flownav.navigation.tape import new_tape, tape_for
-from flownav.record import POSITION_NED, Table
 from flownav.replays.airborne import airborne_of
 from flownav.replays.autopilot import autopilot_scores
 from flownav.replays.fed import prepared_as_fed, run_as_fed

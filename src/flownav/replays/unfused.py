@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from flownav.core.measurement import Array, Sensor, Stream
 from flownav.estimation.gating import Reason
-from flownav.measurement import Array, Sensor, Stream
 from flownav.navigation.rows import InnovationRow
 from flownav.navigation.serving import HORIZONTAL, REFUSALS
 from flownav.replays.sentinel import Finding

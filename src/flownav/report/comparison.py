@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from flownav import __version__, guard
+from flownav.core import guard
+from flownav.core.version import __version__
 from flownav.report.figure_words import number
 from flownav.report.html import HERE
 from flownav.report.style import FONT, PALETTE

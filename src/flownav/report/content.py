@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from flownav.measurement import Sensor
-from flownav.record import Record
+from flownav.core.measurement import Sensor
+from flownav.core.record import Record
 from flownav.report.figure_words import NONE, Tile, metres, number
 from flownav.report.landing import landing_sentences, landing_tiles
 from flownav.report.phase_rows import phases_within

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.record import POSITION_NED, VELOCITY_BODY, Record
+from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record
 from flownav.report.chart import Stack
 from flownav.report.figure_words import number
 from flownav.report.figures_states import View, position, velocity

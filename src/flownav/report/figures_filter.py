@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.measurement import COLUMNS, Sensor
-from flownav.record import POSITION_NED, Record
+from flownav.core.measurement import COLUMNS, Sensor
+from flownav.core.record import POSITION_NED, Record
 from flownav.report.chart import Stack
 from flownav.report.figure_words import number
 from flownav.report.figures_innovation import SENSOR_TITLES, innovation_table

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.measurement import Sensor
-from flownav.record import POSITION_NED, VELOCITY_NED, Record
+from flownav.core.measurement import Sensor
+from flownav.core.record import POSITION_NED, VELOCITY_NED, Record
 from flownav.report.chart import Stack
 from flownav.report.panels import Panel, listed
 from flownav.report.samples import sliding_mean, sliding_rms

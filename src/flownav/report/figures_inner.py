@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.record import Record
+from flownav.core.record import Record
 from flownav.report.chart import Stack
 from flownav.report.panels import Panel
 from flownav.report.series import moments, outages, start_end_s, track

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.measurement import COLUMNS, Sensor
-from flownav.record import Record
+from flownav.core.measurement import COLUMNS, Sensor
+from flownav.core.record import Record
 from flownav.report.chart import Stack
 from flownav.report.panels import Panel
 from flownav.report.series import Array, mapping, moments, outages, start_end_s

@@ -8,8 +8,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.measurement import Sensor
-from flownav.record import POSITION_NED, Record
+from flownav.core.measurement import Sensor
+from flownav.core.record import POSITION_NED, Record
 from flownav.report.panels import Panel, listed
 from flownav.report.samples import LINE_POINTS, thin
 from flownav.report.series import Array, Track, Window, at, estimates, moments, outages, readings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.record import POSITION_NED, PROTECTION_LEVELS, Record
+from flownav.core.record import POSITION_NED, PROTECTION_LEVELS, Record
 from flownav.report.chart import Stack
 from flownav.report.panels import Panel
 from flownav.report.series import difference, moments, outages, start_end_s, track

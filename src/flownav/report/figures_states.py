@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.measurement import Sensor
-from flownav.record import POSITION_NED, VELOCITY_BODY, Record
+from flownav.core.measurement import Sensor
+from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record
 from flownav.report.chart import Stack
 from flownav.report.panels import Panel, listed
 from flownav.report.series import (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.measurement import COLUMNS, Sensor
-from flownav.record import QUATERNION, Record
+from flownav.core.measurement import COLUMNS, Sensor
+from flownav.core.record import QUATERNION, Record
 from flownav.report.chart import Stack
 from flownav.report.panels import Panel, listed
 from flownav.report.samples import sliding_mean, sliding_rms, thin

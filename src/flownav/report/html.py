@@ -10,8 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from flownav import guard
-from flownav.record import Record
+from flownav.core import guard
+from flownav.core.record import Record
 from flownav.report import (
     content,
     figures_errors,

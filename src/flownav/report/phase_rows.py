@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from flownav.record import Record
+from flownav.core.record import Record
 from flownav.report.figure_words import NONE, number
 from flownav.scoring.by_phase import scores_by_phase
 from flownav.scoring.phases import Phase, phase_at

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from flownav import __version__, guard
-from flownav.record import Record
+from flownav.core import guard
+from flownav.core.record import Record
+from flownav.core.version import __version__
 from flownav.report.chart import Stack
 from flownav.report.figures_path import Paths, View, paths_of
 from flownav.report.html import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flownav.record import Record
+from flownav.core.record import Record
 from flownav.report.figure_words import NONE, number
 from flownav.report.figures_innovation import SENSOR_TITLES
 from flownav.report.series import mapping

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.measurement import COLUMNS, Sensor
-from flownav.record import QUATERNION, Record
+from flownav.core.measurement import COLUMNS, Sensor
+from flownav.core.record import QUATERNION, Record
 from flownav.scoring.phases import phases_of
 
 Array = NDArray[np.float64]
@@ -124,7 +124,7 @@ def flow_velocity(record: Record) -> Track | None:
     flow, distance = readings(record, Sensor.FLOW_RATE), readings(record, Sensor.RANGE)
     if flow is None or distance is None:
         return None
-    from flownav.frames import velocity_from_flow
+    from flownav.core.frames import velocity_from_flow
 
     range_m = at(flow.t_s, distance)[:, 0]
     flow_x, flow_y, gyro_x, gyro_y = flow.value.T
@@ -140,7 +140,7 @@ def gps_velocity_body(record: Record) -> Track | None:
     gps, attitude = readings(record, Sensor.GPS_VELOCITY), track(record, "estimate", QUATERNION)
     if gps is None or attitude is None:
         return None
-    from flownav.frames import rotation_from_quaternion, to_body
+    from flownav.core.frames import rotation_from_quaternion, to_body
 
     nearest = np.clip(np.searchsorted(attitude.t_s, gps.t_s), 0, len(attitude.t_s) - 1)
     rotation = rotation_from_quaternion(*attitude.value[nearest].T)
@@ -149,7 +149,7 @@ def gps_velocity_body(record: Record) -> Track | None:
 
 def euler_deg(attitude: Track) -> Array:
     """Roll, pitch, yaw [deg] of a track of quaternions, shape (n, 3), one row at a time: thin it first."""
-    from flownav.frames import euler_from_quaternion
+    from flownav.core.frames import euler_from_quaternion
 
     return np.asarray(np.degrees([euler_from_quaternion(*row) for row in attitude.value])).reshape(-1, 3)
 

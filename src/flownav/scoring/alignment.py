@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.measurement import Array
+from flownav.core.measurement import Array
 
 VELOCITY_SPAN_S = 0.1
 LEAST_SPREAD_M = 0.2  # rms about the middle, of both paths: of less, noise and drift make the angle

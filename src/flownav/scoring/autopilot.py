@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from flownav.frames import rotation_from_quaternion, to_earth, turned_about_down
-from flownav.measurement import Array, Sensor, Stream
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Column, Table
+from flownav.core.frames import rotation_from_quaternion, to_earth, turned_about_down
+from flownav.core.measurement import Array, Sensor, Stream
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Column, Table
+from flownav.core.text import finite_or_none
 from flownav.scoring.alignment import Alignment, align, velocity_of
 from flownav.scoring.outage import difference_at, horizontal_rms
-from flownav.text import finite_or_none
 
 LEAST_ROWS = 10
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.record import POSITION_NED, VELOCITY_BODY, Record
+from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record
 from flownav.scoring.phases import Phase, phase_at
 
 Array = NDArray[np.float64]

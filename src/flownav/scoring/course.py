@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, kernel
+from flownav.core.compile import equation, kernel
 
 Array = NDArray[np.float64]
 

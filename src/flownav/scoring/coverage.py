@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from flownav.measurement import Array, Sensor, Stream
+from flownav.core.measurement import Array, Sensor, Stream
 
 LEAST_SILENCE_S = 5.0
 LEAST_SILENT_SHARE = 0.05  # of the log

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.measurement import Array
+from flownav.core.measurement import Array
 from flownav.scoring.alignment import Alignment, align
 from flownav.scoring.outage import difference_at
 

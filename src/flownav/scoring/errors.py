@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, kernel, larger, magnitude
+from flownav.core.compile import equation, kernel, larger, magnitude
+from flownav.core.text import finite_or_none
 from flownav.scoring.landings import crashed, succeeded, touchdown_of_flight, touchdown_of_flights
 from flownav.scoring.percentiles import spread
 from flownav.scoring.touchdown import TOUCHDOWN_COLUMNS
-from flownav.text import finite_or_none
 
 STATES = ("x", "y", "z", "u", "v", "w")
 STATISTICS = ("mean_error", "std_error", "rms_error", "max_error")

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.measurement import Array
+from flownav.core.measurement import Array
 
 ANCHOR_SAMPLES = 5
 

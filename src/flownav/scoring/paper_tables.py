@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.parameter_files import shipped
+from flownav.core.parameter_files import shipped
 from flownav.scoring.errors import SCORE_COLUMNS, STATES
 
 TABLES = {5: "paper_table5_takeoff.csv", 6: "paper_table6_landing.csv"}

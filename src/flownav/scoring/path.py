@@ -10,14 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.frames import heading_from_quaternion
-from flownav.measurement import Array
-from flownav.record import POSITION_NED, QUATERNION, VELOCITY_NED, Column, Table
+from flownav.core.frames import heading_from_quaternion
+from flownav.core.measurement import Array
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_NED, Column, Table
+from flownav.core.text import finite_or_none
 from flownav.scoring.alignment import Alignment, align, velocity_of
 from flownav.scoring.autopilot import columns_of, velocity_ned
 from flownav.scoring.drift import Motion, Window, end_drift
 from flownav.scoring.outage import OutageError, difference_at, horizontal_rms, outage_error
-from flownav.text import finite_or_none
 
 
 class Path(NamedTuple):

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.record import POSITION_NED, Record
+from flownav.core.record import POSITION_NED, Record
 
 Array = NDArray[np.float64]
 

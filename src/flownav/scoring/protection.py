@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.measurement import Array
+from flownav.core.measurement import Array
 from flownav.scoring.drift import Drift
 
 

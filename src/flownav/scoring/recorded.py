@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from flownav.errors import InputError
-from flownav.measurement import COLUMNS, Array, Sensor
-from flownav.record import POSITION_NED, PROTECTION_LEVELS, QUATERNION, VELOCITY_BODY, Column, Record
+from flownav.core.errors import InputError
+from flownav.core.measurement import COLUMNS, Array, Sensor
+from flownav.core.record import POSITION_NED, PROTECTION_LEVELS, QUATERNION, VELOCITY_BODY, Column, Record
 from flownav.scoring.autopilot import columns_of
 from flownav.scoring.consistency import consistency_of
 from flownav.scoring.drift import drift_of

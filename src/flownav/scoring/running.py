@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, arccos, equation, lane_access, larger, magnitude
-from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.core.compile import Lanes, arccos, equation, lane_access, larger, magnitude
+from flownav.core.frames import rotation_from_quaternion, to_earth
 from flownav.scoring.course import Course, Moving, Touch, followed, nothing_yet
 from flownav.scoring.errors import (
     MAX_POSITION_ERROR,

@@ -18,8 +18,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation, kernel
-from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.core.compile import equation, kernel
+from flownav.core.frames import rotation_from_quaternion, to_earth
 from flownav.scoring.course import Course, Moving, Touch, followed, no_touch, nothing_yet
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation, larger
+from flownav.core.compile import equation, larger
 from flownav.sensors.chance import factor
 from flownav.sensors.first_order import lagged
 from flownav.sensors.gauss_markov import gauss_markov

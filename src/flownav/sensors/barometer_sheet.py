@@ -8,8 +8,8 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from flownav.frames import GRAVITY_M_S2
-from flownav.parameter_files import Number
+from flownav.core.frames import GRAVITY_M_S2
+from flownav.core.parameter_files import Number
 from flownav.sensors.barometer import BarometerParameters
 from flownav.sensors.first_order import lag_weights
 from flownav.sensors.gauss_markov import gauss_markov_coefficients

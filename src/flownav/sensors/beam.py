@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, larger, smaller
-from flownav.frames import Rotation
+from flownav.core.compile import equation, larger, smaller
+from flownav.core.frames import Rotation
 
 SMALLEST_APPROACH = 0.1  # of a beam on a plane, per metre of beam: one that grazes the ground stays finite
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from statistics import NormalDist
 
-from flownav.compile import equation
+from flownav.core.compile import equation
 
 BEYOND_ANY_NORMAL = 1e3  # the generator's normals end at 8.5
 

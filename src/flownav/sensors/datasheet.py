@@ -13,8 +13,8 @@ from typing import Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from flownav.errors import InputError
-from flownav.parameter_files import Number, ParameterModel, load, shipped
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 from flownav.sensors import flow
 from flownav.sensors.flow import FlowParameters
 from flownav.sensors.noise_law import Law, NoiseFit, accuracy_law, constant_noise, fit_noise_law, power_law

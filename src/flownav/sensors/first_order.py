@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from flownav.compile import equation
+from flownav.core.compile import equation
 
 
 class Lag(NamedTuple):

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger
+from flownav.core.compile import clamp, equation, larger
 from flownav.sensors.second_order import SecondOrderHold, hold_step
 
 PERIOD_S = 0.004  # inside the sensor

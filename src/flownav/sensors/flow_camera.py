@@ -27,8 +27,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger, magnitude
-from flownav.frames import angular_flow
+from flownav.core.compile import clamp, equation, larger, magnitude
+from flownav.core.frames import angular_flow
 from flownav.sensors.chance import factor, spell
 from flownav.sensors.flow import SMALLEST_RANGE_M, FlowParameters, flow_noise_sigma
 from flownav.sensors.flow_engagement import engagement, pattern_reach

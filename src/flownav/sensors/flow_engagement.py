@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flownav.compile import equation, larger, magnitude, replacing
+from flownav.core.compile import equation, larger, magnitude, replacing
 from flownav.sensors.flow import FlowParameters, FlowState
 from flownav.sensors.geometry import LensPose
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 
-from flownav.compile import equation
+from flownav.core.compile import equation
 
 
 @equation

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation
-from flownav.frames import Rotation, Vector, to_earth
+from flownav.core.compile import equation
+from flownav.core.frames import Rotation, Vector, to_earth
 
 
 class LensPose(NamedTuple):

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation
-from flownav.frames import Quaternion, of_unit_length, quaternion_product
+from flownav.core.compile import equation
+from flownav.core.frames import Quaternion, of_unit_length, quaternion_product
 from flownav.sensors.gauss_markov import gauss_markov
 from flownav.sensors.quantisation import quantised
 

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation
-from flownav.frames import Rotation, to_earth
+from flownav.core.compile import equation
+from flownav.core.frames import Rotation, to_earth
 from flownav.sensors.chance import factor, spell
 from flownav.sensors.first_order import lagged
 from flownav.sensors.gauss_markov import gauss_markov

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from flownav.parameter_files import Number, ParameterModel
+from flownav.core.parameter_files import Number, ParameterModel
 from flownav.sensors.first_order import lag_weights
 from flownav.sensors.gauss_markov import gauss_markov_coefficients
 from flownav.sensors.gps_receiver import GpsReceiverParameters

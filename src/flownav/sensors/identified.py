@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.sensors.datasheet import Dynamics, FlowSensor
 
 Array = NDArray[np.float64]

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import clamp, equation
+from flownav.core.compile import clamp, equation
 from flownav.sensors.gauss_markov import gauss_markov
 
 PERIOD_S = 0.02

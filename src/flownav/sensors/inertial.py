@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger
+from flownav.core.compile import clamp, equation, larger
 from flownav.sensors.chance import factor
 from flownav.sensors.imu import ImuReading
 

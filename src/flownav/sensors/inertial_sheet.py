@@ -8,8 +8,8 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from flownav.frames import GRAVITY_M_S2
-from flownav.parameter_files import Number, ParameterModel
+from flownav.core.frames import GRAVITY_M_S2
+from flownav.core.parameter_files import Number, ParameterModel
 from flownav.sensors.inertial import InertialParameters
 from flownav.sensors.sheet import SensorSheet
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation
-from flownav.frames import Rotation, to_body
+from flownav.core.compile import equation
+from flownav.core.frames import Rotation, to_body
 
 
 class MagnetometerParameters(NamedTuple):

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from pydantic import Field
 
-from flownav.parameter_files import Number, ParameterModel
+from flownav.core.parameter_files import Number, ParameterModel
 from flownav.sensors.magnetometer import MagnetometerParameters
 from flownav.sensors.sheet import SensorSheet
 

@@ -31,7 +31,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger
+from flownav.core.compile import clamp, equation, larger
 from flownav.sensors.chance import factor
 from flownav.sensors.geometry import LensPose, turned_rotation
 from flownav.sensors.pad_fix import SMALLEST_DEPTH_M, PadFixNormals, PadFixParameters, read_pad

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, larger, magnitude
-from flownav.frames import Rotation, to_body
+from flownav.core.compile import equation, larger, magnitude
+from flownav.core.frames import Rotation, to_body
 
 SMALLEST_DEPTH_M = 0.01
 

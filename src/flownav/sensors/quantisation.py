@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import equation
+from flownav.core.compile import equation
 
 
 @equation

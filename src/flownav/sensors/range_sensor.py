@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger
+from flownav.core.compile import clamp, equation, larger
 from flownav.sensors.beam import BeamHit
 from flownav.sensors.chance import spell
 from flownav.sensors.quantisation import quantised

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import clamp, equation, larger
+from flownav.core.compile import clamp, equation, larger
 from flownav.sensors.quantisation import quantised
 
 PERIOD_S = 0.1

@@ -12,7 +12,7 @@ import cmath
 import math
 from typing import NamedTuple
 
-from flownav.compile import equation
+from flownav.core.compile import equation
 
 
 class SecondOrderHold(NamedTuple):

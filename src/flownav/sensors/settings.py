@@ -11,8 +11,8 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from flownav.frames import GRAVITY_M_S2 as STANDARD_GRAVITY_M_S2
-from flownav.parameter_files import Number, ParameterModel
+from flownav.core.frames import GRAVITY_M_S2 as STANDARD_GRAVITY_M_S2
+from flownav.core.parameter_files import Number, ParameterModel
 from flownav.sensors import gps_ins, imu
 from flownav.sensors.gauss_markov import gauss_markov_coefficients
 from flownav.sensors.gps_ins import GpsInsParameters

@@ -11,7 +11,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from flownav.parameter_files import Number, ParameterModel, load, shipped
+from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 from flownav.sensors.chance import spell_levels
 
 

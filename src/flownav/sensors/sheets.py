@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flownav.parameter_files import ParameterModel
+from flownav.core.parameter_files import ParameterModel
 from flownav.sensors.barometer_sheet import BarometerSheet, load_barometer_sheet
 from flownav.sensors.datasheet import FlowSensor, load_sensor
 from flownav.sensors.flow_camera_sheet import FlowCameraSheet, load_flow_camera_sheet

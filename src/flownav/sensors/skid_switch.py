@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation
+from flownav.core.compile import equation
 
 
 class SkidSwitchParameters(NamedTuple):

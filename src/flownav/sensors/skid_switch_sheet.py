@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from flownav.parameter_files import Number
+from flownav.core.parameter_files import Number
 from flownav.sensors.chance import level_of
 from flownav.sensors.sheet import SensorSheet
 from flownav.sensors.skid_switch import SkidSwitchParameters

@@ -13,10 +13,10 @@ from flownav.control.box import margins_of
 from flownav.control.design import gains_for
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import path_through, rounded
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor
 from flownav.estimation.discretise import discretised
 from flownav.estimation.paper_filter import PaperModel
-from flownav.measurement import Sensor
 from flownav.sensors.datasheet import FlowSensor, load_sensor
 from flownav.simulation.dispersion import Design, Distribution, raises_wind
 from flownav.simulation.ensemble import Ensemble, flown, recirculation_of

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, Work
-from flownav.measurement import Array
+from flownav.core.compile import Lanes, Work
+from flownav.core.measurement import Array
 from flownav.navigation.tape import Output, Tape
 from flownav.simulation.draws import Noise
 

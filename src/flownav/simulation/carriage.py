@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple, get_type_hints
 
-from flownav.compile import Lanes, Layout, OnLanes, Work, equation, write_function
+from flownav.core.compile import Lanes, Layout, OnLanes, Work, equation, write_function
 from flownav.simulation.carried import CarriedSensor
 from flownav.simulation.layout import AS_IS, BEGUN, CARRIERS, NORMALS, STATE, UNIT, put_slot
 from flownav.simulation.onboard import Fitting, Place

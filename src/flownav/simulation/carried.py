@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
 
-from flownav.compile import depends_also
-from flownav.measurement import Sensor
+from flownav.core.compile import depends_also
+from flownav.core.measurement import Sensor
 from flownav.sensors.barometer import BarometerReading, draw_barometer, start_barometer, step_barometer
 from flownav.sensors.barometer_sheet import BarometerSheet
 from flownav.sensors.flow_camera import draw_flow_camera, start_flow_camera

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, field_validator, model_validator
 
-from flownav.parameter_files import Number, ParameterModel, load, shipped
+from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 from flownav.simulation.noise import threefry
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, Work, bits_from_float, equation, float_from_bits, procedure
+from flownav.core.compile import Lanes, Work, bits_from_float, equation, float_from_bits, procedure
 from flownav.simulation import layout
 from flownav.simulation.noise import normal_pair
 

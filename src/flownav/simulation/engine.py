@@ -12,8 +12,8 @@ from typing import Any, NamedTuple, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import LANES, ONE_LANE, announce_compilation, compile_beside
-from flownav.measurement import Sensor
+from flownav.core.compile import LANES, ONE_LANE, announce_compilation, compile_beside
+from flownav.core.measurement import Sensor
 from flownav.navigation.memory import new_work
 from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.take import navigator_unit

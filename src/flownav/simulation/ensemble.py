@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.errors import InputError
-from flownav.parameter_files import ParameterModel, check
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import ParameterModel, check
 from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.sheets import SensorSheets
 from flownav.simulation.dispersion import Design, Distribution, drawn, uniforms

@@ -6,13 +6,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, invoke, procedure, replacing
 from flownav.control.autopilot import AutopilotState, Estimate, inner_loop, landing_logic, outer_loop
 from flownav.control.gains import AutopilotGains
 from flownav.control.go_around import Knowledge
 from flownav.control.guidance import Reference
-from flownav.frames import GRAVITY_M_S2, Quaternion, quaternion_product, rotation_from_quaternion
-from flownav.measurement import Sensor
+from flownav.core.compile import Lanes, Work, equation, invoke, procedure, replacing
+from flownav.core.frames import GRAVITY_M_S2, Quaternion, quaternion_product, rotation_from_quaternion
+from flownav.core.measurement import Sensor
 from flownav.navigation.records import Reading
 from flownav.sensors.beam import Ground, ground_height
 from flownav.sensors.flow import FlowParameters, FlowState, misread, step_flow

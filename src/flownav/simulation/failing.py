@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import Lanes, Work, equation, exp, lane_access, magnitude, procedure
-from flownav.measurement import Sensor
+from flownav.core.compile import Lanes, Work, equation, exp, lane_access, magnitude, procedure
+from flownav.core.measurement import Sensor
 from flownav.navigation.records import Reading
 from flownav.simulation import layout
 from flownav.simulation.draws import draw

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, Work, equation, replacing
+from flownav.core.compile import Lanes, Work, equation, replacing
 from flownav.estimation import paper_filter
 from flownav.estimation.kalman import start
 from flownav.estimation.paper_filter import STATES, PaperModel

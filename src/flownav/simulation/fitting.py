@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from pydantic import create_model
 
-from flownav.errors import InputError
-from flownav.measurement import Array, Sensor
+from flownav.core.errors import InputError
+from flownav.core.measurement import Array, Sensor
 from flownav.navigation.packed import pack
 from flownav.navigation.settings_of import Told, settings_of
 from flownav.navigation.told import FROM_MAG, Equipment

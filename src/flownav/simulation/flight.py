@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, Work, equation, invoke, kernel, pointer
 from flownav.control.autopilot import grounded, hovering
 from flownav.control.guidance import Reference, reference_at
+from flownav.core.compile import Lanes, Work, equation, invoke, kernel, pointer
 from flownav.navigation.tape import output_of
 from flownav.simulation import layout
 from flownav.simulation.block import Aboard, Block, Buffers, Progress

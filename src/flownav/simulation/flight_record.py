@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.measurement import COLUMNS, Sensor
+from flownav.core.measurement import COLUMNS, Sensor
+from flownav.core.provenance import command_line, provenance
+from flownav.core.record import FED, POSITION_NED, PROTECTION_LEVELS, QUATERNION, TABLES, VELOCITY_BODY, Record, Table
 from flownav.navigation.records import Reading
 from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
-from flownav.provenance import command_line, provenance
-from flownav.record import FED, POSITION_NED, PROTECTION_LEVELS, QUATERNION, TABLES, VELOCITY_BODY, Record, Table
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import Flown
 from flownav.simulation.history import HISTORY

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from pydantic import Field, model_validator
 
-from flownav.compile import clamp, equation, larger
-from flownav.parameter_files import Number, ParameterModel
+from flownav.core.compile import clamp, equation, larger
+from flownav.core.parameter_files import Number, ParameterModel
 from flownav.sensors.beam import Ground
 
 WAVE_RMS = math.sqrt(8.0 / 15.0)  # of one wave of `beam.roughness`

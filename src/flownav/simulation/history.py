@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, Work, equation
 from flownav.control.guidance import Reference
+from flownav.core.compile import Lanes, Work, equation
+from flownav.core.frames import rotation_from_quaternion, to_earth
+from flownav.core.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY
 from flownav.estimation.paper_filter import STATES
-from flownav.frames import rotation_from_quaternion, to_earth
-from flownav.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY
 from flownav.sensors.beam import ground_height
 from flownav.simulation import layout
 from flownav.simulation.layout import PLANT, ground_as_is, load_autopilot, load_helicopter

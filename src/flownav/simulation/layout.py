@@ -1,6 +1,6 @@
 """Where everything a block of flights needs lies in its lane buffer: constant rows, and their access.
 
-One flat buffer holds every scalar as a row of lanes (see `flownav.compile`). Rows are module constants, so
+One flat buffer holds every scalar as a row of lanes (see `flownav.core.compile`). Rows are module constants, so
 that kernels see them as compile-time numbers.
 """
 
@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from flownav.compile import Layout, lane_access
 from flownav.control.autopilot import AutopilotState, Estimate
 from flownav.control.go_around import Knowledge
+from flownav.core.compile import Layout, lane_access
 from flownav.estimation.kalman import kalman_row_count, kalman_rows
 from flownav.estimation.paper_filter import STATES
 from flownav.navigation.records import Reading

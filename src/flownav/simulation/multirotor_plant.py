@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flownav.compile import Lanes, Work, equation
+from flownav.core.compile import Lanes, Work, equation
 from flownav.simulation.layout import (
     load_around,
     load_controls,

@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import Lanes, Work, equation, invoke, larger, procedure
 from flownav.control.go_around import Knowledge
 from flownav.control.guidance import Reference
+from flownav.core.compile import Lanes, Work, equation, invoke, larger, procedure
+from flownav.core.frames import conjugate, quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.estimation.consistency import normalised_error
 from flownav.estimation.named import Attitude, PositionNed, VelocityNed
-from flownav.frames import conjugate, quaternion_product, rotation_from_quaternion, to_body, to_earth
 from flownav.navigation.ahead import Carried, carried, coasted, state_of
 from flownav.navigation.memory import load_reading, load_start
 from flownav.navigation.records import GroundMemory, Reading, StartMemory, SuspicionMemory

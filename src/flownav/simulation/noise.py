@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import cosine_of_eighth, equation, float_from_bits, log_of_unit, sine_of_eighth
+from flownav.core.compile import cosine_of_eighth, equation, float_from_bits, log_of_unit, sine_of_eighth
 
 CHANNELS_PER_STEP = np.uint64(256)
 KEY_PARITY = np.uint64(0x1BD11BDAA9FC1A22)

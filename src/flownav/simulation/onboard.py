@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import equation
-from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.core.compile import equation
+from flownav.core.frames import rotation_from_quaternion, to_earth
 from flownav.sensors.beam import BeamHit, Ground, beam_distance
 from flownav.sensors.flow import FlowParameters
 from flownav.vehicle.state import HelicopterState

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import STAGES, Lanes, Work, equation
+from flownav.core.compile import STAGES, Lanes, Work, equation
 from flownav.simulation import layout
 from flownav.simulation.layout import (
     load_around,

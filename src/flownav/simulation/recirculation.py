@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from flownav.compile import clamp, equation, larger
-from flownav.parameter_files import Number, ParameterModel
+from flownav.core.compile import clamp, equation, larger
+from flownav.core.parameter_files import Number, ParameterModel
 from flownav.sensors.gauss_markov import gauss_markov, gauss_markov_coefficients
 from flownav.simulation.wind import PERIOD_S, WindVelocity
 

@@ -7,7 +7,7 @@ order of sampling and emptied in the order of the instants that the readings des
 
 from __future__ import annotations
 
-from flownav.compile import Lanes, Work, equation, lane_access
+from flownav.core.compile import Lanes, Work, equation, lane_access
 from flownav.navigation.memory import store_reading
 from flownav.navigation.records import Reading
 from flownav.simulation import layout

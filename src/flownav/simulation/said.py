@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import Lanes, Layout, Work, equation
+from flownav.core.compile import Lanes, Layout, Work, equation
 from flownav.estimation.covariance import covariance_of, variance_of
 from flownav.estimation.motion import rotation_of
 from flownav.estimation.states import GROUND, PAD, POSITION, STATE

@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from flownav.compile import OnLanes, equation, procedure, write_function
+from flownav.core.compile import OnLanes, equation, procedure, write_function
 from flownav.simulation.carriage import CARRIAGES, Carriage
 from flownav.simulation.draws import draw
 from flownav.simulation.failing import Taken, strike

@@ -12,8 +12,8 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationInfo, create_model, field_validator
 
-from flownav.errors import InputError
-from flownav.parameter_files import Number, ParameterModel, load, shipped
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 from flownav.sensors.datasheet import FlowSettings
 from flownav.sensors.settings import GpsInsSettings, PadFixSettings, RangefinderSettings
 from flownav.simulation.carried import carried_sensors

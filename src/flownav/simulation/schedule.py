@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.measurement import Sensor
+from flownav.core.measurement import Sensor
 from flownav.simulation.onboard import EPOCH_S, PHYSICS_PERIOD_S, Clock, Onboard
 from flownav.simulation.truth import CARRIED
 

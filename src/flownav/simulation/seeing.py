@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, replacing, write_function
 from flownav.control.autopilot import AutopilotState
 from flownav.control.go_around import Knowledge
-from flownav.frames import Rotation, rotation_from_quaternion, to_earth
+from flownav.core.compile import equation, replacing, write_function
+from flownav.core.frames import Rotation, rotation_from_quaternion, to_earth
+from flownav.lab.optics.shutter import image_rate_rad_s
 from flownav.navigation.records import Reading
-from flownav.optics.shutter import image_rate_rad_s
 from flownav.sensors.barometer import BarometerTruth
 from flownav.sensors.beam import BeamHit, Ground, ground_height
 from flownav.sensors.flow import FlowParameters, FlowState

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import Lanes, Work, equation
-from flownav.frames import (
+from flownav.core.compile import Lanes, Work, equation
+from flownav.core.frames import (
     angular_flow,
     conjugate,
     of_unit_length,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from flownav.compile import procedure, write_function
+from flownav.core.compile import procedure, write_function
 from flownav.simulation.carriage import CARRIAGES
 from flownav.simulation.draws import draw
 from flownav.simulation.layout import BEGUN, UNIT, in_pairs

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flownav.compile import Lanes, Work, equation
+from flownav.core.compile import Lanes, Work, equation
 from flownav.simulation import layout
 from flownav.simulation.layout import PLANT, vehicle_as_is
 from flownav.simulation.multirotor_plant import midpoint_step, observe_multirotor

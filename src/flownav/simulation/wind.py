@@ -35,8 +35,8 @@ from typing import NamedTuple
 import numpy as np
 from pydantic import Field
 
-from flownav.compile import equation, larger, log_of_unit, smaller
-from flownav.parameter_files import Number, ParameterModel
+from flownav.core.compile import equation, larger, log_of_unit, smaller
+from flownav.core.parameter_files import Number, ParameterModel
 from flownav.sensors.gauss_markov import gauss_markov, gauss_markov_coefficients
 
 PERIOD_S = 0.02

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import clamp, equation
+from flownav.core.compile import clamp, equation
 from flownav.vehicle.parameters import VehicleParameters
 
 

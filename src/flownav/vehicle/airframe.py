@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation, magnitude
-from flownav.frames import Rotation, Vector, rotation_from_quaternion, to_body
+from flownav.core.compile import equation, magnitude
+from flownav.core.frames import Rotation, Vector, rotation_from_quaternion, to_body
 from flownav.vehicle.around import Around
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.multirotor_state import MultirotorState

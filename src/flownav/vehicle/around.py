@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation
-from flownav.frames import Rotation, Vector
+from flownav.core.compile import equation
+from flownav.core.frames import Rotation, Vector
 
 
 class Around(NamedTuple):

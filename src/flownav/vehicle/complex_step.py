@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 Array = NDArray[np.float64]
 PlainEquation = Callable[[Sequence[Any]], Sequence[Any]]

@@ -13,8 +13,8 @@ from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from flownav.errors import InputError
-from flownav.parameter_files import read_toml
+from flownav.core.errors import InputError
+from flownav.core.parameter_files import read_toml
 from flownav.vehicle.kinds import AnyVehicle, flattened
 from flownav.vehicle.loading import read_kind, vehicle_file
 from flownav.vehicle.multirotor_schema import MultirotorFile

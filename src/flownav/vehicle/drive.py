@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import clamp, equation
+from flownav.core.compile import clamp, equation
 from flownav.vehicle.airframe import AirMotion
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.rotor import speed_ratio

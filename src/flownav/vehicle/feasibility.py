@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 if TYPE_CHECKING:
     from flownav.vehicle.multirotor_parameters import MultirotorParameters

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flownav.compile import equation, larger
+from flownav.core.compile import equation, larger
 
 LOWEST_INDUCED_SQ = 0.3**2  # [m2/s2]
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation
-from flownav.frames import Rotation, Vector, quaternion_rate, to_earth
+from flownav.core.compile import equation
+from flownav.core.frames import Rotation, Vector, quaternion_rate, to_earth
 from flownav.vehicle.actuators import acceleration, blade_angle, collective_servo, cyclic_servo, pedal_servo
 from flownav.vehicle.airframe import (
     AirMotion,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.vehicle.feasibility import hover_induced_velocity, require_feasible
 from flownav.vehicle.multirotor_parameters import (
     MultirotorParameters,

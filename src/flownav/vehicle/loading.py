@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from flownav.parameter_files import check, read_toml, shipped
+from flownav.core.parameter_files import check, read_toml, shipped
 from flownav.vehicle.kinds import AnyFile, AnyVehicle, flattened, require_flyable, schema_of
 
 SHIPPED_VEHICLE = "maxi_joker_3.toml"

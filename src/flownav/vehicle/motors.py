@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger, smaller
+from flownav.core.compile import clamp, equation, larger, smaller
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.multirotor_state import Six
 from flownav.vehicle.state import Controls

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation
-from flownav.frames import Vector, quaternion_rate, to_earth
+from flownav.core.compile import equation
+from flownav.core.frames import Vector, quaternion_rate, to_earth
 from flownav.vehicle.airframe import AirMotion, Wrench, air_motion, attitude, fuselage_drag
 from flownav.vehicle.around import Around, below_plane, plane_normal
 from flownav.vehicle.motors import battery_voltage, mixed, roots_of_shares, shaft_power, speed_rate, told_speed

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.vehicle.feasibility import require_rigid_body
 from flownav.vehicle.multirotor_schema import MultirotorFile
 from flownav.vehicle.parameters import of_either_kind

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field, field_validator
 
-from flownav.parameter_files import Number, ParameterModel
+from flownav.core.parameter_files import Number, ParameterModel
 from flownav.vehicle.schema import Body, Environment, Fuselage, Skids, Touchdown
 
 KIND = "multirotor"

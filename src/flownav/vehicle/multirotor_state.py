@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation, passing, replacing, stepping
+from flownav.core.compile import equation, passing, replacing, stepping
 from flownav.vehicle.state import settled, unit_attitude
 
 

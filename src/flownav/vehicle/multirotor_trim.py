@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.errors import InputError
-from flownav.frames import Vector, quaternion_from_euler
+from flownav.core.errors import InputError
+from flownav.core.frames import Vector, quaternion_from_euler
 from flownav.vehicle import multirotor
 from flownav.vehicle.around import CALM
 from flownav.vehicle.complex_step import solve, value

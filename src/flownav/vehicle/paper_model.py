@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator
 
-from flownav.parameter_files import Number, ParameterModel, load, shipped
+from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 
 SHIPPED_MODEL = "paper_reduced_model.toml"
 

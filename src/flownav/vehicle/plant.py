@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.frames import rotation_from_quaternion, to_earth
+from flownav.core.frames import rotation_from_quaternion, to_earth
 from flownav.vehicle import airframe, helicopter, multirotor
 from flownav.vehicle.around import CALM
 from flownav.vehicle.complex_step import jacobian

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation, larger
+from flownav.core.compile import equation, larger
 from flownav.vehicle.ground_effect import source_and_image
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
 

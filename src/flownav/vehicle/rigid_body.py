@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from flownav.compile import equation
-from flownav.frames import Vector
+from flownav.core.compile import equation
+from flownav.core.frames import Vector
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.parameters import VehicleParameters
 

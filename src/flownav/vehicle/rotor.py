@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger, magnitude, smaller
+from flownav.core.compile import clamp, equation, larger, magnitude, smaller
 from flownav.vehicle.parameters import VehicleParameters
 
 HYPOTENUSE = 2.0 * (2.0**0.5 - 1.0)  # (a² + b² + this·a·b)/(a + b) is √(a² + b²), within 1 %

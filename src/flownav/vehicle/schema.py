@@ -10,7 +10,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from flownav.parameter_files import Number, ParameterModel
+from flownav.core.parameter_files import Number, ParameterModel
 
 
 class Environment(ParameterModel):

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import clamp, equation, larger, smaller, squared
-from flownav.frames import Vector
+from flownav.core.compile import clamp, equation, larger, smaller, squared
+from flownav.core.frames import Vector
 from flownav.vehicle.airframe import Wrench
 from flownav.vehicle.around import Around
 from flownav.vehicle.multirotor_parameters import MultirotorParameters

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from flownav.compile import equation, magnitude, passing, replacing, runge_kutta, stepping
-from flownav.frames import Quaternion, of_unit_length
+from flownav.core.compile import equation, magnitude, passing, replacing, runge_kutta, stepping
+from flownav.core.frames import Quaternion, of_unit_length
 
 
 class HelicopterState(NamedTuple):

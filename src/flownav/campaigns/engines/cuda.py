@@ -19,8 +19,8 @@ from flownav.campaigns.engines.engine import Part
 from flownav.campaigns.engines.local import neighbours
 from flownav.campaigns.local import home_epoch
 from flownav.campaigns.plan import Ready
-from flownav.compile import ONE_LANE, WARP, NoDeviceError, Runner, announce_compilation, device_runner
-from flownav.errors import InputError
+from flownav.core.compile import ONE_LANE, WARP, NoDeviceError, Runner, announce_compilation, device_runner
+from flownav.core.errors import InputError
 from flownav.estimation.covariance import with_lag
 from flownav.navigation.memory import new_work
 from flownav.navigation.packed import load_flow_settings

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import ONE_LANE, WARP, Lanes, Work, equation, pointer, procedure, strided
 from flownav.control.guidance import Reference
+from flownav.core.compile import ONE_LANE, WARP, Lanes, Work, equation, pointer, procedure, strided
 from flownav.navigation.take import navigate
 from flownav.navigation.tape import output_of
 from flownav.scoring.running import RUNNING_ROWS, Shown, Terms, begin_scores, note_shown, write_scores

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flownav.campaigns.engines.engine import Part
 from flownav.campaigns.plan import Ready
 from flownav.campaigns.rows import rows_of
-from flownav.compile import LANES
+from flownav.core.compile import LANES
 from flownav.simulation.engine import Instead, fly_blocks
 from flownav.simulation.plan import Flight
 

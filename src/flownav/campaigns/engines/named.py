@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 if TYPE_CHECKING:
     from flownav.campaigns.engines.engine import Engine

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from flownav.campaigns.engines.engine import Part
 from flownav.campaigns.engines.local import Local
 from flownav.campaigns.plan import Ready, ready_of
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 
 Array = NDArray[np.float64]
 

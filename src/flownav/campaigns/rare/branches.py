@@ -11,7 +11,7 @@ from scipy.special import ndtr
 
 from flownav.campaigns.rare.chains import Array, Streams
 from flownav.campaigns.rows import rows_of
-from flownav.compile import LANES
+from flownav.core.compile import LANES
 from flownav.simulation import layout
 from flownav.simulation.assemble import Setup
 from flownav.simulation.draws import KEYED_EPOCHS, Noise

@@ -15,10 +15,10 @@ from flownav.campaigns.rare.finding import CONFIDENCE, LARGEST_CV, Found, find, 
 from flownav.campaigns.rare.likely import effective, rank_inputs, rank_noise
 from flownav.campaigns.rare.response import Response, responses_to
 from flownav.campaigns.rare.subset import WALK
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.text import finite_or_none
 from flownav.scoring.touchdown import Limits
 from flownav.simulation.assemble import Setup
-from flownav.text import finite_or_none
 
 FEWEST_FLIGHTS, MOST_FLIGHTS = 2000, 100_000
 USUAL_FLIGHTS = 512  # that say what a usual touchdown is

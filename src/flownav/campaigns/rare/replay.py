@@ -10,9 +10,9 @@ from typing import Any
 from flownav.campaigns.local import record_flown
 from flownav.campaigns.plan import made_of
 from flownav.campaigns.rare.branches import Branch, Space
-from flownav.errors import InputError
-from flownav.files import written_whole
-from flownav.record import Record
+from flownav.core.errors import InputError
+from flownav.core.files import written_whole
+from flownav.core.record import Record
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_written
 

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import arctan2, equation, larger
+from flownav.core.compile import arctan2, equation, larger
+from flownav.core.frames import Quaternion, Vector, conjugate, quaternion_product, within_half_turn
 from flownav.estimation.law import law
 from flownav.estimation.laws.geometry import LEAST_UPRIGHT, component
 from flownav.estimation.named import Attitude, InsError, ReadAttitude, rotation_by
-from flownav.frames import Quaternion, Vector, conjugate, quaternion_product, within_half_turn
 
 
 @equation

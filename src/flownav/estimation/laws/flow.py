@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.compile import equation
+from flownav.core.compile import equation
+from flownav.core.frames import flow_about
 from flownav.estimation.law import law
 from flownav.estimation.laws.geometry import along_axis, component, cross, lens_range
 from flownav.estimation.named import Attitude, BodyRate, FlowMount, GyroLeft, Height, Lever, VelocityNed, rotation_by
-from flownav.frames import flow_about
 
 
 class Angular(NamedTuple):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from flownav.compile import equation, larger
-from flownav.frames import Rotation, Vector
+from flownav.core.compile import equation, larger
+from flownav.core.frames import Rotation, Vector
 
 LEAST_RANGE_M = 0.05
 LEAST_UPRIGHT = 0.1

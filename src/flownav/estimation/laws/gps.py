@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from flownav.core.frames import GRAVITY_M_S2, to_earth
 from flownav.estimation.law import law
 from flownav.estimation.laws.geometry import component, cross, turning
 from flownav.estimation.named import Attitude, BodyRate, Lever, rotation_by
-from flownav.frames import GRAVITY_M_S2, to_earth
 
 
 class OnPosition(NamedTuple):

@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.compile import equation
+from flownav.core.compile import equation
+from flownav.core.frames import Vector, to_body, to_earth
 from flownav.estimation.law import law
 from flownav.estimation.laws.geometry import cross
 from flownav.estimation.named import Attitude, Beam, PadNed, PositionNed, ReadSight, rotation_by
-from flownav.frames import Vector, to_body, to_earth
 
 
 @equation

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Literal
 
+from flownav.core.parameter_files import ParameterModel, load, shipped
 from flownav.mavlink.dialect import ARDUPILOT, PX4
 from flownav.mavlink.parameters import Value
-from flownav.parameter_files import ParameterModel, load, shipped
 
 MAKES = {ARDUPILOT: "setup/ardupilot.toml", PX4: "setup/px4.toml"}
 SETS = (1, 2, 3)  # ArduPilot's source sets

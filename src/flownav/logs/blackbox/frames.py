@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import kernel
+from flownav.core.compile import kernel
 from flownav.logs.blackbox.header import Header
 from flownav.logs.blackbox.values import AT_MOST, Bytes, Numbers, packed, signed_vb, unsigned_vb
 

@@ -18,8 +18,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.errors import InputError
-from flownav.frames import GRAVITY_M_S2, quaternion_from_euler
+from flownav.core.errors import InputError
+from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
+from flownav.core.measurement import Array, Sensor, Stream
+from flownav.core.record import Table
 from flownav.logs.absences import absences_of
 from flownav.logs.assembly import content_of, gps_streams, sensor_stream, sha256_of
 from flownav.logs.blackbox.frames import Frames, read_frames
@@ -29,8 +31,6 @@ from flownav.logs.flu import frd, ned_from_frd_of_nwu
 from flownav.logs.log import Log
 from flownav.logs.plausible import check_times, of_one_clock
 from flownav.logs.states import state_table
-from flownav.measurement import Array, Sensor, Stream
-from flownav.record import Table
 
 US, CM, DEG_E7, DECIDEGREE = 1e-6, 1e-2, 1e-7, 0.1
 FLOW_RAW = 2  # INAV's debug_mode

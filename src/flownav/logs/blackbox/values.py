@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.compile import kernel
+from flownav.core.compile import kernel
 
 Bytes = NDArray[np.uint8]
 Numbers = NDArray[np.int64]

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.errors import InputError
-from flownav.guard import an_input
+from flownav.core.errors import InputError
+from flownav.core.guard import an_input
 from flownav.logs.dataflash.formats import DIVISORS, Format, read_formats, records, with_units
 from flownav.logs.dataflash.scan import Bytes, Indices, chain_messages, find_headers
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import hashlib
 from pathlib import Path
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import Sensor, Stream
+from flownav.core.record import Table
 from flownav.logs.absences import absences_of
 from flownav.logs.csv_table import CsvTable
 from flownav.logs.dataflash import reference, sensors
@@ -13,8 +15,6 @@ from flownav.logs.dataflash.columns import DataFlash
 from flownav.logs.fixes import Origin
 from flownav.logs.log import SIMULATOR, Log
 from flownav.logs.plausible import check_plausible
-from flownav.measurement import Sensor, Stream
-from flownav.record import Table
 
 LONGEST_DELAY_S = 1.0
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.frames import quaternion_from_euler
+from flownav.core.frames import quaternion_from_euler
+from flownav.core.measurement import Array
+from flownav.core.record import Table
 from flownav.logs.csv_table import CsvTable
 from flownav.logs.dataflash.columns import DataFlash, text
 from flownav.logs.dataflash.rows import Field, check_rows, held_at, message_rows
 from flownav.logs.fixes import Origin, local_ned
 from flownav.logs.states import state_table
-from flownav.measurement import Array
-from flownav.record import Table
 
 FARTHEST_M, FASTEST_M_S = 1e5, 300.0
 EKF_ORIGIN = 0  # ORGN's Type: the filter's origin; 1 is home

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.logs.csv_table import Column, CsvTable, check_clock, check_finite
 from flownav.logs.dataflash.columns import DataFlash
-from flownav.measurement import Array
 
 MICROSECOND_S = 1e-6
 

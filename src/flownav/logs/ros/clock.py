@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flownav.core.measurement import Array
 from flownav.logs.ros.columns import Gathered
-from flownav.measurement import Array
 
 NS = 1e-9
 AGREEING_S = 3600.0  # headers of one clock; a simulator's clock may lie decades from the recorder's

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.measurement import Array
+from flownav.core.measurement import Array
 
 QUATERNION = ("qw", "qx", "qy", "qz")
 POSE = ("x", "y", "z", *QUATERNION)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from flownav.errors import InputError
-from flownav.guard import an_input
+from flownav.core.errors import InputError
+from flownav.core.guard import an_input
 from flownav.logs.ros.bag import MCAP_MAGIC, ROS1_MAGIC, SQLITE_MAGIC, Bag, Message, Wanted
 
 SUFFIXES = (".mcap", ".db3", ".bag")

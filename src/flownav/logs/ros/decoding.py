@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from typing import Any
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.logs.ros.bag import Channel, Message
 from flownav.logs.ros.ros1_bag import NEEDED
 

@@ -11,16 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.measurement import COLUMNS, Sensor, Stream
+from flownav.core.provenance import hash_of
+from flownav.core.record import Record, Table
 from flownav.logs.absences import absences_of
 from flownav.logs.live_record import KINDS, log_of_record
 from flownav.logs.log import SIMULATOR, TRUTH_FILE, Log
 from flownav.logs.plausible import check_times, check_values
 from flownav.logs.ros.bag import MCAP_MAGIC, Bag, Channel
 from flownav.logs.ros.containers import messages
-from flownav.measurement import COLUMNS, Sensor, Stream
-from flownav.provenance import hash_of
-from flownav.record import Record, Table
 
 LIBRARY = b"flownav "
 TITLE = "flownav."

@@ -12,7 +12,7 @@ from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from typing import Any
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.logs.ros.bag import MCAP_MAGIC, Bag, Channel, Message, Wanted
 
 SCHEMA, CHANNEL, MESSAGE, CHUNK, ATTACHMENT, DATA_END = 3, 4, 5, 6, 9, 15

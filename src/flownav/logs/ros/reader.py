@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
+from flownav.core.provenance import hash_of
 from flownav.logs.absences import absences_of
 from flownav.logs.log import Log
 from flownav.logs.plausible import check_plausible, check_times, of_one_clock
@@ -20,7 +21,6 @@ from flownav.logs.ros.containers import files_of, messages
 from flownav.logs.ros.decoding import Decoder
 from flownav.logs.ros.exported import is_ours, log_of_export
 from flownav.logs.ulog import STATES, log_of_topics
-from flownav.provenance import hash_of
 
 LACKING = {
     "attitude": "no attitude (an orientation in sensor_msgs/Imu, px4_msgs/VehicleAttitude)",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.logs.ros.bag import Bag, Channel, Message, Wanted
 
 NEEDED = "ROS bags need the package rosbags: pip install 'flownav[ros]'"

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
-from flownav.errors import InputError
+from flownav.core.errors import InputError
 from flownav.logs.ros.bag import Bag, Channel, Message, Wanted
 
 

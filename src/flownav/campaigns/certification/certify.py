@@ -1,0 +1,169 @@
+"""A requirement flown, judged and written down: the certificate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.campaigns.certification.cells import words_of
+from flownav.campaigns.certification.envelope import envelope_of, failing, outcome
+from flownav.campaigns.certification.judgement import Judgement, bad_first, judged
+from flownav.campaigns.certification.ranked import ranked, ranking_json
+from flownav.campaigns.engines.engine import Engine
+from flownav.campaigns.measures import ROW_COLUMNS, measured
+from flownav.campaigns.plan import Plan
+from flownav.campaigns.requirement import Requirement, fixed_by
+from flownav.campaigns.run import Watch, run_campaign
+from flownav.campaigns.store import Dataset, Store
+from flownav.campaigns.summary import inputs_of
+from flownav.campaigns.tolerance import Verdict, joint
+from flownav.core.text import finite
+
+Array = NDArray[np.float64]
+
+TOLD = 10  # flights that are named as the worst
+
+
+@dataclass(frozen=True)
+class Flown:
+    """All flights of a certificate, one after the other: cell and number of each, (flights,).
+
+    rows (flights, len(ROW_COLUMNS)); inputs: the dispersed numbers by name, (flights,), NaN in cells without one;
+    verdicts and limits: what became of each, and what limited it.
+    """
+
+    cell: NDArray[np.int64]
+    number: NDArray[np.int64]
+    rows: Array
+    inputs: dict[str, Array]
+    verdicts: tuple[str, ...]
+    limits: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """What the flights show. ranking: None where none was asked for."""
+
+    requirement: Requirement
+    plan: Plan
+    flown: Flown
+    judgements: tuple[Judgement, ...]
+    envelope: dict[str, Any]
+    worst: tuple[int, ...]
+    ranking: dict[str, Any] | None
+
+    @property
+    def verdict(self) -> Verdict:
+        """Of all requirements together."""
+        return joint(judgement.verdict for judgement in self.judgements)
+
+    def as_json(self) -> dict[str, Any]:
+        """The certificate but for what was assumed, files and hashes."""
+        own, rows = self.requirement, self.flown.rows
+        primary = self.judgements[0]
+        together = outcome(own, rows)
+        facts = {
+            "verdict": self.verdict,
+            "requirement": {
+                "name": own.name,
+                "description": own.description,
+                "scenario": own.scenario,
+                "requirements": [judgement.as_json() for judgement in self.judgements],
+                "conditions": own.conditions.model_dump(mode="json", exclude_unset=True),
+                "set": fixed_by(own),
+            },
+            "seed": own.seed,
+            "flights": len(rows),
+            "needed": own.flights(),
+            "failures": together["failures"],
+            "low": together["low"],
+            "high": together["high"],
+            "risk": max(judgement.risk for judgement in self.judgements),
+            "tolerance_bound": primary.as_json()["tolerance_bound"],
+            "verdicts": {name: self.flown.verdicts.count(name) for name in sorted(set(self.flown.verdicts))},
+            "envelope": self.envelope,
+            "worst": [self.told(flight) for flight in self.worst],
+        }
+        return facts | ({"ranking": None, "split": None} if self.ranking is None else self.ranking)
+
+    def told(self, flight: int) -> dict[str, Any]:
+        """One flight in the list of the worst."""
+        cell, rows = int(self.flown.cell[flight]), self.flown.rows[flight : flight + 1]
+        figures = {table.measure: measured(table.measure, rows)[0] for table in self.requirement.requirement}
+        return {
+            "flight": int(self.flown.number[flight]),
+            "cell": words_of(self.plan.cells[cell]),
+            "cell_number": cell,
+            "verdict": self.flown.verdicts[flight],
+            "limited_by": self.flown.limits[flight],
+            "failed": bool(failing(self.requirement, rows).any()),
+            "figures": finite(figures),
+            "inputs": {name: float(self.flown.inputs[name][flight]) for name in self.envelope["axes"]},
+        }
+
+
+def certify(
+    requirement: Requirement, plan: Plan, engine: Engine, store: Store, watch: Watch = lambda progress: None
+) -> Certificate:
+    """Fly what the folder lacks of a plan (`certification.cells.plan_of`), and judge it.
+
+    store: open. InputError where a cell cannot be flown.
+    """
+    data = run_campaign(plan, engine, store, watch)
+    flown = flown_of(plan, data)
+    judgements = tuple(judged(table, flown.rows) for table in requirement.requirement)
+    ready = plan.ready(0)
+    assert ready.ensemble is not None  # a certificate's cells are dispersed
+    envelope = envelope_of(requirement, flown.rows, flown.inputs, ready.ensemble)
+    envelope["cells"] = [
+        {"cell": words_of(cell)} | outcome(requirement, flown.rows[flown.cell == k])
+        for k, cell in enumerate(plan.cells)
+    ]
+    return Certificate(requirement, plan, flown, judgements, envelope, worst_of(requirement, flown.rows), None)
+
+
+def with_ranking(
+    certificate: Certificate, engine: Engine, store: Store, rows: int,
+    on_progress: Callable[[int], object] = lambda flown: None,
+) -> Certificate:  # fmt: skip
+    """The certificate with the inputs ranked, by the first requirement's measure in the cell with most failures.
+
+    rows: of the ranking's samples, a power of 2. What the folder holds of it is not flown again.
+    """
+    plan, table = certificate.plan, certificate.requirement.requirement[0]
+    worst = int(np.argmax([cell["failures"] for cell in certificate.envelope["cells"]]))
+    found = ranking_json(ranked(plan, worst, table, rows, engine, store.folder, on_progress))
+    of = {"ranking_measure": table.measure, "ranking_cell": words_of(plan.cells[worst])}
+    return replace(certificate, ranking=found | of)
+
+
+def flown_of(plan: Plan, data: Dataset) -> Flown:
+    """The flights of a plan's folder."""
+    cells, inputs = range(len(plan.cells)), [inputs_of(data, cell) for cell in range(len(plan.cells))]
+    nothing = np.full(plan.flights, np.nan)
+    names = list(dict.fromkeys(name for own in inputs for name in own))
+
+    def texts(name: str) -> tuple[str, ...]:
+        return tuple(text for cell in cells for text in data.column(cell, name))
+
+    return Flown(
+        cell=np.repeat(np.arange(len(cells)), plan.flights),
+        number=np.concatenate([data.column(cell, "flight") for cell in cells]),
+        rows=np.concatenate([data.rows(cell) for cell in cells]).reshape(-1, len(ROW_COLUMNS)),
+        inputs={name: np.concatenate([own.get(name, nothing) for own in inputs]) for name in names},
+        verdicts=texts("verdict"),
+        limits=texts("limited_by"),
+    )
+
+
+def worst_of(requirement: Requirement, rows: Array) -> tuple[int, ...]:
+    """The places of the worst flights: those that fail most requirements first, then by the first one's figure."""
+    table = requirement.requirement[0]
+    figures = bad_first(table, measured(table.measure, rows))
+    badness = figures if table.upper else -figures
+    order = np.lexsort((np.arange(len(rows)), -badness, -failing(requirement, rows).sum(axis=0)))
+    return tuple(int(flight) for flight in order[:TOLD])

@@ -1,0 +1,109 @@
+"""The navigator on trial, behind a horizon, told what the datasheets of the vehicle's sensors state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from flownav.campaigns.faults.arrival import as_fed, stamped_ahead
+from flownav.campaigns.faults.navigated import Event, Navigate, Navigated, Offers
+from flownav.core.compile import announce_compilation
+from flownav.core.errors import InputError
+from flownav.core.measurement import Array, EventQueue, Sensor, Stream
+from flownav.estimation.gating import Reason
+from flownav.logs.log import Log
+from flownav.navigation.feed import equipment_of
+from flownav.navigation.flags import flags_of
+from flownav.navigation.loop import Running, run, start_navigator
+from flownav.navigation.rows import EstimateRow, InnovationRow
+from flownav.navigation.settings_of import Told
+from flownav.navigation.tables import Written, written_on
+from flownav.navigation.tape import EVENT_NAMES, new_tape
+from flownav.replays.prepare import Prepared, ReplayOptions, prepare
+from flownav.sensors.identified import IdentifiedFlow
+from flownav.simulation.assemble import Setup
+
+TAKEN_IN = (Reason.FUSED, Reason.DATUM)
+
+
+def navigator_told(told: Told) -> Navigate:
+    """The navigator that is told this; how old readings are, their streams state."""
+
+    def navigate(streams: Mapping[Sensor, Stream]) -> Navigated:
+        """Raises InputError where the filter never starts."""
+        prepared, queue, running = started(streams, told)
+        with announce_compilation("faults"):
+            run(queue, running)
+        written = written_on(running.tape)
+        if len(written.estimate) < 2:
+            raise InputError("faults: the navigator never started; it needs an IMU or an attitude, and a fix or flow")
+        return navigated(written, prepared)
+
+    return navigate
+
+
+def started(streams: Mapping[Sensor, Stream], told: Told) -> tuple[Prepared, EventQueue, Running]:
+    """The streams as they are fed, and a navigator that waits for them."""
+    aged = ReplayOptions(_gps_delay(streams), identified=_flow_as_it_is(streams))
+    prepared = prepare(Log(Path("faults"), dict(streams)), aged)
+    queue = as_fed(prepared.streams)
+    equipment = equipment_of(prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, told.settings)
+    return prepared, queue, start_navigator(equipment, told.settings, new_tape(queue), told.noise)
+
+
+def navigator_of(setup: Setup) -> Navigate:
+    """The navigator of a simulated vehicle, told what it is told in flight.
+
+    ValueError where the vehicle carries no sensors of its own.
+    """
+    if setup.fitted is None:
+        raise ValueError(f"{setup.scenario.name}: the paper's filter flies, and no navigator")
+    return navigator_told(setup.fitted.told)
+
+
+def _gps_delay(streams: Mapping[Sensor, Stream]) -> float:
+    """The delay that the receiver states."""
+    delays_s = [streams[sensor].delay_s for sensor in (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY) if sensor in streams]
+    return max(delays_s, default=0.0)
+
+
+def _flow_as_it_is(streams: Mapping[Sensor, Stream]) -> IdentifiedFlow | None:
+    """The flow sensor's age as its stream states it, and its axes the vehicle's."""
+    flow = streams.get(Sensor.FLOW_RATE)
+    return None if flow is None else IdentifiedFlow(1.0, 1.0, flow.delay_s)
+
+
+# -- what came of it ---------------------------------------------------------------------------------------
+def navigated(written: Written, prepared: Prepared) -> Navigated:
+    """What was written as the judges of faults take it. A state that is no number has no standard deviation either."""
+    said = EstimateRow.of(written.estimate)
+    return Navigated(
+        said.t_s,
+        said.pos_ned_m,
+        said.std_pos_ned_m,
+        offers_of(written.innovation, prepared),
+        tuple(Event(t_s, *EVENT_NAMES[int(kind)][:2]) for t_s, kind, _ in written.event.tolist()),
+        flags_of(written.event),
+        said.protection_m,
+    )
+
+
+def offers_of(rows: Array, prepared: Prepared) -> Offers:
+    """Every judged component, and every reading that was not fed because its stamp lay ahead of the clock."""
+    delay_s = np.zeros(max(Sensor) + 1)
+    for sensor, known_s in prepared.delays_s.items():
+        delay_s[sensor] = known_s
+    offered = InnovationRow.of(rows)
+    sensors, reasons = offered.sensor.astype(int), offered.reason.astype(int)
+    labels = np.array([reason.label for reason in Reason])
+    ahead_s = {sensor: stream.t_s[stamped_ahead(stream)] for sensor, stream in prepared.streams.items()}
+    refused = sum(len(times) for times in ahead_s.values())
+    return Offers(
+        np.concatenate([offered.t_s + delay_s[sensors], *ahead_s.values()]),
+        np.concatenate([sensors, *(np.full(len(times), int(sensor)) for sensor, times in ahead_s.items())]),
+        np.concatenate([offered.component.astype(int), np.zeros(refused, int)]),
+        np.concatenate([np.isin(reasons, TAKEN_IN), np.zeros(refused, bool)]),
+        np.concatenate([labels[reasons], np.full(refused, Reason.AHEAD.label)]),
+    )

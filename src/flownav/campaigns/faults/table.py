@@ -1,0 +1,143 @@
+"""Every fault at several heights: one flight a height, its log with and without each fault, the navigator on each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flownav.campaigns.faults.catalogue import Fault
+from flownav.campaigns.faults.flight_log import log_of
+from flownav.campaigns.faults.navigated import Navigate
+from flownav.campaigns.faults.score import FaultScores, score
+from flownav.campaigns.local import fly_recorded
+from flownav.core.measurement import Sensor, Stream
+from flownav.core.parameter_files import check
+from flownav.core.record import POSITION_NED
+from flownav.logs.log import Log
+from flownav.simulation.assemble import assemble
+from flownav.simulation.scenario import Scenario, load_scenario, with_vehicle
+
+HEIGHTS_M = (0.5, 1.5, 3.0)
+DURATIONS_S = (2.0, 5.0)
+BASE = "pad_return"  # its vehicle, sensors, wind and pad
+TAKEOFF_S, CLIMB_M_S, SETTLING_S, AFTER_S = 5.0, 1.0, 10.0, 5.0
+SINK_M_S, RESTING_S = 0.3, 5.0
+NO_FAULT = "none"
+PLACED_S, PLACED_SIGMA_M = 1.0, 0.02  # when and how well a vehicle on the pad is told where it stands
+
+
+class Row(NamedTuple):
+    """A fault at a height; fault NO_FAULT is the same flight without."""
+
+    fault: str
+    height_m: float
+    duration_s: float
+    scores: FaultScores
+
+    def entry(self) -> dict[str, Any]:
+        """The row as JSON has it."""
+        return {
+            "fault": self.fault, "height_m": self.height_m, "duration_s": self.duration_s, **self.scores._asdict()
+        }  # fmt: skip
+
+
+def fault_table(
+    navigate: Navigate,
+    faults: Sequence[Fault],
+    heights_m: Sequence[float] = HEIGHTS_M,
+    durations_s: Sequence[float] = DURATIONS_S,
+    seed: int = 1,
+    on_progress: Callable[[int], None] = lambda done: None,
+    vehicle: str | None = None,
+) -> list[Row]:
+    """Fly, inject, navigate, score. Rows by height, without a fault first; `on_progress` is called with 1 for each.
+
+    vehicle: another one than `BASE` has (`with_vehicle`).
+    """
+    rows = []
+    for height_m in heights_m:
+        longest_s = longest(faults, durations_s)
+        log = flight_at(height_m, longest_s, seed, vehicle)
+        without = navigate(log.streams)
+        truth = log.truth or {}
+        hover_s = window_start(height_m)
+        nothing = score(without, without, truth, (), (hover_s, hover_s), log.streams, log.streams)
+        rows.append(Row(NO_FAULT, height_m, 0.0, nothing))
+        on_progress(1)
+        for fault in faults:
+            for duration_s in durations_of(fault, durations_s):
+                t0_s = hover_s + longest_s + AFTER_S if fault.in_descent else hover_s
+                window = (t0_s, t0_s + duration_s)
+                streams = fault.inject(log.streams, *window, seed)
+                run = navigate(streams)
+                figures = score(run, without, truth, fault.sensors, window, log.streams, streams)
+                rows.append(Row(fault.name, height_m, duration_s, figures))
+                on_progress(1)
+    return rows
+
+
+def durations_of(fault: Fault, durations_s: Sequence[float]) -> tuple[float, ...]:
+    """How long a fault is tried: its own time where it has one."""
+    return tuple(durations_s) if fault.lasts_s is None else (fault.lasts_s,)
+
+
+def longest(faults: Sequence[Fault], durations_s: Sequence[float]) -> float:
+    """The longest of all windows."""
+    return max(duration for fault in faults for duration in durations_of(fault, durations_s))
+
+
+def runs(faults: Sequence[Fault], heights_m: Sequence[float], durations_s: Sequence[float]) -> int:
+    """How many rows a table will have."""
+    return len(heights_m) * (1 + sum(len(durations_of(fault, durations_s)) for fault in faults))
+
+
+# -- the flight --------------------------------------------------------------------------------------------
+def window_start(height_m: float) -> float:
+    """When a fault begins: the vehicle has hovered for 10 s."""
+    return TAKEOFF_S + height_m / CLIMB_M_S + SETTLING_S
+
+
+def flight_at(height_m: float, longest_s: float, seed: int, vehicle: str | None = None) -> Log:
+    """The log of one flight that hovers at a height for as long as any fault takes, and then lands.
+
+    With one POSE: a vehicle on its pad is told where it stands, so that errors are not those of the GPS's frame.
+    """
+    setup = assemble(scenario_at(height_m, longest_s, vehicle))
+    log = log_of(fly_recorded(setup, seed), setup)
+    assert log.truth is not None
+    row = int(np.searchsorted(log.truth["t_s"], PLACED_S))
+    stands = np.array([[log.truth[name][row] for name in POSITION_NED]])
+    variance = np.full((1, 3), PLACED_SIGMA_M**2)
+    log.streams[Sensor.POSE] = Stream.of(Sensor.POSE, log.truth["t_s"][row : row + 1], stands, variance=variance)
+    return log
+
+
+def scenario_at(height_m: float, longest_s: float, vehicle: str | None = None) -> Scenario:
+    """Up from the pad at 1 m/s, hover, down at 0.3 m/s, and 5 s on the pad; flown on the truth.
+
+    So that a fault in the streams changes nothing of the flight. InputError where the height cannot be flown.
+    """
+    hover_s = TAKEOFF_S + height_m / CLIMB_M_S
+    land_s = window_start(height_m) + longest_s + AFTER_S
+    duration_s = land_s + height_m / SINK_M_S + RESTING_S
+    below_m = SINK_M_S * RESTING_S  # on past the ground until the skids carry weight
+    entries = with_vehicle(load_scenario(BASE), vehicle).model_dump(exclude_unset=True)
+    entries["name"] = f"hover_{height_m:g}_m"
+    entries["description"] = f"Take-off, hover at {height_m:g} m, landing on the same pad, flown on the truth"
+    entries["flight"] = {
+        "duration_s": duration_s,
+        "start": "ground",
+        "takeoff_at_s": TAKEOFF_S,
+        "may_land_after_s": land_s,
+        "path": [
+            {"t_s": 0.0, "height_m": 0.0},
+            {"t_s": TAKEOFF_S, "height_m": 0.0},
+            {"t_s": hover_s, "height_m": height_m},
+            {"t_s": land_s, "height_m": height_m},
+            {"t_s": duration_s, "height_m": -below_m},
+        ],
+    }
+    entries["autopilot"] = {"feedback": "truth"}
+    return check(entries, Scenario, "faults")

@@ -1,1 +1,0 @@
-"""What `flownav.compile` is made of; import it from there. With that module, the only code that knows Numba."""

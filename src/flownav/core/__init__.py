@@ -1,0 +1,1 @@
+"""What everything stands on: compiled equations, frames, records, and files read within limits and written whole."""

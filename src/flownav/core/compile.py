@@ -1,0 +1,124 @@
+"""The only door to Numba: scalar equations, procedures, kernels, units, and the lanes they are built on.
+
+An `@equation` is a short pure function of scalars and named tuples. Called from Python it is plain Python,
+which takes floats, complex numbers (for exact derivatives) and, where it has no branch, NumPy arrays; called
+from a kernel it is compiled and inlined. A `@procedure` is an equation too long for that: it is compiled once
+and called. A `@kernel` is an entry point: it releases the interpreter lock and is cached on disk. A `unit` is
+a part of a kernel that is compiled by itself and called through its address.
+
+*Lanes* are flights that a kernel advances side by side. A kernel takes a lane marker, `ONE_LANE` or
+`LANES`, whose length is part of its type and so a compile-time constant: the same source compiles to the
+scalar build (one lane) and to the vectorised one. State lives in one flat buffer, a row of `len(lanes)` values
+for each scalar, at constant row offsets, reached through `pointer`.
+
+The same equations run on a CUDA device, a flight a thread: `device_runner`, and `strided` for the rows of one thread.
+
+Floating-point contraction is off, so that a flight has the same bytes alone, in any batch and on any
+number of threads.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flownav.core.compiling.beside import compile_beside
+from flownav.core.compiling.bundles import (
+    FlatAccess,
+    flat_access,
+    lane_access,
+    passing,
+    replacing,
+    stepping,
+    write_function,
+)
+from flownav.core.compiling.cache import depends_also
+from flownav.core.compiling.elementary import (
+    arccos,
+    arcsin,
+    arctan2,
+    cos,
+    cosh,
+    cosine_of_eighth,
+    exp,
+    log_of_unit,
+    sin,
+    sine_of_eighth,
+    sinh,
+)
+from flownav.core.compiling.engine import LANES_WIDE, equation, kernel, procedure
+from flownav.core.compiling.pointers import invoke, pointer
+from flownav.core.compiling.progress import announce_compilation
+from flownav.core.compiling.records import Layout, OnLanes, compiled, dressed
+from flownav.core.compiling.rows import columns_of, gathering, places_of, row_of, row_store, row_view, width_of
+from flownav.core.compiling.runge_kutta import STAGES, runge_kutta
+from flownav.core.compiling.runner import NoDeviceError, Runner, device_runner
+from flownav.core.compiling.scalars import bits_from_float, clamp, float_from_bits, larger, magnitude, smaller, squared
+from flownav.core.compiling.strided import WARP, strided
+from flownav.core.compiling.units import Unit, unit
+
+Work = Any  # the lane buffer: a flat float64 array in Python, the address of its first element in kernels (`pointer`)
+Lanes = tuple[int, ...]  # how many lanes a kernel has, as part of a type: `len(lanes)` is a compile-time constant
+
+ONE_LANE: Lanes = (0,)
+LANES: Lanes = (0,) * LANES_WIDE
+
+__all__ = [
+    "LANES",
+    "LANES_WIDE",
+    "ONE_LANE",
+    "STAGES",
+    "WARP",
+    "FlatAccess",
+    "Lanes",
+    "Layout",
+    "NoDeviceError",
+    "OnLanes",
+    "Runner",
+    "Unit",
+    "Work",
+    "announce_compilation",
+    "arccos",
+    "arcsin",
+    "arctan2",
+    "bits_from_float",
+    "clamp",
+    "columns_of",
+    "compile_beside",
+    "compiled",
+    "cos",
+    "cosh",
+    "cosine_of_eighth",
+    "depends_also",
+    "device_runner",
+    "dressed",
+    "equation",
+    "exp",
+    "flat_access",
+    "float_from_bits",
+    "gathering",
+    "invoke",
+    "kernel",
+    "lane_access",
+    "larger",
+    "log_of_unit",
+    "magnitude",
+    "passing",
+    "places_of",
+    "pointer",
+    "procedure",
+    "replacing",
+    "row_of",
+    "row_store",
+    "row_view",
+    "runge_kutta",
+    "sin",
+    "sine_of_eighth",
+    "sinh",
+    "smaller",
+    "squared",
+    "stepping",
+    "strided",
+    "unit",
+    "width_of",
+    "write_function",
+]

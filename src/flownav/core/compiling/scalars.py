@@ -1,0 +1,80 @@
+"""Scalar helpers that work on floats, on complex numbers (complex step) and inside lanes; the bits of a float."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic, overload
+
+from flownav.core.compiling.engine import equation
+
+
+@equation
+def larger(a: float, b: float) -> float:
+    """max(a, b) by real part; a select, so lanes stay vectorised and complex steps pass."""
+    return a if a.real > b.real else b
+
+
+@equation
+def smaller(a: float, b: float) -> float:
+    """min(a, b) by real part."""
+    return a if a.real < b.real else b
+
+
+@equation
+def squared(a: float) -> float:
+    """a·a: on a CUDA device a power is computed by a library, to other bits."""
+    return a * a
+
+
+@equation
+def magnitude(a: float) -> float:
+    """|a| as an analytic function of a: -a where the real part is negative."""
+    return a if a.real >= 0.0 else -a
+
+
+@equation
+def clamp(a: float, low: float, high: float) -> float:
+    """a held between low and high."""
+    return larger(low, smaller(a, high))
+
+
+# -- the bits of a float, and back: for polynomial logarithms and exponentials ----------------------------
+def float_from_bits(bits: Any) -> float:
+    """The float64 that these 64 bits (uint64) spell."""
+    return float(struct.unpack("<d", struct.pack("<Q", int(bits)))[0])
+
+
+def bits_from_float(value: float) -> Any:
+    """The 64 bits (uint64) of a float64."""
+    return np.uint64(struct.unpack("<Q", struct.pack("<d", value))[0])
+
+
+@intrinsic
+def _bitcast_to_float(typing_context: Any, bits: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.bitcast(arguments[0], ir.DoubleType())
+
+    return types.float64(types.uint64), generate
+
+
+@intrinsic
+def _bitcast_to_bits(typing_context: Any, value: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.bitcast(arguments[0], ir.IntType(64))
+
+    return types.uint64(types.float64), generate
+
+
+@overload(float_from_bits, inline="always")
+def _compiled_float_from_bits(bits):  # type: ignore[no-untyped-def]
+    return lambda bits: _bitcast_to_float(bits)  # type: ignore[call-arg]
+
+
+@overload(bits_from_float, inline="always")
+def _compiled_bits_from_float(value):  # type: ignore[no-untyped-def]
+    return lambda value: _bitcast_to_bits(value)  # type: ignore[call-arg]

@@ -1,0 +1,296 @@
+"""What machine code is made for, and how: a processor level, and one optimisation instead of one per function.
+
+Numba optimises every function it compiles and emits machine code for it, and does both again in each caller. For the
+functions that only kernels call this is waste. Inside `lean()`
+
+- a function without a loop is left as it is until a caller with a loop, or the entry, has inlined it;
+- a function with a loop is optimised by itself, with all it calls inlined, because LLVM vectorises a loop over lanes
+  reliably only while it stands alone;
+- only an entry (what Python or C calls) is turned into machine code, by one pipeline: Numba's first one gathers
+  reference counts, which kernels do not have.
+
+Kernels are made for a *processor level* (x86-64-v3 with 256-bit vectors, x86-64-v4 with 512) rather than for this very
+processor, so that they can be shipped; a processor of no such level gets code of its own. `FLOWNAV_LEVEL` names a level
+to compile for, which this machine need not have.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any, NamedTuple
+
+import numba
+from llvmlite import binding as llvm
+from llvmlite import ir
+from numba.core import cgutils
+from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.environment import lookup_environment
+from numba.core.registry import cpu_target
+
+from flownav.core.compiling.remembered import remembering
+
+COLLECT_AFTER = 50_000  # objects; Python's own 700 costs a tenth of the time of a compilation
+ENVIRONMENT_SYMBOL = "_ZN08NumbaEnv"
+
+# A lane loop must reach the vectoriser as a loop. Left alone, LLVM fully unrolls one whose body is still a
+# call (equations are inlined later) and the lanes come out scalar; loops of 8 and fewer may unroll.
+# No loop is unrolled in part: loops over states, whose bounds are known, would be, for no speed and half the compile
+# time (landing filter, scalar / 16 lanes: 50 / 69 -> 35 / 36 CPU s at the same 34 / 285 ms a block).
+LLVM_OPTIONS = ("--unroll-full-max-count=8", "--unroll-max-count=1")
+for _option in LLVM_OPTIONS:
+    llvm.set_option("flownav", _option)
+
+
+class Level(NamedTuple):
+    """A processor as LLVM knows it."""
+
+    name: str
+    cpu: str
+    features: str
+
+
+# 512-bit vectors are asked for where they exist: LLVM prefers 256 bits by default (measured 15 % slower)
+LEVELS = {
+    "x86-64-v3": Level("x86-64-v3", "x86-64-v3", ""),
+    "x86-64-v4": Level("x86-64-v4", "x86-64-v4", "-prefer-256-bit"),
+}
+# the marks of each level, highest first (x86-64 psABI, 1.0, table 3.1)
+MARKS = {
+    "x86-64-v4": ("avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"),
+    "x86-64-v3": ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe", "xsave"),
+}
+
+
+@cache
+def level() -> Level:
+    """The level that kernels are compiled for in this process."""
+    asked = os.environ.get("FLOWNAV_LEVEL")
+    if asked in LEVELS:
+        return LEVELS[asked]
+    features = llvm.get_host_cpu_features()
+    if asked != "host" and llvm.get_process_triple().startswith("x86_64"):
+        below = all(features.get(mark) for mark in MARKS["x86-64-v3"])
+        if below:
+            wide = all(features.get(mark) for mark in MARKS["x86-64-v4"])
+            return LEVELS["x86-64-v4" if wide else "x86-64-v3"]
+    wider = ",-prefer-256-bit" if features.get("avx512f") else ""
+    return Level("host", llvm.get_host_cpu_name(), features.flatten() + wider)
+
+
+def target_description() -> str:
+    """Everything about the target and the optimiser that machine code depends on, in words."""
+    return (
+        f"{llvm.get_process_triple()} {' '.join(level())} {' '.join(LLVM_OPTIONS)} {'lean' if is_lean() else 'plain'}"
+    )
+
+
+class LeanLibrary(JITCodeLibrary):
+    """One compiled function: its own code, and the libraries of what it calls, linked when they are needed."""
+
+    def __init__(self, codegen: Any, name: str) -> None:
+        super().__init__(codegen, name)
+        self._has_loop = False
+        self._whole = False  # linked with all that it calls, and optimised
+        self._in_engine = False
+        self._bitcode = b""
+
+    def add_ir_module(self, ir_module: Any) -> None:
+        """Take the code of this function, or that of its entry for Python or C."""
+        self._has_loop |= any(map(_has_loop, ir_module.functions))
+        module = llvm.parse_assembly(cgutils.normalize_ir_text(str(ir_module)))
+        module.name = ir_module.name
+        self.add_llvm_module(module)
+
+    def _optimize_functions(self, module: Any) -> None:
+        """Make a function small for its callers; one with a loop is optimised whole, soon."""
+        if self._has_loop:
+            module.data_layout = self._codegen._data_layout
+        else:
+            super()._optimize_functions(module)
+
+    def finalize(self) -> None:
+        """Link and optimise a function with a loop; leave another to its callers."""
+        self._raise_if_finalized()
+        if self._has_loop:
+            self._make_whole()
+        self._finalized = True
+
+    def _make_whole(self) -> None:
+        self._link_into(self._final_module)
+        for variable in self._final_module.global_variables:
+            if variable.name.startswith(ENVIRONMENT_SYMBOL) and not variable.is_declaration:
+                variable.linkage = "linkonce_odr"  # else "common", which is kept even where nothing uses it
+        passes, builder = self._codegen._module_pass_manager()
+        passes.run(self._final_module, builder)
+        self._whole = True
+
+    def _link_into(self, module: Any) -> None:
+        """Put the code of everything that this function calls into a module."""
+        for library in _called(self):
+            self._reload_init.update(library._reload_init)
+            linked = library.own_module() if isinstance(library, LeanLibrary) else library._get_module_for_linking()
+            module.link_in(linked, preserve=True)
+
+    def own_module(self) -> Any:
+        """This function's code for its callers, with that of what it calls only if it is whole."""
+        if self._bitcode:
+            self._shared_module, self._bitcode = llvm.parse_bitcode(self._bitcode), b""
+        return super()._get_module_for_linking()
+
+    def _get_module_for_linking(self) -> Any:
+        """The code of this function and of everything it calls, for a library of plain Numba."""
+        module = self.own_module()
+        if not self._whole:
+            module = module.clone()
+            self._link_into(module)
+        return module
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """The address of one of this library's functions, which makes its machine code; 0 where it has none such."""
+        self._ensure_finalized()
+        if not self._in_engine:
+            if not any(function.name == name for function in self.get_defined_functions()):
+                return 0
+            self._enter_engine()
+        return int(super().get_pointer_to_function(name))
+
+    def _enter_engine(self) -> None:
+        """Make the machine code."""
+        if not self._whole:
+            self._make_whole()
+        self._final_module.verify()
+        self._in_engine = True
+        self._finalize_final_module()
+        for variable in self._final_module.global_variables:
+            environment = lookup_environment(variable.name)
+            if environment is not None:
+                self._codegen.set_env(variable.name, environment)  # type: ignore[attr-defined]
+
+    def get_llvm_str(self) -> str:
+        """The optimised code, also of what came from the cache."""
+        return str(self.own_module())
+
+    def get_asm_str(self) -> str:
+        """The machine code in words, also of what came from the cache."""
+        return str(self._codegen._tm.emit_assembly(self.own_module()))
+
+    def serialize_using_object_code(self) -> Any:
+        """The machine code and its symbols, and the code for callers that are kernels themselves."""
+        self._ensure_finalized()
+        symbols = [function.name for function in self.get_defined_functions()]
+        symbols += [variable.name for variable in self._final_module.global_variables if not variable.is_declaration]
+        return self.name, symbols, self._get_compiled_object(), self._get_module_for_linking().as_bitcode()
+
+    @classmethod
+    def _unserialize(cls, codegen: Any, state: Any) -> LeanLibrary:
+        name, symbols, machine_code, bitcode = state
+        library: LeanLibrary = codegen.create_library(name)
+        library.enable_object_caching()
+        library._set_compiled_object(machine_code)
+        library._bitcode, library._whole, library._in_engine = bitcode, True, True
+        library._finalize_final_module()
+        codegen._engine._defined_symbols.update(symbols)
+        return library
+
+
+def _called(library: Any) -> list[Any]:
+    """The libraries that a function needs: those it calls, and for what is not linked yet those in turn."""
+    found: dict[int, Any] = {}
+    waiting = list(library._linking_libraries)
+    while waiting:
+        called = waiting.pop(0)
+        if id(called) not in found:
+            found[id(called)] = called
+            if isinstance(called, LeanLibrary) and not called._whole:
+                waiting += called._linking_libraries
+    return list(found.values())
+
+
+def _has_loop(function: ir.Function) -> bool:
+    """Whether some block of a function jumps back to itself or to one before it."""
+    order = {block.name: place for place, block in enumerate(function.blocks)}
+    return any(
+        isinstance(operand, ir.Block) and order[operand.name] <= place
+        for place, block in enumerate(function.blocks)
+        if block.terminator is not None
+        for operand in block.terminator.operands
+    )
+
+
+class LeanCodegen(JITCPUCodegen):
+    """Numba's code generator for the processor level."""
+
+    _library_class = LeanLibrary
+
+    def _get_host_cpu_name(self) -> str:
+        return level().cpu
+
+    def _get_host_cpu_features(self) -> str:
+        return level().features
+
+    def set_env(self, env_name: str, env: Any) -> None:
+        """Give an entry its environment; what only kernels call has none of its own."""
+        if self._engine.is_symbol_defined(env_name):
+            super().set_env(env_name, env)
+
+
+class _Leanness:
+    """Whether functions are compiled as `LeanLibrary` does, or as Numba does by itself."""
+
+    wanted = not os.environ.get("FLOWNAV_PLAIN")
+
+
+def is_lean() -> bool:
+    """Whether this version of Numba is built as `LeanLibrary` supposes; `FLOWNAV_PLAIN=1` says no."""
+    parts = ("_finalize_final_module", "_raise_if_finalized", "_get_module_for_linking", "_optimize_functions")
+    return _Leanness.wanted and all(hasattr(JITCodeLibrary, part) for part in parts)
+
+
+@contextmanager
+def plainly(error: Exception) -> Iterator[None]:
+    """Compile as Numba does by itself inside the block, and from then on if that succeeds where the lean way failed."""
+    _Leanness.wanted = False
+    try:
+        yield
+    except BaseException:
+        _Leanness.wanted = True
+        raise
+    why = f"{type(error).__name__}: {error}".splitlines()[0]
+    print(f"flownav: Numba {numba.__version__} compiles the slow way here ({why})", file=sys.stderr, flush=True)
+
+
+@cache
+def _codegen() -> LeanCodegen:
+    return LeanCodegen("flownav.exec")
+
+
+@contextmanager
+def rarely_collecting() -> Iterator[None]:
+    """Python's search for unreachable cycles, which finds few among a compiler's many objects, more rarely."""
+    before = gc.get_threshold()
+    gc.set_threshold(max(before[0], COLLECT_AFTER), *before[1:])
+    try:
+        yield
+    finally:
+        gc.set_threshold(*before)
+
+
+@contextmanager
+def lean() -> Iterator[None]:
+    """Compile, load and link in this way inside the block, alone among threads."""
+    with global_compiler_lock:
+        context = cpu_target.target_context
+        context.refresh()
+        before = context._internal_codegen
+        context._internal_codegen = _codegen() if is_lean() else before
+        try:
+            with remembering(), rarely_collecting():
+                yield
+        finally:
+            context._internal_codegen = before

@@ -1,0 +1,159 @@
+"""Units: pieces of a kernel that are compiled and cached by themselves and called through their addresses."""
+
+from __future__ import annotations
+
+import ast
+import ctypes
+import inspect
+import linecache
+import textwrap
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numba import types
+from numba.core.ccallback import _CFuncCompiler  # type: ignore[attr-defined]
+from numba.core.registry import cpu_target
+
+from flownav.core.compiling.cache import KernelCache
+from flownav.core.compiling.engine import without_surprises
+from flownav.core.compiling.pipeline import LeanCompiler
+from flownav.core.compiling.progress import compiling
+
+OPTIONS = {"error_model": "numpy"}
+
+LETTERS = {
+    "p": (types.CPointer(types.float64), ctypes.c_void_p, np.float64),
+    "q": (types.CPointer(types.int64), ctypes.c_void_p, np.int64),
+    "d": (types.float64, ctypes.c_double, None),
+    "i": (types.int64, ctypes.c_int64, None),
+}
+
+
+class Unit:
+    """A function with a C interface, compiled apart from its callers; kernels call it by `invoke(address, ...)`."""
+
+    def __init__(self, function: Callable[..., Any], signature: str, constants: dict[str, Any]) -> None:
+        unknown = sorted(set(signature.split()) - set(LETTERS))
+        if unknown:
+            raise ValueError(f"a unit's signature is made of {', '.join(LETTERS)}, not {', '.join(unknown)}")
+        self.function = function
+        self.letters = signature.split()
+        self.constants = constants
+        self.__name__ = function.__name__
+        self.__doc__ = function.__doc__
+        self._signature = types.void(*(LETTERS[letter][0] for letter in self.letters))
+        self._keeper = KernelCache(function, constants)
+        self._lock = threading.RLock()
+        self._entry: Any = None
+
+    def python(self, *arguments: Any) -> None:
+        """The plain Python function on these arguments, its constants bound."""
+        names = [name for name in inspect.signature(self.function).parameters if name not in self.constants]
+        self.function(**dict(zip(names, arguments, strict=True)), **self.constants)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it is compiled or loaded already."""
+        return self._entry is not None
+
+    def file_name(self) -> str | None:
+        """The name of its file in the cache; None where it cannot be kept."""
+        return self._keeper.file_name(self._signature)
+
+    @property
+    def address(self) -> int:
+        """The address of the compiled function, which is compiled or loaded at the first use."""
+        return int(self._compiled[0])
+
+    def __call__(self, *arguments: Any) -> None:
+        """Run the compiled code from Python; a pointer may be given as an array, an address or a ctypes pointer."""
+        if len(arguments) != len(self.letters):
+            raise TypeError(f"{self.__name__} takes {len(self.letters)} arguments, not {len(arguments)}")
+        self._compiled[1](
+            *(_passed(letter, argument) for letter, argument in zip(self.letters, arguments, strict=True))
+        )
+
+    @property
+    def _compiled(self) -> tuple[int, Any]:
+        """The address, and what Python calls; the third keeps the machine code alive."""
+        with self._lock:
+            if self._entry is None:
+                library, address = without_surprises(self._compile)
+                kinds = [LETTERS[letter][1] for letter in self.letters]
+                self._entry = address, ctypes.CFUNCTYPE(None, *kinds)(address), library
+            return self._entry[0], self._entry[1]
+
+    def _compile(self) -> tuple[Any, int]:
+        """The library and the address of its C function, from the cache where it is there."""
+        signature, keeper = self._signature, self._keeper
+        result = keeper.load_overload(signature, cpu_target.target_context)
+        if result is not None:
+            return result.library, _address(result)
+        with compiling(self.__name__):
+            bound = bind_constants(self.function, self.constants)
+            compiler = _CFuncCompiler(bound, cpu_target, OPTIONS, {}, LeanCompiler)
+            result = compiler.compile(signature.args, signature.return_type)
+            address = _address(result)
+        keeper.save_overload(signature, result)
+        return result.library, address
+
+
+def _address(result: Any) -> int:
+    return int(result.library.get_pointer_to_function(result.fndesc.llvm_cfunc_wrapper_name))
+
+
+def unit(function: Callable[..., Any], signature: str, **constants: Any) -> Unit:
+    """A kernel with a C interface, compiled and cached by itself and called through its address.
+
+    `signature` names its arguments: `p` float64*, `q` int64*, `d` a float64, `i` an int64, for example "p p q d i".
+    `constants` are the function's other parameters, fixed when it is compiled: `lanes=LANES` makes `len(lanes)` a
+    constant. It returns nothing and holds or releases no lock: its callers do.
+    """
+    return Unit(function, signature, constants)
+
+
+def _passed(letter: str, argument: Any) -> Any:
+    """An argument as ctypes takes it; an array must be what the letter says."""
+    dtype = LETTERS[letter][2]
+    if dtype is not None and isinstance(argument, np.ndarray):
+        if argument.dtype != dtype or not argument.flags.c_contiguous:
+            raise TypeError(f"'{letter}' takes a contiguous array of {np.dtype(dtype)}, not of {argument.dtype}")
+        return argument.ctypes.data
+    return argument
+
+
+def bind_constants(function: Callable[..., Any], constants: dict[str, Any]) -> Callable[..., Any]:
+    """The function without the parameters `constants`, which become globals and so constants of the compiler."""
+    if not constants:
+        return function
+    source, first_line = inspect.getsource(function), function.__code__.co_firstlineno
+    tree = ast.parse(textwrap.dedent(source))
+    definition = tree.body[0]
+    assert isinstance(definition, ast.FunctionDef)
+    missing = sorted(set(constants) - {argument.arg for argument in _parameters(definition)})
+    if missing:
+        raise TypeError(f"{function.__name__} has no parameter {', '.join(missing)}")
+    _remove_parameters(definition, constants)
+    ast.increment_lineno(tree, first_line - 1)
+    linecache.checkcache(function.__code__.co_filename)
+    names = inspect.getclosurevars(function)
+    scope = {**function.__globals__, **names.nonlocals, **constants}
+    exec(compile(tree, function.__code__.co_filename, "exec", dont_inherit=True), scope)
+    bound: Callable[..., Any] = scope[function.__name__]
+    bound.__qualname__ = function.__qualname__
+    return bound
+
+
+def _parameters(definition: ast.FunctionDef) -> list[ast.arg]:
+    return [*definition.args.posonlyargs, *definition.args.args, *definition.args.kwonlyargs]
+
+
+def _remove_parameters(definition: ast.FunctionDef, constants: dict[str, Any]) -> None:
+    """Take out the parameters of these names, all defaults (a C function has none), annotations and decorators."""
+    kept = [argument for argument in _parameters(definition) if argument.arg not in constants]
+    for argument in kept:
+        argument.annotation = None
+    definition.args = ast.arguments(posonlyargs=[], args=kept, kwonlyargs=[], kw_defaults=[], defaults=[])
+    definition.decorator_list, definition.returns = [], None

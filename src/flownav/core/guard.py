@@ -1,0 +1,264 @@
+"""What a run may read and where it may write: no output is ever an input, a link, a device or somebody else's file.
+
+Readers pass every path through `an_input` before they open it. What a user named to be written is written with the
+`written_whole` of this file, which passes it through `an_output`. Within `a_run` (the command line's is one) what was
+read is remembered, so that a file which another file names is held to be an input too.
+"""
+
+from __future__ import annotations
+
+import mmap
+import os
+import stat
+import zipfile
+import zlib
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from flownav.core import files
+from flownav.core.errors import InputError
+
+KINDS = (
+    (stat.S_ISFIFO, "a FIFO (a named pipe)"),
+    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+)
+MARK = b"flownav"  # stands near the start of all that flownav writes, but for the kinds below
+PAGE_MARK = '<meta name="generator" content="flownav">'  # of pages: notes on flownav speak of it, too
+LOOKED_AT_BYTES = 4096
+LONGEST_SHOWN = 200  # characters of a name in a message
+RECORD_MAGIC, ULOG_MAGIC = b"PK\x03\x04", b"ULog"
+BEGINNINGS = (b"#timestamp [ns],p_RS_R_x [m],", b"| case ")  # of EuRoC files, and of the tables of `accuracy --out`
+LIVE = b'"kind": "live"'
+READ_IN_FOLDERS = {".csv", ".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm"}  # by those who take a folder
+RIG = "rig.toml"
+
+Identity = tuple[int, int]  # of a file, whatever its names: device and inode
+
+
+class Inputs:
+    """What a run reads: files by their identity, and folders."""
+
+    def __init__(self) -> None:
+        self._paths: dict[Identity, Path] = {}
+        self._folders: dict[Identity, Path] = {}
+
+    def note(self, path: Path, info: os.stat_result) -> None:
+        """A path that is read."""
+        kept = self._folders if stat.S_ISDIR(info.st_mode) else self._paths
+        kept[info.st_dev, info.st_ino] = path
+
+    def file(self, info: os.stat_result | None) -> Path | None:
+        """Under which path a file is read, if it is."""
+        return None if info is None else self._paths.get((info.st_dev, info.st_ino))
+
+    def folder_of(self, path: Path) -> Path | None:
+        """The input folder in which a path lies, if it does, at whatever depth."""
+        for parent in Path(os.path.realpath(path)).parents:
+            try:
+                info = parent.stat()
+            except OSError:
+                continue
+            if (info.st_dev, info.st_ino) in self._folders:
+                return self._folders[info.st_dev, info.st_ino]
+        return None
+
+
+_run: Inputs | None = None
+
+
+@contextmanager
+def a_run() -> Iterator[None]:
+    """Within it what is read is remembered, and not written to."""
+    global _run
+    before, _run = _run, Inputs()
+    try:
+        yield
+    finally:
+        _run = before
+
+
+def an_input(path: Path) -> Path:
+    """The path, to be opened and read; what is missing is left to whoever opens it.
+
+    InputError where it is a FIFO, a socket or a device, which would be read for ever, or its name cannot be one.
+    """
+    info = _status(path, os.stat)
+    if info is not None:
+        kind = _special(info)
+        if kind:
+            raise InputError(f"{path}: {kind} is not read; write what it gives to a file, and give that")
+        if _run is not None:
+            _run.note(path, info)
+    return path
+
+
+def inputs_there(paths: Iterable[Path], what: str) -> None:
+    """InputError where a file or folder that is to be read is missing, or cannot be read; `what` says what is taken."""
+    for path in paths:
+        if not an_input(path).exists():
+            raise InputError(f"{path}: no such file or folder; {what}")
+
+
+def a_record_place(path: Path, inputs: Iterable[Path] = (), *, force: bool) -> Path:
+    """The path of a record that is numbered where one is there, or that replaces it (force).
+
+    InputError as of `an_output`, but that what is there may be a live record; with force it must be a record.
+    """
+    info = _status(path, _unfollowed)
+    if info is not None:
+        _check_kind(path, info)
+    _check_no_input(path, info, inputs)
+    if force and info is not None and info.st_size and not _is_record(path):
+        raise InputError(f"{path}: is there already and is no record, so it is not replaced; give another name")
+    return path
+
+
+def an_output(path: Path, inputs: Iterable[Path] = (), *, signed_by: Path | None = None) -> Path:
+    """The path of a file to be written, which may be there already if flownav wrote it.
+
+    inputs: paths that are read in the same run, besides those remembered. signed_by: the file that says who wrote
+    this one, where it does not do so itself. InputError where the path is one of them or
+    would become one, is a link, a folder, a FIFO, a socket or a device, or holds what flownav does not replace.
+    """
+    info = _status(path, _unfollowed)
+    if info is not None:
+        _check_kind(path, info)
+    _check_no_input(path, info, inputs)
+    if info is not None and info.st_size and not _is_ours(signed_by or path):
+        raise InputError(
+            f"{path}: is there already and was not written by flownav, or cannot be made again, so it is not replaced; "
+            "give another --out, or move it away"
+        )
+    return path
+
+
+def an_output_folder(path: Path) -> Path:
+    """The path of a folder to be written. InputError where it is a link, or no folder."""
+    info = _status(path, _unfollowed)
+    if info is not None and stat.S_ISLNK(info.st_mode):
+        raise InputError(_through_a_link(path))
+    if info is not None and not stat.S_ISDIR(info.st_mode):
+        raise InputError(f"{path}: cannot be written (it is {_special(info) or 'a file'}); give a folder as --out")
+    return path
+
+
+@contextmanager
+def written_whole(path: Path, *, replacing: bool = False) -> Iterator[Path]:
+    """As files.written_whole, of a file that a user named.
+
+    replacing: whoever asks knows that what is there may go. InputError, unless replacing, where `an_output` refuses;
+    OSError where the file cannot be written.
+    """
+    if not replacing:
+        an_output(path)
+    with files.written_whole(path) as temporary:
+        yield temporary
+
+
+def write_page(page: str, path: Path) -> None:
+    """Write an HTML page, whole or not at all, with the mark by which it is known as flownav's. As `written_whole`."""
+    marked = page if PAGE_MARK in page else page.replace("<head>", f"<head>{PAGE_MARK}", 1)
+    with written_whole(path) as temporary:
+        temporary.write_text(marked, encoding="utf-8", errors="backslashreplace", newline="\n")
+
+
+@contextmanager
+def folder_written_whole(path: Path) -> Iterator[Path]:
+    """As files.folder_written_whole, of a folder that a user named. InputError where it is a link."""
+    with files.folder_written_whole(an_output_folder(path)) as temporary:
+        yield temporary
+
+
+def _check_kind(path: Path, info: os.stat_result) -> None:
+    if stat.S_ISLNK(info.st_mode):
+        raise InputError(_through_a_link(path))
+    if stat.S_ISDIR(info.st_mode):
+        raise InputError(f"{path}: cannot be written (it is a folder); give a file's name as --out")
+    kind = _special(info)
+    if kind:
+        raise InputError(f"{path}: cannot be written ({kind}); give another --out")
+
+
+def _through_a_link(path: Path) -> str:
+    return f"{path}: cannot be written (nothing is written through a symbolic link); give the name it leads to as --out"
+
+
+def _check_no_input(path: Path, info: os.stat_result | None, inputs: Iterable[Path]) -> None:
+    read = Inputs()
+    for each in inputs:
+        status = _status(each, os.stat)
+        if status is not None:
+            read.note(each, status)
+    for known in (read, _run):
+        taken = None if known is None else known.file(info)
+        if taken is not None:
+            also = "" if str(taken) == str(path) else f" (the same file as {taken})"
+            raise InputError(f"{path}{also}: this would replace what it is made from; give another --out")
+        folder = None if known is None or not _read_in_folders(path) else known.folder_of(path)
+        if folder is not None:
+            raise InputError(f"{path}: lies in {folder}, which this run reads, as one of its files; give another --out")
+
+
+def _read_in_folders(path: Path) -> bool:
+    return path.suffix.lower() in READ_IN_FOLDERS or path.name.lower() == RIG
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether flownav wrote a file and can write it again: nothing is lost that somebody made, or flew."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(LOOKED_AT_BYTES)
+            if head.startswith(ULOG_MAGIC):
+                with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+                    return content.find(MARK + b"_") >= 0
+        if head.startswith(RECORD_MAGIC):
+            return _is_record_of_a_run(path)
+    except OSError:
+        return False
+    if b"<html" in head.lower():
+        return PAGE_MARK.encode() in head
+    return MARK in head or head.startswith(BEGINNINGS)
+
+
+def _is_record(path: Path) -> bool:
+    """Whether a file is a record, of whatever kind."""
+    return _manifest_of(path) is not None
+
+
+def _is_record_of_a_run(path: Path) -> bool:
+    """A record that the same command makes again: not that of a live session, which no command can."""
+    manifest = _manifest_of(path)
+    return manifest is not None and LIVE not in manifest
+
+
+def _manifest_of(path: Path) -> bytes | None:
+    """The beginning of a record's manifest; None where a file is no record."""
+    try:
+        with zipfile.ZipFile(path) as bundle, bundle.open("manifest.json") as manifest:
+            return manifest.read(LOOKED_AT_BYTES)
+    except (OSError, zipfile.BadZipFile, zlib.error, KeyError, ValueError, NotImplementedError, RuntimeError, EOFError):
+        return None
+
+
+def _special(info: os.stat_result) -> str:
+    return next((name for test, name in KINDS if test(info.st_mode)), "")
+
+
+def _unfollowed(path: Path) -> os.stat_result:
+    """Of a link the link itself; `absent/../x` is x, as it will be once the folder is made."""
+    return os.lstat(os.path.join(os.path.realpath(path.parent), path.name))
+
+
+def _status(path: Path, look: Callable[[Path], os.stat_result]) -> os.stat_result | None:
+    """What the system says of a path; None where nothing is there. InputError where the path cannot be one."""
+    try:
+        return look(path)
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        return None
+    except (OSError, ValueError) as error:
+        name = str(path) if len(str(path)) <= LONGEST_SHOWN else f"{str(path)[:LONGEST_SHOWN]}..."
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{name}: cannot be the name of a file ({reason}); give another") from error

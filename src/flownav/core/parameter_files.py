@@ -1,0 +1,154 @@
+"""TOML parameter files: units in the key names, provenance beside the values, one clear line on a mistake.
+
+A number may stand bare, `radius_m = 0.89`, or with its provenance,
+`radius_m = { value = 0.89, uncertainty = 0.03, source = "800 mm blade + grip" }`.
+A file's schema is a pydantic model of `Number` fields with their allowed ranges.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, TypeVar, get_args
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+
+from flownav.core.errors import InputError
+
+PROVENANCE_KEYS = {"value", "uncertainty", "source"}
+MOST_BYTES = 4_000_000  # of a file: the largest that ships has 30 000
+DEEPEST = 20  # tables and lists in each other
+LONGEST_SHOWN = 300  # characters of a key, a value or a sentence in a message
+
+
+def _value_of(entry: Any) -> Any:
+    """The number of an entry that may carry its provenance."""
+    if isinstance(entry, dict):
+        if "value" not in entry or not set(entry) <= PROVENANCE_KEYS:
+            raise ValueError("an entry with provenance is { value = ..., uncertainty = ..., source = ... }")
+        return _number(entry["value"])
+    return _number(entry)
+
+
+def _number(entry: Any) -> Any:
+    """Refuse what pydantic would turn into a number."""
+    if isinstance(entry, bool | str):
+        raise ValueError("a number is needed, not true, false or text")
+    return entry
+
+
+Number = Annotated[float, BeforeValidator(_value_of)]
+
+
+class ParameterModel(BaseModel):
+    """Base of every file schema: unknown keys, NaN and infinity are refused; loaded values are frozen."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+def shipped(name: str) -> Path:
+    """The path of a data file that ships with flownav, e.g. `maxi_joker_3.toml`."""
+    return Path(str(resources.files("flownav") / "data" / name))
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """A TOML file as nested dictionaries. InputError names the file and the line at fault."""
+    from flownav.core.guard import an_input
+
+    try:
+        with an_input(path).open("rb") as file:
+            content = file.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            raise InputError(f"{path}: more than {MOST_BYTES:,} bytes; a parameter file is needed")
+        entries = tomllib.loads(content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n"))
+        if _deeper_than(entries, DEEPEST):
+            raise RecursionError
+        return entries
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read ({error})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not valid TOML: {_one_line(str(error))}") from None
+    except ValueError:  # Python's own limit on an integer's digits
+        raise InputError(f"{path}: not valid TOML: an integer of thousands of digits") from None
+    except RecursionError:
+        raise InputError(f"{path}: not valid TOML: tables or lists nested too deep") from None
+
+
+def _deeper_than(entries: Any, levels: int) -> bool:
+    """Whether tables and lists stand in each other more than so many levels deep."""
+    floor = [entries]
+    for _ in range(levels):
+        floor = [inner for outer in floor for inner in (outer.values() if isinstance(outer, dict) else outer)]
+        floor = [inner for inner in floor if isinstance(inner, dict | list)]
+    return bool(floor)
+
+
+def load(path: Path, schema: type[Model]) -> Model:
+    """Read and check a parameter file. InputError names file, key and what is allowed, in one line."""
+    return check(read_toml(path), schema, str(path))
+
+
+def check(entries: dict[str, Any], schema: type[Model], where: str) -> Model:
+    """Check entries against a schema. InputError as `load`; `where` names the file."""
+    try:
+        return schema.model_validate(entries)
+    except ValidationError as error:
+        # a misspelt key is reported before the key that it should have been
+        first, *others = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
+        key = _one_line(".".join(str(part) for part in first["loc"]))
+        more = f" (and {len(others)} more)" if others else ""
+        raise InputError(f"{where}: {key}: {_sentence(first, schema)}{more}") from None
+
+
+def _sentence(error: Any, schema: type[BaseModel]) -> str:
+    """What is wrong with one key and what would be right."""
+    kind, given = error["type"], error["input"]
+    if kind == "extra_forbidden":
+        known = ", ".join(sorted(_keys_beside(error["loc"], schema)))
+        return f"unknown key; known here: {known}"
+    if kind == "missing":
+        return "missing; add it"
+    return f"{_one_line(error['msg'].removeprefix('Value error, '))}, got {_shown(_number_of(given))}"
+
+
+def _shown(given: Any) -> str:
+    """A value as a message shows it: on one line, not endless."""
+    try:
+        return _one_line(repr(given))
+    except (ValueError, RecursionError):  # an integer too long to be written, a nest too deep
+        return f"something that is too long to show ({type(given).__name__})"
+
+
+def _one_line(text: str) -> str:
+    text = "".join(character if character.isprintable() else repr(character)[1:-1] for character in text)
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
+
+
+def _number_of(given: Any) -> Any:
+    return given.get("value", given) if isinstance(given, dict) else given
+
+
+def _keys_beside(location: tuple[Any, ...], schema: type[BaseModel]) -> list[str]:
+    """The field names of the table in which an unknown key stands; tables in lists count."""
+    model: Any = schema
+    for part in location[:-1]:
+        if isinstance(part, int):
+            continue
+        info = model.model_fields.get(part)
+        models = [m for m in _types_in(info.annotation) if issubclass(m, BaseModel)] if info is not None else []
+        if not models:
+            return []
+        model = models[0]
+    return list(model.model_fields)
+
+
+def _types_in(annotation: Any) -> list[type]:
+    """Every class that an annotation such as tuple[Knot, ...] names."""
+    inner = [found for argument in get_args(annotation) for found in _types_in(argument)]
+    return inner or ([annotation] if isinstance(annotation, type) else [])

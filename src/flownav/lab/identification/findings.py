@@ -1,0 +1,110 @@
+"""What an identification found, whatever kind of log it came from: the one bundle that file, JSON and table read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from flownav.lab.identification.height_law import (
+    NoisePoint,
+    PowerLaw,
+    QualityPoint,
+    ScheduleScore,
+    combined,
+)
+from flownav.lab.identification.orders import Choice
+from flownav.lab.identification.output_error import Fit
+from flownav.lab.identification.quantities import Excitation, Interval
+from flownav.lab.identification.sentinel import Axes
+from flownav.lab.identification.speed import SpeedLaw
+
+
+@dataclass(frozen=True)
+class Response:
+    """Gain and latency of one axis at one height, the model behind them and how it does on unseen data.
+
+    height_m is the middle of what the logs covered. validation_percent: one fit a held-out run.
+    """
+
+    axis: str
+    height_m: float
+    gain: Interval
+    latency_s: Interval
+    choice: Choice
+    runs: int
+    validation_percent: tuple[float, ...]
+
+    @property
+    def model(self) -> Fit:
+        """The chosen model."""
+        return self.choice.best
+
+
+@dataclass(frozen=True)
+class RunModel:
+    """A second-order model of one run, as the paper's Table 1 lists them."""
+
+    height_m: float
+    model: int
+    source: str
+    fit: Fit
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The readings' error: by height, its law, by quality, and what schedules of it are worth.
+
+    tail: how many of the law's standard deviations hold 99.7 % of the readings.
+    """
+
+    points: tuple[NoisePoint, ...]
+    law: PowerLaw
+    quality: tuple[QualityPoint, ...]
+    schedules: tuple[ScheduleScore, ...]
+    signal_sigma_m_s: float
+    tail: float
+
+
+@dataclass(frozen=True)
+class Findings:
+    """Everything found.
+
+    kind: "rig" or "flight"; reference: what the sensor was compared with; max_flow_rad_s: the fastest flow seen
+    while usable (99.9 %); heights_m: least and greatest; notes: one line each; details: further figures for JSON;
+    scale_with_speed: None where no law shows.
+    """
+
+    kind: str
+    reference: str
+    responses: tuple[Response, ...]
+    axes: Axes
+    noise: Noise
+    run_models: tuple[RunModel, ...]
+    heights_m: tuple[float, float]
+    max_flow_rad_s: float
+    least_quality: int
+    files: tuple[Path, ...]
+    notes: tuple[str, ...] = ()
+    details: dict[str, object] = field(default_factory=dict)
+    scale_with_speed: SpeedLaw | None = None
+
+    @property
+    def gain(self) -> Interval:
+        """Over axes and heights; what they differ by widens it."""
+        return combined(list(dict.fromkeys(response.gain for response in self.responses)))
+
+    @property
+    def latency_s(self) -> Interval:
+        """Over axes and heights; what they differ by widens it."""
+        return combined(list(dict.fromkeys(response.latency_s for response in self.responses)))
+
+    @property
+    def best(self) -> Response:
+        """The response with the best-known gain: its dynamics are the sensor's."""
+        return min(self.responses, key=lambda r: (r.gain.high - r.gain.low) / max(abs(r.gain.value), 1e-6))
+
+    @property
+    def excitation(self) -> Excitation:
+        """The verdict on the best response: of its model where dynamics were found, else of a second order."""
+        choice = self.best.choice
+        return choice.excitation if choice.best.structure.order else choice.widest

@@ -1,0 +1,164 @@
+"""A flight log for identification: the flow's velocity, a reference track, and the vehicle's own motion between.
+
+The sensor's velocity along body x and y comes from angular rates times range (`prepare` takes the rotation out),
+or as the sensor says it, in flight only. The reference is the log's truth (or visual odometry), GPS without one. The
+IMU's earth acceleration ties both to the vehicle's clock: it gives the flow's latency as an autopilot needs it, and
+shows swapped or inverted axes even where the reference's heading is unknown.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.core.errors import InputError
+from flownav.core.frames import GRAVITY_M_S2 as GRAVITY_M_S2
+from flownav.core.frames import rotation_from_quaternion, velocity_from_flow
+from flownav.core.measurement import Array, Sensor, Stream
+from flownav.lab.identification.usable import Ranges, believed, beside
+from flownav.logs.log import Log
+from flownav.logs.rates import attitude_at
+from flownav.replays.airborne import flying_at
+from flownav.replays.attitude import turned_sensor, with_attitude
+from flownav.replays.prepare import ReplayOptions, prepare
+
+MOST_JUMPING = 0.6
+LEAST_FLOW = 200
+LONGEST_GAP_S = 0.5
+REFERENCES = ("truth", "gps")
+IMU_NAME = "the IMU"
+
+
+@dataclass(frozen=True)
+class Flight:
+    """What identification needs of a flight.
+
+    t_s (n,) arrival of each flow reading, velocity_m_s (n, 2) along body x and y, age_s what the log says of how
+    old a reading is when it arrives (half its exposure), quality (n,), range_m (n,), good (n,) usable readings;
+    reference_t_s (m,), reference_m (m, 3) north, east, down of a frame that may be turned, reference ("truth" or
+    "gps") and its own velocity where it has one; imu None without one; range_jumping, range_doubt as `usable.Ranges`.
+    """
+
+    name: str
+    t_s: Array
+    velocity_m_s: Array
+    age_s: float
+    quality: Array
+    range_m: Array
+    good: NDArray[np.bool_]
+    attitude: Stream
+    imu: Stream | None
+    reference: str
+    reference_t_s: Array
+    reference_m: Array
+    reference_velocity: Stream | None
+    flow_limit_rad_s: float
+    notes: tuple[str, ...]
+    reference_name: str = ""  # in words
+    range_jumping: float = 0.0
+    range_doubt: float = 0.0
+    attitude_is_own: bool = False  # the navigator's, for want of one in the log
+
+    def rotation(self, instants_s: Array) -> Array:
+        """Body to earth, (n, 3, 3)."""
+        rows = rotation_from_quaternion(*attitude_at(self.attitude, instants_s).T)
+        return np.stack(rows, axis=1).reshape(-1, 3, 3)
+
+    def segments(self) -> list[slice]:
+        """Stretches of readings without a gap; readings that are not good are left out before."""
+        t_s = self.t_s[self.good]
+        cuts = np.flatnonzero(np.diff(t_s) > max(LONGEST_GAP_S, 5.0 * float(np.median(np.diff(t_s))))) + 1
+        edges = [0, *cuts.tolist(), len(t_s)]
+        return [slice(a, b) for a, b in pairwise(edges)]
+
+
+def flight(log: Log, reference: str = "auto", axes: Array | None = None) -> Flight:
+    """A flight out of a log; axes as `with_attitude`. InputError names what is missing: flow, range, a reference."""
+    sensor = next((s for s in (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY) if s in log.streams), None)
+    if sensor is None:
+        raise InputError(f"{log.path}: no flow readings; a log with a flow sensor's is needed to identify it")
+    if Sensor.RANGE not in log.streams:
+        raise InputError(f"{log.path}: no range readings; a range is needed for the flow's scale and height")
+    chosen, reference_t_s, reference_m = _reference(log, reference)
+    name = {"truth": log.truth_name, "gps": "GPS", "imu": IMU_NAME}[chosen]
+    log, found = with_attitude(log, axes)
+    turned = axes is not None and sensor == Sensor.FLOW_RATE and bool(np.isnan(log.streams[sensor].value[:, 2:]).all())
+    identified = turned_sensor(log, axes) if axes is not None and turned else None  # another's gyro: right it before
+    prepared = prepare(log, ReplayOptions(gps_delay_s=0.0, identified=identified))
+    mine = prepared.queue.sensor == sensor
+    value, quality = prepared.queue.value[mine], prepared.queue.quality[mine]
+    age_s = prepared.delays_s[sensor]
+    t_s = prepared.queue.t_s[mine] + age_s
+    shared = (t_s >= reference_t_s[0]) & (t_s <= reference_t_s[-1])
+    if np.count_nonzero(shared) < LEAST_FLOW:
+        raise InputError(
+            f"{log.path}: the reference ({name}) covers {reference_t_s[0]:.1f} to {reference_t_s[-1]:.1f} s, where "
+            f"{np.count_nonzero(shared)} flow readings lie; at least {LEAST_FLOW} are needed, on one clock"
+        )
+    ranges = _ranges(log)
+    range_m, near = beside(ranges, t_s - age_s)
+    velocity, rate = _velocity_and_rate(sensor, value, range_m)
+    velocity = velocity @ axes.T if axes is not None and turned else velocity  # back in the sensor's own axes
+    good = shared & (quality > 0) & np.isfinite(velocity).all(axis=1) & near & flying_at(log, t_s - age_s)
+    good &= np.any(velocity != 0.0, axis=1) & np.concatenate([[True], np.diff(t_s) > 0.0])
+    if np.count_nonzero(good) < LEAST_FLOW:
+        raise InputError(
+            f"{log.path}: {np.count_nonzero(good)} of {len(good)} flow readings are usable (in flight, quality above "
+            f"0, a range near that can be believed, not exactly zero); at least {LEAST_FLOW} are needed"
+        )
+    if not np.all(np.ptp(velocity[good], axis=0) > 0.0):
+        raise InputError(f"{log.path}: the flow is constant; a flight that moves is needed")
+    return Flight(
+        str(log.path), t_s, velocity, age_s, quality, range_m, good, log.streams[Sensor.ATTITUDE],
+        log.streams.get(Sensor.IMU), chosen, reference_t_s, reference_m, _velocity(log) if chosen == "gps" else None,
+        float(np.quantile(np.abs(rate[good]), 0.999)), tuple(note for note in (*prepared.notes, found) if note), name,
+        ranges.jumping, ranges.doubt, bool(found),
+    )  # fmt: skip
+
+
+def _ranges(log: Log) -> Ranges:
+    """The ranges of the flight to go by. InputError where they jump most of the time, or are hardly any."""
+    distance = log.streams[Sensor.RANGE]
+    ranges = believed(str(log.path), distance, flying_at(log, distance.t_s - distance.delay_s))
+    if ranges.jumping > MOST_JUMPING:
+        raise InputError(
+            f"{log.path}: the range jumps in {ranges.jumping:.0%} of its steps in flight; a range that can be believed "
+            "is needed for the flow's scale and height"
+        )
+    return ranges
+
+
+def _velocity_and_rate(sensor: Sensor, value: Array, range_m: Array) -> tuple[Array, Array]:
+    """The sensor's velocity along body x and y (n, 2), and the flow that it saw [rad/s]; value as prepared."""
+    if sensor == Sensor.FLOW_RATE:
+        flow_x, flow_y = (value[:, :2] - value[:, 2:4]).T
+        return np.column_stack(velocity_from_flow(flow_x, flow_y, range_m)), value[:, :2]
+    return value[:, :2], value[:, :2] / np.maximum(range_m, 0.1)[:, None]
+
+
+def _reference(log: Log, wanted: str) -> tuple[str, Array, Array]:
+    if wanted not in ("auto", "imu", *REFERENCES):
+        raise InputError(f"--reference {wanted}: auto, truth (truth.csv) or gps (gps.csv) are possible for a flight")
+    if wanted == "imu" and Sensor.IMU in log.streams:
+        t_s = log.streams[Sensor.IMU].t_s
+        return "imu", t_s, np.zeros((len(t_s), 3))
+    if wanted in ("auto", "truth") and log.truth is not None:
+        columns = [np.asarray(log.truth[name], float) for name in ("pos_n_m", "pos_e_m", "pos_d_m")]
+        return "truth", np.asarray(log.truth["t_s"], float), np.column_stack(columns)
+    if wanted in ("auto", "gps") and Sensor.GPS_POSITION in log.streams:
+        stream = log.streams[Sensor.GPS_POSITION]
+        return "gps", stream.t_s, stream.value
+    missing = {"truth": "truth.csv", "gps": "gps.csv"}.get(wanted, "a reference (truth.csv, gps.csv)")
+    raise InputError(f"{log.path}: no reference to identify against; {missing} is needed")
+
+
+def _velocity(log: Log) -> Stream | None:
+    """GPS velocity, where most of its readings have one."""
+    stream = log.streams.get(Sensor.GPS_VELOCITY)
+    if stream is None:
+        return None
+    known = np.isfinite(stream.value).all(axis=1)
+    return Stream.of(stream.sensor, stream.t_s[known], stream.value[known]) if known.mean() > 0.5 else None

@@ -1,0 +1,140 @@
+"""One run of the experiment: the rod moves, the sensor looks, the board logs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.core.errors import InputError
+from flownav.lab.optics.camera import Camera, exposed, light_named, refocused
+from flownav.lab.optics.firmware import firmware_named
+from flownav.lab.optics.pad import pad_named
+from flownav.lab.rig.encoder import SAMPLE_S, angle_and_rate, counts_of
+from flownav.lab.rig.excitation import EXCITATIONS, move, rod_length
+from flownav.lab.rig.film import Rod, film_swing
+from flownav.lab.rig.instruments import SONAR_ECHO_S, Messages, gyro_at, messages, sonar_at
+from flownav.lab.rig.pendulum import sensor_place, sensor_velocity
+
+Array = NDArray[np.float64]
+LOG_S = 0.01
+
+
+@dataclass(frozen=True)
+class RigSettings:
+    """One experiment. The defaults are the one configuration fixed for all heights (docs/how-to/rig.md says how)."""
+
+    height_m: float = 0.6
+    pivot_height_m: float = 2.1
+    start_angle_rad: float = 0.0912
+    duration_s: float = 25.0
+    pad: str = "stripes"
+    light: str = "normal"
+    firmware: str = "2013-09"
+    excitation: str = "swing"
+    along: str = "x"
+    refocus: float = 1.0
+    chain_delay_s: float = 0.070
+    gyro_late_s: float = 0.0
+    sonar_late_s: float = SONAR_ECHO_S
+    runs: int = 1
+    seed: int = 1
+    camera: Camera = field(default_factory=Camera)
+
+    def at(self, height_m: float) -> RigSettings:
+        """The same experiment at another height."""
+        return replace(self, height_m=height_m)
+
+
+@dataclass(frozen=True)
+class RigLog:
+    """What the board logged in one run, one row every LOG_S; the columns of rig.csv."""
+
+    time_s: Array
+    encoder_counts: NDArray[np.int64]
+    reference_velocity_m_s: Array
+    flow_velocity_m_s: Array
+    flow_x_dpx: NDArray[np.int64]
+    flow_y_dpx: NDArray[np.int64]
+    ground_distance_m: Array
+    quality: NDArray[np.int64]
+    settings: RigSettings
+    run: int
+    rod_length_m: float
+
+
+def check(settings: RigSettings) -> None:
+    """InputError where an experiment cannot be set up so."""
+    s = settings
+    for name, value, low, high in (
+        ("height", s.height_m, 0.2, 5.0),
+        ("pivot height", s.pivot_height_m, s.height_m + 0.1, 20.0),
+        ("start angle", s.start_angle_rad, 0.005, 0.6),
+        ("duration", s.duration_s, 3.0, 3600.0),
+        ("refocus", s.refocus, 0.0, 1.0),
+        ("chain delay", s.chain_delay_s, 0.0, 1.0),
+        ("gyro late", s.gyro_late_s, -0.2, 0.2),
+        ("sonar late", s.sonar_late_s, 0.0, 1.0),
+        ("runs", s.runs, 1, 999),
+    ):
+        if not low <= value <= high:
+            raise InputError(f"rig: {name} {value:g}: must be from {low:g} to {high:g}")
+    if s.excitation not in EXCITATIONS:
+        raise InputError(f"excitation {s.excitation!r}: unknown; known are {', '.join(EXCITATIONS)}")
+    if s.along not in ("x", "y"):
+        raise InputError(f"rig: along {s.along!r}: x or y, the camera's axis along the swing")
+    light_named(s.light)
+    firmware_named(s.firmware)
+
+
+def run_experiment(settings: RigSettings, run: int = 1) -> RigLog:
+    """One run, 1 to `settings.runs`; the same seed and run give the same log. InputError where settings are bad."""
+    check(settings)
+    s = settings
+    rng = np.random.default_rng([s.seed, run, round(1e6 * s.height_m)])
+    length_m = rod_length(s.excitation, s.pivot_height_m, s.height_m, run, s.runs)
+    motion = move(s.excitation, length_m, s.start_angle_rad, s.duration_s, rng)
+    sent = _flow_messages(s, run, length_m, motion.time_s, motion.angle_rad, motion.rate_rad_s, rng)
+    counts = counts_of(np.interp(np.arange(0.0, s.duration_s, SAMPLE_S), motion.time_s, motion.angle_rad))
+    angle, rate = angle_and_rate(counts)
+    every = round(LOG_S / SAMPLE_S)
+    time_s = np.arange(len(counts), dtype=float)[::every] * SAMPLE_S
+    reference = 0.0 + np.asarray(sensor_velocity(angle, rate, length_m)[0])  # type: ignore[arg-type]  # an array passes
+    latest = np.searchsorted(sent.arrival_s, time_s, "right") - 1
+    held, arrived = np.clip(latest, 0, None), latest >= 0
+    along = 0 if s.along == "x" else 1
+    return RigLog(
+        time_s,
+        counts[::every],
+        reference[::every],
+        np.where(arrived, sent.velocity_m_s[held, along], 0.0),
+        np.where(arrived, sent.flow_dpx[held, 0], 0),
+        np.where(arrived, sent.flow_dpx[held, 1], 0),
+        np.where(arrived, sent.ground_distance_m[held], 0.0),
+        np.where(arrived, sent.quality[held], 0),
+        s,
+        run,
+        length_m,
+    )
+
+
+def _flow_messages(
+    s: RigSettings, run: int, length_m: float, time_s: Array, angle: Array, rate: Array, rng: np.random.Generator
+) -> Messages:
+    """The sensor's messages of one motion."""
+    firmware, pad = firmware_named(s.firmware), pad_named(s.pad, s.seed)
+    camera = refocused(s.camera, s.height_m, s.refocus)
+    exposure = exposed(camera, light_named(s.light))
+    frames_s = np.arange(exposure.time_s, s.duration_s - exposure.time_s, 1.0 / firmware.frame_rate_hz)
+    opened = np.interp(frames_s - 0.5 * exposure.time_s, time_s, angle)
+    closed = np.interp(frames_s + 0.5 * exposure.time_s, time_s, angle)
+    rod = Rod(length_m, s.height_m, s.along == "x", float(rng.uniform(0.0, 1.0)))
+    noise_seed = int(rng.integers(2**31))
+    flow, quality = film_swing(opened, closed, rod, pad, camera, exposure, firmware, noise_seed)
+    turning = gyro_at(frames_s[1:], time_s, rate, rng, s.gyro_late_s)
+    none = np.zeros_like(turning)
+    rates = np.stack([none, turning, none] if s.along == "x" else [-turning, none, none], axis=1)
+    height = np.asarray(sensor_place(angle, length_m, s.height_m)[1])  # type: ignore[arg-type]  # an array passes
+    ranges = sonar_at(frames_s[1:], time_s, height, firmware, rng, s.sonar_late_s)
+    return messages(frames_s, flow, quality, rates, ranges, camera.nominal_focal_px, firmware, s.chain_delay_s)

@@ -1,0 +1,149 @@
+"""What the PX4FLOW reads beside its pictures, and what it sends: gyro, sonar, messages, the way to the log."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.core.compile import kernel
+from flownav.lab.optics.firmware import Firmware
+from flownav.lab.optics.flow import compensated, velocities
+from flownav.sensors.rangefinder import RangefinderState, smooth_range
+
+Array = NDArray[np.float64]
+
+GYRO_SAMPLE_S = 1.0 / 760.0
+GYRO_BANDWIDTH_HZ = 30.0
+GYRO_NOISE_RAD_S = 0.005
+GYRO_OFFSET_WEIGHT = 1e-4  # of each frame in the firmware's running mean of the rate, which it subtracts
+
+SONAR_PERIOD_S = 0.1
+SONAR_ECHO_S = 0.05  # from the trigger to the reading
+SONAR_NOISE_M = 0.002
+SONAR_FLOOR_M, SONAR_CEILING_M = 0.30, 5.0
+SONAR_RESOLUTION_M = 1e-3
+
+
+class Messages(NamedTuple):
+    """What the sensor sent: when it arrived in the log [s] and its fields (n rows)."""
+
+    arrival_s: Array
+    velocity_m_s: Array  # (n, 2)
+    flow_dpx: NDArray[np.int64]  # (n, 2), sums in tenths of a pixel
+    quality: NDArray[np.int64]
+    ground_distance_m: Array
+
+
+@kernel
+def _low_passed(values, weight, smooth):  # type: ignore[no-untyped-def]
+    state = values[0]
+    for k in range(len(values)):
+        state += weight * (values[k] - state)
+        smooth[k] = state
+
+
+@kernel
+def _without_mean(values, weight, result):  # type: ignore[no-untyped-def]
+    mean = 0.0
+    for k in range(len(values)):
+        mean += weight * (values[k] - mean)
+        result[k] = values[k] - mean
+
+
+def gyro_at(times_s: Array, motion_s: Array, rate_rad_s: Array, rng: np.random.Generator, late_s: float = 0.0) -> Array:
+    """The gyro's rate at the frames' times [rad/s]: 30 Hz low-pass at 760 Hz, noise, running mean taken out.
+
+    late_s: how much older than those times it is; below 0 the flow is the older one. What the rod turns between the
+    two instants leaks into the velocity.
+    """
+    samples_s = np.arange(motion_s[0], motion_s[-1], GYRO_SAMPLE_S)
+    weight = 1.0 - np.exp(-2.0 * np.pi * GYRO_BANDWIDTH_HZ * GYRO_SAMPLE_S)
+    smooth = np.empty_like(samples_s)
+    _low_passed(np.interp(samples_s, motion_s, rate_rad_s), weight, smooth)
+    latest = np.clip(np.searchsorted(samples_s, times_s - late_s, "right") - 1, 0, None)
+    read = smooth[latest] + GYRO_NOISE_RAD_S * rng.standard_normal(len(times_s))
+    result = np.empty_like(read)
+    _without_mean(read, GYRO_OFFSET_WEIGHT, result)
+    return result
+
+
+def sonar_at(
+    times_s: Array, motion_s: Array, height_m: Array, firmware: Firmware, rng: np.random.Generator,
+    late_s: float = SONAR_ECHO_S,
+) -> tuple[Array, Array]:  # fmt: skip
+    """The sonar's range as the firmware holds it at the frames' times [m]: raw, and through its filter (4.3).
+
+    A wide beam returns the nearest echo, so the range is the height, whatever the tilt of the rod. late_s: from the
+    trigger to the reading, the scale of every velocity meanwhile being that of an earlier height.
+    """
+    triggers_s = np.arange(motion_s[0], motion_s[-1], SONAR_PERIOD_S)
+    echo_m = np.interp(triggers_s, motion_s, height_m) + SONAR_NOISE_M * rng.standard_normal(len(triggers_s))
+    raw_m = np.clip(np.round(echo_m / SONAR_RESOLUTION_M) * SONAR_RESOLUTION_M, SONAR_FLOOR_M, SONAR_CEILING_M)
+    used_m = _median_of_three(raw_m) if firmware.sonar_median else raw_m
+    state = RangefinderState(float(used_m[0]), 0.0)
+    smooth_m = np.empty_like(used_m)
+    for k, range_m in enumerate(used_m):
+        state = smooth_range(state, float(range_m)) if k else state
+        smooth_m[k] = state.range_m
+    latest = np.clip(np.searchsorted(triggers_s + late_s, times_s, "right") - 1, 0, None)
+    return raw_m[latest], smooth_m[latest]
+
+
+def _median_of_three(values: Array) -> Array:
+    padded = np.concatenate([values[:1], values[:1], values])
+    return np.asarray(np.median(np.stack([padded[:-2], padded[1:-1], padded[2:]]), axis=0))
+
+
+def firmware_clock(times_s: Array, firmware: Firmware) -> Array:
+    """Times as the firmware's clock counts them, whole milliseconds until 2014-08 [s]."""
+    return np.floor(times_s / firmware.clock_s + 0.5) * firmware.clock_s
+
+
+def messages(
+    times_s: Array,
+    flow_px: Array,
+    quality: NDArray[np.int64],
+    rates_rad_s: Array,
+    ranges_m: tuple[Array, Array],
+    focal_px: float,
+    firmware: Firmware,
+    chain_delay_s: float,
+) -> Messages:
+    """From matched frames to messages in the log.
+
+    `times_s` (n+1) are the frames' times, the other rows belong to the n newer frames of each pair. The mean of
+    the valid frames' velocities since the last message is sent, or the low-passed velocity where that is on.
+    """
+    clock = firmware_clock(times_s, firmware)
+    dt_s = np.maximum(np.diff(clock), firmware.clock_s)
+    raw_m, smooth_m = ranges_m
+    flow = np.where((quality > 0)[:, None], compensated(flow_px, rates_rad_s, dt_s, focal_px, firmware), 0.0)
+    velocity = velocities(flow, dt_s, focal_px, smooth_m)
+    every = firmware.frames_per_message
+    count = len(quality) // every
+    rows = slice(0, count * every)
+    valid = (quality[rows] > 0).reshape(count, every, 1)
+    sums = (velocity[rows].reshape(count, every, 2) * valid).sum(axis=1)
+    sent = sums / np.maximum(valid.sum(axis=1), 1)
+    last = np.arange(count) * every + every - 1
+    if firmware.low_pass:
+        sent = _exponential(velocity * (quality > 0)[:, None], firmware.low_pass_weight)[last]
+    return Messages(
+        times_s[1:][last] + firmware.transmit_latency_s + chain_delay_s,
+        sent,
+        (10.0 * flow[rows].reshape(count, every, 2).sum(axis=1)).astype(np.int64),
+        quality[last],
+        raw_m[last],
+    )
+
+
+def _exponential(velocity: Array, weight: float) -> Array:
+    smooth = np.empty_like(velocity)
+    start = np.vstack([np.zeros(2), velocity])
+    for axis in (0, 1):
+        column = np.empty(len(start))
+        _low_passed(np.ascontiguousarray(start[:, axis]), weight, column)
+        smooth[:, axis] = column[1:]
+    return smooth

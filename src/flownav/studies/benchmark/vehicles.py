@@ -1,0 +1,118 @@
+"""What a block of flights spends on its plant, on the navigator and on the rest, of each kind of vehicle."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.campaigns.local import fly_many
+from flownav.core.compile import LANES, Lanes, Work, kernel, pointer, procedure, unit
+from flownav.navigation.take import UNIT_SIGNATURE
+from flownav.simulation import layout
+from flownav.simulation.assemble import assemble
+from flownav.simulation.block import Buffers
+from flownav.simulation.engine import Instead, buffers_of, fly_into
+from flownav.simulation.ensemble import believed
+from flownav.simulation.onboard import Onboard
+from flownav.simulation.plan import ATTITUDE_STEPS, PHYSICS_S, PHYSICS_STEPS, Flight
+from flownav.simulation.scenario import load_scenario, with_vehicle
+from flownav.simulation.truth import packed_truth
+from flownav.simulation.vehicles import observe_vehicle, step_vehicle
+from flownav.studies.benchmark.timing import best_of
+from flownav.vehicle.around import CALM
+from flownav.vehicle.parameters import VehicleParameters
+
+KINDS = ("maxi-joker-3", "quad-450")
+ROUNDS = 5
+CORES = os.cpu_count() or 1
+
+
+class Parts(NamedTuple):
+    """Processor time of one block of `len(LANES)` landings [s]; rest: sensors, wind, autopilot, history."""
+
+    whole_s: float
+    plant_s: float
+    navigator_s: float
+
+    @property
+    def rest_s(self) -> float:
+        """What is neither plant nor navigator."""
+        return self.whole_s - self.plant_s - self.navigator_s
+
+
+def landing_of(vehicle: str) -> Flight:
+    """The shipped landing, flown by a shipped vehicle on the navigator."""
+    return assemble(with_vehicle(load_scenario("landing"), vehicle)).flight
+
+
+def rate_of(flight: Flight, count: int) -> float:
+    """Flights a second with scores, on every core."""
+    return count / best_of(lambda: fly_many(flight, 1, count, threads=CORES), 2)
+
+
+def parts_of(flight: Flight) -> Parts:
+    """Times of a block of matched flights. The navigator's is what is saved when readings are taken by nobody."""
+    buffers = buffers_of(flight, LANES, flight.plan.epochs, written=False)
+    on_truth = flight._replace(plan=flight.plan._replace(fly_on_truth=True))
+    return Parts(
+        processor_s(lambda: fly_into(flight, 1, 0, LANES, buffers)),
+        processor_s(lambda: plant_after(flight)),
+        processor_s(lambda: fly_into(on_truth, 1, 0, LANES, buffers))
+        - processor_s(lambda: fly_untaken(on_truth, buffers)),
+    )
+
+
+def processor_s(work: Callable[[], object]) -> float:
+    """The shortest of several processor times of this thread [s]."""
+    return best_of(work, ROUNDS, time.thread_time)
+
+
+# -- parts alone ---------------------------------------------------------------------------------------------------
+@procedure
+def take_nothing(
+    work: Work, p: Work, estimate: Work, innovation: Work, event: Work, entry: Work, state: Work, covariance: Work,
+    room: NDArray[np.int64], used: NDArray[np.int64], t_s: float, sensor: int, lanes: Lanes,
+) -> None:  # fmt: skip
+    """In place of `navigation.take.take_one`: a reading is heard by nobody."""
+    work[len(lanes) - 1] = t_s
+
+
+deaf_lanes = unit(take_nothing, UNIT_SIGNATURE, lanes=LANES)
+
+
+def fly_untaken(flight: Flight, b: Buffers) -> None:
+    """A block on the truth whose readings nobody takes."""
+    fly_into(flight, 1, 0, LANES, b, None, Instead(take=deaf_lanes.address))
+
+
+@kernel
+def step_plants(
+    buffer: NDArray[np.float64], lanes: Lanes, steps: int, rotors: tuple[int, ...] | None, onboard: Onboard | None
+) -> None:
+    """So many steps of physics, observed as a flight observes them; the lanes' vehicles and controls stand in rows."""
+    work = pointer(buffer)
+    for step in range(steps):
+        step_vehicle(work, lanes, PHYSICS_S, rotors, onboard)
+        if (step + 1) % PHYSICS_STEPS == 0:
+            observe_vehicle(work, lanes, rotors, onboard)
+
+
+def plant_after(flight: Flight) -> NDArray[np.float64]:
+    """The vehicles' states, (fields, lanes), after a flight's steps from its start with the controls of its trim."""
+    work = np.zeros(layout.ROWS * len(LANES))
+    rows = work.reshape(-1, len(LANES))
+    rows[layout.AS_IS_BEGIN : layout.AS_IS_END] = packed_truth([believed(flight)] * len(LANES)).reshape(-1, len(LANES))
+    start, gains = flight.plan.start, flight.gains
+    rows[layout.HELICOPTER : layout.HELICOPTER + len(start)] = np.array(start)[:, None]
+    if isinstance(flight.vehicle, VehicleParameters):
+        rows[layout.ROTOR_SPEED] = flight.vehicle.main_speed_rad_s
+    rows[layout.AROUND : layout.AROUND + len(CALM)] = np.array(CALM)[:, None]
+    controls = gains.lon_trim_rad, gains.lat_trim_rad, gains.collective_trim_rad, gains.pedal_trim_rad
+    rows[layout.CONTROLS : layout.CONTROLS + len(controls)] = np.array(controls)[:, None]
+    step_plants(work, LANES, flight.plan.epochs * ATTITUDE_STEPS * PHYSICS_STEPS, flight.rotors, flight.onboard)
+    return rows[layout.HELICOPTER : layout.HELICOPTER + len(start)]

@@ -1,0 +1,80 @@
+"""The verdict: do the proposed settings help on windows that the fit never saw?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from flownav.core.measurement import Array
+from flownav.studies.tuning.resampling import JUDGED, interval_of, resampled
+from flownav.studies.tuning.scores import WORTH, Gains
+
+ACCEPTED, NOT_ACCEPTED = "accepted", "not accepted"
+
+
+class Judged(NamedTuple):
+    """A mean gain over held-out windows [nats] with its 95 % interval, and over how many windows."""
+
+    mean: float
+    low: float
+    high: float
+    windows: int
+
+
+class Judgement(NamedTuple):
+    """total: predictions and errors together; error: errors alone, None where nothing shows them; why: in words."""
+
+    accepted: bool
+    why: str
+    total: Judged | None
+    error: Judged | None
+
+    @property
+    def verdict(self) -> str:
+        """In a word or two."""
+        return ACCEPTED if self.accepted else NOT_ACCEPTED
+
+
+UNMOVED = Judgement(False, "the fit windows ask for no other setting", None, None)
+
+
+def judge(held: Sequence[Gains], whole: Sequence[bool]) -> Judgement:
+    """Of the gains on held-out windows, log by log; whole: of which logs nothing at all was fitted.
+
+    Accepted where the interval of the errors' gain lies above zero, that of errors and predictions together too, and
+    where the errors of the logs that were held out whole did not grow. Better predictions alone are not enough: a
+    filter can predict its own sensors better and err more.
+    """
+    total = judged([gain.total for gain in held])
+    error = judged([_known(gain) for gain in held])
+    apart = judged([_known(gain) for gain, is_whole in zip(held, whole, strict=True) if is_whole])
+    return Judgement(*_verdict(total, error, apart), total, error)
+
+
+def judged(by_log: Sequence[Array]) -> Judged | None:
+    """Mean and interval of gains (w,) of each log that has some; None without any."""
+    counted = [values for values in by_log if len(values) > 1]
+    if not counted:
+        return None
+    mean, windows = float(np.mean([values.mean() for values in counted])), sum(len(values) for values in counted)
+    return Judged(mean, *interval_of(resampled(counted, JUDGED)[:, 0], windows), windows)
+
+
+def _known(gain: Gains) -> Array:
+    return gain.error[np.isfinite(gain.error)]
+
+
+def _verdict(total: Judged | None, error: Judged | None, apart: Judged | None) -> tuple[bool, str]:
+    if error is None or total is None:
+        return False, "no GPS, truth or flow shows the path's error in the held-out windows"
+    if error.high < 0.0:
+        return False, "in the held-out windows the path's error grows"
+    if error.low <= 0.0 or error.mean < WORTH:
+        return False, "in the held-out windows the path's error does not shrink beyond chance and 2 %"
+    if total.low <= 0.0:
+        return False, "in the held-out windows the path's error shrinks by less than the sensors' predictions lose"
+    if apart is not None and apart.mean <= 0.0:
+        return False, "the path's error does not shrink in the logs that were held out whole"
+    return True, "the path's error shrinks in the held-out windows"

@@ -28,7 +28,7 @@ long-log: $(VENV)/.ready-test
 	$(BIN)/python -m pytest -s -m slow tests/replays/test_long_log.py
 
 fuzz: $(VENV)/.ready-test
-	FLOWNAV_FUZZ=$${FLOWNAV_FUZZ:-20000} $(BIN)/python -m pytest -m fuzz tests/logs tests/live/test_fuzz_live.py tests/test_fuzz_parameters.py
+	FLOWNAV_FUZZ=$${FLOWNAV_FUZZ:-20000} $(BIN)/python -m pytest -m fuzz tests/logs tests/live/test_fuzz_live.py tests/core/test_fuzz_parameters.py
 
 mutants: $(VENV)/.ready-test
 	$(BIN)/python tests/helpers/mutants.py $(PART)
@@ -86,7 +86,7 @@ wheel: $(VENV)/.ready-wheel
 	$(BIN)/python tools/build_wheel.py
 
 wheel-test: $(VENV)/.ready-test wheel
-	FLOWNAV_WHEEL=$$(ls dist/flownav-*.whl) $(BIN)/python -m pytest -m slow tests/compile/test_wheel.py
+	FLOWNAV_WHEEL=$$(ls dist/flownav-*.whl) $(BIN)/python -m pytest -m slow tests/compiling/test_wheel.py
 
 clean:
 	rm -rf $(VENV) build dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks

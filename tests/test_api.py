@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import importlib
 import pkgutil
 import re
@@ -12,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import flownav
+import house
 from docs_tools import notebooks, reference
 from places import DOCS
 
@@ -21,48 +21,7 @@ MODULES = sorted(m.name for m in pkgutil.walk_packages([str(PACKAGE)], "flownav.
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 LONGEST_FILE = 330
 
-# rooms from the ground up; a room imports its own floor's neighbours named here and what lies below
-GROUND = {"errors", "files", "compile", "frames", "measurement", "record", "parameter_files", "provenance"}
-GROUND |= {"record_file", "parquet_pages"}
-GROUND |= {"guard", "free_names", "text", "toml_text"}
-EQUATIONS = {"vehicle", "sensors", "control", "estimation", "optics"}
-# what the public API stands on: every room but the faces
-JOBS = {"navigation", "simulation", "logs", "mavlink", "scoring", "replays", "live", "campaigns", "faults"}
-JOBS |= {"identification", "report", "export", "parts"}
-ALLOWED = {
-    "vehicle": GROUND,
-    "sensors": GROUND,
-    "control": GROUND | {"vehicle"},
-    "estimation": GROUND,
-    "optics": GROUND,
-    "scoring": GROUND,
-    "mavlink": GROUND,
-    "logs": GROUND | {"mavlink"},
-    "rig": GROUND | {"optics", "sensors"},
-    "inspection": GROUND | EQUATIONS | {"logs", "replays", "scoring", "identification"},
-    "identification": GROUND | EQUATIONS | {"logs", "rig", "replays", "scoring"},
-    "simulation": GROUND | EQUATIONS | {"navigation"},
-    "navigation": GROUND | EQUATIONS,
-    "replays": GROUND | EQUATIONS | {"navigation", "logs", "scoring"},
-    "compare": GROUND | EQUATIONS | {"navigation", "logs", "replays", "scoring"},
-    "tuning": GROUND | EQUATIONS | {"navigation", "logs", "replays", "scoring", "compare"},
-    "live": GROUND | EQUATIONS | {"mavlink", "logs", "navigation", "replays"},
-    "campaigns": GROUND | EQUATIONS | {"simulation", "navigation", "scoring"},
-    "faults": GROUND | EQUATIONS | {"logs", "simulation", "campaigns", "scoring", "navigation", "replays"},
-    "certification": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "faults", "report"},
-    "schemas": GROUND | EQUATIONS | {"simulation", "campaigns", "navigation"},
-    "samples": GROUND
-    | EQUATIONS
-    | {"logs", "mavlink", "rig", "navigation", "simulation", "scoring", "campaigns", "faults", "live", "export"},
-    "validation": GROUND | EQUATIONS | {"navigation", "simulation", "logs", "replays", "scoring"},
-    "report": GROUND | {"scoring"},
-    "export": GROUND,
-    "parts": GROUND | EQUATIONS | {"navigation", "simulation", "campaigns", "logs", "replays"},
-    "examples": GROUND | EQUATIONS | {"navigation", "parts"},
-    "viewing": GROUND | {"export"},
-    "api": GROUND | EQUATIONS | JOBS,
-    "paper": GROUND | EQUATIONS | {"simulation", "campaigns", "scoring", "rig", "identification", "report"},
-}
+MOST_ENTRIES, MOST_FLOORS = 24, 10
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -70,27 +29,37 @@ def test_every_module_imports_and_says_what_it_is(name):
     assert importlib.import_module(name).__doc__, f"{name} has no docstring"
 
 
-def _rooms_imported(source: Path) -> set[str]:
-    tree = ast.parse(source.read_text(encoding="utf-8"))
-    modules = [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
-    modules += [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
-    return {module.split(".")[1] for module in modules if module.startswith("flownav.") and module.count(".")}
+def test_imports_run_one_way_between_rooms():
+    drawn = house.arrows()
+    assert not house.circles(house.between_rooms(drawn))
+    assert max(house.floors(house.between_rooms(drawn)).values()) <= MOST_FLOORS
 
 
-@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_imports_run_one_way(source):
-    room = source.relative_to(PACKAGE).parts[0].removesuffix(".py")
-    if room in ("compile", "compiling"):
-        assert _rooms_imported(source) <= {"compiling", "files"}
-    elif room in ALLOWED:
-        assert _rooms_imported(source) - {room} <= ALLOWED[room]
-    elif room in GROUND:
-        assert _rooms_imported(source) <= GROUND
+def test_no_modules_import_one_another_in_a_circle():
+    assert not house.circles(house.arrows())
+
+
+def test_the_house_has_few_rooms_and_is_drawn_as_it_is():
+    assert (
+        sum(not entry.name.startswith(("__pycache", "py.typed", "kernels")) for entry in PACKAGE.iterdir())
+        <= MOST_ENTRIES
+    )
+    assert house.drawing(house.between_rooms(house.arrows())) in (PROJECT / "ARCHITECTURE.md").read_text(
+        encoding="utf-8"
+    )
+
+
+def test_a_circle_and_its_absence_are_seen():
+    loop = {house.Arrow("a", "b"), house.Arrow("b", "c"), house.Arrow("c", "b"), house.Arrow("c", "d")}
+    assert house.circles(loop) == [["b", "c"]]
+    straight = {house.Arrow("cli", "api"), house.Arrow("api", "core"), house.Arrow("cli", "core")}
+    assert not house.circles(straight)
+    assert house.drawing(straight) == " 3  cli\n 2  api\n 1  core"
 
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_only_compile_knows_numba(source):
-    if source.relative_to(PACKAGE).parts[0] not in ("compile.py", "compiling"):
+    if source.relative_to(PACKAGE).parts[1:2] not in (("compile.py",), ("compiling",)):
         imported = re.findall(r"^\s*(?:import|from)\s+(numba|llvmlite)", source.read_text(encoding="utf-8"), re.M)
         assert not imported
 
@@ -101,7 +70,7 @@ def test_files_can_be_read_in_one_sitting(source):
 
 
 def test_folders_of_tests_are_rooms():
-    rooms = {source.relative_to(PACKAGE).parts[0].removesuffix(".py") for source in SOURCES}
+    rooms = {path.name for path in PACKAGE.rglob("*") if path.is_dir()}
     folders = {path.parent.name for path in (PROJECT / "tests").glob("*/test_*.py")}
     assert folders <= rooms | {"docs"}  # tests of tools/docs
 

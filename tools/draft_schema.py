@@ -13,7 +13,7 @@ from typing import Any
 
 from flownav.core.schemas import DRAFT
 
-FOLDER = Path(__file__).resolve().parents[1] / "src" / "flownav" / "schemas"
+FOLDER = Path(__file__).resolve().parents[1] / "src" / "flownav" / "data" / "schemas"
 COUNTS = (
     "seed",
     "flights",

@@ -1,4 +1,4 @@
-"""What the house weighs: `make weigh`. Rooms, modules, lines, long and wide functions, and index arithmetic by room.
+"""What the house weighs: `make weigh`. Rooms on floors, modules, lines, functions too long or wide, index arithmetic.
 
 python tools/weigh.py [--list ARGUMENTS|LINES|NESTING]
 """
@@ -11,7 +11,8 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-SOURCE = Path(__file__).parent.parent / "src" / "flownav"
+from house import SOURCE, arrows, between_rooms, circles, drawing
+
 MOST = {"arguments": 8, "lines": 50, "nesting": 3}
 INDEX = "* len(lanes)"
 BRANCHES = (ast.If, ast.For, ast.While, ast.With, ast.Try, ast.Match)
@@ -77,6 +78,14 @@ def weigh(source: Path = SOURCE) -> tuple[dict[str, int], Counter[str], dict[str
     return counts, rooms, beyond
 
 
+def drawn() -> str:
+    """The rooms on their floors, and what runs in a circle."""
+    every = arrows()
+    rooms = between_rooms(every)
+    loops = "".join(f"\ncircle: {', '.join(group)}" for group in circles(every) + circles(rooms))
+    return f"{len(rooms)} arrows between rooms, the highest floor first:\n{drawing(rooms)}{loops or ', no circle'}"
+
+
 def main(asked: list[str]) -> None:
     """Print the counts, or the functions beyond a limit."""
     counts, rooms, beyond = weigh()
@@ -88,6 +97,7 @@ def main(asked: list[str]) -> None:
     for room, count in rooms.most_common():
         if count:
             print(f"{count:8d}    in {room}")
+    print(drawn())
 
 
 if __name__ == "__main__":

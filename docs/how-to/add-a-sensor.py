@@ -208,6 +208,6 @@ f"{distances.sum()} offered, {taken['fused'][distances].sum():.0f} fused"
 # %% [markdown]
 # ## A new kind of reading
 #
-# A reading that no judge knows, such as an airspeed, also needs its kind in `flownav/core/measurement.py` (a number of its
-# own and the names of its columns) and, to be fused, a judge and a law of its own in `flownav/navigation/`. Until then
-# the navigator passes it over, and the record has it.
+# A reading that no judge knows, such as an airspeed, also needs its kind in `flownav/core/measurement.py` (a number
+# of its own and the names of its columns) and, to be fused, a judge and a law of its own in `flownav/navigation/`.
+# Until then the navigator passes it over, and the record has it.

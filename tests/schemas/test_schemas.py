@@ -9,7 +9,6 @@ from pathlib import Path
 import jsonschema
 import pytest
 import typer.main
-from file_schemas import generated
 from typer.testing import CliRunner
 
 from flownav.cli import app
@@ -17,6 +16,7 @@ from flownav.core.parameter_files import shipped
 from flownav.core.record import Record
 from flownav.core.schemas import names, schema_of
 from replay_logs import log_of_flight
+from schemas import generated
 
 COMMANDS = set(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
 FILES = {

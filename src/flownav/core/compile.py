@@ -19,6 +19,7 @@ number of threads.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from flownav.core.compiling.beside import compile_beside
@@ -51,7 +52,7 @@ from flownav.core.compiling.progress import announce_compilation
 from flownav.core.compiling.records import Layout, OnLanes, compiled, dressed
 from flownav.core.compiling.rows import columns_of, gathering, places_of, row_of, row_store, row_view, width_of
 from flownav.core.compiling.runge_kutta import STAGES, runge_kutta
-from flownav.core.compiling.runner import NoDeviceError, Runner, device_runner
+from flownav.core.compiling.runner import NoDeviceError, Runner
 from flownav.core.compiling.scalars import bits_from_float, clamp, float_from_bits, larger, magnitude, smaller, squared
 from flownav.core.compiling.strided import WARP, strided
 from flownav.core.compiling.units import Unit, unit
@@ -122,3 +123,13 @@ __all__ = [
     "width_of",
     "write_function",
 ]
+
+
+def device_runner(instead: Callable[..., None]) -> Runner:
+    """The CUDA device of this machine, or Numba's simulator of one where NUMBA_ENABLE_CUDASIM=1.
+
+    instead: an equation that `invoke` calls on a device, whatever the address. NoDeviceError where there is none.
+    """
+    from flownav.core.compiling.launch import Gpu, Simulator, is_simulated
+
+    return Simulator() if is_simulated() else Gpu(instead)

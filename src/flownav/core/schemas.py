@@ -11,19 +11,19 @@ from typing import Any
 
 from flownav.core.errors import InputError
 
+FOLDER = resources.files("flownav") / "data" / "schemas"
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def names() -> list[str]:
     """The schemas that ship."""
-    folder = resources.files("flownav") / "schemas"
-    return sorted(path.name.removesuffix(".json") for path in folder.iterdir() if path.name.endswith(".json"))
+    return sorted(path.name.removesuffix(".json") for path in FOLDER.iterdir() if path.name.endswith(".json"))
 
 
 def schema_of(name: str) -> dict[str, Any]:
     """A schema by its name. InputError where there is none."""
     if name not in names():
         raise InputError(f"{name}: no such schema; choose from {', '.join(names())}")
-    found = json.loads((resources.files("flownav") / "schemas" / f"{name}.json").read_text(encoding="utf-8"))
+    found = json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8"))
     assert isinstance(found, dict)
     return found

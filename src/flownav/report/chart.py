@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -66,12 +66,6 @@ class Chart:
     def names(self) -> list[str]:
         """What is drawn, each name once, in the order of drawing."""
         return list(dict.fromkeys(one.name for axis in self.axes for one in axis.series))
-
-    def plotly(self) -> Any:
-        """The same as a Plotly figure, for notebooks and for the pages that Plotly draws."""
-        from flownav.report.plotly_chart import figure
-
-        return figure(self)
 
 
 class Stack:

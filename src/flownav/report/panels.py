@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 from flownav.report.chart import Chart
+from flownav.report.plotly_chart import figure
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class Panel:
     @cached_property
     def figure(self) -> Any:
         """What is drawn, as a Plotly figure; a chart is turned into one, any other drawing is given as it is."""
-        return self.drawing.plotly() if isinstance(self.drawing, Chart) else self.drawing
+        return figure(self.drawing) if isinstance(self.drawing, Chart) else self.drawing
 
 
 @dataclass(frozen=True)

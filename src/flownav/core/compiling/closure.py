@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from flownav.core.files import written_whole
 
-PACKAGE = Path(__file__).parents[1]
+PACKAGE = Path(__file__).parents[2]
 LIBRARIES = tuple({sys.prefix, sys.base_prefix, sys.exec_prefix})
 INSTALLED = frozenset({"site-packages", "dist-packages"})
 REMEMBERED_FILES = 2000

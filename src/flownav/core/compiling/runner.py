@@ -31,13 +31,3 @@ class Runner(Protocol):
 
     def run(self, function: Callable[..., None], threads: int, told: dict[str, Any], constants: Constants) -> None:
         """`function(thread, threads, **told, **constants)` for each thread; arrays in `told` are the device's."""
-
-
-def device_runner(instead: Callable[..., None]) -> Runner:
-    """The CUDA device of this machine, or Numba's simulator of one where NUMBA_ENABLE_CUDASIM=1.
-
-    instead: an equation that `invoke` calls on a device, whatever the address. NoDeviceError where there is none.
-    """
-    from flownav.core.compiling.launch import Gpu, Simulator, is_simulated
-
-    return Simulator() if is_simulated() else Gpu(instead)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from flownav.estimation.discretise import discretised
+from flownav.estimation.error_models import discretised
 from flownav.vehicle.paper_model import load_paper_model
 
 

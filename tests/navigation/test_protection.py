@@ -37,7 +37,7 @@ from flownav.estimation.states import (
 )
 from flownav.navigation.flags import Flag, flagged, flags_of
 from flownav.navigation.loop import run, start_navigator
-from flownav.navigation.protection import EXCLUDED, HELD_S, least_size, levels, prior_sigma
+from flownav.navigation.protection import EXCLUDED_SIGMAS, HELD_S, least_size, levels, prior_sigma
 from flownav.navigation.rows import EstimateRow
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import part_of
@@ -214,7 +214,7 @@ def test_what_is_there_or_not_is_sought_anew_once_it_is_excluded():
     found = navigate(noisy(FLOWN).only(*OWN))
     for fault in (FLOW_SWAPPED, FLOW_REVERSED):
         size = told(found, fault)
-        assert 1.0 - size.size <= 4.0 * EXCLUDED * size.sigma  # it is looked at once a while; for ever it would be 1000
+        assert 1.0 - size.size <= 4.0 * EXCLUDED_SIGMAS * size.sigma  # looked at once a while; for ever: 1000
         assert abs(effect_of(found.on.work, ONE_LANE, STATES, fault, POSITION, 0)) < 20.0
 
 

@@ -41,14 +41,14 @@ from flownav.estimation.states import (
 )
 from flownav.navigation.memory import DRIFT_SINCE, MEMORY, PROTECTION, SCALE_DOUBT, SUSPECTED, load_flow, new_work
 from flownav.navigation.protection import (
-    CLEAR,
+    CLEAR_EVIDENCE,
     DRIFT_S,
     HELD_S,
     MEMORY_S,
-    SIGMAS,
+    OWN_ERROR_SIGMAS,
     SIGMAS_BESIDE,
     SIZE_SIGMAS,
-    SUSPECT,
+    SUSPECT_EVIDENCE,
     exclude,
     largest_size,
     levels,
@@ -162,19 +162,21 @@ def test_the_size_that_is_left_possible():
 def test_the_level_is_the_largest_over_all_that_may_have_happened(work):
     for i, variance in enumerate((4.0, 1.0, 9.0)):
         work[at(POSITION + i, POSITION + i)] = variance
-    assert levels(work, ONE_LANE, 0) == pytest.approx((SIGMAS * 2.0, SIGMAS * 3.0))
+    assert levels(work, ONE_LANE, 0) == pytest.approx((OWN_ERROR_SIGMAS * 2.0, OWN_ERROR_SIGMAS * 3.0))
     put_effect(work, HEADING_OFF, 30.0, 40.0, -60.0)
     put_size(work, HEADING_OFF, 0.02, 0.01)
     most = 0.02 + SIZE_SIGMAS * 0.01
     put_effect(work, RANGE_OFFSET, 1.0, 1.0, 1.0)
     small = levels(work, ONE_LANE, 0)
-    assert small == pytest.approx((SIGMAS * 2.0, SIGMAS * 3.0))  # 2.1 m beside 2 sigma are less than 4 sigma
+    assert small == pytest.approx(
+        (OWN_ERROR_SIGMAS * 2.0, OWN_ERROR_SIGMAS * 3.0)
+    )  # 2.1 m beside 2 sigma: below 4 sigma
     put_effect(work, HEADING_OFF, 300.0, -400.0, -600.0)
     assert levels(work, ONE_LANE, 0) == pytest.approx(
         (SIGMAS_BESIDE * 2.0 + 500.0 * most, SIGMAS_BESIDE * 3.0 + 600.0 * most)
     )
     work[HYPOTHESES] = 0.0
-    assert levels(work, ONE_LANE, 0) == pytest.approx((SIGMAS * 2.0, SIGMAS * 3.0))
+    assert levels(work, ONE_LANE, 0) == pytest.approx((OWN_ERROR_SIGMAS * 2.0, OWN_ERROR_SIGMAS * 3.0))
     work[LEFT_OVER] = 100.0
     assert levels(work, ONE_LANE, 0).horizontal_m == pytest.approx(SIGMAS_BESIDE * 2.0 + 100.0)
     work[LEFT_OVER] = 0.0
@@ -186,8 +188,8 @@ def test_the_level_is_the_largest_over_all_that_may_have_happened(work):
         put_effect(work, fault)
     set_levels(work, ONE_LANE)
     axes = np.linalg.eigvalsh([[4.0 + 36.0, 48.0], [48.0, 1.0 + 64.0]])
-    assert work[PROTECTION] == pytest.approx(SIGMAS * np.sqrt(axes[-1]))
-    assert work[PROTECTION + 1] == pytest.approx(SIGMAS * 3.0)
+    assert work[PROTECTION] == pytest.approx(OWN_ERROR_SIGMAS * np.sqrt(axes[-1]))
+    assert work[PROTECTION + 1] == pytest.approx(OWN_ERROR_SIGMAS * 3.0)
 
 
 def test_what_an_excluded_fault_may_have_done_is_remembered(work):
@@ -228,28 +230,28 @@ def evident(work, fault, size, evidence):
 
 def test_a_suspicion_needs_evidence_and_a_size_and_lasts(work):
     minded = Minded(work)
-    evident(work, HEADING_OFF, 0.3, SUSPECT - 1.0)
+    evident(work, HEADING_OFF, 0.3, SUSPECT_EVIDENCE - 1.0)
     assert minded.at(50.0) == []
-    evident(work, HEADING_OFF, 0.1, SUSPECT + 50.0)  # what is no fault yet
+    evident(work, HEADING_OFF, 0.1, SUSPECT_EVIDENCE + 50.0)  # what is no fault yet
     assert minded.at(51.0) == []
-    evident(work, HEADING_OFF, 0.3, SUSPECT + 1.0)
+    evident(work, HEADING_OFF, 0.3, SUSPECT_EVIDENCE + 1.0)
     raised = [52.0, float(FAULT_SUSPECTED), float(HEADING_OFF)]
     assert minded.at(52.0) == [raised]
     assert work[SUSPECTED] == HEADING_OFF + 1.0
-    evident(work, HEADING_OFF, 0.3, CLEAR - 1.0)
+    evident(work, HEADING_OFF, 0.3, CLEAR_EVIDENCE - 1.0)
     assert minded.at(51.9 + HELD_S) == [raised]
-    evident(work, HEADING_OFF, 0.3, CLEAR + 1.0)
+    evident(work, HEADING_OFF, 0.3, CLEAR_EVIDENCE + 1.0)
     assert minded.at(52.1 + HELD_S) == [raised]
-    evident(work, HEADING_OFF, 0.3, CLEAR - 1.0)
+    evident(work, HEADING_OFF, 0.3, CLEAR_EVIDENCE - 1.0)
     assert minded.at(52.2 + HELD_S) == [raised, [52.2 + HELD_S, float(FAULT_CLEARED), float(HEADING_OFF)]]
     assert work[SUSPECTED] == 0.0
 
 
 def test_the_most_evident_fault_is_named(work):
     minded = Minded(work)
-    evident(work, FLOW_SCALE, 1.0, SUSPECT + 1.0)
-    evident(work, RANGE_OFFSET, 1.0, SUSPECT + 9.0)
-    evident(work, HEADING_OFF, 1.0, SUSPECT + 2.0)
+    evident(work, FLOW_SCALE, 1.0, SUSPECT_EVIDENCE + 1.0)
+    evident(work, RANGE_OFFSET, 1.0, SUSPECT_EVIDENCE + 9.0)
+    evident(work, HEADING_OFF, 1.0, SUSPECT_EVIDENCE + 2.0)
     assert minded.at(1.0)[0][2] == RANGE_OFFSET
 
 

@@ -10,15 +10,15 @@ from flownav.navigation.motion_records import ImuMemory, SpikeMemory
 from flownav.navigation.records import Reading
 from flownav.navigation.spikes import (
     BURST_S,
-    LONE,
+    LONE_SHARE,
     MOST_DOUBT_M_S,
     MOST_DOUBT_RAD,
+    Witness,
     doubt_of,
     judge_spike,
     turning_doubt_of,
 )
 from flownav.navigation.tape import IMU_SPIKE
-from flownav.navigation.witnessed import Witness
 from navigation_streams import fly, navigate, still
 
 KEPT = ImuMemory(1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -9.8, 0.0, 0.0, 0.0)
@@ -107,7 +107,7 @@ def test_a_burst_leaves_a_doubt_of_what_it_would_have_done_and_a_lone_spike_some
         _, memory = judge_spike(said, step_s, KEPT, memory)
         velocity.append(doubt_of(said, step_s, KEPT, memory))
         attitude.append(turning_doubt_of(said, step_s, KEPT, memory))
-    assert velocity[0] == pytest.approx((LONE * 40.0 * 0.01) ** 2)
+    assert velocity[0] == pytest.approx((LONE_SHARE * 40.0 * 0.01) ** 2)
     assert sum(velocity[:2]) == pytest.approx((40.0 * 0.02) ** 2)
     assert sum(velocity) == pytest.approx(MOST_DOUBT_M_S**2)
     assert sum(attitude[:2]) == pytest.approx((5.0 * 0.02) ** 2)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flownav.navigation.height import ECHOES, MANY_STRAYS, followed_echo
+from flownav.navigation.height import MANY_STRAYS, STRAYS_OVER_RANGES, followed_echo
 from flownav.navigation.offers import FEW_STRAYS, STRAY_SPAN_M, stray_variance
 from flownav.navigation.records import EchoMemory
 
@@ -37,12 +37,12 @@ def test_the_first_two_ranges_are_not_judged():
 
 
 def test_a_range_that_no_neighbour_confirms_is_one_of_twenty():
-    assert strays_of([2.0, 2.0, 5.0]) == [0.0, 0.0, pytest.approx(1.0 / ECHOES)]
+    assert strays_of([2.0, 2.0, 5.0]) == [0.0, 0.0, pytest.approx(1.0 / STRAYS_OVER_RANGES)]
 
 
 def test_a_range_after_a_stray_is_confirmed_by_the_one_before_it():
     shares = strays_of([2.0, 2.0, 5.0, 2.0, 2.0])
-    assert shares[3] == pytest.approx(shares[2] * (1.0 - 2.0 / ECHOES))
+    assert shares[3] == pytest.approx(shares[2] * (1.0 - 2.0 / STRAYS_OVER_RANGES))
     assert shares[4] < shares[3]
 
 
@@ -72,7 +72,7 @@ def test_in_a_climb_too_a_range_after_a_stray_is_confirmed_by_the_one_before_it_
     ranges = 2.0 + climbed
     ranges[2] = 7.0
     shares = strays_of(ranges, -climbed)
-    assert shares[2:] == pytest.approx([0.9**k / ECHOES for k in range(4)])
+    assert shares[2:] == pytest.approx([0.9**k / STRAYS_OVER_RANGES for k in range(4)])
 
 
 def test_what_confirms_grows_with_the_range():
@@ -84,7 +84,7 @@ def test_what_confirms_grows_with_the_range():
 
 def test_a_step_of_the_ground_is_one_stray():
     shares = strays_of([2.0] * 10 + [0.8] * 10)
-    assert shares[10] == pytest.approx(1.0 / ECHOES)
+    assert shares[10] == pytest.approx(1.0 / STRAYS_OVER_RANGES)
     assert np.all(np.diff(shares[10:]) < 0.0)
 
 

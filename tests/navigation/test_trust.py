@@ -16,12 +16,12 @@ from flownav.navigation.records import EchoMemory, FlowMemory, NoiseMemory, Whit
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import NO_HEADING, Equipment
 from flownav.navigation.trust import (
+    FACTOR_PACE,
     LARGEST_FACTOR,
     LARGEST_NOISE,
     LIKENESS_ALLOWED,
     OF_BARO,
     OF_RANGE,
-    PACE,
     SMALLEST_NOISE,
     SMALLEST_OF_BARO,
     accel_factors,
@@ -110,7 +110,7 @@ def test_white_innovations_do_not_raise_it_however_large():
 
 def test_it_falls_by_what_is_allowed_where_nothing_is_alike_and_never_below_one():
     assert factors([1.0, 0.0, 0.0, 0.0, 0.0], start=10.0)[-1] == pytest.approx(
-        10.0 * math.exp(-PACE * LIKENESS_ALLOWED * 2.0)
+        10.0 * math.exp(-FACTOR_PACE * LIKENESS_ALLOWED * 2.0)
     )
     assert factors(np.zeros(4000), start=10.0)[-1] == 1.0
 

@@ -36,7 +36,7 @@ def a_place(path: Path, inputs: Iterable[Path] = (), *, force: bool, beside: Seq
 
 
 def a_place_of_several(path: Path, inputs: Iterable[Path] = (), *, force: bool) -> Path:
-    """The same of files that are all called after a path: NAME_estimate.tum, NAME_truth.tum, ... of NAME.tum.
+    """A free place for files that are all called after a path: NAME_estimate.tum, NAME_truth.tum, ... of NAME.tum.
 
     force: as of `a_place`, of each that is there.
     """
@@ -85,10 +85,10 @@ def _with_beside(path: Path, endings: Iterable[str]) -> list[Path]:
 
 
 def _is_free(path: Path) -> bool:
-    """Nothing is there, or an empty file."""
+    """Whether nothing is there, or an empty file."""
     return not os.path.lexists(path) or (path.is_file() and not path.is_symlink() and not path.stat().st_size)
 
 
 def _is_free_folder(path: Path) -> bool:
-    """Nothing is there, or an empty folder."""
+    """Whether nothing is there, or an empty folder."""
     return not os.path.lexists(path) or (path.is_dir() and not path.is_symlink() and not any(path.iterdir()))

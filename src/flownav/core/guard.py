@@ -147,7 +147,7 @@ def an_output_folder(path: Path) -> Path:
 
 @contextmanager
 def written_whole(path: Path, *, replacing: bool = False) -> Iterator[Path]:
-    """As files.written_whole, of a file that a user named.
+    """A file that a user named, written whole as by files.written_whole.
 
     replacing: whoever asks knows that what is there may go. InputError, unless replacing, where `an_output` refuses;
     OSError where the file cannot be written.
@@ -167,7 +167,7 @@ def write_page(page: str, path: Path) -> None:
 
 @contextmanager
 def folder_written_whole(path: Path) -> Iterator[Path]:
-    """As files.folder_written_whole, of a folder that a user named. InputError where it is a link."""
+    """A folder that a user named, written whole as by files.folder_written_whole. InputError where it is a link."""
     with files.folder_written_whole(an_output_folder(path)) as temporary:
         yield temporary
 

@@ -156,7 +156,7 @@ def merge(streams: Iterable[Stream]) -> EventQueue:
 
 
 def merged_parts(streams: Iterable[Stream], longest: int) -> Iterator[EventQueue]:
-    """The same queue, in parts of so many events at most, one at least: a long log's is larger than the log itself."""
+    """Parts of the queue, of so many events at most, one at least: a long log's is larger than the log itself."""
     streams = [s for s in streams if len(s)]
     firsts = np.cumsum([0, *map(len, streams)])
     order = np.argsort(np.concatenate([np.zeros(0), *(s.t_s - s.delay_s for s in streams)]), kind="stable")

@@ -49,7 +49,7 @@ def command_line() -> str:
 
 
 def command_words() -> list[str] | str:
-    """The same; of a command its words."""
+    """The words of the command, or of the call from Python."""
     return _call.get() or ["flownav", *sys.argv[1:]]
 
 

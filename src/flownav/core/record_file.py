@@ -109,7 +109,7 @@ class _Bounded(io.FileIO):
     most = MOST_DIRECTORY
 
     def read(self, size: int | None = -1, /) -> bytes:
-        """As a file's; ValueError where it is too much."""
+        """Bytes, as a file gives them; ValueError where they are too many."""
         whole = size is None or size < 0
         if self.most < 0:
             return super().read(-1 if whole else size) or b""

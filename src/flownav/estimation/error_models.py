@@ -1,4 +1,4 @@
-"""How the sensors' errors, the ground and the pad change with time: random walks and Gauss-Markov errors.
+"""How the sensors' errors, the ground and the pad change with time: random walks, Gauss-Markov errors, linear models.
 
 A random walk of w per square root of a second gains the variance w^2 dt in dt. A Gauss-Markov error of standard
 deviation sigma and time constant tau obeys x <- exp(-dt/tau) x and gains sigma^2 (1 - exp(-2 dt/tau)), which keeps it
@@ -10,6 +10,9 @@ together, later, for as long as no law has read them in between.
 from __future__ import annotations
 
 from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from flownav.core.compile import Lanes, Work, equation, exp, procedure, squared
 from flownav.estimation.covariance import add_noise, decay
@@ -99,3 +102,28 @@ def forget(work: Work, lanes: Lanes, n: int, state: int, sigma: float, factor: f
     """x <- factor x, factor = exp(-dt/tau), with the noise that keeps its standard deviation at sigma."""
     decay(work, lanes, n, state, factor)
     add_noise(work, lanes, state, sigma * sigma * (1.0 - factor * factor))
+
+
+Array = NDArray[np.float64]
+TAYLOR_ORDER = 12
+
+
+def discretised(a: Array, b: Array, dt_s: float) -> tuple[Array, Array]:
+    """Transition (n, n) and input matrix (n, m) of x' = A x + B u over dt: the exponential of [[A, B], [0, 0]] dt.
+
+    Scaling and squaring of the Taylor series, exact to rounding for moderate norms (scipy's expm is the oracle
+    in the tests; its import costs more than a whole flight).
+    """
+    n, inputs = b.shape
+    generator = np.zeros((n + inputs, n + inputs))
+    generator[:n, :n], generator[:n, n:] = a * dt_s, b * dt_s
+    norm = float(np.abs(generator).sum(axis=1).max())
+    squarings = max(0, int(np.ceil(np.log2(norm))) + 4) if norm > 0.0 else 0
+    step = generator / 2.0**squarings
+    term = result = np.eye(n + inputs)
+    for order in range(1, TAYLOR_ORDER + 1):
+        term = term @ step / order
+        result = result + term
+    for _ in range(squarings):
+        result = result @ result
+    return np.ascontiguousarray(result[:n, :n]), np.ascontiguousarray(result[:n, n:])

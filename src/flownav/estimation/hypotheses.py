@@ -142,7 +142,7 @@ def sign(work: Work, lanes: Lanes, fault: int, lane: int, value: float, share: f
 
 @equation
 def sign_all(work: Work, lanes: Lanes, fault: int, value: float) -> None:
-    """The same in every lane."""
+    """Write a fault's effect on an observation in every lane."""
     for lane in range(len(lanes)):
         sign(work, lanes, fault, lane, value)
 

@@ -15,8 +15,7 @@ import numpy as np
 from flownav.core.compile import Lanes, Work, cos, cosh, equation, exp, procedure, sin, sinh
 from flownav.core.frames import Rotation
 from flownav.estimation.covariance import columns_of
-from flownav.estimation.discretise import discretised
-from flownav.estimation.error_models import FilterSettings
+from flownav.estimation.error_models import FilterSettings, discretised
 from flownav.estimation.law import step
 from flownav.estimation.laws.geometry import along_axis, cross, lens_range
 from flownav.estimation.motion import predict
@@ -103,7 +102,7 @@ class Seen(NamedTuple):
 
 
 class LagLens(NamedTuple):
-    """Of `FlowLag`: the floor of the sensor's own sonar, the lens's depth, and its lever from the IMU, body FRD [m]."""
+    """The lens of a `FlowLag`: the floor of the sensor's own sonar, its depth, its lever from the IMU, body FRD [m]."""
 
     sonar_floor_m: float
     lens_below_m: float

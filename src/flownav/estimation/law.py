@@ -91,7 +91,7 @@ class Parameter(NamedTuple):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of its numbers."""
+        """Names of its numbers."""
         return (self.name,) if self.record is None else tuple(self.record._fields)
 
     def given(self, value: Callable[[str], str]) -> str:
@@ -117,7 +117,7 @@ class Signature(NamedTuple):
 
     @property
     def names(self) -> list[str]:
-        """Of the scalars that it reads."""
+        """Names of the scalars that it reads."""
         return [name for parameter in self.reads for name in parameter.names]
 
     @property
@@ -137,7 +137,7 @@ class Signature(NamedTuple):
         return dressed(found, self.function, self._defaults())
 
     def _defaults(self) -> tuple[float, ...]:
-        """Of the scalars that a caller may leave out, which are the last."""
+        """Values of the scalars that a caller may leave out, which are the last."""
         known: dict[str, float] = dict(self.function.__kwdefaults__ or {})
         for parameter in self.passed:
             known |= {} if parameter.record is None else parameter.record._field_defaults

@@ -18,10 +18,10 @@ from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import load_start
 from flownav.navigation.rows import EventRow
+from flownav.navigation.spikes import Witness
 from flownav.navigation.tables import written_on
 from flownav.navigation.tape import COMPONENTS, GPS_RESET, START, empty_tape
 from flownav.navigation.told import Equipment
-from flownav.navigation.witnessed import Witness
 from flownav.sensors.identified import UNTURNED, in_vehicle_axes
 
 BATCH = 64  # readings at a time, 6 ms of them

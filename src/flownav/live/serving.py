@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from flownav.core.measurement import Sensor
 from flownav.estimation.gating import Reason
+from flownav.navigation.reasons import HORIZONTAL, REFUSALS
 from flownav.navigation.rows import InnovationRow
-from flownav.navigation.serving import HORIZONTAL, REFUSALS
 
 WATCHED = (*HORIZONTAL, Sensor.RANGE)
 DOWNWARD = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE)  # on the ground they need not serve

@@ -28,8 +28,8 @@ from flownav.mavlink.messages import CONVERTERS
 from flownav.mavlink.outgoing import Estimate
 from flownav.mavlink.state_messages import TrueState, hil_state_quaternion, sim_state
 from flownav.navigation.feed import SLOWEST_IMU_HZ
+from flownav.navigation.reasons import HORIZONTAL
 from flownav.navigation.rows import InnovationRow
-from flownav.navigation.serving import HORIZONTAL
 
 SECOND = 1.0
 SEND_EVERY_S = 0.02  # without flow; with it, an estimate for each of its readings

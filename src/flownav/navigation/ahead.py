@@ -26,7 +26,7 @@ from flownav.navigation.inertial import Motion, motion_between, remembered
 from flownav.navigation.memory import CLOCK, MEMORY, load_imu
 from flownav.navigation.packed import load_equipment, load_imu_settings
 
-AHEAD = 13  # position NED [m], velocity NED [m/s], quaternion body to earth, body rate [rad/s]
+AHEAD_NUMBERS = 13  # position NED [m], velocity NED [m/s], quaternion body to earth, body rate [rad/s]
 
 _strapdown = compiled(strapdown.law)
 
@@ -87,7 +87,7 @@ def coasted(s: Carried, dt_s: float) -> Carried:
 
 @kernel
 def ahead(work: Array, settings: Array, imu: Array, t_s: float, out: Array) -> None:
-    """out (AHEAD,): the state of one lane at t_s. settings: packed.
+    """out (AHEAD_NUMBERS,): the state of one lane at t_s. settings: packed.
 
     imu (n, 7): time and reading of those later than the filter's clock, in order. After the last of them, the last
     stands. The body rate is 0 where no IMU serves.
@@ -120,7 +120,7 @@ def ahead(work: Array, settings: Array, imu: Array, t_s: float, out: Array) -> N
 
 def state_at(work: Array, settings: Array, imu: Array, t_s: float) -> Array:
     """`ahead` into a new array."""
-    out = np.empty(AHEAD)
+    out = np.empty(AHEAD_NUMBERS)
     ahead(work, settings, imu, t_s, out)
     return out
 

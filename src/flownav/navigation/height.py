@@ -57,12 +57,12 @@ AGREEMENT_M, AGREEMENT_SHARE = 0.2, 0.05  # ranges of one ground agree so far
 LEAST_AGREEING = 3.0
 STILL_S = 1.0  # a range that repeats itself so long while a ground is sought is of a vehicle that stands
 ECHO_M, ECHO_SHARE = 0.1, 0.03  # neighbouring ranges of one ground differ by no more
-ECHOES = 20.0  # ranges over which strays are counted
+STRAYS_OVER_RANGES = 20.0  # ranges over which strays are counted
 MANY_STRAYS = 0.15  # so many ranges without an echo tell nothing of the ground's level, or of the accelerometer
 UNSEEN_M_S = 1.0  # a range that repeats itself may hide this climb or descent
 LONGEST_REPEAT_S = 2.0  # nobody hovers so still for longer: a sensor out of its reach says the same for ever
 SERVED_S = 1.0  # before it began to repeat itself, that a range was fused
-ALONE = 5.0  # times the travel, where nothing else tells the height
+UNAIDED_TRAVEL_RATIO = 5.0  # times the travel, where nothing else tells the height
 
 
 with_value = replacing(RangeMemory, "last_m", "same_s", "down_m")
@@ -100,7 +100,7 @@ def repeats(t_s: float, m: RangeMemory, height: Height, alone: bool, s: HeightSe
     drift = 3.0 * height.speed_sigma_m_s * lasting_s
     served = m.taken_s >= m.same_s - SERVED_S
     told = s.range_stuck_travel_m if served and lasting_s < LONGEST_REPEAT_S else 0.0
-    least = ALONE * s.range_stuck_travel_m + drift if alone else told
+    least = UNAIDED_TRAVEL_RATIO * s.range_stuck_travel_m + drift if alone else told
     return lasting_s >= s.range_stuck_s and travelled >= least
 
 
@@ -132,7 +132,7 @@ def followed_echo(range_m: float, down_m: float, m: EchoMemory) -> EchoMemory:
     newest = smaller(abs(range_m - m.newest_m), abs(range_m - m.newest_m + down_m - m.newest_down_m))
     older = smaller(abs(range_m - m.older_m), abs(range_m - m.older_m + down_m - m.older_down_m))
     strays = newest > near and older > near  # false of the first
-    stray = m.stray + (1.0 - m.stray) / ECHOES if strays else m.stray * (1.0 - 2.0 / ECHOES)
+    stray = m.stray + (1.0 - m.stray) / STRAYS_OVER_RANGES if strays else m.stray * (1.0 - 2.0 / STRAYS_OVER_RANGES)
     return EchoMemory(range_m, down_m, m.newest_m, m.newest_down_m, stray)
 
 

@@ -25,7 +25,7 @@ from flownav.navigation.told import (
     carries_lag,
 )
 
-STATED = 3  # variances that a reading carries
+STATED_VARIANCES = 3  # variances that a reading carries
 
 
 class Running(NamedTuple):
@@ -98,11 +98,11 @@ def put_reading(
     """A queue's row as the reading at hand of one lane."""
     for i in range(MAX_VALUES):
         work[READING + i] = value[i]
-    for i in range(STATED):
+    for i in range(STATED_VARIANCES):
         work[READING + MAX_VALUES + i] = variance[i]
-    work[READING + MAX_VALUES + STATED] = quality
-    work[READING + MAX_VALUES + STATED + 1] = arrived
-    work[READING + MAX_VALUES + STATED + 2] = withheld
+    work[READING + MAX_VALUES + STATED_VARIANCES] = quality
+    work[READING + MAX_VALUES + STATED_VARIANCES + 1] = arrived
+    work[READING + MAX_VALUES + STATED_VARIANCES + 2] = withheld
 
 
-assert Reading._fields[MAX_VALUES + STATED :] == ("quality", "arrived", "withheld")
+assert Reading._fields[MAX_VALUES + STATED_VARIANCES :] == ("quality", "arrived", "withheld")

@@ -104,14 +104,14 @@ PROTECTION = MEMORY.keep(Levels)  # horizontal and vertical
 SUSPECTED = MEMORY.row(SuspicionMemory, "suspected")
 # shared by all lanes (kept in the first)
 CLOCK = MEMORY.take(1)  # the instant that the filter has reached [s]
-WRITTEN = MEMORY.take(1)  # the last estimate's [s]
+LAST_ESTIMATE = MEMORY.take(1)  # the last estimate's [s]
 ERRORS_CLOCK = MEMORY.take(1)  # the instant that the Gauss-Markov errors have reached [s]
 STILL_CLOCK = MEMORY.take(1)  # the end of the last window [s]
 DRIFT_SINCE = MEMORY.take(1)  # from when a drift of GPS is sought [s]
 LEVEL_READ = MEMORY.take(1)  # when an external attitude was last taken for level [s]
-LAST = MEMORY.take(max(Sensor) + 1)  # of each sensor, the newest instant [s]
+NEWEST_OF_SENSOR = MEMORY.take(max(Sensor) + 1)  # of each sensor, the newest instant [s]
 OWN_ROWS = 512
-OWN = MEMORY.take(OWN_ROWS)  # the memory of a filter of somebody else's in the navigator's place (`parts.equations`)
+OWN_FILTER = MEMORY.take(OWN_ROWS)  # of somebody else's filter in the navigator's place (`parts.equations`)
 WORK_ROWS = MEMORY.next
 
 load_reading, store_reading = MEMORY.access(Reading)
@@ -136,10 +136,10 @@ _FRESH: dict[int, tuple[float, ...]] = {
     SHARE: (1.0,) * MOST_HYPOTHESES,
     DRIFT_SINCE: (-np.inf,),
     CLOCK: (-np.inf,),
-    WRITTEN: (-np.inf,),
+    LAST_ESTIMATE: (-np.inf,),
     ERRORS_CLOCK: (-np.inf,),
     LEVEL_READ: (-np.inf,),
-    LAST: (-np.inf,) * (max(Sensor) + 1),
+    NEWEST_OF_SENSOR: (-np.inf,) * (max(Sensor) + 1),
 }
 
 

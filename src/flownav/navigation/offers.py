@@ -11,7 +11,7 @@ from flownav.core.measurement import Sensor
 from flownav.estimation.covariance import expect, settle, states_of
 from flownav.estimation.hypotheses import weigh
 from flownav.navigation.journal import note_correction
-from flownav.navigation.memory import CLOCK, LAST, share, shared
+from flownav.navigation.memory import CLOCK, NEWEST_OF_SENSOR, share, shared
 from flownav.navigation.reasons import (
     DUPLICATE,
     FUSED,
@@ -26,7 +26,7 @@ from flownav.navigation.told import AidSettings
 from flownav.navigation.verdicts import Accepted, Event, Fate, Noise, Observation, Offered, Tested, on_lanes
 
 CLOCK_SLACK_S = 1e-6
-COLOR = 4.0  # so many readings after one another err alike
+LIKE_READINGS = 4.0  # so many readings after one another err alike
 FEW_STRAYS = 0.02  # so few ranges that no neighbour confirms are none
 STRAY_SHARE = 1.5  # some strays confirm each other
 STRAY_SPAN_M = 5.0
@@ -46,7 +46,7 @@ class LeftBehind(NamedTuple):
 
 @on_lanes
 def leave_behind(reading: Reading, *, reason: int) -> LeftBehind:
-    """Nothing of the reading but that it came, and why it is not taken."""
+    """Note of a reading only that it came and why it is not taken."""
     return LeftBehind(Fate(reason if reading.arrived > 0.0 else SILENT), Observation(reading.value_0), Noise(np.nan))
 
 
@@ -59,12 +59,12 @@ def too_old(work: Work, lanes: Lanes, t_s: float, sensor: int, o: Output) -> boo
     reason = FUSED
     if not np.isfinite(t_s):
         reason = NOT_FINITE
-    elif t_s <= shared(work, lanes, LAST + sensor):
+    elif t_s <= shared(work, lanes, NEWEST_OF_SENSOR + sensor):
         reason = DUPLICATE
     elif t_s < shared(work, lanes, CLOCK) - CLOCK_SLACK_S:
         reason = LATE
     if reason == FUSED:
-        share(work, lanes, LAST + sensor, t_s)
+        share(work, lanes, NEWEST_OF_SENSOR + sensor, t_s)
         return False
     if sensor != Sensor.IMU:
         leave_behind(work, lanes, reason)
@@ -107,7 +107,7 @@ def fuse_offered(work: Work, lanes: Lanes, gate_sigma: float, o: Output) -> None
     offer_what_is_sound(work, lanes)
     expect(work, lanes, states_of(lanes), o.room[1] > 0)
     settle(work, lanes, states_of(lanes), gate_sigma)
-    weigh(work, lanes, states_of(lanes), COLOR)
+    weigh(work, lanes, states_of(lanes), LIKE_READINGS)
     note_refusal(work, lanes)
     if len(lanes) == 1:
         note_correction(work, lanes, o)

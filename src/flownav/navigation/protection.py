@@ -57,14 +57,14 @@ from flownav.navigation.records import FlowSignMemory, Levels, SuspicionMemory
 from flownav.navigation.rows import position_variance
 from flownav.navigation.tape import FAULT_CLEARED, FAULT_SUSPECTED, Output, write_event
 
-SIGMAS = 4.0  # of the filter's own error, where nothing fails
+OWN_ERROR_SIGMAS = 4.0  # of the filter's own error, where nothing fails
 SIGMAS_BESIDE = 2.0  # of it, beside a fault
 SIZE_SIGMAS = 2.2  # of a fault's size
 MEMORY_S = 20.0  # of what was told of faults
-EXCLUDED = 8.0  # standard deviations from a fault that is there or is not
-PUZZLING = 9.0  # evidence for a fault that is there or is not, after which it may be there for long
+EXCLUDED_SIGMAS = 8.0  # standard deviations from a fault that is there or is not
+PUZZLING_EVIDENCE = 9.0  # evidence for a fault that is there or is not, after which it may be there for long
 DRIFT_S = 20.0  # a drift of GPS is sought from the start of such a window
-SUSPECT, CLEAR = 24.0, 5.0  # evidence that says so, and that says so no more
+SUSPECT_EVIDENCE, CLEAR_EVIDENCE = 24.0, 5.0  # evidence that says so, and that says so no more
 load_position, _ = MEMORY.access(PositionNed)
 load_velocity, _ = MEMORY.access(VelocityNed)
 with_x, with_y = replacing(FlowSignMemory, "read_x"), replacing(FlowSignMemory, "read_y")
@@ -97,7 +97,7 @@ def least_size(fault: int) -> float:
 # -- what a unit of each fault adds to a reading --------------------------------------------------------------
 @procedure
 def sign_flow(work: Work, lanes: Lanes, t_s: float, component: int, angular: bool) -> None:
-    """Of a component of flow [rad/s] or of body velocity [m/s]: a share of it, the other channel, older motion.
+    """Effects of faults on a component of flow [rad/s] or body velocity [m/s]: a share, other channel, older motion.
 
     Of what the sensor itself reads: an angular rate still holds the vehicle's turning. That is taken from the reading
     before, so that the gyro's noise, which is in the innovation too, does not pass for a fault (an instrumental
@@ -186,7 +186,7 @@ def leave_over(work: Work, lanes: Lanes, lane: int, fault: int) -> None:
 
 @procedure
 def sign_drift(work: Work, lanes: Lanes, t_s: float, axis: int) -> None:
-    """Of an axis of a GPS position: the time since the drift began."""
+    """Effect of a fault on an axis of a GPS position: the time since the drift began."""
     since_s = shared(work, lanes, DRIFT_SINCE)
     if t_s - since_s > DRIFT_S:
         share(work, lanes, DRIFT_SINCE, t_s)
@@ -209,7 +209,7 @@ def levels(work: Work, lanes: Lanes, lane: int) -> Levels:
         covariance_of(work, lanes, POSITION, POSITION + 1, lane) + north_m * east_m,
     )
     down_m = np.sqrt(larger(position_variance(work, lanes, 2, lane), 0.0))
-    horizontal_m, vertical_m = SIGMAS * own_m, SIGMAS * down_m
+    horizontal_m, vertical_m = OWN_ERROR_SIGMAS * own_m, OWN_ERROR_SIGMAS * down_m
     for k in range(followed(work, lanes)):
         largest = largest_size(k, size_in(work, lanes, k, lane))
         down = effect_of(work, lanes, states_of(lanes), k, POSITION + 2, lane)
@@ -236,7 +236,7 @@ def exclude(work: Work, lanes: Lanes, lane: int, fault: int) -> None:
     sought from now on. What it may have done until it was excluded, had it begun in between, is remembered.
     """
     found = size_in(work, lanes, fault, lane)
-    if 1.0 - found.size > EXCLUDED * found.sigma:
+    if 1.0 - found.size > EXCLUDED_SIGMAS * found.sigma:
         leave_over(work, lanes, lane, fault)
         begin_lane_anew(work, lanes, states_of(lanes), fault, lane)
 
@@ -246,8 +246,8 @@ def judge_suspicion(
     m: SuspicionMemory, worst: float, which: int, puzzled: bool, travel_m: float, kept: float, t_s: float
 ) -> SuspicionMemory:
     """What is suspected, by the evidence of the worst fault; what was left over fades, and grows while flow puzzles."""
-    suspects = m.suspected == 0.0 and worst > SUSPECT
-    clears = m.suspected > 0.0 and worst < CLEAR and t_s - m.suspected_s > HELD_S
+    suspects = m.suspected == 0.0 and worst > SUSPECT_EVIDENCE
+    clears = m.suspected > 0.0 and worst < CLEAR_EVIDENCE and t_s - m.suspected_s > HELD_S
     puzzled_s = t_s if puzzled else m.puzzled_s
     left_over_m = m.left_over_m * kept
     return SuspicionMemory(
@@ -275,7 +275,7 @@ def mind_faults(work: Work, lanes: Lanes, t_s: float, dt_s: float, o: Output) ->
             worst_flow = larger(worst_flow, found.evidence if k >= FLOW_SWAPPED else 0.0)
         before = load_suspicion(work, lanes, lane)
         unheld = not held_by_gps(work, lanes, lane, t_s)
-        puzzled = worst_flow > PUZZLING or (unheld and load_flow(work, lanes, lane).doubted > 0.0)
+        puzzled = worst_flow > PUZZLING_EVIDENCE or (unheld and load_flow(work, lanes, lane).doubted > 0.0)
         speed_m_s = load_sign(work, lanes, lane).speed_m_s
         after = judge_suspicion(before, worst, which, puzzled, 2.0 * dt_s * speed_m_s, kept, t_s)
         store_suspicion(work, lanes, lane, after)

@@ -1,5 +1,5 @@
 """The reasons for refusing a component, as kernels write them (`estimation.gating.Reason` in plain numbers), and the
-checks that all sensors have in common.
+checks that all sensors have in common; what it means that a sensor speaks and does not serve.
 """
 
 from __future__ import annotations
@@ -7,6 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from flownav.core.compile import equation
+from flownav.core.measurement import Sensor
 from flownav.estimation.gating import Reason
 from flownav.navigation.records import Reading
 
@@ -43,3 +44,8 @@ def usable(reading: Reading, value: float, variance: float, started: float) -> i
 def usable_in_flight(reading: Reading, value: float, variance: float, started: float) -> int:
     """What `usable` says, of a sensor of which nothing is said before the start."""
     return SILENT if started == 0.0 else usable(reading, value, variance, started)
+
+
+HORIZONTAL = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.POSE)
+# A reading that knows nothing, or that another serves for, is no alarm; these are.
+REFUSALS = (Reason.INNOVATION_GATE, Reason.NOT_FINITE, Reason.DUPLICATE, Reason.LATE, Reason.STUCK, Reason.AHEAD)

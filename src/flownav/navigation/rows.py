@@ -122,7 +122,7 @@ def innovation_row(
 # -- the estimate ------------------------------------------------------------------------------------------
 @equation
 def position_variance(work: Work, lanes: Lanes, axis: int, lane: int) -> float:
-    """Of position [m2]; level, with what a flow scale that nothing tells makes of the way from the start."""
+    """Variance of position [m2]; level, with what a flow scale that nothing tells makes of the way from the start."""
     unknown_m = work[SCALE_DOUBT * len(lanes) + lane] * work[(STATE + POSITION + axis) * len(lanes) + lane]
     return variance_of(work, lanes, POSITION + axis, lane) + (unknown_m * unknown_m if axis < 2 else 0.0)
 
@@ -136,14 +136,14 @@ def position_deviation(work: Work, lanes: Lanes, axis: int, lane: int) -> float:
 
 @equation
 def tilt_deviation(work: Work, lanes: Lanes, axis: int, lane: int) -> float:
-    """Of the attitude about an axis of the earth [rad]."""
+    """Standard deviation of the attitude about an axis of the earth [rad]."""
     deviation: float = np.sqrt(variance_of(work, lanes, ATTITUDE + axis, lane))
     return deviation
 
 
 @equation
 def deviation_of(work: Work, lanes: Lanes, state: int, lane: int) -> float:
-    """Of a state, 0 where rounding has left its variance below that."""
+    """Standard deviation of a state, 0 where rounding has left its variance below that."""
     deviation: float = np.sqrt(max(variance_of(work, lanes, state, lane), 0.0))
     return deviation
 
@@ -161,7 +161,7 @@ def body_velocity_variance(work: Work, lanes: Lanes, lane: int, north: float, ea
 
 @equation
 def body_velocity_deviations(work: Work, lanes: Lanes, lane: int, rotation: Rotation) -> Vector:
-    """Of the velocity along the body's axes [m/s]; rotation: body to earth."""
+    """Standard deviations of the velocity along the body's axes [m/s]; rotation: body to earth."""
     return (
         np.sqrt(body_velocity_variance(work, lanes, lane, rotation[0], rotation[3], rotation[6])),
         np.sqrt(body_velocity_variance(work, lanes, lane, rotation[1], rotation[4], rotation[7])),

@@ -27,8 +27,8 @@ from flownav.sensors.sheets import SensorSheets
 
 ABOVE_FLOOR_M = 0.01  # a rangefinder that reads its floor says only that there is no more
 LEAST_SHARE = 0.05  # of a stated accuracy, where the sheet says what changes from fix to fix
-SURE = 3.0  # standard deviations that a limit of a bias leaves room for
-ALLOWED = 2.0  # times the stated vibration; what is beyond it, the sheet does not know
+BIAS_LIMIT_SIGMAS = 3.0  # standard deviations that a limit of a bias leaves room for
+VIBRATION_MARGIN = 2.0  # times the stated vibration; what is beyond it, the sheet does not know
 AIDED_HZ = 2.0  # slower motion is held by what aids the IMU
 WASH_LASTS_S = 3.0
 CLIMB_M_S = 1.0  # by how much a lag errs, in a descent at this speed
@@ -159,9 +159,9 @@ def of_inertial(sheet: InertialSheet, rotor_hz: tuple[float, float] | None = Non
         "gyro_walk_rad_s_rt_s": math.radians(gyro.walk_deg_s_rts),
         "accel_bias_sigma_m_s2": max(accel_bias, 1e-4),
         "gyro_bias_sigma_rad_s": max(gyro_bias, 1e-6),
-        "accel_bias_limit_m_s2": max(float(usual.accel_bias_limit_m_s2), SURE * accel_bias),
-        "gyro_bias_limit_rad_s": max(float(usual.gyro_bias_limit_rad_s), SURE * gyro_bias),
-        "vibration_free_m_s2": max(float(usual.vibration_free_m_s2), ALLOWED * jumping_m_s2),
+        "accel_bias_limit_m_s2": max(float(usual.accel_bias_limit_m_s2), BIAS_LIMIT_SIGMAS * accel_bias),
+        "gyro_bias_limit_rad_s": max(float(usual.gyro_bias_limit_rad_s), BIAS_LIMIT_SIGMAS * gyro_bias),
+        "vibration_free_m_s2": max(float(usual.vibration_free_m_s2), VIBRATION_MARGIN * jumping_m_s2),
         "imu_integrates": 1.0,
     }
 

@@ -1,8 +1,8 @@
 """The best estimate after the flight: the navigator's run smoothed backwards over all of its readings.
 
 The run is deterministic and all it knows lies in its lane buffer, so it is not kept but repeated: forward once with a
-copy of that buffer every CHUNK events, then, from the last chunk to the first, forward again with a journal and
-backward through that. Memory is a copy a chunk, one chunk's journal, and the result.
+copy of that buffer every EVENTS_AT_ONCE events, then, from the last chunk to the first, forward again with a journal
+and backward through that. Memory is a copy a chunk, one chunk's journal, and the result.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ from flownav.navigation.tape import (
 )
 from flownav.navigation.told import carries_lag
 
-CHUNK = 2048  # events
+EVENTS_AT_ONCE = 2048  # events
 
 
 class Mark(NamedTuple):
@@ -69,7 +69,7 @@ class Backward(NamedTuple):
     matrix: Array
 
 
-def smooth(queue: EventQueue, running: Running, chunk: int = CHUNK) -> Array:
+def smooth(queue: EventQueue, running: Running, chunk: int = EVENTS_AT_ONCE) -> Array:
     """Run a navigator that has heard nothing through a queue; its estimates smoothed, (n, ESTIMATE_COLUMNS).
 
     The rows are those of the tape's estimate, at the same instants. No state is merely considered in this run: what

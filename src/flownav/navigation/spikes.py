@@ -3,6 +3,7 @@
 A jump is a spike where it is larger than turning and shaking can make it from one reading to the next. What stays away
 for longer than a burst lasts is believed: then the vehicle was hit, and by how much the velocity may have changed
 meanwhile is added to its doubt, so that flow and GPS find it anew. An IMU that reads nothing but zeros has failed.
+A `Witness` judges so beside the filter: for the flow's turning, and for the carrying to now.
 """
 
 from __future__ import annotations
@@ -10,29 +11,32 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from flownav.core.compile import equation, larger, smaller
+from flownav.core.compile import ONE_LANE, equation, kernel, larger, pointer, smaller
+from flownav.core.measurement import Array
 from flownav.estimation.states import ATTITUDE, VELOCITY
 from flownav.navigation.inertial import sound
-from flownav.navigation.memory import MEMORY, READING
+from flownav.navigation.memory import MEMORY, READING, load_imu, load_spike, new_work, store_imu, store_spike
 from flownav.navigation.motion_records import ImuMemory, SpikeMemory
 from flownav.navigation.records import Reading, StartMemory
 from flownav.navigation.tape import IMU_SPIKE
 from flownav.navigation.verdicts import Doubt, Event, on_lanes
+from flownav.navigation.vibration import with_reading
 
 GYRO_JUMP_RAD_S, TURNING_RAD_S2 = 1.0, 200.0  # what a small vehicle does at once, and in the time between
 ACCEL_JUMP_M_S2, SHAKING_M_S3 = 10.0, 1000.0
-TIMES = 6.0  # the usual jump
-USUAL = 50.0  # readings over which that is followed
-SLOWER = 3.0  # times, in a burst: it must not make itself usual
+SPIKE_RATIO = 6.0  # the usual jump
+USUAL_JUMP_READINGS = 50.0  # readings over which that is followed
+BURST_SLOWNESS = 3.0  # times, in a burst: it must not make itself usual
 LONGEST_S = 0.1  # after a gap no jump is a spike
-MOST = 3.0  # in a row, of a vehicle that shakes, where what the next reading says again is believed
+MOST_REFUSED = 3.0  # in a row, of a vehicle that shakes, where what the next reading says again is believed
 CALM_RAD_S, CALM_M_S2 = 0.3, 1.5  # usual jumps of one that does not: there a burst is told from what happens
 BURST_S = 0.3  # spikes that last longer are what happened
-BACK = 0.5  # of the possible jump: so near a reading must come to what was before the burst, to end it
+RETURN_SHARE = 0.5  # of the possible jump: so near a reading must come to what was before the burst, to end it
 MOST_DOUBT_M_S = 1.0  # what a burst that was none may have done to the velocity
 MOST_DOUBT_RAD = 0.2  # and to the attitude
-LONE = 0.3  # of that, for one reading alone: a hard touchdown, at a low rate
+LONE_SHARE = 0.3  # of that, for one reading alone: a hard touchdown, at a low rate
 
 
 @equation
@@ -60,20 +64,20 @@ def judge_spike(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -
     """
     gyro = distance(reading.value_0 - m.gyro_x, reading.value_1 - m.gyro_y, reading.value_2 - m.gyro_z)
     accel = distance(reading.value_3 - m.accel_x, reading.value_4 - m.accel_y, reading.value_5 - m.accel_z)
-    calm = (s.gyro_rad_s < CALM_RAD_S and s.accel_m_s2 < CALM_M_S2) or s.refused > MOST
+    calm = (s.gyro_rad_s < CALM_RAD_S and s.accel_m_s2 < CALM_M_S2) or s.refused > MOST_REFUSED
     burst = calm and s.refused > 0.0 and step_s <= BURST_S
     reach_s = s.reach_s if burst else step_s
-    most_gyro = GYRO_JUMP_RAD_S + TURNING_RAD_S2 * reach_s + TIMES * s.gyro_rad_s
-    most_accel = ACCEL_JUMP_M_S2 + SHAKING_M_S3 * reach_s + TIMES * s.accel_m_s2
-    back = BACK if burst else 1.0
+    most_gyro = GYRO_JUMP_RAD_S + TURNING_RAD_S2 * reach_s + SPIKE_RATIO * s.gyro_rad_s
+    most_accel = ACCEL_JUMP_M_S2 + SHAKING_M_S3 * reach_s + SPIKE_RATIO * s.accel_m_s2
+    back = RETURN_SHARE if burst else 1.0
     jumps = gyro > back * most_gyro or accel > back * most_accel
     comparable = burst or step_s <= LONGEST_S
     gyro_next = distance(reading.value_0 - s.gyro_x, reading.value_1 - s.gyro_y, reading.value_2 - s.gyro_z)
     accel_next = distance(reading.value_3 - s.accel_x, reading.value_4 - s.accel_y, reading.value_5 - s.accel_z)
     again = s.refused > 0.0 and gyro_next < 0.5 * most_gyro and accel_next < 0.5 * most_accel
-    confirmed = not calm and (again or s.refused >= MOST)
+    confirmed = not calm and (again or s.refused >= MOST_REFUSED)
     spike = (jumps and comparable and not confirmed) or is_dead(reading)
-    share = 1.0 / (SLOWER * USUAL if spike else USUAL)
+    share = 1.0 / (BURST_SLOWNESS * USUAL_JUMP_READINGS if spike else USUAL_JUMP_READINGS)
     gyro_usual = s.gyro_rad_s + share * (smaller(gyro_next, most_gyro) - s.gyro_rad_s)
     accel_usual = s.accel_m_s2 + share * (smaller(accel_next, most_accel) - s.accel_m_s2)
     return spike, SpikeMemory(
@@ -90,7 +94,7 @@ def doubt_of(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -> f
     """The velocity's variance [m2/s2] that one spike more of a burst adds, an axis.
 
     In all that of what the readings say beyond the one that was kept, over the time since, up to MOST_DOUBT_M_S; for a
-    spike that is alone LONE of it.
+    spike that is alone LONE_SHARE of it.
     """
     accel = distance(reading.value_3 - m.accel_x, reading.value_4 - m.accel_y, reading.value_5 - m.accel_z)
     return grown(accel, step_s, MOST_DOUBT_M_S, s)
@@ -98,16 +102,16 @@ def doubt_of(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -> f
 
 @equation
 def turning_doubt_of(reading: Reading, step_s: float, m: ImuMemory, s: SpikeMemory) -> float:
-    """The same of the attitude [rad2], of what the gyro says."""
+    """Variance that a hit adds to the attitude [rad2], of what the gyro says."""
     gyro = distance(reading.value_0 - m.gyro_x, reading.value_1 - m.gyro_y, reading.value_2 - m.gyro_z)
     return grown(gyro, step_s, MOST_DOUBT_RAD, s)
 
 
 @equation
 def grown(rate: float, step_s: float, most: float, s: SpikeMemory) -> float:
-    """How much the square of rate times time has grown with the newest step of a burst; of the first, LONE."""
-    now = smaller(rate * step_s, most) * (LONE if s.refused == 1.0 else 1.0)
-    before = smaller(rate * larger(step_s - s.reach_s, 0.0), most) * (LONE if s.refused == 2.0 else 1.0)
+    """How much the square of rate times time has grown with the newest step of a burst; of the first, LONE_SHARE."""
+    now = smaller(rate * step_s, most) * (LONE_SHARE if s.refused == 1.0 else 1.0)
+    before = smaller(rate * larger(step_s - s.reach_s, 0.0), most) * (LONE_SHARE if s.refused == 2.0 else 1.0)
     return now * now - before * before if s.refused > 1.0 else now * now
 
 
@@ -149,3 +153,34 @@ def drop_spikes(reading: Reading, start: StartMemory, m: ImuMemory, before: Spik
             distance(reading.value_0, reading.value_1, reading.value_2),
         ),
     )
+
+
+class Witness:
+    """The filter's judge of spikes on a memory of its own, from reading to reading."""
+
+    def __init__(self) -> None:
+        self._work = new_work(ONE_LANE)
+
+    def keeps(self, imu: Array) -> NDArray[np.bool_]:
+        """Which inertial readings are no spikes, (n,); imu (n, 7): time [s], gyro [rad/s], specific force [m/s2]."""
+        kept = np.ones(len(imu), np.bool_)
+        mark_spikes(self._work, imu, kept)
+        return kept
+
+
+@kernel
+def mark_spikes(work: Array, imu: Array, kept: NDArray[np.bool_]) -> None:
+    """False in `kept` where a reading is a spike after those before it; the first is none."""
+    rows, lanes, unstated = pointer(work), ONE_LANE, np.nan
+    for k in range(len(imu)):
+        reading = Reading(
+            imu[k, 1], imu[k, 2], imu[k, 3], imu[k, 4], imu[k, 5], imu[k, 6],
+            unstated, unstated, unstated, 255.0, 1.0, 0.0,
+        )  # fmt: skip
+        m = load_imu(rows, lanes, 0)
+        if np.isfinite(m.read_s):
+            spike, after = judge_spike(reading, imu[k, 0] - m.read_s, m, load_spike(rows, lanes, 0))
+            store_spike(rows, lanes, 0, after)
+            kept[k] = not spike
+        if kept[k]:
+            store_imu(rows, lanes, 0, with_reading(reading, imu[k, 0], m))

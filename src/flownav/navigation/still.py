@@ -120,7 +120,7 @@ class Windows(NamedTuple):
 
 @on_lanes
 def open_windows() -> Windows:
-    """Nothing has been read in the windows."""
+    """Windows in which nothing has been read."""
     return Windows(NO_READINGS, NOTHING_SEEN)
 
 

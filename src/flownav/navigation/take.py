@@ -32,7 +32,7 @@ from flownav.navigation.memory import (
     CLOCK,
     ERRORS_CLOCK,
     HEADING_SOUGHT,
-    WRITTEN,
+    LAST_ESTIMATE,
     load_step,
     share,
     shared,
@@ -94,8 +94,8 @@ def navigate(work: Work, lanes: Lanes, p: Work, o: Output, t_s: float, sensor: i
     consider_none(work, lanes)
     if running:
         note_aid_age(work, lanes, t_s, load_aid_settings(p), o)
-    if t_s - shared(work, lanes, WRITTEN) >= ESTIMATE_PERIOD_S:
-        share(work, lanes, WRITTEN, t_s)
+    if t_s - shared(work, lanes, LAST_ESTIMATE) >= ESTIMATE_PERIOD_S:
+        share(work, lanes, LAST_ESTIMATE, t_s)
         if running:
             limit_biases(work, lanes, load_imu_settings(p))
             set_levels(work, lanes)

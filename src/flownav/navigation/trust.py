@@ -22,14 +22,14 @@ BLOCK_S = 0.1
 LONGEST_BLOCK_S = 1.0  # readings further apart say nothing of each other
 FOLLOWING_BLOCKS = 10.0
 LIKENESS_ALLOWED = 0.15
-PACE = 0.2  # by how much the factor grows or shrinks in a block, per likeness beyond what is allowed
+FACTOR_PACE = 0.2  # by how much the factor grows or shrinks in a block, per likeness beyond what is allowed
 LARGEST_FACTOR = 30.0
 NOISE_TIME_S = 20.0
 SMALLEST_NOISE, LARGEST_NOISE = 0.02, 25.0  # of the variance that is said
 SMALLEST_OF_BARO = 0.1  # wash and gusts last
 # places of components whose noise is followed; GPS position and velocity have three
 OF_RANGE, OF_BARO, OF_GPS = 0, 1, 2
-STRAYS = 0.02  # a share of ranges that say nothing
+STRAY_SHARE = 0.02  # a share of ranges that say nothing
 
 with_sum = replacing(WhitenessMemory, "since_s", "total", "readings")
 with_factor = replacing(WhitenessMemory, "factor")
@@ -56,7 +56,7 @@ def block_ended(t_s: float, m: WhitenessMemory) -> tuple[float, WhitenessMemory]
 def followed_factor(t_s: float, m: WhitenessMemory) -> WhitenessMemory:
     """A new block, and the factor by how alike those before it are."""
     likeness, after = block_ended(t_s, m)
-    factor = m.factor * exp(PACE * (likeness - LIKENESS_ALLOWED))
+    factor = m.factor * exp(FACTOR_PACE * (likeness - LIKENESS_ALLOWED))
     return with_factor(after, factor=clamp(factor, 1.0, LARGEST_FACTOR))
 
 
@@ -65,7 +65,7 @@ def watch_whiteness(
     tested: Tested, echo: EchoMemory, gps: GpsMemory, m: WhitenessMemory, *, t_s: float, axis: int
 ) -> WhitenessMemory:
     """After the test of a component along body axis 0, 1 or 2: how alike its innovations are moves the factor."""
-    strays = axis == 2 and echo.stray > STRAYS
+    strays = axis == 2 and echo.stray > STRAY_SHARE
     unheld = not holds(gps, t_s)  # else a flow that is refused is what is wrong
     refused = tested.reason == INNOVATION_GATE and axis < 2 and unheld  # a refused echo is as alike as a wrong height
     counts = not strays and (tested.reason == FUSED or refused)
@@ -120,7 +120,7 @@ def follow_noise(
 ) -> NoiseMemory:
     """After the test: a component that was fused teaches its noise."""
     smallest = SMALLEST_OF_BARO if place == OF_BARO else SMALLEST_NOISE
-    strays = place == OF_RANGE and echo.stray > STRAYS
+    strays = place == OF_RANGE and echo.stray > STRAY_SHARE
     if tested.reason != FUSED or strays:
         return m
     return followed_noise(tested.innovation, tested.total, tested.variance, smallest, gate_sigma, t_s, m)

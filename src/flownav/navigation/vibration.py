@@ -26,7 +26,7 @@ DOUBT_LASTS_S = 60.0
 FREED_WALK_M_S2_RT_S = 0.02  # of a bias, for each time that the accelerometer is noisier than told
 with_doubt = replacing(ImuMemory, "doubt_m_s2")
 
-SURE = 3.0  # standard deviations that a limit leaves room for
+BIAS_LIMIT_SIGMAS = 3.0  # standard deviations that a limit leaves room for
 DOUBTED_SPEED_M_S = 1.0  # what it may have done to the velocity
 
 
@@ -115,7 +115,7 @@ def limit_biases(m: ImuMemory, start: StartMemory, factor: AccelFactors, b: Bias
     beyond = vibration_beyond(m, s)
     level = s.accel_bias_limit_m_s2 + s.vibration_bias_share * beyond
     down = s.accel_bias_limit_m_s2 + s.vibration_bias_share * larger(beyond, m.doubt_m_s2)
-    at_start = SURE * np.sqrt(start.shaken)
+    at_start = BIAS_LIMIT_SIGMAS * np.sqrt(start.shaken)
     level += (factor.level - 1.0) * s.accel_bias_limit_m_s2 + at_start
     down += (factor.down - 1.0) * s.accel_bias_limit_m_s2 + at_start
     turning = s.gyro_bias_limit_rad_s

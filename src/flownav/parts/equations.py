@@ -20,7 +20,17 @@ from flownav.core.frames import of_unit_length
 from flownav.core.measurement import Array, Sensor
 from flownav.estimation.covariance import place
 from flownav.estimation.states import ACCEL_BIAS, GROUND, GYRO_BIAS, POSITION, QUATERNION, STATE, VELOCITY
-from flownav.navigation.memory import CLOCK, GROUND_SEEN, OWN, OWN_ROWS, START, WRITTEN, load_reading, share, shared
+from flownav.navigation.memory import (
+    CLOCK,
+    GROUND_SEEN,
+    LAST_ESTIMATE,
+    OWN_FILTER,
+    OWN_ROWS,
+    START,
+    load_reading,
+    share,
+    shared,
+)
 from flownav.navigation.records import Reading as Row
 from flownav.navigation.take import UNIT_SIGNATURE
 from flownav.navigation.tape import ESTIMATE_PERIOD_S, output_of, write_estimate
@@ -103,7 +113,7 @@ class EquationFilter:
     def unit_source(self) -> Callable[..., None]:
         """The function that is compiled: `navigation.take.UNIT_SIGNATURE` and lanes."""
         step, say, initial = self.step, self.say, self.memory
-        load, store = lane_access(type(self.memory), OWN)
+        load, store = lane_access(type(self.memory), OWN_FILTER)
 
         def take_own(
             work: Work, p: Work, estimate: Work, innovation: Work, event: Work, entry: Work, state: Work,
@@ -118,8 +128,8 @@ class EquationFilter:
                 store(work, lanes, lane, after)
                 put_said(work, lanes, lane, say(after))
             share(work, lanes, CLOCK, t_s)
-            if t_s - shared(work, lanes, WRITTEN) >= ESTIMATE_PERIOD_S:
-                share(work, lanes, WRITTEN, t_s)
+            if t_s - shared(work, lanes, LAST_ESTIMATE) >= ESTIMATE_PERIOD_S:
+                share(work, lanes, LAST_ESTIMATE, t_s)
                 write_estimate(work, lanes, t_s, o)
 
         return take_own

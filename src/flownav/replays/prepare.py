@@ -19,8 +19,8 @@ from flownav.core.measurement import Array, EventQueue, Sensor, Stream, merge, m
 from flownav.logs.log import Log
 from flownav.logs.rates import attitude_rates, mean_over
 from flownav.navigation.feed import imu_serves
+from flownav.navigation.spikes import Witness
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
-from flownav.navigation.witnessed import Witness
 from flownav.sensors.identified import IdentifiedFlow, in_vehicle_axes
 
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)

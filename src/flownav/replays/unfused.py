@@ -9,8 +9,8 @@ import numpy as np
 
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.estimation.gating import Reason
+from flownav.navigation.reasons import HORIZONTAL, REFUSALS
 from flownav.navigation.rows import InnovationRow
-from flownav.navigation.serving import HORIZONTAL, REFUSALS
 from flownav.replays.sentinel import Finding
 
 LEAST_READINGS = 20

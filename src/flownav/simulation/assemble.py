@@ -15,7 +15,7 @@ from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import path_through, rounded
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
-from flownav.estimation.discretise import discretised
+from flownav.estimation.error_models import discretised
 from flownav.estimation.paper_filter import PaperModel
 from flownav.sensors.datasheet import FlowSensor, load_sensor
 from flownav.simulation.dispersion import Design, Distribution, raises_wind

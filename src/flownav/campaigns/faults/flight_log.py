@@ -9,7 +9,7 @@ import numpy as np
 from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
 from flownav.core.record import FED, Record
 from flownav.logs.log import Log
-from flownav.navigation.loop import STATED
+from flownav.navigation.loop import STATED_VARIANCES
 from flownav.simulation.assemble import Setup
 
 VALUE, VARIANCE = FED.index("value_0"), FED.index("variance_0")
@@ -46,7 +46,7 @@ def stream_of(fed: Array, sensor: Sensor, delay_s: float) -> Stream:
     mine = (fed[:, FED.index("sensor")] == sensor) & (fed[:, FED.index("arrived")] > 0.0)
     rows, width = fed[mine], len(COLUMNS[sensor])
     variance = np.full((len(rows), width), np.nan)
-    stated = min(width, STATED)
+    stated = min(width, STATED_VARIANCES)
     variance[:, :stated] = rows[:, VARIANCE : VARIANCE + stated]
     return Stream.of(
         sensor,

@@ -167,7 +167,7 @@ class Simulator:
             raise NoDeviceError("the simulator is asked for by NUMBA_ENABLE_CUDASIM=1")
 
     def free_bytes(self) -> int:
-        """As much as needed: few flights are simulated."""
+        """More than is needed: few flights are simulated."""
         return SIMULATED_BYTES
 
     def put(self, value: Any) -> Any:

@@ -1,7 +1,7 @@
 """From frames, rates and range to flow, velocity and quality: what the PX4FLOW does after the matching.
 
 `flow_of_frames` is the whole sensor for a user's own pictures. The parts are functions of arrays, one value a
-frame pair, which `rig/` uses too.
+frame pair, which `lab/rig/` uses too.
 """
 
 from __future__ import annotations

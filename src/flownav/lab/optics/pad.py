@@ -1,7 +1,7 @@
 """Landing pads: patterns of reflectance 0..1 that repeat over the ground, as a raster of square texels.
 
 Pads repeat without a seam, so blur can be applied to them exactly, by Fourier transform. Stripes are also
-known in closed form (`Pad.stripe_pitch_m`), which `rig/` renders from their harmonics.
+known in closed form (`Pad.stripe_pitch_m`), which `lab/rig/` renders from their harmonics.
 """
 
 from __future__ import annotations

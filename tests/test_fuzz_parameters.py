@@ -16,20 +16,20 @@ from flownav.core.parameter_files import load, shipped
 from flownav.lab.identification.rig_log import Rig
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import settings_of
-from flownav.sensors.barometer_sheet import load_barometer_sheet
+from flownav.sensors.barometer import load_barometer_sheet
 from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.flow_camera_sheet import load_flow_camera_sheet
 from flownav.sensors.gps_receiver_sheet import load_gps_receiver_sheet
 from flownav.sensors.inertial_sheet import load_inertial_sheet
-from flownav.sensors.magnetometer_sheet import load_magnetometer_sheet
+from flownav.sensors.magnetometer import load_magnetometer_sheet
 from flownav.sensors.pad_camera_sheet import load_pad_camera_sheet
-from flownav.sensors.range_sensor_sheet import load_range_sensor_sheet
-from flownav.sensors.skid_switch_sheet import load_skid_switch_sheet
+from flownav.sensors.range_sensor import load_range_sensor_sheet
+from flownav.sensors.skid_switch import load_skid_switch_sheet
 from flownav.simulation.dispersion import DispersionFile
 from flownav.simulation.scenario import load_scenario
 from flownav.studies.validation.flights import load_flights
-from flownav.vehicle.loading import load_vehicle
-from flownav.vehicle.paper_model import load_paper_model
+from flownav.vehicle.kinds import load_vehicle
+from flownav.vehicle.linearize import load_paper_model
 from fuzzing import FIRST_SEED, MUTANTS, assert_promise
 from toml_mutations import mutate_toml
 

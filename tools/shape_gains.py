@@ -11,8 +11,7 @@ from pathlib import Path
 from flownav.control.design import gains_for
 from flownav.control.shaping import AXES, Shape, axis_of, drift_m, least_margins, shape_in, shaped
 from flownav.core.errors import FlownavError
-from flownav.vehicle.kinds import hover_of
-from flownav.vehicle.loading import load_vehicle
+from flownav.vehicle.kinds import hover_of, load_vehicle
 
 
 def main(path: Path | None) -> None:

@@ -8,12 +8,17 @@ import control as ct
 import numpy as np
 import pytest
 
-from flownav.control.box import LEAST_GAIN_DB, LEAST_PHASE_DEG, margins_of, margins_over_box, short_of_margin
 from flownav.control.design import gains_for
 from flownav.control.gains import AutopilotGains
-from flownav.control.loops import CUTS, LOOPS, Timing, loop_gains
-from flownav.control.margins import margins
-from flownav.control.sampled import period_map, spectral_radius
+from flownav.control.loops import CUTS, LOOPS, Timing, loop_gains, period_map, spectral_radius
+from flownav.control.margins import (
+    LEAST_GAIN_DB,
+    LEAST_PHASE_DEG,
+    margins,
+    margins_of,
+    margins_over_box,
+    short_of_margin,
+)
 from flownav.control.shaping import (
     OMEGA_RAD_S,
     Shape,
@@ -25,8 +30,8 @@ from flownav.control.shaping import (
     with_shape,
 )
 from flownav.core.frames import GRAVITY_M_S2
-from flownav.vehicle.loading import load_vehicle
-from flownav.vehicle.plant import INPUTS, OUTPUTS, frequency_response, hover_plant
+from flownav.vehicle.kinds import load_vehicle
+from flownav.vehicle.linearize import INPUTS, OUTPUTS, frequency_response, hover_plant
 from flownav.vehicle.trim import trim
 
 VEHICLE = load_vehicle()

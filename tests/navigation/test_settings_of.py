@@ -15,7 +15,7 @@ from flownav.navigation.told import NO_HEADING, NO_STATED_NOISE, Equipment
 from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.gps_receiver_sheet import load_gps_receiver_sheet
 from flownav.sensors.inertial_sheet import Vibration, load_inertial_sheet
-from flownav.sensors.magnetometer_sheet import MagneticField, load_magnetometer_sheet
+from flownav.sensors.magnetometer import MagneticField, load_magnetometer_sheet
 from flownav.sensors.sheets import shipped_sheets
 
 FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)

@@ -12,15 +12,16 @@ from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.parameter_files import check
 from flownav.sensors.barometer import (
     BarometerNormals,
+    BarometerSheet,
     BarometerStartNormals,
     BarometerTruth,
     BarometerUnit,
     draw_barometer,
+    load_barometer_sheet,
     start_barometer,
     step_barometer,
     wash_error,
 )
-from flownav.sensors.barometer_sheet import BarometerSheet, load_barometer_sheet
 from sensor_normals import draws, moved_by, silent
 
 SHEET = load_barometer_sheet()

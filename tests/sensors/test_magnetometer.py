@@ -11,12 +11,14 @@ from scipy.spatial.transform import Rotation as Turn
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check
 from flownav.sensors.magnetometer import (
+    MagneticField,
     MagnetometerNormals,
+    MagnetometerSheet,
     MagnetometerUnit,
     draw_magnetometer,
+    load_magnetometer_sheet,
     read_magnetometer,
 )
-from flownav.sensors.magnetometer_sheet import MagneticField, MagnetometerSheet, load_magnetometer_sheet
 from sensor_normals import draws, moved_by, silent
 
 SHEET = load_magnetometer_sheet()

@@ -10,19 +10,20 @@ from scipy.spatial.transform import Rotation as Turn
 
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check, shipped
-from flownav.sensors.beam import LEVEL, BeamHit, beam_distance
+from flownav.sensors.geometry import LEVEL, BeamHit, beam_distance
 from flownav.sensors.range_sensor import (
     RangeSensorNormals,
     RangeSensorParameters,
     RangeSensorReading,
+    RangeSensorSheet,
     RangeSensorState,
     RangeSensorUnit,
     draw_range_sensor,
+    load_range_sensor_sheet,
     start_range_sensor,
     step_range_sensor,
     wide_beam,
 )
-from flownav.sensors.range_sensor_sheet import RangeSensorSheet, load_range_sensor_sheet
 from sensor_normals import draws, moved_by, silent
 
 SHEET = load_range_sensor_sheet()

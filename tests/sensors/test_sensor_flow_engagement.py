@@ -12,8 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion
 from flownav.sensors.datasheet import FlowSettings, load_sensor
-from flownav.sensors.flow import start_flow
-from flownav.sensors.flow_engagement import engage_flow, engagement, pattern_reach
+from flownav.sensors.flow import engage_flow, engagement, pattern_reach, start_flow
 from flownav.sensors.geometry import LensPose
 
 SENSOR = load_sensor()

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from flownav.core.compile import LANES, ONE_LANE, equation, kernel, lane_access
 from flownav.core.frames import rotation_from_quaternion
 from flownav.sensors.datasheet import FlowSettings, load_sensor
-from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, read_flow, start_flow, step_flow
-from flownav.sensors.flow_engagement import engage_flow
+from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, engage_flow, read_flow, start_flow, step_flow
 from flownav.sensors.geometry import LensPose
 from flownav.sensors.gps_ins import (
     GpsInsErrors,

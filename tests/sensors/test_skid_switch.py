@@ -12,12 +12,13 @@ from flownav.core.parameter_files import check, shipped
 from flownav.sensors.sheets import SensorSheets, shipped_sheets
 from flownav.sensors.skid_switch import (
     SkidSwitchNormals,
+    SkidSwitchSheet,
     SkidSwitchUnit,
     draw_skid_switch,
+    load_skid_switch_sheet,
     start_skid_switch,
     step_skid_switch,
 )
-from flownav.sensors.skid_switch_sheet import SkidSwitchSheet, load_skid_switch_sheet
 from sensor_normals import draws, silent
 
 SHEET = load_skid_switch_sheet()

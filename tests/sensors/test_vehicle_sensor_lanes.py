@@ -22,7 +22,6 @@ from flownav.sensors.barometer import (
     start_barometer,
     step_barometer,
 )
-from flownav.sensors.beam import Ground, beam_distance
 from flownav.sensors.datasheet import FlowSettings, load_sensor
 from flownav.sensors.flow import FlowParameters
 from flownav.sensors.flow_camera import (
@@ -38,7 +37,7 @@ from flownav.sensors.flow_camera import (
     start_flow_camera,
     step_flow_camera,
 )
-from flownav.sensors.geometry import LensPose
+from flownav.sensors.geometry import Ground, LensPose, beam_distance
 from flownav.sensors.gps_receiver import (
     GpsReceiverNormals,
     GpsReceiverParameters,

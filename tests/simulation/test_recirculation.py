@@ -14,8 +14,7 @@ from flownav.simulation.recirculation import (
     step_recirculation,
 )
 from flownav.simulation.wind import WindVelocity
-from flownav.vehicle.kinds import disc_of
-from flownav.vehicle.loading import load_vehicle
+from flownav.vehicle.kinds import disc_of, load_vehicle
 
 VEHICLE = load_vehicle()
 DISC = disc_of(VEHICLE)

@@ -9,7 +9,7 @@ import pytest
 
 from flownav.core.compile import LANES, kernel
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
-from flownav.sensors.beam import roughness, stepped
+from flownav.sensors.geometry import roughness, stepped
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
 from flownav.simulation.draws import key_lanes, plain_noise

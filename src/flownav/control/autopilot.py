@@ -11,8 +11,18 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flownav.control.gains import AutopilotGains
-from flownav.control.gate import descent_limit, misaligned, skids_beside
-from flownav.control.go_around import Approach, GoAround, Knowledge, climb_out, mind_landing, search_offset, seeks
+from flownav.control.go_around import (
+    Approach,
+    GoAround,
+    Knowledge,
+    climb_out,
+    descent_limit,
+    mind_landing,
+    misaligned,
+    search_offset,
+    seeks,
+    skids_beside,
+)
 from flownav.control.guidance import Reference
 from flownav.core.compile import clamp, equation, magnitude, replacing, smaller
 from flownav.core.frames import GRAVITY_M_S2, Rotation, heading_cosine_sine, to_earth

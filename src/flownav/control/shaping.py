@@ -17,15 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
-from flownav.control.box import LEAST_GAIN_DB, LEAST_PHASE_DEG
 from flownav.control.gains import AutopilotGains
-from flownav.control.loops import FLOWN, hold, integral
-from flownav.control.margins import margins
-from flownav.control.sampled import spectral_radius
+from flownav.control.loops import FLOWN, hold, integral, spectral_radius
+from flownav.control.margins import LEAST_GAIN_DB, LEAST_PHASE_DEG, margins
 from flownav.core.frames import GRAVITY_M_S2
 from flownav.vehicle.corners import corners
 from flownav.vehicle.kinds import hover_of
-from flownav.vehicle.plant import INPUTS, OUTPUTS, Complex, LinearPlant, frequency_response, gust_input, hover_plant
+from flownav.vehicle.linearize import INPUTS, OUTPUTS, Complex, LinearPlant, frequency_response, gust_input, hover_plant
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 from flownav.sensors import flow
 from flownav.sensors.flow import FlowParameters
 from flownav.sensors.noise_law import Law, NoiseFit, accuracy_law, constant_noise, fit_noise_law, power_law
-from flownav.sensors.second_order import second_order_hold
+from flownav.sensors.processes import second_order_hold
 
 DEFAULT_SENSOR = "px4flow_paper.toml"
 

@@ -9,8 +9,8 @@ from typing import ClassVar
 from pydantic import Field, ValidationInfo, field_validator
 
 from flownav.core.parameter_files import Number, ParameterModel
-from flownav.sensors.chance import level_of
 from flownav.sensors.flow_camera import FlowCameraParameters
+from flownav.sensors.processes import level_of
 from flownav.sensors.sheet import Lever, SensorSheet, Spells
 
 

@@ -9,10 +9,8 @@ from typing import ClassVar
 from pydantic import Field
 
 from flownav.core.parameter_files import Number, ParameterModel
-from flownav.sensors.first_order import lag_weights
-from flownav.sensors.gauss_markov import gauss_markov_coefficients
 from flownav.sensors.gps_receiver import GpsReceiverParameters
-from flownav.sensors.quantisation import steps_per_unit
+from flownav.sensors.processes import gauss_markov_coefficients, lag_weights, steps_per_unit
 from flownav.sensors.sheet import Lever, SensorSheet, Spells
 
 

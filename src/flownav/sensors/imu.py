@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flownav.core.compile import clamp, equation
-from flownav.sensors.gauss_markov import gauss_markov
+from flownav.sensors.processes import gauss_markov
 
 PERIOD_S = 0.02
 

@@ -25,8 +25,8 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import clamp, equation, larger
-from flownav.sensors.chance import factor
 from flownav.sensors.imu import ImuReading
+from flownav.sensors.processes import factor
 
 QUALITY = 255.0
 

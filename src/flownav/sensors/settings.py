@@ -14,10 +14,9 @@ from pydantic import Field, ValidationInfo, field_validator
 from flownav.core.frames import GRAVITY_M_S2 as STANDARD_GRAVITY_M_S2
 from flownav.core.parameter_files import Number, ParameterModel
 from flownav.sensors import gps_ins, imu
-from flownav.sensors.gauss_markov import gauss_markov_coefficients
 from flownav.sensors.gps_ins import GpsInsParameters
 from flownav.sensors.imu import ImuParameters
-from flownav.sensors.quantisation import steps_per_unit
+from flownav.sensors.processes import gauss_markov_coefficients, steps_per_unit
 from flownav.sensors.rangefinder import RangefinderParameters
 
 SIGMA_PER_CEP = 1.0 / math.sqrt(2.0 * math.log(2.0))  # one axis of two equal normal ones: 1/1.1774

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from flownav.core.parameter_files import ParameterModel
-from flownav.sensors.barometer_sheet import BarometerSheet, load_barometer_sheet
+from flownav.sensors.barometer import BarometerSheet, load_barometer_sheet
 from flownav.sensors.datasheet import FlowSensor, load_sensor
 from flownav.sensors.flow_camera_sheet import FlowCameraSheet, load_flow_camera_sheet
 from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet, load_gps_receiver_sheet
 from flownav.sensors.inertial_sheet import InertialSheet, load_inertial_sheet
-from flownav.sensors.magnetometer_sheet import MagneticField, MagnetometerSheet, load_magnetometer_sheet
+from flownav.sensors.magnetometer import MagneticField, MagnetometerSheet, load_magnetometer_sheet
 from flownav.sensors.pad_camera_sheet import PadCameraSheet, load_pad_camera_sheet
-from flownav.sensors.range_sensor_sheet import RangeSensorSheet, load_range_sensor_sheet
-from flownav.sensors.skid_switch_sheet import SkidSwitchSheet, load_skid_switch_sheet
+from flownav.sensors.range_sensor import RangeSensorSheet, load_range_sensor_sheet
+from flownav.sensors.skid_switch import SkidSwitchSheet, load_skid_switch_sheet
 
 
 class SensorSheets(ParameterModel):

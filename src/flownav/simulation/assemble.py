@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from flownav.control.box import margins_of
 from flownav.control.design import gains_for
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import path_through, rounded
+from flownav.control.margins import margins_of
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.estimation.discretise import discretised
@@ -27,15 +27,24 @@ from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
 from flownav.vehicle.corners import NOMINAL
-from flownav.vehicle.kinds import AnyFile, AnyState, AnyTrim, AnyVehicle, disc_of, hover_of, rotors_of
-from flownav.vehicle.loading import VehicleDescription, describe_vehicle, read_vehicle, vehicle_file
+from flownav.vehicle.kinds import (
+    AnyFile,
+    AnyState,
+    AnyTrim,
+    AnyVehicle,
+    VehicleDescription,
+    describe_vehicle,
+    disc_of,
+    hover_of,
+    read_vehicle,
+    rotors_of,
+    vehicle_file,
+)
+from flownav.vehicle.linearize import ReducedModel, hover_plant, load_paper_model
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.multirotor_trim import parked_multirotor
-from flownav.vehicle.paper_model import ReducedModel, load_paper_model
 from flownav.vehicle.parameters import touchdown_limits
-from flownav.vehicle.plant import hover_plant
 from flownav.vehicle.state import Controls
-from flownav.vehicle.trim import Trim, parked
+from flownav.vehicle.trim import Trim, parked, parked_multirotor
 
 NEVER_S = 1e9
 GO_AROUND = {"height_m": "go_around_height_m", "most": "go_arounds_most"}

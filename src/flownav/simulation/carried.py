@@ -13,23 +13,31 @@ from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
 
 from flownav.core.compile import depends_also
 from flownav.core.measurement import Sensor
-from flownav.sensors.barometer import BarometerReading, draw_barometer, start_barometer, step_barometer
-from flownav.sensors.barometer_sheet import BarometerSheet
+from flownav.sensors.barometer import BarometerReading, BarometerSheet, draw_barometer, start_barometer, step_barometer
 from flownav.sensors.flow_camera import draw_flow_camera, start_flow_camera
 from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from flownav.sensors.gps_receiver import GpsReceiverReading, draw_gps_receiver, start_gps_receiver, step_gps_receiver
 from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
 from flownav.sensors.inertial import InertialReading, draw_inertial, start_inertial
 from flownav.sensors.inertial_sheet import InertialSheet
-from flownav.sensors.magnetometer import MagnetometerReading, draw_magnetometer, read_magnetometer
-from flownav.sensors.magnetometer_sheet import MagneticField, MagnetometerSheet
+from flownav.sensors.magnetometer import (
+    MagneticField,
+    MagnetometerReading,
+    MagnetometerSheet,
+    draw_magnetometer,
+    read_magnetometer,
+)
 from flownav.sensors.pad_camera import PadCameraReading, draw_pad_camera
 from flownav.sensors.pad_camera_sheet import PadCameraSheet
-from flownav.sensors.range_sensor import RangeSensorReading, draw_range_sensor, start_range_sensor, step_range_sensor
-from flownav.sensors.range_sensor_sheet import RangeSensorSheet
+from flownav.sensors.range_sensor import (
+    RangeSensorReading,
+    RangeSensorSheet,
+    draw_range_sensor,
+    start_range_sensor,
+    step_range_sensor,
+)
 from flownav.sensors.sheet import SensorSheet
-from flownav.sensors.skid_switch import SkidSwitchReading, draw_skid_switch, start_skid_switch
-from flownav.sensors.skid_switch_sheet import SkidSwitchSheet
+from flownav.sensors.skid_switch import SkidSwitchReading, SkidSwitchSheet, draw_skid_switch, start_skid_switch
 from flownav.simulation import seeing, wanted
 from flownav.simulation.seeing import told
 

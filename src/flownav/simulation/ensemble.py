@@ -25,10 +25,8 @@ from flownav.simulation.plan import Flight
 from flownav.simulation.recirculation import RecirculationParameters, RecirculationSettings
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.truth import LATE, NAMES, PARTS, PUNCTUAL, SIZES, Carried, Truth
-from flownav.vehicle.kinds import AnyFile, AnyVehicle, as_the_paper_has_it, disc_of, flattened
-from flownav.vehicle.loading import VehicleDescription
-from flownav.vehicle.multirotor_schema import MultirotorFile
-from flownav.vehicle.schema import VehicleFile
+from flownav.vehicle.kinds import AnyFile, AnyVehicle, VehicleDescription, as_the_paper_has_it, disc_of, flattened
+from flownav.vehicle.schema import MultirotorFile, VehicleFile
 
 Array = NDArray[np.float64]
 

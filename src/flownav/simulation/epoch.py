@@ -14,8 +14,8 @@ from flownav.core.compile import Lanes, Work, equation, invoke, procedure, repla
 from flownav.core.frames import GRAVITY_M_S2, Quaternion, quaternion_product, rotation_from_quaternion
 from flownav.core.measurement import Sensor
 from flownav.navigation.records import Reading
-from flownav.sensors.beam import Ground, ground_height
 from flownav.sensors.flow import FlowParameters, FlowState, misread, step_flow
+from flownav.sensors.geometry import Ground, ground_height
 from flownav.sensors.gps_ins import GpsInsErrors, attitude_with_error
 from flownav.sensors.rangefinder import slant_range
 from flownav.simulation.block import Block, Progress

@@ -16,7 +16,7 @@ from flownav.navigation.told import FROM_MAG, Equipment
 from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.flow import FlowParameters
 from flownav.sensors.identified import needs_lag_states
-from flownav.sensors.magnetometer_sheet import MagneticField
+from flownav.sensors.magnetometer import MagneticField
 from flownav.sensors.sheet import Lever, SensorSheet
 from flownav.sensors.sheets import SensorSheets
 from flownav.simulation.carried import BLADES, CarriedSensor, Carrier

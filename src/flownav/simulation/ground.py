@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from flownav.core.compile import clamp, equation, larger
 from flownav.core.parameter_files import Number, ParameterModel
-from flownav.sensors.beam import Ground
+from flownav.sensors.geometry import Ground
 
 WAVE_RMS = math.sqrt(8.0 / 15.0)  # of one wave of `beam.roughness`
 AREA_1, AREA_3 = 2.0 / math.pi, 0.5 - 2.0 / math.pi  # of a disc beyond a line: ± this·x ± this·x³, right within 0.01

@@ -49,8 +49,7 @@ from flownav.simulation.truth import CARRIED, PARTS, SIZES
 from flownav.simulation.wind import WindNormals, WindState
 from flownav.vehicle.around import Around
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.multirotor_state import MultirotorState, Six
-from flownav.vehicle.state import Controls, HelicopterState, Inflow
+from flownav.vehicle.state import Controls, HelicopterState, Inflow, MultirotorState, Six
 
 
 def size_of(record: Any) -> int:

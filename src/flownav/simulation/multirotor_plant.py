@@ -17,7 +17,7 @@ from flownav.simulation.layout import (
 from flownav.simulation.plant import note_outputs
 from flownav.vehicle.motors import mixed, roots_of_shares
 from flownav.vehicle.multirotor import derivative_at_roots, outputs
-from flownav.vehicle.multirotor_state import moved, of_unit_attitude
+from flownav.vehicle.state import moved, of_unit_attitude
 
 
 @equation

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from flownav.core.compile import equation
 from flownav.core.frames import rotation_from_quaternion, to_earth
-from flownav.sensors.beam import BeamHit, Ground, beam_distance
 from flownav.sensors.flow import FlowParameters
+from flownav.sensors.geometry import BeamHit, Ground, beam_distance
 from flownav.vehicle.state import HelicopterState
 
 EPOCH_S = 0.02

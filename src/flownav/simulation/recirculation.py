@@ -18,7 +18,7 @@ from pydantic import Field
 
 from flownav.core.compile import clamp, equation, larger
 from flownav.core.parameter_files import Number, ParameterModel
-from flownav.sensors.gauss_markov import gauss_markov, gauss_markov_coefficients
+from flownav.sensors.processes import gauss_markov, gauss_markov_coefficients
 from flownav.simulation.wind import PERIOD_S, WindVelocity
 
 WORST_WIND = 0.7  # of the induced velocity

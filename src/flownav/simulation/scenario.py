@@ -22,7 +22,7 @@ from flownav.simulation.dispersion import DispersionSection
 from flownav.simulation.ground import GroundSettings
 from flownav.simulation.recirculation import RecirculationSettings
 from flownav.simulation.wind import WindSettings
-from flownav.vehicle.loading import SHIPPED_NAMES
+from flownav.vehicle.kinds import SHIPPED_NAMES
 
 SHIPPED = ("takeoff", "landing", "gusty", "pad_return", "approach")
 

@@ -14,7 +14,6 @@ from flownav.core.frames import Rotation, rotation_from_quaternion, to_earth
 from flownav.lab.optics.shutter import image_rate_rad_s
 from flownav.navigation.records import Reading
 from flownav.sensors.barometer import BarometerTruth
-from flownav.sensors.beam import BeamHit, Ground, ground_height
 from flownav.sensors.flow import FlowParameters, FlowState
 from flownav.sensors.flow_camera import (
     FlowCameraNormals,
@@ -25,7 +24,7 @@ from flownav.sensors.flow_camera import (
     pad_texture,
     step_flow_camera,
 )
-from flownav.sensors.geometry import LensPose
+from flownav.sensors.geometry import BeamHit, Ground, LensPose, ground_height
 from flownav.sensors.gps_receiver import GpsReceiverTruth
 from flownav.sensors.imu import ImuReading
 from flownav.sensors.inertial import (

@@ -14,8 +14,7 @@ from flownav.core.frames import (
     to_body,
     to_earth,
 )
-from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, read_flow, start_flow
-from flownav.sensors.flow_engagement import engage_flow
+from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, engage_flow, read_flow, start_flow
 from flownav.sensors.geometry import LensPose
 from flownav.sensors.gps_ins import (
     GpsInsParameters,

@@ -8,7 +8,7 @@ import numpy as np
 
 from flownav.core.compile import Lanes, Work, equation, procedure, replacing
 from flownav.core.frames import Rotation, rotation_from_quaternion, to_earth
-from flownav.sensors.beam import Ground, ground_height, roughness, stepped
+from flownav.sensors.geometry import Ground, ground_height, roughness, stepped
 from flownav.simulation import layout
 from flownav.simulation.draws import RECIRCULATION_CHANNEL, draw
 from flownav.simulation.ground import under_rotor

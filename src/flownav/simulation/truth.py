@@ -13,8 +13,8 @@ from typing import Any, NamedTuple, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.sensors.beam import Ground
 from flownav.sensors.flow import FlowParameters
+from flownav.sensors.geometry import Ground
 from flownav.simulation.carried import carried_sensors
 from flownav.simulation.fault import SensorFault
 from flownav.simulation.recirculation import RecirculationParameters

@@ -8,7 +8,7 @@ from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
 from flownav.sensors.inertial_sheet import InertialSheet
 from flownav.sensors.pad_camera_sheet import AngleNoise, DistanceNoise, PadCameraSheet
-from flownav.sensors.range_sensor_sheet import RangeSensorSheet
+from flownav.sensors.range_sensor import RangeSensorSheet
 from flownav.sensors.settings import GpsInsSettings, PadFixSettings, RangefinderSettings
 from flownav.sensors.sheet import Lever, SensorSheet
 from flownav.simulation.onboard import EPOCH_S, PHYSICS_PERIOD_S, Clock

@@ -10,28 +10,37 @@ from typing import NamedTuple
 
 from flownav.core.compile import equation
 from flownav.core.frames import Rotation, Vector, quaternion_rate, to_earth
-from flownav.vehicle.actuators import acceleration, blade_angle, collective_servo, cyclic_servo, pedal_servo
 from flownav.vehicle.airframe import (
     AirMotion,
     Wrench,
     air_motion,
+    angular_acceleration,
     attitude,
     flight_wrench,
     fuselage_drag,
+    linear_acceleration,
     main_rotor_wrench,
     tail_plane_force,
     tail_side_force,
     tail_sideslip,
 )
 from flownav.vehicle.around import Around, below_plane, plane_normal
-from flownav.vehicle.drive import Turning, held_turning, turning_of
-from flownav.vehicle.ground_effect import multiplier_of_squares
+from flownav.vehicle.drive import (
+    Turning,
+    acceleration,
+    blade_angle,
+    collective_servo,
+    cyclic_servo,
+    held_turning,
+    pedal_servo,
+    turning_of,
+)
 from flownav.vehicle.parameters import VehicleParameters
-from flownav.vehicle.rigid_body import angular_acceleration, linear_acceleration
 from flownav.vehicle.rotor import (
     blowback,
     induced_velocity,
     main_rotor,
+    multiplier_of_squares,
     speed_ratio,
     tail_rotor,
     thrust,

@@ -10,15 +10,28 @@ from typing import NamedTuple
 
 from flownav.core.compile import equation
 from flownav.core.frames import Vector, quaternion_rate, to_earth
-from flownav.vehicle.airframe import AirMotion, Wrench, air_motion, attitude, fuselage_drag
+from flownav.vehicle.airframe import (
+    AirMotion,
+    Wrench,
+    air_motion,
+    angular_acceleration,
+    attitude,
+    fuselage_drag,
+    linear_acceleration,
+)
 from flownav.vehicle.around import Around, below_plane, plane_normal
-from flownav.vehicle.motors import battery_voltage, mixed, roots_of_shares, shaft_power, speed_rate, told_speed
+from flownav.vehicle.motors import (
+    battery_voltage,
+    mixed,
+    propeller_load,
+    roots_of_shares,
+    shaft_power,
+    speed_rate,
+    told_speed,
+)
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.multirotor_state import MultirotorState, Six, moved, of_unit_attitude, speeds_of, total_of
-from flownav.vehicle.propeller import propeller_load
-from flownav.vehicle.rigid_body import angular_acceleration, linear_acceleration
 from flownav.vehicle.skids import support, with_friction, with_support
-from flownav.vehicle.state import Controls, Outputs
+from flownav.vehicle.state import Controls, MultirotorState, Outputs, Six, moved, of_unit_attitude, speeds_of, total_of
 
 
 class RotorLoads(NamedTuple):

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from flownav.core.errors import InputError
 from flownav.vehicle.feasibility import require_rigid_body
-from flownav.vehicle.multirotor_schema import MultirotorFile
 from flownav.vehicle.parameters import of_either_kind
+from flownav.vehicle.schema import MultirotorFile
 
 HOVER_MARGIN = 1.2  # the rotors must be able to lift this much of the weight
 

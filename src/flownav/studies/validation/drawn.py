@@ -12,7 +12,7 @@ from scipy.special import ndtri
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.parameter_files import shipped
 from flownav.logs.log import Log
-from flownav.sensors.range_sensor_sheet import RangeSensorSheet, load_range_sensor_sheet
+from flownav.sensors.range_sensor import RangeSensorSheet, load_range_sensor_sheet
 from flownav.sensors.sheet import Lever
 from flownav.sensors.sheets import SensorSheets, shipped_sheets
 from flownav.simulation.dispersion import DispersionSection, drawn, uniforms

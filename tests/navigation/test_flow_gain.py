@@ -25,14 +25,14 @@ from flownav.sensors.flow_camera import (
     FlowCameraUnit,
     step_flow_camera,
 )
-from flownav.sensors.flow_camera_sheet import load_flow_camera_sheet
+from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from navigation_streams import circle, fly, navigate
 from sensor_normals import silent
 
 NAN = math.nan
 GAINS = (0.5, 0.7, 1.0, 1.4, 2.0)
 FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
-CAMERA = load_flow_camera_sheet().parameters()._replace(quality_sigma=0.0)
+CAMERA = FlowCameraSheet.read().parameters()._replace(quality_sigma=0.0)
 DRAWS = 3000
 RATE_X, RATE_Y = 0.1, -0.2  # of the vehicle [rad/s]
 FORWARD_M_S, RIGHT_M_S = 0.3, -0.2

@@ -17,14 +17,13 @@ from flownav.sensors.barometer import (
     BarometerTruth,
     BarometerUnit,
     draw_barometer,
-    load_barometer_sheet,
     start_barometer,
     step_barometer,
     wash_error,
 )
 from sensor_normals import draws, moved_by, silent
 
-SHEET = load_barometer_sheet()
+SHEET = BarometerSheet.read()
 RADIUS_M, DENSITY = 0.89, 1.225
 P = SHEET.parameters(RADIUS_M, DENSITY)
 PLAIN = BarometerUnit(0.0, 0.0, 1.0, 1.0)

@@ -16,12 +16,11 @@ from flownav.sensors.magnetometer import (
     MagnetometerSheet,
     MagnetometerUnit,
     draw_magnetometer,
-    load_magnetometer_sheet,
     read_magnetometer,
 )
 from sensor_normals import draws, moved_by, silent
 
-SHEET = load_magnetometer_sheet()
+SHEET = MagnetometerSheet.read()
 FIELD = MagneticField(strength_gauss=0.5, declination_deg=10.0, inclination_deg=60.0)
 P = SHEET.parameters(FIELD)
 PERFECT, QUIET = silent(MagnetometerUnit), silent(MagnetometerNormals)

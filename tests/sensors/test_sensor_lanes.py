@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from helpers.paper_imu import ImuNormals, ImuParameters, ImuSettings, ImuState, start_imu, step_imu
 from numpy.typing import NDArray
 
 from flownav.core.compile import LANES, ONE_LANE, equation, kernel, lane_access
 from flownav.core.frames import rotation_from_quaternion
-from flownav.sensors.datasheet import FlowSettings, load_sensor
+from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, engage_flow, read_flow, start_flow, step_flow
 from flownav.sensors.geometry import LensPose
 from flownav.sensors.gps_ins import (
@@ -22,7 +23,7 @@ from flownav.sensors.gps_ins import (
     start_gps_ins,
     step_gps_ins,
 )
-from flownav.sensors.imu import ImuNormals, ImuParameters, ImuReading, ImuState, start_imu, step_imu
+from flownav.sensors.inertial import ImuReading
 from flownav.sensors.rangefinder import (
     RangefinderParameters,
     RangefinderState,
@@ -31,7 +32,7 @@ from flownav.sensors.rangefinder import (
     start_rangefinder,
     step_rangefinder,
 )
-from flownav.sensors.settings import GpsInsSettings, ImuSettings, RangefinderSettings
+from flownav.sensors.settings import FlowSettings, GpsInsSettings, RangefinderSettings
 from flownav.simulation.wind import (
     WindNormals,
     WindParameters,

@@ -15,13 +15,12 @@ from flownav.sensors.skid_switch import (
     SkidSwitchSheet,
     SkidSwitchUnit,
     draw_skid_switch,
-    load_skid_switch_sheet,
     start_skid_switch,
     step_skid_switch,
 )
 from sensor_normals import draws, silent
 
-SHEET = load_skid_switch_sheet()
+SHEET = SkidSwitchSheet.read()
 P = SHEET.parameters(80.0)  # closes at 12 N, opens below 8 N, follows after 5 readings
 WORKING, QUIET = SkidSwitchUnit(0.0, 0.0), silent(SkidSwitchNormals)
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flownav.simulation.recirculation import (
+from flownav.simulation.ground import (
     RecirculationSettings,
     RecirculationState,
     recirculated,

@@ -26,7 +26,7 @@ from flownav.parts.flying import fly_parts, fly_with, require_started
 from flownav.parts.protocols import Parts
 from flownav.simulation.assemble import Setup
 from flownav.simulation.ensemble import Ensemble
-from flownav.simulation.fault import SensorFault
+from flownav.simulation.truth import SensorFault
 
 
 class OwnPartsEngine:

@@ -27,10 +27,10 @@ from flownav.parts.taking import Taker
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import Flown, Instead, buffers_of, fly_into
 from flownav.simulation.ensemble import Ensemble
-from flownav.simulation.fault import SensorFault
 from flownav.simulation.history import column
 from flownav.simulation.plan import Flight, OwnParts
 from flownav.simulation.sensing import EPOCH_S
+from flownav.simulation.truth import SensorFault
 
 Part = TypeVar("Part")
 

@@ -14,7 +14,6 @@ Altitudes are metres over the place of take-off, positive upwards.
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import ClassVar, NamedTuple
 
 from pydantic import Field
@@ -175,8 +174,3 @@ class BarometerSheet(SensorSheet):
             *lag_weights(self.lag_s, self.period_s),
             self.sigma_m, self.resolution_m, steps_per_unit(self.resolution_m),
         )  # fmt: skip
-
-
-def load_barometer_sheet(path: Path | str | None = None) -> BarometerSheet:
-    """The barometer of a file; the shipped one where `path` is None."""
-    return BarometerSheet.read(path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import ClassVar
 
 from pydantic import Field
@@ -84,8 +83,3 @@ class GpsReceiverSheet(SensorSheet):
             self.horizontal_sigma_m, self.vertical_sigma_m, self.speed_sigma_m_s,
             self.stated_spread, e.spread, *self.outage.levels(period),
         )  # fmt: skip
-
-
-def load_gps_receiver_sheet(path: Path | str | None = None) -> GpsReceiverSheet:
-    """The receiver of a file; the shipped one where `path` is None."""
-    return GpsReceiverSheet.read(path)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from pathlib import Path
 from typing import ClassVar, NamedTuple
 
 from pydantic import Field
@@ -148,11 +147,6 @@ class MagnetometerSheet(SensorSheet):
             soft=0.01 * self.soft_iron_percent,
             gauss_per_w=1e-6 * self.current_mgauss_per_kw,
         )
-
-
-def load_magnetometer_sheet(path: Path | str | None = None) -> MagnetometerSheet:
-    """The magnetometer of a file; the shipped one where `path` is None."""
-    return MagnetometerSheet.read(path)
 
 
 MODEL_YEAR = 2026.0  # declination changes by less than 0.3 deg a year; logs seldom say which year they are of

@@ -15,7 +15,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -181,8 +180,3 @@ class RangeSensorSheet(SensorSheet):
             *self.lost.levels(self.period_s), *self.held.levels(self.period_s),
             0.0 if self.stuck_at_m is None else 1.0, self.stuck_at_m or 0.0,
         )  # fmt: skip
-
-
-def load_range_sensor_sheet(path: Path | str | None = None) -> RangeSensorSheet:
-    """The rangefinder of a file; the shipped one where `path` is None."""
-    return RangeSensorSheet.read(path)

@@ -8,7 +8,6 @@ Debouncing, 2004). A switch may be stuck open or closed for a whole flight.
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import ClassVar, NamedTuple
 
 from pydantic import Field, ValidationInfo, field_validator
@@ -123,8 +122,3 @@ class SkidSwitchSheet(SensorSheet):
             stuck_open_above=level_of(self.stuck_open_share),
             stuck_closed_below=-level_of(self.stuck_closed_share),
         )
-
-
-def load_skid_switch_sheet(path: Path | str | None = None) -> SkidSwitchSheet:
-    """The switch of a file; the shipped one where `path` is None."""
-    return SkidSwitchSheet.read(path)

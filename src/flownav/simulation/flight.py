@@ -18,8 +18,8 @@ from flownav.control.guidance import Reference, reference_at
 from flownav.core.compile import Lanes, Work, equation, invoke, kernel, pointer
 from flownav.navigation.tape import output_of
 from flownav.simulation import layout
-from flownav.simulation.block import Aboard, Block, Buffers, Progress
-from flownav.simulation.draws import key_lanes, put_start
+from flownav.simulation.block import Aboard, Block, Buffers, Progress, key_lanes, put_start
+from flownav.simulation.carriage import draw_units, sample, start_onboard
 from flownav.simulation.epoch import (
     advance,
     advance_sensing,
@@ -46,11 +46,9 @@ from flownav.simulation.navigating import (
 )
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import NOTHING, PHYSICS_S, START_STEP, Flight, OwnParts
-from flownav.simulation.sampling import sample
+from flownav.simulation.plant import observe_vehicle, place
 from flownav.simulation.sensing import EPOCH_S, draw_epoch, sense, start_sensors
 from flownav.simulation.surroundings import draw_recirculation, start_surroundings, surround
-from flownav.simulation.units import draw_units, start_onboard
-from flownav.simulation.vehicles import observe_vehicle, place
 
 
 @equation

@@ -18,10 +18,10 @@ from flownav.core.frames import conjugate, quaternion_product, rotation_from_qua
 from flownav.estimation.consistency import normalised_error
 from flownav.estimation.named import Attitude, PositionNed, VelocityNed
 from flownav.navigation.ahead import Carried, carried, coasted, state_of
-from flownav.navigation.memory import load_reading, load_start
+from flownav.navigation.memory import load_reading, load_start, store_reading
 from flownav.navigation.records import GroundMemory, Reading, StartMemory, SuspicionMemory
 from flownav.simulation.block import Aboard
-from flownav.simulation.layout import PLANT, load_inertial_then, store_estimated
+from flownav.simulation.layout import FIELDS, PLANT, ROWS, load_inertial_then, load_slot, store_estimated, store_row
 from flownav.simulation.records import (
     AttitudeError,
     Estimated,
@@ -33,7 +33,6 @@ from flownav.simulation.records import (
     Spread,
     TruthThen,
 )
-from flownav.simulation.ring import FIELDS, FIRST, hand_over, store_row
 from flownav.simulation.said import GroundSaid, PadSaid, PadVariance, StatedVariance, on_both
 from flownav.vehicle.state import HelicopterState
 
@@ -61,7 +60,7 @@ class Timetable(NamedTuple):
 @equation
 def first_truth(table: Timetable) -> int:
     """The first row of the remembered truths, behind the ring."""
-    return FIRST + table.slots * FIELDS
+    return ROWS + table.slots * FIELDS
 
 
 @equation
@@ -93,7 +92,8 @@ def feed_due(work: Work, lanes: Lanes, epoch: int, following: int, aboard: Aboar
     """Every reading that is due in this epoch, in order; the next one's number."""
     nav, o = aboard.nav, aboard.o
     while following < table.readings and table.epoch[following] <= epoch:
-        hand_over(work, nav, lanes, table.slot[following])
+        for lane in range(len(lanes)):
+            store_reading(nav, lanes, lane, load_slot(work, lanes, table.slot[following], lane))
         if o.room[5] > following:
             for lane in range(len(lanes)):
                 store_row(aboard.fed, lanes, following * FIELDS, lane, load_reading(nav, lanes, lane))

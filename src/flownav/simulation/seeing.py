@@ -26,8 +26,8 @@ from flownav.sensors.flow_camera import (
 )
 from flownav.sensors.geometry import BeamHit, Ground, LensPose, ground_height
 from flownav.sensors.gps_receiver import GpsReceiverTruth
-from flownav.sensors.imu import ImuReading
 from flownav.sensors.inertial import (
+    ImuReading,
     InertialNormals,
     InertialParameters,
     InertialReading,

@@ -23,7 +23,7 @@ from flownav.sensors.gps_ins import (
     start_gps_ins,
     step_gps_ins,
 )
-from flownav.sensors.imu import ImuReading
+from flownav.sensors.inertial import ImuReading
 from flownav.sensors.rangefinder import (
     RangefinderParameters,
     RangefinderState,
@@ -32,7 +32,7 @@ from flownav.sensors.rangefinder import (
     step_rangefinder,
 )
 from flownav.simulation import layout
-from flownav.simulation.draws import draw
+from flownav.simulation.block import draw
 from flownav.simulation.layout import (
     PAPERS,
     PLANT,

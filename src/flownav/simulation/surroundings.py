@@ -10,8 +10,14 @@ from flownav.core.compile import Lanes, Work, equation, procedure, replacing
 from flownav.core.frames import Rotation, rotation_from_quaternion, to_earth
 from flownav.sensors.geometry import Ground, ground_height, roughness, stepped
 from flownav.simulation import layout
-from flownav.simulation.draws import RECIRCULATION_CHANNEL, draw
-from flownav.simulation.ground import under_rotor
+from flownav.simulation.block import RECIRCULATION_CHANNEL, draw
+from flownav.simulation.ground import (
+    RecirculationParameters,
+    RecirculationState,
+    recirculated,
+    step_recirculation,
+    under_rotor,
+)
 from flownav.simulation.layout import (
     PLANT,
     load_recirculation,
@@ -19,12 +25,6 @@ from flownav.simulation.layout import (
     recirculation_as_is,
     store_around,
     store_recirculation,
-)
-from flownav.simulation.recirculation import (
-    RecirculationParameters,
-    RecirculationState,
-    recirculated,
-    step_recirculation,
 )
 from flownav.simulation.records import Loads
 from flownav.simulation.wind import WindNormals, WindParameters, WindState, WindVelocity, start_wind, step_wind

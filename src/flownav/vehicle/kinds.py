@@ -11,12 +11,11 @@ from typing import Any, NamedTuple
 
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check, read_toml, shipped
-from flownav.vehicle.feasibility import hover_induced_velocity, require_feasible
+from flownav.vehicle.feasibility import hover_induced_velocity, require_feasible, require_multirotor
 from flownav.vehicle.multirotor_parameters import (
     MultirotorParameters,
     flatten_multirotor,
     hover_speed,
-    require_multirotor,
 )
 from flownav.vehicle.parameters import VehicleParameters, flatten, without_slop
 from flownav.vehicle.schema import KIND, MultirotorFile, VehicleFile

@@ -217,12 +217,27 @@ def outputs(state: MultirotorState, around: Around, hexa: bool, vehicle: Multiro
 
 
 @equation
+def middle_of_step(
+    state: MultirotorState, roots: Six, around: Around, dt: float, hexa: bool, vehicle: MultirotorParameters
+) -> MultirotorState:
+    """The state half a step on, at the rate of its start."""
+    return moved(state, derivative_at_roots(state, roots, around, hexa, vehicle), 0.5 * dt)
+
+
+@equation
+def end_of_step(
+    state: MultirotorState, middle: MultirotorState, roots: Six, around: Around, dt: float, hexa: bool,
+    vehicle: MultirotorParameters,
+) -> MultirotorState:  # fmt: skip
+    """The state a step on, at the rate of the step's middle."""
+    return of_unit_attitude(moved(state, derivative_at_roots(middle, roots, around, hexa, vehicle), dt))
+
+
+@equation
 def step(
     state: MultirotorState, controls: Controls, around: Around, dt: float, hexa: bool, vehicle: MultirotorParameters
 ) -> MultirotorState:
     """The state `dt` seconds later by the midpoint rule, controls and surroundings held."""
     roots = roots_of_shares(mixed(controls, hexa, vehicle), hexa)
-    first = derivative_at_roots(state, roots, around, hexa, vehicle)
-    middle = moved(state, first, 0.5 * dt)
-    second = derivative_at_roots(middle, roots, around, hexa, vehicle)
-    return of_unit_attitude(moved(state, second, dt))
+    middle = middle_of_step(state, roots, around, dt, hexa, vehicle)
+    return end_of_step(state, middle, roots, around, dt, hexa, vehicle)

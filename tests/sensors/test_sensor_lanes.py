@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from helpers.paper_imu import ImuNormals, ImuParameters, ImuSettings, ImuState, start_imu, step_imu
 from numpy.typing import NDArray
 
 from flownav.core.compile import LANES, ONE_LANE, equation, kernel, lane_access
@@ -42,6 +41,7 @@ from flownav.simulation.wind import (
     start_wind,
     step_wind,
 )
+from paper_imu import ImuNormals, ImuParameters, ImuSettings, ImuState, start_imu, step_imu
 
 EPOCHS = 12
 

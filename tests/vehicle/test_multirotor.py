@@ -15,13 +15,13 @@ from flownav.core.errors import InputError
 from flownav.core.parameter_files import read_toml
 from flownav.vehicle import airframe, multirotor
 from flownav.vehicle.around import CALM, in_wind
+from flownav.vehicle.feasibility import require_multirotor
 from flownav.vehicle.kinds import flattened, load_vehicle, read_kind, vehicle_file
 from flownav.vehicle.motors import battery_voltage, mixed, propeller_load, root_of_share, told_speed
 from flownav.vehicle.multirotor_parameters import (
     MultirotorParameters,
     full_thrust,
     hover_speed,
-    require_multirotor,
     with_inflow_held,
 )
 from flownav.vehicle.parameters import VehicleParameters

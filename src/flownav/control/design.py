@@ -1,16 +1,14 @@
 """The autopilot's gains from a vehicle's control powers.
 
-The shape of each loop is the outcome of a search (`control.shaping`): of all gains whose loops keep their margins at
-every corner of the shipped vehicle's uncertainty box, those with the least error of position in turbulence. Here it
-stands in units that the control powers take out, so that another vehicle gets loops of the same bandwidth; whether they
-hold on it is what `flownav vehicle FILE --margins` says.
+The shape of a helicopter's loops is the outcome of a search (`tools/shape_gains.py`): of all gains whose loops keep
+their margins at every corner of the shipped vehicle's uncertainty box, those with the least error of position in
+turbulence. Here it stands in units that the control powers take out, so that another vehicle gets loops of the same bandwidth;
+whether they hold on it is what `flownav vehicle FILE --margins` says.
 
-A multirotor's gains from its control powers: the shape of each loop in units that the control powers take out.
-
-The shape of the horizontal axes is where a local search for the least drift (`control.shaping`'s measure and margins)
-ended on the shipped 450 mm quad, its gains then lowered by hand until the loops of both shipped multirotors keep 45
-degrees with the inflow held, too; both axes have the same. A share of the rotors' thrust gives the body an angular
-acceleration, where a cyclic gives it a rate.
+A multirotor's horizontal axes are where a local search for the least drift (that tool's measure and margins) ended on
+the shipped 450 mm quad, its gains then lowered by hand until the loops of both shipped multirotors keep 45 degrees with
+the inflow held, too; both axes have the same. A share of the rotors' thrust gives the body an angular acceleration,
+where a cyclic gives it a rate.
 """
 
 from __future__ import annotations

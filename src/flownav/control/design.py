@@ -2,8 +2,8 @@
 
 The shape of a helicopter's loops is the outcome of a search (`tools/shape_gains.py`): of all gains whose loops keep
 their margins at every corner of the shipped vehicle's uncertainty box, those with the least error of position in
-turbulence. Here it stands in units that the control powers take out, so that another vehicle gets loops of the same bandwidth;
-whether they hold on it is what `flownav vehicle FILE --margins` says.
+turbulence. Here it stands in units that the control powers take out, so that another vehicle gets loops of the same
+bandwidth; whether they hold on it is what `flownav vehicle FILE --margins` says.
 
 A multirotor's horizontal axes are where a local search for the least drift (that tool's measure and margins) ended on
 the shipped 450 mm quad, its gains then lowered by hand until the loops of both shipped multirotors keep 45 degrees with

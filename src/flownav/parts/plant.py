@@ -21,15 +21,6 @@ from flownav.parts.protocols import Controller, Flown, SensorModel, Truth, Value
 from flownav.simulation import layout
 from flownav.simulation.block import Buffers
 from flownav.simulation.epoch import own_attitude
-from flownav.simulation.layout import (
-    PLANT,
-    load_around,
-    load_autopilot,
-    load_controls,
-    load_helicopter,
-    store_controls,
-    store_loads,
-)
 from flownav.simulation.navigating import TRUTH, Timetable, first_truth
 from flownav.simulation.plan import ATTITUDE_S, Flight
 from flownav.simulation.records import AttitudeError, Loads
@@ -38,7 +29,7 @@ from flownav.vehicle.around import Around
 from flownav.vehicle.state import Controls
 
 RIGID = 13
-load_error, _ = PLANT.access(AttitudeError)
+load_error, _ = layout.PLANT.access(AttitudeError)
 ATTITUDE = slice(6, 10)
 _, timed_step = runge_kutta(lambda timed, rate, dt_s: timed + rate * dt_s)  # the time [s], then the vehicle's state
 
@@ -53,7 +44,7 @@ class OwnVehicle:
 
     def _step(self, _work: int, dt_s: float) -> None:
         rows = self._work[layout.HELICOPTER : layout.HELICOPTER + RIGID]
-        controls, around = load_controls(self._work, ONE_LANE, 0), load_around(self._work, ONE_LANE, 0)
+        controls, around = layout.load_controls(self._work, ONE_LANE, 0), layout.load_around(self._work, ONE_LANE, 0)
         if dt_s == 0.0:
             self._t_s, self._state = 0.0, self._checked("start", self._part.start(rows.copy()), None)
         else:
@@ -63,7 +54,7 @@ class OwnVehicle:
         seen = self._part.outputs(self._t_s, self._state, controls, around)
         if not np.isfinite(tuple(seen)).all():
             raise InputError(f"vehicle {name_of(self._part)}: outputs() gave {tuple(seen)}; finite ones are needed")
-        store_loads(self._work, ONE_LANE, 0, Loads(seen.thrust_n, seen.contact_force_n, seen.power_w))
+        layout.store_loads(self._work, ONE_LANE, 0, Loads(seen.thrust_n, seen.contact_force_n, seen.power_w))
 
     def _moved(self, dt_s: float, controls: Controls, around: Around) -> Array:
         """One classical fourth-order step; the quaternion is brought back to unit length."""
@@ -98,14 +89,14 @@ class OwnController:
     def _steer(self, _work: int) -> None:
         work, t_s = self._work, self._calls * ATTITUDE_S
         self._calls += 1
-        state = load_helicopter(work, ONE_LANE, 0)
+        state = layout.load_helicopter(work, ONE_LANE, 0)
         seen = work[layout.ESTIMATE : layout.ESTIMATE + 9]
         home = work[layout.HOME : layout.HOME + 3]
         flown = Flown(
             seen[:3] - home, seen[3:6].copy(), np.array(own_attitude(state, load_error(work, ONE_LANE, 0))),
             np.array([state.p, state.q, state.r]), seen[6:9].copy(),
         )  # fmt: skip
-        flying = load_autopilot(work, ONE_LANE, 0).flying > 0.0
+        flying = layout.load_autopilot(work, ONE_LANE, 0).flying > 0.0
         asked = self._part.command(t_s, flown, reference_at(self._flight.path, t_s), flying=flying)
         controls = tuple(float(value) for value in asked)
         if len(controls) != len(Controls._fields) or not np.isfinite(controls).all():
@@ -113,7 +104,7 @@ class OwnController:
                 f"controller {name_of(self._part)}: command() gave {controls}; four finite angles are needed "
                 f"({', '.join(Controls._fields)}) [rad]"
             )
-        store_controls(work, ONE_LANE, 0, Controls(*controls))
+        layout.store_controls(work, ONE_LANE, 0, Controls(*controls))
 
 
 STATED = 3

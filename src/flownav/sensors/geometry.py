@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import equation, larger, smaller
-from flownav.core.frames import Rotation, Vector, to_earth
+from flownav.core.frames import Rotation, Vector, angular_flow, to_earth
 
 
 class LensPose(NamedTuple):
@@ -156,3 +156,15 @@ def beam_distance(pos_n_m: float, pos_e_m: float, height_m: float, rotation: Rot
     hit = hit - roughness(pos_n_m + north * hit, pos_e_m + east * hit, g) / approach
     normal = 1.0 / np.sqrt(1.0 + g.slope_n * g.slope_n + g.slope_e * g.slope_e)
     return BeamHit(larger(hit, 0.0), smaller(approach * normal, 1.0))
+
+
+@equation
+def image_rate_rad_s(
+    forward_m_s: float, right_m_s: float, rate_p_rad_s: float, rate_q_rad_s: float, height_m: float
+) -> tuple[float, float]:
+    """How fast the ground straight below passes, towards body forward and right, as tangents a second.
+
+    The ground falls back as the camera goes ahead, and comes forward as the nose goes up.
+    """
+    flow_x, flow_y = angular_flow(forward_m_s, right_m_s, rate_p_rad_s, rate_q_rad_s, height_m)
+    return -flow_y, flow_x

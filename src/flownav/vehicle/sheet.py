@@ -12,16 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.vehicle import linearize
 from flownav.vehicle.kinds import describe_vehicle, load_vehicle
-from flownav.vehicle.linearize import (
-    INPUTS,
-    STATES,
-    LinearModel,
-    ReducedModel,
-    eigenvalues,
-    load_paper_model,
-    reduced_model,
-)
 from flownav.vehicle.multirotor_parameters import MultirotorParameters, full_thrust
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.rotor import multiplier
@@ -36,9 +28,9 @@ class VehicleSheet(NamedTuple):
     name: str
     vehicle: VehicleParameters
     trim: Trim
-    frozen: LinearModel
-    quasi_steady: LinearModel
-    paper: ReducedModel
+    frozen: linearize.LinearModel
+    quasi_steady: linearize.LinearModel
+    paper: linearize.ReducedModel
     ground_effect: tuple[tuple[float, float], ...]
 
 
@@ -57,9 +49,9 @@ def helicopter_sheet(name: str, vehicle: VehicleParameters) -> VehicleSheet:
         name=name,
         vehicle=vehicle,
         trim=hover,
-        frozen=reduced_model(vehicle, hover, freeze_inflow=True),
-        quasi_steady=reduced_model(vehicle, hover, freeze_inflow=False),
-        paper=load_paper_model(),
+        frozen=linearize.reduced_model(vehicle, hover, freeze_inflow=True),
+        quasi_steady=linearize.reduced_model(vehicle, hover, freeze_inflow=False),
+        paper=linearize.load_paper_model(),
         ground_effect=ground_effect_in_hover(vehicle, hover.induced_velocity_m_s),
     )
 
@@ -89,8 +81,8 @@ def as_json(sheet: VehicleSheet) -> dict[str, Any]:
             "lon_rad": hover.lon,
             "lat_rad": hover.lat,
         },
-        "states": list(STATES),
-        "inputs": list(INPUTS),
+        "states": list(linearize.STATES),
+        "inputs": list(linearize.INPUTS),
         "frozen_inflow": _model(sheet.frozen.a, sheet.frozen.b),
         "quasi_steady_inflow": _model(sheet.quasi_steady.a, sheet.quasi_steady.b),
         "paper": _model(sheet.paper.a, sheet.paper.b),
@@ -99,7 +91,7 @@ def as_json(sheet: VehicleSheet) -> dict[str, Any]:
 
 
 def _model(a: NDArray[np.float64], b: NDArray[np.float64]) -> dict[str, Any]:
-    pairs = [[float(value.real), float(value.imag)] for value in eigenvalues(a)]
+    pairs = [[float(value.real), float(value.imag)] for value in linearize.eigenvalues(a)]
     return {"A": a.tolist(), "B": b.tolist(), "eigenvalues": pairs}
 
 

@@ -18,10 +18,10 @@ from flownav.simulation.engine import fly_one
 from flownav.simulation.history import column
 from flownav.simulation.scenario import load_scenario, with_vehicle
 from flownav.simulation.sensing import EPOCH_S
-from flownav.vehicle.loading import load_vehicle
+from flownav.vehicle.kinds import load_vehicle
 from flownav.vehicle.multirotor import derivative
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.multirotor_trim import is_hexa, trim_multirotor
+from flownav.vehicle.trim import is_hexa, trim_multirotor
 
 Array = NDArray[np.float64]
 Columns = dict[str, Array]

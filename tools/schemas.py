@@ -38,8 +38,7 @@ def generated() -> dict[str, dict[str, Any]]:
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.sensors.datasheet import FlowSensor
     from flownav.simulation.scenario import Scenario
-    from flownav.vehicle.multirotor_schema import MultirotorFile
-    from flownav.vehicle.schema import VehicleFile
+    from flownav.vehicle.schema import MultirotorFile, VehicleFile
 
     models: dict[str, type[BaseModel]] = {
         "file-scenario": Scenario,

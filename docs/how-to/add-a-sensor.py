@@ -17,7 +17,7 @@
 from typing import NamedTuple
 
 from flownav.core.compile import equation
-from flownav.sensors.beam import BeamHit
+from flownav.sensors.geometry import BeamHit
 
 
 class LaserParameters(NamedTuple):

@@ -14,8 +14,7 @@ from flownav.campaigns.measures import ROW_COLUMNS
 from flownav.campaigns.plan import Ready, ready_of
 from flownav.core.errors import InputError
 from flownav.simulation import layout
-from flownav.simulation.fault import SOUND
-from flownav.simulation.truth import TRUTH_ROWS
+from flownav.simulation.truth import SOUND, TRUTH_ROWS
 
 SHORT = {"filter": {"name": "paper"}, "flight": {"duration_s": 1.0}}
 NUMBER = ROW_COLUMNS.index("x.mean_error")

@@ -23,7 +23,7 @@ from flownav.scoring.errors import SCORE_COLUMNS
 from flownav.scoring.touchdown import Limits
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
-from flownav.simulation.draws import KEYED_EPOCHS, Noise
+from flownav.simulation.block import KEYED_EPOCHS, Noise
 from flownav.simulation.engine import Branches, Instead, buffers_of, fly_into
 from flownav.simulation.ensemble import believed
 from flownav.simulation.history import columns

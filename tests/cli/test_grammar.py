@@ -87,7 +87,7 @@ def test_the_choices_of_the_command_line_are_those_of_the_rooms():
     from flownav.live.options import SENDINGS
     from flownav.paper.reproduction import TABLES
     from flownav.simulation.scenario import SHIPPED
-    from flownav.vehicle.loading import SHIPPED_NAMES
+    from flownav.vehicle.kinds import SHIPPED_NAMES
 
     assert choices.SCENARIOS == SHIPPED
     assert tuple(SHIPPED_NAMES) == choices.VEHICLES

@@ -8,26 +8,22 @@ import control as ct
 import numpy as np
 import pytest
 
-from flownav.control.box import LEAST_GAIN_DB, LEAST_PHASE_DEG, margins_of, margins_over_box, short_of_margin
 from flownav.control.design import gains_for
 from flownav.control.gains import AutopilotGains
-from flownav.control.loops import CUTS, LOOPS, Timing, loop_gains
-from flownav.control.margins import margins
-from flownav.control.sampled import period_map, spectral_radius
-from flownav.control.shaping import (
-    OMEGA_RAD_S,
-    Shape,
-    axis_of,
-    drift_m,
-    least_margins,
-    loops_of,
-    shape_in,
-    with_shape,
+from flownav.control.loops import CUTS, LOOPS, Timing, loop_gains, period_map, spectral_radius
+from flownav.control.margins import (
+    LEAST_GAIN_DB,
+    LEAST_PHASE_DEG,
+    margins,
+    margins_of,
+    margins_over_box,
+    short_of_margin,
 )
 from flownav.core.frames import GRAVITY_M_S2
-from flownav.vehicle.loading import load_vehicle
-from flownav.vehicle.plant import INPUTS, OUTPUTS, frequency_response, hover_plant
+from flownav.vehicle.kinds import load_vehicle
+from flownav.vehicle.linearize import INPUTS, OUTPUTS, frequency_response, hover_plant
 from flownav.vehicle.trim import trim
+from gain_search import shape_gains
 
 VEHICLE = load_vehicle()
 HOVER = trim(VEHICLE)
@@ -171,11 +167,11 @@ def test_the_plant_is_the_reduced_model_where_attitude_is_held():
 @pytest.mark.parametrize("name", ["forward", "right"])
 def test_the_search_sees_the_loops_that_are_flown(name):
     """Its own cuts of one axis are those of the whole autopilot on the vehicle as told, but for what couples axes."""
-    axis = axis_of(name)
-    ours = loops_of(shape_in(GAINS, name), axis)[0]
-    whole = loop_gains(frequency_response(PLANT, OMEGA_RAD_S), OMEGA_RAD_S, GAINS)
+    axis = shape_gains.axis_of(name)
+    ours = shape_gains.loops_of(shape_gains.shape_in(GAINS, name), axis)[0]
+    whole = loop_gains(frequency_response(PLANT, shape_gains.OMEGA_RAD_S), shape_gains.OMEGA_RAD_S, GAINS)
     tilt = "pitch" if name == "forward" else "roll"
-    fast = OMEGA_RAD_S > 3.0
+    fast = shape_gains.OMEGA_RAD_S > 3.0
     for i, loop in enumerate((tilt, f"{tilt} rate", f"velocity {name}", f"position {name}")):
         theirs = whole[:, LOOPS.index(loop)]
         assert np.abs(ours[i] - theirs)[fast].max() < 0.08 * np.abs(theirs[fast]).max(), loop
@@ -184,19 +180,19 @@ def test_the_search_sees_the_loops_that_are_flown(name):
 @pytest.mark.parametrize("name", ["forward", "right"])
 def test_the_designed_gains_are_where_less_drift_costs_a_margin(name):
     """Turned up by a sixth, the velocity's gain drifts less, and the box no longer keeps 45 degrees and 6 dB."""
-    axis, shape = axis_of(name), shape_in(GAINS, name)
-    drift = drift_m(shape, axis)
+    axis, shape = shape_gains.axis_of(name), shape_gains.shape_in(GAINS, name)
+    drift = shape_gains.drift_m(shape, axis)
     more = shape._replace(velocity_1_s=1.17 * shape.velocity_1_s)
-    phase, gain = least_margins(more, axis)
-    assert drift_m(more, axis) < drift
+    phase, gain = shape_gains.least_margins(more, axis)
+    assert shape_gains.drift_m(more, axis) < drift
     assert phase < LEAST_PHASE_DEG or gain < LEAST_GAIN_DB
-    assert drift_m(shape._replace(gust_s=1e3), axis) > 1.2 * drift  # without the observer
+    assert shape_gains.drift_m(shape._replace(gust_s=1e3), axis) > 1.2 * drift  # without the observer
 
 
 def test_a_shape_goes_into_the_gains_and_comes_out_again():
-    shape = Shape(0.1, 0.02, 0.03, 1.0, 0.4, 0.2, 0.3)
+    shape = shape_gains.Shape(0.1, 0.02, 0.03, 1.0, 0.4, 0.2, 0.3)
     for name in ("forward", "right"):
-        assert shape_in(with_shape(GAINS, shape, name), name) == pytest.approx(shape)
+        assert shape_gains.shape_in(shape_gains.with_shape(GAINS, shape, name), name) == pytest.approx(shape)
 
 
 @pytest.mark.parametrize("name", ["quad-450", "hexa-550"])

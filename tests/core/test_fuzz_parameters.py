@@ -16,20 +16,20 @@ from flownav.core.parameter_files import load, shipped
 from flownav.lab.identification.rig_log import Rig
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import settings_of
-from flownav.sensors.barometer_sheet import load_barometer_sheet
+from flownav.sensors.barometer import BarometerSheet
 from flownav.sensors.datasheet import load_sensor
-from flownav.sensors.flow_camera_sheet import load_flow_camera_sheet
-from flownav.sensors.gps_receiver_sheet import load_gps_receiver_sheet
-from flownav.sensors.inertial_sheet import load_inertial_sheet
-from flownav.sensors.magnetometer_sheet import load_magnetometer_sheet
-from flownav.sensors.pad_camera_sheet import load_pad_camera_sheet
-from flownav.sensors.range_sensor_sheet import load_range_sensor_sheet
-from flownav.sensors.skid_switch_sheet import load_skid_switch_sheet
+from flownav.sensors.flow_camera_sheet import FlowCameraSheet
+from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
+from flownav.sensors.inertial_sheet import InertialSheet
+from flownav.sensors.magnetometer import MagnetometerSheet
+from flownav.sensors.pad_camera_sheet import PadCameraSheet
+from flownav.sensors.range_sensor import RangeSensorSheet
+from flownav.sensors.skid_switch import SkidSwitchSheet
 from flownav.simulation.dispersion import DispersionFile
 from flownav.simulation.scenario import load_scenario
 from flownav.studies.validation.flights import load_flights
-from flownav.vehicle.loading import load_vehicle
-from flownav.vehicle.paper_model import load_paper_model
+from flownav.vehicle.kinds import load_vehicle
+from flownav.vehicle.linearize import load_paper_model
 from fuzzing import FIRST_SEED, MUTANTS, assert_promise
 from toml_mutations import mutate_toml
 
@@ -63,14 +63,14 @@ LOADERS: dict[str, Callable[[Path], Any]] = {
     "dispersion.toml": lambda path: load(path, DispersionFile),
     "validation.toml": load_flights,
     "paper_reduced_model.toml": load_paper_model,
-    "sensors/gps_receiver.toml": load_gps_receiver_sheet,
-    "sensors/range_sensor.toml": load_range_sensor_sheet,
-    "sensors/inertial.toml": load_inertial_sheet,
-    "sensors/flow_camera.toml": load_flow_camera_sheet,
-    "sensors/magnetometer.toml": load_magnetometer_sheet,
-    "sensors/barometer.toml": load_barometer_sheet,
-    "sensors/pad_camera.toml": load_pad_camera_sheet,
-    "sensors/skid_switch.toml": load_skid_switch_sheet,
+    "sensors/gps_receiver.toml": GpsReceiverSheet.read,
+    "sensors/range_sensor.toml": RangeSensorSheet.read,
+    "sensors/inertial.toml": InertialSheet.read,
+    "sensors/flow_camera.toml": FlowCameraSheet.read,
+    "sensors/magnetometer.toml": MagnetometerSheet.read,
+    "sensors/barometer.toml": BarometerSheet.read,
+    "sensors/pad_camera.toml": PadCameraSheet.read,
+    "sensors/skid_switch.toml": SkidSwitchSheet.read,
     "rig": lambda path: load(path, Rig),
     "settings": lambda path: load(path, NavigatorSettingsFile),
 }

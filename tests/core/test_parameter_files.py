@@ -10,8 +10,8 @@ import pytest
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 from flownav.vehicle.feasibility import require_feasible
-from flownav.vehicle.loading import describe_vehicle, load_vehicle
-from flownav.vehicle.paper_model import load_paper_model
+from flownav.vehicle.kinds import describe_vehicle, load_vehicle
+from flownav.vehicle.linearize import load_paper_model
 from flownav.vehicle.parameters import VehicleParameters
 from vehicle_files import X_CELL
 

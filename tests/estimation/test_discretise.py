@@ -7,7 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from flownav.estimation.error_models import discretised
-from flownav.vehicle.paper_model import load_paper_model
+from flownav.vehicle.linearize import load_paper_model
 
 
 @pytest.mark.parametrize("dt", [0.0, 0.004, 0.02, 1.0])

@@ -21,7 +21,7 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_written
 from flownav.simulation.failing import FaultNormals, failed, strikes
-from flownav.simulation.fault import SOUND
+from flownav.simulation.truth import SOUND
 
 BY_CHANCE = ("flow_garbage", "low_texture", "low_texture_unsaid", "range_spikes", "accel_vibration")
 AHEAD = ("gps_clock", "flow_clock")  # a receiver does not feed what is stamped ahead of its clock

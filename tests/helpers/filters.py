@@ -46,7 +46,7 @@ from flownav.estimation.states import (
     VELOCITY,
     VELOCITY_LAG,
 )
-from flownav.sensors.second_order import second_order_hold
+from flownav.sensors.processes import second_order_hold
 
 N = STATES_WITH_LAG
 ELEMENTS = N * (N + 1) // 2

@@ -293,7 +293,7 @@ def fly_over(baud: int, vehicle: SimulatedVehicle, seconds: float, options: Opti
 
 def options_of(setup: Any, baud: int) -> Options:
     """What a session needs to know of a simulated flight."""
-    from flownav.sensors.identified import IdentifiedFlow
+    from flownav.sensors.datasheet import IdentifiedFlow
 
     ages_s = setup.fitted.ages_s
     return Options(

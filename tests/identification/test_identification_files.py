@@ -25,7 +25,8 @@ from flownav.lab.identification.orders import CANDIDATES
 from flownav.lab.identification.rig_log import rate_of, read_runs
 from flownav.lab.identification.sensor_file import bessel, sensor_entries, write_sensor
 from flownav.lab.identification.sentinel import judge
-from flownav.sensors.datasheet import FlowSettings, load_sensor
+from flownav.sensors.datasheet import load_sensor
+from flownav.sensors.settings import FlowSettings
 
 A, B, C = 210.0, 16.0, 200.0  # gain 1.05, latency 80 ms
 COUNTS, ROD_M = 40_000, 1.5

@@ -21,17 +21,10 @@ from flownav.lab.identification.height_law import (
 )
 from flownav.lab.identification.orders import choose, parse_order
 from flownav.lab.identification.output_error import fit
-from flownav.lab.identification.quantities import (
-    Interval,
-    damping,
-    excitation,
-    gain,
-    latency,
-    natural_frequency,
-    numerator,
-)
+from flownav.lab.identification.quantities import Interval, excitation, gain, latency, numerator
 from flownav.lab.identification.sentinel import judge, one_axis
 from flownav.lab.identification.statistics import chi_square_tail, fit_percent, information_criteria, whiteness
+from second_order_fit import damping, natural_frequency
 
 FINE_S = 0.001
 DELAY = Structure(0)

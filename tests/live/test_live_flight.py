@@ -35,7 +35,7 @@ from flownav.navigation.tables import estimate_table, innovation_table, states_t
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
-from flownav.sensors.identified import IdentifiedFlow
+from flownav.sensors.datasheet import IdentifiedFlow
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 from live_ends import Hover, Wire

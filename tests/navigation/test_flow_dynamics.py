@@ -36,8 +36,15 @@ from flownav.navigation.told import FROM_MAG, Equipment
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
-from flownav.sensors.datasheet import DEFAULT_SENSOR, Dynamics, load_sensor
-from flownav.sensors.identified import DELAY_WITHIN_DEG, identified_flow, needs_lag_states, phase_off_delay_deg
+from flownav.sensors.datasheet import (
+    DEFAULT_SENSOR,
+    DELAY_WITHIN_DEG,
+    Dynamics,
+    identified_flow,
+    load_sensor,
+    needs_lag_states,
+    phase_off_delay_deg,
+)
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import buffers_of, fly_into, fly_one, fly_written
 from flownav.simulation.fitting import refitted, timetable_of

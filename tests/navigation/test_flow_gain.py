@@ -15,7 +15,6 @@ from flownav.navigation.settings_of import settings_of
 from flownav.navigation.told import NO_HEADING, NO_STATED_NOISE, Equipment, FlowSettings
 from flownav.navigation.verdicts import Biases
 from flownav.sensors.datasheet import FlowSensor, load_sensor
-from flownav.sensors.datasheet import FlowSettings as Chosen
 from flownav.sensors.flow import FlowParameters, FlowState, flow_noise_sigma, read_flow
 from flownav.sensors.flow_camera import (
     FlowCameraNormals,
@@ -25,14 +24,15 @@ from flownav.sensors.flow_camera import (
     FlowCameraUnit,
     step_flow_camera,
 )
-from flownav.sensors.flow_camera_sheet import load_flow_camera_sheet
+from flownav.sensors.flow_camera_sheet import FlowCameraSheet
+from flownav.sensors.settings import FlowSettings as Chosen
 from navigation_streams import circle, fly, navigate
 from sensor_normals import silent
 
 NAN = math.nan
 GAINS = (0.5, 0.7, 1.0, 1.4, 2.0)
 FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
-CAMERA = load_flow_camera_sheet().parameters()._replace(quality_sigma=0.0)
+CAMERA = FlowCameraSheet.read().parameters()._replace(quality_sigma=0.0)
 DRAWS = 3000
 RATE_X, RATE_Y = 0.1, -0.2  # of the vehicle [rad/s]
 FORWARD_M_S, RIGHT_M_S = 0.3, -0.2

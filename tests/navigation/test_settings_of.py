@@ -13,9 +13,9 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.settings_of import noise_of, of_gps_receiver, of_inertial, of_magnetometer, settings_of
 from flownav.navigation.told import NO_HEADING, NO_STATED_NOISE, Equipment
 from flownav.sensors.datasheet import load_sensor
-from flownav.sensors.gps_receiver_sheet import load_gps_receiver_sheet
-from flownav.sensors.inertial_sheet import Vibration, load_inertial_sheet
-from flownav.sensors.magnetometer_sheet import MagneticField, load_magnetometer_sheet
+from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
+from flownav.sensors.inertial_sheet import InertialSheet, Vibration
+from flownav.sensors.magnetometer import MagneticField, MagnetometerSheet
 from flownav.sensors.sheets import shipped_sheets
 
 FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
@@ -41,7 +41,7 @@ def test_what_a_user_states_stands_above_every_sheet_and_what_he_does_not_below(
     told, _ = settings_of(load_sensor(), shipped_sheets(), stated=stated)
     assert (told.flow_gain_x, told.gps_slow_sigma_m, told.gate_sigma) == (0.9, 7.0, 4.0)
     assert told.flow_gain_y == load_sensor().dynamics.gain
-    assert told.gps_slow_tau_s == load_gps_receiver_sheet().position.slow_tau_s
+    assert told.gps_slow_tau_s == GpsReceiverSheet.read().position.slow_tau_s
 
 
 def test_the_files_law_of_noise_is_the_filters_where_it_is_asked_for():
@@ -78,7 +78,7 @@ def test_every_shipped_sheet_is_heard():
 
 def test_the_velocity_that_white_noise_integrates_to_is_what_the_filter_expects():
     """Readings of the sheet's own noise, summed: their spread after a second is the filter's density."""
-    sheet = load_inertial_sheet().model_copy(update={"vibration": Vibration()})
+    sheet = InertialSheet.read().model_copy(update={"vibration": Vibration()})
     keys, parameters = of_inertial(sheet), sheet.parameters(0.0, 2.0)
     random, count = np.random.default_rng(1), round(float(sheet.rate_hz))
     for key, sigma in (
@@ -91,7 +91,7 @@ def test_the_velocity_that_white_noise_integrates_to_is_what_the_filter_expects(
 
 
 def test_weight_turns_scale_and_misalignment_of_an_accelerometer_into_bias():
-    sheet = load_inertial_sheet()
+    sheet = InertialSheet.read()
     own = 1e-3 * GRAVITY_M_S2 * sheet.accelerometer.bias_mg
     still = sheet.accelerometer.model_copy(update={"scale_percent": 0.0, "misalignment_deg": 0.0})
     alone = of_inertial(sheet.model_copy(update={"accelerometer": still}))
@@ -101,7 +101,7 @@ def test_weight_turns_scale_and_misalignment_of_an_accelerometer_into_bias():
 
 
 def test_vibration_of_the_sheet_counts_as_noise_and_as_harmless():
-    sheet = load_inertial_sheet()
+    sheet = InertialSheet.read()
     calm = of_inertial(sheet.model_copy(update={"vibration": Vibration()}))
     shaken, weakened = of_inertial(sheet), of_inertial(sheet, (23.0, 46.0))
     for key in ("accel_noise_m_s2_rt_hz", "gyro_noise_rad_s_rt_hz"):
@@ -110,7 +110,7 @@ def test_vibration_of_the_sheet_counts_as_noise_and_as_harmless():
 
 
 def test_a_receivers_sheet_says_what_changes_from_fix_to_fix():
-    sheet = load_gps_receiver_sheet()
+    sheet = GpsReceiverSheet.read()
     keys = of_gps_receiver(sheet)
     assert keys["gps_white_sigma_m"] == pytest.approx(
         math.hypot(sheet.position.white_sigma_m, sheet.position.quantum_m / math.sqrt(12.0))
@@ -121,5 +121,5 @@ def test_a_receivers_sheet_says_what_changes_from_fix_to_fix():
 
 def test_hard_iron_is_an_angle_of_the_level_field():
     field = MagneticField(strength_gauss=0.5, inclination_deg=60.0)
-    sheet = load_magnetometer_sheet().model_copy(update={"hard_iron_mgauss": 25.0})
+    sheet = MagnetometerSheet.read().model_copy(update={"hard_iron_mgauss": 25.0})
     assert of_magnetometer(sheet, field)["compass_sigma_rad"] == pytest.approx(0.1)

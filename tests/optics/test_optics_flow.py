@@ -19,8 +19,9 @@ from flownav.lab.optics.flow import compensated, flow_of_frames
 from flownav.lab.optics.frame_files import read_frames
 from flownav.lab.optics.frame_window import binned, middle
 from flownav.lab.optics.pad import texture
-from flownav.lab.optics.projection import CameraMotion, motion_field, pose_looking_down
+from flownav.lab.optics.projection import pose_looking_down
 from flownav.lab.optics.render import film
+from image_motion import CameraMotion, motion_field
 
 FPS = 250.0
 HEIGHT_M = 0.8

@@ -11,9 +11,8 @@ from typer.testing import CliRunner
 from flownav.campaigns.plan import planned
 from flownav.campaigns.rows import rows_of
 from flownav.core.errors import InputError
-from flownav.parts.engine import OwnPartsEngine, identities
 from flownav.parts.examples.complementary import ComplementaryFilter
-from flownav.parts.flying import fly_parts
+from flownav.parts.flying import OwnPartsEngine, fly_parts, identities
 from flownav.parts.naming import names, part_of
 from flownav.parts.protocols import Parts
 

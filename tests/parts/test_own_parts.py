@@ -16,7 +16,7 @@ from flownav.parts.examples.pd_controller import PdController
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 from flownav.vehicle.helicopter import derivative, outputs
-from flownav.vehicle.loading import read_vehicle
+from flownav.vehicle.kinds import read_vehicle
 from flownav.vehicle.parameters import flatten
 from flownav.vehicle.state import HelicopterState
 

@@ -14,8 +14,7 @@ from flownav.logs.log import Log
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions, prepare, put_right
 from flownav.replays.session import replay
-from flownav.sensors.datasheet import load_sensor
-from flownav.sensors.identified import IdentifiedFlow, identified_flow
+from flownav.sensors.datasheet import IdentifiedFlow, identified_flow, load_sensor
 from replay_logs import log_of_flight
 
 

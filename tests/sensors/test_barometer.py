@@ -12,6 +12,7 @@ from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.parameter_files import check
 from flownav.sensors.barometer import (
     BarometerNormals,
+    BarometerSheet,
     BarometerStartNormals,
     BarometerTruth,
     BarometerUnit,
@@ -20,10 +21,9 @@ from flownav.sensors.barometer import (
     step_barometer,
     wash_error,
 )
-from flownav.sensors.barometer_sheet import BarometerSheet, load_barometer_sheet
 from sensor_normals import draws, moved_by, silent
 
-SHEET = load_barometer_sheet()
+SHEET = BarometerSheet.read()
 RADIUS_M, DENSITY = 0.89, 1.225
 P = SHEET.parameters(RADIUS_M, DENSITY)
 PLAIN = BarometerUnit(0.0, 0.0, 1.0, 1.0)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flownav.sensors.chance import factor, level_of, spell, spell_levels
+from flownav.sensors.processes import factor, level_of, spell, spell_levels
 
 
 def test_a_normal_exceeds_its_level_with_the_probability() -> None:

@@ -7,7 +7,7 @@ import math
 import pytest
 from pymavlink.mavextra import get_mag_field_ef
 
-from flownav.sensors.earth_field import declination_rad
+from flownav.sensors.magnetometer import declination_rad
 
 # the model's values in 2026, to 0.1 deg
 TOWNS = {

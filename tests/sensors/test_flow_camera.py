@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation as Turn
 from flownav.core.errors import InputError
 from flownav.core.frames import angular_flow
 from flownav.core.parameter_files import check
-from flownav.sensors.datasheet import FlowSettings, load_sensor
+from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.flow import flow_noise_sigma
 from flownav.sensors.flow_camera import (
     FlowCameraNormals,
@@ -27,11 +27,12 @@ from flownav.sensors.flow_camera import (
     start_flow_camera,
     step_flow_camera,
 )
-from flownav.sensors.flow_camera_sheet import FlowCameraSheet, load_flow_camera_sheet
+from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from flownav.sensors.geometry import LensPose
+from flownav.sensors.settings import FlowSettings
 from sensor_normals import draws, moved_by, silent
 
-SHEET = load_flow_camera_sheet()
+SHEET = FlowCameraSheet.read()
 # a camera whose quality tells more than the shipped one's
 P = SHEET.parameters()._replace(best_quality=250.0, quality_fall_height=0.4, quality_fall_flow=0.4, quality_sigma=20.0)
 FLOW = FlowSettings(sonar_overscale=False).parameters(load_sensor())

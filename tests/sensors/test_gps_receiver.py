@@ -22,10 +22,10 @@ from flownav.sensors.gps_receiver import (
     start_gps_receiver,
     step_gps_receiver,
 )
-from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet, load_gps_receiver_sheet
+from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
 from sensor_normals import draws, moved_by, silent
 
-SHEET = load_gps_receiver_sheet()
+SHEET = GpsReceiverSheet.read()
 PLAIN = GpsReceiverUnit(1.0, 1.0, 1.0, 1.0)
 QUIET = silent(GpsReceiverNormals)
 UPRIGHT = tuple(float(x) for x in np.eye(3).ravel())

@@ -10,8 +10,8 @@ import pytest
 from flownav.core.errors import InputError
 from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.parameter_files import check
-from flownav.sensors.imu import ImuReading
 from flownav.sensors.inertial import (
+    ImuReading,
     InertialNormals,
     InertialParameters,
     InertialStartNormals,
@@ -21,14 +21,14 @@ from flownav.sensors.inertial import (
     start_inertial,
     step_inertial,
 )
-from flownav.sensors.inertial_sheet import InertialSheet, load_inertial_sheet
+from flownav.sensors.inertial_sheet import InertialSheet
 from sensor_normals import draws, moved_by, silent
 
 HOVER = ImuReading(0.0, 0.0, 0.0, 0.0, 0.0, -GRAVITY_M_S2)
 PERFECT = silent(InertialUnit, vibration=1.0)
 QUIET = silent(InertialNormals)
 ROTOR_RAD_S, BLADES = 152.4, 2
-SHEET = load_inertial_sheet()
+SHEET = InertialSheet.read()
 
 
 def parameters(sheet: InertialSheet = SHEET, **given: float) -> InertialParameters:

@@ -11,15 +11,16 @@ from scipy.spatial.transform import Rotation as Turn
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check
 from flownav.sensors.magnetometer import (
+    MagneticField,
     MagnetometerNormals,
+    MagnetometerSheet,
     MagnetometerUnit,
     draw_magnetometer,
     read_magnetometer,
 )
-from flownav.sensors.magnetometer_sheet import MagneticField, MagnetometerSheet, load_magnetometer_sheet
 from sensor_normals import draws, moved_by, silent
 
-SHEET = load_magnetometer_sheet()
+SHEET = MagnetometerSheet.read()
 FIELD = MagneticField(strength_gauss=0.5, declination_deg=10.0, inclination_deg=60.0)
 P = SHEET.parameters(FIELD)
 PERFECT, QUIET = silent(MagnetometerUnit), silent(MagnetometerNormals)

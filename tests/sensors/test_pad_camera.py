@@ -21,11 +21,11 @@ from flownav.sensors.pad_camera import (
     reach_of,
     read_pad_camera,
 )
-from flownav.sensors.pad_camera_sheet import PadCameraSheet, load_pad_camera_sheet
+from flownav.sensors.pad_camera_sheet import PadCameraSheet
 from sensor_normals import draws, moved_by, silent
 
 SHEET = check(
-    load_pad_camera_sheet().model_dump()
+    PadCameraSheet.read().model_dump()
     | {
         "angle": {"floor_mrad": 5.0},
         "distance": {"floor_percent": 2.0},

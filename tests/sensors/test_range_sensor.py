@@ -10,11 +10,12 @@ from scipy.spatial.transform import Rotation as Turn
 
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check, shipped
-from flownav.sensors.beam import LEVEL, BeamHit, beam_distance
+from flownav.sensors.geometry import LEVEL, BeamHit, beam_distance
 from flownav.sensors.range_sensor import (
     RangeSensorNormals,
     RangeSensorParameters,
     RangeSensorReading,
+    RangeSensorSheet,
     RangeSensorState,
     RangeSensorUnit,
     draw_range_sensor,
@@ -22,10 +23,9 @@ from flownav.sensors.range_sensor import (
     step_range_sensor,
     wide_beam,
 )
-from flownav.sensors.range_sensor_sheet import RangeSensorSheet, load_range_sensor_sheet
 from sensor_normals import draws, moved_by, silent
 
-SHEET = load_range_sensor_sheet()
+SHEET = RangeSensorSheet.read()
 EXACT = SHEET.parameters()._replace(resolution_m=0.0)
 PERFECT = RangeSensorUnit(0.0, 0.0)
 QUIET = silent(RangeSensorNormals)
@@ -166,7 +166,7 @@ def test_it_starts_on_what_it_sees() -> None:
 
 
 def test_the_lidar_ships_too() -> None:
-    lidar = load_range_sensor_sheet(shipped("sensors/range_lidar.toml"))
+    lidar = RangeSensorSheet.read(shipped("sensors/range_lidar.toml"))
     assert lidar.floor_m < SHEET.floor_m
     assert lidar.ceiling_m > SHEET.ceiling_m
     assert read(down(10.0), p=lidar.parameters()) == (10.0, 255.0, 1.0)
@@ -182,4 +182,4 @@ def test_what_the_datasheet_refuses() -> None:
         with pytest.raises(InputError, match=f"^range.toml: {message}"):
             sheet_with(**changes)
     with pytest.raises(InputError, match=r"nowhere\.toml: no such file"):
-        load_range_sensor_sheet("nowhere.toml")
+        RangeSensorSheet.read("nowhere.toml")

@@ -9,7 +9,9 @@ import pytest
 
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check, shipped
-from flownav.sensors.datasheet import FlowSettings, Noise, load_sensor
+from flownav.sensors.datasheet import load_sensor
+from flownav.sensors.noise_law import Noise
+from flownav.sensors.settings import FlowSettings
 
 TABLES = [
     "table1_identified_models.csv",

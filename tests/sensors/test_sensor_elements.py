@@ -14,9 +14,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flownav.core.parameter_files import shipped
-from flownav.sensors.gauss_markov import gauss_markov, gauss_markov_coefficients
-from flownav.sensors.quantisation import quantised, steps_per_unit
-from flownav.sensors.second_order import hold_step, second_order_hold
+from flownav.sensors.processes import (
+    gauss_markov,
+    gauss_markov_coefficients,
+    hold_step,
+    quantised,
+    second_order_hold,
+    steps_per_unit,
+)
 
 with shipped("paper_table1_identified_models.csv").open() as table:
     TABLE_1 = [(float(r["a"]), float(r["b"]), float(r["c"])) for r in csv.DictReader(table)]

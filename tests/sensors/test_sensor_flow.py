@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flownav.core.frames import angular_flow, velocity_from_flow
-from flownav.sensors.datasheet import FlowSettings, load_sensor
+from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.flow import (
     PERIOD_S,
     FlowParameters,
@@ -23,6 +23,7 @@ from flownav.sensors.flow import (
     step_flow,
 )
 from flownav.sensors.noise_law import WORST_FIT, accuracy_law, fit_noise_law, power_law
+from flownav.sensors.settings import FlowSettings
 
 SENSOR = load_sensor()
 G = 9.81

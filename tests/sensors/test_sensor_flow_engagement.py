@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion
-from flownav.sensors.datasheet import FlowSettings, load_sensor
-from flownav.sensors.flow import start_flow
-from flownav.sensors.flow_engagement import engage_flow, engagement, pattern_reach
+from flownav.sensors.datasheet import load_sensor
+from flownav.sensors.flow import engage_flow, engagement, pattern_reach, start_flow
 from flownav.sensors.geometry import LensPose
+from flownav.sensors.settings import FlowSettings
 
 SENSOR = load_sensor()
 P = FlowSettings().parameters(SENSOR)

@@ -10,9 +10,16 @@ from scipy.signal import lsim
 from scipy.spatial.transform import Rotation as Turn
 
 from flownav.core.frames import rotation_from_quaternion
-from flownav.sensors.beam import LEVEL, Ground, beam_distance, ground_height
-from flownav.sensors.first_order import lag_weights, lagged
-from flownav.sensors.geometry import in_turned_axes, lever_velocity, turned_rotation
+from flownav.sensors.geometry import (
+    LEVEL,
+    Ground,
+    beam_distance,
+    ground_height,
+    in_turned_axes,
+    lever_velocity,
+    turned_rotation,
+)
+from flownav.sensors.processes import lag_weights, lagged
 
 
 def rows(turn: Turn) -> tuple[float, ...]:

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from flownav.sensors.imu import PERIOD_S, ImuNormals, ImuReading, start_imu, step_imu
-from flownav.sensors.settings import STANDARD_GRAVITY_M_S2, ImuSettings
+from flownav.sensors.inertial import ImuReading
+from paper_imu import PERIOD_S, STANDARD_GRAVITY_M_S2, ImuNormals, ImuSettings, start_imu, step_imu
 
 start, step = start_imu, step_imu
 SILENT = ImuNormals(*(0.0,) * len(ImuNormals._fields))

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from flownav.core.compile import LANES, ONE_LANE, equation, kernel, lane_access
 from flownav.core.frames import rotation_from_quaternion
-from flownav.sensors.datasheet import FlowSettings, load_sensor
-from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, read_flow, start_flow, step_flow
-from flownav.sensors.flow_engagement import engage_flow
+from flownav.sensors.datasheet import load_sensor
+from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, engage_flow, read_flow, start_flow, step_flow
 from flownav.sensors.geometry import LensPose
 from flownav.sensors.gps_ins import (
     GpsInsErrors,
@@ -23,7 +22,7 @@ from flownav.sensors.gps_ins import (
     start_gps_ins,
     step_gps_ins,
 )
-from flownav.sensors.imu import ImuNormals, ImuParameters, ImuReading, ImuState, start_imu, step_imu
+from flownav.sensors.inertial import ImuReading
 from flownav.sensors.rangefinder import (
     RangefinderParameters,
     RangefinderState,
@@ -32,7 +31,7 @@ from flownav.sensors.rangefinder import (
     start_rangefinder,
     step_rangefinder,
 )
-from flownav.sensors.settings import GpsInsSettings, ImuSettings, RangefinderSettings
+from flownav.sensors.settings import FlowSettings, GpsInsSettings, RangefinderSettings
 from flownav.simulation.wind import (
     WindNormals,
     WindParameters,
@@ -42,6 +41,7 @@ from flownav.simulation.wind import (
     start_wind,
     step_wind,
 )
+from paper_imu import ImuNormals, ImuParameters, ImuSettings, ImuState, start_imu, step_imu
 
 EPOCHS = 12
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
-from flownav.sensors.pad_fix import PadFixNormals, PadFixParameters, PadFixReading, read_pad
+from flownav.sensors.pad_camera import PadFixNormals, PadFixParameters, PadFixReading, read_pad
 
 CAMERA = PadFixParameters(1.0, 0.003, 0.02, 0.3, 3.0, math.tan(0.6), math.tan(0.6), 0.0)
 SILENT = PadFixNormals(0.0, 0.0, 0.0, 0.0)

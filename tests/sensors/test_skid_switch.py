@@ -12,15 +12,15 @@ from flownav.core.parameter_files import check, shipped
 from flownav.sensors.sheets import SensorSheets, shipped_sheets
 from flownav.sensors.skid_switch import (
     SkidSwitchNormals,
+    SkidSwitchSheet,
     SkidSwitchUnit,
     draw_skid_switch,
     start_skid_switch,
     step_skid_switch,
 )
-from flownav.sensors.skid_switch_sheet import SkidSwitchSheet, load_skid_switch_sheet
 from sensor_normals import draws, silent
 
-SHEET = load_skid_switch_sheet()
+SHEET = SkidSwitchSheet.read()
 P = SHEET.parameters(80.0)  # closes at 12 N, opens below 8 N, follows after 5 readings
 WORKING, QUIET = SkidSwitchUnit(0.0, 0.0), silent(SkidSwitchNormals)
 

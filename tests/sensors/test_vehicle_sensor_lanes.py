@@ -22,8 +22,7 @@ from flownav.sensors.barometer import (
     start_barometer,
     step_barometer,
 )
-from flownav.sensors.beam import Ground, beam_distance
-from flownav.sensors.datasheet import FlowSettings, load_sensor
+from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.flow import FlowParameters
 from flownav.sensors.flow_camera import (
     FlowCameraNormals,
@@ -38,7 +37,7 @@ from flownav.sensors.flow_camera import (
     start_flow_camera,
     step_flow_camera,
 )
-from flownav.sensors.geometry import LensPose
+from flownav.sensors.geometry import Ground, LensPose, beam_distance
 from flownav.sensors.gps_receiver import (
     GpsReceiverNormals,
     GpsReceiverParameters,
@@ -51,8 +50,8 @@ from flownav.sensors.gps_receiver import (
     start_gps_receiver,
     step_gps_receiver,
 )
-from flownav.sensors.imu import ImuReading
 from flownav.sensors.inertial import (
+    ImuReading,
     InertialNormals,
     InertialParameters,
     InertialReading,
@@ -89,6 +88,7 @@ from flownav.sensors.range_sensor import (
     start_range_sensor,
     step_range_sensor,
 )
+from flownav.sensors.settings import FlowSettings
 from flownav.sensors.sheets import shipped_sheets
 from flownav.sensors.skid_switch import (
     SkidSwitchNormals,

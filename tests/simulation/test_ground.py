@@ -9,7 +9,7 @@ import pytest
 
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check
-from flownav.sensors.beam import LEVEL, ground_height, roughness
+from flownav.sensors.geometry import LEVEL, ground_height, roughness
 from flownav.simulation.ground import GroundSettings, share_beyond, under_rotor
 
 DECK = GroundSettings(step_m=-2.0, edge_north_m=1.5, edge_toward_deg=0.0).parameters()

@@ -16,9 +16,9 @@ from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_blocks, fly_one
 from flownav.simulation.ensemble import believed
 from flownav.simulation.history import column, columns
+from flownav.simulation.plant import step_vehicle
 from flownav.simulation.scenario import load_scenario, with_filter, with_vehicle
 from flownav.simulation.truth import packed_truth
-from flownav.simulation.vehicles import step_vehicle
 from flownav.vehicle import multirotor
 from flownav.vehicle.around import CALM
 from flownav.vehicle.state import Controls

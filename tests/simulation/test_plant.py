@@ -11,10 +11,9 @@ from flownav.simulation.assemble import assemble
 from flownav.simulation.ensemble import believed
 from flownav.simulation.layout import store_around, store_controls, store_helicopter
 from flownav.simulation.plan import PHYSICS_S
-from flownav.simulation.plant import linear_step, runge_kutta_step
+from flownav.simulation.plant import linear_step, place, runge_kutta_step
 from flownav.simulation.scenario import Scenario, load_scenario
 from flownav.simulation.truth import packed_truth
-from flownav.simulation.vehicles import place
 from flownav.vehicle import helicopter
 from flownav.vehicle.around import CALM
 from flownav.vehicle.state import Controls, HelicopterState

@@ -7,15 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from flownav.simulation.recirculation import (
+from flownav.simulation.ground import (
     RecirculationSettings,
     RecirculationState,
     recirculated,
     step_recirculation,
 )
 from flownav.simulation.wind import WindVelocity
-from flownav.vehicle.kinds import disc_of
-from flownav.vehicle.loading import load_vehicle
+from flownav.vehicle.kinds import disc_of, load_vehicle
 
 VEHICLE = load_vehicle()
 DISC = disc_of(VEHICLE)

@@ -9,10 +9,10 @@ import pytest
 
 from flownav.core.compile import LANES, kernel
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
-from flownav.sensors.beam import roughness, stepped
+from flownav.sensors.geometry import roughness, stepped
 from flownav.simulation import layout
 from flownav.simulation.assemble import assemble
-from flownav.simulation.draws import key_lanes, plain_noise
+from flownav.simulation.block import key_lanes, plain_noise
 from flownav.simulation.ensemble import believed
 from flownav.simulation.ground import GroundSettings
 from flownav.simulation.layout import load_around, store_helicopter

@@ -12,9 +12,10 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
 from flownav.sensors import flow, inertial
-from flownav.sensors.datasheet import FlowSettings, load_sensor
-from flownav.sensors.imu import ImuReading
-from flownav.sensors.inertial_sheet import load_inertial_sheet
+from flownav.sensors.datasheet import load_sensor
+from flownav.sensors.inertial import ImuReading
+from flownav.sensors.inertial_sheet import InertialSheet
+from flownav.sensors.settings import FlowSettings
 from flownav.studies.validation.drawn import Flight, drawn_sheets, kept_of, sheets_of
 from flownav.studies.validation.flights import load_flights
 from flownav.studies.validation.path import path_of
@@ -107,7 +108,7 @@ def test_the_lag_is_that_of_the_flying_sensor(path):
 
 
 def test_one_reading_of_three_is_three_steps_on():
-    p = load_inertial_sheet().parameters(600.0, 2.0)._replace(gyro_sigma_rad_s=0.0, accel_sigma_m_s2=0.0)
+    p = InertialSheet.read().parameters(600.0, 2.0)._replace(gyro_sigma_rad_s=0.0, accel_sigma_m_s2=0.0)
     quiet, truth = inertial.InertialNormals(*[0.0] * 12), ImuReading(0.1, 0.2, 0.3, 1.0, 2.0, -9.8)
     unit = inertial.InertialUnit(*[0.0] * 27, 1.0)
     begun = inertial.start_inertial(inertial.InertialStartNormals(*[0.3] * 10), p)

@@ -15,22 +15,19 @@ from flownav.core.errors import InputError
 from flownav.core.parameter_files import read_toml
 from flownav.vehicle import airframe, multirotor
 from flownav.vehicle.around import CALM, in_wind
-from flownav.vehicle.ground_effect import multiplier
-from flownav.vehicle.kinds import flattened
-from flownav.vehicle.loading import load_vehicle, read_kind, vehicle_file
-from flownav.vehicle.motors import battery_voltage, mixed, root_of_share, told_speed
+from flownav.vehicle.feasibility import require_multirotor
+from flownav.vehicle.kinds import flattened, load_vehicle, read_kind, vehicle_file
+from flownav.vehicle.motors import battery_voltage, mixed, propeller_load, root_of_share, told_speed
 from flownav.vehicle.multirotor_parameters import (
     MultirotorParameters,
     full_thrust,
     hover_speed,
-    require_multirotor,
     with_inflow_held,
 )
-from flownav.vehicle.multirotor_state import MultirotorState
-from flownav.vehicle.multirotor_trim import parked_multirotor, settled, trim_multirotor
 from flownav.vehicle.parameters import VehicleParameters
-from flownav.vehicle.propeller import propeller_load
-from flownav.vehicle.state import Controls, HelicopterState
+from flownav.vehicle.rotor import multiplier
+from flownav.vehicle.state import Controls, HelicopterState, MultirotorState
+from flownav.vehicle.trim import parked_multirotor, settled, trim_multirotor
 
 NAME = Path("quad-450")
 QUAD: MultirotorParameters = load_vehicle(NAME)  # type: ignore[assignment]

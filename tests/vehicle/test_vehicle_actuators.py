@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from flownav.vehicle import actuators
-from flownav.vehicle.actuators import Servo
+from flownav.vehicle.drive import Servo, acceleration, blade_angle
 
-acceleration = actuators.acceleration
 SERVO = Servo(50.0, 0.7, 1.2, -0.14, 0.14, 0.0)
 
 
@@ -49,9 +47,9 @@ def test_a_command_beyond_the_travel_ends_at_the_stop():
 
 
 def test_the_blade_never_passes_the_stop():
-    assert actuators.blade_angle(0.15, SERVO) == 0.14
-    assert actuators.blade_angle(-0.15, SERVO) == -0.14
-    assert actuators.blade_angle(0.05, SERVO) == 0.05
+    assert blade_angle(0.15, SERVO) == 0.14
+    assert blade_angle(-0.15, SERVO) == -0.14
+    assert blade_angle(0.05, SERVO) == 0.05
 
 
 def test_slop_leaves_an_error_within_its_band_and_answers_the_rest():

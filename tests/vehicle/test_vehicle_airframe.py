@@ -8,7 +8,7 @@ import pytest
 from flownav.vehicle import airframe
 from flownav.vehicle.airframe import AirMotion, Wrench
 from flownav.vehicle.helicopter import tail_inplane_sq
-from flownav.vehicle.loading import load_vehicle
+from flownav.vehicle.kinds import load_vehicle
 
 VEHICLE = load_vehicle()
 RHO = VEHICLE.air_density_kg_m3

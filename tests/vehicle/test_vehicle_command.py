@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 from flownav.cli.vehicle import command
 from flownav.core.errors import InputError, VerdictError
 from flownav.core.parameter_files import shipped
-from flownav.vehicle.loading import SHIPPED_VEHICLE
-from flownav.vehicle.paper_model import load_paper_model
+from flownav.vehicle.kinds import SHIPPED_VEHICLE
+from flownav.vehicle.linearize import load_paper_model
 from vehicle_files import X_CELL
 
 APP = typer.Typer()

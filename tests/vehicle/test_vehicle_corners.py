@@ -7,7 +7,7 @@ import pytest
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import shipped
 from flownav.vehicle.corners import ALONE, CROSSED, NOMINAL, corners
-from flownav.vehicle.loading import SHIPPED_VEHICLE, load_vehicle
+from flownav.vehicle.kinds import SHIPPED_VEHICLE, load_vehicle
 
 SHEET = shipped(SHIPPED_VEHICLE).read_text(encoding="utf-8")
 

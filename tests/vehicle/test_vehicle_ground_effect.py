@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_body
-from flownav.vehicle import ground_effect
 from flownav.vehicle.around import CALM
 from flownav.vehicle.helicopter import outputs
-from flownav.vehicle.loading import load_vehicle
+from flownav.vehicle.kinds import load_vehicle
+from flownav.vehicle.rotor import multiplier
 from flownav.vehicle.trim import trim
 
-multiplier = ground_effect.multiplier
 R, V_I = 0.89, 3.57
 
 

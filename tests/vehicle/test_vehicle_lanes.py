@@ -8,9 +8,9 @@ import numpy as np
 from flownav.core.compile import LANES, ONE_LANE, lane_access, stepping
 from flownav.vehicle import helicopter
 from flownav.vehicle.around import in_wind
-from flownav.vehicle.helicopter import derivative, normalised
-from flownav.vehicle.loading import load_vehicle
-from flownav.vehicle.state import Controls, HelicopterState
+from flownav.vehicle.helicopter import derivative
+from flownav.vehicle.kinds import load_vehicle
+from flownav.vehicle.state import Controls, HelicopterState, normalised
 from flownav.vehicle.trim import parked, trim
 
 FIELDS = len(HelicopterState._fields)

@@ -8,9 +8,8 @@ import pytest
 from flownav.vehicle import airframe, helicopter
 from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.complex_step import jacobian, solve
-from flownav.vehicle.linearize import INPUTS, STATES, eigenvalues, reduced_model
-from flownav.vehicle.loading import load_vehicle
-from flownav.vehicle.paper_model import load_paper_model
+from flownav.vehicle.kinds import load_vehicle
+from flownav.vehicle.linearize import INPUTS, STATES, eigenvalues, load_paper_model, reduced_model
 from flownav.vehicle.state import Controls, HelicopterState
 from flownav.vehicle.trim import trim
 

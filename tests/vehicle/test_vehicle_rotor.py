@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 from flownav.vehicle import rotor as equations
-from flownav.vehicle.loading import load_vehicle
+from flownav.vehicle.kinds import load_vehicle
 
 VEHICLE = load_vehicle()
 MAIN = equations.main_rotor(VEHICLE, 1.0)

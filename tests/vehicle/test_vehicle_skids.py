@@ -9,7 +9,7 @@ from flownav.core.errors import InputError
 from flownav.core.frames import quaternion_from_euler
 from flownav.vehicle import helicopter, skids
 from flownav.vehicle.around import CALM, in_wind
-from flownav.vehicle.loading import load_vehicle
+from flownav.vehicle.kinds import load_vehicle
 from flownav.vehicle.state import Controls
 from flownav.vehicle.trim import parked, trim
 

@@ -11,7 +11,7 @@ import flownav
 
 def ground_effect() -> Figure:
     """Thrust gained near the ground, of the paper's helicopter, at three airspeeds."""
-    from flownav.vehicle.ground_effect import multiplier
+    from flownav.vehicle.rotor import multiplier
     from flownav.vehicle.sheet import vehicle_sheet
 
     sheet = vehicle_sheet(None)
@@ -28,7 +28,7 @@ def ground_effect() -> Figure:
 
 def margins() -> Figure:
     """Phase margin of every loop of the autopilot: as told, and at the worst corner of the uncertainty box."""
-    from flownav.control.box import LEAST_PHASE_DEG, margins_over_box
+    from flownav.control.margins import LEAST_PHASE_DEG, margins_over_box
 
     rows = margins_over_box(None).rows
     loops = list(dict.fromkeys(row.loop for row in rows))

@@ -19,8 +19,7 @@ from flownav.sensors.sheets import SensorSheets
 from flownav.simulation.dispersion import DispersionFile
 from flownav.simulation.scenario import Scenario
 from flownav.studies.validation.flights import ValidationFile
-from flownav.vehicle.multirotor_schema import MultirotorFile
-from flownav.vehicle.schema import VehicleFile
+from flownav.vehicle.schema import MultirotorFile, VehicleFile
 
 INTRODUCTION = """# Keys of the parameter files
 

@@ -16,7 +16,7 @@ from flownav.campaigns.measures import measured
 from flownav.campaigns.plan import Plan
 from flownav.campaigns.store import RECORDS, REPORT, Dataset
 from flownav.core.errors import InputError
-from flownav.parts.engine import recording_of
+from flownav.parts.flying import recording_of
 
 if TYPE_CHECKING:
     import pandas

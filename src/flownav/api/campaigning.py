@@ -29,7 +29,7 @@ from flownav.campaigns.store import RECORDS, SUMMARY, Store
 from flownav.campaigns.summary import WORST, summary_of
 from flownav.core.errors import InputError
 from flownav.core.provenance import called_as
-from flownav.parts.engine import OwnPartsEngine, identities
+from flownav.parts.flying import OwnPartsEngine, identities
 from flownav.parts.protocols import Controller, Filter, SensorModel, VehicleModel
 
 FLIGHTS, FLIGHTS_UNTIL = 1000, 100_000

@@ -28,8 +28,7 @@ from flownav.replays.session import Replay, outage_summary, table_windows
 from flownav.replays.session import outage_table as fly_table
 from flownav.replays.session import replay as run_log
 from flownav.scoring.path import outage_entry
-from flownav.sensors.datasheet import FlowSensor, load_sensor
-from flownav.sensors.identified import identified_flow
+from flownav.sensors.datasheet import FlowSensor, identified_flow, load_sensor
 
 GPS_DELAY_S = 0.22
 Progress = Callable[[int], object]

@@ -13,7 +13,7 @@ from flownav.core.parameter_files import check
 from flownav.simulation.dispersion import SHIPPED as SHIPPED_DISPERSION
 from flownav.simulation.scenario import Scenario as File
 from flownav.simulation.scenario import load_scenario
-from flownav.vehicle.loading import SHIPPED_NAMES
+from flownav.vehicle.kinds import SHIPPED_NAMES
 
 WORDS = {"gps": "model", "filter": "name", "vehicle": "file", "autopilot": "feedback"}  # what one word for a table says
 

@@ -7,8 +7,7 @@ from typing import Any
 
 from flownav.api.changing import kept_file, merged, saved
 from flownav.core.parameter_files import read_toml
-from flownav.vehicle.kinds import AnyFile, flattened, require_flyable
-from flownav.vehicle.loading import read_kind, vehicle_file
+from flownav.vehicle.kinds import AnyFile, flattened, read_kind, require_flyable, vehicle_file
 
 
 class Vehicle:

@@ -11,7 +11,7 @@ from flownav.campaigns.plan import Plan
 from flownav.core.record import Record
 from flownav.simulation.assemble import Setup
 from flownav.simulation.ensemble import Ensemble
-from flownav.simulation.fault import SensorFault
+from flownav.simulation.truth import SensorFault
 
 
 class Recording(Protocol):

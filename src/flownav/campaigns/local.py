@@ -16,12 +16,12 @@ from flownav.scoring.touchdown import Limits, motion_of, touchdowns
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import Flown, fly_blocks, fly_written
 from flownav.simulation.ensemble import Ensemble
-from flownav.simulation.fault import SensorFault
 from flownav.simulation.flight_record import record_of
 from flownav.simulation.history import column, columns
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S
+from flownav.simulation.truth import SensorFault
 
 Array = NDArray[np.float64]
 

@@ -19,9 +19,9 @@ from flownav.core.provenance import code_sha256
 from flownav.core.version import __version__
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.ensemble import Ensemble
-from flownav.simulation.fault import SensorFault
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
+from flownav.simulation.truth import SensorFault
 
 SCHEMA_VERSION = 1
 MOST_CELLS = 10_000

@@ -17,7 +17,7 @@ from flownav.core.parameter_files import Number, ParameterModel, check, load, sh
 from flownav.simulation.dispersion import Distribution, leaves
 from flownav.simulation.scenario import SHIPPED as SHIPPED_SCENARIOS
 from flownav.simulation.scenario import Scenario, load_scenario, with_vehicle
-from flownav.vehicle.loading import SHIPPED_NAMES
+from flownav.vehicle.kinds import SHIPPED_NAMES
 
 SHIPPED = ("takeoff", "landing", "pad_return", "approach", "approach_8_m_s")
 FOLDER = "requirements"

@@ -74,7 +74,7 @@ def command(
     from flownav.campaigns.engines.named import engine_named, require_engine
     from flownav.campaigns.summary import WORST
     from flownav.cli.campaign_rare import fly_again, fly_rare
-    from flownav.parts.engine import OwnPartsEngine, identities
+    from flownav.parts.flying import OwnPartsEngine, identities
 
     planned = _planned_flights(out) if flight is not None else None
     count = _flights_of(flights, planned, until=not (until is None and rare is None))

@@ -107,8 +107,7 @@ def settings_asked(asked: list[str], sensor: Path | None) -> list[Setting]:
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.navigation.settings_of import settings_of
     from flownav.replays.prepare import ReplayOptions
-    from flownav.sensors.datasheet import load_sensor
-    from flownav.sensors.identified import identified_flow
+    from flownav.sensors.datasheet import identified_flow, load_sensor
     from flownav.studies.compare.job import Setting
     from flownav.studies.compare.rows import names_of
 

@@ -200,8 +200,7 @@ def _options(
     from flownav.mavlink.signing import load_key
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.navigation.settings_of import settings_of
-    from flownav.sensors.datasheet import load_sensor
-    from flownav.sensors.identified import identified_flow
+    from flownav.sensors.datasheet import identified_flow, load_sensor
 
     flow = load_sensor(sensor) if sensor else None
     told = settings_of(flow, stated=load(settings, NavigatorSettingsFile) if settings else None)

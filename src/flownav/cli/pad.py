@@ -190,16 +190,16 @@ def _write_datasheet(
     from flownav.core.provenance import command_line
     from flownav.lab.optics.pad_datasheet import Assumed, datasheet
     from flownav.lab.optics.pad_trial import camera_named
-    from flownav.sensors.pad_camera_sheet import load_pad_camera_sheet
+    from flownav.sensors.pad_camera_sheet import PadCameraSheet
 
-    sheet = load_pad_camera_sheet()
+    sheet = PadCameraSheet.read()
     lens_m = (float(sheet.lens.forward_m), float(sheet.lens.right_m), float(sheet.lens.down_m))
     assumed = Assumed(float(sheet.rate_hz), float(sheet.latency_s), float(sheet.jitter_s), lens_m, mounting_deg)
     trial = camera_named(camera_name, focus_m)
     text = datasheet(facts["laws"], trial, camera_name, target, assumed, command_line())
     with written_whole(out) as temporary:
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
-    load_pad_camera_sheet(out)
+    PadCameraSheet.read(out)
     return str(out)
 
 

@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
     from rich.table import Table
 
-    from flownav.vehicle.multirotor_sheet import MultirotorSheet
-    from flownav.vehicle.sheet import VehicleSheet
+    from flownav.vehicle.sheet import MultirotorSheet, VehicleSheet
 
     Array = NDArray[np.float64]
 
@@ -42,8 +41,7 @@ def command(
 
         show_margins(path, as_json=json_output)
         return
-    from flownav.vehicle.multirotor_sheet import MultirotorSheet
-    from flownav.vehicle.sheet import as_json, vehicle_sheet
+    from flownav.vehicle.sheet import MultirotorSheet, as_json, vehicle_sheet
 
     sheet = vehicle_sheet(path)
     if isinstance(sheet, MultirotorSheet):
@@ -62,7 +60,7 @@ def command(
 
 def show_multirotor(sheet: MultirotorSheet, *, json_output: bool) -> None:
     """Hover, forward flight and ground effect of a multirotor."""
-    from flownav.vehicle.multirotor_sheet import facts_of, rows_of
+    from flownav.vehicle.sheet import facts_of, rows_of
 
     if json_output:
         emit(facts_of(sheet))

@@ -12,12 +12,12 @@ from flownav.core.errors import VerdictError
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from flownav.control.box import Box
+    from flownav.control.margins import Box
 
 
 def show_margins(file: Path | None, *, as_json: bool) -> None:
     """Print the margins over the uncertainty box. VerdictError where a loop keeps less than it must."""
-    from flownav.control.box import LEAST_GAIN_DB, LEAST_PHASE_DEG, margins_over_box, short_of_margin
+    from flownav.control.margins import LEAST_GAIN_DB, LEAST_PHASE_DEG, margins_over_box, short_of_margin
 
     box = margins_over_box(file)
     if as_json:
@@ -26,7 +26,7 @@ def show_margins(file: Path | None, *, as_json: bool) -> None:
         from rich.console import Console
 
         from flownav.vehicle.corners import groups_of
-        from flownav.vehicle.loading import read_vehicle
+        from flownav.vehicle.kinds import read_vehicle
 
         console = Console(markup=False, highlight=False)
         console.print(table(box))
@@ -79,7 +79,7 @@ def _figure(value: float, form: str = ".1f") -> str:
 
 def _short(corner: str) -> str:
     """`mass -, inertia +, ...` of the crossed groups as their signs alone; any other name as it is."""
-    from flownav.control.box import INFLOW_HELD
+    from flownav.control.margins import INFLOW_HELD
     from flownav.vehicle.corners import CROSSED, MULTIROTOR_CROSSED
 
     parts = corner.split(", ")

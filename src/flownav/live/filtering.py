@@ -22,7 +22,7 @@ from flownav.navigation.spikes import Witness
 from flownav.navigation.tables import written_on
 from flownav.navigation.tape import COMPONENTS, GPS_RESET, START, empty_tape
 from flownav.navigation.told import Equipment
-from flownav.sensors.identified import UNTURNED, in_vehicle_axes
+from flownav.sensors.datasheet import UNTURNED, in_vehicle_axes
 
 BATCH = 64  # readings at a time, 6 ms of them
 KEPT_IMU = 512  # two seconds at 250 Hz, more than the horizon and an exposure

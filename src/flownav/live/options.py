@@ -8,7 +8,7 @@ from typing import Literal, get_args
 from flownav.live.reception import BESIDE, Accepted
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
-from flownav.sensors.identified import IdentifiedFlow
+from flownav.sensors.datasheet import IdentifiedFlow
 
 Sending = Literal["odometry", "vision", "landing-target", "none"]
 SENDINGS = get_args(Sending)

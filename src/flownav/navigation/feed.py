@@ -7,7 +7,7 @@ import numpy as np
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import FROM_ATTITUDE, FROM_MAG, FROM_YAW, NO_HEADING, Equipment
-from flownav.sensors.earth_field import declination_rad
+from flownav.sensors.magnetometer import declination_rad
 
 SLOWEST_IMU_HZ = 20.0
 

@@ -14,15 +14,14 @@ from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.parameter_files import check
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
-from flownav.sensors.barometer_sheet import BarometerSheet
-from flownav.sensors.datasheet import FlowSensor
+from flownav.sensors.barometer import BarometerSheet
+from flownav.sensors.datasheet import FlowSensor, identified_flow, needs_lag_states
 from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
-from flownav.sensors.identified import identified_flow, needs_lag_states
 from flownav.sensors.inertial_sheet import InertialSheet
-from flownav.sensors.magnetometer_sheet import MagneticField, MagnetometerSheet
+from flownav.sensors.magnetometer import MagneticField, MagnetometerSheet
 from flownav.sensors.pad_camera_sheet import PadCameraSheet
-from flownav.sensors.range_sensor_sheet import RangeSensorSheet
+from flownav.sensors.range_sensor import RangeSensorSheet
 from flownav.sensors.sheets import SensorSheets
 
 ABOVE_FLOOR_M = 0.01  # a rangefinder that reads its floor says only that there is no more

@@ -23,7 +23,7 @@ from flownav.lab.rig.experiment import RigLog, RigSettings
 from flownav.paper import published
 from flownav.paper.published import HEIGHTS_M, MODELS, ErrorRow
 from flownav.sensors.datasheet import Dynamics
-from flownav.sensors.second_order import hold_step, second_order_hold
+from flownav.sensors.processes import hold_step, second_order_hold
 
 ORDERS = (0, 1, 2, 3, 4)
 SECOND = Structure(2)

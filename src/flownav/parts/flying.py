@@ -1,17 +1,28 @@
-"""One flight with parts of somebody else's, on the compiled loop, as a scored Record."""
+"""One flight with parts of somebody else's, on the compiled loop, as a scored Record.
+
+A campaign's engine for flights with parts of somebody else's: one after the other, or equations on lanes.
+"""
 
 from __future__ import annotations
 
 import copy
+import hashlib
+import inspect
+import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
 
-from flownav.campaigns.local import record_flown
-from flownav.core.compile import ONE_LANE, announce_compilation
+from flownav.campaigns.again import Recording
+from flownav.campaigns.engines.engine import Engine, Part
+from flownav.campaigns.engines.local import Local
+from flownav.campaigns.local import fly_recorded, record_flown
+from flownav.campaigns.plan import Ready
+from flownav.campaigns.rows import rows_of
+from flownav.core.compile import LANES, ONE_LANE, announce_compilation
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array
 from flownav.core.record import Record
@@ -20,22 +31,21 @@ from flownav.navigation.take import navigator_unit
 from flownav.navigation.told import carries_lag
 from flownav.parts.calling import Mistakes, name_of
 from flownav.parts.equations import EquationFilter, EquationVehicle
-from flownav.parts.plant import OwnController, OwnVehicle
+from flownav.parts.plant import OwnController, OwnReadings, OwnVehicle
 from flownav.parts.protocols import Parts, Told
-from flownav.parts.sensing import OwnReadings
 from flownav.parts.taking import Taker
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import Flown, Instead, buffers_of, fly_into
 from flownav.simulation.ensemble import Ensemble
-from flownav.simulation.fault import SensorFault
 from flownav.simulation.history import column
 from flownav.simulation.plan import Flight, OwnParts
 from flownav.simulation.sensing import EPOCH_S
+from flownav.simulation.truth import SensorFault
 
-Part = TypeVar("Part")
+One = TypeVar("One")
 
 
-def fresh(part: Part | type[Part] | Callable[[], Part]) -> Part:
+def fresh(part: One | type[One] | Callable[[], One]) -> One:
     """A part that has flown nothing: of a class or a function a new one, of an object a copy.
 
     InputError where it cannot be made.
@@ -44,7 +54,7 @@ def fresh(part: Part | type[Part] | Callable[[], Part]) -> Part:
     if isinstance(part, type) or (callable(part) and not hasattr(part, "start")):
         make = part
     try:
-        made: Part = make()
+        made: One = make()
     except Exception as mistake:
         said = " ".join(str(mistake).split())
         raise InputError(f"{name_of(part)}: cannot be made: {type(mistake).__name__}: {said}") from mistake
@@ -147,3 +157,82 @@ def fly_parts(
     if parts.filter is not None:
         require_started(flight, b.history, name_of(parts.filter))
     return Flown(b.history, b.tape, b.fed)
+
+
+class OwnPartsEngine:
+    """parts: flown in every flight, each beginning anew; a filter of equations alone, on lanes as ours."""
+
+    def __init__(self, parts: Parts) -> None:
+        self.parts = parts
+
+    def fly(
+        self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
+    ) -> Iterator[tuple[Part, Array]]:
+        """The rows of each part. InputError where a part of a flight makes a mistake."""
+        own = self.parts
+        if isinstance(own.filter, EquationFilter) and not (own.sensors or own.vehicle or own.controller):
+            with announce_compilation("batch"):
+                address = own.filter.unit(LANES).address
+            check = partial(require_started, name=name_of(own.filter))
+            yield from Local(instead=address, check=check).fly(cell, seed, parts, on_progress)
+            return
+        faults = cell.faults(seed)
+        for part in parts:
+            rows = []
+            for number in range(part.first, part.first + part.flights):
+                fault = faults(number) if faults else None
+                flown = fly_parts(cell.setup, self.parts, seed, number, cell.ensemble, fault, written=False)
+                rows.append(rows_of(cell.flight, flown.history))
+                on_progress(1)
+            yield part, np.concatenate(rows)
+
+    def recording(
+        self, setup: Setup, seed: int, index: int, ensemble: Ensemble | None, fault: SensorFault | None, /
+    ) -> Record:
+        """One of the flights as a scored record."""
+        return fly_with(setup, self.parts, seed, index, ensemble, fault)
+
+
+def recording_of(engine: Engine | None) -> Recording:
+    """How the flights of an engine are flown again, one by one."""
+    return engine.recording if isinstance(engine, OwnPartsEngine) else fly_recorded
+
+
+def identities(parts: Parts) -> tuple[str, ...]:
+    """What a campaign's folder says of its parts: kind, name and SHA-256 of what they are made of.
+
+    That is the class, the source of its file, and the object's own numbers. A campaign resumes with these alone.
+    """
+    kinds = [("filter", parts.filter), *(("sensor", one) for one in parts.sensors), ("vehicle", parts.vehicle),
+             ("controller", parts.controller)]  # fmt: skip
+    return tuple(f"{kind} {name_of(part)} {_digest(part)}" for kind, part in kinds if part is not None)
+
+
+def _digest(part: Any) -> str:
+    """Of everything that a part is made of, as far as Python shows it."""
+    digest = hashlib.sha256()
+    made_of = [part if isinstance(part, type) or inspect.isfunction(part) else type(part)]
+    if not isinstance(part, type) and not inspect.isfunction(part):
+        own = vars(part) if hasattr(part, "__dict__") else {}
+        told = {name: value for name, value in own.items() if not name.startswith("_") and name != "unit_source"}
+        made_of += [value for value in told.values() if inspect.isfunction(value)]
+        numbers = {name: value for name, value in told.items() if not inspect.isfunction(value)}
+        digest.update(json.dumps(numbers, sort_keys=True, default=_plain).encode())
+    for each in made_of:
+        digest.update(f"{each.__module__} {each.__qualname__} {_source(each)}".encode())
+    return digest.hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """A value that JSON has no word for."""
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else repr(value)
+
+
+def _source(made_of: Any) -> str:
+    """The source of the file that a class or a function stands in; of itself where it stands in none (a notebook)."""
+    for each in (inspect.getmodule(made_of), made_of):
+        try:
+            return inspect.getsource(each) if each is not None else ""
+        except (OSError, TypeError):
+            continue
+    return repr(made_of)

@@ -12,7 +12,7 @@ from flownav.logs.log import Log
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import FLOW, ReplayOptions, prepare
 from flownav.replays.session import replay
-from flownav.sensors.identified import IdentifiedFlow
+from flownav.sensors.datasheet import IdentifiedFlow
 
 FOUND = "the log has no attitude: it is the navigator's own, from IMU and flow, its heading counted from its start"
 

@@ -21,7 +21,7 @@ from flownav.logs.rates import attitude_rates, mean_over
 from flownav.navigation.feed import imu_serves
 from flownav.navigation.spikes import Witness
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
-from flownav.sensors.identified import IdentifiedFlow, in_vehicle_axes
+from flownav.sensors.datasheet import IdentifiedFlow, in_vehicle_axes
 
 GPS = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY)
 FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)

@@ -13,13 +13,16 @@ Altitudes are metres over the place of take-off, positive upwards.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import ClassVar, NamedTuple
+
+from pydantic import Field
 
 from flownav.core.compile import equation, larger
-from flownav.sensors.chance import factor
-from flownav.sensors.first_order import lagged
-from flownav.sensors.gauss_markov import gauss_markov
-from flownav.sensors.quantisation import quantised
+from flownav.core.frames import GRAVITY_M_S2
+from flownav.core.parameter_files import Number
+from flownav.sensors import processes
+from flownav.sensors.sheet import SensorSheet
 
 
 class BarometerParameters(NamedTuple):
@@ -96,8 +99,8 @@ def draw_barometer(n: BarometerUnit, p: BarometerParameters) -> BarometerUnit:
     return BarometerUnit(
         p.offset_sigma_m * n.offset_m,
         p.ramp_step_m * n.ramp_step_m,
-        factor(p.wash_spread, n.wash),
-        factor(p.wash_spread, n.ground),
+        processes.factor(p.wash_spread, n.wash),
+        processes.factor(p.wash_spread, n.ground),
     )
 
 
@@ -124,9 +127,42 @@ def step_barometer(
     state: BarometerState, unit: BarometerUnit, truth: BarometerTruth, n: BarometerNormals, p: BarometerParameters
 ) -> tuple[BarometerState, BarometerReading]:
     """One reading."""
-    drift_m = gauss_markov(state.drift_m, p.drift_decay, p.drift_drive * p.drift_sigma_m, n.drift)
+    drift_m = processes.gauss_markov(state.drift_m, p.drift_decay, p.drift_drive * p.drift_sigma_m, n.drift)
     ramp_m = state.ramp_m + unit.ramp_step_m
     seen_m = truth.altitude_m + (unit.offset_m + drift_m + ramp_m + wash_error(truth, unit, p))
-    lagged_m = lagged(state.lagged_m, state.before_m, seen_m, p.lag_keep, p.lag_before, p.lag_now)
-    alt_m = quantised(lagged_m + p.sigma_m * n.noise, p.resolution_m, p.steps_per_m)
+    lagged_m = processes.lagged(state.lagged_m, state.before_m, seen_m, p.lag_keep, p.lag_before, p.lag_now)
+    alt_m = processes.quantised(lagged_m + p.sigma_m * n.noise, p.resolution_m, p.steps_per_m)
     return BarometerState(drift_m, ramp_m, seen_m, lagged_m), BarometerReading(alt_m, 255.0, 1.0)
+
+
+class BarometerSheet(SensorSheet):
+    """A barometer where it is fitted.
+
+    wash_share, ground_share: pressure error at the port over the rotor's disk loading, out of ground effect and what
+    the ground adds at rotor height 0; wash_spread: the share by which flights differ in them.
+    """
+
+    shipped_file: ClassVar[str] = "barometer.toml"
+
+    rate_hz: Number = Field(ge=1.0, le=200.0)
+    sigma_m: Number = Field(ge=0.0, le=10.0)
+    resolution_m: Number = Field(0.0, ge=0.0, le=10.0)
+    lag_s: Number = Field(0.0, ge=0.0, le=10.0)
+    offset_sigma_m: Number = Field(0.0, ge=0.0, le=100.0)
+    drift_sigma_m: Number = Field(ge=0.0, le=100.0)
+    drift_tau_s: Number = Field(ge=0.0, le=1e5)
+    ramp_m_per_h: Number = Field(0.0, ge=0.0, le=1000.0)
+    wash_share: Number = Field(0.0, ge=-2.0, le=2.0)
+    ground_share: Number = Field(0.0, ge=-2.0, le=2.0)
+    wash_spread: Number = Field(0.0, ge=0.0, le=2.0)
+
+    def parameters(self, rotor_radius_m: float, air_density_kg_m3: float) -> BarometerParameters:
+        """Coefficients of one reading on a vehicle with this rotor (of a multirotor: the disk of all its rotors)."""
+        m_per_n = 1.0 / (math.pi * rotor_radius_m**2 * air_density_kg_m3 * GRAVITY_M_S2)
+        return BarometerParameters(
+            *processes.gauss_markov_coefficients(self.drift_tau_s, self.period_s), self.drift_sigma_m,
+            self.ramp_m_per_h / 3600.0 * self.period_s, self.offset_sigma_m,
+            self.wash_share * m_per_n, self.ground_share * m_per_n, 1.0 / rotor_radius_m, self.wash_spread,
+            *processes.lag_weights(self.lag_s, self.period_s),
+            self.sigma_m, self.resolution_m, processes.steps_per_unit(self.resolution_m),
+        )  # fmt: skip

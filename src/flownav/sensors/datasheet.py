@@ -7,20 +7,23 @@ sensor of the paper, with the 28 models of its Table 1.
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, field_validator
 
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import Number, ParameterModel, load, shipped
-from flownav.sensors import flow
-from flownav.sensors.flow import FlowParameters
-from flownav.sensors.noise_law import Law, NoiseFit, accuracy_law, constant_noise, fit_noise_law, power_law
-from flownav.sensors.second_order import second_order_hold
+from flownav.sensors.noise_law import Noise, not_below
 
 DEFAULT_SENSOR = "px4flow_paper.toml"
+UNTURNED = ((1.0, 0.0), (0.0, 1.0))
+BAND_HZ = 1.0  # of the closed loop: attitude follows to 5.4 rad/s (`simulation.assemble`), velocity less far
+DELAY_WITHIN_DEG = 10.0  # a delay stands for dynamics whose phase it follows so well
+
+Array = NDArray[np.float64]
 
 
 class Dynamics(ParameterModel):
@@ -59,56 +62,6 @@ class IdentifiedModel(Dynamics):
     fit_percent: Number = Field(le=100.0)
 
 
-class Noise(ParameterModel):
-    """Standard deviation of a published velocity against height (`noise_law.py`); the law picks its keys."""
-
-    law: Literal["constant", "power", "accuracy"]
-    sigma_m_s: Number | None = Field(None, ge=0.0, le=100.0, validate_default=True)
-    reference_height_m: Number = Field(0.6, gt=0.0, le=1000.0)
-    exponent: Number = Field(1.0, ge=-4.0, le=4.0)
-    accuracy: Number = Field(0.9, gt=0.0, lt=1.0)
-    signal_sigma_m_s: Number | None = Field(None, gt=0.0, le=100.0, validate_default=True)
-    floor_m_s: Number = Field(0.0, ge=0.0, le=100.0)
-    min_height_m: Number = Field(gt=0.0, le=1000.0)
-    max_height_m: Number = Field(gt=0.0, le=1000.0)
-
-    @field_validator("sigma_m_s", "signal_sigma_m_s")
-    @classmethod
-    def _scale_is_given(cls, value: float | None, info: ValidationInfo) -> float | None:
-        law = info.data.get("law")
-        needed = "signal_sigma_m_s" if law == "accuracy" else "sigma_m_s"
-        if law is not None and value is None and info.field_name == needed:
-            raise ValueError(f'law = "{law}" needs this key')
-        return value
-
-    @field_validator("max_height_m")
-    @classmethod
-    def _law_holds(cls, value: float, info: ValidationInfo) -> float:
-        """Above the lower height, and the law can be evaluated between the two (checked if all else is right)."""
-        value = _not_below("min_height_m", value, info)
-        if set(info.data) | {"max_height_m"} == set(cls.model_fields):
-            cls.model_construct(**info.data, max_height_m=value).fit()
-        return value
-
-    def fit(self) -> NoiseFit:
-        """The law as the equations evaluate it, without its floor. ValueError as `fit_noise_law`."""
-        return _fitted(self)
-
-    def curve(self) -> Law:
-        """The law that varies with height: heights [m] to standard deviations [m/s]."""
-        if self.law == "accuracy":
-            return accuracy_law(self.accuracy, self.reference_height_m, self.signal_sigma_m_s or 0.0)
-        return power_law(self.sigma_m_s or 0.0, self.reference_height_m, self.exponent)
-
-
-@lru_cache(maxsize=64)
-def _fitted(noise: Noise) -> NoiseFit:
-    """The law's fit, which many flights of one sensor share."""
-    if noise.law == "constant":
-        return constant_noise(noise.sigma_m_s or 0.0, noise.min_height_m, noise.max_height_m)
-    return fit_noise_law(noise.curve(), noise.min_height_m, noise.max_height_m)
-
-
 class Limits(ParameterModel):
     """Where the sensor measures. `hysteresis` is the fraction inside each limit that it takes to engage."""
 
@@ -121,7 +74,7 @@ class Limits(ParameterModel):
     @field_validator("max_height_m")
     @classmethod
     def _above(cls, value: float, info: ValidationInfo) -> float:
-        return _not_below("min_height_m", value, info)
+        return not_below("min_height_m", value, info)
 
 
 class Optics(ParameterModel):
@@ -249,78 +202,83 @@ class FlowSensor(ParameterModel):
         raise InputError(f"{self.name}: no identified model {model} at {height_m:g} m; it has: {known}")
 
 
-def _not_below(lower: str, value: float, info: ValidationInfo) -> float:
-    if value < info.data.get(lower, 0.0):
-        raise ValueError(f"at least {lower} = {info.data[lower]} is needed")
-    return value
-
-
 def load_sensor(path: Path | str | None = None) -> FlowSensor:
     """The sensor of a file; the paper's where `path` is None. InputError names file, key and allowed range."""
     return load(Path(path) if path is not None else shipped(DEFAULT_SENSOR), FlowSensor)
 
 
-class FlowSettings(ParameterModel):
-    """What a scenario says about the flow sensor beside its file: what is switched on, and the shake's mode.
+# -- what the file says to those who use the sensor ---------------------------------------------------------------
+class IdentifiedFlow(NamedTuple):
+    """Reported over true velocity of each body axis, the age of a reading, and sensor's axes = axes @ vehicle's."""
 
-    identified_height_m and identified_model choose a row of the file's identified models instead of its own
-    dynamics; constant_noise_m_s replaces its noise law.
+    gain_u: float
+    gain_v: float
+    latency_s: float
+    axes: tuple[tuple[float, float], tuple[float, float]] = UNTURNED
+
+
+def in_vehicle_axes(value: Array, identified: IdentifiedFlow, *, angular: bool) -> Array:
+    """Readings (n, 2 or more) of a sensor that is turned or wired otherwise, in the vehicle's axes.
+
+    A sensor's axes are the vehicle's, each with a sign and perhaps swapped, so the way back is the transpose. Angular
+    flow and the sensor's own gyro (columns 2 and 3) turn as the velocity (flow_y, -flow_x) does.
     """
+    back, value = np.transpose(identified.axes), value.copy()
+    for x, y in ((0, 1), (2, 3)) if angular else ((0, 1),):
+        if angular:
+            forward, right = back @ np.array([value[:, y], -value[:, x]])
+            value[:, y], value[:, x] = forward, -right
+        else:
+            value[:, x], value[:, y] = back @ value[:, [x, y]].T
+    return value
 
-    vertical: Literal["synthetic", "sonar"] = "synthetic"
-    sonar_overscale: bool = True
-    sonar_lag_s: Number = Field(0.0, ge=0.0, le=1.0)
-    rotation_leak: Number = Field(0.0, ge=-1.0, le=1.0)
-    shake: bool = True
-    shake_frequency_hz: Number = Field(4.0, gt=0.0, le=100.0)
-    shake_damping_ratio: Number = Field(0.1, gt=0.0, le=2.0)
-    shake_horizontal_fraction: Number = Field(0.2, ge=-1.0, le=1.0)
-    gain_sigma: Number = Field(0.0, ge=0.0, le=0.5)
-    constant_noise_m_s: Number | None = Field(None, ge=0.0, le=100.0)
-    identified_height_m: Number | None = Field(None, gt=0.0, le=1000.0)
-    identified_model: int | None = Field(None, ge=1, validate_default=True)
 
-    @field_validator("identified_model")
-    @classmethod
-    def _whole_choice(cls, value: int | None, info: ValidationInfo) -> int | None:
-        if (value is None) != (info.data.get("identified_height_m") is None):
-            raise ValueError("goes together with identified_height_m; give both or neither")
-        return value
+def identified_axes(verdict: str) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    """What a sensor file says of the axes, as sensor's = axes @ vehicle's; None where it does not know."""
+    if "unclear" in verdict or "mirrored" in verdict.replace("not mirrored", ""):
+        return None
+    both = "signs of x and y" in verdict or "both signs" in verdict
+    x = -1.0 if both or "sign of x" in verdict else 1.0
+    y = -1.0 if both or "sign of y" in verdict else 1.0
+    return ((0.0, x), (y, 0.0)) if "swapped" in verdict else ((x, 0.0), (0.0, y))
 
-    def parameters(self, sensor: FlowSensor) -> FlowParameters:
-        """Coefficients at 250 Hz of this sensor under these settings. InputError where the model is unknown."""
-        if self.identified_model is not None and self.identified_height_m is not None:
-            sensor = sensor.with_model(self.identified_height_m, self.identified_model)
-        mode_rad_s = 2.0 * math.pi * self.shake_frequency_hz
-        lag = second_order_hold(sensor.dynamics.b_1_s, sensor.dynamics.c_1_s2, flow.PERIOD_S)
-        mount = second_order_hold(2.0 * self.shake_damping_ratio * mode_rad_s, mode_rad_s**2, flow.PERIOD_S)
-        noise = self._noise(sensor)
-        limits = sensor.limits
-        engaging_tilt = math.radians(limits.max_tilt_deg * (1.0 - limits.hysteresis))
-        return FlowParameters(
-            *lag, 1.0 / sensor.dynamics.c_1_s2, sensor.dynamics.a_1_s2,
-            *mount, 1.0 / mode_rad_s**2,
-            shake_vertical=1.0 if self.shake else 0.0,
-            shake_horizontal=self.shake_horizontal_fraction if self.shake else 0.0,
-            sonar_floor_m=sensor.sonar_floor_m if self.sonar_overscale else 0.0,
-            sonar_lag_s=self.sonar_lag_s,
-            rotation_leak=self.rotation_leak,
-            vertical_from_sonar=1.0 if self.vertical == "sonar" else 0.0,
-            noise_low_m=noise.low_m, noise_high_m=noise.high_m,
-            noise_centre=noise.centre, noise_scale=noise.scale,
-            **{f"noise_{i}": c for i, c in enumerate(noise.coefficients)},
-            noise_floor_m_s=0.0 if self.constant_noise_m_s is not None else sensor.noise.floor_m_s,
-            min_height_m=limits.min_height_m,
-            max_height_m=limits.max_height_m,
-            max_flow_rad_s=limits.max_flow_rad_s,
-            min_tilt_cosine=math.cos(math.radians(limits.max_tilt_deg)),
-            engaging_tilt_cosine=math.cos(engaging_tilt),
-            hysteresis=limits.hysteresis,
-            half_fov_tangent=sensor.optics.half_fov_tangent,
-        )  # fmt: skip
 
-    def _noise(self, sensor: FlowSensor) -> NoiseFit:
-        """The sensor's law, or the constant in its place."""
-        if self.constant_noise_m_s is None:
-            return sensor.noise.fit()
-        return constant_noise(self.constant_noise_m_s, sensor.noise.min_height_m, sensor.noise.max_height_m)
+def phase_off_delay_deg(dynamics: Dynamics, band_hz: float = BAND_HZ) -> float:
+    """How far the phase of G(s) = a/(s^2 + b s + c) is at most from that of its delay b/c, from 0 to band_hz [deg].
+
+    Noise beyond the band does not matter: G is taken for what it does to motion that the vehicle makes.
+    """
+    w = 2.0 * np.pi * np.linspace(0.0, band_hz, 201)
+    lag = np.arctan2(dynamics.b_1_s * w, dynamics.c_1_s2 - w * w)
+    return float(np.degrees(np.max(np.abs(lag - dynamics.delay_s * w))))
+
+
+def needs_lag_states(sensor: FlowSensor) -> bool:
+    """Whether the sensor's dynamics are more than a delay over the flight's band, and were identified as such."""
+    found = sensor.identification
+    off = phase_off_delay_deg(sensor.dynamics) > DELAY_WITHIN_DEG
+    return off and (found is None or found.dynamics.validity == "identified")
+
+
+def identified_flow(sensor: FlowSensor, lag_states: bool | None = None) -> IdentifiedFlow:
+    """A sensor file's axes, gains and latency; those of its dynamics where no log was identified.
+
+    lag_states: whether the dynamics are states of the filter; by default where the sensor needs it. The latency is then
+    without their delay. InputError where the file's axes are not known.
+    """
+    found = sensor.identification
+    lag_states = needs_lag_states(sensor) if lag_states is None else lag_states
+    carried_s = sensor.dynamics.delay_s if lag_states else 0.0
+    if found is None:
+        return IdentifiedFlow(sensor.dynamics.gain, sensor.dynamics.gain, sensor.dynamics.delay_s - carried_s)
+    axes = identified_axes(found.axes)
+    if axes is None:
+        raise InputError(f"{sensor.name}: {found.axes}; mend the log's axes, then identify again")
+
+    def gain_of(axis: str) -> float:
+        """The axis' gain, 1 where no height's interval excludes it: an uncertain gain would do more harm than good."""
+        rows = [r for r in found.responses if r.axis == axis] or list(found.responses)
+        sure = any(not r.gain_low <= 1.0 <= r.gain_high for r in rows)
+        return float(np.mean([r.gain for r in rows])) if sure else 1.0
+
+    return IdentifiedFlow(gain_of("x"), gain_of("y"), max(found.latency_s - carried_s, 0.0), axes)

@@ -29,10 +29,9 @@ import numpy as np
 
 from flownav.core.compile import clamp, equation, larger, magnitude
 from flownav.core.frames import angular_flow
-from flownav.sensors.chance import factor, spell
-from flownav.sensors.flow import SMALLEST_RANGE_M, FlowParameters, flow_noise_sigma
-from flownav.sensors.flow_engagement import engagement, pattern_reach
+from flownav.sensors.flow import SMALLEST_RANGE_M, FlowParameters, engagement, flow_noise_sigma, pattern_reach
 from flownav.sensors.geometry import LensPose, in_turned_axes
+from flownav.sensors.processes import factor, spell
 
 
 class FlowCameraParameters(NamedTuple):

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import ClassVar
 
 from pydantic import Field, ValidationInfo, field_validator
 
 from flownav.core.parameter_files import Number, ParameterModel
-from flownav.sensors.chance import level_of
 from flownav.sensors.flow_camera import FlowCameraParameters
+from flownav.sensors.processes import level_of
 from flownav.sensors.sheet import Lever, SensorSheet, Spells
 
 
@@ -109,8 +108,3 @@ class FlowCameraSheet(SensorSheet):
             quality_sigma=self.quality.sigma,
             lost_above=level_of(self.lost_share),
         )
-
-
-def load_flow_camera_sheet(path: Path | str | None = None) -> FlowCameraSheet:
-    """The flow camera of a file; the shipped one where `path` is None."""
-    return FlowCameraSheet.read(path)

@@ -16,8 +16,7 @@ from typing import NamedTuple
 
 from flownav.core.compile import equation
 from flownav.core.frames import Quaternion, of_unit_length, quaternion_product
-from flownav.sensors.gauss_markov import gauss_markov
-from flownav.sensors.quantisation import quantised
+from flownav.sensors.processes import gauss_markov, quantised
 
 PERIOD_S = 0.02
 

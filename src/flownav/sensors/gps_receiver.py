@@ -16,11 +16,8 @@ from typing import NamedTuple
 
 from flownav.core.compile import equation
 from flownav.core.frames import Rotation, to_earth
-from flownav.sensors.chance import factor, spell
-from flownav.sensors.first_order import lagged
-from flownav.sensors.gauss_markov import gauss_markov
 from flownav.sensors.geometry import lever_velocity
-from flownav.sensors.quantisation import quantised
+from flownav.sensors.processes import factor, gauss_markov, lagged, quantised, spell
 
 
 class GpsReceiverParameters(NamedTuple):

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import ClassVar
 
 from pydantic import Field
 
 from flownav.core.parameter_files import Number, ParameterModel
-from flownav.sensors.first_order import lag_weights
-from flownav.sensors.gauss_markov import gauss_markov_coefficients
 from flownav.sensors.gps_receiver import GpsReceiverParameters
-from flownav.sensors.quantisation import steps_per_unit
+from flownav.sensors.processes import gauss_markov_coefficients, lag_weights, steps_per_unit
 from flownav.sensors.sheet import Lever, SensorSheet, Spells
 
 
@@ -86,8 +83,3 @@ class GpsReceiverSheet(SensorSheet):
             self.horizontal_sigma_m, self.vertical_sigma_m, self.speed_sigma_m_s,
             self.stated_spread, e.spread, *self.outage.levels(period),
         )  # fmt: skip
-
-
-def load_gps_receiver_sheet(path: Path | str | None = None) -> GpsReceiverSheet:
-    """The receiver of a file; the shipped one where `path` is None."""
-    return GpsReceiverSheet.read(path)

@@ -25,10 +25,20 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import clamp, equation, larger
-from flownav.sensors.chance import factor
-from flownav.sensors.imu import ImuReading
+from flownav.sensors.processes import factor
 
 QUALITY = 255.0
+
+
+class ImuReading(NamedTuple):
+    """Gyro and accelerometer, body FRD: a reading, or the truth behind it."""
+
+    gyro_x_rad_s: float
+    gyro_y_rad_s: float
+    gyro_z_rad_s: float
+    accel_x_m_s2: float
+    accel_y_m_s2: float
+    accel_z_m_s2: float
 
 
 class InertialParameters(NamedTuple):

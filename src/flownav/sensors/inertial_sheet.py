@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import ClassVar
 
 from pydantic import Field
@@ -107,8 +106,3 @@ class InertialSheet(SensorSheet):
             f"{name}_tilt_rad_s": left * math.radians(tone.tilt_deg_s),
             f"{name}_yaw_rad_s": left * math.radians(tone.yaw_deg_s),
         }
-
-
-def load_inertial_sheet(path: Path | str | None = None) -> InertialSheet:
-    """The IMU of a file; the shipped one where `path` is None."""
-    return InertialSheet.read(path)

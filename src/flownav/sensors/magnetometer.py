@@ -10,10 +10,16 @@ has left, drawn once a flight.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from functools import cache
+from typing import ClassVar, NamedTuple
+
+from pydantic import Field
 
 from flownav.core.compile import equation
 from flownav.core.frames import Rotation, to_body
+from flownav.core.parameter_files import Number, ParameterModel
+from flownav.sensors.sheet import SensorSheet
 
 
 class MagnetometerParameters(NamedTuple):
@@ -97,3 +103,75 @@ def read_magnetometer(
         255.0,
         1.0,
     )
+
+
+SHARJAH_GAUSS = 0.4455  # World Magnetic Model 2025 at 25.31 N, 55.49 E, mid-2025
+SHARJAH_DECLINATION_DEG = 2.2
+SHARJAH_INCLINATION_DEG = 40.0
+
+
+class MagneticField(ParameterModel):
+    """The earth's field at a place; inclination downwards. The default is Sharjah's, the paper's place."""
+
+    strength_gauss: Number = Field(SHARJAH_GAUSS, gt=0.0, le=1.0)
+    declination_deg: Number = Field(SHARJAH_DECLINATION_DEG, ge=-180.0, le=180.0)
+    inclination_deg: Number = Field(SHARJAH_INCLINATION_DEG, ge=-90.0, le=90.0)
+
+    @property
+    def ned_gauss(self) -> tuple[float, float, float]:
+        """North, east, down."""
+        dip, east = math.radians(self.inclination_deg), math.radians(self.declination_deg)
+        level = self.strength_gauss * math.cos(dip)
+        return level * math.cos(east), level * math.sin(east), self.strength_gauss * math.sin(dip)
+
+
+class MagnetometerSheet(SensorSheet):
+    """A magnetometer where it is fitted, after calibration: each figure one standard deviation of an axis."""
+
+    shipped_file: ClassVar[str] = "magnetometer.toml"
+
+    rate_hz: Number = Field(ge=1.0, le=1000.0)
+    sigma_mgauss: Number = Field(ge=0.0, le=100.0)
+    hard_iron_mgauss: Number = Field(ge=0.0, le=1000.0)
+    scale_percent: Number = Field(ge=0.0, le=50.0)
+    soft_iron_percent: Number = Field(ge=0.0, le=50.0)
+    current_mgauss_per_kw: Number = Field(0.0, ge=0.0, le=1000.0)
+
+    def parameters(self, field: MagneticField) -> MagnetometerParameters:
+        """Coefficients of one reading at a place."""
+        return MagnetometerParameters(
+            *field.ned_gauss,
+            sigma_gauss=1e-3 * self.sigma_mgauss,
+            hard_gauss=1e-3 * self.hard_iron_mgauss,
+            scale=0.01 * self.scale_percent,
+            soft=0.01 * self.soft_iron_percent,
+            gauss_per_w=1e-6 * self.current_mgauss_per_kw,
+        )
+
+
+MODEL_YEAR = 2026.0  # declination changes by less than 0.3 deg a year; logs seldom say which year they are of
+COARSE_DEG = 0.1
+
+
+def declination_rad(origin_deg_m: tuple[float, float, float] | None) -> float:
+    """Heading of magnetic north at latitude, longitude [deg], altitude [m], clockwise from true north [rad].
+
+    0 where there is no origin, or the needle does not know (at the poles).
+    """
+    if origin_deg_m is None or not all(math.isfinite(value) for value in origin_deg_m):
+        return 0.0
+    latitude, longitude, _ = origin_deg_m
+    if abs(latitude) > 90.0 or abs(longitude) > 180.0:
+        return 0.0
+    return _declination_rad(round(latitude / COARSE_DEG), round(longitude / COARSE_DEG))
+
+
+@cache
+def _declination_rad(latitude_steps: int, longitude_steps: int) -> float:
+    from pygeomag import GeoMag
+
+    field = GeoMag().calculate(
+        glat=latitude_steps * COARSE_DEG, glon=longitude_steps * COARSE_DEG, alt=0.0, time=MODEL_YEAR
+    )
+    declination = math.radians(float(field.d))
+    return declination if math.isfinite(declination) else 0.0

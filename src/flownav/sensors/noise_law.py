@@ -13,12 +13,15 @@ smooth in it: degree 8 follows the shipped law to 2e-12, every power from -1 to 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
+from pydantic import Field, ValidationInfo, field_validator
 
+from flownav.core.parameter_files import Number, ParameterModel
 from flownav.sensors.flow import NOISE_DEGREE
 
 Array = NDArray[np.float64]
@@ -72,3 +75,60 @@ def fit_noise_law(law: Law, low_m: float, high_m: float) -> NoiseFit:
     if worst > WORST_FIT:
         raise ValueError(f"the noise law is too steep from {low_m:g} to {high_m:g} m; narrow the heights")
     return NoiseFit(low_m, high_m, centre, scale, tuple(float(c) for c in fit.coef), worst)
+
+
+class Noise(ParameterModel):
+    """Standard deviation of a published velocity against height (`noise_law.py`); the law picks its keys."""
+
+    law: Literal["constant", "power", "accuracy"]
+    sigma_m_s: Number | None = Field(None, ge=0.0, le=100.0, validate_default=True)
+    reference_height_m: Number = Field(0.6, gt=0.0, le=1000.0)
+    exponent: Number = Field(1.0, ge=-4.0, le=4.0)
+    accuracy: Number = Field(0.9, gt=0.0, lt=1.0)
+    signal_sigma_m_s: Number | None = Field(None, gt=0.0, le=100.0, validate_default=True)
+    floor_m_s: Number = Field(0.0, ge=0.0, le=100.0)
+    min_height_m: Number = Field(gt=0.0, le=1000.0)
+    max_height_m: Number = Field(gt=0.0, le=1000.0)
+
+    @field_validator("sigma_m_s", "signal_sigma_m_s")
+    @classmethod
+    def _scale_is_given(cls, value: float | None, info: ValidationInfo) -> float | None:
+        law = info.data.get("law")
+        needed = "signal_sigma_m_s" if law == "accuracy" else "sigma_m_s"
+        if law is not None and value is None and info.field_name == needed:
+            raise ValueError(f'law = "{law}" needs this key')
+        return value
+
+    @field_validator("max_height_m")
+    @classmethod
+    def _law_holds(cls, value: float, info: ValidationInfo) -> float:
+        """Above the lower height, and the law can be evaluated between the two (checked if all else is right)."""
+        value = not_below("min_height_m", value, info)
+        if set(info.data) | {"max_height_m"} == set(cls.model_fields):
+            cls.model_construct(**info.data, max_height_m=value).fit()
+        return value
+
+    def fit(self) -> NoiseFit:
+        """The law as the equations evaluate it, without its floor. ValueError as `fit_noise_law`."""
+        return _fitted(self)
+
+    def curve(self) -> Law:
+        """The law that varies with height: heights [m] to standard deviations [m/s]."""
+        if self.law == "accuracy":
+            return accuracy_law(self.accuracy, self.reference_height_m, self.signal_sigma_m_s or 0.0)
+        return power_law(self.sigma_m_s or 0.0, self.reference_height_m, self.exponent)
+
+
+@lru_cache(maxsize=64)
+def _fitted(noise: Noise) -> NoiseFit:
+    """The law's fit, which many flights of one sensor share."""
+    if noise.law == "constant":
+        return constant_noise(noise.sigma_m_s or 0.0, noise.min_height_m, noise.max_height_m)
+    return fit_noise_law(noise.curve(), noise.min_height_m, noise.max_height_m)
+
+
+def not_below(lower: str, value: float, info: ValidationInfo) -> float:
+    """The value, which must not be below that of another key. ValueError where it is."""
+    if value < info.data.get(lower, 0.0):
+        raise ValueError(f"at least {lower} = {info.data[lower]} is needed")
+    return value

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import ClassVar
 
 from pydantic import Field, ValidationInfo, field_validator
 
 from flownav.core.parameter_files import Number, ParameterModel
-from flownav.sensors.chance import level_of
 from flownav.sensors.pad_camera import PadCameraParameters
+from flownav.sensors.processes import level_of
 from flownav.sensors.sheet import Lever, SensorSheet
 
 
@@ -122,8 +121,3 @@ class PadCameraSheet(SensorSheet):
             hidden_above=level_of(self.hidden_share),
             false_above=level_of(self.false_share),
         )
-
-
-def load_pad_camera_sheet(path: Path | str | None = None) -> PadCameraSheet:
-    """The pad camera of a file; the shipped one where `path` is None."""
-    return PadCameraSheet.read(path)

@@ -14,14 +14,17 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import ClassVar, NamedTuple
 
 import numpy as np
+from pydantic import Field, ValidationInfo, field_validator
 
 from flownav.core.compile import clamp, equation, larger
-from flownav.sensors.beam import BeamHit
-from flownav.sensors.chance import spell
-from flownav.sensors.quantisation import quantised
+from flownav.core.parameter_files import Number
+from flownav.sensors.geometry import BeamHit
+from flownav.sensors.processes import level_of, quantised, spell, steps_per_unit
+from flownav.sensors.sheet import Lever, SensorSheet, Spells
 
 SMALLEST_COSINE = 0.1
 
@@ -135,3 +138,45 @@ def step_range_sensor(
     quality = 255.0 if stuck else (state.last_quality if repeats else fresh_quality)
     after = RangeSensorState(range_m, quality, held, lost)
     return after, RangeSensorReading(range_m, quality, 0.0 if lost > 0.5 else 1.0)
+
+
+class RangeSensorSheet(SensorSheet):
+    """A lidar or a sonar. half_beam_deg: of the cone; max_incidence_deg: beyond which there is no echo."""
+
+    shipped_file: ClassVar[str] = "range_sensor.toml"
+
+    rate_hz: Number = Field(ge=1.0, le=1000.0)
+    floor_m: Number = Field(ge=0.0, le=10.0)
+    ceiling_m: Number = Field(gt=0.0, le=1000.0)
+    half_beam_deg: Number = Field(0.0, ge=0.0, le=45.0)
+    max_incidence_deg: Number = Field(60.0, gt=0.0, le=80.0)
+    resolution_m: Number = Field(0.0, ge=0.0, le=1.0)
+    sigma_m: Number = Field(ge=0.0, le=10.0)
+    sigma_percent: Number = Field(0.0, ge=0.0, le=50.0)
+    scale_percent: Number = Field(0.0, ge=0.0, le=20.0)
+    offset_sigma_m: Number = Field(0.0, ge=0.0, le=1.0)
+    echo_share: Number = Field(0.0, ge=0.0, le=1.0)
+    near_echo_m: Number = Field(0.3, ge=0.0, le=10.0)
+    lost: Spells = Spells()
+    held: Spells = Spells()
+    stuck_at_m: Number | None = Field(None, ge=0.0, le=1000.0)
+    lens: Lever = Lever()
+
+    @field_validator("ceiling_m")
+    @classmethod
+    def _above_the_floor(cls, value: float, info: ValidationInfo) -> float:
+        if value <= info.data.get("floor_m", 0.0):
+            raise ValueError(f"more than floor_m = {info.data['floor_m']:g} is needed")
+        return value
+
+    def parameters(self) -> RangeSensorParameters:
+        """Coefficients of one reading."""
+        half_beam = math.radians(self.half_beam_deg)
+        return RangeSensorParameters(
+            math.cos(half_beam), math.sin(half_beam), math.cos(math.radians(self.max_incidence_deg)),
+            self.floor_m, self.ceiling_m, self.resolution_m, steps_per_unit(self.resolution_m),
+            0.01 * self.scale_percent, self.offset_sigma_m, self.sigma_m, 0.01 * self.sigma_percent,
+            level_of(self.echo_share), self.near_echo_m,
+            *self.lost.levels(self.period_s), *self.held.levels(self.period_s),
+            0.0 if self.stuck_at_m is None else 1.0, self.stuck_at_m or 0.0,
+        )  # fmt: skip

@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flownav.core.compile import clamp, equation, larger
-from flownav.sensors.quantisation import quantised
+from flownav.sensors.processes import quantised
 
 PERIOD_S = 0.1
 FILTER_RANGE_GAIN = 0.8461

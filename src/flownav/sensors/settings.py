@@ -1,4 +1,4 @@
-"""What a scenario file may say about GPS/INS, rangefinder and IMU, and the parameters built from it.
+"""What a scenario file may say about GPS/INS, flow, rangefinder and pad camera, and the parameters built from it.
 
 Units stand in the keys; every default has a source in `docs/explanation/sensors.md`. `.parameters()` computes
 the coefficients that the equations use, so no exponential is left for the flight loop.
@@ -11,13 +11,13 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from flownav.core.frames import GRAVITY_M_S2 as STANDARD_GRAVITY_M_S2
 from flownav.core.parameter_files import Number, ParameterModel
-from flownav.sensors import gps_ins, imu
-from flownav.sensors.gauss_markov import gauss_markov_coefficients
+from flownav.sensors import flow, gps_ins
+from flownav.sensors.datasheet import FlowSensor
+from flownav.sensors.flow import FlowParameters
 from flownav.sensors.gps_ins import GpsInsParameters
-from flownav.sensors.imu import ImuParameters
-from flownav.sensors.quantisation import steps_per_unit
+from flownav.sensors.noise_law import NoiseFit, constant_noise
+from flownav.sensors.processes import gauss_markov_coefficients, second_order_hold, steps_per_unit
 from flownav.sensors.rangefinder import RangefinderParameters
 
 SIGMA_PER_CEP = 1.0 / math.sqrt(2.0 * math.log(2.0))  # one axis of two equal normal ones: 1/1.1774
@@ -119,6 +119,72 @@ class GpsInsSettings(ParameterModel):
         return GpsInsParameters(**nothing | white)
 
 
+class FlowSettings(ParameterModel):
+    """What a scenario says about the flow sensor beside its file: what is switched on, and the shake's mode.
+
+    identified_height_m and identified_model choose a row of the file's identified models instead of its own
+    dynamics; constant_noise_m_s replaces its noise law.
+    """
+
+    vertical: Literal["synthetic", "sonar"] = "synthetic"
+    sonar_overscale: bool = True
+    sonar_lag_s: Number = Field(0.0, ge=0.0, le=1.0)
+    rotation_leak: Number = Field(0.0, ge=-1.0, le=1.0)
+    shake: bool = True
+    shake_frequency_hz: Number = Field(4.0, gt=0.0, le=100.0)
+    shake_damping_ratio: Number = Field(0.1, gt=0.0, le=2.0)
+    shake_horizontal_fraction: Number = Field(0.2, ge=-1.0, le=1.0)
+    gain_sigma: Number = Field(0.0, ge=0.0, le=0.5)
+    constant_noise_m_s: Number | None = Field(None, ge=0.0, le=100.0)
+    identified_height_m: Number | None = Field(None, gt=0.0, le=1000.0)
+    identified_model: int | None = Field(None, ge=1, validate_default=True)
+
+    @field_validator("identified_model")
+    @classmethod
+    def _whole_choice(cls, value: int | None, info: ValidationInfo) -> int | None:
+        if (value is None) != (info.data.get("identified_height_m") is None):
+            raise ValueError("goes together with identified_height_m; give both or neither")
+        return value
+
+    def parameters(self, sensor: FlowSensor) -> FlowParameters:
+        """Coefficients at 250 Hz of this sensor under these settings. InputError where the model is unknown."""
+        if self.identified_model is not None and self.identified_height_m is not None:
+            sensor = sensor.with_model(self.identified_height_m, self.identified_model)
+        mode_rad_s = 2.0 * math.pi * self.shake_frequency_hz
+        lag = second_order_hold(sensor.dynamics.b_1_s, sensor.dynamics.c_1_s2, flow.PERIOD_S)
+        mount = second_order_hold(2.0 * self.shake_damping_ratio * mode_rad_s, mode_rad_s**2, flow.PERIOD_S)
+        noise = self._noise(sensor)
+        limits = sensor.limits
+        engaging_tilt = math.radians(limits.max_tilt_deg * (1.0 - limits.hysteresis))
+        return FlowParameters(
+            *lag, 1.0 / sensor.dynamics.c_1_s2, sensor.dynamics.a_1_s2,
+            *mount, 1.0 / mode_rad_s**2,
+            shake_vertical=1.0 if self.shake else 0.0,
+            shake_horizontal=self.shake_horizontal_fraction if self.shake else 0.0,
+            sonar_floor_m=sensor.sonar_floor_m if self.sonar_overscale else 0.0,
+            sonar_lag_s=self.sonar_lag_s,
+            rotation_leak=self.rotation_leak,
+            vertical_from_sonar=1.0 if self.vertical == "sonar" else 0.0,
+            noise_low_m=noise.low_m, noise_high_m=noise.high_m,
+            noise_centre=noise.centre, noise_scale=noise.scale,
+            **{f"noise_{i}": c for i, c in enumerate(noise.coefficients)},
+            noise_floor_m_s=0.0 if self.constant_noise_m_s is not None else sensor.noise.floor_m_s,
+            min_height_m=limits.min_height_m,
+            max_height_m=limits.max_height_m,
+            max_flow_rad_s=limits.max_flow_rad_s,
+            min_tilt_cosine=math.cos(math.radians(limits.max_tilt_deg)),
+            engaging_tilt_cosine=math.cos(engaging_tilt),
+            hysteresis=limits.hysteresis,
+            half_fov_tangent=sensor.optics.half_fov_tangent,
+        )  # fmt: skip
+
+    def _noise(self, sensor: FlowSensor) -> NoiseFit:
+        """The sensor's law, or the constant in its place."""
+        if self.constant_noise_m_s is None:
+            return sensor.noise.fit()
+        return constant_noise(self.constant_noise_m_s, sensor.noise.min_height_m, sensor.noise.max_height_m)
+
+
 class RangefinderSettings(ParameterModel):
     """The HRLV sonar of the PX4FLOW."""
 
@@ -145,40 +211,6 @@ class RangefinderSettings(ParameterModel):
             sigma_m=self.sigma_m,
             stuck=0.0 if self.stuck_at_m is None else 1.0,
             stuck_m=self.stuck_at_m or 0.0,
-        )
-
-
-class ImuSettings(ParameterModel):
-    """The MIDG's gyros and accelerometers: Table 4, and biases that the paper does not print."""
-
-    bandwidth_hz: Number = Field(20.0, gt=0.0, le=10000.0)
-    gyro_density_deg_s_rthz: Number = Field(0.05, ge=0.0, le=10.0)
-    gyro_bias_deg_s: Number = Field(0.1, ge=0.0, le=100.0)
-    gyro_walk_deg_s_rts: Number = Field(0.002, ge=0.0, le=10.0)
-    gyro_range_deg_s: Number = Field(300.0, gt=0.0, le=10000.0)
-    accel_density_ug_rthz: Number = Field(150.0, ge=0.0, le=1e5)
-    accel_bias_mg: Number = Field(2.0, ge=0.0, le=1000.0)
-    accel_walk_mg_rts: Number = Field(0.02, ge=0.0, le=1000.0)
-    accel_range_g: Number = Field(6.0, gt=0.0, le=1000.0)
-
-    def parameters(self) -> ImuParameters:
-        """Coefficients at 50 Hz."""
-        tau_s = 1.0 / (2.0 * math.pi * self.bandwidth_hz)
-        noise_bandwidth_rthz = math.sqrt(0.5 * math.pi * self.bandwidth_hz)
-        decay, drive = gauss_markov_coefficients(tau_s, imu.PERIOD_S)
-        rt_period = math.sqrt(imu.PERIOD_S)
-        mg_m_s2 = 1e-3 * STANDARD_GRAVITY_M_S2
-        return ImuParameters(
-            decay=decay,
-            drive=drive,
-            gyro_sigma_rad_s=math.radians(self.gyro_density_deg_s_rthz) * noise_bandwidth_rthz,
-            gyro_bias_rad_s=math.radians(self.gyro_bias_deg_s),
-            gyro_walk_rad_s=math.radians(self.gyro_walk_deg_s_rts) * rt_period,
-            gyro_range_rad_s=math.radians(self.gyro_range_deg_s),
-            accel_sigma_m_s2=1e-3 * mg_m_s2 * self.accel_density_ug_rthz * noise_bandwidth_rthz,
-            accel_bias_m_s2=mg_m_s2 * self.accel_bias_mg,
-            accel_walk_m_s2=mg_m_s2 * self.accel_walk_mg_rts * rt_period,
-            accel_range_m_s2=STANDARD_GRAVITY_M_S2 * self.accel_range_g,
         )
 
 

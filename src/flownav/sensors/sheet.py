@@ -12,7 +12,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, ValidationInfo, field_validator
 
 from flownav.core.parameter_files import Number, ParameterModel, load, shipped
-from flownav.sensors.chance import spell_levels
+from flownav.sensors.processes import spell_levels
 
 
 class SensorSheet(ParameterModel):

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from flownav.core.parameter_files import ParameterModel
-from flownav.sensors.barometer_sheet import BarometerSheet, load_barometer_sheet
+from flownav.sensors.barometer import BarometerSheet
 from flownav.sensors.datasheet import FlowSensor, load_sensor
-from flownav.sensors.flow_camera_sheet import FlowCameraSheet, load_flow_camera_sheet
-from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet, load_gps_receiver_sheet
-from flownav.sensors.inertial_sheet import InertialSheet, load_inertial_sheet
-from flownav.sensors.magnetometer_sheet import MagneticField, MagnetometerSheet, load_magnetometer_sheet
-from flownav.sensors.pad_camera_sheet import PadCameraSheet, load_pad_camera_sheet
-from flownav.sensors.range_sensor_sheet import RangeSensorSheet, load_range_sensor_sheet
-from flownav.sensors.skid_switch_sheet import SkidSwitchSheet, load_skid_switch_sheet
+from flownav.sensors.flow_camera_sheet import FlowCameraSheet
+from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
+from flownav.sensors.inertial_sheet import InertialSheet
+from flownav.sensors.magnetometer import MagneticField, MagnetometerSheet
+from flownav.sensors.pad_camera_sheet import PadCameraSheet
+from flownav.sensors.range_sensor import RangeSensorSheet
+from flownav.sensors.skid_switch import SkidSwitchSheet
 
 
 class SensorSheets(ParameterModel):
@@ -36,13 +36,13 @@ class SensorSheets(ParameterModel):
 def shipped_sheets() -> SensorSheets:
     """The sheets that ship with flownav: a small helicopter with everything on board."""
     return SensorSheets(
-        inertial=load_inertial_sheet(),
-        magnetometer=load_magnetometer_sheet(),
-        barometer=load_barometer_sheet(),
-        gps_receiver=load_gps_receiver_sheet(),
-        flow_camera=load_flow_camera_sheet(),
+        inertial=InertialSheet.read(),
+        magnetometer=MagnetometerSheet.read(),
+        barometer=BarometerSheet.read(),
+        gps_receiver=GpsReceiverSheet.read(),
+        flow_camera=FlowCameraSheet.read(),
         flow_sensor=load_sensor(),
-        range_sensor=load_range_sensor_sheet(),
-        pad_camera=load_pad_camera_sheet(),
-        skid_switch=load_skid_switch_sheet(),
+        range_sensor=RangeSensorSheet.read(),
+        pad_camera=PadCameraSheet.read(),
+        skid_switch=SkidSwitchSheet.read(),
     )

@@ -7,9 +7,15 @@ Debouncing, 2004). A switch may be stuck open or closed for a whole flight.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
+from typing import ClassVar, NamedTuple
+
+from pydantic import Field, ValidationInfo, field_validator
 
 from flownav.core.compile import equation
+from flownav.core.parameter_files import Number
+from flownav.sensors.processes import level_of
+from flownav.sensors.sheet import SensorSheet
 
 
 class SkidSwitchParameters(NamedTuple):
@@ -84,3 +90,35 @@ def step_skid_switch(
     reported = contact if follows else state.reported
     after = SkidSwitchState(contact, reported, 0.0 if follows else otherwise)
     return after, SkidSwitchReading(reported, 255.0, 1.0)
+
+
+class SkidSwitchSheet(SensorSheet):
+    """A switch. Loads are shares of the vehicle's weight; stuck shares are of flights."""
+
+    shipped_file: ClassVar[str] = "skid_switch.toml"
+
+    rate_hz: Number = Field(ge=1.0, le=1000.0)
+    closing_share: Number = Field(gt=0.0, le=1.0)
+    opening_share: Number = Field(gt=0.0, le=1.0)
+    sigma_share: Number = Field(0.0, ge=0.0, le=1.0)
+    debounce_s: Number = Field(ge=0.0, le=5.0)
+    stuck_open_share: Number = Field(0.0, ge=0.0, le=0.5)
+    stuck_closed_share: Number = Field(0.0, ge=0.0, le=0.5)
+
+    @field_validator("opening_share")
+    @classmethod
+    def _below(cls, value: float, info: ValidationInfo) -> float:
+        if value > info.data.get("closing_share", 1.0):
+            raise ValueError(f"at most closing_share = {info.data['closing_share']:g} is needed")
+        return value
+
+    def parameters(self, weight_n: float) -> SkidSwitchParameters:
+        """Coefficients of one reading on a vehicle of this weight."""
+        return SkidSwitchParameters(
+            closing_load_n=self.closing_share * weight_n,
+            opening_load_n=self.opening_share * weight_n,
+            sigma_n=self.sigma_share * weight_n,
+            debounce_readings=max(1.0, float(math.ceil(self.debounce_s * self.rate_hz - 1e-9))),
+            stuck_open_above=level_of(self.stuck_open_share),
+            stuck_closed_below=-level_of(self.stuck_closed_share),
+        )

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from flownav.control.box import margins_of
 from flownav.control.design import gains_for
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import path_through, rounded
+from flownav.control.margins import margins_of
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.estimation.error_models import discretised
@@ -26,16 +26,13 @@ from flownav.simulation.plan import ATTITUDE_S, Flight, FlightPlan
 from flownav.simulation.plant import LinearTruth
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
+from flownav.vehicle import kinds
 from flownav.vehicle.corners import NOMINAL
-from flownav.vehicle.kinds import AnyFile, AnyState, AnyTrim, AnyVehicle, disc_of, hover_of, rotors_of
-from flownav.vehicle.loading import VehicleDescription, describe_vehicle, read_vehicle, vehicle_file
+from flownav.vehicle.linearize import ReducedModel, hover_plant, load_paper_model
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.multirotor_trim import parked_multirotor
-from flownav.vehicle.paper_model import ReducedModel, load_paper_model
 from flownav.vehicle.parameters import touchdown_limits
-from flownav.vehicle.plant import hover_plant
 from flownav.vehicle.state import Controls
-from flownav.vehicle.trim import Trim, parked
+from flownav.vehicle.trim import Trim, parked, parked_multirotor
 
 NEVER_S = 1e9
 GO_AROUND = {"height_m": "go_around_height_m", "most": "go_arounds_most"}
@@ -55,11 +52,11 @@ class Setup:
     sensor: FlowSensor
     flight: Flight
     fitted: Fitted | None
-    trim: AnyTrim
+    trim: kinds.AnyTrim
     inputs: tuple[Path, ...]
     parameters: dict[str, Any]
-    file: AnyFile
-    described: VehicleDescription
+    file: kinds.AnyFile
+    described: kinds.VehicleDescription
     dispersion: dict[str, Distribution]
 
     def ensemble(self, design: Design | None = None) -> Ensemble:
@@ -76,12 +73,12 @@ class Setup:
 def assemble(scenario: Scenario) -> Setup:
     """Read, check, trim and discretise everything a scenario names. InputError as the loaders say."""
     _require_what_is_linear(scenario)
-    own_file = vehicle_file(Path(scenario.vehicle.file)) if scenario.vehicle.file else None
+    own_file = kinds.vehicle_file(Path(scenario.vehicle.file)) if scenario.vehicle.file else None
     sensor_file = Path(scenario.flow_sensor) if scenario.flow_sensor else None
-    file, sensor, paper = read_vehicle(own_file), load_sensor(sensor_file), load_paper_model()
+    file, sensor, paper = kinds.read_vehicle(own_file), load_sensor(sensor_file), load_paper_model()
     vehicle = flown(scenario, file)
     _require_paper_helicopter(scenario, vehicle)
-    hover = hover_of(vehicle)
+    hover = kinds.hover_of(vehicle)
     gains = _gains(scenario, vehicle, hover)
     dispersion = scenario.dispersion.entries()
     plan = _plan(scenario, vehicle, hover, gains, dispersion)
@@ -89,9 +86,9 @@ def assemble(scenario: Scenario) -> Setup:
     flight = Flight(
         plan=plan,
         vehicle=vehicle,
-        rotors=rotors_of(vehicle),
+        rotors=kinds.rotors_of(vehicle),
         sensors=_sensors(scenario, sensor, vehicle),
-        wind=scenario.wind.parameters(disc_of(vehicle).span_m),
+        wind=scenario.wind.parameters(kinds.disc_of(vehicle).span_m),
         ground=scenario.ground.parameters(),
         recirculation=recirculation_of(scenario, scenario.recirculation, vehicle),
         path=_path(scenario, vehicle),
@@ -104,7 +101,7 @@ def assemble(scenario: Scenario) -> Setup:
         linear=_linear_truth(paper, hover) if scenario.truth == "linear" and isinstance(hover, Trim) else None,
         limits=touchdown_limits(file),
     )
-    described = describe_vehicle(own_file)
+    described = kinds.describe_vehicle(own_file)
     parameters: dict[str, Any] = {
         "scenario": scenario.model_dump(),
         "flow_sensor": sensor.model_dump(exclude={"identified_models"}),
@@ -125,7 +122,7 @@ def assemble(scenario: Scenario) -> Setup:
     return Setup(scenario, sensor, flight, carried, hover, inputs, parameters, file, described, dispersion)
 
 
-def _values_of(described: VehicleDescription) -> dict[str, Any]:
+def _values_of(described: kinds.VehicleDescription) -> dict[str, Any]:
     """Value, uncertainty and source of each number of a vehicle, by its key."""
     return {
         entry.key: {"value": entry.value, "uncertainty": entry.uncertainty, "source": entry.source}
@@ -145,7 +142,7 @@ def _require_what_is_linear(scenario: Scenario) -> None:
         raise InputError(f'{scenario.name}: truth = "linear" has no forces for an IMU to feel; fly the "paper" filter')
 
 
-def _require_paper_helicopter(scenario: Scenario, vehicle: AnyVehicle) -> None:
+def _require_paper_helicopter(scenario: Scenario, vehicle: kinds.AnyVehicle) -> None:
     """The paper's filter and its linear truth are the model of its helicopter. InputError for another kind."""
     if isinstance(vehicle, MultirotorParameters) and (scenario.filter.name == "paper" or scenario.truth == "linear"):
         raise InputError(
@@ -154,7 +151,7 @@ def _require_paper_helicopter(scenario: Scenario, vehicle: AnyVehicle) -> None:
         )
 
 
-def _gains(scenario: Scenario, vehicle: AnyVehicle, hover: AnyTrim) -> AutopilotGains:
+def _gains(scenario: Scenario, vehicle: kinds.AnyVehicle, hover: kinds.AnyTrim) -> AutopilotGains:
     """The vehicle's gains, what the scenario says of them, and the last metres."""
     section = scenario.autopilot
     precision = {} if section.precision is None else section.precision.model_dump()
@@ -175,7 +172,7 @@ def _gains(scenario: Scenario, vehicle: AnyVehicle, hover: AnyTrim) -> Autopilot
 
 
 def _plan(
-    scenario: Scenario, vehicle: AnyVehicle, hover: AnyTrim, gains: AutopilotGains,
+    scenario: Scenario, vehicle: kinds.AnyVehicle, hover: kinds.AnyTrim, gains: AutopilotGains,
     dispersion: dict[str, Distribution],
 ) -> FlightPlan:  # fmt: skip
     """What the loop is asked to do."""
@@ -210,8 +207,13 @@ def start_of(scenario: Scenario) -> str:
 
 
 def _start(
-    scenario: Scenario, vehicle: AnyVehicle, hover: AnyTrim, gains: AutopilotGains, on_ground: bool, linear: bool
-) -> AnyState:
+    scenario: Scenario,
+    vehicle: kinds.AnyVehicle,
+    hover: kinds.AnyTrim,
+    gains: AutopilotGains,
+    on_ground: bool,
+    linear: bool,
+) -> kinds.AnyState:
     """The vehicle's first state: parked, in trimmed hover, or level for the linear truth."""
     first = scenario.flight.path[0]
     pos_d = -first.height_m - vehicle.cg_above_skid_m
@@ -222,7 +224,7 @@ def _start(
     return state._replace(qw=1.0, qx=0.0, qy=0.0, qz=0.0) if linear else state
 
 
-def _parked(vehicle: AnyVehicle, hover: AnyTrim, gains: AutopilotGains) -> AnyState:
+def _parked(vehicle: kinds.AnyVehicle, hover: kinds.AnyTrim, gains: AutopilotGains) -> kinds.AnyState:
     """At rest on the ground, rotors idling."""
     if isinstance(vehicle, MultirotorParameters):
         return parked_multirotor(vehicle)
@@ -232,7 +234,7 @@ def _parked(vehicle: AnyVehicle, hover: AnyTrim, gains: AutopilotGains) -> AnySt
     return parked(vehicle, Controls(hover.lon, hover.lat, idle, pedal))
 
 
-def _path(scenario: Scenario, vehicle: AnyVehicle) -> Any:
+def _path(scenario: Scenario, vehicle: kinds.AnyVehicle) -> Any:
     """The reference path of the centre of gravity. The linear truth has no ground: its path stops there."""
     lowest = 0.0 if scenario.truth == "linear" else -np.inf
     straight = path_through(
@@ -244,7 +246,7 @@ def _path(scenario: Scenario, vehicle: AnyVehicle) -> Any:
     return rounded(straight, CORNER_S)
 
 
-def _sensors(scenario: Scenario, sensor: FlowSensor, vehicle: AnyVehicle) -> SensorSuite:
+def _sensors(scenario: Scenario, sensor: FlowSensor, vehicle: kinds.AnyVehicle) -> SensorSuite:
     """Every sensor's coefficients."""
     return SensorSuite(
         gps=scenario.gps.parameters(),

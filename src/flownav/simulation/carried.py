@@ -13,24 +13,32 @@ from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
 
 from flownav.core.compile import depends_also
 from flownav.core.measurement import Sensor
-from flownav.sensors.barometer import BarometerReading, draw_barometer, start_barometer, step_barometer
-from flownav.sensors.barometer_sheet import BarometerSheet
+from flownav.sensors.barometer import BarometerReading, BarometerSheet, draw_barometer, start_barometer, step_barometer
 from flownav.sensors.flow_camera import draw_flow_camera, start_flow_camera
 from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from flownav.sensors.gps_receiver import GpsReceiverReading, draw_gps_receiver, start_gps_receiver, step_gps_receiver
 from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
 from flownav.sensors.inertial import InertialReading, draw_inertial, start_inertial
 from flownav.sensors.inertial_sheet import InertialSheet
-from flownav.sensors.magnetometer import MagnetometerReading, draw_magnetometer, read_magnetometer
-from flownav.sensors.magnetometer_sheet import MagneticField, MagnetometerSheet
+from flownav.sensors.magnetometer import (
+    MagneticField,
+    MagnetometerReading,
+    MagnetometerSheet,
+    draw_magnetometer,
+    read_magnetometer,
+)
 from flownav.sensors.pad_camera import PadCameraReading, draw_pad_camera
 from flownav.sensors.pad_camera_sheet import PadCameraSheet
-from flownav.sensors.range_sensor import RangeSensorReading, draw_range_sensor, start_range_sensor, step_range_sensor
-from flownav.sensors.range_sensor_sheet import RangeSensorSheet
+from flownav.sensors.range_sensor import (
+    RangeSensorReading,
+    RangeSensorSheet,
+    draw_range_sensor,
+    start_range_sensor,
+    step_range_sensor,
+)
 from flownav.sensors.sheet import SensorSheet
-from flownav.sensors.skid_switch import SkidSwitchReading, draw_skid_switch, start_skid_switch
-from flownav.sensors.skid_switch_sheet import SkidSwitchSheet
-from flownav.simulation import seeing, wanted
+from flownav.sensors.skid_switch import SkidSwitchReading, SkidSwitchSheet, draw_skid_switch, start_skid_switch
+from flownav.simulation import onboard, seeing
 from flownav.simulation.seeing import told
 
 if TYPE_CHECKING:
@@ -84,8 +92,8 @@ class CarriedSensor(NamedTuple):
     late: bool = False
     lever: str = ""
     heard: Callable[..., Any] | None = None
-    wanted: Callable[[wanted.Wishes, Any, float], Any] = wanted.as_filed
-    readings: Callable[[wanted.Wishes], int] | None = None  # how many of `says` it gives; None: all
+    wanted: Callable[[onboard.Wishes, Any, float], Any] = onboard.as_filed
+    readings: Callable[[onboard.Wishes], int] | None = None  # how many of `says` it gives; None: all
     coefficients: Callable[[Any, Carrier], Any] = lambda sheet, _: sheet.parameters()
 
     @property
@@ -128,7 +136,7 @@ _table: list[CarriedSensor] = [
          Said(Sensor.GPS_VELOCITY, told(
              GpsReceiverReading, ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s"), ("speed_variance_m2_s2",) * 3))),
         draw_gps_receiver, start_gps_receiver, step_gps_receiver, (seeing.see_motion,), Channels(110, 175, 150),
-        phase=1, late=True, wanted=wanted.receiver_sheet, readings=wanted.receiver_readings,
+        phase=1, late=True, wanted=onboard.receiver_sheet, readings=onboard.receiver_readings,
     ),
     CarriedSensor(
         "barometer", BarometerSheet, (Said(Sensor.BARO, told(BarometerReading, ("alt_m",))),),
@@ -144,19 +152,19 @@ _table: list[CarriedSensor] = [
     CarriedSensor(
         "range_sensor", RangeSensorSheet, (Said(Sensor.RANGE, told(RangeSensorReading, ("range_m",))),),
         draw_range_sensor, start_range_sensor, step_range_sensor, (seeing.see_beam,), Channels(130, 190, 162),
-        phase=2, late=True, lever="lens", wanted=wanted.range_sheet,
+        phase=2, late=True, lever="lens", wanted=onboard.range_sheet,
     ),
     CarriedSensor(
         "flow_camera", FlowCameraSheet, (Said(Sensor.FLOW_RATE, None),),
         draw_flow_camera, start_flow_camera, seeing.look, (seeing.mean_rates, seeing.see_flow),
-        Channels(120, 183, 165), phase=1, late=True, lever="lens", wanted=wanted.camera_sheet,
+        Channels(120, 183, 165), phase=1, late=True, lever="lens", wanted=onboard.camera_sheet,
     ),
     CarriedSensor(
         "pad_camera", PadCameraSheet,
         (Said(Sensor.PAD, told(PadCameraReading, ("tan_forward", "tan_right", "distance_m"),
                                ("forward_variance", "right_variance", "distance_variance_m2"))),),
         draw_pad_camera, None, seeing.look_for_pad, (seeing.see_pad,), Channels(142, 205, 168),
-        phase=3, late=True, lever="lens", heard=seeing.note_seen, wanted=wanted.pad_sheet,
+        phase=3, late=True, lever="lens", heard=seeing.note_seen, wanted=onboard.pad_sheet,
     ),
     CarriedSensor(
         "skid_switch", SkidSwitchSheet, (Said(Sensor.LANDED, told(SkidSwitchReading, ("landed",))),),
@@ -167,7 +175,7 @@ _table: list[CarriedSensor] = [
         "inertial", InertialSheet,
         (Said(Sensor.IMU, told(InertialReading, (
             "gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s", "accel_x_m_s2", "accel_y_m_s2", "accel_z_m_s2"))),),
-        draw_inertial, start_inertial, seeing.feel_motion, (), Channels(40, 160, 174), wanted=wanted.inertial_sheet,
+        draw_inertial, start_inertial, seeing.feel_motion, (), Channels(40, 160, 174), wanted=onboard.inertial_sheet,
         coefficients=lambda sheet, on: sheet.parameters(on.rotor.speed_rad_s, BLADES),
     ),
 ]  # fmt: skip

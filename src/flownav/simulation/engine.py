@@ -20,16 +20,13 @@ from flownav.navigation.take import navigator_unit
 from flownav.navigation.tape import COMPONENTS, Tape, empty_tape, room_of
 from flownav.navigation.told import carries_lag
 from flownav.simulation import layout
-from flownav.simulation.block import Block, Buffers
-from flownav.simulation.draws import Noise, plain_noise
+from flownav.simulation.block import Block, Buffers, Noise, plain_noise
 from flownav.simulation.ensemble import Ensemble, believed
-from flownav.simulation.fault import SensorFault
 from flownav.simulation.flight import fly_block
 from flownav.simulation.history import HISTORY
 from flownav.simulation.navigating import first_inertial, kept_inertials
 from flownav.simulation.plan import PHYSICS_S, Flight
-from flownav.simulation.ring import FIELDS
-from flownav.simulation.truth import Truth, packed_truth
+from flownav.simulation.truth import SensorFault, Truth, packed_truth
 
 Array = NDArray[np.float64]
 Result = TypeVar("Result")
@@ -72,7 +69,12 @@ NOTHING_ELSE = Instead()
 def buffers_of(flight: Flight, lanes: tuple[int, ...], epochs: int, *, written: bool) -> Buffers:
     """Scratch for one block after the other; written: the navigator's tape and what it is fed are kept."""
     table = flight.table
-    rows, nav, tape, fed = layout.ROWS, np.zeros(0), empty_tape(0, 0, 0, len(lanes)), np.zeros((0, FIELDS, len(lanes)))
+    rows, nav, tape, fed = (
+        layout.ROWS,
+        np.zeros(0),
+        empty_tape(0, 0, 0, len(lanes)),
+        np.zeros((0, layout.FIELDS, len(lanes))),
+    )
     if table is not None and flight.onboard is not None:
         rows = first_inertial(table)
         rows += 6 * kept_inertials(table, flight.onboard.inertial_steps * PHYSICS_S)
@@ -80,7 +82,7 @@ def buffers_of(flight: Flight, lanes: tuple[int, ...], epochs: int, *, written: 
         if written:
             components = int(sum(COMPONENTS.get(Sensor(kind), 0) for kind in table.sensor))
             tape = empty_tape(epochs + 2, components, 4 * epochs + 8, len(lanes))
-            fed = np.zeros((table.readings, FIELDS, len(lanes)))
+            fed = np.zeros((table.readings, layout.FIELDS, len(lanes)))
     room = np.array([*room_of(tape), len(fed)])
     return Buffers(np.empty(rows * len(lanes)), nav, tape, fed, room, np.empty((epochs, len(HISTORY), len(lanes))))
 

@@ -18,17 +18,14 @@ from flownav.core.parameter_files import ParameterModel, check
 from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.sheets import SensorSheets
 from flownav.simulation.dispersion import Design, Distribution, drawn, uniforms
-from flownav.simulation.fault import SOUND
 from flownav.simulation.fitting import onboard_of
+from flownav.simulation.ground import RecirculationParameters, RecirculationSettings
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import Flight
-from flownav.simulation.recirculation import RecirculationParameters, RecirculationSettings
 from flownav.simulation.scenario import Scenario
-from flownav.simulation.truth import LATE, NAMES, PARTS, PUNCTUAL, SIZES, Carried, Truth
-from flownav.vehicle.kinds import AnyFile, AnyVehicle, as_the_paper_has_it, disc_of, flattened
-from flownav.vehicle.loading import VehicleDescription
-from flownav.vehicle.multirotor_schema import MultirotorFile
-from flownav.vehicle.schema import VehicleFile
+from flownav.simulation.truth import LATE, NAMES, PARTS, PUNCTUAL, SIZES, SOUND, Carried, Truth
+from flownav.vehicle.kinds import AnyFile, AnyVehicle, VehicleDescription, as_the_paper_has_it, disc_of, flattened
+from flownav.vehicle.schema import MultirotorFile, VehicleFile
 
 Array = NDArray[np.float64]
 

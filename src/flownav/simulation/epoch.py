@@ -14,11 +14,12 @@ from flownav.core.compile import Lanes, Work, equation, invoke, procedure, repla
 from flownav.core.frames import GRAVITY_M_S2, Quaternion, quaternion_product, rotation_from_quaternion
 from flownav.core.measurement import Sensor
 from flownav.navigation.records import Reading
-from flownav.sensors.beam import Ground, ground_height
 from flownav.sensors.flow import FlowParameters, FlowState, misread, step_flow
+from flownav.sensors.geometry import Ground, ground_height
 from flownav.sensors.gps_ins import GpsInsErrors, attitude_with_error
 from flownav.sensors.rangefinder import slant_range
 from flownav.simulation.block import Block, Progress
+from flownav.simulation.carriage import INERTIAL_FAULT, read_inertial
 from flownav.simulation.failing import Taken, strike
 from flownav.simulation.layout import PAPERS, PLANT
 from flownav.simulation.navigating import Timetable, inertial_row, keep_inertial
@@ -32,11 +33,9 @@ from flownav.simulation.plan import (
     Flight,
     OwnParts,
 )
-from flownav.simulation.plant import LinearTruth, linear_step
+from flownav.simulation.plant import LinearTruth, linear_step, observe_vehicle, step_vehicle
 from flownav.simulation.records import AttitudeError, Estimated, Felt, Home, Landed, Loads, PaperInput
-from flownav.simulation.sampling import INERTIAL_FAULT, read_inertial
 from flownav.simulation.sensing import EPOCH_S, lens_height, true_imu
-from flownav.simulation.vehicles import observe_vehicle, step_vehicle
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.state import Controls, HelicopterState
 

@@ -15,11 +15,10 @@ from flownav.core.compile import Lanes, Work, equation, exp, lane_access, magnit
 from flownav.core.measurement import Sensor
 from flownav.navigation.records import Reading
 from flownav.simulation import layout
-from flownav.simulation.draws import draw
-from flownav.simulation.fault import SensorFault
-from flownav.simulation.layout import PLANT, fault_as_is
+from flownav.simulation.block import draw
+from flownav.simulation.layout import FIELDS, PLANT, fault_as_is, load_slot, put_slot, reading_at, store_row
 from flownav.simulation.records import HeldRange
-from flownav.simulation.ring import FIELDS, load_slot, put_slot, reading_at, store_row
+from flownav.simulation.truth import SensorFault
 
 
 class FaultNormals(NamedTuple):

@@ -13,19 +13,17 @@ from flownav.core.measurement import Array, Sensor
 from flownav.navigation.packed import pack
 from flownav.navigation.settings_of import Told, settings_of
 from flownav.navigation.told import FROM_MAG, Equipment
-from flownav.sensors.datasheet import FlowSensor
+from flownav.sensors.datasheet import FlowSensor, needs_lag_states
 from flownav.sensors.flow import FlowParameters
-from flownav.sensors.identified import needs_lag_states
-from flownav.sensors.magnetometer_sheet import MagneticField
+from flownav.sensors.magnetometer import MagneticField
 from flownav.sensors.sheet import Lever, SensorSheet
 from flownav.sensors.sheets import SensorSheets
 from flownav.simulation.carried import BLADES, CarriedSensor, Carrier
 from flownav.simulation.navigating import Timetable
-from flownav.simulation.onboard import ALWAYS, NEVER, PHYSICS_PERIOD_S, Fitting, Onboard, Place
+from flownav.simulation.onboard import ALWAYS, NEVER, PHYSICS_PERIOD_S, Fitting, Onboard, Place, clock_of
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.schedule import Schedule, Timing, schedule_of
 from flownav.simulation.truth import CARRIED, Carried
-from flownav.simulation.wanted import clock_of
 from flownav.vehicle.kinds import AnyVehicle, rotor_facts
 
 START_WAIT_S = 10.0

@@ -17,9 +17,9 @@ from flownav.control.autopilot import grounded, hovering
 from flownav.control.guidance import Reference, reference_at
 from flownav.core.compile import Lanes, Work, equation, invoke, kernel, pointer
 from flownav.navigation.tape import output_of
-from flownav.simulation import layout
-from flownav.simulation.block import Aboard, Block, Buffers, Progress
-from flownav.simulation.draws import key_lanes, put_start
+from flownav.simulation import layout, navigating
+from flownav.simulation.block import Aboard, Block, Buffers, Progress, key_lanes, put_start
+from flownav.simulation.carriage import draw_units, sample, start_onboard
 from flownav.simulation.epoch import (
     advance,
     advance_sensing,
@@ -32,25 +32,11 @@ from flownav.simulation.epoch import (
 from flownav.simulation.filtering import run_filter, start_filter
 from flownav.simulation.history import write_history
 from flownav.simulation.layout import store_autopilot
-from flownav.simulation.navigating import (
-    Timetable,
-    carry_ahead,
-    compare_at_horizon,
-    feed_due,
-    hand_to_autopilot,
-    note_knowledge,
-    note_normalised_error,
-    note_truth,
-    put_on_truth,
-    truth_row,
-)
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import NOTHING, PHYSICS_S, START_STEP, Flight, OwnParts
-from flownav.simulation.sampling import sample
+from flownav.simulation.plant import observe_vehicle, place
 from flownav.simulation.sensing import EPOCH_S, draw_epoch, sense, start_sensors
 from flownav.simulation.surroundings import draw_recirculation, start_surroundings, surround
-from flownav.simulation.units import draw_units, start_onboard
-from flownav.simulation.vehicles import observe_vehicle, place
 
 
 @equation
@@ -140,24 +126,24 @@ def epochs_on_paper(note: Callable[..., None]) -> Callable[..., None]:
 
 @equation
 def decide_navigated(
-    b: Block, aboard: Aboard, flight: Flight, onboard: Onboard, table: Timetable, epoch: int, at: Progress
+    b: Block, aboard: Aboard, flight: Flight, onboard: Onboard, table: navigating.Timetable, epoch: int, at: Progress
 ) -> tuple[Progress, Reference]:
     """One epoch of the vehicle's own sensors and the navigator, up to what the autopilot asks for."""
     work, lanes, nav, t_s = b.work, b.lanes, aboard.nav, epoch * EPOCH_S
     ahead = table.horizon_epochs * inertial_parts(onboard)
     reference = begin_epoch(b, epoch, flight)
     taken = sample(work, lanes, b.seed, b.first, epoch, table.slots, at.taken, onboard, flight.fails)
-    note_truth(work, lanes, truth_row(epoch, table))
-    following = feed_due(work, lanes, epoch, at.following, aboard, table)
+    navigating.note_truth(work, lanes, navigating.truth_row(epoch, table))
+    following = navigating.feed_due(work, lanes, epoch, at.following, aboard, table)
     ahead = ahead if at.heard >= ahead else at.heard
-    carry_ahead(work, nav, lanes, at.heard, ahead, onboard.inertial_steps * PHYSICS_S, table)
-    reached, then = epoch >= table.horizon_epochs, truth_row(epoch - table.horizon_epochs, table)
-    compare_at_horizon(work, lanes, reached, nav, then)
-    note_normalised_error(work, nav, lanes, reached, then)
+    navigating.carry_ahead(work, nav, lanes, at.heard, ahead, onboard.inertial_steps * PHYSICS_S, table)
+    reached, then = epoch >= table.horizon_epochs, navigating.truth_row(epoch - table.horizon_epochs, table)
+    navigating.compare_at_horizon(work, lanes, reached, nav, then)
+    navigating.note_normalised_error(work, nav, lanes, reached, then)
     if flight.plan.along_truth:
-        put_on_truth(work, lanes, reached, nav, then)
-    note_knowledge(work, lanes, nav)
-    hand_to_autopilot(work, lanes, t_s < flight.plan.handover_s, flight.plan.home_at_start, reference, nav)
+        navigating.put_on_truth(work, lanes, reached, nav, then)
+    navigating.note_knowledge(work, lanes, nav)
+    navigating.hand_to_autopilot(work, lanes, t_s < flight.plan.handover_s, flight.plan.home_at_start, reference, nav)
     estimate_for_autopilot(work, lanes, flight.plan.fly_on_truth)
     command(work, lanes, t_s, reference, flight, onboard)
     return Progress(taken, following, at.heard), reference
@@ -170,7 +156,9 @@ def epochs_navigated(note: Callable[..., None]) -> Callable[..., None]:
     """
 
     @equation
-    def fly_epochs(b: Block, aboard: Aboard, flight: Flight, onboard: Onboard, table: Timetable, into: Any) -> None:
+    def fly_epochs(
+        b: Block, aboard: Aboard, flight: Flight, onboard: Onboard, table: navigating.Timetable, into: Any
+    ) -> None:
         parts, at = inertial_parts(onboard), Progress(0, 0, 0)
         for epoch in range(flight.plan.epochs):
             at, reference = decide_navigated(b, aboard, flight, onboard, table, epoch, at)
@@ -196,7 +184,7 @@ fly_navigated = epochs_navigated(note_history)
 
 @equation
 def fly(
-    b: Block, aboard: Aboard, flight: Flight, onboard: Onboard | None, table: Timetable | None,
+    b: Block, aboard: Aboard, flight: Flight, onboard: Onboard | None, table: navigating.Timetable | None,
     history: NDArray[np.float64],
 ) -> None:  # fmt: skip
     """A block of flights, whichever filter flies; the compiler drops the branch of the other."""

@@ -10,7 +10,7 @@ from flownav.core.compile import Lanes, Work, equation
 from flownav.core.frames import rotation_from_quaternion, to_earth
 from flownav.core.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY
 from flownav.estimation.paper_filter import STATES
-from flownav.sensors.beam import ground_height
+from flownav.sensors.geometry import ground_height
 from flownav.simulation import layout
 from flownav.simulation.layout import PLANT, ground_as_is, load_autopilot, load_helicopter
 from flownav.simulation.records import Spread

@@ -16,41 +16,16 @@ from flownav.estimation.paper_filter import STATES
 from flownav.navigation.records import Reading
 from flownav.sensors.flow import FlowParameters, FlowReading, FlowState
 from flownav.sensors.gps_ins import GpsInsErrors, GpsInsNormals, NavSolution
-from flownav.sensors.imu import ImuReading
+from flownav.sensors.inertial import ImuReading
 from flownav.sensors.rangefinder import RangefinderState, RangeReading
-from flownav.simulation.recirculation import RecirculationState
-from flownav.simulation.records import (
-    Arrived,
-    AttitudeError,
-    Before,
-    Estimated,
-    Exposed,
-    Felt,
-    FlowNormals,
-    HeldRange,
-    Home,
-    HorizonError,
-    InertialThen,
-    Landed,
-    Loads,
-    Measured,
-    Nees,
-    PadPlace,
-    PaperInput,
-    PaperState,
-    PaperVariance,
-    RotorSpeed,
-    SeesFlow,
-    Spread,
-    TruthThen,
-)
+from flownav.simulation import records
+from flownav.simulation.ground import RecirculationState
 from flownav.simulation.seeing import attitude_of
 from flownav.simulation.truth import CARRIED, PARTS, SIZES
 from flownav.simulation.wind import WindNormals, WindState
 from flownav.vehicle.around import Around
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.multirotor_state import MultirotorState, Six
-from flownav.vehicle.state import Controls, HelicopterState, Inflow
+from flownav.vehicle.state import Controls, HelicopterState, Inflow, MultirotorState, Six
 
 
 def size_of(record: Any) -> int:
@@ -73,7 +48,7 @@ AS_IS_BEGIN, AS_IS_END = AS_IS["vehicle"], _rows.next
 # the plant
 HELICOPTER = _rows.keep(HelicopterState)  # or the multirotor, whose first fields are the same
 ROTOR_SPEED = HELICOPTER + HelicopterState._fields.index("speed")
-_rows.name(RotorSpeed, ROTOR_SPEED)
+_rows.name(records.RotorSpeed, ROTOR_SPEED)
 STAGE = _rows.take(len(HelicopterState._fields))  # the state of a Runge-Kutta stage
 SUM = _rows.take(len(HelicopterState._fields))  # the weighted sum of stage rates
 INFLOW = _rows.take(len(Inflow._fields))
@@ -81,9 +56,9 @@ CONTROLS = _rows.keep(Controls)
 WIND = _rows.keep(WindState)
 AROUND = _rows.keep(Around)
 _rows.keep(RecirculationState)
-LOADS = _rows.keep(Loads)
+LOADS = _rows.keep(records.Loads)
 THRUST, CONTACT, POWER = LOADS, LOADS + 1, LOADS + 2
-_rows.keep(Before)
+_rows.keep(records.Before)
 
 # the sensors
 _rows.keep(GpsInsErrors)
@@ -93,7 +68,7 @@ _rows.keep(FlowState)
 _rows.keep(RangefinderState)
 FLOW_READING = _rows.keep(FlowReading)
 SEES_FLOW = FLOW_READING + FlowReading._fields.index("engaged")
-_rows.name(SeesFlow, SEES_FLOW)
+_rows.name(records.SeesFlow, SEES_FLOW)
 RANGE = _rows.keep(RangeReading)
 
 STREAM = _rows.take(1)  # of the lane's noise, from its block's first flight on; the bits of a whole number
@@ -102,7 +77,7 @@ STREAM = _rows.take(1)  # of the lane's noise, from its block's first flight on;
 START_NORMALS = _rows.next  # from here to START_END what is drawn before the first epoch
 GPS_NORMALS = _rows.keep(GpsInsNormals)
 GPS_JITTER = GPS_NORMALS + GpsInsNormals._fields.index("jitter_n")
-FLOW_NORMALS = _rows.keep(FlowNormals)
+FLOW_NORMALS = _rows.keep(records.FlowNormals)
 WIND_NORMALS = _rows.keep(WindNormals)
 NORMALS_END = _rows.next
 RECIRCULATION_NORMALS = _rows.take(len(RecirculationState._fields) + len(RecirculationState._fields) % 2)
@@ -115,11 +90,11 @@ START_END = _rows.next
 
 # the paper's filter: state and covariance, inputs and measurements
 FILTER = kalman_rows(_rows.take(kalman_row_count(STATES)), STATES)
-_rows.name(PaperState, *range(FILTER.state, FILTER.state + STATES))
-_rows.name(PaperVariance, *(FILTER.covariance + i * (STATES + 1) for i in range(STATES)))
-INPUT = _rows.keep(PaperInput)
-MEASURED = _rows.keep(Measured)
-ARRIVED = _rows.keep(Arrived)
+_rows.name(records.PaperState, *range(FILTER.state, FILTER.state + STATES))
+_rows.name(records.PaperVariance, *(FILTER.covariance + i * (STATES + 1) for i in range(STATES)))
+INPUT = _rows.keep(records.PaperInput)
+MEASURED = _rows.keep(records.Measured)
+ARRIVED = _rows.keep(records.Arrived)
 INNOVATION = _rows.take(2 * STATES)  # of each component, then their variances
 
 # the sensors that feed the navigator: the state of each, the normals of its reading
@@ -129,32 +104,37 @@ for _one in BY_CHANNEL:
     NORMALS[_one.name] = _rows.take(in_pairs(_one.normals))
 _rows.keep(ImuReading)  # means over the last inertial period
 _rows.keep(Knowledge)
-_rows.keep(Felt)
-_rows.keep(Exposed)
+_rows.keep(records.Felt)
+_rows.keep(records.Exposed)
 FAULT_NORMALS = _rows.take(6)
-_rows.keep(HeldRange)
+_rows.keep(records.HeldRange)
 EARLIER_READINGS = 8
 FAULT_EARLIER = _rows.take(len(Reading._fields) * EARLIER_READINGS)  # the last readings of flow
-_rows.keep(Landed)
+_rows.keep(records.Landed)
 # what the vehicle makes of the navigator: carried on to now
-_rows.keep(PadPlace)
-_rows.keep(AttitudeError)
-HORIZON_ERROR = _rows.keep(HorizonError)
+_rows.keep(records.PadPlace)
+_rows.keep(records.AttitudeError)
+HORIZON_ERROR = _rows.keep(records.HorizonError)
 # what the filter says, whichever flies
-ESTIMATED = _rows.keep(Estimated)
-_rows.keep(Spread)
-NEES = _rows.keep(Nees)
+ESTIMATED = _rows.keep(records.Estimated)
+_rows.keep(records.Spread)
+NEES = _rows.keep(records.Nees)
 # the autopilot
 ESTIMATE = _rows.keep(Estimate)  # what it flies on
-HOME = _rows.keep(Home)
+HOME = _rows.keep(records.Home)
 AUTOPILOT = _rows.keep(AutopilotState)
 
 ROWS = _rows.next
-# behind the rows: readings on their way (`ring`), and what is remembered for as long as the horizon is
+# behind the rows: readings on their way, a ring of slots, each with one reading of every lane. They are filled in the
+# order of sampling and emptied in that of the instants that the readings describe, both known beforehand (`schedule`),
+# so that no lane waits for another.
 _rows.keep(Reading, 0, "slot")
 load_slot, put_slot = PLANT.access(Reading)
-_rows.anywhere(TruthThen, "truth_row")
-load_inertial_then, _ = _rows.anywhere(InertialThen, "inertial_row")
+FIELDS = len(Reading._fields)
+reading_at, store_row = lane_access(Reading, None)
+# and what is remembered for as long as the horizon is
+_rows.anywhere(records.TruthThen, "truth_row")
+load_inertial_then, _ = _rows.anywhere(records.InertialThen, "inertial_row")
 
 _rows.name(MultirotorParameters, *range(AS_IS["vehicle"], AS_IS["vehicle"] + len(MultirotorParameters._fields)))
 for _part in ("vehicle", "wind", "ground", "recirculation", "fault"):
@@ -173,8 +153,8 @@ load_multirotor_stage, store_multirotor_stage = lane_access(MultirotorState, STA
 load_roots, store_roots = lane_access(Six, SUM)  # of the shares of thrust that the mixer asks for
 load_inflow, store_inflow = lane_access(Inflow, INFLOW)
 load_controls, store_controls = PLANT.access(Controls)
-load_loads, store_loads = PLANT.access(Loads)
-load_estimated, store_estimated = PLANT.access(Estimated)
+load_loads, store_loads = PLANT.access(records.Loads)
+load_estimated, store_estimated = PLANT.access(records.Estimated)
 load_around, store_around = PLANT.access(Around)
 load_recirculation, store_recirculation = PLANT.access(RecirculationState)
 load_recirculation_normals, _ = lane_access(RecirculationState, RECIRCULATION_NORMALS)

@@ -18,32 +18,21 @@ from flownav.core.frames import conjugate, quaternion_product, rotation_from_qua
 from flownav.estimation.consistency import normalised_error
 from flownav.estimation.named import Attitude, PositionNed, VelocityNed
 from flownav.navigation.ahead import Carried, carried, coasted, state_of
-from flownav.navigation.memory import load_reading, load_start
+from flownav.navigation.memory import load_reading, load_start, store_reading
 from flownav.navigation.records import GroundMemory, Reading, StartMemory, SuspicionMemory
+from flownav.simulation import records
 from flownav.simulation.block import Aboard
-from flownav.simulation.layout import PLANT, load_inertial_then, store_estimated
-from flownav.simulation.records import (
-    AttitudeError,
-    Estimated,
-    HorizonError,
-    InertialThen,
-    Loads,
-    Nees,
-    PadPlace,
-    Spread,
-    TruthThen,
-)
-from flownav.simulation.ring import FIELDS, FIRST, hand_over, store_row
+from flownav.simulation.layout import FIELDS, PLANT, ROWS, load_inertial_then, load_slot, store_estimated, store_row
 from flownav.simulation.said import GroundSaid, PadSaid, PadVariance, StatedVariance, on_both
 from flownav.vehicle.state import HelicopterState
 
 EPOCH_S = 0.02
-TRUTH = len(TruthThen._fields)
-INERTIAL = len(InertialThen._fields)
+TRUTH = len(records.TruthThen._fields)
+INERTIAL = len(records.InertialThen._fields)
 
-load_truth_then, _ = PLANT.access(TruthThen)
-load_place, _ = PLANT.access(PadPlace)
-_, store_nees = PLANT.access(Nees)
+load_truth_then, _ = PLANT.access(records.TruthThen)
+load_place, _ = PLANT.access(records.PadPlace)
+_, store_nees = PLANT.access(records.Nees)
 
 
 class Timetable(NamedTuple):
@@ -61,7 +50,7 @@ class Timetable(NamedTuple):
 @equation
 def first_truth(table: Timetable) -> int:
     """The first row of the remembered truths, behind the ring."""
-    return FIRST + table.slots * FIELDS
+    return ROWS + table.slots * FIELDS
 
 
 @equation
@@ -93,7 +82,8 @@ def feed_due(work: Work, lanes: Lanes, epoch: int, following: int, aboard: Aboar
     """Every reading that is due in this epoch, in order; the next one's number."""
     nav, o = aboard.nav, aboard.o
     while following < table.readings and table.epoch[following] <= epoch:
-        hand_over(work, nav, lanes, table.slot[following])
+        for lane in range(len(lanes)):
+            store_reading(nav, lanes, lane, load_slot(work, lanes, table.slot[following], lane))
         if o.room[5] > following:
             for lane in range(len(lanes)):
                 store_row(aboard.fed, lanes, following * FIELDS, lane, load_reading(nav, lanes, lane))
@@ -107,24 +97,26 @@ def feed_due(work: Work, lanes: Lanes, epoch: int, following: int, aboard: Aboar
 
 # -- the truth at the horizon -----------------------------------------------------------------------------------
 @PLANT.on_lanes
-def note_truth(state: HelicopterState) -> TruthThen:
+def note_truth(state: HelicopterState) -> records.TruthThen:
     """The truth of this instant."""
     rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
     vel_n, vel_e, vel_d = to_earth(rotation, state.u, state.v, state.w)
-    return TruthThen(state.pos_n, state.pos_e, state.pos_d, vel_n, vel_e, vel_d, state.qw, state.qx, state.qy, state.qz)
+    return records.TruthThen(
+        state.pos_n, state.pos_e, state.pos_d, vel_n, vel_e, vel_d, state.qw, state.qx, state.qy, state.qz
+    )
 
 
 class Compared(NamedTuple):
     """The navigator beside the truth."""
 
-    error: HorizonError
-    stated: Spread
+    error: records.HorizonError
+    stated: records.Spread
 
 
 @on_both
 def compare_at_horizon(
     start: StartMemory, position: PositionNed, velocity: VelocityNed, attitude: Attitude, stated: StatedVariance,
-    then: TruthThen, *, reached: bool,
+    then: records.TruthThen, *, reached: bool,
 ) -> Compared:  # fmt: skip
     """Errors of the navigator where it stands, and their variances. reached: the horizon is past the start."""
     running = start.started > 0.0 and reached
@@ -133,7 +125,7 @@ def compare_at_horizon(
     said = to_body(own, velocity.vel_n, velocity.vel_e, velocity.vel_d)
     was = to_body(true, then.vel_n_m_s, then.vel_e_m_s, then.vel_d_m_s)
     return Compared(
-        HorizonError(
+        records.HorizonError(
             position.pos_n - then.pos_n_m if running else np.nan,
             position.pos_e - then.pos_e_m if running else np.nan,
             position.pos_d - then.pos_d_m if running else np.nan,
@@ -141,7 +133,7 @@ def compare_at_horizon(
             said[1] - was[1] if running else np.nan,
             said[2] - was[2] if running else np.nan,
         ),
-        Spread(*stated),
+        records.Spread(*stated),
     )
 
 
@@ -152,7 +144,7 @@ def note_normalised_error(work: Work, nav: Work, lanes: Lanes, reached: bool, ro
         then = load_truth_then(work, lanes, row, lane)
         nees = normalised_error(nav, lanes, lane, then[:6])
         running = load_start(nav, lanes, lane).started > 0.0 and reached
-        store_nees(work, lanes, lane, Nees(nees if running else np.nan))
+        store_nees(work, lanes, lane, records.Nees(nees if running else np.nan))
 
 
 class OnTruth(NamedTuple):
@@ -165,7 +157,7 @@ class OnTruth(NamedTuple):
 
 @on_both
 def put_on_truth(
-    start: StartMemory, position: PositionNed, velocity: VelocityNed, attitude: Attitude, then: TruthThen,
+    start: StartMemory, position: PositionNed, velocity: VelocityNed, attitude: Attitude, then: records.TruthThen,
     *, reached: bool,
 ) -> OnTruth:  # fmt: skip
     """The navigator's position, velocity and attitude become the truth at its horizon, for Jacobians to be taken there.
@@ -182,10 +174,10 @@ def put_on_truth(
 
 # -- from the horizon to now --------------------------------------------------------------------------------------
 @on_both
-def find_place(place: PadPlace, pad: PadSaid, ground: GroundMemory, below: GroundSaid) -> PadPlace:
+def find_place(place: records.PadPlace, pad: PadSaid, ground: GroundMemory, below: GroundSaid) -> records.PadPlace:
     """The pad's place by its camera and by the range, where they have told."""
     found, grounded = pad.known > 0.0, ground.known > 0.0
-    return PadPlace(
+    return records.PadPlace(
         pad.north_m if found else place.north_m,
         pad.east_m if found else place.east_m,
         below.down_m if grounded else place.down_m,
@@ -210,10 +202,10 @@ def carry_ahead(work: Work, nav: Work, lanes: Lanes, heard: int, ahead: int, per
 
 
 @equation
-def over_pad(c: Carried, place: PadPlace) -> Estimated:
+def over_pad(c: Carried, place: records.PadPlace) -> records.Estimated:
     """The state as it is flown on."""
     u, v, w = to_body(rotation_from_quaternion(c.qw, c.qx, c.qy, c.qz), c.vel_n, c.vel_e, c.vel_d)
-    return Estimated(
+    return records.Estimated(
         c.pos_n - place.north_m, c.pos_e - place.east_m, c.pos_d - place.down_m, u, v, w, c.qw, c.qx, c.qy, c.qz
     )
 
@@ -232,9 +224,9 @@ def note_knowledge(
 
 
 @PLANT.on_lanes
-def keep_inertial(reading: Reading) -> InertialThen:
+def keep_inertial(reading: Reading) -> records.InertialThen:
     """Remember the reading that was just put into a slot."""
-    return InertialThen(
+    return records.InertialThen(
         reading.value_0, reading.value_1, reading.value_2, reading.value_3, reading.value_4, reading.value_5
     )
 
@@ -243,15 +235,15 @@ def keep_inertial(reading: Reading) -> InertialThen:
 class HandedOver(NamedTuple):
     """What the autopilot flies on, and from where it counts."""
 
-    place: PadPlace
-    estimated: Estimated
-    error: AttitudeError
+    place: records.PadPlace
+    estimated: records.Estimated
+    error: records.AttitudeError
 
 
 @on_both
 def hand_to_autopilot(
-    state: HelicopterState, start: StartMemory, loads: Loads, place: PadPlace, said: Estimated, *, waiting: bool,
-    at_start: bool, reference: Reference,
+    state: HelicopterState, start: StartMemory, loads: records.Loads, place: records.PadPlace, said: records.Estimated,
+    *, waiting: bool, at_start: bool, reference: Reference,
 ) -> HandedOver:  # fmt: skip
     """Before the hand-over the vehicle stands where its path begins, or is flown on the truth, and notes its place.
 
@@ -260,16 +252,16 @@ def hand_to_autopilot(
     running = start.started > 0.0
     handed = running and not waiting
     notes, stands = at_start and running and not handed, loads.contact_n > 0.0
-    noted = PadPlace(
+    noted = records.PadPlace(
         place.north_m + said.pos_n_m - (reference.pos_n if stands else state.pos_n),
         place.east_m + said.pos_e_m - (reference.pos_e if stands else state.pos_e),
         place.down_m + said.pos_d_m - (reference.pos_d if stands else state.pos_d),
     )
-    truth = Estimated(
+    truth = records.Estimated(
         state.pos_n, state.pos_e, state.pos_d, state.u, state.v, state.w, state.qw, state.qx, state.qy, state.qz
     )
     flown = said if handed else truth
     turn = quaternion_product(
         (flown.qw, flown.qx, flown.qy, flown.qz), conjugate((state.qw, state.qx, state.qy, state.qz))
     )
-    return HandedOver(noted if notes else place, flown, AttitudeError(*turn))
+    return HandedOver(noted if notes else place, flown, records.AttitudeError(*turn))

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from flownav.control.gains import AutopilotGains
 from flownav.control.guidance import Path
 from flownav.estimation.paper_filter import PaperModel
-from flownav.sensors.beam import Ground
+from flownav.sensors.geometry import Ground
+from flownav.simulation.ground import RecirculationParameters
 from flownav.simulation.navigating import Timetable
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plant import LinearTruth
-from flownav.simulation.recirculation import RecirculationParameters
 from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
 from flownav.simulation.wind import WindParameters
 from flownav.vehicle.kinds import AnyState, AnyVehicle

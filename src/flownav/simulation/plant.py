@@ -9,36 +9,22 @@ from numpy.typing import NDArray
 
 from flownav.core.compile import STAGES, Lanes, Work, equation
 from flownav.simulation import layout
-from flownav.simulation.layout import (
-    load_around,
-    load_controls,
-    load_helicopter,
-    load_inflow,
-    load_stage,
-    load_sum,
-    store_helicopter,
-    store_inflow,
-    store_loads,
-    store_stage,
-    store_sum,
-    vehicle_as_is,
-)
 from flownav.simulation.onboard import Onboard
-from flownav.simulation.records import Loads
+from flownav.simulation.records import Loads, RotorSpeed
+from flownav.vehicle import helicopter, multirotor
 from flownav.vehicle.airframe import AirMotion, air_motion, attitude, tail_sideslip
-from flownav.vehicle.helicopter import (
-    blade_angles,
-    derivative_at_inflow,
-    derivative_at_tail,
-    inflow,
-    outputs,
-    outputs_at_inflow,
-    tail_inflow,
-    tail_inplane_sq,
-)
+from flownav.vehicle.kinds import AnyState
+from flownav.vehicle.motors import mixed, roots_of_shares
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.rotor import main_rotor, refine_induced_velocity, speed_ratio, tail_rotor, thrustless_inflow
-from flownav.vehicle.state import Controls, HelicopterState, Inflow, Outputs, after_stage, normalised
+from flownav.vehicle.state import (
+    Controls,
+    HelicopterState,
+    Inflow,
+    Outputs,
+    after_stage,
+    normalised,
+)
 
 
 class LinearTruth(NamedTuple):
@@ -62,22 +48,22 @@ def runge_kutta_step(work: Work, lanes: Lanes, dt: float, onboard: Onboard | Non
     onboard None: the paper's helicopter, both inflows in balance at once and the rotor's speed constant.
     """
     for lane in range(len(lanes)):
-        state, vehicle = load_helicopter(work, lanes, lane), vehicle_as_is(work, lanes, lane)
-        store_sum(work, lanes, lane, state)
+        state, vehicle = layout.load_helicopter(work, lanes, lane), layout.vehicle_as_is(work, lanes, lane)
+        layout.store_sum(work, lanes, lane, state)
         air = moving_air(work, lanes, lane, state)
-        induced = solved_inflow(state, air, blade_angles(state, vehicle), vehicle, onboard)
-        store_inflow(work, lanes, lane, induced)
+        induced = solved_inflow(state, air, helicopter.blade_angles(state, vehicle), vehicle, onboard)
+        layout.store_inflow(work, lanes, lane, induced)
         add_stage(work, lanes, lane, rate_at_inflow(work, lanes, lane, state, air, induced, vehicle, onboard), 0, dt)
     for stage in range(1, STAGES):
         for lane in range(len(lanes)):
-            state, vehicle = load_stage(work, lanes, lane), vehicle_as_is(work, lanes, lane)
-            air, guess = moving_air(work, lanes, lane, state), load_inflow(work, lanes, lane)
-            induced = refined_inflow(guess, state, air, blade_angles(state, vehicle), vehicle, onboard)
-            store_inflow(work, lanes, lane, induced)
+            state, vehicle = layout.load_stage(work, lanes, lane), layout.vehicle_as_is(work, lanes, lane)
+            air, guess = moving_air(work, lanes, lane, state), layout.load_inflow(work, lanes, lane)
+            induced = refined_inflow(guess, state, air, helicopter.blade_angles(state, vehicle), vehicle, onboard)
+            layout.store_inflow(work, lanes, lane, induced)
             rate = rate_at_inflow(work, lanes, lane, state, air, induced, vehicle, onboard)
             add_stage(work, lanes, lane, rate, stage, dt)
     for lane in range(len(lanes)):
-        store_helicopter(work, lanes, lane, normalised(load_sum(work, lanes, lane)))
+        layout.store_helicopter(work, lanes, lane, normalised(layout.load_sum(work, lanes, lane)))
 
 
 @equation
@@ -86,19 +72,19 @@ def rate_at_inflow(
     vehicle: VehicleParameters, onboard: Onboard | None,
 ) -> HelicopterState:  # fmt: skip
     """The rate of a state under this lane's controls, at these induced velocities."""
-    controls, around = load_controls(work, lanes, lane), load_around(work, lanes, lane)
+    controls, around = layout.load_controls(work, lanes, lane), layout.load_around(work, lanes, lane)
     if onboard is None:
-        return derivative_at_inflow(state, controls, air, attitude(state), induced, around, vehicle)
-    return derivative_at_tail(state, controls, air, attitude(state), induced.tail, around, vehicle)
+        return helicopter.derivative_at_inflow(state, controls, air, attitude(state), induced, around, vehicle)
+    return helicopter.derivative_at_tail(state, controls, air, attitude(state), induced.tail, around, vehicle)
 
 
 @equation
 def add_stage(work: Work, lanes: Lanes, lane: int, rate: HelicopterState, stage: int, dt: float) -> None:
     """A stage's rate into the step's sum, and the next stage's state (`after_stage`)."""
-    start, total = load_helicopter(work, lanes, lane), load_sum(work, lanes, lane)
+    start, total = layout.load_helicopter(work, lanes, lane), layout.load_sum(work, lanes, lane)
     total, following = after_stage(stage, start, total, rate, dt)
-    store_sum(work, lanes, lane, total)
-    store_stage(work, lanes, lane, following)
+    layout.store_sum(work, lanes, lane, total)
+    layout.store_stage(work, lanes, lane, following)
 
 
 @equation
@@ -107,14 +93,14 @@ def solved_inflow(
 ) -> Inflow:
     """The induced velocities that are in balance; the main rotor's is a state, but of the paper's helicopter."""
     if onboard is None:
-        return inflow(air, blades, 1.0, vehicle)
-    return Inflow(0.0, tail_inflow(air, blades, speed_ratio(state.speed, vehicle), vehicle))
+        return helicopter.inflow(air, blades, 1.0, vehicle)
+    return Inflow(0.0, helicopter.tail_inflow(air, blades, speed_ratio(state.speed, vehicle), vehicle))
 
 
 @equation
 def moving_air(work: Work, lanes: Lanes, lane: int, state: HelicopterState) -> AirMotion:
     """Motion of a state through this lane's air."""
-    return air_motion(state, attitude(state), load_around(work, lanes, lane))
+    return air_motion(state, attitude(state), layout.load_around(work, lanes, lane))
 
 
 @equation
@@ -138,7 +124,7 @@ def refined_tail_inflow(
 ) -> float:
     """The tail rotor's induced velocity, one Halley step on from that of a neighbouring state."""
     tail = tail_rotor(vehicle, speed_ratio(state.speed, vehicle))
-    inplane_sq, sideslip = tail_inplane_sq(air, vehicle), tail_sideslip(air, vehicle)
+    inplane_sq, sideslip = helicopter.tail_inplane_sq(air, vehicle), tail_sideslip(air, vehicle)
     free = thrustless_inflow(blades.ped, inplane_sq, sideslip, tail)
     return refine_induced_velocity(guess, free, inplane_sq, sideslip, tail)
 
@@ -147,7 +133,7 @@ def refined_tail_inflow(
 def linear_step(work: Work, lanes: Lanes, model: LinearTruth) -> None:
     """One step of the paper's linear truth: earth position and body velocity; attitude stays level, no ground."""
     for lane in range(len(lanes)):
-        store_stage(work, lanes, lane, load_helicopter(work, lanes, lane))
+        layout.store_stage(work, lanes, lane, layout.load_helicopter(work, lanes, lane))
     for i in range(6):
         for lane in range(len(lanes)):
             total = 0.0
@@ -163,21 +149,84 @@ def linear_step(work: Work, lanes: Lanes, model: LinearTruth) -> None:
 def observe_plant(work: Work, lanes: Lanes) -> None:
     """Thrust, skid load and power of the present state."""
     for lane in range(len(lanes)):
-        around, vehicle = load_around(work, lanes, lane), vehicle_as_is(work, lanes, lane)
-        note_outputs(work, lanes, lane, outputs(load_helicopter(work, lanes, lane), around, vehicle))
+        around, vehicle = layout.load_around(work, lanes, lane), layout.vehicle_as_is(work, lanes, lane)
+        note_outputs(work, lanes, lane, helicopter.outputs(layout.load_helicopter(work, lanes, lane), around, vehicle))
 
 
 @equation
 def observe_balanced(work: Work, lanes: Lanes) -> None:
     """The same of the paper's helicopter."""
     for lane in range(len(lanes)):
-        around, vehicle = load_around(work, lanes, lane), vehicle_as_is(work, lanes, lane)
-        state = load_helicopter(work, lanes, lane)
-        induced = inflow(moving_air(work, lanes, lane, state), blade_angles(state, vehicle), 1.0, vehicle)
-        note_outputs(work, lanes, lane, outputs_at_inflow(state, induced, around, vehicle))
+        around, vehicle = layout.load_around(work, lanes, lane), layout.vehicle_as_is(work, lanes, lane)
+        state = layout.load_helicopter(work, lanes, lane)
+        induced = helicopter.inflow(
+            moving_air(work, lanes, lane, state), helicopter.blade_angles(state, vehicle), 1.0, vehicle
+        )
+        note_outputs(work, lanes, lane, helicopter.outputs_at_inflow(state, induced, around, vehicle))
 
 
 @equation
 def note_outputs(work: Work, lanes: Lanes, lane: int, seen: Outputs) -> None:
     """What sensors and scores read of the plant."""
-    store_loads(work, lanes, lane, Loads(seen.thrust_n, seen.contact_force_n, seen.power_w))
+    layout.store_loads(work, lanes, lane, Loads(seen.thrust_n, seen.contact_force_n, seen.power_w))
+
+
+@equation
+def midpoint_step(work: Work, lanes: Lanes, dt: float, rotors: tuple[int, ...]) -> None:
+    """One step of every lane's multirotor; controls and surroundings held over the step (`multirotor.step`)."""
+    hexa = len(rotors) > 4
+    for lane in range(len(lanes)):
+        state, vehicle = layout.load_multirotor(work, lanes, lane), layout.multirotor_as_is(work, lanes, lane)
+        roots = roots_of_shares(mixed(layout.load_controls(work, lanes, lane), hexa, vehicle), hexa)
+        layout.store_roots(work, lanes, lane, roots)
+        middle = multirotor.middle_of_step(state, roots, layout.load_around(work, lanes, lane), dt, hexa, vehicle)
+        layout.store_multirotor_stage(work, lanes, lane, middle)
+    for lane in range(len(lanes)):
+        middle, vehicle = layout.load_multirotor_stage(work, lanes, lane), layout.multirotor_as_is(work, lanes, lane)
+        state, roots = layout.load_multirotor(work, lanes, lane), layout.load_roots(work, lanes, lane)
+        around = layout.load_around(work, lanes, lane)
+        after = multirotor.end_of_step(state, middle, roots, around, dt, hexa, vehicle)
+        layout.store_multirotor(work, lanes, lane, after)
+
+
+@equation
+def observe_multirotor(work: Work, lanes: Lanes, rotors: tuple[int, ...]) -> None:
+    """Thrust, load of the feet and power of the present state."""
+    hexa = len(rotors) > 4
+    for lane in range(len(lanes)):
+        around, vehicle = layout.load_around(work, lanes, lane), layout.multirotor_as_is(work, lanes, lane)
+        note_outputs(
+            work, lanes, lane, multirotor.outputs(layout.load_multirotor(work, lanes, lane), around, hexa, vehicle)
+        )
+
+
+_, store_rotor_speed = layout.PLANT.access(RotorSpeed)
+
+
+@equation
+def place(work: Work, lanes: Lanes, lane: int, state: AnyState, rotors: tuple[int, ...] | None) -> None:
+    """Put the vehicle of a lane where it starts; a helicopter's rotor has its own governed speed."""
+    for field in range(len(state)):
+        work[(layout.HELICOPTER + field) * len(lanes) + lane] = state[field]
+    if rotors is None:
+        store_rotor_speed(work, lanes, lane, RotorSpeed(layout.vehicle_as_is(work, lanes, lane).main_speed_rad_s))
+
+
+@equation
+def step_vehicle(work: Work, lanes: Lanes, dt: float, rotors: tuple[int, ...] | None, onboard: Onboard | None) -> None:
+    """One step of every lane's vehicle; without sensors of its own it is the paper's helicopter."""
+    if rotors is not None:
+        midpoint_step(work, lanes, dt, rotors)
+    else:
+        runge_kutta_step(work, lanes, dt, onboard)
+
+
+@equation
+def observe_vehicle(work: Work, lanes: Lanes, rotors: tuple[int, ...] | None, onboard: Onboard | None) -> None:
+    """Thrust, ground load and power of the present state."""
+    if rotors is not None:
+        observe_multirotor(work, lanes, rotors)
+    elif onboard is None:
+        observe_balanced(work, lanes)
+    else:
+        observe_plant(work, lanes)

@@ -14,15 +14,13 @@ from pydantic import Field, ValidationInfo, create_model, field_validator
 
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import Number, ParameterModel, load, shipped
-from flownav.sensors.datasheet import FlowSettings
-from flownav.sensors.settings import GpsInsSettings, PadFixSettings, RangefinderSettings
+from flownav.sensors.settings import FlowSettings, GpsInsSettings, PadFixSettings, RangefinderSettings
 from flownav.simulation.carried import carried_sensors
 from flownav.simulation.dispersion import SHIPPED as SHIPPED_DISPERSION
 from flownav.simulation.dispersion import DispersionSection
-from flownav.simulation.ground import GroundSettings
-from flownav.simulation.recirculation import RecirculationSettings
+from flownav.simulation.ground import GroundSettings, RecirculationSettings
 from flownav.simulation.wind import WindSettings
-from flownav.vehicle.loading import SHIPPED_NAMES
+from flownav.vehicle.kinds import SHIPPED_NAMES
 
 SHIPPED = ("takeoff", "landing", "gusty", "pad_return", "approach")
 

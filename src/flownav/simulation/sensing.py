@@ -14,17 +14,10 @@ from flownav.core.frames import (
     to_body,
     to_earth,
 )
-from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, read_flow, start_flow
-from flownav.sensors.flow_engagement import engage_flow
+from flownav.sensors import gps_ins
+from flownav.sensors.flow import FlowParameters, FlowReading, FlowState, engage_flow, read_flow, start_flow
 from flownav.sensors.geometry import LensPose
-from flownav.sensors.gps_ins import (
-    GpsInsParameters,
-    GpsInsState,
-    NavSolution,
-    start_gps_ins,
-    step_gps_ins,
-)
-from flownav.sensors.imu import ImuReading
+from flownav.sensors.inertial import ImuReading
 from flownav.sensors.rangefinder import (
     RangefinderParameters,
     RangefinderState,
@@ -33,18 +26,7 @@ from flownav.sensors.rangefinder import (
     step_rangefinder,
 )
 from flownav.simulation import layout
-from flownav.simulation.draws import draw
-from flownav.simulation.layout import (
-    PAPERS,
-    PLANT,
-    load_gps_errors,
-    load_gps_held,
-    load_gps_normals,
-    load_helicopter,
-    store_gps,
-    store_gps_errors,
-    store_gps_held,
-)
+from flownav.simulation.block import draw
 from flownav.simulation.records import Arrived, Before, FlowNormals, Loads, Measured
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.state import HelicopterState
@@ -56,7 +38,7 @@ RANGE_EPOCHS = 5  # the rangefinder: 10 Hz
 class SensorSuite(NamedTuple):
     """Every sensor's parameters and where they look from."""
 
-    gps: GpsInsParameters
+    gps: gps_ins.GpsInsParameters
     flow: FlowParameters
     rangefinder: RangefinderParameters
     lens_below_cg_m: float
@@ -93,11 +75,11 @@ def draw_epoch(work: Work, lanes: Lanes, seed: int, flight: int, step: int, draw
 
 
 @equation
-def true_solution(state: HelicopterState) -> NavSolution:
+def true_solution(state: HelicopterState) -> gps_ins.NavSolution:
     """What a perfect GPS/INS would report."""
     rotation = rotation_from_quaternion(state.qw, state.qx, state.qy, state.qz)
     vel_n, vel_e, vel_d = to_earth(rotation, state.u, state.v, state.w)
-    return NavSolution(
+    return gps_ins.NavSolution(
         state.pos_n, state.pos_e, state.pos_d, vel_n, vel_e, vel_d, state.qw, state.qx, state.qy, state.qz
     )
 
@@ -123,7 +105,7 @@ class Integrated(NamedTuple):
     now: Before
 
 
-@PLANT.on_lanes
+@layout.PLANT.on_lanes
 def true_imu(state: HelicopterState, before: Before, vehicle: VehicleParameters, *, period_s: float) -> Integrated:
     """Means over the last period in body axes, as an integrating IMU has them.
 
@@ -144,13 +126,13 @@ def true_imu(state: HelicopterState, before: Before, vehicle: VehicleParameters,
     return Integrated(ImuReading(per_s * turn[1], per_s * turn[2], per_s * turn[3], force_x, force_y, force_z), now)
 
 
-@PLANT.on_lanes
+@layout.PLANT.on_lanes
 def motion_now(state: HelicopterState) -> Before:
     """Velocity NED and attitude, whence an inertial period begins."""
     return motion_of(state)
 
 
-@PLANT.on_lanes
+@layout.PLANT.on_lanes
 def rest_rangefinder(
     state: HelicopterState, *, lens_below_cg_m: float, sonar: RangefinderParameters
 ) -> RangefinderState:
@@ -159,7 +141,7 @@ def rest_rangefinder(
     return start_rangefinder(lens_height(state, cosine, lens_below_cg_m), cosine, sonar)
 
 
-@PAPERS.on_lanes
+@layout.PAPERS.on_lanes
 def rest_flow(state: HelicopterState, loads: Loads, vehicle: VehicleParameters, flow: FlowParameters) -> FlowState:
     """The flow sensor settled on the first state."""
     return start_flow(state.u, state.v, state.w, loads.thrust_n / vehicle.mass_kg, flow)
@@ -170,10 +152,10 @@ def start_sensors(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
     """Every sensor settled on the first state; error processes drawn from their stationary distributions."""
     motion_now(work, lanes)
     for lane in range(len(lanes)):
-        truth = true_solution(load_helicopter(work, lanes, lane))
-        gps = start_gps_ins(truth, load_gps_normals(work, lanes, lane), suite.gps)
-        store_gps_errors(work, lanes, lane, gps.errors)
-        store_gps_held(work, lanes, lane, gps.held)
+        truth = true_solution(layout.load_helicopter(work, lanes, lane))
+        gps = gps_ins.start_gps_ins(truth, layout.load_gps_normals(work, lanes, lane), suite.gps)
+        layout.store_gps_errors(work, lanes, lane, gps.errors)
+        layout.store_gps_held(work, lanes, lane, gps.held)
     rest_rangefinder(work, lanes, suite.lens_below_cg_m, suite.rangefinder)
     rest_flow(work, lanes)
 
@@ -182,12 +164,12 @@ def start_sensors(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
 def read_gps(work: Work, lanes: Lanes, suite: SensorSuite) -> None:
     """The GPS/INS reading of this epoch."""
     for lane in range(len(lanes)):
-        state = GpsInsState(load_gps_errors(work, lanes, lane), load_gps_held(work, lanes, lane))
-        truth = true_solution(load_helicopter(work, lanes, lane))
-        after, reading = step_gps_ins(state, truth, load_gps_normals(work, lanes, lane), suite.gps)
-        store_gps_errors(work, lanes, lane, after.errors)
-        store_gps_held(work, lanes, lane, after.held)
-        store_gps(work, lanes, lane, reading)
+        state = gps_ins.GpsInsState(layout.load_gps_errors(work, lanes, lane), layout.load_gps_held(work, lanes, lane))
+        truth = true_solution(layout.load_helicopter(work, lanes, lane))
+        after, reading = gps_ins.step_gps_ins(state, truth, layout.load_gps_normals(work, lanes, lane), suite.gps)
+        layout.store_gps_errors(work, lanes, lane, after.errors)
+        layout.store_gps_held(work, lanes, lane, after.held)
+        layout.store_gps(work, lanes, lane, reading)
 
 
 class Ranged(NamedTuple):
@@ -197,7 +179,7 @@ class Ranged(NamedTuple):
     reading: RangeReading
 
 
-@PLANT.on_lanes
+@layout.PLANT.on_lanes
 def read_rangefinder(
     state: HelicopterState, before: RangefinderState, normals: FlowNormals, *, lens_below_cg_m: float,
     sonar: RangefinderParameters,
@@ -216,7 +198,7 @@ class Flowed(NamedTuple):
     reading: FlowReading
 
 
-@PAPERS.on_lanes
+@layout.PAPERS.on_lanes
 def read_flow_sensor(
     state: HelicopterState, before: FlowState, sonar: RangefinderState, n: FlowNormals, sensor: FlowParameters, *,
     lens_below_cg_m: float, pad_half_size_m: float,
@@ -240,8 +222,8 @@ class Heard(NamedTuple):
     arrived: Arrived
 
 
-@PLANT.on_lanes
-def choose_measurement(gps: NavSolution, flow: FlowReading, *, gps_offers_velocity: bool) -> Heard:
+@layout.PLANT.on_lanes
+def choose_measurement(gps: gps_ins.NavSolution, flow: FlowReading, *, gps_offers_velocity: bool) -> Heard:
     """The GPS/INS's position, and velocity by flow where it is engaged, else the GPS/INS's own, turned to the body."""
     rotation = rotation_from_quaternion(gps.qw, gps.qx, gps.qy, gps.qz)
     ins = to_body(rotation, gps.vel_n_m_s, gps.vel_e_m_s, gps.vel_d_m_s)

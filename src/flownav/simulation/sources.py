@@ -11,12 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.sensors.gps_ins import GpsInsNormals
-from flownav.simulation import draws, layout
+from flownav.simulation import layout
+from flownav.simulation.block import RECIRCULATION_CHANNEL
 from flownav.simulation.carried import CarriedSensor
+from flownav.simulation.ground import RecirculationState
 from flownav.simulation.noise import CHANNELS_PER_STEP, threefry
 from flownav.simulation.onboard import ALWAYS, EPOCH_S, PHYSICS_PERIOD_S, Clock, Onboard
 from flownav.simulation.plan import Flight
-from flownav.simulation.recirculation import RecirculationState
 from flownav.simulation.sensing import RANGE_EPOCHS
 from flownav.simulation.wind import WindNormals
 
@@ -92,7 +93,7 @@ def sources_of(flight: Flight) -> list[Source]:
     if drawn.wind:
         bundles.append(("wind", WindNormals._fields, (layout.WIND_NORMALS - layout.GPS_NORMALS) // 2, ALWAYS))
     if drawn.recirculation:
-        bundles.append(("recirculation", RecirculationState._fields, draws.RECIRCULATION_CHANNEL, ALWAYS))
+        bundles.append(("recirculation", RecirculationState._fields, RECIRCULATION_CHANNEL, ALWAYS))
     if onboard is not None:
         bundles += _readings(onboard)
     return [

@@ -8,23 +8,15 @@ import numpy as np
 
 from flownav.core.compile import Lanes, Work, equation, procedure, replacing
 from flownav.core.frames import Rotation, rotation_from_quaternion, to_earth
-from flownav.sensors.beam import Ground, ground_height, roughness, stepped
+from flownav.sensors.geometry import Ground, ground_height, roughness, stepped
 from flownav.simulation import layout
-from flownav.simulation.draws import RECIRCULATION_CHANNEL, draw
-from flownav.simulation.ground import under_rotor
-from flownav.simulation.layout import (
-    PLANT,
-    load_recirculation,
-    load_recirculation_normals,
-    recirculation_as_is,
-    store_around,
-    store_recirculation,
-)
-from flownav.simulation.recirculation import (
+from flownav.simulation.block import RECIRCULATION_CHANNEL, draw
+from flownav.simulation.ground import (
     RecirculationParameters,
     RecirculationState,
     recirculated,
     step_recirculation,
+    under_rotor,
 )
 from flownav.simulation.records import Loads
 from flownav.simulation.wind import WindNormals, WindParameters, WindState, WindVelocity, start_wind, step_wind
@@ -46,13 +38,13 @@ def start_surroundings(work: Work, lanes: Lanes, rotors: tuple[int, ...] | None)
     in their rows.
     """
     for lane in range(len(lanes)):
-        store_recirculation(work, lanes, lane, load_recirculation_normals(work, lanes, lane))
-        store_around(work, lanes, lane, CALM)
+        layout.store_recirculation(work, lanes, lane, layout.load_recirculation_normals(work, lanes, lane))
+        layout.store_around(work, lanes, lane, CALM)
     first_gusts(work, lanes)
     lay_ground(work, lanes, rotors)
 
 
-@PLANT.on_lanes
+@layout.PLANT.on_lanes
 def first_gusts(normals: WindNormals, wind: WindParameters) -> WindState:
     """Gusts from their stationary distribution."""
     return start_wind(normals, wind)
@@ -68,9 +60,12 @@ def surround(
     lay_ground(work, lanes, rotors)
     blow(work, lanes, engine)
     for lane in range(len(lanes)):
-        normals, wake = load_recirculation_normals(work, lanes, lane), load_recirculation(work, lanes, lane)
-        p = recirculation_as_is(work, lanes, lane)
-        store_recirculation(work, lanes, lane, step_recirculation(wake, normals, p))
+        normals, wake = (
+            layout.load_recirculation_normals(work, lanes, lane),
+            layout.load_recirculation(work, lanes, lane),
+        )
+        p = layout.recirculation_as_is(work, lanes, lane)
+        layout.store_recirculation(work, lanes, lane, step_recirculation(wake, normals, p))
     come_back(work, lanes)
 
 
@@ -81,7 +76,7 @@ class Air(NamedTuple):
     around: Around
 
 
-@PLANT.on_lanes
+@layout.PLANT.on_lanes
 def blow(
     state: HelicopterState, ground: Ground, gusts: WindState, normals: WindNormals, wind: WindParameters, here: Around,
     *, engine: float,
@@ -92,7 +87,7 @@ def blow(
     return Air(after, in_air(here, air, engine))
 
 
-@PLANT.on_lanes
+@layout.PLANT.on_lanes
 def come_back(
     state: HelicopterState, wake: RecirculationState, p: RecirculationParameters, here: Around, loads: Loads
 ) -> Around:
@@ -122,7 +117,7 @@ def draw_recirculation(work: Work, lanes: Lanes, seed: int, first: int, step: in
         draw(work, lanes, layout.RECIRCULATION_NORMALS, 4, seed, first, step, RECIRCULATION_CHANNEL)
 
 
-@PLANT.on_lanes
+@layout.PLANT.on_lanes
 def lay_ground(
     state: HelicopterState, ground: Ground, here: Around, vehicle: VehicleParameters, x: MultirotorParameters, *,
     rotors: tuple[int, ...] | None,

@@ -2,6 +2,8 @@
 
 Each flight has a `Truth` of its own, which lies in its lane's rows of the buffer. Where nothing is dispersed
 (*matched*) it is what the datasheets say; of an *ensemble* it is drawn flight by flight (`simulation.ensemble`).
+
+A sensor's fault as numbers: what one flight's sensors do wrong, and when.
 """
 
 from __future__ import annotations
@@ -13,15 +15,61 @@ from typing import Any, NamedTuple, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.sensors.beam import Ground
 from flownav.sensors.flow import FlowParameters
+from flownav.sensors.geometry import Ground
 from flownav.simulation.carried import carried_sensors
-from flownav.simulation.fault import SensorFault
-from flownav.simulation.recirculation import RecirculationParameters
+from flownav.simulation.ground import RecirculationParameters
 from flownav.simulation.wind import WindParameters
 from flownav.vehicle.kinds import AnyVehicle
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
 from flownav.vehicle.parameters import VehicleParameters
+
+
+class SensorFault(NamedTuple):
+    """Which sensors a fault strikes (1), from when to when [s], and what it does; as it stands here, nothing.
+
+    The first two values go through a matrix (flow's signs, axes, scale), get a bias, which grows by a drift per second,
+    and noise; the others a bias, and the fourth to sixth noise (an accelerometer's). In the units of each value.
+    """
+
+    begins_s: float = np.inf
+    ends_s: float = np.inf
+    inertial: float = 0.0
+    position: float = 0.0
+    velocity: float = 0.0
+    flow: float = 0.0
+    range: float = 0.0
+    others: float = 0.0  # of no own column here
+    skids: float = 0.0  # the switch, as the navigator hears it; the autopilot has it by wire
+    lost: float = 0.0  # 1: nothing arrives
+    m_xx: float = 1.0
+    m_xy: float = 0.0
+    m_yx: float = 0.0
+    m_yy: float = 1.0
+    bias_0: float = 0.0
+    bias_1: float = 0.0
+    bias_2: float = 0.0
+    bias_3: float = 0.0
+    bias_4: float = 0.0
+    bias_5: float = 0.0
+    drift_0: float = 0.0
+    drift_1: float = 0.0
+    noise_first: float = 0.0
+    noise_last: float = 0.0
+    even_to: float = 0.0  # the first two values are drawn anew, evenly up to this; 0: they are not
+    quality: float = np.nan  # what it says of itself; NaN: as ever
+    held: float = 0.0  # 1: its first value is that before the fault
+    always: float = np.nan  # its first value; NaN: as ever
+    spike_share: float = 0.0  # of the readings whose first value is drawn anew, evenly between
+    spike_low: float = 0.0
+    spike_high: float = 0.0
+    blank_s: float = 0.0  # no values for so long, at the start of every
+    blank_every_s: float = 1.0
+    late_readings: float = 0.0  # flow says what it said so many readings before
+
+
+SOUND = SensorFault()
+
 
 Array = NDArray[np.float64]
 

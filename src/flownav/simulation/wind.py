@@ -37,7 +37,7 @@ from pydantic import Field
 
 from flownav.core.compile import equation, larger, log_of_unit, smaller
 from flownav.core.parameter_files import Number, ParameterModel
-from flownav.sensors.gauss_markov import gauss_markov, gauss_markov_coefficients
+from flownav.sensors.processes import gauss_markov, gauss_markov_coefficients
 
 PERIOD_S = 0.02
 FOOT_M = 0.3048

@@ -2,6 +2,8 @@
 
 Sources: reference section 2, block 3 (Gavrilets, Mettler and Feron; Heffley and Mnich NASA CR-177476). The main
 rotor turns clockwise seen from above, so its torque yaws the body to the left and the tail rotor pushes left.
+
+Block 4, the rigid body: paper equations 2-7, with the attitude as a quaternion in place of equations 8-10.
 """
 
 from __future__ import annotations
@@ -14,10 +16,9 @@ from flownav.core.compile import equation, magnitude
 from flownav.core.frames import Rotation, Vector, rotation_from_quaternion, to_body
 from flownav.vehicle.around import Around
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.multirotor_state import MultirotorState
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.rotor import cosine_of_tilt, sine_of_tilt
-from flownav.vehicle.state import HelicopterState
+from flownav.vehicle.state import HelicopterState, MultirotorState
 
 AnyMotion = HelicopterState | MultirotorState  # their first fields are the same
 
@@ -131,4 +132,29 @@ def flight_wrench(
         rotor.l + vehicle.tail_above_cg_m * tail,
         rotor.m + vehicle.horizontal_fin_behind_cg_m * plane,
         rotor.n - vehicle.tail_behind_cg_m * tail,
+    )
+
+
+@equation
+def linear_acceleration(velocity: Vector, rates: Vector, force: Vector, mass_kg: float) -> Vector:
+    """Rate of the body-frame velocity [m/s2] (equations 5-7); force [N] with gravity in it."""
+    u, v, w = velocity
+    p, q, r = rates
+    per_mass = 1.0 / mass_kg
+    return (
+        r * v - q * w + force[0] * per_mass,
+        p * w - r * u + force[1] * per_mass,
+        q * u - p * v + force[2] * per_mass,
+    )
+
+
+@equation
+def angular_acceleration(rates: Vector, moment: Vector, vehicle: VehicleParameters | MultirotorParameters) -> Vector:
+    """Rate of the body rates [rad/s2] (equations 2-4); moment [N m] about the centre of gravity."""
+    p, q, r = rates
+    jx, jy, jz = vehicle.inertia_xx_kg_m2, vehicle.inertia_yy_kg_m2, vehicle.inertia_zz_kg_m2
+    return (
+        (moment[0] - (jz - jy) * q * r) * (1.0 / jx),
+        (moment[1] - (jx - jz) * p * r) * (1.0 / jy),
+        (moment[2] - (jy - jx) * p * q) * (1.0 / jz),
     )

@@ -15,9 +15,8 @@ from typing import Any, NamedTuple
 
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import read_toml
-from flownav.vehicle.kinds import AnyVehicle, flattened
-from flownav.vehicle.loading import read_kind, vehicle_file
-from flownav.vehicle.multirotor_schema import MultirotorFile
+from flownav.vehicle.kinds import AnyVehicle, flattened, read_kind, vehicle_file
+from flownav.vehicle.schema import MultirotorFile
 
 NOMINAL = "nominal"
 Groups = dict[str, tuple[str, ...]]

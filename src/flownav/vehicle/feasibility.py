@@ -1,4 +1,4 @@
-"""Refuse a helicopter that cannot be: one line that says which numbers contradict each other.
+"""Refuse a vehicle that cannot be: one line that says which numbers contradict each other.
 
 Closed forms only (hover by momentum theory and blade elements), so that a bad file is refused at once.
 """
@@ -6,15 +6,13 @@ Closed forms only (hover by momentum theory and blade elements), so that a bad f
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 from flownav.core.errors import InputError
-
-if TYPE_CHECKING:
-    from flownav.vehicle.multirotor_parameters import MultirotorParameters
-    from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.multirotor_parameters import MultirotorParameters, full_thrust, hover_speed
+from flownav.vehicle.parameters import VehicleParameters
 
 HOVER_MARGIN = 1.05  # the thrust and power limits must leave this much above what hover takes
+LIFT_MARGIN = 1.2  # a multirotor's rotors must be able to lift this much of the weight
 
 
 def require_feasible(vehicle: VehicleParameters, where: str) -> None:
@@ -99,3 +97,27 @@ def hover_induced_velocity(thrust_n: float, thrust_slope_n_s_m: float, inflow_sp
 def hover_pitch(thrust_n: float, induced_m_s: float, thrust_slope_n_s_m: float, tip_speed_m_s: float) -> float:
     """Blade pitch [rad] that gives the thrust in hover: T = thrust_slope·(2/3·ΩR·θ - v_i)."""
     return 1.5 * (thrust_n / thrust_slope_n_s_m + induced_m_s) / tip_speed_m_s
+
+
+def require_multirotor(vehicle: MultirotorParameters, where: str) -> None:
+    """InputError, naming file, keys and numbers, where the multirotor contradicts itself or cannot hover."""
+    require_rigid_body(vehicle, where)
+    apart = 2.0 / vehicle.per_arm_1_m * math.sin(math.pi / vehicle.rotor_count)
+    if apart < 2.0 * vehicle.radius_m:
+        raise InputError(
+            f"{where}: frame.arm_m: the propellers strike each other, their hubs are {apart:.3f} m apart and they are "
+            f"{2.0 * vehicle.radius_m:.3f} m wide; correct arm_m or propeller.radius_m"
+        )
+    if vehicle.volt_per_as <= 0.0:
+        raise InputError(f"{where}: battery: empty_v must be less than full_v")
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    hover = hover_speed(vehicle)
+    watt = vehicle.rotor_count * vehicle.torque_n_m_s2 * hover**3 / vehicle.efficiency
+    under_root = vehicle.full_v**2 - 4.0 * vehicle.resistance_ohm * watt
+    sagged = 0.5 * (1.0 + math.sqrt(max(under_root, 0.0)) / vehicle.full_v)
+    lift = vehicle.rotor_count * full_thrust(vehicle) * sagged**2
+    if under_root <= 0.0 or lift < LIFT_MARGIN * weight:
+        raise InputError(
+            f"{where}: cannot hover, the rotors lift {lift:.1f} N on the battery as it sags and it weighs {weight:.1f} "
+            "N; correct body.mass_kg, motor.full_speed_rad_s, propeller.radius_m or battery.resistance_ohm"
+        )

@@ -10,52 +10,11 @@ from typing import NamedTuple
 
 from flownav.core.compile import equation
 from flownav.core.frames import Rotation, Vector, quaternion_rate, to_earth
-from flownav.vehicle.actuators import acceleration, blade_angle, collective_servo, cyclic_servo, pedal_servo
-from flownav.vehicle.airframe import (
-    AirMotion,
-    Wrench,
-    air_motion,
-    attitude,
-    flight_wrench,
-    fuselage_drag,
-    main_rotor_wrench,
-    tail_plane_force,
-    tail_side_force,
-    tail_sideslip,
-)
+from flownav.vehicle import airframe, drive, rotor
 from flownav.vehicle.around import Around, below_plane, plane_normal
-from flownav.vehicle.drive import Turning, held_turning, turning_of
-from flownav.vehicle.ground_effect import multiplier_of_squares
 from flownav.vehicle.parameters import VehicleParameters
-from flownav.vehicle.rigid_body import angular_acceleration, linear_acceleration
-from flownav.vehicle.rotor import (
-    blowback,
-    induced_velocity,
-    main_rotor,
-    speed_ratio,
-    tail_rotor,
-    thrust,
-    torque,
-)
 from flownav.vehicle.skids import support, with_friction, with_support
 from flownav.vehicle.state import Controls, HelicopterState, Inflow, Outputs, RotorLoads, classical_step, normalised
-
-__all__ = [
-    "Controls",
-    "HelicopterState",
-    "Inflow",
-    "Outputs",
-    "derivative",
-    "derivative_at_inflow",
-    "derivative_in_balance",
-    "inflow",
-    "inflow_of",
-    "normalised",
-    "outputs",
-    "outputs_at_inflow",
-    "step",
-    "tail_power",
-]
 
 
 class Rotors(NamedTuple):
@@ -64,97 +23,102 @@ class Rotors(NamedTuple):
     blades: Controls
     induced: Inflow
     loads: RotorLoads
-    turning: Turning
+    turning: drive.Turning
 
 
 @equation
 def blade_angles(state: HelicopterState, vehicle: VehicleParameters) -> Controls:
     """Where the servos hold the blades [rad]."""
-    cyclic = cyclic_servo(vehicle)
+    cyclic = drive.cyclic_servo(vehicle)
     return Controls(
-        blade_angle(state.lon, cyclic),
-        blade_angle(state.lat, cyclic),
-        blade_angle(state.col, collective_servo(vehicle)),
-        blade_angle(state.ped, pedal_servo(vehicle)),
+        drive.blade_angle(state.lon, cyclic),
+        drive.blade_angle(state.lat, cyclic),
+        drive.blade_angle(state.col, drive.collective_servo(vehicle)),
+        drive.blade_angle(state.ped, drive.pedal_servo(vehicle)),
     )
 
 
 @equation
-def tail_inplane_sq(air: AirMotion, vehicle: VehicleParameters) -> float:
+def tail_inplane_sq(air: airframe.AirMotion, vehicle: VehicleParameters) -> float:
     """The square of the airspeed in the tail rotor's plane [m2/s2]."""
     w = air.w + vehicle.tail_behind_cg_m * air.q
     return air.u * air.u + w * w
 
 
 @equation
-def inflow(air: AirMotion, blades: Controls, ratio: float, vehicle: VehicleParameters) -> Inflow:
+def inflow(air: airframe.AirMotion, blades: Controls, ratio: float, vehicle: VehicleParameters) -> Inflow:
     """Both rotors' induced velocities, in balance with the present motion (quasi-steady); ratio: `speed_ratio`."""
     return Inflow(
-        induced_velocity(blades.col, air.u * air.u + air.v * air.v, air.w, main_rotor(vehicle, ratio)),
+        rotor.induced_velocity(blades.col, air.u * air.u + air.v * air.v, air.w, rotor.main_rotor(vehicle, ratio)),
         tail_inflow(air, blades, ratio, vehicle),
     )
 
 
 @equation
-def tail_inflow(air: AirMotion, blades: Controls, ratio: float, vehicle: VehicleParameters) -> float:
+def tail_inflow(air: airframe.AirMotion, blades: Controls, ratio: float, vehicle: VehicleParameters) -> float:
     """The tail rotor's induced velocity, in balance with the present motion: it lags by 10 ms only."""
-    inplane_sq, sideslip = tail_inplane_sq(air, vehicle), tail_sideslip(air, vehicle)
-    return induced_velocity(blades.ped, inplane_sq, sideslip, tail_rotor(vehicle, ratio))
+    inplane_sq, sideslip = tail_inplane_sq(air, vehicle), airframe.tail_sideslip(air, vehicle)
+    return rotor.induced_velocity(blades.ped, inplane_sq, sideslip, rotor.tail_rotor(vehicle, ratio))
 
 
 @equation
 def inflow_of(state: HelicopterState, around: Around, vehicle: VehicleParameters) -> Inflow:
     """Both rotors' induced velocities as they are: the main rotor's is a state."""
-    air, ratio = air_motion(state, attitude(state), around), speed_ratio(state.speed, vehicle)
+    air, ratio = airframe.air_motion(state, airframe.attitude(state), around), rotor.speed_ratio(state.speed, vehicle)
     return Inflow(state.inflow, tail_inflow(air, blade_angles(state, vehicle), ratio, vehicle))
 
 
 @equation
 def rotor_loads(
-    state: HelicopterState, air: AirMotion, blades: Controls, induced: Inflow, vehicle: VehicleParameters
+    state: HelicopterState, air: airframe.AirMotion, blades: Controls, induced: Inflow, vehicle: VehicleParameters
 ) -> RotorLoads:
     """Thrust out of ground effect and torque of both rotors."""
-    ratio = speed_ratio(state.speed, vehicle)
-    main, tail = main_rotor(vehicle, ratio), tail_rotor(vehicle, ratio)
+    ratio = rotor.speed_ratio(state.speed, vehicle)
+    main, tail = rotor.main_rotor(vehicle, ratio), rotor.tail_rotor(vehicle, ratio)
     inplane_sq = air.u * air.u + air.v * air.v
-    tail_sq, sideslip = tail_inplane_sq(air, vehicle), tail_sideslip(air, vehicle)
-    lift = thrust(blades.col, inplane_sq, air.w, induced.main, main)
-    aside = thrust(blades.ped, tail_sq, sideslip, induced.tail, tail)
+    tail_sq, sideslip = tail_inplane_sq(air, vehicle), airframe.tail_sideslip(air, vehicle)
+    lift = rotor.thrust(blades.col, inplane_sq, air.w, induced.main, main)
+    aside = rotor.thrust(blades.ped, tail_sq, sideslip, induced.tail, tail)
     return RotorLoads(
         lift,
-        torque(lift, inplane_sq, air.w, induced.main, main),
+        rotor.torque(lift, inplane_sq, air.w, induced.main, main),
         aside,
-        torque(aside, tail_sq, sideslip, induced.tail, tail),
+        rotor.torque(aside, tail_sq, sideslip, induced.tail, tail),
     )
 
 
 @equation
 def near_ground(
-    state: HelicopterState, down: Vector, air: AirMotion, induced_m_s: float, around: Around, vehicle: VehicleParameters
+    state: HelicopterState,
+    down: Vector,
+    air: airframe.AirMotion,
+    induced_m_s: float,
+    around: Around,
+    vehicle: VehicleParameters,
 ) -> float:
     """The main rotor's thrust in ground effect over that in free air, at constant power (equation 11)."""
     sinking = air.u * down[0] + air.v * down[1] + air.w * down[2]
     horizontal_sq = air.u * air.u + air.v * air.v + air.w * air.w - sinking * sinking
     below = below_plane(state.pos_n, state.pos_e, state.pos_d, around)
     hub_height = vehicle.hub_above_cg_m * down[2] - below - around.rotor_1_m
-    return multiplier_of_squares(hub_height, horizontal_sq, induced_m_s, vehicle.main_radius_m)
+    return rotor.multiplier_of_squares(hub_height, horizontal_sq, induced_m_s, vehicle.main_radius_m)
 
 
 @equation
 def forces_and_moments(
-    state: HelicopterState, rotation: Rotation, air: AirMotion, rotors: Rotors, around: Around,
+    state: HelicopterState, rotation: Rotation, air: airframe.AirMotion, rotors: Rotors, around: Around,
     vehicle: VehicleParameters,
-) -> Wrench:  # fmt: skip
+) -> airframe.Wrench:  # fmt: skip
     """All forces and moments about the centre of gravity (block 3), the ground's last: friction answers the rest."""
     down = (rotation[6], rotation[7], rotation[8])
     induced = rotors.induced
     lift = near_ground(state, down, air, induced.main, around, vehicle) * rotors.loads.lift_n
-    ratio = speed_ratio(state.speed, vehicle)
-    free = flight_wrench(
-        main_rotor_wrench(lift, rotors.turning.torque_n_m, state.a1, state.b1, air, ratio, vehicle),
-        tail_side_force(rotors.loads.tail_n, induced.tail, air, vehicle),
-        tail_plane_force(induced.main, air, vehicle),
-        fuselage_drag(induced.main, air, vehicle),
+    ratio = rotor.speed_ratio(state.speed, vehicle)
+    free = airframe.flight_wrench(
+        airframe.main_rotor_wrench(lift, rotors.turning.torque_n_m, state.a1, state.b1, air, ratio, vehicle),
+        airframe.tail_side_force(rotors.loads.tail_n, induced.tail, air, vehicle),
+        airframe.tail_plane_force(induced.main, air, vehicle),
+        airframe.fuselage_drag(induced.main, air, vehicle),
         down,
         vehicle,
     )
@@ -165,8 +129,8 @@ def forces_and_moments(
 
 @equation
 def rates_of(
-    state: HelicopterState, controls: Controls, air: AirMotion, rotation: Rotation, rotors: Rotors, around: Around,
-    vehicle: VehicleParameters,
+    state: HelicopterState, controls: Controls, air: airframe.AirMotion, rotation: Rotation, rotors: Rotors, around:
+    Around, vehicle: VehicleParameters,
 ) -> HelicopterState:  # fmt: skip
     """The rates of the state while the rotors work like this.
 
@@ -175,30 +139,30 @@ def rates_of(
     velocity, rates = (state.u, state.v, state.w), (state.p, state.q, state.r)
     blades, induced, _, turning = rotors
     total = forces_and_moments(state, rotation, air, rotors, around, vehicle)
-    main = main_rotor(vehicle, speed_ratio(state.speed, vehicle))
-    tilt = vehicle.flap_response * blowback(
+    main = rotor.main_rotor(vehicle, rotor.speed_ratio(state.speed, vehicle))
+    tilt = vehicle.flap_response * rotor.blowback(
         blades.col, air.u * air.u + air.v * air.v, air.w, induced.main, vehicle.main_lift_solidity, main.tip_speed_m_s
     )
     per_tip, per_turn = 1.0 / main.tip_speed_m_s, 1.0 / main.speed_rad_s
     back = blades.lon + tilt * air.u * per_tip + (state.p - air.p) * per_turn
     right = blades.lat - tilt * air.v * per_tip - (state.q - air.q) * per_turn
-    flap_rate = vehicle.flap_rate_1_s * speed_ratio(state.speed, vehicle)
-    cyclic = cyclic_servo(vehicle)
+    flap_rate = vehicle.flap_rate_1_s * rotor.speed_ratio(state.speed, vehicle)
+    cyclic = drive.cyclic_servo(vehicle)
     return HelicopterState(
         *to_earth(rotation, state.u, state.v, state.w),
-        *linear_acceleration(velocity, rates, (total.x, total.y, total.z), vehicle.mass_kg),
+        *airframe.linear_acceleration(velocity, rates, (total.x, total.y, total.z), vehicle.mass_kg),
         *quaternion_rate(state.qw, state.qx, state.qy, state.qz, state.p, state.q, state.r),
-        *angular_acceleration(rates, (total.l, total.m, total.n), vehicle),
+        *airframe.angular_acceleration(rates, (total.l, total.m, total.n), vehicle),
         flap_rate * (back - state.a1) - state.q,
         flap_rate * (right - state.b1) - state.p,
         state.lon_rate,
         state.lat_rate,
         state.col_rate,
         state.ped_rate,
-        acceleration(state.lon, state.lon_rate, controls.lon, cyclic),
-        acceleration(state.lat, state.lat_rate, controls.lat, cyclic),
-        acceleration(state.col, state.col_rate, controls.col, collective_servo(vehicle)),
-        acceleration(state.ped, state.ped_rate, controls.ped, pedal_servo(vehicle)),
+        drive.acceleration(state.lon, state.lon_rate, controls.lon, cyclic),
+        drive.acceleration(state.lat, state.lat_rate, controls.lat, cyclic),
+        drive.acceleration(state.col, state.col_rate, controls.col, drive.collective_servo(vehicle)),
+        drive.acceleration(state.ped, state.ped_rate, controls.ped, drive.pedal_servo(vehicle)),
         turning.inflow_m_s2,
         turning.speed_rad_s2,
         turning.governed_w_s,
@@ -207,13 +171,13 @@ def rates_of(
 
 @equation
 def derivative_at_inflow(
-    state: HelicopterState, controls: Controls, air: AirMotion, rotation: Rotation, induced: Inflow, around: Around,
-    vehicle: VehicleParameters,
+    state: HelicopterState, controls: Controls, air: airframe.AirMotion, rotation: Rotation, induced: Inflow, around:
+    Around, vehicle: VehicleParameters,
 ) -> HelicopterState:  # fmt: skip
     """The rates at given induced velocities while the rotor keeps its speed (held ones: the paper's frozen inflow)."""
     blades = blade_angles(state, vehicle)
     loads = rotor_loads(state, air, blades, induced, vehicle)
-    rotors = Rotors(blades, induced, loads, held_turning(loads))
+    rotors = Rotors(blades, induced, loads, drive.held_turning(loads))
     return rates_of(state, controls, air, rotation, rotors, around, vehicle)
 
 
@@ -222,21 +186,21 @@ def derivative_in_balance(
     state: HelicopterState, controls: Controls, around: Around, vehicle: VehicleParameters
 ) -> HelicopterState:
     """The rates of the paper's helicopter, its equations 1-11: inflow re-solved at every call, rotor speed constant."""
-    rotation = attitude(state)
-    air = air_motion(state, rotation, around)
-    induced = inflow(air, blade_angles(state, vehicle), speed_ratio(state.speed, vehicle), vehicle)
+    rotation = airframe.attitude(state)
+    air = airframe.air_motion(state, rotation, around)
+    induced = inflow(air, blade_angles(state, vehicle), rotor.speed_ratio(state.speed, vehicle), vehicle)
     return derivative_at_inflow(state, controls, air, rotation, induced, around, vehicle)
 
 
 @equation
 def derivative_at_tail(
-    state: HelicopterState, controls: Controls, air: AirMotion, rotation: Rotation, tail_m_s: float, around: Around,
-    vehicle: VehicleParameters,
+    state: HelicopterState, controls: Controls, air: airframe.AirMotion, rotation: Rotation, tail_m_s: float, around:
+    Around, vehicle: VehicleParameters,
 ) -> HelicopterState:  # fmt: skip
     """The rates of the state at the tail rotor's induced velocity."""
     blades, induced = blade_angles(state, vehicle), Inflow(state.inflow, tail_m_s)
     loads = rotor_loads(state, air, blades, induced, vehicle)
-    rotors = Rotors(blades, induced, loads, turning_of(state, air, loads, around.engine, vehicle))
+    rotors = Rotors(blades, induced, loads, drive.turning_of(state, air, loads, around.engine, vehicle))
     return rates_of(state, controls, air, rotation, rotors, around, vehicle)
 
 
@@ -245,9 +209,9 @@ def derivative(
     state: HelicopterState, controls: Controls, around: Around, vehicle: VehicleParameters
 ) -> HelicopterState:
     """The rates of the state: inflow lags, the rotor's speed droops, the governor answers up to the power limit."""
-    rotation = attitude(state)
-    air = air_motion(state, rotation, around)
-    tail_m_s = tail_inflow(air, blade_angles(state, vehicle), speed_ratio(state.speed, vehicle), vehicle)
+    rotation = airframe.attitude(state)
+    air = airframe.air_motion(state, rotation, around)
+    tail_m_s = tail_inflow(air, blade_angles(state, vehicle), rotor.speed_ratio(state.speed, vehicle), vehicle)
     return derivative_at_tail(state, controls, air, rotation, tail_m_s, around, vehicle)
 
 
@@ -260,23 +224,23 @@ def outputs(state: HelicopterState, around: Around, vehicle: VehicleParameters) 
 @equation
 def outputs_at_inflow(state: HelicopterState, induced: Inflow, around: Around, vehicle: VehicleParameters) -> Outputs:
     """What the state implies at given induced velocities."""
-    rotation = attitude(state)
-    air = air_motion(state, rotation, around)
+    rotation = airframe.attitude(state)
+    air = airframe.air_motion(state, rotation, around)
     loads = rotor_loads(state, air, blade_angles(state, vehicle), induced, vehicle)
     down, normal = (rotation[6], rotation[7], rotation[8]), plane_normal(rotation, around)
     lift = near_ground(state, down, air, induced.main, around, vehicle) * loads.lift_n
     velocity, rates = (state.u, state.v, state.w), (state.p, state.q, state.r)
     feet = support(below_plane(state.pos_n, state.pos_e, state.pos_d, around), normal, velocity, rates, around, vehicle)
-    power = loads.torque_n_m * main_rotor(vehicle, speed_ratio(state.speed, vehicle)).speed_rad_s
+    power = loads.torque_n_m * rotor.main_rotor(vehicle, rotor.speed_ratio(state.speed, vehicle)).speed_rad_s
     return Outputs(lift, loads.torque_n_m, power, induced.main, feet.normal_n)
 
 
 @equation
 def tail_power(state: HelicopterState, around: Around, vehicle: VehicleParameters) -> float:
     """Shaft power of the tail rotor [W]."""
-    air = air_motion(state, attitude(state), around)
+    air = airframe.air_motion(state, airframe.attitude(state), around)
     loads = rotor_loads(state, air, blade_angles(state, vehicle), inflow_of(state, around, vehicle), vehicle)
-    return loads.tail_torque_n_m * tail_rotor(vehicle, speed_ratio(state.speed, vehicle)).speed_rad_s
+    return loads.tail_torque_n_m * rotor.tail_rotor(vehicle, rotor.speed_ratio(state.speed, vehicle)).speed_rad_s
 
 
 @equation

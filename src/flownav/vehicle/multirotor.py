@@ -10,15 +10,11 @@ from typing import NamedTuple
 
 from flownav.core.compile import equation
 from flownav.core.frames import Vector, quaternion_rate, to_earth
-from flownav.vehicle.airframe import AirMotion, Wrench, air_motion, attitude, fuselage_drag
+from flownav.vehicle import airframe, motors
 from flownav.vehicle.around import Around, below_plane, plane_normal
-from flownav.vehicle.motors import battery_voltage, mixed, roots_of_shares, shaft_power, speed_rate, told_speed
 from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.multirotor_state import MultirotorState, Six, moved, of_unit_attitude, speeds_of, total_of
-from flownav.vehicle.propeller import propeller_load
-from flownav.vehicle.rigid_body import angular_acceleration, linear_acceleration
 from flownav.vehicle.skids import support, with_friction, with_support
-from flownav.vehicle.state import Controls, Outputs
+from flownav.vehicle.state import Controls, MultirotorState, Outputs, Six, moved, of_unit_attitude, speeds_of, total_of
 
 
 class RotorLoads(NamedTuple):
@@ -50,7 +46,7 @@ class Rotor(NamedTuple):
 class RotorAir(NamedTuple):
     """The air that all rotors have: its motion, and squares of its speed in the rotors' plane and level."""
 
-    motion: AirMotion
+    motion: airframe.AirMotion
     inplane_sq: float
     horizontal_sq: float
 
@@ -63,7 +59,7 @@ def with_rotor(
     speed, x_m, y_m, sense, ground_m = rotor
     axial = air.motion.w + air.motion.p * y_m - air.motion.q * x_m
     height = vehicle.rotors_above_cg_m * normal[2] - ground_m - normal[0] * x_m - normal[1] * y_m
-    one = propeller_load(speed, air.inplane_sq, axial, air.horizontal_sq, height, vehicle)
+    one = motors.propeller_load(speed, air.inplane_sq, axial, air.horizontal_sq, height, vehicle)
     return RotorLoads(
         loads.thrust_n + one.thrust_n,
         loads.drag_n_s_m + one.drag_n_s_m,
@@ -76,7 +72,7 @@ def with_rotor(
 
 @equation
 def rotor_loads(
-    speeds: Six, below_m: float, down: Vector, normal: Vector, air: AirMotion, hexa: bool, around: Around,
+    speeds: Six, below_m: float, down: Vector, normal: Vector, air: airframe.AirMotion, hexa: bool, around: Around,
     vehicle: MultirotorParameters,
 ) -> RotorLoads:  # fmt: skip
     """All rotors' loads; below_m: of the centre of gravity under the ground's plane."""
@@ -99,18 +95,23 @@ def rotor_loads(
 
 @equation
 def free_wrench(
-    loads: RotorLoads, turning: float, spinning_up: float, down: Vector, air: AirMotion, vehicle: MultirotorParameters
-) -> Wrench:
+    loads: RotorLoads,
+    turning: float,
+    spinning_up: float,
+    down: Vector,
+    air: airframe.AirMotion,
+    vehicle: MultirotorParameters,
+) -> airframe.Wrench:
     """All forces and moments but the ground's (block 3).
 
     turning: Σ of the speeds of the rotors that turn left less those that turn right [rad/s]: they are gyroscopes;
     spinning_up: its rate [rad/s2], whose reaction turns the body.
     """
     x, y = -loads.drag_n_s_m * air.u, -loads.drag_n_s_m * air.v
-    drag = fuselage_drag(0.0, air, vehicle)
+    drag = airframe.fuselage_drag(0.0, air, vehicle)
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
     spin = vehicle.rotor_inertia_kg_m2 * turning
-    return Wrench(
+    return airframe.Wrench(
         x + drag[0] + weight * down[0],
         y + drag[1] + weight * down[1],
         drag[2] + weight * down[2] - loads.thrust_n,
@@ -130,9 +131,9 @@ def to_the_left(x: Six) -> float:
 def total_power(speeds: Six, vehicle: MultirotorParameters) -> float:
     """Shaft power of all rotors [W]."""
     return (
-        (shaft_power(speeds.one, vehicle) + shaft_power(speeds.two, vehicle))
-        + (shaft_power(speeds.three, vehicle) + shaft_power(speeds.four, vehicle))
-    ) + (shaft_power(speeds.five, vehicle) + shaft_power(speeds.six, vehicle))
+        (motors.shaft_power(speeds.one, vehicle) + motors.shaft_power(speeds.two, vehicle))
+        + (motors.shaft_power(speeds.three, vehicle) + motors.shaft_power(speeds.four, vehicle))
+    ) + (motors.shaft_power(speeds.five, vehicle) + motors.shaft_power(speeds.six, vehicle))
 
 
 @equation
@@ -143,21 +144,21 @@ def derivative_at_roots(
 
     roots: `roots_of_shares`.
     """
-    rotation = attitude(state)
+    rotation = airframe.attitude(state)
     down = (rotation[6], rotation[7], rotation[8])
     velocity, rates = (state.u, state.v, state.w), (state.p, state.q, state.r)
-    air = air_motion(state, rotation, around)
+    air = airframe.air_motion(state, rotation, around)
     speeds = speeds_of(state)
     power = total_power(speeds, vehicle)
-    voltage = battery_voltage(power, state.used, vehicle)
+    voltage = motors.battery_voltage(power, state.used, vehicle)
     driving = voltage * around.engine
     spins = Six(
-        speed_rate(speeds.one, told_speed(roots.one, driving, vehicle), vehicle),
-        speed_rate(speeds.two, told_speed(roots.two, driving, vehicle), vehicle),
-        speed_rate(speeds.three, told_speed(roots.three, driving, vehicle), vehicle),
-        speed_rate(speeds.four, told_speed(roots.four, driving, vehicle), vehicle),
-        speed_rate(speeds.five, told_speed(roots.five, driving, vehicle), vehicle) if hexa else 0.0,
-        speed_rate(speeds.six, told_speed(roots.six, driving, vehicle), vehicle) if hexa else 0.0,
+        motors.speed_rate(speeds.one, motors.told_speed(roots.one, driving, vehicle), vehicle),
+        motors.speed_rate(speeds.two, motors.told_speed(roots.two, driving, vehicle), vehicle),
+        motors.speed_rate(speeds.three, motors.told_speed(roots.three, driving, vehicle), vehicle),
+        motors.speed_rate(speeds.four, motors.told_speed(roots.four, driving, vehicle), vehicle),
+        motors.speed_rate(speeds.five, motors.told_speed(roots.five, driving, vehicle), vehicle) if hexa else 0.0,
+        motors.speed_rate(speeds.six, motors.told_speed(roots.six, driving, vehicle), vehicle) if hexa else 0.0,
     )
     normal = plane_normal(rotation, around)
     below = below_plane(state.pos_n, state.pos_e, state.pos_d, around)
@@ -167,9 +168,9 @@ def derivative_at_roots(
     total = with_friction(with_support(free, feet, normal, vehicle), feet, velocity, rates, vehicle)
     return MultirotorState(
         *to_earth(rotation, state.u, state.v, state.w),
-        *linear_acceleration(velocity, rates, (total.x, total.y, total.z), vehicle.mass_kg),
+        *airframe.linear_acceleration(velocity, rates, (total.x, total.y, total.z), vehicle.mass_kg),
         *quaternion_rate(state.qw, state.qx, state.qy, state.qz, state.p, state.q, state.r),
-        *angular_acceleration(rates, (total.l, total.m, total.n), vehicle),
+        *airframe.angular_acceleration(rates, (total.l, total.m, total.n), vehicle),
         spins.one,
         spins.two,
         spins.three,
@@ -185,15 +186,17 @@ def derivative(
     state: MultirotorState, controls: Controls, around: Around, hexa: bool, vehicle: MultirotorParameters
 ) -> MultirotorState:
     """The rates of the state."""
-    return derivative_at_roots(state, roots_of_shares(mixed(controls, hexa, vehicle), hexa), around, hexa, vehicle)
+    return derivative_at_roots(
+        state, motors.roots_of_shares(motors.mixed(controls, hexa, vehicle), hexa), around, hexa, vehicle
+    )
 
 
 @equation
 def outputs(state: MultirotorState, around: Around, hexa: bool, vehicle: MultirotorParameters) -> Outputs:
     """What the state implies: all rotors' thrust in ground effect, torque on the body, shaft power; feet's force."""
-    rotation = attitude(state)
+    rotation = airframe.attitude(state)
     down = (rotation[6], rotation[7], rotation[8])
-    air = air_motion(state, rotation, around)
+    air = airframe.air_motion(state, rotation, around)
     speeds = speeds_of(state)
     normal = plane_normal(rotation, around)
     below = below_plane(state.pos_n, state.pos_e, state.pos_d, around)
@@ -204,12 +207,27 @@ def outputs(state: MultirotorState, around: Around, hexa: bool, vehicle: Multiro
 
 
 @equation
+def middle_of_step(
+    state: MultirotorState, roots: Six, around: Around, dt: float, hexa: bool, vehicle: MultirotorParameters
+) -> MultirotorState:
+    """The state half a step on, at the rate of its start."""
+    return moved(state, derivative_at_roots(state, roots, around, hexa, vehicle), 0.5 * dt)
+
+
+@equation
+def end_of_step(
+    state: MultirotorState, middle: MultirotorState, roots: Six, around: Around, dt: float, hexa: bool,
+    vehicle: MultirotorParameters,
+) -> MultirotorState:  # fmt: skip
+    """The state a step on, at the rate of the step's middle."""
+    return of_unit_attitude(moved(state, derivative_at_roots(middle, roots, around, hexa, vehicle), dt))
+
+
+@equation
 def step(
     state: MultirotorState, controls: Controls, around: Around, dt: float, hexa: bool, vehicle: MultirotorParameters
 ) -> MultirotorState:
     """The state `dt` seconds later by the midpoint rule, controls and surroundings held."""
-    roots = roots_of_shares(mixed(controls, hexa, vehicle), hexa)
-    first = derivative_at_roots(state, roots, around, hexa, vehicle)
-    middle = moved(state, first, 0.5 * dt)
-    second = derivative_at_roots(middle, roots, around, hexa, vehicle)
-    return of_unit_attitude(moved(state, second, dt))
+    roots = motors.roots_of_shares(motors.mixed(controls, hexa, vehicle), hexa)
+    middle = middle_of_step(state, roots, around, dt, hexa, vehicle)
+    return end_of_step(state, middle, roots, around, dt, hexa, vehicle)

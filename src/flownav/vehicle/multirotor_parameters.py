@@ -5,12 +5,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from flownav.core.errors import InputError
-from flownav.vehicle.feasibility import require_rigid_body
-from flownav.vehicle.multirotor_schema import MultirotorFile
 from flownav.vehicle.parameters import of_either_kind
-
-HOVER_MARGIN = 1.2  # the rotors must be able to lift this much of the weight
+from flownav.vehicle.schema import MultirotorFile
 
 
 class MultirotorParameters(NamedTuple):
@@ -137,27 +133,3 @@ def hover_speed(vehicle: MultirotorParameters) -> float:
     """At which the rotors carry the weight in still air [rad/s]."""
     weight = vehicle.mass_kg * vehicle.gravity_m_s2
     return math.sqrt(weight / (vehicle.rotor_count * vehicle.thrust_n_s2))
-
-
-def require_multirotor(vehicle: MultirotorParameters, where: str) -> None:
-    """InputError, naming file, keys and numbers, where the multirotor contradicts itself or cannot hover."""
-    require_rigid_body(vehicle, where)
-    apart = 2.0 / vehicle.per_arm_1_m * math.sin(math.pi / vehicle.rotor_count)
-    if apart < 2.0 * vehicle.radius_m:
-        raise InputError(
-            f"{where}: frame.arm_m: the propellers strike each other, their hubs are {apart:.3f} m apart and they are "
-            f"{2.0 * vehicle.radius_m:.3f} m wide; correct arm_m or propeller.radius_m"
-        )
-    if vehicle.volt_per_as <= 0.0:
-        raise InputError(f"{where}: battery: empty_v must be less than full_v")
-    weight = vehicle.mass_kg * vehicle.gravity_m_s2
-    hover = hover_speed(vehicle)
-    watt = vehicle.rotor_count * vehicle.torque_n_m_s2 * hover**3 / vehicle.efficiency
-    under_root = vehicle.full_v**2 - 4.0 * vehicle.resistance_ohm * watt
-    sagged = 0.5 * (1.0 + math.sqrt(max(under_root, 0.0)) / vehicle.full_v)
-    lift = vehicle.rotor_count * full_thrust(vehicle) * sagged**2
-    if under_root <= 0.0 or lift < HOVER_MARGIN * weight:
-        raise InputError(
-            f"{where}: cannot hover, the rotors lift {lift:.1f} N on the battery as it sags and it weighs {weight:.1f} "
-            "N; correct body.mass_kg, motor.full_speed_rad_s, propeller.radius_m or battery.resistance_ohm"
-        )

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from flownav.vehicle.multirotor_schema import MultirotorFile
-from flownav.vehicle.schema import Actuator, MainRotor, TailRotor, VehicleFile
+from flownav.vehicle.schema import Actuator, MainRotor, MultirotorFile, TailRotor, VehicleFile
 
 ROTOR_INERTIA = 1.15  # of all that turns with the main rotor, over that of its blades, where a file says none
 

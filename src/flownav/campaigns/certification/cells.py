@@ -22,10 +22,10 @@ from flownav.campaigns.sampling import INSIDE
 from flownav.campaigns.store import PLAN, plan_in
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check
-from flownav.simulation.fault import SensorFault
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S
+from flownav.simulation.truth import SensorFault
 
 BEFORE_LANDING_S = 5.0  # that a fault begins, where the requirement does not say when
 MOST_CELLS = 200

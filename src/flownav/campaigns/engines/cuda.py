@@ -27,7 +27,7 @@ from flownav.navigation.packed import load_flow_settings
 from flownav.navigation.take import navigator_unit
 from flownav.navigation.told import carries_lag
 from flownav.scoring.running import RUNNING_COLUMNS, RUNNING_ROWS
-from flownav.simulation.draws import plain_noise
+from flownav.simulation.block import plain_noise
 from flownav.simulation.engine import buffers_of
 from flownav.simulation.plan import Flight
 from flownav.simulation.truth import TRUTH_ROWS

@@ -16,10 +16,9 @@ from flownav.core.compile import ONE_LANE, WARP, Lanes, Work, equation, pointer,
 from flownav.navigation.take import navigate
 from flownav.navigation.tape import output_of
 from flownav.scoring.running import RUNNING_ROWS, Shown, Terms, begin_scores, note_shown, write_scores
-from flownav.sensors.beam import ground_height
+from flownav.sensors.geometry import ground_height
 from flownav.simulation import layout
-from flownav.simulation.block import Aboard, Block
-from flownav.simulation.draws import Noise
+from flownav.simulation.block import Aboard, Block, Noise
 from flownav.simulation.flight import epochs_navigated, epochs_on_paper, start_block
 from flownav.simulation.layout import (
     ground_as_is,

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 
 from flownav.campaigns.plan import Ready, ready_of
 from flownav.simulation.ensemble import Ensemble, believed
-from flownav.simulation.fault import SensorFault
 from flownav.simulation.plan import Flight
-from flownav.simulation.truth import TRUTH_ROWS, packed_truth
+from flownav.simulation.truth import TRUTH_ROWS, SensorFault, packed_truth
 
 Array = NDArray[np.float64]
 Truths = Callable[[int, int], Array]  # of so many flights from a number on: (TRUTH_ROWS, flights); of one, for all

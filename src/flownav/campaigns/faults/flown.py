@@ -38,10 +38,10 @@ from flownav.navigation.tape import EVENT_NAMES
 from flownav.scoring.landings import REST_DISTANCE, column_of, verdict_of
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.engine import Flown, fly_written
-from flownav.simulation.fault import SOUND, SensorFault
 from flownav.simulation.history import column, columns
 from flownav.simulation.scenario import Scenario, load_scenario, with_vehicle
 from flownav.simulation.sensing import EPOCH_S
+from flownav.simulation.truth import SOUND, SensorFault
 
 HEIGHTS_M = (0.5, 1.5, 3.0)
 DURATIONS_S = (5.0, 20.0)  # over before the descent begins, and through the touchdown

@@ -20,8 +20,8 @@ from flownav.campaigns.faults.catalogue import (
     Fault,
 )
 from flownav.core.measurement import Sensor
-from flownav.simulation.fault import SensorFault
 from flownav.simulation.layout import EARLIER_READINGS
+from flownav.simulation.truth import SensorFault
 
 LATE_S, MOST_LATE = 0.1, EARLIER_READINGS - 1
 OF_SENSOR = {

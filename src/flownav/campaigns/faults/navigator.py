@@ -22,7 +22,7 @@ from flownav.navigation.settings_of import Told
 from flownav.navigation.tables import Written, written_on
 from flownav.navigation.tape import EVENT_NAMES, new_tape
 from flownav.replays.prepare import Prepared, ReplayOptions, prepare
-from flownav.sensors.identified import IdentifiedFlow
+from flownav.sensors.datasheet import IdentifiedFlow
 from flownav.simulation.assemble import Setup
 
 TAKEN_IN = (Reason.FUSED, Reason.DATUM)

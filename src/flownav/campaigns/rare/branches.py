@@ -14,7 +14,7 @@ from flownav.campaigns.rows import rows_of
 from flownav.core.compile import LANES
 from flownav.simulation import layout
 from flownav.simulation.assemble import Setup
-from flownav.simulation.draws import KEYED_EPOCHS, Noise
+from flownav.simulation.block import KEYED_EPOCHS, Noise
 from flownav.simulation.engine import Branches, Instead, fly_blocks
 from flownav.simulation.ensemble import Ensemble, believed
 from flownav.simulation.plan import Flight

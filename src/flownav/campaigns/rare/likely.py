@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.campaigns.rare.chains import Array, States
-from flownav.simulation.draws import KEYED_EPOCHS
+from flownav.simulation.block import KEYED_EPOCHS
 from flownav.simulation.onboard import EPOCH_S
 from flownav.simulation.plan import Flight
 from flownav.simulation.sources import Source, normals_of, sources_of

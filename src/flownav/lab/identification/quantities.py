@@ -1,4 +1,4 @@
-"""What a fitted model means: gain, latency, frequency, damping, each with its interval; and what the input shows.
+"""What a fitted model means: gain and latency, each with its interval; and what the input shows.
 
 The latency is the delay of a slow signal, T + a_{n-1}/a_n: the one number that gain and delay models, the paper's
 second-order ones (b/c) and an autopilot's delay parameter share.
@@ -86,23 +86,6 @@ def gain(fit: Fit) -> Interval:
 def latency(fit: Fit) -> Interval:
     """Interval of `latency_s` by its derivatives."""
     return _by_derivative(fit, latency_s)
-
-
-def natural_frequency(fit: Fit) -> Interval | None:
-    """sqrt(a_2) [rad/s] of a second-order model."""
-    if fit.structure.order != 2:
-        return None
-    return Interval.of_log(float(np.exp(0.5 * fit.point.log_a[1])), 0.5 * float(np.sqrt(fit.covariance[1, 1])))
-
-
-def damping(fit: Fit) -> Interval | None:
-    """a_1/(2 sqrt(a_2)) of a second-order model."""
-    if fit.structure.order != 2:
-        return None
-    weights = np.array([1.0, -0.5])
-    sigma = float(np.sqrt(weights @ fit.covariance[:2, :2] @ weights))
-    log_a = fit.point.log_a
-    return Interval.of_log(0.5 * float(np.exp(log_a[0] - 0.5 * log_a[1])), sigma)
 
 
 def coefficients(fit: Fit) -> list[Interval]:

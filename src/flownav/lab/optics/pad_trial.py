@@ -39,7 +39,8 @@ from flownav.lab.optics.pad_truth import Truth, fix_error, is_wrong, truth_of
 from flownav.lab.optics.projection import Pose, ground_point, pose_looking_down
 from flownav.lab.optics.scene import Scene, drawn_scene, in_shadow_of_vehicle
 from flownav.lab.optics.shot import Ground, Optic, Shot, View, ground_at, shoot, view_of
-from flownav.lab.optics.shutter import FlightMotion, image_rate_rad_s
+from flownav.lab.optics.shutter import FlightMotion
+from flownav.sensors.geometry import image_rate_rad_s
 
 Array = NDArray[np.float64]
 

@@ -20,7 +20,8 @@ from flownav.lab.optics.pad_target import GROUND_REFLECTANCE, PadTarget, ground,
 from flownav.lab.optics.projection import Pose, ground_point
 from flownav.lab.optics.render import blurred, digitise, noise_bank, sampled
 from flownav.lab.optics.scene import Cover, Scene, Shadow, covered, lit, mirrored
-from flownav.lab.optics.shutter import FlightMotion, image_rate_rad_s, moved, part_time_s, row_time_s
+from flownav.lab.optics.shutter import FlightMotion, moved, part_time_s, row_time_s
+from flownav.sensors.geometry import image_rate_rad_s
 
 Array = NDArray[np.float64]
 

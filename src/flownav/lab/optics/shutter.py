@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flownav.core.compile import equation
-from flownav.core.frames import angular_flow
 from flownav.lab.optics.projection import Pose
 
 
@@ -56,15 +55,3 @@ def moved(pose: Pose, motion: FlightMotion, time_s: float) -> Pose:
         pose.r32 + pose.r33 * x - pose.r31 * z,
         pose.r33 + pose.r31 * y - pose.r32 * x,
     )
-
-
-@equation
-def image_rate_rad_s(
-    forward_m_s: float, right_m_s: float, rate_p_rad_s: float, rate_q_rad_s: float, height_m: float
-) -> tuple[float, float]:
-    """How fast the ground straight below passes, towards body forward and right, as tangents a second.
-
-    The ground falls back as the camera goes ahead, and comes forward as the nose goes up.
-    """
-    flow_x, flow_y = angular_flow(forward_m_s, right_m_s, rate_p_rad_s, rate_q_rad_s, height_m)
-    return -flow_y, flow_x

@@ -20,9 +20,9 @@ from flownav.simulation.engine import Instead, buffers_of, fly_into
 from flownav.simulation.ensemble import believed
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import ATTITUDE_STEPS, PHYSICS_S, PHYSICS_STEPS, Flight
+from flownav.simulation.plant import observe_vehicle, step_vehicle
 from flownav.simulation.scenario import load_scenario, with_vehicle
 from flownav.simulation.truth import packed_truth
-from flownav.simulation.vehicles import observe_vehicle, step_vehicle
 from flownav.studies.benchmark.timing import best_of
 from flownav.vehicle.around import CALM
 from flownav.vehicle.parameters import VehicleParameters

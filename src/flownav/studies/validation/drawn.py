@@ -12,7 +12,7 @@ from scipy.special import ndtri
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.parameter_files import shipped
 from flownav.logs.log import Log
-from flownav.sensors.range_sensor_sheet import RangeSensorSheet, load_range_sensor_sheet
+from flownav.sensors.range_sensor import RangeSensorSheet
 from flownav.sensors.sheet import Lever
 from flownav.sensors.sheets import SensorSheets, shipped_sheets
 from flownav.simulation.dispersion import DispersionSection, drawn, uniforms
@@ -78,11 +78,11 @@ def sheets_of(log: Log, vehicle: AssumedVehicle) -> SensorSheets:
 
 def _ranger(stream: Stream | None) -> RangeSensorSheet:
     """The lidar's or the sonar's datasheet."""
-    sonar = load_range_sensor_sheet()
+    sonar = RangeSensorSheet.read()
     if stream is None:
         return sonar
     lidar = float(np.min(stream.value[:, 0], initial=np.inf)) < LIDAR_BELOW_M
-    sheet = load_range_sensor_sheet(shipped("sensors/range_lidar.toml")) if lidar else sonar
+    sheet = RangeSensorSheet.read(shipped("sensors/range_lidar.toml")) if lidar else sonar
     return sheet.model_copy(update={"rate_hz": rate_hz(stream), "lens": Lever()})
 
 

@@ -20,19 +20,16 @@ from flownav.core.frames import rotation_from_quaternion
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.log import Log
 from flownav.sensors.barometer import BarometerTruth
-from flownav.sensors.beam import LEVEL, BeamHit, beam_distance
-from flownav.sensors.datasheet import FlowSettings
-from flownav.sensors.earth_field import declination_rad
 from flownav.sensors.flow import PERIOD_S as FLOW_STEP_S
 from flownav.sensors.flow import FlowParameters
 from flownav.sensors.flow_camera import FlowCameraTruth, step_flow_camera
-from flownav.sensors.gauss_markov import gauss_markov_coefficients
+from flownav.sensors.geometry import LEVEL, BeamHit, beam_distance
 from flownav.sensors.gps_ins import attitude_with_error
 from flownav.sensors.gps_receiver import GpsReceiverTruth
-from flownav.sensors.imu import ImuReading
-from flownav.sensors.inertial import InertialParameters, step_inertial
-from flownav.sensors.magnetometer_sheet import MagneticField
-from flownav.sensors.settings import GpsInsSettings
+from flownav.sensors.inertial import ImuReading, InertialParameters, step_inertial
+from flownav.sensors.magnetometer import MagneticField, declination_rad
+from flownav.sensors.processes import gauss_markov_coefficients
+from flownav.sensors.settings import FlowSettings, GpsInsSettings
 from flownav.sensors.sheet import SensorSheet
 from flownav.sensors.sheets import SensorSheets
 from flownav.studies.validation.drawn import Flight, drawn_sheets, kept_of, sheets_of

@@ -1,4 +1,4 @@
-"""The inertial sensors inside the MIDG (paper Table 4): bandwidth, noise, biases, range.
+"""The inertial sensors inside the MIDG (paper Table 4), which no flight has aboard: bandwidth, noise, biases, range.
 
 Each axis is a first-order filter of bandwidth f_3dB whose input is the truth and white noise of the published
 density N (one-sided, unit/sqrt(Hz)). The filtered noise has the standard deviation N sqrt(pi/2 f_3dB): 0.28 deg/s
@@ -12,10 +12,16 @@ Body FRD; gyro [rad/s], specific force (all forces but gravity, over mass) [m/s^
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
+from pydantic import Field
+
 from flownav.core.compile import clamp, equation
-from flownav.sensors.gauss_markov import gauss_markov
+from flownav.core.frames import GRAVITY_M_S2 as STANDARD_GRAVITY_M_S2
+from flownav.core.parameter_files import Number, ParameterModel
+from flownav.sensors.inertial import ImuReading
+from flownav.sensors.processes import gauss_markov, gauss_markov_coefficients
 
 PERIOD_S = 0.02
 
@@ -33,17 +39,6 @@ class ImuParameters(NamedTuple):
     accel_bias_m_s2: float
     accel_walk_m_s2: float
     accel_range_m_s2: float
-
-
-class ImuReading(NamedTuple):
-    """Gyro and accelerometer, body FRD: a reading, or the truth behind it."""
-
-    gyro_x_rad_s: float
-    gyro_y_rad_s: float
-    gyro_z_rad_s: float
-    accel_x_m_s2: float
-    accel_y_m_s2: float
-    accel_z_m_s2: float
 
 
 class ImuNormals(NamedTuple):
@@ -132,3 +127,37 @@ def step_imu(state: ImuState, truth: ImuReading, n: ImuNormals, p: ImuParameters
         accel_z_m_s2=clamp(s.accel_z + s.accel_bias_z, -accel, accel),
     )
     return s, reading
+
+
+class ImuSettings(ParameterModel):
+    """The MIDG's gyros and accelerometers: Table 4, and biases that the paper does not print."""
+
+    bandwidth_hz: Number = Field(20.0, gt=0.0, le=10000.0)
+    gyro_density_deg_s_rthz: Number = Field(0.05, ge=0.0, le=10.0)
+    gyro_bias_deg_s: Number = Field(0.1, ge=0.0, le=100.0)
+    gyro_walk_deg_s_rts: Number = Field(0.002, ge=0.0, le=10.0)
+    gyro_range_deg_s: Number = Field(300.0, gt=0.0, le=10000.0)
+    accel_density_ug_rthz: Number = Field(150.0, ge=0.0, le=1e5)
+    accel_bias_mg: Number = Field(2.0, ge=0.0, le=1000.0)
+    accel_walk_mg_rts: Number = Field(0.02, ge=0.0, le=1000.0)
+    accel_range_g: Number = Field(6.0, gt=0.0, le=1000.0)
+
+    def parameters(self) -> ImuParameters:
+        """Coefficients at 50 Hz."""
+        tau_s = 1.0 / (2.0 * math.pi * self.bandwidth_hz)
+        noise_bandwidth_rthz = math.sqrt(0.5 * math.pi * self.bandwidth_hz)
+        decay, drive = gauss_markov_coefficients(tau_s, PERIOD_S)
+        rt_period = math.sqrt(PERIOD_S)
+        mg_m_s2 = 1e-3 * STANDARD_GRAVITY_M_S2
+        return ImuParameters(
+            decay=decay,
+            drive=drive,
+            gyro_sigma_rad_s=math.radians(self.gyro_density_deg_s_rthz) * noise_bandwidth_rthz,
+            gyro_bias_rad_s=math.radians(self.gyro_bias_deg_s),
+            gyro_walk_rad_s=math.radians(self.gyro_walk_deg_s_rts) * rt_period,
+            gyro_range_rad_s=math.radians(self.gyro_range_deg_s),
+            accel_sigma_m_s2=1e-3 * mg_m_s2 * self.accel_density_ug_rthz * noise_bandwidth_rthz,
+            accel_bias_m_s2=mg_m_s2 * self.accel_bias_mg,
+            accel_walk_m_s2=mg_m_s2 * self.accel_walk_mg_rts * rt_period,
+            accel_range_m_s2=STANDARD_GRAVITY_M_S2 * self.accel_range_g,
+        )

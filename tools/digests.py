@@ -36,7 +36,7 @@ from flownav.replays.session import replay
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_written
 from flownav.simulation.scenario import Scenario, load_scenario, with_filter, with_vehicle
-from flownav.studies.compare.league import logs_in
+from flownav.studies.compare.job import logs_in
 
 Case = tuple[str, Callable[[], str]]
 

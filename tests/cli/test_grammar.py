@@ -83,7 +83,7 @@ def test_the_choices_of_the_command_line_are_those_of_the_rooms():
     from flownav.lab.optics.firmware import firmware_named
     from flownav.lab.optics.pad_target import PATTERNS
     from flownav.lab.optics.pad_trial import CAMERAS
-    from flownav.lab.rig.excitation import EXCITATIONS
+    from flownav.lab.rig.pendulum import EXCITATIONS
     from flownav.live.options import SENDINGS
     from flownav.paper.reproduction import TABLES
     from flownav.simulation.scenario import SHIPPED

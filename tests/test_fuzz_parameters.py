@@ -27,7 +27,7 @@ from flownav.sensors.range_sensor_sheet import load_range_sensor_sheet
 from flownav.sensors.skid_switch_sheet import load_skid_switch_sheet
 from flownav.simulation.dispersion import DispersionFile
 from flownav.simulation.scenario import load_scenario
-from flownav.studies.validation.flights import load_flights
+from flownav.studies.validation.drawn import load_flights
 from flownav.vehicle.loading import load_vehicle
 from flownav.vehicle.paper_model import load_paper_model
 from fuzzing import FIRST_SEED, MUTANTS, assert_promise

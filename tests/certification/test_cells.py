@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.campaigns.certification.assumed import assumed
-from flownav.campaigns.certification.cells import MOST_CELLS, plan_of, require_planned, words_of
-from flownav.campaigns.certification.started import from_height
+from flownav.campaigns.certification.cells import MOST_CELLS, from_height, plan_of, require_planned, words_of
+from flownav.campaigns.certification.written import assumed
 from flownav.campaigns.engines.engine import Part
 from flownav.campaigns.engines.local import Local
 from flownav.campaigns.faults.catalogue import FAULTS

@@ -5,8 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.lab.optics.projection import CameraMotion, Pose, image_point, motion_field, pose_looking_down
-from flownav.lab.optics.shutter import FlightMotion, image_rate_rad_s, moved, part_time_s, row_time_s
+from flownav.lab.optics.projection import (
+    CameraMotion,
+    FlightMotion,
+    Pose,
+    image_point,
+    image_rate_rad_s,
+    motion_field,
+    moved,
+    part_time_s,
+    pose_looking_down,
+    row_time_s,
+)
 
 STILL = FlightMotion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 

@@ -15,8 +15,7 @@ from flownav.sensors import flow, inertial
 from flownav.sensors.datasheet import FlowSettings, load_sensor
 from flownav.sensors.imu import ImuReading
 from flownav.sensors.inertial_sheet import load_inertial_sheet
-from flownav.studies.validation.drawn import Flight, drawn_sheets, kept_of, sheets_of
-from flownav.studies.validation.flights import load_flights
+from flownav.studies.validation.drawn import Flight, drawn_sheets, kept_of, load_flights, sheets_of
 from flownav.studies.validation.path import path_of
 from flownav.studies.validation.sensed import every_nth, field_of, seen_velocity, simulated_log, step_of, stepped
 

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
-from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, score_block, scores_of_flight
-from flownav.scoring.paper_tables import published
-from flownav.scoring.takeoffs import takeoff_of_flight, takeoffs
+from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, published, score_block, scores_of_flight
+from flownav.scoring.landings import takeoff_of_flight, takeoffs
 from flownav.scoring.touchdown import Limits, motion_of, touchdowns
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import Flown, fly_blocks, fly_written

@@ -96,7 +96,7 @@ def _fly(
 
 def _say_plan(asked: Requirement, as_json: bool) -> None:
     """How many flights each requirement needs, by the failures that it may have, and how many the file asks for."""
-    from flownav.campaigns.certification.judgement import PLANS
+    from flownav.campaigns.certification.envelope import PLANS
     from flownav.campaigns.requirement import needed_by
 
     rows = [

@@ -11,7 +11,7 @@ from flownav.control.autopilot import AutopilotState
 from flownav.control.go_around import Knowledge
 from flownav.core.compile import equation, replacing, write_function
 from flownav.core.frames import Rotation, rotation_from_quaternion, to_earth
-from flownav.lab.optics.shutter import image_rate_rad_s
+from flownav.lab.optics.projection import image_rate_rad_s
 from flownav.navigation.records import Reading
 from flownav.sensors.barometer import BarometerTruth
 from flownav.sensors.beam import BeamHit, Ground, ground_height

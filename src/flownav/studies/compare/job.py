@@ -18,8 +18,8 @@ from flownav.replays.airborne import airborne_of
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import FLOW, ReplayOptions, check_windows
 from flownav.replays.session import Replay, outage_summary, outage_table, replay
-from flownav.scoring.outage import OutageError, outage_error
 from flownav.scoring.path import References, end_drift_of, outage_entry
+from flownav.scoring.reference import OutageError, outage_error
 from flownav.studies.compare.tracks import (
     Reference,
     Track,

@@ -18,10 +18,8 @@ from flownav.logs.log import Log
 from flownav.logs.rates import attitude_at
 from flownav.navigation.rows import EstimateRow
 from flownav.navigation.tables import estimate_table
-from flownav.scoring.alignment import Alignment, align, velocity_of
-from flownav.scoring.autopilot import columns_of
-from flownav.scoring.drift import Motion
-from flownav.scoring.path import motion_of
+from flownav.scoring.path import columns_of, motion_of
+from flownav.scoring.reference import Alignment, Motion, align, velocity_of
 
 LONGEST_GAP_S = 0.5  # over more, an estimate between two rows is nobody's
 

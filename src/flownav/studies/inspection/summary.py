@@ -12,7 +12,7 @@ from flownav.core.frames import rotation_from_quaternion, to_earth
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import VELOCITY_BODY
 from flownav.lab.identification.first_look import IN_PART, Look, first_look
-from flownav.lab.identification.usable import jumps
+from flownav.lab.identification.flight import jumps
 from flownav.logs.log import Log
 from flownav.logs.plausible import check_plausible
 from flownav.logs.rates import attitude_at

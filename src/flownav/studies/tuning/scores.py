@@ -25,8 +25,7 @@ from flownav.navigation.told import flow_gain
 from flownav.replays.judged import TESTED
 from flownav.replays.prepare import FLOW, ReplayOptions
 from flownav.replays.session import Replay, replay_again
-from flownav.scoring.alignment import velocity_of
-from flownav.scoring.outage import difference_at
+from flownav.scoring.reference import difference_at, velocity_of
 from flownav.studies.compare.tracks import Window
 from flownav.studies.tuning.knobs import Knob, turned
 

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from flownav.campaigns.engines.named import engine_named
+from flownav.campaigns.engines import engine_named
 from flownav.campaigns.plan import planned
 from flownav.campaigns.run import run_campaign
 from flownav.campaigns.store import Store

@@ -75,7 +75,7 @@ def test_help_is_plain_and_says_what_each_option_takes(name):
 
 def test_the_choices_of_the_command_line_are_those_of_the_rooms():
     from flownav.campaigns.faults.catalogue import FAULTS
-    from flownav.campaigns.sampling import SAMPLINGS
+    from flownav.campaigns.plan import SAMPLINGS
     from flownav.export.samples.kinds import KINDS
     from flownav.lab.identification.autopilot_parameters import AUTOPILOTS
     from flownav.lab.identification.quantities import parse_order

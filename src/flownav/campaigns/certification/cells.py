@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from flownav.campaigns.faults.catalogue import FAULTS, NOT_FLOWN
 from flownav.campaigns.faults.flown import law_of_flight
 from flownav.campaigns.measures import MEASURES, NOT_LANDED
-from flownav.campaigns.plan import Cell, Plan, lands
+from flownav.campaigns.plan import INSIDE, Cell, Plan, lands
 from flownav.campaigns.requirement import NO_FAULT, OWN_SENSOR, Requirement, fixed_by, scenario_of
-from flownav.campaigns.sampling import INSIDE
 from flownav.campaigns.store import PLAN, plan_in
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check

@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaigns.arrow import column, numbers, read
 from flownav.campaigns.certification.cells import words_of
 from flownav.campaigns.certification.envelope import Judgement, bad_first, envelope_of, failing, judged, outcome
-from flownav.campaigns.engines.engine import Engine, Part
+from flownav.campaigns.engines import Engine, Part
 from flownav.campaigns.measures import ROW_COLUMNS, measured
 from flownav.campaigns.plan import Plan
 from flownav.campaigns.ranking import Index, Ranking, rank
 from flownav.campaigns.requirement import Requirement, RequirementTable, fixed_by
 from flownav.campaigns.run import Watch, run_campaign
-from flownav.campaigns.store import Dataset, Store
+from flownav.campaigns.store import Dataset, Store, column, numbers, read
 from flownav.campaigns.summary import inputs_of
 from flownav.campaigns.tolerance import Verdict, joint
 from flownav.core.files import written_whole

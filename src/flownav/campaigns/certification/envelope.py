@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from flownav.campaigns.measures import MEASURES, measured
 from flownav.campaigns.requirement import Requirement, RequirementTable, needed_by
+from flownav.campaigns.summary import DIRECTION, SPEED
 from flownav.campaigns.tolerance import (
     Interval,
     Verdict,
@@ -22,7 +23,6 @@ from flownav.campaigns.tolerance import (
     tolerance_bound,
     verdict,
 )
-from flownav.campaigns.views import DIRECTION, SPEED
 from flownav.core.text import finite_or_none
 from flownav.simulation.ensemble import Ensemble
 

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from flownav.campaigns.again import record_again, record_path
 from flownav.campaigns.certification.cells import words_of as words_of_cell
 from flownav.campaigns.certification.certify import FOLDER as RANKING
 from flownav.campaigns.certification.certify import Certificate
@@ -18,6 +17,7 @@ from flownav.campaigns.local import known_exactly
 from flownav.campaigns.measures import MEASURES, NOT_LANDED, ROW_COLUMNS, measured
 from flownav.campaigns.plan import Cell, Plan
 from flownav.campaigns.requirement import requirement_file
+from flownav.campaigns.run import record_again, record_path
 from flownav.campaigns.store import RECORDS, Dataset, Store
 from flownav.core.parameter_files import shipped
 from flownav.core.provenance import code_sha256, command_line, hash_of, provenance

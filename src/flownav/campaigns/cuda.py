@@ -93,7 +93,6 @@ def _draw(first: int, count: int) -> Array:
 
 
 # -- the engine --------------------------------------------------------------------------------------------------
-
 AT_ONCE = 32768  # flights: eight warps on each of an H200's 132 multiprocessors
 MEMORY_SHARE = 0.8  # of what is free
 

@@ -12,7 +12,7 @@ import secrets
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +23,6 @@ from flownav.core.compile import LANES
 from flownav.core.errors import InputError
 from flownav.simulation.engine import Instead, fly_blocks
 from flownav.simulation.plan import Flight
-
-if TYPE_CHECKING:
-    from flownav.campaigns.engines import Engine
 
 Array = NDArray[np.float64]
 
@@ -48,8 +45,6 @@ class Engine(Protocol):
 
 
 # -- this machine ------------------------------------------------------------------------------------------------
-
-
 class Local:
     """threads: how many fly at once; None: as many as there are cores. instead: as of `fly_blocks`.
 
@@ -111,7 +106,6 @@ def neighbours(parts: Sequence[Part]) -> Iterator[list[Part]]:
 
 
 # -- a cluster ---------------------------------------------------------------------------------------------------
-
 AHEAD = 2  # parts that wait for each core of the cluster
 
 

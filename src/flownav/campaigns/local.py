@@ -218,8 +218,6 @@ def median_flight(scores: Array) -> int:
 
 
 # -- rows of a campaign ------------------------------------------------------------------------------------------
-
-
 def rows_of(flight: Flight, history: Array) -> Array:
     """The rows of a block's flights, (lanes, len(ROW_COLUMNS)); history (epochs, len(HISTORY), lanes)."""
     return np.column_stack([score_history(flight, history), largest_horizontal_m(flight, history)])

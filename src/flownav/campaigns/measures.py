@@ -135,7 +135,6 @@ def happened(event: Event, rows: Array) -> NDArray[np.bool_]:
 
 
 # -- figures of many flights -------------------------------------------------------------------------------------
-
 CONFIDENCE = 0.95
 FIRST_LOOK, GROWTH = 512, 1.5  # flights at the first look, and how many times as many at each further one
 TOGETHER = 256  # flights are looked at in whole files

@@ -235,7 +235,6 @@ def read(path: Path, columns: Sequence[str] | None = None) -> Any:
 
 
 # -- a flight as a row -------------------------------------------------------------------------------------------
-
 INPUT = "input."  # before the name of a dispersed number
 SWEPT = "set."  # before the name of what the campaign sweeps
 

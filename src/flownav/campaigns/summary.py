@@ -145,7 +145,6 @@ def inputs_of(data: Dataset, cell: int) -> dict[str, Array]:
 
 
 # -- views of a cell ---------------------------------------------------------------------------------------------
-
 SPEED, DIRECTION = "wind.speed_20ft_m_s", "wind.from_direction_deg"
 SECTORS, RINGS = 8, 4
 POINTS = 24  # of a convergence

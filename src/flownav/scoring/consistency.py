@@ -243,7 +243,6 @@ def _root(squares: Array, steps: Array) -> Array:
 
 
 # -- normalised innovations squared of one sensor ----------------------------------------------------------------
-
 CHI_SQUARE_95 = 3.841458820694124  # one degree of freedom
 
 

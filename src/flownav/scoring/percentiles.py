@@ -61,7 +61,6 @@ def share_with_interval(count: int, of: int, confidence: float = 0.95) -> tuple[
 
 
 # -- one estimate less another, over the same stretch of time ----------------------------------------------------
-
 BATCHES = 20
 LEAST_ROWS = 5  # of a batch: with fewer in any the difference has no interval
 CONFIDENCE = 0.95

@@ -172,7 +172,6 @@ def worst_of(requirement: Requirement, rows: Array) -> tuple[int, ...]:
 
 
 # -- the ranking -------------------------------------------------------------------------------------------------
-
 FOLDER, FIGURE = "ranking", "figure"
 
 

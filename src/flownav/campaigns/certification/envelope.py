@@ -125,7 +125,6 @@ def bad_first(table: RequirementTable, figures: Array) -> Array:
 
 
 # -- the envelope ------------------------------------------------------------------------------------------------
-
 WIND = (SPEED, DIRECTION)
 GRIDS = ((6, 12), (5, 8), (4, 8), (4, 4), (3, 4), (2, 4))  # fields of the first axis and the second, finest first
 USEFUL = 50  # flights of a field that say something, where there are too few to show the requirement

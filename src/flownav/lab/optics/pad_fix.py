@@ -205,7 +205,6 @@ def _fix(pose: PlanePose, corners: Array, axes: Array, target: PadTarget) -> Pad
 
 
 # -- the pad as it is --------------------------------------------------------------------------------------------
-
 WRONG_CENTRE, WRONG_DISTANCE = 0.5, 0.1  # of the pad's side, of the distance: a fix farther off is wrong, not noisy
 
 

@@ -12,11 +12,9 @@ import time
 import numpy as np
 import pytest
 
-from flownav.campaigns.engines.cuda import AT_ONCE, Cuda
-from flownav.campaigns.engines.device_flight import take_here
-from flownav.campaigns.engines.drawn import truths_of
-from flownav.campaigns.local import fly_many
-from flownav.campaigns.rows import rows_of
+from flownav.campaigns.cuda import AT_ONCE, Cuda, truths_of
+from flownav.campaigns.device_flight import take_here
+from flownav.campaigns.local import fly_many, rows_of
 from flownav.core.compile import NoDeviceError, device_runner
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_blocks

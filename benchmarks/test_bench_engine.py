@@ -10,7 +10,7 @@ from flownav.core.compile import LANES, ONE_LANE
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import buffers_of, fly_into
 from flownav.simulation.scenario import load_scenario, with_filter
-from flownav.studies.benchmark.filter_loop import ROWS, run_paper_filter
+from flownav.studies.benchmark.filters import PAPER_ROWS, run_paper_filter
 
 STEPS = 1000
 
@@ -33,7 +33,7 @@ def test_flight(benchmark, name, lanes):
 
 @pytest.mark.benchmark(group=f"{STEPS} predict+update of six states")
 def test_paper_filter(benchmark, flight):
-    benchmark(run_paper_filter, np.zeros(ROWS), ONE_LANE, STEPS, flight.paper)
+    benchmark(run_paper_filter, np.zeros(PAPER_ROWS), ONE_LANE, STEPS, flight.paper)
 
 
 @pytest.mark.benchmark(group=f"{STEPS} predict+update of six states")

@@ -13,9 +13,8 @@ from scipy import signal
 from scipy.optimize import least_squares
 
 from flownav.lab.identification.experiment import experiment
-from flownav.lab.identification.orders import choose
-from flownav.lab.identification.output_error import Structure, fit
-from flownav.lab.identification.statistics import fit_percent
+from flownav.lab.identification.output_error import Structure, fit, fit_percent
+from flownav.lab.identification.quantities import choose
 
 SAMPLES, RATE_HZ = 15_000, 100.0
 TRUE = (196.9, 14.8, 191.9)  # a, b, c of the paper's selected model

@@ -17,18 +17,17 @@ from filterpy.kalman import KalmanFilter
 from flownav.core.compile import LANES, ONE_LANE
 from flownav.estimation.lag import FlowLag
 from flownav.estimation.states import STATES, STATES_WITH_LAG
-from flownav.studies.benchmark.filter_parts import (
-    SETTINGS,
-    correct_often,
+from flownav.studies.benchmark.filters import SETTINGS, correct_often, offer_nothing, predict_often
+from landing_loop import (
+    ATTITUDE_VARIANCE,
+    SCALARS,
     decay_often,
     expect_often,
+    hovering,
     move_covariance,
     observe_often,
-    offer_nothing,
-    predict_often,
-    standing,
+    run_landing_filter,
 )
-from flownav.studies.benchmark.landing_loop import ATTITUDE_VARIANCE, SCALARS, run_landing_filter
 
 GROUP = f"landing filter: predict, and {SCALARS} corrections of {STATES} states"
 PARTS = f"landing filter of {STATES} states: its parts"
@@ -57,7 +56,7 @@ def note(benchmark, name: str, work: Callable[[], None], flight_steps: int) -> f
 @pytest.mark.parametrize(("lanes", "steps"), [(LANES, STEPS), (ONE_LANE, STEPS), (ONE_LANE, 1)],
                          ids=["engine, 16 lanes", "scalar, inside one call", "scalar, called from Python"])  # fmt: skip
 def test_flownav(benchmark, lanes, steps, lag):
-    buffer = standing(lanes, STATES if lag is None else STATES_WITH_LAG)
+    buffer = hovering(lanes, STATES if lag is None else STATES_WITH_LAG)
 
     def work() -> None:
         run_landing_filter(buffer, lanes, steps, SETTINGS, lag)
@@ -76,7 +75,7 @@ def test_flownav(benchmark, lanes, steps, lag):
     ids=lambda part: part.__doc__.rstrip("."),
 )
 def test_parts(benchmark, part, lanes):
-    start = standing(lanes)
+    start = hovering(lanes)
     buffer = start.copy()
 
     def work() -> None:

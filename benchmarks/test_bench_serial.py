@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from flownav.campaigns.faults.flight_log import log_of
+from flownav.campaigns.faults.table import log_of
 from flownav.campaigns.local import fly_recorded
 from flownav.live.recorder import NoRecorder
 from flownav.live.session import Session

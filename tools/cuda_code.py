@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 from cuda import pathfinder
 
-from flownav.campaigns.engines.cuda import Cuda
-from flownav.campaigns.engines.device_flight import take_here
-from flownav.campaigns.engines.drawn import truths_of
+from flownav.campaigns.cuda import Cuda, truths_of
+from flownav.campaigns.device_flight import take_here
 from flownav.core.compiling.device import call_instead, lowered
 from flownav.core.compiling.launch import argument_type, per_thread, told_names
 from flownav.simulation.assemble import assemble

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from flownav.campaigns.engines.named import engine_named
+from flownav.campaigns.engines import engine_named
 from flownav.campaigns.plan import planned
 from flownav.campaigns.run import run_campaign
 from flownav.campaigns.store import Store
@@ -36,7 +36,7 @@ from flownav.replays.session import replay
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_written
 from flownav.simulation.scenario import Scenario, load_scenario, with_filter, with_vehicle
-from flownav.studies.compare.league import logs_in
+from flownav.studies.compare.job import logs_in
 
 Case = tuple[str, Callable[[], str]]
 

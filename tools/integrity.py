@@ -18,9 +18,10 @@ from flownav.campaigns.faults.integrity import (
     Judged,
     cost,
     fly,
+    placed,
     rows_of,
+    section,
 )
-from flownav.campaigns.faults.integrity_page import placed, section
 from flownav.campaigns.faults.navigator import navigator_told
 from flownav.campaigns.faults.table import BASE, flight_at
 from flownav.core.errors import FlownavError

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from flownav.core.errors import FlownavError
 from flownav.core.files import written_whole
-from flownav.studies.compare.league import logs_in, page, play
+from flownav.studies.compare.job import logs_in, page, play
 
 
 def main(folder: Path, out: Path) -> None:

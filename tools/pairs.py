@@ -26,7 +26,7 @@ def works() -> dict[str, Callable[[], object]]:
     from flownav.simulation.assemble import assemble
     from flownav.simulation.engine import buffers_of, fly_into, fly_one
     from flownav.simulation.scenario import load_scenario, with_filter
-    from flownav.studies.benchmark.recorded import navigator_run, recorded_flight
+    from flownav.studies.benchmark.vehicles import navigator_run, recorded_flight
 
     found: dict[str, Callable[[], object]] = {}
     for name in ("paper", "landing"):

@@ -9,10 +9,21 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from flownav.campaigns.figures import FIGURES, confidence_of_a_look, enough, figure_of, looks, stop_of
-from flownav.campaigns.measures import MEASURES, ROW_COLUMNS, Event, event_of, happened, measured
-from flownav.campaigns.plan import changed, planned
-from flownav.campaigns.sampling import TOGETHER, Spread, design_of
+from flownav.campaigns.measures import (
+    FIGURES,
+    MEASURES,
+    ROW_COLUMNS,
+    Event,
+    confidence_of_a_look,
+    enough,
+    event_of,
+    figure_of,
+    happened,
+    looks,
+    measured,
+    stop_of,
+)
+from flownav.campaigns.plan import TOGETHER, Spread, changed, design_of, planned
 from flownav.campaigns.summary import Flight, worst_first
 from flownav.core.errors import InputError
 from flownav.simulation.dispersion import uniforms

@@ -15,12 +15,10 @@ import pytest
 from typer.testing import CliRunner
 
 from command import run as typed
-from flownav.campaigns.again import record_again
-from flownav.campaigns.engines.engine import Part
-from flownav.campaigns.engines.local import Local, neighbours
+from flownav.campaigns.engines import Local, Part, neighbours
 from flownav.campaigns.local import fly_many
 from flownav.campaigns.plan import planned
-from flownav.campaigns.run import run_campaign
+from flownav.campaigns.run import record_again, run_campaign
 from flownav.campaigns.store import PART, Dataset, Store
 from flownav.campaigns.summary import inputs_of, summary_of
 from flownav.cli import app

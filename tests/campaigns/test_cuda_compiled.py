@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import device_cases
-from flownav.campaigns.engines.device_flight import take_here
+from flownav.campaigns.device_flight import take_here
 from flownav.core.compile import equation
 from flownav.core.compiling.device import compile_for_device
 from flownav.core.compiling.launch import argument_type, compiled, flattened, per_thread, told_names

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import device_cases
-from flownav.campaigns.engines import drawn
-from flownav.campaigns.engines.cuda import Cuda, most_that_fit
-from flownav.campaigns.engines.drawn import truths_of, truths_of_cell
-from flownav.campaigns.engines.engine import Part
+from flownav.campaigns import cuda
+from flownav.campaigns.cuda import Cuda, most_that_fit, truths_of, truths_of_cell
+from flownav.campaigns.engines import Part
 from flownav.campaigns.measures import ROW_COLUMNS
 from flownav.campaigns.plan import Ready, ready_of
 from flownav.core.errors import InputError
@@ -90,8 +89,8 @@ def test_no_more_flights_at_once_than_memory_holds(cells):
 
 
 def test_other_processes_draw_the_same_truths(cells, monkeypatch):
-    monkeypatch.setattr(drawn, "WORTH_IT", 1)
-    monkeypatch.setattr(drawn, "SLICE", 16)
+    monkeypatch.setattr(cuda, "WORTH_IT", 1)
+    monkeypatch.setattr(cuda, "SLICE", 16)
     cell = cells["ensemble"]
     alone = truths_of(cell.flight, 7, cell.ensemble)(30, 50)
     with truths_of_cell(cell, 7, 50, 2) as truths:

@@ -32,7 +32,7 @@ def test_no_device_is_one_line_that_says_what_to_do(tmp_path, more):
 
 
 def test_a_missing_library_is_named_with_its_extra(monkeypatch):
-    from flownav.campaigns.engines.cuda import Cuda
+    from flownav.campaigns.cuda import Cuda
     from flownav.core.errors import InputError
 
     monkeypatch.delenv("NUMBA_ENABLE_CUDASIM", raising=False)

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from flownav.campaigns.envelope import directions_deg, fly_envelope, in_wind
-from flownav.campaigns.local import fly_many
+from flownav.campaigns.local import directions_deg, fly_envelope, fly_many, in_wind
 from flownav.cli import app
 from flownav.core.errors import InputError
 from flownav.report.envelope import envelope_figure

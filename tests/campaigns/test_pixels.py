@@ -21,7 +21,7 @@ from flownav.campaigns.pixels import (
 )
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check
-from flownav.lab.optics.pad_truth import truth_of
+from flownav.lab.optics.pad_fix import truth_of
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_one
 from flownav.simulation.history import columns

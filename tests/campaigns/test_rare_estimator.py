@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.campaigns.rare import finding
-from flownav.campaigns.rare.chains import FIRST_STREAM, ancestors
-from flownav.campaigns.rare.finding import find, together_with
+from flownav.campaigns.rare import estimate
+from flownav.campaigns.rare.estimate import find, together_with
 from flownav.campaigns.rare.likely import moments, nats, rank_inputs
-from flownav.campaigns.rare.subset import WALK, climb, fly_islands, next_level
+from flownav.campaigns.rare.walk import FIRST_STREAM, WALK, ancestors, climb, fly_islands, next_level
 from rare_stand_in import INPUTS, SPANS, limit_of, walker_of
 
 REPEATS = 120
@@ -18,16 +17,16 @@ REPEATS = 120
 @pytest.fixture
 def smaller(monkeypatch):
     """A quarter of the flights: what is asked of the estimator does not depend on how many they are."""
-    monkeypatch.setattr(finding, "PILOT_FLIGHTS", 128)
-    monkeypatch.setattr(finding, "ISLAND_FLIGHTS", 128)
+    monkeypatch.setattr(estimate, "PILOT_FLIGHTS", 128)
+    monkeypatch.setattr(estimate, "ISLAND_FLIGHTS", 128)
 
 
 @pytest.fixture(scope="module")
 def repeats():
     """What many estimates of 1e-4 found, each of its own seed."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(finding, "PILOT_FLIGHTS", 128)
-        patch.setattr(finding, "ISLAND_FLIGHTS", 128)
+        patch.setattr(estimate, "PILOT_FLIGHTS", 128)
+        patch.setattr(estimate, "ISLAND_FLIGHTS", 128)
         return [find(walker_of(seed), limit_of(1e-4), 20_000) for seed in range(REPEATS)]
 
 

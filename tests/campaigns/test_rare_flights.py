@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from flownav.campaigns.local import rows_of
 from flownav.campaigns.measures import event_of, measured
 from flownav.campaigns.plan import changed
-from flownav.campaigns.rare import estimate, finding
-from flownav.campaigns.rare.branches import START_ROWS, Space
+from flownav.campaigns.rare import estimate
+from flownav.campaigns.rare.branches import START_ROWS, Space, read_branch, replayed, write_branch
 from flownav.campaigns.rare.estimate import estimate_rare
-from flownav.campaigns.rare.replay import read_branch, replayed, write_branch
-from flownav.campaigns.rare.response import figures, responses_to
-from flownav.campaigns.rows import rows_of
+from flownav.campaigns.rare.likely import figures, responses_to
 from flownav.cli import app
 from flownav.core.compile import LANES, ONE_LANE
 from flownav.core.errors import InputError
@@ -51,9 +50,9 @@ def setup():
 def fewer():
     """So few flights that an estimate takes seconds."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(finding, "PILOT_FLIGHTS", 64)
-        patch.setattr(finding, "ISLAND_FLIGHTS", 16)
-        patch.setattr(finding, "LARGEST_CV", 10.0)
+        patch.setattr(estimate, "PILOT_FLIGHTS", 64)
+        patch.setattr(estimate, "ISLAND_FLIGHTS", 16)
+        patch.setattr(estimate, "LARGEST_CV", 10.0)
         patch.setattr(estimate, "USUAL_FLIGHTS", 16)
         yield
 

@@ -9,9 +9,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from flownav.campaigns.engines import ray_cluster
-from flownav.campaigns.engines.engine import Part
-from flownav.campaigns.engines.local import Local
+from flownav.campaigns import engines
+from flownav.campaigns.engines import Local, Part
 from flownav.campaigns.plan import planned
 from flownav.core.errors import InputError
 from flownav.simulation.scenario import load_scenario
@@ -65,17 +64,17 @@ class FrailCluster:
         function, arguments = self.asked[what]
         if what % 3 == 0:
             function(*arguments)  # its rows are lost with its worker
-            ray_cluster._cells.clear()  # the next worker knows of no cell
+            engines._cells.clear()  # the next worker knows of no cell
         return function(*arguments)
 
 
 def test_the_rows_are_those_of_one_machine_in_order_though_workers_are_lost(cell, monkeypatch):
     ray, counted = FrailCluster(), []
     monkeypatch.setitem(sys.modules, "ray", ray)
-    found = list(ray_cluster.RayCluster().fly(cell, 5, PARTS[:6], counted.append))
+    found = list(engines.RayCluster().fly(cell, 5, PARTS[:6], counted.append))
     assert [part for part, _ in found] == PARTS[:6]
     assert counted == [FLIGHTS] * 6
-    assert ray.most_waiting == 2 * ray_cluster.AHEAD
+    assert ray.most_waiting == 2 * engines.AHEAD
     for (_, rows), (_, expected) in zip(found, Local().fly(cell, 5, PARTS[:6]), strict=True):
         assert rows.tobytes() == expected.tobytes()
 
@@ -102,7 +101,7 @@ def test_two_nodes_fly_the_same_bytes_as_one_machine_though_one_is_killed(cell, 
     cluster, second = nodes
     wanted = list(Local().fly(cell, 5, PARTS))
     counted, found = [], []
-    for part, rows in ray_cluster.RayCluster(cluster.address).fly(cell, 5, PARTS, counted.append):
+    for part, rows in engines.RayCluster(cluster.address).fly(cell, 5, PARTS, counted.append):
         found.append((part, rows))
         if len(found) == 3:
             assert len(cluster.list_all_nodes()) == 2
@@ -117,7 +116,7 @@ def test_two_nodes_fly_the_same_bytes_as_one_machine_though_one_is_killed(cell, 
 def test_without_ray_the_engine_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(InputError, match=r"flownav\[cluster\]"):
-        ray_cluster.RayCluster()
+        engines.RayCluster()
 
 
 def test_the_rows_of_a_part_are_numbers(cell):

@@ -5,15 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.campaigns.certification.assumed import assumed
-from flownav.campaigns.certification.cells import MOST_CELLS, plan_of, require_planned, words_of
-from flownav.campaigns.certification.started import from_height
-from flownav.campaigns.engines.engine import Part
-from flownav.campaigns.engines.local import Local
+from flownav.campaigns.certification.cells import MOST_CELLS, from_height, plan_of, require_planned, words_of
+from flownav.campaigns.certification.written import assumed
+from flownav.campaigns.engines import Local, Part
 from flownav.campaigns.faults.catalogue import FAULTS
 from flownav.campaigns.faults.flown import law_of_flight
+from flownav.campaigns.local import rows_of
 from flownav.campaigns.requirement import load_requirement
-from flownav.campaigns.rows import rows_of
 from flownav.campaigns.store import Store
 from flownav.core.compile import LANES
 from flownav.core.errors import InputError

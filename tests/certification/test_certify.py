@@ -10,9 +10,9 @@ import pytest
 
 from flownav.campaigns.certification.cells import plan_of
 from flownav.campaigns.certification.certify import certify, with_ranking
-from flownav.campaigns.certification.judgement import judged
+from flownav.campaigns.certification.envelope import judged
 from flownav.campaigns.certification.written import write_certificate
-from flownav.campaigns.engines.local import Local
+from flownav.campaigns.engines import Local
 from flownav.campaigns.requirement import RequirementTable, load_requirement
 from flownav.campaigns.store import Store
 from requirements import ASKED, HEAD, WINDY, StandIn, rows_touching, write

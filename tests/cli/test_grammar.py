@@ -75,15 +75,15 @@ def test_help_is_plain_and_says_what_each_option_takes(name):
 
 def test_the_choices_of_the_command_line_are_those_of_the_rooms():
     from flownav.campaigns.faults.catalogue import FAULTS
-    from flownav.campaigns.sampling import SAMPLINGS
+    from flownav.campaigns.plan import SAMPLINGS
     from flownav.export.samples.kinds import KINDS
     from flownav.lab.identification.autopilot_parameters import AUTOPILOTS
-    from flownav.lab.identification.orders import parse_order
+    from flownav.lab.identification.quantities import parse_order
     from flownav.lab.optics.camera import LIGHTS
     from flownav.lab.optics.firmware import firmware_named
-    from flownav.lab.optics.pad_target import PATTERNS
+    from flownav.lab.optics.pad import PATTERNS
     from flownav.lab.optics.pad_trial import CAMERAS
-    from flownav.lab.rig.excitation import EXCITATIONS
+    from flownav.lab.rig.pendulum import EXCITATIONS
     from flownav.live.options import SENDINGS
     from flownav.paper.reproduction import TABLES
     from flownav.simulation.scenario import SHIPPED

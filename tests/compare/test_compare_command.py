@@ -14,8 +14,7 @@ from typer.testing import CliRunner
 
 from flownav.cli.compare import command
 from flownav.core.errors import InputError
-from flownav.studies.compare.league import logs_in, page, play
-from flownav.studies.compare.rows import HEADINGS, cells, default_windows, markdown, names_of
+from flownav.studies.compare.job import HEADINGS, cells, default_windows, logs_in, markdown, names_of, page, play
 from places import PROJECT
 from replay_logs import log_of_flight, write_table
 from ulog_files import ulog_of_flight

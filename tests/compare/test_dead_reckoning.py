@@ -11,9 +11,9 @@ from flownav.core.frames import quaternion_from_euler
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.logs.open_log import open_flight
 from flownav.replays.prepare import ReplayOptions, prepare
-from flownav.scoring.outage import outage_error
-from flownav.studies.compare.dead_reckoning import dead_reckoned
-from flownav.studies.compare.rows import default_windows
+from flownav.scoring.reference import outage_error
+from flownav.studies.compare.job import default_windows
+from flownav.studies.compare.tracks import dead_reckoned
 from replay_logs import log_of_flight
 
 T_S = np.arange(0.0, 20.0, 0.05)

@@ -11,9 +11,8 @@ from flownav.core.frames import quaternion_from_euler
 from flownav.core.measurement import Sensor, Stream
 from flownav.logs.log import Log
 from flownav.replays.airborne import airborne_of
-from flownav.scoring.drift import Motion
-from flownav.studies.compare.like_for_like import errors_of, reference_of, shared_by
-from flownav.studies.compare.tracks import Track, of_table, says
+from flownav.scoring.reference import Motion
+from flownav.studies.compare.tracks import Track, errors_of, of_table, reference_of, says, shared_by
 
 NONE = np.zeros(0)
 T_S = np.arange(0.0, 60.0, 0.1)

@@ -27,7 +27,7 @@ from flownav.sensors.range_sensor import RangeSensorSheet
 from flownav.sensors.skid_switch import SkidSwitchSheet
 from flownav.simulation.dispersion import DispersionFile
 from flownav.simulation.scenario import load_scenario
-from flownav.studies.validation.flights import load_flights
+from flownav.studies.validation.drawn import load_flights
 from flownav.vehicle.kinds import load_vehicle
 from flownav.vehicle.linearize import load_paper_model
 from fuzzing import FIRST_SEED, MUTANTS, assert_promise

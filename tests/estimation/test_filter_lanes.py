@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import landing_loop
 from filters import KEPT, SETTINGS, Filter, N, filter_at, paper_lag, random_covariance
 from flownav.core.compile import LANES, ONE_LANE, kernel, pointer
 from flownav.core.frames import GRAVITY_M_S2
@@ -49,8 +50,7 @@ from flownav.estimation.states import (
     STATES,
     TEST_RATIO,
 )
-from flownav.studies.benchmark import landing_loop
-from flownav.studies.benchmark.landing_loop import ARRIVED, ATTITUDE_READ, POSITION_READ, RANGE_READ, ROWS, STEP_S
+from landing_loop import ARRIVED, ATTITUDE_READ, POSITION_READ, RANGE_READ, ROWS, STEP_S
 
 WIDE = len(LANES)
 NUMBERS = SETTINGS._replace(gate_sigma=1e6)  # everything is fused, whatever it says

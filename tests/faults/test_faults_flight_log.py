@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flownav.campaigns.faults.flight_log import log_of
+from flownav.campaigns.faults.table import log_of
 from flownav.campaigns.local import fly_recorded
 from flownav.core.frames import rotation_from_quaternion
 from flownav.core.measurement import COLUMNS, Sensor

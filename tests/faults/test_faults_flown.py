@@ -9,9 +9,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from flownav.campaigns.faults.catalogue import FAULTS
+from flownav.campaigns.faults.catalogue import DOES, FAULTS, NOT_FLOWN, law_of
 from flownav.campaigns.faults.flown import flown_table, scenario_flown, window_start
-from flownav.campaigns.faults.laws import DOES, NOT_FLOWN, law_of
 from flownav.cli import faults as faults_command
 from flownav.core.compile import LANES
 from flownav.core.errors import InputError

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from command import run
-from flownav.campaigns.faults.arrival import WAIT_S, Restamped, arrival_of, as_fed, stamped_ahead
 from flownav.campaigns.faults.catalogue import faults_named
+from flownav.campaigns.faults.inject import WAIT_S, Restamped, arrival_of, as_fed, stamped_ahead
 from flownav.campaigns.faults.table import fault_table, flight_at, window_start
 from flownav.cli.faults import navigator
 from flownav.core.errors import InputError

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flownav.campaigns.faults.navigated import Event, Flag, Navigated, Offers
+from flownav.campaigns.faults.navigator import Event, Flag, Navigated, Offers
 from flownav.campaigns.faults.score import course_of, detected_after, score, touchdown_error, unflagged, wrongly_fused
 from flownav.core.measurement import Sensor, Stream
 

@@ -11,7 +11,7 @@ import typer
 from typer.testing import CliRunner
 
 from flownav.campaigns.faults.catalogue import FAULTS, faults_named
-from flownav.campaigns.faults.navigated import Event, Flag, Navigated, Offers
+from flownav.campaigns.faults.navigator import Event, Flag, Navigated, Offers
 from flownav.campaigns.faults.table import fault_table, flight_at, runs, window_start
 from flownav.cli import faults as faults_command
 from flownav.core.errors import InputError

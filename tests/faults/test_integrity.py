@@ -10,10 +10,23 @@ import pytest
 
 from flownav.campaigns.faults import integrity
 from flownav.campaigns.faults.catalogue import FAULTS, faults_named
-from flownav.campaigns.faults.integrity import SUSPECTS, TOGETHER, Judged, cost, fly, judged, row_of, rows_of
-from flownav.campaigns.faults.integrity_page import BEGIN, END, alarms, placed, section, table
-from flownav.campaigns.faults.navigated import Flag, Navigated, Offers
-from flownav.campaigns.faults.navigator import navigator_of
+from flownav.campaigns.faults.integrity import (
+    BEGIN,
+    END,
+    SUSPECTS,
+    TOGETHER,
+    Judged,
+    alarms,
+    cost,
+    fly,
+    judged,
+    placed,
+    row_of,
+    rows_of,
+    section,
+    table,
+)
+from flownav.campaigns.faults.navigator import Flag, Navigated, Offers, navigator_of
 from flownav.campaigns.faults.table import BASE, DURATIONS_S, HEIGHTS_M, flight_at, runs
 from flownav.core.errors import InputError
 from flownav.estimation.hypotheses import COUNT

@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from flownav.campaigns.engines.cuda import Cuda
-from flownav.campaigns.engines.drawn import truths_of
-from flownav.campaigns.rows import rows_of
+from flownav.campaigns.cuda import Cuda, truths_of
+from flownav.campaigns.local import rows_of
 from flownav.core.compile import equation, kernel
 from flownav.core.parameter_files import check
 from flownav.simulation.assemble import Setup, assemble
@@ -95,7 +94,7 @@ def noise_on_device(runner: Any) -> tuple[Any, Any]:
 
 def main(file: str) -> None:
     """All of it on the simulator."""
-    from flownav.campaigns.engines.device_flight import take_here
+    from flownav.campaigns.device_flight import take_here
     from flownav.core.compile import device_runner
 
     runner = device_runner(take_here)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import norm
 
-from flownav.campaigns.rare.chains import Walker
+from flownav.campaigns.rare.walk import Walker
 from flownav.simulation.sources import normals_of
 
 INPUTS, SPANS = 3, 12

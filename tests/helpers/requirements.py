@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flownav.campaigns.engines.engine import Part
+from flownav.campaigns.engines import Part
 from flownav.campaigns.measures import ROW_COLUMNS
 from flownav.campaigns.plan import Ready
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flownav.core.measurement import Sensor, Stream
-from flownav.lab.identification.displacement import match
 from flownav.lab.identification.flight import Flight
+from flownav.lab.identification.scale import match
 
 STEP_S, REFERENCE_STEP_S, DURATION_S = 0.05, 0.1, 120.0
 

@@ -19,12 +19,12 @@ from flownav.core.toml_text import to_toml
 from flownav.lab.identification.autopilot_parameters import parameters, write_parameters
 from flownav.lab.identification.descent import Structure
 from flownav.lab.identification.findings import Findings
+from flownav.lab.identification.first_look import judge
 from flownav.lab.identification.height_law import QualityPoint, compare_schedules, paper_sigma, variance_by_quality
 from flownav.lab.identification.job import identify
-from flownav.lab.identification.orders import CANDIDATES
+from flownav.lab.identification.quantities import CANDIDATES
 from flownav.lab.identification.rig_log import rate_of, read_runs
 from flownav.lab.identification.sensor_file import bessel, sensor_entries, write_sensor
-from flownav.lab.identification.sentinel import judge
 from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.settings import FlowSettings
 

@@ -9,11 +9,11 @@ import pytest
 
 import replay_logs
 from flownav.core.errors import InputError
-from flownav.lab.identification import displacement
+from flownav.lab.identification import scale
 from flownav.lab.identification.flight import flight
 from flownav.lab.identification.flight_identification import identify_flight
 from flownav.lab.identification.job import identify
-from flownav.lab.identification.orders import CANDIDATES
+from flownav.lab.identification.quantities import CANDIDATES
 from flownav.lab.identification.reference_motion import motion
 from flownav.logs.csv_folder import read_csv_folder
 
@@ -79,7 +79,7 @@ def test_intervals_hold_the_gains_in_most_flights(tmp_path):
     held = 0
     for seed in range(8):
         flown = flight(read_csv_folder(written(tmp_path / str(seed), seed, duration_s=70.0)))
-        track = displacement.match(flown, LATENCY_S)
+        track = scale.match(flown, LATENCY_S)
         response = np.linalg.inv(track.mixing)
         sigma = np.sqrt(np.diag(track.covariance))[[0, 3]] * np.diag(response) ** 2
         held += int(np.sum(np.abs(np.diag(response) - [GAIN_X, GAIN_Y]) <= 1.96 * sigma))

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from flownav.lab.identification.height_law import NoisePoint, combined, fit_power_law, spread
+from flownav.lab.identification.output_error import Z_95
 from flownav.lab.identification.quantities import Interval
-from flownav.lab.identification.statistics import Z_95
 
 # log relative risk and its variance in 13 trials of the BCG vaccine (Colditz and others, JAMA 271, 1994)
 BCG = [(-0.8893, 0.3256), (-1.5854, 0.1946), (-1.3481, 0.4154), (-1.4416, 0.0200), (-0.2175, 0.0512),

@@ -13,11 +13,10 @@ import replay_logs
 from flownav.cli import identify as identify_command
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
-from flownav.lab.identification.flight import flight
+from flownav.lab.identification.flight import flight, jumps
 from flownav.lab.identification.flight_identification import identify_flight
 from flownav.lab.identification.job import identify
-from flownav.lab.identification.orders import CANDIDATES
-from flownav.lab.identification.usable import jumps
+from flownav.lab.identification.quantities import CANDIDATES
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.replays.airborne import airborne_of, flying_at
 

@@ -10,10 +10,9 @@ from scipy import signal
 
 from flownav.core.errors import InputError
 from flownav.lab.identification.descent import DELAY_RANGE_S, Point, Structure, linearise
-from flownav.lab.identification.experiment import experiment
-from flownav.lab.identification.grid import MOST_STEPS, distinct_steps, lay_grid
-from flownav.lab.identification.orders import cross_validation
+from flownav.lab.identification.experiment import MOST_STEPS, distinct_steps, experiment, lay_grid
 from flownav.lab.identification.output_error import fit, simulate
+from flownav.lab.identification.quantities import cross_validation
 
 POLES = (14.0, 9.0, 20.0, 30.0)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.lab.identification.statistics import whiteness
+from flownav.lab.identification.output_error import whiteness
 
 
 def ljung_box(residual, lags):

@@ -11,6 +11,7 @@ from scipy import signal, stats
 from flownav.core.errors import InputError
 from flownav.lab.identification.descent import Structure
 from flownav.lab.identification.experiment import experiment
+from flownav.lab.identification.first_look import judge, one_axis
 from flownav.lab.identification.height_law import (
     NoisePoint,
     combined,
@@ -19,11 +20,8 @@ from flownav.lab.identification.height_law import (
     paper_fit,
     paper_sigma,
 )
-from flownav.lab.identification.orders import choose, parse_order
-from flownav.lab.identification.output_error import fit
-from flownav.lab.identification.quantities import Interval, excitation, gain, latency, numerator
-from flownav.lab.identification.sentinel import judge, one_axis
-from flownav.lab.identification.statistics import chi_square_tail, fit_percent, information_criteria, whiteness
+from flownav.lab.identification.output_error import chi_square_tail, fit, fit_percent, information_criteria, whiteness
+from flownav.lab.identification.quantities import Interval, choose, excitation, gain, latency, numerator, parse_order
 from second_order_fit import damping, natural_frequency
 
 FINE_S = 0.001

@@ -15,7 +15,7 @@ import pymap3d
 import pytest
 
 from command import run as typed
-from flownav.campaigns.faults.flight_log import log_of
+from flownav.campaigns.faults.table import log_of
 from flownav.campaigns.local import fly_recorded
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor

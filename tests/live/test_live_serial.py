@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flownav.campaigns.faults.flight_log import log_of
+from flownav.campaigns.faults.table import log_of
 from flownav.campaigns.local import fly_recorded
 from flownav.live.rates import plan
 from flownav.live.simulated import SimulatedVehicle

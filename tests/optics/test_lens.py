@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.lab.optics.lens import (
+from flownav.lab.optics.camera import (
     PINHOLE_K1,
     PINHOLE_K2,
     Calibration,

@@ -16,8 +16,7 @@ from flownav.core.errors import InputError
 from flownav.lab.optics.camera import Camera, effective_focal_px
 from flownav.lab.optics.firmware import VERSIONS, firmware_named
 from flownav.lab.optics.flow import compensated, flow_of_frames
-from flownav.lab.optics.frame_files import read_frames
-from flownav.lab.optics.frame_window import binned, middle
+from flownav.lab.optics.frame_files import binned, middle, read_frames
 from flownav.lab.optics.pad import texture
 from flownav.lab.optics.projection import pose_looking_down
 from flownav.lab.optics.render import film

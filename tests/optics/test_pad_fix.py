@@ -18,10 +18,9 @@ from flownav.core.errors import InputError
 from flownav.core.measurement import COLUMNS, Sensor
 from flownav.lab.optics import pad_fix
 from flownav.lab.optics.camera import Camera, effective_focal_px
-from flownav.lab.optics.pad import Pad
-from flownav.lab.optics.pad_fix import PadSearch, find_pad
-from flownav.lab.optics.pad_target import (
+from flownav.lab.optics.pad import (
     CODES_36H11,
+    Pad,
     PadTarget,
     code_cells,
     corners_m,
@@ -31,7 +30,7 @@ from flownav.lab.optics.pad_target import (
     print_target,
     printed_cells,
 )
-from flownav.lab.optics.pad_truth import fix_error, is_wrong, truth_of
+from flownav.lab.optics.pad_fix import PadSearch, find_pad, fix_error, is_wrong, truth_of
 from flownav.lab.optics.plane_pose import homography, plane_pose
 from flownav.lab.optics.projection import Pose, pose_looking_down
 from flownav.lab.optics.render import film

@@ -12,8 +12,10 @@ from typer.testing import CliRunner
 
 from flownav.cli import pad as pad_command
 from flownav.core.errors import InputError
-from flownav.lab.optics.lens import field_angle_rad
+from flownav.lab.optics.camera import field_angle_rad
+from flownav.lab.optics.pad import PadTarget
 from flownav.lab.optics.pad_datasheet import Assumed, datasheet
+from flownav.lab.optics.pad_fix import truth_of
 from flownav.lab.optics.pad_statistics import (
     NoiseLaw,
     beta_of,
@@ -25,9 +27,7 @@ from flownav.lab.optics.pad_statistics import (
     missed_law,
     sigma_of,
 )
-from flownav.lab.optics.pad_target import PadTarget
 from flownav.lab.optics.pad_trial import CAMERAS, TrialFrame, camera_flight, camera_named, frames_at, tried
-from flownav.lab.optics.pad_truth import truth_of
 from flownav.sensors.pad_camera_sheet import PadCameraSheet
 
 TAG = PadTarget()

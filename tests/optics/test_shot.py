@@ -5,15 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.lab.optics.camera import Camera, Exposure
-from flownav.lab.optics.lens import Lens, illumination, pixel_grid, rays_of
-from flownav.lab.optics.pad_fix import find_pad
-from flownav.lab.optics.pad_target import PadTarget
-from flownav.lab.optics.pad_truth import fix_error, truth_of
-from flownav.lab.optics.projection import pose_looking_down
+from flownav.lab.optics.camera import Camera, Exposure, Lens, illumination, pixel_grid, rays_of
+from flownav.lab.optics.pad import PadTarget
+from flownav.lab.optics.pad_fix import find_pad, fix_error, truth_of
+from flownav.lab.optics.projection import FlightMotion, pose_looking_down
 from flownav.lab.optics.scene import Gloss, Scene, Shadow, clear
 from flownav.lab.optics.shot import Ground, Optic, Shot, blur_width_px, shoot, view_of
-from flownav.lab.optics.shutter import FlightMotion
 
 TAG = PadTarget(0.2)
 PLAIN = Ground(np.full((64, 64), 0.35, np.float32), 0.01)

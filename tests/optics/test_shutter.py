@@ -5,8 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.lab.optics.projection import Pose, image_point, pose_looking_down
-from flownav.lab.optics.shutter import FlightMotion, moved, part_time_s, row_time_s
+from flownav.lab.optics.projection import (
+    FlightMotion,
+    Pose,
+    image_point,
+    moved,
+    part_time_s,
+    pose_looking_down,
+    row_time_s,
+)
 from flownav.sensors.geometry import image_rate_rad_s
 from image_motion import CameraMotion, motion_field
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from flownav.campaigns.local import rows_of
 from flownav.campaigns.plan import planned
-from flownav.campaigns.rows import rows_of
 from flownav.core.errors import InputError
 from flownav.parts.examples.complementary import ComplementaryFilter
 from flownav.parts.flying import OwnPartsEngine, fly_parts, identities
@@ -77,7 +77,7 @@ def test_the_command_line_flies_a_filter_of_a_file(file, tmp_path):
 
 
 def test_a_campaigns_rows_are_the_flights_one_by_one_and_its_folder_names_the_parts():
-    from flownav.campaigns.engines.engine import Part
+    from flownav.campaigns.engines import Part
     from flownav.simulation.scenario import load_scenario
 
     plan = planned(

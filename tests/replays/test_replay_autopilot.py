@@ -15,7 +15,7 @@ from flownav.cli.replay import command as replay_command
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_body, to_earth
 from flownav.core.measurement import Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
-from flownav.scoring.autopilot import in_frame_of
+from flownav.scoring.path import in_frame_of
 from replay_logs import SyntheticLog, log_of_flight
 from ulog_files import START_US, ulog_of_flight
 

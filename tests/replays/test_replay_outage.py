@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flownav.scoring.alignment import align, velocity_of
-from flownav.scoring.outage import horizontal_rms, outage_error
+from flownav.scoring.reference import align, horizontal_rms, outage_error, velocity_of
 
 T = np.arange(0.0, 100.0, 0.1)
 PATH = np.column_stack([2.0 * T, -T])

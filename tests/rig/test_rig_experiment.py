@@ -15,8 +15,7 @@ from typer.testing import CliRunner
 from flownav.cli import rig as rig_command
 from flownav.core.errors import InputError
 from flownav.lab.optics.firmware import VERSIONS
-from flownav.lab.rig.campaign import run_campaign
-from flownav.lab.rig.experiment import RigLog, RigSettings, run_experiment
+from flownav.lab.rig.experiment import RigLog, RigSettings, run_campaign, run_experiment
 from flownav.lab.rig.instruments import gyro_at, messages, sonar_at
 from flownav.lab.rig.log_folder import COLUMNS
 

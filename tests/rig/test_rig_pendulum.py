@@ -10,14 +10,17 @@ from scipy.special import ellipk
 
 from flownav.core.errors import InputError
 from flownav.lab.optics.projection import ground_point
-from flownav.lab.rig.encoder import COUNTS_PER_REVOLUTION, SAMPLE_S, angle_and_rate, counts_of
-from flownav.lab.rig.excitation import EXCITATIONS, LARGEST_ANGLE_RAD, move, rod_length
+from flownav.lab.rig.instruments import COUNTS_PER_REVOLUTION, SAMPLE_S, angle_and_rate, counts_of
 from flownav.lab.rig.pendulum import (
+    EXCITATIONS,
     GRAVITY_M_S2,
+    LARGEST_ANGLE_RAD,
     STEP_S,
     half_sine,
     largest_speed,
+    move,
     push_for,
+    rod_length,
     sensor_place,
     sensor_pose,
     sensor_velocity,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.scoring.alignment import Alignment, align, velocity_of
+from flownav.scoring.reference import Alignment, align, velocity_of
 
 PATH = np.column_stack(
     [np.cos(np.arange(30.0)) * np.arange(30.0), np.sin(0.3 * np.arange(30.0)), 0.1 * np.arange(30.0)]

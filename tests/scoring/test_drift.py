@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flownav.core.measurement import Array
-from flownav.scoring.drift import Motion, end_drift, flight_of
+from flownav.scoring.reference import Motion, end_drift, flight_of
 
 NONE = np.zeros(0)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from flownav.scoring.nis import CHI_SQUARE_95, nis_of
+from flownav.scoring.consistency import CHI_SQUARE_95, nis_of
 
 
 def test_the_band_is_that_of_chi_square():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.scoring.outage import difference_at, horizontal_rms, outage_error
+from flownav.scoring.reference import difference_at, horizontal_rms, outage_error
 
 T_S = np.arange(0.0, 20.0, 0.1)
 STRAIGHT = np.column_stack([2.0 * T_S, -1.0 * T_S])  # 2 m/s north, 1 m/s west

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.scoring.drift import Drift
-from flownav.scoring.protection import exceeded_unsaid, protection_of
+from flownav.scoring.reference import Drift, exceeded_unsaid, protection_of
 
 T_S = np.arange(0.0, 10.0, 1.0)
 LEVELS_M = np.column_stack([np.full(10, 2.0), np.full(10, 1.0)])

@@ -10,11 +10,12 @@ import pytest
 from flownav.scoring.errors import (
     SCORE_COLUMNS,
     error_statistics,
+    percentile_of_paper,
+    published,
     score_block,
     scores_of_flight,
     scores_of_flights,
 )
-from flownav.scoring.paper_tables import percentile_of_paper, published
 from flownav.scoring.touchdown import TOUCHDOWN_COLUMNS
 
 

@@ -8,9 +8,8 @@ import pytest
 from flownav.campaigns.local import counted_steps, fly_many, fly_recorded, score_history
 from flownav.core.parameter_files import check, shipped
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
-from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, touchdown_rows
+from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, published, touchdown_rows
 from flownav.scoring.landings import column_of, succeeded
-from flownav.scoring.paper_tables import published
 from flownav.scoring.touchdown import TOUCHDOWN_COLUMNS, names_of
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import fly_blocks, fly_one

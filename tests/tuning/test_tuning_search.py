@@ -12,9 +12,8 @@ from flownav.core.measurement import COLUMNS, Sensor, Stream
 from flownav.logs.log import Log
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.studies.tuning.job import proposals
-from flownav.studies.tuning.judge import ACCEPTED, NOT_ACCEPTED, judge, judged
+from flownav.studies.tuning.judge import ACCEPTED, NOT_ACCEPTED, interval_of, judge, judged, resampled
 from flownav.studies.tuning.knobs import KNOBS, MOST_NOISE, knobs_of, limits_of, rounded, turned
-from flownav.studies.tuning.resampling import interval_of, resampled
 from flownav.studies.tuning.scores import Gains
 from flownav.studies.tuning.search import Found, search
 

@@ -11,7 +11,7 @@ import pytest
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor, Stream
 from flownav.logs.log import Log
-from flownav.studies.tuning.windows import GAP_SHARE, LEAST_JUDGES, split_flight, split_flights
+from flownav.studies.tuning.knobs import GAP_SHARE, LEAST_JUDGES, split_flight, split_flights
 
 
 def log_of(duration_s: float, landed_s: float | None = None) -> Log:

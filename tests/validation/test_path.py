@@ -16,7 +16,7 @@ from flownav.logs.csv_folder import read_csv_folder
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
-from flownav.studies.validation.flights import load_flights
+from flownav.studies.validation.drawn import load_flights
 from flownav.studies.validation.path import Lean, lean_of, path_of, upright
 
 VEHICLE = load_flights().vehicle

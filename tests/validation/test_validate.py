@@ -13,10 +13,9 @@ from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.log import Log
-from flownav.studies.validation.flights import load_flights
+from flownav.studies.validation.drawn import load_flights
 from flownav.studies.validation.job import Row, row_of, validate_log
-from flownav.studies.validation.page import page
-from flownav.studies.validation.words import MEANINGS, widened
+from flownav.studies.validation.page import MEANINGS, page, widened
 
 HEAD = 'schema_version = 1\nname = "made"\nprovenance = "made for a test"\n'
 VEHICLE = load_flights().vehicle

@@ -95,7 +95,7 @@ def pads() -> Figure:
 
 def pad_target() -> Figure:
     """The nested landing target as it is printed, and in frames of a camera from 6 m and from 2.5 m."""
-    from flownav.lab.optics.pad_target import PadTarget, printed_cells
+    from flownav.lab.optics.pad import PadTarget, printed_cells
     from flownav.lab.optics.pad_trial import CAMERAS, camera_flight, camera_named, frames_at, look
 
     target = PadTarget(1.0, "nested", 0)

@@ -18,7 +18,7 @@ from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.sheets import SensorSheets
 from flownav.simulation.dispersion import DispersionFile
 from flownav.simulation.scenario import Scenario
-from flownav.studies.validation.flights import ValidationFile
+from flownav.studies.validation.drawn import ValidationFile
 from flownav.vehicle.schema import MultirotorFile, VehicleFile
 
 INTRODUCTION = """# Keys of the parameter files

@@ -10,10 +10,10 @@ import numpy as np
 
 from flownav.api.record import Record
 from flownav.api.table import FRAMES
-from flownav.campaigns.again import record_again
-from flownav.campaigns.engines.engine import Engine
+from flownav.campaigns.engines import Engine
 from flownav.campaigns.measures import measured
 from flownav.campaigns.plan import Plan
+from flownav.campaigns.run import record_again
 from flownav.campaigns.store import RECORDS, REPORT, Dataset
 from flownav.core.errors import InputError
 from flownav.parts.flying import recording_of

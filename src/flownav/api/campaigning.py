@@ -18,13 +18,10 @@ from flownav.api.record import Record
 from flownav.api.scenario import Scenario, scenario_of
 from flownav.api.vehicle import Vehicle
 from flownav.api.words import call_of, require_from
-from flownav.campaigns.again import record_path
-from flownav.campaigns.engines.engine import Engine
-from flownav.campaigns.engines.named import engine_named
-from flownav.campaigns.figures import stop_of
-from flownav.campaigns.plan import MOST_FLIGHTS, Plan, Value, planned
-from flownav.campaigns.run import Progress, Watch, run_campaign
-from flownav.campaigns.sampling import SAMPLINGS, Sampling
+from flownav.campaigns.engines import Engine, engine_named
+from flownav.campaigns.measures import stop_of
+from flownav.campaigns.plan import MOST_FLIGHTS, SAMPLINGS, Plan, Sampling, Value, planned
+from flownav.campaigns.run import Progress, Watch, record_path, run_campaign
 from flownav.campaigns.store import RECORDS, SUMMARY, Store
 from flownav.campaigns.summary import WORST, summary_of
 from flownav.core.errors import InputError

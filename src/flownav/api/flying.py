@@ -19,9 +19,8 @@ from flownav.campaigns.local import fly_recorded, known_exactly, median_flight, 
 from flownav.core.provenance import called_as
 from flownav.parts.flying import fly_parts, fly_with, names_of
 from flownav.parts.protocols import Controller, Filter, Parts, SensorModel, VehicleModel
-from flownav.scoring.errors import scores_of_flights
-from flownav.scoring.paper_tables import percentile_of_paper, published
-from flownav.scoring.takeoffs import takeoff_of_flights
+from flownav.scoring.errors import percentile_of_paper, published, scores_of_flights
+from flownav.scoring.landings import takeoff_of_flights
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.engine import fly_one
 from flownav.simulation.ensemble import Ensemble

@@ -74,7 +74,7 @@ def identify_logs(
     from flownav.core.provenance import command_line
     from flownav.lab.identification.job import identify as findings_of
     from flownav.lab.identification.job import name_of
-    from flownav.lab.identification.orders import parse_order
+    from flownav.lab.identification.quantities import parse_order
     from flownav.lab.identification.sensor_file import sensor_entries
     from flownav.sensors.datasheet import load_sensor
 

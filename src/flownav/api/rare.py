@@ -12,8 +12,8 @@ from typing import Any
 from flownav.api.record import Record
 from flownav.campaigns.measures import MEASURES, Event, event_of
 from flownav.campaigns.plan import Plan, lands
+from flownav.campaigns.rare.branches import read_branch, replayed, write_branch
 from flownav.campaigns.rare.estimate import Rare, estimate_rare
-from flownav.campaigns.rare.replay import read_branch, replayed, write_branch
 from flownav.core.errors import InputError
 from flownav.core.files import written_whole
 

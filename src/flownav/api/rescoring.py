@@ -8,8 +8,7 @@ from flownav.api.given import columns_of_estimate
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, Record, Table
-from flownav.scoring.autopilot import columns_of
-from flownav.scoring.path import path_of, truth_alignment
+from flownav.scoring.path import columns_of, path_of, truth_alignment
 from flownav.scoring.recorded import at_instants, scores_of_other
 
 # tables that our filter wrote, or that lie in the frame of its estimate

@@ -99,7 +99,7 @@ class Sensor:
             >>> flownav.Sensor.load().facts
             {}
         """
-        from flownav.lab.identification.facts import facts_of
+        from flownav.lab.identification.findings import facts_of
 
         return {} if self.findings is None else facts_of(self.findings)
 

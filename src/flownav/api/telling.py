@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from flownav.campaigns.faults.flight_log import log_of
+from flownav.campaigns.faults.table import log_of
 from flownav.core.errors import InputError
 from flownav.core.record import Record
 from flownav.live.link import open_link

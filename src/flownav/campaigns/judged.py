@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaigns.local import counted_steps, score_history, takeoff_history
-from flownav.campaigns.rows import largest_horizontal_m
+from flownav.campaigns.local import counted_steps, largest_horizontal_m, score_history, takeoff_history
 from flownav.core.record import POSITION_NED, VELOCITY_BODY
 from flownav.core.text import finite, finite_or_none
 from flownav.scoring.consistency import (

@@ -1,19 +1,36 @@
-"""Flights on this machine, scored as they land."""
+"""Flights on this machine, scored as they land, and a scenario's envelope."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.parameter_files import check
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
-from flownav.scoring.errors import MAX_POSITION_ERROR, SCORE_COLUMNS, score_block, scores_of_flight
-from flownav.scoring.paper_tables import published
-from flownav.scoring.takeoffs import takeoff_of_flight, takeoffs
+from flownav.scoring.consistency import largest_horizontal_error
+from flownav.scoring.errors import (
+    MAX_POSITION_ERROR,
+    SCORE_COLUMNS,
+    published,
+    score_block,
+    scores_of_flight,
+    touchdown_rows,
+)
+from flownav.scoring.landings import (
+    CONTACT_DISTANCE,
+    REST_DISTANCE,
+    crashed,
+    radius,
+    success,
+    takeoff_of_flight,
+    takeoffs,
+)
 from flownav.scoring.touchdown import Limits, motion_of, touchdowns
-from flownav.simulation.assemble import Setup
+from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.engine import Flown, fly_blocks, fly_written
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.flight_record import record_of
@@ -198,3 +215,69 @@ def median_flight(scores: Array) -> int:
     """The index of the flight whose largest position error is the (lower) median."""
     order = np.argsort(scores[:, MAX_POSITION_ERROR], kind="stable")
     return int(order[(len(order) - 1) // 2])
+
+
+# -- rows of a campaign ------------------------------------------------------------------------------------------
+def rows_of(flight: Flight, history: Array) -> Array:
+    """The rows of a block's flights, (lanes, len(ROW_COLUMNS)); history (epochs, len(HISTORY), lanes)."""
+    return np.column_stack([score_history(flight, history), largest_horizontal_m(flight, history)])
+
+
+def largest_horizontal_m(flight: Flight, history: Array) -> Array:
+    """The largest horizontal error in flight of what each flight was flown on [m], (lanes,).
+
+    It is relative to where the vehicle takes its pad to be, and counted from there on.
+    """
+    home, epoch = home_epoch(flight), np.arange(len(history))[:, None]
+    aloft = (history[:, column("truth", "contact_n")] <= 0.0) & (epoch >= (home or 0))
+    counted = counted_steps(flight, history) * aloft
+    estimate, truth = history[:, columns("estimate", POSITION_NED)], history[:, columns("truth", POSITION_NED)]
+    return largest_horizontal_error(estimate, truth, home, counted)
+
+
+# -- over the wind -----------------------------------------------------------------------------------------------
+def directions_deg(count: int) -> list[float]:
+    """So many directions, even over the circle, from north on."""
+    return [360.0 * k / count for k in range(count)]
+
+
+def fly_envelope(
+    scenario: Scenario,
+    speeds_m_s: Sequence[float],
+    directions: Sequence[float],
+    seed: int,
+    flights: int,
+    *,
+    dispersed: bool,
+    on_progress: Callable[[int], None] = lambda flown: None,
+) -> list[dict[str, Any]]:
+    """A row for each speed at 20 ft [m/s] and direction [deg], of `flights` flights, the same noise in each.
+
+    dispersed: of an ensemble whose vehicle and sensors are drawn; the wind is the cell's, and is not.
+    """
+    rows = []
+    for speed in speeds_m_s:
+        for direction in directions:
+            setup = in_wind(scenario, speed, direction)
+            ensemble = setup.ensemble() if dispersed else None
+            scores = fly_many(setup.flight, seed, flights, ensemble=ensemble, on_progress=on_progress)
+            landings = touchdown_rows(scores)
+            rows.append(
+                {
+                    "speed_20ft_m_s": speed,
+                    "from_direction_deg": direction,
+                    "success": success(landings),
+                    "crashed": int(crashed(landings).sum()),
+                    "contact": radius(landings, CONTACT_DISTANCE),
+                    "rest": radius(landings, REST_DISTANCE),
+                }
+            )
+    return rows
+
+
+def in_wind(scenario: Scenario, speed_m_s: float, direction_deg: float) -> Setup:
+    """The scenario in this wind, which its dispersion leaves alone; gusts as the scenario has them."""
+    wind = scenario.wind.model_dump() | {"speed_20ft_m_s": speed_m_s, "from_direction_deg": direction_deg}
+    setup = assemble(check(scenario.model_dump(exclude_unset=True) | {"wind": wind}, Scenario, scenario.name))
+    still = {name: entry for name, entry in setup.dispersion.items() if not name.startswith("wind.")}
+    return replace(setup, dispersion=still)

@@ -23,7 +23,8 @@ from flownav.core.compile import announce_compilation
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.core.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY
-from flownav.lab.optics.pad_target import BOARD_CELLS, NESTED_CELLS, TAG_CELLS, PadTarget
+from flownav.lab.optics.pad import BOARD_CELLS, NESTED_CELLS, TAG_CELLS, PadTarget
+from flownav.lab.optics.pad_fix import fix_error, is_wrong, truth_of
 from flownav.lab.optics.pad_trial import (
     CameraFlight,
     camera_flight,
@@ -34,9 +35,7 @@ from flownav.lab.optics.pad_trial import (
     take_frame,
     whole_in_view,
 )
-from flownav.lab.optics.pad_truth import fix_error, is_wrong, truth_of
-from flownav.lab.optics.projection import Pose
-from flownav.lab.optics.shutter import FlightMotion
+from flownav.lab.optics.projection import FlightMotion, Pose
 from flownav.sensors.pad_camera import PadCameraParameters, angle_noise, distance_noise
 from flownav.sensors.pad_camera_sheet import PadCameraSheet
 from flownav.simulation.assemble import Setup

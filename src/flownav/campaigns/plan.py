@@ -1,4 +1,9 @@
-"""What a campaign flies: cells, each a scenario with its values of what is swept, and how their flights are drawn."""
+"""What a campaign flies: cells, each a scenario with its values of what is swept, and how their flights are drawn.
+
+A design gives the uniforms of an input, a number in (0, 1) for each flight, as a function of (seed, flight, name) and
+of how many flights the campaign has. Hypercubes and sequences are of `TOGETHER` flights each, one after the other and
+independent of each other: a flight's inputs can be had without those of a million others.
+"""
 
 from __future__ import annotations
 
@@ -7,22 +12,71 @@ import itertools
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, Literal, Protocol
 
-from flownav.campaigns.figures import FIGURES, stop_of
-from flownav.campaigns.measures import MEASURES
-from flownav.campaigns.sampling import Sampling, design_of
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.campaigns.measures import FIGURES, MEASURES, stop_of
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check
 from flownav.core.provenance import code_sha256
 from flownav.core.version import __version__
 from flownav.simulation.assemble import Setup, assemble
+from flownav.simulation.dispersion import Design, uniforms
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.truth import SensorFault
 
+Array = NDArray[np.float64]
+
+TOGETHER = 1024  # flights of one hypercube, or of one scrambled sequence
+INSIDE = 2.0**-53  # of (0, 1): a point may lie on the edge, where a distribution may be infinite
+SAMPLINGS = ("plain", "latin", "sobol")
+Sampling = Literal["plain", "latin", "sobol"]
+
+
+class Spread:
+    """A design of scipy.stats.qmc over the named inputs, for flights 0 to `flights - 1`; later ones are plain."""
+
+    def __init__(self, kind: Literal["latin", "sobol"], names: Sequence[str], flights: int) -> None:
+        self.kind, self.flights = kind, flights
+        self.column = {name: column for column, name in enumerate(sorted(names))}
+        self._points = lru_cache(maxsize=8)(self._drawn)
+
+    def uniforms(self, seed: int, flights: Sequence[int], name: str) -> Array:
+        """The numbers of these flights."""
+        found = uniforms(seed, flights, name)
+        index, column = np.asarray(flights), self.column[name]
+        for lot in np.unique(index[index < self.flights] // TOGETHER):
+            own = (index // TOGETHER == lot) & (index < self.flights)
+            found[own] = self._points(seed, int(lot))[index[own] - lot * TOGETHER, column]
+        return found
+
+    def _drawn(self, seed: int, lot: int) -> Array:
+        """The points of one lot, (flights in it, inputs)."""
+        from scipy.stats import qmc
+
+        count = min(TOGETHER, self.flights - lot * TOGETHER)
+        rng = np.random.default_rng([seed, lot])
+        engine: Any
+        if self.kind == "latin":
+            engine = qmc.LatinHypercube(len(self.column), rng=rng)
+            points = engine.random(count)
+        else:
+            engine = qmc.Sobol(len(self.column), scramble=True, rng=rng)
+            points = engine.random_base2(TOGETHER.bit_length() - 1)[:count]
+        return np.asarray(np.clip(points, INSIDE, 1.0 - INSIDE))
+
+
+def design_of(sampling: Sampling, names: Sequence[str], flights: int) -> Design | None:
+    """The design of a sampling; None: by the noise counter, each flight independent of all others."""
+    return None if sampling == "plain" or not names else Spread(sampling, names, flights)
+
+
+# -- cells -------------------------------------------------------------------------------------------------------
 SCHEMA_VERSION = 1
 MOST_CELLS = 10_000
 MOST_FLIGHTS = 100_000_000

@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaigns.sampling import INSIDE
+from flownav.campaigns.plan import INSIDE
 from flownav.simulation.dispersion import Design, Distribution
 
 Array = NDArray[np.float64]

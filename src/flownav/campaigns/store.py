@@ -14,7 +14,7 @@ import fcntl
 import json
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -22,13 +22,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaigns import arrow
-from flownav.campaigns.measures import ROW_COLUMNS
+from flownav.campaigns.measures import ROW_COLUMNS, measured
 from flownav.campaigns.plan import Plan
 from flownav.core.errors import InputError
 from flownav.core.files import written_whole
 from flownav.core.guard import an_output_folder
-from flownav.scoring.errors import SCORE_COLUMNS
+from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
+from flownav.scoring.landings import BROKEN, verdict_of
+from flownav.scoring.touchdown import LIMITED_BY, names_of
 
 Array = NDArray[np.float64]
 
@@ -144,22 +145,22 @@ class Dataset:
         """A cell's flights as an Arrow table, flight by flight."""
         import pyarrow as pa
 
-        tables = [arrow.read(path, columns) for path in self.parts(cell)]
+        tables = [read(path, columns) for path in self.parts(cell)]
         return pa.concat_tables(tables).unify_dictionaries() if tables else pa.table({})
 
     def column(self, cell: int, name: str) -> NDArray[Any]:
         """One column of a cell, (flights,)."""
-        return arrow.column(self.table(cell, [name]), name)
+        return column(self.table(cell, [name]), name)
 
     def rows(self, cell: int) -> Array:
         """The scores of a cell, (flights, len(ROW_COLUMNS)): flights in order."""
         table = self.table(cell, list(ROW_COLUMNS))
-        return np.column_stack([arrow.column(table, name) for name in ROW_COLUMNS])
+        return np.column_stack([column(table, name) for name in ROW_COLUMNS])
 
     def rows_of_part(self, cell: int, part: int) -> Array:
         """The scores of one file."""
-        table = arrow.read(part_path(self.folder, cell, part), ROW_COLUMNS)
-        return np.column_stack([arrow.column(table, name) for name in ROW_COLUMNS])
+        table = read(part_path(self.folder, cell, part), ROW_COLUMNS)
+        return np.column_stack([column(table, name) for name in ROW_COLUMNS])
 
     def scores(self, cell: int) -> Array:
         """The same as (flights, len(SCORE_COLUMNS))."""
@@ -188,3 +189,84 @@ def _write_text(path: Path, text: str) -> Path:
     with written_whole(path) as temporary:
         temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
     return path
+
+
+# -- columns between NumPy and Arrow -----------------------------------------------------------------------------
+KINDS = {"d": "float64", "i": "int32", "l": "int64", "?": "bool"}
+
+
+def numbers(values: NDArray[Any]) -> Any:
+    """An Arrow array of a NumPy array of float64, int32 or int64, (rows,), which it keeps alive."""
+    import pyarrow as pa
+
+    values = np.ascontiguousarray(values)
+    kind = getattr(pa, KINDS[values.dtype.char])()
+    return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(values)])
+
+
+def words(values: Sequence[str]) -> Any:
+    """An Arrow array of words, each kept once."""
+    import pyarrow as pa
+
+    known = {word: place for place, word in enumerate(dict.fromkeys(values))}
+    text = [word.encode() for word in known]
+    ends = np.concatenate([[0], np.cumsum([len(word) for word in text])]).astype(np.int32)
+    book = pa.Array.from_buffers(pa.utf8(), len(text), [None, pa.py_buffer(ends), pa.py_buffer(b"".join(text))])
+    return pa.DictionaryArray.from_arrays(numbers(np.array([known[word] for word in values], np.int32)), book)
+
+
+def column(table: Any, name: str) -> NDArray[Any]:
+    """A column as NumPy, (rows,): numbers, or words as objects. KeyError without it."""
+    if str(table.schema.field(name).type).startswith("dictionary"):
+        return np.array(table.column(name).to_pylist(), object)
+    parts = []
+    for chunk in table.column(name).chunks:
+        kind = np.dtype(str(chunk.type).replace("double", "float64"))
+        parts.append(np.frombuffer(chunk.buffers()[1], kind, len(chunk), chunk.offset * kind.itemsize))
+    return np.concatenate(parts) if parts else np.zeros(0)
+
+
+def read(path: Path, columns: Sequence[str] | None = None) -> Any:
+    """A Parquet file's columns as a table."""
+    import pyarrow.parquet as pq
+
+    with pq.ParquetFile(path) as file:
+        return file.read(list(columns) if columns is not None else None)
+
+
+# -- a flight as a row -------------------------------------------------------------------------------------------
+INPUT = "input."  # before the name of a dispersed number
+SWEPT = "set."  # before the name of what the campaign sweeps
+
+
+def limited_by(row: Array) -> str:
+    """What limited a flight: what broke it, or the largest part of how far off it touched."""
+    landing = touchdown_rows(row[None, : len(SCORE_COLUMNS)])[0]
+    if broken := names_of(landing[BROKEN]):
+        return ", ".join(broken)
+    parts = {name: float(measured(f"touchdown.{name}", row[None, :])[0]) for name in LIMITED_BY}
+    if not np.isfinite(list(parts.values())).all():
+        return verdict_of(landing)
+    return max(parts, key=lambda name: parts[name]).removesuffix("_m")
+
+
+def table_of(cell: int, values: dict[str, Any], first: int, rows: Array, inputs: Mapping[str, Sequence[float]]) -> Any:
+    """The rows of flights from number `first` on as an Arrow table."""
+    import pyarrow as pa
+
+    landings = touchdown_rows(rows[:, : len(SCORE_COLUMNS)])
+    count = len(rows)
+    swept = {
+        name: words([value] * count) if isinstance(value, str) else numbers(np.full(count, float(value)))
+        for name, value in values.items()
+    }
+    names = {
+        "cell": numbers(np.full(count, cell, np.int32)),
+        "flight": numbers(np.arange(first, first + count, dtype=np.int64)),
+        **{f"{SWEPT}{name}": column for name, column in swept.items()},
+        "verdict": words([verdict_of(row) for row in landings]),
+        "limited_by": words([limited_by(row) for row in rows]),
+        **{name: numbers(rows[:, i]) for i, name in enumerate(ROW_COLUMNS)},
+        **{f"{INPUT}{name}": numbers(np.asarray(drawn, float)) for name, drawn in inputs.items()},
+    }
+    return pa.table(names)

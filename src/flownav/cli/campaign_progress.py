@@ -28,7 +28,7 @@ class Shown:
 
 def figure_words(progress: Progress) -> str:
     """The figure that is followed, with its interval."""
-    from flownav.campaigns.figures import FIGURES
+    from flownav.campaigns.measures import FIGURES
 
     if progress.interval is None:
         return ""

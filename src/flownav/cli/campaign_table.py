@@ -7,7 +7,7 @@ from typing import Any
 
 import typer
 
-from flownav.campaigns.again import place_of
+from flownav.campaigns.run import place_of
 
 
 def show(summary: dict[str, Any], folder: Path, rate: float | None, records: list[str]) -> None:

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.campaigns.engines.named import engine_named, require_engine
 from flownav.cli.choices import REQUIREMENTS, argument, option
 from flownav.cli.options import KEPT, EngineOption, JsonOption, RecordsOption, VehicleOption, out_option
 from flownav.cli.output import emit
 from flownav.core.errors import InputError
 
 if TYPE_CHECKING:
-    from flownav.campaigns.engines.engine import Engine
+    from flownav.campaigns.engines import Engine
     from flownav.campaigns.plan import Plan
     from flownav.campaigns.requirement import Requirement
 
@@ -41,6 +40,7 @@ def command(
     """Fly what a requirement asks for: pass, fail or not shown, with its risk; exit status 1 unless it passes."""
     from flownav.campaigns.certification.cells import plan_of
     from flownav.campaigns.certification.certify import TOLD
+    from flownav.campaigns.engines import engine_named, require_engine
     from flownav.campaigns.ranking import LEAST
     from flownav.campaigns.requirement import load_requirement
     from flownav.cli.output import require_between
@@ -96,7 +96,7 @@ def _fly(
 
 def _say_plan(asked: Requirement, as_json: bool) -> None:
     """How many flights each requirement needs, by the failures that it may have, and how many the file asks for."""
-    from flownav.campaigns.certification.judgement import PLANS
+    from flownav.campaigns.certification.envelope import PLANS
     from flownav.campaigns.requirement import needed_by
 
     rows = [

@@ -55,8 +55,7 @@ def command(
     from flownav.core.measurement import Sensor
     from flownav.logs.open_log import open_flight
     from flownav.replays.session import table_windows
-    from flownav.studies.compare.job import compare_log, windows_of
-    from flownav.studies.compare.rows import names_of
+    from flownav.studies.compare.job import compare_log, names_of, windows_of
 
     if len(logs) > 1 and all(path.suffix == ".fnr" for path in logs) and not (settings or sensor or outages):
         return _records(logs, None if out is None else place(out, *logs, force=force), as_json=as_json)
@@ -83,8 +82,8 @@ def _records(paths: list[Path], out: Path | None, *, as_json: bool) -> None:
     """Records beside each other, as they are: nothing is replayed."""
     from flownav.core.record import Record
     from flownav.report.records import write_records
+    from flownav.studies.compare.job import names_of
     from flownav.studies.compare.records import HEADINGS, cells, errors_in_time, rows_of_records
-    from flownav.studies.compare.rows import names_of
 
     named = list(zip(names_of(paths), [Record.load(path) for path in paths], strict=True))
     rows = rows_of_records(named)
@@ -108,8 +107,7 @@ def settings_asked(asked: list[str], sensor: Path | None) -> list[Setting]:
     from flownav.navigation.settings_of import settings_of
     from flownav.replays.prepare import ReplayOptions
     from flownav.sensors.datasheet import identified_flow, load_sensor
-    from flownav.studies.compare.job import Setting
-    from flownav.studies.compare.rows import names_of
+    from flownav.studies.compare.job import Setting, names_of
 
     twice = sorted({name for name in asked if asked.count(name) > 1})
     if twice:
@@ -129,7 +127,7 @@ def settings_asked(asked: list[str], sensor: Path | None) -> list[Setting]:
 def _write(rows: list[dict[str, Any]], path: Path) -> dict[str, str]:
     """The page; where it lies. InputError where it cannot."""
     from flownav.report.comparison import write_comparison
-    from flownav.studies.compare.rows import HEADINGS, cells
+    from flownav.studies.compare.job import HEADINGS, cells
 
     with _writing(path):
         write_comparison(HEADINGS, [cells(row) for row in rows], rows, path)
@@ -182,7 +180,7 @@ def _print(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from flownav.studies.compare.rows import cells
+    from flownav.studies.compare.job import cells
 
     console = Console(markup=False, highlight=False)
     table = Table(*SHORT, title=TITLE, box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))

@@ -35,7 +35,7 @@ def command(
     as_json: JsonOption = False,
 ) -> None:
     """Fly a scenario in winds of many speeds and directions: a table and a polar map of the share that landed."""
-    from flownav.campaigns.envelope import directions_deg, fly_envelope
+    from flownav.campaigns.local import directions_deg, fly_envelope
     from flownav.cli.lists import numbers
     from flownav.cli.output import place, progress, require_between
     from flownav.core.errors import InputError

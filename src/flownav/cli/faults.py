@@ -14,7 +14,7 @@ from flownav.core.errors import InputError
 if TYPE_CHECKING:
     from flownav.campaigns.faults.catalogue import Fault
     from flownav.campaigns.faults.flown import Row as FlownRow
-    from flownav.campaigns.faults.navigated import Navigate
+    from flownav.campaigns.faults.navigator import Navigate
     from flownav.campaigns.faults.table import Row
 
 HEIGHTS_M = (0.3, 20.0)
@@ -54,8 +54,7 @@ def command(
     as_json: JsonOption = False,
 ) -> None:
     """Sensors that fail on a landing: whether the vehicle lands, goes around or crashes, and what is said of it."""
-    from flownav.campaigns.faults.catalogue import faults_named
-    from flownav.campaigns.faults.laws import NOT_FLOWN
+    from flownav.campaigns.faults.catalogue import NOT_FLOWN, faults_named
     from flownav.cli.lists import numbers, words
     from flownav.cli.output import require_between
 

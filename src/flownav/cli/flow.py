@@ -40,8 +40,7 @@ def command(
     """Flow and quality from each frame to the next, with the historical firmware of your choice."""
     from flownav.core.compile import announce_compilation
     from flownav.lab.optics.flow import flow_of_frames
-    from flownav.lab.optics.frame_files import read_frames
-    from flownav.lab.optics.frame_window import binned, middle
+    from flownav.lab.optics.frame_files import binned, middle, read_frames
 
     turned = _rates(rates) if rates else None
     grey = binned(read_frames(frames), bin_by)

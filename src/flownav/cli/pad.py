@@ -14,7 +14,7 @@ from flownav.cli.output import emit
 from flownav.core.text import finite
 
 if TYPE_CHECKING:
-    from flownav.lab.optics.pad_target import PadTarget
+    from flownav.lab.optics.pad import PadTarget
     from flownav.lab.optics.pad_trial import Trials
 
 HEIGHTS = ["0.15,0.175,0.2,0.3,0.5,1,2,3,4"]
@@ -70,7 +70,7 @@ def command(
     """Where the pad is from the lens: angles, distance, heading; and how well, by height."""
     from flownav.cli.lists import numbers
     from flownav.cli.output import folder_place, place
-    from flownav.lab.optics.pad_target import PadTarget, checked
+    from flownav.lab.optics.pad import PadTarget, checked
     from flownav.lab.optics.pad_trial import Trials
 
     target = checked(PadTarget(side, pattern, code))
@@ -91,7 +91,7 @@ def command(
 
 def _print_target(target: PadTarget, picture: Path, as_json: bool) -> None:
     """The target as a picture of its true size."""
-    from flownav.lab.optics.pad_target import print_target
+    from flownav.lab.optics.pad import print_target
 
     print_target(target, picture)
     facts: dict[str, Any] = {"target": target._asdict(), "picture": str(picture)}

@@ -80,7 +80,7 @@ def _swung(settings: RigSettings, heights_m: list[float], folder: Path) -> list[
     from flownav.cli.output import progress
     from flownav.core.compile import announce_compilation
     from flownav.core.provenance import command_line
-    from flownav.lab.rig.campaign import run_campaign
+    from flownav.lab.rig.experiment import run_campaign
     from flownav.lab.rig.log_folder import check_rig_folder, run_folders, write_rig_folder
 
     count = len(heights_m) * settings.runs

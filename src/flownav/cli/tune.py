@@ -30,8 +30,7 @@ def command(
     from flownav.core.provenance import command_line
     from flownav.logs.open_log import open_flight
     from flownav.navigation.settings import NavigatorSettingsFile
-    from flownav.studies.tuning.job import runs_expected, tune
-    from flownav.studies.tuning.settings_file import write_settings
+    from flownav.studies.tuning.job import runs_expected, tune, write_settings
 
     path = out or Path("out/settings.toml")
     if path.suffix != ".toml":
@@ -86,8 +85,8 @@ def _print(tuned: Tuned, facts: dict[str, Any]) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from flownav.studies.tuning.job import gain_words
     from flownav.studies.tuning.scores import UNITS
-    from flownav.studies.tuning.settings_file import gain_words
 
     console = Console(markup=False, highlight=False)
     if tuned.proposed:

@@ -37,7 +37,7 @@ def command(
     from flownav.cli.output import place, progress, require_between
     from flownav.core.errors import InputError, VerdictError
     from flownav.core.guard import an_input, written_whole
-    from flownav.studies.validation.flights import load_flights
+    from flownav.studies.validation.drawn import load_flights
     from flownav.studies.validation.job import replays_of, validate
     from flownav.studies.validation.page import page
 
@@ -69,7 +69,7 @@ def _show(rows: list[Row]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from flownav.studies.validation.words import TOO_KIND, number, said, verdicts, widened
+    from flownav.studies.validation.page import TOO_KIND, number, said, verdicts, widened
 
     table = Table(title="Recorded flights, and the same paths with simulated sensors", title_justify="left")
     for name in ("log", "figure"):

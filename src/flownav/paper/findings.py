@@ -14,7 +14,7 @@ from flownav.paper.flights import Flights
 from flownav.paper.laboratory import Laboratory, delay_s
 from flownav.paper.published import HEIGHTS_M, RELATION_FITS, ErrorRow
 from flownav.report.panels import listed
-from flownav.scoring import paper_tables
+from flownav.scoring import errors
 
 FIT_TOLERANCE = 6.0
 LARGEST_TOLERANCE = 0.20
@@ -225,7 +225,7 @@ def of_flights(flights: Flights) -> list[Finding]:
 
 def circular(flights: Flights) -> str:
     """Why positions that agree with Tables 5 and 6 say little: where the white GPS noise comes from."""
-    table_5 = paper_tables.published(5)
+    table_5 = errors.published(5)
     assert table_5 is not None
     printed = float(table_5["states"][BACK_SOLVED_STATE]["std_error"])
     leaves = float(flights.scores["states"][BACK_SOLVED_STATE]["std_error"]["median"]) / flights.white_noise_m

@@ -15,11 +15,9 @@ import numpy as np
 
 from flownav.core.measurement import Array
 from flownav.lab.identification.experiment import Experiment, experiment
-from flownav.lab.identification.output_error import Fit, Structure, fit, simulate
+from flownav.lab.identification.output_error import Fit, Structure, fit, fit_percent, simulate
 from flownav.lab.identification.quantities import Excitation, excitation, latency_s
-from flownav.lab.identification.statistics import fit_percent
-from flownav.lab.rig.campaign import run_campaign
-from flownav.lab.rig.experiment import RigLog, RigSettings
+from flownav.lab.rig.experiment import RigLog, RigSettings, run_campaign
 from flownav.paper import published
 from flownav.paper.published import HEIGHTS_M, MODELS, ErrorRow
 from flownav.sensors.datasheet import Dynamics

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flownav.lab.rig.excitation import DAMPING_1_S
-from flownav.lab.rig.pendulum import largest_speed
+from flownav.lab.rig.pendulum import DAMPING_1_S, largest_speed
 from flownav.paper import published
 from flownav.paper.findings import FIT_TOLERANCE
 from flownav.paper.laboratory import Identified, Laboratory, Run, delay_s, identified

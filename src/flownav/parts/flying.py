@@ -16,12 +16,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from flownav.campaigns.again import Recording
-from flownav.campaigns.engines.engine import Engine, Part
-from flownav.campaigns.engines.local import Local
-from flownav.campaigns.local import fly_recorded, record_flown
+from flownav.campaigns.engines import Engine, Local, Part
+from flownav.campaigns.local import fly_recorded, record_flown, rows_of
 from flownav.campaigns.plan import Ready
-from flownav.campaigns.rows import rows_of
+from flownav.campaigns.run import Recording
 from flownav.core.compile import LANES, ONE_LANE, announce_compilation
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from flownav.core.measurement import Array, Sensor
 from flownav.logs.log import Log
-from flownav.scoring.drift import flight_of
+from flownav.scoring.reference import flight_of
 
 ON_THE_GROUND = 20  # readings of a range that starts on the ground
 LIFTED_M = 0.3  # a sonar's noise and a landing gear's spring are less

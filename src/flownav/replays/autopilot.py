@@ -9,7 +9,7 @@ from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import Table
 from flownav.logs.log import Log
 from flownav.replays.prepare import GPS
-from flownav.scoring.autopilot import autopilot_errors, in_frame_of
+from flownav.scoring.path import autopilot_errors, in_frame_of
 
 
 def autopilot_path(log: Log, gps_delay_s: float, t_s: Array, position: Array) -> Table | None:

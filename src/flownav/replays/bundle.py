@@ -17,7 +17,7 @@ from flownav.navigation.flags import flagged, flags_of
 from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
 from flownav.replays.autopilot import autopilot_path
 from flownav.replays.session import Replay
-from flownav.scoring.alignment import velocity_of
+from flownav.scoring.reference import velocity_of
 
 KEPT = (
     Sensor.GPS_POSITION,

@@ -18,9 +18,8 @@ from flownav.navigation.tables import Written, estimate_table
 from flownav.replays.airborne import airborne_of
 from flownav.scoring.consistency import consistency_of
 from flownav.scoring.coverage import coverage_of
-from flownav.scoring.drift import drift_of
 from flownav.scoring.path import motion_of, truth_motion
-from flownav.scoring.protection import protection_of
+from flownav.scoring.reference import drift_of, protection_of
 
 NO_REJECTION = (Reason.FUSED, Reason.DATUM)
 TESTED = (Reason.FUSED, Reason.INNOVATION_GATE)

@@ -38,12 +38,10 @@ from flownav.replays.judged import (
 from flownav.replays.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replays.sentinel import Finding, findings
 from flownav.replays.unfused import unfused
-from flownav.scoring.alignment import Alignment
-from flownav.scoring.autopilot import columns_of
 from flownav.scoring.coverage import silences
-from flownav.scoring.outage import OutageError
 from flownav.scoring.path import (
     References,
+    columns_of,
     end_drift_of,
     motion_of,
     outage_of,
@@ -53,6 +51,7 @@ from flownav.scoring.path import (
     truth_scores,
     velocity_rms,
 )
+from flownav.scoring.reference import Alignment, OutageError
 
 HORIZONTAL = (*GPS, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 LONGEST_TABLE = 2000

@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.scoring.errors import STATES
-from flownav.scoring.nis import nis_of
 
 Array = NDArray[np.float64]
 
@@ -241,3 +240,25 @@ def largest_horizontal_error(estimate: Array, truth: Array, home: int | None, co
 def _root(squares: Array, steps: Array) -> Array:
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(np.sqrt(squares / steps))
+
+
+# -- normalised innovations squared of one sensor ----------------------------------------------------------------
+CHI_SQUARE_95 = 3.841458820694124  # one degree of freedom
+
+
+class Nis(NamedTuple):
+    """Of one sensor's scalar components: how many were tested, the mean (1 where the filter is right), and the share
+    inside the 95 % band of chi-square with one degree of freedom (0.95 where it is right)."""
+
+    tested: int
+    mean: float
+    inside_fraction: float
+
+
+def nis_of(innovation: Array, innovation_variance: Array) -> Nis | None:
+    """The NIS of tested components, rejected ones among them, (n,) each; None where there is none."""
+    known = np.isfinite(innovation) & np.isfinite(innovation_variance) & (innovation_variance > 0.0)
+    if not known.any():
+        return None
+    squares = innovation[known] ** 2 / innovation_variance[known]
+    return Nis(int(known.sum()), float(squares.mean()), float(np.mean(squares <= CHI_SQUARE_95)))

@@ -10,13 +10,11 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.measurement import COLUMNS, Array, Sensor
 from flownav.core.record import POSITION_NED, PROTECTION_LEVELS, QUATERNION, VELOCITY_BODY, Column, Record
-from flownav.scoring.autopilot import columns_of
 from flownav.scoring.consistency import consistency_of
-from flownav.scoring.drift import drift_of
 from flownav.scoring.errors import MAX_POSITION_ERROR, STATES, STATISTICS, score_block, scores_of_flight
-from flownav.scoring.path import References, end_drift_of, motion_of, path_scores, truth_motion
-from flownav.scoring.protection import protection_of
-from flownav.scoring.takeoffs import takeoff_of_flight, takeoffs
+from flownav.scoring.landings import takeoff_of_flight, takeoffs
+from flownav.scoring.path import References, columns_of, end_drift_of, motion_of, path_scores, truth_motion
+from flownav.scoring.reference import drift_of, protection_of
 from flownav.scoring.touchdown import Limits, touchdowns
 from flownav.scoring.touchdown import motion_of as truth_in_motion
 

@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaigns.faults.catalogue import Fault
-from flownav.campaigns.faults.laws import law_of
+from flownav.campaigns.faults.catalogue import Fault, law_of
 from flownav.campaigns.faults.table import (
     BASE,
     CLIMB_M_S,

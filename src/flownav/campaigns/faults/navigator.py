@@ -1,21 +1,23 @@
-"""The navigator on trial, behind a horizon, told what the datasheets of the vehicle's sensors state."""
+"""The navigator on trial, behind a horizon, told what the datasheets of the sensors state, and what it gives back."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from flownav.campaigns.faults.arrival import as_fed, stamped_ahead
-from flownav.campaigns.faults.navigated import Event, Navigate, Navigated, Offers
+from flownav.campaigns.faults.inject import as_fed, stamped_ahead
 from flownav.core.compile import announce_compilation
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array, EventQueue, Sensor, Stream
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
 from flownav.navigation.feed import equipment_of
-from flownav.navigation.flags import flags_of
+from flownav.navigation.flags import Flag, flags_of
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.rows import EstimateRow, InnovationRow
 from flownav.navigation.settings_of import Told
@@ -25,6 +27,52 @@ from flownav.replays.prepare import Prepared, ReplayOptions, prepare
 from flownav.sensors.datasheet import IdentifiedFlow
 from flownav.simulation.assemble import Setup
 
+
+class Offers(NamedTuple):
+    """One row for each component of a reading that the navigator was given and judged.
+
+    t_s (m,): the reading's time stamp, as in the stream that was handed in (not less its delay). sensor (m,): of
+    measurement.Sensor. component (m,): its number in the reading. fused (m,): whether it moved the state or set a
+    datum. reason (m,): the label where it was not.
+    """
+
+    t_s: Array
+    sensor: NDArray[np.int64]
+    component: NDArray[np.int64]
+    fused: NDArray[np.bool_]
+    reason: NDArray[np.str_]
+
+
+class Event(NamedTuple):
+    """A happening: a reset, a datum, a flag raised or taken down. source: "gps", "flow", "range", ... or "filter"."""
+
+    t_s: float
+    source: str
+    kind: str
+
+
+@dataclass(frozen=True)
+class Navigated:
+    """What a navigator made of a log.
+
+    t_s (n,) increasing, the instants that the estimates describe; position_ned_m and sigma_ned_m (n, 3) in the log's
+    local frame, one standard deviation each; offers, events, flags in any order. levels_m (n, 2): protection levels,
+    horizontal and vertical; None where the navigator states none.
+    """
+
+    t_s: Array
+    position_ned_m: Array
+    sigma_ned_m: Array
+    offers: Offers
+    events: tuple[Event, ...] = ()
+    flags: tuple[Flag, ...] = ()
+    levels_m: Array | None = None
+
+
+Navigate = Callable[[Mapping[Sensor, Stream]], Navigated]
+
+
+# -- the navigator -----------------------------------------------------------------------------------------------
 TAKEN_IN = (Reason.FUSED, Reason.DATUM)
 
 

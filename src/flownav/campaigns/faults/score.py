@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaigns.faults.navigated import Navigated
+from flownav.campaigns.faults.navigator import Navigated
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
 from flownav.core.text import finite_or_none

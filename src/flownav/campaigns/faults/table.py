@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from flownav.campaigns.faults.catalogue import Fault
-from flownav.campaigns.faults.flight_log import log_of
-from flownav.campaigns.faults.navigated import Navigate
+from flownav.campaigns.faults.navigator import Navigate
 from flownav.campaigns.faults.score import FaultScores, score
 from flownav.campaigns.local import fly_recorded
-from flownav.core.measurement import Sensor, Stream
+from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
 from flownav.core.parameter_files import check
-from flownav.core.record import POSITION_NED
+from flownav.core.record import FED, POSITION_NED, Record
 from flownav.logs.log import Log
-from flownav.simulation.assemble import assemble
+from flownav.navigation.loop import STATED_VARIANCES
+from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.scenario import Scenario, load_scenario, with_vehicle
 
 HEIGHTS_M = (0.5, 1.5, 3.0)
@@ -141,3 +142,50 @@ def scenario_at(height_m: float, longest_s: float, vehicle: str | None = None) -
     }
     entries["autopilot"] = {"feedback": "truth"}
     return check(entries, Scenario, "faults")
+
+
+# -- a simulated flight as the log that its vehicle would have recorded ------------------------------------------
+VALUE, VARIANCE = FED.index("value_0"), FED.index("variance_0")
+
+
+def log_of(record: Record, setup: Setup) -> Log:
+    """The log of a recorded flight of `setup`, with the flight's truth and what its autopilot flew on beside it.
+
+    Each stream states the age of its readings as the sensor's datasheet does. ValueError where the flight carries no
+    sensors of its own (it flew on the paper's filter).
+    """
+    if "fed" not in record.tables or setup.fitted is None:
+        raise ValueError("the flight has no sensors of its own; fly it on the navigator")
+    fed, limits = record.matrix("fed", FED), setup.sensor.limits
+    streams = {sensor: stream_of(fed, sensor, float(setup.fitted.ages_s[sensor])) for sensor in Sensor}
+    ranger = setup.fitted.sheets.range_sensor
+    ranges = {} if ranger is None else {"range_m": (float(ranger.floor_m), float(ranger.ceiling_m))}
+    return Log(
+        Path(f"{setup.scenario.name} (simulated)"),
+        {sensor: stream for sensor, stream in streams.items() if len(stream)},
+        truth=record.tables["truth"],
+        autopilot=record.tables["flown"],
+        autopilot_name="flownav",
+        limits=ranges
+        | {
+            "flow_height_m": (float(limits.min_height_m), float(limits.max_height_m)),
+            "flow_rad_s": (0.0, float(limits.max_flow_rad_s)),
+        },
+    )
+
+
+def stream_of(fed: Array, sensor: Sensor, delay_s: float) -> Stream:
+    """One sensor's readings that arrived, of rows as `record.FED` has them."""
+    mine = (fed[:, FED.index("sensor")] == sensor) & (fed[:, FED.index("arrived")] > 0.0)
+    rows, width = fed[mine], len(COLUMNS[sensor])
+    variance = np.full((len(rows), width), np.nan)
+    stated = min(width, STATED_VARIANCES)
+    variance[:, :stated] = rows[:, VARIANCE : VARIANCE + stated]
+    return Stream.of(
+        sensor,
+        rows[:, FED.index("arrival_s")],
+        rows[:, VALUE : VALUE + width],
+        variance=variance,
+        quality=rows[:, FED.index("quality")],
+        delay_s=delay_s,
+    )

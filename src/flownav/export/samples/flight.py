@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import lru_cache
 
-from flownav.campaigns.faults.flight_log import log_of
+from flownav.campaigns.faults.table import log_of
 from flownav.campaigns.local import fly_recorded
 from flownav.core.parameter_files import shipped
 from flownav.core.record import Record

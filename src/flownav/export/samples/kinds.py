@@ -34,8 +34,7 @@ class Sample(NamedTuple):
 def _rig(seed: int, folder: Path) -> None:
     """Two runs at each of two heights, as `flownav rig` makes them."""
     from flownav.core.compile import announce_compilation
-    from flownav.lab.rig.campaign import run_campaign
-    from flownav.lab.rig.experiment import RigSettings
+    from flownav.lab.rig.experiment import RigSettings, run_campaign
     from flownav.lab.rig.log_folder import run_folders, write_rig_folder
 
     heights = " ".join(f"--height {height:g}" for height in RIG_HEIGHTS_M)

@@ -18,10 +18,11 @@ import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array
-from flownav.lab.identification import displacement
+from flownav.lab.identification import scale
 from flownav.lab.identification.descent import Structure
 from flownav.lab.identification.experiment import Experiment, experiment
 from flownav.lab.identification.findings import Findings, Noise, Response
+from flownav.lab.identification.first_look import Axes, judged
 from flownav.lab.identification.flight import Flight
 from flownav.lab.identification.height_law import (
     compare_schedules,
@@ -30,10 +31,8 @@ from flownav.lab.identification.height_law import (
     tail,
     variance_by_quality,
 )
-from flownav.lab.identification.judged import judged
-from flownav.lab.identification.orders import choose, cross_validation
-from flownav.lab.identification.output_error import fit
-from flownav.lab.identification.quantities import Interval, latency
+from flownav.lab.identification.output_error import Z_95, fit
+from flownav.lab.identification.quantities import Interval, choose, cross_validation, latency
 from flownav.lab.identification.reference_motion import (
     Motion,
     difference,
@@ -42,9 +41,7 @@ from flownav.lab.identification.reference_motion import (
     flow_likeness,
     with_flow,
 )
-from flownav.lab.identification.sentinel import Axes
-from flownav.lab.identification.speed import against_speed
-from flownav.lab.identification.statistics import Z_95
+from flownav.lab.identification.scale import against_speed
 from flownav.logs.open_log import open_flight
 
 CLUSTER_S = 3.0
@@ -154,14 +151,14 @@ def _body_input(flown: Flight, moved: Motion, age_s: float) -> Array:
     return moved.in_body(flown, flown.t_s[flown.good] - age_s)[:, :2]
 
 
-def _scale(flown: Flight, moved: Motion, age_s: float, velocity: Array) -> tuple[Scale, displacement.Match | None]:
+def _scale(flown: Flight, moved: Motion, age_s: float, velocity: Array) -> tuple[Scale, scale.Match | None]:
     if flown.reference == "gps":
-        track = displacement.match(flown, age_s, velocity)
+        track = scale.match(flown, age_s, velocity)
         return _scale_of_track(track), track
     return _scale_of_velocity(flown, moved, velocity), None
 
 
-def _scale_of_track(track: displacement.Match) -> Scale:
+def _scale_of_track(track: scale.Match) -> Scale:
     """The response is the inverse of the mixing; its covariance by the inverse's derivative, dB = -B dM B."""
     response = np.linalg.inv(track.mixing)
     covariance = track.covariance[:4, :4]  # of m11, m21, m12, m22
@@ -277,7 +274,7 @@ def _notes(flown: Flight, moved: Motion, scale: Scale, axes: Axes) -> list[str]:
 
 
 def _details(
-    flown: Flight, moved: Motion, scale: Scale, axes: Axes, raw: Array, track: displacement.Match | None
+    flown: Flight, moved: Motion, scale: Scale, axes: Axes, raw: Array, track: scale.Match | None
 ) -> dict[str, object]:
     details: dict[str, object] = {
         "scale_method": scale.method,

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.measurement import Array
+from flownav.lab.identification.output_error import Z_95
 from flownav.lab.identification.quantities import Interval
-from flownav.lab.identification.statistics import Z_95
 
 ACCURACY, ACCURACY_HEIGHT_M = 0.90, 0.6
 BINS = 8

@@ -17,9 +17,8 @@ from flownav.core.measurement import Array
 from flownav.lab.identification.descent import DELAY_RANGE_S, Structure
 from flownav.lab.identification.experiment import Experiment, experiment
 from flownav.lab.identification.flight import GRAVITY_M_S2, Flight
-from flownav.lab.identification.output_error import fit
+from flownav.lab.identification.output_error import Z_95, fit
 from flownav.lab.identification.quantities import Interval, latency
-from flownav.lab.identification.statistics import Z_95
 from flownav.logs.rates import mean_over
 
 GRID_S = 0.02

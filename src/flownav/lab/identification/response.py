@@ -26,7 +26,7 @@ import numpy as np
 
 from flownav.core.compile import equation, exp, kernel
 from flownav.core.measurement import Array
-from flownav.lab.identification.grid import Grid, Steps
+from flownav.lab.identification.experiment import Grid, Steps
 
 LARGEST_SERIES = 0.7  # |M h| of one series; a longer step is done in parts
 SMALLEST_FREE = 1e-14  # below this the start is forgotten

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.lab.optics.lens import Lens, field_angle_rad
+from flownav.lab.optics.camera import Lens, field_angle_rad
+from flownav.lab.optics.pad import PadTarget
 from flownav.lab.optics.pad_statistics import PadLaws
-from flownav.lab.optics.pad_target import PadTarget
 from flownav.lab.optics.pad_trial import TrialCamera
 
 SMALLEST = 1e-5  # a figure below this is none

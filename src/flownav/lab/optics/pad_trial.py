@@ -18,28 +18,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.errors import InputError
-from flownav.lab.optics.camera import MEAN_REFLECTANCE, Camera, Exposure, effective_focal_px, exposed
-from flownav.lab.optics.frame_files import save_picture
-from flownav.lab.optics.lens import (
+from flownav.lab.optics.camera import (
+    MEAN_REFLECTANCE,
     PINHOLE_K1,
     PINHOLE_K2,
     Calibration,
+    Camera,
+    Exposure,
     Lens,
     Rectifier,
     believed,
+    effective_focal_px,
+    exposed,
     image_radius_px,
     pixels_of,
     rays_of,
     rectified,
     rectifier,
 )
-from flownav.lab.optics.pad_fix import PadSearch, find_pad
-from flownav.lab.optics.pad_target import GROUND_REFLECTANCE, PadTarget
-from flownav.lab.optics.pad_truth import Truth, fix_error, is_wrong, truth_of
-from flownav.lab.optics.projection import Pose, ground_point, pose_looking_down
+from flownav.lab.optics.frame_files import save_picture
+from flownav.lab.optics.pad import GROUND_REFLECTANCE, PadTarget
+from flownav.lab.optics.pad_fix import PadSearch, Truth, find_pad, fix_error, is_wrong, truth_of
+from flownav.lab.optics.projection import FlightMotion, Pose, ground_point, pose_looking_down
 from flownav.lab.optics.scene import Scene, drawn_scene, in_shadow_of_vehicle
 from flownav.lab.optics.shot import Ground, Optic, Shot, View, ground_at, shoot, view_of
-from flownav.lab.optics.shutter import FlightMotion
 from flownav.sensors.geometry import image_rate_rad_s
 
 Array = NDArray[np.float64]

@@ -1,8 +1,10 @@
-"""Where a camera over a plane looks, and how its image moves: the analytic oracle of the laboratory.
+"""Where a camera over a plane looks, how its image moves, and when each row of it is exposed.
 
 Camera frame: x to the right of the image, y down, z along the optical axis (right-handed). The ground is the
 plane at height 0; the earth frame has x and y in the ground and z down, so a camera at height h stands at
 z = -h. Pixels (x, y) are counted from the principal point; f is the focal length in pixels.
+
+Times are from the middle of the exposure of the frame's middle row, which is the instant that the frame is of.
 """
 
 from __future__ import annotations
@@ -78,3 +80,50 @@ def image_point(pose: Pose, x_m: float, y_m: float, focal_px: float) -> tuple[fl
     below = pose.r12 * north + pose.r22 * east + pose.r32 * down
     depth_m = pose.r13 * north + pose.r23 * east + pose.r33 * down
     return focal_px * right / depth_m, focal_px * below / depth_m
+
+
+# -- the shutter -------------------------------------------------------------------------------------------------
+class FlightMotion(NamedTuple):
+    """How the camera moves while a frame is taken: velocity in the earth frame [m/s], rates in its own [rad/s]."""
+
+    velocity_x_m_s: float
+    velocity_y_m_s: float
+    velocity_z_m_s: float
+    rate_x_rad_s: float
+    rate_y_rad_s: float
+    rate_z_rad_s: float
+
+
+@equation
+def row_time_s(row: float, rows: int, readout_s: float) -> float:
+    """The middle of a row's exposure; readout_s: from the first row to the one after the last, 0 for a global shutter.
+
+    A rate w that moves the image along its rows shears it by w readout_s f pixels from top to bottom.
+    """
+    return (row - 0.5 * (rows - 1)) / rows * readout_s
+
+
+@equation
+def part_time_s(part: int, parts: int, exposure_s: float) -> float:
+    """The middle of the `part`-th of equal parts of an exposure: what moves by w rad/s is w exposure_s f wide."""
+    return ((part + 0.5) / parts - 0.5) * exposure_s
+
+
+@equation
+def moved(pose: Pose, motion: FlightMotion, time_s: float) -> Pose:
+    """The pose this much later, the turn to the first order: good to 1e-4 rad in 15 ms at 1 rad/s."""
+    x, y, z = motion.rate_x_rad_s * time_s, motion.rate_y_rad_s * time_s, motion.rate_z_rad_s * time_s
+    return Pose(
+        pose.x_m + motion.velocity_x_m_s * time_s,
+        pose.y_m + motion.velocity_y_m_s * time_s,
+        pose.height_m - motion.velocity_z_m_s * time_s,
+        pose.r11 + pose.r12 * z - pose.r13 * y,
+        pose.r12 + pose.r13 * x - pose.r11 * z,
+        pose.r13 + pose.r11 * y - pose.r12 * x,
+        pose.r21 + pose.r22 * z - pose.r23 * y,
+        pose.r22 + pose.r23 * x - pose.r21 * z,
+        pose.r23 + pose.r21 * y - pose.r22 * x,
+        pose.r31 + pose.r32 * z - pose.r33 * y,
+        pose.r32 + pose.r33 * x - pose.r31 * z,
+        pose.r33 + pose.r31 * y - pose.r32 * x,
+    )

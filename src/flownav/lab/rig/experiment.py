@@ -1,7 +1,10 @@
-"""One run of the experiment: the rod moves, the sensor looks, the board logs."""
+"""One run of the experiment, and several: the rod moves, the sensor looks, the board logs."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,11 +14,18 @@ from flownav.core.errors import InputError
 from flownav.lab.optics.camera import Camera, exposed, light_named, refocused
 from flownav.lab.optics.firmware import firmware_named
 from flownav.lab.optics.pad import pad_named
-from flownav.lab.rig.encoder import SAMPLE_S, angle_and_rate, counts_of
-from flownav.lab.rig.excitation import EXCITATIONS, move, rod_length
 from flownav.lab.rig.film import Rod, film_swing
-from flownav.lab.rig.instruments import SONAR_ECHO_S, Messages, gyro_at, messages, sonar_at
-from flownav.lab.rig.pendulum import sensor_place, sensor_velocity
+from flownav.lab.rig.instruments import (
+    SAMPLE_S,
+    SONAR_ECHO_S,
+    Messages,
+    angle_and_rate,
+    counts_of,
+    gyro_at,
+    messages,
+    sonar_at,
+)
+from flownav.lab.rig.pendulum import EXCITATIONS, move, rod_length, sensor_place, sensor_velocity
 
 Array = NDArray[np.float64]
 LOG_S = 0.01
@@ -138,3 +148,25 @@ def _flow_messages(
     height = np.asarray(sensor_place(angle, length_m, s.height_m)[1])  # type: ignore[arg-type]  # an array passes
     ranges = sonar_at(frames_s[1:], time_s, height, firmware, rng, s.sonar_late_s)
     return messages(frames_s, flow, quality, rates, ranges, camera.nominal_focal_px, firmware, s.chain_delay_s)
+
+
+# -- several runs and heights ------------------------------------------------------------------------------------
+PAPER_HEIGHTS_M = (0.6, 0.8, 1.0, 1.5)
+
+
+def run_campaign(
+    settings: RigSettings,
+    heights_m: Sequence[float] = PAPER_HEIGHTS_M,
+    on_run: Callable[[int], object] = lambda done: None,
+) -> Iterator[RigLog]:
+    """Every run (1 to `settings.runs`) at every height, in that order; InputError before the first where one is bad.
+
+    The kernels release the interpreter, so runs proceed side by side on the machine's cores.
+    """
+    jobs = [(settings.at(height), run) for height in heights_m for run in range(1, settings.runs + 1)]
+    for job, _ in jobs:
+        check(job)
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        for log in pool.map(lambda job: run_experiment(*job), jobs):
+            on_run(1)
+            yield log

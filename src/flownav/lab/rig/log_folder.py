@@ -16,8 +16,8 @@ from flownav.core.errors import InputError
 from flownav.core.guard import an_output, an_output_folder, written_whole
 from flownav.core.provenance import provenance
 from flownav.core.text import plain
-from flownav.lab.rig.encoder import COUNTS_PER_REVOLUTION
 from flownav.lab.rig.experiment import RigLog
+from flownav.lab.rig.instruments import COUNTS_PER_REVOLUTION
 
 SCHEMA_VERSION = 1
 COLUMNS = {

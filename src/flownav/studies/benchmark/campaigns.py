@@ -12,8 +12,7 @@ from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
-from flownav.campaigns.engines.engine import Engine, Part
-from flownav.campaigns.engines.local import Local
+from flownav.campaigns.engines import Engine, Local, Part
 from flownav.campaigns.plan import Plan, planned
 from flownav.campaigns.run import run_campaign
 from flownav.campaigns.store import PART, Store
@@ -87,7 +86,7 @@ def _cluster(plan: Plan) -> list[Figure]:
     """Ray on one node against threads, both warm; nothing without Ray."""
     if find_spec("ray") is None:
         return []
-    from flownav.campaigns.engines.ray_cluster import RayCluster
+    from flownav.campaigns.engines import RayCluster
 
     cluster = RayCluster()
     local, ray = _by_turns([lambda: _bare(plan), lambda: _fly(plan, cluster)])

@@ -1,7 +1,9 @@
-"""One figure of `flownav bench`."""
+"""One figure of `flownav bench`, and wall time of work."""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable
 from dataclasses import dataclass
 
 
@@ -25,3 +27,19 @@ class Figure:
         if self.asked is None:
             return None
         return self.value >= self.asked if self.more_is_better else self.value <= self.asked
+
+
+REPEATS = 5
+
+
+def best_of(
+    work: Callable[[], object], repeats: int = REPEATS, clock: Callable[[], float] = time.perf_counter
+) -> float:
+    """The shortest of several times [s], of the wall's clock; the first call, which may compile, is not counted."""
+    work()
+    times = []
+    for _ in range(repeats):
+        start = clock()
+        work()
+        times.append(clock() - start)
+    return min(times)

@@ -18,8 +18,7 @@ from flownav.estimation.paper_filter import PaperModel
 from flownav.simulation.engine import fly_blocks, fly_one
 from flownav.simulation.plan import Flight
 from flownav.studies.benchmark.campaigns import campaigns
-from flownav.studies.benchmark.figure import Figure
-from flownav.studies.benchmark.timing import REPEATS, best_of
+from flownav.studies.benchmark.figure import REPEATS, Figure, best_of
 
 PART_STEPS, PART_ROUNDS = 1000, 50
 NAVIGATORS_SHARE = 4  # the navigator's batch is so many times smaller
@@ -129,7 +128,7 @@ def vehicles(flights: int) -> list[Figure]:
 # -- the filters' steps --------------------------------------------------------------------------------------
 def filter_parts() -> list[Figure]:
     """Prediction, correction, and one that nobody offers, of the navigator's filter: scalar, and a lane of sixteen."""
-    from flownav.studies.benchmark.filter_parts import SETTINGS, correct_often, offer_nothing, predict_often, standing
+    from flownav.studies.benchmark.filters import SETTINGS, correct_often, offer_nothing, predict_often, standing
 
     def us_of(part: Callable[..., Any], lanes: tuple[int, ...]) -> float:
         start = standing(lanes)
@@ -155,10 +154,10 @@ def filter_parts() -> list[Figure]:
 
 def _filter_runner() -> Callable[[int], float]:
     """Seconds for n predict+update steps of the paper's filter on one lane."""
-    from flownav.studies.benchmark.filter_loop import ROWS, run_paper_filter
+    from flownav.studies.benchmark.filters import PAPER_ROWS, run_paper_filter
 
     model = _papers_model()
-    work = np.zeros(ROWS)
+    work = np.zeros(PAPER_ROWS)
 
     def run(steps: int) -> float:
         work[:] = 0.0
@@ -206,7 +205,7 @@ def filter_against_filterpy() -> Iterator[Figure]:
 # -- whole jobs -----------------------------------------------------------------------------------------------
 def replay_of_recorded_flight() -> Iterator[Figure]:
     """Reading and replaying the recorded 849 s flight; left out where the data folder is absent."""
-    from flownav.studies.benchmark.recorded import navigator_run, recorded_flight, replay_once
+    from flownav.studies.benchmark.vehicles import navigator_run, recorded_flight, replay_once
 
     folder = recorded_flight()
     if folder is not None:

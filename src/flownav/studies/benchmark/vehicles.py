@@ -1,10 +1,11 @@
-"""What a block of flights spends on its plant, on the navigator and on the rest, of each kind of vehicle."""
+"""What a block of flights spends on its plant, on the navigator and on the rest, of each kind of vehicle; replays."""
 
 from __future__ import annotations
 
 import os
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +24,7 @@ from flownav.simulation.plan import ATTITUDE_STEPS, PHYSICS_S, PHYSICS_STEPS, Fl
 from flownav.simulation.plant import observe_vehicle, step_vehicle
 from flownav.simulation.scenario import load_scenario, with_vehicle
 from flownav.simulation.truth import packed_truth
-from flownav.studies.benchmark.timing import best_of
+from flownav.studies.benchmark.figure import best_of
 from flownav.vehicle.around import CALM
 from flownav.vehicle.parameters import VehicleParameters
 
@@ -116,3 +117,49 @@ def plant_after(flight: Flight) -> NDArray[np.float64]:
     rows[layout.CONTROLS : layout.CONTROLS + len(controls)] = np.array(controls)[:, None]
     step_plants(work, LANES, flight.plan.epochs * ATTITUDE_STEPS * PHYSICS_STEPS, flight.rotors, flight.onboard)
     return rows[layout.HELICOPTER : layout.HELICOPTER + len(start)]
+
+
+# -- the recorded flight that the replay is timed on -------------------------------------------------------------
+FLIGHT = "quad-px4flow-outdoor"
+
+
+def recorded_flight() -> Path | None:
+    """The 849 s flight in the folder that FLOWNAV_DATA names, or in ../shared/data; None where neither has it."""
+    roots = [os.environ.get("FLOWNAV_DATA"), Path.cwd().parent / "shared" / "data"]
+    folders = [Path(root) / FLIGHT for root in roots if root]
+    return next((folder for folder in folders if folder.is_dir()), None)
+
+
+def replay_once(folder: Path) -> object:
+    """Read the log, replay it, and bundle the record."""
+    from flownav.logs.csv_folder import read_csv_folder
+    from flownav.navigation.settings import NavigatorSettingsFile
+    from flownav.replays.bundle import to_record
+    from flownav.replays.prepare import ReplayOptions
+    from flownav.replays.session import replay
+
+    flown = replay(read_csv_folder(folder), ReplayOptions(), NavigatorSettingsFile())
+    return to_record(flown, flown.scores(), ["flownav", "bench"])
+
+
+def navigator_run(folder: Path) -> Callable[[], object]:
+    """The navigator on the log's prepared readings, from its start to its end: what the engine does of a replay."""
+    from flownav.logs.csv_folder import read_csv_folder
+    from flownav.navigation.feed import equipment_of
+    from flownav.navigation.loop import run, start_navigator
+    from flownav.navigation.settings import NavigatorSettingsFile
+    from flownav.navigation.tape import new_tape
+    from flownav.replays.prepare import ReplayOptions, prepare
+
+    settings, prepared = NavigatorSettingsFile(), prepare(read_csv_folder(folder), ReplayOptions())
+    queue = prepared.queue
+    equipment = equipment_of(prepared.streams, float(queue.t_s[0]), prepared.flow_gyro_is_imu, settings)
+    tape = new_tape(queue)
+
+    def once() -> object:
+        tape.used[:] = 0
+        running = start_navigator(equipment, settings, tape)
+        run(queue, running)
+        return running
+
+    return once

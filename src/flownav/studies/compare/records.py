@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record
 from flownav.core.text import finite_or_none
 from flownav.scoring.by_phase import errors_of
-from flownav.scoring.differences import CONFIDENCE, Difference, mean_difference
+from flownav.scoring.percentiles import CONFIDENCE, Difference, mean_difference
 from flownav.scoring.phases import phases_of
 
 Array = NDArray[np.float64]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -10,16 +11,17 @@ from flownav.core.errors import InputError
 from flownav.core.frames import rotation_from_quaternion, to_earth
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import VELOCITY_BODY
-from flownav.lab.identification.first_look import Look, first_look
+from flownav.lab.identification.first_look import IN_PART, Look, first_look
+from flownav.lab.identification.flight import jumps
 from flownav.logs.log import Log
 from flownav.logs.plausible import check_plausible
 from flownav.logs.rates import attitude_at
+from flownav.replays.airborne import flying_at
 from flownav.replays.autopilot import autopilot_scores
 from flownav.replays.prepare import ReplayOptions, prepare
 from flownav.replays.readiness import obstacles
 from flownav.replays.sentinel import Finding, findings
 from flownav.scoring.coverage import silences
-from flownav.studies.inspection.told import told_of
 
 CLOCK_REASONS = {
     "no_time": "without a time",
@@ -165,3 +167,34 @@ def _autopilot(log: Log) -> dict[str, Any] | None:
     if log.autopilot is None:
         return None
     return {**_track(log.autopilot["t_s"]), **(autopilot_scores(log, ReplayOptions().gps_delay_s) or {})}
+
+
+# -- what a first look makes a warning ---------------------------------------------------------------------------
+LEAST_JUMPING = 0.01  # of the steps in flight: of less, one echo is no trouble
+
+
+def told_of(log: Log, look: Look | None, found: Sequence[Finding]) -> list[Finding]:
+    """Warnings beside those found: the flow's axes, unless they are told already, and a range that jumps."""
+    told = []
+    if look is not None and look.clear and not look.right and not any(finding.flow_is_wrong for finding in found):
+        sure = look.correlation >= IN_PART
+        told += [Finding(f"flow: {look.axes}, against {look.against}; mend the log's flow columns", True)] * sure
+    return [*told, *_of_range(log)]
+
+
+def _of_range(log: Log) -> list[Finding]:
+    if Sensor.RANGE not in log.streams:
+        return []
+    stream = log.streams[Sensor.RANGE]
+    aloft = flying_at(log, stream.t_s - stream.delay_s) & (stream.value[:, 0] > 0.0)
+    t_s, range_m = stream.t_s[aloft], stream.value[aloft, 0]
+    share, doubt = jumps(t_s, range_m)
+    if share < LEAST_JUMPING:
+        return []
+    largest = float(np.abs(np.diff(range_m)).max())
+    return [
+        Finding(
+            f"range jumps in {share:.0%} of its steps in flight, by up to {largest:.1f} m: velocities from flow and "
+            f"range are off by {doubt:.0%} or so"
+        )
+    ]

@@ -1,4 +1,4 @@
-"""Tuning: from logs to a proposal, and whether it is to be accepted."""
+"""Tuning: from logs to a proposal, whether it is to be accepted, and the settings file that it becomes."""
 
 from __future__ import annotations
 
@@ -10,18 +10,19 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.errors import InputError
+from flownav.core.guard import written_whole
+from flownav.core.parameter_files import load
+from flownav.core.version import __version__
 from flownav.logs.log import Log
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay
-from flownav.studies.compare.rows import names_of
-from flownav.studies.tuning.judge import UNMOVED, Judgement, judge
-from flownav.studies.tuning.knobs import Knob, knobs_of, rounded, turned
-from flownav.studies.tuning.scores import Gains, reference_name
+from flownav.studies.compare.job import names_of
+from flownav.studies.tuning.judge import UNMOVED, Judged, Judgement, judge
+from flownav.studies.tuning.knobs import Knob, Split, knobs_of, rounded, split_flights, turned
+from flownav.studies.tuning.scores import Course, Gains, Trials, course_of, reference_name
 from flownav.studies.tuning.search import Found, search
-from flownav.studies.tuning.trials import Course, Trials, course_of
-from flownav.studies.tuning.windows import Split, split_flights
 
 RUNS_A_KNOB = 30  # about as many as a search takes, for the progress bar
 
@@ -146,3 +147,53 @@ def _of_log(name: str, path: Path, split: Split, course: Course, gain: Gains, ke
     both = np.isfinite(before) & np.isfinite(after)
     medians = (float(np.median(before[both])), float(np.median(after[both]))) if both.any() else (None, None)
     return OfLog(name, path, split, reference_name(course.flown.log), float(gain.total.mean()), *medians)
+
+
+# -- the settings file -------------------------------------------------------------------------------------------
+def write_settings(path: Path, tuned: Tuned, stated: NavigatorSettingsFile | None, command: str) -> None:
+    """Write an accepted proposal, and read it back as `replay --settings` does.
+
+    stated: what the fit started from; its other keys are kept. InputError where the file cannot be written.
+    """
+    try:
+        with written_whole(path) as temporary:
+            temporary.write_text(settings_text(tuned, stated, command), encoding="utf-8", errors="backslashreplace")
+            load(temporary, NavigatorSettingsFile)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
+
+
+def settings_text(tuned: Tuned, stated: NavigatorSettingsFile | None, command: str) -> str:
+    """The file as TOML; the same for the same logs, command and version."""
+    proposed = {row.key for row in tuned.proposed}
+    kept = {} if stated is None else stated.model_dump(exclude_unset=True)
+    lines = [
+        "# Settings of flownav's navigator; use them with `flownav replay LOG --settings FILE`.",
+        f"# Made with flownav {__version__} by: {' '.join(command.split())}",
+        *(f"# {_part(log)}" for log in tuned.logs),
+        f"# Held-out windows: {gain_words(tuned.judgement.error)}.",
+        "",
+        *(f"{key} = {float(value)!r}" for key, value in kept.items() if key not in proposed),
+        *(_line(row) for row in tuned.proposed),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def gain_words(error: Judged | None) -> str:
+    """What the proposal does to the path's error, with the interval."""
+    if error is None:
+        return "nothing shows the path's error"
+    interval = f"95 % interval {error.low:.3f} to {error.high:.3f}, {error.windows} windows"
+    return f"gain of the path's error {error.mean:.3f} nats ({interval}); half the error would be 0.53"
+
+
+def _part(log: OfLog) -> str:
+    """How a log took part, in one line of a comment."""
+    fitted = "held out whole" if log.split.whole else f"fitted on {len(log.split.fit)} windows"
+    name = "".join(character if character.isprintable() else "?" for character in log.name)
+    return f"{name}: {fitted}, judged on {len(log.split.held)}, by {log.reference or 'nothing'}"
+
+
+def _line(row: Proposed) -> str:
+    interval = f"95 % {row.low:.4g} to {row.high:.4g}"
+    return f"{row.key} = {row.value!r}  # {row.unit}; was {row.default:g}; {interval}; {row.knob}"

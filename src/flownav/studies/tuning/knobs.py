@@ -1,4 +1,7 @@
-"""What may be tuned: a few settings, each by a factor on the value that it starts from."""
+"""What may be tuned, a few settings each by a factor, and which windows of flights are fitted and which judge the fit.
+
+Between two windows lies a gap, so that what lasts of an error in one is not found again in the next.
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,12 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+from flownav.core.errors import InputError
 from flownav.core.measurement import Array, Sensor
 from flownav.logs.log import Log
 from flownav.navigation.feed import imu_serves
 from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.replays.airborne import Window, airborne_of
 
 USUAL_SPREAD = math.log(3.0)  # a datasheet's noise is right to a factor of three
 SCALE_SPREAD = 0.1  # as `flow_scale_sigma`
@@ -98,3 +103,55 @@ def limits_of(knob: Knob, settings: NavigatorSettingsFile) -> tuple[float, float
 def penalty(knobs: Sequence[Knob], log_factors: Array) -> float:
     """Minus the logarithm of the prior: what a log does not show stays as it was."""
     return 0.5 * sum((float(factor) / knob.spread) ** 2 for knob, factor in zip(knobs, log_factors, strict=True))
+
+
+# -- windows -----------------------------------------------------------------------------------------------------
+LONGEST_S = 30.0  # half of it is no harder a GPS cut, twice of it leaves too few windows of a usual flight
+USUAL_S = 5.0
+SHORTEST_S = 3.0  # a shorter one holds too few readings of a 10 Hz sensor
+LEAST_JUDGES = 6  # with fewer, chance alone puts all of them on one side more often than once in forty
+GAP_SHARE = 0.1
+EVERY_THIRD = 3  # of several logs, one in three is held out whole
+
+
+class Split(NamedTuple):
+    """A log's windows: those of the fit and those that judge it [s]; whole: the log is held out, nothing is fitted."""
+
+    fit: tuple[Window, ...]
+    held: tuple[Window, ...]
+    whole: bool = False
+
+
+def split_flight(log: Log) -> Split:
+    """Alternate windows of the flight; of the whole log where nobody says when it flew.
+
+    InputError where the flight is too short for LEAST_JUDGES of each kind.
+    """
+    flown = airborne_of(log)
+    first, last = log.span_s if flown is None else flown
+    length = _length(last - first)
+    if length < SHORTEST_S:
+        what = "the log" if flown is None else "the flight"
+        raise InputError(
+            f"{log.path}: {what} lasts {last - first:.1f} s, too short for {2 * LEAST_JUDGES} windows of "
+            f"{SHORTEST_S:g} s; give a log of {2 * LEAST_JUDGES * SHORTEST_S:g} s or more"
+        )
+    count = int((last - first) / length + 1e-9)
+    windows = [(first + k * length, first + (k + 1.0 - GAP_SHARE) * length) for k in range(count)]
+    return Split(tuple(windows[::2]), tuple(windows[1::2]))
+
+
+def _length(flight_s: float) -> float:
+    """Of one window and the gap after it [s]: twice as many as are needed where that leaves USUAL_S to each."""
+    return min(max(flight_s / (4 * LEAST_JUDGES), USUAL_S), flight_s / (2 * LEAST_JUDGES), LONGEST_S)
+
+
+def split_flights(logs: Sequence[Log]) -> list[Split]:
+    """Each log's windows; of several logs the second of every three has nothing fitted to it.
+
+    InputError as `split_flight`.
+    """
+    splits = [split_flight(log) for log in logs]
+    return [
+        Split((), split.held, whole=True) if number % EVERY_THIRD == 1 else split for number, split in enumerate(splits)
+    ]

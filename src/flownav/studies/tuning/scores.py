@@ -1,4 +1,4 @@
-"""What one run of a log is worth in each of its windows: what it predicted of its sensors, and how far it was off.
+"""What one run of a log is worth in each of its windows: what it predicted of its sensors, how far it was off.
 
 Both are in nats, so that they may be added: a reading predicted with errors smaller by a factor f, and stated so, is
 worth ln f more, and an error of the path that is smaller by f counts the same ln f.
@@ -6,14 +6,16 @@ worth ln f more, and an error of the path that is smaller by f counts the same l
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.errors import InputError
 from flownav.core.measurement import Array, Sensor
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
@@ -22,10 +24,10 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import flow_gain
 from flownav.replays.judged import TESTED
 from flownav.replays.prepare import FLOW, ReplayOptions
-from flownav.replays.session import Replay
-from flownav.scoring.alignment import velocity_of
-from flownav.scoring.outage import difference_at
-from flownav.studies.compare.like_for_like import Window
+from flownav.replays.session import Replay, replay_again
+from flownav.scoring.reference import difference_at, velocity_of
+from flownav.studies.compare.tracks import Window
+from flownav.studies.tuning.knobs import Knob, turned
 
 STRETCH_S = 5.0  # over which innovations are summed: what lasts longer the filter carries as a state
 HUBER = 3.0  # standard deviations beyond which a surprise counts linearly
@@ -217,3 +219,68 @@ def _truth_errors(flown: Replay, windows: Sequence[Window]) -> Array:
         error = difference_at(said.t_s, said.vel_ned_m_s[:, :2], t_s[inside], moving[inside])
         found.append(np.sqrt(np.mean(np.sum(error**2, axis=1))) if len(error) else np.nan)
     return np.array(found)
+
+
+# -- logs flown again by other settings --------------------------------------------------------------------------
+WORKERS = 2
+
+
+@dataclass(frozen=True)
+class Course:
+    """A log prepared once, the settings that it starts from, its windows, and what the start is worth in them."""
+
+    flown: Replay
+    windows: tuple[Window, ...]
+    start: Scores
+
+    def scores(self, keys: dict[str, float]) -> Scores:
+        """By the starting settings with some keys changed. InputError where the filter never starts."""
+        return _scores(self.flown, self.windows, keys)
+
+    def gains(self, keys: dict[str, float]) -> Gains:
+        """Over the start; a filter that no longer starts loses everywhere."""
+        try:
+            return gains_of(self.scores(keys), self.start)
+        except InputError:
+            lost = np.full(len(self.windows), LOSS)
+            return Gains(lost, np.where(np.isfinite(self.start.log_error), LOSS, np.nan))
+
+
+def course_of(flown: Replay, windows: Sequence[Window]) -> Course:
+    """A log on these windows, with `scores.with_cuts` in them and nowhere else."""
+    return Course(flown, tuple(windows), _scores(flown, windows, {}))
+
+
+def _scores(flown: Replay, windows: Sequence[Window], keys: dict[str, float]) -> Scores:
+    settings = NavigatorSettingsFile.model_validate(flown.settings.model_dump(exclude_unset=True) | keys)
+    options = with_cuts(flown.log, flown.options, windows)
+    return scores_of(replay_again(flown, options, settings), windows)
+
+
+class Trials:
+    """Several courses flown by the same factors; a pair of factors is flown once."""
+
+    def __init__(
+        self, courses: Sequence[Course], knobs: Sequence[Knob], settings: NavigatorSettingsFile,
+        on_progress: Callable[[int], None],
+    ) -> None:  # fmt: skip
+        self.courses = list(courses)
+        self.knobs = list(knobs)
+        self._settings = settings
+        self._on_progress = on_progress
+        self._known: dict[tuple[float, ...], list[Gains]] = {}
+
+    @property
+    def flown(self) -> int:
+        """How many different factors were flown."""
+        return len(self._known)
+
+    def gains(self, log_factors: Array) -> list[Gains]:
+        """Course by course."""
+        factors = tuple(round(float(factor), 6) for factor in log_factors)
+        if factors not in self._known:
+            keys = turned(self._settings, self.knobs, factors)
+            with ThreadPoolExecutor(WORKERS) as pool:
+                self._known[factors] = list(pool.map(lambda course: course.gains(keys), self.courses))
+            self._on_progress(len(self.courses))
+        return self._known[factors]

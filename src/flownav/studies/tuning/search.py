@@ -10,10 +10,9 @@ import numpy as np
 
 from flownav.core.measurement import Array
 from flownav.navigation.settings import NavigatorSettingsFile
+from flownav.studies.tuning.judge import MEASURED, interval_of, resampled
 from flownav.studies.tuning.knobs import limits_of, penalty
-from flownav.studies.tuning.resampling import MEASURED, interval_of, resampled
-from flownav.studies.tuning.scores import WORTH, Gains
-from flownav.studies.tuning.trials import Trials
+from flownav.studies.tuning.scores import WORTH, Gains, Trials
 
 STEPS = tuple(math.log(step) for step in (2.0, 1.4, 1.2))  # of a noise, coarse to fine
 STRIDES = (-2, -1, 1, 2)  # the second over what is rough in a gain: gates that open, a heading that drifts another way

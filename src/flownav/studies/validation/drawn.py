@@ -1,26 +1,82 @@
-"""The sensors of one simulated flight: kinds and rates as in the log, errors drawn from the shipped dispersion."""
+"""The recorded flights that are flown again, and the sensors of one simulated flight, drawn for it."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, Literal, get_type_hints
 from zlib import crc32
 
 import numpy as np
+from pydantic import Field
 from scipy.special import ndtri
 
 from flownav.core.measurement import Array, Sensor, Stream
-from flownav.core.parameter_files import shipped
+from flownav.core.parameter_files import Number, ParameterModel, load, shipped
 from flownav.logs.log import Log
+from flownav.replays.session import table_windows
 from flownav.sensors.range_sensor import RangeSensorSheet
 from flownav.sensors.sheet import Lever
 from flownav.sensors.sheets import SensorSheets, shipped_sheets
 from flownav.simulation.dispersion import DispersionSection, drawn, uniforms
 from flownav.simulation.ensemble import SHEETS, with_numbers
 from flownav.simulation.noise import threefry
-from flownav.studies.validation.flights import AssumedVehicle
-from flownav.studies.validation.rates import rate_hz
+from flownav.simulation.truth import CARRIED
 
+
+def rate_hz(stream: Stream) -> float:
+    """One over the median step of a stream."""
+    return float(1.0 / np.median(np.diff(stream.t_s)))
+
+
+# -- which flights -----------------------------------------------------------------------------------------------
+SHIPPED_FILE = "validation.toml"
+
+Window = tuple[float, float]
+
+
+class RecordedFlight(ParameterModel):
+    """A log's folder, and its GPS outages: `[T0, T1, LENGTH]` each, seconds of the log."""
+
+    log: str
+    windows_s: tuple[tuple[Number, Number, Number], ...] = Field(min_length=1)
+
+    def windows(self) -> list[Window]:
+        """Each outage [s]. InputError where one cannot be."""
+        return [window for whole in self.windows_s for window in table_windows(*whole, option=f"{self.log}: windows_s")]
+
+
+class AssumedVehicle(ParameterModel):
+    """What sensor models ask of a vehicle and a log does not tell; path_bandwidth_hz: of the path that is flown."""
+
+    thrust_n: Number = Field(gt=0.0, le=1e4)
+    rotor_radius_m: Number = Field(gt=0.0, le=10.0)
+    rotor_speed_rad_s: Number = Field(gt=0.0, le=1e4)
+    rotor_speed_spread: Number = Field(ge=0.0, lt=1.0)
+    blades: Number = Field(ge=1.0, le=12.0)
+    hover_power_w: Number = Field(ge=0.0, le=1e5)
+    path_bandwidth_hz: Number = Field(gt=0.1, le=5.0)
+    flow_max_height_m: Number = Field(gt=0.0, le=1000.0)
+
+
+class ValidationFile(ParameterModel):
+    """The file of flights."""
+
+    schema_version: Literal[1]
+    name: str
+    provenance: str
+    flight: tuple[RecordedFlight, ...] = Field(min_length=1)
+    vehicle: AssumedVehicle
+
+
+def load_flights(path: Path | None = None) -> ValidationFile:
+    """The flights of a file; the shipped ones where `path` is None. InputError names file, key and allowed range."""
+    return load(path or shipped(SHIPPED_FILE), ValidationFile)
+
+
+# -- what is drawn -----------------------------------------------------------------------------------------------
 SLOWEST_INERTIAL_HZ = 100.0  # of the datasheets; a log that has less holds every second or third reading
 LIDAR_BELOW_M = 0.25  # a sonar of this class reads 0.30 m for anything nearer
 
@@ -106,3 +162,43 @@ def _number_of(sheet: Any, key: str) -> float:
     for part in key.split("."):
         sheet = getattr(sheet, part)
     return float(sheet)
+
+
+# -- readings ----------------------------------------------------------------------------------------------------
+Seen = dict[Any, Any]  # records by their kinds
+
+
+def readings(
+    flight: Flight, name: str, drawn: str, p: Any, seen: Sequence[Seen], step: Callable[..., Any] | None = None
+) -> list[Any]:
+    """What a carried sensor reads of what it sees, one reading after the other, by the equations of its row.
+
+    drawn: the name of its draws; p: its coefficients; step: its equation, where the row's takes more than the sensor's.
+    """
+    one = next(sensor for sensor in CARRIED if sensor.name == name)
+    step, values, kept = step or one.step, [], {one.parameters: p}
+    kept[one.unit] = lawful(one.draw, kept | {one.unit: one.unit(*normals_of(flight, f"{drawn} unit", one.unit))})
+    if one.start is not None:
+        begun = {} if one.begun is None else {one.begun: one.begun(*normals_of(flight, f"{drawn} start", one.begun))}
+        kept[one.state] = lawful(one.start, kept | begun | seen[0])
+    normals = flight.normals(drawn, len(seen), len(one.normals._fields)).tolist()
+    for now, of_this in zip(seen, normals, strict=True):
+        read = lawful(step, kept | now | {one.normals: one.normals(*of_this)})
+        if one.state is not None:
+            kept[one.state], read = read
+        values.append(read)
+    return values
+
+
+def lawful(law: Callable[..., Any], records: Seen) -> Any:
+    """What a law says of the records that its parameters are annotated with."""
+    return law(*(records[kind] for name, kind in hints_of(law).items() if name != "return"))
+
+
+hints_of = lru_cache(get_type_hints)
+
+
+def normals_of(flight: Flight, name: str, record: Any) -> list[float]:
+    """Standard normals of what is drawn once a flight, one for each field of a record."""
+    drawn: list[float] = flight.normals(name, 1, len(record._fields))[0].tolist()
+    return drawn

@@ -17,8 +17,8 @@ from flownav.navigation.tape import EVENT_NAMES
 from flownav.replays.judged import TESTED
 from flownav.replays.session import Replay
 from flownav.scoring.consistency import consistency_of, lag_one
+from flownav.studies.validation.drawn import rate_hz
 from flownav.studies.validation.path import DOWN, ground_of, rotation_of
-from flownav.studies.validation.rates import rate_hz
 
 AIRBORNE_M = 0.5  # of the range sensor over the ground
 REACH_M = 4.0  # up to here the range sensors of such vehicles hear their echo, and the height is well known

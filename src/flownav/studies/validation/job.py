@@ -16,9 +16,8 @@ from flownav.logs.open_log import open_flight
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import Replay, outage_summary, outage_table, replay
-from flownav.studies.validation.drawn import Flight
+from flownav.studies.validation.drawn import AssumedVehicle, Flight, ValidationFile, Window
 from flownav.studies.validation.figures import figures_of
-from flownav.studies.validation.flights import AssumedVehicle, ValidationFile, Window
 from flownav.studies.validation.path import path_of
 from flownav.studies.validation.sensed import simulated_log
 

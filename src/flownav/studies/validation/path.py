@@ -27,7 +27,7 @@ from flownav.logs.log import Log
 from flownav.navigation.rows import EstimateRow
 from flownav.navigation.tables import states_table
 from flownav.replays.session import Replay
-from flownav.studies.validation.flights import AssumedVehicle
+from flownav.studies.validation.drawn import AssumedVehicle
 
 GRID_HZ = 50.0
 KNOT_EVERY = 5  # of the grid: the path's spline has 10 knots a second

@@ -32,11 +32,17 @@ from flownav.sensors.processes import gauss_markov_coefficients
 from flownav.sensors.settings import FlowSettings, GpsInsSettings
 from flownav.sensors.sheet import SensorSheet
 from flownav.sensors.sheets import SensorSheets
-from flownav.studies.validation.drawn import Flight, drawn_sheets, kept_of, sheets_of
-from flownav.studies.validation.flights import AssumedVehicle
+from flownav.studies.validation.drawn import (
+    AssumedVehicle,
+    Flight,
+    Seen,
+    drawn_sheets,
+    kept_of,
+    rate_hz,
+    readings,
+    sheets_of,
+)
 from flownav.studies.validation.path import FlownPath
-from flownav.studies.validation.rates import rate_hz
-from flownav.studies.validation.readings import Seen, readings
 
 COARSEST_UNSEEN_M = 0.05  # steps of a recorded position below it are the receiver's, not the log's
 

@@ -1,17 +1,21 @@
-"""A bare loop of filter steps, for timing and for very long runs."""
+"""Bare loops of the landing filter's steps and of their parts, for timing and for very long runs."""
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from flownav.core.compile import Lanes, Work, equation, kernel, pointer
 from flownav.estimation.covariance import expect, settle
-from flownav.estimation.error_models import FilterSettings, propagate_errors
+from flownav.estimation.error_models import FilterSettings, propagate_errors, propagate_gauss_markov
 from flownav.estimation.lag import FlowLag, lag_ends, lag_starts
 from flownav.estimation.laws.attitude import attitude
 from flownav.estimation.laws.flow import flow_rate, lagged_flow
 from flownav.estimation.laws.gps import gps_position, gps_velocity
 from flownav.estimation.laws.height import range_along_boresight
-from flownav.estimation.motion import predict
+from flownav.estimation.motion import errors_in_motion, predict
 from flownav.estimation.states import FILTER_ROWS, MEASURED, NOISE, OFFERED, STATES, STATES_WITH_LAG
+from flownav.studies.benchmark.filters import standing
 
 ATTITUDE_READ = FILTER_ROWS  # quaternion
 POSITION_READ = ATTITUDE_READ + 4
@@ -79,3 +83,45 @@ def run_landing_filter(buffer: Work, lanes: Lanes, steps: int, settings: FilterS
         offer(work, lanes, RANGE_READ, 1, RANGE_VARIANCE)
         range_along_boresight(work, lanes, 0, LENS_BELOW_M, 0.0, 0.0)
         take(work, lanes, n, gate)
+
+
+def hovering(lanes: Lanes, n: int = STATES) -> NDArray[np.float64]:
+    """A buffer of filters that hover 5 m above the ground, with readings that agree."""
+    rows = np.zeros((ROWS, len(lanes)))
+    rows[:FILTER_ROWS] = standing(lanes, n).reshape(FILTER_ROWS, len(lanes))
+    rows[ATTITUDE_READ] = rows[ARRIVED] = 1.0
+    rows[POSITION_READ + 2], rows[RANGE_READ] = -5.0, 4.9
+    return rows.reshape(-1)
+
+
+# -- parts of a step -----------------------------------------------------------------------------------------
+@kernel
+def expect_often(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettings) -> None:
+    """P h' and S of a law that reads nine states."""
+    work = pointer(buffer)
+    for _ in range(steps):
+        expect(work, lanes, STATES, True)
+
+
+@kernel
+def observe_often(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettings) -> None:
+    """The law of a flow rate."""
+    work = pointer(buffer)
+    for step in range(steps):
+        flow_rate(work, lanes, step % 2, 0.1, 0.0, 0.1, 0.1)
+
+
+@kernel
+def move_covariance(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettings) -> None:
+    """The covariance of one prediction."""
+    work = pointer(buffer)
+    for _ in range(steps):
+        errors_in_motion(work, lanes, STATES, 1e-4)
+
+
+@kernel
+def decay_often(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettings) -> None:
+    """The Gauss-Markov errors, of which one step serves for several predictions."""
+    work = pointer(buffer)
+    for _ in range(steps):
+        propagate_gauss_markov(work, lanes, STATES, 1e-4, settings)

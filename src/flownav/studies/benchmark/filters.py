@@ -1,4 +1,4 @@
-"""The parts of a step of the landing filter, each in a bare loop, for timing."""
+"""Steps of the filters and their parts, each in a bare loop, for timing."""
 
 from __future__ import annotations
 
@@ -7,15 +7,18 @@ import numpy as np
 from flownav.core.compile import Lanes, Work, kernel, pointer
 from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.measurement import Array
+from flownav.estimation import paper_filter
 from flownav.estimation.covariance import at, correct, expect, settle
-from flownav.estimation.error_models import FilterSettings, propagate_gauss_markov, propagate_walks
-from flownav.estimation.laws.flow import flow_rate
-from flownav.estimation.motion import errors_in_motion, predict
+from flownav.estimation.error_models import FilterSettings, propagate_walks
+from flownav.estimation.kalman import kalman_row_count, kalman_rows
+from flownav.estimation.motion import predict
+from flownav.estimation.paper_filter import PaperModel
 from flownav.estimation.states import (
     ACCEL_NOISE,
     ACCEPTED,
     COEFFICIENT,
     CROSS,
+    FILTER_ROWS,
     GYRO_NOISE,
     IMU,
     INNOVATION_VARIANCE,
@@ -27,7 +30,6 @@ from flownav.estimation.states import (
     STATE,
     STATES,
 )
-from flownav.studies.benchmark.landing_loop import ARRIVED, ATTITUDE_READ, POSITION_READ, RANGE_READ, ROWS
 
 SETTINGS = FilterSettings(
     accel_noise_m_s2_rt_hz=0.05, gyro_noise_rad_s_rt_hz=0.004, accel_walk_m_s2_rt_s=0.003, gyro_walk_rad_s_rt_s=1e-4,
@@ -42,26 +44,17 @@ SETTINGS = FilterSettings(
 
 
 def standing(lanes: Lanes, n: int = STATES) -> Array:
-    """A buffer of filters that hover 5 m above the ground, with readings that agree."""
-    rows = np.zeros((ROWS, len(lanes)))
-    rows[QUATERNION] = rows[ATTITUDE_READ] = rows[ARRIVED] = rows[OFFERED] = rows[INNOVATION_VARIANCE] = 1.0
+    """A buffer of filters that hover 5 m above the ground."""
+    rows = np.zeros((FILTER_ROWS, len(lanes)))
+    rows[QUATERNION] = rows[OFFERED] = rows[INNOVATION_VARIANCE] = 1.0
     rows[IMU + 5] = -GRAVITY_M_S2
-    rows[STATE + POSITION + 2] = rows[POSITION_READ + 2] = -5.0
-    rows[RANGE_READ] = 4.9
+    rows[STATE + POSITION + 2] = -5.0
     rows[ACCEL_NOISE], rows[GYRO_NOISE] = SETTINGS.accel_noise_m_s2_rt_hz**2, SETTINGS.gyro_noise_rad_s_rt_hz**2
     for i in range(n):
         rows[at(i, i)] = 0.01
     rows[OBSERVED : OBSERVED + 11] = np.array([10, 3, 4, 5, 6, 7, 8, 29, 2, 27, 9])[:, None]  # as a flow rate
     rows[COEFFICIENT : COEFFICIENT + 9], rows[CROSS : CROSS + n], rows[NOISE] = 0.1, 1e-8, 1.0
     return rows.reshape(-1)
-
-
-@kernel
-def expect_often(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettings) -> None:
-    """P h' and S of a law that reads nine states."""
-    work = pointer(buffer)
-    for _ in range(steps):
-        expect(work, lanes, STATES, True)
 
 
 @kernel
@@ -86,22 +79,6 @@ def offer_nothing(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettin
 
 
 @kernel
-def observe_often(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettings) -> None:
-    """The law of a flow rate."""
-    work = pointer(buffer)
-    for step in range(steps):
-        flow_rate(work, lanes, step % 2, 0.1, 0.0, 0.1, 0.1)
-
-
-@kernel
-def move_covariance(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettings) -> None:
-    """The covariance of one prediction."""
-    work = pointer(buffer)
-    for _ in range(steps):
-        errors_in_motion(work, lanes, STATES, 1e-4)
-
-
-@kernel
 def predict_often(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettings) -> None:
     """A prediction with its random walks."""
     work = pointer(buffer)
@@ -110,9 +87,21 @@ def predict_often(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettin
         propagate_walks(work, lanes, 1e-4, settings)
 
 
+# -- the paper's filter ------------------------------------------------------------------------------------------
+FILTER = kalman_rows(0, paper_filter.STATES)
+INPUT = kalman_row_count(paper_filter.STATES)
+MEASURED = INPUT + paper_filter.INPUTS
+ARRIVED = MEASURED + paper_filter.STATES
+SEEN = ARRIVED + paper_filter.STATES
+PAPER_ROWS = SEEN + 2 * paper_filter.STATES
+
+
 @kernel
-def decay_often(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettings) -> None:
-    """The Gauss-Markov errors, of which one step serves for several predictions."""
-    work = pointer(buffer)
+def run_paper_filter(work: Work, lanes: Lanes, steps: int, model: PaperModel) -> None:
+    """Predict and update `steps` times with every component present; work (PAPER_ROWS * len(lanes),)."""
+    for lane in range(len(lanes)):
+        for component in range(paper_filter.STATES):
+            work[(ARRIVED + component) * len(lanes) + lane] = 1.0
     for _ in range(steps):
-        propagate_gauss_markov(work, lanes, STATES, 1e-4, settings)
+        paper_filter.predict(work, lanes, FILTER, INPUT, model)
+        paper_filter.update(work, lanes, FILTER, MEASURED, ARRIVED, SEEN, model)

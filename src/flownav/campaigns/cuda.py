@@ -1,24 +1,27 @@
 """Flights on a CUDA device (extra `gpu`): a thread a flight, float64, from the same equations as on the CPU.
 
+A truth of its own costs Python more than a millisecond; a device that flies a thousand times as fast would wait.
+
 Flights are flown so many at once; their scores come back and nothing else. Of an ensemble the truths are drawn on the
 CPU, as everywhere, while the device flies the flights before.
 """
 
 from __future__ import annotations
 
+import multiprocessing
+import pickle
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaigns.engines.device_flight import TAPE_COUNTS, fly_navigated_flight, fly_paper_flight, take_here
-from flownav.campaigns.engines.drawn import Truths, truths_of_cell
-from flownav.campaigns.engines.engine import Part
-from flownav.campaigns.engines.local import neighbours
+from flownav.campaigns.device_flight import TAPE_COUNTS, fly_navigated_flight, fly_paper_flight, take_here
+from flownav.campaigns.engines import Part, neighbours
 from flownav.campaigns.local import home_epoch
-from flownav.campaigns.plan import Ready
+from flownav.campaigns.plan import Ready, ready_of
 from flownav.core.compile import ONE_LANE, WARP, NoDeviceError, Runner, announce_compilation, device_runner
 from flownav.core.errors import InputError
 from flownav.estimation.covariance import with_lag
@@ -29,11 +32,66 @@ from flownav.navigation.told import carries_lag
 from flownav.scoring.running import RUNNING_COLUMNS, RUNNING_ROWS
 from flownav.simulation.block import plain_noise
 from flownav.simulation.engine import buffers_of
+from flownav.simulation.ensemble import Ensemble, believed
 from flownav.simulation.plan import Flight
-from flownav.simulation.truth import TRUTH_ROWS
+from flownav.simulation.truth import TRUTH_ROWS, SensorFault, packed_truth
 
 Array = NDArray[np.float64]
+Truths = Callable[[int, int], Array]  # of so many flights from a number on: (TRUTH_ROWS, flights); of one, for all
 
+SLICE = 512  # flights that a process draws at a time
+WORTH_IT = 4096  # flights: fewer are drawn before other processes have started
+
+
+def truths_of(
+    flight: Flight, seed: int, ensemble: Ensemble | None, faults: Callable[[int], SensorFault] | None = None
+) -> Truths:
+    """As `simulation.engine.fly_into` has them: what the sheets say or the ensemble draws, and each flight's fault."""
+
+    def packed(first: int, count: int) -> Array:
+        if ensemble is not None:
+            truths = ensemble.truths(seed, first, count)
+        else:
+            truths = [believed(flight)] * (1 if faults is None else count)
+        if faults is not None:
+            truths = [truth._replace(fault=faults(first + k)) for k, truth in enumerate(truths)]
+        return packed_truth(truths).reshape(TRUTH_ROWS, -1)
+
+    return packed
+
+
+@contextmanager
+def truths_of_cell(cell: Ready, seed: int, flights: int, processes: int) -> Iterator[Truths]:
+    """The truths of a cell of which so many flights will be asked for."""
+    if cell.ensemble is None or cell.failure is not None or processes < 2 or flights < WORTH_IT:
+        yield truths_of(cell.flight, seed, cell.ensemble, cell.faults(seed))
+        return
+    told = pickle.dumps((cell.setup, cell.truth_model, cell.sampling, cell.flights))
+    pool = ProcessPoolExecutor(processes, multiprocessing.get_context("spawn"), _begin, (told, seed))
+
+    def packed(first: int, count: int) -> Array:
+        ends = [*range(first, first + count, SLICE), first + count]
+        return np.concatenate(list(pool.map(_draw, ends[:-1], np.diff(ends).tolist())), axis=1)
+
+    try:
+        yield packed
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+_drawing: list[Truths] = []  # of a process that draws
+
+
+def _begin(told: bytes, seed: int) -> None:
+    cell = ready_of(*pickle.loads(told))
+    _drawing[:] = [truths_of(cell.flight, seed, cell.ensemble)]
+
+
+def _draw(first: int, count: int) -> Array:
+    return _drawing[0](first, count)
+
+
+# -- the engine --------------------------------------------------------------------------------------------------
 AT_ONCE = 32768  # flights: eight warps on each of an H200's 132 multiprocessors
 MEMORY_SHARE = 0.8  # of what is free
 

@@ -1,0 +1,192 @@
+"""The engines of campaigns by their names: what every engine does, this machine's cores, a cluster of Ray's.
+
+The cluster is the one that RAY_ADDRESS names, else one of this machine's cores. Every task flies its part on one thread
+and gives its rows back. What it needs (vehicle, sensors, scenario) goes with it: workers read no file of the user's.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import secrets
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flownav.campaigns.local import rows_of
+from flownav.campaigns.plan import Ready, ready_of
+from flownav.core.compile import LANES
+from flownav.core.errors import InputError
+from flownav.simulation.engine import Instead, fly_blocks
+from flownav.simulation.plan import Flight
+
+Array = NDArray[np.float64]
+
+
+class Part(NamedTuple):
+    """Some flights of a cell: so many from number `first` on; number: of the file that they go to."""
+
+    number: int
+    first: int
+    flights: int
+
+
+class Engine(Protocol):
+    """Flies flights; the same rows whichever engine does."""
+
+    def fly(
+        self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object]
+    ) -> Iterator[tuple[Part, Array]]:
+        """The rows of each part, (flights, len(measures.ROW_COLUMNS)), part by part."""
+
+
+# -- this machine ------------------------------------------------------------------------------------------------
+class Local:
+    """threads: how many fly at once; None: as many as there are cores. instead: as of `fly_blocks`.
+
+    check: is given each block's flight and history, and raises where they cannot be judged.
+    """
+
+    def __init__(
+        self, threads: int | None = None, instead: int | None = None,
+        check: Callable[[Flight, Array], None] = lambda flight, history: None,
+    ) -> None:  # fmt: skip
+        self.threads, self.instead, self.check = threads, instead, check
+
+    def fly(
+        self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
+    ) -> Iterator[tuple[Part, Array]]:
+        """The rows of each part; parts that follow each other are flown without a pause between them."""
+        for together in neighbours(parts):
+            yield from self._without_pause(cell, seed, together, on_progress)
+
+    def _without_pause(
+        self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object]
+    ) -> Iterator[tuple[Part, Array]]:
+        flight, waiting = cell.flight, list(parts)
+        held: list[Array] = []
+        total = sum(part.flights for part in parts)
+
+        def judge(history: Array) -> Array:
+            self.check(flight, history)
+            return rows_of(flight, history)
+
+        have = 0
+        first, fault = parts[0].first, cell.faults(seed)
+
+        def instead(start: int) -> Instead:
+            numbers = range(first + start, first + start + len(LANES))
+            return Instead(faults=fault and [fault(number) for number in numbers], take=self.instead)
+
+        for flown, block in fly_blocks(flight, seed, first, total, judge, self.threads, cell.ensemble, instead):
+            held.append(block)
+            have += flown
+            on_progress(flown)
+            while waiting and have >= waiting[0].flights:
+                part, rows = waiting.pop(0), np.concatenate(held)
+                held, have = [rows[part.flights :]], have - part.flights
+                yield part, rows[: part.flights]
+
+
+def neighbours(parts: Sequence[Part]) -> Iterator[list[Part]]:
+    """Parts in runs that follow each other without a gap."""
+    if not parts:
+        return
+    run = [parts[0]]
+    for before, after in pairwise(parts):
+        if after.first != before.first + before.flights:
+            yield run
+            run = []
+        run.append(after)
+    yield run
+
+
+# -- a cluster ---------------------------------------------------------------------------------------------------
+AHEAD = 2  # parts that wait for each core of the cluster
+
+
+class RayCluster:
+    """address: of the cluster; None: as RAY_ADDRESS says, else a new one on this machine. InputError without Ray."""
+
+    def __init__(self, address: str | None = None) -> None:
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        try:
+            import ray
+        except ImportError:
+            raise InputError('--engine ray: Ray is not installed; pip install "flownav[cluster]"') from None
+        self._ray = ray
+        if not ray.is_initialized():
+            where = address or os.environ.get("RAY_ADDRESS")
+            try:
+                ray.init(
+                    address=where,
+                    include_dashboard=None if where else False,
+                    log_to_driver=False,
+                    logging_level=logging.ERROR,
+                )
+            except (ConnectionError, RuntimeError, ValueError) as error:
+                raise InputError(f"--engine ray: no cluster at {where}: {str(error).splitlines()[0]}") from None
+
+    def close(self) -> None:
+        """Leave the cluster; one of this machine alone ends."""
+        self._ray.shutdown()
+
+    def fly(
+        self, cell: Ready, seed: int, parts: Sequence[Part], on_progress: Callable[[int], object] = lambda flown: None
+    ) -> Iterator[tuple[Part, Array]]:
+        """The rows of each part, in order, whichever worker has flown it."""
+        told = self._ray.put((cell.setup, cell.truth_model, cell.sampling, cell.flights, cell.failure))
+        key = secrets.token_hex(8)
+        task = self._ray.remote(num_cpus=1, max_retries=-1)(fly_part)
+        most = AHEAD * max(1, int(self._ray.cluster_resources().get("CPU", 1)))
+        waiting: deque[tuple[Part, Any]] = deque()
+        for part in parts:
+            waiting.append((part, task.remote([told], key, seed, part)))
+            if len(waiting) >= most:
+                yield self._taken(*waiting.popleft(), on_progress)
+        while waiting:
+            yield self._taken(*waiting.popleft(), on_progress)
+
+    def _taken(self, part: Part, result: Any, on_progress: Callable[[int], object]) -> tuple[Part, Array]:
+        """The rows of a part, once it has been flown."""
+        rows = np.array(self._ray.get(result))
+        on_progress(part.flights)
+        return part, rows
+
+
+_cells: dict[str, Ready] = {}  # of a worker: the last cell that it has flown
+
+
+def fly_part(told: list[Any], key: str, seed: int, part: Part) -> Array:
+    """A part's rows, flown by a worker on one thread. told: where what `plan.ready_of` makes a cell of is to be had."""
+    if key not in _cells:
+        import ray
+
+        _cells.clear()
+        _cells[key] = ready_of(*ray.get(told[0]))
+    ((_, rows),) = Local(threads=1).fly(_cells[key], seed, [part])
+    return rows
+
+
+# -- by name -----------------------------------------------------------------------------------------------------
+ENGINES = ("local", "ray", "cuda")
+
+
+def require_engine(name: str) -> None:
+    """InputError where there is no engine of that name."""
+    if name not in ENGINES:
+        raise InputError(f"--engine {name}: must be {', '.join(ENGINES[:-1])} or {ENGINES[-1]}")
+
+
+def engine_named(name: str) -> Engine:
+    """The engine of that name. InputError where what it needs is not there."""
+    require_engine(name)
+    if name == "cuda":
+        from flownav.campaigns.cuda import Cuda
+
+        return Cuda(processes=os.cpu_count() or 1)
+    return RayCluster() if name == "ray" else Local()

@@ -1,1 +1,0 @@
-"""Where a campaign's flights are flown: on this machine's cores, on a cluster, on a GPU."""

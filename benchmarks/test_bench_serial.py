@@ -16,10 +16,10 @@ import numpy as np
 
 from flownav.campaigns.faults.flight_log import log_of
 from flownav.campaigns.local import fly_recorded
+from flownav.live.loop import warm_up
 from flownav.live.recorder import NoRecorder
 from flownav.live.session import Session
 from flownav.live.simulated import BOOT_S, SimulatedVehicle
-from flownav.live.warm import warm_up
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 from serial_line import SETTLED_S, Flown, fly_over, options_of

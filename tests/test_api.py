@@ -24,7 +24,7 @@ LONGEST_FILE = 330
 # rooms from the ground up; a room imports its own floor's neighbours named here and what lies below
 GROUND = {"errors", "files", "compile", "frames", "measurement", "record", "parameter_files", "provenance"}
 GROUND |= {"record_file", "parquet_pages"}
-GROUND |= {"guard", "free_names", "text", "toml_text"}
+GROUND |= {"guard", "free_names", "text"}
 EQUATIONS = {"vehicle", "sensors", "control", "estimation", "optics"}
 # what the public API stands on: every room but the faces
 JOBS = {"navigation", "simulation", "logs", "mavlink", "scoring", "replays", "live", "campaigns", "faults"}

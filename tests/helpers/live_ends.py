@@ -9,12 +9,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from flownav.core.measurement import Measurement, Sensor
-from flownav.live.link import UdpLink, open_link
+from flownav.live.byte_links import open_link
+from flownav.live.link import UdpLink
 from flownav.live.options import Options
 from flownav.live.recorder import NoRecorder
 from flownav.live.session import Session
-from flownav.mavlink import sensors_outgoing as say
-from flownav.mavlink.dialect import coder
+from flownav.mavlink import outgoing as say
+from flownav.mavlink.framing import coder
 from flownav.mavlink.signing import sign_outgoing
 
 ORIGIN = (47.0, 8.5, 400.0)

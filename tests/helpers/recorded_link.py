@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 from flownav.live.options import Options
 from flownav.live.recorder import NoRecorder
 from flownav.live.session import Session
-from flownav.mavlink.dialect import coder
-from flownav.mavlink.framing import StreamFrames
+from flownav.mavlink.framing import StreamFrames, coder
 
 TICK_S = 0.005  # as the loop wakes up
 

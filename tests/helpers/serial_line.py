@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flownav.core.measurement import Sensor
-from flownav.live.byte_links import SerialLink
-from flownav.live.link import Link, open_link, parse_url
+from flownav.live.byte_links import SerialLink, open_link
+from flownav.live.link import Link, parse_url
 from flownav.live.loop import Latency, run_session, run_vehicle
 from flownav.live.options import Options
 from flownav.live.recorder import NoRecorder

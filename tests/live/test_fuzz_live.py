@@ -9,11 +9,11 @@ from random import Random
 
 import pytest
 
+from flownav.live.loop import warm_up
 from flownav.live.options import Options
 from flownav.live.recorder import NoRecorder
 from flownav.live.session import Session
-from flownav.live.warm import warm_up
-from flownav.mavlink.dialect import coder
+from flownav.mavlink.framing import coder
 from fuzzing import FIRST_SEED, MUTANTS
 from link_mutations import mutate_piece
 from live_ends import START_S, STEP_S, UNIX_S, Hover

@@ -20,17 +20,16 @@ from flownav.campaigns.local import fly_recorded
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.core.record import Record
+from flownav.live.byte_links import open_link
 from flownav.live.display import draw
-from flownav.live.link import open_link
-from flownav.live.loop import Latency, run_session, run_vehicle
+from flownav.live.loop import Latency, run_session, run_vehicle, warm_up
 from flownav.live.options import Options
 from flownav.live.recorder import NoRecorder, Recorder
 from flownav.live.screen import Screen
 from flownav.live.session import Session
 from flownav.live.simulated import BOOT_S, ORIGIN_DEG_M, SimulatedVehicle
-from flownav.live.warm import warm_up
 from flownav.logs.open_log import open_flight
-from flownav.mavlink.dialect import coder
+from flownav.mavlink.framing import coder
 from flownav.navigation.tables import estimate_table, innovation_table, states_table
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions

@@ -14,16 +14,15 @@ from hypothesis import strategies as st
 from flownav.core.errors import InputError
 from flownav.core.measurement import Measurement, Sensor
 from flownav.estimation.states import POSITION, QUATERNION, STATE, VELOCITY
-from flownav.live.byte_links import SerialLink, TcpLink
-from flownav.live.estimating import estimate_of
+from flownav.live.answers import estimate_of
+from flownav.live.byte_links import SerialLink, TcpLink, open_link
 from flownav.live.filtering import BATCH, Filtering
-from flownav.live.horizon import Horizon, Waiting
-from flownav.live.link import Address, open_link, parse_url
+from flownav.live.horizon import SILENT_S, Horizon, Source, Sources, Waiting
+from flownav.live.link import Address, parse_url
 from flownav.live.loop import Latency
 from flownav.live.options import Options
 from flownav.live.recorder import NoRecorder
 from flownav.live.screen import strip
-from flownav.live.sources import SILENT_S, Source, Sources
 from flownav.live.timing import VehicleClock
 from flownav.mavlink.framing import LARGEST_FRAME, StreamFrames
 from mavlink_logs import flight_log, made

@@ -17,7 +17,7 @@ from types import SimpleNamespace
 import pytest
 
 from flownav.live import display as shown
-from flownav.live import priority
+from flownav.live import loop
 from flownav.live.display import Display, View
 from flownav.live.filtering import BATCH
 from flownav.live.loop import COLLECT_S, Collector, Latency, run_session, stoppable
@@ -87,8 +87,8 @@ def test_the_scheduling_is_what_is_permitted_and_is_said(monkeypatch, refused, s
     monkeypatch.setattr(os, "sched_setscheduler", permitted("fifo"))
     monkeypatch.setattr(os, "setpriority", permitted("nice"))
     try:
-        assert said in priority.run_before_others()
-        assert sys.getswitchinterval() == pytest.approx(priority.SWITCH_S)
+        assert said in loop.run_before_others()
+        assert sys.getswitchinterval() == pytest.approx(loop.SWITCH_S)
     finally:
         sys.setswitchinterval(before_s)
 

@@ -16,19 +16,17 @@ from rich.console import Console
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.estimation.states import POSITION, STATE
-from flownav.live.answers import ODOMETRY_COMPONENT
+from flownav.live.answers import ODOMETRY_COMPONENT, why_withheld
 from flownav.live.display import draw
-from flownav.live.estimating import why_withheld
-from flownav.live.horizon import MOST_WAITING
+from flownav.live.horizon import MOST_WAITING, Refused
 from flownav.live.loop import Latency
 from flownav.live.options import Limits, Options
 from flownav.live.reception import BESIDE, Accepted, accepted_by, accepted_of
 from flownav.live.recorder import NoRecorder
 from flownav.live.screen import Screen
-from flownav.live.serving import Refused
 from flownav.live.session import Session
-from flownav.mavlink import sensors_outgoing as say
-from flownav.mavlink.dialect import coder
+from flownav.mavlink import outgoing as say
+from flownav.mavlink.framing import coder
 from flownav.mavlink.position_messages import LOCAL_FRD
 from flownav.mavlink.signing import SignatureCheck
 from flownav.navigation.memory import PROTECTION

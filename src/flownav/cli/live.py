@@ -123,15 +123,12 @@ def _navigate(
 ) -> None:
     """Navigate until asked to end, and say what came of it. VerdictError where nobody was heard or kept."""
     from flownav.core.errors import VerdictError
+    from flownav.live.byte_links import open_link
     from flownav.live.display import on_terminal
-    from flownav.live.link import open_link
-    from flownav.live.loop import Latency, run_session, stoppable
-    from flownav.live.priority import run_as_others, run_before_others
+    from flownav.live.loop import Latency, run_as_others, run_before_others, run_session, stoppable, warm_up
     from flownav.live.recorder import NoRecorder, told_every_second
-    from flownav.live.screen import Screen
+    from flownav.live.screen import Screen, traffic_facts
     from flownav.live.session import Session
-    from flownav.live.traffic import traffic_facts
-    from flownav.live.warm import warm_up
 
     warm_up()
     shown = not as_json and sys.stdout.isatty()
@@ -278,8 +275,8 @@ def _print(facts: dict[str, Any]) -> None:
     """The same figures for people."""
     from rich.console import Console
 
-    from flownav.live.estimating import WITHHELD
-    from flownav.live.traffic import in_words
+    from flownav.live.answers import WITHHELD
+    from flownav.live.screen import in_words
 
     console = Console(markup=False, highlight=False)
     vehicle = facts["vehicle"]

@@ -147,11 +147,11 @@ class Record:
         """
         from flownav.core.record_file import save
 
-        save(self, path, replacing=replacing)
+        save({"schema": SCHEMA_VERSION, **self.manifest}, self.tables, path, replacing=replacing)
 
     @classmethod
     def load(cls, path: Path) -> Record:
         """Read a record. InputError where the file is missing, is no record, or is of a newer schema."""
         from flownav.core.record_file import load
 
-        return load(path)
+        return cls(*load(path, SCHEMA_VERSION, TABLES))

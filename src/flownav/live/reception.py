@@ -8,8 +8,7 @@ from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 from flownav.core.errors import InputError
-from flownav.mavlink.dialect import INVALID_AUTOPILOT, Message, coder, dialect
-from flownav.mavlink.framing import StreamFrames
+from flownav.mavlink.framing import INVALID_AUTOPILOT, Message, StreamFrames, coder, dialect
 from flownav.mavlink.signing import SignatureCheck
 
 LONGEST_LOSS = 128  # a greater step of the sequence is a sender that began anew

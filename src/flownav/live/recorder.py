@@ -20,11 +20,10 @@ from flownav.core.errors import InputError
 from flownav.core.free_names import free_name
 from flownav.core.measurement import Array, EventQueue
 from flownav.core.provenance import command_line, provenance
-from flownav.live.journal_place import claim
 from flownav.live.options import Options
 from flownav.live.recovery import WIDTHS, recovered
-from flownav.live.writing import Writer
-from flownav.mavlink.state_messages import TrueState
+from flownav.live.writing import Writer, claim
+from flownav.mavlink.messages import TrueState
 from flownav.navigation.tables import fed_rows
 from flownav.navigation.told import Equipment
 

@@ -11,22 +11,19 @@ from collections import Counter, deque
 from typing import Protocol
 
 from flownav.core.measurement import Measurement, Sensor
-from flownav.live.answers import ODOMETRY_COMPONENT, Answers
-from flownav.live.estimating import UNFUSED, WITHHELD, estimate_of, fault_of, why_withheld
+from flownav.live.answers import ODOMETRY_COMPONENT, UNFUSED, WITHHELD, Answers, estimate_of, fault_of, why_withheld
 from flownav.live.filtering import BATCH, Filtering, Keeper
 from flownav.live.hearing import Hearing
+from flownav.live.horizon import Refused
 from flownav.live.options import Options
 from flownav.live.rates import Rates
 from flownav.live.reception import Reception, Vehicle
-from flownav.live.requests import Requests
-from flownav.live.serving import Refused
-from flownav.live.simulator import Simulator
+from flownav.live.requests import Requests, Simulator
 from flownav.live.timing import VehicleClock
 from flownav.mavlink.converted import Pose
-from flownav.mavlink.dialect import Message
-from flownav.mavlink.messages import CONVERTERS
+from flownav.mavlink.framing import Message
+from flownav.mavlink.messages import CONVERTERS, TrueState, hil_state_quaternion, sim_state
 from flownav.mavlink.outgoing import Estimate
-from flownav.mavlink.state_messages import TrueState, hil_state_quaternion, sim_state
 from flownav.navigation.feed import SLOWEST_IMU_HZ
 from flownav.navigation.rows import InnovationRow
 from flownav.navigation.serving import HORIZONTAL

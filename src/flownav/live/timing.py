@@ -15,7 +15,7 @@ from flownav.mavlink.clock import (
     timesync_offset_s,
     told_unix_time,
 )
-from flownav.mavlink.dialect import Message
+from flownav.mavlink.framing import Message
 
 NAN = float("nan")
 LONGEST_ROUND_TRIP_S = 0.5

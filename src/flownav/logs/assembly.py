@@ -1,18 +1,24 @@
-"""From a reader's columns to a Stream: in time order, what cannot be thrown away and counted, whatever the format."""
+"""From columns of a reader to a Stream: rows in time order, what cannot be thrown away and counted in every format."""
 
 from __future__ import annotations
 
 import hashlib
+from bisect import bisect_right
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flownav.core.errors import InputError
 from flownav.core.guard import an_input
 from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
-from flownav.logs.fixes import Origin, local_position, near_the_rest, origin_of
-from flownav.logs.rows import Rows, drop_duplicates, drop_strays, longest_ordered
 
+LATE_SHARE = 0.05  # more rows than this out of time order: not a late row here and there
+LONGEST_GAP_S = 600.0  # a few rows further away than this carry a wrong time
+FARTHEST_FIX_DEG = 0.5
+
+Origin = tuple[float, float, float]  # latitude, longitude [deg], altitude [m]
 # what a vehicle's sensor can say at most, in the unit of `measurement.COLUMNS`; beyond it a bit or a unit is wrong
 MOST: dict[Sensor, tuple[float, ...]] = {
     Sensor.GPS_VELOCITY: (150.0,) * 3,
@@ -32,6 +38,104 @@ SEA_LEVEL_PA = 101325.0
 SCALE_HEIGHT_M, ALTITUDE_EXPONENT = 44330.77, 0.1902632  # the standard atmosphere's troposphere
 
 
+@dataclass
+class Rows:
+    """t_s (n,), columns by name (n,) each, counts of thrown-away rows by reason."""
+
+    t_s: Array
+    columns: dict[str, Array]
+    rejected: dict[str, int] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    def column(self, name: str) -> Array:
+        """A column; NaN where the table lacks it, which cannot be written to."""
+        return self.columns.get(name, np.broadcast_to(np.nan, len(self.t_s)))
+
+    def matrix(self, *names: str) -> Array:
+        """Columns side by side, shape (n, len(names)); a column that the table lacks is NaN."""
+        return np.column_stack([self.column(name) for name in names])
+
+    def keep(self, good: NDArray[np.bool_] | np.bool_, reason: str) -> None:
+        """Throw the other rows away and count them."""
+        bad = int(np.count_nonzero(~good))
+        if bad:
+            self.rejected[reason] = self.rejected.get(reason, 0) + bad
+            self.t_s = self.t_s[good]
+            self.columns = {name: values[good] for name, values in self.columns.items()}
+
+
+def drop_strays(rows: Rows) -> None:
+    """Throw away the few rows at either end that a gap of many minutes parts from all others."""
+    gaps = np.flatnonzero(np.diff(rows.t_s) > LONGEST_GAP_S) + 1
+    few = max(1, int(LATE_SHARE * len(rows)))
+    near = np.ones(len(rows), bool)
+    for gap in gaps:
+        if len(near) - gap <= few:
+            near[gap:] = False
+        elif gap <= few:
+            near[:gap] = False
+    rows.keep(near, "clock_jump")
+
+
+def drop_duplicates(rows: Rows) -> None:
+    """Throw away rows that say the same at the same time as the row before; two readings at one time both stay."""
+    again = np.zeros(len(rows), bool)
+    again[1:] = np.diff(rows.t_s) == 0
+    for values in rows.columns.values():
+        again[1:] &= (values[1:] == values[:-1]) | (np.isnan(values[1:]) & np.isnan(values[:-1]))
+    rows.keep(~again, "duplicate")
+
+
+def longest_ordered(t_s: Array) -> NDArray[np.bool_]:
+    """The largest set of rows whose times never run back (patience sorting), as a mask."""
+    keep = np.zeros(len(t_s), bool)
+    tails: list[float] = []
+    tail_rows: list[int] = []
+    before = np.full(len(t_s), -1)
+    for row, t in enumerate(t_s.tolist()):
+        place = bisect_right(tails, t)
+        before[row] = tail_rows[place - 1] if place else -1
+        if place == len(tails):
+            tails.append(t)
+            tail_rows.append(row)
+        else:
+            tails[place], tail_rows[place] = t, row
+    row = tail_rows[-1] if tail_rows else -1
+    while row >= 0:
+        keep[row] = True
+        row = int(before[row])
+    return keep
+
+
+# -- geodetic positions -------------------------------------------------------------------------------------
+def near_the_rest(latitude_deg: Array, longitude_deg: Array) -> NDArray[np.bool_]:
+    """Fixes within half a degree of the middle one: a receiver's first are at times 0, 0 or where it was last used."""
+    north = latitude_deg - np.sort(latitude_deg)[len(latitude_deg) // 2]
+    east = (longitude_deg - np.sort(longitude_deg)[len(longitude_deg) // 2] + 180.0) % 360.0 - 180.0
+    return np.asarray(np.hypot(north, east) < FARTHEST_FIX_DEG)
+
+
+def origin_of(fixes: Rows) -> Origin:
+    """The first fix. Rows have columns lat_deg, lon_deg, alt_m."""
+    first = fixes.matrix("lat_deg", "lon_deg", "alt_m")[0]
+    return float(first[0]), float(first[1]), float(first[2])
+
+
+def local_position(fixes: Rows) -> Array:
+    """North, east, down [m] about the first fix (n, 3). Rows have columns lat_deg, lon_deg, alt_m."""
+    return local_ned(fixes.matrix("lat_deg", "lon_deg", "alt_m"), origin_of(fixes))
+
+
+def local_ned(geodetic_deg_m: Array, origin: Origin) -> Array:
+    """North, east, down [m] about an origin; latitude, longitude [deg] and altitude [m] in, shape (n, 3) both."""
+    import pymap3d
+
+    return np.column_stack(pymap3d.geodetic2ned(*geodetic_deg_m.T, *origin))
+
+
+# -- streams ------------------------------------------------------------------------------------------------
 def sensor_stream(
     sensor: Sensor, t_s: Array, value: Array, *, variance: Array | None = None, quality: Array | None = None,
     delay_s: float = 0.0, rejected: dict[str, int] | None = None,

@@ -24,13 +24,11 @@ from flownav.core.errors import InputError
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
-from flownav.logs.absences import absences_of
 from flownav.logs.assembly import pressure_altitude_m, sensor_stream
 from flownav.logs.crazyflie import Block, Blocks, read_blocks
-from flownav.logs.flu import frd, ned_from_frd_of_nwu
-from flownav.logs.log import Log
+from flownav.logs.frames import frd, ned_from_frd_of_nwu, state_table
+from flownav.logs.log import Log, absences_of
 from flownav.logs.plausible import check_times, of_one_clock
-from flownav.logs.states import state_table
 
 COUNTS_PER_PIXEL, PIXELS, APERTURE_RAD = 10.0, 35.0, 0.71674
 RAD_PER_COUNT = APERTURE_RAD / (PIXELS * COUNTS_PER_PIXEL)

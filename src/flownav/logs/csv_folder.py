@@ -16,10 +16,9 @@ from flownav.core.errors import InputError
 from flownav.core.frames import quaternion_from_euler
 from flownav.core.guard import an_input
 from flownav.core.measurement import Array, Sensor, Stream
-from flownav.logs.absences import absences_of
+from flownav.logs.assembly import local_position, near_the_rest, origin_of
 from flownav.logs.csv_table import Column, CsvTable, read_csv_table
-from flownav.logs.fixes import local_position, near_the_rest, origin_of
-from flownav.logs.log import Log
+from flownav.logs.log import Log, absences_of
 from flownav.logs.plausible import check_plausible
 
 HALF_TURN = np.pi + 0.01

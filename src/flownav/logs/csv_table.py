@@ -18,7 +18,7 @@ from flownav.core.errors import InputError
 from flownav.core.guard import an_input
 from flownav.core.measurement import Array
 from flownav.core.text import number
-from flownav.logs.rows import LATE_SHARE, Rows, drop_duplicates, drop_strays, longest_ordered
+from flownav.logs.assembly import LATE_SHARE, Rows, drop_duplicates, drop_strays, longest_ordered
 
 WRONG_UNIT_SHARE = 0.1  # more rows than this outside the limits: the column is in another unit
 LONGEST_MEDIAN_STEP_S = 10.0

@@ -88,7 +88,7 @@ def _reader(kind: str) -> Callable[..., Log]:
 
         return read_dataflash
     if kind == "record":
-        from flownav.logs.live_record import read_live_record
+        from flownav.logs.record_log import read_live_record
 
         return read_live_record
     if kind == "crazyflie":

@@ -12,8 +12,7 @@ from pathlib import Path
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor, Stream
 from flownav.core.record import Table
-from flownav.logs.absences import absences_of
-from flownav.logs.log import SIMULATOR, VISUAL_ODOMETRY, Absence, Log
+from flownav.logs.log import SIMULATOR, VISUAL_ODOMETRY, Absence, Log, absences_of
 from flownav.logs.plausible import check_times, of_one_clock
 from flownav.logs.ulog_flow import FLOW_TOPICS, flow_stream, flow_topic, range_stream, reading_limits
 from flownav.logs.ulog_references import autopilot_estimate, pose_stream, truth_of

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from flownav.core.frames import heading_from_quaternion, rotation_from_quaternion, to_body, turned_about_down
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
-from flownav.logs.rates import attitude_at
-from flownav.logs.states import state_table
+from flownav.logs.frames import attitude_at, state_table
 from flownav.logs.ulog_topics import MOST_VARIANCE, Topic, Topics
 
 LEAST_ROWS = 2

@@ -6,8 +6,8 @@ import numpy as np
 
 from flownav.core.frames import rotation_from_quaternion, to_body
 from flownav.core.measurement import Array, Sensor, Stream
-from flownav.logs.fixes import Origin, local_position, near_the_rest, origin_of
-from flownav.logs.rates import attitude_at
+from flownav.logs.assembly import Origin, local_position, near_the_rest, origin_of
+from flownav.logs.frames import attitude_at
 from flownav.logs.ulog_topics import MOST_VARIANCE, Topic, Topics
 
 LEAST_IMU_HZ = 20.0  # slower, an inertial reading says nothing of the motion between two

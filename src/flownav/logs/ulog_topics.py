@@ -16,7 +16,7 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.guard import an_input
 from flownav.core.measurement import Array
-from flownav.logs.rows import Rows, drop_duplicates, drop_strays, longest_ordered
+from flownav.logs.assembly import Rows, drop_duplicates, drop_strays, longest_ordered
 from flownav.logs.ulog_framing import Framed, frame
 from flownav.logs.ulog_rows import Bytes, Places, field_of
 

@@ -24,20 +24,20 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import smooth
 from flownav.navigation.tables import Written, estimate_table, written_on
 from flownav.navigation.tape import new_tape, tape_for
-from flownav.replays.airborne import airborne_of
-from flownav.replays.autopilot import autopilot_scores
 from flownav.replays.fed import prepared_as_fed, run_as_fed
 from flownav.replays.judged import (
     NO_REJECTION,
+    airborne_of,
+    autopilot_scores,
     consistency_scores,
     coverage_scores,
     protection_scores,
     reading_scores,
     told,
+    unfused,
 )
 from flownav.replays.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replays.sentinel import Finding, findings
-from flownav.replays.unfused import unfused
 from flownav.scoring.alignment import Alignment
 from flownav.scoring.autopilot import columns_of
 from flownav.scoring.coverage import silences

@@ -75,8 +75,7 @@ def _prepare(record: Record, name: str, to: Path | None = None) -> Prepared:
     paths = trajectories(record)
     import rerun as rr
 
-    from flownav.export.viewing.arrangement import arrangement
-    from flownav.export.viewing.plots import log_plots
+    from flownav.export.viewing.plots import arrangement, log_plots
     from flownav.export.viewing.scene import log_scene
 
     stream = rr.RecordingStream(APPLICATION, recording_id=str(uuid.uuid4()), send_properties=False)

@@ -14,8 +14,8 @@ from flownav.lab.identification.flight import IMU_NAME
 from flownav.lab.identification.judged import judged
 from flownav.lab.identification.reference_motion import ALIKE_S, fast_flow, flow_likeness, on_grid, with_flow
 from flownav.lab.identification.sentinel import ALL_AXES, CLEAR, sentence
+from flownav.logs.frames import mean_over
 from flownav.logs.log import Log
-from flownav.logs.rates import mean_over
 
 AGREE, IN_PART = 0.9, 0.4  # correlation from which two velocities agree, or do so in part
 

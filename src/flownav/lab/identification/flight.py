@@ -19,10 +19,10 @@ from flownav.core.frames import GRAVITY_M_S2 as GRAVITY_M_S2
 from flownav.core.frames import rotation_from_quaternion, velocity_from_flow
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.lab.identification.usable import Ranges, believed, beside
+from flownav.logs.frames import attitude_at
 from flownav.logs.log import Log
-from flownav.logs.rates import attitude_at
-from flownav.replays.airborne import flying_at
-from flownav.replays.attitude import turned_sensor, with_attitude
+from flownav.replays.bundle import turned_sensor, with_attitude
+from flownav.replays.judged import flying_at
 from flownav.replays.prepare import ReplayOptions, prepare
 
 MOST_JUMPING = 0.6

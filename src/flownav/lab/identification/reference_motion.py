@@ -20,7 +20,7 @@ from flownav.lab.identification.flight import GRAVITY_M_S2, Flight
 from flownav.lab.identification.output_error import fit
 from flownav.lab.identification.quantities import Interval, latency
 from flownav.lab.identification.statistics import Z_95
-from flownav.logs.rates import mean_over
+from flownav.logs.frames import mean_over
 
 GRID_S = 0.02
 SPLIT_S = 1.0

@@ -7,11 +7,9 @@ from typing import Any
 
 from flownav.live.link import Address
 from flownav.live.reception import Vehicle
-from flownav.live.setup.compare import Block, Row, blocks_of, rows_of, source_set
-from flownav.live.setup.exchange import Change, read, why_not, write
+from flownav.live.setup.compare import Block, Row, blocks_of, port_names, port_of, rows_of, source_set
 from flownav.live.setup.knowledge import Knowledge, knowledge_of
-from flownav.live.setup.serial_port import port_names, port_of
-from flownav.live.setup.talk import Talk
+from flownav.live.setup.talk import Change, Talk, read, why_not, write
 from flownav.mavlink.parameters import Value
 
 MEET_S = 10.0

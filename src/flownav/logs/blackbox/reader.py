@@ -22,15 +22,12 @@ from flownav.core.errors import InputError
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import Table
-from flownav.logs.absences import absences_of
-from flownav.logs.assembly import content_of, gps_streams, sensor_stream, sha256_of
+from flownav.logs.assembly import Origin, content_of, gps_streams, sensor_stream, sha256_of
+from flownav.logs.blackbox.format import Header, headers
 from flownav.logs.blackbox.frames import Frames, read_frames
-from flownav.logs.blackbox.header import Header, headers
-from flownav.logs.fixes import Origin
-from flownav.logs.flu import frd, ned_from_frd_of_nwu
-from flownav.logs.log import Log
+from flownav.logs.frames import frd, ned_from_frd_of_nwu, state_table
+from flownav.logs.log import Log, absences_of
 from flownav.logs.plausible import check_times, of_one_clock
-from flownav.logs.states import state_table
 
 US, CM, DEG_E7, DECIDEGREE = 1e-6, 1e-2, 1e-7, 0.1
 FLOW_RAW = 2  # INAV's debug_mode
@@ -229,7 +226,7 @@ def _estimate(frames: Frames, t_s: Array, attitude: Stream | None) -> Table | No
     up_is_down = np.array([1.0, 1.0, -1.0])
     turned = None
     if attitude is not None and len(attitude) > 1:
-        from flownav.logs.rates import attitude_at
+        from flownav.logs.frames import attitude_at
 
         turned = attitude_at(attitude, t_s[rows])
     return state_table(t_s[rows], CM * place[rows] * up_is_down, CM * speed[rows] * up_is_down, turned)

@@ -11,12 +11,9 @@ import numpy as np
 
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
-from flownav.logs.assembly import gps_streams, pressure_altitude_m, sensor_stream
-from flownav.logs.fixes import Origin
-from flownav.logs.flu import frd, ned, ned_from_frd
-from flownav.logs.ros.clock import Clock
-from flownav.logs.ros.columns import POSE, QUATERNION, Gathered
-from flownav.logs.states import in_order, state_table
+from flownav.logs.assembly import Origin, gps_streams, pressure_altitude_m, sensor_stream
+from flownav.logs.frames import frd, in_order, ned, ned_from_frd, state_table
+from flownav.logs.ros.topics import POSE, QUATERNION, Clock, Gathered
 
 GAUSS_PER_TESLA = 1e4
 KNOWN_COVARIANCE = 1  # sensor_msgs/NavSatFix: COVARIANCE_TYPE_APPROXIMATED and above

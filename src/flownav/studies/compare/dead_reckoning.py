@@ -9,7 +9,7 @@ import numpy as np
 
 from flownav.core.frames import heading_from_quaternion, rotation_from_quaternion, to_earth, velocity_from_flow
 from flownav.core.measurement import Array, Sensor, Stream
-from flownav.logs.rates import attitude_at
+from flownav.logs.frames import attitude_at
 from flownav.scoring.drift import Motion
 from flownav.studies.compare.tracks import Track
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from flownav.logs.log import Log
-from flownav.replays.airborne import airborne_of
+from flownav.replays.judged import airborne_of
 from flownav.replays.session import outage_summary
 from flownav.scoring.outage import OutageError
 from flownav.scoring.path import References, end_drift_of, outage_entry

@@ -10,7 +10,7 @@ from flownav.core.measurement import Sensor
 from flownav.lab.identification.first_look import IN_PART, Look
 from flownav.lab.identification.usable import jumps
 from flownav.logs.log import Log
-from flownav.replays.airborne import flying_at
+from flownav.replays.judged import flying_at
 from flownav.replays.sentinel import Finding
 
 LEAST_JUMPING = 0.01  # of the steps in flight: of less, one echo is no trouble

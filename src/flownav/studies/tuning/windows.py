@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from flownav.core.errors import InputError
 from flownav.logs.log import Log
-from flownav.replays.airborne import Window, airborne_of
+from flownav.replays.judged import Window, airborne_of
 
 LONGEST_S = 30.0  # half of it is no harder a GPS cut, twice of it leaves too few windows of a usual flight
 USUAL_S = 5.0

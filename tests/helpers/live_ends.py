@@ -10,9 +10,9 @@ from typing import Any
 
 from flownav.core.measurement import Measurement, Sensor
 from flownav.live.byte_links import open_link
+from flownav.live.filtering import Keeper
 from flownav.live.link import UdpLink
 from flownav.live.options import Options
-from flownav.live.recorder import NoRecorder
 from flownav.live.session import Session
 from flownav.mavlink import outgoing as say
 from flownav.mavlink.framing import coder
@@ -117,7 +117,7 @@ class Wire:
 
     def __init__(self, vehicle: Hover, options: Options | None = None, keeper: Any = None) -> None:
         self.vehicle, self.t_s = vehicle, 0.0
-        self.session = Session(options or Options(), keeper or NoRecorder(), START_S, UNIX_S)
+        self.session = Session(options or Options(), keeper or Keeper(), START_S, UNIX_S)
         link = open_link("udp:0")
         assert isinstance(link, UdpLink)
         link.close()

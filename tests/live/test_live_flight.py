@@ -22,9 +22,10 @@ from flownav.core.measurement import Sensor
 from flownav.core.record import Record
 from flownav.live.byte_links import open_link
 from flownav.live.display import draw
+from flownav.live.filtering import Keeper
 from flownav.live.loop import Latency, run_session, run_vehicle, warm_up
 from flownav.live.options import Options
-from flownav.live.recorder import NoRecorder, Recorder
+from flownav.live.recorder import Recorder
 from flownav.live.screen import Screen
 from flownav.live.session import Session
 from flownav.live.simulated import BOOT_S, ORIGIN_DEG_M, SimulatedVehicle
@@ -231,7 +232,7 @@ def test_a_record_of_another_kind_is_refused(tmp_path):
 
 
 def test_memory_does_not_grow_with_the_session():
-    wire = Wire(Hover(), Options(), NoRecorder()).fly(4.0)
+    wire = Wire(Hover(), Options(), Keeper()).fly(4.0)
 
     def held(seconds):
         wire.fly(seconds)

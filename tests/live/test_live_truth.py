@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from flownav.live.filtering import Keeper
 from flownav.live.options import Options
-from flownav.live.recorder import NoRecorder
 from flownav.live.requests import HIL, SET_MESSAGE_INTERVAL, SILENT_S, TRIES
 from flownav.live.session import Session
 from flownav.mavlink import outgoing as say
@@ -14,7 +14,7 @@ from flownav.mavlink.framing import coder
 ARDUPILOT, PX4 = 3, 12
 
 
-class Kept(NoRecorder):
+class Kept(Keeper):
     def __init__(self):
         self.truths = []
 

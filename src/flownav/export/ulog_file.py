@@ -18,28 +18,9 @@ from flownav.core.guard import written_whole
 from flownav.core.provenance import hash_of
 from flownav.core.record import Record
 from flownav.core.version import __version__
+from flownav.export import ulog_topics as ulog
 from flownav.export.tables import finite_rows, is_text, shift_needed_s
 from flownav.export.trajectory import Trajectory, trajectories
-from flownav.export.ulog_topics import (
-    HEADER_SIZE,
-    LARGEST,
-    MAGIC,
-    Found,
-    Stamped,
-    Topic,
-    assembled,
-    attitude_topic,
-    data,
-    definition,
-    event_strings,
-    information,
-    innovation_topics,
-    our_topic,
-    position_topic,
-    subscription,
-    table_topic,
-    walk,
-)
 
 DEFINITIONS = frozenset(b"BFIMPQ")
 FLAGS_SIZE, INCOMPATIBLE_AT, OFFSETS_AT = 40, 8, 16
@@ -71,23 +52,25 @@ class Layout(NamedTuple):
     next_number: int
 
 
-def merged(log: bytes, name: str, topics: list[Topic], strings: list[Stamped], texts: dict[str, str]) -> bytes:
+def merged(
+    log: bytes, name: str, topics: list[ulog.Topic], strings: list[ulog.Stamped], texts: dict[str, str]
+) -> bytes:
     """A log with our topics, logged strings and texts in it; `name` is the log's, for errors.
 
     InputError where it is no ULog that can be read, holds such topics already, or is of another time.
     """
-    if not log.startswith(MAGIC) or len(log) < HEADER_SIZE:
+    if not log.startswith(ulog.MAGIC) or len(log) < ulog.HEADER_SIZE:
         raise InputError(f"{name}: not a ULog file; give the .ulg that was replayed")
     flags = _flags(log, name)
     layout = _layout(log, sorted({*(offset for offset in flags.offsets if offset), len(log)}))
     _check(layout, name, topics)
     first = layout.next_number
     numbered = list(enumerate(topics, first))
-    rows = [row for number, topic in numbered for row in data(topic, number)]
+    rows = [row for number, topic in numbered for row in ulog.data(topic, number)]
     rows = sorted([*rows, *strings], key=lambda row: row.time_us)
-    head = [definition(topic) for topic in topics]
-    head += [information(key, text) for key, text in texts.items() if text]
-    head += [subscription(topic.name, number) for number, topic in numbered]
+    head = [ulog.definition(topic) for topic in topics]
+    head += [ulog.information(key, text) for key, text in texts.items() if text]
+    head += [ulog.subscription(topic.name, number) for number, topic in numbered]
     body = _interleaved(log, layout, rows)
     grown = sum(map(len, head)) + sum(len(row.body) for row in rows)
     return b"".join([_with_offsets(log[: layout.data_at], flags, grown), *head, *body, log[layout.whole_to :]])
@@ -95,7 +78,7 @@ def merged(log: bytes, name: str, topics: list[Topic], strings: list[Stamped], t
 
 def _flags(log: bytes, name: str) -> Flags:
     """The flag bits, which old logs lack. InputError where they announce what this reader does not know."""
-    first = next(walk(log, HEADER_SIZE, len(log)), None)
+    first = next(ulog.walk(log, ulog.HEADER_SIZE, len(log)), None)
     if first is None:
         raise InputError(f"{name}: the ULog holds no message; give the .ulg that was replayed")
     body = first.begin + 3
@@ -110,11 +93,11 @@ def _flags(log: bytes, name: str) -> Flags:
 
 def _layout(log: bytes, ends: list[int]) -> Layout:
     """One walk over what was written while flying, up to the first of `ends`, and the numbers taken after it."""
-    data_at, whole_to, next_number = -1, HEADER_SIZE, 0
+    data_at, whole_to, next_number = -1, ulog.HEADER_SIZE, 0
     formats: dict[bytes, bool] = {}
     clocked: set[int] = set()
     clock: list[tuple[int, int]] = []
-    for found in walk(log, HEADER_SIZE, ends[0]):
+    for found in ulog.walk(log, ulog.HEADER_SIZE, ends[0]):
         whole_to = found.end
         if data_at < 0 and found.kind not in DEFINITIONS:
             data_at = found.begin
@@ -129,20 +112,20 @@ def _layout(log: bytes, ends: list[int]) -> Layout:
         elif found.kind == ord("D") and found.end - found.begin >= 13 and _number(log, found, 3) in clocked:
             clock.append((int.from_bytes(log[found.begin + 5 : found.begin + 13], "little"), found.begin))
     for begin, end in pairwise(ends):
-        for found in walk(log, begin, end):
+        for found in ulog.walk(log, begin, end):
             if found.kind == ord("A"):
                 next_number = max(next_number, _number(log, found, 4) + 1)
     return Layout(data_at, whole_to, clock, {topic.decode("utf-8", "replace") for topic in formats}, next_number)
 
 
-def _check(layout: Layout, name: str, topics: list[Topic]) -> None:
+def _check(layout: Layout, name: str, topics: list[ulog.Topic]) -> None:
     """InputError where our topics cannot go into that log."""
     if not layout.clock:
         raise InputError(f"{name}: the ULog holds no data with times; give the .ulg that was replayed")
     taken = sorted(layout.formats & {topic.name for topic in topics})
     if taken:
         raise InputError(f"{name}: holds {taken[0]} already; merge into the log as the vehicle wrote it")
-    if layout.next_number + len(topics) > LARGEST:
+    if layout.next_number + len(topics) > ulog.LARGEST:
         raise InputError(f"{name}: no message numbers are left for {len(topics)} more topics")
     ours = [int(t) for topic in topics for t in (topic.time_us[:1], topic.time_us[-1:]) for t in t]
     theirs = [t for t, _ in layout.clock]
@@ -153,7 +136,7 @@ def _check(layout: Layout, name: str, topics: list[Topic]) -> None:
         )
 
 
-def _interleaved(log: bytes, layout: Layout, rows: list[Stamped]) -> list[bytes]:
+def _interleaved(log: bytes, layout: Layout, rows: list[ulog.Stamped]) -> list[bytes]:
     """The data section's whole messages with `rows` (in order of time) between them."""
     pieces, copied, row = [], layout.data_at, 0
     for time_us, place in layout.clock:
@@ -177,7 +160,7 @@ def _with_offsets(head: bytes, flags: Flags, grown: int) -> bytes:
     return head[: flags.at] + moved + head[flags.at + OFFSETS.size :]
 
 
-def _number(log: bytes, found: Found, at: int) -> int:
+def _number(log: bytes, found: ulog.Found, at: int) -> int:
     """The uint16 at a place of a message."""
     return int.from_bytes(log[found.begin + at : found.begin + at + 2], "little")
 
@@ -186,8 +169,8 @@ def _number(log: bytes, found: Found, at: int) -> int:
 class Contents(NamedTuple):
     """What goes into a log: topics, logged strings, texts about the whole log, and notes for the user."""
 
-    topics: list[Topic]
-    strings: list[Stamped]
+    topics: list[ulog.Topic]
+    strings: list[ulog.Stamped]
     texts: dict[str, str]
     notes: list[str]
 
@@ -202,7 +185,7 @@ def write_ulog(record: Record, path: Path, original: Path | None = None) -> tupl
     """
     if original is None:
         contents = _all_of(record)
-        whole = assembled(contents.topics, contents.strings, _known(contents.texts))
+        whole = ulog.assembled(contents.topics, contents.strings, _known(contents.texts))
     else:
         log = _read_original(record, original)
         contents = _from_zero_on(_ours(record, _clock_start_s(record, original)))
@@ -221,12 +204,12 @@ def _all_of(record: Record) -> Contents:
         notes.append(f"all times are {shift_s:g} s later than in the record: the format has no negative time")
     for path in trajectories(record):
         if path.name in NAMED:
-            topics.append(position_topic(record, path, f"vehicle_local_position{NAMED[path.name]}", shift_s))
+            topics.append(ulog.position_topic(record, path, f"vehicle_local_position{NAMED[path.name]}", shift_s))
             if path.oriented:
-                topics.append(attitude_topic(path, f"vehicle_attitude{NAMED[path.name]}", shift_s))
+                topics.append(ulog.attitude_topic(path, f"vehicle_attitude{NAMED[path.name]}", shift_s))
     for name, table in record.tables.items():
         if name not in APART:
-            topics.append(table_topic(name, table, shift_s))
+            topics.append(ulog.table_topic(name, table, shift_s))
             text = [column for column in table if is_text(table[column])]
             if text:
                 notes.append(f"{name}: ULog topics hold numbers; left out: {', '.join(text)}")
@@ -241,13 +224,13 @@ def _ours(record: Record, shift_s: float) -> Contents:
         lost = len(table["t_s"]) - len(finite_rows(table["t_s"]))
         if lost and name not in [path.name for path in paths]:
             notes.append(f"{name}: rows without a time left out: {lost}")
-    topics = [our_topic(record, path, shift_s) for path in paths]
+    topics = [ulog.our_topic(record, path, shift_s) for path in paths]
     texts = {"flownav_record": str(record.manifest.get("scenario") or record.manifest.get("log") or "")}
     if "innovation" in record.tables:
-        innovations, reasons = innovation_topics(record.tables["innovation"], shift_s)
+        innovations, reasons = ulog.innovation_topics(record.tables["innovation"], shift_s)
         topics += innovations
         texts["flownav_reasons"] = ", ".join(f"{code} {reason}" for code, reason in enumerate(reasons))
-    strings = event_strings(record.tables["events"], shift_s) if "events" in record.tables else []
+    strings = ulog.event_strings(record.tables["events"], shift_s) if "events" in record.tables else []
     return Contents(topics, strings, texts, notes)
 
 
@@ -264,7 +247,9 @@ def _from_zero_on(contents: Contents) -> Contents:
     topics = []
     for topic in contents.topics:
         kept = topic.time_us >= 0
-        topics.append(Topic(topic.name, topic.time_us[kept], [f._replace(values=f.values[kept]) for f in topic.fields]))
+        topics.append(
+            ulog.Topic(topic.name, topic.time_us[kept], [f._replace(values=f.values[kept]) for f in topic.fields])
+        )
     strings = [string for string in contents.strings if string.time_us >= 0]
     lost = sum(len(before.time_us) - len(after.time_us) for before, after in zip(contents.topics, topics, strict=True))
     lost += len(contents.strings) - len(strings)

@@ -13,15 +13,8 @@ from flownav.core.measurement import Array
 from flownav.estimation.states import ATTITUDE, GYRO_BIAS, PAD, POSITION, STATE, VELOCITY
 from flownav.live.options import Limits, Options
 from flownav.live.reception import Vehicle
+from flownav.mavlink import outgoing as say
 from flownav.mavlink.framing import INVALID_AUTOPILOT, PX4, Message, coder
-from flownav.mavlink.outgoing import (
-    MAVLINK_VERSION,
-    Estimate,
-    landing_target,
-    odometry,
-    vision_position_estimate,
-    vision_speed_estimate,
-)
 from flownav.mavlink.position_messages import LOCAL_FRD, LOCAL_NED
 from flownav.mavlink.signing import sign_outgoing
 from flownav.navigation.ahead import covariance_at, state_at
@@ -80,7 +73,7 @@ def estimate_of(
     resets: int,
     offset_ned_m: Vector = (0.0, 0.0, 0.0),
     limits: Limits = Limits(),  # noqa: B008  (frozen)
-) -> Estimate:
+) -> say.Estimate:
     """The state carried on to t_s. imu (n, 7): readings later than the filter's clock. boot_s: t_s on their clock.
 
     offset_ned_m: of the navigator's origin in the frame that is sent. limits: what `quality` is a share of.
@@ -91,7 +84,7 @@ def estimate_of(
     if not on.told.equipment.use_imu:
         state[10:13] = [float("nan")] * 3
     north_m, east_m, down_m = offset_ned_m
-    return Estimate(
+    return say.Estimate(
         max(0, round(boot_s * 1e6)),
         (state[0] + north_m, state[1] + east_m, state[2] + down_m),
         (state[3], state[4], state[5]),
@@ -119,7 +112,7 @@ def quality_of(on: Running, pose: Array, velocity: Array, t_s: float, limits: Li
     return max(1, min(100, round(100.0 * (1.0 - worst))))
 
 
-def fault_of(estimate: Estimate, limits: Limits) -> str:
+def fault_of(estimate: say.Estimate, limits: Limits) -> str:
     """What is wrong with an estimate itself: `not_finite`, `uncertain`, or ""."""
     assert estimate.pose_covariance is not None
     assert estimate.velocity_covariance is not None
@@ -172,7 +165,7 @@ class Answers:
 
     def heartbeat(self) -> Message:
         """Of a companion computer."""
-        return self._mav.heartbeat_encode(ONBOARD_CONTROLLER, INVALID_AUTOPILOT, 0, 0, ACTIVE, MAVLINK_VERSION)
+        return self._mav.heartbeat_encode(ONBOARD_CONTROLLER, INVALID_AUTOPILOT, 0, 0, ACTIVE, say.MAVLINK_VERSION)
 
     def timesync(self, now_s: float) -> Message:
         """A request, with our time."""
@@ -183,7 +176,7 @@ class Answers:
         return self._mav.timesync_encode(round(boot_s * 1e9), request.ts1)
 
     def estimates(
-        self, vehicle: Vehicle, estimate: Estimate, on: Running, offset_ned_m: Vector = (0.0, 0.0, 0.0)
+        self, vehicle: Vehicle, estimate: say.Estimate, on: Running, offset_ned_m: Vector = (0.0, 0.0, 0.0)
     ) -> list[Message]:
         """The estimate as `--send` asks; none where the pad is asked for and not known.
 
@@ -191,9 +184,9 @@ class Answers:
         """
         send = self._options.send
         if send == "odometry":
-            return [odometry(self._mav, estimate, frame=LOCAL_NED if vehicle.make == PX4 else LOCAL_FRD)]
+            return [say.odometry(self._mav, estimate, frame=LOCAL_NED if vehicle.make == PX4 else LOCAL_FRD)]
         if send == "vision":
-            return [vision_position_estimate(self._mav, estimate), vision_speed_estimate(self._mav, estimate)]
+            return [say.vision_position_estimate(self._mav, estimate), say.vision_speed_estimate(self._mav, estimate)]
         if on.work[PAD_KNOWN] != SEEN:  # the place of take-off is not what a camera lands on
             return []
         pad = [float(value) for value in on.work[STATE + PAD : STATE + PAD + 3]]
@@ -204,4 +197,4 @@ class Answers:
         if not z > STEEPEST * distance_m:
             return []
         in_earth = place if vehicle.make == PX4 else None
-        return [landing_target(self._mav, estimate.time_us, x / z, y / z, distance_m, pad_ned_m=in_earth)]
+        return [say.landing_target(self._mav, estimate.time_us, x / z, y / z, distance_m, pad_ned_m=in_earth)]

@@ -21,11 +21,10 @@ import numpy as np
 from flownav.core.compile import announce_compilation
 from flownav.core.measurement import COLUMNS, Measurement, Sensor
 from flownav.live.answers import estimate_of
-from flownav.live.filtering import Filtering
+from flownav.live.filtering import Filtering, Keeper
 from flownav.live.horizon import Waiting
 from flownav.live.link import Link
 from flownav.live.options import Options
-from flownav.live.recorder import NoRecorder
 from flownav.live.session import Session
 from flownav.live.simulated import SimulatedVehicle
 from flownav.mavlink.framing import coder
@@ -72,7 +71,7 @@ def warm_up() -> None:
 
     A second of loading while a vehicle talks would overflow the socket's buffer.
     """
-    filtering = Filtering(Options(), NoRecorder())
+    filtering = Filtering(Options(), Keeper())
     readings = [
         Waiting(0.1 * step, step, Measurement(0.1 * step, sensor, (0.1,) * len(COLUMNS[sensor]), (np.nan,) * 6), 0.1)
         for step, sensor in enumerate([Sensor.ATTITUDE, Sensor.IMU, Sensor.IMU, *Sensor])

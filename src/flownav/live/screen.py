@@ -115,7 +115,7 @@ class Screen:
         return View(
             self._title(),
             self._alarms(),
-            [self._sensor(sensor, now_s) for sensor in sorted(session.readings)],
+            [self._sensor(sensor, now_s) for sensor in sorted(session.hearing.readings)],
             self._estimate(),
             [(name, strip(values), _figure(values[-1])) for name, values in self._strips.items()],
             [self._protection(), f"dropped: {dropped}", self._line(now_s), self._footing(), self._running()],
@@ -128,7 +128,7 @@ class Screen:
         return (
             sensor.name.lower(),
             f"{self._rates.get(sensor, 0.0):.0f}",
-            f"{now_s - session.heard_s[sensor]:.2f}",
+            f"{now_s - session.hearing.heard_s[sensor]:.2f}",
             f"{session.hearing.lags.by_sensor.get(sensor, 0.0):.2f}",
             " ".join(_figure(innovation) for innovation, _, _ in found),
             " ".join(_figure(ratio) for _, ratio, _ in found),
@@ -203,13 +203,13 @@ class Screen:
 
     def _follow(self, now_s: float) -> None:
         session, elapsed_s = self._session, now_s - self._at_s
-        for sensor, count in session.readings.items():
+        for sensor, count in session.hearing.readings.items():
             if elapsed_s > 0.0:
                 self._rates[sensor] = (count - self._before.get(sensor, 0)) / elapsed_s
             self._before[sensor] = count
         self._at_s = now_s
         for sensor, places in SHOWN.items():
-            reading = session.latest.get(sensor)
+            reading = session.hearing.latest.get(sensor)
             for place in places if reading else ():
                 values = self._strips.setdefault(COLUMNS[sensor][place], deque(maxlen=STRIP))
                 values.append(reading.value[place] if reading else float("nan"))
@@ -218,7 +218,7 @@ class Screen:
 def told(session: Session, key: tuple[int, int]) -> bool:
     """Whether the newest reading of a sensor has the component: GPS over MAVLink has no vertical velocity to judge."""
     sensor, component = Sensor(key[0]), key[1]
-    reading = session.latest.get(sensor)
+    reading = session.hearing.latest.get(sensor)
     return reading is None or component not in OPTIONAL.get(sensor, ()) or math.isfinite(reading.value[component])
 
 

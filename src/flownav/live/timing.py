@@ -5,16 +5,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from typing import NamedTuple
 
-from flownav.mavlink.clock import (
-    CONFIRMATIONS,
-    Aligned,
-    ClockState,
-    Stamp,
-    align,
-    stamp_of,
-    timesync_offset_s,
-    told_unix_time,
-)
+from flownav.mavlink import clock as stamps
 from flownav.mavlink.framing import Message
 
 NAN = float("nan")
@@ -46,20 +37,20 @@ class VehicleClock:
     """
 
     def __init__(self, system: int, component: int) -> None:
-        self._state = ClockState((system, component, "boot"))
+        self._state = stamps.ClockState((system, component, "boot"))
         self._leads: deque[tuple[float, float]] = deque(maxlen=2)  # since when, and session time less ours [s]
         self._exchanges: deque[Exchange] = deque(maxlen=REMEMBERED)
         self._leaping, self._leap_s = 0, NAN  # stamps in a row that are ahead of our clock, and by how much
         self._told_s = self._doubted_s = NAN  # offset that TIMESYNC tells, and one that differs by a step
         self.counts: Counter[str] = Counter()
 
-    def stamped(self, message: Message, system: int, component: int, now_s: float) -> Aligned:
+    def stamped(self, message: Message, system: int, component: int, now_s: float) -> stamps.Aligned:
         """The session time of a message that arrived at `now_s` of our clock."""
-        stamp = stamp_of(message, system, component, self._state.reference_s)
-        state, aligned = align(self._state, now_s, stamp)
+        stamp = stamps.stamp_of(message, system, component, self._state.reference_s)
+        state, aligned = stamps.align(self._state, now_s, stamp)
         if self._leaps(stamp, aligned, now_s):
             self.counts["ahead"] += 1
-            return Aligned(NAN, "stale_time")
+            return stamps.Aligned(NAN, "stale_time")
         self._state = state
         if aligned.event:
             self.counts[aligned.event] += 1
@@ -70,7 +61,7 @@ class VehicleClock:
             self._note_lead(aligned.t_s - now_s, now_s)
         return aligned
 
-    def _leaps(self, stamp: Stamp | None, aligned: Aligned, now_s: float) -> bool:
+    def _leaps(self, stamp: stamps.Stamp | None, aligned: stamps.Aligned, now_s: float) -> bool:
         """Whether the autopilot's clock has leapt ahead of ours in this one message: some in a row must agree on it."""
         if stamp is None or stamp.clock != self._state.reference or aligned.reason or aligned.event:
             return False
@@ -78,7 +69,7 @@ class VehicleClock:
         agrees = abs(leap_s - self._leap_s) <= LEAP_S
         self._leaping = (self._leaping + 1 if agrees else 1) if leap_s > LEAP_S else 0
         self._leap_s = leap_s
-        return 0 < self._leaping < CONFIRMATIONS
+        return 0 < self._leaping < stamps.CONFIRMATIONS
 
     def _note_lead(self, lead_s: float, now_s: float) -> None:
         """The least wait on the link is the greatest lead; it is remembered for two windows."""
@@ -96,11 +87,13 @@ class VehicleClock:
         """SYSTEM_TIME."""
         if message.time_boot_ms:
             clock = (system, component, "unix")
-            self._state = told_unix_time(self._state, clock, message.time_unix_usec * 1e-6, message.time_boot_ms * 1e-3)
+            self._state = stamps.told_unix_time(
+                self._state, clock, message.time_unix_usec * 1e-6, message.time_boot_ms * 1e-3
+            )
 
     def exchanged(self, tc1_ns: int, ts1_ns: int, now_s: float) -> bool:
         """A TIMESYNC reply to a request that we sent at `ts1_ns` of our clock; True where it tells of a new start."""
-        exchange = Exchange(now_s, *timesync_offset_s(tc1_ns, ts1_ns, round(now_s * 1e9)))
+        exchange = Exchange(now_s, *stamps.timesync_offset_s(tc1_ns, ts1_ns, round(now_s * 1e9)))
         if not 0.0 <= exchange.round_trip_s <= LONGEST_ROUND_TRIP_S:
             self.counts["timesync_refused"] += 1
             return False

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.errors import InputError
-from flownav.logs.assembly import content_of, sha256_of
+from flownav.logs.assembly import MOST_BYTES, content_of, sha256_of
 
 MAGIC = 0xBC
 LETTERS = {"B": "u1", "b": "i1", "H": "u2", "h": "i2", "I": "u4", "i": "i4", "Q": "u8", "q": "i8", "e": "f2", "f": "f4"}
@@ -59,7 +59,7 @@ class _Kind:
 
 def read_blocks(path: Path) -> Blocks:
     """The blocks of a file. InputError where it cannot be read or its head is none of the two versions."""
-    content = content_of(path, "a log of the micro SD deck")
+    content = content_of(path, "a log of the micro SD deck", MOST_BYTES)
     version, kinds, place = _head(path, content)
     sound = len(content) >= 9 and crc32(content[:-4]) == int.from_bytes(content[-4:], "little")
     end = len(content) - 4 if sound else len(content)

@@ -28,7 +28,7 @@ from flownav.logs.assembly import pressure_altitude_m, sensor_stream
 from flownav.logs.crazyflie import Block, Blocks, read_blocks
 from flownav.logs.frames import frd, ned_from_frd_of_nwu, state_table
 from flownav.logs.log import Log, absences_of
-from flownav.logs.plausible import check_times, of_one_clock
+from flownav.logs.plausible import of_one_clock
 
 COUNTS_PER_PIXEL, PIXELS, APERTURE_RAD = 10.0, 35.0, 0.71674
 RAD_PER_COUNT = APERTURE_RAD / (PIXELS * COUNTS_PER_PIXEL)
@@ -62,14 +62,12 @@ def read_crazyflie(path: Path, *, flow_instance: int | None = None) -> Log:
     for block in blocks.found:
         block.t_s = block.t_s - start_s
     found = (_imu(blocks), _attitude(blocks), _flow(blocks), _range(blocks), _baro(blocks), _mag(blocks))
-    streams, strays = of_one_clock({stream.sensor: stream for stream in found if stream is not None})
-    if not streams:
-        held = sorted({name for block in blocks.found for name in block.columns})
-        raise InputError(
-            f"{path}: no usable reading of any sensor; it holds {', '.join(held[:8]) or 'nothing'}; log acc, gyro, "
-            "motion.deltaX, motion.deltaY and range.zrange in the deck's config.txt"
-        )
-    check_times(path, streams)
+    held = sorted({name for block in blocks.found for name in block.columns})
+    streams, strays = of_one_clock(
+        path, found,
+        f"no usable reading of any sensor; it holds {', '.join(held[:8]) or 'nothing'}; log acc, gyro, motion.deltaX, "
+        "motion.deltaY and range.zrange in the deck's config.txt",
+    )  # fmt: skip
     truth, truth_name = _truth(blocks)
     own = _estimate(blocks)
     scale = f"flow: {RAD_PER_COUNT:.6f} rad a count of the PMW3901, read every {1e3 * READ_EVERY_S:.0f} ms"

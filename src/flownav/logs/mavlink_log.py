@@ -5,9 +5,7 @@ docs/reference/mavlink.md lists the messages, their units and traps.
 
 from __future__ import annotations
 
-import hashlib
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,41 +13,27 @@ import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.frames import Quaternion
-from flownav.core.guard import an_input
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import Table
-from flownav.logs.assembly import Origin, local_ned, near_the_rest
+from flownav.logs.assembly import Origin, content_of, local_ned, near_the_rest, sha256_of
 from flownav.logs.frames import attitude_at, in_order, state_table
 from flownav.logs.log import SIMULATOR, Log, absences_of
 from flownav.logs.mavlink_streams import Gathered, Source
-from flownav.logs.plausible import check_times, of_one_clock
+from flownav.logs.plausible import of_one_clock
 from flownav.mavlink.clock import Aligned, ClockState, align, stamp_of, told_unix_time
 from flownav.mavlink.converted import Context, Dropped, Pose
 from flownav.mavlink.framing import ARDUPILOT, INVALID_AUTOPILOT, PX4, Frame, Message, coder, dialect, tlog_frames
-from flownav.mavlink.messages import (
-    CONVERTERS,
-    GlobalState,
-    LocalState,
-    TrueState,
-    global_position_int,
-    hil_state_quaternion,
-    instance_of,
-    local_position_ned,
-    measurements,
-    sim_state,
-)
+from flownav.mavlink.messages import CONVERTERS, STATES, LocalState, instance_of, measurements
 from flownav.mavlink.position_messages import LEAST_FIX, fix_deg_m
 from flownav.mavlink.sensor_messages import range_limits_m
 
 AUTOPILOTS = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
-STATES: dict[str, Callable[[Message], LocalState | GlobalState | TrueState | None]] = {
-    "LOCAL_POSITION_NED": local_position_ned,
-    "GLOBAL_POSITION_INT": global_position_int,
-    "SIM_STATE": sim_state,
-    "HIL_STATE_QUATERNION": hil_state_quaternion,
-}
 WANTED = {*CONVERTERS, *STATES, "SYSTEM_TIME", "PARAM_VALUE"}
 RATES = ("rate_p_rad_s", "rate_q_rad_s", "rate_r_rad_s")
+NOTHING = (
+    "no usable reading of any sensor; have the autopilot send ATTITUDE or HIGHRES_IMU at 20 Hz or more, and "
+    "GPS_RAW_INT or OPTICAL_FLOW_RAD"
+)
 LACKING = {
     "attitude": "no attitude (ATTITUDE_QUATERNION, ATTITUDE)",
     "imu": "no IMU (HIGHRES_IMU, SCALED_IMU; RAW_IMU of ArduPilot)",
@@ -256,7 +240,7 @@ def read_tlog(path: Path, *, flow_instance: int | None = None) -> Log:
     InputError, one line, where the file cannot be read, holds no MAVLink frame, no reading of any sensor, or no flow
     sensor of that instance, and where pymavlink is not installed.
     """
-    content = _content(path)
+    content = content_of(path, "a .tlog file")
     damage: Counter[str] = Counter()
     frames = list(tlog_frames(content, damage))
     if not frames:
@@ -268,16 +252,14 @@ def read_tlog(path: Path, *, flow_instance: int | None = None) -> Log:
         streams, chosen = flight.gathered.streams(flow_instance)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    streams, strays = of_one_clock(streams)
-    _check_needed(path, streams)
-    check_times(path, streams)
+    streams, strays = of_one_clock(path, streams.values(), NOTHING)
     truth = flight.truth()
     return Log(
         path,
         streams,
         flight.origin_deg_m,
         truth,
-        {path.name: hashlib.sha256(content).hexdigest()},
+        {path.name: sha256_of(content)},
         (*choice, *_damage_notes(damage, frames), *_flight_notes(flight), *chosen, *strays),
         flight.autopilot(streams.get(Sensor.ATTITUDE)),
         vehicle.name,
@@ -286,13 +268,6 @@ def read_tlog(path: Path, *, flow_instance: int | None = None) -> Log:
         clock_start_s=0.0,
         truth_name=SIMULATOR,
     )
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return an_input(path).read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give a .tlog file") from error
 
 
 def _damage_notes(damage: Counter[str], frames: list[Frame]) -> list[str]:
@@ -325,11 +300,3 @@ def _flight_notes(flight: Flight) -> list[str]:
     if flight.states["LOCAL_POSITION_NED"] and flight.origin_deg_m is not None and not flight.states_its_origin:
         notes.append("no GPS_GLOBAL_ORIGIN: the autopilot's path may lie shifted, its origin is not in the log")
     return notes
-
-
-def _check_needed(path: Path, streams: dict[Sensor, Stream]) -> None:
-    if not streams:
-        raise InputError(
-            f"{path}: no usable reading of any sensor; have the autopilot send ATTITUDE or HIGHRES_IMU at 20 Hz or "
-            "more, and GPS_RAW_INT or OPTICAL_FLOW_RAD"
-        )

@@ -144,6 +144,14 @@ def _possible(position: Vector, velocity: Vector, rate: Vector = (0.0, 0.0, 0.0)
     )
 
 
+STATES: dict[str, Callable[[Message], LocalState | GlobalState | TrueState | None]] = {
+    "LOCAL_POSITION_NED": local_position_ned,
+    "GLOBAL_POSITION_INT": global_position_int,
+    "SIM_STATE": sim_state,
+    "HIL_STATE_QUATERNION": hil_state_quaternion,
+}
+
+
 # -- measurements -------------------------------------------------------------------------------------------
 def measurements(message: Message, t_s: float, context: Context) -> tuple[Outcome, ...]:
     """What a message measures at its log time [s], and what of it was dropped and why; empty where nothing.

@@ -22,12 +22,12 @@ from flownav.core.errors import InputError
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import Table
-from flownav.logs.assembly import Origin, content_of, gps_streams, sensor_stream, sha256_of
+from flownav.logs.assembly import MOST_BYTES, Origin, content_of, gps_streams, sensor_stream, sha256_of
 from flownav.logs.blackbox.format import Header, headers
 from flownav.logs.blackbox.frames import Frames, read_frames
 from flownav.logs.frames import frd, ned_from_frd_of_nwu, state_table
 from flownav.logs.log import Log, absences_of
-from flownav.logs.plausible import check_times, of_one_clock
+from flownav.logs.plausible import of_one_clock
 
 US, CM, DEG_E7, DECIDEGREE = 1e-6, 1e-2, 1e-7, 0.1
 FLOW_RAW = 2  # INAV's debug_mode
@@ -60,7 +60,7 @@ def read_blackbox(path: Path, *, flow_instance: int | None = None) -> Log:
     """
     if flow_instance is not None:
         raise InputError(f"--flow-instance: {path} is a blackbox log, with one flow sensor at most; leave it out")
-    content = content_of(path, "a blackbox log")
+    content = content_of(path, "a blackbox log", MOST_BYTES)
     found = headers(content)
     if not found:
         raise InputError(f"{path}: no blackbox log whose header defines its fields; give another log")
@@ -73,10 +73,8 @@ def read_blackbox(path: Path, *, flow_instance: int | None = None) -> Log:
     fixes, origin = _gps(header, frames, start_us)
     listed = [_imu(header, frames, t_s), _attitude(frames, t_s), _flow(header, frames, t_s), _range(frames, t_s),
               _baro(frames, t_s), *fixes]  # fmt: skip
-    streams, strays = of_one_clock({stream.sensor: stream for stream in listed if stream is not None})
-    if not streams:
-        raise InputError(f"{path}: no usable reading of any sensor; log gyro, accelerometer, barometer and GPS")
-    check_times(path, streams)
+    nothing = "no usable reading of any sensor; log gyro, accelerometer, barometer and GPS"
+    streams, strays = of_one_clock(path, listed, nothing)
     own = _estimate(frames, t_s, streams.get(Sensor.ATTITUDE))
     return Log(
         path,

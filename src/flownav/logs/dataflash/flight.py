@@ -5,7 +5,6 @@ docs/reference/dataflash.md says which messages are read and how.
 
 from __future__ import annotations
 
-import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.frames import quaternion_from_euler
 from flownav.core.measurement import Array, Sensor, Stream
+from flownav.core.provenance import hash_of
 from flownav.core.record import Table
 from flownav.logs.assembly import Origin, local_ned
 from flownav.logs.csv_table import CsvTable
@@ -162,7 +162,7 @@ def read_dataflash(path: Path, *, flow_instance: int | None = None) -> Log:
         if table is not None:
             table.t_s = table.t_s - start_s
     _check_overlap(path, tables)
-    origin = _origin(tables)
+    origin = _first(tables.get("GPS"))
     about = origin or _first(origins) or _first(simulated[0] if simulated else None)
     streams = _streams(tables, origin, settings)
     check_plausible(path, streams)
@@ -173,7 +173,7 @@ def read_dataflash(path: Path, *, flow_instance: int | None = None) -> Log:
         streams,
         origin,
         _truth(simulated, about),
-        {path.name: _sha256(path)},
+        {path.name: hash_of(path)},
         (*notes, *(note for table in tables.values() for note in table.notes)),
         estimate(estimated[1], origins, about) if estimated else None,
         estimated[0] if estimated else "",
@@ -235,10 +235,6 @@ def _delay_s(settings: dict[str, float], names: tuple[str, ...], unit_s: float) 
     return stated[0] if stated and 0.0 <= stated[0] <= LONGEST_DELAY_S else 0.0
 
 
-def _origin(tables: dict[str, CsvTable]) -> Origin | None:
-    return _first(tables.get("GPS"))
-
-
 def _first(table: CsvTable | None) -> Origin | None:
     if table is None:
         return None
@@ -250,8 +246,3 @@ def _truth(simulated: tuple[CsvTable, CsvTable | None] | None, about: Origin | N
     if simulated is None or about is None:
         return None
     return truth(*simulated, about)
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -17,14 +17,14 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.provenance import hash_of
 from flownav.logs.log import Log, absences_of
-from flownav.logs.plausible import check_plausible, check_times, of_one_clock
+from flownav.logs.plausible import check_plausible, of_one_clock
 from flownav.logs.record_log import is_ours, log_of_export
 from flownav.logs.ros import standard
 from flownav.logs.ros.bag import Bag, Channel, Decoder
 from flownav.logs.ros.containers import files_of, messages
 from flownav.logs.ros.topics import NAMES, Clock, Gathered, chosen, clock_of, stamp_of, values_of
 from flownav.logs.ulog import FIELDS, STATES, TOPICS, log_of_topics
-from flownav.logs.ulog_topics import Topic, Topics, order
+from flownav.logs.ulog_topics import Topic, Topics, count_from_first
 
 PACKAGE = "px4_msgs/msg/"
 US = 1e-6
@@ -78,16 +78,8 @@ def px4_topics(gathered: list[Gathered], sha256: str, states: tuple[str, ...]) -
             columns["sample_s"] = US * columns.pop("timestamp_sample")
         topic = Topic(t_s, columns, name=name, instance=count.get(name, 0))
         count[name] = topic.instance + 1
-        order(topic)
         found.append(topic)
-    start_s = min((topic.t_s[0] for topic in found if len(topic) and topic.name not in states), default=0.0)
-    for topic in found:
-        topic.t_s = topic.t_s - start_s
-        if "sample_s" in topic.columns:
-            topic.columns["sample_s"] -= start_s
-        if topic.name in states:
-            topic.t_s = np.maximum(topic.t_s, 0.0)
-    return Topics(found, {}, sha256, start_s)
+    return Topics(found, {}, sha256, count_from_first(found, states))
 
 
 # -- the log ------------------------------------------------------------------------------------------------
@@ -160,10 +152,8 @@ def _ros_log(
     roles, choice = chosen(gathered, asked, flow_instance)
     clock, clock_notes = clock_of(roles.values())
     listed, origin = standard.streams_of(roles, clock)
-    streams, strays = of_one_clock({stream.sensor: stream for stream in listed})
-    if not streams:
-        raise InputError(f"{path}: no usable reading of any sensor; record an Imu and a NavSatFix or OpticalFlowRad")
-    check_times(path, streams)
+    nothing = "no usable reading of any sensor; record an Imu and a NavSatFix or OpticalFlowRad"
+    streams, strays = of_one_clock(path, listed, nothing)
     check_plausible(path, streams)
     truth, own = (
         standard.path_table(roles[name], clock.times(roles[name]) - clock.delay_s(roles[name]))

@@ -21,8 +21,8 @@ from flownav.live.horizon import SILENT_S, Horizon, Source, Sources, Waiting
 from flownav.live.link import Address, parse_url
 from flownav.live.loop import Latency
 from flownav.live.options import Options
+from flownav.live.reception import VehicleClock
 from flownav.live.screen import strip
-from flownav.live.timing import VehicleClock
 from flownav.mavlink.framing import LARGEST_FRAME, StreamFrames
 from mavlink_logs import flight_log, made
 

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.frames import heading_from_quaternion
-from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record, Table
+from flownav.core.record import STANDARD_DEVIATIONS as STD
+from flownav.core.record import Record, Table
 from flownav.export.tables import Stamps, finite_rows, is_text, stamps
 from flownav.export.trajectory import Trajectory
 
@@ -29,7 +30,6 @@ LARGEST = 0xFFFF
 _TYPES = {"float": "<f4", "double": "<f8", "uint64_t": "<u8", "uint32_t": "<u4", "uint8_t": "u1", "int8_t": "i1"}
 _TYPES["bool"] = "u1"
 US = 1e6
-STD = tuple(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY))
 NUMBERS = ("observation", "observation_variance", "innovation", "innovation_variance", "test_ratio")
 DOWNWARD = 25  # MAV_SENSOR_ROTATION_PITCH_270
 Array = NDArray[Any]

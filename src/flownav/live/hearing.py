@@ -15,8 +15,7 @@ from flownav.core.measurement import Measurement, Sensor
 from flownav.live.filtering import FLOW
 from flownav.live.horizon import LATE, Horizon, Lags, Serving, Source, Sources, Waiting
 from flownav.live.options import Options
-from flownav.live.reception import Vehicle, sender_of
-from flownav.live.timing import VehicleClock
+from flownav.live.reception import Vehicle, VehicleClock, sender_of
 from flownav.mavlink.converted import Context, Dropped, Pose
 from flownav.mavlink.framing import ARDUPILOT, Message
 from flownav.mavlink.messages import instance_of, measurements

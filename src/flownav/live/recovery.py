@@ -11,7 +11,7 @@ import numpy as np
 from flownav.core.compile import columns_of, width_of
 from flownav.core.errors import InputError
 from flownav.core.measurement import COLUMNS, MAX_VALUES, Array, Sensor
-from flownav.core.record import FED, POSITION_NED, QUATERNION, VELOCITY_BODY, Record, Table
+from flownav.core.record import FED, RATES, STATE, Record, Table
 from flownav.logs.journal import MAGIC, Block, Damage, blocks
 from flownav.navigation import tables
 from flownav.navigation.rows import ESTIMATE_COLUMNS, EVENT_COLUMNS, INNOVATION_COLUMNS
@@ -223,6 +223,6 @@ def _truth(rows: Array, origins: Array) -> Table:
     place = origin.place_deg_m[np.maximum(since - 1, 0)]
     position = pymap3d.geodetic2ned(*said.place_deg_m.T, *place.T)
     body = to_body(rotation_from_quaternion(*said.quaternion.T), *said.vel_ned_m_s.T)
-    names = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, "rate_p_rad_s", "rate_q_rad_s", "rate_r_rad_s")
+    names = (*STATE, *RATES)
     columns = (*position, *body, *said.quaternion.T, *said.rate_frd_rad_s.T)
     return {"t_s": said.t_s, **dict(zip(names, map(np.asarray, columns), strict=True))}

@@ -16,9 +16,8 @@ from flownav.live.hearing import Hearing
 from flownav.live.horizon import Refused
 from flownav.live.options import Options
 from flownav.live.rates import Rates
-from flownav.live.reception import Reception, Vehicle
+from flownav.live.reception import Reception, Vehicle, VehicleClock
 from flownav.live.requests import TRUTHS, Requests, Simulator
-from flownav.live.timing import VehicleClock
 from flownav.mavlink.converted import Pose
 from flownav.mavlink.framing import Message
 from flownav.mavlink.messages import CONVERTERS, STATES, TrueState

@@ -194,6 +194,11 @@ def keep_possible(rows: Rows, sensor: Sensor, names: Sequence[str]) -> None:
     rows.keep(inside, "out_of_range")
 
 
+def counted(**bad: NDArray[np.bool_]) -> dict[str, int]:
+    """How many rows are thrown away for each reason; reasons without any are left out."""
+    return {reason: int(np.count_nonzero(rows)) for reason, rows in bad.items() if rows.any()}
+
+
 def possible_variance(variance: Array) -> Array:
     """Variances with NaN, which is unstated, in place of those that cannot be; changes what it is given."""
     variance[~((variance > 0.0) & (variance < MOST_VARIANCE))] = np.nan

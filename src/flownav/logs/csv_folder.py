@@ -87,15 +87,12 @@ def read_csv_folder(folder: Path) -> Log:
     check_plausible(folder, streams)
     origin = origin_of(tables["gps"]) if "gps" in tables else None
     return Log(
-        folder,
-        streams,
-        origin,
+        folder, streams, origin,
         _columns(tables.get("truth"), dict(zip(POSITION_NED, ("x_m", "y_m", "z_m"), strict=True))),
         {f"{name}.csv": table.sha256 for name, table in tables.items()},
-        tuple(note for table in tables.values() for note in table.notes),
-        absences=tuple(absences_of(streams)),
+        tuple(note for table in tables.values() for note in table.notes), absences=tuple(absences_of(streams)),
         heading_truth=_columns(tables.get("heading_truth"), {"yaw_rad": "yaw_rad"}),
-    )
+    )  # fmt: skip
 
 
 def _tables(folder: Path) -> dict[str, CsvTable]:

@@ -14,7 +14,7 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.frames import Quaternion
 from flownav.core.measurement import Array, Sensor, Stream
-from flownav.core.record import Table
+from flownav.core.record import RATES, Table
 from flownav.logs.assembly import Origin, content_of, local_ned, near_the_rest, sha256_of
 from flownav.logs.frames import attitude_at, in_order, state_table
 from flownav.logs.log import SIMULATOR, Log, absences_of
@@ -29,7 +29,6 @@ from flownav.mavlink.sensor_messages import range_limits_m
 
 AUTOPILOTS = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
 WANTED = {*CONVERTERS, *STATES, "SYSTEM_TIME", "PARAM_VALUE"}
-RATES = ("rate_p_rad_s", "rate_q_rad_s", "rate_r_rad_s")
 NOTHING = (
     "no usable reading of any sensor; have the autopilot send ATTITUDE or HIGHRES_IMU at 20 Hz or more, and "
     "GPS_RAW_INT or OPTICAL_FLOW_RAD"
@@ -255,19 +254,11 @@ def read_tlog(path: Path, *, flow_instance: int | None = None) -> Log:
     streams, strays = of_one_clock(path, streams.values(), NOTHING)
     truth = flight.truth()
     return Log(
-        path,
-        streams,
-        flight.origin_deg_m,
-        truth,
-        {path.name: sha256_of(content)},
+        path, streams, flight.origin_deg_m, truth, {path.name: sha256_of(content)},
         (*choice, *_damage_notes(damage, frames), *_flight_notes(flight), *chosen, *strays),
-        flight.autopilot(streams.get(Sensor.ATTITUDE)),
-        vehicle.name,
-        flight.limits,
-        tuple(absences_of(streams, **LACKING)),
-        clock_start_s=0.0,
-        truth_name=SIMULATOR,
-    )
+        flight.autopilot(streams.get(Sensor.ATTITUDE)), vehicle.name, flight.limits,
+        tuple(absences_of(streams, **LACKING)), clock_start_s=0.0, truth_name=SIMULATOR,
+    )  # fmt: skip
 
 
 def _damage_notes(damage: Counter[str], frames: list[Frame]) -> list[str]:

@@ -92,7 +92,7 @@ def _reader(kind: str) -> Callable[..., Log]:
 
         return read_live_record
     if kind == "crazyflie":
-        from flownav.logs.crazyflie_log import read_crazyflie
+        from flownav.logs.crazyflie import read_crazyflie
 
         return read_crazyflie
     if kind == "blackbox":

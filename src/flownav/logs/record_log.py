@@ -66,16 +66,10 @@ def log_of_record(path: Path, record: Record) -> Log:
     check_times(path, streams)
     check_values(path, streams)
     return Log(
-        path,
-        streams,
-        _origin(parameters),
-        record.tables.get("truth"),
-        {path.name: hash_of(path)},
+        path, streams, _origin(parameters), record.tables.get("truth"), {path.name: hash_of(path)},
         (f"{KINDS[kind]} of {len(parts)} navigator{'s' * (len(parts) != 1)}: fed again as it was fed",),
-        fed=parts,
-        fed_settings=parameters,
-        truth_name=SIMULATOR,
-    )
+        fed=parts, fed_settings=parameters, truth_name=SIMULATOR,
+    )  # fmt: skip
 
 
 def _fed_of(record: Record) -> Array:

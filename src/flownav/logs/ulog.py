@@ -104,28 +104,20 @@ def log_of_topics(
     why = "; ".join(_unusable(topics)) or "every row is invalid"
     streams, strays = of_one_clock(path, streams.values(), f"no usable reading of any sensor ({why}); give another log")
     flow_note = f"flow is {flow.label}; not used: {', '.join(flows)}" if flow is not None and flows else ""
-    said = {"attitude": "no attitude (vehicle_attitude, or vehicle_visual_odometry with one)"}
-    said |= {"imu": slow_imu} if slow_imu else {}
-    absences = [*absences_of(streams, **said)]
+    known = {"attitude": "no attitude (vehicle_attitude, or vehicle_visual_odometry with one)"}
+    known |= {"imu": slow_imu} if slow_imu else {}
+    absences = [*absences_of(streams, **known)]
     if source == "vehicle_visual_odometry":
         absences.append(
             Absence("no vehicle_attitude", "attitude is the visual odometry's, its heading from its own start")
         )
+    said = (*topics.notes, *notes, flow_note, truth_note, pose_note, autopilot_note, *strays)
     return Log(
-        path,
-        streams,
-        origin,
-        truth,
-        inputs,
-        tuple(filter(None, (*topics.notes, *notes, flow_note, truth_note, pose_note, autopilot_note, *strays)))
-        + tuple(_unusable(topics)),
-        autopilot,
-        _estimator(topics) if autopilot is not None else "",
-        reading_limits(topics, flow),
-        tuple(absences),
-        clock_start_s=topics.start_s,
+        path, streams, origin, truth, inputs, (*filter(None, said), *_unusable(topics)),
+        autopilot, _estimator(topics) if autopilot is not None else "", reading_limits(topics, flow),
+        tuple(absences), clock_start_s=topics.start_s,
         truth_name=reference_name or (VISUAL_ODOMETRY if truth_note else SIMULATOR),
-    )
+    )  # fmt: skip
 
 
 def _sensors(topics: Topics, flow: Topic | None, attitude: Stream | None) -> Iterator[Stream]:

@@ -77,18 +77,10 @@ def read_blackbox(path: Path, *, flow_instance: int | None = None) -> Log:
     streams, strays = of_one_clock(path, listed, nothing)
     own = _estimate(frames, t_s, streams.get(Sensor.ATTITUDE))
     return Log(
-        path,
-        streams,
-        origin,
-        None,
-        {path.name: sha256_of(content)},
-        (*_notes(path, found, header, frames), *strays),
-        own,
-        header.firmware if own is not None else "",
-        {},
-        tuple(absences_of(streams, flow_rate=_no_flow(header), **LACKING)),
-        clock_start_s=US * start_us,
-    )
+        path, streams, origin, None, {path.name: sha256_of(content)}, (*_notes(path, found, header, frames), *strays),
+        own, header.firmware if own is not None else "", {},
+        tuple(absences_of(streams, flow_rate=_no_flow(header), **LACKING)), clock_start_s=US * start_us,
+    )  # fmt: skip
 
 
 def _notes(path: Path, found: list[Header], header: Header, frames: Frames) -> list[str]:

@@ -169,19 +169,13 @@ def read_dataflash(path: Path, *, flow_instance: int | None = None) -> Log:
     if estimated and origins is None:
         notes.append("ORGN is absent: the autopilot's estimate stands about its own origin")
     return Log(
-        path,
-        streams,
-        origin,
-        _truth(simulated, about),
-        {path.name: hash_of(path)},
+        path, streams, origin, _truth(simulated, about), {path.name: hash_of(path)},
         (*notes, *(note for table in tables.values() for note in table.notes)),
-        estimate(estimated[1], origins, about) if estimated else None,
-        estimated[0] if estimated else "",
+        estimate(estimated[1], origins, about) if estimated else None, estimated[0] if estimated else "",
         stated_limits(settings, sensors.rangefinder_instance(log)) if "RFND" in tables else {},
         tuple(absences_of(streams, flow_rate="no optical flow (OF)", range="no downward rangefinder (RFND)")),
-        clock_start_s=float(start_s),
-        truth_name=SIMULATOR,
-    )
+        clock_start_s=float(start_s), truth_name=SIMULATOR,
+    )  # fmt: skip
 
 
 def _file_notes(log: DataFlash) -> list[str]:

@@ -164,19 +164,11 @@ def _ros_log(
     if "range" in roles:
         choice.append(f"range {roles['range'].topic} is taken to look down: its message does not say where it looks")
     return Log(
-        path,
-        streams,
-        origin,
-        truth,
-        inputs,
-        (*notes, *choice, *clock_notes, *strays),
-        own,
-        roles["autopilot"].topic if own is not None else "",
-        standard.limits_of(roles),
-        tuple(absences_of(streams, **LACKING)),
-        clock_start_s=clock.start_ns * 1e-9,
+        path, streams, origin, truth, inputs, (*notes, *choice, *clock_notes, *strays),
+        own, roles["autopilot"].topic if own is not None else "", standard.limits_of(roles),
+        tuple(absences_of(streams, **LACKING)), clock_start_s=clock.start_ns * 1e-9,
         truth_name=roles["truth"].topic if truth is not None else "",
-    )
+    )  # fmt: skip
 
 
 def _px4_log(

@@ -174,13 +174,13 @@ def _time(time_ns: int) -> Row:
 
 def _rows(table: Table) -> Iterator[Row]:
     """A table's rows as JSON objects without the values that JSON cannot say: those not finite, and texts not there."""
+
+    def said(value: Any) -> bool:
+        return value is not None and not (isinstance(value, float) and not math.isfinite(value))
+
     columns = [texts(values) if is_text(values) else values.tolist() for values in table.values()]
     for row in zip(*columns, strict=True):
-        yield {name: value for name, value in zip(table, row, strict=True) if _can_be_said(value)}
-
-
-def _can_be_said(value: Any) -> bool:
-    return value is not None and not (isinstance(value, float) and not math.isfinite(value))
+        yield {name: value for name, value in zip(table, row, strict=True) if said(value)}
 
 
 # -- the layout ---------------------------------------------------------------------------------------------
@@ -229,18 +229,14 @@ def topic_and_field(value: str) -> tuple[str, str]:
 def _panel(config: dict[str, Any], topics: dict[str, dict[str, Any]]) -> dict[str, Any] | None:
     """A panel with what the file has; None where nothing is left."""
     if "paths" in config:
-        paths = [each for each in config["paths"] if _there(each["value"], topics)]
+        named = [(each, *topic_and_field(each["value"])) for each in config["paths"]]
+        paths = [each for each, topic, field in named if field in topics.get(topic, {})]
         return config | {"paths": paths} if paths else None
     if "topicPath" in config:
         return config if config["topicPath"] in topics else None
     if "topics" in config:
         return config | {"topics": {name: how for name, how in config["topics"].items() if name in topics}}
     return config
-
-
-def _there(value: str, topics: dict[str, dict[str, Any]]) -> bool:
-    topic, field = topic_and_field(value)
-    return field in topics.get(topic, {})
 
 
 def _tree(node: Node, kept: dict[str, Any]) -> Node | None:

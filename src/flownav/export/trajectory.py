@@ -93,13 +93,9 @@ def _trajectory(record: Record, name: str) -> Trajectory | None:
     unit = quaternion[row] / np.linalg.norm(quaternion[row], axis=1, keepdims=True)
     velocity = None
     if oriented and set(VELOCITY_BODY) <= table.keys():
-        velocity = _in_earth(unit, record.matrix(name, VELOCITY_BODY)[row])
+        body = record.matrix(name, VELOCITY_BODY)[row]
+        velocity = np.column_stack(to_earth(rotation_from_quaternion(*unit.T), *body.T))
     return Trajectory(name, t_s[row], position[row], unit, velocity, oriented, row, int(len(t_s) - len(row)))
-
-
-def _in_earth(quaternion: Array, body: Array) -> Array:
-    """Body vectors (n, 3) in the earth frame."""
-    return np.column_stack(to_earth(rotation_from_quaternion(*quaternion.T), *body.T))
 
 
 def error_table(record: Record, paths: list[Trajectory]) -> Table | None:

@@ -20,7 +20,7 @@ from flownav.core.record import Record
 from flownav.core.version import __version__
 from flownav.export import ulog_topics as ulog
 from flownav.export.tables import finite_rows, is_text, shift_needed_s
-from flownav.export.trajectory import Trajectory, trajectories
+from flownav.export.trajectory import trajectories
 
 DEFINITIONS = frozenset(b"BFIMPQ")
 FLAGS_SIZE, INCOMPATIBLE_AT, OFFSETS_AT = 40, 8, 16
@@ -185,7 +185,8 @@ def write_ulog(record: Record, path: Path, original: Path | None = None) -> tupl
     """
     if original is None:
         contents = _all_of(record)
-        whole = ulog.assembled(contents.topics, contents.strings, _known(contents.texts))
+        texts = {"sys_name": "flownav", "ver_sw": __version__, **contents.texts}
+        whole = ulog.assembled(contents.topics, contents.strings, texts)
     else:
         log = _read_original(record, original)
         contents = _from_zero_on(_ours(record, _clock_start_s(record, original)))
@@ -219,7 +220,7 @@ def _all_of(record: Record) -> Contents:
 def _ours(record: Record, shift_s: float) -> Contents:
     """What only flownav can say: paths, innovations, events."""
     paths = trajectories(record)
-    notes = [note for path in paths for note in _notes(path)]
+    notes = [note for path in paths for note in path._replace(oriented=True).notes]  # nothing stands in here
     for name, table in record.tables.items():
         lost = len(table["t_s"]) - len(finite_rows(table["t_s"]))
         if lost and name not in [path.name for path in paths]:
@@ -255,16 +256,6 @@ def _from_zero_on(contents: Contents) -> Contents:
     lost += len(contents.strings) - len(strings)
     notes = [*contents.notes, *([f"rows before time 0 of the log's clock left out: {lost}"] if lost else [])]
     return contents._replace(topics=topics, strings=strings, notes=notes)
-
-
-def _notes(path: Trajectory) -> list[str]:
-    """A path's notes; here nothing stands in for an attitude that was not recorded."""
-    return list(path._replace(oriented=True).notes)
-
-
-def _known(texts: dict[str, str]) -> dict[str, str]:
-    """Texts about the whole log, with who wrote it."""
-    return {"sys_name": "flownav", "ver_sw": __version__, **texts}
 
 
 def _read_original(record: Record, original: Path) -> bytes:

@@ -174,7 +174,8 @@ class Hearing:
         context = Context(vehicle.make == ARDUPILOT, by_autopilot, self.origin.navigator_deg_m, pose)
         for outcome in measurements(message, aligned.t_s, context):
             if isinstance(outcome, Dropped) or aligned.reason:
-                self._dropped(outcome.sensor, outcome.reason if isinstance(outcome, Dropped) else aligned.reason)
+                reason = outcome.reason if isinstance(outcome, Dropped) else aligned.reason
+                self.counts[f"{outcome.sensor.name.lower()}: {reason}"] += 1
             elif self.sources.takes(outcome.sensor, source, aligned.t_s):
                 self._reading(outcome, now_s, heard)
         return ""
@@ -191,9 +192,6 @@ class Hearing:
         if message.fix_type >= LEAST_FIX and place is not None and self.origin.fixed(place, here_ned_m):
             self.counts["origin: refused"] += 1
         return False
-
-    def _dropped(self, sensor: Sensor, reason: str) -> None:
-        self.counts[f"{sensor.name.lower()}: {reason}"] += 1
 
     def _reading(self, reading: Measurement, now_s: float, heard: Callable[[Waiting], None]) -> None:
         exposure_s = 0.0

@@ -178,7 +178,8 @@ def run_session(
     def tick() -> float:
         before, now_s = session.sent, clock()
         session.tick(now_s)
-        _send(session, link)
+        while session.outbox:
+            link.write(session.outbox.popleft())
         if session.due:
             return flow_s
         if session.sent > before and flow_s == flow_s:
@@ -206,11 +207,6 @@ def run_session(
                 for show in shows:
                     show(now_s)
             collector.turn(now_s)
-
-
-def _send(session: Session, link: Link) -> None:
-    while session.outbox:
-        link.write(session.outbox.popleft())
 
 
 def _wait(link: Link) -> None:

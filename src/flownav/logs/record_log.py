@@ -183,7 +183,7 @@ def log_of_export(path: Path, flow_instance: int | None) -> Log:
             rows.setdefault(message.channel.kind.removeprefix(TITLE), []).append(row)
     columns = {channel.kind.removeprefix(TITLE): _columns_of(channel) for channel in bag.channels}
     tables = {name: _table(found, columns.get(name, {})) for name, found in rows.items()}
-    record = Record(_manifest(bag))
+    record = Record(_row(bag.attachments.get("manifest.json", b"{}")) or {})
     for name, table in tables.items():
         if "t_s" in table:
             record.add(name, table)
@@ -221,11 +221,6 @@ def _row(data: bytes) -> dict[str, Any] | None:
     except (ValueError, RecursionError):
         return None
     return row if isinstance(row, dict) else None
-
-
-def _manifest(bag: Bag) -> dict[str, Any]:
-    found = _row(bag.attachments.get("manifest.json", b"{}"))
-    return found or {}
 
 
 def _columns_of(channel: Channel) -> dict[str, str]:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from flownav.core.errors import InputError
 from flownav.core.guard import written_whole
 from flownav.core.record import Record
-from flownav.export.trajectory import Trajectory, trajectories
+from flownav.export.trajectory import trajectories
 
 APPLICATION = "flownav"
 SUFFIX = ".rrd"
@@ -85,8 +85,4 @@ def _prepare(record: Record, name: str, to: Path | None = None) -> Prepared:
     stream.send_recording_name(name)
     log_scene(stream, record, paths)
     log_plots(stream, record, paths)
-    return Prepared(stream, blueprint, _notes(paths))
-
-
-def _notes(paths: list[Trajectory]) -> list[str]:
-    return [note for path in paths for note in path.notes]
+    return Prepared(stream, blueprint, [note for path in paths for note in path.notes])

@@ -88,7 +88,8 @@ def check(
         _write(talk, report, values)
         after = _compared(known, values, send, asked_set or report.source_set or None, address if uart else None)
         report.rows, report.blocks, report.fits, report.verdict = after.rows, after.blocks, after.fits, after.verdict
-        if rebooting := [row.name for row in after.rows if row.reboot and row.name in _written(report)]:
+        written = {change.name for change in report.changes if change.done}
+        if rebooting := [row.name for row in after.rows if row.reboot and row.name in written]:
             report.notes.insert(
                 0, f"Reboot the vehicle, then run this again: {', '.join(rebooting)} count from then on."
             )
@@ -125,10 +126,6 @@ def _compared(
         port=port, notes=notes,
         in_flight=[line.replace("{n}", str(chosen)) for line in in_flight],
     )  # fmt: skip
-
-
-def _written(report: Report) -> set[str]:
-    return {change.name for change in report.changes if change.done}
 
 
 def _write(talk: Talk, report: Report, values: dict[str, Value]) -> None:

@@ -200,7 +200,8 @@ def read_formats(content: Bytes, headers: Headers) -> tuple[dict[str, Format], i
     for row in _sound(content, headers):
         name, labels = bytes(row["Name"]), _text(row["Columns"]).split(",")
         codes = _text(row["Format"])
-        if not _NAME.fullmatch(name) or len(codes) != len(labels if codes else []) or not _distinct(labels, codes):
+        distinct = not codes or (len(set(labels)) == len(labels) and all(labels))
+        if not _NAME.fullmatch(name) or len(codes) != len(labels if codes else []) or not distinct:
             continue
         found = Format(int(row["Type"]), name.decode(), codes, tuple(labels) if codes else ())
         if taken.get(found.type, formats.get(found.name, found)) != found:
@@ -223,10 +224,6 @@ def _sound(content: Bytes, headers: Headers) -> NDArray[np.void]:
     rows = rows[size == rows["Length"]]
     _, first = np.unique(rows.view(f"V{FMT.dtype.itemsize}"), return_index=True)
     return np.asarray(rows[np.sort(first)])
-
-
-def _distinct(labels: list[str], codes: str) -> bool:
-    return not codes or (len(set(labels)) == len(labels) and all(labels))
 
 
 def records(content: Bytes, dtype: np.dtype[np.void]) -> NDArray[np.void]:

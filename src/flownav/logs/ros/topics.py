@@ -5,6 +5,7 @@ from __future__ import annotations
 from array import array
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,32 +14,53 @@ from numpy.typing import NDArray
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array
 
-QUATERNION = ("qw", "qx", "qy", "qz")
-POSE = ("x", "y", "z", *QUATERNION)
-NAMES: dict[str, tuple[str, ...]] = {
-    "sensor_msgs/msg/Imu": (
-        "gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z", *QUATERNION, "no_orientation", "no_rates",
-        "no_force",
-    ),
-    "sensor_msgs/msg/NavSatFix": ("status", "lat", "lon", "alt", "var_e", "var_n", "var_u", "covariance_type"),
-    "sensor_msgs/msg/FluidPressure": ("pressure", "variance"),
-    "sensor_msgs/msg/MagneticField": ("x", "y", "z"),
-    "sensor_msgs/msg/Range": ("range", "min_range", "max_range"),
-    "geometry_msgs/msg/TwistStamped": ("vx", "vy", "vz"),
-    "geometry_msgs/msg/PoseStamped": POSE,
-    "geometry_msgs/msg/PoseWithCovarianceStamped": POSE,
-    "geometry_msgs/msg/TransformStamped": POSE,
-    "nav_msgs/msg/Odometry": (*POSE, "vx", "vy", "vz"),
-    "mavros_msgs/msg/OpticalFlowRad": (
-        "integration_time_us", "integrated_x", "integrated_y", "integrated_xgyro", "integrated_ygyro", "quality",
-        "distance",
-    ),
-}  # fmt: skip
 ODOMETRY, POSE_STAMPED = "nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped"
 POSES = (POSE_STAMPED, "geometry_msgs/msg/PoseWithCovarianceStamped", "geometry_msgs/msg/TransformStamped", ODOMETRY)
 NS = 1e-9
 AGREEING_S = 3600.0  # headers of one clock; a simulator's clock may lie decades from the recorder's
 LONGEST_DELAY_S = 1.0
+
+QUATERNION = ("qw", "qx", "qy", "qz")
+POSE = ("x", "y", "z", *QUATERNION)
+Values = Callable[[Any], tuple[Any, ...]]
+
+
+def _xyz(prefix: str, vector: str, *, axes: str = "xyz") -> dict[str, str]:
+    return {f"{prefix}{axis}": f"{vector}.{axis}" for axis in axes}
+
+
+def _pose(position: str, orientation: str) -> dict[str, str]:
+    return _xyz("", position) | _xyz("q", orientation, axes="wxyz")
+
+
+# what is kept of each type: columns by name, and where each lies in the message
+KEPT: dict[str, dict[str, str]] = {
+    "sensor_msgs/msg/Imu": {
+        **_xyz("gyro_", "angular_velocity"), **_xyz("accel_", "linear_acceleration"),
+        **_xyz("q", "orientation", axes="wxyz"), "no_orientation": "orientation_covariance",
+        "no_rates": "angular_velocity_covariance", "no_force": "linear_acceleration_covariance",
+    },
+    "sensor_msgs/msg/NavSatFix": {
+        "status": "status.status", "lat": "latitude", "lon": "longitude", "alt": "altitude",
+        **dict.fromkeys(("var_e", "var_n", "var_u"), "position_covariance"),
+        "covariance_type": "position_covariance_type",
+    },
+    "sensor_msgs/msg/FluidPressure": {"pressure": "fluid_pressure", "variance": "variance"},
+    "sensor_msgs/msg/MagneticField": _xyz("", "magnetic_field"),
+    "sensor_msgs/msg/Range": {name: name for name in ("range", "min_range", "max_range")},
+    "geometry_msgs/msg/TwistStamped": _xyz("v", "twist.linear"),
+    "geometry_msgs/msg/PoseStamped": _pose("pose.position", "pose.orientation"),
+    "geometry_msgs/msg/PoseWithCovarianceStamped": _pose("pose.pose.position", "pose.pose.orientation"),
+    "geometry_msgs/msg/TransformStamped": _pose("transform.translation", "transform.rotation"),
+    "nav_msgs/msg/Odometry": _pose("pose.pose.position", "pose.pose.orientation") | _xyz("v", "twist.twist.linear"),
+    "mavros_msgs/msg/OpticalFlowRad": {
+        name: name
+        for name in ("integration_time_us", "integrated_x", "integrated_y", "integrated_xgyro", "integrated_ygyro",
+                     "quality", "distance")
+    },
+}  # fmt: skip
+NAMES = {kind: tuple(columns) for kind, columns in KEPT.items()}
+READ: dict[str, Values] = {kind: attrgetter(*columns.values()) for kind, columns in KEPT.items()}
 
 
 @dataclass
@@ -90,46 +112,13 @@ def stamp_of(message: Any) -> int:
 
 
 def values_of(kind: str, message: Any) -> tuple[float, ...]:
-    """What is kept of a message, in the order of NAMES[kind]."""
-    return tuple(map(float, VALUES[kind](message)))
-
-
-def _imu(m: Any) -> tuple[Any, ...]:
-    turn, push, q = m.angular_velocity, m.linear_acceleration, m.orientation
-    absent = (m.orientation_covariance[0], m.angular_velocity_covariance[0], m.linear_acceleration_covariance[0])
-    return (turn.x, turn.y, turn.z, push.x, push.y, push.z, q.w, q.x, q.y, q.z, *(each == -1.0 for each in absent))
-
-
-def _fix(m: Any) -> tuple[Any, ...]:
-    c = m.position_covariance
-    return m.status.status, m.latitude, m.longitude, m.altitude, c[0], c[4], c[8], m.position_covariance_type
-
-
-def _pose(p: Any, q: Any) -> tuple[Any, ...]:
-    return p.x, p.y, p.z, q.w, q.x, q.y, q.z
-
-
-def _odometry(m: Any) -> tuple[Any, ...]:
-    speed = m.twist.twist.linear
-    return (*_pose(m.pose.pose.position, m.pose.pose.orientation), speed.x, speed.y, speed.z)
-
-
-VALUES: dict[str, Callable[[Any], tuple[Any, ...]]] = {
-    "sensor_msgs/msg/Imu": _imu,
-    "sensor_msgs/msg/NavSatFix": _fix,
-    "sensor_msgs/msg/FluidPressure": lambda m: (m.fluid_pressure, m.variance),
-    "sensor_msgs/msg/MagneticField": lambda m: (m.magnetic_field.x, m.magnetic_field.y, m.magnetic_field.z),
-    "sensor_msgs/msg/Range": lambda m: (m.range, m.min_range, m.max_range),
-    "geometry_msgs/msg/TwistStamped": lambda m: (m.twist.linear.x, m.twist.linear.y, m.twist.linear.z),
-    "geometry_msgs/msg/PoseStamped": lambda m: _pose(m.pose.position, m.pose.orientation),
-    "geometry_msgs/msg/PoseWithCovarianceStamped": lambda m: _pose(m.pose.pose.position, m.pose.pose.orientation),
-    "geometry_msgs/msg/TransformStamped": lambda m: _pose(m.transform.translation, m.transform.rotation),
-    "nav_msgs/msg/Odometry": _odometry,
-    "mavros_msgs/msg/OpticalFlowRad": lambda m: (
-        m.integration_time_us, m.integrated_x, m.integrated_y, m.integrated_xgyro, m.integrated_ygyro, m.quality,
-        m.distance,
-    ),
-}  # fmt: skip
+    """What is kept of a message, in the order of NAMES[kind]; of covariances what says that there are none."""
+    values = READ[kind](message)
+    if kind == "sensor_msgs/msg/Imu":
+        values = (*values[:10], *(covariance[0] == -1.0 for covariance in values[10:]))
+    elif kind == "sensor_msgs/msg/NavSatFix":
+        values = (*values[:4], *(values[4][k] for k in (0, 4, 8)), values[7])
+    return tuple(map(float, values))
 
 
 # -- which topic serves -------------------------------------------------------------------------------------

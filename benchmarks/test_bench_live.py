@@ -22,13 +22,12 @@ from pathlib import Path
 import pytest
 
 from flownav.core.measurement import Sensor
-from flownav.live.link import MOST_READS, Piece, UdpLink, open_link, parse_url
-from flownav.live.loop import Latency, run_session
+from flownav.live.byte_links import open_link
+from flownav.live.link import MOST_READS, Piece, UdpLink, parse_url
+from flownav.live.loop import Latency, run_before_others, run_session, warm_up
 from flownav.live.options import Options
-from flownav.live.priority import run_before_others
 from flownav.live.recorder import Recorder
 from flownav.live.session import Session
-from flownav.live.warm import warm_up
 
 DURATION_S = float(os.environ.get("FLOWNAV_LIVE_BENCH_S", "20"))
 PRIORITY = os.environ.get("FLOWNAV_LIVE_PRIORITY", "1") != "0"
@@ -40,7 +39,7 @@ FLOW_MESSAGE, ESTIMATE_MESSAGE = (number.to_bytes(3, "little") for number in (10
 
 def vehicle(port: int, seconds: float) -> None:
     """A hover at 250 Hz of HIGHRES_IMU and OPTICAL_FLOW_RAD, 50 Hz attitude, 25 Hz range, 10 Hz GPS."""
-    from flownav.mavlink import sensors_outgoing as say
+    from flownav.mavlink import outgoing as say
     from live_ends import ORIGIN, Hover, reading
 
     if PRIORITY:  # a vehicle's sensors do not wait for our processes, nor does the session wait for them
@@ -151,7 +150,7 @@ def test_latency_from_flow_to_estimate(tmp_path, loaded):
     link.close()
     grown = memory_kb[-1] - memory_kb[len(memory_kb) // 10]
     print(f"\n{DURATION_S:g} s, {'both cores busy' if loaded else 'alone'}, scheduling: {scheduling}")
-    print(f"{session.readings[Sensor.FLOW_RATE]} flow readings, {session.sent} estimates sent")
+    print(f"{session.hearing.readings[Sensor.FLOW_RATE]} flow readings, {session.sent} estimates sent")
     print("withheld:", dict(session.withheld), "dropped:", session.dropped, "link:", dict(link.counts))
     for name, found in (("reading", latency), ("arrival", link.since_arrival)):
         print(f"from its {name}: {_shown([found.quantile_s(share) for share in SHARES])}")

@@ -16,10 +16,10 @@ import numpy as np
 
 from flownav.campaigns.faults.table import log_of
 from flownav.campaigns.local import fly_recorded
-from flownav.live.recorder import NoRecorder
+from flownav.live.filtering import Keeper
+from flownav.live.loop import warm_up
 from flownav.live.session import Session
 from flownav.live.simulated import BOOT_S, SimulatedVehicle
-from flownav.live.warm import warm_up
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 from serial_line import SETTLED_S, Flown, fly_over, options_of
@@ -73,7 +73,7 @@ STEP_S, UNTIL_S = 0.005, 30.0
 def thinned(log: Any, setup: Any, imu_hz: float) -> tuple[float, int]:
     """Error [m] and jumps of a session that asks for the slowest streams and so much of the IMU, on a made clock."""
     vehicle, asked = SimulatedVehicle(log), SLOW | {"HIGHRES_IMU": (105, imu_hz)}
-    session = Session(replace(options_of(setup, 57_600), capacity_bytes_s=None), NoRecorder(), 0.0, 1.8e9)
+    session = Session(replace(options_of(setup, 57_600), capacity_bytes_s=None), Keeper(), 0.0, 1.8e9)
     session.rates.begin = lambda make, beside=None: asked  # type: ignore[method-assign]
     for step in range(round(UNTIL_S / STEP_S)):
         t_s = STEP_S * step

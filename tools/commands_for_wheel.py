@@ -48,7 +48,7 @@ def smooth_and_warm() -> None:
     """The kernels of `replay --smooth`, of `info` and of `live`, which want a log or a link."""
     from flownav.campaigns.faults.table import log_of
     from flownav.core.record import Record
-    from flownav.live.warm import warm_up
+    from flownav.live.loop import warm_up
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.replays.prepare import ReplayOptions
     from flownav.replays.session import replay

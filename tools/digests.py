@@ -21,9 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from flownav.campaigns.engines import engine_named
 from flownav.campaigns.plan import planned
-from flownav.campaigns.run import run_campaign
+from flownav.campaigns.run import engine_named, run_campaign
 from flownav.campaigns.store import Store
 from flownav.core.compile import LANES, ONE_LANE
 from flownav.core.errors import InputError

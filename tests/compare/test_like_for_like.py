@@ -10,7 +10,7 @@ import pytest
 from flownav.core.frames import quaternion_from_euler
 from flownav.core.measurement import Sensor, Stream
 from flownav.logs.log import Log
-from flownav.replays.airborne import airborne_of
+from flownav.replays.judged import airborne_of
 from flownav.scoring.reference import Motion
 from flownav.studies.compare.tracks import Track, errors_of, of_table, reference_of, says, shared_by
 

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from flownav.cli import app
 from flownav.core.compile import LANES, ONE_LANE, kernel
-from flownav.live.warm import warm_up
+from flownav.live.loop import warm_up
 from flownav.navigation.take import navigator_unit
 from machine_code import asked_for, borrowed, codes, compiled_functions, parts
 

@@ -15,8 +15,8 @@ from export_records import awkward
 from flownav.cli import app
 from flownav.core.errors import InputError
 from flownav.core.record import POSITION_NED, Record
-from flownav.export.earth import GX, KML, origin_from
 from flownav.export.formats import export
+from flownav.export.paths import GX, KML, origin_from
 from report_records import flight
 
 ORIGIN = (47.397742, 8.545594, 488.1)

@@ -11,10 +11,9 @@ import pytest
 from mcap.reader import make_reader
 
 from flownav.core.record import POSITION_NED, Record
-from flownav.export.errors import error_table
 from flownav.export.formats import export
-from flownav.export.foxglove import LAYOUT, layout_for, topic_and_field
-from flownav.export.trajectory import trajectories
+from flownav.export.mcap_file import LAYOUT, layout_for, topic_and_field
+from flownav.export.trajectory import error_table, trajectories
 from report_records import flight
 
 PATH = re.compile(r"^(/\w+)((?:\{\w+==\"\w+\"\})*)\.(\w+)(?:\.@negative)?$")
@@ -82,7 +81,7 @@ def test_every_curve_that_the_whole_layout_knows_is_of_the_records_vocabulary():
     """A misspelt column would never be drawn, and nothing else would say so."""
     from flownav.core.measurement import COLUMNS, Sensor
     from flownav.core.record import TABLES
-    from flownav.export.errors import BOUND, ERROR
+    from flownav.export.trajectory import BOUND, ERROR
 
     known = {f"/{name}": {*columns, "t_s"} for name, columns in TABLES.items()} | {"/error": {*ERROR, *BOUND}}
     known |= {f"/{sensor.name.lower()}": {*COLUMNS[sensor], "quality"} for sensor in Sensor}

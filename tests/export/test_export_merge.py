@@ -13,7 +13,7 @@ from pyulog import ULog
 from flownav.core.errors import InputError
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.export.formats import export
-from flownav.export.ulog_messages import (
+from flownav.export.ulog_topics import (
     SYNC,
     Field,
     Topic,

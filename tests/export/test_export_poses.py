@@ -11,7 +11,7 @@ from export_records import awkward
 from flownav.core.errors import InputError
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion
 from flownav.core.record import POSITION_NED, QUATERNION, Record
-from flownav.export import poses
+from flownav.export import paths
 from flownav.export.formats import export
 from flownav.export.trajectory import Trajectory, in_enu, trajectories
 from report_records import flight, replay
@@ -150,7 +150,7 @@ def test_all_files_appear_or_none(tmp_path, monkeypatch):
             raise OSError(28, "No space left on device")
         return "written"
 
-    monkeypatch.setitem(poses.TEXTS, ".tum", fails_on_truth)
+    monkeypatch.setitem(paths.TEXTS, ".tum", fails_on_truth)
     with pytest.raises(OSError, match="No space"):
         export(flight("landing"), "tum", tmp_path / "run.tum")
     assert list(tmp_path.iterdir()) == []

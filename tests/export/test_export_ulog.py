@@ -11,7 +11,7 @@ from export_records import awkward
 from flownav.core.frames import euler_from_quaternion
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.export.formats import export
-from flownav.export.ulog_messages import message
+from flownav.export.ulog_topics import message
 from report_records import flight, replay
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flownav.export.samples.dataflash_file import HEAD as HEAD
-from flownav.export.samples.dataflash_file import DataFlashWriter as DataFlashWriter
-from flownav.export.samples.dataflash_file import define_flight as define_flight
+from flownav.export.samples.dataflash import HEAD as HEAD
+from flownav.export.samples.dataflash import DataFlashWriter as DataFlashWriter
+from flownav.export.samples.dataflash import define_flight as define_flight
 from replay_logs import ORIGIN, SyntheticLog
 
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from flownav.live.link import Link
-from flownav.mavlink.dialect import coder
-from flownav.mavlink.framing import StreamFrames
+from flownav.mavlink.framing import StreamFrames, coder
 from flownav.mavlink.signing import sign_outgoing
 
 ARDUPILOT, PX4 = 3, 12

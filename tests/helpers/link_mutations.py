@@ -7,7 +7,7 @@ import struct
 from random import Random
 from typing import Any
 
-from flownav.mavlink.dialect import coder, dialect
+from flownav.mavlink.framing import coder, dialect
 from flownav.mavlink.messages import CONVERTERS
 from log_mutations import mutate
 from mavlink_logs import packed_payload

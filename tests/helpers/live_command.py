@@ -12,7 +12,7 @@ from typer.testing import CliRunner, Result
 
 from flownav.cli import app
 from flownav.cli import live as command
-from flownav.live import link, loop, priority
+from flownav.live import byte_links, loop
 from journal_turns import Turns
 from live_ends import STEP_S, Hover
 from virtual_link import UNIX_S, Clock, VirtualLink
@@ -49,7 +49,7 @@ def run_live(
         return frames(now_s)
 
     patched.setattr(command, "time", SimpleNamespace(monotonic=clock, time=lambda: UNIX_S))
-    patched.setattr(link, "open_link", lambda url: VirtualLink(clock, told))
+    patched.setattr(byte_links, "open_link", lambda url: VirtualLink(clock, told))
     patched.setattr(loop, "run_session", partial(loop.run_session, clock=clock))
-    patched.setattr(priority, "run_before_others", lambda: "ordinary")
+    patched.setattr(loop, "run_before_others", lambda: "ordinary")
     return CliRunner().invoke(app, ["live", "udp:0", *map(str, arguments)])

@@ -9,12 +9,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from flownav.core.measurement import Measurement, Sensor
-from flownav.live.link import UdpLink, open_link
+from flownav.live.byte_links import open_link
+from flownav.live.filtering import Keeper
+from flownav.live.link import UdpLink
 from flownav.live.options import Options
-from flownav.live.recorder import NoRecorder
 from flownav.live.session import Session
-from flownav.mavlink import sensors_outgoing as say
-from flownav.mavlink.dialect import coder
+from flownav.mavlink import outgoing as say
+from flownav.mavlink.framing import coder
 from flownav.mavlink.signing import sign_outgoing
 
 ORIGIN = (47.0, 8.5, 400.0)
@@ -116,7 +117,7 @@ class Wire:
 
     def __init__(self, vehicle: Hover, options: Options | None = None, keeper: Any = None) -> None:
         self.vehicle, self.t_s = vehicle, 0.0
-        self.session = Session(options or Options(), keeper or NoRecorder(), START_S, UNIX_S)
+        self.session = Session(options or Options(), keeper or Keeper(), START_S, UNIX_S)
         link = open_link("udp:0")
         assert isinstance(link, UdpLink)
         link.close()

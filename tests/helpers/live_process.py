@@ -9,7 +9,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from flownav.live.link import open_link
+from flownav.live.byte_links import open_link
 from live_ends import Hover
 
 ODOMETRY = 331

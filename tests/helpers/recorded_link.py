@@ -7,11 +7,10 @@ from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from flownav.live.filtering import Keeper
 from flownav.live.options import Options
-from flownav.live.recorder import NoRecorder
 from flownav.live.session import Session
-from flownav.mavlink.dialect import coder
-from flownav.mavlink.framing import StreamFrames
+from flownav.mavlink.framing import StreamFrames, coder
 
 TICK_S = 0.005  # as the loop wakes up
 
@@ -70,7 +69,7 @@ def play(
     """A session that lives through the arrivals, and all that it sent; `look` is called at each tick."""
     frames = list(frames)
     now_s = frames[0].now_s
-    session = Session(options or Options(), keeper or NoRecorder(), now_s, 1.8e9)
+    session = Session(options or Options(), keeper or Keeper(), now_s, 1.8e9)
     sent: list[Sent] = []
     decoder: Any = coder()
 

@@ -20,11 +20,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flownav.core.measurement import Sensor
-from flownav.live.byte_links import SerialLink
-from flownav.live.link import Link, open_link, parse_url
+from flownav.live.byte_links import SerialLink, open_link
+from flownav.live.filtering import Keeper
+from flownav.live.link import Link, parse_url
 from flownav.live.loop import Latency, run_session, run_vehicle
 from flownav.live.options import Options
-from flownav.live.recorder import NoRecorder
 from flownav.live.session import Session
 from flownav.live.simulated import BOOT_S, SimulatedVehicle
 
@@ -215,7 +215,7 @@ class Flight:
     ) -> None:
         self.vehicle, self.uart, self.link, self.clock = vehicle, uart, link, clock
         self.began_s = clock()
-        self.session = Watched(options, NoRecorder(), self.began_s, UNIX_S)
+        self.session = Watched(options, Keeper(), self.began_s, UNIX_S)
         self.session.ages_s = []
         self.session.vehicle_now_s = lambda: BOOT_S + clock() - self.began_s
         self._backlog: list[int] = []

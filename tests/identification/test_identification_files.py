@@ -15,7 +15,7 @@ from scipy import signal
 
 from flownav.core.errors import InputError
 from flownav.core.provenance import hash_of
-from flownav.core.toml_text import to_toml
+from flownav.core.text import to_toml
 from flownav.lab.identification.autopilot_parameters import parameters, write_parameters
 from flownav.lab.identification.descent import Structure
 from flownav.lab.identification.findings import Findings

@@ -18,7 +18,7 @@ from flownav.lab.identification.flight_identification import identify_flight
 from flownav.lab.identification.job import identify
 from flownav.lab.identification.quantities import CANDIDATES
 from flownav.logs.csv_folder import read_csv_folder
-from flownav.replays.airborne import airborne_of, flying_at
+from flownav.replays.judged import airborne_of, flying_at
 
 YAW_RAD = 0.7
 

@@ -9,11 +9,11 @@ from random import Random
 
 import pytest
 
+from flownav.live.filtering import Keeper
+from flownav.live.loop import warm_up
 from flownav.live.options import Options
-from flownav.live.recorder import NoRecorder
 from flownav.live.session import Session
-from flownav.live.warm import warm_up
-from flownav.mavlink.dialect import coder
+from flownav.mavlink.framing import coder
 from fuzzing import FIRST_SEED, MUTANTS
 from link_mutations import mutate_piece
 from live_ends import START_S, STEP_S, UNIX_S, Hover
@@ -43,7 +43,7 @@ def fly_damaged(seed: int) -> None:
     random = Random(seed)
     key = KEY if seed % 5 == 4 else None
     send = ("odometry", "vision", "landing-target", "none")[seed % 4]
-    session = Session(Options(send=send, key=key), NoRecorder(), START_S, UNIX_S)
+    session = Session(Options(send=send, key=key), Keeper(), START_S, UNIX_S)
     vehicle, hears = Hover(key=key), coder()
     struck = {random.randrange(round(FLOWN_S / STEP_S)) for _ in range(PIECES)}
     now_s, earlier, whole = START_S, b"", seed % 3 != 0

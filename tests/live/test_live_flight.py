@@ -20,17 +20,17 @@ from flownav.campaigns.local import fly_recorded
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.core.record import Record
+from flownav.live.byte_links import open_link
 from flownav.live.display import draw
-from flownav.live.link import open_link
-from flownav.live.loop import Latency, run_session, run_vehicle
+from flownav.live.filtering import Keeper
+from flownav.live.loop import Latency, run_session, run_vehicle, warm_up
 from flownav.live.options import Options
-from flownav.live.recorder import NoRecorder, Recorder
+from flownav.live.recorder import Recorder
 from flownav.live.screen import Screen
 from flownav.live.session import Session
 from flownav.live.simulated import BOOT_S, ORIGIN_DEG_M, SimulatedVehicle
-from flownav.live.warm import warm_up
 from flownav.logs.open_log import open_flight
-from flownav.mavlink.dialect import coder
+from flownav.mavlink.framing import coder
 from flownav.navigation.tables import estimate_table, innovation_table, states_table
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions
@@ -232,7 +232,7 @@ def test_a_record_of_another_kind_is_refused(tmp_path):
 
 
 def test_memory_does_not_grow_with_the_session():
-    wire = Wire(Hover(), Options(), NoRecorder()).fly(4.0)
+    wire = Wire(Hover(), Options(), Keeper()).fly(4.0)
 
     def held(seconds):
         wire.fly(seconds)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from flownav.core.measurement import Sensor
+from flownav.live.filtering import Keeper
 from flownav.live.options import Options
-from flownav.live.recorder import NoRecorder
-from flownav.mavlink import sensors_outgoing as say
+from flownav.mavlink import outgoing as say
 from flownav.navigation.tape import IMU_SPIKE
 from live_ends import GRAVITY, Hover, Wire, reading
 
@@ -16,7 +16,7 @@ HIGHRES_IMU = 105
 BEGIN_S = 10.0
 
 
-class Flagged(NoRecorder):
+class Flagged(Keeper):
     """Counts spikes."""
 
     spikes = 0

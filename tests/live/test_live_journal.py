@@ -17,13 +17,13 @@ from flownav.core.errors import InputError, VerdictError
 from flownav.core.free_names import free_name
 from flownav.core.record import Record
 from flownav.live import writing
-from flownav.live.journal_place import claim, is_locked
 from flownav.live.options import Options
 from flownav.live.recorder import Recorder
 from flownav.live.recovery import recovered
+from flownav.live.writing import claim, is_locked
 from flownav.logs.journal import MAGIC, Block, blocks
 from flownav.logs.open_log import open_flight
-from flownav.mavlink.state_messages import TrueState
+from flownav.mavlink.messages import TrueState
 from flownav.navigation.tables import estimate_table, innovation_table
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions

@@ -12,8 +12,8 @@ import pytest
 
 from flownav.core.errors import InputError
 from flownav.live import byte_links
-from flownav.live.byte_links import TcpLink
-from flownav.live.link import Address, UdpLink, open_link, parse_url, same_sender
+from flownav.live.byte_links import TcpLink, open_link
+from flownav.live.link import Address, UdpLink, parse_url, same_sender
 
 
 def has_ipv6():

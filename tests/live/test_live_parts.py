@@ -14,17 +14,15 @@ from hypothesis import strategies as st
 from flownav.core.errors import InputError
 from flownav.core.measurement import Measurement, Sensor
 from flownav.estimation.states import POSITION, QUATERNION, STATE, VELOCITY
-from flownav.live.byte_links import SerialLink, TcpLink
-from flownav.live.estimating import estimate_of
-from flownav.live.filtering import BATCH, Filtering
-from flownav.live.horizon import Horizon, Waiting
-from flownav.live.link import Address, open_link, parse_url
+from flownav.live.answers import estimate_of
+from flownav.live.byte_links import SerialLink, TcpLink, open_link
+from flownav.live.filtering import BATCH, Filtering, Keeper
+from flownav.live.horizon import SILENT_S, Horizon, Source, Sources, Waiting
+from flownav.live.link import Address, parse_url
 from flownav.live.loop import Latency
 from flownav.live.options import Options
-from flownav.live.recorder import NoRecorder
+from flownav.live.reception import VehicleClock
 from flownav.live.screen import strip
-from flownav.live.sources import SILENT_S, Source, Sources
-from flownav.live.timing import VehicleClock
 from flownav.mavlink.framing import LARGEST_FRAME, StreamFrames
 from mavlink_logs import flight_log, made
 
@@ -187,7 +185,7 @@ def test_the_estimate_of_now_is_where_the_filter_will_be_when_it_gets_there():
     fix = Measurement(0.5, Sensor.GPS_POSITION, (1.0, 2.0, -3.0), (1.0,) * 3)
     past = sorted([*past, Waiting(-0.01, 0, attitude), Waiting(0.505, 0, fix)])
     coming = [imu(1.0 + 0.01 * k) for k in range(30)]
-    filtering = Filtering(Options(), NoRecorder())
+    filtering = Filtering(Options(), Keeper())
     filtering.begin(past, gps_heard=True)
     for start in range(0, len(past), BATCH):
         filtering.feed(past[start : start + BATCH])

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from flownav.core.measurement import Sensor
+from flownav.live.filtering import Keeper
 from flownav.live.options import Limits, Options
-from flownav.live.recorder import NoRecorder
-from flownav.mavlink.dialect import coder
+from flownav.mavlink.framing import coder
 from recorded_link import Arrival, arrivals, play
 
 GPS_RAW_INT, TIMESYNC, COMMAND_LONG, GLOBAL_ORIGIN = 24, 111, 76, 49
@@ -59,7 +59,7 @@ def rms_m(sent, truth):
 def test_gps_is_fused_whatever_its_phase_to_the_stream(link, shift_s):
     """A 5 Hz fix repeated at 10 Hz: its first copy is up to 100 ms old. With a fixed 0.27 s all were late."""
     session, sent = play(delayed(link("square", 20.0), GPS_RAW_INT, shift_s))
-    fixes = session.readings[Sensor.GPS_POSITION]
+    fixes = session.hearing.readings[Sensor.GPS_POSITION]
     assert fixes > 50
     assert session.dropped["gps_position: repeated"] == pytest.approx(fixes, abs=2)
     assert session.dropped.get("gps_position: late", 0) <= 2  # until the horizon has followed
@@ -72,8 +72,8 @@ def test_gps_is_fused_whatever_its_phase_to_the_stream(link, shift_s):
 @pytest.mark.parametrize("period_s", [0.1, 0.2])
 def test_a_link_that_delivers_in_batches_loses_nothing(link, period_s):
     session, sent = play(batched(link("square", 20.0), period_s))
-    assert session.readings[Sensor.GPS_POSITION] > 50
-    assert session.readings[Sensor.FLOW_RATE] > 900
+    assert session.hearing.readings[Sensor.GPS_POSITION] > 50
+    assert session.hearing.readings[Sensor.FLOW_RATE] > 900
     assert not [name for name in session.dropped if name.endswith(": late")]
     assert session.reason == ""
     assert longest_gap_s(sent) < period_s + 0.1
@@ -91,7 +91,7 @@ def test_the_square_is_flown_within_fifteen_centimetres(link, data_folder, shift
 def test_gps_later_than_the_longest_horizon_is_an_alarm_and_nothing_is_sent(link):
     notes = []
 
-    class Keeper(NoRecorder):
+    class Keeper(Keeper):
         def note(self, t_s, source, kind, detail, value=float("nan")):
             notes.append((source, kind, detail))
 

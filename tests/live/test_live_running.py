@@ -17,12 +17,11 @@ from types import SimpleNamespace
 import pytest
 
 from flownav.live import display as shown
-from flownav.live import priority
+from flownav.live import loop
 from flownav.live.display import Display, View
-from flownav.live.filtering import BATCH
+from flownav.live.filtering import BATCH, Keeper
 from flownav.live.loop import COLLECT_S, Collector, Latency, run_session, stoppable
 from flownav.live.options import Options
-from flownav.live.recorder import NoRecorder
 from flownav.live.screen import Screen
 from live_ends import Hover, Wire
 
@@ -52,7 +51,7 @@ def test_the_collector_is_on_again_when_the_session_fails():
 
 
 def test_what_was_listened_to_is_fed_in_slices_and_nothing_is_sent_meanwhile():
-    wire = Wire(Hover(), Options(), NoRecorder())
+    wire = Wire(Hover(), Options(), Keeper())
     fed, sent = [], []
     real = wire.session.filtering.feed
 
@@ -87,8 +86,8 @@ def test_the_scheduling_is_what_is_permitted_and_is_said(monkeypatch, refused, s
     monkeypatch.setattr(os, "sched_setscheduler", permitted("fifo"))
     monkeypatch.setattr(os, "setpriority", permitted("nice"))
     try:
-        assert said in priority.run_before_others()
-        assert sys.getswitchinterval() == pytest.approx(priority.SWITCH_S)
+        assert said in loop.run_before_others()
+        assert sys.getswitchinterval() == pytest.approx(loop.SWITCH_S)
     finally:
         sys.setswitchinterval(before_s)
 
@@ -103,7 +102,7 @@ def test_a_terminal_that_hangs_up_twice_does_not_break_off():
 
 
 def test_a_recording_that_stopped_is_the_first_thing_that_the_screen_says():
-    wire = Wire(Hover(), Options(), NoRecorder()).fly(3.0)
+    wire = Wire(Hover(), Options(), Keeper()).fly(3.0)
     recorder = SimpleNamespace(reason="", path="flight.fnr", size=2_000_000)
     screen = Screen(wire.session, Latency(), "udp:1", recorder, "real time")
     calm = screen.view(wire.now_s)

@@ -16,19 +16,17 @@ from rich.console import Console
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.estimation.states import POSITION, STATE
-from flownav.live.answers import ODOMETRY_COMPONENT
+from flownav.live.answers import ODOMETRY_COMPONENT, why_withheld
 from flownav.live.display import draw
-from flownav.live.estimating import why_withheld
-from flownav.live.horizon import MOST_WAITING
+from flownav.live.filtering import Keeper
+from flownav.live.horizon import MOST_WAITING, Refused
 from flownav.live.loop import Latency
 from flownav.live.options import Limits, Options
 from flownav.live.reception import BESIDE, Accepted, accepted_by, accepted_of
-from flownav.live.recorder import NoRecorder
 from flownav.live.screen import Screen
-from flownav.live.serving import Refused
 from flownav.live.session import Session
-from flownav.mavlink import sensors_outgoing as say
-from flownav.mavlink.dialect import coder
+from flownav.mavlink import outgoing as say
+from flownav.mavlink.framing import coder
 from flownav.mavlink.position_messages import LOCAL_FRD
 from flownav.mavlink.signing import SignatureCheck
 from flownav.navigation.memory import PROTECTION
@@ -506,11 +504,11 @@ def test_quality_is_what_is_left_of_the_limits(wires):
 def test_a_recorded_link_played_into_a_fresh_session_is_not_heard_beyond_the_protocols_minute(old_s, heard):
     vehicle = Hover(boot_s=5000.0, key=KEY)
     recorded = [frame for step in range(200) for frame in vehicle.frames(-old_s + 0.01 * step)]
-    session = Session(Options(key=KEY), NoRecorder(), START_S, UNIX_S)
+    session = Session(Options(key=KEY), Keeper(), START_S, UNIX_S)
     for number, frame in enumerate(recorded):
         session.take(frame, START_S + 1e-3 * number, whole=True)
     assert (session.reception.vehicle is not None) is heard
-    assert bool(session.readings) is heard
+    assert bool(session.hearing.readings) is heard
 
 
 # -- what a reviewer broke ---------------------------------------------------------------------------------

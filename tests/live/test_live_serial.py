@@ -9,9 +9,9 @@ import pytest
 
 from flownav.campaigns.faults.table import log_of
 from flownav.campaigns.local import fly_recorded
+from flownav.live.loop import warm_up
 from flownav.live.rates import plan
 from flownav.live.simulated import SimulatedVehicle
-from flownav.live.warm import warm_up
 from flownav.simulation.assemble import assemble
 from flownav.simulation.scenario import load_scenario
 from serial_line import fly_over, fly_virtually, options_of

@@ -19,16 +19,15 @@ from typer.testing import CliRunner
 from fake_autopilot import ARDUPILOT, PX4, FakeAutopilot, FakeLink
 from flownav.cli import app
 from flownav.core.errors import InputError
-from flownav.live import link as live_link
+from flownav.live import byte_links
 from flownav.live.link import parse_url
 from flownav.live.options import SENDINGS
 from flownav.live.setup import talk
 from flownav.live.setup.check import check
-from flownav.live.setup.exchange import TRIES, read
+from flownav.live.setup.compare import baud_of
 from flownav.live.setup.knowledge import MAKES, knowledge_of
-from flownav.live.setup.serial_port import baud_of
-from flownav.live.setup.talk import Talk
-from flownav.mavlink.dialect import coder, dialect
+from flownav.live.setup.talk import TRIES, Talk, read
+from flownav.mavlink.framing import coder, dialect
 from flownav.mavlink.parameters import INTEGERS, Value, decoded, name_of, set_value
 from recorded_link import frames_of
 
@@ -382,7 +381,7 @@ def command(monkeypatch):
 
     def run(autopilot, url, *arguments):
         link = FakeLink(autopilot)
-        monkeypatch.setattr(live_link, "open_link", lambda url: link)
+        monkeypatch.setattr(byte_links, "open_link", lambda url: link)
         monkeypatch.setattr(talk, "Talk", partial(Talk, clock=link.clock, wait=link.wait))
         return CliRunner().invoke(app, ["live", url, *arguments])
 

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import pytest
 
+from flownav.live.filtering import Keeper
 from flownav.live.options import Options
-from flownav.live.recorder import NoRecorder
-from flownav.live.requests import SET_MESSAGE_INTERVAL, SILENT_S
+from flownav.live.requests import HIL, SET_MESSAGE_INTERVAL, SILENT_S, TRIES
 from flownav.live.session import Session
-from flownav.live.simulator import HIL, TRIES
-from flownav.mavlink import sensors_outgoing as say
-from flownav.mavlink.dialect import coder
+from flownav.mavlink import outgoing as say
+from flownav.mavlink.framing import coder
 
 ARDUPILOT, PX4 = 3, 12
 
 
-class Kept(NoRecorder):
+class Kept(Keeper):
     def __init__(self):
         self.truths = []
 

@@ -21,8 +21,8 @@ from blackbox_logs import (
 )
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
+from flownav.logs.blackbox.format import packed as unpacked
 from flownav.logs.blackbox.reader import read_blackbox
-from flownav.logs.blackbox.values import packed as unpacked
 from flownav.logs.open_log import log_kind, open_log
 from replay_logs import SyntheticLog, log_of_flight
 from replayed_alike import apart, largest_difference

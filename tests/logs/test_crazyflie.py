@@ -10,7 +10,7 @@ import pytest
 from crazyflie_logs import RAD_PER_COUNT, DeckLog, deck_log, quantised
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
-from flownav.logs.crazyflie_log import read_crazyflie
+from flownav.logs.crazyflie import read_crazyflie
 from flownav.logs.open_log import log_kind, open_log
 from replay_logs import SyntheticLog, log_of_flight
 from replayed_alike import apart, largest_difference

@@ -25,7 +25,7 @@ from fed_records import queue_of_flight, record_of
 from flownav.core.errors import InputError
 from flownav.export.formats import export
 from flownav.logs.blackbox.reader import read_blackbox
-from flownav.logs.crazyflie_log import read_crazyflie
+from flownav.logs.crazyflie import read_crazyflie
 from flownav.logs.csv_folder import read_csv_folder
 from flownav.logs.dataflash import read_dataflash
 from flownav.logs.dataflash.formats import CODES

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from flownav.core.errors import InputError
-from flownav.logs.journal import HEADER, MAGIC, MARK, Block, Damage, block, blocks, is_journal
-from flownav.logs.open_log import open_log
+from flownav.logs.journal import HEADER, MAGIC, MARK, Block, Damage, block, blocks
+from flownav.logs.open_log import log_kind, open_log
 
 ROWS = {"fed": np.arange(12.0).reshape(3, 4), "event": np.full((1, 3), np.nan)}
 WHOLE = [block(number, {"notes": [[0.5, "a", f"b{number}"]]}, ROWS) for number in range(4)]
@@ -103,8 +103,8 @@ def test_a_payload_of_another_make_is_damage(payload):
 def test_whoever_opens_a_journal_is_told_to_recover_it(tmp_path):
     path = tmp_path / "flight.fnr.journal"
     path.write_bytes(FILE)
-    assert is_journal(path)
-    assert not is_journal(tmp_path / "none")
+    assert log_kind(path) == "journal"
+    assert not log_kind(tmp_path / "none")
     for asked in (path, tmp_path / "flight.fnr"):
         with pytest.raises(InputError, match=r"did not end; `flownav recover .*flight\.fnr\.journal`"):
             open_log(asked)

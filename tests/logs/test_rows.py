@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.logs.rows import Rows, drop_duplicates, drop_strays, longest_ordered
+from flownav.logs.assembly import Rows, drop_duplicates, drop_strays, longest_ordered
 
 
 def rows_of(t_s, values) -> Rows:

@@ -12,10 +12,17 @@ from hypothesis import strategies as st
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
 from flownav.core.measurement import Measurement, Sensor
 from flownav.mavlink.converted import OPTIONAL, Context, Dropped, Pose
-from flownav.mavlink.dialect import coder
-from flownav.mavlink.inertial_messages import pressure_altitude_m, pressure_hpa
-from flownav.mavlink.messages import CONVERTERS, instance_of, measurements
-from flownav.mavlink.state_messages import global_position_int, hil_state_quaternion, local_position_ned, sim_state
+from flownav.mavlink.framing import coder
+from flownav.mavlink.messages import (
+    CONVERTERS,
+    global_position_int,
+    hil_state_quaternion,
+    instance_of,
+    local_position_ned,
+    measurements,
+    sim_state,
+)
+from flownav.mavlink.sensor_messages import pressure_altitude_m, pressure_hpa
 from mavlink_logs import arbitrary_payload, made, packed_payload
 
 ORIGIN = (47.0, 8.5, 400.0)

@@ -11,13 +11,12 @@ from hypothesis import strategies as st
 
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion
 from flownav.core.measurement import Measurement, Sensor
-from flownav.mavlink import outgoing, sensors_outgoing
+from flownav.mavlink import outgoing
 from flownav.mavlink.converted import Context
-from flownav.mavlink.dialect import coder
-from flownav.mavlink.messages import measurements
+from flownav.mavlink.framing import coder
+from flownav.mavlink.messages import measurements, sim_state
 from flownav.mavlink.outgoing import Estimate
 from flownav.mavlink.position_messages import LOCAL_NED
-from flownav.mavlink.state_messages import sim_state
 from mavlink_logs import made, through_bytes
 
 MAV = coder(1, 1)
@@ -143,17 +142,17 @@ def reading(sensor, *value, variance=None, quality=255.0):
 @given(st.tuples(*[number(-10, 10)] * 3), st.tuples(*[number(-100, 100)] * 3), number(-400, 4000))
 def test_highres_imu(rates, force, altitude):
     imu = reading(Sensor.IMU, *rates, *force)
-    found = back(sensors_outgoing.highres_imu(MAV, 7, imu, mag_gauss=(0.2, 0.0, 0.4), altitude_m=altitude))
+    found = back(outgoing.highres_imu(MAV, 7, imu, mag_gauss=(0.2, 0.0, 0.4), altitude_m=altitude))
     close(found[Sensor.IMU].value, imu.value)
     close(found[Sensor.MAG].value, (0.2, 0.0, 0.4))
     close(found[Sensor.BARO].value, [altitude], abs=2e-3)  # a float's last digit at 1000 hPa is 0.5 mm
-    assert set(back(sensors_outgoing.highres_imu(MAV, 7, imu))) == {Sensor.IMU}
+    assert set(back(outgoing.highres_imu(MAV, 7, imu))) == {Sensor.IMU}
 
 
 @settings(max_examples=40, deadline=None)
 @given(quaternions, st.integers(0, 2**40))
 def test_attitude_quaternion(quaternion, boot_ms):
-    message = through_bytes(sensors_outgoing.attitude_quaternion(MAV, boot_ms, quaternion, (0.1, 0.2, 0.3)))
+    message = through_bytes(outgoing.attitude_quaternion(MAV, boot_ms, quaternion, (0.1, 0.2, 0.3)))
     assert message.time_boot_ms == boot_ms % 2**32
     close(back(message)[Sensor.ATTITUDE].value, quaternion)
 
@@ -165,7 +164,7 @@ def test_gps_raw_int(north_deg, east_deg, altitude, north, east, sigma):
 
     fix = (ORIGIN[0] + north_deg, ORIGIN[1] + east_deg, altitude)
     velocity = reading(Sensor.GPS_VELOCITY, north, east, NAN, variance=(sigma**2, sigma**2, NAN))
-    message = sensors_outgoing.gps_raw_int(MAV, 3, fix, velocity, horizontal_sigma_m=sigma, vertical_sigma_m=2 * sigma)
+    message = outgoing.gps_raw_int(MAV, 3, fix, velocity, horizontal_sigma_m=sigma, vertical_sigma_m=2 * sigma)
     found = back(message)
     close(found[Sensor.GPS_POSITION].value, pymap3d.geodetic2ned(*fix, *ORIGIN), abs=0.02)
     close(np.sqrt(found[Sensor.GPS_POSITION].variance), (sigma, sigma, 2 * sigma), abs=1e-3)
@@ -178,7 +177,7 @@ def test_gps_raw_int(north_deg, east_deg, altitude, north, east, sigma):
        st.floats(0.002, 0.5), st.integers(0, 255), st.one_of(st.just(-1.0), number(0.05, 30.0)))  # fmt: skip
 def test_optical_flow_rad(flow, gyro, interval, quality, distance):
     sent = reading(Sensor.FLOW_RATE, *flow, *gyro, quality=float(quality))
-    found = back(sensors_outgoing.optical_flow_rad(MAV, 3, sent, interval, distance_m=distance))
+    found = back(outgoing.optical_flow_rad(MAV, 3, sent, interval, distance_m=distance))
     close(found[Sensor.FLOW_RATE].value, sent.value, rel=3e-4)  # half a microsecond of two milliseconds
     assert found[Sensor.FLOW_RATE].quality == quality
     close(found[Sensor.FLOW_RATE].delay_s, interval / 2, abs=1e-6)
@@ -189,7 +188,7 @@ def test_optical_flow_rad(flow, gyro, interval, quality, distance):
 @given(number(0.1, 40.0), st.one_of(st.just(NAN), number(1e-4, 0.02)), number(10, 255))
 def test_distance_sensor(distance, variance, quality):
     sent = reading(Sensor.RANGE, distance, variance=(variance,), quality=quality)
-    found = back(sensors_outgoing.distance_sensor(MAV, 3, sent, (0.05, 45.0)))[Sensor.RANGE]
+    found = back(outgoing.distance_sensor(MAV, 3, sent, (0.05, 45.0)))[Sensor.RANGE]
     close(found.value, [distance], abs=0.00501)
     close(found.variance, [variance], abs=0.51e-4)
     close(found.quality, quality, abs=1.3)
@@ -197,14 +196,14 @@ def test_distance_sensor(distance, variance, quality):
 
 @pytest.mark.parametrize("landed", [True, False])
 def test_extended_sys_state(landed):
-    found = back(sensors_outgoing.extended_sys_state(MAV, landed=landed))
+    found = back(outgoing.extended_sys_state(MAV, landed=landed))
     assert found[Sensor.LANDED].value == (float(landed),)
 
 
 @settings(max_examples=40, deadline=None)
 @given(vectors, quaternions, number(-80, 80), number(-170, 170), number(-100, 4000))
 def test_sim_state(velocity, quaternion, latitude, longitude, altitude):
-    message = sensors_outgoing.sim_state(
+    message = outgoing.sim_state(
         MAV, (latitude, longitude, altitude), velocity, quaternion, (0.0, 0.0, 0.0), (0.1, 0.2, 0.3), (0.0, 0.0, -9.8)
     )
     state = sim_state(through_bytes(message))
@@ -216,12 +215,12 @@ def test_sim_state(velocity, quaternion, latitude, longitude, altitude):
 
 
 def test_heartbeat_says_helicopter_and_armed():
-    message = through_bytes(sensors_outgoing.heartbeat(MAV, armed=True))
+    message = through_bytes(outgoing.heartbeat(MAV, armed=True))
     assert (message.type, message.autopilot, message.base_mode, message.system_status) == (4, 0, 128, 4)
-    assert through_bytes(sensors_outgoing.heartbeat(MAV, armed=False)).base_mode == 0
+    assert through_bytes(outgoing.heartbeat(MAV, armed=False)).base_mode == 0
 
 
 def test_timesync_is_answered_once():
-    reply = through_bytes(sensors_outgoing.timesync_reply(MAV, made("TIMESYNC", tc1=0, ts1=42), 1234))
+    reply = through_bytes(outgoing.timesync_reply(MAV, made("TIMESYNC", tc1=0, ts1=42), 1234))
     assert (reply.tc1, reply.ts1) == (1234, 42)
-    assert sensors_outgoing.timesync_reply(MAV, reply, 9999) is None
+    assert outgoing.timesync_reply(MAV, reply, 9999) is None

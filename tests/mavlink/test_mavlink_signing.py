@@ -7,7 +7,7 @@ import struct
 import pytest
 
 from flownav.core.errors import InputError
-from flownav.mavlink.dialect import coder
+from flownav.mavlink.framing import coder
 from flownav.mavlink.signing import SignatureCheck, load_key, sign_outgoing, timestamp_at
 from mavlink_logs import made
 

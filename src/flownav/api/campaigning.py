@@ -18,10 +18,10 @@ from flownav.api.record import Record
 from flownav.api.scenario import Scenario, scenario_of
 from flownav.api.vehicle import Vehicle
 from flownav.api.words import call_of, require_from
-from flownav.campaigns.engines import Engine, engine_named
+from flownav.campaigns.engines import Engine
 from flownav.campaigns.measures import stop_of
 from flownav.campaigns.plan import MOST_FLIGHTS, SAMPLINGS, Plan, Sampling, Value, planned
-from flownav.campaigns.run import Progress, Watch, record_path, run_campaign
+from flownav.campaigns.run import Progress, Watch, engine_named, record_path, run_campaign
 from flownav.campaigns.store import RECORDS, SUMMARY, Store
 from flownav.campaigns.summary import WORST, summary_of
 from flownav.core.errors import InputError

@@ -13,7 +13,7 @@ from typing import Any
 
 from flownav.core.errors import InputError
 from flownav.core.guard import written_whole
-from flownav.core.toml_text import to_toml
+from flownav.core.text import to_toml
 
 Entries = dict[str, Any]
 

@@ -8,7 +8,7 @@ from typing import Any
 from flownav.campaigns.faults.table import log_of
 from flownav.core.errors import InputError
 from flownav.core.record import Record
-from flownav.live.link import open_link
+from flownav.live.byte_links import open_link
 from flownav.live.loop import run_vehicle, stoppable
 from flownav.live.simulated import SimulatedVehicle
 from flownav.mavlink.signing import load_key

@@ -170,23 +170,3 @@ def fly_part(told: list[Any], key: str, seed: int, part: Part) -> Array:
         _cells[key] = ready_of(*ray.get(told[0]))
     ((_, rows),) = Local(threads=1).fly(_cells[key], seed, [part])
     return rows
-
-
-# -- by name -----------------------------------------------------------------------------------------------------
-ENGINES = ("local", "ray", "cuda")
-
-
-def require_engine(name: str) -> None:
-    """InputError where there is no engine of that name."""
-    if name not in ENGINES:
-        raise InputError(f"--engine {name}: must be {', '.join(ENGINES[:-1])} or {ENGINES[-1]}")
-
-
-def engine_named(name: str) -> Engine:
-    """The engine of that name. InputError where what it needs is not there."""
-    require_engine(name)
-    if name == "cuda":
-        from flownav.campaigns.cuda import Cuda
-
-        return Cuda(processes=os.cpu_count() or 1)
-    return RayCluster() if name == "ray" else Local()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -10,11 +11,12 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaigns.engines import Engine, Part
+from flownav.campaigns.engines import Engine, Local, Part, RayCluster
 from flownav.campaigns.local import fly_recorded
 from flownav.campaigns.measures import Interval, enough, figure_of, looks, stop_of, values_of
 from flownav.campaigns.plan import Plan, Ready
 from flownav.campaigns.store import PART, Dataset, Store, table_of
+from flownav.core.errors import InputError
 from flownav.core.record import Record
 from flownav.simulation.assemble import Setup
 from flownav.simulation.ensemble import Ensemble
@@ -23,6 +25,7 @@ from flownav.simulation.truth import SensorFault
 
 Array = NDArray[np.float64]
 
+ENGINES = ("local", "ray", "cuda")
 LANDING, TAKEOFF = "r95_m", "p95_axis_m"  # what is followed while a campaign flies
 
 
@@ -163,3 +166,20 @@ def place_of(cell: int, flight: int) -> str:
 def record_path(folder: Path, cell: int, flight: int) -> Path:
     """Where the record of a flight is written."""
     return folder / f"cell-{cell:03d}-flight-{flight:06d}.fnr"
+
+
+# -- engines by name ----------------------------------------------------------------------------------------------
+def require_engine(name: str) -> None:
+    """InputError where there is no engine of that name."""
+    if name not in ENGINES:
+        raise InputError(f"--engine {name}: must be {', '.join(ENGINES[:-1])} or {ENGINES[-1]}")
+
+
+def engine_named(name: str) -> Engine:
+    """The engine of that name. InputError where what it needs is not there."""
+    require_engine(name)
+    if name == "cuda":
+        from flownav.campaigns.cuda import Cuda
+
+        return Cuda(processes=os.cpu_count() or 1)
+    return RayCluster() if name == "ray" else Local()

@@ -71,7 +71,7 @@ def command(
     """Fly a scenario many times: radii, shares and percentiles with intervals, a dataset, the worst flights."""
     from flownav.api.campaigning import plan_of
     from flownav.api.parts import split
-    from flownav.campaigns.engines import engine_named, require_engine
+    from flownav.campaigns.run import engine_named, require_engine
     from flownav.campaigns.summary import WORST
     from flownav.cli.campaign_rare import fly_again, fly_rare
     from flownav.parts.flying import OwnPartsEngine, identities

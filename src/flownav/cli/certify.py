@@ -40,9 +40,9 @@ def command(
     """Fly what a requirement asks for: pass, fail or not shown, with its risk; exit status 1 unless it passes."""
     from flownav.campaigns.certification.cells import plan_of
     from flownav.campaigns.certification.certify import TOLD
-    from flownav.campaigns.engines import engine_named, require_engine
     from flownav.campaigns.ranking import LEAST
     from flownav.campaigns.requirement import load_requirement
+    from flownav.campaigns.run import engine_named, require_engine
     from flownav.cli.output import require_between
     from flownav.core.errors import VerdictError
 

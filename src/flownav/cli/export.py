@@ -35,8 +35,8 @@ def command(
     from flownav.cli.output import folder_place, place, several_place
     from flownav.core.errors import InputError
     from flownav.core.record import Record
-    from flownav.export.earth import origin_from
     from flownav.export.formats import FOLDERS, FRAMED, destination, export, written_files
+    from flownav.export.paths import origin_from
 
     path = destination(record, to, out)
     if to in FOLDERS:

@@ -20,7 +20,7 @@ def command(
     """Show what a log holds: sensors, rates, gaps, thrown-away rows, limits, signs, and what it lacks."""
     from flownav.core.compile import announce_compilation
     from flownav.logs.open_log import open_log
-    from flownav.logs.ros.choice import asked_topics
+    from flownav.logs.ros.topics import asked_topics
     from flownav.studies.inspection.summary import summarise
 
     read = open_log(log, flow_instance=flow_instance, topics=asked_topics(topic or []))

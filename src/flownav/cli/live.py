@@ -123,15 +123,13 @@ def _navigate(
 ) -> None:
     """Navigate until asked to end, and say what came of it. VerdictError where nobody was heard or kept."""
     from flownav.core.errors import VerdictError
+    from flownav.live.byte_links import open_link
     from flownav.live.display import on_terminal
-    from flownav.live.link import open_link
-    from flownav.live.loop import Latency, run_session, stoppable
-    from flownav.live.priority import run_as_others, run_before_others
-    from flownav.live.recorder import NoRecorder, told_every_second
-    from flownav.live.screen import Screen
+    from flownav.live.filtering import Keeper
+    from flownav.live.loop import Latency, run_as_others, run_before_others, run_session, stoppable, warm_up
+    from flownav.live.recorder import told_every_second
+    from flownav.live.screen import Screen, traffic_facts
     from flownav.live.session import Session
-    from flownav.live.traffic import traffic_facts
-    from flownav.live.warm import warm_up
 
     warm_up()
     shown = not as_json and sys.stdout.isatty()
@@ -139,7 +137,7 @@ def _navigate(
         link.capacity_bytes_s = options.capacity_bytes_s
         scheduling = run_before_others()
         now_s, latency = time.monotonic(), Latency()
-        session = Session(options, recorder or NoRecorder(), now_s, time.time())
+        session = Session(options, recorder or Keeper(), now_s, time.time())
         end_s = float("inf") if duration_s is None else now_s + duration_s
 
         def facts_now() -> dict[str, Any]:
@@ -248,7 +246,7 @@ def _facts(session: Session, latency: Latency, duration_s: float) -> dict[str, A
         "other_autopilots": session.reception.others,
         "sent": session.sent,
         "withheld": dict(session.withheld),
-        "readings": {sensor.name.lower(): count for sensor, count in sorted(session.readings.items())},
+        "readings": {sensor.name.lower(): count for sensor, count in sorted(session.hearing.readings.items())},
         "sources": session.hearing.sources.names(),
         "dropped": session.dropped,
         "resets": session.resets,
@@ -277,8 +275,8 @@ def _print(facts: dict[str, Any]) -> None:
     """The same figures for people."""
     from rich.console import Console
 
-    from flownav.live.estimating import WITHHELD
-    from flownav.live.traffic import in_words
+    from flownav.live.answers import WITHHELD
+    from flownav.live.screen import in_words
 
     console = Console(markup=False, highlight=False)
     vehicle = facts["vehicle"]

@@ -28,7 +28,8 @@ def run(
     as_json: bool,
 ) -> None:
     """Read, compare, write where asked to; print. Exit status 1 where something must change."""
-    from flownav.live.link import open_link, parse_url
+    from flownav.live.byte_links import open_link
+    from flownav.live.link import parse_url
     from flownav.live.setup.check import check
     from flownav.live.setup.talk import Talk
 

@@ -24,8 +24,8 @@ def command(
     from flownav.cli.output import require_recordable, told
     from flownav.core.errors import InputError, VerdictError
     from flownav.core.free_names import free_name
-    from flownav.live.journal_place import is_locked, journal_of
     from flownav.live.recovery import recovered
+    from flownav.live.writing import is_locked, journal_of
     from flownav.logs.journal import SUFFIX
 
     if not journal.exists() and journal_of(journal).exists():

@@ -67,7 +67,7 @@ def command(
     from flownav.core.errors import VerdictError
     from flownav.core.parameter_files import load
     from flownav.logs.open_log import open_flight
-    from flownav.logs.ros.choice import asked_topics
+    from flownav.logs.ros.topics import asked_topics
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.replays.session import table_windows
     from flownav.sensors.datasheet import load_sensor

@@ -40,13 +40,9 @@ def a_place_of_several(path: Path, inputs: Iterable[Path] = (), *, force: bool) 
 
     force: as of `a_place`, of each that is there.
     """
-    for each in [_named_after(path, "estimate"), *sorted(_several(path))]:
+    for each in [path.with_name(f"{path.stem}_estimate{path.suffix}"), *sorted(_several(path))]:
         a_place(each, inputs, force=force)
     return path if force else _first_free(path, lambda found: not _several(found))
-
-
-def _named_after(path: Path, what: str) -> Path:
-    return path.with_name(f"{path.stem}_{what}{path.suffix}")
 
 
 def _several(path: Path) -> list[Path]:
@@ -60,7 +56,11 @@ def a_folder_place(path: Path, *, force: bool = False) -> Path:
     force: the path itself, for its writer to look into. InputError where it is a link, or no folder.
     """
     an_output_folder(path)
-    return path if force else _first_free(path, _is_free_folder)
+
+    def is_free(found: Path) -> bool:  # nothing is there, or an empty folder
+        return not os.path.lexists(found) or (found.is_dir() and not found.is_symlink() and not any(found.iterdir()))
+
+    return path if force else _first_free(path, is_free)
 
 
 def numbered(path: Path, number: int) -> Path:
@@ -87,8 +87,3 @@ def _with_beside(path: Path, endings: Iterable[str]) -> list[Path]:
 def _is_free(path: Path) -> bool:
     """Whether nothing is there, or an empty file."""
     return not os.path.lexists(path) or (path.is_file() and not path.is_symlink() and not path.stat().st_size)
-
-
-def _is_free_folder(path: Path) -> bool:
-    """Whether nothing is there, or an empty folder."""
-    return not os.path.lexists(path) or (path.is_dir() and not path.is_symlink() and not any(path.iterdir()))

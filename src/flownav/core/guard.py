@@ -111,7 +111,7 @@ def a_record_place(path: Path, inputs: Iterable[Path] = (), *, force: bool) -> P
     if info is not None:
         _check_kind(path, info)
     _check_no_input(path, info, inputs)
-    if force and info is not None and info.st_size and not _is_record(path):
+    if force and info is not None and info.st_size and _manifest_of(path) is None:
         raise InputError(f"{path}: is there already and is no record, so it is not replaced; give another name")
     return path
 
@@ -192,18 +192,15 @@ def _check_no_input(path: Path, info: os.stat_result | None, inputs: Iterable[Pa
         status = _status(each, os.stat)
         if status is not None:
             read.note(each, status)
+    in_folders = path.suffix.lower() in READ_IN_FOLDERS or path.name.lower() == RIG
     for known in (read, _run):
         taken = None if known is None else known.file(info)
         if taken is not None:
             also = "" if str(taken) == str(path) else f" (the same file as {taken})"
             raise InputError(f"{path}{also}: this would replace what it is made from; give another --out")
-        folder = None if known is None or not _read_in_folders(path) else known.folder_of(path)
+        folder = None if known is None or not in_folders else known.folder_of(path)
         if folder is not None:
             raise InputError(f"{path}: lies in {folder}, which this run reads, as one of its files; give another --out")
-
-
-def _read_in_folders(path: Path) -> bool:
-    return path.suffix.lower() in READ_IN_FOLDERS or path.name.lower() == RIG
 
 
 def _is_ours(path: Path) -> bool:
@@ -221,11 +218,6 @@ def _is_ours(path: Path) -> bool:
     if b"<html" in head.lower():
         return PAGE_MARK.encode() in head
     return MARK in head or head.startswith(BEGINNINGS)
-
-
-def _is_record(path: Path) -> bool:
-    """Whether a file is a record, of whatever kind."""
-    return _manifest_of(path) is not None
 
 
 def _is_record_of_a_run(path: Path) -> bool:

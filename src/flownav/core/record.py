@@ -41,61 +41,35 @@ TILTS = ("tilt_n_rad", "tilt_e_rad", "heading_rad")  # errors of the attitude ab
 PROTECTION_LEVELS = ("protection_horizontal_m", "protection_vertical_m")
 VELOCITY_NED = ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
 
+STATE = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION)
+STANDARD_DEVIATIONS = tuple(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY))
+RATES = ("rate_p_rad_s", "rate_q_rad_s", "rate_r_rad_s")
+
 # The vocabulary: every table has `t_s` first; a writer may leave a table or a trailing column out.
 TABLES: dict[str, tuple[str, ...]] = {
     # what was so (simulation, motion capture)
-    "truth": (
-        *POSITION_NED,
-        *VELOCITY_BODY,
-        *QUATERNION,
-        "rate_p_rad_s",
-        "rate_q_rad_s",
-        "rate_r_rad_s",
-        "thrust_n",
-        "on_ground",
-    ),
+    "truth": (*STATE, *RATES, "thrust_n", "on_ground"),
     # what the filter says, with one standard deviation of each, and how far off it may be if a sensor fails unseen
-    "estimate": (
-        *POSITION_NED,
-        *VELOCITY_BODY,
-        *QUATERNION,
-        *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)),
-        *PROTECTION_LEVELS,
-    ),
+    "estimate": (*STATE, *STANDARD_DEVIATIONS, *PROTECTION_LEVELS),
     # where the truth is known: the error squared of position and velocity over what the filter states (NEES)
     "consistency": ("nees",),
     # the rest of what it says, at the same instants: velocity in the earth's axes, standard deviations of the attitude,
     # and every other state with its own
     "states": (
-        *VELOCITY_NED,
-        *(f"std_{name}" for name in TILTS),
-        *FILTER_STATES,
-        *(f"std_{name}" for name in FILTER_STATES),
+        *VELOCITY_NED, *(f"std_{name}" for name in TILTS), *FILTER_STATES, *(f"std_{name}" for name in FILTER_STATES),
     ),
     # what the filter says once it has seen the whole flight
-    "smoothed": (
-        *POSITION_NED,
-        *VELOCITY_BODY,
-        *QUATERNION,
-        *(f"std_{name}" for name in (*POSITION_NED, *VELOCITY_BODY)),
-    ),
+    "smoothed": (*STATE, *STANDARD_DEVIATIONS),
     # what another estimator said (an autopilot's own)
-    "autopilot": (*POSITION_NED, *VELOCITY_BODY, *QUATERNION),
+    "autopilot": STATE,
     # what an autopilot flew on: the estimate carried on to now, position from where the pad is taken to be
-    "flown": (*POSITION_NED, *VELOCITY_BODY, *QUATERNION),
+    "flown": STATE,
     # what the vehicle was told: references and controls
     "command": ("pos_n_ref_m", "pos_e_ref_m", "pos_d_ref_m", "lon_rad", "lat_rad", "col_rad", "ped_rad"),
     # one row per measurement component offered to the filter (PX4's estimator_aid_src fields)
     "innovation": (
-        "sensor",
-        "component",
-        "observation",
-        "observation_variance",
-        "innovation",
-        "innovation_variance",
-        "test_ratio",
-        "fused",
-        "reason",
+        "sensor", "component", "observation", "observation_variance", "innovation", "innovation_variance", "test_ratio",
+        "fused", "reason",
     ),
     # one row per happening: source, kind, detail (text), value
     "events": ("source", "kind", "detail", "value"),
@@ -108,7 +82,7 @@ TABLES: dict[str, tuple[str, ...]] = {
     "reference": (*POSITION_NED, *QUATERNION),
     "reference_heading": ("yaw_rad",),
     # measurement streams are tables "gps_position", "flow_velocity", ...: measurement.COLUMNS and "quality"
-}
+}  # fmt: skip
 
 Column = NDArray[Any]
 Table = dict[str, Column]
@@ -147,11 +121,11 @@ class Record:
         """
         from flownav.core.record_file import save
 
-        save(self, path, replacing=replacing)
+        save({"schema": SCHEMA_VERSION, **self.manifest}, self.tables, path, replacing=replacing)
 
     @classmethod
     def load(cls, path: Path) -> Record:
         """Read a record. InputError where the file is missing, is no record, or is of a newer schema."""
         from flownav.core.record_file import load
 
-        return load(path)
+        return cls(*load(path, SCHEMA_VERSION, TABLES))

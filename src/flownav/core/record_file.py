@@ -12,17 +12,21 @@ import json
 import re
 import zipfile
 import zlib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from flownav.core.errors import InputError
 from flownav.core.guard import an_input, written_whole
 from flownav.core.measurement import COLUMNS, Sensor
 from flownav.core.parquet_pages import check_pages, read_footer
-from flownav.core.record import SCHEMA_VERSION, TABLES, Column, Record, Table
+
+Column = NDArray[Any]
+Tables = dict[str, dict[str, Column]]
 
 MANIFEST = "manifest.json"
 MEMBER = re.compile(r"[A-Za-z0-9_-]{1,64}\.parquet")
@@ -68,7 +72,7 @@ class Manifest(BaseModel):
     segments: list[dict[str, float | bool]] | None = None
 
 
-def save(record: Record, path: Path, *, replacing: bool = False) -> None:
+def save(manifest: dict[str, Any], tables: Tables, path: Path, *, replacing: bool = False) -> None:
     """Write a record as one file, whole or not at all; as `Record.save` says. The same record is the same bytes."""
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -77,9 +81,8 @@ def save(record: Record, path: Path, *, replacing: bool = False) -> None:
         written_whole(path, replacing=replacing) as temporary,
         zipfile.ZipFile(temporary, "w", zipfile.ZIP_STORED) as bundle,
     ):
-        manifest = {"schema": SCHEMA_VERSION, **record.manifest}
         bundle.writestr(zipfile.ZipInfo(MANIFEST), json.dumps(manifest, indent=1, default=str))
-        for name, table in record.tables.items():
+        for name, table in tables.items():
             columns, entry = pa.table(table), zipfile.ZipInfo(f"{name}.parquet")
             with bundle.open(entry, "w", force_zip64=columns.nbytes >= zipfile.ZIP64_LIMIT) as stream:
                 pq.write_table(columns, pa.PythonFile(_Told(stream), "w"), compression="zstd")
@@ -87,17 +90,20 @@ def save(record: Record, path: Path, *, replacing: bool = False) -> None:
             pa.default_memory_pool().release_unused()
 
 
-def load(path: Path) -> Record:
-    """Read a record. InputError where it is missing, no record, of a newer schema, or would become too large."""
+def load(path: Path, newest: int, known: Mapping[str, tuple[str, ...]]) -> tuple[dict[str, Any], Tables]:
+    """A record's manifest and tables. newest: the schema that is understood. known: columns by table.
+
+    InputError where the file is missing, no record, of a newer schema, or would become too large.
+    """
     if not an_input(path).is_file():
         raise InputError(f"{path}: no such record; `flownav fly landing` writes one")
     try:
         with _Bounded(path) as file, zipfile.ZipFile(file) as bundle:
             file.most = -1
             names = _checked_members(bundle, path.stat().st_size)
-            manifest = _manifest(bundle.read(MANIFEST), path)
-            _check_tables(bundle, names, path.stat().st_size)
-            return Record(manifest, {Path(name).stem: _table(bundle.read(name)) for name in names})
+            manifest = _manifest(bundle.read(MANIFEST), path, newest)
+            _check_tables(bundle, names, path.stat().st_size, known)
+            return manifest, {Path(name).stem: _table(bundle.read(name)) for name in names}
     except WRONG as error:
         what = " ".join(str(error).split())[:200] or type(error).__name__
         raise InputError(f"{path}: not a flownav record ({what}); write it again with fly or replay") from error
@@ -139,7 +145,7 @@ def _checked_members(bundle: zipfile.ZipFile, size: int) -> list[str]:
     return [name for name in names if name != MANIFEST]
 
 
-def _manifest(text: bytes, path: Path) -> dict[str, Any]:
+def _manifest(text: bytes, path: Path, newest: int) -> dict[str, Any]:
     """The manifest as it stands, its keys checked."""
     try:
         said = json.loads(text)
@@ -147,7 +153,7 @@ def _manifest(text: bytes, path: Path) -> dict[str, Any]:
         raise ValueError(f"{MANIFEST} is nested too deep") from error
     if not isinstance(said, dict):
         raise ValueError(f"{MANIFEST} is no object")
-    if isinstance(said.get("schema"), int) and said["schema"] > SCHEMA_VERSION:
+    if isinstance(said.get("schema"), int) and said["schema"] > newest:
         raise InputError(f"{path}: record schema {said['schema']} is newer than this flownav; update flownav")
     try:
         Manifest.model_validate({"schema": 0, **said})
@@ -157,7 +163,7 @@ def _manifest(text: bytes, path: Path) -> dict[str, Any]:
     return said
 
 
-def _check_tables(bundle: zipfile.ZipFile, names: list[str], size: int) -> None:
+def _check_tables(bundle: zipfile.ZipFile, names: list[str], size: int, known: Mapping[str, tuple[str, ...]]) -> None:
     """What the tables say of themselves, before any is read: columns, types, and how large they become."""
     import pyarrow.parquet as pq
 
@@ -168,7 +174,7 @@ def _check_tables(bundle: zipfile.ZipFile, names: list[str], size: int) -> None:
         schema = pq.ParquetFile(io.BytesIO(data)).schema_arrow
         if len(schema) > MOST_COLUMNS or any(len(group) != len(schema) for group in footer.groups):
             raise ValueError(f"{name}: {len(schema)} columns")
-        texts = _check_columns(Path(name).stem, schema)
+        texts = _check_columns(Path(name).stem, schema, known)
         rows = sum(footer.rows)
         left -= 8 * rows * len(schema) + sum(group[place].grown for group in footer.groups for place in texts)
         if left < 0:
@@ -177,19 +183,19 @@ def _check_tables(bundle: zipfile.ZipFile, names: list[str], size: int) -> None:
             check_pages(data, footer)
 
 
-def _check_columns(table: str, schema: Any) -> list[int]:
+def _check_columns(table: str, schema: Any, known: Mapping[str, tuple[str, ...]]) -> list[int]:
     """Places of the columns of text. ValueError where a column is of no type, or not of its own."""
     import pyarrow as pa
 
     if "t_s" not in schema.names or len(set(schema.names)) < len(schema.names):
         raise ValueError(f"table {table} has no t_s, or a column twice")
-    known = TABLES.get(table) or (COLUMNS[Sensor[table.upper()]] if table.upper() in Sensor.__members__ else ())
+    columns = known.get(table) or (COLUMNS[Sensor[table.upper()]] if table.upper() in Sensor.__members__ else ())
     texts = []
     for place, field in enumerate(schema):
         kind = field.type
         text = pa.types.is_string(kind) or pa.types.is_large_string(kind)
         number = pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_boolean(kind)
-        stated = field.name == "t_s" or field.name in known
+        stated = field.name == "t_s" or field.name in columns
         numbered = field.name in NUMBERED.get(table, ())  # by some writers
         wrong = stated and not numbered and text != (field.name in TEXTS.get(table, ()))
         if not (text or number) or wrong:
@@ -199,7 +205,7 @@ def _check_columns(table: str, schema: Any) -> list[int]:
     return texts
 
 
-def _table(data: bytes) -> Table:
+def _table(data: bytes) -> dict[str, Column]:
     """A table's columns; texts once each, however often they stand there."""
     import pyarrow as pa
     import pyarrow.parquet as pq

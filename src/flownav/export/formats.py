@@ -48,7 +48,7 @@ def written_files(to: str, path: Path) -> list[Path]:
     if to in FRAMED:
         return [path.with_name(f"{path.stem}_estimate{path.suffix}")]
     if to == "foxglove":
-        from flownav.export.foxglove import layout_path
+        from flownav.export.mcap_file import layout_path
 
         return [path, layout_path(path)]
     return [path]
@@ -74,15 +74,15 @@ def export(
     if origin is not None and to not in ON_EARTH:
         raise InputError(f"--origin is for {' and '.join(ON_EARTH)}")
     if to in ON_EARTH:
-        from flownav.export.earth import write_earth
+        from flownav.export.paths import write_earth
 
         return Written(*write_earth(record, path, to, origin))
     if to == "foxglove":
-        from flownav.export.foxglove import write_foxglove
+        from flownav.export.mcap_file import write_foxglove
 
         return Written(*write_foxglove(record, path))
     if to in FRAMED:
-        from flownav.export.poses import write_poses
+        from flownav.export.paths import write_poses
 
         return Written(*write_poses(record, path, frame or "ned"))
     if to in FOLDERS:

@@ -1,15 +1,18 @@
-"""A record as an MCAP file for Foxglove: poses, a tree of frames, and every table as JSON.
+"""A record as an MCAP file for Foxglove: poses, a tree of frames, every table as JSON; and a layout beside it.
 
 Frames: `enu` (z up, what a 3-D view should be fixed to) > `ned` > `estimate`, `truth`, `autopilot` (body FRD).
-Times are nanoseconds of the record's clock.
+Times are nanoseconds of the record's clock. Foxglove recognises a well-known schema by its name; field names as its
+message schema reference gives them. `foxglove_layout.json` is the whole layout, as Foxglove exports one; of a record
+that lacks something the curves and panels that would stay empty are left out.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from heapq import merge
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,16 +20,50 @@ import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.guard import written_whole
-from flownav.core.record import Record, Table
+from flownav.core.record import Column, Record, Table
 from flownav.core.version import __version__
-from flownav.export.errors import error_table
-from flownav.export.mcap_schemas import FRAME_TRANSFORM, POSE_IN_FRAME, Schema, table_schema
-from flownav.export.stamps import Stamps, finite_rows, shift_needed_s, stamps
-from flownav.export.tables import is_text, manifest_json, texts
-from flownav.export.trajectory import ENU_FROM_NED, Trajectory, trajectories
+from flownav.export.tables import Stamps, finite_rows, is_text, manifest_json, shift_needed_s, stamps, texts
+from flownav.export.trajectory import ENU_FROM_NED, Trajectory, error_table, trajectories
 
+Schema = dict[str, Any]
+
+NUMBER: Schema = {"type": "number"}
+TEXT: Schema = {"type": "string"}
 NS = 1_000_000_000
 Row = dict[str, Any]
+LAYOUT = "foxglove_layout.json"
+Node = str | dict[str, Any]
+
+
+def _object(properties: Mapping[str, Schema], title: str = "") -> Schema:
+    named = {"title": title} if title else {}
+    return {**named, "type": "object", "properties": dict(properties), "required": list(properties)}
+
+
+TIME = _object({"sec": {"type": "integer"}, "nsec": {"type": "integer"}}, "time")
+VECTOR = _object(dict.fromkeys("xyz", NUMBER))
+QUATERNION = _object(dict.fromkeys("xyzw", NUMBER))
+POSE_IN_FRAME = _object(
+    {"timestamp": TIME, "frame_id": TEXT, "pose": _object({"position": VECTOR, "orientation": QUATERNION})},
+    "foxglove.PoseInFrame",
+)
+FRAME_TRANSFORM = _object(
+    {
+        "timestamp": TIME,
+        "parent_frame_id": TEXT,
+        "child_frame_id": TEXT,
+        "translation": VECTOR,
+        "rotation": QUATERNION,
+    },
+    "foxglove.FrameTransform",
+)
+_TYPES = {"f": "number", "i": "integer", "u": "integer", "b": "boolean"}
+
+
+def table_schema(name: str, table: Mapping[str, Column]) -> Schema:
+    """The schema of a table's rows. No column is required: JSON has no NaN, so such a value is left out of its row."""
+    properties = {column: {"type": _TYPES.get(values.dtype.kind, "string")} for column, values in table.items()}
+    return {"title": f"flownav.{name}", "type": "object", "properties": properties}
 
 
 class Channel(NamedTuple):
@@ -137,10 +174,76 @@ def _time(time_ns: int) -> Row:
 
 def _rows(table: Table) -> Iterator[Row]:
     """A table's rows as JSON objects without the values that JSON cannot say: those not finite, and texts not there."""
+
+    def said(value: Any) -> bool:
+        return value is not None and not (isinstance(value, float) and not math.isfinite(value))
+
     columns = [texts(values) if is_text(values) else values.tolist() for values in table.values()]
     for row in zip(*columns, strict=True):
-        yield {name: value for name, value in zip(table, row, strict=True) if _can_be_said(value)}
+        yield {name: value for name, value in zip(table, row, strict=True) if said(value)}
 
 
-def _can_be_said(value: Any) -> bool:
-    return value is not None and not (isinstance(value, float) and not math.isfinite(value))
+# -- the layout ---------------------------------------------------------------------------------------------
+def layout_path(mcap: Path) -> Path:
+    """Where the layout lies: beside the MCAP file."""
+    return mcap.with_name(f"{mcap.stem}_layout.json")
+
+
+def write_foxglove(record: Record, path: Path) -> tuple[list[Path], list[str]]:
+    """Write the MCAP file and the layout beside it; both files and notes. InputError as of `write_mcap`."""
+    written, notes = write_mcap(record, path)
+    layout = layout_for(topics_of(path))
+    with written_whole(layout_path(path)) as temporary:
+        temporary.write_text(json.dumps(layout, indent=1) + "\n", encoding="utf-8")
+    return [*written, layout_path(path)], notes
+
+
+def topics_of(path: Path) -> dict[str, dict[str, Any]]:
+    """Topics of an MCAP file with the properties of their JSON schemas."""
+    from mcap.reader import make_reader
+
+    with path.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    if summary is None:
+        return {}
+    schemas = {number: json.loads(schema.data).get("properties", {}) for number, schema in summary.schemas.items()}
+    return {channel.topic: schemas.get(channel.schema_id, {}) for channel in summary.channels.values()}
+
+
+def layout_for(topics: dict[str, dict[str, Any]]) -> dict[str, Any]:
+    """The layout without the curves of topics and columns that a file lacks."""
+    whole: dict[str, Any] = json.loads(files("flownav.export").joinpath(LAYOUT).read_text(encoding="utf-8"))
+    kept = {
+        name: panel for name, config in whole["configById"].items() if (panel := _panel(config, topics)) is not None
+    }
+    return whole | {"configById": kept, "layout": _tree(whole["layout"], kept)}
+
+
+def topic_and_field(value: str) -> tuple[str, str]:
+    """Topic and column of a message path: /innovation{sensor=="range"}.innovation, /error.error_n_m.@negative."""
+    topic, _, rest = value.partition("{") if "{" in value else value.partition(".")
+    field = rest.rsplit("}.", 1)[-1] if "{" in value else rest
+    return topic, field.split(".")[0]
+
+
+def _panel(config: dict[str, Any], topics: dict[str, dict[str, Any]]) -> dict[str, Any] | None:
+    """A panel with what the file has; None where nothing is left."""
+    if "paths" in config:
+        named = [(each, *topic_and_field(each["value"])) for each in config["paths"]]
+        paths = [each for each, topic, field in named if field in topics.get(topic, {})]
+        return config | {"paths": paths} if paths else None
+    if "topicPath" in config:
+        return config if config["topicPath"] in topics else None
+    if "topics" in config:
+        return config | {"topics": {name: how for name, how in config["topics"].items() if name in topics}}
+    return config
+
+
+def _tree(node: Node, kept: dict[str, Any]) -> Node | None:
+    """The arrangement without the panels that are left out; a side alone takes the whole place."""
+    if isinstance(node, str):
+        return node if node in kept else None
+    first, second = _tree(node["first"], kept), _tree(node["second"], kept)
+    if first is None or second is None:
+        return first or second
+    return node | {"first": first, "second": second}

@@ -1,4 +1,4 @@
-"""The paths of a record as poses: what TUM, EuRoC, MCAP and ULog are written from, in NED/FRD or in ENU/FLU."""
+"""The paths of a record as poses, in NED/FRD or in ENU/FLU, and the estimate's error where the record holds a truth."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flownav.core.errors import InputError
 from flownav.core.frames import quaternion_product, rotation_from_quaternion, to_earth
-from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record, Table
 
 Array = NDArray[np.float64]
 
@@ -18,6 +18,9 @@ PATHS = ("estimate", "smoothed", "truth", "autopilot")
 FRAMES = ("ned", "enu")
 ENU_FROM_NED = (0.0, np.sqrt(0.5), np.sqrt(0.5), 0.0)  # swaps north and east, turns down up
 FRD_FROM_FLU = (0.0, 1.0, 0.0, 0.0)  # half a turn about forward
+SIGMAS = 3.0
+ERROR = ("error_n_m", "error_e_m", "error_d_m")
+BOUND = ("three_sigma_n_m", "three_sigma_e_m", "three_sigma_d_m")
 
 
 class Trajectory(NamedTuple):
@@ -90,10 +93,30 @@ def _trajectory(record: Record, name: str) -> Trajectory | None:
     unit = quaternion[row] / np.linalg.norm(quaternion[row], axis=1, keepdims=True)
     velocity = None
     if oriented and set(VELOCITY_BODY) <= table.keys():
-        velocity = _in_earth(unit, record.matrix(name, VELOCITY_BODY)[row])
+        body = record.matrix(name, VELOCITY_BODY)[row]
+        velocity = np.column_stack(to_earth(rotation_from_quaternion(*unit.T), *body.T))
     return Trajectory(name, t_s[row], position[row], unit, velocity, oriented, row, int(len(t_s) - len(row)))
 
 
-def _in_earth(quaternion: Array, body: Array) -> Array:
-    """Body vectors (n, 3) in the earth frame."""
-    return np.column_stack(to_earth(rotation_from_quaternion(*quaternion.T), *body.T))
+def error_table(record: Record, paths: list[Trajectory]) -> Table | None:
+    """Estimate less truth [m] at the estimate's instants inside the truth's time, and three standard deviations.
+
+    Columns t_s, ERROR, and BOUND where the record states them. None without an estimate, a truth, or an instant that
+    both have.
+    """
+    named = {path.name: path for path in paths}
+    if not {"estimate", "truth"} <= named.keys():
+        return None
+    estimate, truth = named["estimate"], named["truth"]
+    inside = (estimate.t_s >= truth.t_s[0]) & (estimate.t_s <= truth.t_s[-1])
+    if not inside.any():
+        return None
+    t_s = estimate.t_s[inside]
+    table: Table = {"t_s": t_s}
+    for k, name in enumerate(ERROR):
+        table[name] = estimate.position_m[inside, k] - np.interp(t_s, truth.t_s, truth.position_m[:, k])
+    columns = tuple(f"std_{name}" for name in POSITION_NED)
+    if set(columns) <= record.tables["estimate"].keys():
+        spread = record.matrix("estimate", columns)[estimate.row][inside]
+        table |= {name: SIGMAS * spread[:, k] for k, name in enumerate(BOUND)}
+    return table

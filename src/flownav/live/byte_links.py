@@ -1,4 +1,4 @@
-"""Links that are streams of bytes: TCP and serial ports. What waits to be written is outgoing's."""
+"""Links that are streams of bytes, TCP and serial ports, and whatever link a URL names."""
 
 from __future__ import annotations
 
@@ -11,8 +11,7 @@ from contextlib import suppress
 from typing import Any
 
 from flownav.core.errors import InputError
-from flownav.live.link import EVERYWHERE_6, MOST_BYTES, Address, Link, Piece
-from flownav.live.outgoing import Outgoing
+from flownav.live.link import EVERYWHERE_6, FORMS, MOST_BYTES, Address, Link, Outgoing, Piece, UdpLink, parse_url
 
 RECONNECT_S = 1.0  # for a call to be answered
 UNHEARD_MS = 5000  # a peer that acknowledges nothing for so long is gone
@@ -241,3 +240,14 @@ class SerialLink(ByteLink):
                 self._port.close()
         self._port = None
         self._outgoing.clear()
+
+
+def open_link(url: str) -> Link:
+    """The link that a URL names. InputError where the URL is wrong or the address cannot be had."""
+    address = parse_url(url)
+    try:
+        if address.kind in ("udp", "udpout"):
+            return UdpLink(address)
+        return SerialLink(address) if address.kind == "serial" else TcpLink(address)
+    except OSError as error:
+        raise InputError(f"{url}: cannot be opened ({error.strerror or error}); {FORMS}") from error

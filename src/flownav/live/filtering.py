@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from flownav.core.measurement import COLUMNS, MAX_VALUES, Array, EventQueue, Sen
 from flownav.estimation.states import POSITION, STATE
 from flownav.live.horizon import Waiting
 from flownav.live.options import Options
-from flownav.logs.rates import attitude_rates, mean_over
+from flownav.logs.frames import attitude_rates, mean_over
+from flownav.mavlink.messages import TrueState
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import load_start
@@ -24,6 +25,7 @@ from flownav.navigation.tape import COMPONENTS, GPS_RESET, START, empty_tape
 from flownav.navigation.told import Equipment
 from flownav.sensors.datasheet import UNTURNED, in_vehicle_axes
 
+NAN = float("nan")
 BATCH = 64  # readings at a time, 6 ms of them
 KEPT_IMU = 512  # two seconds at 250 Hz, more than the horizon and an exposure
 KEPT_ATTITUDES = 128
@@ -31,17 +33,26 @@ FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 JUMPS = (int(START), int(GPS_RESET))  # events at which the estimate jumps
 
 
-class Keeper(Protocol):
-    """Who keeps what the navigator was fed and what it wrote (recorder.py, or nobody)."""
+class Keeper:
+    """Who keeps a session's story, and what the navigator was fed and wrote: nobody; recorder.Recorder keeps all."""
 
     def segment(self, equipment: Equipment) -> None:
-        """A navigator begins."""
+        """A navigator begins; what is fed from now on is fed to it."""
 
     def fed(self, queue: EventQueue, arrival_s: Array) -> None:
         """A batch is about to be fed."""
 
     def written(self, estimate: Array, innovation: Array, event: Array) -> None:
         """What came of it."""
+
+    def note(self, t_s: float, source: str, kind: str, detail: str, value: float = NAN) -> None:
+        """A happening."""
+
+    def origin(self, t_s: float, origin_deg_m: tuple[float, float, float]) -> None:
+        """The navigator's frame has this origin from now on."""
+
+    def truth(self, t_s: float, state: TrueState) -> None:
+        """What a simulator says is so."""
 
 
 class Outcome(NamedTuple):

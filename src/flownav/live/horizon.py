@@ -1,14 +1,128 @@
-"""The delayed horizon: readings wait until everything of their instant must have arrived, then go on in its order."""
+"""Readings on their way to the navigator: which source serves, how far streams lag, the delayed horizon, and alarms.
+
+Of each kind of sensor one source serves, the preferred message that is alive. Readings wait until everything of their
+instant must have arrived, as long as the slowest stream runs behind the newest reading, then go on in its order. A
+sensor that is heard and does not serve is an alarm, since what is sent then rests on less than the vehicle has.
+"""
 
 from __future__ import annotations
 
 import heapq
-from collections import Counter
+from collections import Counter, deque
+from collections.abc import Iterable
 from typing import NamedTuple
 
-from flownav.core.measurement import Measurement
+from flownav.core.measurement import Measurement, Sensor
+from flownav.estimation.gating import Reason
+from flownav.mavlink.messages import PREFERENCE
+from flownav.navigation.reasons import HORIZONTAL, REFUSALS
+from flownav.navigation.rows import InnovationRow
 
+SILENT_S = 2.0  # a source that says nothing for so long gives way
+WINDOW_S = 5.0
+WINDOWS = 4  # a stream that comes in time again is waited for so many windows longer
 MOST_WAITING = 8192
+WATCHED = (*HORIZONTAL, Sensor.RANGE)
+DOWNWARD = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE)  # on the ground they need not serve
+LATE = Reason.LATE.label
+LEAST_READINGS = 10
+GONE_S = 2.0  # a sensor that has said nothing for so long is silent, which the screen shows otherwise
+
+
+class Source(NamedTuple):
+    """Who measured: message, instance, and whether the autopilot itself tells it (False: another component)."""
+
+    message: str
+    instance: int
+    by_autopilot: bool = True
+
+
+class _Chosen(NamedTuple):
+    source: Source
+    rank: tuple[int, bool, int]
+    heard_s: float
+
+
+class Sources:
+    """Whether a reading is of the source that serves. dropped counts, by sensor, readings of the others."""
+
+    def __init__(self) -> None:
+        self.dropped: Counter[Sensor] = Counter()
+        self._chosen: dict[Sensor, _Chosen] = {}
+
+    def takes(self, sensor: Sensor, source: Source, t_s: float) -> bool:
+        """Take a reading of a source at an instant. A better or a lone source takes over from a silent one."""
+        if sensor == Sensor.FLOW_VELOCITY and self._alive(Sensor.FLOW_RATE, t_s):
+            self.dropped[sensor] += 1  # the same flow, before it was multiplied by a range
+            return False
+        order = PREFERENCE.get(sensor, ())
+        place = order.index(source.message) if source.message in order else len(order)
+        rank = place, not source.by_autopilot, source.instance
+        chosen = self._chosen.get(sensor)
+        if chosen is not None and chosen.source != source and chosen.rank <= rank and self._alive(sensor, t_s):
+            self.dropped[sensor] += 1
+            return False
+        self._chosen[sensor] = _Chosen(source, rank, t_s)
+        return True
+
+    def _alive(self, sensor: Sensor, t_s: float) -> bool:
+        chosen = self._chosen.get(sensor)
+        return chosen is not None and abs(t_s - chosen.heard_s) <= SILENT_S
+
+    def names(self) -> dict[str, str]:
+        """The message that serves for each sensor."""
+        return {sensor.name.lower(): chosen.source.message for sensor, chosen in sorted(self._chosen.items())}
+
+
+class Lags:
+    """The greatest lag of each sensor's readings over the last 15 to 20 s, on the vehicle's clock.
+
+    A reading's lag is the newest instant that any sensor has described, less its own. It holds the sensor's own delay,
+    the phase between a reading and the message that tells it, and what one message is faster on the link than another;
+    a link that delivers in batches, or stands still, adds nothing, since it holds back all alike. One that is larger
+    than `most_s` is not waited for.
+    """
+
+    def __init__(self, most_s: float = 1.0) -> None:
+        self._most_s = most_s
+        self._newest_s = float("-inf")
+        self._windows: dict[Sensor, deque[tuple[float, float]]] = {}  # begin, greatest lag [s]
+
+    def heard(self, sensor: Sensor, instant_s: float) -> None:
+        """A reading that describes an instant."""
+        self._newest_s = max(self._newest_s, instant_s)
+        lag_s = self._newest_s - instant_s
+        if lag_s > self._most_s:
+            return  # nobody waits for so long; it comes too late, and is counted so
+        windows = self._windows.setdefault(sensor, deque(maxlen=WINDOWS))
+        if not windows or self._newest_s - windows[-1][0] >= WINDOW_S:
+            windows.append((self._newest_s, lag_s))
+        elif lag_s > windows[-1][1]:
+            windows[-1] = windows[-1][0], lag_s
+
+    def clear(self) -> None:
+        """Begin anew."""
+        self._newest_s = float("-inf")
+        self._windows.clear()
+
+    @property
+    def newest_s(self) -> float:
+        """The newest instant that was described; minus infinity before the first."""
+        return self._newest_s
+
+    @property
+    def by_sensor(self) -> dict[Sensor, float]:
+        """The lag to wait for, by sensor [s]; a sensor that has not spoken for all windows is not waited for."""
+        oldest_s = self._newest_s - WINDOWS * WINDOW_S
+        return {
+            sensor: max(lag_s for _, lag_s in windows)
+            for sensor, windows in self._windows.items()
+            if windows[-1][0] >= oldest_s
+        }
+
+    def horizon_s(self, least_s: float, margin_s: float, most_s: float) -> float:
+        """What to wait: the greatest lag and a margin, at least `least_s` and at most `most_s`."""
+        return min(max(least_s, max(self.by_sensor.values(), default=0.0) + margin_s), most_s)
 
 
 class Waiting(NamedTuple):
@@ -70,3 +184,60 @@ class Horizon:
     def clear(self) -> None:
         """Forget what waits; instants before the newest released stay gone."""
         self._waiting.clear()
+
+
+class Refused(NamedTuple):
+    """A spell in which no reading of a sensor was fused: since and until when, how many, and why the last."""
+
+    since_s: float
+    until_s: float
+    readings: int
+    why: str
+
+
+class Serving:
+    """Spells of readings that were heard and not fused, by sensor, on the vehicle's clock."""
+
+    def __init__(self) -> None:
+        self._spells: dict[Sensor, Refused] = {}
+        self._landed = False
+
+    def refused(self, sensor: Sensor, t_s: float, why: str) -> None:
+        """A reading that never got to the navigator."""
+        if sensor not in WATCHED or (self._landed and sensor in DOWNWARD):
+            return
+        before = self._spells.get(sensor)
+        if before is None or t_s - before.until_s > GONE_S:
+            before = Refused(t_s, t_s, 0, why)
+        self._spells[sensor] = Refused(before.since_s, max(t_s, before.until_s), before.readings + 1, why)
+
+    def judged(self, offered: Iterable[InnovationRow[float]]) -> None:
+        """What became of readings in the navigator."""
+        for row in offered:
+            sensor, component, reason = Sensor(int(row.sensor)), int(row.component), int(row.reason)
+            if reason == Reason.FUSED and component < 2:
+                self._spells.pop(sensor, None)
+            elif reason in REFUSALS and component == 0:
+                self.refused(sensor, row.t_s, Reason(reason).label)
+
+    def landed(self, on_ground: bool) -> None:
+        """What the autopilot says of the ground."""
+        self._landed = on_ground
+        if on_ground:
+            for sensor in DOWNWARD:
+                self._spells.pop(sensor, None)
+
+    def clear(self) -> None:
+        """The navigation begins anew."""
+        self._spells.clear()
+        self._landed = False
+
+    def alarms(self, t_s: float, after_s: float) -> dict[Sensor, Refused]:
+        """Sensors of which nothing was fused for `after_s` although they speak."""
+        return {
+            sensor: spell
+            for sensor, spell in self._spells.items()
+            if spell.readings >= LEAST_READINGS
+            and spell.until_s - spell.since_s >= after_s
+            and t_s - spell.until_s <= GONE_S
+        }

@@ -1,15 +1,22 @@
-"""Links to a vehicle: UDP, TCP and serial (byte_links), none of which ever blocks. Loopback unless told otherwise."""
+"""Links to a vehicle, none of which ever blocks: addresses, UDP, and frames on their way into a stream of bytes.
+
+Loopback unless told otherwise; `byte_links` has TCP and serial ports. Into a stream of bytes go whole frames only, at
+the line's pace, and no estimate that is old: a line that is full is no reason to wait, and none to send what was true a
+second ago. Of estimates the newest unsent one stands for all before it, and what does not go out is counted.
+"""
 
 from __future__ import annotations
 
 import os
 import re
 import socket
-from collections import Counter
+from collections import Counter, deque
+from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, NamedTuple
 
 from flownav.core.errors import InputError
+from flownav.mavlink.framing import MAVLINK_2
 
 FORMS = (
     "udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:[HOST:]PORT or serial:DEVICE[:BAUD]; "
@@ -21,6 +28,9 @@ MOST_BYTES = 65536
 MOST_READS = 64  # in a row, before the session has its turn
 USB = re.compile(r"ttyACM|tty\.usbmodem|cu\.usbmodem|COM\d+$")  # ports whose baud rate is a formality
 BITS_A_BYTE = 10  # with start and stop bit
+LATEST_ONLY = (331, 102, 103, 149)  # ODOMETRY, VISION_POSITION_ESTIMATE, VISION_SPEED_ESTIMATE, LANDING_TARGET
+MOST_WAITING = 4096  # bytes of other frames
+BURST_S = 0.02  # of the line's pace that may go out at once
 
 
 class Address(NamedTuple):
@@ -114,19 +124,6 @@ class Link:
         """The vehicle is silent: anyone may speak."""
 
 
-def open_link(url: str) -> Link:
-    """InputError where the URL is wrong or the address cannot be had."""
-    from flownav.live.byte_links import SerialLink, TcpLink
-
-    address = parse_url(url)
-    try:
-        if address.kind in ("udp", "udpout"):
-            return UdpLink(address)
-        return SerialLink(address) if address.kind == "serial" else TcpLink(address)
-    except OSError as error:
-        raise InputError(f"{url}: cannot be opened ({error.strerror or error}); {FORMS}") from error
-
-
 class UdpLink(Link):
     """Datagrams. udp listens to anyone until the vehicle has spoken; udpout talks to the address that is named."""
 
@@ -203,3 +200,77 @@ def _own_end(host: str) -> str:
     if ":" in host:
         return LOOPBACK_6 if host == LOOPBACK_6 else EVERYWHERE_6
     return LOOPBACK if host.startswith("127.") else ""
+
+
+# -- frames into a stream of bytes --------------------------------------------------------------------------
+def message_id_of(frame: bytes) -> int:
+    """The number of a frame's message; -1 of what is no MAVLink 2 frame."""
+    return int.from_bytes(frame[7:10], "little") if len(frame) >= 10 and frame[0] == MAVLINK_2 else -1
+
+
+class Outgoing:
+    """What waits to be written. counts: `replaced`, estimates that a newer one stood for; `not_sent`, other frames.
+
+    pace_bytes_s: what the line carries; None where it takes what it is given.
+    """
+
+    def __init__(self, counts: Counter[str], pace_bytes_s: float | None = None) -> None:
+        self._counts, self._pace_bytes_s = counts, pace_bytes_s
+        self._others: deque[bytes] = deque()
+        self._estimates: dict[int, bytes] = {}
+        self._rest = b""  # of the frame that is being written
+        self._credit = 0.0  # bytes that may be written now
+        self._earned_s = float("-inf")
+
+    def __len__(self) -> int:
+        """Bytes that wait."""
+        waiting = (*self._others, *self._estimates.values())
+        return len(self._rest) + sum(map(len, waiting))
+
+    def put(self, frame: bytes) -> None:
+        """Queue a frame, or count it as not sent."""
+        number = message_id_of(frame)
+        if number in LATEST_ONLY:
+            if self._estimates.pop(number, None) is not None:
+                self._counts["replaced"] += 1
+            self._estimates[number] = frame
+        elif sum(map(len, self._others)) + len(frame) > MOST_WAITING:
+            self._counts["not_sent"] += 1
+        else:
+            self._others.append(frame)
+
+    def flush(self, write: Callable[[bytes], int], now_s: float) -> int:
+        """Write what the pace and the port allow; write says how many bytes it took. How many went out."""
+        self._earn(now_s)
+        written = 0
+        while self._rest or (self._credit > 0.0 and self._next()):
+            taken = write(self._rest)
+            self._rest = self._rest[taken:]
+            self._credit -= taken
+            written += taken
+            if self._rest:
+                break
+        return written
+
+    def clear(self) -> None:
+        """The connection is gone, and what waited for it."""
+        self._counts["not_sent"] += bool(self._rest) + len(self._others) + len(self._estimates)
+        self._others.clear()
+        self._estimates.clear()
+        self._rest = b""
+
+    def _earn(self, now_s: float) -> None:
+        if self._pace_bytes_s is None:
+            self._credit = float("inf")
+            return
+        most = BURST_S * self._pace_bytes_s
+        self._credit = min(most, self._credit + self._pace_bytes_s * (now_s - self._earned_s))
+        self._earned_s = now_s
+
+    def _next(self) -> bool:
+        """Take up the next frame: what is not an estimate first, since TIMESYNC measures the way."""
+        if self._others:
+            self._rest = self._others.popleft()
+        elif self._estimates:
+            self._rest = self._estimates.pop(next(iter(self._estimates)))
+        return bool(self._rest)

@@ -1,28 +1,93 @@
-"""The loop between a link and a session, and between a simulated vehicle and its link: select, clock, signals."""
+"""The loop between a link and a session, and between a simulated vehicle and its link: select, clock, signals.
+
+Before it begins kernels are loaded, and the process asks to run before others where the system permits it.
+"""
 
 from __future__ import annotations
 
 import gc
+import os
 import select
 import signal
+import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Self
 
 import numpy as np
 
+from flownav.core.compile import announce_compilation
+from flownav.core.measurement import COLUMNS, Measurement, Sensor
+from flownav.live.answers import estimate_of
+from flownav.live.filtering import Filtering, Keeper
+from flownav.live.horizon import Waiting
 from flownav.live.link import Link
+from flownav.live.options import Options
 from flownav.live.session import Session
 from flownav.live.simulated import SimulatedVehicle
+from flownav.mavlink.framing import coder
+from flownav.mavlink.outgoing import odometry
+from flownav.mavlink.position_messages import local_position_m
 
+PRIORITY = 1  # the least of the real-time ones: before every ordinary process, behind the system's own
+NICE = -10
+SWITCH_S = 0.0005  # Python's own default is ten times this
 WAIT_S = 0.005
 SILENT_S = 3.0  # after so long without the vehicle anyone may speak on a UDP port
 SCREEN_S = 0.25
 COLLECT_S = 0.1
 NAN = float("nan")
 EDGES_S = np.geomspace(1e-6, 10.0, 281)  # of the latency's histogram, 40 a decade
+
+
+def run_before_others() -> str:
+    """Ask for real-time scheduling, else for a higher priority; what was given, in words.
+
+    Threads made later inherit it: the journal's must not be held up while it holds Python's lock.
+    """
+    sys.setswitchinterval(SWITCH_S)
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
+        return f"real time (SCHED_FIFO {PRIORITY})"
+    except OSError:
+        pass
+    try:
+        os.setpriority(os.PRIO_PROCESS, 0, NICE)
+        return f"priority (nice {NICE})"
+    except OSError:
+        return "ordinary (more is not permitted)"
+
+
+def run_as_others() -> None:
+    """What follows the flight must not hold up the rest of the machine."""
+    with suppress(OSError):
+        os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+
+
+def warm_up() -> None:
+    """One reading of each kind through a navigator that nobody listens to, and one message there and back.
+
+    A second of loading while a vehicle talks would overflow the socket's buffer.
+    """
+    filtering = Filtering(Options(), Keeper())
+    readings = [
+        Waiting(0.1 * step, step, Measurement(0.1 * step, sensor, (0.1,) * len(COLUMNS[sensor]), (np.nan,) * 6), 0.1)
+        for step, sensor in enumerate([Sensor.ATTITUDE, Sensor.IMU, Sensor.IMU, *Sensor])
+    ]
+    with announce_compilation("live"):
+        filtering.begin(readings, gps_heard=True)
+        for reading in readings:
+            filtering.heard(reading)
+        filtering.feed(readings)
+        assert filtering.running is not None
+        estimate = estimate_of(filtering.running, filtering.imu_after(-1.0), 1.0, 1.0, 0)
+    local_position_m((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    mav = coder()
+    mav.decode(bytearray(odometry(mav, estimate).pack(mav)))
+    gc.collect()
+    gc.freeze()  # what is loaded by now stays; the collector need not look at it again
 
 
 class Latency:
@@ -113,7 +178,8 @@ def run_session(
     def tick() -> float:
         before, now_s = session.sent, clock()
         session.tick(now_s)
-        _send(session, link)
+        while session.outbox:
+            link.write(session.outbox.popleft())
         if session.due:
             return flow_s
         if session.sent > before and flow_s == flow_s:
@@ -141,11 +207,6 @@ def run_session(
                 for show in shows:
                     show(now_s)
             collector.turn(now_s)
-
-
-def _send(session: Session, link: Link) -> None:
-    while session.outbox:
-        link.write(session.outbox.popleft())
 
 
 def _wait(link: Link) -> None:

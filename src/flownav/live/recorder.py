@@ -20,15 +20,14 @@ from flownav.core.errors import InputError
 from flownav.core.free_names import free_name
 from flownav.core.measurement import Array, EventQueue
 from flownav.core.provenance import command_line, provenance
-from flownav.live.journal_place import claim
+from flownav.live.filtering import NAN, Keeper
 from flownav.live.options import Options
 from flownav.live.recovery import WIDTHS, recovered
-from flownav.live.writing import Writer
-from flownav.mavlink.state_messages import TrueState
+from flownav.live.writing import Writer, claim
+from flownav.mavlink.messages import TrueState
 from flownav.navigation.tables import fed_rows
 from flownav.navigation.told import Equipment
 
-NAN = float("nan")
 MOST_NOTES = 100_000
 FACTS_S = 1.0
 
@@ -61,8 +60,8 @@ class Finished(NamedTuple):
         )
 
 
-class Recorder:
-    """A Chronicle that keeps all. InputError where its journal cannot be begun; nothing is raised after that."""
+class Recorder(Keeper):
+    """A Keeper that keeps all. InputError where its journal cannot be begun; nothing is raised after that."""
 
     def __init__(
         self, path: Path, options: Options, *, force: bool = False, failed: Callable[[str], None] = lambda reason: None
@@ -169,28 +168,6 @@ class Recorder:
     def _remove_journal(self) -> None:
         """Still locked: nobody takes it for the journal of a killed run in between."""
         self.journal.unlink(missing_ok=True)
-
-
-class NoRecorder:
-    """A Chronicle that keeps nothing."""
-
-    def segment(self, equipment: Equipment) -> None:
-        """Nothing."""
-
-    def fed(self, queue: EventQueue, arrival_s: Array) -> None:
-        """Nothing."""
-
-    def written(self, estimate: Array, innovation: Array, event: Array) -> None:
-        """Nothing."""
-
-    def note(self, t_s: float, source: str, kind: str, detail: str, value: float = NAN) -> None:
-        """Nothing."""
-
-    def origin(self, t_s: float, origin_deg_m: tuple[float, float, float]) -> None:
-        """Nothing."""
-
-    def truth(self, t_s: float, state: TrueState) -> None:
-        """Nothing."""
 
 
 def told_every_second(recorder: Recorder, facts: Callable[[], dict[str, Any]]) -> Callable[[float], None]:

@@ -11,17 +11,10 @@ import numpy as np
 from flownav.core.compile import columns_of, width_of
 from flownav.core.errors import InputError
 from flownav.core.measurement import COLUMNS, MAX_VALUES, Array, Sensor
-from flownav.core.record import FED, POSITION_NED, QUATERNION, VELOCITY_BODY, Record, Table
+from flownav.core.record import FED, RATES, STATE, Record, Table
 from flownav.logs.journal import MAGIC, Block, Damage, blocks
+from flownav.navigation import tables
 from flownav.navigation.rows import ESTIMATE_COLUMNS, EVENT_COLUMNS, INNOVATION_COLUMNS
-from flownav.navigation.tables import (
-    Happening,
-    estimate_table,
-    fed_table,
-    happenings,
-    innovation_table,
-    states_table,
-)
 
 T_S, SEGMENT = FED.index("t_s"), FED.index("segment")
 NAN = float("nan")
@@ -73,7 +66,7 @@ class _Story(NamedTuple):
     head: dict[str, Any]
     segments: dict[int, dict[str, Any]]
     origins: Array  # rows of `OriginRow`
-    notes: list[Happening]
+    notes: list[tables.Happening]
     facts: dict[str, Any]
     end: dict[str, Any] | None
     rows: dict[str, Array]
@@ -179,21 +172,21 @@ def _manifest(story: _Story) -> dict[str, Any]:
 def _fill(record: Record, story: _Story, found: Recovered) -> None:
     """Put the tables in."""
     fed, estimate, truth = (story.rows[name] for name in ("fed", "estimate", "truth"))
-    record.add("estimate", estimate_table(estimate))
-    record.add("states", states_table(estimate))
-    record.add("fed", fed_table(fed))
+    record.add("estimate", tables.estimate_table(estimate))
+    record.add("states", tables.states_table(estimate))
+    record.add("fed", tables.fed_table(fed))
     for sensor in Sensor:
         rows = fed[fed[:, FED.index("sensor")] == sensor]
         if len(rows):
             record.add(sensor.name.lower(), _readings(sensor, rows))
     if len(truth) and len(story.origins):
         record.add("truth", _truth(truth, story.origins))
-    record.add("innovation", innovation_table(story.rows["innovation"]))
+    record.add("innovation", tables.innovation_table(story.rows["innovation"]))
     record.add("events", _events(story, found))
 
 
 def _events(story: _Story, found: Recovered) -> dict[str, Any]:
-    events = happenings(story.rows["event"]) + story.notes
+    events = tables.happenings(story.rows["event"]) + story.notes
     times_s = [*(event[0] for event in events), *story.rows["fed"][-1:, T_S].tolist()]
     last_s = max((t_s for t_s in times_s if t_s == t_s), default=0.0)
     lost = int((story.end or {}).get("notes_lost", 0))
@@ -230,6 +223,6 @@ def _truth(rows: Array, origins: Array) -> Table:
     place = origin.place_deg_m[np.maximum(since - 1, 0)]
     position = pymap3d.geodetic2ned(*said.place_deg_m.T, *place.T)
     body = to_body(rotation_from_quaternion(*said.quaternion.T), *said.vel_ned_m_s.T)
-    names = (*POSITION_NED, *VELOCITY_BODY, *QUATERNION, "rate_p_rad_s", "rate_q_rad_s", "rate_r_rad_s")
+    names = (*STATE, *RATES)
     columns = (*position, *body, *said.quaternion.T, *said.rate_frd_rad_s.T)
     return {"t_s": said.t_s, **dict(zip(names, map(np.asarray, columns), strict=True))}

@@ -1,20 +1,20 @@
-"""The live screen: what arrives and how old it is, what the filter makes of it, the estimate, and recent signals."""
+"""The live screen: what arrives and how old it is, what the filter makes of it, the estimate, how full the link is."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from flownav.core.measurement import COLUMNS, Sensor
 from flownav.estimation.gating import Reason
 from flownav.estimation.hypotheses import NAMES
+from flownav.live.answers import WITHHELD
 from flownav.live.display import View
-from flownav.live.estimating import WITHHELD
 from flownav.live.link import Link
 from flownav.live.loop import Latency
 from flownav.live.session import Session
-from flownav.live.traffic import Traffic, in_words
 from flownav.mavlink.converted import OPTIONAL
 from flownav.navigation.memory import PROTECTION, SUSPECTED
 
@@ -26,6 +26,64 @@ BARS = "▁▂▃▄▅▆▇█"
 SHOWN = {
     Sensor.FLOW_RATE: (0, 1), Sensor.FLOW_VELOCITY: (0, 1), Sensor.RANGE: (0,), Sensor.IMU: (5,),
 }  # fmt: skip
+
+
+class Traffic:
+    """Bytes between one look and the next."""
+
+    def __init__(self, link: Link, session: Session, now_s: float) -> None:
+        self._link, self._session = link, session
+        self._received, self._written, self._at_s = link.received, link.written, now_s
+
+    def look(self, now_s: float) -> dict[str, Any]:
+        """Since the last look."""
+        link, elapsed_s = self._link, now_s - self._at_s
+        received, written = link.received - self._received, link.written - self._written
+        self._received, self._written, self._at_s = link.received, link.written, now_s
+        return traffic_facts(link, self._session, elapsed_s, received, written)
+
+
+def traffic_facts(
+    link: Link, session: Session, duration_s: float, received: int | None = None, written: int | None = None
+) -> dict[str, Any]:
+    """Rates asked for, bytes each way and their share of the line, and what was not sent.
+
+    received, written: bytes in the duration; the link's own where they are not given. Counts are the session's.
+    """
+    plan, capacity = session.rates.plan, link.capacity_bytes_s
+    seconds = max(duration_s, 1e-6)
+    received_bytes_s = (link.received if received is None else received) / seconds
+    written_bytes_s = (link.written if written is None else written) / seconds
+    return {
+        "capacity_bytes_s": capacity,
+        "received_bytes_s": received_bytes_s,
+        "written_bytes_s": written_bytes_s,
+        "received_share": received_bytes_s / capacity if capacity else None,
+        "written_share": written_bytes_s / capacity if capacity else None,
+        "asked_hz": {name: rate_hz for name, (_, rate_hz) in plan.streams.items()},
+        "asked_bytes_s": plan.bytes_s,
+        "too_slow_for": plan.lacks,
+        "estimate_hz_at_most": plan.estimate_hz if plan.estimate_hz < float("inf") else None,
+        "estimates_replaced": link.counts["replaced"],
+        "flow_without_own_estimate": session.hearing.flow_waited,
+        "frames_not_sent": link.counts["not_sent"],
+    }
+
+
+def in_words(facts: Mapping[str, Any]) -> str:
+    """One line of `traffic_facts`: what came and went, of what the link carries, and what was not sent."""
+
+    def one(bytes_s: float, share: float | None) -> str:
+        return f"{bytes_s / 1e3:.1f} kB/s" + ("" if share is None else f" ({100.0 * share:.0f} %)")
+
+    received, written = (one(facts[f"{way}_bytes_s"], facts[f"{way}_share"]) for way in ("received", "written"))
+    said = [f"Link: in {received}, out {written}"]
+    at_most = facts["estimate_hz_at_most"]
+    said += [f"at most {at_most:.0f} estimates/s"] if at_most is not None else []
+    said += [f"TOO SLOW for {facts['too_slow_for']}"] if facts["too_slow_for"] else []
+    replaced, not_sent = facts["estimates_replaced"], facts["frames_not_sent"]
+    said += [f"not sent: {replaced} old estimates, {not_sent} other frames"] if replaced or not_sent else []
+    return "; ".join(said)
 
 
 class Screen:
@@ -57,7 +115,7 @@ class Screen:
         return View(
             self._title(),
             self._alarms(),
-            [self._sensor(sensor, now_s) for sensor in sorted(session.readings)],
+            [self._sensor(sensor, now_s) for sensor in sorted(session.hearing.readings)],
             self._estimate(),
             [(name, strip(values), _figure(values[-1])) for name, values in self._strips.items()],
             [self._protection(), f"dropped: {dropped}", self._line(now_s), self._footing(), self._running()],
@@ -70,7 +128,7 @@ class Screen:
         return (
             sensor.name.lower(),
             f"{self._rates.get(sensor, 0.0):.0f}",
-            f"{now_s - session.heard_s[sensor]:.2f}",
+            f"{now_s - session.hearing.heard_s[sensor]:.2f}",
             f"{session.hearing.lags.by_sensor.get(sensor, 0.0):.2f}",
             " ".join(_figure(innovation) for innovation, _, _ in found),
             " ".join(_figure(ratio) for _, ratio, _ in found),
@@ -145,13 +203,13 @@ class Screen:
 
     def _follow(self, now_s: float) -> None:
         session, elapsed_s = self._session, now_s - self._at_s
-        for sensor, count in session.readings.items():
+        for sensor, count in session.hearing.readings.items():
             if elapsed_s > 0.0:
                 self._rates[sensor] = (count - self._before.get(sensor, 0)) / elapsed_s
             self._before[sensor] = count
         self._at_s = now_s
         for sensor, places in SHOWN.items():
-            reading = session.latest.get(sensor)
+            reading = session.hearing.latest.get(sensor)
             for place in places if reading else ():
                 values = self._strips.setdefault(COLUMNS[sensor][place], deque(maxlen=STRIP))
                 values.append(reading.value[place] if reading else float("nan"))
@@ -160,7 +218,7 @@ class Screen:
 def told(session: Session, key: tuple[int, int]) -> bool:
     """Whether the newest reading of a sensor has the component: GPS over MAVLink has no vertical velocity to judge."""
     sensor, component = Sensor(key[0]), key[1]
-    reading = session.latest.get(sensor)
+    reading = session.hearing.latest.get(sensor)
     return reading is None or component not in OPTIONAL.get(sensor, ()) or math.isfinite(reading.value[component])
 
 

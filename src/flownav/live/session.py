@@ -8,47 +8,28 @@ carried on to now, is sent where nothing speaks against it (estimating).
 from __future__ import annotations
 
 from collections import Counter, deque
-from typing import Protocol
 
-from flownav.core.measurement import Measurement, Sensor
-from flownav.live.answers import ODOMETRY_COMPONENT, Answers
-from flownav.live.estimating import UNFUSED, WITHHELD, estimate_of, fault_of, why_withheld
+from flownav.core.measurement import Sensor
+from flownav.live.answers import ODOMETRY_COMPONENT, UNFUSED, WITHHELD, Answers, estimate_of, fault_of, why_withheld
 from flownav.live.filtering import BATCH, Filtering, Keeper
 from flownav.live.hearing import Hearing
+from flownav.live.horizon import Refused
 from flownav.live.options import Options
 from flownav.live.rates import Rates
-from flownav.live.reception import Reception, Vehicle
-from flownav.live.requests import Requests
-from flownav.live.serving import Refused
-from flownav.live.simulator import Simulator
-from flownav.live.timing import VehicleClock
+from flownav.live.reception import Reception, Vehicle, VehicleClock
+from flownav.live.requests import TRUTHS, Requests, Simulator
 from flownav.mavlink.converted import Pose
-from flownav.mavlink.dialect import Message
-from flownav.mavlink.messages import CONVERTERS
+from flownav.mavlink.framing import Message
+from flownav.mavlink.messages import CONVERTERS, STATES, TrueState
 from flownav.mavlink.outgoing import Estimate
-from flownav.mavlink.state_messages import TrueState, hil_state_quaternion, sim_state
 from flownav.navigation.feed import SLOWEST_IMU_HZ
 from flownav.navigation.reasons import HORIZONTAL
 from flownav.navigation.rows import InnovationRow
 
 SECOND = 1.0
 SEND_EVERY_S = 0.02  # without flow; with it, an estimate for each of its readings
-TRUTHS = {"SIM_STATE": sim_state, "HIL_STATE_QUATERNION": hil_state_quaternion}
 OUTRANKED = ("", "position_invalid", "dead_reckoning", "unprotected")  # what a sensor that does not serve may cause
 NAN = float("nan")
-
-
-class Chronicle(Keeper, Protocol):
-    """Who keeps a session's story beside what the navigator is fed."""
-
-    def note(self, t_s: float, source: str, kind: str, detail: str, value: float = NAN) -> None:
-        """A happening."""
-
-    def origin(self, t_s: float, origin_deg_m: tuple[float, float, float]) -> None:
-        """The navigator's frame has this origin from now on."""
-
-    def truth(self, t_s: float, state: TrueState) -> None:
-        """What a simulator says is so."""
 
 
 class Session:
@@ -58,7 +39,7 @@ class Session:
     that are heard and not fused, since when and why.
     """
 
-    def __init__(self, options: Options, keeper: Chronicle, now_s: float, unix_s: float) -> None:
+    def __init__(self, options: Options, keeper: Keeper, now_s: float, unix_s: float) -> None:
         self.options, self.keeper = options, keeper
         self._unix_less_now_s = unix_s - now_s
         self.reception = Reception(
@@ -86,21 +67,6 @@ class Session:
         found = {f"link: {name}": n for name, n in self.reception.counts.items()}
         found |= {f"clock: {name}": n for name, n in (self.clock.counts if self.clock else Counter[str]()).items()}
         return found | dict(self.hearing.dropped)
-
-    @property
-    def readings(self) -> Counter[Sensor]:
-        """Readings taken, by sensor."""
-        return self.hearing.readings
-
-    @property
-    def heard_s(self) -> dict[Sensor, float]:
-        """When each sensor was last heard, on our clock."""
-        return self.hearing.heard_s
-
-    @property
-    def latest(self) -> dict[Sensor, Measurement]:
-        """The last reading of each sensor."""
-        return self.hearing.latest
 
     @property
     def origin_deg_m(self) -> tuple[float, float, float] | None:
@@ -171,8 +137,8 @@ class Session:
         elif name == "GPS_GLOBAL_ORIGIN":
             self._origin_told(message, clock.now_s(now_s))
         elif name in TRUTHS:
-            state, t_s = TRUTHS[name](message), clock.now_s(now_s)
-            if state is not None and t_s == t_s:
+            state, t_s = STATES[name](message), clock.now_s(now_s)
+            if isinstance(state, TrueState) and t_s == t_s:
                 self.keeper.truth(t_s, state)
 
     def _timesync(self, message: Message, clock: VehicleClock, vehicle: Vehicle, now_s: float) -> None:
@@ -242,11 +208,8 @@ class Session:
             outcome = self.filtering.feed(released)
             offered = [InnovationRow(*row) for row in outcome.innovation.tolist()]
             for row in offered:
-                self.innovations[int(row.sensor), int(row.component)] = (
-                    row.innovation,
-                    row.test_ratio,
-                    int(row.reason),
-                )
+                told = row.innovation, row.test_ratio, int(row.reason)
+                self.innovations[int(row.sensor), int(row.component)] = told
             self.hearing.serving.judged(offered)
         return len(released) == BATCH
 

@@ -15,11 +15,11 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.frames import quaternion_from_euler
 from flownav.core.guard import an_input
-from flownav.core.measurement import Array, Sensor, Stream
-from flownav.logs.absences import absences_of
+from flownav.core.measurement import COLUMNS, Sensor, Stream
+from flownav.core.record import POSITION_NED, Table
+from flownav.logs.assembly import local_position, near_the_rest, origin_of
 from flownav.logs.csv_table import Column, CsvTable, read_csv_table
-from flownav.logs.fixes import local_position, near_the_rest, origin_of
-from flownav.logs.log import Log
+from flownav.logs.log import Log, absences_of
 from flownav.logs.plausible import check_plausible
 
 HALF_TURN = np.pi + 0.01
@@ -87,15 +87,12 @@ def read_csv_folder(folder: Path) -> Log:
     check_plausible(folder, streams)
     origin = origin_of(tables["gps"]) if "gps" in tables else None
     return Log(
-        folder,
-        streams,
-        origin,
-        _truth(tables["truth"]) if "truth" in tables else None,
+        folder, streams, origin,
+        _columns(tables.get("truth"), dict(zip(POSITION_NED, ("x_m", "y_m", "z_m"), strict=True))),
         {f"{name}.csv": table.sha256 for name, table in tables.items()},
-        tuple(note for table in tables.values() for note in table.notes),
-        absences=tuple(absences_of(streams)),
-        heading_truth=_heading_truth(tables["heading_truth"]) if "heading_truth" in tables else None,
-    )
+        tuple(note for table in tables.values() for note in table.notes), absences=tuple(absences_of(streams)),
+        heading_truth=_columns(tables.get("heading_truth"), {"yaw_rad": "yaw_rad"}),
+    )  # fmt: skip
 
 
 def _tables(folder: Path) -> dict[str, CsvTable]:
@@ -132,16 +129,16 @@ def _check_overlap(folder: Path, tables: dict[str, CsvTable]) -> None:
             )
 
 
+def _columns(table: CsvTable | None, names: dict[str, str]) -> Table | None:
+    """Columns of a table under a record's names; None without the table."""
+    return None if table is None else {"t_s": table.t_s, **{name: table.columns[of] for name, of in names.items()}}
+
+
 # -- a file's streams --------------------------------------------------------------------------------------
 def _attitude(table: CsvTable) -> list[Stream]:
     angles = table.matrix("roll_rad", "pitch_rad", "yaw_rad")
     quaternion = np.column_stack(quaternion_from_euler(*angles.T))
     return [Stream.of(Sensor.ATTITUDE, table.t_s, quaternion, rejected=table.rejected)]
-
-
-def _imu(table: CsvTable) -> list[Stream]:
-    columns = [column.name for column in FILES["imu"]]
-    return [Stream.of(Sensor.IMU, table.t_s, table.matrix(*columns), rejected=table.rejected)]
 
 
 def _gps(table: CsvTable) -> list[Stream]:
@@ -150,35 +147,24 @@ def _gps(table: CsvTable) -> list[Stream]:
     if not len(table.t_s):
         raise InputError(f"{table.path}: no row has a 3-D fix (fix_type 3 or more); remove the file to replay without")
     table.keep(near_the_rest(table.columns["lat_deg"], table.columns["lon_deg"]), "out_of_range")
-    velocity = table.matrix("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
     return [
-        Stream.of(Sensor.GPS_VELOCITY, table.t_s, velocity, rejected=table.rejected),
+        table.stream(Sensor.GPS_VELOCITY, *COLUMNS[Sensor.GPS_VELOCITY]),
         Stream.of(Sensor.GPS_POSITION, table.t_s, local_position(table), rejected=table.rejected),
     ]
 
 
-def _flow(table: CsvTable) -> list[Stream]:
-    value = table.matrix("flow_x_rad_s", "flow_y_rad_s", "gyro_x_rad_s", "gyro_y_rad_s")
-    return [Stream.of(Sensor.FLOW_RATE, table.t_s, value, quality=table.columns["quality"], rejected=table.rejected)]
-
-
 def _px4flow(table: CsvTable) -> list[Stream]:
     """MAVLink OPTICAL_FLOW: velocity compensated and scaled in the sensor, and the sonar's distance."""
-    velocity = table.matrix("flow_comp_m_x_m_s", "flow_comp_m_y_m_s", "flow_comp_m_z_m_s")
-    quality = table.columns["quality"]
+    names = ("flow_comp_m_x_m_s", "flow_comp_m_y_m_s", "flow_comp_m_z_m_s")
     return [
-        Stream.of(Sensor.FLOW_VELOCITY, table.t_s, velocity, quality=quality, rejected=table.rejected),
+        table.stream(Sensor.FLOW_VELOCITY, *names, quality="quality"),
         Stream.of(Sensor.RANGE, table.t_s, table.matrix("ground_distance_m")),
     ]
 
 
 def _range(table: CsvTable) -> list[Stream]:
     table.keep(table.columns["valid"] > 0, "invalid")
-    return [Stream.of(Sensor.RANGE, table.t_s, table.matrix("range_m"), rejected=table.rejected)]
-
-
-def _baro(table: CsvTable) -> list[Stream]:
-    return [Stream.of(Sensor.BARO, table.t_s, table.matrix("alt_m"), rejected=table.rejected)]
+    return [table.stream(Sensor.RANGE, "range_m")]
 
 
 def _mag(table: CsvTable) -> list[Stream]:
@@ -186,27 +172,14 @@ def _mag(table: CsvTable) -> list[Stream]:
     return [Stream.of(Sensor.MAG, table.t_s, field, rejected=table.rejected)]
 
 
-def _landed(table: CsvTable) -> list[Stream]:
-    return [Stream.of(Sensor.LANDED, table.t_s, table.matrix("landed"), rejected=table.rejected)]
-
-
-def _truth(table: CsvTable) -> dict[str, Array]:
-    names = {"pos_n_m": "x_m", "pos_e_m": "y_m", "pos_d_m": "z_m"}
-    return {"t_s": table.t_s, **{name: table.columns[column] for name, column in names.items()}}
-
-
-def _heading_truth(table: CsvTable) -> dict[str, Array]:
-    return {"t_s": table.t_s, "yaw_rad": table.columns["yaw_rad"]}
-
-
 CONVERTERS: dict[str, Callable[[CsvTable], list[Stream]]] = {
     "attitude": _attitude,
-    "imu": _imu,
+    "imu": lambda table: [table.stream(Sensor.IMU, *COLUMNS[Sensor.IMU])],
     "gps": _gps,
     "px4flow": _px4flow,
-    "flow": _flow,
+    "flow": lambda table: [table.stream(Sensor.FLOW_RATE, *COLUMNS[Sensor.FLOW_RATE], quality="quality")],
     "range": _range,
-    "baro": _baro,
+    "baro": lambda table: [table.stream(Sensor.BARO, "alt_m")],
     "mag": _mag,
-    "landed": _landed,
+    "landed": lambda table: [table.stream(Sensor.LANDED, "landed")],
 }

@@ -6,7 +6,6 @@ names say (a wrong unit, two logs in one file), that is an InputError of one lin
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,10 +14,9 @@ from typing import Any
 import numpy as np
 
 from flownav.core.errors import InputError
-from flownav.core.guard import an_input
-from flownav.core.measurement import Array
+from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.text import number
-from flownav.logs.rows import LATE_SHARE, Rows, drop_duplicates, drop_strays, longest_ordered
+from flownav.logs.assembly import LATE_SHARE, Rows, content_of, drop_duplicates, drop_strays, longest_ordered, sha256_of
 
 WRONG_UNIT_SHARE = 0.1  # more rows than this outside the limits: the column is in another unit
 LONGEST_MEDIAN_STEP_S = 10.0
@@ -44,19 +42,25 @@ class CsvTable(Rows):
     sha256: str = ""
     notes: list[str] = field(default_factory=list)
 
+    def stream(self, sensor: Sensor, *names: str, quality: str = "") -> Stream:
+        """Columns as a sensor's stream; quality: the column that says it, if any."""
+        level = self.columns[quality] if quality else None
+        return Stream.of(sensor, self.t_s, self.matrix(*names), quality=level, rejected=self.rejected)
+
 
 def read_csv_table(path: Path, columns: Sequence[Column], *, seldom: bool = False) -> CsvTable:
     """Read and check one file. InputError where it cannot be read, lacks a column or cannot be in the units.
 
     seldom: rows stand where something happened, however far apart.
     """
-    content = _content(path)
+    content = content_of(path, "a folder of CSV files")
     malformed: list[int] = []
     raw = _parse(path, content, [column.name for column in columns], malformed)
     lacking = [c.name for c in columns if c.required and c.name not in raw] + ([] if "t_s" in raw else ["t_s"])
     if lacking:
-        raise InputError(f"{path}: no column {', '.join(lacking)}; a {path.name} needs {_needs(columns)}")
-    table = CsvTable(raw.pop("t_s"), raw, path=path, sha256=hashlib.sha256(content).hexdigest())
+        needs = ", ".join(["t_s", *(c.name for c in columns if c.required)])
+        raise InputError(f"{path}: no column {', '.join(lacking)}; a {path.name} needs {needs}")
+    table = CsvTable(raw.pop("t_s"), raw, path=path, sha256=sha256_of(content))
     if malformed:
         table.rejected["malformed_row"] = len(malformed)
     check_finite(table, columns)
@@ -68,17 +72,6 @@ def read_csv_table(path: Path, columns: Sequence[Column], *, seldom: bool = Fals
         reasons = ", ".join(f"{count} {reason}" for reason, count in table.rejected.items()) or "it is empty"
         raise InputError(f"{path}: no usable row ({reasons})")
     return table
-
-
-def _needs(columns: Sequence[Column]) -> str:
-    return ", ".join(["t_s", *(c.name for c in columns if c.required)])
-
-
-def _content(path: Path) -> bytes:
-    try:
-        return an_input(path).read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give a folder of CSV files") from error
 
 
 def _parse(path: Path, content: bytes, wanted: list[str], malformed: list[int]) -> dict[str, Array]:

@@ -13,7 +13,6 @@ import re
 import struct
 import zlib
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -78,15 +77,6 @@ def blocks(data: memoryview) -> Iterator[Block | Damage]:
         place = _next_mark(data, place + 1) if patience > 0 or length < 0 else end
     if bad >= 0:
         yield Damage(bad, len(data) - bad, True)
-
-
-def is_journal(path: Path) -> bool:
-    """Whether a file begins as a journal does; False where it cannot be read."""
-    try:
-        with path.open("rb") as file:
-            return file.read(len(MAGIC)) == MAGIC
-    except OSError:
-        return False
 
 
 def _payload_length(data: memoryview, place: int) -> int:

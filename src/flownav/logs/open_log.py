@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 
 from flownav.core.errors import InputError
@@ -18,6 +19,14 @@ KNOWN = (
     "ROS bag (a folder, .db3, .mcap, .bag), a Crazyflie's log, a Betaflight or INAV blackbox, or a live session's "
     "record (.fnr)"
 )
+READERS = {
+    "ulog": ("ulog", "read_ulog"),
+    "dataflash": ("dataflash", "read_dataflash"),
+    "tlog": ("mavlink_log", "read_tlog"),
+    "record": ("record_log", "read_live_record"),
+    "crazyflie": ("crazyflie", "read_crazyflie"),
+    "blackbox": ("blackbox.reader", "read_blackbox"),
+}
 ULOG_MAGIC = b"\x55\x4c\x6f\x67\x01\x12\x35"
 DATAFLASH_MAGIC = b"\xa3\x95"
 DATAFLASH_FORMAT = b"\xa3\x95\x80"  # the message that describes others: a log that has lost its start still has many
@@ -35,14 +44,17 @@ def open_log(path: Path, *, flow_instance: int | None = None, topics: Mapping[st
     flow_instance: which of several flow sensors; None takes the one with most to say. topics: of a ROS bag, which
     topic serves as what, by role. InputError where the path is missing or no known format, or the log cannot be read.
     """
-    kind = "ros" if _is_bag_folder(path) else "" if an_input(path).is_dir() else log_kind(path)
+    from flownav.logs.ros.containers import is_bag_folder
+
+    folder = an_input(path).is_dir()
+    kind = ("ros" if is_bag_folder(path) else "") if folder else log_kind(path)
     if kind == "ros":
         from flownav.logs.ros.reader import read_ros
 
         return read_ros(path, flow_instance=flow_instance, topics=topics)
     if topics:
         raise InputError(f"--topic: {path} is no ROS bag; leave it out")
-    if an_input(path).is_dir():
+    if folder:
         if flow_instance is not None:
             raise InputError(f"--flow-instance: {path} is a folder of CSV files, with one flow sensor; leave it out")
         from flownav.logs.csv_folder import read_csv_folder
@@ -55,7 +67,9 @@ def open_log(path: Path, *, flow_instance: int | None = None, topics: Mapping[st
         )
     if not kind:
         raise InputError(f"{path}: {'not a log that is known' if path.exists() else 'no such log'}; give {KNOWN}")
-    return _reader(kind)(path, flow_instance=flow_instance)
+    module, reader = READERS[kind]
+    log: Log = getattr(import_module(f"flownav.logs.{module}"), reader)(path, flow_instance=flow_instance)
+    return log
 
 
 def open_flight(path: Path, *, flow_instance: int | None = None, topics: Mapping[str, str] | None = None) -> Log:
@@ -69,39 +83,6 @@ def open_flight(path: Path, *, flow_instance: int | None = None, topics: Mapping
             f"{path}: the log lacks {' and '.join(lacking)}, which a replay needs; `flownav info` shows what it holds"
         )
     return log
-
-
-def _is_bag_folder(path: Path) -> bool:
-    """Whether a path is a folder with a ROS 2 bag in it."""
-    from flownav.logs.ros.containers import is_bag_folder
-
-    return an_input(path).is_dir() and is_bag_folder(path)
-
-
-def _reader(kind: str) -> Callable[..., Log]:
-    if kind == "ulog":
-        from flownav.logs.ulog import read_ulog
-
-        return read_ulog
-    if kind == "dataflash":
-        from flownav.logs.dataflash import read_dataflash
-
-        return read_dataflash
-    if kind == "record":
-        from flownav.logs.live_record import read_live_record
-
-        return read_live_record
-    if kind == "crazyflie":
-        from flownav.logs.crazyflie_log import read_crazyflie
-
-        return read_crazyflie
-    if kind == "blackbox":
-        from flownav.logs.blackbox.reader import read_blackbox
-
-        return read_blackbox
-    from flownav.logs.mavlink_log import read_tlog
-
-    return read_tlog
 
 
 def log_kind(path: Path) -> str:

@@ -8,6 +8,7 @@ axis or sign breaks them, never a bad sensor.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.frames import rotation_from_quaternion
 from flownav.core.measurement import Array, Sensor, Stream
-from flownav.logs.rates import attitude_at, attitude_rates, mean_over
+from flownav.logs.frames import attitude_at, attitude_rates, mean_over
 
 LONGEST_LOG_S = 172_800.0
 # beyond these, in a stream's own unit, a record is damaged: far more than what a live link or a simulation lets through
@@ -103,19 +104,25 @@ def check_values(where: Path, streams: dict[Sensor, Stream]) -> None:
             raise InputError(f"{where}: {name}: a quality that is not from 0 to 255")
 
 
-def of_one_clock(streams: dict[Sensor, Stream]) -> tuple[dict[Sensor, Stream], list[str]]:
-    """The streams without those whose clock is days away from most others', and a note on each of these."""
+def of_one_clock(where: Path, found: Iterable[Stream | None], nothing: str) -> tuple[dict[Sensor, Stream], list[str]]:
+    """The streams of most others' clock, by sensor, and a note on each left out, whose clock is days away.
+
+    InputError where there are none, with `nothing` as the reason, and as of `check_times`.
+    """
+    streams = {stream.sensor: stream for stream in found if stream is not None}
+    if not streams:
+        raise InputError(f"{where}: {nothing}")
     starts = sorted(float(stream.t_s[0]) for stream in streams.values() if len(stream))
-    if not starts:
-        return streams, []
-    usual = starts[(len(starts) - 1) // 2]
+    usual = starts[(len(starts) - 1) // 2] if starts else 0.0
     far = {s for s, stream in streams.items() if len(stream) and abs(stream.t_s[0] - usual) > LONGEST_LOG_S}
     notes = [
         f"{sensor.name.lower()} is left out: its clock shows {streams[sensor].t_s[0]:g} s where the others' show "
         f"{usual:g} s ({len(streams[sensor])} readings)"
         for sensor in sorted(far)
     ]
-    return {sensor: stream for sensor, stream in streams.items() if sensor not in far}, notes
+    streams = {sensor: stream for sensor, stream in streams.items() if sensor not in far}
+    check_times(where, streams)
+    return streams, notes
 
 
 def _check_gravity(where: Path, imu: Stream, attitude: Stream) -> None:

@@ -9,25 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor, Stream
 from flownav.core.record import Table
-from flownav.logs.absences import absences_of
-from flownav.logs.log import SIMULATOR, VISUAL_ODOMETRY, Absence, Log
-from flownav.logs.plausible import check_times, of_one_clock
+from flownav.logs import ulog_sensors as sensed
+from flownav.logs.log import SIMULATOR, VISUAL_ODOMETRY, Absence, Log, absences_of
+from flownav.logs.plausible import of_one_clock
 from flownav.logs.ulog_flow import FLOW_TOPICS, flow_stream, flow_topic, range_stream, reading_limits
 from flownav.logs.ulog_references import autopilot_estimate, pose_stream, truth_of
-from flownav.logs.ulog_sensors import (
-    LEAST_IMU_HZ,
-    attitude_stream,
-    baro_stream,
-    fastest_imu,
-    gps_streams,
-    imu_stream,
-    landed_stream,
-    mag_stream,
-    pad_stream,
-)
 from flownav.logs.ulog_topics import Topic, Topics, read_topics
 
 STATES = ("vehicle_land_detected",)
@@ -103,9 +91,9 @@ def log_of_topics(
     flow = flow_topic(path, topics, flow_instance)
     flows = [f"{topic.label} ({len(topic)} readings)" for topic in topics.of(*FLOW_TOPICS) if topic is not flow]
     slow_imu = _slow_imu(topics)
-    attitude, source = attitude_stream(topics)
+    attitude, source = sensed.attitude_stream(topics)
     sensors = list(_sensors(topics, flow, attitude))
-    gps, origin = gps_streams(topics)
+    gps, origin = sensed.gps_streams(topics)
     streams = {stream.sensor: stream for stream in (*sensors, *gps) if len(stream)}
     odometry_serves = bool(streams.keys() & {Sensor.FLOW_RATE, Sensor.GPS_POSITION})
     truth, truth_note = truth_of(topics, odometry_serves) if reference is None else (reference, "")
@@ -113,55 +101,44 @@ def log_of_topics(
     if pose is not None:
         streams[Sensor.POSE] = pose
     autopilot, autopilot_note = autopilot_estimate(topics, attitude, source)
-    if not streams:
-        why = "; ".join(_unusable(topics)) or "every row is invalid"
-        raise InputError(f"{path}: no usable reading of any sensor ({why}); give another log")
-    streams, strays = of_one_clock(streams)
-    check_times(path, streams)
+    why = "; ".join(_unusable(topics)) or "every row is invalid"
+    streams, strays = of_one_clock(path, streams.values(), f"no usable reading of any sensor ({why}); give another log")
     flow_note = f"flow is {flow.label}; not used: {', '.join(flows)}" if flow is not None and flows else ""
-    said = {"attitude": "no attitude (vehicle_attitude, or vehicle_visual_odometry with one)"}
-    said |= {"imu": slow_imu} if slow_imu else {}
-    absences = [*absences_of(streams, **said)]
+    known = {"attitude": "no attitude (vehicle_attitude, or vehicle_visual_odometry with one)"}
+    known |= {"imu": slow_imu} if slow_imu else {}
+    absences = [*absences_of(streams, **known)]
     if source == "vehicle_visual_odometry":
         absences.append(
             Absence("no vehicle_attitude", "attitude is the visual odometry's, its heading from its own start")
         )
+    said = (*topics.notes, *notes, flow_note, truth_note, pose_note, autopilot_note, *strays)
     return Log(
-        path,
-        streams,
-        origin,
-        truth,
-        inputs,
-        tuple(filter(None, (*topics.notes, *notes, flow_note, truth_note, pose_note, autopilot_note, *strays)))
-        + tuple(_unusable(topics)),
-        autopilot,
-        _estimator(topics) if autopilot is not None else "",
-        reading_limits(topics, flow),
-        tuple(absences),
-        clock_start_s=topics.start_s,
+        path, streams, origin, truth, inputs, (*filter(None, said), *_unusable(topics)),
+        autopilot, _estimator(topics) if autopilot is not None else "", reading_limits(topics, flow),
+        tuple(absences), clock_start_s=topics.start_s,
         truth_name=reference_name or (VISUAL_ODOMETRY if truth_note else SIMULATOR),
-    )
+    )  # fmt: skip
 
 
 def _sensors(topics: Topics, flow: Topic | None, attitude: Stream | None) -> Iterator[Stream]:
     """Every stream but GPS and odometry, where the log has it."""
     found = (
         attitude,
-        imu_stream(topics),
+        sensed.imu_stream(topics),
         flow_stream(topics, flow) if flow is not None else None,
         range_stream(topics, flow),
-        baro_stream(topics),
-        mag_stream(topics),
-        landed_stream(topics),
-        pad_stream(topics, attitude),
+        sensed.baro_stream(topics),
+        sensed.mag_stream(topics),
+        sensed.landed_stream(topics),
+        sensed.pad_stream(topics, attitude),
     )
     return (stream for stream in found if stream is not None)
 
 
 def _slow_imu(topics: Topics) -> str:
     """What inertial readings there are, where they come too slowly to be used."""
-    label, rate_hz, count = fastest_imu(topics)
-    if not label or rate_hz >= LEAST_IMU_HZ:
+    label, rate_hz, count = sensed.fastest_imu(topics)
+    if not label or rate_hz >= sensed.LEAST_IMU_HZ:
         return ""
     return f"inertial readings at {rate_hz:.0f} Hz only ({label}, {count} readings, left out)"
 

@@ -14,7 +14,8 @@ import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array, Sensor, Stream
-from flownav.logs.ulog_topics import MOST_VARIANCE, Topic, Topics
+from flownav.logs.assembly import possible_variance
+from flownav.logs.ulog_topics import Topic, Topics
 
 FLOW_TOPICS = ("vehicle_optical_flow", "optical_flow", "sensor_optical_flow")  # the first that saw enough
 ENOUGH = 0.5  # of what the best topic saw
@@ -104,8 +105,7 @@ def range_stream(topics: Topics, flow: Topic | None) -> Stream | None:
         if len(topic) and (best is None or len(topic) > len(best)):
             best = topic
     if best is not None:
-        variance = best.matrix("variance")
-        variance[~((variance > 0) & (variance < MOST_VARIANCE))] = np.nan
+        variance = possible_variance(best.matrix("variance"))
         return Stream.of(
             Sensor.RANGE, best.t_s, best.matrix("current_distance"), variance=variance, delay_s=best.delay_s,
             rejected=best.rejected,

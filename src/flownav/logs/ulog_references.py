@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from flownav.core.frames import heading_from_quaternion, rotation_from_quaternion, to_body, turned_about_down
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
-from flownav.logs.rates import attitude_at
-from flownav.logs.states import state_table
-from flownav.logs.ulog_topics import MOST_VARIANCE, Topic, Topics
+from flownav.logs.assembly import possible_variance
+from flownav.logs.frames import attitude_at, state_table
+from flownav.logs.ulog_topics import Topic, Topics
 
 LEAST_ROWS = 2
 NED, FRD, BODY = "NED", "FRD", "body"
@@ -57,9 +57,13 @@ def pose_stream(topics: Topics, attitude: Stream | None) -> tuple[Stream | None,
         variance = odometry.vector("position_variance", 3)
     else:
         variance = odometry.matrix("pose_covariance[0]", "pose_covariance[6]", "pose_covariance[11]")
-    variance[~((variance > 0) & (variance < MOST_VARIANCE))] = np.nan
     stream = Stream.of(
-        Sensor.POSE, odometry.t_s, position, variance=variance, delay_s=odometry.delay_s, rejected=odometry.rejected
+        Sensor.POSE,
+        odometry.t_s,
+        position,
+        variance=possible_variance(variance),
+        delay_s=odometry.delay_s,
+        rejected=odometry.rejected,
     )
     return stream, note
 

@@ -6,19 +6,26 @@ import numpy as np
 
 from flownav.core.frames import rotation_from_quaternion, to_body
 from flownav.core.measurement import Array, Sensor, Stream
-from flownav.logs.fixes import Origin, local_position, near_the_rest, origin_of
-from flownav.logs.rates import attitude_at
-from flownav.logs.ulog_topics import MOST_VARIANCE, Topic, Topics
+from flownav.logs.assembly import (
+    ALTITUDE_EXPONENT,
+    PLACE,
+    SCALE_HEIGHT_M,
+    SEA_LEVEL_PA,
+    Origin,
+    Rows,
+    keep_fixes,
+    keep_possible,
+    stream_of_rows,
+    streams_of_fixes,
+)
+from flownav.logs.frames import attitude_at
+from flownav.logs.ulog_topics import Topic, Topics
 
 LEAST_IMU_HZ = 20.0  # slower, an inertial reading says nothing of the motion between two
 FASTEST_M_S = 150.0
-FASTEST_TURN_RAD_S = 70.0
-MOST_SAID = {Sensor.MAG: 100.0, Sensor.BARO: 1e5, Sensor.LANDED: 1.0}  # [gauss] 200 times the earth's; [m]
-HARDEST_M_S2 = 400.0
-UNIT_LENGTH_WITHIN = 0.1
 QUATERNION_FIELDS = tuple(f"q[{k}]" for k in range(4))
-SEA_LEVEL_PA = 101325.0
-SCALE_HEIGHT_M, ALTITUDE_EXPONENT = 44330.77, 0.1902632  # the standard atmosphere's troposphere
+IMU_FIELDS = tuple(f"imu[{k}]" for k in range(6))
+VELOCITY_FIELDS = ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
 LARGEST_HECTOPASCAL = 2000.0
 LARGEST_RELATIVE_US = 1e6  # RELATIVE_TIMESTAMP_INVALID is far above
 YAW_90 = 2.0  # PX4's rotation of an IR-LOCK where no parameter says another
@@ -28,18 +35,18 @@ def attitude_stream(topics: Topics) -> tuple[Stream | None, str]:
     """Body FRD to NED, and the topic: the autopilot's, or where it is not logged that of the visual odometry."""
     for name in ("vehicle_attitude", "vehicle_visual_odometry"):
         topic = topics.fullest(name, needs=QUATERNION_FIELDS)
-        stream = _rotations(topic, dict(topic.rejected) if name == "vehicle_attitude" else {}) if topic else None
+        rejected = topic.rejected if topic and name == "vehicle_attitude" else {}
+        stream = _fields(Sensor.ATTITUDE, topic, QUATERNION_FIELDS, rejected) if topic else None
         if stream is not None and len(stream):
             return stream, name
     return None, ""
 
 
-def _rotations(topic: Topic, rejected: dict[str, int]) -> Stream:
-    """Quaternions of unit length."""
-    rows = Topic(topic.t_s, {name: topic.columns[name] for name in QUATERNION_FIELDS}, rejected)
-    rows.keep(np.isfinite(rows.vector("q", 4)).all(axis=1), "not_finite")
-    rows.keep(abs(np.linalg.norm(rows.vector("q", 4), axis=1) - 1.0) < UNIT_LENGTH_WITHIN, "out_of_range")
-    return Stream.of(Sensor.ATTITUDE, rows.t_s, rows.vector("q", 4), delay_s=topic.delay_s, rejected=rows.rejected)
+def _fields(sensor: Sensor, topic: Topic, names: tuple[str, ...], rejected: dict[str, int] | None = None) -> Stream:
+    """Fields of a topic as they stand; rejected: what is counted already, the topic's own where it is not given."""
+    counts = topic.rejected if rejected is None else rejected
+    rows = Rows(topic.t_s, {name: topic.columns[name] for name in names}, dict(counts))
+    return stream_of_rows(sensor, rows, names, topic.delay_s)
 
 
 # -- inertial ----------------------------------------------------------------------------------------------
@@ -51,16 +58,12 @@ def imu_stream(topics: Topics) -> Stream | None:
     if rates is not None and force is not None and force.rate_hz >= LEAST_IMU_HZ:
         sources.append(_joined(rates, force))
     for source in sources:
-        source.keep(np.logical_and.reduce([np.isfinite(column) for column in source.parts("imu", 6)]), "not_finite")
-        most = (*(FASTEST_TURN_RAD_S,) * 3, *(HARDEST_M_S2,) * 3)
-        parts = zip(source.parts("imu", 6), most, strict=True)
-        inside = [(column <= limit) & (column >= -limit) for column, limit in parts]
-        source.keep(np.logical_and.reduce(inside), "out_of_range")
+        keep_possible(source, Sensor.IMU, IMU_FIELDS)
     fast = [source for source in sources if source.rate_hz >= LEAST_IMU_HZ]
     if not fast:
         return None
     best = max(fast, key=lambda source: source.rate_hz)
-    return Stream.of(Sensor.IMU, best.t_s, best.vector("imu", 6), delay_s=best.delay_s, rejected=best.rejected)
+    return Stream.of(Sensor.IMU, best.t_s, best.matrix(*IMU_FIELDS), delay_s=best.delay_s, rejected=best.rejected)
 
 
 def fastest_imu(topics: Topics) -> tuple[str, float, int]:
@@ -71,7 +74,7 @@ def fastest_imu(topics: Topics) -> tuple[str, float, int]:
 
 
 def _inertial(topic: Topic, parts: list[Array]) -> Topic:
-    columns = {f"imu[{k}]": part for k, part in enumerate(parts)}
+    columns = dict(zip(IMU_FIELDS, parts, strict=True))
     if "sample_s" in topic.columns:
         columns["sample_s"] = topic.columns["sample_s"]
     return Topic(topic.t_s, columns, dict(topic.rejected), topic.name, topic.instance)
@@ -104,19 +107,10 @@ def gps_streams(topics: Topics) -> tuple[list[Stream], Origin | None]:
         return [], None
     most = max(candidates, key=lambda topic: int(np.count_nonzero(topic.columns.get("fix_type", np.zeros(1)) >= 3)))
     fixes = _fixes(most)
-    if not len(fixes):
-        return [], None
     sigma = fixes.matrix("s_variance_m_s", "eph", "epv")  # accuracies [m/s, m], whatever the first one's name says
-    sigma[~((sigma > 0) & (sigma < MOST_VARIANCE**0.5))] = np.nan
-    velocity = fixes.matrix("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
-    values = {
-        Sensor.GPS_VELOCITY: (velocity, sigma[:, [0, 0, 0]] ** 2),
-        Sensor.GPS_POSITION: (local_position(fixes), sigma[:, [1, 1, 2]] ** 2),
-    }
-    return [
-        Stream.of(sensor, fixes.t_s, value, variance=variance, delay_s=fixes.delay_s, rejected=fixes.rejected)
-        for sensor, (value, variance) in values.items()
-    ], origin_of(fixes)
+    sigma[~(sigma > 0)] = np.nan
+    velocity = fixes.matrix(*VELOCITY_FIELDS)
+    return streams_of_fixes(fixes, velocity, sigma[:, [0, 0, 0]] ** 2, sigma[:, [1, 1, 2]] ** 2, fixes.delay_s)
 
 
 def _fixes(topic: Topic) -> Topic:
@@ -125,18 +119,11 @@ def _fixes(topic: Topic) -> Topic:
         place = topic.matrix("latitude_deg", "longitude_deg", "altitude_msl_m")
     else:
         place = topic.matrix("lat", "lon", "alt") * (1e-7, 1e-7, 1e-3)
-    topic.columns |= dict(zip(("lat_deg", "lon_deg", "alt_m"), place.T, strict=True))
-    names = ("vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
-    velocity = topic.matrix(*names)
+    velocity = topic.matrix(*VELOCITY_FIELDS)
     known = (abs(velocity) < FASTEST_M_S).all(axis=1) & (topic.columns.get("vel_ned_valid", np.ones(len(topic))) > 0)
     velocity[~known] = np.nan
-    topic.columns |= dict(zip(names, velocity.T, strict=True))
-    topic.keep(topic.columns.get("fix_type", np.zeros(len(topic))) >= 3, "no_fix")
-    topic.keep(np.isfinite(topic.matrix("lat_deg", "lon_deg", "alt_m")).all(axis=1), "not_finite")
-    inside = (abs(topic.columns["lat_deg"]) <= 90) & (abs(topic.columns["lon_deg"]) <= 180)
-    topic.keep(inside & (abs(topic.columns["alt_m"]) < 1e5), "out_of_range")
-    if len(topic):
-        topic.keep(near_the_rest(topic.columns["lat_deg"], topic.columns["lon_deg"]), "out_of_range")
+    topic.columns |= dict(zip((*PLACE, *VELOCITY_FIELDS), (*place.T, *velocity.T), strict=True))
+    keep_fixes(topic, topic.columns.get("fix_type", np.zeros(len(topic))))
     return topic
 
 
@@ -145,13 +132,13 @@ def baro_stream(topics: Topics) -> Stream | None:
     """Pressure altitude [m]."""
     topic = topics.fullest("vehicle_air_data", "sensor_combined", needs=("baro_alt_meter",))
     if topic is not None:
-        return _column(Sensor.BARO, _at_relative(topic, "baro"), ("baro_alt_meter",))
+        return _fields(Sensor.BARO, _at_relative(topic, "baro"), ("baro_alt_meter",))
     topic = topics.fullest("sensor_baro", needs=("altitude",)) or topics.fullest("sensor_baro", needs=("pressure",))
     if topic is not None and not topic.has("altitude"):
         pressure = topic.columns["pressure"]
         pressure_pa = np.where(pressure < LARGEST_HECTOPASCAL, 100.0, 1.0) * np.maximum(pressure, 0.0)
         topic.columns["altitude"] = SCALE_HEIGHT_M * (1.0 - (pressure_pa / SEA_LEVEL_PA) ** ALTITUDE_EXPONENT)
-    return None if topic is None else _column(Sensor.BARO, topic, ("altitude",))
+    return None if topic is None else _fields(Sensor.BARO, topic, ("altitude",))
 
 
 def mag_stream(topics: Topics) -> Stream | None:
@@ -159,22 +146,15 @@ def mag_stream(topics: Topics) -> Stream | None:
     names = tuple(f"magnetometer_ga[{k}]" for k in range(3))
     topic = topics.fullest("vehicle_magnetometer", "sensor_combined", needs=names)
     if topic is not None:
-        return _column(Sensor.MAG, _at_relative(topic, "magnetometer"), names)
+        return _fields(Sensor.MAG, _at_relative(topic, "magnetometer"), names)
     topic = topics.fullest("sensor_mag", needs=("x", "y", "z"))
-    return None if topic is None else _column(Sensor.MAG, topic, ("x", "y", "z"))
+    return None if topic is None else _fields(Sensor.MAG, topic, ("x", "y", "z"))
 
 
 def landed_stream(topics: Topics) -> Stream | None:
     """1 on the ground, 0 in flight."""
     topic = topics.fullest("vehicle_land_detected", needs=("landed",))
-    return None if topic is None else _column(Sensor.LANDED, topic, ("landed",))
-
-
-def _column(sensor: Sensor, topic: Topic, names: tuple[str, ...]) -> Stream:
-    rows = Topic(topic.t_s, {name: topic.columns[name] for name in names}, dict(topic.rejected))
-    rows.keep(np.isfinite(rows.matrix(*names)).all(axis=1), "not_finite")
-    rows.keep((abs(rows.matrix(*names)) <= MOST_SAID[sensor]).all(axis=1), "out_of_range")
-    return Stream.of(sensor, rows.t_s, rows.matrix(*names), delay_s=topic.delay_s, rejected=rows.rejected)
+    return None if topic is None else _fields(Sensor.LANDED, topic, ("landed",))
 
 
 def _at_relative(topic: Topic, what: str) -> Topic:
@@ -214,8 +194,6 @@ def pad_stream(topics: Topics, attitude: Stream | None) -> Stream | None:
 
 
 def _pad(topic: Topic, value: Array) -> Stream:
-    rows = Topic(topic.t_s, dict(zip(("forward", "right", "distance"), value.T, strict=True)), dict(topic.rejected))
-    rows.keep(np.isfinite(value[:, :2]).all(axis=1), "not_finite")
-    return Stream.of(
-        Sensor.PAD, rows.t_s, rows.matrix("forward", "right", "distance"), delay_s=topic.delay_s, rejected=rows.rejected
-    )
+    names = ("forward", "right", "distance")
+    rows = Rows(topic.t_s, dict(zip(names, value.T, strict=True)), dict(topic.rejected))
+    return stream_of_rows(Sensor.PAD, rows, names, topic.delay_s)

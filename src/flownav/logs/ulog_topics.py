@@ -16,11 +16,10 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.guard import an_input
 from flownav.core.measurement import Array
-from flownav.logs.rows import Rows, drop_duplicates, drop_strays, longest_ordered
+from flownav.logs.assembly import Rows, put_in_order
 from flownav.logs.ulog_framing import Framed, frame
 from flownav.logs.ulog_rows import Bytes, Places, field_of
 
-MOST_VARIANCE = 1e12  # stated; beyond it a bit is wrong, as in what comes by MAVLink
 LONGEST_DELAY_S = 1.0  # a sample older than this on arrival carries a wrong time
 
 
@@ -114,15 +113,7 @@ def read_topics(path: Path, wanted: Collection[str], fields: Collection[str], st
     read = np.frombuffer(content, np.uint8)
     found = [_topic(data, read, framed.rows[data.msg_id], fields) for data in log.data_list]
     del content, read
-    for topic in found:
-        order(topic)
-    start_s = min((topic.t_s[0] for topic in found if len(topic) and topic.name not in states), default=0.0)
-    for topic in found:
-        topic.t_s = topic.t_s - start_s
-        if topic.name in states:
-            topic.t_s = np.maximum(topic.t_s, 0.0)
-        if "sample_s" in topic.columns:
-            topic.columns["sample_s"] -= start_s
+    start_s = count_from_first(found, states)
     if not any(map(len, found)):
         others = f"; it holds {', '.join(sorted(framed.topics)[:6])} ..." if framed.topics else ""
         raise InputError(
@@ -174,13 +165,22 @@ def _topic(data: Any, content: Bytes, rows: Places, fields: Collection[str]) -> 
     return Topic(t_s, columns, name=str(data.name), instance=int(data.multi_id))
 
 
-def order(topic: Topic) -> None:
-    """Rows in time order; late ones, stray ones and repeated ones are counted and thrown away."""
-    topic.keep(topic.t_s > 0.0, "no_time")
-    if np.any(np.diff(topic.t_s) < 0):
-        topic.keep(longest_ordered(topic.t_s), "out_of_order")
-    drop_strays(topic)
-    drop_duplicates(topic)
+def count_from_first(found: list[Topic], states: Collection[str]) -> float:
+    """The time of the first reading, from which the topics' times count then; their rows are put in order before.
+
+    states: topics that hold for longer than they are published, which are put at that time at the earliest.
+    """
+    for topic in found:
+        topic.keep(topic.t_s > 0.0, "no_time")
+        put_in_order(topic)
+    start_s = min((float(topic.t_s[0]) for topic in found if len(topic) and topic.name not in states), default=0.0)
+    for topic in found:
+        topic.t_s = topic.t_s - start_s
+        if topic.name in states:
+            topic.t_s = np.maximum(topic.t_s, 0.0)
+        if "sample_s" in topic.columns:
+            topic.columns["sample_s"] -= start_s
+    return start_s
 
 
 def _notes(framed: Framed) -> list[str]:

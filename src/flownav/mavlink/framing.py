@@ -1,8 +1,8 @@
-"""Frames in the bytes of a tlog, 8 bytes of arrival time (big-endian UNIX microseconds) before each, or of a link.
+"""pymavlink's tables, and frames in the bytes of a link or a tlog, 8 bytes of arrival time before each of a tlog's.
 
 Only a frame whose checksum holds is believed. After damage the search goes on at the next byte that could begin a
 frame, so that nothing but the damaged frames is lost; what is lost is counted. A frame is 280 bytes at most, so no
-length in a file can claim more.
+length in a file can claim more. The dialect ardupilotmega includes all of MAVLink's common messages.
 
 MAVLink 1: FE, length, sequence, system, component, id, payload, checksum.
 MAVLink 2: FD, length, incompatibility flags, compatibility flags, sequence, system, component, id (3 bytes),
@@ -14,10 +14,15 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from types import ModuleType
+from typing import Any, NamedTuple
 
-from flownav.mavlink.dialect import dialect
+from flownav.core.errors import InputError
 
+# MAV_AUTOPILOT: who answers a HEARTBEAT; a ground station and a camera say that they are none
+ARDUPILOT, PX4, INVALID_AUTOPILOT = 3, 12, 8
+
+Message = Any  # a message that pymavlink decoded or built
 MAVLINK_1, MAVLINK_2 = 0xFE, 0xFD
 HEADER_1, HEADER_2 = 6, 10
 CHECKSUM_BYTES, SIGNATURE_BYTES = 2, 13
@@ -28,6 +33,21 @@ OPEN_END = re.compile(rb"\xfd.{0,8}\Z", re.DOTALL)  # the beginning of a header 
 BEGINNING = re.compile(rb"\xfd.[\x00\x01].{6}\x00|\xfe", re.DOTALL)  # ids of known messages fit in two bytes
 
 
+def dialect() -> ModuleType:
+    """The MAVLink 2 dialect module. InputError where pymavlink is not installed."""
+    try:
+        from pymavlink.dialects.v20 import ardupilotmega
+    except ImportError as error:
+        raise InputError("MAVLink needs pymavlink; install it with `pip install 'flownav[live]'`") from error
+    return ardupilotmega  # type: ignore[no-any-return]
+
+
+def coder(system: int = 1, component: int = 1) -> Any:
+    """A pymavlink `MAVLink` that packs messages as this system and component, and decodes any."""
+    return dialect().MAVLink(None, srcSystem=system, srcComponent=component)
+
+
+# -- frames -------------------------------------------------------------------------------------------------
 class Frame(NamedTuple):
     """Where a frame lies in the bytes (start, end), when it arrived [us], and what its header says."""
 

@@ -1,23 +1,30 @@
-"""A replay as a Record: estimates, measurements, innovations, events, scores and provenance."""
+"""A replay as a Record: estimates, measurements, innovations, events, scores and provenance; and an attitude for logs
+without one."""
 
 from __future__ import annotations
 
 import platform
+from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
+from flownav.core.errors import InputError
 from flownav.core.frames import rotation_from_quaternion
-from flownav.core.measurement import COLUMNS, Array, Sensor
+from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.estimation.gating import Reason
-from flownav.logs.rates import attitude_at
+from flownav.logs.frames import attitude_at
+from flownav.logs.log import Log
 from flownav.navigation.flags import flagged, flags_of
+from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.tables import estimate_table, happenings, innovation_table, states_table
-from flownav.replays.autopilot import autopilot_path
-from flownav.replays.session import Replay
+from flownav.replays.judged import autopilot_path
+from flownav.replays.prepare import FLOW, ReplayOptions, prepare
+from flownav.replays.session import Replay, replay
 from flownav.scoring.reference import velocity_of
+from flownav.sensors.datasheet import IdentifiedFlow
 
 KEPT = (
     Sensor.GPS_POSITION,
@@ -30,6 +37,7 @@ KEPT = (
 )
 LOST_AFTER_S = 1.0
 DOWN = "pos_d_m"
+FOUND = "the log has no attitude: it is the navigator's own, from IMU and flow, its heading counted from its start"
 
 
 def to_record(replay: Replay, scores: dict[str, Any], command: list[str] | str) -> Record:
@@ -159,3 +167,29 @@ def _losses(replay: Replay, sensor: Sensor) -> list[tuple[float, str, str, str, 
         events.append((float(t_s[row]), sensor.name.lower(), "lost", "nothing fused for this long [s]", length))
         events.append((float(t_s[row + 1]), sensor.name.lower(), "back", "", np.nan))
     return events
+
+
+def with_attitude(log: Log, axes: Array | None = None) -> tuple[Log, str]:
+    """The log with an attitude, and a note where that is the navigator's own estimate.
+
+    axes (2, 2) of -1, 0, 1: how the flow sensor's lie, sensor = axes @ vehicle, where they are known to lie otherwise.
+    InputError where the log has neither an attitude nor what a replay needs to find one.
+    """
+    if Sensor.ATTITUDE in log.streams:
+        return log, ""
+    if Sensor.IMU not in log.streams:
+        raise InputError(
+            f"{log.path}: neither attitude nor IMU; one of them turns the reference into the sensor's axes"
+        )
+    options = ReplayOptions() if axes is None else ReplayOptions(identified=turned_sensor(log, axes))
+    found = replay(log, options, NavigatorSettingsFile()).said
+    known = np.isfinite(found.quaternion).all(axis=1)
+    attitude = Stream.of(Sensor.ATTITUDE, found.t_s[known], found.quaternion[known])
+    return replace(log, streams={**log.streams, Sensor.ATTITUDE: attitude}), FOUND
+
+
+def turned_sensor(log: Log, axes: Array) -> IdentifiedFlow:
+    """A sensor of gain 1 whose axes lie so, and whose readings are as old as the log makes them."""
+    delays_s = prepare(log, ReplayOptions()).delays_s
+    first, second = ((float(row[0]), float(row[1])) for row in axes)
+    return IdentifiedFlow(1.0, 1.0, max(delays_s.get(sensor, 0.0) for sensor in FLOW), (first, second))

@@ -1,30 +1,95 @@
-"""What a replay says of itself besides its errors: innovations, coverage of the sensors, where the path ended."""
+"""What a replay is judged by besides its errors: when the vehicle flew, innovations, coverage, sensors that do not
+serve, the autopilot's own estimate, and what a log would lack to be replayed."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.measurement import Array, Sensor, Stream
+from flownav.core.record import Table
 from flownav.estimation.gating import Reason
 from flownav.logs.log import Log
+from flownav.navigation.feed import SLOWEST_IMU_HZ, imu_serves, rate_hz
 from flownav.navigation.flags import flagged, flags_of
+from flownav.navigation.reasons import HORIZONTAL, REFUSALS
 from flownav.navigation.rows import EstimateRow, InnovationRow
 from flownav.navigation.tables import Written, estimate_table
-from flownav.replays.airborne import airborne_of
+from flownav.replays.prepare import GPS
+from flownav.replays.sentinel import Finding
 from flownav.scoring.consistency import consistency_of
 from flownav.scoring.coverage import coverage_of
-from flownav.scoring.path import motion_of, truth_motion
-from flownav.scoring.reference import drift_of, protection_of
+from flownav.scoring.path import autopilot_errors, in_frame_of, motion_of, truth_motion
+from flownav.scoring.reference import drift_of, flight_of, protection_of
 
+ON_THE_GROUND = 20  # readings of a range that starts on the ground
+LIFTED_M = 0.3  # a sonar's noise and a landing gear's spring are less
+NEAR_M = 0.1  # the way from here up to where it is surely lifted is flight already
+
+Window = tuple[float, float]
+AIDS = (Sensor.GPS_POSITION, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 NO_REJECTION = (Reason.FUSED, Reason.DATUM)
 TESTED = (Reason.FUSED, Reason.INNOVATION_GATE)
 # components that a sensor may leave out: a NaN here is nothing told, not a reading that is broken
 MAY_BE_LEFT_OUT = ((Sensor.GPS_VELOCITY, 2), (Sensor.FLOW_VELOCITY, 2), (Sensor.PAD, 2))
+LEAST_READINGS = 20
+LEAST_SHARE = 0.2  # a live session fuses what it heard in its first two seconds, however late
+LATE = Reason.LATE.label  # what a live session's horizon left out never came to the navigator
+
+
+def airborne_of(log: Log) -> Window | None:
+    """From the first lift-off to the last touchdown [s]; None where nobody says."""
+    if Sensor.LANDED in log.streams:
+        landed = log.streams[Sensor.LANDED]
+        flying = np.flatnonzero(landed.value[:, 0] < 0.5)
+        if len(flying):
+            last = flying[-1] + 1
+            return float(landed.t_s[flying[0]]), float(landed.t_s[last]) if last < len(landed) else log.span_s[1]
+    if log.truth is not None:
+        return flight_of(np.asarray(log.truth["t_s"], float), np.asarray(log.truth["pos_d_m"], float))
+    if Sensor.RANGE not in log.streams or len(log.streams[Sensor.RANGE]) < ON_THE_GROUND:
+        return None
+    distance = log.streams[Sensor.RANGE]
+    height_m = distance.value[:, 0] - np.median(distance.value[:ON_THE_GROUND, 0])
+    away = np.flatnonzero(height_m > LIFTED_M)
+    if not len(away):
+        return None
+    near = np.flatnonzero(height_m <= NEAR_M)
+    before, after = near[near < away[0]], near[near > away[-1]]
+    first = before[-1] + 1 if len(before) else away[0]
+    last = after[0] - 1 if len(after) else away[-1]
+    return float(distance.t_s[first]), float(distance.t_s[last])
+
+
+def flying_at(log: Log, t_s: Array) -> NDArray[np.bool_]:
+    """Which instants (n,) lie in flight, stops on the ground between cut out; all where nobody says."""
+    window = airborne_of(log)
+    if window is None:
+        return np.ones(len(t_s), bool)
+    inside = (t_s >= window[0]) & (t_s <= window[1])
+    if Sensor.LANDED not in log.streams:
+        return np.asarray(inside)
+    landed = log.streams[Sensor.LANDED]
+    row = np.clip(np.searchsorted(landed.t_s, t_s, side="right") - 1, 0, len(landed) - 1)
+    said = landed.value[row, 0] < 0.5
+    return np.asarray(inside & said if (landed.value[:, 0] < 0.5).any() else inside)
+
+
+def obstacles(log: Log) -> list[str]:
+    """What a replay of the log would lack, one line each; none where it can be replayed."""
+    found = []
+    if Sensor.ATTITUDE not in log.streams and not imu_serves(log.streams):
+        slow = Sensor.IMU in log.streams
+        has = f"its IMU has {rate_hz(log.streams[Sensor.IMU].t_s):.1f} Hz" if slow else "it has no IMU"
+        found.append(f"no attitude, and {has}: one of them is needed, an IMU of {SLOWEST_IMU_HZ:g} Hz or more")
+    if not log.streams.keys() & set(AIDS):
+        found.append("neither GPS nor optical flow: nothing to hold the position")
+    return found
 
 
 def consistency_scores(innovation: Array) -> dict[str, dict[str, Any]]:
@@ -105,3 +170,42 @@ def protection_scores(log: Log, written: Written) -> dict[str, Any] | None:
     )
     said = EstimateRow.of(rows)
     return protection_of(said.t_s, said.protection_m, flagged(said.t_s, flags_of(written.event)), drift)
+
+
+def unfused(innovation: Array, streams: Mapping[Sensor, Stream]) -> list[Finding]:
+    """One finding for each; innovation: rows of a tape's. Readings that were cut or know nothing do not count."""
+    found, offered = [], InnovationRow.of(innovation)
+    for sensor in HORIZONTAL:
+        rows = InnovationRow.of(innovation[(offered.sensor == sensor) & (offered.component < 2)])
+        if sensor not in streams:
+            continue
+        fused = len(np.unique(rows.t_s[rows.reason == Reason.FUSED]))
+        first = rows.reason[(rows.component == 0) & np.isin(rows.reason, REFUSALS)].astype(int)
+        why = Counter(Reason(reason).label for reason in first.tolist())
+        why[LATE] += streams[sensor].rejected.get(LATE, 0)
+        if why.total() >= LEAST_READINGS and fused < LEAST_SHARE * (fused + why.total()):
+            reasons = ", ".join(f"{reason} {count}" for reason, count in why.most_common() if count)
+            heard = f"{sensor.name.lower()} was heard and {'hardly' if fused else 'never'} fused"
+            text = f"{heard} ({fused} readings; {reasons}): the estimate rests on the other sensors"
+            found.append(Finding(text, unfused=True))
+    return found
+
+
+def autopilot_path(log: Log, gps_delay_s: float, t_s: Array, position: Array) -> Table | None:
+    """The autopilot's estimate in the frame of ours, t_s (n,) and position (n, 3); None where there is none.
+
+    Columns as record.TABLES["autopilot"].
+    """
+    return None if log.autopilot is None else in_frame_of(t_s, position, log.autopilot, _gps(log, gps_delay_s))
+
+
+def autopilot_scores(log: Log, gps_delay_s: float) -> dict[str, Any] | None:
+    """Name of the autopilot's estimator and the errors of its estimate (scoring/autopilot); None without one."""
+    if log.autopilot is None:
+        return None
+    return {"name": log.autopilot_name, **autopilot_errors(log.autopilot, log.truth, _gps(log, gps_delay_s))}
+
+
+def _gps(log: Log, delay_s: float) -> dict[Sensor, Stream]:
+    """GPS as the log has it, withheld or not, with its delay."""
+    return {sensor: replace(log.streams[sensor], delay_s=delay_s) for sensor in GPS if sensor in log.streams}

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from flownav.core.frames import rotation_from_quaternion, velocity_from_flow
 from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
-from flownav.logs.rates import attitude_at, mean_over
+from flownav.logs.frames import attitude_at, mean_over
 
 MOVING_M_S = 1.0
 LEAST_MOVING_S = 10.0

@@ -24,32 +24,14 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.smoother import smooth
 from flownav.navigation.tables import Written, estimate_table, written_on
 from flownav.navigation.tape import new_tape, tape_for
-from flownav.replays.airborne import airborne_of
-from flownav.replays.autopilot import autopilot_scores
+from flownav.replays import judged
 from flownav.replays.fed import prepared_as_fed, run_as_fed
-from flownav.replays.judged import (
-    NO_REJECTION,
-    consistency_scores,
-    coverage_scores,
-    protection_scores,
-    reading_scores,
-    told,
-)
 from flownav.replays.prepare import GPS, Prepared, ReplayOptions, check_windows, prepare, withhold
 from flownav.replays.sentinel import Finding, findings
-from flownav.replays.unfused import unfused
+from flownav.scoring import path as scored
 from flownav.scoring.coverage import silences
 from flownav.scoring.path import (
-    References,
     columns_of,
-    end_drift_of,
-    motion_of,
-    outage_of,
-    path_of,
-    path_scores,
-    truth_alignment,
-    truth_scores,
-    velocity_rms,
 )
 from flownav.scoring.reference import Alignment, OutageError
 
@@ -103,7 +85,7 @@ class Replay:
             what = "horizontal was fused" if len(fused) else "was fused"
             text = f"nothing {what}: the path is dead reckoning on attitude and accelerometer alone"
             found.append(Finding(text, label="Note"))
-        found += unfused(self.innovation, self.log.streams)
+        found += judged.unfused(self.innovation, self.log.streams)
         return found + [Finding(text) for text in silences(self.log.streams, self.log.span_s)]
 
     @cached_property
@@ -112,14 +94,14 @@ class Replay:
         return estimate_table(self.estimate)
 
     @cached_property
-    def references(self) -> References:
+    def references(self) -> scored.References:
         """What the log knows that the path is scored against."""
         return references_of(self.log, self.options)
 
     @cached_property
     def truth_alignment(self) -> Alignment | None:
         """How the log's truth lies in the estimate's frame; None without a truth that overlaps."""
-        return truth_alignment(path_of(self.table), self.log.truth)
+        return scored.truth_alignment(scored.path_of(self.table), self.log.truth)
 
     @cached_property
     def truth_position(self) -> Array:
@@ -128,31 +110,31 @@ class Replay:
 
     def outage(self, t0: float, t1: float) -> OutageError:
         """The outage error over a window."""
-        return outage_of(path_of(self.table), self.references, t0, t1)
+        return scored.outage_of(scored.path_of(self.table), self.references, t0, t1)
 
     def velocity_rms(self) -> float | None:
         """Horizontal velocity against GPS velocity at the instant it describes [m/s]; None without GPS."""
-        return velocity_rms(path_of(self.table), self.references)
+        return scored.velocity_rms(scored.path_of(self.table), self.references)
 
     def rejected(self) -> dict[str, dict[str, int]]:
         """What was not fused, by sensor and reason: rows by the reader, components by the filter, added up."""
         counts = {}
-        offered = InnovationRow.of(told(self.innovation))
+        offered = InnovationRow.of(judged.told(self.innovation))
         sensors, reasons = offered.sensor.astype(int), offered.reason.astype(int)
         for sensor, stream in self.log.streams.items():
             numbers = np.bincount(reasons[sensors == sensor], minlength=len(Reason))
-            found = {r.label: int(numbers[r]) for r in Reason if numbers[r] and r not in NO_REJECTION}
+            found = {r.label: int(numbers[r]) for r in Reason if numbers[r] and r not in judged.NO_REJECTION}
             if found or stream.rejected:
                 counts[sensor.name.lower()] = dict(Counter(stream.rejected) + Counter(found))
         return counts
 
     def truth_scores(self) -> dict[str, Any] | None:
         """Errors against the log's truth, turned and shifted onto the estimate; None without one."""
-        return truth_scores(path_of(self.table), self.references)
+        return scored.truth_scores(scored.path_of(self.table), self.references)
 
     def end_drift(self) -> float | None:
         """Horizontal error at the end of the flight, the truth laid on the estimate at take-off [m]; None without."""
-        return end_drift_of(motion_of(self.table), self.references)
+        return scored.end_drift_of(scored.motion_of(self.table), self.references)
 
     def scores(self) -> dict[str, Any]:
         """What `--json` prints, but for the outage table and the record's path."""
@@ -161,32 +143,32 @@ class Replay:
             "duration_s": end - start,
             **self.path_scores(),
             "end_drift_m": self.end_drift(),
-            "protection": protection_scores(self.log, self.written),
-            "consistency": consistency_scores(self.innovation),
-            "coverage": coverage_scores(self.log),
+            "protection": judged.protection_scores(self.log, self.written),
+            "consistency": judged.consistency_scores(self.innovation),
+            "coverage": judged.coverage_scores(self.log),
             "rejected": self.rejected(),
-            "readings": reading_scores(self.innovation, self.log.streams),
+            "readings": judged.reading_scores(self.innovation, self.log.streams),
             "warnings": [finding.text for finding in self.findings],
         }
         beside = {
-            "autopilot": autopilot_scores(self.log, self.options.gps_delay_s),
+            "autopilot": judged.autopilot_scores(self.log, self.options.gps_delay_s),
             "smoothed": self.smoothed_scores(),
         }
         return scores | {name: found for name, found in beside.items() if found is not None}
 
     def path_scores(self) -> dict[str, Any]:
         """Errors of the path: through each outage, of velocity against GPS, against the truth where there is one."""
-        return path_scores(self.table, self.references)
+        return scored.path_scores(self.table, self.references)
 
     def smoothed_scores(self) -> dict[str, Any] | None:
         """The same of the smoothed path; None without one."""
-        return None if self.smoothed is None else path_scores(estimate_table(self.smoothed), self.references)
+        return None if self.smoothed is None else scored.path_scores(estimate_table(self.smoothed), self.references)
 
 
-def references_of(log: Log, options: ReplayOptions) -> References:
+def references_of(log: Log, options: ReplayOptions) -> scored.References:
     """What a log knows of its flight: its GPS, withheld or not, and its truth."""
     fixes, speeds = (log.streams.get(sensor) for sensor in GPS)
-    return References(
+    return scored.References(
         fixes=None if fixes is None else (fixes.t_s, fixes.value),
         speeds=None if speeds is None else (speeds.t_s, speeds.value),
         gps_delay_s=options.gps_delay_s,
@@ -194,7 +176,7 @@ def references_of(log: Log, options: ReplayOptions) -> References:
         truth=log.truth,
         truth_name=log.truth_name,
         heading=log.heading_truth,
-        flight_s=airborne_of(log),
+        flight_s=judged.airborne_of(log),
     )
 
 

@@ -1,19 +1,88 @@
-"""Which sample logs there are, what each holds, how it is written, and what to try with it."""
+"""Which sample logs there are, what each holds, what to try with it, and how the plainer ones are written.
+
+The folder of CSV files is what `logs/csv_folder.py` reads (docs/reference/csv-folder.md); a ground station's MAVLink
+log is what the simulated vehicle of `live` tells, a time before each frame.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import struct
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from flownav.core.errors import InputError
-from flownav.export.samples.csv_folder import write_csv_folder
-from flownav.export.samples.dataflash import write_dataflash
-from flownav.export.samples.flight import sample_log, sample_record
-from flownav.export.samples.tlog import write_tlog
-from flownav.export.samples.ulog import write_ulog
+import numpy as np
 
+from flownav.core.errors import InputError
+from flownav.core.measurement import COLUMNS, Array, Sensor
+from flownav.core.record import POSITION_NED
+from flownav.export.samples.dataflash import write_dataflash
+from flownav.export.samples.flight import Fixes, angles_of, changes, fixes_of, sample_log, sample_record
+from flownav.export.samples.ulog import write_ulog
+from flownav.live.simulated import SimulatedVehicle
+from flownav.logs.log import Log
+
+MILLIGAUSS = 1e3
+FIX_3D = 3.0
+Columns = dict[str, Array]
+START_US = 1_767_225_600_000_000  # 2026-01-01: of the ground station's clock, which no flight was flown by
+STEP_S = 0.002
+LINK_S = 0.004  # from the vehicle to the ground station
 RIG_HEIGHTS_M, RIG_RUNS = (0.6, 1.0), 2
+
+
+def write_csv_folder(log: Log, folder: Path) -> None:
+    """Write a file for each sensor of a log into a folder that is there."""
+    for name, columns in tables_of(log):
+        formats = ["%.9f" if key in ("lat_deg", "lon_deg") else "%.6f" if key == "t_s" else "%.9g" for key in columns]
+        line = ",".join(formats)
+        rows = np.column_stack(list(columns.values())).tolist()
+        text = "\n".join([",".join(columns), *(line % tuple(row) for row in rows)]) + "\n"
+        (folder / f"{name}.csv").write_text(text, encoding="utf-8", newline="\n")
+
+
+def tables_of(log: Log) -> Iterator[tuple[str, Columns]]:
+    """Name and columns of each file; the attitude is the one that the vehicle's autopilot flew on."""
+    if log.autopilot is not None:
+        own = log.autopilot
+        angles = zip(("roll_rad", "pitch_rad", "yaw_rad"), angles_of(own).T, strict=True)
+        yield "attitude", {"t_s": own["t_s"], **dict(angles)}
+    for name, sensor in (("imu", Sensor.IMU), ("flow", Sensor.FLOW_RATE), ("baro", Sensor.BARO)):
+        if sensor in log.streams:
+            stream = log.streams[sensor]
+            columns = {"t_s": stream.t_s, **dict(zip(COLUMNS[sensor], stream.value.T, strict=True))}
+            yield name, columns | ({"quality": stream.quality} if sensor == Sensor.FLOW_RATE else {})
+    if Sensor.GPS_POSITION in log.streams:
+        yield "gps", _gps(fixes_of(log))
+    if Sensor.RANGE in log.streams:
+        ranges = log.streams[Sensor.RANGE]
+        yield "range", {"t_s": ranges.t_s, "range_m": ranges.value[:, 0], "valid": (ranges.quality > 0.0).astype(float)}
+    if Sensor.MAG in log.streams:
+        field = log.streams[Sensor.MAG]
+        names = (f"mag_{axis}_mgauss" for axis in "xyz")
+        yield "mag", {"t_s": field.t_s, **dict(zip(names, MILLIGAUSS * field.value.T, strict=True))}
+    if Sensor.LANDED in log.streams:
+        t_s, landed = changes(log)
+        yield "landed", {"t_s": t_s, "landed": landed}
+    if log.truth is not None:
+        place = {f"{axis}_m": log.truth[name] for axis, name in zip("xyz", POSITION_NED, strict=True)}
+        yield "truth", {"t_s": log.truth["t_s"], **place}
+        yield "heading_truth", {"t_s": log.truth["t_s"], "yaw_rad": angles_of(log.truth)[:, 2]}
+
+
+def _gps(fixes: Fixes) -> Columns:
+    velocity = dict(zip((f"vel_{axis}_m_s" for axis in "ned"), fixes.velocity_ned_m_s.T, strict=True))
+    place = {"lat_deg": fixes.lat_deg, "lon_deg": fixes.lon_deg, "alt_m": fixes.alt_m}
+    return {"t_s": fixes.t_s, "fix_type": np.full(len(fixes.t_s), FIX_3D), **place, **velocity}
+
+
+def write_tlog(log: Log, path: Path) -> None:
+    """Write a log as a .tlog. InputError where pymavlink is not installed."""
+    vehicle, parts = SimulatedVehicle(log), []
+    for t_s in np.arange(0.0, vehicle.end_s + STEP_S, STEP_S).tolist():
+        stamp = struct.pack(">Q", START_US + round((t_s + LINK_S) * 1e6))
+        parts += [stamp + frame for frame in vehicle.due(t_s, 0.0)]
+    path.write_bytes(b"".join(parts))
 
 
 class Sample(NamedTuple):

@@ -8,11 +8,9 @@ import numpy as np
 
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, Table
-from flownav.export.samples.angles import velocities_ned
-from flownav.export.samples.csv_folder import changes
-from flownav.export.samples.fixes import fixes_of
-from flownav.export.stamps import Stamps, stamps
-from flownav.export.ulog_messages import Field, Topic, assembled
+from flownav.export.samples.flight import changes, fixes_of, velocities_ned
+from flownav.export.tables import Stamps, stamps
+from flownav.export.ulog_topics import Field, Topic, assembled
 from flownav.logs.log import Log
 
 BOOT_S = 20.0  # the vehicle's time since boot when the log's time 0 is

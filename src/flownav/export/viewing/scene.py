@@ -13,10 +13,8 @@ import rerun as rr
 from numpy.typing import NDArray
 
 from flownav.core.record import POSITION_NED, Record
-from flownav.export.errors import SIGMAS
-from flownav.export.trajectory import ENU_FROM_NED, Trajectory
-from flownav.export.viewing.flow_arrows import flow_arrows
-from flownav.export.viewing.shapes import Camera, cameras, vehicle_outline
+from flownav.export.trajectory import ENU_FROM_NED, SIGMAS, Trajectory
+from flownav.export.viewing.shapes import Camera, cameras, flow_arrows, vehicle_outline
 
 TIMELINE = "t_s"
 EARTH, NED = "/enu", "/enu/ned"

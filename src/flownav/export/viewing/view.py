@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from flownav.core.errors import InputError
 from flownav.core.guard import written_whole
 from flownav.core.record import Record
-from flownav.export.trajectory import Trajectory, trajectories
+from flownav.export.trajectory import trajectories
 
 APPLICATION = "flownav"
 SUFFIX = ".rrd"
@@ -75,8 +75,7 @@ def _prepare(record: Record, name: str, to: Path | None = None) -> Prepared:
     paths = trajectories(record)
     import rerun as rr
 
-    from flownav.export.viewing.arrangement import arrangement
-    from flownav.export.viewing.plots import log_plots
+    from flownav.export.viewing.plots import arrangement, log_plots
     from flownav.export.viewing.scene import log_scene
 
     stream = rr.RecordingStream(APPLICATION, recording_id=str(uuid.uuid4()), send_properties=False)
@@ -86,8 +85,4 @@ def _prepare(record: Record, name: str, to: Path | None = None) -> Prepared:
     stream.send_recording_name(name)
     log_scene(stream, record, paths)
     log_plots(stream, record, paths)
-    return Prepared(stream, blueprint, _notes(paths))
-
-
-def _notes(paths: list[Trajectory]) -> list[str]:
-    return [note for path in paths for note in path.notes]
+    return Prepared(stream, blueprint, [note for path in paths for note in path.notes])

@@ -21,8 +21,8 @@ from flownav.lab.identification.reference_motion import (
     velocity_response,
     with_flow,
 )
+from flownav.logs.frames import mean_over
 from flownav.logs.log import Log
-from flownav.logs.rates import mean_over
 
 CLEAR = 2.0  # the best assignment must explain this much more than the next
 

@@ -18,7 +18,7 @@ from flownav.core.errors import InputError
 from flownav.core.guard import written_whole
 from flownav.core.parameter_files import check
 from flownav.core.provenance import hash_of
-from flownav.core.toml_text import to_toml
+from flownav.core.text import to_toml
 from flownav.lab.identification.descent import Structure
 from flownav.lab.identification.findings import Findings, Response
 from flownav.lab.identification.quantities import Interval, coefficients, numerator

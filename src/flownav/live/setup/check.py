@@ -7,11 +7,9 @@ from typing import Any
 
 from flownav.live.link import Address
 from flownav.live.reception import Vehicle
-from flownav.live.setup.compare import Block, Row, blocks_of, rows_of, source_set
-from flownav.live.setup.exchange import Change, read, why_not, write
+from flownav.live.setup.compare import Block, Row, blocks_of, port_names, port_of, rows_of, source_set
 from flownav.live.setup.knowledge import Knowledge, knowledge_of
-from flownav.live.setup.serial_port import port_names, port_of
-from flownav.live.setup.talk import Talk
+from flownav.live.setup.talk import Change, Talk, read, why_not, write
 from flownav.mavlink.parameters import Value
 
 MEET_S = 10.0
@@ -90,7 +88,8 @@ def check(
         _write(talk, report, values)
         after = _compared(known, values, send, asked_set or report.source_set or None, address if uart else None)
         report.rows, report.blocks, report.fits, report.verdict = after.rows, after.blocks, after.fits, after.verdict
-        if rebooting := [row.name for row in after.rows if row.reboot and row.name in _written(report)]:
+        written = {change.name for change in report.changes if change.done}
+        if rebooting := [row.name for row in after.rows if row.reboot and row.name in written]:
             report.notes.insert(
                 0, f"Reboot the vehicle, then run this again: {', '.join(rebooting)} count from then on."
             )
@@ -127,10 +126,6 @@ def _compared(
         port=port, notes=notes,
         in_flight=[line.replace("{n}", str(chosen)) for line in in_flight],
     )  # fmt: skip
-
-
-def _written(report: Report) -> set[str]:
-    return {change.name for change in report.changes if change.done}
 
 
 def _write(talk: Talk, report: Report, values: dict[str, Value]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from flownav.core.parameter_files import ParameterModel, load, shipped
-from flownav.mavlink.dialect import ARDUPILOT, PX4
+from flownav.mavlink.framing import ARDUPILOT, PX4
 from flownav.mavlink.parameters import Value
 
 MAKES = {ARDUPILOT: "setup/ardupilot.toml", PX4: "setup/px4.toml"}

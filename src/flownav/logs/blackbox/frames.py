@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.compile import kernel
-from flownav.logs.blackbox.header import Header
-from flownav.logs.blackbox.values import AT_MOST, Bytes, Numbers, packed, signed_vb, unsigned_vb
+from flownav.logs.blackbox.format import AT_MOST, Bytes, Header, Numbers, packed, signed_vb, unsigned_vb
 
 FRAME_I, FRAME_P, FRAME_S, FRAME_G, FRAME_H, FRAME_E = 73, 80, 83, 71, 72, 69
 LONGEST_FRAME = 1024

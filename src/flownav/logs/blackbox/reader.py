@@ -22,15 +22,12 @@ from flownav.core.errors import InputError
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import Table
-from flownav.logs.absences import absences_of
-from flownav.logs.assembly import content_of, gps_streams, sensor_stream, sha256_of
+from flownav.logs.assembly import MOST_BYTES, Origin, content_of, gps_streams, sensor_stream, sha256_of
+from flownav.logs.blackbox.format import Header, headers
 from flownav.logs.blackbox.frames import Frames, read_frames
-from flownav.logs.blackbox.header import Header, headers
-from flownav.logs.fixes import Origin
-from flownav.logs.flu import frd, ned_from_frd_of_nwu
-from flownav.logs.log import Log
-from flownav.logs.plausible import check_times, of_one_clock
-from flownav.logs.states import state_table
+from flownav.logs.frames import frd, ned_from_frd_of_nwu, state_table
+from flownav.logs.log import Log, absences_of
+from flownav.logs.plausible import of_one_clock
 
 US, CM, DEG_E7, DECIDEGREE = 1e-6, 1e-2, 1e-7, 0.1
 FLOW_RAW = 2  # INAV's debug_mode
@@ -63,7 +60,7 @@ def read_blackbox(path: Path, *, flow_instance: int | None = None) -> Log:
     """
     if flow_instance is not None:
         raise InputError(f"--flow-instance: {path} is a blackbox log, with one flow sensor at most; leave it out")
-    content = content_of(path, "a blackbox log")
+    content = content_of(path, "a blackbox log", MOST_BYTES)
     found = headers(content)
     if not found:
         raise InputError(f"{path}: no blackbox log whose header defines its fields; give another log")
@@ -76,24 +73,14 @@ def read_blackbox(path: Path, *, flow_instance: int | None = None) -> Log:
     fixes, origin = _gps(header, frames, start_us)
     listed = [_imu(header, frames, t_s), _attitude(frames, t_s), _flow(header, frames, t_s), _range(frames, t_s),
               _baro(frames, t_s), *fixes]  # fmt: skip
-    streams, strays = of_one_clock({stream.sensor: stream for stream in listed if stream is not None})
-    if not streams:
-        raise InputError(f"{path}: no usable reading of any sensor; log gyro, accelerometer, barometer and GPS")
-    check_times(path, streams)
+    nothing = "no usable reading of any sensor; log gyro, accelerometer, barometer and GPS"
+    streams, strays = of_one_clock(path, listed, nothing)
     own = _estimate(frames, t_s, streams.get(Sensor.ATTITUDE))
     return Log(
-        path,
-        streams,
-        origin,
-        None,
-        {path.name: sha256_of(content)},
-        (*_notes(path, found, header, frames), *strays),
-        own,
-        header.firmware if own is not None else "",
-        {},
-        tuple(absences_of(streams, flow_rate=_no_flow(header), **LACKING)),
-        clock_start_s=US * start_us,
-    )
+        path, streams, origin, None, {path.name: sha256_of(content)}, (*_notes(path, found, header, frames), *strays),
+        own, header.firmware if own is not None else "", {},
+        tuple(absences_of(streams, flow_rate=_no_flow(header), **LACKING)), clock_start_s=US * start_us,
+    )  # fmt: skip
 
 
 def _notes(path: Path, found: list[Header], header: Header, frames: Frames) -> list[str]:
@@ -229,7 +216,7 @@ def _estimate(frames: Frames, t_s: Array, attitude: Stream | None) -> Table | No
     up_is_down = np.array([1.0, 1.0, -1.0])
     turned = None
     if attitude is not None and len(attitude) > 1:
-        from flownav.logs.rates import attitude_at
+        from flownav.logs.frames import attitude_at
 
         turned = attitude_at(attitude, t_s[rows])
     return state_table(t_s[rows], CM * place[rows] * up_is_down, CM * speed[rows] * up_is_down, turned)

@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from flownav.core.errors import InputError
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_body
 from flownav.core.measurement import Array, Sensor, Stream
+from flownav.logs.assembly import Origin, local_ned, near_the_rest
 from flownav.logs.csv_table import CsvTable
-from flownav.logs.dataflash.columns import DataFlash
-from flownav.logs.dataflash.rows import Field, check_rows, message_rows
-from flownav.logs.fixes import Origin, local_ned, near_the_rest
-from flownav.logs.rates import attitude_at
+from flownav.logs.dataflash.columns import DataFlash, Field, check_rows, message_rows
+from flownav.logs.frames import attitude_at
 
 GYRO_LIMIT_RAD_S = 70.0  # twice the range of a 2000 deg/s gyro
 RANGE_GOOD, FACING_DOWN = 4, 25  # RangeFinder::Status::Good, ROTATION_PITCH_270
@@ -146,12 +145,6 @@ def attitude(table: CsvTable) -> Stream:
     return Stream.of(Sensor.ATTITUDE, table.t_s, quaternion, rejected=table.rejected)
 
 
-def imu(table: CsvTable) -> Stream:
-    """IMU: rad/s and m/s2, body FRD."""
-    value = table.matrix("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")
-    return Stream.of(Sensor.IMU, table.t_s, value, rejected=table.rejected)
-
-
 def gps(table: CsvTable, accuracy: CsvTable | None, origin: Origin, delay_s: float) -> list[Stream]:
     """GPS and, at the same TimeUS, GPA: velocity first, so that a filter that starts at a fix knows how fast."""
     speed, course, down = table.matrix("Spd", "GCrs", "VZ").T
@@ -175,27 +168,6 @@ def _at_same_time(t_s: Array, accuracy: CsvTable | None) -> Array:
     at = np.minimum(np.searchsorted(accuracy.t_s, t_s), len(accuracy.t_s) - 1)
     values = accuracy.matrix("HAcc", "VAcc", "SAcc", "VV")[at]
     return np.where((accuracy.t_s[at] == t_s)[:, None], values, np.nan)
-
-
-def flow(table: CsvTable) -> Stream:
-    """OF: mean angular rates since the last reading, and the gyro's [rad/s]."""
-    value = table.matrix("flowX", "flowY", "bodyX", "bodyY")
-    return Stream.of(Sensor.FLOW_RATE, table.t_s, value, quality=table.columns["Qual"], rejected=table.rejected)
-
-
-def distance(table: CsvTable) -> Stream:
-    """RFND."""
-    return Stream.of(Sensor.RANGE, table.t_s, table.matrix("Dist"), rejected=table.rejected)
-
-
-def pressure_height(table: CsvTable) -> Stream:
-    """BARO: height above where it was started."""
-    return Stream.of(Sensor.BARO, table.t_s, table.matrix("Alt"), rejected=table.rejected)
-
-
-def magnetic_field(table: CsvTable) -> Stream:
-    """MAG: the field with the vehicle's offsets taken off [gauss]."""
-    return Stream.of(Sensor.MAG, table.t_s, table.matrix("MagX", "MagY", "MagZ"), rejected=table.rejected)
 
 
 def landed(table: CsvTable, start_s: float) -> Stream:
@@ -230,9 +202,13 @@ def rangefinder_instance(log: DataFlash) -> int:
 
 STREAMS: dict[str, Callable[[CsvTable], Stream]] = {
     "ATT": attitude,
-    "IMU": imu,
-    "OF": flow,
-    "RFND": distance,
-    "BARO": pressure_height,
-    "MAG": magnetic_field,
+    # rad/s and m/s2, body FRD
+    "IMU": lambda table: table.stream(Sensor.IMU, "GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ"),
+    # mean angular rates since the last reading, and the gyro's [rad/s]
+    "OF": lambda table: table.stream(Sensor.FLOW_RATE, "flowX", "flowY", "bodyX", "bodyY", quality="Qual"),
+    "RFND": lambda table: table.stream(Sensor.RANGE, "Dist"),
+    "BARO": lambda table: table.stream(Sensor.BARO, "Alt"),  # height above where it was started
+    "MAG": lambda table: table.stream(
+        Sensor.MAG, "MagX", "MagY", "MagZ"
+    ),  # the vehicle's offsets are taken off [gauss]
 }

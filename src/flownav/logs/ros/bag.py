@@ -1,12 +1,25 @@
-"""What a bag holds, whatever file it lies in: channels, messages, and what walking through it finds."""
+"""What a bag holds, whatever file it lies in; bags of SQLite (.db3) and of ROS 1 (.bag); messages as objects.
+
+rosbag2_storage_sqlite3 has the tables of a .db3: https://github.com/ros2/rosbag2, rosbag2_storage_sqlite3/README.md.
+The library rosbags reads a .bag, and makes objects of bytes from the definitions that the bag itself holds.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sqlite3
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import closing
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from flownav.core.errors import InputError
 
 MCAP_MAGIC, SQLITE_MAGIC, ROS1_MAGIC = b"\x89MCAP0\r\n", b"SQLite format 3\0", b"#ROSBAG V2.0\n"
+NEEDED = "ROS bags need the package rosbags: pip install 'flownav[ros]'"
+LARGEST_CHUNK = 256 << 20
+LONGEST_DEFINITION = 64 << 10
 
 
 class Channel(NamedTuple):
@@ -41,3 +54,110 @@ class Bag:
 
 
 Wanted = Callable[[Channel], bool]
+
+
+def sqlite_messages(path: Path, bag: Bag, wanted: Wanted) -> Iterator[Message]:
+    """The wanted messages of a .db3 file. InputError where SQLite cannot open it or it holds no bag's tables."""
+    try:
+        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro&immutable=1", uri=True)) as base:
+            base.text_factory = lambda text: text.decode(errors="replace")
+            channels = _channels(base)
+            bag.channels.update(channels.values())
+            taken = [number for number, channel in channels.items() if wanted(channel)]
+            marks = ",".join("?" * len(taken))
+            rows = base.execute(f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({marks})", taken)
+            try:
+                for number, log_ns, data in rows:
+                    if isinstance(log_ns, int) and isinstance(data, bytes) and number in channels:
+                        yield Message(channels[number], log_ns, data)
+            except (sqlite3.Error, OverflowError) as error:
+                bag.notes.append(f"{path.name}: damaged ({error}); what follows is left out")
+    except (sqlite3.Error, OverflowError) as error:
+        raise InputError(f"{path}: no readable ROS 2 bag ({error}); give another log") from error
+
+
+def _channels(base: sqlite3.Connection) -> dict[int, Channel]:
+    definitions = {}
+    if base.execute("SELECT 1 FROM sqlite_master WHERE name = 'message_definitions'").fetchone():
+        query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+        definitions = {str(kind): (str(words), str(encoding)) for kind, encoding, words in base.execute(query)}
+    found = {}
+    for number, topic, kind, encoding in base.execute("SELECT id, name, type, serialization_format FROM topics"):
+        words, definition_kind = definitions.get(str(kind), ("", ""))
+        found[number] = Channel(str(topic), str(kind), str(encoding), words, definition_kind)
+    return found
+
+
+def ros1_messages(path: Path, bag: Bag, wanted: Wanted) -> Iterator[Message]:
+    """The wanted messages of a .bag file. InputError where the library cannot open it (a bag without its index)."""
+    try:
+        from rosbags.rosbag1 import Reader
+    except ImportError as error:
+        raise InputError(NEEDED) from error
+    try:
+        reader = Reader(path)
+        reader.open()
+    except Exception as error:  # whatever the library raises is the file's fault
+        why = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(f"{path}: no readable ROS 1 bag ({why}); try `rosbag reindex`") from error
+    try:
+        channels = {
+            connection: Channel(connection.topic, connection.msgtype, "ros1", connection.msgdef.data, "ros1msg")
+            for connection in reader.connections
+        }
+        bag.channels.update(channels.values())
+        taken = [connection for connection, channel in channels.items() if wanted(channel)]
+        if taken:
+            for connection, log_ns, data in reader.messages(connections=taken):
+                yield Message(channels[connection], log_ns, bytes(data))
+    except Exception as error:
+        bag.notes.append(f"{path.name}: damaged ({type(error).__name__}); what follows is left out")
+    finally:
+        reader.close()
+
+
+class Decoder:
+    """Makes objects of messages. undecodable: how many could not be, by topic; undefined: topics without a type."""
+
+    def __init__(self) -> None:
+        self.undecodable: Counter[str] = Counter()
+        self.undefined: set[str] = set()
+        self._stores: dict[Channel, Any] = {}
+
+    def decode(self, message: Message) -> Any | None:
+        """A message's object; None, counted, where its bytes are none of its type."""
+        channel = message.channel
+        if channel not in self._stores:
+            self._stores[channel] = self._store(channel)
+        store = self._stores[channel]
+        if store is None:
+            return None
+        read = store.deserialize_ros1 if channel.encoding == "ros1" else store.deserialize_cdr
+        try:
+            return read(message.data, channel.kind)
+        except Exception:  # whatever the library stumbles over is the file's fault
+            self.undecodable[channel.topic] += 1
+            return None
+
+    def _store(self, channel: Channel) -> Any | None:
+        """The types of a channel: its own definition's; without one those of ROS itself. None where there is none."""
+        try:
+            from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+        except ImportError as error:
+            raise InputError(NEEDED) from error
+        if channel.definition and len(channel.definition) <= LONGEST_DEFINITION:
+            read = {"ros2idl": lambda words, kind: get_types_from_idl(words)}.get(
+                channel.definition_kind, get_types_from_msg
+            )
+            try:
+                store = get_typestore(Stores.EMPTY)
+                store.register(read(channel.definition, channel.kind))
+                if channel.kind in store.fielddefs:
+                    return store
+            except Exception:  # a definition that is damaged: ROS's own serves, where it has one
+                pass
+        known = get_typestore(Stores.ROS1_NOETIC if channel.encoding == "ros1" else Stores.ROS2_HUMBLE)
+        if channel.kind in known.fielddefs:
+            return known
+        self.undefined.add(channel.topic)
+        return None

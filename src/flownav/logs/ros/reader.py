@@ -1,27 +1,33 @@
-"""A bag as a Log: which messages are read, on one clock, and what is said of the choice. docs/reference/ros.md."""
+"""A bag as a Log: which messages are read, on one clock, and what is said of the choice. docs/reference/ros.md.
+
+px4_msgs (https://github.com/PX4/px4_msgs) become the topics of a ULog: the same fields under the same names, so the
+same converters make streams of them. A topic's name is that of uORB behind /fmu/out/ (`uxrce_dds_client`), with the
+version that PX4 1.16 appends (_v1).
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.provenance import hash_of
-from flownav.logs.absences import absences_of
-from flownav.logs.log import Log
-from flownav.logs.plausible import check_plausible, check_times, of_one_clock
-from flownav.logs.ros import px4, standard
-from flownav.logs.ros.bag import Bag, Channel
-from flownav.logs.ros.choice import chosen
-from flownav.logs.ros.clock import Clock, clock_of
-from flownav.logs.ros.columns import NAMES, Gathered, stamp_of, values_of
+from flownav.logs.log import Log, absences_of
+from flownav.logs.plausible import check_plausible, of_one_clock
+from flownav.logs.record_log import is_ours, log_of_export
+from flownav.logs.ros import standard
+from flownav.logs.ros.bag import Bag, Channel, Decoder
 from flownav.logs.ros.containers import files_of, messages
-from flownav.logs.ros.decoding import Decoder
-from flownav.logs.ros.exported import is_ours, log_of_export
-from flownav.logs.ulog import STATES, log_of_topics
+from flownav.logs.ros.topics import NAMES, Clock, Gathered, chosen, clock_of, stamp_of, values_of
+from flownav.logs.ulog import FIELDS, STATES, TOPICS, log_of_topics
+from flownav.logs.ulog_topics import Topic, Topics, count_from_first
 
+PACKAGE = "px4_msgs/msg/"
+US = 1e-6
 LACKING = {
     "attitude": "no attitude (an orientation in sensor_msgs/Imu, px4_msgs/VehicleAttitude)",
     "imu": "no IMU (sensor_msgs/Imu, px4_msgs/SensorCombined)",
@@ -33,6 +39,50 @@ LACKING = {
 SHOWN = 8  # topics in a message
 
 
+def px4_topic(topic: str, kind: str) -> str:
+    """The uORB name that a topic stands for; "" where it is none that is read."""
+    name = re.sub(r"_v\d+$", "", topic.rsplit("/", 1)[-1])
+    bare = name.rstrip("0123456789")
+    for each in (name, bare):
+        if each in TOPICS:
+            return each
+    snake = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", kind.removeprefix(PACKAGE)).lower()
+    return snake if snake in TOPICS and kind != f"{PACKAGE}VehicleOdometry" else ""
+
+
+def px4_values(message: Any) -> tuple[tuple[str, ...], tuple[float, ...]]:
+    """Times and the wanted fields of a message, arrays element by element."""
+    names, values = ["timestamp"], [float(message.timestamp)]
+    for name in message.__dataclass_fields__:
+        if name not in FIELDS and name != "timestamp_sample":
+            continue
+        value = getattr(message, name)
+        if isinstance(value, (bool, int, float)):
+            names.append(name)
+            values.append(float(value))
+        elif isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "fiub":
+            names += [f"{name}[{k}]" for k in range(len(value))]
+            values += [float(each) for each in value]
+    return tuple(names), tuple(values)
+
+
+def px4_topics(gathered: list[Gathered], sha256: str, states: tuple[str, ...]) -> Topics:
+    """The topics, in order, their times in seconds since the first reading (`Topics.start_s` on PX4's clock)."""
+    found = []
+    count: dict[str, int] = {}
+    for each in sorted(gathered, key=lambda topic: topic.topic):
+        name = px4_topic(each.topic, each.kind)
+        columns = {field: each.column(field)[:, 0] for field in each.names}
+        t_s = US * columns.pop("timestamp")
+        if "timestamp_sample" in columns:
+            columns["sample_s"] = US * columns.pop("timestamp_sample")
+        topic = Topic(t_s, columns, name=name, instance=count.get(name, 0))
+        count[name] = topic.instance + 1
+        found.append(topic)
+    return Topics(found, {}, sha256, count_from_first(found, states))
+
+
+# -- the log ------------------------------------------------------------------------------------------------
 @np.errstate(all="ignore")  # a flipped bit makes numbers that overflow; the limits leave them out
 def read_ros(path: Path, *, flow_instance: int | None = None, topics: Mapping[str, str] | None = None) -> Log:
     """Read a ROS 2 bag (folder, .db3, .mcap), a ROS 1 bag (.bag), or an MCAP file that `flownav export` wrote.
@@ -54,8 +104,8 @@ def read_ros(path: Path, *, flow_instance: int | None = None, topics: Mapping[st
         raise InputError(f"{path}: no message of a known type{why}; the bag holds {listed}")
     inputs = {file.name: hash_of(file) for file in files}
     notes = [*bag.notes, *_lost(decoder)]
-    flown = [topic for topic in gathered if topic.kind.startswith(px4.PACKAGE)]
-    others = [topic for topic in gathered if not topic.kind.startswith(px4.PACKAGE)]
+    flown = [topic for topic in gathered if topic.kind.startswith(PACKAGE)]
+    others = [topic for topic in gathered if not topic.kind.startswith(PACKAGE)]
     if flown:
         return _px4_log(path, flown, others, inputs, notes, flow_instance, topics or {})
     return _ros_log(path, others, inputs, notes, flow_instance, topics or {})
@@ -75,7 +125,7 @@ def _gathered(files: list[Path], bag: Bag, decoder: Decoder) -> list[Gathered]:
                 if channel.kind in NAMES:
                     names, values = NAMES[channel.kind], values_of(channel.kind, content)
                 else:
-                    names, values = px4.px4_values(content)
+                    names, values = px4_values(content)
                 gathered.take(message.log_ns, stamp_of(content), names, values)
             except (AttributeError, TypeError, ValueError, IndexError, OverflowError):
                 decoder.undecodable[channel.topic] += 1  # a type of that name with other fields
@@ -86,9 +136,7 @@ def _known(channel: Channel) -> bool:
     """Whether a topic's messages are read."""
     if channel.encoding not in ("cdr", "ros1"):
         return False
-    return channel.kind in NAMES or bool(
-        channel.kind.startswith(px4.PACKAGE) and px4.px4_topic(channel.topic, channel.kind)
-    )
+    return channel.kind in NAMES or bool(channel.kind.startswith(PACKAGE) and px4_topic(channel.topic, channel.kind))
 
 
 def _lost(decoder: Decoder) -> list[str]:
@@ -104,10 +152,8 @@ def _ros_log(
     roles, choice = chosen(gathered, asked, flow_instance)
     clock, clock_notes = clock_of(roles.values())
     listed, origin = standard.streams_of(roles, clock)
-    streams, strays = of_one_clock({stream.sensor: stream for stream in listed})
-    if not streams:
-        raise InputError(f"{path}: no usable reading of any sensor; record an Imu and a NavSatFix or OpticalFlowRad")
-    check_times(path, streams)
+    nothing = "no usable reading of any sensor; record an Imu and a NavSatFix or OpticalFlowRad"
+    streams, strays = of_one_clock(path, listed, nothing)
     check_plausible(path, streams)
     truth, own = (
         standard.path_table(roles[name], clock.times(roles[name]) - clock.delay_s(roles[name]))
@@ -118,19 +164,11 @@ def _ros_log(
     if "range" in roles:
         choice.append(f"range {roles['range'].topic} is taken to look down: its message does not say where it looks")
     return Log(
-        path,
-        streams,
-        origin,
-        truth,
-        inputs,
-        (*notes, *choice, *clock_notes, *strays),
-        own,
-        roles["autopilot"].topic if own is not None else "",
-        standard.limits_of(roles),
-        tuple(absences_of(streams, **LACKING)),
-        clock_start_s=clock.start_ns * 1e-9,
+        path, streams, origin, truth, inputs, (*notes, *choice, *clock_notes, *strays),
+        own, roles["autopilot"].topic if own is not None else "", standard.limits_of(roles),
+        tuple(absences_of(streams, **LACKING)), clock_start_s=clock.start_ns * 1e-9,
         truth_name=roles["truth"].topic if truth is not None else "",
-    )
+    )  # fmt: skip
 
 
 def _px4_log(
@@ -138,7 +176,7 @@ def _px4_log(
     flow_instance: int | None, asked: Mapping[str, str],
 ) -> Log:  # fmt: skip
     """As of a ULog; a reference from another topic (motion capture) is laid on PX4's clock by the times of logging."""
-    topics = px4.px4_topics(flown, "", STATES)
+    topics = px4_topics(flown, "", STATES)
     offset_ns = np.median(np.concatenate([each.logged - 1e3 * each.column("timestamp")[:, 0] for each in flown]))
     poses, choice = chosen(others, {name: topic for name, topic in asked.items() if name == "truth"}, None)
     truth, truth_name = None, ""

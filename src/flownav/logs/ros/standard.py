@@ -11,12 +11,9 @@ import numpy as np
 
 from flownav.core.measurement import Array, Sensor, Stream
 from flownav.core.record import POSITION_NED, Table
-from flownav.logs.assembly import gps_streams, pressure_altitude_m, sensor_stream
-from flownav.logs.fixes import Origin
-from flownav.logs.flu import frd, ned, ned_from_frd
-from flownav.logs.ros.clock import Clock
-from flownav.logs.ros.columns import POSE, QUATERNION, Gathered
-from flownav.logs.states import in_order, state_table
+from flownav.logs.assembly import Origin, counted, gps_streams, pressure_altitude_m, sensor_stream
+from flownav.logs.frames import frd, in_order, ned, ned_from_frd, state_table
+from flownav.logs.ros.topics import POSE, QUATERNION, Clock, Gathered
 
 GAUSS_PER_TESLA = 1e4
 KNOWN_COVARIANCE = 1  # sensor_msgs/NavSatFix: COVARIANCE_TYPE_APPROXIMATED and above
@@ -51,26 +48,23 @@ def _imu(roles: dict[str, Gathered], clock: Clock) -> list[Stream | None]:
 
 
 def _simple(roles: dict[str, Gathered], clock: Clock) -> list[Stream | None]:
+    def said(sensor: Sensor, topic: Gathered, value: Array) -> Stream | None:
+        return sensor_stream(sensor, clock.times(topic), value, delay_s=clock.delay_s(topic))
+
     found: list[Stream | None] = []
     if "baro" in roles:
-        topic = roles["baro"]
-        height = pressure_altitude_m(topic.column("pressure")[:, 0])
-        found.append(sensor_stream(Sensor.BARO, clock.times(topic), height, delay_s=clock.delay_s(topic)))
+        found.append(said(Sensor.BARO, roles["baro"], pressure_altitude_m(roles["baro"].column("pressure")[:, 0])))
     if "mag" in roles:
-        topic = roles["mag"]
-        field = GAUSS_PER_TESLA * frd(topic.column("x", "y", "z"))
-        found.append(sensor_stream(Sensor.MAG, clock.times(topic), field, delay_s=clock.delay_s(topic)))
+        found.append(said(Sensor.MAG, roles["mag"], GAUSS_PER_TESLA * frd(roles["mag"].column("x", "y", "z"))))
     if "range" in roles:
-        topic = roles["range"]
-        range_m, low, high = topic.column("range", "min_range", "max_range").T
+        range_m, low, high = roles["range"].column("range", "min_range", "max_range").T
         range_m = np.where((range_m >= low) & ((range_m <= high) | (high <= low)), range_m, np.nan)
-        found.append(sensor_stream(Sensor.RANGE, clock.times(topic), range_m, delay_s=clock.delay_s(topic)))
+        found.append(said(Sensor.RANGE, roles["range"], range_m))
     elif "flow" in roles:
-        topic = roles["flow"]
-        distance, quality = topic.column("distance", "quality").T
+        distance, quality = roles["flow"].column("distance", "quality").T
         distance = np.where((distance > 0.0) & (quality > 0.0), distance, np.nan)
         if np.isfinite(distance).any():
-            found.append(sensor_stream(Sensor.RANGE, clock.times(topic), distance, delay_s=clock.delay_s(topic)))
+            found.append(said(Sensor.RANGE, roles["flow"], distance))
     return found
 
 
@@ -88,11 +82,9 @@ def _flow(roles: dict[str, Gathered], clock: Clock) -> Stream | None:
     value[blind & ~np.isfinite(value[:, :2]).all(axis=1), :2] = 0.0
     timed = np.isfinite(dt_s) | blind
     delay_s = clock.delay_s(topic) + 0.5 * (float(np.nanmedian(dt_s)) if np.isfinite(dt_s).any() else 0.0)
-    untimed = int(np.count_nonzero(~timed))
-    rejected = {"no_integration_time": untimed} if untimed else {}
     return sensor_stream(
         Sensor.FLOW_RATE, clock.times(topic)[timed], value[timed], quality=quality[timed], delay_s=delay_s,
-        rejected=rejected,
+        rejected=counted(no_integration_time=~timed),
     )  # fmt: skip
 
 

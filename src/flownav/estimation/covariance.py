@@ -37,7 +37,7 @@ from flownav.estimation.states import (
     TEST_RATIO,
 )
 
-LARGEST_VARIANCE = 1e30
+LARGEST_VARIANCE = 1e30  # chosen: no reading is so poor, and its square is still finite
 
 
 def with_lag(lanes: Lanes) -> Lanes:

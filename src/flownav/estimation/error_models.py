@@ -105,7 +105,7 @@ def forget(work: Work, lanes: Lanes, n: int, state: int, sigma: float, factor: f
 
 
 Array = NDArray[np.float64]
-TAYLOR_ORDER = 12
+TAYLOR_ORDER = 12  # of a norm of 1/16 at most, whose next term is 4e-26: exact to rounding (test_discretise)
 
 
 def discretised(a: Array, b: Array, dt_s: float) -> tuple[Array, Array]:

@@ -25,7 +25,7 @@ from flownav.estimation.kalman import (
 
 STATES = 6
 INPUTS = 4
-OPEN_GATE_SIGMA = 1e6
+OPEN_GATE_SIGMA = 1e6  # the paper's filter has no gate
 
 
 class PaperModel(NamedTuple):

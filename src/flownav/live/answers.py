@@ -22,7 +22,7 @@ from flownav.navigation.loop import Running
 from flownav.navigation.memory import PAD_KNOWN, PROTECTION, SUSPECTED, load_aid, load_imu, load_start
 from flownav.navigation.place import SEEN
 
-LONGEST_AHEAD_S = 2.0
+LONGEST_AHEAD_S = 2.0  # chosen: twice the longest horizon, within the inertial readings that are kept
 UNFUSED = "unfused"  # a reason that the session finds (serving.py)
 INVALID = 2.0  # the flag of `memory.AidMemory`
 WITHHELD = {
@@ -43,7 +43,7 @@ WITHHELD = {
 ONBOARD_CONTROLLER, ACTIVE = 18, 4  # MAV_TYPE, MAV_STATE
 ODOMETRY_COMPONENT = 197  # MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY
 OWN_SYSTEM = 1  # until the vehicle's is known, which we then are of
-STEEPEST = 0.1  # cosine of the steepest sight of the pad that is told
+STEEPEST = 0.1  # cosine of the steepest sight of the pad that is told, 84 deg: chosen, beyond any camera's view
 
 
 def why_withheld(on: Running | None, t_s: float, newest_s: float, limits: Limits) -> str:

@@ -13,8 +13,8 @@ from typing import Any
 from flownav.core.errors import InputError
 from flownav.live.link import EVERYWHERE_6, FORMS, MOST_BYTES, Address, Link, Outgoing, Piece, UdpLink, parse_url
 
-RECONNECT_S = 1.0  # for a call to be answered
-UNHEARD_MS = 5000  # a peer that acknowledges nothing for so long is gone
+RECONNECT_S = 1.0  # for a call to be answered: chosen
+UNHEARD_MS = 5000  # a peer that acknowledges nothing for so long is gone: chosen; the kernel's own takes minutes
 
 
 class ByteLink(Link):

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-LAST_WAIT_S = 1.0  # for the terminal, at the end
+LAST_WAIT_S = 1.0  # for the terminal, at the end: chosen
 DRAWN = b"."
 
 

@@ -26,9 +26,9 @@ from flownav.navigation.told import Equipment
 from flownav.sensors.datasheet import UNTURNED, in_vehicle_axes
 
 NAN = float("nan")
-BATCH = 64  # readings at a time, 6 ms of them
+BATCH = 64  # readings at a time, 6 ms of them; all at once, the first estimates stop the loop for 130 ms
 KEPT_IMU = 512  # two seconds at 250 Hz, more than the horizon and an exposure
-KEPT_ATTITUDES = 128
+KEPT_ATTITUDES = 128  # more than two seconds at 50 Hz
 FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
 JUMPS = (int(START), int(GPS_RESET))  # events at which the estimate jumps
 

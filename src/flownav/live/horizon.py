@@ -19,14 +19,16 @@ from flownav.navigation.reasons import HORIZONTAL, REFUSALS
 from flownav.navigation.rows import InnovationRow
 
 SILENT_S = 2.0  # a source that says nothing for so long gives way
+# Chosen, and held by test_live_recordings: ArduPilot repeats a fix of 5 Hz at 10 Hz, its first copy up to 0.1 s old;
+# with a horizon that did not follow it, all fixes came too late on most starts.
 WINDOW_S = 5.0
 WINDOWS = 4  # a stream that comes in time again is waited for so many windows longer
-MOST_WAITING = 8192
+MOST_WAITING = 8192  # chosen: ten seconds of a busy link; a flood is dropped and counted (test_live_safety)
 WATCHED = (*HORIZONTAL, Sensor.RANGE)
 DOWNWARD = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE)  # on the ground they need not serve
 LATE = Reason.LATE.label
-LEAST_READINGS = 10
-GONE_S = 2.0  # a sensor that has said nothing for so long is silent, which the screen shows otherwise
+LEAST_READINGS = 10  # chosen: 2 s of a 5 Hz receiver
+GONE_S = 2.0  # a sensor that has said nothing for so long is silent, which the screen shows otherwise: chosen
 
 
 class Source(NamedTuple):

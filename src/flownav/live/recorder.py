@@ -28,8 +28,8 @@ from flownav.mavlink.messages import TrueState
 from flownav.navigation.tables import fed_rows
 from flownav.navigation.told import Equipment
 
-MOST_NOTES = 100_000
-FACTS_S = 1.0
+MOST_NOTES = 100_000  # chosen, so that memory has a bound
+FACTS_S = 1.0  # chosen: a killed session loses its last second
 
 
 class Finished(NamedTuple):

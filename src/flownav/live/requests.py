@@ -20,6 +20,8 @@ OF_A_SIMULATOR = "SIM_SPEEDUP"
 MOST_QUESTIONS, AGAIN_S = 4, 2.0
 SET_MESSAGE_INTERVAL, REQUEST_MESSAGE = 511, 512  # MAV_CMD
 ACCEPTED, TEMPORARILY_REJECTED, IN_PROGRESS = 0, 1, 5  # MAV_RESULT
+# Chosen; after a reboot that leaves HEARTBEAT and TIMESYNC alone all streams are back within seconds (test_live_safety,
+# test_live_recordings).
 ANSWER_S = 0.5
 TRIES = 3
 SILENT_S = 2.0  # a stream that has said nothing for so long is asked for again

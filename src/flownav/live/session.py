@@ -27,7 +27,7 @@ from flownav.navigation.reasons import HORIZONTAL
 from flownav.navigation.rows import InnovationRow
 
 SECOND = 1.0
-SEND_EVERY_S = 0.02  # without flow; with it, an estimate for each of its readings
+SEND_EVERY_S = 0.02  # without flow, above EKF2's 30 Hz; with it, an estimate for each of its readings
 OUTRANKED = ("", "position_invalid", "dead_reckoning", "unprotected")  # what a sensor that does not serve may cause
 NAN = float("nan")
 

@@ -35,7 +35,7 @@ OF_SENSOR = {
     Sensor.RANGE: "DISTANCE_SENSOR",
 }
 KEPT = 20_000  # estimates heard
-FRACTION = 0.9  # of an interval that must have passed: schedules jitter
+FRACTION = 0.9  # of an interval that must have passed: schedules jitter; chosen
 
 
 class Due(NamedTuple):

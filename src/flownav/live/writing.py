@@ -26,11 +26,12 @@ from flownav.logs.journal import MAGIC, SUFFIX, block
 
 LOCK_WAIT_S = 1.0  # for somebody who only looks whether the journal is locked
 NO_LOCKS = (errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS, errno.EINVAL)  # of file systems that have none
+# Chosen: together less than the second that a killed session may lose (test_at_most_a_second_is_not_on_the_disk).
 WRITE_S = 0.2  # how often what has come is written
 SYNC_S = 0.5  # how often it is forced to the disk
 HEAD_EVERY_S = 60.0  # the head is written again, so that a damaged sector at the start does not cost the flight
-MOST_WAITING = 64 << 20  # bytes that may wait for a disk that does not answer
-LAST_WAIT_S = 30.0  # for the disk, at the end
+MOST_WAITING = 64 << 20  # bytes that may wait for a disk that does not answer: chosen
+LAST_WAIT_S = 30.0  # for the disk, at the end: chosen
 
 Rows = dict[str, Array]
 

@@ -9,6 +9,7 @@ from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import FROM_ATTITUDE, FROM_MAG, FROM_YAW, NO_HEADING, Equipment
 from flownav.sensors.magnetometer import declination_rad
 
+# chosen: 25 Hz (dataflash/heli_sitl) gives 0.05 m rms (league.md); voxl's IMU of 2 Hz is passed over
 SLOWEST_IMU_HZ = 20.0
 
 

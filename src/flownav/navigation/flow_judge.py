@@ -37,9 +37,9 @@ with_turning = replacing(Look, "turning_x", "turning_y")
 with_reason = replacing(Look, "reason")
 with_gyro = replacing(FlowMemory, "bias_x", "bias_y", "bias_count")
 
-LARGEST_SPREAD = 0.5  # of the height over the ground, of which flow makes no speed
-UNKNOWN_RANGE_M = 2.0
-NEAR_LIMIT = 0.98  # a sensor that has reached its limit reads the limit, whatever the flow
+LARGEST_SPREAD = 0.5  # of the height over the ground, of which flow makes no speed: chosen, not measured
+UNKNOWN_RANGE_M = 2.0  # chosen: an angular flow over an unknown height is written down, not fused (NO_HEIGHT)
+NEAR_LIMIT = 0.98  # a sensor at its limit reads the limit, whatever the flow: chosen, 2 % for rounding (test_judges)
 
 
 @equation

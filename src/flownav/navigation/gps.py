@@ -24,10 +24,10 @@ from flownav.navigation.told import GpsSettings
 from flownav.navigation.trust import OF_GPS, follow_noise, scale_noise
 from flownav.navigation.verdicts import Event, Force, Offer, Reset, Tested, on_lanes
 
-LEAST_REJECTIONS = 5
-SOON_S = 1.0
-UNKNOWN_PAD_M = 100.0
-LEAST_PAD_VARIANCE_M2 = 1e-6
+LEAST_REJECTIONS = 5  # chosen: a second of a 5 Hz receiver; one refusal alone is none (test_judges)
+SOON_S = 1.0  # with 7 s a flow of the wrong sign carried the vehicle 84 m off, so 10 to 15 (flownav faults)
+UNKNOWN_PAD_M = 100.0  # as good as unknown: the tie to the vehicle that follows tells it
+LEAST_PAD_VARIANCE_M2 = 1e-6  # chosen: 1 mm, so that a tie is never exact
 
 with_ratio = replacing(GpsMemory, "level_ratio")
 with_reset = replacing(GpsMemory, "told_s", "moved_n_m", "moved_e_m")

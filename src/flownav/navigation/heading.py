@@ -19,8 +19,8 @@ from flownav.navigation.tape import Output
 from flownav.navigation.told import FROM_YAW, AttitudeSettings, Equipment
 from flownav.navigation.verdicts import Offer, on_lanes
 
-LEAST_FIELD_GAUSS = 1e-3
-LEAST_STEP_S = 1e-3
+LEAST_FIELD_GAUSS = 1e-3  # chosen: hundreds of times less than the level field but near the magnetic poles
+LEAST_STEP_S = 1e-3  # keeps a division finite
 
 with_time = replacing(HeadingMemory, "read_s")
 with_field = replacing(HeadingMemory, "field_rad")

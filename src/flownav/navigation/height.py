@@ -52,17 +52,20 @@ from flownav.navigation.verdicts import (
 )
 from flownav.navigation.vibration import doubted_imu
 
-DOUBTING_S = 0.05  # a range that alone tells the height and is refused so long is believed, not the accelerometer
-AGREEMENT_M, AGREEMENT_SHARE = 0.2, 0.05  # ranges of one ground agree so far
-LEAST_AGREEING = 3.0
-STILL_S = 1.0  # a range that repeats itself so long while a ground is sought is of a vehicle that stands
-ECHO_M, ECHO_SHARE = 0.1, 0.03  # neighbouring ranges of one ground differ by no more
-STRAYS_OVER_RANGES = 20.0  # ranges over which strays are counted
-MANY_STRAYS = 0.15  # so many ranges without an echo tell nothing of the ground's level, or of the accelerometer
-UNSEEN_M_S = 1.0  # a range that repeats itself may hide this climb or descent
-LONGEST_REPEAT_S = 2.0  # nobody hovers so still for longer: a sensor out of its reach says the same for ever
-SERVED_S = 1.0  # before it began to repeat itself, that a range was fused
-UNAIDED_TRAVEL_RATIO = 5.0  # times the travel, where nothing else tells the height
+# Logs are those of ../shared/data; a stray is a range that neither of the two before it confirms.
+# Refused so long, a range that alone tells the height is believed, not the accelerometer: chosen; at once, a lone echo
+# would make the accelerometer doubted.
+DOUBTING_S = 0.05
+AGREEMENT_M, AGREEMENT_SHARE = 0.2, 0.05  # ranges of one ground agree so far: chosen, not measured
+LEAST_AGREEING = 3.0  # one echo finds no ground; a roof of 1.2 m is found after 1.45 s (test_navigation_safeguards)
+STILL_S = 1.0  # a range that repeats itself so long while a ground is sought is of a vehicle that stands: not measured
+ECHO_M, ECHO_SHARE = 0.1, 0.03  # outdoor: 99 % of neighbours differ by 0.04 m or less, 1 in 10^4 is a stray
+STRAYS_OVER_RANGES = 20.0  # chosen; nine that agree then end a step of the ground (test_navigation_safeguards)
+MANY_STRAYS = 0.15  # sonars that jump have 0.11 (outdoor-3) and 0.78 (outdoor-2) of strays, sound ones 0.02 at most
+UNSEEN_M_S = 1.0  # climb or descent that a repeated range may hide: chosen, what it weighs is held by test_judges
+LONGEST_REPEAT_S = 2.0  # a still hover repeats one value for 1.9 s (outdoor), a range beyond reach for 2.1 (outdoor-3)
+SERVED_S = 1.0  # believing a range that says the same from the first on, 436 of 480 gusty approaches land; else 455
+UNAIDED_TRAVEL_RATIO = 5.0  # times the travel, where nothing else tells the height: chosen, held by test_judges
 
 
 with_value = replacing(RangeMemory, "last_m", "same_s", "down_m")

@@ -15,8 +15,8 @@ from flownav.navigation.trust import AccelFactors
 from flownav.navigation.verdicts import AppliedMotion, Event, Force, MotionNoise, on_lanes
 from flownav.navigation.vibration import followed_vibration, with_reading
 
-LEAST_STEP_S = 0.002  # a shorter step is not made to pay what is owed
-STEADY_S = 0.1
+LEAST_STEP_S = 0.002  # chosen: half a period at 250 Hz; what is owed over less would be an acceleration of its own
+STEADY_S = 0.1  # chosen: of vibration at 24 Hz (the shipped rotor) a fifteenth is left
 with_motion = replacing(ImuMemory, "vibration", "gap")
 Motion = tuple[float, float, float, float, float, float]  # body rate [rad/s] and specific force [m/s2], body FRD
 

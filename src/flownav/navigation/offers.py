@@ -25,11 +25,11 @@ from flownav.navigation.tape import AIDED_AGAIN, DEAD_RECKONING, POSITION_INVALI
 from flownav.navigation.told import AidSettings
 from flownav.navigation.verdicts import Accepted, Event, Fate, Noise, Observation, Offered, Tested, on_lanes
 
-CLOCK_SLACK_S = 1e-6
-LIKE_READINGS = 4.0  # so many readings after one another err alike
-FEW_STRAYS = 0.02  # so few ranges that no neighbour confirms are none
-STRAY_SHARE = 1.5  # some strays confirm each other
-STRAY_SPAN_M = 5.0
+CLOCK_SLACK_S = 1e-6  # the tick of logged times
+LIKE_READINGS = 4.0  # so many readings after one another err alike: chosen; what it gives, integrity.md has
+FEW_STRAYS = 0.02  # sound ranges have 0.013 (mocap) and 0.02 (e-steps) at most, those that jump 0.11 and 0.78
+STRAY_SHARE = 1.5  # some strays confirm each other: chosen; halved or doubled it fails test_strays
+STRAY_SPAN_M = 5.0  # chosen: sonars' neighbours are 3.2 and 3.7 m apart at most (outdoor-2 and -3)
 
 with_aid = replacing(AidMemory, "aided_s", "flag")
 with_flag = replacing(AidMemory, "flag")

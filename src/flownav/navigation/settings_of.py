@@ -24,13 +24,13 @@ from flownav.sensors.pad_camera_sheet import PadCameraSheet
 from flownav.sensors.range_sensor import RangeSensorSheet
 from flownav.sensors.sheets import SensorSheets
 
-ABOVE_FLOOR_M = 0.01  # a rangefinder that reads its floor says only that there is no more
-LEAST_SHARE = 0.05  # of a stated accuracy, where the sheet says what changes from fix to fix
-BIAS_LIMIT_SIGMAS = 3.0  # standard deviations that a limit of a bias leaves room for
-VIBRATION_MARGIN = 2.0  # times the stated vibration; what is beyond it, the sheet does not know
-AIDED_HZ = 2.0  # slower motion is held by what aids the IMU
-WASH_LASTS_S = 3.0
-CLIMB_M_S = 1.0  # by how much a lag errs, in a descent at this speed
+ABOVE_FLOOR_M = 0.01  # a step of the shipped lidar: a rangefinder that reads its floor says only that there is no more
+LEAST_SHARE = 0.05  # of a stated accuracy, where the sheet says what changes from fix to fix: chosen, not measured
+BIAS_LIMIT_SIGMAS = 3.0  # a limit leaves room for all but 3 in 1000 units; chosen
+VIBRATION_MARGIN = 2.0  # chosen, not measured: what is beyond twice the stated vibration, the sheet does not know
+AIDED_HZ = 2.0  # chosen, not measured: slower motion is held by what aids the IMU
+WASH_LASTS_S = 3.0  # chosen, not measured: how long a rotor's wash deceives a barometer
+CLIMB_M_S = 1.0  # chosen: a lag errs by its length in a descent at this speed
 
 Keys = dict[str, float]
 

@@ -27,17 +27,18 @@ from flownav.navigation.told import FROM_MAG, FROM_YAW, NO_HEADING, Equipment
 from flownav.navigation.verdicts import Biases, Event, Force, on_lanes
 from flownav.navigation.vibration import with_reading
 
+# All chosen for any small vehicle, none fitted to a log; what no test is named beside is not measured.
 ORIGIN_SIGMA_M = 0.1  # the local origin, where the navigator's start defines it
 LOST_SIGMA_M = 10.0  # the same where the log's fixes define it and came too late, and about a first fix
-READ_TILT_RAD = 0.03  # an attitude that was read
-STANDING_TILT_RAD = 0.07  # of a vehicle that stands, or hovers, before anything is read: 4 deg
-LEVELLED_FLOOR_RAD = 0.005  # of one from the accelerometer
-READ_HEADING_RAD = 0.1  # an autopilot's, whose compass is calibrated
-UNKNOWN_RAD = 1.5  # one that is to be found from the course
-COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's
+READ_TILT_RAD = 0.03  # an attitude that was read: three times the autopilot's usual error (ins_tilt_sigma_rad)
+STANDING_TILT_RAD = 0.07  # before anything is read, 4 deg; a shaken force believed wholly fails test_start
+LEVELLED_FLOOR_RAD = 0.005  # of one from the accelerometer; the sum covers the truth (test_start)
+READ_HEADING_RAD = 0.1  # an autopilot's, whose compass is calibrated: outdoor's is 5 to 7 deg off the course for 50 s
+UNKNOWN_RAD = 1.5  # one that is to be found from the course: any of half a turn
+COMPASS_HEADING_RAD = 0.3  # a raw magnetometer's: twice the usual hard iron (compass_sigma_rad)
 DATUM_HEADING_RAD = 1e-3  # the start defines the frame
-UNTOLD_HEADING_RAD = 1.0  # the first heading that is told will
-LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0
+UNTOLD_HEADING_RAD = 1.0  # the first heading that is told will, 0.5 rad off (test_an_external_heading_is_taken)
+LEAST_LEVELLING, MOST_LEVELLING = 5.0, 100.0  # readings whose mean is level: 0.1 to 2 s at 50 Hz
 
 with_force = replacing(StartMemory, "force_x", "force_y", "force_z", "readings", "shaken")
 with_attitude = replacing(StartMemory, "attitude_s", "qw", "qx", "qy", "qz")

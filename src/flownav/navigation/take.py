@@ -54,10 +54,12 @@ from flownav.navigation.tape import ESTIMATE_PERIOD_S, Output, output_of, write_
 from flownav.navigation.told import FROM_MAG, NO_HEADING, Equipment
 from flownav.navigation.vibration import add_vibration_noise, limit_biases
 
-LONGEST_STEP_S = 0.1
-MOST_STEPS = 10000
-LOST_M, LOST_M_S = 1e5, 1e6  # standard deviations: more than this, and correlations are beyond a double's digits
-LONGEST_LAG_OF_ERRORS_S = 0.1  # Gauss-Markov errors go on at least so often
+LONGEST_STEP_S = 0.1  # chosen, not measured: only pauses of the IMU make longer ones
+MOST_STEPS = 10000  # chosen: 1000 s in steps of LONGEST_STEP_S; a pause of hours takes longer ones (test_long_pauses)
+# Standard deviations: more than this, and correlations are beyond a double's digits. Without it variances are NaN after
+# two hours without an aid (test_long_pauses).
+LOST_M, LOST_M_S = 1e5, 1e6
+LONGEST_LAG_OF_ERRORS_S = 0.1  # chosen: Gauss-Markov errors, of 5 s and more, go on at least so often
 
 
 @procedure

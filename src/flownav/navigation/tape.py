@@ -34,7 +34,7 @@ from flownav.navigation.rows import (
     store_innovation,
 )
 
-ESTIMATE_PERIOD_S = 0.02
+ESTIMATE_PERIOD_S = 0.02  # the 50 Hz at which autopilots and the simulator fly on it
 OBSERVES: dict[Sensor, tuple[str, ...]] = {  # of each sensor's reading, what the filter is offered
     **{sensor: names for sensor, names in COLUMNS.items() if sensor != Sensor.IMU},
     Sensor.FLOW_RATE: COLUMNS[Sensor.FLOW_RATE][:2],

@@ -18,18 +18,21 @@ from flownav.navigation.reasons import FUSED, INNOVATION_GATE
 from flownav.navigation.records import EchoMemory, GpsMemory, NoiseMemory, WhitenessMemory
 from flownav.navigation.verdicts import Noise, Tested, on_lanes
 
+# Chosen together: an accelerometer that comes to read 3 m/s2 too much moves the position by 0.1 m (test_hard_flights),
+# white innovations of any size leave the factor at 1 (test_trust). Each but the largest, halved or doubled, fails
+# test_trust.
 BLOCK_S = 0.1
 LONGEST_BLOCK_S = 1.0  # readings further apart say nothing of each other
 FOLLOWING_BLOCKS = 10.0
 LIKENESS_ALLOWED = 0.15
 FACTOR_PACE = 0.2  # by how much the factor grows or shrinks in a block, per likeness beyond what is allowed
-LARGEST_FACTOR = 30.0
-NOISE_TIME_S = 20.0
-SMALLEST_NOISE, LARGEST_NOISE = 0.02, 25.0  # of the variance that is said
-SMALLEST_OF_BARO = 0.1  # wash and gusts last
+LARGEST_FACTOR = 30.0  # 1 carries that position half a kilometre off
+NOISE_TIME_S = 20.0  # chosen: a noise is found within 15 % (test_trust)
+SMALLEST_NOISE, LARGEST_NOISE = 0.02, 25.0  # of the variance that is said: chosen; the first is held by test_trust
+SMALLEST_OF_BARO = 0.1  # wash and gusts last: chosen, not measured
 # places of components whose noise is followed; GPS position and velocity have three
 OF_RANGE, OF_BARO, OF_GPS = 0, 1, 2
-STRAY_SHARE = 0.02  # a share of ranges that say nothing
+STRAY_SHARE = 0.02  # among so many strays ranges say nothing of the accelerometer: `offers.FEW_STRAYS` (test_trust)
 
 with_sum = replacing(WhitenessMemory, "since_s", "total", "readings")
 with_factor = replacing(WhitenessMemory, "factor")

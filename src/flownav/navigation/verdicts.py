@@ -197,7 +197,7 @@ class Doubt(NamedTuple):
     variance: float
 
 
-UNKNOWN_M = 100.0  # the doubt of a ground, an origin or a pad that is about to be found
+UNKNOWN_M = 100.0  # the doubt of a ground, an origin or a pad that is about to be found: more than a first fix errs
 
 NO_EVENT = Event(-1, 0.0)
 NO_RESET = Reset(-1, 0.0, 0.0)

@@ -20,14 +20,16 @@ from flownav.navigation.told import ImuSettings
 from flownav.navigation.trust import AccelFactors
 from flownav.navigation.verdicts import Biases, Doubt, Event, on_lanes
 
-FOLLOWING_S = 1.0
+# Chosen together: 3 m/s2 rectified at take-off leave the height within 0.3 m (test_vibration_at_take_off), 6 in half a
+# second within 5 m (test_hard_flights). None was varied alone.
+FOLLOWING_S = 1.0  # over which readings' scatter is followed (test_judges)
 DOUBT_M_S2 = 2.0  # of an accelerometer that the range contradicts
 DOUBT_LASTS_S = 60.0
 FREED_WALK_M_S2_RT_S = 0.02  # of a bias, for each time that the accelerometer is noisier than told
 with_doubt = replacing(ImuMemory, "doubt_m_s2")
 
-BIAS_LIMIT_SIGMAS = 3.0  # standard deviations that a limit leaves room for
-DOUBTED_SPEED_M_S = 1.0  # what it may have done to the velocity
+BIAS_LIMIT_SIGMAS = 3.0  # standard deviations that a limit leaves room for: chosen, as in `settings_of`
+DOUBTED_SPEED_M_S = 1.0  # what it may have done to the velocity: half a second of DOUBT_M_S2
 
 
 @equation

@@ -35,7 +35,7 @@ KEPT = (
     Sensor.BARO,
     Sensor.PAD,
 )
-LOST_AFTER_S = 1.0
+LOST_AFTER_S = 1.0  # chosen: five fixes of a 5 Hz receiver; it writes events, and decides nothing
 DOWN = "pos_d_m"
 FOUND = "the log has no attitude: it is the navigator's own, from IMU and flow, its heading counted from its start"
 

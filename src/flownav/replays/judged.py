@@ -27,9 +27,9 @@ from flownav.scoring.coverage import coverage_of
 from flownav.scoring.path import autopilot_errors, in_frame_of, motion_of, truth_motion
 from flownav.scoring.reference import drift_of, flight_of, protection_of
 
-ON_THE_GROUND = 20  # readings of a range that starts on the ground
-LIFTED_M = 0.3  # a sonar's noise and a landing gear's spring are less
-NEAR_M = 0.1  # the way from here up to where it is surely lifted is flight already
+ON_THE_GROUND = 20  # readings of a range that starts on the ground: chosen, 0.4 to 2 s
+LIFTED_M = 0.3  # sound ranges vary by 0.01 m on the ground (indoor-made); outdoor-2's sonar jumps, and errs by 4 s
+NEAR_M = 0.1  # the way from here up to where it is surely lifted is flight already: chosen
 
 Window = tuple[float, float]
 AIDS = (Sensor.GPS_POSITION, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
@@ -37,8 +37,8 @@ NO_REJECTION = (Reason.FUSED, Reason.DATUM)
 TESTED = (Reason.FUSED, Reason.INNOVATION_GATE)
 # components that a sensor may leave out: a NaN here is nothing told, not a reading that is broken
 MAY_BE_LEFT_OUT = ((Sensor.GPS_VELOCITY, 2), (Sensor.FLOW_VELOCITY, 2), (Sensor.PAD, 2))
-LEAST_READINGS = 20
-LEAST_SHARE = 0.2  # a live session fuses what it heard in its first two seconds, however late
+LEAST_READINGS = 20  # chosen: 4 s of a 5 Hz receiver
+LEAST_SHARE = 0.2  # chosen: a live session fuses what it heard in its first two seconds, however late
 LATE = Reason.LATE.label  # what a live session's horizon left out never came to the navigator
 
 

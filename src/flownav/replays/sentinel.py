@@ -20,8 +20,11 @@ from flownav.core.frames import rotation_from_quaternion, velocity_from_flow
 from flownav.core.measurement import COLUMNS, Array, Sensor, Stream
 from flownav.logs.frames import attitude_at, mean_over
 
+# Chosen so that nothing is said of quad-px4flow-outdoor, whole or in any part of 30 to 120 s, and each of its twelve
+# spoilt copies is found out (test_replay_sentinel). Halving or doubling any one of them changes no verdict on nine such
+# parts and eleven copies, but for LEAST_OVERLAP, which beyond 1 silences all; that of the climb has but 40 intervals.
 MOVING_M_S = 1.0
-LEAST_MOVING_S = 10.0
+LEAST_MOVING_S = 10.0  # take-off and hover, 12 s of that log, say nothing
 LEAST_MOVING_FOR_LAG_S = 20.0
 LEAST_PAIRS = 30
 SMOOTHING_S = 0.6
@@ -29,19 +32,19 @@ STALE_S = 1.0
 LARGEST_LAG_S = 15.0
 LAG_STEP_S = 0.1
 LEAST_OVERLAP = 0.7
-LARGEST_TILT_RAD = 0.8
-RANGE_LIMITS_M = (0.02, 100.0)
+LARGEST_TILT_RAD = 0.8  # `tilt_limit_rad`, beyond which no flow is fused
+RANGE_LIMITS_M = (0.02, 100.0)  # the navigator's default limits of a range
 FASTEST = 2.0  # times the speed by GPS: a faster flow reading is a spike
 LIKE = 1.3  # noise ratio up to which two ways to read the flow are as good as each other
 CLEARLY = 0.5  # a better explanation leaves less than this share of the power that the other leaves
 UNEXPLAINED = 0.4  # an explanation that leaves more than this share of the power is none
 SLACK = (1.5, 0.05)  # a simpler explanation serves if it leaves no more than this: factor, and share of power
-LEAST_HEADING_ERROR_RAD = 0.35
-ABOUT_RAD = 2.6
-LEAST_CLOCK_ERROR_S = 0.8
+LEAST_HEADING_ERROR_RAD = 0.35  # 20 deg: outdoor's own yaw is 5 to 7 off its course
+ABOUT_RAD = 2.6  # 149 deg
+LEAST_CLOCK_ERROR_S = 0.8  # outdoor's receiver itself lags by 0.23 s or more (../shared/data/README.md)
 CLIMB_INTERVAL_S = 2.0
 LEAST_CLIMB_LIKENESS = 0.3
-SIGNIFICANT = 3.5  # standard errors
+SIGNIFICANT = 3.5  # standard errors: one in 4000 by chance
 
 Matrix = tuple[tuple[int, int], tuple[int, int]]
 RIGHT: Matrix = ((1, 0), (0, 1))

@@ -36,8 +36,8 @@ from flownav.scoring.path import (
 from flownav.scoring.reference import Alignment, OutageError
 
 HORIZONTAL = (*GPS, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)
-LONGEST_TABLE = 2000
-LEAST_WINDOW_S = 1e-6
+LONGEST_TABLE = 2000  # chosen: a replay each, hours of them
+LEAST_WINDOW_S = 1e-6  # what rounding leaves of a window is none
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ from flownav.vehicle.trim import Trim, parked, parked_multirotor
 
 NEVER_S = 1e9
 GO_AROUND = {"height_m": "go_around_height_m", "most": "go_arounds_most"}
-CORNER_S = 1.5  # a corner of the path is flown at constant acceleration for so long
+CORNER_S = 1.5  # a corner is flown at constant acceleration for so long: take-off passes 3 m by 0.06, not by 0.29
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,7 @@ class Buffers(NamedTuple):
 # of the sensors that a vehicle carries (`carried`)
 RECIRCULATION_CHANNEL = 36
 
-KEYED_EPOCHS = 2  # a lane's noise stream may change from one so many epochs to the next: 40 ms
+KEYED_EPOCHS = 2  # a lane's noise stream may change every 40 ms; at 100 a step of rare events' walk moves too much
 
 
 class Noise(NamedTuple):

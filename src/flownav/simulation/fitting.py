@@ -26,7 +26,7 @@ from flownav.simulation.schedule import Schedule, Timing, schedule_of
 from flownav.simulation.truth import CARRIED, Carried
 from flownav.vehicle.kinds import AnyVehicle, rotor_facts
 
-START_WAIT_S = 10.0
+START_WAIT_S = 10.0  # the navigator's default start_wait_s
 
 
 class Fitted(NamedTuple):

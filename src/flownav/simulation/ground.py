@@ -94,8 +94,8 @@ def under_rotor(north_m: float, east_m: float, over_plane_m: float, radius_m: fl
     return over_plane_m - 1.0 / np.sqrt(strength) if ground.step_m * ground.step_m > 0.0 else 0.0
 
 
-WORST_WIND = 0.7  # of the induced velocity
-STILL_M_S = 0.3
+WORST_WIND = 0.7  # of the induced velocity: Curtiss et al. 1984, as above
+STILL_M_S = 0.3  # keeps a division finite: no hovering rotor's air is so slow
 
 
 class RecirculationParameters(NamedTuple):

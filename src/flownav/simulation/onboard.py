@@ -25,9 +25,9 @@ from flownav.vehicle.state import HelicopterState
 
 EPOCH_S = 0.02
 PHYSICS_PERIOD_S = 0.002
-LEAST_HEIGHT_M = 0.1
+LEAST_HEIGHT_M = 0.1  # keeps an image's rate finite; chosen: nearer, no lens sees its pad sharply
 PAD_SEEN = 4  # tangents forward and right, distance and reach of the mark that was found [m]; reach 0: none
-SETTLED_S = 2.0  # the skids take the weight as the collective goes down
+SETTLED_S = 2.0  # the skids take the weight as the collective goes down: chosen, not measured
 
 
 class Clock(NamedTuple):

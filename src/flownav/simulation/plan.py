@@ -24,7 +24,7 @@ ATTITUDE_STEPS = 5  # 250 Hz within an epoch
 PHYSICS_STEPS = 2  # 500 Hz within an attitude step
 ATTITUDE_S = EPOCH_S / ATTITUDE_STEPS
 PHYSICS_S = ATTITUDE_S / PHYSICS_STEPS
-CONTACT_SHARE = 0.05  # of the weight on the skids counts as touching (a skid switch)
+CONTACT_SHARE = 0.05  # of the weight on the skids counts as touching (a skid switch): chosen, not measured
 START_STEP = 1 << 40  # the noise counter's step for the draws before the first epoch
 NOTHING = np.zeros(0)
 

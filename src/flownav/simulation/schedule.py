@@ -22,7 +22,7 @@ from flownav.simulation.truth import CARRIED
 
 JITTER_KEY = 20251121  # of the timetable's own generator: it is part of the scenario, not of a seed
 KEYS_A_KIND = 256  # of several sensors of one kind each has its own jitter
-SLACK_S = 1e-9
+SLACK_S = 1e-9  # what rounding leaves of an instant
 
 
 class Timing(NamedTuple):

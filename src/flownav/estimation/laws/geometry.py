@@ -5,8 +5,8 @@ from __future__ import annotations
 from flownav.core.compile import equation, larger
 from flownav.core.frames import Rotation, Vector
 
-LEAST_RANGE_M = 0.05
-LEAST_UPRIGHT = 0.1
+LEAST_RANGE_M = 0.05  # chosen: no flow is fused nearer to the ground (flow_min_height_m)
+LEAST_UPRIGHT = 0.1  # 84 deg, which only keeps a division finite: from 46 on no flow or range is fused (tilt_limit_rad)
 
 
 @equation

@@ -12,7 +12,7 @@ from flownav.live.setup.knowledge import Knowledge, knowledge_of
 from flownav.live.setup.talk import Change, Talk, read, why_not, write
 from flownav.mavlink.parameters import Value
 
-MEET_S = 10.0
+MEET_S = 10.0  # chosen: ten HEARTBEATs
 ENABLING = ("VISO_TYPE", "PLND_ENABLED")  # ArduPilot shows the rest of the group once these are set
 
 

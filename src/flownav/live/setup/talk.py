@@ -21,13 +21,13 @@ from flownav.mavlink.signing import sign_outgoing
 COMPANION = 197  # MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY, which `live` speaks as
 ONBOARD_CONTROLLER, ACTIVE = 18, 4  # MAV_TYPE, MAV_STATE
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
-FRESH_S = 3.0  # an older HEARTBEAT does not say whether the vehicle is armed
-WAIT_S = 0.02
+FRESH_S = 3.0  # an older HEARTBEAT does not say whether the vehicle is armed: chosen, three of them
+WAIT_S = 0.02  # chosen
 HEARTBEAT_S = 1.0
-AT_ONCE = 4  # requests under way: an autopilot's queue is short, and so is a slow link's
+AT_ONCE = 4  # requests under way: an autopilot's queue is short, and so is a slow link's; chosen
 ANSWER_S = 0.5
 TRIES = 8  # at 30 % loss each way one in 200 is still missed
-LIMIT_S = 60.0
+LIMIT_S = 60.0  # chosen: reading ends although much never answers (test_live_setup)
 UNKNOWN = 1  # MAV_PARAM_ERROR_DOES_NOT_EXIST
 
 

@@ -39,7 +39,7 @@ ASKED_PERCENT = 95.0
 LONGEST_S = 600.0  # a mutant that hangs longer is noticed
 CHEAP = "not slow and not real_time"
 WARM = multiprocessing.get_context("forkserver")
-WARM.set_forkserver_preload(["numba", "numpy", "scipy.optimize", "scipy.stats", "pydantic", "hypothesis", "pytest"])
+WARM.set_forkserver_preload(["numba", "numpy", "scipy.optimize", "scipy.stats", "pydantic"])
 NOT_COPIED = (".git", ".venv", "out", "dist", "__pycache__", ".*_cache", ".hypothesis", ".benchmarks", "*.egg-info")
 # no minutes spent on the smallest failing example, and no memory of the mutant before
 CONFTEST = """import hypothesis

@@ -204,9 +204,10 @@ def run(project: Path, parts: Sequence[str], jobs: int, every: int = 1, kernels:
             if kernels is not None:
                 warmed(tree, kernels)
             free.put(tree)
-        for status, said in pool.map(sound, sorted({test for one in mutants for test in one.tests})):
+        named = sorted({test for one in mutants for test in one.tests})
+        for test, (status, said) in zip(named, pool.map(sound, named), strict=True):
             if status != 0:
-                raise ListError(f"the tests fail without any mutation: {said}")
+                raise ListError(f"the tests fail without any mutation: {said or f'{test}, exit status {status}'}")
         for one, other in permutations(trees, 2):
             warmed(one, other.parent / "kernels")
         for mutant, (word, said, seconds) in zip(mutants, pool.map(tried, mutants), strict=True):

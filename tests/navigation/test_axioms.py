@@ -139,7 +139,7 @@ def test_the_state_of_an_instant_hangs_on_no_later_reading_and_on_no_zero_of_tim
         np.testing.assert_array_equal(state_at(on.work, on.settings, imu[:last], t_s)[:10], found[:10])
         later = on.work.copy()
         later[CLOCK] += LATER_S
-        shifted = imu + [LATER_S, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+        shifted = imu + np.array([LATER_S, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
         np.testing.assert_allclose(state_at(later, on.settings, shifted, t_s + LATER_S), found, rtol=1e-9, atol=1e-11)
     before, after = (state_at(on.work, on.settings, imu, t_s) for t_s in (8.25 - 1e-7, 8.25 + 1e-7))
     np.testing.assert_allclose(after[:10], before[:10], atol=1e-5)  # no jump at a reading
@@ -151,12 +151,8 @@ def test_levels_are_the_same_whichever_way_north_is(seed):
     """Covariance, position, a fault's effect and what GPS moved, all turned by a heading."""
     rng = np.random.default_rng(seed)
     factor = rng.normal(size=(2, 2))
-    covariance, place, effect, moved = (
-        factor @ factor.T,
-        floats(rng, 2, 30.0),
-        floats(rng, 2, 20.0),
-        floats(rng, 2, 9.0),
-    )
+    covariance = factor @ factor.T
+    place, effect, moved = floats(rng, 2, 30.0), floats(rng, 2, 20.0), floats(rng, 2, 9.0)
 
     def level(angle: float, *, doubt: float, faults: float) -> tuple[float, ...]:
         work = new_work(ONE_LANE)
@@ -289,11 +285,8 @@ def test_a_range_that_was_fused_within_a_second_of_standing_still_has_served():
 # -- noise that lasts ------------------------------------------------------------------------------------------
 def test_an_error_that_lasts_averages_out_as_slowly_as_its_correlation_says():
     """Of readings dt apart with an error sigma exp(-t/tau), the mean's variance is that of white ones of this size."""
-    sigma, tau_s, dt_s = (
-        TOLD.attitude.heading_noise_rad,
-        TOLD.attitude.heading_time_s,
-        0.02 * TOLD.attitude.heading_time_s,
-    )
+    sigma, tau_s = TOLD.attitude.heading_noise_rad, TOLD.attitude.heading_time_s
+    dt_s = 0.02 * tau_s
     lags = np.arange(-4000, 4001)
     summed = sigma**2 * np.exp(-abs(lags) * dt_s / tau_s).sum()  # N times the variance of a mean of N
     assert heading_variance(dt_s, HeadingMemory(read_s=0.0), TOLD.attitude) == pytest.approx(summed, rel=1e-3)
@@ -306,10 +299,9 @@ def test_a_velocity_error_that_lasts_lets_the_position_walk_as_its_integral_does
     error = s.flow_lasting_rad_s * 3.0
     step_s, steps = 0.02 * s.flow_lasting_s, 20_000
     ages = step_s * np.arange(1, steps)
-    total = (
-        error**2 * step_s * (steps * step_s + 2.0 * ((steps * step_s - ages) * np.exp(-ages / s.flow_lasting_s)).sum())
-    )
-    assert lasting_walk(3.0, 0.0, s) == pytest.approx(total / (steps * step_s), rel=0.01)
+    long_s = steps * step_s
+    total = error**2 * step_s * (long_s + 2.0 * ((long_s - ages) * np.exp(-ages / s.flow_lasting_s)).sum())
+    assert lasting_walk(3.0, 0.0, s) == pytest.approx(total / long_s, rel=0.01)
     assert lasting_walk(6.0, 0.0, s) == pytest.approx(4.0 * lasting_walk(3.0, 0.0, s))
 
 

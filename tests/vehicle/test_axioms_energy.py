@@ -100,7 +100,7 @@ def test_the_main_rotor_s_forces_act_at_its_hub(seed):
     wrench = airframe.main_rotor_wrench(60.0, 4.0, a1, b1, air, 1.1, HELICOPTER)
     arm = (0.0, 0.0, -HELICOPTER.hub_above_cg_m)
     stiff = HELICOPTER.hub_stiffness_n_m_rad
-    assert wrench[3:] == pytest.approx(np.cross(arm, wrench[:3]) + [stiff * b1, stiff * a1, -4.0])
+    assert wrench[3:] == pytest.approx(np.cross(arm, wrench[:3]) + np.array([stiff * b1, stiff * a1, -4.0]))
 
 
 @SEEDS

@@ -102,7 +102,7 @@ def test_in_a_mirror_a_multirotor_flies_the_mirrored_way(seed, vehicle, flips, r
 
 @SEEDS
 def test_a_square_quad_that_is_turned_by_a_quarter_feels_the_same(seed):
-    """Forces, moments and hub moments turn along; torques change sides, for each rotor stands where its neighbour was."""
+    """Forces, moments and hub moments turn along; torques change sides: each rotor stands where its neighbour was."""
     rng = np.random.default_rng(seed)
     speeds = Six(*rng.uniform(300.0, 600.0, 4), 0.0, 0.0)
     u, v, w, p, q, r = rng.normal(size=6)

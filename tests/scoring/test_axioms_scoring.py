@@ -7,12 +7,17 @@ import math
 import numpy as np
 import pytest
 
+from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, turned_about_down, within_half_turn
+from flownav.core.measurement import Sensor, Stream
+from flownav.report.series import Track, difference
 from flownav.scoring.alignment import align, velocity_of
+from flownav.scoring.autopilot import autopilot_errors
 from flownav.scoring.drift import Motion, drift_of
 from flownav.scoring.errors import ErrorSums, error_statistics, statistics_of, with_error
 from flownav.scoring.outage import difference_at, outage_error
 from flownav.scoring.path import Path, References, path_scores
 from flownav.scoring.percentiles import percentile_with_interval, share_with_interval
+from flownav.scoring.recorded import at_instants
 
 T_S = np.arange(0.0, 60.0, 0.25)
 
@@ -138,3 +143,40 @@ def test_nothing_is_wrong_with_a_path_that_is_the_truth():
     assert found["truth"]["horizontal_max_m"] == pytest.approx(0.0, abs=1e-9)
     assert found["truth"]["vertical_rms_m"] == pytest.approx(0.0, abs=1e-9)
     assert isinstance(Path(T_S, truth, truth[:, :2]), Path)
+
+
+def test_an_estimate_is_not_held_beyond_its_own_time():
+    """Neither where a flight is scored again nor where a report draws the difference: there it says nothing."""
+    table_ = {"t_s": np.array([2.0, 4.0]), "pos_n_m": np.array([1.0, 3.0]), "pos_e_m": np.array([0.0, -1.0])}
+    found = at_instants(table_, ("pos_n_m", "pos_e_m", "pos_d_m"), np.array([1.9, 2.0, 3.0, 4.0, 4.1]))
+    assert np.isnan(found[[0, 4]]).all()
+    assert np.isnan(found[:, 2]).all()  # it has no height
+    assert found[1:4, :2].tolist() == [[1.0, 0.0], [2.0, -0.5], [3.0, -1.0]]
+    same = at_instants(table_, ("pos_n_m",), np.array([2.0, 4.0]))
+    assert same[:, 0].tolist() == [1.0, 3.0]
+    apart = difference(Track(np.array([1.0, 3.0, 5.0]), np.ones((3, 1))), Track(np.array([2.0, 4.0]), np.zeros((2, 1))))
+    assert apart.t_s.tolist() == [3.0]
+
+
+@pytest.mark.parametrize(("angle", "shift_s"), [(0.0, 1024.0), (0.5 * math.pi, 0.0), (-2.4, 65536.0)])
+def test_an_autopilot_errs_as_much_in_its_own_frame_and_at_any_time(angle, shift_s):
+    """Its truth is turned and shifted onto it, whichever way its north is; of GPS the mean difference is taken out."""
+    truth, said = walk(1), walk(1) + walk(2, 0.1)
+    q = np.array([quaternion_from_euler(0.0, 0.0, 0.02 * k) for k in range(len(T_S))])
+    velocity = np.array([np.reshape(rotation_from_quaternion(*each), (3, 3)).T @ v
+                         for each, v in zip(q, np.gradient(said, 0.25, axis=0), strict=True)])  # fmt: skip
+
+    def errs(angle: float, shift_s: float):
+        turn = np.array([turned_about_down(tuple(each), angle) for each in q])
+        named = dict(zip(("qw", "qx", "qy", "qz"), turn.T, strict=True))
+        named |= dict(zip(("vel_u_m_s", "vel_v_m_s", "vel_w_m_s"), velocity.T, strict=True))
+        own = table(T_S + shift_s, turned(said, angle) + np.array([9.0, -4.0, 2.0])) | named
+        by_truth = autopilot_errors(own, table(T_S + shift_s, truth), {})
+        fixes = Stream.of(Sensor.GPS_POSITION, T_S + shift_s + 0.25, turned(truth, angle), delay_s=0.25)
+        by_gps = autopilot_errors(own, None, {Sensor.GPS_POSITION: fixes})
+        numbers = ("horizontal_rms_m", "horizontal_max_m", "vertical_rms_m", "velocity_rms_m_s")
+        return [by_truth[name] for name in numbers] + [by_gps[name] for name in numbers[:3]], by_truth["yaw_rad"]
+
+    (before, yaw), (after, turned_yaw) = errs(0.0, 0.0), errs(angle, shift_s)
+    assert after == pytest.approx(before, rel=1e-6)
+    assert within_half_turn(turned_yaw - yaw - angle) == pytest.approx(0.0, abs=1e-6)

@@ -152,14 +152,15 @@ def verdict(tree: Path, mutant: Mutant, project: Path) -> tuple[str, str, float]
     """`killed`, `survived` or `broken` (no test could run), by whom, and the seconds it took."""
     path = tree / PACKAGE / mutant.file
     sound = path.read_text(encoding="utf-8")
-    kept = set((tree.parent / "kernels").rglob("*"))
+    kernels = tree.parent / "kernels" / "kernels"
+    kept = set(kernels.glob("*"))
     begun = time.monotonic()
     try:
         _put(path, mutant.text(tree))
         status, said = tested(tree, mutant.tests, project)
     finally:
         _put(path, sound)
-        for file in set((tree.parent / "kernels").rglob("*")) - kept:
+        for file in set(kernels.glob("*")) - kept:
             file.unlink()  # nobody will ask for a mutant's kernels again
     word = {0: "survived", 1: "killed", -1: "killed"}.get(status, "broken")
     return word, "" if word == "survived" else said, time.monotonic() - begun
@@ -210,12 +211,14 @@ def run(project: Path, parts: Sequence[str], jobs: int, every: int = 1, kernels:
                 raise ListError(f"the tests fail without any mutation: {said or f'{test}, exit status {status}'}")
         for one, other in permutations(trees, 2):
             warmed(one, other.parent / "kernels")
+        left: list[str] = []
         for mutant, (word, said, seconds) in zip(mutants, pool.map(tried, mutants), strict=True):
             count[word] += 1
+            left += [f"  {word}: {mutant.file}: {mutant.name}"] if word != "killed" else []
             print(f"{word:8}  {seconds:5.1f} s  {mutant.file:34}  {mutant.name:60}  {said}"[:240], flush=True)
     share = 100.0 * count["killed"] / len(mutants)
     survived, broken = count["survived"], count["broken"]
-    print(f"{(time.monotonic() - begun) / 60.0:.0f} min")
+    print("\n".join([*left, f"{(time.monotonic() - begun) / 60.0:.0f} min"]))
     print(
         f"{count['killed']} of {len(mutants)} killed ({share:.1f} %), {survived} survived, {broken} could not be tried"
     )
@@ -226,7 +229,7 @@ def main() -> int:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("parts", nargs="*", help="only mutations in whose name or file one of these occurs")
-    parser.add_argument("--jobs", type=int, default=max(1, (os.cpu_count() or 1) // 2), help="how many at a time")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="how many at a time")
     parser.add_argument("--every", type=int, default=1, help="only each so many-th of them, as a sample")
     arguments = parser.parse_args()
     try:

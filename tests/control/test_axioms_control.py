@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from flownav.control.autopilot import Estimate, hovering, inner_loop, outer_loop
+from flownav.control.autopilot import Estimate, hovering, inner_loop, outer_loop, unexplained_acceleration
 from flownav.control.gains import AutopilotGains
 from flownav.control.go_around import Knowledge
 from flownav.control.guidance import Path, Reference, reference_at, rounded
-from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, turned_about_down
+from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler, rotation_from_quaternion, turned_about_down
 
 SEEDS = pytest.mark.parametrize("seed", range(8))
 GAINS = AutopilotGains(
@@ -138,3 +138,16 @@ def test_a_rounded_corner_is_the_mean_of_the_sharp_one_over_the_blend():
         around = [reference_at(path, t) for t in np.linspace(t_s - 1.0, t_s + 1.0, 2001)]
         mean = np.mean([place[:2] for place in around], axis=0)
         assert reference_at(smooth, t_s)[:2] == pytest.approx(mean, abs=5e-3)
+
+
+@pytest.mark.parametrize("heading", [0.0, 1.3, -2.0])
+@pytest.mark.parametrize(("roll", "pitch"), [(0.1, 0.0), (-0.1, 0.0), (0.0, 0.1), (0.05, -0.08)])
+def test_one_that_leans_on_nothing_but_its_own_thrust_feels_no_gust(roll, pitch, heading):
+    """Thrust that carries the weight explains what is felt, to the third order of the lean; a push beside it shows."""
+    rotation = rotation_from_quaternion(*quaternion_from_euler(roll, pitch, heading))
+    thrust = -GRAVITY_M_S2 / rotation[8]
+    leaning = Estimate(0.0, 0.0, -3.0, 0.0, 0.0, 0.0, 0.0, 0.0, thrust)
+    gains = AutopilotGains()
+    assert unexplained_acceleration(leaning, rotation, gains) == pytest.approx((0.0, 0.0), abs=0.01)
+    pushed = unexplained_acceleration(leaning._replace(force_x=0.5, force_y=-0.3), rotation, gains)
+    assert pushed == pytest.approx((0.5, -0.3), abs=0.02)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from flownav.sensors.beam import LEVEL, Ground
 from flownav.simulation.ground import share_beyond, under_rotor
+from flownav.simulation.onboard import EPOCH_S, Clock
 from flownav.simulation.recirculation import RecirculationSettings, RecirculationState, recirculated
+from flownav.simulation.schedule import Timing, clocks, sampled_readings, schedule_of
+from flownav.simulation.truth import CARRIED
 from flownav.simulation.wind import WindNormals, WindSettings, WindState, WindVelocity, start_wind, step_wind
 
 SEEDS = pytest.mark.parametrize("seed", range(6))
@@ -112,3 +116,40 @@ def test_far_beyond_an_edge_a_rotor_finds_the_step_and_far_before_it_nothing(ste
     halfway = under_rotor(0.0, 0.0, 2.0, 0.9, ground)
     assert min(0.0, step_m) < halfway < max(0.0, step_m)
     assert under_rotor(0.0, 0.0, 2.0, 0.9, LEVEL) == 0.0
+
+
+# -- the timetable -------------------------------------------------------------------------------------------------
+ONBOARD = SimpleNamespace(
+    carried=SimpleNamespace(**{sensor.name: SimpleNamespace(clock=Clock(9, 5, 2)) for sensor in CARRIED}),
+    inertial_steps=2,
+)
+KINDS = {kind for kind, _, _ in clocks(ONBOARD)}  # type: ignore[arg-type]
+
+
+def timed(lag_s: float, latency_s: float, jitter_s: float = 0.0) -> dict:
+    return dict.fromkeys(KINDS, Timing(lag_s, latency_s, jitter_s))
+
+
+@pytest.mark.parametrize("true", [(0.03, 0.05), (0.0, 0.2), (0.01, 0.0)])
+@pytest.mark.parametrize("stated", [(0.03, 0.05), (0.0, 0.0), (0.1, 0.02)])
+def test_a_reading_is_of_when_it_came_less_the_age_that_is_stated(true, stated):
+    """Whatever nobody knows of its latency makes it seem as much younger; the order in which it is taken follows."""
+    t_s, kind, epoch = sampled_readings(200, ONBOARD, timed(*true), timed(*stated))  # type: ignore[arg-type]
+    other = np.isin(kind, list(KINDS))
+    arrival_s = epoch[other] * EPOCH_S + true[1]
+    np.testing.assert_allclose(t_s[other], arrival_s - sum(stated), atol=1e-12)
+    taken = schedule_of(200, ONBOARD, timed(*true), timed(*stated))  # type: ignore[arg-type]
+    assert (np.diff(taken.t_s) >= 0.0).all()
+    mine = np.isin(taken.sensor, list(KINDS))
+    came_s = taken.t_s[mine] + sum(stated)
+    assert (taken.epoch[mine] * EPOCH_S >= came_s - 1e-9).all()  # nothing is taken before it has come
+    assert taken.horizon_s >= max(sum(true), sum(stated)) - 1e-9
+
+
+def test_arrivals_are_uneven_by_the_jitter_and_each_sensor_s_are_its_own():
+    even, _, _ = sampled_readings(200, ONBOARD, timed(0.0, 0.05), timed(0.0, 0.05))  # type: ignore[arg-type]
+    uneven, kind, _ = sampled_readings(200, ONBOARD, timed(0.0, 0.05, 0.004), timed(0.0, 0.05))  # type: ignore[arg-type]
+    off = (uneven - even)[np.isin(kind, list(KINDS))]
+    assert abs(off).max() <= 0.004
+    assert abs(off).max() > 0.003
+    assert abs(off.mean()) < 0.001

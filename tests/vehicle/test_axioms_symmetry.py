@@ -292,3 +292,23 @@ def test_a_rotor_is_the_nearer_to_the_ground_the_lower_its_side_is():
         loads = multirotor.rotor_loads(speeds, -0.25, down, down, air, False, CALM, QUAD)
         # rolled right, the right rotors are low, lift more, and roll it back to the left
         assert loads.roll_n_m * roll + loads.pitch_n_m * pitch < -1e-4, (roll, pitch)
+
+
+@SEEDS
+def test_a_rotor_s_disc_does_not_tell_back_from_right(seed):
+    """Quarter-turns of speed, cyclic, rates, and of gusts that turn the air: flapping back becomes flapping right."""
+    rng = np.random.default_rng(seed)
+    u, v, w, p, q, a1, b1, lon, lat, turn_x, turn_y = (float(x) for x in 0.1 * rng.normal(size=11))
+    held = dict.fromkeys(HelicopterState._fields, 0.0) | {
+        "qw": 1.0, "pos_d": -50.0, "col": 0.07, "ped": 0.1, "inflow": 3.5, "speed": 150.0, "w": w, "r": 0.3,
+    }  # fmt: skip
+
+    def flapping(**motion) -> tuple[float, float]:
+        around = CALM._replace(turn_n_rad_s=motion.pop("turn_x"), turn_e_rad_s=motion.pop("turn_y"))
+        state = HelicopterState(**(held | motion))
+        rate = helicopter.derivative(state, Controls(0.0, 0.0, 0.07, 0.1), around, HELICOPTER)
+        return rate.a1, rate.b1
+
+    back, right = flapping(u=u, v=v, p=p, q=q, a1=a1, b1=b1, lon=lon, lat=lat, turn_x=turn_x, turn_y=turn_y)
+    turned = flapping(u=-v, v=u, p=-q, q=p, a1=b1, b1=-a1, lon=lat, lat=-lon, turn_x=-turn_y, turn_y=turn_x)
+    assert turned == pytest.approx((right, -back), rel=1e-9, abs=1e-12)

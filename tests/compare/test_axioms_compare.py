@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flownav.core.frames import quaternion_from_euler, turned_about_down
+from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, turned_about_down
 from flownav.core.measurement import Sensor, Stream
 from flownav.studies.compare.dead_reckoning import dead_reckoned
 from flownav.studies.compare.tracks import at, says
@@ -61,3 +61,25 @@ def test_a_track_says_nothing_beyond_its_ends():
     instants = np.array([first - 0.01, first, 0.5 * (first + last), last, last + 0.01])
     assert says(track, instants).tolist() == [False, True, True, True, False]
     np.testing.assert_allclose(at(track, track.velocity_ne, track.t_s), track.velocity_ne)
+
+
+@pytest.mark.parametrize("lean", [-0.3, 0.2])
+def test_one_that_leans_to_the_side_moves_as_far_as_one_that_leans_ahead(lean):
+    """Either moves level: what the lens sees is the part across its boresight, v cos(lean), on whichever axis."""
+
+    def way(roll: float, pitch: float, flow) -> np.ndarray:
+        q = np.tile(quaternion_from_euler(roll, pitch, 0.0), (len(T_S), 1))
+        track = dead_reckoned(
+            Stream.of(Sensor.FLOW_RATE, T_S, np.tile(flow, (len(T_S), 1))),
+            Stream.of(Sensor.RANGE, T_S, np.full((len(T_S), 1), 2.0)),
+            Stream.of(Sensor.ATTITUDE, T_S, q),
+        )
+        assert track is not None
+        return track.motion.position[-1]
+
+    ahead, aside = way(0.0, lean, [0.0, 0.25, 0.0, 0.0]), way(lean, 0.0, [-0.25, 0.0, 0.0, 0.0])
+    assert ahead[0] == pytest.approx(0.5 * T_S[-1] / math.cos(lean))
+    assert aside[[1, 0, 2]] == pytest.approx(ahead, abs=1e-9)
+    both = way(lean, 0.25, [-0.2, 0.3, 0.0, 0.0])[:2] / T_S[-1]
+    rotation = np.reshape(rotation_from_quaternion(*quaternion_from_euler(lean, 0.25, 0.0)), (3, 3))
+    assert (rotation.T @ [*both, 0.0])[:2] == pytest.approx([0.6, 0.4])  # seen from the body it is what was seen

@@ -10,7 +10,7 @@ from flownav.campaigns.faults.catalogue import FAULTS
 from flownav.core.measurement import COLUMNS, Sensor, Stream
 
 BEGIN_S, END_S = 4.0, 7.0
-LATER_S = 512.0
+LATER_S = 512.1875  # no multiple of any fault's own period
 STRUCK = (Sensor.GPS_POSITION, Sensor.GPS_VELOCITY, Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY, Sensor.RANGE, Sensor.IMU,
           Sensor.BARO, Sensor.ATTITUDE)  # fmt: skip
 

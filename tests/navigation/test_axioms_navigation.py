@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -22,17 +23,33 @@ from flownav.estimation.named import Attitude, BodyRate, Lever
 from flownav.estimation.states import HYPOTHESES, POSITION, STATE, STATES
 from flownav.navigation.ahead import Carried, carried, coasted, state_at
 from flownav.navigation.course import judge_course, with_flow, with_gps
-from flownav.navigation.flow_noise import lasting_walk, wrong_since
+from flownav.navigation.flow_noise import (
+    followed_agreement,
+    followed_likeness,
+    followed_quality,
+    lasting_walk,
+    wrong_since,
+)
 from flownav.navigation.gps import judge_rejections
 from flownav.navigation.heading import heading_variance
 from flownav.navigation.height import judge_ground, repeats
+from flownav.navigation.inertial import paid, steady_force
 from flownav.navigation.loop import start_navigator
 from flownav.navigation.memory import CLOCK, MEMORY, SCALE_DOUBT, new_work
-from flownav.navigation.motion_records import CourseMemory, ImuMemory, ImuWindow, SeenWindow, SpikeMemory, StandMemory
+from flownav.navigation.motion_records import (
+    CourseMemory,
+    ImuMemory,
+    ImuWindow,
+    SeenWindow,
+    SpikeMemory,
+    StandMemory,
+    SteadyForce,
+)
 from flownav.navigation.place import judge_pad
 from flownav.navigation.protection import HELD_S, judge_suspicion, levels
 from flownav.navigation.reasons import FUSED
 from flownav.navigation.records import (
+    FlowMemory,
     GpsMemory,
     GroundMemory,
     HeadingMemory,
@@ -47,7 +64,7 @@ from flownav.navigation.spikes import BURST_S, LONE, MOST_DOUBT_M_S, doubt_of
 from flownav.navigation.still import GYRO_FLOOR_RAD_S, RESTS, SHAKEN, offer_bias, with_imu
 from flownav.navigation.tape import empty_tape
 from flownav.navigation.told import NO_HEADING, Equipment
-from flownav.navigation.verdicts import Height
+from flownav.navigation.verdicts import Force, Height
 
 SEEDS = pytest.mark.parametrize("seed", range(6))
 FITTED = Equipment(True, False, NO_HEADING, False, -math.inf)
@@ -356,3 +373,50 @@ def test_a_mean_of_more_readings_is_surer():
     assert offers[100].variance < offers[25].variance
     shaken = offer_bias.law(StartMemory(started=1.0), window, SeenWindow(), StandMemory(does=SHAKEN), axis=0)
     assert shaken.reason != FUSED  # no ground was seen below it
+
+
+# -- what is followed, and what is paid --------------------------------------------------------------------------
+@pytest.mark.parametrize("step_s", [0.0, 0.01, 0.3, 5.0, 1000.0])
+def test_what_is_followed_lies_between_what_it_was_and_what_is_seen(step_s):
+    """After no time as before, after any time not beyond; and later is nearer."""
+    flow = FlowMemory(taken_s=50.0, ratio=2.0, likeness=2.0)
+    for seen in (7.0, -3.0):
+        found = {
+            "agreement": followed_agreement(seen, 50.0 + step_s, flow),
+            "likeness": followed_likeness(seen, 50.0 + step_s, flow),
+            "quality": followed_quality(seen, step_s, 2.0),
+            "force": steady_force.law(SteadyForce(2.0, 2.0, 2.0), Force(seen, seen, seen), dt_s=step_s).east_m_s2,
+            "course": with_flow(seen, seen, 50.0 + step_s, CourseMemory(flow_s=50.0, east_m_s=2.0)).east_m_s,
+        }
+        for name, value in found.items():
+            assert min(2.0, seen) <= value <= max(2.0, seen), name
+            assert bool(value == 2.0) is (step_s == 0.0), name
+
+
+@SEEDS
+def test_of_each_inertial_period_as_much_is_paid_as_was_read(seed):
+    """Momentum: however often other sensors stop the filter in between, the integral of what moves it is the IMU's."""
+    rng = np.random.default_rng(seed)
+    spent = owed = held = paid_out = read = 0.0
+    for _ in range(60):
+        period_s, between = float(rng.uniform(0.004, 0.02)), float(rng.normal())
+        stops = np.sort(rng.uniform(0.0, period_s, rng.integers(0, 4)))
+        edges = [0.0, *stops.tolist(), period_s]
+        for k, (begin, end) in enumerate(pairwise(edges)):
+            now = k == len(edges) - 2
+            step = paid(between, held, spent, owed, end - begin, period_s, now, True)
+            paid_out += step.value * (end - begin)
+            spent, owed = step.spent, step.owed
+        read += between * period_s
+        held = between
+        assert paid_out + owed == pytest.approx(read, abs=1e-12)
+    assert spent == 0.0
+
+
+def test_a_flow_of_another_motion_does_not_tell_the_course():
+    """Older than a quarter of a second, whatever time it is."""
+    for t_s in (10.0, 10.0 + LATER_S):
+        for age_s, counts in ((0.0, True), (0.25, True), (0.26, False), (0.9, False)):
+            m = CourseMemory(gps_s=t_s - 0.1, flow_s=t_s - age_s, north_m_s=2.0, east_m_s=0.0)
+            after = with_gps(Reading(2.0, 0.0, 0.0, arrived=1.0), t_s, m)
+            assert bool(after.travel_m > 0.0) is counts

@@ -12,6 +12,14 @@ from flownav.sensors.beam import LEVEL, BeamHit, Ground, beam_distance, ground_h
 from flownav.sensors.datasheet import FlowSettings, load_sensor
 from flownav.sensors.first_order import lag_weights, lagged
 from flownav.sensors.flow import FlowState, misread, start_flow, step_flow
+from flownav.sensors.flow_camera import (
+    FlowCameraNormals,
+    FlowCameraState,
+    FlowCameraTruth,
+    FlowCameraUnit,
+    step_flow_camera,
+)
+from flownav.sensors.flow_camera_sheet import load_flow_camera_sheet
 from flownav.sensors.flow_engagement import pattern_reach
 from flownav.sensors.gauss_markov import gauss_markov_coefficients
 from flownav.sensors.geometry import LensPose, in_turned_axes, lever_velocity, turned_rotation
@@ -246,3 +254,22 @@ def test_two_half_periods_are_a_whole_one(seed):
 def test_at_rest_in_a_steady_motion_nothing_changes():
     state = start_flow(0.7, -0.3, 0.2, 9.8, FLOW)
     assert step_flow(state, 0.7, -0.3, 0.2, 2.0, 9.8, FLOW) == pytest.approx(state, abs=1e-12)
+
+
+def test_a_camera_that_leans_in_place_sees_as_well_as_before():
+    """Quality and what is engaged go by the lens's height; the range along the boresight makes the flow alone."""
+    p = (
+        load_flow_camera_sheet()
+        .parameters()
+        ._replace(quality_fall_height=0.5, quality_fall_flow=0.0, quality_sigma=0.0, best_quality=250.0)
+    )
+    unit, quiet = silent(FlowCameraUnit, noise=1.0), silent(FlowCameraNormals)
+    seeing = FlowCameraState(1.0, 0.0, 0.0, 0.0)
+    level = FlowCameraTruth(0.4, -0.3, 0.0, 0.0, 0.0, 0.0, 1.2, 1.2, 1.0, 1.0)
+    one = step_flow_camera(seeing, unit, level, quiet, FLOW, p)[1]
+    two = step_flow_camera(seeing, unit, level._replace(range_m=1.5 * level.range_m), quiet, FLOW, p)[1]
+    assert (two.quality, two.arrived) == (one.quality, one.arrived)
+    assert 1.0 < one.quality < 250.0
+    assert (one.flow_x_rad_s, one.flow_y_rad_s) == pytest.approx((1.5 * two.flow_x_rad_s, 1.5 * two.flow_y_rad_s))
+    higher = step_flow_camera(seeing, unit, level._replace(height_m=2.0), quiet, FLOW, p)[1]
+    assert higher.quality < one.quality

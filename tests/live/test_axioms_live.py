@@ -9,6 +9,7 @@ import math
 import os
 
 import numpy as np
+import pymap3d
 import pytest
 
 from flownav.core.compile import ONE_LANE
@@ -22,7 +23,9 @@ from flownav.live.horizon import Horizon
 from flownav.live.journal_place import LOCK_WAIT_S, claim, is_locked, journal_of
 from flownav.live.lags import WINDOW_S, WINDOWS, Lags
 from flownav.live.options import Limits
-from flownav.live.timing import COARSE_S, VehicleClock
+from flownav.live.origin import Origin
+from flownav.live.timing import COARSE_S, FRESH_S, VehicleClock
+from flownav.live.timing import WINDOW_S as LEADS_S
 from flownav.live.writing import HEAD_EVERY_S, SYNC_S, Writer
 from flownav.navigation.loop import start_navigator
 from flownav.navigation.memory import CLOCK, MEMORY, PROTECTION
@@ -247,3 +250,43 @@ def test_nothing_that_withholds_an_estimate_hangs_on_the_zero_of_time(shift_s):
     for later_s, age_s, why in ((0.0, 0.1, ""), (0.0, 0.31, "stale"), (1.25, 0.1, ""), (1.375, 0.1, "dead_reckoning"),
                                 (LONGEST_AHEAD_S + 0.125, 0.1, "stale")):  # fmt: skip
         assert why_withheld(on, t_s + later_s, t_s + later_s - age_s, Limits()) == why
+
+
+def test_an_exchange_serves_for_as_long_as_crystals_agree():
+    """For FRESH_S after it ended, at any zero of our clock; then the stamps' least wait is all there is."""
+    for ours_s in (0.0, 1e5):
+        clock = stamped_clock(100.0, ours_s, 0.03)
+        clock.exchanged(round(101.0 * 1e9), round((ours_s + 1.0) * 1e9), ours_s + 1.0)
+        assert clock.best(ours_s + 0.5 + FRESH_S) is not None
+        assert clock.now_s(ours_s + 1.5) == pytest.approx(101.5, abs=2e-3)
+        assert clock.best(ours_s + 1.5 + FRESH_S) is None
+        late_s = ours_s + 1.5 + FRESH_S
+        assert clock.now_s(late_s) == pytest.approx(late_s - ours_s + 100.0 - 0.03, abs=2e-3)
+
+
+def test_the_least_wait_on_the_link_is_forgotten_after_two_windows():
+    """A link that has become slower by 40 ms: what it waited before holds for two windows at most."""
+    clock, forgotten_s = stamped_clock(100.0, 0.0, 0.0), None
+    for k in range(1, 200):
+        sent_s = 1.0 + 0.02 * k
+        arrives_s = sent_s + 0.04
+        clock.stamped(made("ATTITUDE", time_boot_ms=round((100.0 + sent_s) * 1e3)), 1, 1, arrives_s)
+        behind_s = 100.0 + arrives_s - clock.now_s(arrives_s)
+        if forgotten_s is None and behind_s > 0.035:
+            forgotten_s = 0.02 * k
+    assert forgotten_s is not None
+    assert LEADS_S - 0.05 <= forgotten_s <= 2.0 * LEADS_S + 0.05
+
+
+@pytest.mark.parametrize("told", [(25.0001, 55.0002, 13.0), (24.9995, 54.9999, 4.0)])
+def test_a_place_is_the_same_in_the_navigator_s_frame_and_in_the_autopilot_s(told):
+    """The origin that is told later, north, east and higher or lower: with the offset it is one spot of the earth."""
+    origin, fix = Origin(), (25.0, 55.0, 10.0)
+    assert origin.fixed(fix) == ""
+    assert origin.told(told) == "moved"
+    assert origin.told(told) == ""  # again: nothing moves
+    for here in ((0.0, 0.0, 0.0), (12.0, -7.0, -3.0)):
+        there = np.add(here, origin.offset_ned_m)
+        ours, theirs = pymap3d.ned2geodetic(*here, *fix), pymap3d.ned2geodetic(*there, *told)
+        assert theirs[:2] == pytest.approx(ours[:2], abs=2e-7)
+        assert theirs[2] == pytest.approx(ours[2], abs=0.01)

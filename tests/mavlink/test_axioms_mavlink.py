@@ -76,3 +76,14 @@ def test_an_exchange_tells_the_difference_of_two_clocks_to_half_its_round_trip(t
         offset_s, trip_s = timesync_offset_s(tc1_ns, round(ours_s * 1e9), round((ours_s + there_s + back_s) * 1e9))
         assert trip_s == pytest.approx(there_s + back_s)
         assert abs(offset_s - (theirs_s - ours_s)) <= 0.5 * trip_s + 1e-6
+
+
+@pytest.mark.parametrize("rate", [1.0, 1.0 - 150e-6, 1.0 + 150e-6])
+def test_a_companion_s_crystal_that_is_slow_or_fast_is_followed(rate):
+    """An hour on, a clock that loses or gains half a second has its messages where they came, to within the wait."""
+    state = ClockState(BOOT)
+    for k in range(7200):
+        t_s = 10.0 + 0.5 * k
+        state, _ = align(state, t_s, Stamp(BOOT, t_s, WRAP_MS_S))
+        state, aligned = align(state, t_s + 0.01, Stamp(OTHER, 3.0 + rate * 0.5 * k))
+        assert aligned.t_s == pytest.approx(t_s + 0.01, abs=0.02)

@@ -180,3 +180,16 @@ def test_an_autopilot_errs_as_much_in_its_own_frame_and_at_any_time(angle, shift
     (before, yaw), (after, turned_yaw) = errs(0.0, 0.0), errs(angle, shift_s)
     assert after == pytest.approx(before, rel=1e-6)
     assert within_half_turn(turned_yaw - yaw - angle) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_heading_at_the_seam_of_its_turn_is_a_heading():
+    """Headings as they are written, within half a turn, seldom, and about south at take-off."""
+    truth, estimate, seldom = walk(1), walk(1) + walk(2, 0.1), T_S[::8] + 0.0625
+    heading = math.pi - 0.3 + 0.15 * seldom  # past half a turn within the first seconds
+    wrapped = (heading + math.pi) % (2.0 * math.pi) - math.pi
+    flight = (2.1, 55.0)
+    found = [
+        drift_of(Motion(T_S, estimate, seldom, ours), Motion(T_S, truth, seldom, heading), flight).horizontal_m
+        for ours in (heading, wrapped)
+    ]
+    assert found[1] == pytest.approx(found[0], rel=1e-6, abs=1e-6)

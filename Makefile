@@ -31,7 +31,7 @@ fuzz: $(VENV)/.ready-test
 	FLOWNAV_FUZZ=$${FLOWNAV_FUZZ:-20000} $(BIN)/python -m pytest -m fuzz tests/logs tests/live/test_fuzz_live.py tests/core/test_fuzz_parameters.py
 
 mutants: $(VENV)/.ready-test
-	$(BIN)/python tests/helpers/mutants.py $(PART)
+	$(BIN)/python tests/helpers/mutants.py $(if $(EVERY),--every $(EVERY)) $(PART)
 
 league: $(VENV)/.ready
 	$(BIN)/python tools/league.py $${FLOWNAV_DATA:-../shared/data} docs/explanation/league.md

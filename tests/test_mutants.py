@@ -27,7 +27,7 @@ def project(folder: Path, *entries: str, test: str = TEST) -> Path:
 
 def test_every_listed_mutation_fits_the_tree():
     found = listed()
-    assert len(found) >= 110
+    assert len(found) >= 600
     assert all(mutant.tests for mutant in found)
 
 
@@ -39,9 +39,13 @@ def test_the_killed_and_the_survivors_are_counted_and_the_tree_stays_as_it_was(t
     assert lines[0].split()[0] == "killed"
     assert "test_sums.py::test_twice" in lines[0]
     assert lines[1].split()[0] == "survived"
+    assert lines[2] == "  survived: sums.py: quad"
     assert lines[-1] == "1 of 2 killed (50.0 %), 1 survived, 0 could not be tried"
     assert (tree / "src/flownav/sums.py").read_text() == SOURCE
     assert run(tree, ("half",), jobs=1) == 0
+    capsys.readouterr()
+    assert run(tree, (), jobs=1, every=2) == 0  # a sample: the first of the two
+    assert capsys.readouterr().out.splitlines()[-1].startswith("1 of 1 killed")
 
 
 def test_a_mutation_that_no_test_can_run_with_is_not_killed(tmp_path, capsys):

@@ -4,7 +4,11 @@ The lists are tests/mutants/*.toml, one file a room. A mutation is a file of src
 exactly once, what stands there instead, and the tests that must then fail. All of it happens in a copy of the tree,
 whose compiled kernels go into a folder of their own. The named tests must first pass without any mutation.
 
-    python tests/helpers/mutants.py [--jobs N] [PART OF A NAME OR FILE ...]
+A whole run is hundreds of test runs, so each is made cheap: it is forked from a process that has imported what all
+tests import, finds the kernels that do not depend on the mutated line compiled, draws each example of Hypothesis once
+and shrinks none, and leaves out tests that are marked slow or that need real time.
+
+    python tests/helpers/mutants.py [--jobs N] [--every K] [PART OF A NAME OR FILE ...]
 
 Exit status: 0 where at least 95 % are killed, 1 where fewer are, 2 where the list or the tests are not in order.
 """
@@ -12,10 +16,11 @@ Exit status: 0 where at least 95 % are killed, 1 where fewer are, 2 where the li
 from __future__ import annotations
 
 import argparse
+import multiprocessing
 import os
 import queue
 import shutil
-import subprocess
+import signal
 import sys
 import tempfile
 import time
@@ -24,6 +29,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from itertools import permutations
 from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -31,14 +37,18 @@ PACKAGE = Path("src") / "flownav"
 LISTS = Path("tests") / "mutants"
 ASKED_PERCENT = 95.0
 LONGEST_S = 600.0  # a mutant that hangs longer is noticed
+CHEAP = "not slow and not real_time"
+WARM = multiprocessing.get_context("forkserver")
+WARM.set_forkserver_preload(["numba", "numpy", "scipy.optimize", "scipy.stats", "pydantic"])
 NOT_COPIED = (".git", ".venv", "out", "dist", "__pycache__", ".*_cache", ".hypothesis", ".benchmarks", "*.egg-info")
 # no minutes spent on the smallest failing example, and no memory of the mutant before
 CONFTEST = """import hypothesis
 
 hypothesis.settings.register_profile(
-    "mutants", database=None, derandomize=True, phases=(hypothesis.Phase.explicit, hypothesis.Phase.generate)
+    "mutants", database=None, derandomize=True, deadline=None,
+    suppress_health_check=[hypothesis.HealthCheck.too_slow],
+    phases=(hypothesis.Phase.explicit, hypothesis.Phase.generate),
 )
-hypothesis.settings.load_profile("mutants")
 """
 
 
@@ -98,34 +108,60 @@ def copied(project: Path) -> Iterator[Path]:
 
 def tested(tree: Path, tests: Sequence[str], project: Path) -> tuple[int, str]:
     """pytest's exit status (1: a test failed; -1: too long) and the last of what it said."""
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", *(f"tests/{t}" for t in tests)]
-    data = os.environ.get("FLOWNAV_DATA") or str(project.parent / "shared" / "data")
-    paper = os.environ.get("FLOWNAV_PAPER") or str(project.parent / "shared" / "paper")
-    environment = {
-        **os.environ,
-        "PYTHONPATH": str(tree / "src"),
-        "FLOWNAV_CACHE": str(tree.parent / "kernels"),
-        "FLOWNAV_DATA": data,
-        "FLOWNAV_PAPER": paper,
-    }
-    try:
-        done = subprocess.run(command, cwd=tree, env=environment, capture_output=True, text=True, timeout=LONGEST_S)
-    except subprocess.TimeoutExpired:
+    said = tree.parent / "said"
+    process = WARM.Process(target=_run_tests, args=(tree, [f"tests/{test}" for test in tests], project, said))
+    process.start()
+    process.join(LONGEST_S)
+    if process.exitcode is None:
+        os.killpg(process.pid or 0, signal.SIGKILL)
+        process.join()
         return -1, f"took longer than {LONGEST_S:g} s"
-    lines = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))] or [done.stdout[-300:]]
-    return done.returncode, lines[0].strip()
+    text = said.read_text(encoding="utf-8", errors="replace")
+    lines = [line for line in text.splitlines() if line.startswith(("FAILED", "ERROR"))] or [text[-300:]]
+    return process.exitcode, lines[0].strip()
+
+
+def _run_tests(tree: Path, tests: list[str], project: Path, said: Path) -> None:
+    """pytest on the tree's package, in this process, which is made anew for it; `said`: where its words go."""
+    import pytest
+
+    os.setsid()
+    os.environ["PYTHONPATH"] = str(tree / "src")
+    os.environ["FLOWNAV_CACHE"] = str(tree.parent / "kernels")
+    for name in ("data", "paper"):
+        os.environ.setdefault(f"FLOWNAV_{name.upper()}", str(project.parent / "shared" / name))
+    sys.path.insert(0, str(tree / "src"))
+    os.chdir(tree)
+    file = os.open(said, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+    for stream in (1, 2):
+        os.dup2(file, stream)
+    options = ["-x", "-q", "-m", CHEAP, "-p", "no:cacheprovider", "-p", "no:benchmark"]
+    sys.exit(int(pytest.main([*options, "--hypothesis-profile=mutants", *tests])))
+
+
+def warmed(tree: Path, kernels: Path) -> None:
+    """The kernels of a cache for the tree's own: files are named after all that they are made of, so none is wrong."""
+    own = tree.parent / "kernels" / "kernels"
+    own.mkdir(parents=True, exist_ok=True)
+    for file in (kernels / "kernels").glob("*.kernel"):
+        if not (own / file.name).exists():
+            shutil.copy2(file, own)
 
 
 def verdict(tree: Path, mutant: Mutant, project: Path) -> tuple[str, str, float]:
     """`killed`, `survived` or `broken` (no test could run), by whom, and the seconds it took."""
     path = tree / PACKAGE / mutant.file
     sound = path.read_text(encoding="utf-8")
+    kernels = tree.parent / "kernels" / "kernels"
+    kept = set(kernels.glob("*"))
     begun = time.monotonic()
     try:
         _put(path, mutant.text(tree))
         status, said = tested(tree, mutant.tests, project)
     finally:
         _put(path, sound)
+        for file in set(kernels.glob("*")) - kept:
+            file.unlink()  # nobody will ask for a mutant's kernels again
     word = {0: "survived", 1: "killed", -1: "killed"}.get(status, "broken")
     return word, "" if word == "survived" else said, time.monotonic() - begun
 
@@ -137,9 +173,12 @@ def _put(path: Path, text: str) -> None:
         compiled.unlink()
 
 
-def run(project: Path, parts: Sequence[str], jobs: int) -> int:
-    """Try every listed mutation and print what became of it; the exit status."""
-    mutants = listed(project, parts)
+def run(project: Path, parts: Sequence[str], jobs: int, every: int = 1, kernels: Path | None = None) -> int:
+    """Try every listed mutation, or each `every`-th, and print what became of it; the exit status.
+
+    kernels: a cache of kernels that are compiled already.
+    """
+    mutants = listed(project, parts)[::every]
     if not mutants:
         raise ListError(f"no mutation is called {' or '.join(parts) or 'anything'}")
     count = {"killed": 0, "survived": 0, "broken": 0}
@@ -152,18 +191,34 @@ def run(project: Path, parts: Sequence[str], jobs: int) -> int:
         finally:
             free.put(tree)
 
+    def sound(test: str) -> tuple[int, str]:
+        tree = free.get()
+        try:
+            return tested(tree, [test], project)
+        finally:
+            free.put(tree)
+
+    begun = time.monotonic()
     with ExitStack() as copies, ThreadPoolExecutor(jobs) as pool:
         trees = [copies.enter_context(copied(project)) for _ in range(jobs)]
-        status, said = tested(trees[0], sorted({test for one in mutants for test in one.tests}), project)
-        if status != 0:
-            raise ListError(f"the tests fail without any mutation: {said}")
         for tree in trees:
+            if kernels is not None:
+                warmed(tree, kernels)
             free.put(tree)
+        named = sorted({test for one in mutants for test in one.tests})
+        for test, (status, said) in zip(named, pool.map(sound, named), strict=True):
+            if status != 0:
+                raise ListError(f"the tests fail without any mutation: {said or f'{test}, exit status {status}'}")
+        for one, other in permutations(trees, 2):
+            warmed(one, other.parent / "kernels")
+        left: list[str] = []
         for mutant, (word, said, seconds) in zip(mutants, pool.map(tried, mutants), strict=True):
             count[word] += 1
+            left += [f"  {word}: {mutant.file}: {mutant.name}"] if word != "killed" else []
             print(f"{word:8}  {seconds:5.1f} s  {mutant.file:34}  {mutant.name:60}  {said}"[:240], flush=True)
     share = 100.0 * count["killed"] / len(mutants)
     survived, broken = count["survived"], count["broken"]
+    print("\n".join([*left, f"{(time.monotonic() - begun) / 60.0:.0f} min"]))
     print(
         f"{count['killed']} of {len(mutants)} killed ({share:.1f} %), {survived} survived, {broken} could not be tried"
     )
@@ -174,10 +229,12 @@ def main() -> int:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("parts", nargs="*", help="only mutations in whose name or file one of these occurs")
-    parser.add_argument("--jobs", type=int, default=max(1, (os.cpu_count() or 1) // 2), help="how many at a time")
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="how many at a time")
+    parser.add_argument("--every", type=int, default=1, help="only each so many-th of them, as a sample")
     arguments = parser.parse_args()
     try:
-        return run(PROJECT, arguments.parts, arguments.jobs)
+        kernels = Path(os.environ.get("FLOWNAV_CACHE") or Path.home() / ".cache" / "flownav")
+        return run(PROJECT, arguments.parts, arguments.jobs, arguments.every, kernels)
     except ListError as error:
         print(f"mutants: {error}", file=sys.stderr)
         return 2

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from flownav.core.parameter_files import Number, ParameterModel
+from flownav.core.parameter_files import Number, ParameterModel, in_si, record_of
 from flownav.sensors.flow_camera import FlowCameraParameters
 from flownav.sensors.processes import level_of
 from flownav.sensors.sheet import Lever, SensorSheet, Spells
@@ -84,27 +84,17 @@ class FlowCameraSheet(SensorSheet):
     def parameters(self) -> FlowCameraParameters:
         """Coefficients of one reading."""
         low, high = self.gain.low_height_m**0.25, self.gain.high_height_m**0.25
-        return FlowCameraParameters(
-            gain_sigma=self.gain.sigma,
-            gain_lowest=self.gain.lowest,
-            gain_highest=self.gain.highest,
+        numbers = in_si(self)
+        begins_above, ends_above = self.texture.low.levels(self.period_s)
+        return record_of(
+            FlowCameraParameters,
+            numbers,
             gain_centre=0.5 * (low + high),
             gain_scale=2.0 / (high - low),
-            noise_spread=self.noise_spread,
-            misalignment_rad=math.radians(self.misalignment_deg),
-            gyro_sigma_rad_s=math.radians(self.gyro.density_deg_s_rthz) / math.sqrt(2.0 * self.exposure_s),
-            gyro_bias_rad_s=math.radians(self.gyro.bias_deg_s),
-            gyro_walk_rad_s=math.radians(self.gyro.walk_deg_s_rts) * math.sqrt(self.period_s),
-            gyro_scale=0.01 * self.gyro.scale_percent,
-            least_texture=self.texture.least,
-            low_texture=self.texture.remaining,
-            low_texture_noise=self.texture.noise_factor,
-            **dict(zip(("low_begins_above", "low_ends_above"), self.texture.low.levels(self.period_s), strict=True)),
+            gyro_sigma_rad_s=numbers["gyro_density_rad_s_rthz"] / math.sqrt(2.0 * self.exposure_s),
+            gyro_walk_rad_s=numbers["gyro_walk_rad_s_rts"] * math.sqrt(self.period_s),
+            low_begins_above=begins_above,
+            low_ends_above=ends_above,
             outlier_above=level_of(self.outliers.share),
-            outlier_sigma_rad_s=self.outliers.sigma_rad_s,
-            best_quality=self.quality.best,
-            quality_fall_height=self.quality.lost_at_height,
-            quality_fall_flow=self.quality.lost_at_speed,
-            quality_sigma=self.quality.sigma,
             lost_above=level_of(self.lost_share),
         )

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from flownav.core.parameter_files import Number, ParameterModel
+from flownav.core.parameter_files import Number, ParameterModel, in_si, record_of
 from flownav.sensors.pad_camera import PadCameraParameters
 from flownav.sensors.processes import level_of
 from flownav.sensors.sheet import Lever, SensorSheet
@@ -99,22 +99,13 @@ class PadCameraSheet(SensorSheet):
         """Coefficients of one frame."""
         level = level_of(self.missed.share)
         aside_deg = self.half_view_deg if self.half_view_right_deg is None else self.half_view_right_deg
-        return PadCameraParameters(
-            angle_floor_rad=1e-3 * self.angle.floor_mrad,
+        return record_of(
+            PadCameraParameters,
+            in_si(self),
             angle_per_m=1e-3 * self.angle.per_m_mrad,
             angle_per_rad_s=1e-3 * self.angle.per_rad_s_mrad,
-            distance_floor=0.01 * self.distance.floor_percent,
-            distance_per_m=0.01 * self.distance.per_m_percent,
-            distance_per_rad_s=0.01 * self.distance.per_rad_s_percent,
-            min_height_m=self.min_height_m,
-            max_height_m=self.max_height_m,
             half_view_forward_tangent=math.tan(math.radians(self.half_view_deg)),
             half_view_right_tangent=math.tan(math.radians(aside_deg)),
-            side_m=self.side_m,
-            ratio=self.ratio,
-            boresight_rad=math.radians(self.boresight_deg),
-            scale=0.01 * self.scale_percent,
-            stated_spread=self.stated_spread,
             missed_above=level,
             missed_by_height=level - level_of(self.missed.share_at_max_height),
             missed_per_rad_s=(level - level_of(self.missed.share_at_blur)) / self.missed.blur_rad_s,

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from flownav.core.parameter_files import Number, ParameterModel
+from flownav.core.parameter_files import Number, ParameterModel, in_si, record_of
 from flownav.sensors import flow, gps_ins
 from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.flow import FlowParameters
@@ -153,30 +153,25 @@ class FlowSettings(ParameterModel):
         mode_rad_s = 2.0 * math.pi * self.shake_frequency_hz
         lag = second_order_hold(sensor.dynamics.b_1_s, sensor.dynamics.c_1_s2, flow.PERIOD_S)
         mount = second_order_hold(2.0 * self.shake_damping_ratio * mode_rad_s, mode_rad_s**2, flow.PERIOD_S)
-        noise = self._noise(sensor)
-        limits = sensor.limits
-        engaging_tilt = math.radians(limits.max_tilt_deg * (1.0 - limits.hysteresis))
-        return FlowParameters(
-            *lag, 1.0 / sensor.dynamics.c_1_s2, sensor.dynamics.a_1_s2,
-            *mount, 1.0 / mode_rad_s**2,
+        noise, limits = self._noise(sensor), sensor.limits
+        numbers = in_si(self) | in_si(limits)
+        for name, part in (("lag", lag), ("mount", mount), ("noise", noise)):
+            numbers |= {f"{name}_{field}": value for field, value in part._asdict().items()}
+        return record_of(
+            FlowParameters,
+            numbers | {f"noise_{i}": c for i, c in enumerate(noise.coefficients)},
+            lag_rest=1.0 / sensor.dynamics.c_1_s2,
+            gain=sensor.dynamics.a_1_s2,
+            mount_rest=1.0 / mode_rad_s**2,
             shake_vertical=1.0 if self.shake else 0.0,
             shake_horizontal=self.shake_horizontal_fraction if self.shake else 0.0,
             sonar_floor_m=sensor.sonar_floor_m if self.sonar_overscale else 0.0,
-            sonar_lag_s=self.sonar_lag_s,
-            rotation_leak=self.rotation_leak,
             vertical_from_sonar=1.0 if self.vertical == "sonar" else 0.0,
-            noise_low_m=noise.low_m, noise_high_m=noise.high_m,
-            noise_centre=noise.centre, noise_scale=noise.scale,
-            **{f"noise_{i}": c for i, c in enumerate(noise.coefficients)},
             noise_floor_m_s=0.0 if self.constant_noise_m_s is not None else sensor.noise.floor_m_s,
-            min_height_m=limits.min_height_m,
-            max_height_m=limits.max_height_m,
-            max_flow_rad_s=limits.max_flow_rad_s,
             min_tilt_cosine=math.cos(math.radians(limits.max_tilt_deg)),
-            engaging_tilt_cosine=math.cos(engaging_tilt),
-            hysteresis=limits.hysteresis,
+            engaging_tilt_cosine=math.cos(math.radians(limits.max_tilt_deg * (1.0 - limits.hysteresis))),
             half_fov_tangent=sensor.optics.half_fov_tangent,
-        )  # fmt: skip
+        )
 
     def _noise(self, sensor: FlowSensor) -> NoiseFit:
         """The sensor's law, or the constant in its place."""
@@ -203,14 +198,10 @@ class RangefinderSettings(ParameterModel):
 
     def parameters(self) -> RangefinderParameters:
         """Coefficients of one reading."""
-        return RangefinderParameters(
-            floor_m=self.floor_m,
-            ceiling_m=self.ceiling_m,
-            resolution_m=self.resolution_m,
-            steps_per_m=steps_per_unit(self.resolution_m),
-            sigma_m=self.sigma_m,
-            stuck=0.0 if self.stuck_at_m is None else 1.0,
-            stuck_m=self.stuck_at_m or 0.0,
+        stuck = 0.0 if self.stuck_at_m is None else 1.0
+        steps = steps_per_unit(self.resolution_m)
+        return record_of(
+            RangefinderParameters, in_si(self), steps_per_m=steps, stuck=stuck, stuck_m=self.stuck_at_m or 0.0
         )
 
 

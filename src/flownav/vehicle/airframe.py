@@ -88,7 +88,7 @@ def main_rotor_wrench(
 @equation
 def tail_side_force(thrust: float, induced: float, air: AirMotion, vehicle: VehicleParameters) -> float:
     """Side force of the tail rotor, to the left, and of the vertical fin in its wake, at one place [N]."""
-    sideslip = tail_sideslip(air, vehicle) - vehicle.vertical_fin_inflow_fraction * induced
+    sideslip = tail_sideslip(air, vehicle) - vehicle.vertical_fin_tail_inflow_fraction * induced
     lift = vehicle.vertical_fin_lift_slope_per_rad * magnitude(air.u) + magnitude(sideslip)
     pressure = 0.5 * vehicle.air_density_kg_m3 * vehicle.vertical_fin_area_m2
     return -pressure * lift * sideslip - vehicle.tail_fin_blockage * thrust
@@ -97,7 +97,7 @@ def tail_side_force(thrust: float, induced: float, air: AirMotion, vehicle: Vehi
 @equation
 def tail_plane_force(induced: float, air: AirMotion, vehicle: VehicleParameters) -> float:
     """Downward force of the horizontal fin in the airspeed and a share of the main rotor's wake [N]."""
-    w = air.w + vehicle.horizontal_fin_behind_cg_m * air.q - vehicle.horizontal_fin_inflow_fraction * induced
+    w = air.w + vehicle.horizontal_fin_behind_cg_m * air.q - vehicle.horizontal_fin_main_inflow_fraction * induced
     lift = vehicle.horizontal_fin_lift_slope_per_rad * magnitude(air.u) + magnitude(w)
     pressure = 0.5 * vehicle.air_density_kg_m3 * vehicle.horizontal_fin_area_m2
     return -pressure * lift * w

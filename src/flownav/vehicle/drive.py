@@ -42,8 +42,8 @@ def cyclic_servo(vehicle: VehicleParameters) -> Servo:
         vehicle.cyclic_frequency_rad_s,
         vehicle.cyclic_damping_ratio,
         vehicle.cyclic_rate_limit_rad_s,
-        vehicle.cyclic_min_rad,
-        vehicle.cyclic_max_rad,
+        vehicle.cyclic_minimum_rad,
+        vehicle.cyclic_maximum_rad,
         vehicle.cyclic_dead_band_rad,
     )
 
@@ -55,8 +55,8 @@ def collective_servo(vehicle: VehicleParameters) -> Servo:
         vehicle.collective_frequency_rad_s,
         vehicle.collective_damping_ratio,
         vehicle.collective_rate_limit_rad_s,
-        vehicle.collective_min_rad,
-        vehicle.collective_max_rad,
+        vehicle.collective_minimum_rad,
+        vehicle.collective_maximum_rad,
         vehicle.collective_dead_band_rad,
     )
 
@@ -68,8 +68,8 @@ def pedal_servo(vehicle: VehicleParameters) -> Servo:
         vehicle.pedal_frequency_rad_s,
         vehicle.pedal_damping_ratio,
         vehicle.pedal_rate_limit_rad_s,
-        vehicle.pedal_min_rad,
-        vehicle.pedal_max_rad,
+        vehicle.pedal_minimum_rad,
+        vehicle.pedal_maximum_rad,
         vehicle.pedal_dead_band_rad,
     )
 
@@ -133,7 +133,7 @@ def turning_of(
 ) -> Turning:
     """How the main rotor changes under its loads."""
     ratio = speed_ratio(state.speed, vehicle)
-    taken = loads.torque_n_m + vehicle.tail_gear * loads.tail_torque_n_m
+    taken = loads.torque_n_m + vehicle.tail_gear_ratio * loads.tail_torque_n_m
     slow = vehicle.main_speed_rad_s - state.speed
     asked = vehicle.governor_w_s_rad * slow + state.governed
     given = shaft_power(state, engine, vehicle) * (1.0 / (vehicle.main_speed_rad_s * ratio))

@@ -57,7 +57,7 @@ def _require_hover(vehicle: VehicleParameters, where: str) -> None:
     inflow = hover_induced_velocity(weight, vehicle.main_thrust_slope_n_s_m, vehicle.main_inflow_speed_m_s)
     collective = hover_pitch(weight, inflow, vehicle.main_thrust_slope_n_s_m, vehicle.main_tip_speed_m_s)
     _require_travel(
-        "collective", collective, vehicle.collective_min_rad, vehicle.collective_max_rad, where, "body.mass_kg"
+        "collective", collective, vehicle.collective_minimum_rad, vehicle.collective_maximum_rad, where, "body.mass_kg"
     )
     torque = vehicle.main_profile_torque_n_m + weight * inflow / vehicle.main_speed_rad_s
     side_force = torque / vehicle.tail_behind_cg_m / vehicle.tail_fin_blockage
@@ -68,7 +68,7 @@ def _require_hover(vehicle: VehicleParameters, where: str) -> None:
         )
     tail_inflow = hover_induced_velocity(side_force, vehicle.tail_thrust_slope_n_s_m, vehicle.tail_inflow_speed_m_s)
     pedal = hover_pitch(side_force, tail_inflow, vehicle.tail_thrust_slope_n_s_m, vehicle.tail_tip_speed_m_s)
-    _require_travel("pedal", pedal, vehicle.pedal_min_rad, vehicle.pedal_max_rad, where, "tail_rotor")
+    _require_travel("pedal", pedal, vehicle.pedal_minimum_rad, vehicle.pedal_maximum_rad, where, "tail_rotor")
     power = (
         torque * vehicle.main_speed_rad_s
         + vehicle.tail_profile_torque_n_m * vehicle.tail_speed_rad_s

@@ -167,7 +167,7 @@ def propeller_load(
     tilt = vehicle.flap_back_m * (by_lift * by_ground * per_all)  # [rad/(m/s)]
     return PropellerLoad(
         thrust,
-        vehicle.inplane_drag_n_s2_m * speed + thrust * tilt,
+        vehicle.inplane_drag_n_s2_m_rad * speed + thrust * tilt,
         vehicle.hub_stiffness_n_m_rad * tilt,
         vehicle.torque_n_m_s2 * speed * speed,
     )

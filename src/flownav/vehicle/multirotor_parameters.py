@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+from flownav.core.parameter_files import in_si, record_of
 from flownav.vehicle.parameters import of_either_kind
 from flownav.vehicle.schema import MultirotorFile
 
@@ -48,7 +49,7 @@ class MultirotorParameters(NamedTuple):
     axial_held_n_s2_m: float  # the same while v_i keeps its value
     inplane_n_s2_m2: float
     hover_inflow_m: float
-    inplane_drag_n_s2_m: float  # H-force per in-plane airspeed and speed
+    inplane_drag_n_s2_m_rad: float  # H-force per in-plane airspeed and speed
     flap_back_m: float  # tilt of the disc = this·V/(Ω·R²), against the airspeed
     hub_stiffness_n_m_rad: float
     rotor_inertia_kg_m2: float
@@ -92,30 +93,21 @@ def flatten_multirotor(file: MultirotorFile) -> MultirotorParameters:
     inflow = math.sqrt(thrust / (2.0 * disc))
     slope = rho * blade.lift_slope_per_rad * blade.blade_count * blade.chord_m * radius**2 / 4.0
     pitch = 1.5 * (thrust / slope + inflow) / radius  # the blades' effective pitch
-    return MultirotorParameters(
-        **of_either_kind(file),
+    numbers = of_either_kind(file) | in_si(frame) | in_si(blade) | in_si(blade, "rotor_")
+    return record_of(
+        MultirotorParameters,
+        numbers | in_si(file.motor) | in_si(file.battery),
         **{f"{axis}_{i + 1}_m": place[k] for i, place in enumerate(places) for k, axis in enumerate("xy")},
-        rotor_count=float(count),
         per_arm_1_m=1.0 / frame.arm_m,
-        rotors_above_cg_m=frame.rotors_above_cg_m,
-        radius_m=radius,
         thrust_n_s2=thrust,
         torque_n_m_s2=torque,
         axial_n_s2_m=0.5 * slope / (1.0 + slope / (4.0 * disc * inflow)),
         axial_held_n_s2_m=slope,
         inplane_n_s2_m2=slope / (4.0 * inflow + slope / disc) + slope * pitch / radius,
         hover_inflow_m=inflow,
-        inplane_drag_n_s2_m=blade.inplane_drag_n_s2_m_rad,
         flap_back_m=blade.flap_response * 2.0 * (4.0 / 3.0 * pitch * radius - inflow),
-        hub_stiffness_n_m_rad=blade.hub_stiffness_n_m_rad,
-        rotor_inertia_kg_m2=blade.inertia_kg_m2,
         motor_rate_1_s=1.0 / file.motor.time_constant_s,
-        full_speed_rad_s=file.motor.full_speed_rad_s,
-        idle_share=file.motor.idle_share,
-        efficiency=file.motor.efficiency,
-        full_v=file.battery.full_v,
         volt_per_as=(file.battery.full_v - file.battery.empty_v) / (3600.0 * file.battery.capacity_ah),
-        resistance_ohm=file.battery.resistance_ohm,
     )
 
 

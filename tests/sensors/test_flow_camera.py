@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation as Turn
 from flownav.core.errors import InputError
 from flownav.core.frames import angular_flow
 from flownav.core.parameter_files import check
+from flownav.sensors.camera_sheets import FlowCameraSheet
 from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.flow import flow_noise_sigma
 from flownav.sensors.flow_camera import (
@@ -27,7 +28,6 @@ from flownav.sensors.flow_camera import (
     start_flow_camera,
     step_flow_camera,
 )
-from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from flownav.sensors.geometry import LensPose
 from flownav.sensors.settings import FlowSettings
 from sensor_normals import draws, moved_by, silent

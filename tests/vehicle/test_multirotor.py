@@ -18,13 +18,13 @@ from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.feasibility import require_multirotor
 from flownav.vehicle.kinds import flattened, load_vehicle, read_kind, vehicle_file
 from flownav.vehicle.motors import battery_voltage, mixed, propeller_load, root_of_share, told_speed
-from flownav.vehicle.multirotor_parameters import (
+from flownav.vehicle.parameters import (
     MultirotorParameters,
+    VehicleParameters,
     full_thrust,
     hover_speed,
     with_inflow_held,
 )
-from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.rotor import multiplier
 from flownav.vehicle.state import Controls, HelicopterState, MultirotorState
 from flownav.vehicle.trim import parked_multirotor, settled, trim_multirotor

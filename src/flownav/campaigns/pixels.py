@@ -37,8 +37,8 @@ from flownav.lab.optics.pad_trial import (
 from flownav.lab.optics.pad_truth import fix_error, is_wrong, truth_of
 from flownav.lab.optics.projection import Pose
 from flownav.lab.optics.shutter import FlightMotion
+from flownav.sensors.camera_sheets import PadCameraSheet
 from flownav.sensors.pad_camera import PadCameraParameters, angle_noise, distance_noise
-from flownav.sensors.pad_camera_sheet import PadCameraSheet
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_one
 from flownav.simulation.ensemble import Ensemble

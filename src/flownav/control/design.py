@@ -19,8 +19,7 @@ from flownav.control.gains import AutopilotGains
 from flownav.control.loops import OUTER_S
 from flownav.vehicle.feasibility import hover_induced_velocity, hover_pitch
 from flownav.vehicle.kinds import AnyTrim, AnyVehicle
-from flownav.vehicle.multirotor_parameters import MultirotorParameters, full_thrust
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters, full_thrust
 from flownav.vehicle.trim import MultirotorTrim, Trim
 
 # attitude: a steady cyclic turns the body at 1/τ_f of it per second, τ_f the flapping's time constant

@@ -1,6 +1,6 @@
 """The sensors that a vehicle carries for its navigator: coefficients, clocks and places, and what they look at.
 
-Datasheets as a scenario wants them: its own figures above the files', at rates that the simulator's clock has.
+Last: datasheets as a scenario wants them, its own figures above the files', at rates that the simulator's clock has.
 """
 
 from __future__ import annotations
@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from flownav.core.compile import equation
 from flownav.core.frames import rotation_from_quaternion, to_earth
+from flownav.sensors.camera_sheets import AngleNoise, DistanceNoise, FlowCameraSheet, PadCameraSheet
 from flownav.sensors.flow import FlowParameters
-from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from flownav.sensors.geometry import BeamHit, Ground, beam_distance
 from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
 from flownav.sensors.inertial_sheet import InertialSheet
-from flownav.sensors.pad_camera_sheet import AngleNoise, DistanceNoise, PadCameraSheet
 from flownav.sensors.range_sensor import RangeSensorSheet
 from flownav.sensors.settings import GpsInsSettings, PadFixSettings, RangefinderSettings
 from flownav.sensors.sheet import Lever, SensorSheet

@@ -1,9 +1,9 @@
-"""Block 3, forces and torques about the centre of gravity, body axes: rotors, fuselage, fins, gravity.
+"""Blocks 3 and 4: forces and torques about the centre of gravity, body axes, and the rigid body that they move.
 
 Sources: reference section 2, block 3 (Gavrilets, Mettler and Feron; Heffley and Mnich NASA CR-177476). The main
 rotor turns clockwise seen from above, so its torque yaws the body to the left and the tail rotor pushes left.
 
-Block 4, the rigid body: paper equations 2-7, with the attitude as a quaternion in place of equations 8-10.
+The rigid body is the paper's equations 2-7, with the attitude as a quaternion in place of equations 8-10.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ import numpy as np
 from flownav.core.compile import equation, magnitude
 from flownav.core.frames import Rotation, Vector, rotation_from_quaternion, to_body
 from flownav.vehicle.around import Around
-from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters
 from flownav.vehicle.rotor import cosine_of_tilt, sine_of_tilt
 from flownav.vehicle.state import HelicopterState, MultirotorState
 

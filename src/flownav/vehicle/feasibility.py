@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 
 from flownav.core.errors import InputError
-from flownav.vehicle.multirotor_parameters import MultirotorParameters, full_thrust, hover_speed
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters, full_thrust, hover_speed
 
 HOVER_MARGIN = 1.05  # the thrust and power limits must leave this much above what hover takes
 LIFT_MARGIN = 1.2  # a multirotor's rotors must be able to lift this much of the weight

@@ -1,6 +1,7 @@
-"""What there is to know of a helicopter before it flies: trim, linear models beside the paper's, ground effect.
+"""What there is to know of a vehicle before it flies.
 
-What there is to know of a multirotor before it flies: hover, battery, loads by airspeed, ground effect.
+Of a helicopter: trim, linear models beside the paper's, ground effect. Of a multirotor: hover, battery, loads by
+airspeed, ground effect.
 """
 
 from __future__ import annotations
@@ -14,8 +15,7 @@ from numpy.typing import NDArray
 
 from flownav.vehicle import linearize
 from flownav.vehicle.kinds import describe_vehicle, load_vehicle
-from flownav.vehicle.multirotor_parameters import MultirotorParameters, full_thrust
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters, full_thrust
 from flownav.vehicle.rotor import multiplier
 from flownav.vehicle.trim import MultirotorTrim, Trim, trim, trim_multirotor
 

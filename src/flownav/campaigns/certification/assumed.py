@@ -19,7 +19,7 @@ from flownav.simulation.dispersion import SHIPPED_FILE, Distribution
 from flownav.simulation.scenario import SHIPPED as SHIPPED_SCENARIOS
 from flownav.simulation.scenario import Scenario
 from flownav.vehicle.kinds import vehicle_file
-from flownav.vehicle.multirotor_parameters import MultirotorParameters
+from flownav.vehicle.parameters import MultirotorParameters
 
 # each is said at greater length in the docs named
 NOT_MODELLED = (

@@ -1,8 +1,8 @@
 """The sensors that a vehicle carries for its navigator: one table, a row each.
 
 From a row follow where the sensor lies in the lane buffer and how it is drawn, started and read there (`layout`,
-`carriage`), how it is fitted and its timetable (`fitting`), the names of its noise (`sources`), its truth and what may be
-dispersed of it (`truth`, `ensemble`), its part of a scenario's file (`scenario`), and what validation makes of it.
+`carriage`), how it is fitted and its timetable (`fitting`), the names of its noise (`sources`), its truth and what may
+be dispersed of it (`truth`, `ensemble`), its part of a scenario's file (`scenario`), and what validation makes of it.
 docs/how-to/add-a-sensor.md adds one.
 """
 

@@ -14,7 +14,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError, ValidationInfo
 
 from flownav.core.errors import InputError
 
@@ -47,6 +47,17 @@ class ParameterModel(BaseModel):
     """Base of every file schema: unknown keys, NaN and infinity are refused; loaded values are frozen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+def more_than(key: str) -> Callable[[float, ValidationInfo], float]:
+    """A field's validator: its value must be more than that of a key above it."""
+
+    def checked(value: float, info: ValidationInfo) -> float:
+        if value <= info.data.get(key, 0.0):
+            raise ValueError(f"more than {key} = {info.data[key]:g} is needed")
+        return value
+
+    return checked
 
 
 Model = TypeVar("Model", bound=BaseModel)

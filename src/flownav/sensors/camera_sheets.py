@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from flownav.core.parameter_files import Number, ParameterModel, in_si, record_of
+from flownav.core.parameter_files import Number, ParameterModel, in_si, more_than, record_of
 from flownav.sensors.flow_camera import FlowCameraParameters
 from flownav.sensors.pad_camera import PadCameraParameters
 from flownav.sensors.processes import level_of
@@ -26,12 +26,7 @@ class Gain(ParameterModel):
     low_height_m: Number = Field(gt=0.0, le=1000.0)
     high_height_m: Number = Field(gt=0.0, le=1000.0)
 
-    @field_validator("high_height_m")
-    @classmethod
-    def _above(cls, value: float, info: ValidationInfo) -> float:
-        if value <= info.data.get("low_height_m", 0.0):
-            raise ValueError(f"more than low_height_m = {info.data['low_height_m']:g} is needed")
-        return value
+    _above = field_validator("high_height_m")(more_than("low_height_m"))
 
 
 class CameraGyro(ParameterModel):
@@ -169,12 +164,7 @@ class PadCameraSheet(SensorSheet):
     false_share: Number = Field(0.0, ge=0.0, le=1.0)
     lens: Lever = Lever()
 
-    @field_validator("max_height_m")
-    @classmethod
-    def _above(cls, value: float, info: ValidationInfo) -> float:
-        if value <= info.data.get("min_height_m", 0.0):
-            raise ValueError(f"more than min_height_m = {info.data['min_height_m']:g} is needed")
-        return value
+    _above = field_validator("max_height_m")(more_than("min_height_m"))
 
     @property
     def angle_sigma_mrad(self) -> float:

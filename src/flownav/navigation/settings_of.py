@@ -96,7 +96,7 @@ def of_sheets(sheets: SensorSheets, rotor_hz: tuple[float, float] | None = None)
 def of_flow_sensor(sensor: FlowSensor) -> Keys:
     """Gains, limits, and dynamics that are more than a delay.
 
-    Latency and axes belong to those who feed the readings (`sensors.identified`).
+    Latency and axes belong to those who feed the readings (`sensors.datasheet`).
     """
     found = identified_flow(sensor)
     dynamics = sensor.dynamics

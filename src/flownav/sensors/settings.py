@@ -20,8 +20,6 @@ from flownav.sensors.noise_law import NoiseFit, constant_noise
 from flownav.sensors.processes import gauss_markov_coefficients, second_order_hold, steps_per_unit
 from flownav.sensors.rangefinder import RangefinderParameters
 
-SIGMA_PER_CEP = 1.0 / math.sqrt(2.0 * math.log(2.0))  # one axis of two equal normal ones: 1/1.1774
-
 
 class GpsInsSettings(ParameterModel):
     """The MIDG. `white`: independent position noise alone. `midg`: the errors that 2 m CEP stands for."""
@@ -82,11 +80,6 @@ class GpsInsSettings(ParameterModel):
     def velocity_sigma_total_m_s(self) -> float:
         """Stationary standard deviation of the velocity error of one axis."""
         return math.hypot(self.velocity_sigma_m_s, self.velocity_white_m_s) if self.model == "midg" else 0.0
-
-    @property
-    def horizontal_cep_m(self) -> float:
-        """Circular error probable of the horizontal position."""
-        return self.position_sigma_m[0] / SIGMA_PER_CEP
 
     def parameters(self) -> GpsInsParameters:
         """Coefficients at 50 Hz."""

@@ -20,7 +20,7 @@ from flownav.simulation.scenario import load_scenario, with_vehicle
 from flownav.simulation.sensing import EPOCH_S
 from flownav.vehicle.kinds import load_vehicle
 from flownav.vehicle.multirotor import derivative
-from flownav.vehicle.multirotor_parameters import MultirotorParameters
+from flownav.vehicle.parameters import MultirotorParameters
 from flownav.vehicle.trim import is_hexa, trim_multirotor
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from flownav.campaigns.local import fly_recorded
 from flownav.core.measurement import Sensor
 from flownav.estimation.bound import posterior_bound
 from flownav.simulation.assemble import assemble
-from flownav.simulation.fitting import refitted, timetable_of
+from flownav.simulation.fitting import refitted
 from flownav.simulation.onboard import without
 from flownav.simulation.scenario import load_scenario, with_filter
 
@@ -30,7 +30,7 @@ def hover():
     onboard = setup.fitted.onboard
     fewer = without(onboard, *BESIDE)
     fitted = refitted(setup.fitted, setup.flight.plan.epochs, onboard=fewer)
-    table = timetable_of(fitted.schedule)
+    table = fitted.schedule
     return replace(setup, fitted=fitted, flight=setup.flight._replace(onboard=fewer, table=table))
 
 

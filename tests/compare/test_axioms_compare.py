@@ -9,8 +9,7 @@ import pytest
 
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, turned_about_down
 from flownav.core.measurement import Sensor, Stream
-from flownav.studies.compare.dead_reckoning import dead_reckoned
-from flownav.studies.compare.tracks import at, says
+from flownav.studies.compare.tracks import at, dead_reckoned, says
 
 T_S = np.arange(0.0, 16.0, 0.0625)
 

@@ -72,7 +72,7 @@ def test_a_file_may_leave_provenance_out(tmp_path):
 def test_degrees_become_radians_and_rotor_constants_are_derived(tmp_path):
     vehicle = load_vehicle(written(tmp_path, X_CELL))
     assert isinstance(vehicle, VehicleParameters)
-    assert vehicle.cyclic_max_rad == pytest.approx(math.radians(8.0))
+    assert vehicle.cyclic_maximum_rad == pytest.approx(math.radians(8.0))
     assert vehicle.pedal_rate_limit_rad_s == pytest.approx(math.radians(300.0))
     solidity = 2 * 0.058 / (math.pi * 0.775)
     assert vehicle.main_lift_solidity == pytest.approx(5.5 * solidity)
@@ -164,7 +164,12 @@ def test_the_papers_model_refuses_a_wrong_shape_and_a_negative_variance(tmp_path
 def test_a_twentieth_more_thrust_than_hover_takes_is_asked_for():
     vehicle = load_vehicle()
     heaviest = vehicle.main_thrust_limit_n / vehicle.gravity_m_s2 / 1.05
-    free = {"collective_max_rad": 1.0, "pedal_max_rad": 1.0, "shaft_power_limit_w": 1e6, "tail_thrust_limit_n": 1e6}
+    free = {
+        "collective_maximum_rad": 1.0,
+        "pedal_maximum_rad": 1.0,
+        "shaft_power_limit_w": 1e6,
+        "tail_thrust_limit_n": 1e6,
+    }
     require_feasible(vehicle._replace(mass_kg=0.999 * heaviest, **free), "here")
     with pytest.raises(InputError, match="main_rotor: cannot hover, the blades stall"):
         require_feasible(vehicle._replace(mass_kg=1.001 * heaviest, **free), "here")

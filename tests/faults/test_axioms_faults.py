@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.campaigns.faults.arrival import as_fed
 from flownav.campaigns.faults.catalogue import FAULTS
+from flownav.campaigns.faults.inject import as_fed
 from flownav.core.measurement import COLUMNS, Sensor, Stream
 
 BEGIN_S, END_S = 4.0, 7.0

@@ -10,7 +10,7 @@ import pytest
 from flownav.core.measurement import Sensor, Stream
 from flownav.lab.identification.flight import Flight
 from flownav.lab.identification.reference_motion import Motion
-from flownav.lab.identification.speed import against_speed
+from flownav.lab.identification.scale import against_speed
 
 GRID_S = np.arange(-2.0, 92.0, 0.02)
 DELAY_S = 0.24

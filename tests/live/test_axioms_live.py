@@ -11,6 +11,9 @@ import os
 import numpy as np
 import pymap3d
 import pytest
+from flownav.live.lags import WINDOW_S
+from flownav.live.timing import FRESH_S
+from flownav.live.timing import WINDOW_S as LEADS_S
 
 from flownav.core.compile import ONE_LANE
 from flownav.core.frames import euler_from_quaternion, quaternion_from_euler, quaternion_product
@@ -18,15 +21,12 @@ from flownav.core.measurement import Measurement, Sensor
 from flownav.estimation.packed import pack
 from flownav.estimation.states import ATTITUDE, GYRO_BIAS, POSITION, QUATERNION, STATES, VELOCITY
 from flownav.live import journal_place, writing
-from flownav.live.estimating import LONGEST_AHEAD_S, estimate_of, quality_of, why_withheld
-from flownav.live.horizon import Horizon
-from flownav.live.journal_place import LOCK_WAIT_S, claim, is_locked, journal_of
-from flownav.live.lags import WINDOW_S, WINDOWS, Lags
+from flownav.live.answers import LONGEST_AHEAD_S, estimate_of, quality_of, why_withheld
+from flownav.live.hearing import Origin
+from flownav.live.horizon import WINDOWS, Horizon, Lags
 from flownav.live.options import Limits
-from flownav.live.origin import Origin
-from flownav.live.timing import COARSE_S, FRESH_S, VehicleClock
-from flownav.live.timing import WINDOW_S as LEADS_S
-from flownav.live.writing import HEAD_EVERY_S, SYNC_S, Writer
+from flownav.live.reception import COARSE_S, VehicleClock
+from flownav.live.writing import HEAD_EVERY_S, LOCK_WAIT_S, SYNC_S, Writer, claim, is_locked, journal_of
 from flownav.navigation.loop import start_navigator
 from flownav.navigation.memory import CLOCK, MEMORY, PROTECTION
 from flownav.navigation.motion_records import ImuMemory

@@ -47,11 +47,10 @@ from flownav.sensors.datasheet import (
 )
 from flownav.simulation.assemble import assemble
 from flownav.simulation.engine import buffers_of, fly_into, fly_one, fly_written
-from flownav.simulation.fitting import refitted, timetable_of
+from flownav.simulation.fitting import Timing, refitted
 from flownav.simulation.flight_record import record_of
 from flownav.simulation.history import columns
 from flownav.simulation.scenario import load_scenario
-from flownav.simulation.schedule import Timing
 from navigation_streams import fly, navigate
 
 SEED = 5
@@ -98,7 +97,7 @@ def flight_with(setup, *, lagged):
         carried, setup.flight.plan.epochs, told=carried.told._replace(settings=settings),
         stated=carried.timing | {Sensor.FLOW_RATE: stated},
     )  # fmt: skip
-    return setup.flight._replace(table=timetable_of(other.schedule), settings=other.settings)
+    return setup.flight._replace(table=other.schedule, settings=other.settings)
 
 
 def velocity_rms_m_s(flight):

@@ -14,6 +14,7 @@ from flownav.navigation.records import FlowMemory, Look, Reading
 from flownav.navigation.settings_of import settings_of
 from flownav.navigation.told import NO_HEADING, NO_STATED_NOISE, Equipment, FlowSettings
 from flownav.navigation.verdicts import Biases
+from flownav.sensors.camera_sheets import FlowCameraSheet
 from flownav.sensors.datasheet import FlowSensor, load_sensor
 from flownav.sensors.flow import FlowParameters, FlowState, flow_noise_sigma, read_flow
 from flownav.sensors.flow_camera import (
@@ -24,7 +25,6 @@ from flownav.sensors.flow_camera import (
     FlowCameraUnit,
     step_flow_camera,
 )
-from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from flownav.sensors.settings import FlowSettings as Chosen
 from navigation_streams import circle, fly, navigate
 from sensor_normals import silent

@@ -28,7 +28,7 @@ from flownav.lab.optics.pad_statistics import (
     sigma_of,
 )
 from flownav.lab.optics.pad_trial import CAMERAS, TrialFrame, camera_flight, camera_named, frames_at, tried
-from flownav.sensors.pad_camera_sheet import PadCameraSheet
+from flownav.sensors.camera_sheets import PadCameraSheet
 
 TAG = PadTarget()
 RNG = np.random.default_rng(5)

@@ -6,18 +6,16 @@ import math
 
 import numpy as np
 import pytest
+from flownav.scoring.drift import Motion
 
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, turned_about_down, within_half_turn
 from flownav.core.measurement import Sensor, Stream
 from flownav.report.series import Track, difference
-from flownav.scoring.alignment import align, velocity_of
-from flownav.scoring.autopilot import autopilot_errors
-from flownav.scoring.drift import Motion, drift_of
 from flownav.scoring.errors import ErrorSums, error_statistics, statistics_of, with_error
-from flownav.scoring.outage import difference_at, outage_error
-from flownav.scoring.path import Path, References, path_scores
+from flownav.scoring.path import Path, References, autopilot_errors, path_scores
 from flownav.scoring.percentiles import percentile_with_interval, share_with_interval
 from flownav.scoring.recorded import at_instants
+from flownav.scoring.reference import align, difference_at, drift_of, outage_error, velocity_of
 
 T_S = np.arange(0.0, 60.0, 0.25)
 

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
+from flownav.sensors.flow_camera_sheet import load_flow_camera_sheet
+from flownav.sensors.range_sensor_sheet import load_range_sensor_sheet
 
 from flownav.core.frames import angular_flow, quaternion_from_euler, rotation_from_quaternion, turned_about_down
-from flownav.sensors.beam import LEVEL, BeamHit, Ground, beam_distance, ground_height
-from flownav.sensors.datasheet import FlowSettings, load_sensor
-from flownav.sensors.first_order import lag_weights, lagged
-from flownav.sensors.flow import FlowState, misread, start_flow, step_flow
+from flownav.sensors.datasheet import load_sensor
+from flownav.sensors.flow import FlowState, misread, pattern_reach, start_flow, step_flow
 from flownav.sensors.flow_camera import (
     FlowCameraNormals,
     FlowCameraState,
@@ -19,10 +19,17 @@ from flownav.sensors.flow_camera import (
     FlowCameraUnit,
     step_flow_camera,
 )
-from flownav.sensors.flow_camera_sheet import load_flow_camera_sheet
-from flownav.sensors.flow_engagement import pattern_reach
-from flownav.sensors.gauss_markov import gauss_markov_coefficients
-from flownav.sensors.geometry import LensPose, in_turned_axes, lever_velocity, turned_rotation
+from flownav.sensors.geometry import (
+    LEVEL,
+    BeamHit,
+    Ground,
+    LensPose,
+    beam_distance,
+    ground_height,
+    in_turned_axes,
+    lever_velocity,
+    turned_rotation,
+)
 from flownav.sensors.gps_receiver import (
     GpsReceiverNormals,
     GpsReceiverStartNormals,
@@ -32,8 +39,14 @@ from flownav.sensors.gps_receiver import (
     step_gps_receiver,
 )
 from flownav.sensors.gps_receiver_sheet import load_gps_receiver_sheet
-from flownav.sensors.imu import ImuReading
-from flownav.sensors.inertial import InertialNormals, InertialStartNormals, InertialUnit, start_inertial, step_inertial
+from flownav.sensors.inertial import (
+    ImuReading,
+    InertialNormals,
+    InertialStartNormals,
+    InertialUnit,
+    start_inertial,
+    step_inertial,
+)
 from flownav.sensors.inertial_sheet import load_inertial_sheet
 from flownav.sensors.magnetometer import (
     MagnetometerNormals,
@@ -41,6 +54,7 @@ from flownav.sensors.magnetometer import (
     MagnetometerUnit,
     read_magnetometer,
 )
+from flownav.sensors.processes import gauss_markov_coefficients, hold_step, lag_weights, lagged, second_order_hold
 from flownav.sensors.range_sensor import (
     RangeSensorNormals,
     RangeSensorState,
@@ -48,8 +62,7 @@ from flownav.sensors.range_sensor import (
     step_range_sensor,
     wide_beam,
 )
-from flownav.sensors.range_sensor_sheet import load_range_sensor_sheet
-from flownav.sensors.second_order import hold_step, second_order_hold
+from flownav.sensors.settings import FlowSettings
 from sensor_normals import silent
 
 SEEDS = pytest.mark.parametrize("seed", range(6))

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation as Turn
 from flownav.core.errors import InputError
 from flownav.core.frames import angular_flow
 from flownav.core.parameter_files import check
+from flownav.sensors.camera_sheets import FlowCameraSheet
 from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.flow import flow_noise_sigma
 from flownav.sensors.flow_camera import (
@@ -27,14 +28,15 @@ from flownav.sensors.flow_camera import (
     start_flow_camera,
     step_flow_camera,
 )
-from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from flownav.sensors.geometry import LensPose
 from flownav.sensors.settings import FlowSettings
 from sensor_normals import draws, moved_by, silent
 
 SHEET = FlowCameraSheet.read()
 # a camera whose quality tells more than the shipped one's
-P = SHEET.parameters()._replace(best_quality=250.0, quality_fall_height=0.4, quality_fall_flow=0.4, quality_sigma=20.0)
+P = SHEET.parameters()._replace(
+    quality_best=250.0, quality_lost_at_height=0.4, quality_lost_at_speed=0.4, quality_sigma=20.0
+)
 FLOW = FlowSettings(sonar_overscale=False).parameters(load_sensor())
 PERFECT = silent(FlowCameraUnit, noise=1.0)
 QUIET = silent(FlowCameraNormals)
@@ -157,7 +159,7 @@ def test_a_spell_of_low_texture_makes_noise_and_takes_quality() -> None:
     n = silent(FlowCameraNormals, noise_y=1.0)
     assert read(HOVER, n, state=spell).flow_y_rad_s == pytest.approx(3.0 * read(HOVER, n).flow_y_rad_s)
     assert read(HOVER, state=spell).quality == pytest.approx(0.3 * 250 * (1 - 0.4 / 3.5**2), abs=0.5)
-    blind = P._replace(least_texture=0.31)
+    blind = P._replace(texture_least=0.31)
     assert read(HOVER, state=spell, p=blind).quality == 0.0
     assert read(HOVER, p=blind).quality > 200.0
 

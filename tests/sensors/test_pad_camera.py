@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation as Turn
 from flownav.core.errors import InputError
 from flownav.core.frames import Rotation
 from flownav.core.parameter_files import check
+from flownav.sensors.camera_sheets import PadCameraSheet
 from flownav.sensors.geometry import LensPose
 from flownav.sensors.pad_camera import (
     PadCameraNormals,
@@ -21,7 +22,6 @@ from flownav.sensors.pad_camera import (
     reach_of,
     read_pad_camera,
 )
-from flownav.sensors.pad_camera_sheet import PadCameraSheet
 from sensor_normals import draws, moved_by, silent
 
 SHEET = check(

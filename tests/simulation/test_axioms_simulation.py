@@ -8,11 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from flownav.sensors.beam import LEVEL, Ground
-from flownav.simulation.ground import share_beyond, under_rotor
+from flownav.sensors.geometry import LEVEL, Ground
+from flownav.simulation.fitting import Timing, clocks, sampled_readings, schedule_of
+from flownav.simulation.ground import RecirculationSettings, RecirculationState, recirculated, share_beyond, under_rotor
 from flownav.simulation.onboard import EPOCH_S, Clock
-from flownav.simulation.recirculation import RecirculationSettings, RecirculationState, recirculated
-from flownav.simulation.schedule import Timing, clocks, sampled_readings, schedule_of
 from flownav.simulation.truth import CARRIED
 from flownav.simulation.wind import WindNormals, WindSettings, WindState, WindVelocity, start_wind, step_wind
 

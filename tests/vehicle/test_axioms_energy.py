@@ -6,17 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from flownav.vehicle.multirotor_trim import settled
 
 from flownav.core.frames import rotation_from_quaternion
 from flownav.vehicle import airframe, drive, helicopter, multirotor
+from flownav.vehicle.airframe import angular_acceleration, linear_acceleration
 from flownav.vehicle.around import CALM
-from flownav.vehicle.loading import load_vehicle
-from flownav.vehicle.motors import battery_voltage, shaft_power
-from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.multirotor_trim import settled
-from flownav.vehicle.parameters import VehicleParameters
-from flownav.vehicle.propeller import propeller_load
-from flownav.vehicle.rigid_body import angular_acceleration, linear_acceleration
+from flownav.vehicle.kinds import load_vehicle
+from flownav.vehicle.motors import battery_voltage, propeller_load, shaft_power
+from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters
 from flownav.vehicle.skids import Support, with_friction, with_support
 from flownav.vehicle.state import Controls, RotorLoads
 from flownav.vehicle.trim import trim

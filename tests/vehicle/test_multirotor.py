@@ -18,13 +18,13 @@ from flownav.vehicle.around import CALM, in_wind
 from flownav.vehicle.feasibility import require_multirotor
 from flownav.vehicle.kinds import flattened, load_vehicle, read_kind, vehicle_file
 from flownav.vehicle.motors import battery_voltage, mixed, propeller_load, root_of_share, told_speed
-from flownav.vehicle.multirotor_parameters import (
+from flownav.vehicle.parameters import (
     MultirotorParameters,
+    VehicleParameters,
     full_thrust,
     hover_speed,
     with_inflow_held,
 )
-from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.rotor import multiplier
 from flownav.vehicle.state import Controls, HelicopterState, MultirotorState
 from flownav.vehicle.trim import parked_multirotor, settled, trim_multirotor
@@ -163,7 +163,7 @@ def test_a_propellers_three_quotients_are_those_of_its_formulas(speed, inplane_s
     tilt = QUAD.flap_back_m / (QUAD.radius_m**2 * max(speed, 1.0))
     assert load.thrust_n == pytest.approx(near_ground * free, rel=1e-9, abs=1e-9)
     assert load.drag_n_s_m == pytest.approx(
-        QUAD.inplane_drag_n_s2_m * speed + near_ground * free * tilt, rel=1e-9, abs=1e-9
+        QUAD.inplane_drag_n_s2_m_rad * speed + near_ground * free * tilt, rel=1e-9, abs=1e-9
     )
     assert load.hub_n_s == pytest.approx(QUAD.hub_stiffness_n_m_rad * tilt, rel=1e-9)
     assert load.torque_n_m == pytest.approx(QUAD.torque_n_m_s2 * speed**2)
@@ -187,7 +187,7 @@ def test_a_tilted_quad_is_righted_by_the_ground_under_its_lower_rotors():
 def test_in_free_space_angular_momentum_is_kept():
     """Without air, gravity and drag the body gives what spin the rotors take up."""
     vacuum = QUAD._replace(
-        thrust_n_s2=0.0, torque_n_m_s2=1e-30, axial_n_s2_m=0.0, inplane_n_s2_m2=0.0, inplane_drag_n_s2_m=0.0,
+        thrust_n_s2=0.0, torque_n_m_s2=1e-30, axial_n_s2_m=0.0, inplane_n_s2_m2=0.0, inplane_drag_n_s2_m_rad=0.0,
         flap_back_m=0.0, gravity_m_s2=0.0, fuselage_area_x_m2=0.0, fuselage_area_y_m2=0.0, fuselage_area_z_m2=0.0,
         resistance_ohm=0.0,
     )  # fmt: skip

@@ -25,7 +25,7 @@ def test_fuselage_drag_opposes_the_motion_through_air_and_wake():
 
 def test_the_tail_pushes_left_and_the_fin_in_its_wake_takes_some_back():
     thrust, induced = 8.0, 6.0
-    sideslip = AIR.v - ARM * AIR.r + ABOVE * AIR.p - VEHICLE.vertical_fin_inflow_fraction * induced
+    sideslip = AIR.v - ARM * AIR.r + ABOVE * AIR.p - VEHICLE.vertical_fin_tail_inflow_fraction * induced
     lift = VEHICLE.vertical_fin_lift_slope_per_rad * abs(AIR.u) + abs(sideslip)
     expected = -RHO / 2 * VEHICLE.vertical_fin_area_m2 * lift * sideslip - VEHICLE.tail_fin_blockage * thrust
     side = airframe.tail_side_force
@@ -36,7 +36,7 @@ def test_the_tail_pushes_left_and_the_fin_in_its_wake_takes_some_back():
 
 def test_the_tail_plane_is_pushed_down_by_the_wake_and_lifts_with_speed():
     plane = airframe.tail_plane_force
-    w = AIR.w + VEHICLE.horizontal_fin_behind_cg_m * AIR.q - VEHICLE.horizontal_fin_inflow_fraction * 3.5
+    w = AIR.w + VEHICLE.horizontal_fin_behind_cg_m * AIR.q - VEHICLE.horizontal_fin_main_inflow_fraction * 3.5
     lift = VEHICLE.horizontal_fin_lift_slope_per_rad * abs(AIR.u) + abs(w)
     assert plane(3.5, AIR, VEHICLE) == pytest.approx(-RHO / 2 * VEHICLE.horizontal_fin_area_m2 * lift * w)
     assert plane(3.5, AirMotion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), VEHICLE) > 0.0

@@ -19,10 +19,9 @@ from flownav.navigation.told import FlowNoise
 from flownav.sensors.flow import flow_noise_sigma
 from flownav.sensors.noise_law import constant_noise
 from flownav.simulation.assemble import Setup
-from flownav.simulation.fitting import Fitted, refitted, timetable_of
+from flownav.simulation.fitting import Fitted, Timing, refitted
 from flownav.simulation.onboard import without
 from flownav.simulation.plan import Flight
-from flownav.simulation.schedule import Timing
 
 
 def ablations(setup: Setup) -> dict[str, Flight]:
@@ -52,7 +51,7 @@ def _with(setup: Setup, **changed: Any) -> Flight:
     """The flight with a navigator that is told, or a vehicle that carries, something else."""
     assert setup.fitted is not None
     other = refitted(setup.fitted, setup.flight.plan.epochs, **changed)
-    return setup.flight._replace(onboard=other.onboard, table=timetable_of(other.schedule), settings=other.settings)
+    return setup.flight._replace(onboard=other.onboard, table=other.schedule, settings=other.settings)
 
 
 def _without(setup: Setup, sensor: str) -> Flight:

@@ -33,7 +33,7 @@ from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario, with_filter
-from flownav.vehicle.multirotor_parameters import MultirotorParameters
+from flownav.vehicle.parameters import MultirotorParameters
 
 CASES = SHIPPED  # requirements by name, with what is flown and what the ensemble must keep
 PAPERS_CONDITIONS = ("takeoff", "landing")

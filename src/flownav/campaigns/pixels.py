@@ -36,8 +36,8 @@ from flownav.lab.optics.pad_trial import (
     whole_in_view,
 )
 from flownav.lab.optics.projection import FlightMotion, Pose
+from flownav.sensors.camera_sheets import PadCameraSheet
 from flownav.sensors.pad_camera import PadCameraParameters, angle_noise, distance_noise
-from flownav.sensors.pad_camera_sheet import PadCameraSheet
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_one
 from flownav.simulation.ensemble import Ensemble

@@ -190,7 +190,7 @@ def _write_datasheet(
     from flownav.core.provenance import command_line
     from flownav.lab.optics.pad_datasheet import Assumed, datasheet
     from flownav.lab.optics.pad_trial import camera_named
-    from flownav.sensors.pad_camera_sheet import PadCameraSheet
+    from flownav.sensors.camera_sheets import PadCameraSheet
 
     sheet = PadCameraSheet.read()
     lens_m = (float(sheet.lens.forward_m), float(sheet.lens.right_m), float(sheet.lens.down_m))

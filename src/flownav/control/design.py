@@ -19,8 +19,7 @@ from flownav.control.gains import AutopilotGains
 from flownav.control.loops import OUTER_S
 from flownav.vehicle.feasibility import hover_induced_velocity, hover_pitch
 from flownav.vehicle.kinds import AnyTrim, AnyVehicle
-from flownav.vehicle.multirotor_parameters import MultirotorParameters, full_thrust
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters, full_thrust
 from flownav.vehicle.trim import MultirotorTrim, Trim
 
 # attitude: a steady cyclic turns the body at 1/τ_f of it per second, τ_f the flapping's time constant
@@ -71,28 +70,32 @@ def helicopter_gains(
         gust_decay_forward=math.exp(-OUTER_S / GUST_FORWARD_S),
         gust_decay_right=math.exp(-OUTER_S / GUST_RIGHT_S),
         height_gain=HEIGHT_1_S,
-        collective_gain=collective,
-        collective_integral=HEAVE_INTEGRAL_1_S * collective,
-        pitch_gain=pitch,
-        pitch_integral=PITCH_INTEGRAL_1_S * pitch,
-        pitch_damping=PITCH_LEAD_S * pitch,
-        roll_gain=roll,
-        roll_integral=ROLL_INTEGRAL_1_S * roll,
-        roll_damping=ROLL_LEAD_S * roll,
+        **_loop("collective", collective, HEAVE_INTEGRAL_1_S),
+        **_loop("pitch", pitch, PITCH_INTEGRAL_1_S, PITCH_LEAD_S),
+        **_loop("roll", roll, ROLL_INTEGRAL_1_S, ROLL_LEAD_S),
+        **_loop("yaw_rate", yaw, YAW_RATE_INTEGRAL_1_S),
         heading_gain=HEADING_1_S,
-        yaw_rate_gain=yaw,
-        yaw_rate_integral=YAW_RATE_INTEGRAL_1_S * yaw,
         collective_trim_rad=hover.collective_rad,
         pedal_trim_rad=hover.pedal_rad,
         lon_trim_rad=hover.lon,
         lat_trim_rad=hover.lat,
-        pitch_trim_sine=math.sin(hover.pitch_rad),
-        roll_trim_sine=math.sin(hover.roll_rad) * math.cos(hover.pitch_rad),
+        **_at_rest(vehicle, hover),
         idle_collective_rad=idle_collective_rad,
         pedal_per_collective=_pedal_per_collective(vehicle, hover),
-        pad_pos_d_m=-vehicle.cg_above_skid_m,
-        skids_below_cg_m=vehicle.cg_above_skid_m,
     )
+
+
+def _at_rest(vehicle: AnyVehicle, hover: AnyTrim) -> dict[str, float]:
+    """How a vehicle hangs in hover, and how high it stands."""
+    pitch_sine, roll_sine = math.sin(hover.pitch_rad), math.sin(hover.roll_rad) * math.cos(hover.pitch_rad)
+    standing = {"pad_pos_d_m": -vehicle.cg_above_skid_m, "skids_below_cg_m": vehicle.cg_above_skid_m}
+    return {"pitch_trim_sine": pitch_sine, "roll_trim_sine": roll_sine, **standing}
+
+
+def _loop(name: str, gain: float, integral_1_s: float, lead_s: float | None = None) -> dict[str, float]:
+    """The gains of a loop; its integral and its damping are shares of its gain."""
+    damping = {} if lead_s is None else {f"{name}_damping": lead_s * gain}
+    return {f"{name}_gain": gain, f"{name}_integral": integral_1_s * gain, **damping}
 
 
 def _pedal_per_collective(vehicle: VehicleParameters, hover: Trim) -> float:
@@ -136,30 +139,21 @@ def multirotor_gains(
         gust_decay_forward=decay,
         gust_decay_right=decay,
         height_gain=ROTORS_HEIGHT_1_S,
-        collective_gain=by_heave,
-        collective_integral=ROTORS_HEAVE_INTEGRAL_1_S * by_heave,
+        **_loop("collective", by_heave, ROTORS_HEAVE_INTEGRAL_1_S),
+        **_loop("pitch", by_pitch, ATTITUDE_INTEGRAL_1_S, LEAD_S),
+        **_loop("roll", by_roll, ATTITUDE_INTEGRAL_1_S, LEAD_S),
+        **_loop("yaw_rate", by_yaw, ROTORS_YAW_RATE_INTEGRAL_1_S),
         collective_limit_rad=CLIMB_LIMIT_SHARE,
-        pitch_gain=by_pitch,
-        pitch_integral=ATTITUDE_INTEGRAL_1_S * by_pitch,
-        pitch_damping=LEAD_S * by_pitch,
-        roll_gain=by_roll,
-        roll_integral=ATTITUDE_INTEGRAL_1_S * by_roll,
-        roll_damping=LEAD_S * by_roll,
         cyclic_limit_rad=TILT_LIMIT_SHARE,
         heading_gain=ROTORS_HEADING_1_S,
-        yaw_rate_gain=by_yaw,
-        yaw_rate_integral=ROTORS_YAW_RATE_INTEGRAL_1_S * by_yaw,
         pedal_limit_rad=YAW_LIMIT_SHARE,
         collective_trim_rad=hover.controls.col,
         pedal_trim_rad=hover.controls.ped,
         lon_trim_rad=hover.controls.lon,
         lat_trim_rad=hover.controls.lat,
-        pitch_trim_sine=math.sin(hover.pitch_rad),
-        roll_trim_sine=math.sin(hover.roll_rad) * math.cos(hover.pitch_rad),
+        **_at_rest(vehicle, hover),
         idle_collective_rad=vehicle.idle_share,
         spool_rate_rad_s=hover.controls.col / SPOOL_S,
-        pad_pos_d_m=-vehicle.cg_above_skid_m,
-        skids_below_cg_m=vehicle.cg_above_skid_m,
     )
 
 

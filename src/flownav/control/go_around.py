@@ -8,7 +8,7 @@ well, and comes down again; without a camera that could help it for so long only
 often only: then it lands with what it has. A vehicle that must find its pad with a camera never lands without having
 found it, over ground that its range knows.
 
-The last metres of a precision landing: what is brought over the pad, and the gate before the touchdown.
+Last: what is brought over the pad, and the gate before the touchdown.
 """
 
 from __future__ import annotations

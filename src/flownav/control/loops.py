@@ -1,4 +1,4 @@
-"""The autopilot's laws as signals of frequency, and each loop as it is where every other one is closed.
+"""The autopilot's loops, each as it is where every other one is closed: by frequency, and as they are sampled.
 
 The flight kernel runs `autopilot.inner_loop` at 250 Hz and `autopilot.outer_loop` at 50 Hz, each holding its commands.
 Here the same laws stand as frequency responses between the signals at which a loop can be cut: the four blade
@@ -9,10 +9,9 @@ that takes these signals round to themselves, cutting signal i and leaving all o
 
 Sampling and holding are in it exactly but for what folds back from above half the sampling rate.
 
-The closed loop as it is flown, exactly: a linear plant, the attitude loop every 4 ms, the outer loop every 20 ms.
-
-One period of the outer loop is one matrix. Its largest eigenvalue says whether the loop is stable, sampling, holding
-and the estimate's delay (whole periods of the outer loop) included: the margins of `loops`, which are read from
+`period_map` is the closed loop as it is flown, exactly: a linear plant, the attitude loop every 4 ms, the outer loop
+every 20 ms. One period of the outer loop is one matrix. Its largest eigenvalue says whether the loop is stable,
+sampling, holding and the estimate's delay (whole periods of the outer loop) included: the margins, which are read from
 frequency responses, are proven on it.
 """
 

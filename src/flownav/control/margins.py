@@ -1,6 +1,7 @@
 """Stability margins of a loop from its frequency response L(jω), where L = -1 is the edge of stability.
 
-Every loop's margins at every corner of a vehicle's uncertainty box, flown with the gains of the vehicle as told.
+`margins_over_box` has those of every loop at every corner of a vehicle's uncertainty box, flown with the gains of the
+vehicle as told.
 """
 
 from __future__ import annotations

@@ -7,12 +7,14 @@ A file's schema is a pydantic model of `Number` fields with their allowed ranges
 
 from __future__ import annotations
 
+import math
 import tomllib
+from collections.abc import Callable, Mapping
 from importlib import resources
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_args
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, ValidationError, ValidationInfo
 
 from flownav.core.errors import InputError
 
@@ -47,7 +49,50 @@ class ParameterModel(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
+def more_than(key: str) -> Callable[[float, ValidationInfo], float]:
+    """A field's validator: its value must be more than that of a key above it."""
+
+    def checked(value: float, info: ValidationInfo) -> float:
+        if value <= info.data.get(key, 0.0):
+            raise ValueError(f"more than {key} = {info.data[key]:g} is needed")
+        return value
+
+    return checked
+
+
 Model = TypeVar("Model", bound=BaseModel)
+Record = TypeVar("Record", bound=tuple[Any, ...])
+
+# a file's units beside those of the equations, as words of a key
+IN_SI: dict[str, tuple[str, Callable[[float], float]]] = {
+    "deg": ("rad", math.radians),
+    "percent": ("", lambda percent: 0.01 * percent),
+    "mrad": ("rad", lambda mrad: 1e-3 * mrad),
+    "mgauss": ("gauss", lambda mgauss: 1e-3 * mgauss),
+}
+
+
+def in_si(model: BaseModel, before: str = "") -> dict[str, float]:
+    """Every number of a checked file by its key in SI units, behind the names of the tables that it stands in.
+
+    `bias_deg_s` of the table `gyro` is `gyro_bias_rad_s`; a share in per cent is a share.
+    """
+    found: dict[str, float] = {}
+    for key, value in model:
+        if isinstance(value, BaseModel):
+            found |= in_si(value, f"{before}{key}_")
+        elif isinstance(value, float):
+            words = f"{before}{key}".split("_")
+            for word in words:
+                value = IN_SI[word][1](value) if word in IN_SI else value
+            found["_".join(name for word in words if (name := IN_SI.get(word, (word,))[0]))] = value
+    return found
+
+
+def record_of(record: type[Record], numbers: Mapping[str, float], **derived: Any) -> Record:
+    """A record of an equation's parameters: its fields are those of a file's numbers, but for what is derived."""
+    fields: tuple[str, ...] = vars(record)["_fields"]
+    return record(**{name: numbers[name] for name in fields if name not in derived}, **derived)
 
 
 def shipped(name: str) -> Path:

@@ -15,12 +15,11 @@ from flownav.core.parameter_files import check
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.navigation.told import NO_STATED_NOISE, FlowNoise
 from flownav.sensors.barometer import BarometerSheet
+from flownav.sensors.camera_sheets import FlowCameraSheet, PadCameraSheet
 from flownav.sensors.datasheet import FlowSensor, identified_flow, needs_lag_states
-from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
 from flownav.sensors.inertial_sheet import InertialSheet
 from flownav.sensors.magnetometer import MagneticField, MagnetometerSheet
-from flownav.sensors.pad_camera_sheet import PadCameraSheet
 from flownav.sensors.range_sensor import RangeSensorSheet
 from flownav.sensors.sheets import SensorSheets
 
@@ -97,7 +96,7 @@ def of_sheets(sheets: SensorSheets, rotor_hz: tuple[float, float] | None = None)
 def of_flow_sensor(sensor: FlowSensor) -> Keys:
     """Gains, limits, and dynamics that are more than a delay.
 
-    Latency and axes belong to those who feed the readings (`sensors.identified`).
+    Latency and axes belong to those who feed the readings (`sensors.datasheet`).
     """
     found = identified_flow(sensor)
     dynamics = sensor.dynamics

@@ -1,6 +1,6 @@
-"""One flight with parts of somebody else's, on the compiled loop, as a scored Record.
+"""Flights with parts of somebody else's on the compiled loop: one as a scored Record, or a campaign's.
 
-A campaign's engine for flights with parts of somebody else's: one after the other, or equations on lanes.
+A campaign flies them one after the other, or, where they are equations, on lanes.
 """
 
 from __future__ import annotations

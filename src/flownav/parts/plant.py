@@ -1,6 +1,6 @@
-"""A vehicle and a controller of somebody else's, called by the simulator's loop in place of ours.
+"""A vehicle, a controller and sensors of somebody else's, called by the simulator's loop in place of ours.
 
-Sensors of somebody else's: their readings in place of ours, on the way into the navigator and into the record.
+Readings are replaced on their way into the navigator and into the record.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ standard deviation that grows with height. What else happens on a real vehicle i
 
 Velocities are of the lens, body FRD [m/s]; heights are of the lens above the ground.
 
-When the optical-flow sensor sees the pattern of the pad and can follow it.
+Last: when the sensor sees the pattern of the pad and can follow it (`engagement`).
 """
 
 from __future__ import annotations

@@ -48,16 +48,16 @@ class FlowCameraParameters(NamedTuple):
     gyro_bias_rad_s: float
     gyro_walk_rad_s: float
     gyro_scale: float
-    least_texture: float
-    low_texture: float  # what a spell leaves of the texture
-    low_texture_noise: float  # times the noise
+    texture_least: float
+    texture_remaining: float  # what a spell leaves of it
+    texture_noise_factor: float  # and makes of the noise
     low_begins_above: float
     low_ends_above: float
     outlier_above: float
-    outlier_sigma_rad_s: float
-    best_quality: float
-    quality_fall_height: float  # share of the quality lost at the greatest height
-    quality_fall_flow: float  # and at the fastest flow
+    outliers_sigma_rad_s: float
+    quality_best: float
+    quality_lost_at_height: float  # share of the quality lost at the greatest height
+    quality_lost_at_speed: float  # and at the fastest flow
     quality_sigma: float
     lost_above: float
 
@@ -201,10 +201,10 @@ def _next_state(
 @equation
 def _quality(texture: float, height_share: float, flow_share: float, normal: float, p: FlowCameraParameters) -> float:
     """A whole number from 1 to 255: what texture, height and speed leave of the best, and noise."""
-    at_height = 1.0 - p.quality_fall_height * height_share * height_share
-    at_speed = 1.0 - p.quality_fall_flow * flow_share * flow_share
+    at_height = 1.0 - p.quality_lost_at_height * height_share * height_share
+    at_speed = 1.0 - p.quality_lost_at_speed * flow_share * flow_share
     quality: float = np.rint(
-        clamp(p.best_quality * texture * at_height * at_speed + p.quality_sigma * normal, 1.0, 255.0)
+        clamp(p.quality_best * texture * at_height * at_speed + p.quality_sigma * normal, 1.0, 255.0)
     )
     return quality
 
@@ -227,11 +227,11 @@ def step_flow_camera(
         truth.seen_u_m_s, truth.seen_v_m_s, truth.seen_w_m_s, unit.turned_x, unit.turned_y, unit.turned_z
     )
     low = s.low_texture > 0.5
-    texture = truth.texture * (p.low_texture if low else 1.0)
+    texture = truth.texture * (p.texture_remaining if low else 1.0)
     per_m = 1.0 / larger(truth.range_m, SMALLEST_RANGE_M)
     gain = flow_gain(truth.height_m, unit, p)
-    sigma = unit.noise * flow_noise_sigma(truth.height_m, flow) * per_m * (p.low_texture_noise if low else 1.0)
-    stray = p.outlier_sigma_rad_s if n.outlier > p.outlier_above else 0.0
+    sigma = unit.noise * flow_noise_sigma(truth.height_m, flow) * per_m * (p.texture_noise_factor if low else 1.0)
+    stray = p.outliers_sigma_rad_s if n.outlier > p.outlier_above else 0.0
     # the velocity is over the range already: what is seen from a metre away
     flow_x, flow_y = angular_flow(gain * vel_x * per_m, gain * vel_y * per_m, rate_x, rate_y, 1.0)
     flow_x, flow_y = (
@@ -239,7 +239,7 @@ def step_flow_camera(
         flow_y + sigma * n.noise_y + stray * n.outlier_y,
     )
     fastest = flow.max_flow_rad_s
-    sees = (s.engaged > 0.5) & (texture >= p.least_texture)
+    sees = (s.engaged > 0.5) & (texture >= p.texture_least)
     height_share = clamp(truth.height_m / flow.max_height_m, 0.0, 1.0)
     flow_share = clamp(larger(magnitude(flow_x), magnitude(flow_y)) / fastest, 0.0, 1.0)
     return s, FlowCameraReading(

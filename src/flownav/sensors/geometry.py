@@ -1,12 +1,11 @@
-"""Where a sensor sits and how it looks: levers, and mountings that are off by small angles.
+"""Where a sensor sits, how it looks, and where its beam meets the ground.
 
 Levers are body FRD metres from the centre of gravity. A mounting error is three small angles [rad] about the body's
 x, y and z by which the sensor's axes are turned against the body's; first order, good to 2e-4 of the vector at a
 degree (Titterton, Weston, Strapdown Inertial Navigation Technology, 2nd ed., section 3.6).
 
-Where a beam from the vehicle meets the ground: a plane with a slope, one straight step in it, and a rough surface.
-
-The ground's height over the datum, metres upwards, north and east from the origin:
+The ground is a plane with a slope, one straight step in it, and a rough surface. Its height over the datum, metres
+upwards, north and east from the origin:
 
     z(n, e) = slope_n n + slope_e e + (step where (n - edge_n) dir_n + (e - edge_e) dir_e > 0)
 

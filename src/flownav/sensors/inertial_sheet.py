@@ -8,7 +8,7 @@ from typing import ClassVar
 from pydantic import Field
 
 from flownav.core.frames import GRAVITY_M_S2
-from flownav.core.parameter_files import Number, ParameterModel
+from flownav.core.parameter_files import Number, ParameterModel, in_si, record_of
 from flownav.sensors.inertial import InertialParameters
 from flownav.sensors.sheet import SensorSheet
 
@@ -73,36 +73,24 @@ class InertialSheet(SensorSheet):
     def parameters(self, rotor_speed_rad_s: float, blade_count: float) -> InertialParameters:
         """Coefficients of one period on a vehicle with this rotor (of a multirotor: one of its propellers)."""
         rt_period, per_reading = math.sqrt(self.period_s), math.sqrt(0.5 * self.rate_hz)
-        mg = 1e-3 * GRAVITY_M_S2
-        gyro, accel, shake = self.gyro, self.accelerometer, self.vibration
-        blades_rad_s = rotor_speed_rad_s * blade_count
-        return InertialParameters(
-            gyro_sigma_rad_s=math.radians(gyro.density_deg_s_rthz) * per_reading,
-            gyro_bias_rad_s=math.radians(gyro.bias_deg_s),
-            gyro_walk_rad_s=math.radians(gyro.walk_deg_s_rts) * rt_period,
-            gyro_scale=0.01 * gyro.scale_percent,
-            gyro_misalignment_rad=math.radians(gyro.misalignment_deg),
-            gyro_per_force_rad_s=math.radians(gyro.g_sensitivity_deg_s_g) / GRAVITY_M_S2,
-            gyro_range_rad_s=math.radians(gyro.range_deg_s),
+        mg, accel = 1e-3 * GRAVITY_M_S2, self.accelerometer
+        gyro = in_si(self.gyro, "gyro_")
+        tones = self._tone("rev", rotor_speed_rad_s) | self._tone("blade", rotor_speed_rad_s * blade_count)
+        return record_of(
+            InertialParameters,
+            in_si(self) | in_si(accel, "accel_") | tones,
+            gyro_sigma_rad_s=gyro["gyro_density_rad_s_rthz"] * per_reading,
+            gyro_walk_rad_s=gyro["gyro_walk_rad_s_rts"] * rt_period,
+            gyro_per_force_rad_s=gyro["gyro_g_sensitivity_rad_s_g"] / GRAVITY_M_S2,
             accel_sigma_m_s2=1e-3 * mg * accel.density_ug_rthz * per_reading,
             accel_bias_m_s2=mg * accel.bias_mg,
             accel_walk_m_s2=mg * accel.walk_mg_rts * rt_period,
-            accel_scale=0.01 * accel.scale_percent,
-            accel_misalignment_rad=math.radians(accel.misalignment_deg),
             accel_range_m_s2=GRAVITY_M_S2 * accel.range_g,
-            **self._tone("rev", shake.rotor, rotor_speed_rad_s),
-            **self._tone("blade", shake.blades, blades_rad_s),
-            vibration_spread=shake.spread,
         )
 
-    def _tone(self, name: str, tone: Tone, speed_rad_s: float) -> dict[str, float]:
-        left = self.left_of_tone(speed_rad_s / (2.0 * math.pi))
-        turn = speed_rad_s * self.period_s
-        return {
-            f"{name}_cosine": math.cos(turn),
-            f"{name}_sine": math.sin(turn),
-            f"{name}_level_m_s2": left * tone.level_m_s2,
-            f"{name}_vertical_m_s2": left * tone.vertical_m_s2,
-            f"{name}_tilt_rad_s": left * math.radians(tone.tilt_deg_s),
-            f"{name}_yaw_rad_s": left * math.radians(tone.yaw_deg_s),
-        }
+    def _tone(self, name: str, speed_rad_s: float) -> dict[str, float]:
+        """What a tone's turn in a period is, and what is left of its amplitudes."""
+        tone = self.vibration.rotor if name == "rev" else self.vibration.blades
+        left, turn = self.left_of_tone(speed_rad_s / (2.0 * math.pi)), speed_rad_s * self.period_s
+        amplitudes = {key: left * amplitude for key, amplitude in in_si(tone, f"{name}_").items()}
+        return {f"{name}_cosine": math.cos(turn), f"{name}_sine": math.sin(turn), **amplitudes}

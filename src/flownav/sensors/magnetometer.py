@@ -18,7 +18,7 @@ from pydantic import Field
 
 from flownav.core.compile import equation
 from flownav.core.frames import Rotation, to_body
-from flownav.core.parameter_files import Number, ParameterModel
+from flownav.core.parameter_files import Number, ParameterModel, in_si, record_of
 from flownav.sensors.sheet import SensorSheet
 
 
@@ -29,9 +29,9 @@ class MagnetometerParameters(NamedTuple):
     field_e_gauss: float
     field_d_gauss: float
     sigma_gauss: float
-    hard_gauss: float
+    hard_iron_gauss: float
     scale: float
-    soft: float  # off the diagonal
+    soft_iron: float  # off the diagonal
     gauss_per_w: float
 
 
@@ -78,7 +78,7 @@ class MagnetometerReading(NamedTuple):
 @equation
 def draw_magnetometer(n: MagnetometerUnit, p: MagnetometerParameters) -> MagnetometerUnit:
     """This flight's unit in this flight's vehicle."""
-    scale, soft, hard, power = p.scale, p.soft, p.hard_gauss, p.gauss_per_w
+    scale, soft, hard, power = p.scale, p.soft_iron, p.hard_iron_gauss, p.gauss_per_w
     return MagnetometerUnit(
         scale * n.soft_xx, soft * n.soft_xy, soft * n.soft_xz,
         soft * n.soft_yx, scale * n.soft_yy, soft * n.soft_yz,
@@ -139,14 +139,11 @@ class MagnetometerSheet(SensorSheet):
 
     def parameters(self, field: MagneticField) -> MagnetometerParameters:
         """Coefficients of one reading at a place."""
-        return MagnetometerParameters(
-            *field.ned_gauss,
-            sigma_gauss=1e-3 * self.sigma_mgauss,
-            hard_gauss=1e-3 * self.hard_iron_mgauss,
-            scale=0.01 * self.scale_percent,
-            soft=0.01 * self.soft_iron_percent,
+        north, east, down = field.ned_gauss
+        return record_of(
+            MagnetometerParameters, in_si(self), field_n_gauss=north, field_e_gauss=east, field_d_gauss=down,
             gauss_per_w=1e-6 * self.current_mgauss_per_kw,
-        )
+        )  # fmt: skip
 
 
 MODEL_YEAR = 2026.0  # declination changes by less than 0.3 deg a year; logs seldom say which year they are of

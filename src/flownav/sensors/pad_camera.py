@@ -1,6 +1,6 @@
 """A camera that finds the pad, with what goes wrong: bias, noise, missed and false fixes, a wrong stated accuracy.
 
-The fix is `pad_fix.read_pad`'s (tangents towards body forward and right, distance; MAVLink LANDING_TARGET) of a camera
+The fix is `read_pad`'s (tangents towards body forward and right, distance; MAVLink LANDING_TARGET) of a camera
 whose axes are turned against the body by small angles that are drawn once a flight, and whose focal length is believed
 too long by a share that is drawn once a flight: tangents are smaller by that share and distances larger. What this
 camera sees is reported as if it were right.
@@ -24,12 +24,11 @@ distance; also where the pad is out of view, while the height is within the limi
 across the sight, projected on the image plane), and of the distance, by noise, boresight and scale of the *datasheet*,
 which the camera's own may exceed, times a factor that is wrong by a share.
 
-A pad-relative fix: where the pad's centre lies from the lens, as a downward camera and a target give it.
-
-The reading is what MAVLink LANDING_TARGET carries: tangents of the angles towards body forward and right, and the
-distance. The line of sight has white noise across it, the same both ways, and the distance a share of itself;
-readings are offered while the lens is between two heights and the pad's mark, whose sides lie north and east, is whole
-within a view that is so wide forward and so wide to the right.
+**A fix** says where the pad's centre lies from the lens, as a downward camera and a target give it. It is what MAVLink
+LANDING_TARGET carries: tangents of the angles towards body forward and right, and the distance. The line of sight has
+white noise across it, the same both ways, and the distance a share of itself; readings are offered while the lens is
+between two heights and the pad's mark, whose sides lie north and east, is whole within a view that is so wide forward
+and so wide to the right.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""What happens to a sensor by chance: an event at one reading, a spell of many, and a factor that is somewhat off.
+"""What sensors have in common: chance, errors that forget themselves, lags that are advanced exactly, whole steps.
+
+**Chance.** An event at one reading, a spell of many, and a factor that is somewhat off.
 
 Every draw is a standard normal that the caller hands in. An event of probability P happens where the normal exceeds
 the level q with 1 - Phi(q) = P, so that no uniform draw is needed and masks stay selects.
@@ -7,30 +9,26 @@ A spell (no fix, no texture, a value that sticks) is a two-state chain that is a
 System Technical Journal 39, 1960, who modelled bursts of errors so): it ends with probability T/mean at each reading,
 hence lasts `mean` on average, and begins with the probability that gives it its share of the time.
 
-First-order Gauss-Markov processes: errors that forget themselves with a time constant.
-
-A process of standard deviation `sigma` and time constant `tau` has the autocorrelation
+**First-order Gauss-Markov.** A process of standard deviation `sigma` and time constant `tau` has the autocorrelation
 sigma^2 exp(-|t|/tau). Sampled every `period_s` it is, exactly,
 
     e[k+1] = decay e[k] + drive sigma n[k],   decay = exp(-period/tau),   drive = sqrt(1 - decay^2),
 
 with n standard normal, so it is stationary from a first value sigma n on. With tau = 0 it is white.
 
-A first-order lag advanced exactly while its input moves in a straight line between two readings.
+**A first-order lag**, advanced exactly while its input moves in a straight line between two readings.
 
     tau y' = u - y,   u(t) = u0 + (u1 - u0) t/T
 
 gives y1 = k y0 + (m - k) u0 + (1 - m) u1 with k = exp(-T/tau) and m = (tau/T)(1 - k): a ramp is late by exactly tau,
 whatever the period. With tau = 0 the output is the input.
 
-A second-order lag advanced exactly while its input is held.
+**A second-order lag**, advanced exactly while its input is held:
 
     x1' = x2,   x2' = -c x1 - b x2 + u
 
 is the state of 1/(s^2 + b s + c): x1 the output, x2 its rate. Over one period with u held constant (zero-order
 hold) the solution is linear, x[k+1] = F x[k] + G u[k], and F, G are computed once, in closed form.
-
-Readings that come in whole steps.
 """
 
 from __future__ import annotations

@@ -18,10 +18,10 @@ import math
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import Field, field_validator
 
 from flownav.core.compile import clamp, equation, larger
-from flownav.core.parameter_files import Number
+from flownav.core.parameter_files import Number, more_than
 from flownav.sensors.geometry import BeamHit
 from flownav.sensors.processes import level_of, quantised, spell, steps_per_unit
 from flownav.sensors.sheet import Lever, SensorSheet, Spells
@@ -162,12 +162,7 @@ class RangeSensorSheet(SensorSheet):
     stuck_at_m: Number | None = Field(None, ge=0.0, le=1000.0)
     lens: Lever = Lever()
 
-    @field_validator("ceiling_m")
-    @classmethod
-    def _above_the_floor(cls, value: float, info: ValidationInfo) -> float:
-        if value <= info.data.get("floor_m", 0.0):
-            raise ValueError(f"more than floor_m = {info.data['floor_m']:g} is needed")
-        return value
+    _above_the_floor = field_validator("ceiling_m")(more_than("floor_m"))
 
     def parameters(self) -> RangeSensorParameters:
         """Coefficients of one reading."""

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from flownav.core.parameter_files import Number, ParameterModel
+from flownav.core.parameter_files import Number, ParameterModel, in_si, record_of
 from flownav.sensors import flow, gps_ins
 from flownav.sensors.datasheet import FlowSensor
 from flownav.sensors.flow import FlowParameters
@@ -19,8 +19,6 @@ from flownav.sensors.gps_ins import GpsInsParameters
 from flownav.sensors.noise_law import NoiseFit, constant_noise
 from flownav.sensors.processes import gauss_markov_coefficients, second_order_hold, steps_per_unit
 from flownav.sensors.rangefinder import RangefinderParameters
-
-SIGMA_PER_CEP = 1.0 / math.sqrt(2.0 * math.log(2.0))  # one axis of two equal normal ones: 1/1.1774
 
 
 class GpsInsSettings(ParameterModel):
@@ -82,11 +80,6 @@ class GpsInsSettings(ParameterModel):
     def velocity_sigma_total_m_s(self) -> float:
         """Stationary standard deviation of the velocity error of one axis."""
         return math.hypot(self.velocity_sigma_m_s, self.velocity_white_m_s) if self.model == "midg" else 0.0
-
-    @property
-    def horizontal_cep_m(self) -> float:
-        """Circular error probable of the horizontal position."""
-        return self.position_sigma_m[0] / SIGMA_PER_CEP
 
     def parameters(self) -> GpsInsParameters:
         """Coefficients at 50 Hz."""
@@ -153,30 +146,25 @@ class FlowSettings(ParameterModel):
         mode_rad_s = 2.0 * math.pi * self.shake_frequency_hz
         lag = second_order_hold(sensor.dynamics.b_1_s, sensor.dynamics.c_1_s2, flow.PERIOD_S)
         mount = second_order_hold(2.0 * self.shake_damping_ratio * mode_rad_s, mode_rad_s**2, flow.PERIOD_S)
-        noise = self._noise(sensor)
-        limits = sensor.limits
-        engaging_tilt = math.radians(limits.max_tilt_deg * (1.0 - limits.hysteresis))
-        return FlowParameters(
-            *lag, 1.0 / sensor.dynamics.c_1_s2, sensor.dynamics.a_1_s2,
-            *mount, 1.0 / mode_rad_s**2,
+        noise, limits = self._noise(sensor), sensor.limits
+        numbers = in_si(self) | in_si(limits)
+        for name, part in (("lag", lag), ("mount", mount), ("noise", noise)):
+            numbers |= {f"{name}_{field}": value for field, value in part._asdict().items()}
+        return record_of(
+            FlowParameters,
+            numbers | {f"noise_{i}": c for i, c in enumerate(noise.coefficients)},
+            lag_rest=1.0 / sensor.dynamics.c_1_s2,
+            gain=sensor.dynamics.a_1_s2,
+            mount_rest=1.0 / mode_rad_s**2,
             shake_vertical=1.0 if self.shake else 0.0,
             shake_horizontal=self.shake_horizontal_fraction if self.shake else 0.0,
             sonar_floor_m=sensor.sonar_floor_m if self.sonar_overscale else 0.0,
-            sonar_lag_s=self.sonar_lag_s,
-            rotation_leak=self.rotation_leak,
             vertical_from_sonar=1.0 if self.vertical == "sonar" else 0.0,
-            noise_low_m=noise.low_m, noise_high_m=noise.high_m,
-            noise_centre=noise.centre, noise_scale=noise.scale,
-            **{f"noise_{i}": c for i, c in enumerate(noise.coefficients)},
             noise_floor_m_s=0.0 if self.constant_noise_m_s is not None else sensor.noise.floor_m_s,
-            min_height_m=limits.min_height_m,
-            max_height_m=limits.max_height_m,
-            max_flow_rad_s=limits.max_flow_rad_s,
             min_tilt_cosine=math.cos(math.radians(limits.max_tilt_deg)),
-            engaging_tilt_cosine=math.cos(engaging_tilt),
-            hysteresis=limits.hysteresis,
+            engaging_tilt_cosine=math.cos(math.radians(limits.max_tilt_deg * (1.0 - limits.hysteresis))),
             half_fov_tangent=sensor.optics.half_fov_tangent,
-        )  # fmt: skip
+        )
 
     def _noise(self, sensor: FlowSensor) -> NoiseFit:
         """The sensor's law, or the constant in its place."""
@@ -203,14 +191,10 @@ class RangefinderSettings(ParameterModel):
 
     def parameters(self) -> RangefinderParameters:
         """Coefficients of one reading."""
-        return RangefinderParameters(
-            floor_m=self.floor_m,
-            ceiling_m=self.ceiling_m,
-            resolution_m=self.resolution_m,
-            steps_per_m=steps_per_unit(self.resolution_m),
-            sigma_m=self.sigma_m,
-            stuck=0.0 if self.stuck_at_m is None else 1.0,
-            stuck_m=self.stuck_at_m or 0.0,
+        stuck = 0.0 if self.stuck_at_m is None else 1.0
+        steps = steps_per_unit(self.resolution_m)
+        return record_of(
+            RangefinderParameters, in_si(self), steps_per_m=steps, stuck=stuck, stuck_m=self.stuck_at_m or 0.0
         )
 
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from flownav.core.parameter_files import ParameterModel
 from flownav.sensors.barometer import BarometerSheet
+from flownav.sensors.camera_sheets import FlowCameraSheet, PadCameraSheet
 from flownav.sensors.datasheet import FlowSensor, load_sensor
-from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
 from flownav.sensors.inertial_sheet import InertialSheet
 from flownav.sensors.magnetometer import MagneticField, MagnetometerSheet
-from flownav.sensors.pad_camera_sheet import PadCameraSheet
 from flownav.sensors.range_sensor import RangeSensorSheet
 from flownav.sensors.skid_switch import SkidSwitchSheet
 

@@ -20,7 +20,7 @@ from flownav.estimation.paper_filter import PaperModel
 from flownav.sensors.datasheet import FlowSensor, load_sensor
 from flownav.simulation.dispersion import Design, Distribution, raises_wind
 from flownav.simulation.ensemble import Ensemble, flown, recirculation_of
-from flownav.simulation.fitting import Fitted, fitted, timetable_of
+from flownav.simulation.fitting import Fitted, fitted
 from flownav.simulation.ground import GroundSettings
 from flownav.simulation.plan import ATTITUDE_S, Flight, FlightPlan
 from flownav.simulation.plant import LinearTruth
@@ -29,8 +29,7 @@ from flownav.simulation.sensing import EPOCH_S, Draws, SensorSuite
 from flownav.vehicle import kinds
 from flownav.vehicle.corners import NOMINAL
 from flownav.vehicle.linearize import ReducedModel, hover_plant, load_paper_model
-from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.parameters import touchdown_limits
+from flownav.vehicle.parameters import MultirotorParameters, touchdown_limits
 from flownav.vehicle.state import Controls
 from flownav.vehicle.trim import Trim, parked, parked_multirotor
 
@@ -95,7 +94,7 @@ def assemble(scenario: Scenario) -> Setup:
         gains=gains,
         paper=_paper_filter(paper) if scenario.filter.name == "paper" else None,
         onboard=carried.onboard if carried else None,
-        table=timetable_of(carried.schedule) if carried else None,
+        table=carried.schedule if carried else None,
         settings=carried.settings if carried else np.zeros(0),
         initial_variance=_initial_variance(scenario, paper),
         linear=_linear_truth(paper, hover) if scenario.truth == "linear" and isinstance(hover, Trim) else None,

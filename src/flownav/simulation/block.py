@@ -1,6 +1,6 @@
 """What belongs together in a block of flights: its lanes and their noise, the navigator on board, how far it is.
 
-Normals for the sensors, by the noise counter: each sensor's own channels, into rows of the lane buffer.
+Normals are drawn by the noise counter, each sensor's on its own channels, into rows of the lane buffer.
 """
 
 from __future__ import annotations

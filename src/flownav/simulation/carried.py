@@ -1,9 +1,9 @@
 """The sensors that a vehicle carries for its navigator: one table, a row each.
 
 From a row follow where the sensor lies in the lane buffer and how it is drawn, started and read there (`layout`,
-`carriage`, `sampling`, `units`), its timetable (`schedule`), the names of its noise (`sources`), its truth and what may
-be dispersed of it (`truth`, `ensemble`), its part of a scenario's file (`scenario`), how it is fitted (`fitting`), and
-what validation makes of it. docs/how-to/add-a-sensor.md adds one.
+`carriage`), how it is fitted and its timetable (`fitting`), the names of its noise (`sources`), its truth and what may
+be dispersed of it (`truth`, `ensemble`), its part of a scenario's file (`scenario`), and what validation makes of it.
+docs/how-to/add-a-sensor.md adds one.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, get_type_hints
 from flownav.core.compile import depends_also
 from flownav.core.measurement import Sensor
 from flownav.sensors.barometer import BarometerReading, BarometerSheet, draw_barometer, start_barometer, step_barometer
+from flownav.sensors.camera_sheets import FlowCameraSheet, PadCameraSheet
 from flownav.sensors.flow_camera import draw_flow_camera, start_flow_camera
-from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from flownav.sensors.gps_receiver import GpsReceiverReading, draw_gps_receiver, start_gps_receiver, step_gps_receiver
 from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
 from flownav.sensors.inertial import InertialReading, draw_inertial, start_inertial
@@ -28,7 +28,6 @@ from flownav.sensors.magnetometer import (
     read_magnetometer,
 )
 from flownav.sensors.pad_camera import PadCameraReading, draw_pad_camera
-from flownav.sensors.pad_camera_sheet import PadCameraSheet
 from flownav.sensors.range_sensor import (
     RangeSensorReading,
     RangeSensorSheet,
@@ -42,6 +41,7 @@ from flownav.simulation import onboard, seeing
 from flownav.simulation.seeing import told
 
 if TYPE_CHECKING:
+    from flownav.simulation.scenario import Scenario
     from flownav.vehicle.kinds import AnyVehicle, RotorFacts
 
 BLADES = 2.0  # of the main rotor
@@ -92,8 +92,8 @@ class CarriedSensor(NamedTuple):
     late: bool = False
     lever: str = ""
     heard: Callable[..., Any] | None = None
-    wanted: Callable[[onboard.Wishes, Any, float], Any] = onboard.as_filed
-    readings: Callable[[onboard.Wishes], int] | None = None  # how many of `says` it gives; None: all
+    wanted: Callable[[Scenario, Any, float], Any] = onboard.as_filed
+    readings: Callable[[Scenario], int] | None = None  # how many of `says` it gives; None: all
     coefficients: Callable[[Any, Carrier], Any] = lambda sheet, _: sheet.parameters()
 
     @property

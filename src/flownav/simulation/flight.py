@@ -8,15 +8,19 @@ batch, and both are the same bytes. Rates: physics 500 Hz (Runge-Kutta), flow dy
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flownav.control.autopilot import grounded, hovering
 from flownav.control.guidance import Reference, reference_at
-from flownav.core.compile import Lanes, Work, equation, invoke, kernel, pointer
+from flownav.core.compile import Lanes, Work, equation, invoke, kernel, pointer, replacing
+from flownav.estimation import paper_filter
+from flownav.estimation.kalman import start
+from flownav.estimation.paper_filter import STATES, PaperModel
 from flownav.navigation.tape import output_of
+from flownav.sensors.gps_ins import NavSolution
 from flownav.simulation import layout, navigating
 from flownav.simulation.block import Aboard, Block, Buffers, Progress, key_lanes, put_start
 from flownav.simulation.carriage import draw_units, sample, start_onboard
@@ -29,14 +33,15 @@ from flownav.simulation.epoch import (
     note_home,
     note_inputs,
 )
-from flownav.simulation.filtering import run_filter, start_filter
 from flownav.simulation.history import write_history
-from flownav.simulation.layout import store_autopilot
+from flownav.simulation.layout import PLANT, store_autopilot
 from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import NOTHING, PHYSICS_S, START_STEP, Flight, OwnParts
 from flownav.simulation.plant import observe_vehicle, place
+from flownav.simulation.records import Estimated, Measured, PaperState, PaperVariance, Spread
 from flownav.simulation.sensing import EPOCH_S, draw_epoch, sense, start_sensors
 from flownav.simulation.surroundings import draw_recirculation, start_surroundings, surround
+from flownav.vehicle.state import HelicopterState
 
 
 @equation
@@ -214,3 +219,69 @@ def fly_block(flight: Flight, truth: NDArray[np.float64], block: Block, buffers:
     b = Block(pointer(work), lanes, block.seed, block.first, block.noise)
     aboard = Aboard(pointer(buffers.nav), take, pointer(flight.settings), o, pointer(buffers.fed.reshape(-1)))
     fly(b, aboard, flight, flight.onboard, flight.table, buffers.history)
+
+
+at_position = replacing(PaperState, "pos_n_m", "pos_e_m", "pos_d_m")
+with_motion = replacing(Estimated, *PaperState._fields)
+with_attitude = replacing(Estimated, "qw", "qx", "qy", "qz")
+
+
+@equation
+def start_filter(work: Work, lanes: Lanes, variance: NDArray[np.float64], start_known: bool) -> None:
+    """x: the known start, or the first GPS position; velocity zero. P = diag(variance)."""
+    start(work, lanes, layout.FILTER, STATES, variance)
+    start_position(work, lanes, start_known)
+
+
+@PLANT.on_lanes
+def start_position(x: PaperState, state: HelicopterState, measured: Measured, *, start_known: bool) -> PaperState:
+    """The filter's state at the known start, or at the first GPS position."""
+    return at_position(
+        x,
+        pos_n_m=state.pos_n if start_known else measured.pos_n_m,
+        pos_e_m=state.pos_e if start_known else measured.pos_e_m,
+        pos_d_m=state.pos_d if start_known else measured.pos_d_m,
+    )
+
+
+@equation
+def run_filter(work: Work, lanes: Lanes, epoch: int, paper: PaperModel | None) -> None:
+    """Predict over the last epoch, correct with this one's readings, and say what is estimated.
+
+    The compiler drops the branch where the filter is None.
+    """
+    if paper is not None:
+        run_paper_filter(work, lanes, epoch, paper)
+        say_state(work, lanes)
+    say_ins_attitude(work, lanes)
+
+
+@equation
+def run_paper_filter(work: Work, lanes: Lanes, epoch: int, model: PaperModel) -> None:
+    """Equations 24-30."""
+    if epoch > 0:
+        paper_filter.predict(work, lanes, layout.FILTER, layout.INPUT, model)
+    paper_filter.update(work, lanes, layout.FILTER, layout.MEASURED, layout.ARRIVED, layout.INNOVATION, model)
+
+
+class Stated(NamedTuple):
+    """What the filter says."""
+
+    estimated: Estimated
+    spread: Spread
+
+
+@PLANT.on_lanes
+def say_state(said: Estimated, x: PaperState, variance: PaperVariance) -> Stated:
+    """The estimate is the state."""
+    estimated = with_motion(
+        said, pos_n_m=x.pos_n_m, pos_e_m=x.pos_e_m, pos_d_m=x.pos_d_m, vel_u_m_s=x.vel_u_m_s, vel_v_m_s=x.vel_v_m_s,
+        vel_w_m_s=x.vel_w_m_s,
+    )  # fmt: skip
+    return Stated(estimated, Spread(*variance))
+
+
+@PLANT.on_lanes
+def say_ins_attitude(said: Estimated, gps: NavSolution) -> Estimated:
+    """A filter without an attitude of its own says the INS's."""
+    return with_attitude(said, qw=gps.qw, qx=gps.qx, qy=gps.qy, qz=gps.qz)

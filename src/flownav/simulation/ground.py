@@ -1,13 +1,13 @@
-"""The ground of a scenario: level, sloping, with a step or a deck's edge, smooth or rough; the pad's centre is at 0.
+"""The ground of a scenario, and what comes back from it of a rotor's own wake.
 
-A rotor's own wake about it, near the ground: it comes back from the ground and is drawn in again.
+The ground is level or sloping, with a step or a deck's edge, smooth or rough; the pad's centre is at 0.
 
-In a wind the ground vortex is drawn in and costs lift, most where the wind is about 0.7 of the induced velocity v_i
-(Curtiss, Sun, Putman and Hanker 1984: recirculation below about 0.5 v_i, a ground vortex under the disc up to about
-1.2 v_i; Ganesh and Komerath 2006: both unsteady). Here that is air which moves: down by `loss`·v_i at most, and
-unsteady by `unsteady`·v_i down and, over the disc's radius, from side to side. Both fade with the square of the hub's
-height, to nothing at one rotor diameter. The sizes are assumed: 1 % of lift, and 1 % at random, on the Maxi Joker's
-skids; nobody measured them on a vehicle of its size.
+Near the ground a rotor's wake comes back and is drawn in again. In a wind the ground vortex is drawn in and costs
+lift, most where the wind is about 0.7 of the induced velocity v_i (Curtiss, Sun, Putman and Hanker 1984: recirculation
+below about 0.5 v_i, a ground vortex under the disc up to about 1.2 v_i; Ganesh and Komerath 2006: both unsteady). Here
+that is air which moves: down by `loss`·v_i at most, and unsteady by `unsteady`·v_i down and, over the disc's radius,
+from side to side. Both fade with the square of the hub's height, to nothing at one rotor diameter. The sizes are
+assumed: 1 % of lift, and 1 % at random, on the Maxi Joker's skids; nobody measured them on a vehicle of its size.
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ from flownav.simulation.seeing import attitude_of
 from flownav.simulation.truth import CARRIED, PARTS, SIZES
 from flownav.simulation.wind import WindNormals, WindState
 from flownav.vehicle.around import Around
-from flownav.vehicle.multirotor_parameters import MultirotorParameters
+from flownav.vehicle.parameters import MultirotorParameters
 from flownav.vehicle.state import Controls, HelicopterState, Inflow, MultirotorState, Six
 
 
@@ -126,7 +126,7 @@ AUTOPILOT = _rows.keep(AutopilotState)
 
 ROWS = _rows.next
 # behind the rows: readings on their way, a ring of slots, each with one reading of every lane. They are filled in the
-# order of sampling and emptied in that of the instants that the readings describe, both known beforehand (`schedule`),
+# order of sampling and emptied in that of the instants that the readings describe, both known beforehand (`fitting`),
 # so that no lane waits for another.
 _rows.keep(Reading, 0, "slot")
 load_slot, put_slot = PLANT.access(Reading)

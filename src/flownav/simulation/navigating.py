@@ -36,7 +36,11 @@ _, store_nees = PLANT.access(records.Nees)
 
 
 class Timetable(NamedTuple):
-    """`schedule.Schedule` as kernels take it, and where the truth of the last instants lies in the lane buffer."""
+    """The readings in the order in which the navigator takes them (`fitting.schedule_of`).
+
+    t_s (n,), sensor (n,), slot (n,) of the ring, epoch (n,) in which it is taken; slots: of the ring; horizon_epochs:
+    how far the navigator lags behind the present; readings: n.
+    """
 
     t_s: NDArray[np.float64]
     sensor: NDArray[np.int64]
@@ -45,6 +49,11 @@ class Timetable(NamedTuple):
     slots: int
     horizon_epochs: int
     readings: int
+
+    @property
+    def horizon_s(self) -> float:
+        """How far the navigator lags behind the present [s]."""
+        return self.horizon_epochs * EPOCH_S
 
 
 @equation

@@ -1,27 +1,28 @@
 """The sensors that a vehicle carries for its navigator: coefficients, clocks and places, and what they look at.
 
-Datasheets as a scenario wants them: its own figures above the files', at rates that the simulator's clock has.
+Last: datasheets as a scenario wants them, its own figures above the files', at rates that the simulator's clock has.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.compile import equation
 from flownav.core.frames import rotation_from_quaternion, to_earth
+from flownav.sensors.camera_sheets import AngleNoise, DistanceNoise, FlowCameraSheet, PadCameraSheet
 from flownav.sensors.flow import FlowParameters
-from flownav.sensors.flow_camera_sheet import FlowCameraSheet
 from flownav.sensors.geometry import BeamHit, Ground, beam_distance
 from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
 from flownav.sensors.inertial_sheet import InertialSheet
-from flownav.sensors.pad_camera_sheet import AngleNoise, DistanceNoise, PadCameraSheet
 from flownav.sensors.range_sensor import RangeSensorSheet
-from flownav.sensors.settings import GpsInsSettings, PadFixSettings, RangefinderSettings
 from flownav.sensors.sheet import Lever, SensorSheet
 from flownav.vehicle.state import HelicopterState
+
+if TYPE_CHECKING:
+    from flownav.simulation.scenario import Scenario
 
 EPOCH_S = 0.02
 PHYSICS_PERIOD_S = 0.002
@@ -110,22 +111,6 @@ EPOCH_HZ = 1.0 / EPOCH_S
 STEPS_AN_EPOCH = round(EPOCH_S / PHYSICS_PERIOD_S)
 
 
-class Wishes(Protocol):
-    """What a scenario says of sensors itself, above their files."""
-
-    @property
-    def gps(self) -> GpsInsSettings:
-        """The receiver's errors."""
-
-    @property
-    def rangefinder(self) -> RangefinderSettings:
-        """The rangefinder's limits and noise."""
-
-    @property
-    def pad_fix(self) -> PadFixSettings | None:
-        """The pad camera's view and noise; None where there is no such camera."""
-
-
 def at_height(lens: Lever, down_m: float) -> Lever:
     """A lens where the vehicle's file puts it."""
     return lens.model_copy(update={"down_m": down_m})
@@ -147,21 +132,21 @@ def clock_of(sheet: SensorSheet, phase: int, readings: int) -> Clock:
     return Clock(readings, period, phase % period)
 
 
-def as_filed(wishes: Wishes, sheet: Sheet, lens_down_m: float) -> Sheet:
+def as_filed(scenario: Scenario, sheet: Sheet, lens_down_m: float) -> Sheet:
     """What its file says."""
     return on_clock(sheet)
 
 
-def inertial_sheet(wishes: Wishes, sheet: InertialSheet, lens_down_m: float) -> InertialSheet:
+def inertial_sheet(scenario: Scenario, sheet: InertialSheet, lens_down_m: float) -> InertialSheet:
     """The IMU at the lowest rate, not below its own, whose period is so many physics steps that an epoch has."""
     steps = [n for n in range(1, STEPS_AN_EPOCH + 1) if STEPS_AN_EPOCH % n == 0]
     fast = [n for n in steps if 1.0 / (n * PHYSICS_PERIOD_S) >= float(sheet.rate_hz) - 1e-6]
     return sheet.model_copy(update={"rate_hz": 1.0 / (max(fast or steps[:1]) * PHYSICS_PERIOD_S)})
 
 
-def receiver_sheet(wishes: Wishes, sheet: GpsReceiverSheet, lens_down_m: float) -> GpsReceiverSheet:
+def receiver_sheet(scenario: Scenario, sheet: GpsReceiverSheet, lens_down_m: float) -> GpsReceiverSheet:
     """The receiver: the paper's white noise at 50 Hz, or the sheet with what the scenario says of its errors."""
-    gps = wishes.gps
+    gps = scenario.gps
     if gps.model == "white":
         white = dict.fromkeys(("slow_sigma_m", "slow_sigma_down_m", "fast_sigma_m", "fast_sigma_down_m", "spread"), 0.0)
         white |= {"white_sigma_m": gps.white_sigma_m, "white_sigma_down_m": gps.white_sigma_m, "quantum_m": 0.0}
@@ -182,26 +167,26 @@ def receiver_sheet(wishes: Wishes, sheet: GpsReceiverSheet, lens_down_m: float) 
     return on_clock(sheet.model_copy(update={"position": sheet.position.model_copy(update=shared)}))
 
 
-def receiver_readings(wishes: Wishes) -> int:
+def receiver_readings(scenario: Scenario) -> int:
     """A fix is a position and a velocity; the paper's white one has no velocity."""
-    return 1 if wishes.gps.model == "white" else 2
+    return 1 if scenario.gps.model == "white" else 2
 
 
-def camera_sheet(wishes: Wishes, sheet: FlowCameraSheet, lens_down_m: float) -> FlowCameraSheet:
+def camera_sheet(scenario: Scenario, sheet: FlowCameraSheet, lens_down_m: float) -> FlowCameraSheet:
     """The flow camera, its lens where the scenario puts it."""
     return on_clock(sheet.model_copy(update={"lens": at_height(sheet.lens, lens_down_m)}))
 
 
-def range_sheet(wishes: Wishes, sheet: RangeSensorSheet, lens_down_m: float) -> RangeSensorSheet:
+def range_sheet(scenario: Scenario, sheet: RangeSensorSheet, lens_down_m: float) -> RangeSensorSheet:
     """The rangefinder with what the scenario says of it, its lens where the scenario puts it."""
-    sonar = wishes.rangefinder
+    sonar = scenario.rangefinder
     said = {name: getattr(sonar, name) for name in sonar.model_fields_set}
     return on_clock(sheet.model_copy(update=said | {"lens": at_height(sheet.lens, lens_down_m)}))
 
 
-def pad_sheet(wishes: Wishes, sheet: PadCameraSheet, lens_down_m: float) -> PadCameraSheet | None:
+def pad_sheet(scenario: Scenario, sheet: PadCameraSheet, lens_down_m: float) -> PadCameraSheet | None:
     """The pad's camera, where the scenario has one."""
-    fix = wishes.pad_fix
+    fix = scenario.pad_fix
     if fix is None:
         return None
     stated = fix.model_fields_set

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from flownav.sensors.gps_ins import NavSolution
+
 
 class RotorSpeed(NamedTuple):
     """Of a helicopter's main rotor."""
@@ -75,19 +77,12 @@ class PaperInput(NamedTuple):
     ped_rad: float
 
 
-class PaperState(NamedTuple):
+class PaperState(Measured):
     """The state of the paper's filter."""
 
-    pos_n_m: float
-    pos_e_m: float
-    pos_d_m: float
-    vel_u_m_s: float
-    vel_v_m_s: float
-    vel_w_m_s: float
 
-
-class PaperVariance(NamedTuple):
-    """The diagonal of its covariance."""
+class Spread(NamedTuple):
+    """The variances that a filter states of position over the pad and body velocity."""
 
     pos_n_m2: float
     pos_e_m2: float
@@ -95,6 +90,10 @@ class PaperVariance(NamedTuple):
     vel_u_m2_s2: float
     vel_v_m2_s2: float
     vel_w_m2_s2: float
+
+
+class PaperVariance(Spread):
+    """The diagonal of its covariance."""
 
 
 class Felt(NamedTuple):
@@ -142,19 +141,8 @@ class HeldRange(NamedTuple):
     range_m: float
 
 
-class TruthThen(NamedTuple):
+class TruthThen(NavSolution):
     """The truth at a remembered instant."""
-
-    pos_n_m: float
-    pos_e_m: float
-    pos_d_m: float
-    vel_n_m_s: float
-    vel_e_m_s: float
-    vel_d_m_s: float
-    qw: float
-    qx: float
-    qy: float
-    qz: float
 
 
 class InertialThen(NamedTuple):
@@ -191,32 +179,14 @@ class Estimated(NamedTuple):
     qz: float
 
 
-class Spread(NamedTuple):
-    """The variances that it states."""
-
-    pos_n_m2: float
-    pos_e_m2: float
-    pos_d_m2: float
-    vel_u_m2_s2: float
-    vel_v_m2_s2: float
-    vel_w_m2_s2: float
-
-
 class Nees(NamedTuple):
     """Its normalised error squared, of position and velocity NED; 0 where the filter does not say."""
 
     nees: float
 
 
-class HorizonError(NamedTuple):
+class HorizonError(Measured):
     """The navigator's position and body velocity at its horizon, less the truth then."""
-
-    pos_n_m: float
-    pos_e_m: float
-    pos_d_m: float
-    vel_u_m_s: float
-    vel_v_m_s: float
-    vel_w_m_s: float
 
 
 class AttitudeError(NamedTuple):
@@ -228,9 +198,5 @@ class AttitudeError(NamedTuple):
     z: float
 
 
-class Home(NamedTuple):
+class Home(PadPlace):
     """Where the estimate puts the pad."""
-
-    north_m: float
-    east_m: float
-    down_m: float

@@ -11,6 +11,7 @@ from flownav.estimation.states import GROUND, PAD, POSITION, STATE
 from flownav.navigation.memory import MEMORY, PAD_KNOWN
 from flownav.navigation.rows import body_velocity_variance
 from flownav.simulation.layout import PLANT
+from flownav.simulation.records import Spread
 
 
 class PadSaid(NamedTuple):
@@ -27,15 +28,8 @@ class GroundSaid(NamedTuple):
     down_m: float
 
 
-class StatedVariance(NamedTuple):
+class StatedVariance(Spread):
     """The variances of position NED and of body velocity."""
-
-    pos_n_m2: float
-    pos_e_m2: float
-    pos_d_m2: float
-    vel_u_m2_s2: float
-    vel_v_m2_s2: float
-    vel_w_m2_s2: float
 
 
 class PadVariance(NamedTuple):

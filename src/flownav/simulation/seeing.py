@@ -185,8 +185,8 @@ def see_load(loads: Loads) -> float:
 
 
 def touch(
-    state: skid_switch.SkidSwitchState, unit: skid_switch.SkidSwitchUnit, load_n: float, n:
-    skid_switch.SkidSwitchNormals, p: skid_switch.SkidSwitchParameters, autopilot: AutopilotState,
+    state: skid_switch.SkidSwitchState, unit: skid_switch.SkidSwitchUnit, load_n: float,
+    n: skid_switch.SkidSwitchNormals, p: skid_switch.SkidSwitchParameters, autopilot: AutopilotState,
 ) -> Touched:  # fmt: skip
     """The skid switch, and what the vehicle says of it: on the ground, not about to fly, and settled."""
     after, read = skid_switch.step_skid_switch(state, unit, load_n, n, p)

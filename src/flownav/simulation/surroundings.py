@@ -21,8 +21,7 @@ from flownav.simulation.ground import (
 from flownav.simulation.records import Loads
 from flownav.simulation.wind import WindNormals, WindParameters, WindState, WindVelocity, start_wind, step_wind
 from flownav.vehicle.around import CALM, Around
-from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters
 from flownav.vehicle.state import HelicopterState
 
 Four = tuple[float, float, float, float]

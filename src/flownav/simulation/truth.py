@@ -2,8 +2,7 @@
 
 Each flight has a `Truth` of its own, which lies in its lane's rows of the buffer. Where nothing is dispersed
 (*matched*) it is what the datasheets say; of an *ensemble* it is drawn flight by flight (`simulation.ensemble`).
-
-A sensor's fault as numbers: what one flight's sensors do wrong, and when.
+Its sensors' fault is part of it: what they do wrong, and when.
 """
 
 from __future__ import annotations
@@ -21,8 +20,7 @@ from flownav.simulation.carried import carried_sensors
 from flownav.simulation.ground import RecirculationParameters
 from flownav.simulation.wind import WindParameters
 from flownav.vehicle.kinds import AnyVehicle
-from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters
 
 
 class SensorFault(NamedTuple):

@@ -1,9 +1,9 @@
-"""Block 3, forces and torques about the centre of gravity, body axes: rotors, fuselage, fins, gravity.
+"""Blocks 3 and 4: forces and torques about the centre of gravity, body axes, and the rigid body that they move.
 
 Sources: reference section 2, block 3 (Gavrilets, Mettler and Feron; Heffley and Mnich NASA CR-177476). The main
 rotor turns clockwise seen from above, so its torque yaws the body to the left and the tail rotor pushes left.
 
-Block 4, the rigid body: paper equations 2-7, with the attitude as a quaternion in place of equations 8-10.
+The rigid body is the paper's equations 2-7, with the attitude as a quaternion in place of equations 8-10.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ import numpy as np
 from flownav.core.compile import equation, magnitude
 from flownav.core.frames import Rotation, Vector, rotation_from_quaternion, to_body
 from flownav.vehicle.around import Around
-from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters
 from flownav.vehicle.rotor import cosine_of_tilt, sine_of_tilt
 from flownav.vehicle.state import HelicopterState, MultirotorState
 
@@ -88,7 +87,7 @@ def main_rotor_wrench(
 @equation
 def tail_side_force(thrust: float, induced: float, air: AirMotion, vehicle: VehicleParameters) -> float:
     """Side force of the tail rotor, to the left, and of the vertical fin in its wake, at one place [N]."""
-    sideslip = tail_sideslip(air, vehicle) - vehicle.vertical_fin_inflow_fraction * induced
+    sideslip = tail_sideslip(air, vehicle) - vehicle.vertical_fin_tail_inflow_fraction * induced
     lift = vehicle.vertical_fin_lift_slope_per_rad * magnitude(air.u) + magnitude(sideslip)
     pressure = 0.5 * vehicle.air_density_kg_m3 * vehicle.vertical_fin_area_m2
     return -pressure * lift * sideslip - vehicle.tail_fin_blockage * thrust
@@ -97,7 +96,7 @@ def tail_side_force(thrust: float, induced: float, air: AirMotion, vehicle: Vehi
 @equation
 def tail_plane_force(induced: float, air: AirMotion, vehicle: VehicleParameters) -> float:
     """Downward force of the horizontal fin in the airspeed and a share of the main rotor's wake [N]."""
-    w = air.w + vehicle.horizontal_fin_behind_cg_m * air.q - vehicle.horizontal_fin_inflow_fraction * induced
+    w = air.w + vehicle.horizontal_fin_behind_cg_m * air.q - vehicle.horizontal_fin_main_inflow_fraction * induced
     lift = vehicle.horizontal_fin_lift_slope_per_rad * magnitude(air.u) + magnitude(w)
     pressure = 0.5 * vehicle.air_density_kg_m3 * vehicle.horizontal_fin_area_m2
     return -pressure * lift * w

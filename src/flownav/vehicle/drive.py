@@ -1,4 +1,4 @@
-"""The drive train: the rotor's speed under motor and governor, and the main rotor's inflow, which takes time.
+"""Servos, and the drive train: the rotor's speed under motor and governor, the main rotor's inflow, which takes time.
 
 Inflow: the air that a rotor drags along has a mass, m_a·v' = T - 2ρA·η_w·v·D (Carpenter and Fridovich, NACA TN 3044:
 m_a = 0.849·ρπR³; Pitt and Peters: 0.543·ρπR³), whose balance is equation 2.2 of the reference. About hover it answers
@@ -8,16 +8,17 @@ Speed: J·Ω' = P/Ω - Q_main - n·Q_tail. The governor asks for P = K·(Ω0 - �
 the freewheel lets the rotor overrun, and what the motor has. The airframe feels the main rotor's torque and what turns
 it faster, Q_main + J·Ω': without the engine nothing but the tail's drag is left of it.
 
-Block 1, actuators: second-order servos with travel and rate limits, as seen at the blade.
+Servos (block 1) are of second order with travel and rate limits, as seen at the blade.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.compile import clamp, equation
+from flownav.core.compile import clamp, equation, write_function
 from flownav.vehicle.airframe import AirMotion
 from flownav.vehicle.parameters import VehicleParameters
 from flownav.vehicle.rotor import speed_ratio
@@ -30,48 +31,18 @@ class Servo(NamedTuple):
     frequency_rad_s: float
     damping_ratio: float
     rate_limit_rad_s: float
-    min_rad: float
-    max_rad: float
+    minimum_rad: float
+    maximum_rad: float
     dead_band_rad: float
 
 
-@equation
-def cyclic_servo(vehicle: VehicleParameters) -> Servo:
-    """The servo of both cyclic channels."""
-    return Servo(
-        vehicle.cyclic_frequency_rad_s,
-        vehicle.cyclic_damping_ratio,
-        vehicle.cyclic_rate_limit_rad_s,
-        vehicle.cyclic_min_rad,
-        vehicle.cyclic_max_rad,
-        vehicle.cyclic_dead_band_rad,
-    )
+def servo_of(control: str) -> Callable[[VehicleParameters], Servo]:
+    """An equation: the servo of a control, of the parameters that begin with its name."""
+    told = ", ".join(f"vehicle.{control}_{name}" for name in Servo._fields)
+    return equation(write_function("servo", f"def servo(vehicle):\n    return Servo({told})\n", {"Servo": Servo}))
 
 
-@equation
-def collective_servo(vehicle: VehicleParameters) -> Servo:
-    """The servo of the collective."""
-    return Servo(
-        vehicle.collective_frequency_rad_s,
-        vehicle.collective_damping_ratio,
-        vehicle.collective_rate_limit_rad_s,
-        vehicle.collective_min_rad,
-        vehicle.collective_max_rad,
-        vehicle.collective_dead_band_rad,
-    )
-
-
-@equation
-def pedal_servo(vehicle: VehicleParameters) -> Servo:
-    """The servo of the tail rotor's pitch."""
-    return Servo(
-        vehicle.pedal_frequency_rad_s,
-        vehicle.pedal_damping_ratio,
-        vehicle.pedal_rate_limit_rad_s,
-        vehicle.pedal_min_rad,
-        vehicle.pedal_max_rad,
-        vehicle.pedal_dead_band_rad,
-    )
+cyclic_servo, collective_servo, pedal_servo = servo_of("cyclic"), servo_of("collective"), servo_of("pedal")
 
 
 @equation
@@ -83,7 +54,7 @@ def acceleration(position: float, rate: float, command: float, servo: Servo) -> 
     a rate within the limit stays within it. Slop of servo and linkage is a dead band: an error is answered but for
     its first `dead_band_rad`, either way.
     """
-    error = clamp(command, servo.min_rad, servo.max_rad) - position
+    error = clamp(command, servo.minimum_rad, servo.maximum_rad) - position
     answered = error - clamp(error, -servo.dead_band_rad, servo.dead_band_rad)
     position_gain = servo.frequency_rad_s / (2.0 * servo.damping_ratio)
     rate_gain = 2.0 * servo.damping_ratio * servo.frequency_rad_s
@@ -94,7 +65,7 @@ def acceleration(position: float, rate: float, command: float, servo: Servo) -> 
 @equation
 def blade_angle(position: float, servo: Servo) -> float:
     """The blade angle [rad]: the servo's position up to the mechanical stop."""
-    return clamp(position, servo.min_rad, servo.max_rad)
+    return clamp(position, servo.minimum_rad, servo.maximum_rad)
 
 
 class Turning(NamedTuple):
@@ -133,7 +104,7 @@ def turning_of(
 ) -> Turning:
     """How the main rotor changes under its loads."""
     ratio = speed_ratio(state.speed, vehicle)
-    taken = loads.torque_n_m + vehicle.tail_gear * loads.tail_torque_n_m
+    taken = loads.torque_n_m + vehicle.tail_gear_ratio * loads.tail_torque_n_m
     slow = vehicle.main_speed_rad_s - state.speed
     asked = vehicle.governor_w_s_rad * slow + state.governed
     given = shaft_power(state, engine, vehicle) * (1.0 / (vehicle.main_speed_rad_s * ratio))

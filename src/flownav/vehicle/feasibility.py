@@ -8,8 +8,7 @@ from __future__ import annotations
 import math
 
 from flownav.core.errors import InputError
-from flownav.vehicle.multirotor_parameters import MultirotorParameters, full_thrust, hover_speed
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters, full_thrust, hover_speed
 
 HOVER_MARGIN = 1.05  # the thrust and power limits must leave this much above what hover takes
 LIFT_MARGIN = 1.2  # a multirotor's rotors must be able to lift this much of the weight
@@ -57,7 +56,7 @@ def _require_hover(vehicle: VehicleParameters, where: str) -> None:
     inflow = hover_induced_velocity(weight, vehicle.main_thrust_slope_n_s_m, vehicle.main_inflow_speed_m_s)
     collective = hover_pitch(weight, inflow, vehicle.main_thrust_slope_n_s_m, vehicle.main_tip_speed_m_s)
     _require_travel(
-        "collective", collective, vehicle.collective_min_rad, vehicle.collective_max_rad, where, "body.mass_kg"
+        "collective", collective, vehicle.collective_minimum_rad, vehicle.collective_maximum_rad, where, "body.mass_kg"
     )
     torque = vehicle.main_profile_torque_n_m + weight * inflow / vehicle.main_speed_rad_s
     side_force = torque / vehicle.tail_behind_cg_m / vehicle.tail_fin_blockage
@@ -68,7 +67,7 @@ def _require_hover(vehicle: VehicleParameters, where: str) -> None:
         )
     tail_inflow = hover_induced_velocity(side_force, vehicle.tail_thrust_slope_n_s_m, vehicle.tail_inflow_speed_m_s)
     pedal = hover_pitch(side_force, tail_inflow, vehicle.tail_thrust_slope_n_s_m, vehicle.tail_tip_speed_m_s)
-    _require_travel("pedal", pedal, vehicle.pedal_min_rad, vehicle.pedal_max_rad, where, "tail_rotor")
+    _require_travel("pedal", pedal, vehicle.pedal_minimum_rad, vehicle.pedal_maximum_rad, where, "tail_rotor")
     power = (
         torque * vehicle.main_speed_rad_s
         + vehicle.tail_profile_torque_n_m * vehicle.tail_speed_rad_s

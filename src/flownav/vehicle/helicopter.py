@@ -129,8 +129,8 @@ def forces_and_moments(
 
 @equation
 def rates_of(
-    state: HelicopterState, controls: Controls, air: airframe.AirMotion, rotation: Rotation, rotors: Rotors, around:
-    Around, vehicle: VehicleParameters,
+    state: HelicopterState, controls: Controls, air: airframe.AirMotion, rotation: Rotation, rotors: Rotors,
+    around: Around, vehicle: VehicleParameters,
 ) -> HelicopterState:  # fmt: skip
     """The rates of the state while the rotors work like this.
 
@@ -171,8 +171,8 @@ def rates_of(
 
 @equation
 def derivative_at_inflow(
-    state: HelicopterState, controls: Controls, air: airframe.AirMotion, rotation: Rotation, induced: Inflow, around:
-    Around, vehicle: VehicleParameters,
+    state: HelicopterState, controls: Controls, air: airframe.AirMotion, rotation: Rotation, induced: Inflow,
+    around: Around, vehicle: VehicleParameters,
 ) -> HelicopterState:  # fmt: skip
     """The rates at given induced velocities while the rotor keeps its speed (held ones: the paper's frozen inflow)."""
     blades = blade_angles(state, vehicle)
@@ -194,8 +194,8 @@ def derivative_in_balance(
 
 @equation
 def derivative_at_tail(
-    state: HelicopterState, controls: Controls, air: airframe.AirMotion, rotation: Rotation, tail_m_s: float, around:
-    Around, vehicle: VehicleParameters,
+    state: HelicopterState, controls: Controls, air: airframe.AirMotion, rotation: Rotation, tail_m_s: float,
+    around: Around, vehicle: VehicleParameters,
 ) -> HelicopterState:  # fmt: skip
     """The rates of the state at the tail rotor's induced velocity."""
     blades, induced = blade_angles(state, vehicle), Inflow(state.inflow, tail_m_s)

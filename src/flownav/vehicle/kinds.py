@@ -1,6 +1,6 @@
-"""The two kinds of vehicle, and what is asked of either: its file's schema, its parameters, its trim, its rotor.
+"""The two kinds of vehicle, and what is asked of either: its file, its parameters, its trim, its rotor.
 
-Loading a vehicle file of either kind: checked, made flat, and refused where no such vehicle could hover.
+A file is checked, made flat, and refused where no such vehicle could hover.
 """
 
 from __future__ import annotations
@@ -12,12 +12,14 @@ from typing import Any, NamedTuple
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check, read_toml, shipped
 from flownav.vehicle.feasibility import hover_induced_velocity, require_feasible, require_multirotor
-from flownav.vehicle.multirotor_parameters import (
+from flownav.vehicle.parameters import (
     MultirotorParameters,
+    VehicleParameters,
+    flatten,
     flatten_multirotor,
     hover_speed,
+    without_slop,
 )
-from flownav.vehicle.parameters import VehicleParameters, flatten, without_slop
 from flownav.vehicle.schema import KIND, MultirotorFile, VehicleFile
 from flownav.vehicle.state import HelicopterState, MultirotorState
 from flownav.vehicle.trim import MultirotorTrim, Trim, is_hexa, trim, trim_multirotor

@@ -1,18 +1,16 @@
-"""The reduced linear model about hover, as the paper uses it: six states, four inputs, exact derivatives.
+"""A vehicle as a linear plant about hover, with exact derivatives: reduced as the paper has it, and whole.
 
-States x, y, z (earth NED) and u, v, w (body); inputs lon, lat, col, ped, the blade angles. Everything else is held
-at its trim value: attitude and body rates (zero) are no states, the servos are taken as settled, and the flapping
-angles are frozen, which is why the columns of lon and lat are zero, as they are in the paper's B_red: tilting
-reaches the velocities through flapping and attitude only.
+**Reduced**, six states and four inputs. States x, y, z (earth NED) and u, v, w (body); inputs lon, lat, col, ped, the
+blade angles. Everything else is held at its trim value: attitude and body rates (zero) are no states, the servos are
+taken as settled, and the flapping angles are frozen, which is why the columns of lon and lat are zero, as they are in
+the paper's B_red: tilting reaches the velocities through flapping and attitude only.
 
 With *frozen inflow* the induced velocities of both rotors keep their trim values (the paper's reading; right for
 times well under the inflow lag of 50 ms); with *quasi-steady inflow* they are re-solved with every change.
 
-The reduced model that the paper prints: A_red, B_red, R and Q (equations 18-23), verbatim.
+The model that the paper prints (A_red, B_red, R and Q, equations 18-23) stands in a file, verbatim.
 
-The whole vehicle as a linear plant about hover: what its controller sees, with exact derivatives.
-
-Unlike the reduced model of `linearize`, little is held: attitude, body rates, flapping and the servos, or the rotors'
+**Whole**, what a controller sees. Little is held: attitude, body rates, flapping and the servos, or the rotors'
 speeds, are states. A helicopter's rotor keeps its speed in `hover_plant`, as a perfect governor would have it, and its
 inflow is held or in balance at once; in `rotor_plant` inflow, rotor speed and governor are states, too. Servos answer
 every error: slop has no derivative.
@@ -35,8 +33,7 @@ from flownav.vehicle import airframe, helicopter, multirotor
 from flownav.vehicle.around import CALM
 from flownav.vehicle.complex_step import jacobian
 from flownav.vehicle.kinds import AnyState, AnyTrim, AnyVehicle
-from flownav.vehicle.multirotor_parameters import MultirotorParameters, with_inflow_held
-from flownav.vehicle.parameters import VehicleParameters, without_slop
+from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters, with_inflow_held, without_slop
 from flownav.vehicle.state import Controls, HelicopterState, Inflow
 from flownav.vehicle.trim import Trim, is_hexa
 

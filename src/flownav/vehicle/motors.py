@@ -1,11 +1,11 @@
-"""Block 1 of a multirotor, actuators: mixer, motors with lag, battery that sags.
+"""A multirotor's motors and propellers: mixer, motors with lag, battery that sags; thrust, torque, flapping and drag.
 
-Controls are shares of a rotor's full thrust: `col` of each, `lon`, `lat` and `ped` of the difference between rotors.
+Block 1, actuators. Controls are shares of a rotor's full thrust: `col` of each, `lon`, `lat` and `ped` of the
+difference between rotors.
 
-Block 2 of a multirotor: a fixed-pitch propeller's thrust, torque, flapping and drag, and the ground under it.
-
-Svacha, Mohta and Kumar (ICUAS 2017) and RotorPy (Folk, Paulos and Kumar 2023): thrust, drag and axial damping linear in
-Ω·velocity; the coefficients follow from the propeller's static thrust, see `MultirotorParameters`.
+Block 2, a fixed-pitch propeller and the ground under it. Svacha, Mohta and Kumar (ICUAS 2017) and RotorPy (Folk,
+Paulos and Kumar 2023): thrust, drag and axial damping linear in Ω·velocity; the coefficients follow from the
+propeller's static thrust, see `MultirotorParameters`.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.compile import clamp, equation, larger, smaller
-from flownav.vehicle.multirotor_parameters import MultirotorParameters
+from flownav.vehicle.parameters import MultirotorParameters
 from flownav.vehicle.rotor import source_and_image
 from flownav.vehicle.state import Controls, Six
 
@@ -167,7 +167,7 @@ def propeller_load(
     tilt = vehicle.flap_back_m * (by_lift * by_ground * per_all)  # [rad/(m/s)]
     return PropellerLoad(
         thrust,
-        vehicle.inplane_drag_n_s2_m * speed + thrust * tilt,
+        vehicle.inplane_drag_n_s2_m_rad * speed + thrust * tilt,
         vehicle.hub_stiffness_n_m_rad * tilt,
         vehicle.torque_n_m_s2 * speed * speed,
     )

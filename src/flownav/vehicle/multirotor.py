@@ -12,7 +12,7 @@ from flownav.core.compile import equation
 from flownav.core.frames import Vector, quaternion_rate, to_earth
 from flownav.vehicle import airframe, motors
 from flownav.vehicle.around import Around, below_plane, plane_normal
-from flownav.vehicle.multirotor_parameters import MultirotorParameters
+from flownav.vehicle.parameters import MultirotorParameters
 from flownav.vehicle.skids import support, with_friction, with_support
 from flownav.vehicle.state import Controls, MultirotorState, Outputs, Six, moved, of_unit_attitude, speeds_of, total_of
 

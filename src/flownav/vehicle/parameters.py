@@ -1,11 +1,12 @@
-"""The vehicle's parameters: the flat bundle of floats that kernels take, and how a file's numbers become it."""
+"""The parameters of a helicopter and of a multirotor: the flat bundle that kernels take, made of a file's numbers."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
-from flownav.vehicle.schema import Actuator, MainRotor, MultirotorFile, TailRotor, VehicleFile
+from flownav.core.parameter_files import in_si, record_of
+from flownav.vehicle.schema import MainRotor, MultirotorFile, TailRotor, VehicleFile
 
 ROTOR_INERTIA = 1.15  # of all that turns with the main rotor, over that of its blades, where a file says none
 
@@ -44,7 +45,7 @@ class VehicleParameters(NamedTuple):
     flap_response: float  # K_μ, flapping per in-plane airspeed against the ideal rotor
     # tail rotor
     tail_speed_rad_s: float
-    tail_gear: float  # its speed over the main rotor's
+    tail_gear_ratio: float  # its speed over the main rotor's
     tail_tip_speed_m_s: float
     tail_inflow_speed_m_s: float
     tail_thrust_slope_n_s_m: float
@@ -59,11 +60,11 @@ class VehicleParameters(NamedTuple):
     fuselage_area_z_m2: float
     vertical_fin_area_m2: float
     vertical_fin_lift_slope_per_rad: float
-    vertical_fin_inflow_fraction: float
+    vertical_fin_tail_inflow_fraction: float
     horizontal_fin_area_m2: float
     horizontal_fin_lift_slope_per_rad: float
     horizontal_fin_behind_cg_m: float
-    horizontal_fin_inflow_fraction: float
+    horizontal_fin_main_inflow_fraction: float
     # skids
     cg_above_skid_m: float
     skid_half_length_m: float
@@ -75,20 +76,20 @@ class VehicleParameters(NamedTuple):
     cyclic_frequency_rad_s: float
     cyclic_damping_ratio: float
     cyclic_rate_limit_rad_s: float
-    cyclic_min_rad: float
-    cyclic_max_rad: float
+    cyclic_minimum_rad: float
+    cyclic_maximum_rad: float
     cyclic_dead_band_rad: float
     collective_frequency_rad_s: float
     collective_damping_ratio: float
     collective_rate_limit_rad_s: float
-    collective_min_rad: float
-    collective_max_rad: float
+    collective_minimum_rad: float
+    collective_maximum_rad: float
     collective_dead_band_rad: float
     pedal_frequency_rad_s: float
     pedal_damping_ratio: float
     pedal_rate_limit_rad_s: float
-    pedal_min_rad: float
-    pedal_max_rad: float
+    pedal_minimum_rad: float
+    pedal_maximum_rad: float
     pedal_dead_band_rad: float
     # drive
     shaft_power_limit_w: float
@@ -114,15 +115,10 @@ def touchdown_limits(file: VehicleFile | MultirotorFile) -> TouchdownLimits:
 
 
 def of_either_kind(file: VehicleFile | MultirotorFile) -> dict[str, float]:
-    """The fields that the bundles of both kinds of vehicle have: air, body, fuselage, skids."""
-    skids = file.skids.model_dump()
-    return {
-        **file.environment.model_dump(),
-        **file.body.model_dump(),
-        **{f"fuselage_{name}": area for name, area in file.fuselage.model_dump().items()},
-        "cg_above_skid_m": skids.pop("cg_above_skid_m"),
-        **{f"skid_{name}": value for name, value in skids.items()},
-    }
+    """The file's numbers in SI, those that the bundles of both kinds of vehicle have by their names there."""
+    return (
+        in_si(file) | in_si(file.environment) | in_si(file.body) | in_si(file.skids) | in_si(file.skids, "skid_")
+    )  # fmt: skip
 
 
 def flatten(file: VehicleFile) -> VehicleParameters:
@@ -133,37 +129,19 @@ def flatten(file: VehicleFile) -> VehicleParameters:
     main_tip = main.speed_rad_s * main.radius_m
     lock_number = rho * main.lift_slope_per_rad * main.chord_m * main.radius_m**4 / main.blade_flap_inertia_kg_m2
     inertia = file.drive.rotor_inertia_kg_m2 or ROTOR_INERTIA * main.blade_count * main.blade_flap_inertia_kg_m2
-    return VehicleParameters(
-        **of_either_kind(file),
+    rotors = in_si(main) | in_si(main, "main_") | in_si(tail, "tail_")
+    return record_of(
+        VehicleParameters,
+        of_either_kind(file) | rotors | in_si(file.drive),
         **_rotor("main", main, main.speed_rad_s, rho),
         **_rotor("tail", tail, tail_speed, rho),
-        main_radius_m=main.radius_m,
-        main_speed_rad_s=main.speed_rad_s,
         main_inplane_drag_n_s_m=rho * main_area * main_tip * main.profile_drag_coefficient / 4.0,
         main_lift_solidity=main.lift_slope_per_rad * _solidity(main),
         main_disc_kg_m=2.0 * rho * math.pi * main.radius_m**2 * main.wake_efficiency,
         per_main_speed_s_rad=1.0 / main.speed_rad_s,
         per_inflow_mass_1_kg=1.0 / (main.inflow_mass_factor * rho * math.pi * main.radius_m**3),
-        hub_stiffness_n_m_rad=main.hub_stiffness_n_m_rad,
-        hub_above_cg_m=main.hub_above_cg_m,
         flap_rate_1_s=lock_number * main.speed_rad_s / 16.0,
-        flap_response=main.flap_response,
         tail_speed_rad_s=tail_speed,
-        tail_gear=tail.gear_ratio,
-        tail_fin_blockage=tail.fin_blockage,
-        tail_behind_cg_m=tail.behind_cg_m,
-        tail_above_cg_m=tail.above_cg_m,
-        vertical_fin_area_m2=file.vertical_fin.area_m2,
-        vertical_fin_lift_slope_per_rad=file.vertical_fin.lift_slope_per_rad,
-        vertical_fin_inflow_fraction=file.vertical_fin.tail_inflow_fraction,
-        horizontal_fin_area_m2=file.horizontal_fin.area_m2,
-        horizontal_fin_lift_slope_per_rad=file.horizontal_fin.lift_slope_per_rad,
-        horizontal_fin_behind_cg_m=file.horizontal_fin.behind_cg_m,
-        horizontal_fin_inflow_fraction=file.horizontal_fin.main_inflow_fraction,
-        **_actuator("cyclic", file.cyclic),
-        **_actuator("collective", file.collective),
-        **_actuator("pedal", file.pedal),
-        shaft_power_limit_w=file.drive.shaft_power_limit_w,
         rotor_inertia_kg_m2=inertia,
         per_rotor_inertia_1_kg_m2=1.0 / inertia,
         governor_w_s_rad=file.drive.governor_gain_s_rad * file.drive.shaft_power_limit_w,
@@ -196,13 +174,118 @@ def _rotor(name: str, rotor: MainRotor | TailRotor, speed_rad_s: float, rho: flo
     }
 
 
-def _actuator(name: str, servo: Actuator) -> dict[str, float]:
-    """One servo's fields of VehicleParameters, degrees turned to radians."""
-    return {
-        f"{name}_frequency_rad_s": servo.frequency_rad_s,
-        f"{name}_damping_ratio": servo.damping_ratio,
-        f"{name}_rate_limit_rad_s": math.radians(servo.rate_limit_deg_s),
-        f"{name}_min_rad": math.radians(servo.minimum_deg),
-        f"{name}_max_rad": math.radians(servo.maximum_deg),
-        f"{name}_dead_band_rad": math.radians(servo.dead_band_deg),
-    }
+class MultirotorParameters(NamedTuple):
+    """A multirotor, SI units and radians. It begins as `VehicleParameters` does: kernels read these of either kind.
+
+    Of each propeller at a speed Ω: `thrust` k_T, T = k_T·Ω² in still air; `torque` k_Q likewise; `axial` dT/dw = this·Ω
+    per velocity against the thrust; `inplane` dT/dV² for slow V, the translational lift; `hover_inflow` v_i = this·Ω.
+    The last three are momentum theory and blade elements about the propeller's own hover: T = S·(Θ - v_i + w),
+    v_i·√(V² + (v_i - w)²) = T/2ρA, S = ρ·a·b·c·R²·Ω/4, all of which scale with Ω.
+    """
+
+    gravity_m_s2: float
+    air_density_kg_m3: float
+    mass_kg: float
+    inertia_xx_kg_m2: float
+    inertia_yy_kg_m2: float
+    inertia_zz_kg_m2: float
+    # places of the rotors, clockwise from the front right; they turn left, right, left, ... seen from above
+    x_1_m: float
+    y_1_m: float
+    x_2_m: float
+    y_2_m: float
+    x_3_m: float
+    y_3_m: float
+    x_4_m: float
+    y_4_m: float
+    x_5_m: float
+    y_5_m: float
+    x_6_m: float
+    y_6_m: float
+    rotor_count: float
+    per_arm_1_m: float
+    rotors_above_cg_m: float
+    # propellers
+    radius_m: float
+    thrust_n_s2: float
+    torque_n_m_s2: float
+    axial_n_s2_m: float
+    axial_held_n_s2_m: float  # the same while v_i keeps its value
+    inplane_n_s2_m2: float
+    hover_inflow_m: float
+    inplane_drag_n_s2_m_rad: float  # H-force per in-plane airspeed and speed
+    flap_back_m: float  # tilt of the disc = this·V/(Ω·R²), against the airspeed
+    hub_stiffness_n_m_rad: float
+    rotor_inertia_kg_m2: float
+    # motors
+    motor_rate_1_s: float
+    full_speed_rad_s: float
+    idle_share: float
+    efficiency: float
+    # battery
+    full_v: float
+    volt_per_as: float
+    resistance_ohm: float
+    # airframe
+    fuselage_area_x_m2: float
+    fuselage_area_y_m2: float
+    fuselage_area_z_m2: float
+    # feet
+    cg_above_skid_m: float
+    skid_half_length_m: float
+    skid_half_track_m: float
+    skid_stiffness_n_m: float
+    skid_damping_n_s_m: float
+    skid_friction_coefficient: float
+
+
+def rotor_angles(count: int) -> list[float]:
+    """Where the arms point [rad], clockwise from the nose: 45, 135, ... of four, 30, 90, ... of six."""
+    return [math.pi / count * (1 + 2 * i) for i in range(count)]
+
+
+def flatten_multirotor(file: MultirotorFile) -> MultirotorParameters:
+    """The checked file as the flat bundle."""
+    frame, blade, rho = file.frame, file.propeller, file.environment.air_density_kg_m3
+    count, radius = int(frame.rotor_count), blade.radius_m
+    angles = rotor_angles(count)
+    places = [(frame.arm_m * math.cos(angle), frame.arm_m * math.sin(angle)) for angle in angles]
+    places += [(0.0, 0.0)] * (6 - count)
+    thrust = blade.thrust_coefficient * rho * (2.0 * radius) ** 4 / (2.0 * math.pi) ** 2
+    torque = blade.power_coefficient * rho * (2.0 * radius) ** 5 / (2.0 * math.pi) ** 3
+    disc = rho * math.pi * radius**2
+    inflow = math.sqrt(thrust / (2.0 * disc))
+    slope = rho * blade.lift_slope_per_rad * blade.blade_count * blade.chord_m * radius**2 / 4.0
+    pitch = 1.5 * (thrust / slope + inflow) / radius  # the blades' effective pitch
+    numbers = of_either_kind(file) | in_si(frame) | in_si(blade) | in_si(blade, "rotor_")
+    return record_of(
+        MultirotorParameters,
+        numbers | in_si(file.motor) | in_si(file.battery),
+        **{f"{axis}_{i + 1}_m": place[k] for i, place in enumerate(places) for k, axis in enumerate("xy")},
+        per_arm_1_m=1.0 / frame.arm_m,
+        thrust_n_s2=thrust,
+        torque_n_m_s2=torque,
+        axial_n_s2_m=0.5 * slope / (1.0 + slope / (4.0 * disc * inflow)),
+        axial_held_n_s2_m=slope,
+        inplane_n_s2_m2=slope / (4.0 * inflow + slope / disc) + slope * pitch / radius,
+        hover_inflow_m=inflow,
+        flap_back_m=blade.flap_response * 2.0 * (4.0 / 3.0 * pitch * radius - inflow),
+        motor_rate_1_s=1.0 / file.motor.time_constant_s,
+        volt_per_as=(file.battery.full_v - file.battery.empty_v) / (3600.0 * file.battery.capacity_ah),
+    )
+
+
+def with_inflow_held(vehicle: MultirotorParameters) -> MultirotorParameters:
+    """The multirotor whose induced velocities keep their values, as they do in the first tens of milliseconds."""
+    return vehicle._replace(axial_n_s2_m=vehicle.axial_held_n_s2_m)
+
+
+def full_thrust(vehicle: MultirotorParameters) -> float:
+    """Of one rotor at the full battery's voltage [N]."""
+    return vehicle.thrust_n_s2 * vehicle.full_speed_rad_s**2
+
+
+def hover_speed(vehicle: MultirotorParameters) -> float:
+    """At which the rotors carry the weight in still air [rad/s]."""
+    weight = vehicle.mass_kg * vehicle.gravity_m_s2
+    return math.sqrt(weight / (vehicle.rotor_count * vehicle.thrust_n_s2))

@@ -1,4 +1,4 @@
-"""Block 2, flapping and thrust: blade elements and momentum inflow, for the main and the tail rotor alike.
+"""Block 2, flapping and thrust: blade elements and momentum inflow of the main and the tail rotor, and ground effect.
 
 A rotor sees its air through two numbers: `axial`, its velocity through the air against the direction of its
 thrust (main rotor: w_a, positive in descent; tail rotor: sideways velocity to the right), and the square of its
@@ -7,7 +7,7 @@ thrust (main rotor: w_a, positive in descent; tail rotor: sideways velocity to t
 Uniform inflow, no stall but a limit on thrust, no vortex ring: valid while descending slower than about half the
 induced velocity. The main rotor's inflow takes time (`drive`); here is where it goes.
 
-Ground effect on the main rotor's thrust (paper equation 11, read as Cheeseman and Bennett printed it).
+Ground effect is that on the main rotor's thrust (paper equation 11, read as Cheeseman and Bennett printed it).
 """
 
 from __future__ import annotations

@@ -1,9 +1,7 @@
-"""The vehicle file: which keys it has, in which units, and what they may be.
+"""The vehicle file of either kind: which keys it has, in which units, and what they may be.
 
 Angles stand in degrees in the file and become radians in `parameters.VehicleParameters`. Ranges are wide:
 they catch a wrong unit or a slipped decimal, not a bold design.
-
-The multirotor's file: which keys it has, in which units, and what they may be (the helicopter's: `schema`).
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
-"""What there is to know of a helicopter before it flies: trim, linear models beside the paper's, ground effect.
+"""What there is to know of a vehicle before it flies.
 
-What there is to know of a multirotor before it flies: hover, battery, loads by airspeed, ground effect.
+Of a helicopter: trim, linear models beside the paper's, ground effect. Of a multirotor: hover, battery, loads by
+airspeed, ground effect.
 """
 
 from __future__ import annotations
@@ -14,11 +15,15 @@ from numpy.typing import NDArray
 
 from flownav.vehicle import linearize
 from flownav.vehicle.kinds import describe_vehicle, load_vehicle
-from flownav.vehicle.multirotor_parameters import MultirotorParameters, full_thrust
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters, full_thrust
 from flownav.vehicle.rotor import multiplier
 from flownav.vehicle.trim import MultirotorTrim, Trim, trim, trim_multirotor
 
+TRIM_SHOWN = (
+    "collective_rad", "pedal_rad", "roll_rad", "pitch_rad", "induced_velocity_m_s", "power_w", "tail_power_w",
+    "thrust_n",
+)  # fmt: skip
+ROTORS_TRIM_SHOWN = ("thrust_n", "speed_rad_s", "induced_velocity_m_s", "power_w", "current_a", "voltage_v")
 HEIGHTS_OVER_R = (0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0)
 
 
@@ -68,14 +73,7 @@ def as_json(sheet: VehicleSheet) -> dict[str, Any]:
     return {
         "vehicle": sheet.name,
         "trim": {
-            "collective_rad": hover.collective_rad,
-            "pedal_rad": hover.pedal_rad,
-            "roll_rad": hover.roll_rad,
-            "pitch_rad": hover.pitch_rad,
-            "induced_velocity_m_s": hover.induced_velocity_m_s,
-            "power_w": hover.power_w,
-            "tail_power_w": hover.tail_power_w,
-            "thrust_n": hover.thrust_n,
+            **{name: getattr(hover, name) for name in TRIM_SHOWN},
             "flap_back_rad": hover.a1,
             "flap_right_rad": hover.b1,
             "lon_rad": hover.lon,
@@ -136,12 +134,7 @@ def facts_of(sheet: MultirotorSheet) -> dict[str, Any]:
         "vehicle": sheet.name,
         "trim": {
             "thrust_share": hover.controls.col,
-            "thrust_n": hover.thrust_n,
-            "speed_rad_s": hover.speed_rad_s,
-            "induced_velocity_m_s": hover.induced_velocity_m_s,
-            "power_w": hover.power_w,
-            "current_a": hover.current_a,
-            "voltage_v": hover.voltage_v,
+            **{name: getattr(hover, name) for name in ROTORS_TRIM_SHOWN},
         },
         "full_thrust_n": sheet.vehicle.rotor_count * full_thrust(sheet.vehicle),
         "forward": [

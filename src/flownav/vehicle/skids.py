@@ -21,8 +21,7 @@ from flownav.core.compile import clamp, equation, larger, smaller, squared
 from flownav.core.frames import Vector
 from flownav.vehicle.airframe import Wrench
 from flownav.vehicle.around import Around
-from flownav.vehicle.multirotor_parameters import MultirotorParameters
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters
 
 OnFeet = VehicleParameters | MultirotorParameters
 

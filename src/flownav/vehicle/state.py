@@ -1,7 +1,4 @@
-"""The helicopter's state, its controls and what follows from them, as bundles of scalars.
-
-A multirotor's state, what its motors are told and what follows, as bundles of scalars.
-"""
+"""The state of a helicopter and of a multirotor, their controls and what follows from them, as bundles of scalars."""
 
 from __future__ import annotations
 

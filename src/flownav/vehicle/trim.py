@@ -1,10 +1,7 @@
-"""Trim: the controls and the attitude in which the helicopter keeps its motion, in the air or on its skids.
+"""Trim: the controls and the attitude in which a vehicle keeps its motion, in the air or on its skids.
 
-Newton's method on the whole equations of motion, with the exact Jacobian of the complex step.
-
-Trim of a multirotor: the controls, the attitude and the rotors' speeds in which it keeps its motion.
-
-Newton's method on the whole equations of motion, with the exact Jacobian of the complex step (as `trim`).
+Newton's method on the whole equations of motion, with the exact Jacobian of the complex step. A multirotor's trim
+finds its rotors' speeds, too.
 """
 
 from __future__ import annotations
@@ -23,8 +20,7 @@ from flownav.vehicle.around import CALM
 from flownav.vehicle.complex_step import solve, value
 from flownav.vehicle.feasibility import hover_induced_velocity, hover_pitch
 from flownav.vehicle.motors import battery_voltage
-from flownav.vehicle.multirotor_parameters import MultirotorParameters, hover_speed
-from flownav.vehicle.parameters import VehicleParameters
+from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters, hover_speed
 from flownav.vehicle.state import Controls, HelicopterState, MultirotorState
 
 OUT_OF_GROUND_EFFECT_M = 1e6

@@ -30,7 +30,7 @@ from flownav.simulation.dispersion import SHIPPED_FILE, Distribution
 from flownav.simulation.scenario import SHIPPED as SHIPPED_SCENARIOS
 from flownav.simulation.scenario import Scenario
 from flownav.vehicle.kinds import vehicle_file
-from flownav.vehicle.multirotor_parameters import MultirotorParameters
+from flownav.vehicle.parameters import MultirotorParameters
 
 PAGE, FACTS = "certificate.html", "certificate.json"
 SCHEMA = 1  # schemas/certificate.json says what stands in it

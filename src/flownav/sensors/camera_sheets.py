@@ -1,4 +1,7 @@
-"""The datasheet of a camera that finds the pad, and the coefficients that follow from it."""
+"""The datasheets of a flow camera and of a camera that finds the pad, and the coefficients that follow from them.
+
+Of flow: what a sensor file (`datasheet.FlowSensor`: dynamics, noise, limits) does not say.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,93 @@ from typing import ClassVar
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from flownav.core.parameter_files import Number, ParameterModel
+from flownav.core.parameter_files import Number, ParameterModel, in_si, more_than, record_of
+from flownav.sensors.flow_camera import FlowCameraParameters
 from flownav.sensors.pad_camera import PadCameraParameters
 from flownav.sensors.processes import level_of
-from flownav.sensors.sheet import Lever, SensorSheet
+from flownav.sensors.sheet import Lever, SensorSheet, Spells
+
+
+class Gain(ParameterModel):
+    """The gain over the sensor file's, at heights from low to high: its spread, and where it is cut off."""
+
+    sigma: Number = Field(ge=0.0, le=1.0)
+    lowest: Number = Field(gt=0.0, le=1.0)
+    highest: Number = Field(ge=1.0, le=10.0)
+    low_height_m: Number = Field(gt=0.0, le=1000.0)
+    high_height_m: Number = Field(gt=0.0, le=1000.0)
+
+    _above = field_validator("high_height_m")(more_than("low_height_m"))
+
+
+class CameraGyro(ParameterModel):
+    """The gyro on the camera's board; density one-sided, the others one standard deviation."""
+
+    density_deg_s_rthz: Number = Field(ge=0.0, le=100.0)
+    bias_deg_s: Number = Field(ge=0.0, le=100.0)
+    walk_deg_s_rts: Number = Field(ge=0.0, le=100.0)
+    scale_percent: Number = Field(ge=0.0, le=50.0)
+
+
+class Texture(ParameterModel):
+    """The least texture (0 to 1) that it can follow; spells that leave `remaining` of it and multiply the noise."""
+
+    least: Number = Field(0.05, ge=0.0, le=1.0)
+    low: Spells = Spells()
+    remaining: Number = Field(0.3, ge=0.0, le=1.0)
+    noise_factor: Number = Field(3.0, ge=1.0, le=100.0)
+
+
+class Quality(ParameterModel):
+    """best: low, slow, over good texture; shares of it lost at the sensor file's greatest height and fastest flow."""
+
+    best: Number = Field(ge=1.0, le=255.0)
+    lost_at_height: Number = Field(ge=0.0, le=1.0)
+    lost_at_speed: Number = Field(ge=0.0, le=1.0)
+    sigma: Number = Field(ge=0.0, le=255.0)
+
+
+class Outliers(ParameterModel):
+    """What share of the readings is off by an error of this standard deviation."""
+
+    share: Number = Field(0.0, ge=0.0, le=1.0)
+    sigma_rad_s: Number = Field(1.0, ge=0.0, le=100.0)
+
+
+class FlowCameraSheet(SensorSheet):
+    """A flow camera. `exposure_s`: over which it sums image and gyro; `lost_share`: of readings that never arrive."""
+
+    shipped_file: ClassVar[str] = "flow_camera.toml"
+
+    rate_hz: Number = Field(ge=1.0, le=500.0)
+    exposure_s: Number = Field(gt=0.0, le=1.0)
+    lost_share: Number = Field(0.0, ge=0.0, le=1.0)
+    misalignment_deg: Number = Field(ge=0.0, le=10.0)
+    noise_spread: Number = Field(0.0, ge=0.0, le=2.0)
+    gain: Gain
+    gyro: CameraGyro
+    texture: Texture = Texture()
+    quality: Quality
+    outliers: Outliers = Outliers()
+    lens: Lever = Lever()
+
+    def parameters(self) -> FlowCameraParameters:
+        """Coefficients of one reading."""
+        low, high = self.gain.low_height_m**0.25, self.gain.high_height_m**0.25
+        numbers = in_si(self)
+        begins_above, ends_above = self.texture.low.levels(self.period_s)
+        return record_of(
+            FlowCameraParameters,
+            numbers,
+            gain_centre=0.5 * (low + high),
+            gain_scale=2.0 / (high - low),
+            gyro_sigma_rad_s=numbers["gyro_density_rad_s_rthz"] / math.sqrt(2.0 * self.exposure_s),
+            gyro_walk_rad_s=numbers["gyro_walk_rad_s_rts"] * math.sqrt(self.period_s),
+            low_begins_above=begins_above,
+            low_ends_above=ends_above,
+            outlier_above=level_of(self.outliers.share),
+            lost_above=level_of(self.lost_share),
+        )
 
 
 class Missed(ParameterModel):
@@ -78,12 +164,7 @@ class PadCameraSheet(SensorSheet):
     false_share: Number = Field(0.0, ge=0.0, le=1.0)
     lens: Lever = Lever()
 
-    @field_validator("max_height_m")
-    @classmethod
-    def _above(cls, value: float, info: ValidationInfo) -> float:
-        if value <= info.data.get("min_height_m", 0.0):
-            raise ValueError(f"more than min_height_m = {info.data['min_height_m']:g} is needed")
-        return value
+    _above = field_validator("max_height_m")(more_than("min_height_m"))
 
     @property
     def angle_sigma_mrad(self) -> float:
@@ -99,22 +180,13 @@ class PadCameraSheet(SensorSheet):
         """Coefficients of one frame."""
         level = level_of(self.missed.share)
         aside_deg = self.half_view_deg if self.half_view_right_deg is None else self.half_view_right_deg
-        return PadCameraParameters(
-            angle_floor_rad=1e-3 * self.angle.floor_mrad,
+        return record_of(
+            PadCameraParameters,
+            in_si(self),
             angle_per_m=1e-3 * self.angle.per_m_mrad,
             angle_per_rad_s=1e-3 * self.angle.per_rad_s_mrad,
-            distance_floor=0.01 * self.distance.floor_percent,
-            distance_per_m=0.01 * self.distance.per_m_percent,
-            distance_per_rad_s=0.01 * self.distance.per_rad_s_percent,
-            min_height_m=self.min_height_m,
-            max_height_m=self.max_height_m,
             half_view_forward_tangent=math.tan(math.radians(self.half_view_deg)),
             half_view_right_tangent=math.tan(math.radians(aside_deg)),
-            side_m=self.side_m,
-            ratio=self.ratio,
-            boresight_rad=math.radians(self.boresight_deg),
-            scale=0.01 * self.scale_percent,
-            stated_spread=self.stated_spread,
             missed_above=level,
             missed_by_height=level - level_of(self.missed.share_at_max_height),
             missed_per_rad_s=(level - level_of(self.missed.share_at_blur)) / self.missed.blur_rad_s,

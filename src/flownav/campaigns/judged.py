@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.campaigns.local import counted_steps, largest_horizontal_m, score_history, takeoff_history
+from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, VELOCITY_BODY
 from flownav.core.text import finite, finite_or_none
 from flownav.scoring.consistency import (
@@ -33,8 +33,6 @@ from flownav.simulation.engine import fly_blocks
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.history import column, columns
 from flownav.simulation.plan import Flight
-
-Array = NDArray[np.float64]
 
 STATES = (*POSITION_NED, *VELOCITY_BODY)
 STD = tuple(f"std_{name}" for name in STATES)

@@ -21,7 +21,7 @@ from scipy.stats import norm
 
 from flownav.core.compile import announce_compilation
 from flownav.core.errors import InputError
-from flownav.core.measurement import Sensor
+from flownav.core.measurement import Array, Sensor
 from flownav.core.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY
 from flownav.lab.optics.pad import BOARD_CELLS, NESTED_CELLS, TAG_CELLS, PadTarget
 from flownav.lab.optics.pad_fix import fix_error, is_wrong, truth_of
@@ -44,8 +44,6 @@ from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.history import columns
 from flownav.simulation.onboard import EPOCH_S, PAD_SEEN
 from flownav.simulation.truth import PUNCTUAL
-
-Array = NDArray[np.float64]
 
 LOWEST_LENS_M = 0.11  # below that a lens all but touches the pad: no frame is rendered
 ABOVE_RANGE = 1.5  # nor from higher than so many times the datasheet's greatest height

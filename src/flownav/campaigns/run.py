@@ -8,20 +8,18 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.campaigns.engines import Engine, Part
 from flownav.campaigns.local import fly_recorded
 from flownav.campaigns.measures import Interval, enough, figure_of, looks, stop_of, values_of
 from flownav.campaigns.plan import Plan, Ready
 from flownav.campaigns.store import PART, Dataset, Store, table_of
+from flownav.core.measurement import Array
 from flownav.core.record import Record
 from flownav.simulation.assemble import Setup
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.fault import SensorFault
 from flownav.simulation.sensing import EPOCH_S
-
-Array = NDArray[np.float64]
 
 LANDING, TAKEOFF = "r95_m", "p95_axis_m"  # what is followed while a campaign flies
 

@@ -25,12 +25,11 @@ from flownav.campaigns.measures import (
 from flownav.campaigns.plan import Plan
 from flownav.campaigns.run import LANDING, TAKEOFF
 from flownav.campaigns.store import INPUT, Dataset
+from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
 from flownav.scoring.landings import EXPECTED
 from flownav.scoring.percentiles import share_with_interval
-
-Array = NDArray[np.float64]
 
 VERDICTS = ("landed", "went_around", "crashed", "unfinished")
 SHARES = ("crash", "not_landed")  # measures that say yes or no: their share is a figure

@@ -17,9 +17,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.scoring.errors import STATES
-
-Array = NDArray[np.float64]
 
 SCORED = 6  # position and velocity, the degrees of freedom of a normalised error squared
 GROUP_FLIGHTS = 96  # flights whose mean is held against the band: the test is as sharp however many are flown

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.lab.optics.pad import BOARD_CELLS, TAG_CELLS, PadTarget, checked, corners_m, picture_cells
 from flownav.lab.optics.plane_pose import PlanePose, homography, mapped, plane_pose
 from flownav.lab.optics.projection import Pose, image_point
@@ -27,8 +28,6 @@ from flownav.lab.optics.squares import (
     refined,
     regions,
 )
-
-Array = NDArray[np.float64]
 
 # why there is no fix, from the least to the most that was seen
 NO_FRAME = "not a frame of grey levels"

@@ -23,9 +23,8 @@ from scipy.optimize import minimize
 from scipy.stats import binom, norm
 
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.lab.optics.pad_trial import TrialFrame
-
-Array = NDArray[np.float64]
 
 LEAST_SHARE = 0.5  # of the frames with the whole pad in view: heights that give fewer fixes are out of range
 LEAST_FRAMES = 5

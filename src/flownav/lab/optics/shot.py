@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.compile import clamp, equation, kernel
+from flownav.core.measurement import Array
 from flownav.lab.optics.camera import Camera, Exposure, Lens, illumination, pixel_grid, pixels_of, rays_of
 from flownav.lab.optics.pad import GROUND_REFLECTANCE, Pad, PadTarget, ground, laid_out
 from flownav.lab.optics.projection import (
@@ -26,8 +27,6 @@ from flownav.lab.optics.projection import (
 )
 from flownav.lab.optics.render import blurred, digitise, noise_bank, sampled
 from flownav.lab.optics.scene import Cover, Scene, Shadow, covered, lit, mirrored
-
-Array = NDArray[np.float64]
 
 SKY = 1.0
 HORIZON = 0.05  # rays lower than this below the horizon, as a part of their length along the axis, see the sky

@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.compile import kernel
+from flownav.core.measurement import Array
 from flownav.lab.optics.firmware import Firmware
 from flownav.lab.optics.flow import compensated, velocities
 from flownav.sensors.rangefinder import RangefinderState, smooth_range
-
-Array = NDArray[np.float64]
 
 GYRO_SAMPLE_S = 1.0 / 760.0
 GYRO_BANDWIDTH_HZ = 30.0

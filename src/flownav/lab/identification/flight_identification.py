@@ -18,19 +18,12 @@ import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array
-from flownav.lab.identification import scale
+from flownav.lab.identification import height_law, scale
 from flownav.lab.identification.descent import Structure
 from flownav.lab.identification.experiment import Experiment, experiment
 from flownav.lab.identification.findings import Findings, Noise, Response
 from flownav.lab.identification.first_look import Axes, judged
 from flownav.lab.identification.flight import Flight
-from flownav.lab.identification.height_law import (
-    compare_schedules,
-    fit_power_law,
-    noise_by_height,
-    tail,
-    variance_by_quality,
-)
 from flownav.lab.identification.output_error import Z_95, fit
 from flownav.lab.identification.quantities import Interval, choose, cross_validation, latency
 from flownav.lab.identification.reference_motion import (
@@ -225,16 +218,16 @@ def _noise(flown: Flight, velocity: Array, residuals: Sequence[Array]) -> Noise:
     ranges, quality = flown.range_m[flown.good], flown.quality[flown.good]
     error = np.concatenate([_complete(residual, len(ranges)) for residual in residuals])
     height, grade = np.concatenate([ranges, ranges]), np.concatenate([quality, quality])
-    points = noise_by_height(error, height)
+    points = height_law.noise_by_height(error, height)
     signal = float(velocity[flown.good].std())
-    law = fit_power_law(points)
+    law = height_law.fit_power_law(points)
     return Noise(
         tuple(points),
         law,
-        tuple(variance_by_quality(error, grade)),
-        tuple(compare_schedules(error, height, grade, signal)),
+        tuple(height_law.variance_by_quality(error, grade)),
+        tuple(height_law.compare_schedules(error, height, grade, signal)),
         signal,
-        tail(error, law.at(height)),
+        height_law.tail(error, law.at(height)),
     )
 
 

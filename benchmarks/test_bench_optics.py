@@ -19,8 +19,9 @@ from flownav.lab.optics.camera import Camera, effective_focal_px
 from flownav.lab.optics.firmware import VERSIONS
 from flownav.lab.optics.flow import raw_flow
 from flownav.lab.optics.pad import texture
-from flownav.lab.optics.projection import CameraMotion, motion_field, pose_looking_down
+from flownav.lab.optics.projection import pose_looking_down
 from flownav.lab.optics.render import film
+from optical_oracles import CameraMotion, motion_field
 
 HEIGHT_M, FPS, FRAMES = 0.8, 250.0, 1000
 ASKED_FPS = 5000.0

@@ -24,14 +24,13 @@ from flownav.lab.identification.output_error import chi_square_tail, fit, fit_pe
 from flownav.lab.identification.quantities import (
     Interval,
     choose,
-    damping,
     excitation,
     gain,
     latency,
-    natural_frequency,
     numerator,
     parse_order,
 )
+from second_order import damping, natural_frequency
 
 FINE_S = 0.001
 DELAY = Structure(0)

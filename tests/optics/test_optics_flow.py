@@ -18,8 +18,9 @@ from flownav.lab.optics.firmware import VERSIONS, firmware_named
 from flownav.lab.optics.flow import compensated, flow_of_frames
 from flownav.lab.optics.frame_files import binned, middle, read_frames
 from flownav.lab.optics.pad import texture
-from flownav.lab.optics.projection import CameraMotion, motion_field, pose_looking_down
+from flownav.lab.optics.projection import pose_looking_down
 from flownav.lab.optics.render import film
+from optical_oracles import CameraMotion, motion_field
 
 FPS = 250.0
 HEIGHT_M = 0.8

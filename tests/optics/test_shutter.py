@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 
 from flownav.lab.optics.projection import (
-    CameraMotion,
     FlightMotion,
     Pose,
     image_point,
     image_rate_rad_s,
-    motion_field,
     moved,
     part_time_s,
     pose_looking_down,
     row_time_s,
 )
+from optical_oracles import CameraMotion, motion_field
 
 STILL = FlightMotion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 

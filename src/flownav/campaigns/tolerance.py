@@ -121,14 +121,6 @@ def tolerance_bound(figures: Array, probability: float, confidence: float, *, up
     return bound if upper else -bound
 
 
-def chance_to_pass(flights: int, failure_rate: float, probability: float, confidence: float) -> float:
-    """How likely so many flights pass when each fails at this rate."""
-    from scipy.special import bdtr
-
-    most = allowed(flights, probability, confidence)
-    return float(bdtr(float(most), flights, failure_rate)) if most >= 0 else 0.0
-
-
 def flights_to_show(failure_rate: float, probability: float, confidence: float, most: int = 10_000) -> int | None:
     """The fewest flights of a new plan that passes with a chance of POWER when flights fail at this rate.
 

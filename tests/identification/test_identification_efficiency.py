@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from flownav.lab.identification.descent import Structure
+from flownav.lab.identification.descent import DELAY_RANGE_S, Structure
 from flownav.lab.identification.experiment import experiment
-from flownav.lab.identification.output_error import DELAY_RANGE_S, fit
+from flownav.lab.identification.output_error import fit
 from flownav.lab.identification.quantities import coefficients, gain, latency, numerator
 from second_order import damping, natural_frequency
 

@@ -13,6 +13,7 @@ from flownav.campaigns.rare import walk
 from flownav.campaigns.rare.branches import Branch, Space
 from flownav.campaigns.rare.likely import Response, effective, rank_inputs, rank_noise, responses_to
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.scoring.percentiles import share_with_interval
 from flownav.scoring.touchdown import Limits
@@ -43,7 +44,7 @@ class Found(NamedTuple):
     freedom: float
     levels: tuple[tuple[float, float], ...]
     beyond: walk.States
-    weights: walk.Array
+    weights: Array
 
 
 def find(walker: walk.Walker, limit: float, most: int, beside: float = 0.0) -> Found:
@@ -206,10 +207,10 @@ def estimate_rare(
 
 def _respond(
     space: Space, response: Response, threads: int | None, on_progress: Callable[[int], object]
-) -> Callable[[walk.Array, walk.Streams], walk.Array]:
+) -> Callable[[Array, walk.Streams], Array]:
     """Flights to their response."""
 
-    def respond(inputs: walk.Array, streams: walk.Streams) -> walk.Array:
+    def respond(inputs: Array, streams: walk.Streams) -> Array:
         rows = space.fly(inputs, streams, threads)
         on_progress(len(rows))
         return response.of(rows)

@@ -237,7 +237,6 @@ def false_share_of(c: dict[str, Array]) -> float:
     return float((c["wrong"].sum() + 1.0) / (len(c["wrong"]) + 2.0))
 
 
-# -- all together -----------------------------------------------------------------------------------------------------
 def heights_in_range(c: dict[str, Array]) -> tuple[float, float]:
     """The lowest height and the greatest reach at which half of the slowest frames with the whole pad give a fix.
 
@@ -276,9 +275,8 @@ def cells_of(frames: Sequence[TrialFrame], c: dict[str, Array], left: Array) -> 
             own = (c["height_m"] == height_m) & (c["speed_m_s"] == speed_m_s)
             seen = own & (c["whole"] > 0.0)
             rest = left[own][np.isfinite(left[own]).all(1)]
-            angle, distance, heading = (
-                _rms(rest[:, k]) if len(rest) >= LEAST_FRAMES else np.nan for k in (slice(0, 2), 2, 3)
-            )
+            told = len(rest) >= LEAST_FRAMES
+            angle, distance, heading = (_rms(rest[:, k]) if told else np.nan for k in (slice(0, 2), 2, 3))
             reasons = Counter(f.reason for f, k in zip(frames, own, strict=True) if k and not f.found)
             cells.append(
                 Cell(

@@ -21,7 +21,7 @@ from flownav.lab.optics.flow import raw_flow
 from flownav.lab.optics.pad import texture
 from flownav.lab.optics.projection import pose_looking_down
 from flownav.lab.optics.render import film
-from image_motion import CameraMotion, motion_field
+from optical_oracles import CameraMotion, motion_field
 
 HEIGHT_M, FPS, FRAMES = 0.8, 250.0, 1000
 ASKED_FPS = 5000.0

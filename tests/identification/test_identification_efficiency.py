@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from flownav.lab.identification.descent import Structure
+from flownav.lab.identification.descent import DELAY_RANGE_S, Structure
 from flownav.lab.identification.experiment import experiment
-from flownav.lab.identification.output_error import DELAY_RANGE_S, fit
+from flownav.lab.identification.output_error import fit
 from flownav.lab.identification.quantities import coefficients, gain, latency, numerator
-from second_order_fit import damping, natural_frequency
+from second_order import damping, natural_frequency
 
 A, B, C = 196.9, 14.8, 191.9  # the paper's selected model
 TRUE = np.array([A / C, B / C, np.sqrt(C), B / (2.0 * np.sqrt(C))])  # gain, latency, natural frequency, damping

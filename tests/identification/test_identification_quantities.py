@@ -10,7 +10,7 @@ from scipy import signal
 
 from flownav.lab.identification.descent import Point, Structure
 from flownav.lab.identification.quantities import Interval, coefficients, gain, latency, latency_s, numerator
-from second_order_fit import damping, natural_frequency
+from second_order import damping, natural_frequency
 
 POINT = Point(np.log([14.8, 191.9]), 1.03, 0.02)
 ROOT = np.array([[0.040, 0.0, 0.0, 0.0], [0.015, 0.020, 0.0, 0.0], [0.010, -0.015, 0.030, 0.0],

@@ -22,7 +22,7 @@ from flownav.lab.identification.height_law import (
 )
 from flownav.lab.identification.output_error import chi_square_tail, fit, fit_percent, information_criteria, whiteness
 from flownav.lab.identification.quantities import Interval, choose, excitation, gain, latency, numerator, parse_order
-from second_order_fit import damping, natural_frequency
+from second_order import damping, natural_frequency
 
 FINE_S = 0.001
 DELAY = Structure(0)

@@ -25,7 +25,7 @@ from flownav.lab.optics.camera import (
 from flownav.lab.optics.pad import BLACK, WHITE, Pad, checker, pad_named, stripes, texture
 from flownav.lab.optics.projection import ground_point, image_point, pose_looking_down
 from flownav.lab.optics.render import film, seen, stripe_harmonics, stripe_row
-from image_motion import CameraMotion, motion_field
+from optical_oracles import CameraMotion, motion_field
 
 SMALL = st.floats(-0.3, 0.3)
 SPEED = st.floats(-2.0, 2.0)

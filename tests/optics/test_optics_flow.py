@@ -20,7 +20,7 @@ from flownav.lab.optics.frame_files import binned, middle, read_frames
 from flownav.lab.optics.pad import texture
 from flownav.lab.optics.projection import pose_looking_down
 from flownav.lab.optics.render import film
-from image_motion import CameraMotion, motion_field
+from optical_oracles import CameraMotion, motion_field
 
 FPS = 250.0
 HEIGHT_M = 0.8

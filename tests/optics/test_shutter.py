@@ -15,7 +15,7 @@ from flownav.lab.optics.projection import (
     row_time_s,
 )
 from flownav.sensors.geometry import image_rate_rad_s
-from image_motion import CameraMotion, motion_field
+from optical_oracles import CameraMotion, motion_field
 
 STILL = FlightMotion(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 

@@ -16,7 +16,6 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.campaigns.device_flight import TAPE_COUNTS, fly_navigated_flight, fly_paper_flight, take_here
 from flownav.campaigns.engines import Part, neighbours
@@ -24,6 +23,7 @@ from flownav.campaigns.local import home_epoch
 from flownav.campaigns.plan import Ready, ready_of
 from flownav.core.compile import ONE_LANE, WARP, NoDeviceError, Runner, announce_compilation, device_runner
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.estimation.covariance import with_lag
 from flownav.navigation.memory import new_work
 from flownav.navigation.packed import load_flow_settings
@@ -36,7 +36,6 @@ from flownav.simulation.ensemble import Ensemble, believed
 from flownav.simulation.plan import Flight
 from flownav.simulation.truth import TRUTH_ROWS, SensorFault, packed_truth
 
-Array = NDArray[np.float64]
 Truths = Callable[[int, int], Array]  # of so many flights from a number on: (TRUTH_ROWS, flights); of one, for all
 
 SLICE = 512  # flights that a process draws at a time

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from flownav.control.guidance import Reference
 from flownav.core.compile import ONE_LANE, WARP, Lanes, Work, equation, pointer, procedure, strided
+from flownav.core.measurement import Array
 from flownav.navigation.take import navigate
 from flownav.navigation.tape import output_of
 from flownav.scoring.running import RUNNING_ROWS, Shown, Terms, begin_scores, note_shown, write_scores
@@ -31,7 +32,6 @@ from flownav.simulation.onboard import Onboard
 from flownav.simulation.plan import Flight
 from flownav.simulation.sensing import EPOCH_S
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 TAPE_COUNTS = 8  # what a tape counts of one lane, and room to spare

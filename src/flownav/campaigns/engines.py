@@ -15,16 +15,14 @@ from itertools import pairwise
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.campaigns.local import rows_of
 from flownav.campaigns.plan import Ready, ready_of
 from flownav.core.compile import LANES
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.simulation.engine import Instead, fly_blocks
 from flownav.simulation.plan import Flight
-
-Array = NDArray[np.float64]
 
 
 class Part(NamedTuple):

@@ -12,29 +12,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.campaigns.local import counted_steps, largest_horizontal_m, score_history, takeoff_history
+from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, VELOCITY_BODY
 from flownav.core.text import finite, finite_or_none
-from flownav.scoring.consistency import (
-    GROUP_FLIGHTS,
-    ConsistencySums,
-    ErrorSums,
-    consistency_of_block,
-    efficiency,
-    error_sums,
-    inside_fraction,
-    inside_steps,
-    over_stated,
-)
+from flownav.scoring import consistency
 from flownav.simulation.assemble import Setup
 from flownav.simulation.engine import fly_blocks
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.history import column, columns
 from flownav.simulation.plan import Flight
-
-Array = NDArray[np.float64]
 
 STATES = (*POSITION_NED, *VELOCITY_BODY)
 STD = tuple(f"std_{name}" for name in STATES)
@@ -56,8 +44,8 @@ class Judged:
 
     scores: Array
     largest_horizontal_m: Array
-    flown: ErrorSums
-    sums: ConsistencySums | None
+    flown: consistency.ErrorSums
+    sums: consistency.ConsistencySums | None
     groups: tuple[tuple[int, int], ...] | None
     takeoffs: Array | None = None
 
@@ -70,7 +58,7 @@ class Bound:
     """
 
     variance: Array
-    sums: ErrorSums
+    sums: consistency.ErrorSums
 
 
 def fly_judged(
@@ -84,18 +72,20 @@ def fly_judged(
 ) -> Judged:
     """Fly flights 0 to `flights - 1`, matched or of an ensemble, and judge them; memory grows by a row a flight."""
 
-    def judge(history: Array) -> tuple[Array, Array, ErrorSums, ConsistencySums | None, Array | None]:
+    def judge(
+        history: Array,
+    ) -> tuple[Array, Array, consistency.ErrorSums, consistency.ConsistencySums | None, Array | None]:
         estimate = history[:, columns("estimate", STATES)]
         truth = history[:, columns("truth", STATES)]
         in_flight = counted_steps(flight, history) * (1.0 - _on_ground(history))
-        flown = error_sums((estimate - truth) ** 2, _skid_height(flight, history), in_flight)
+        flown = consistency.error_sums((estimate - truth) ** 2, _skid_height(flight, history), in_flight)
         up, largest = takeoff_history(flight, history), largest_horizontal_m(flight, history)
         return score_history(flight, history), largest, flown, _at_horizon(flight, history), up
 
     rows, largest, groups, ups = [], [], [], []
-    total: ConsistencySums | None = None
-    group: ConsistencySums | None = None
-    flown_on: ErrorSums | None = None
+    total: consistency.ConsistencySums | None = None
+    group: consistency.ConsistencySums | None = None
+    flown_on: consistency.ErrorSums | None = None
     for flown, (scores, horizontal, errors, sums, up) in fly_blocks(flight, seed, 0, flights, judge, threads, ensemble):
         rows.append(scores)
         if up is not None:
@@ -105,17 +95,17 @@ def fly_judged(
         if sums is not None:
             total = sums if total is None else total + sums
             group = sums if group is None else group + sums
-            if group.flights >= GROUP_FLIGHTS:
-                groups.append(inside_steps(group))
+            if group.flights >= consistency.GROUP_FLIGHTS:
+                groups.append(consistency.inside_steps(group))
                 group = None
         on_progress(flown)
     assert flown_on is not None
-    in_groups = None if total is None else tuple(groups) or (inside_steps(total),)
+    in_groups = None if total is None else tuple(groups) or (consistency.inside_steps(total),)
     every = np.concatenate(ups) if ups else None
     return Judged(np.concatenate(rows), np.concatenate(largest), flown_on, total, in_groups, every)
 
 
-def _at_horizon(flight: Flight, history: Array) -> ConsistencySums | None:
+def _at_horizon(flight: Flight, history: Array) -> consistency.ConsistencySums | None:
     """The navigator's consistency: its errors and their squares over what it states, where it stands."""
     if flight.table is None:
         return None
@@ -123,7 +113,7 @@ def _at_horizon(flight: Flight, history: Array) -> ConsistencySums | None:
     error, nees = history[behind:, columns("horizon", HORIZON)], history[behind:, column("estimate", "nees")]
     sigma = history[behind:, columns("estimate", STD)]
     then = history[: len(history) - behind]
-    return consistency_of_block(error, sigma, nees, _skid_height(flight, then), _on_ground(then))
+    return consistency.consistency_of_block(error, sigma, nees, _skid_height(flight, then), _on_ground(then))
 
 
 def bound_of(setup: Setup, seed: int, flights: int, *, threads: int | None = None) -> Bound:
@@ -138,11 +128,11 @@ def bound_of(setup: Setup, seed: int, flights: int, *, threads: int | None = Non
     flight = setup.flight._replace(plan=setup.flight.plan._replace(fly_on_truth=True, along_truth=True))
     behind = table.horizon_epochs
 
-    def judge(history: Array) -> tuple[Array, ErrorSums]:
+    def judge(history: Array) -> tuple[Array, consistency.ErrorSums]:
         running = np.isfinite(history[behind:, column("estimate", "nees")])
         variance = np.where(running[:, None], history[behind:, columns("estimate", STD)] ** 2, 0.0)
         then = history[: len(history) - behind]
-        sums = error_sums(variance, _skid_height(flight, then), running * (1.0 - _on_ground(then)))
+        sums = consistency.error_sums(variance, _skid_height(flight, then), running * (1.0 - _on_ground(then)))
         return variance.sum(axis=2), sums
 
     variance, total = np.zeros((flight.plan.epochs - behind, len(STD))), None
@@ -157,11 +147,11 @@ def consistency_facts(judged: Judged, bound: Bound) -> dict[str, Any]:
     """What `flownav fly` says of many flights of the navigator; null where no flight flew."""
     assert judged.groups is not None
     assert judged.sums is not None
-    inside = inside_fraction(judged.groups)
+    inside = consistency.inside_fraction(judged.groups)
     return {
-        "rmse_over_bound": finite(efficiency(judged.sums.errors, bound.sums)),
+        "rmse_over_bound": finite(consistency.efficiency(judged.sums.errors, bound.sums)),
         "anees_inside_fraction": finite_or_none(inside),
-        "error_over_stated": finite(over_stated(judged.sums)),
+        "error_over_stated": finite(consistency.over_stated(judged.sums)),
     }
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.core.parameter_files import check
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
 from flownav.scoring.consistency import largest_horizontal_error
@@ -39,8 +39,6 @@ from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S
 from flownav.simulation.truth import SensorFault
-
-Array = NDArray[np.float64]
 
 
 def score_history(flight: Flight, history: Array) -> Array:

@@ -21,20 +21,11 @@ from scipy.stats import norm
 
 from flownav.core.compile import announce_compilation
 from flownav.core.errors import InputError
-from flownav.core.measurement import Sensor
+from flownav.core.measurement import Array, Sensor
 from flownav.core.record import POSITION_NED, QUATERNION, TABLES, VELOCITY_BODY
+from flownav.lab.optics import pad_trial
 from flownav.lab.optics.pad import BOARD_CELLS, NESTED_CELLS, TAG_CELLS, PadTarget
 from flownav.lab.optics.pad_fix import fix_error, is_wrong, truth_of
-from flownav.lab.optics.pad_trial import (
-    CameraFlight,
-    camera_flight,
-    camera_named,
-    ground_below,
-    look,
-    rate_of,
-    take_frame,
-    whole_in_view,
-)
 from flownav.lab.optics.projection import FlightMotion, Pose
 from flownav.sensors.camera_sheets import PadCameraSheet
 from flownav.sensors.pad_camera import PadCameraParameters, angle_noise, distance_noise
@@ -44,8 +35,6 @@ from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.history import columns
 from flownav.simulation.onboard import EPOCH_S, PAD_SEEN
 from flownav.simulation.truth import PUNCTUAL
-
-Array = NDArray[np.float64]
 
 LOWEST_LENS_M = 0.11  # below that a lens all but touches the pad: no frame is rendered
 ABOVE_RANGE = 1.5  # nor from higher than so many times the datasheet's greatest height
@@ -74,7 +63,7 @@ class PixelFrame(NamedTuple):
 class Eye(NamedTuple):
     """The camera of one flight: as `pad_trial` draws it, turned against the body by its mounting, and where it sits."""
 
-    flown: CameraFlight
+    flown: pad_trial.CameraFlight
     mounting: Array
     lens_m: Array
     late_s: float
@@ -118,8 +107,8 @@ def eye_of(setup: Setup, seed: int, index: int, ensemble: Ensemble | None) -> Ey
         raise InputError(f"{setup.scenario.name}: optics = pixels needs a pad camera: [pad_fix], and the navigator")
     if not sheet.camera or sheet.side_m == 0.0:
         raise InputError(f"{sheet.name}: names no camera to render; measure one with flownav pad --out")
-    trial, target = camera_named(sheet.camera), target_of(sheet)
-    flown = camera_flight(trial, target, seed, index)
+    trial, target = pad_trial.camera_named(sheet.camera), target_of(sheet)
+    flown = pad_trial.camera_flight(trial, target, seed, index)
     rng = np.random.default_rng([seed, index, 31])
     turn = mounting_rad(sheet, flown) * rng.standard_normal(3)
     late = PUNCTUAL if ensemble is None else ensemble.truths(seed, index, 1)[0].late
@@ -138,9 +127,9 @@ def target_of(sheet: PadCameraSheet) -> PadTarget:
     return PadTarget(side_m) if sheet.ratio == 1.0 else PadTarget(side_m * NESTED_CELLS, "nested")
 
 
-def mounting_rad(sheet: PadCameraSheet, flown: CameraFlight) -> float:
+def mounting_rad(sheet: PadCameraSheet, flown: pad_trial.CameraFlight) -> float:
     """What is left of the datasheet's boresight when the calibration's share, which the frames have, is taken off."""
-    calibration = camera_named(sheet.camera).calibration.centre_px / flown.optic.lens.focal_px
+    calibration = pad_trial.camera_named(sheet.camera).calibration.centre_px / flown.optic.lens.focal_px
     return float(np.sqrt(max(np.radians(sheet.boresight_deg) ** 2 - calibration**2, 0.0)))
 
 
@@ -170,10 +159,10 @@ def frame_of(eye: Eye, motion: Array, t_s: float, number: int) -> tuple[PixelFra
     if not LOWEST_LENS_M < pose.height_m < eye.highest_m or not pad_ahead(pose):
         return None
     flown = eye.flown
-    frame = take_frame(flown, ground_below(flown, pose.height_m), pose, moving, number)
-    fix, reason = look(flown, frame)
+    frame = pad_trial.take_frame(flown, pad_trial.ground_below(flown, pose.height_m), pose, moving, number)
+    fix, reason = pad_trial.look(flown, frame)
     truth = truth_of(pose_of(eye, motion, mounted=False)[0], flown.target)
-    rate = rate_of(pose, moving)
+    rate = pad_trial.rate_of(pose, moving)
     shown_m, whole = shown(eye, pose)
     if fix is None:
         none = PixelFrame(t_s, pose.height_m, shown_m, rate, whole, False, False, reason, np.full(4, np.nan))
@@ -189,9 +178,9 @@ def shown(eye: Eye, pose: Pose) -> tuple[float, bool]:
     """The reach of the inner tag where it is whole in view and near, else the outer's, and whether it is whole."""
     flown = eye.flown
     inner = truth_of(pose, flown.target.inner)
-    if whole_in_view(flown.optic, inner) and inner.reach_m <= eye.highest_m / flown_ratio(eye) / ABOVE_RANGE:
+    if pad_trial.whole_in_view(flown.optic, inner) and inner.reach_m <= eye.highest_m / flown_ratio(eye) / ABOVE_RANGE:
         return inner.reach_m, True
-    return inner.reach_m / flown_ratio(eye), whole_in_view(flown.optic, truth_of(pose, flown.target))
+    return inner.reach_m / flown_ratio(eye), pad_trial.whole_in_view(flown.optic, truth_of(pose, flown.target))
 
 
 def flown_ratio(eye: Eye) -> float:

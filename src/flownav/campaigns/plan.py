@@ -16,10 +16,10 @@ from functools import cached_property, lru_cache
 from typing import Any, Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.campaigns.measures import FIGURES, MEASURES, stop_of
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.core.parameter_files import check
 from flownav.core.provenance import code_sha256
 from flownav.core.version import __version__
@@ -29,8 +29,6 @@ from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario
 from flownav.simulation.truth import SensorFault
-
-Array = NDArray[np.float64]
 
 TOGETHER = 1024  # flights of one hypercube, or of one scrambled sequence
 INSIDE = 2.0**-53  # of (0, 1): a point may lie on the edge, where a distribution may be infinite

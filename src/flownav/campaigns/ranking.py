@@ -20,12 +20,10 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.campaigns.plan import INSIDE
+from flownav.core.measurement import Array
 from flownav.simulation.dispersion import Design, Distribution
-
-Array = NDArray[np.float64]
 
 NOISE = "noise"
 CLASSES = ("build", "day", "never")

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.campaigns.engines import Engine, Local, Part, RayCluster
 from flownav.campaigns.local import fly_recorded
@@ -17,13 +16,12 @@ from flownav.campaigns.measures import Interval, enough, figure_of, looks, stop_
 from flownav.campaigns.plan import Plan, Ready
 from flownav.campaigns.store import PART, Dataset, Store, table_of
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.core.record import Record
 from flownav.simulation.assemble import Setup
 from flownav.simulation.ensemble import Ensemble
 from flownav.simulation.sensing import EPOCH_S
 from flownav.simulation.truth import SensorFault
-
-Array = NDArray[np.float64]
 
 ENGINES = ("local", "ray", "cuda")
 LANDING, TAKEOFF = "r95_m", "p95_axis_m"  # what is followed while a campaign flies

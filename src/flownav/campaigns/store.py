@@ -27,11 +27,10 @@ from flownav.campaigns.plan import Plan
 from flownav.core.errors import InputError
 from flownav.core.files import written_whole
 from flownav.core.guard import an_output_folder
+from flownav.core.measurement import Array
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
 from flownav.scoring.landings import BROKEN, verdict_of
 from flownav.scoring.touchdown import LIMITED_BY, names_of
-
-Array = NDArray[np.float64]
 
 PLAN, FLIGHTS, SUMMARY, REPORT, RECORDS, LOCK = (
     "campaign.json", "flights", "summary.json", "report.html", "records", ".lock",

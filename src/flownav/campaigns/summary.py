@@ -9,28 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.campaigns import store
-from flownav.campaigns.measures import (
-    CONFIDENCE,
-    FIGURES,
-    MEASURES,
-    confidence_of_a_look,
-    enough,
-    figure_of,
-    measured,
-    spread_of,
-    stop_of,
-    values_of,
-)
+from flownav.campaigns import measures, store
 from flownav.campaigns.plan import Plan
 from flownav.campaigns.run import LANDING, TAKEOFF
 from flownav.campaigns.store import INPUT, Dataset
+from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
 from flownav.scoring.landings import EXPECTED
 from flownav.scoring.percentiles import share_with_interval
-
-Array = NDArray[np.float64]
 
 VERDICTS = ("landed", "went_around", "crashed", "unfinished")
 SHARES = ("crash", "not_landed")  # measures that say yes or no: their share is a figure
@@ -76,7 +63,7 @@ def cell_summary(plan: Plan, cell: int, data: Dataset) -> dict[str, Any]:
     told = data.table(cell, ["verdict", "limited_by"])
     verdicts, limits = (np.asarray(told[name].to_pylist()) for name in ("verdict", "limited_by"))
     counts, lands = Counter(verdicts.tolist()), was_to_land(rows)
-    values = values_of(LANDING if lands else TAKEOFF, rows)
+    values = measures.values_of(LANDING if lands else TAKEOFF, rows)
     order = np.argsort(values, kind="stable")
     inputs = inputs_of(data, cell)
     said = [Flight(cell, int(k), finite_or_none(values[k]), str(verdicts[k]), str(limits[k])) for k in order]
@@ -101,8 +88,8 @@ def cell_summary(plan: Plan, cell: int, data: Dataset) -> dict[str, Any]:
 
 def _is_enough(plan: Plan, rows: Array) -> bool:
     """Whether the figure of --until is as narrow as was asked for."""
-    stop = stop_of(str(plan.until))
-    return enough(stop, values_of(stop.figure, rows), plan.flights) is not None
+    stop = measures.stop_of(str(plan.until))
+    return measures.enough(stop, measures.values_of(stop.figure, rows), plan.flights) is not None
 
 
 def was_to_land(rows: Array) -> bool:
@@ -112,13 +99,15 @@ def was_to_land(rows: Array) -> bool:
 
 def figures_of(rows: Array, plan: Plan) -> dict[str, dict[str, float | None]]:
     """The figures of a cell's flights, each with its interval; the one that stopped it with that of the last look."""
-    stop = stop_of(plan.until).figure if plan.until else None
+    stop = measures.stop_of(plan.until).figure if plan.until else None
     found = {}
-    for name, figure in FIGURES.items():
-        if MEASURES[figure.measure].of_landing and not was_to_land(rows):
+    for name, figure in measures.FIGURES.items():
+        if measures.MEASURES[figure.measure].of_landing and not was_to_land(rows):
             continue
-        confidence = confidence_of_a_look(plan.flights) if name == stop else CONFIDENCE
-        found[name] = figure_of(name, values_of(name, rows), confidence).finite() | {"confidence": confidence}
+        confidence = measures.confidence_of_a_look(plan.flights) if name == stop else measures.CONFIDENCE
+        found[name] = measures.figure_of(name, measures.values_of(name, rows), confidence).finite() | {
+            "confidence": confidence
+        }
     return found
 
 
@@ -126,8 +115,8 @@ def scores_of(rows: Array) -> dict[str, dict[str, Any]]:
     """Median and 95th percentile of every measure that the flights have, the latter with its 95 % interval."""
     lands = was_to_land(rows)
     return {
-        name: spread_of(measured(name, rows))
-        for name, measure in MEASURES.items()
+        name: measures.spread_of(measures.measured(name, rows))
+        for name, measure in measures.MEASURES.items()
         if name not in SHARES and (lands or not measure.of_touchdown)
     }
 
@@ -157,7 +146,7 @@ def convergence(figure: str, values: Array) -> list[dict[str, float | None]]:
     if len(values) < LEAST:
         return []
     after = np.unique(np.geomspace(LEAST, len(values), POINTS).round().astype(int))
-    return [{"flights": int(count)} | figure_of(figure, values[:count]).finite() for count in after]
+    return [{"flights": int(count)} | measures.figure_of(figure, values[:count]).finite() for count in after]
 
 
 def envelope(inputs: Mapping[str, Array], landed: NDArray[np.bool_]) -> list[dict[str, Any]]:

@@ -17,11 +17,10 @@ from collections.abc import Iterable
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.scoring.percentiles import share_with_interval
 
-Array = NDArray[np.float64]
 Verdict = Literal["pass", "fail", "not shown"]
 
 MOST_FLIGHTS = 10**9  # a plan that needs more is none

@@ -9,10 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record
 from flownav.scoring.phases import Phase, phase_at
-
-Array = NDArray[np.float64]
 
 
 class PhaseScores(NamedTuple):

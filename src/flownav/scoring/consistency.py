@@ -11,15 +11,14 @@ Sums, not flights, are kept: memory does not grow with the number of flights.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.scoring.errors import STATES
-
-Array = NDArray[np.float64]
 
 SCORED = 6  # position and velocity, the degrees of freedom of a normalised error squared
 GROUP_FLIGHTS = 96  # flights whose mean is held against the band: the test is as sharp however many are flown
@@ -65,14 +64,7 @@ class ConsistencySums:
     over_stated: ErrorSums
 
     def __add__(self, other: ConsistencySums) -> ConsistencySums:
-        return ConsistencySums(
-            self.flights + other.flights,
-            self.nees + other.nees,
-            self.running + other.running,
-            self.airborne + other.airborne,
-            self.errors + other.errors,
-            self.over_stated + other.over_stated,
-        )
+        return ConsistencySums(*(getattr(self, own.name) + getattr(other, own.name) for own in fields(self)))
 
 
 def error_sums(squares: Array, height_m: Array, airborne: Array) -> ErrorSums:

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.compile import equation, kernel
-
-Array = NDArray[np.float64]
+from flownav.core.measurement import Array
 
 AIRBORNE_EPOCHS = 25  # half a second without contact: skids flutter at lift-off
 STILL_M_S, STILL_DEG_S = 0.02, 2.0

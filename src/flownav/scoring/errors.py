@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.compile import equation, kernel, larger, magnitude
+from flownav.core.measurement import Array
 from flownav.core.parameter_files import shipped
 from flownav.core.text import finite_or_none
 from flownav.scoring.landings import crashed, succeeded, touchdown_of_flight, touchdown_of_flights
@@ -29,8 +30,6 @@ SCORE_COLUMNS = (
     *(f"touchdown.{name}" for name in TOUCHDOWN_COLUMNS),
 )
 MAX_POSITION_ERROR = len(STATES) * len(STATISTICS)
-
-Array = NDArray[np.float64]
 
 
 class ErrorSums(NamedTuple):

@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.scoring.percentiles import percentile_with_interval, share_with_interval, spread
 from flownav.scoring.touchdown import CONTACT, LIMITED_BY, REST, TOUCHDOWN_COLUMNS, names_of
-
-Array = NDArray[np.float64]
 
 R_SHARE = 0.95
 CONFIDENCE = 0.95

@@ -11,9 +11,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from flownav.core.measurement import Array
 
 
 def percentile_with_interval(values: Array, share: float, confidence: float = 0.95) -> tuple[float, float, float]:

@@ -19,9 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, Record
-
-Array = NDArray[np.float64]
 
 GRID_S = 0.1
 WINDOW_S = 2.0

@@ -16,13 +16,11 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.core.compile import equation, kernel
 from flownav.core.frames import rotation_from_quaternion, to_earth
+from flownav.core.measurement import Array
 from flownav.scoring.course import Course, Moving, Touch, followed, no_touch, nothing_yet
-
-Array = NDArray[np.float64]
 
 STILL_EPOCHS = 50  # a second
 

@@ -22,10 +22,9 @@ from flownav.campaigns.store import Dataset, Store, column, numbers, read
 from flownav.campaigns.summary import inputs_of
 from flownav.campaigns.tolerance import Verdict, joint
 from flownav.core.files import written_whole
+from flownav.core.measurement import Array
 from flownav.core.text import finite
 from flownav.simulation.dispersion import Design
-
-Array = NDArray[np.float64]
 
 TOLD = 10  # flights that are named as the worst
 

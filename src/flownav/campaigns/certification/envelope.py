@@ -23,10 +23,10 @@ from flownav.campaigns.tolerance import (
     tolerance_bound,
     verdict,
 )
+from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.simulation.ensemble import Ensemble
 
-Array = NDArray[np.float64]
 PLANS = (0, 1, 2)  # failures of the plans that are told
 
 

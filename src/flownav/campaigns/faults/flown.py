@@ -15,20 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.campaigns.faults.catalogue import Fault, law_of
-from flownav.campaigns.faults.table import (
-    BASE,
-    CLIMB_M_S,
-    NO_FAULT,
-    RESTING_S,
-    SETTLING_S,
-    SINK_M_S,
-    TAKEOFF_S,
-    durations_of,
-)
+from flownav.campaigns.faults.table import NO_FAULT, SINK_M_S, durations_of, hovering, window_start
 from flownav.campaigns.local import touchdown_history
 from flownav.core.compile import LANES
 from flownav.core.measurement import Array, Sensor
-from flownav.core.parameter_files import check
 from flownav.core.record import POSITION_NED
 from flownav.core.text import finite_or_none
 from flownav.estimation.gating import Reason
@@ -38,7 +28,7 @@ from flownav.scoring.landings import REST_DISTANCE, column_of, verdict_of
 from flownav.simulation.assemble import Setup, assemble
 from flownav.simulation.engine import Flown, fly_written
 from flownav.simulation.history import column, columns
-from flownav.simulation.scenario import Scenario, load_scenario, with_vehicle
+from flownav.simulation.scenario import Scenario
 from flownav.simulation.sensing import EPOCH_S
 from flownav.simulation.truth import SOUND, SensorFault
 
@@ -133,33 +123,10 @@ def flown_table(
     return rows
 
 
-def window_start(height_m: float) -> float:
-    """When a fault begins: the vehicle has hovered for 10 s."""
-    return TAKEOFF_S + height_m / CLIMB_M_S + SETTLING_S
-
-
 def scenario_flown(height_m: float, vehicle: str | None = None) -> Scenario:
     """Up from the pad at 1 m/s, 15 s of hover, down at 0.3 m/s, with time for a go-around; flown on the estimate."""
-    hover_s, land_s = TAKEOFF_S + height_m / CLIMB_M_S, window_start(height_m) + DESCENDS_AFTER_S
-    down_s = land_s + height_m / SINK_M_S + RESTING_S
-    entries = with_vehicle(load_scenario(BASE), vehicle).model_dump(exclude_unset=True)
-    entries["name"] = f"faults_{height_m:g}_m"
-    entries["description"] = f"Take-off, hover at {height_m:g} m, landing on the same pad, go-arounds"
-    entries["flight"] = {
-        "duration_s": down_s + AROUND_S,
-        "start": "ground",
-        "takeoff_at_s": TAKEOFF_S,
-        "may_land_after_s": land_s,
-        "path": [
-            {"t_s": 0.0, "height_m": 0.0},
-            {"t_s": TAKEOFF_S, "height_m": 0.0},
-            {"t_s": hover_s, "height_m": height_m},
-            {"t_s": land_s, "height_m": height_m},
-            {"t_s": down_s, "height_m": -SINK_M_S * RESTING_S},
-        ],
-    }
-    entries["autopilot"] = AUTOPILOT
-    return check(entries, Scenario, "faults")
+    words = f"faults_{height_m:g}_m", "landing on the same pad, go-arounds"
+    return hovering(words, height_m, window_start(height_m) + DESCENDS_AFTER_S, AUTOPILOT, vehicle, AROUND_S)
 
 
 def _fly(

@@ -120,27 +120,32 @@ def scenario_at(height_m: float, longest_s: float, vehicle: str | None = None) -
 
     So that a fault in the streams changes nothing of the flight. InputError where the height cannot be flown.
     """
-    hover_s = TAKEOFF_S + height_m / CLIMB_M_S
+    words = f"hover_{height_m:g}_m", "landing on the same pad, flown on the truth"
     land_s = window_start(height_m) + longest_s + AFTER_S
-    duration_s = land_s + height_m / SINK_M_S + RESTING_S
-    below_m = SINK_M_S * RESTING_S  # on past the ground until the skids carry weight
+    return hovering(words, height_m, land_s, {"feedback": "truth"}, vehicle)
+
+
+def hovering(
+    words: tuple[str, str], height_m: float, land_s: float, autopilot: dict[str, Any], vehicle: str | None,
+    longer_s: float = 0.0,
+) -> Scenario:  # fmt: skip
+    """Up from the pad at 1 m/s, hover until land_s, down at 0.3 m/s, 5 s on the pad, and so much longer.
+
+    words: the scenario's name, and how its description ends. InputError where the height cannot be flown.
+    """
+    down_s, below_m = land_s + height_m / SINK_M_S + RESTING_S, SINK_M_S * RESTING_S  # until the skids carry weight
+    heights = ((0.0, 0.0), (TAKEOFF_S, 0.0), (TAKEOFF_S + height_m / CLIMB_M_S, height_m), (land_s, height_m))
     entries = with_vehicle(load_scenario(BASE), vehicle).model_dump(exclude_unset=True)
-    entries["name"] = f"hover_{height_m:g}_m"
-    entries["description"] = f"Take-off, hover at {height_m:g} m, landing on the same pad, flown on the truth"
+    entries["name"] = words[0]
+    entries["description"] = f"Take-off, hover at {height_m:g} m, {words[1]}"
     entries["flight"] = {
-        "duration_s": duration_s,
+        "duration_s": down_s + longer_s,
         "start": "ground",
         "takeoff_at_s": TAKEOFF_S,
         "may_land_after_s": land_s,
-        "path": [
-            {"t_s": 0.0, "height_m": 0.0},
-            {"t_s": TAKEOFF_S, "height_m": 0.0},
-            {"t_s": hover_s, "height_m": height_m},
-            {"t_s": land_s, "height_m": height_m},
-            {"t_s": duration_s, "height_m": -below_m},
-        ],
+        "path": [{"t_s": t_s, "height_m": own_m} for t_s, own_m in (*heights, (down_s, -below_m))],
     }
-    entries["autopilot"] = {"feedback": "truth"}
+    entries["autopilot"] = autopilot
     return check(entries, Scenario, "faults")
 
 

@@ -14,10 +14,11 @@ from scipy.special import ndtr
 
 from flownav.campaigns.local import record_flown, rows_of
 from flownav.campaigns.plan import made_of
-from flownav.campaigns.rare.walk import Array, Streams
+from flownav.campaigns.rare.walk import Streams
 from flownav.core.compile import LANES
 from flownav.core.errors import InputError
 from flownav.core.files import written_whole
+from flownav.core.measurement import Array
 from flownav.core.record import Record
 from flownav.simulation import layout
 from flownav.simulation.assemble import Setup

@@ -9,21 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flownav.campaigns.measures import Event
+from flownav.campaigns.rare import walk
 from flownav.campaigns.rare.branches import Branch, Space
 from flownav.campaigns.rare.likely import Response, effective, rank_inputs, rank_noise, responses_to
-from flownav.campaigns.rare.walk import (
-    WALK,
-    Array,
-    Islands,
-    Ladder,
-    States,
-    Streams,
-    Walker,
-    climb,
-    fly_islands,
-    together,
-)
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.core.text import finite_or_none
 from flownav.scoring.percentiles import share_with_interval
 from flownav.scoring.touchdown import Limits
@@ -53,11 +43,11 @@ class Found(NamedTuple):
     cv: float
     freedom: float
     levels: tuple[tuple[float, float], ...]
-    beyond: States
+    beyond: walk.States
     weights: Array
 
 
-def find(walker: Walker, limit: float, most: int, beside: float = 0.0) -> Found:
+def find(walker: walk.Walker, limit: float, most: int, beside: float = 0.0) -> Found:
     """The probability of a response beyond the limit: by levels where the response has them, else at random.
 
     Islands are flown in lots of ISLANDS until the coefficient of variation is small enough or `most` flights are used
@@ -65,30 +55,32 @@ def find(walker: Walker, limit: float, most: int, beside: float = 0.0) -> Found:
     it is left at that, and the probability counts as 0 with what it may be as `high`.
     """
     negligible = max(NEGLIGIBLE * beside, LEAST)
-    ladder = climb(walker, limit, PILOT_FLIGHTS, most // 2, negligible)
+    ladder = walk.climb(walker, limit, PILOT_FLIGHTS, most // 2, negligible)
     if not ladder.reached and ladder.above < negligible:
         levels, high = tuple((level, np.nan) for level in ladder.levels), PILOTS_FACTOR * ladder.above
         return Found(0.0, 0.0, high, np.inf, np.inf, levels, walker.fresh(0), np.zeros(0))
     if not ladder.reached:
         return at_random(walker, limit, most - walker.flown)
-    price = ISLANDS * (1.0 + (len(ladder.levels) - 1) * (1.0 - 1.0 / WALK))  # of a flight of every island and level
-    count = min(int((most - walker.flown) / price) // WALK * WALK, ISLAND_FLIGHTS)
-    lots: list[Islands] = []
+    price = ISLANDS * (
+        1.0 + (len(ladder.levels) - 1) * (1.0 - 1.0 / walk.WALK)
+    )  # of a flight of every island and level
+    count = min(int((most - walker.flown) / price) // walk.WALK * walk.WALK, ISLAND_FLIGHTS)
+    lots: list[walk.Islands] = []
     while True:
-        lots.append(fly_islands(walker, ladder, ISLANDS, count))
+        lots.append(walk.fly_islands(walker, ladder, ISLANDS, count))
         found = found_on(ladder, lots, count)
         small = found.cv * found.probability <= SMALL * beside
         if found.cv <= LARGEST_CV or small or walker.flown + price * count > most:
             return found
 
 
-def found_on(ladder: Ladder, lots: list[Islands], count: int) -> Found:
+def found_on(ladder: walk.Ladder, lots: list[walk.Islands], count: int) -> Found:
     """What islands of `count` flights a level say together: the mean of their estimates."""
     estimates = np.concatenate([lot.estimates for lot in lots])
     islands, mean = len(estimates), float(estimates.mean())
     shares = np.concatenate([lot.shares for lot in lots]).mean(axis=0)
     levels = tuple(zip(ladder.levels, shares.tolist(), strict=True))
-    beyond = together([lot.beyond for lot in lots])
+    beyond = walk.together([lot.beyond for lot in lots])
     if mean == 0.0:
         return Found(0.0, 0.0, FAR / (islands * count), np.inf, np.inf, levels, beyond.at(np.arange(0)), np.zeros(0))
     cv = float(estimates.std(ddof=1)) / mean / np.sqrt(islands)
@@ -105,14 +97,14 @@ def interval_of(mean: float, cv: float, freedom: float) -> tuple[float, float]:
     return mean / factor, min(mean * factor, 1.0)
 
 
-def at_random(walker: Walker, limit: float, most: int) -> Found:
+def at_random(walker: walk.Walker, limit: float, most: int) -> Found:
     """The share of flights drawn at random, its interval after Clopper and Pearson: of a response without levels."""
     happened, flown = [walker.fresh(0)], 0
     while flown < most:
         states = walker.fresh(min(DIRECT_FLIGHTS, most - flown))
         happened.append(states.at(np.flatnonzero(states.response > limit)))
         flown += len(states.response)
-    beyond = together(happened)
+    beyond = walk.together(happened)
     hits = len(beyond.response)
     share, low, high = share_with_interval(hits, flown, CONFIDENCE)
     cv = float(np.sqrt((1.0 - hits / flown) / hits)) if hits else np.inf
@@ -200,7 +192,7 @@ def estimate_rare(
     found: list[Found] = []
     left, flown = flights - USUAL_FLIGHTS, []
     for part, response in enumerate(responses):
-        walker = Walker(_respond(space, response, threads, on_progress), len(space.names), space.spans, seed, part)
+        walker = walk.Walker(_respond(space, response, threads, on_progress), len(space.names), space.spans, seed, part)
         beside = sum(one.probability for one in found)
         found.append(find(walker, response.limit, left // (len(responses) - part), beside))
         flown.append(walker.flown)
@@ -215,10 +207,10 @@ def estimate_rare(
 
 def _respond(
     space: Space, response: Response, threads: int | None, on_progress: Callable[[int], object]
-) -> Callable[[Array, Streams], Array]:
+) -> Callable[[Array, walk.Streams], Array]:
     """Flights to their response."""
 
-    def respond(inputs: Array, streams: Streams) -> Array:
+    def respond(inputs: Array, streams: walk.Streams) -> Array:
         rows = space.fly(inputs, streams, threads)
         on_progress(len(rows))
         return response.of(rows)
@@ -228,8 +220,8 @@ def _respond(
 
 def differences(space: Space, found: list[Found]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """How the inputs and the noise of the event's flights differ from those of all flights."""
-    beyond, weights = together([part.beyond for part in found]), np.concatenate([part.weights for part in found])
-    independent = effective(weights) / WALK
+    beyond, weights = walk.together([part.beyond for part in found]), np.concatenate([part.weights for part in found])
+    independent = effective(weights) / walk.WALK
     inputs = rank_inputs(space.names, beyond.inputs, weights, independent)
     noise = rank_noise(space.flight, space.seed, beyond, weights, independent)
     return inputs, noise

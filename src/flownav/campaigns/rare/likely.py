@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from flownav.campaigns.measures import CRASH, MEASURES, NOT_LANDED, Event, measured
 from flownav.campaigns.rare.walk import States
+from flownav.core.measurement import Array
 from flownav.scoring.errors import SCORE_COLUMNS, touchdown_rows
 from flownav.scoring.landings import column_of
 from flownav.scoring.touchdown import Limits
@@ -22,8 +23,6 @@ from flownav.simulation.block import KEYED_EPOCHS
 from flownav.simulation.onboard import EPOCH_S
 from flownav.simulation.plan import Flight
 from flownav.simulation.sources import Source, normals_of, sources_of
-
-Array = NDArray[np.float64]
 
 # a touchdown's figures, and what of the vehicle's limits each is held against
 HELD = {

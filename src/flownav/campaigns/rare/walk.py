@@ -26,7 +26,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from flownav.core.measurement import Array
+
 Streams = NDArray[np.int64]
 Respond = Callable[[Array, Streams], Array]
 

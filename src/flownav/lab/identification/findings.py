@@ -7,14 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from flownav.core.text import finite
+from flownav.lab.identification import height_law
 from flownav.lab.identification.first_look import Axes
-from flownav.lab.identification.height_law import (
-    NoisePoint,
-    PowerLaw,
-    QualityPoint,
-    ScheduleScore,
-    combined,
-)
 from flownav.lab.identification.output_error import Fit
 from flownav.lab.identification.quantities import Choice, Excitation, Interval
 from flownav.lab.identification.scale import SpeedLaw
@@ -58,10 +52,10 @@ class Noise:
     tail: how many of the law's standard deviations hold 99.7 % of the readings.
     """
 
-    points: tuple[NoisePoint, ...]
-    law: PowerLaw
-    quality: tuple[QualityPoint, ...]
-    schedules: tuple[ScheduleScore, ...]
+    points: tuple[height_law.NoisePoint, ...]
+    law: height_law.PowerLaw
+    quality: tuple[height_law.QualityPoint, ...]
+    schedules: tuple[height_law.ScheduleScore, ...]
     signal_sigma_m_s: float
     tail: float
 
@@ -92,12 +86,12 @@ class Findings:
     @property
     def gain(self) -> Interval:
         """Over axes and heights; what they differ by widens it."""
-        return combined(list(dict.fromkeys(response.gain for response in self.responses)))
+        return height_law.combined(list(dict.fromkeys(response.gain for response in self.responses)))
 
     @property
     def latency_s(self) -> Interval:
         """Over axes and heights; what they differ by widens it."""
-        return combined(list(dict.fromkeys(response.latency_s for response in self.responses)))
+        return height_law.combined(list(dict.fromkeys(response.latency_s for response in self.responses)))
 
     @property
     def best(self) -> Response:

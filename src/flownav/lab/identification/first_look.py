@@ -10,17 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from flownav.core.measurement import Array, Sensor
+from flownav.lab.identification import reference_motion
 from flownav.lab.identification.flight import IMU_NAME, Flight, flight
-from flownav.lab.identification.reference_motion import (
-    ALIKE_S,
-    Motion,
-    fast_flow,
-    flow_likeness,
-    motion,
-    on_grid,
-    velocity_response,
-    with_flow,
-)
 from flownav.logs.frames import mean_over
 from flownav.logs.log import Log
 
@@ -96,7 +87,7 @@ class Judged(NamedTuple):
     """The flight, its motion by the reference, the flow's response to it (2, 2), and what that says of the axes."""
 
     flown: Flight
-    moved: Motion
+    moved: reference_motion.Motion
     response: Array
     axes: Axes
 
@@ -115,10 +106,10 @@ def judged(log: Log, reference: str = "auto") -> Judged:
 
 
 def _judged(flown: Flight) -> Judged:
-    moved = motion(flown)
+    moved = reference_motion.motion(flown)
     tie = moved.flow_tie
     age_s = tie.delay_s.value if tie is not None and tie.holds else flown.age_s
-    response = velocity_response(flown, moved, age_s)
+    response = reference_motion.velocity_response(flown, moved, age_s)
     return Judged(flown, moved, response, judge(response, moved.yaw_known))
 
 
@@ -164,10 +155,13 @@ def first_look(log: Log) -> Look:
         return _against_imu(log)
     flown, moved, _, axes = judged(log)
     put_right = flown.velocity_m_s @ axes.assignment
-    alike = flow_likeness(flown, moved.t_s, moved.velocity_m_s, put_right)
+    alike = reference_motion.flow_likeness(flown, moved.t_s, moved.velocity_m_s, put_right)
     t_s, seen = flown.t_s[flown.good], flown.t_s[flown.good] - flown.age_s
-    body = on_grid(moved.t_s, moved.in_body(flown, moved.t_s)[:, :2], seen + alike.lag_s)
-    flow, reference = (mean_over(t_s, values, t_s - ALIKE_S, t_s + ALIKE_S) for values in (put_right[flown.good], body))
+    body = reference_motion.on_grid(moved.t_s, moved.in_body(flown, moved.t_s)[:, :2], seen + alike.lag_s)
+    flow, reference = (
+        mean_over(t_s, values, t_s - reference_motion.ALIKE_S, t_s + reference_motion.ALIKE_S)
+        for values in (put_right[flown.good], body)
+    )
     scale = float(np.sum(flow * reference) / max(float(np.sum(reference**2)), 1e-12))
     return Look(
         flown.reference_name, alike.likeness, alike.lag_s + moved.reference_delay_s, scale, axes.verdict, axes.right,
@@ -180,14 +174,14 @@ def _against_imu(log: Log) -> Look:
     flown, moved, _, _ = judged(log, "imu")
     scores = []
     for axes in ALL_AXES:
-        tie = with_flow(moved, flown, flown.velocity_m_s @ axes).flow_tie
+        tie = reference_motion.with_flow(moved, flown, flown.velocity_m_s @ axes).flow_tie
         assert tie is not None
         scores.append((tie.likeness * float(np.cos(tie.turn_rad)), tie.alike, tie.delay_s.value))
     order = np.argsort([score for score, _, _ in scores])[::-1]
     best, (score, alike, lag_s) = ALL_AXES[order[0]], scores[order[0]]
     clear = alike and (order[0] == 0 or score > CLEAR * max(scores[0][0], 0.0))  # than with the axes as they should be
-    fast = fast_flow(flown, moved.t_s, flown.velocity_m_s @ best)
-    inertial = on_grid(moved.t_s, moved.velocity_m_s[:, :2], flown.t_s[flown.good] - lag_s)
+    fast = reference_motion.fast_flow(flown, moved.t_s, flown.velocity_m_s @ best)
+    inertial = reference_motion.on_grid(moved.t_s, moved.velocity_m_s[:, :2], flown.t_s[flown.good] - lag_s)
     scale = float(np.sum(fast * inertial) / max(float(np.sum(inertial**2)), 1e-12))
     right = bool(np.array_equal(best, np.eye(2)))
     return Look(

@@ -18,19 +18,12 @@ import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array
-from flownav.lab.identification import scale
+from flownav.lab.identification import height_law
 from flownav.lab.identification.descent import Structure
 from flownav.lab.identification.experiment import Experiment, experiment
 from flownav.lab.identification.findings import Findings, Noise, Response
 from flownav.lab.identification.first_look import Axes, judged
 from flownav.lab.identification.flight import Flight
-from flownav.lab.identification.height_law import (
-    compare_schedules,
-    fit_power_law,
-    noise_by_height,
-    tail,
-    variance_by_quality,
-)
 from flownav.lab.identification.output_error import Z_95, fit
 from flownav.lab.identification.quantities import Interval, choose, cross_validation, latency
 from flownav.lab.identification.reference_motion import (
@@ -41,7 +34,7 @@ from flownav.lab.identification.reference_motion import (
     flow_likeness,
     with_flow,
 )
-from flownav.lab.identification.scale import against_speed
+from flownav.lab.identification.scale import Match, against_speed, match
 from flownav.logs.open_log import open_flight
 
 CLUSTER_S = 3.0
@@ -151,14 +144,14 @@ def _body_input(flown: Flight, moved: Motion, age_s: float) -> Array:
     return moved.in_body(flown, flown.t_s[flown.good] - age_s)[:, :2]
 
 
-def _scale(flown: Flight, moved: Motion, age_s: float, velocity: Array) -> tuple[Scale, scale.Match | None]:
+def _scale(flown: Flight, moved: Motion, age_s: float, velocity: Array) -> tuple[Scale, Match | None]:
     if flown.reference == "gps":
-        track = scale.match(flown, age_s, velocity)
+        track = match(flown, age_s, velocity)
         return _scale_of_track(track), track
     return _scale_of_velocity(flown, moved, velocity), None
 
 
-def _scale_of_track(track: scale.Match) -> Scale:
+def _scale_of_track(track: Match) -> Scale:
     """The response is the inverse of the mixing; its covariance by the inverse's derivative, dB = -B dM B."""
     response = np.linalg.inv(track.mixing)
     covariance = track.covariance[:4, :4]  # of m11, m21, m12, m22
@@ -225,16 +218,16 @@ def _noise(flown: Flight, velocity: Array, residuals: Sequence[Array]) -> Noise:
     ranges, quality = flown.range_m[flown.good], flown.quality[flown.good]
     error = np.concatenate([_complete(residual, len(ranges)) for residual in residuals])
     height, grade = np.concatenate([ranges, ranges]), np.concatenate([quality, quality])
-    points = noise_by_height(error, height)
+    points = height_law.noise_by_height(error, height)
     signal = float(velocity[flown.good].std())
-    law = fit_power_law(points)
+    law = height_law.fit_power_law(points)
     return Noise(
         tuple(points),
         law,
-        tuple(variance_by_quality(error, grade)),
-        tuple(compare_schedules(error, height, grade, signal)),
+        tuple(height_law.variance_by_quality(error, grade)),
+        tuple(height_law.compare_schedules(error, height, grade, signal)),
         signal,
-        tail(error, law.at(height)),
+        height_law.tail(error, law.at(height)),
     )
 
 
@@ -274,7 +267,7 @@ def _notes(flown: Flight, moved: Motion, scale: Scale, axes: Axes) -> list[str]:
 
 
 def _details(
-    flown: Flight, moved: Motion, scale: Scale, axes: Axes, raw: Array, track: scale.Match | None
+    flown: Flight, moved: Motion, scale: Scale, axes: Axes, raw: Array, track: Match | None
 ) -> dict[str, object]:
     details: dict[str, object] = {
         "scale_method": scale.method,

@@ -10,19 +10,11 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.guard import inputs_there
 from flownav.core.measurement import Array
+from flownav.lab.identification import height_law
 from flownav.lab.identification.descent import DELAY_RANGE_S, Structure
 from flownav.lab.identification.findings import Findings, Noise, Response, RunModel
 from flownav.lab.identification.first_look import one_axis
 from flownav.lab.identification.flight_identification import identify_flight
-from flownav.lab.identification.height_law import (
-    NoisePoint,
-    compare_schedules,
-    fit_power_law,
-    noise_by_height,
-    spread,
-    tail,
-    variance_by_quality,
-)
 from flownav.lab.identification.output_error import fit
 from flownav.lab.identification.quantities import CANDIDATES, choose, cross_validation, gain, latency
 from flownav.lab.identification.rig_log import Run, assign_heights, is_rig, read_runs
@@ -102,21 +94,21 @@ def _noise(errors: Sequence[tuple[Run, Array]]) -> Noise:
     ]
     errors_all, heights_all = np.concatenate(error), np.concatenate(height)
     quality_all, signal_sigma = np.concatenate(quality), float(np.concatenate(signal).std())
-    points = by_height if len(by_height) > 1 else noise_by_height(errors_all, heights_all)
-    law = fit_power_law(points)
+    points = by_height if len(by_height) > 1 else height_law.noise_by_height(errors_all, heights_all)
+    law = height_law.fit_power_law(points)
     return Noise(
         tuple(points),
         law,
-        tuple(variance_by_quality(errors_all, quality_all)),
-        tuple(compare_schedules(errors_all, heights_all, quality_all, signal_sigma)),
+        tuple(height_law.variance_by_quality(errors_all, quality_all)),
+        tuple(height_law.compare_schedules(errors_all, heights_all, quality_all, signal_sigma)),
         signal_sigma,
-        tail(errors_all, law.at(heights_all)),
+        height_law.tail(errors_all, law.at(heights_all)),
     )
 
 
-def _point(height_m: float, error: Array) -> NoisePoint:
+def _point(height_m: float, error: Array) -> height_law.NoisePoint:
     """A noise point from all errors at one height."""
-    return NoisePoint(height_m, spread(error), len(error))
+    return height_law.NoisePoint(height_m, height_law.spread(error), len(error))
 
 
 # -- rig logs or a flight ----------------------------------------------------------------------------------------

@@ -19,18 +19,6 @@ import numpy as np
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array
 from flownav.lab.identification import descent
-from flownav.lab.identification.descent import (
-    DELAY_RANGE_S,
-    SMALLEST_EIGENVALUE,
-    State,
-    begin,
-    by_cost,
-    descend,
-    inverse_of,
-    linearise,
-    linearise_all,
-    normal_equations,
-)
 from flownav.lab.identification.descent import Point as Point
 from flownav.lab.identification.descent import Structure as Structure
 from flownav.lab.identification.experiment import Experiment
@@ -181,29 +169,29 @@ def fit(
         raise InputError("no experiment to identify from; give a log")
     if not 0 <= structure.order <= HIGHEST_ORDER:
         raise InputError(f"order {structure.order}: 0 (gain and delay) to {HIGHEST_ORDER} are possible")
-    runs = [run.within(DELAY_RANGE_S) for run in experiments]
+    runs = [run.within(descent.DELAY_RANGE_S) for run in experiments]
     if starts is None:
-        guess = guess or descent.gain_and_delay(runs, DELAY_RANGE_S)
+        guess = guess or descent.gain_and_delay(runs, descent.DELAY_RANGE_S)
         starts = descent.points(guess, structure)
         if structure.order > 2:
             second = fit(experiments, structure._replace(order=2), guess=guess).point
             starts = [*starts, second._replace(log_a=descent.with_fast_poles(second.log_a, structure.order))]
-    states = sorted((begin(runs, structure, start) for start in starts), key=by_cost)
-    hopeful = [descend(runs, structure, state, HEAT_ITERATIONS) for state in states[:FINALISTS]]
-    state = descend(runs, structure, min(hopeful, key=by_cost), MOST_ITERATIONS)
+    states = sorted((descent.begin(runs, structure, start) for start in starts), key=descent.by_cost)
+    hopeful = [descent.descend(runs, structure, state, HEAT_ITERATIONS) for state in states[:FINALISTS]]
+    state = descent.descend(runs, structure, min(hopeful, key=descent.by_cost), MOST_ITERATIONS)
     if not np.isfinite(state.cost):
         raise InputError(f"{runs[0].name}: no stable model of order {structure.label} fits; try a lower order")
     return _finish(runs, structure, state)
 
 
-def _finish(runs: Sequence[Experiment], structure: Structure, state: State) -> Fit:
-    parts = linearise_all(runs, structure, state.point, state.nuisance, whole=True)
-    normal = normal_equations(parts, structure.parameters)
+def _finish(runs: Sequence[Experiment], structure: Structure, state: descent.State) -> Fit:
+    parts = descent.linearise_all(runs, structure, state.point, state.nuisance, whole=True)
+    normal = descent.normal_equations(parts, structure.parameters)
     residuals = [part.columns[:, -1].copy() for part in parts]
     readings = sum(map(len, residuals))
     free = structure.parameters + len(runs) * (structure.order + 1)
     variance = state.cost / max(1, readings - free)
-    inverse = inverse_of(normal.matrix)
+    inverse = descent.inverse_of(normal.matrix)
     tested = whiteness(residuals)
     covariance = white = variance * inverse
     if not tested.white:
@@ -243,7 +231,7 @@ def _at_least(white: Array, sandwich: Array, readings_per_independent: float) ->
     Of parameters that the data hardly hold it is rounding, and no covariance: then white's, of fewer readings.
     """
     sure, coloured = np.diag(white), np.diag(sandwich)
-    if np.any(coloured <= SMALLEST_EIGENVALUE * sure):
+    if np.any(coloured <= descent.SMALLEST_EIGENVALUE * sure):
         return white * readings_per_independent
     keep = np.sqrt(np.maximum(1.0, sure / coloured))
     return np.asarray(sandwich * np.outer(keep, keep))
@@ -251,8 +239,8 @@ def _at_least(white: Array, sandwich: Array, readings_per_independent: float) ->
 
 def simulate(run: Experiment, structure: Structure, point: Point) -> Array:
     """Model output at a run's readings, with the start and offset that suit this run best (as `compare` does)."""
-    part = linearise(run, structure, point, np.zeros(structure.order + 1), whole=True)
-    normal = normal_equations([part], structure.parameters)
+    part = descent.linearise(run, structure, point, np.zeros(structure.order + 1), whole=True)
+    normal = descent.normal_equations([part], structure.parameters)
     own = normal.inverse[0] @ normal.own_gradient[0]
     shared = structure.parameters
     return np.asarray(run.y - part.columns[:, -1] + part.columns[:, shared:-1] @ own)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.signal import fftconvolve
 
 from flownav.core.measurement import Array
 from flownav.lab.identification.descent import DELAY_RANGE_S, Structure
@@ -77,11 +78,8 @@ def smoothed(values: Array, width_s: float = SPLIT_S) -> Array:
     """Gaussian mean along the first axis of columns on the grid (two-sided: no delay)."""
     reach = int(4.0 * width_s / GRID_S)
     weights = np.exp(-0.5 * (np.arange(-reach, reach + 1) * GRID_S / width_s) ** 2)
-    weights /= weights.sum()
-    size = 1 << (len(values) + 4 * reach).bit_length()
     padded = np.pad(values, ((reach, reach), (0, 0)), mode="edge")
-    spectrum = np.fft.rfft(padded, size, axis=0) * np.fft.rfft(weights, size)[:, None]
-    return np.asarray(np.fft.irfft(spectrum, size, axis=0)[2 * reach : 2 * reach + len(values)])
+    return np.asarray(fftconvolve(padded, weights[:, None] / weights.sum(), "valid", axes=0))
 
 
 def on_grid(t_s: Array, values: Array, grid: Array) -> Array:

@@ -32,7 +32,6 @@ LARGEST_SERIES = 0.7  # |M h| of one series; a longer step is done in parts
 SMALLEST_FREE = 1e-14  # below this the start is forgotten
 SERIES_TERMS = 15  # 0.7^15/15! = 4e-15
 
-
 Order = tuple[int, ...]  # (0,) * n: an order whose length is part of its type, so that kernels are built for it
 
 
@@ -212,8 +211,7 @@ def response(of: Order, given: Input, grid: Grid, tried: Tried, y: Array, column
     coefficients, gain, with_delay, own = tried
     order = len(of)
     rate = exp(coefficients[order - 1] / order)
-    a, unit = np.empty(order), np.empty(order)
-    power = 1.0
+    a, unit, power = np.empty(order), np.empty(order), 1.0
     for i in range(order):
         unit[i] = power
         power = power / rate
@@ -222,7 +220,7 @@ def response(of: Order, given: Input, grid: Grid, tried: Tried, y: Array, column
     work = np.zeros((2, width))
     between = _matrices(grid.between, rate, of, a, held, work)
     past = _matrices(grid.past, rate, of, a, held, work)
-    z, now = np.zeros(width), np.zeros(width)
+    z, now, moved = np.zeros(width), np.zeros(width), np.zeros(width)
     free, free_now = np.zeros(order), np.zeros(order)
     free[0] = 1.0
     for i in range(order):
@@ -232,7 +230,6 @@ def response(of: Order, given: Input, grid: Grid, tried: Tried, y: Array, column
     sample, between_s, between_kind = grid.sample, grid.between.length_s, grid.between.kind
     past_s, past_kind = grid.past.length_s, grid.past.kind
     between_tabled, past_tabled = len(between) > 0, len(past) > 0
-    moved = np.zeros(width)
     whole, last = len(columns) > 1, columns.shape[1] - 1
     begin = order + 2 if with_delay else order + 1
     at, alive = 0, True
@@ -240,15 +237,14 @@ def response(of: Order, given: Input, grid: Grid, tried: Tried, y: Array, column
     for row in range(len(y)):
         at_row = row if whole else 0
         while at < sample[row]:
-            h = between_s[at] * rate
             if between_tabled:
                 _move(z, between, between_kind[at], of, moved)
                 if alive:
                     _move_free(free, between, between_kind[at], of, moved)
             else:
-                _advance(z, h, of, a, held, work)
+                _advance(z, between_s[at] * rate, of, a, held, work)
                 if alive:
-                    _advance_free(free, h, of, a, work)
+                    _advance_free(free, between_s[at] * rate, of, a, work)
             alive = alive and np.abs(free).max() > SMALLEST_FREE
             at += 1
             _feed(z, t_u, u, at, order, rate, gain, held)
@@ -257,15 +253,14 @@ def response(of: Order, given: Input, grid: Grid, tried: Tried, y: Array, column
         for i in range(order):
             free_now[i] = free[i] if alive else 0.0
         if past_s[row] != 0.0:
-            h = past_s[row] * rate
             if past_tabled:
                 _move(now, past, past_kind[row], of, moved)
                 if alive:
                     _move_free(free_now, past, past_kind[row], of, moved)
             else:
-                _advance(now, h, of, a, held, work)
+                _advance(now, past_s[row] * rate, of, a, held, work)
                 if alive:
-                    _advance_free(free_now, h, of, a, work)
+                    _advance_free(free_now, past_s[row] * rate, of, a, work)
         forced = now[0]
         for j in range(order):
             columns[at_row, order - 1 - j] = a[order - 1 - j] * now[order + j]

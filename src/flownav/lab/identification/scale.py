@@ -27,8 +27,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.signal import lfilter
 
-from flownav.core.compile import kernel
 from flownav.core.errors import InputError
 from flownav.core.measurement import Array
 from flownav.lab.identification.flight import Flight
@@ -70,16 +70,9 @@ class _Track(NamedTuple):
     reference_m: Array  # (m, 2)
 
 
-@kernel
 def _whitened(columns: Array, gain: float) -> Array:
     """Innovations of x[k+1] = x[k] + gain (z[k] - x[k]), column by column, started at the first row; (n - 1, k)."""
-    out = np.empty((columns.shape[0] - 1, columns.shape[1]))
-    for j in range(columns.shape[1]):
-        level = columns[0, j]
-        for i in range(1, columns.shape[0]):
-            out[i - 1, j] = columns[i, j] - level
-            level += gain * out[i - 1, j]
-    return out
+    return np.asarray(lfilter([1.0], [1.0, gain - 1.0], np.diff(columns, axis=0), axis=0))
 
 
 def match(flown: Flight, latency_s: float, corrected: Array | None = None) -> Match:

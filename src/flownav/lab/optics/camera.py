@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import map_coordinates
 
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 
 SUPER_PIXEL_M = 24e-6
 FOCAL_M = 0.016
@@ -129,8 +130,6 @@ def lens_transfer(camera: Camera, frequency: ArrayLike, distance_m: float) -> ND
 
 
 # -- a wide lens -------------------------------------------------------------------------------------------------
-Array = NDArray[np.float64]
-
 PINHOLE_K1, PINHOLE_K2 = 1.0 / 3.0, 2.0 / 15.0
 NEWTON_STEPS = 8
 WIDEST_RAD = 1.45  # rays farther from the axis have no tangent worth the name

@@ -7,6 +7,7 @@ set of plain numbers and switches, so that a defect can be switched alone:
 
 from __future__ import annotations
 
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 from flownav.core.errors import InputError
@@ -48,7 +49,7 @@ class Firmware(NamedTuple):
     histogram_index_defect: bool
 
 
-_2013_06 = Firmware(
+FIRST = Firmware(
     name="2013-06",
     frame_rate_hz=250.0,
     search_px=4,
@@ -72,34 +73,23 @@ _2013_06 = Firmware(
     over_zero_defect=True,
     histogram_index_defect=True,
 )
-_2013_09 = _2013_06._replace(name="2013-09", first_px=0, step_px=0)
-_2014_01 = _2013_09._replace(name="2014-01", over_zero_defect=False)
-_2014_07 = _2014_01._replace(name="2014-07", frame_rate_hz=400.0, patches=5)
-_2014_08 = _2014_07._replace(name="2014-08", clock_s=1e-5, frames_per_message=1, transmit_latency_s=0.356)
-_2014_10 = _2014_08._replace(name="2014-10", frames_per_message=10, transmit_latency_s=0.003, gyro_compensation=False)
-_2014_11 = _2014_10._replace(name="2014-11", gyro_scale=1.0)
-_2014_12 = _2014_11._replace(name="2014-12", rows_twice_defect=False, half_pixel_y_defect=False, sonar_median=True)
-_2015_12 = _2014_12._replace(name="2015-12", sonar_median=False)
-_2016 = _2015_12._replace(name="2016", search_px=8, frames_per_message=40)
-_2017 = _2016._replace(name="2017", feature_threshold=40)
-_2020 = _2017._replace(name="2020", histogram_index_defect=False)
-
+# what each version changed in the one before
+CHANGES: dict[str, dict[str, Any]] = {
+    "2013-09": {"first_px": 0, "step_px": 0},
+    "2014-01": {"over_zero_defect": False},
+    "2014-07": {"frame_rate_hz": 400.0, "patches": 5},
+    "2014-08": {"clock_s": 1e-5, "frames_per_message": 1, "transmit_latency_s": 0.356},
+    "2014-10": {"frames_per_message": 10, "transmit_latency_s": 0.003, "gyro_compensation": False},
+    "2014-11": {"gyro_scale": 1.0},
+    "2014-12": {"rows_twice_defect": False, "half_pixel_y_defect": False, "sonar_median": True},
+    "2015-12": {"sonar_median": False},
+    "2016": {"search_px": 8, "frames_per_message": 40},
+    "2017": {"feature_threshold": 40},
+    "2020": {"histogram_index_defect": False},
+}
 VERSIONS: dict[str, Firmware] = {
     version.name: version
-    for version in (
-        _2013_06,
-        _2013_09,
-        _2014_01,
-        _2014_07,
-        _2014_08,
-        _2014_10,
-        _2014_11,
-        _2014_12,
-        _2015_12,
-        _2016,
-        _2017,
-        _2020,
-    )
+    for version in accumulate(CHANGES.items(), lambda old, new: old._replace(name=new[0], **new[1]), initial=FIRST)
 }
 
 DEFECTS: dict[str, dict[str, Any]] = {
@@ -110,11 +100,8 @@ DEFECTS: dict[str, dict[str, Any]] = {
     "histogram-index": {"histogram_index_defect": True},
 }
 REPAIRS: dict[str, dict[str, Any]] = {
-    "rows-twice": {"rows_twice_defect": False},
-    "half-pixel-y": {"half_pixel_y_defect": False},
-    "gyro-scale": {"gyro_scale": 1.0},
-    "over-zero": {"over_zero_defect": False},
-    "histogram-index": {"histogram_index_defect": False},
+    name: {switch: 1.0 if switch == "gyro_scale" else False for switch in switches}
+    for name, switches in DEFECTS.items()
 }
 
 

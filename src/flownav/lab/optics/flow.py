@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.lab.optics.block_matching import (
     PixelFlow,
     fits,
@@ -21,8 +22,6 @@ from flownav.lab.optics.block_matching import (
 )
 from flownav.lab.optics.camera import FIRMWARE_FOCAL_PX
 from flownav.lab.optics.firmware import DEFAULT, TILE_PX, Firmware, firmware_named
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

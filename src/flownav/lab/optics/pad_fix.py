@@ -12,23 +12,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
+from flownav.lab.optics import squares
 from flownav.lab.optics.pad import BOARD_CELLS, TAG_CELLS, PadTarget, checked, corners_m, picture_cells
 from flownav.lab.optics.plane_pose import PlanePose, homography, mapped, plane_pose
 from flownav.lab.optics.projection import Pose, image_point
-from flownav.lab.optics.squares import (
-    DARK,
-    LEAST_CONTRAST_GREY,
-    LEAST_SIDE_PX,
-    LIGHT,
-    Region,
-    Square,
-    area,
-    bilinear,
-    refined,
-    regions,
-)
-
-Array = NDArray[np.float64]
 
 # why there is no fix, from the least to the most that was seen
 NO_FRAME = "not a frame of grey levels"
@@ -90,16 +78,18 @@ def find_pad(
         if inner.fix is not None:
             return inner
     grey = np.asarray(frame)
-    if grey.ndim != 2 or grey.dtype != np.uint8 or min(grey.shape) < 2 * LEAST_SIDE_PX:
+    if grey.ndim != 2 or grey.dtype != np.uint8 or min(grey.shape) < 2 * squares.LEAST_SIDE_PX:
         return PadSearch(None, NO_FRAME)
     low, high = np.percentile(_halved(grey), (0.2, 99.8))
-    if high - low < LEAST_CONTRAST_GREY:
+    if high - low < squares.LEAST_CONTRAST_GREY:
         return PadSearch(None, TOO_DARK)
     axes = np.eye(3) if body_from_camera is None else np.asarray(body_from_camera, float)
     levels = grey.astype(float)
     seen: list[tuple[float, PadFix]] = []
     reasons = [NO_SQUARE]
-    for region in regions(np.ascontiguousarray(grey), (DARK,) if target.coded else (DARK, LIGHT)):
+    for region in squares.regions(
+        np.ascontiguousarray(grey), (squares.DARK,) if target.coded else (squares.DARK, squares.LIGHT)
+    ):
         corners, reason = _corners_of(region, levels, target)
         if corners is None:
             reasons.append(reason)
@@ -109,7 +99,7 @@ def find_pad(
         if fix is None:
             reasons.append(OTHER)
         else:
-            seen.append((area(corners), fix))
+            seen.append((squares.area(corners), fix))
     if not seen:
         return PadSearch(None, max(reasons, key=REASONS.index))
     return PadSearch(max(seen, key=lambda found: found[0])[1], "found")
@@ -121,7 +111,7 @@ def _halved(grey: NDArray[np.uint8]) -> Array:
     return np.asarray(grey[: 2 * rows, : 2 * columns].reshape(rows, 2, columns, 2).mean((1, 3)))
 
 
-def _corners_of(region: Region, levels: Array, target: PadTarget) -> tuple[Array | None, str]:
+def _corners_of(region: squares.Region, levels: Array, target: PadTarget) -> tuple[Array | None, str]:
     """The target's corners in the picture's order, or None and why this region is not the target."""
     height, width = levels.shape
     if region.cut:
@@ -130,11 +120,11 @@ def _corners_of(region: Region, levels: Array, target: PadTarget) -> tuple[Array
     if region.corners is None:
         return None, NO_SQUARE
     cells = TAG_CELLS if target.coded else BOARD_CELLS
-    square = refined(levels, region.corners, region.shade, cells)
+    square = squares.refined(levels, region.corners, region.shade, cells)
     if square is None:
         return None, NO_SQUARE
     sides = np.linalg.norm(np.roll(square.corners, -1, 0) - square.corners, axis=1)
-    if sides.min() < LEAST_SIDE_PX:
+    if sides.min() < squares.LEAST_SIDE_PX:
         return None, TOO_FAR
     inside = (square.corners > 0.0) & (square.corners < np.array([width - 1.0, height - 1.0]))
     if not inside.all():
@@ -144,7 +134,7 @@ def _corners_of(region: Region, levels: Array, target: PadTarget) -> tuple[Array
     return _in_order(levels, square, target), OTHER
 
 
-def _in_order(levels: Array, square: Square, target: PadTarget) -> Array | None:
+def _in_order(levels: Array, square: squares.Square, target: PadTarget) -> Array | None:
     """The corners turned so that the first is the picture's top left; None where the cells are not the target's."""
     wanted = picture_cells(target)[1:-1, 1:-1] if target.coded else picture_cells(target)
     cells = read_cells(levels, square, len(wanted))
@@ -161,7 +151,7 @@ def _in_order(levels: Array, square: Square, target: PadTarget) -> Array | None:
     return np.roll(square.corners, -best, 0) if ring <= ring_allowed and code <= code_allowed else None
 
 
-def read_cells(levels: Array, square: Square, count: int) -> NDArray[np.bool_] | None:
+def read_cells(levels: Array, square: squares.Square, count: int) -> NDArray[np.bool_] | None:
     """The count x count cells of a square as they stand from its first corner, True where white.
 
     Grey levels are compared with the middle of those within and without the square's edge. None where the corners
@@ -176,7 +166,7 @@ def read_cells(levels: Array, square: Square, count: int) -> NDArray[np.bool_] |
     points = mapped(transform, np.column_stack([column.ravel(), row.ravel()]))
     if not np.isfinite(points).all():
         return None
-    samples = bilinear(levels, points[:, 0], points[:, 1])
+    samples = squares.bilinear(levels, points[:, 0], points[:, 1])
     means = samples.reshape(count, len(CELL_SAMPLES), count, len(CELL_SAMPLES)).mean((1, 3))
     return np.asarray(means > 0.5 * (square.inner_grey + square.outer_grey))
 
@@ -187,7 +177,7 @@ def _pose_of(corners: Array, shape: tuple[int, ...], target: PadTarget, focal_px
     pose = plane_pose(corners_m(target), (corners - middle) / focal_px)
     if pose is None or target.coded:
         return pose
-    allowed_px = SQUARE_PART * float(np.sqrt(area(corners))) + 0.2
+    allowed_px = SQUARE_PART * float(np.sqrt(squares.area(corners))) + 0.2
     return pose if pose.rms * focal_px <= allowed_px else None
 
 

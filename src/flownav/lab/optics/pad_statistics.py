@@ -23,9 +23,8 @@ from scipy.optimize import minimize
 from scipy.stats import binom, norm
 
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.lab.optics.pad_trial import TrialFrame
-
-Array = NDArray[np.float64]
 
 LEAST_SHARE = 0.5  # of the frames with the whole pad in view: heights that give fewer fixes are out of range
 LEAST_FRAMES = 5
@@ -238,7 +237,6 @@ def false_share_of(c: dict[str, Array]) -> float:
     return float((c["wrong"].sum() + 1.0) / (len(c["wrong"]) + 2.0))
 
 
-# -- all together -----------------------------------------------------------------------------------------------------
 def heights_in_range(c: dict[str, Array]) -> tuple[float, float]:
     """The lowest height and the greatest reach at which half of the slowest frames with the whole pad give a fix.
 

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.lab.optics.camera import (
     MEAN_REFLECTANCE,
     PINHOLE_K1,
@@ -43,8 +44,6 @@ from flownav.lab.optics.projection import FlightMotion, Pose, ground_point, pose
 from flownav.lab.optics.scene import Scene, drawn_scene, in_shadow_of_vehicle
 from flownav.lab.optics.shot import Ground, Optic, Shot, View, ground_at, shoot, view_of
 from flownav.sensors.geometry import image_rate_rad_s
-
-Array = NDArray[np.float64]
 
 TILT_RAD = float(np.radians(15.0))
 RATE_RAD_S = 0.15  # standard deviation of each of the body's rates

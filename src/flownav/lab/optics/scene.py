@@ -8,12 +8,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flownav.core.compile import clamp, equation, exp
+from flownav.core.measurement import Array
 from flownav.lab.optics.projection import Pose
-
-Array = NDArray[np.float64]
 
 SUN_RAD = 0.0093  # the sun's diameter
 VEHICLE_M = (0.12, 1.2)  # width and length of what throws the vehicle's shadow: fuselage and boom

@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.compile import clamp, equation, kernel
+from flownav.core.measurement import Array
 from flownav.lab.optics.camera import Camera, Exposure, Lens, illumination, pixel_grid, pixels_of, rays_of
 from flownav.lab.optics.pad import GROUND_REFLECTANCE, Pad, PadTarget, ground, laid_out
 from flownav.lab.optics.projection import FlightMotion, Pose, ground_point, moved, part_time_s, row_time_s
 from flownav.lab.optics.render import blurred, digitise, noise_bank, sampled
 from flownav.lab.optics.scene import Cover, Scene, Shadow, covered, lit, mirrored
 from flownav.sensors.geometry import image_rate_rad_s
-
-Array = NDArray[np.float64]
 
 SKY = 1.0
 HORIZON = 0.05  # rays lower than this below the horizon, as a part of their length along the axis, see the sky

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.compile import kernel
-
-Array = NDArray[np.float64]
+from flownav.core.measurement import Array
 
 DARK, LIGHT = 1, 2
 TILES_ALONG_SHORT_SIDE = (3, 8, 24)  # a pixel is judged against 3x3 tiles of each of these sizes

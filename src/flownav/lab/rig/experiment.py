@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.lab.optics.camera import Camera, exposed, light_named, refocused
 from flownav.lab.optics.firmware import firmware_named
 from flownav.lab.optics.pad import pad_named
@@ -27,7 +28,6 @@ from flownav.lab.rig.instruments import (
 )
 from flownav.lab.rig.pendulum import EXCITATIONS, move, rod_length, sensor_place, sensor_velocity
 
-Array = NDArray[np.float64]
 LOG_S = 0.01
 
 

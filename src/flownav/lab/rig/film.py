@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.core.compile import kernel
+from flownav.core.measurement import Array
 from flownav.lab.optics.block_matching import Matching, Workspace, fits, match, matching_of, workspace
 from flownav.lab.optics.camera import Camera, Exposure, effective_focal_px
 from flownav.lab.optics.firmware import Firmware
@@ -24,8 +25,6 @@ from flownav.lab.optics.render import (
     take_raster_frame,
 )
 from flownav.lab.rig.pendulum import sensor_pose
-
-Array = NDArray[np.float64]
 
 
 class Rod(NamedTuple):

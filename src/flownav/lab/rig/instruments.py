@@ -11,13 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter, savgol_filter
 
-from flownav.core.compile import kernel
+from flownav.core.measurement import Array
 from flownav.lab.optics.firmware import Firmware
 from flownav.lab.optics.flow import compensated, velocities
 from flownav.sensors.rangefinder import RangefinderState, smooth_range
-
-Array = NDArray[np.float64]
 
 GYRO_SAMPLE_S = 1.0 / 760.0
 GYRO_BANDWIDTH_HZ = 30.0
@@ -41,20 +40,10 @@ class Messages(NamedTuple):
     ground_distance_m: Array
 
 
-@kernel
-def _low_passed(values, weight, smooth):  # type: ignore[no-untyped-def]
-    state = values[0]
-    for k in range(len(values)):
-        state += weight * (values[k] - state)
-        smooth[k] = state
-
-
-@kernel
-def _without_mean(values, weight, result):  # type: ignore[no-untyped-def]
-    mean = 0.0
-    for k in range(len(values)):
-        mean += weight * (values[k] - mean)
-        result[k] = values[k] - mean
+def _low_passed(values: Array, weight: float, start: Array | float) -> Array:
+    """A running mean (n, ...) that takes in this share of each value, from `start` on."""
+    kept = (1.0 - weight) * np.broadcast_to(start, values[:1].shape)
+    return np.asarray(lfilter([weight], [1.0, weight - 1.0], values, axis=0, zi=kept)[0])
 
 
 def gyro_at(times_s: Array, motion_s: Array, rate_rad_s: Array, rng: np.random.Generator, late_s: float = 0.0) -> Array:
@@ -65,13 +54,11 @@ def gyro_at(times_s: Array, motion_s: Array, rate_rad_s: Array, rng: np.random.G
     """
     samples_s = np.arange(motion_s[0], motion_s[-1], GYRO_SAMPLE_S)
     weight = 1.0 - np.exp(-2.0 * np.pi * GYRO_BANDWIDTH_HZ * GYRO_SAMPLE_S)
-    smooth = np.empty_like(samples_s)
-    _low_passed(np.interp(samples_s, motion_s, rate_rad_s), weight, smooth)
+    rate = np.interp(samples_s, motion_s, rate_rad_s)
+    smooth = _low_passed(rate, weight, rate[0])
     latest = np.clip(np.searchsorted(samples_s, times_s - late_s, "right") - 1, 0, None)
     read = smooth[latest] + GYRO_NOISE_RAD_S * rng.standard_normal(len(times_s))
-    result = np.empty_like(read)
-    _without_mean(read, GYRO_OFFSET_WEIGHT, result)
-    return result
+    return read - _low_passed(read, GYRO_OFFSET_WEIGHT, 0.0)
 
 
 def sonar_at(
@@ -134,7 +121,7 @@ def messages(
     sent = sums / np.maximum(valid.sum(axis=1), 1)
     last = np.arange(count) * every + every - 1
     if firmware.low_pass:
-        sent = _exponential(velocity * (quality > 0)[:, None], firmware.low_pass_weight)[last]
+        sent = _low_passed(velocity * (quality > 0)[:, None], firmware.low_pass_weight, 0.0)[last]
     return Messages(
         times_s[1:][last] + firmware.transmit_latency_s + chain_delay_s,
         sent,
@@ -142,16 +129,6 @@ def messages(
         quality[last],
         raw_m[last],
     )
-
-
-def _exponential(velocity: Array, weight: float) -> Array:
-    smooth = np.empty_like(velocity)
-    start = np.vstack([np.zeros(2), velocity])
-    for axis in (0, 1):
-        column = np.empty(len(start))
-        _low_passed(np.ascontiguousarray(start[:, axis]), weight, column)
-        smooth[:, axis] = column[1:]
-    return smooth
 
 
 # -- encoder -----------------------------------------------------------------------------------------------------
@@ -172,8 +149,6 @@ def angle_and_rate(counts: NDArray[np.int64]) -> tuple[Array, Array]:
     The ends are fitted with the windows nearest to them, which assumes a rod at rest there or a longer record.
     """
     angle = (counts + 0.5) * (2.0 * np.pi / COUNTS_PER_REVOLUTION)
-    offsets = np.arange(-HALF_WINDOW, HALF_WINDOW + 1)
-    basis = np.vander(offsets * SAMPLE_S, 4, increasing=True)
-    value_weights, slope_weights = np.linalg.pinv(basis)[:2]
-    padded = np.pad(angle, HALF_WINDOW, mode="edge")
-    return np.correlate(padded, value_weights, "valid"), np.correlate(padded, slope_weights, "valid")
+    window = 2 * HALF_WINDOW + 1
+    value, slope = (savgol_filter(angle, window, 3, deriv=k, delta=SAMPLE_S, mode="nearest") for k in (0, 1))
+    return value, slope

@@ -37,18 +37,7 @@ def write_rig_folder(log: RigLog, folder: Path, command: str = "", *, dated: boo
 
     dated: whether rig.toml says when it was written.
     """
-    table = np.column_stack(
-        [
-            log.time_s,
-            log.encoder_counts,
-            log.reference_velocity_m_s,
-            log.flow_velocity_m_s,
-            log.flow_x_dpx,
-            log.flow_y_dpx,
-            log.ground_distance_m,
-            log.quality,
-        ]
-    )
+    table = np.column_stack([log.time_s if name == "t_s" else getattr(log, name) for name in COLUMNS])
     line = ",".join(COLUMNS.values())
     text = "\n".join([",".join(COLUMNS), *(line % tuple(row) for row in table.tolist())]) + "\n"
     check_rig_folder(folder)

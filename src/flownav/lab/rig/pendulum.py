@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from flownav.core.compile import cos, equation, kernel, runge_kutta, sin, stepping
 from flownav.core.errors import InputError
+from flownav.core.measurement import Array
 from flownav.lab.optics.projection import Pose
 
 GRAVITY_M_S2 = 9.81
@@ -119,7 +120,6 @@ def half_sine(count: int, start_s: float, length_s: float, peak: float) -> NDArr
 
 
 # -- excitation: free swing, several rod lengths, chirp, steps ---------------------------------------------------
-Array = NDArray[np.float64]
 EXCITATIONS = ("swing", "lengths", "chirp", "steps")
 DAMPING_1_S = 0.04
 HAND_PUSH_S = 1.0

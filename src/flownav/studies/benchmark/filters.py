@@ -7,29 +7,12 @@ import numpy as np
 from flownav.core.compile import Lanes, Work, kernel, pointer
 from flownav.core.frames import GRAVITY_M_S2
 from flownav.core.measurement import Array
-from flownav.estimation import paper_filter
+from flownav.estimation import paper_filter, states
 from flownav.estimation.covariance import at, correct, expect, settle
 from flownav.estimation.error_models import FilterSettings, propagate_walks
 from flownav.estimation.kalman import kalman_row_count, kalman_rows
 from flownav.estimation.motion import predict
 from flownav.estimation.paper_filter import PaperModel
-from flownav.estimation.states import (
-    ACCEL_NOISE,
-    ACCEPTED,
-    COEFFICIENT,
-    CROSS,
-    FILTER_ROWS,
-    GYRO_NOISE,
-    IMU,
-    INNOVATION_VARIANCE,
-    NOISE,
-    OBSERVED,
-    OFFERED,
-    POSITION,
-    QUATERNION,
-    STATE,
-    STATES,
-)
 
 SETTINGS = FilterSettings(
     accel_noise_m_s2_rt_hz=0.05, gyro_noise_rad_s_rt_hz=0.004, accel_walk_m_s2_rt_s=0.003, gyro_walk_rad_s_rt_s=1e-4,
@@ -43,17 +26,26 @@ SETTINGS = FilterSettings(
 )  # fmt: skip
 
 
-def standing(lanes: Lanes, n: int = STATES) -> Array:
+def standing(lanes: Lanes, n: int = states.STATES) -> Array:
     """A buffer of filters that hover 5 m above the ground."""
-    rows = np.zeros((FILTER_ROWS, len(lanes)))
-    rows[QUATERNION] = rows[OFFERED] = rows[INNOVATION_VARIANCE] = 1.0
-    rows[IMU + 5] = -GRAVITY_M_S2
-    rows[STATE + POSITION + 2] = -5.0
-    rows[ACCEL_NOISE], rows[GYRO_NOISE] = SETTINGS.accel_noise_m_s2_rt_hz**2, SETTINGS.gyro_noise_rad_s_rt_hz**2
+    rows = np.zeros((states.FILTER_ROWS, len(lanes)))
+    rows[states.QUATERNION] = rows[states.OFFERED] = rows[states.INNOVATION_VARIANCE] = 1.0
+    rows[states.IMU + 5] = -GRAVITY_M_S2
+    rows[states.STATE + states.POSITION + 2] = -5.0
+    rows[states.ACCEL_NOISE], rows[states.GYRO_NOISE] = (
+        SETTINGS.accel_noise_m_s2_rt_hz**2,
+        SETTINGS.gyro_noise_rad_s_rt_hz**2,
+    )
     for i in range(n):
         rows[at(i, i)] = 0.01
-    rows[OBSERVED : OBSERVED + 11] = np.array([10, 3, 4, 5, 6, 7, 8, 29, 2, 27, 9])[:, None]  # as a flow rate
-    rows[COEFFICIENT : COEFFICIENT + 9], rows[CROSS : CROSS + n], rows[NOISE] = 0.1, 1e-8, 1.0
+    rows[states.OBSERVED : states.OBSERVED + 11] = np.array([10, 3, 4, 5, 6, 7, 8, 29, 2, 27, 9])[
+        :, None
+    ]  # as a flow rate
+    rows[states.COEFFICIENT : states.COEFFICIENT + 9], rows[states.CROSS : states.CROSS + n], rows[states.NOISE] = (
+        0.1,
+        1e-8,
+        1.0,
+    )
     return rows.reshape(-1)
 
 
@@ -63,8 +55,8 @@ def correct_often(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettin
     work = pointer(buffer)
     for _ in range(steps):
         for lane in range(len(lanes)):
-            work[ACCEPTED * len(lanes) + lane] = 1.0
-        correct(work, lanes, STATES)
+            work[states.ACCEPTED * len(lanes) + lane] = 1.0
+        correct(work, lanes, states.STATES)
 
 
 @kernel
@@ -72,10 +64,10 @@ def offer_nothing(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettin
     """A reading that no lane offers."""
     work = pointer(buffer)
     for lane in range(len(lanes)):
-        work[OFFERED * len(lanes) + lane] = 0.0
+        work[states.OFFERED * len(lanes) + lane] = 0.0
     for _ in range(steps):
-        expect(work, lanes, STATES, False)
-        settle(work, lanes, STATES, 5.0)
+        expect(work, lanes, states.STATES, False)
+        settle(work, lanes, states.STATES, 5.0)
 
 
 @kernel
@@ -83,7 +75,7 @@ def predict_often(buffer: Work, lanes: Lanes, steps: int, settings: FilterSettin
     """A prediction with its random walks."""
     work = pointer(buffer)
     for _ in range(steps):
-        predict(work, lanes, STATES, 1e-4, settings)
+        predict(work, lanes, states.STATES, 1e-4, settings)
         propagate_walks(work, lanes, 1e-4, settings)
 
 

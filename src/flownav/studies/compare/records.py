@@ -6,15 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from flownav.core.measurement import Array
 from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record
 from flownav.core.text import finite_or_none
 from flownav.scoring.by_phase import errors_of
 from flownav.scoring.percentiles import CONFIDENCE, Difference, mean_difference
 from flownav.scoring.phases import phases_of
 
-Array = NDArray[np.float64]
 Row = dict[str, Any]
 MEASURES = ("horizontal_m", "vertical_m", "velocity_m_s")
 

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from flownav.core.frames import heading_from_quaternion, rotation_from_quaternion, to_earth, velocity_from_flow
 from flownav.core.measurement import Array, Sensor, Stream
-from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Table
+from flownav.core.record import POSITION_NED, Table
 from flownav.logs.frames import attitude_at
 from flownav.logs.log import Log
 from flownav.navigation.rows import EstimateRow
 from flownav.navigation.tables import estimate_table
-from flownav.scoring.path import columns_of, motion_of
+from flownav.scoring.path import columns_of, motion_of, velocity_ned
 from flownav.scoring.reference import Alignment, Motion, align, velocity_of
 
 LONGEST_GAP_S = 0.5  # over more, an estimate between two rows is nobody's
@@ -43,12 +43,8 @@ def of_estimate(rows: Array) -> Track:
 
 def of_table(table: Table) -> Track:
     """Of an autopilot's own estimate; its velocity is NaN where it states none, or no attitude to turn it by."""
-    motion = motion_of(table)
-    velocity = np.full((len(motion.t_s), 2), np.nan)
-    if {*VELOCITY_BODY, *QUATERNION} <= table.keys():
-        rotation = rotation_from_quaternion(*columns_of(table, QUATERNION).T)
-        velocity = np.column_stack(to_earth(rotation, *columns_of(table, VELOCITY_BODY).T))[:, :2]
-    return Track(motion, velocity)
+    motion, velocity = motion_of(table), velocity_ned(table)
+    return Track(motion, np.full((len(motion.t_s), 2), np.nan) if velocity is None else velocity[:, :2])
 
 
 def says(track: Track, instants_s: Array) -> NDArray[np.bool_]:

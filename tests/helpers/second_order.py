@@ -1,4 +1,4 @@
-"""What a second-order model that was fitted means: frequency and damping with their intervals."""
+"""What a fitted second-order model's natural frequency and damping are, each with its interval."""
 
 from __future__ import annotations
 

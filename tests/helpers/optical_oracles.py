@@ -1,4 +1,4 @@
-"""The motion field of a camera, which renderers and block matching are held against."""
+"""How the image of a camera over a plane moves, analytically: the oracle of the laboratory."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from flownav.campaigns.envelope import directions_deg, fly_envelope, in_wind
 from flownav.campaigns.local import fly_many
 from flownav.cli import app
 from flownav.core.errors import InputError
-from flownav.report.envelope import envelope_figure
+from flownav.report.campaign_figures import envelope_figure
 from flownav.scoring.errors import touchdown_rows
 from flownav.scoring.landings import succeeded
 from flownav.simulation.scenario import load_scenario, with_filter

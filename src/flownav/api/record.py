@@ -224,12 +224,12 @@ class Record(ground.Record):
             raise InputError(f"{target}: cannot be written ({error.strerror}); give another path") from error
 
     def __repr__(self) -> str:
-        from flownav.api.shown import lines_of
+        from flownav.api.plots import lines_of
 
         return "\n".join(lines_of(self))
 
     def _repr_html_(self) -> str:
-        from flownav.api.shown import html_of
+        from flownav.api.plots import html_of
 
         return html_of(self)
 

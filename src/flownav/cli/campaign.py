@@ -69,8 +69,8 @@ def command(
     as_json: JsonOption = False,
 ) -> None:
     """Fly a scenario many times: radii, shares and percentiles with intervals, a dataset, the worst flights."""
+    from flownav.api.calls import split
     from flownav.api.campaigning import plan_of
-    from flownav.api.parts import split
     from flownav.campaigns.engines.named import engine_named, require_engine
     from flownav.campaigns.summary import WORST
     from flownav.cli.campaign_rare import fly_again, fly_rare

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 def fly_rare(plan: Plan, event: str, folder: Path, as_json: bool) -> None:
     """Estimate, write what was found and the most likely flight, and say it."""
-    from flownav.api.rare import estimate_event, rare_event_of
+    from flownav.api.campaigning import estimate_event, rare_event_of
     from flownav.cli.output import folder_place, progress
 
     chosen = rare_event_of(plan, event)
@@ -30,7 +30,7 @@ def fly_rare(plan: Plan, event: str, folder: Path, as_json: bool) -> None:
 
 def fly_again(plan: Plan, path: Path, as_json: bool) -> None:
     """The flight of such a file, flown again; its record lies beside it."""
-    from flownav.api.rare import fly_branch
+    from flownav.api.campaigning import fly_branch
 
     record, where = fly_branch(plan, path)
     if as_json:

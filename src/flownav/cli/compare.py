@@ -82,7 +82,7 @@ def command(
 def _records(paths: list[Path], out: Path | None, *, as_json: bool) -> None:
     """Records beside each other, as they are: nothing is replayed."""
     from flownav.core.record import Record
-    from flownav.report.records import write_records
+    from flownav.report.comparison import write_records
     from flownav.studies.compare.records import HEADINGS, cells, errors_in_time, rows_of_records
     from flownav.studies.compare.rows import names_of
 

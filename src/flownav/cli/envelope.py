@@ -39,7 +39,7 @@ def command(
     from flownav.cli.lists import numbers
     from flownav.cli.output import place, progress, require_between
     from flownav.core.errors import InputError
-    from flownav.report.envelope import write_envelope
+    from flownav.report.campaign_figures import write_envelope
     from flownav.simulation.scenario import load_scenario, with_vehicle
 
     require_between("--flights", flights, 1, 1_000_000)

@@ -74,8 +74,8 @@ def command(
     as_json: JsonOption = False,
 ) -> None:
     """Fly a scenario: the table of errors beside Table 5 or 6, touchdown, the record and its report."""
+    from flownav.api.calls import split
     from flownav.api.flying import MOST_FLIGHTS, fly_setup
-    from flownav.api.parts import split
     from flownav.api.scenario import Scenario
     from flownav.cli.output import progress, record_place, require_between, save
     from flownav.simulation.assemble import assemble
@@ -98,7 +98,7 @@ def command(
         flown = fly_setup(setup, seed, flight or 0, flights, dispersed=dispersed, parts=parts, progress=advance)
     facts = flown.facts | save(flown.record, record_path, report=report)
     if mavlink is not None:
-        from flownav.api.telling import tell
+        from flownav.api.flying import tell
 
         facts["told"] = tell(setup, flown.record, mavlink, speed, signing_key)
     _say(facts, flown, flights, as_json)

@@ -42,7 +42,7 @@ def command(
     if as_json:
         emit(made.as_json() | {"page": str(page)})
     else:
-        from flownav.paper.console import show
+        from flownav.paper.page import show
 
         show(made, str(page))
     if made.broken:

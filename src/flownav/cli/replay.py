@@ -61,7 +61,7 @@ def command(
     as_json: JsonOption = False,
 ) -> None:
     """Fuse a recorded flight: its trajectory, its errors against its own GPS, and the drift through GPS outages."""
-    from flownav.api.parts import own_filter
+    from flownav.api.calls import own_filter
     from flownav.api.replaying import replay_log
     from flownav.cli.output import progress, record_place, save
     from flownav.core.errors import VerdictError

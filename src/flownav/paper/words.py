@@ -13,8 +13,7 @@ from flownav.paper.flights import RIG_ERRORS, Flights
 from flownav.paper.published import HEIGHTS_M, RELATION_FITS
 from flownav.paper.reproduction import Reproduction
 from flownav.paper.rows import TableRow
-from flownav.report.figure_words import Tile, number
-from flownav.report.panels import listed
+from flownav.report.panels import Tile, listed, number
 from flownav.scoring.errors import STATES
 
 FLIGHT_NAMES = {"takeoff": "take-off", "landing": "landing"}

@@ -10,9 +10,8 @@ from flownav.core import guard
 from flownav.core.version import __version__
 from flownav.report import campaign_figures as figures
 from flownav.report.campaign_figures import Touchdowns
-from flownav.report.figure_words import number
 from flownav.report.html import drawn_with, template
-from flownav.report.panels import Panel, Section
+from flownav.report.panels import Panel, Section, number
 
 MOST_CELLS = 8  # whose touchdowns are drawn
 FIGURES = {

@@ -7,10 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from flownav.report import certificate_figures as figures
-from flownav.report import content
-from flownav.report.figure_words import NONE, number
+from flownav.report import tables
 from flownav.report.html import HERE, drawn_with, template, widened
-from flownav.report.panels import Section
+from flownav.report.panels import NONE, Section, number
 
 HEADLINES = {"pass": "Pass", "fail": "Fail", "not shown": "Not shown"}
 SENTENCES = {
@@ -39,7 +38,7 @@ def render(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> str:
         measures=[one["measure"] for one in facts["requirement"]["requirements"]],
         axes=[figures.INPUT_WORDS.get(name, name) for name in facts["envelope"]["axes"]],
         known=figures.KNOWN_WORDS,
-        groups=content.groups,
+        groups=tables.groups,
         files=[
             ("SHA-256 of what went in", facts["files"]["in"]),
             ("SHA-256 of what came out", by_folder(facts["files"]["out"])),
@@ -81,12 +80,12 @@ def conditions(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Under what the statement holds: settings, ranges, lists."""
     own = facts["requirement"]
     rows = [("scenario", own["scenario"])]
-    rows += [(name, value) for _, group in content.groups({"set": own["set"]}) for name, value in group]
+    rows += [(name, value) for _, group in tables.groups({"set": own["set"]}) for name, value in group]
     given = dict(own["conditions"])
     for name, entry in given.pop("ranges", {}).items():
         low, high = entry.get("loc", 0.0), entry.get("loc", 0.0) + entry.get("scale", 1.0)
         even = entry["distribution"] == "uniform"
-        said = f"{low:g} to {high:g}, evenly" if even else content.text(entry)
+        said = f"{low:g} to {high:g}, evenly" if even else tables.text(entry)
         rows.append((figures.INPUT_WORDS.get(name, name), said))
     for name, value in given.items():
         if value == []:

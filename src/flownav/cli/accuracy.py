@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import REQUIREMENTS, one_of
-from flownav.cli.options import ForceOption, JsonOption, SeedOption, VehicleOption, out_option
+from flownav.cli import options
+from flownav.cli.options import REQUIREMENTS, one_of, out_option
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
@@ -29,15 +29,15 @@ def command(
     ablations: Annotated[
         int, typer.Option(metavar="N", help="Flights of each variant that lacks a piece of the navigator; 0 for none.")
     ] = 100,
-    vehicle: VehicleOption = None,
-    seed: SeedOption = 1,
+    vehicle: options.Vehicle = None,
+    seed: options.Seed = 1,
     out: Annotated[Path | None, out_option("The tables as Markdown")] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
 ) -> None:
     """Hold the navigator against its targets, matched and as an ensemble; what its pieces are worth, matched."""
     from flownav.campaigns.accuracy import CASES, flights_of, run_case
-    from flownav.cli.lists import words
+    from flownav.cli.options import words
     from flownav.cli.output import place, progress, require_between
     from flownav.core.errors import VerdictError
 

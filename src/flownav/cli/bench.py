@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from flownav.cli.options import JsonOption
+from flownav.cli import options
 from flownav.cli.output import emit
 
 WIDE = 144  # columns of the table
@@ -14,7 +14,7 @@ WIDE = 144  # columns of the table
 
 def command(
     flights: Annotated[int, typer.Option(metavar="N", help="Flights in the batch that is timed.")] = 1024,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Measure flights on both filters, lanes, the filters' steps, replay, start-up, compile time and memory."""
     from flownav.cli.output import progress, require_between

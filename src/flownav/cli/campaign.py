@@ -9,17 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import SAMPLINGS, SCENARIOS, TRUTH_MODELS, argument, one_of, option
-from flownav.cli.options import (
-    KEPT,
-    EngineOption,
-    FilterOption,
-    JsonOption,
-    RecordsOption,
-    SeedOption,
-    VehicleOption,
-    out_option,
-)
+from flownav.cli import options
+from flownav.cli.options import KEPT, SAMPLINGS, SCENARIOS, TRUTH_MODELS, argument, one_of, option, out_option
 from flownav.cli.output import emit, require_between
 from flownav.core.errors import InputError
 
@@ -58,15 +49,15 @@ def command(
     set_: SetOption = None,
     sampling: SamplingOption = "plain",
     truth_model: Annotated[str, typer.Option(help=MODELS, **one_of(*TRUTH_MODELS))] = "ensemble",
-    filter_name: FilterOption = None,
-    vehicle: VehicleOption = None,
-    seed: SeedOption = 1,
-    engine: EngineOption = "local",
+    filter_name: options.Filter = None,
+    vehicle: options.Vehicle = None,
+    seed: options.Seed = 1,
+    engine: options.Engine = "local",
     out: OutOption = None,
-    records: RecordsOption = 1,
+    records: options.Records = 1,
     flight: Annotated[str | None, option("K", FLIGHT)] = None,
     rare: Annotated[str | None, option("EVENT", RARE)] = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Fly a scenario many times: radii, shares and percentiles with intervals, a dataset, the worst flights."""
     from flownav.api.calls import split

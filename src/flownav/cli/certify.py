@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flownav.campaigns.engines.named import engine_named, require_engine
-from flownav.cli.choices import REQUIREMENTS, argument, option
-from flownav.cli.options import KEPT, EngineOption, JsonOption, RecordsOption, VehicleOption, out_option
+from flownav.cli import options
+from flownav.cli.options import KEPT, REQUIREMENTS, argument, option, out_option
 from flownav.cli.output import emit
 from flownav.core.errors import InputError
 
@@ -32,11 +32,11 @@ def command(
     plan_only: Annotated[bool, typer.Option("--plan", help="Only say how many flights are needed.")] = False,
     flights: Annotated[int | None, option("N", "How many flights.", unset="as many as the requirement needs")] = None,
     ranking: RankingOption = 64,
-    records: RecordsOption = 3,
-    vehicle: VehicleOption = None,
-    engine: EngineOption = "local",
+    records: options.Records = 3,
+    vehicle: options.Vehicle = None,
+    engine: options.Engine = "local",
     out: Annotated[Path | None, out_option(f"The folder; {KEPT}", "out/NAME_certificate")] = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Fly what a requirement asks for: pass, fail or not shown, with its risk; exit status 1 unless it passes."""
     from flownav.campaigns.certification.cells import plan_of

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import option
-from flownav.cli.options import LOG_KINDS, ForceOption, JsonOption, SensorOption, out_option
+from flownav.cli import options
+from flownav.cli.options import LOG_KINDS, option, out_option
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
@@ -42,11 +42,11 @@ OutagesOption = Annotated[str | None, option("T0:T1:LENGTH", WINDOWS, unset="who
 def command(
     logs: LogsOrRecords,
     settings: WithOption = None,
-    sensor: SensorOption = None,
+    sensor: options.Sensor = None,
     outages: OutagesOption = None,
     out: Annotated[Path | None, out_option("The comparison (HTML)")] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
 ) -> None:
     """Score every log by every setting, beside dead reckoning and its autopilot; or lay records over each other."""
     from flownav.cli.output import place, progress

@@ -7,36 +7,28 @@ from typing import Annotated, Any
 
 import typer
 
-from flownav.cli.choices import option
-from flownav.cli.options import (
-    EnsembleOption,
-    ForceOption,
-    JsonOption,
-    ScenarioArgument,
-    SeedOption,
-    VehicleOption,
-    out_option,
-)
+from flownav.cli import options
+from flownav.cli.options import option, out_option
 from flownav.cli.output import emit
 
 SPEEDS_M_S = ["2,4,6,8,10"]
 
 
 def command(
-    scenario: ScenarioArgument,
+    scenario: options.Scenario,
     speeds: Annotated[list[str], option("M/S", "Wind speeds at 20 ft [m/s], repeated or with commas.")] = SPEEDS_M_S,
     directions: Annotated[int, option("N", "How many directions the wind blows from, from north on.")] = 8,
-    vehicle: VehicleOption = None,
+    vehicle: options.Vehicle = None,
     flights: Annotated[int, option("N", "Flights of each speed and direction.")] = 32,
-    seed: SeedOption = 1,
-    ensemble: EnsembleOption = True,
+    seed: options.Seed = 1,
+    ensemble: options.Ensemble = True,
     out: Annotated[Path | None, out_option("The page (HTML)", "out/SCENARIO_envelope.html")] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
 ) -> None:
     """Fly a scenario in winds of many speeds and directions: a table and a polar map of the share that landed."""
     from flownav.campaigns.envelope import directions_deg, fly_envelope
-    from flownav.cli.lists import numbers
+    from flownav.cli.options import numbers
     from flownav.cli.output import place, progress, require_between
     from flownav.core.errors import InputError
     from flownav.report.campaign_figures import write_envelope

@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
-from flownav.cli.choices import FORMATS, one_of, option
-from flownav.cli.options import ForceOption, JsonOption, RecordArgument, out_option
+from flownav.cli import options
+from flownav.cli.options import FORMATS, one_of, option, out_option
 from flownav.cli.output import emit
 
 FRAME = "The frame of tum and euroc: ned (body FRD), enu (body FLU)."
@@ -22,14 +22,14 @@ OriginOption = Annotated[
 
 
 def command(
-    record: RecordArgument,
+    record: options.Record,
     to: Annotated[str, typer.Option("--to", help="The format.", show_default=False, **one_of(*FORMATS))],
     out: Annotated[Path | None, out_option("The file, or the folder of parquet and csv", "beside the record")] = None,
-    force: ForceOption = False,
+    force: options.Force = False,
     frame: FrameOption = None,
     merge: MergeOption = None,
     origin: OriginOption = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Write a record for other tools: Foxglove, evo, spreadsheets, data frames, PlotJuggler, Google Earth, maps."""
     from flownav.cli.output import folder_place, place, several_place

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import FAULTS, one_of, option
-from flownav.cli.options import EnsembleOption, JsonOption, SeedOption, VehicleOption
+from flownav.cli import options
+from flownav.cli.options import FAULTS, one_of, option
 from flownav.cli.output import emit
 from flownav.core.errors import InputError
 
@@ -47,16 +47,16 @@ def command(
     heights: Annotated[list[str], option("M", "Skids above the pad in hover [m], repeated or with commas.")] = HOVERS_M,
     durations: LastingOption = None,
     flights: Annotated[int, option("N", "Flights of each row.")] = DEFAULT_FLIGHTS,
-    ensemble: EnsembleOption = True,
+    ensemble: options.Ensemble = True,
     offline: OfflineOption = False,
-    vehicle: VehicleOption = None,
-    seed: SeedOption = 1,
-    as_json: JsonOption = False,
+    vehicle: options.Vehicle = None,
+    seed: options.Seed = 1,
+    as_json: options.Json = False,
 ) -> None:
     """Sensors that fail on a landing: whether the vehicle lands, goes around or crashes, and what is said of it."""
     from flownav.campaigns.faults.catalogue import faults_named
     from flownav.campaigns.faults.laws import NOT_FLOWN
-    from flownav.cli.lists import numbers, words
+    from flownav.cli.options import numbers, words
     from flownav.cli.output import require_between
 
     require_between("--flights", flights, *FLIGHTS)

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import option
-from flownav.cli.options import FirmwareOption, JsonOption
+from flownav.cli import options
+from flownav.cli.options import option
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
@@ -32,10 +32,10 @@ def command(
     focal: FocalOption = 666.67,
     distance: RangeOption = None,
     rates: Annotated[Path | None, option("FILE.csv", RATES, unset=False)] = None,
-    firmware: FirmwareOption = "2014-12",
+    firmware: options.Firmware = "2014-12",
     window: WindowOption = None,
     bin_by: BinOption = 1,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Flow and quality from each frame to the next, with the historical firmware of your choice."""
     from flownav.core.compile import announce_compilation

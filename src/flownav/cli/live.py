@@ -13,15 +13,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import LINKS, SENDINGS, one_of, option
-from flownav.cli.options import (
-    ForceOption,
-    GpsDelayOption,
-    JsonOption,
-    SensorOption,
-    SettingsOption,
-    SigningKeyOption,
-)
+from flownav.cli import options
+from flownav.cli.options import LINKS, SENDINGS, one_of, option
 from flownav.cli.output import emit, require_between, require_recordable
 
 if TYPE_CHECKING:
@@ -68,15 +61,15 @@ SourceSetOption = Annotated[int | None, option("1..3", SOURCES, unset="a free on
 
 def command(
     url: UrlArgument,
-    sensor: SensorOption = None,
+    sensor: options.Sensor = None,
     send: SendOption = "odometry",
     record: RecordOption = None,
-    force: ForceOption = False,
-    signing_key: SigningKeyOption = None,
+    force: options.Force = False,
+    signing_key: options.SigningKey = None,
     system: SystemOption = None,
     component: ComponentOption = None,
-    gps_delay: GpsDelayOption = 0.22,
-    settings: SettingsOption = None,
+    gps_delay: options.GpsDelay = 0.22,
+    settings: options.Settings = None,
     send_limit: Annotated[float, option("S", LIMIT, within=(0.1, 60.0))] = 1.5,
     send_sigma: Annotated[float, option("M", SIGMA, within=(0.01, 1000.0))] = 5.0,
     send_protection: Annotated[float, option("M", PROTECTION, within=(0.01, 1000.0))] = 20.0,
@@ -87,7 +80,7 @@ def command(
     setup: Annotated[bool, typer.Option("--setup", help=SETUP)] = False,
     write: Annotated[bool, typer.Option("--write", help=WRITE)] = False,
     source_set: SourceSetOption = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Navigate a vehicle that is connected by MAVLink: fuse its sensors, send the estimate, show and record it."""
     from flownav.cli.live_setup import run as run_setup

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import CAMERAS, PATTERNS, one_of, option
-from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
+from flownav.cli import options
+from flownav.cli.options import CAMERAS, PATTERNS, one_of, option, out_option
 from flownav.cli.output import emit
 from flownav.core.text import finite
 
@@ -60,15 +60,15 @@ def command(
     count: CountOption = 2,
     tilt: TiltOption = 15.0,
     mounting: MountingOption = 0.4,
-    seed: SeedOption = 1,
+    seed: options.Seed = 1,
     out: Annotated[Path | None, out_option("The datasheet (TOML), which a scenario's [sensors] name")] = None,
-    force: ForceOption = False,
+    force: options.Force = False,
     pictures: Annotated[Path | None, option("PATH", PICTURES, unset=False)] = None,
     print_to: PrintOption = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Where the pad is from the lens: angles, distance, heading; and how well, by height."""
-    from flownav.cli.lists import numbers
+    from flownav.cli.options import numbers
     from flownav.cli.output import folder_place, place
     from flownav.lab.optics.pad_target import PadTarget, checked
     from flownav.lab.optics.pad_trial import Trials

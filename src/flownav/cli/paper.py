@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flownav.cli.choices import TABLES, one_of
-from flownav.cli.options import ForceOption, JsonOption, RigSeedOption, out_option
+from flownav.cli import options
+from flownav.cli.options import TABLES, one_of, out_option
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
@@ -20,10 +20,10 @@ def command(
         str | None, typer.Option(help="One table alone.", show_default="all of them", **one_of(*TABLES))
     ] = None,
     out: Annotated[Path | None, out_option("The page (HTML)", "out/paper.html, or out/paper-tableN.html")] = None,
-    force: ForceOption = False,
+    force: options.Force = False,
     flights: Annotated[int, typer.Option(metavar="N", help="Flights for each of Tables 5 and 6.")] = 200,
-    seed: RigSeedOption = 1,
-    as_json: JsonOption = False,
+    seed: options.RigSeed = 1,
+    as_json: options.Json = False,
 ) -> None:
     """Reproduce the paper: Tables 1 to 3 from the synthetic rig, 5 and 6 from flights, on one HTML page."""
     from flownav.cli.output import place, require_between

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from flownav.cli.options import ForceOption, JsonOption, out_option
+from flownav.cli import options
+from flownav.cli.options import out_option
 from flownav.cli.output import emit
 
 
@@ -17,8 +18,8 @@ def command(
         typer.Argument(metavar="FILE.fnr.journal", help="What a killed `flownav live` left.", show_default=False),
     ],
     out: Annotated[Path | None, out_option("The record", "FILE.fnr")] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
 ) -> None:
     """Make the record of a live session that was killed, or could not write it; the journal stays."""
     from flownav.cli.output import require_recordable, told

@@ -7,15 +7,16 @@ from typing import Annotated
 
 import typer
 
-from flownav.cli.options import ForceOption, JsonOption, RecordArgument, out_option
+from flownav.cli import options
+from flownav.cli.options import out_option
 from flownav.cli.output import emit
 
 
 def command(
-    record: RecordArgument,
+    record: options.Record,
     out: Annotated[Path | None, out_option("The page (HTML)", "RECORD.html, beside the record")] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
 ) -> None:
     """Write a record's report: figures, scores, events and provenance in one HTML file that works offline."""
     from flownav.cli.output import place

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import AXES, EXCITATIONS, LIGHTS, RIG_PADS, one_of, option
-from flownav.cli.options import FirmwareOption, ForceOption, JsonOption, RigSeedOption, out_option
+from flownav.cli import options
+from flownav.cli.options import AXES, EXCITATIONS, LIGHTS, RIG_PADS, one_of, option, out_option
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
@@ -27,14 +27,14 @@ GYRO_LATE = "How much older the gyro is than the flow [s]; below 0 the flow is o
 
 def command(
     out: OutOption = None,
-    force: ForceOption = False,
+    force: options.Force = False,
     height: HeightOption = HEIGHTS_M,
     runs: Annotated[int, option("N", "Runs at each height.")] = 1,
     duration: Annotated[float, option("S", "Length of a run [s].")] = 25.0,
     excitation: ExcitationOption = "swing",
     pad: PadOption = "stripes",
     light: Annotated[str, typer.Option(help="How bright it is.", **one_of(*LIGHTS))] = "normal",
-    firmware: FirmwareOption = "2013-09",
+    firmware: options.Firmware = "2013-09",
     along: Annotated[str, typer.Option(help="The camera's axis along the swing.", **one_of(*AXES))] = "x",
     pivot_height: Annotated[float, option("M", "Pivot above the pad [m].")] = 2.1,
     start_angle: Annotated[float, option("RAD", "Amplitude of the swing [rad].")] = 0.0912,
@@ -42,11 +42,11 @@ def command(
     chain_delay: Annotated[float, option("S", "Serial and logging chain [s].")] = 0.07,
     gyro_late: Annotated[float, option("S", GYRO_LATE)] = 0.0,
     sonar_late: Annotated[float, option("S", "From the sonar's trigger to its reading [s].")] = 0.05,
-    seed: RigSeedOption = 1,
-    as_json: JsonOption = False,
+    seed: options.RigSeed = 1,
+    as_json: options.Json = False,
 ) -> None:
     """Swing a PX4FLOW over a pad beside an encoder and log both: rig.csv and rig.toml, a folder a run."""
-    from flownav.cli.lists import numbers
+    from flownav.cli.options import numbers
     from flownav.cli.output import folder_place
     from flownav.lab.rig.experiment import RigSettings
 

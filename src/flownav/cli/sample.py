@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import SAMPLES, argument
-from flownav.cli.options import ForceOption, JsonOption, RigSeedOption, out_option
+from flownav.cli import options
+from flownav.cli.options import SAMPLES, argument, out_option
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
@@ -22,14 +22,14 @@ def command(
     ] = None,
     list_only: Annotated[bool, typer.Option("--list", help="Only say what there is; write nothing.")] = False,
     out: Annotated[Path | None, out_option("The folder to write into", "samples")] = None,
-    seed: RigSeedOption = 1,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    seed: options.RigSeed = 1,
+    force: options.Force = False,
+    as_json: options.Json = False,
 ) -> None:
     """Write sample logs: a simulated flight in the formats of PX4, ArduPilot, MAVLink and CSV, a rig, and a record."""
     from importlib.util import find_spec
 
-    from flownav.cli.lists import words
+    from flownav.cli.options import words
     from flownav.core.errors import InputError
     from flownav.export.samples.kinds import SAMPLES as MADE
     from flownav.export.samples.kinds import sample_of

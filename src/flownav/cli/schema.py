@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from flownav.cli.options import JsonOption
+from flownav.cli import options
 
 
 def _complete(incomplete: str) -> list[str]:
@@ -26,7 +26,7 @@ def command(
             autocompletion=_complete,
         ),
     ] = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Print the JSON schema of a command's --json object (by the command's name), or of a file; or list them."""
     from flownav.cli.output import emit

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-from flownav.cli.options import ForceOption, JsonOption, LogsArgument, SensorOption, SettingsOption, out_option
+from flownav.cli import options
+from flownav.cli.options import out_option
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
@@ -13,14 +14,14 @@ if TYPE_CHECKING:
 
 
 def command(
-    logs: LogsArgument,
-    settings: SettingsOption = None,
-    sensor: SensorOption = None,
+    logs: options.Logs,
+    settings: options.Settings = None,
+    sensor: options.Sensor = None,
     out: Annotated[
         Path | None, out_option("The settings file, written only if the proposal is accepted", "out/settings.toml")
     ] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
 ) -> None:
     """Propose settings from logs: fitted on every other window of the flights, accepted only if the rest gain by it."""
     from flownav.cli.compare import DEFAULT, settings_asked

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flownav.cli.choices import option
-from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
+from flownav.cli import options
+from flownav.cli.options import option, out_option
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
@@ -28,10 +28,10 @@ def command(
     data: Annotated[Path, typer.Option(metavar="PATH", envvar="FLOWNAV_DATA", help=DATA)] = Path("../shared/data"),
     flights_file: FileOption = None,
     flights: Annotated[int, option("N", "Simulated flights of each log.")] = 8,
-    seed: SeedOption = 1,
+    seed: options.Seed = 1,
     out: Annotated[Path | None, out_option("The page (Markdown)")] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
 ) -> None:
     """Hold the simulator against recorded flights: outage drift, innovations, noise, as flown and as simulated."""
     from flownav.cli.output import place, progress, require_between

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flownav.cli.choices import VEHICLES, argument
-from flownav.cli.options import JsonOption
+from flownav.cli import options
+from flownav.cli.options import VEHICLES, argument
 from flownav.cli.output import emit
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ def command(
     margins: Annotated[
         bool, typer.Option("--margins", help="Of the autopilot's loops, over the vehicle's uncertainty box.")
     ] = False,
-    json_output: JsonOption = False,
+    json_output: options.Json = False,
 ) -> None:
     """Trim, power, linear models with inflow frozen and re-solved beside the paper's, and ground effect."""
     path = None if file is None else Path(file)

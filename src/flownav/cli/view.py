@@ -7,18 +7,19 @@ from typing import Annotated
 
 import typer
 
-from flownav.cli.options import ForceOption, JsonOption, RecordArgument, out_option
+from flownav.cli import options
+from flownav.cli.options import out_option
 from flownav.cli.output import emit
 
 
 def command(
-    record: RecordArgument,
+    record: options.Record,
     out: Annotated[
         Path | None,
         out_option("A file for Rerun (.rrd) instead of a window", "none is written; without a display RECORD.rrd"),
     ] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
 ) -> None:
     """Show a record in Rerun: vehicle, pad, cameras, flow, paths and standard deviations in space, errors over time.
 

@@ -5,37 +5,41 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from flownav.cli import options
-from flownav.cli.options import AXES, EXCITATIONS, LIGHTS, RIG_PADS, one_of, option, out_option
-from flownav.cli.output import emit
+from flownav.cli.options import chosen, numbers, option, out_option
+from flownav.cli.tables import Column, answer, say, table_of
 
 if TYPE_CHECKING:
     from flownav.lab.rig.experiment import RigLog, RigSettings
 
 HEIGHTS_M = ["0.6"]
-OutOption = Annotated[Path | None, out_option("The folder, with a folder in it for each of several runs", "out/rig")]
 HEIGHT = "Sensor's height above the pad at rest [m], repeated or with commas."
-HeightOption = Annotated[list[str], option("M", HEIGHT, "--height", "--heights")]
-ExcitationOption = Annotated[str, typer.Option(help="How it is swung; swing is the paper's.", **one_of(*EXCITATIONS))]
-PadOption = Annotated[
-    str, typer.Option(help="What it looks at; MM is the stripes' width.", **one_of(*RIG_PADS, beside="FILE:WIDTH_M"))
-]
+EXCITATION = "How it is swung; swing is the paper's."
+PAD = "What it looks at; MM is the stripes' width."
+FOLDER = "The folder, with a folder in it for each of several runs"
+COLUMNS = (
+    Column("folder", "folder"),
+    Column("height [m]", "height_m", "g"),
+    Column("rod [m]", "rod_length_m", ".3f"),
+    Column("peak [m/s]", "peak_reference_m_s", ".3f"),
+    Column("encoder rms [m/s]", "rms_reference_m_s", ".3f"),
+    Column("flow rms [m/s]", "rms_flow_m_s", ".3f"),
+    Column("quality", "mean_quality", ".0f"),
+)
 GYRO_LATE = "How much older the gyro is than the flow [s]; below 0 the flow is older."
 
 
 def command(
-    out: OutOption = None,
+    out: Annotated[Path | None, out_option(FOLDER, "out/rig")] = None,
     force: options.Force = False,
-    height: HeightOption = HEIGHTS_M,
+    height: Annotated[list[str], option("M", HEIGHT, "--height", "--heights")] = HEIGHTS_M,
     runs: Annotated[int, option("N", "Runs at each height.")] = 1,
     duration: Annotated[float, option("S", "Length of a run [s].")] = 25.0,
-    excitation: ExcitationOption = "swing",
-    pad: PadOption = "stripes",
-    light: Annotated[str, typer.Option(help="How bright it is.", **one_of(*LIGHTS))] = "normal",
+    excitation: Annotated[str, chosen(EXCITATION, *options.EXCITATIONS)] = "swing",
+    pad: Annotated[str, chosen(PAD, *options.RIG_PADS, beside="FILE:WIDTH_M")] = "stripes",
+    light: Annotated[str, chosen("How bright it is.", *options.LIGHTS)] = "normal",
     firmware: options.Firmware = "2013-09",
-    along: Annotated[str, typer.Option(help="The camera's axis along the swing.", **one_of(*AXES))] = "x",
+    along: Annotated[str, chosen("The camera's axis along the swing.", *options.AXES)] = "x",
     pivot_height: Annotated[float, option("M", "Pivot above the pad [m].")] = 2.1,
     start_angle: Annotated[float, option("RAD", "Amplitude of the swing [rad].")] = 0.0912,
     refocus: Annotated[float, option("0..1", "1: lens focused at each height; 0: at 0.6 m.")] = 1.0,
@@ -46,7 +50,6 @@ def command(
     as_json: options.Json = False,
 ) -> None:
     """Swing a PX4FLOW over a pad beside an encoder and log both: rig.csv and rig.toml, a folder a run."""
-    from flownav.cli.options import numbers
     from flownav.cli.output import folder_place
     from flownav.lab.rig.experiment import RigSettings
 
@@ -69,10 +72,9 @@ def command(
         seed=seed,
     )
     rows = _swung(settings, heights, folder_place(out or Path("out/rig"), force=force))
-    if as_json:
-        emit({"seed": seed, "firmware": firmware, "pad": pad, "excitation": excitation, "runs": rows})
-    else:
-        _print(rows)
+    facts = {"seed": seed, "firmware": firmware, "pad": pad, "excitation": excitation, "runs": rows}
+    shown = table_of(COLUMNS, rows, title="Logs written", title_justify="left", left=1)
+    answer(facts, as_json, lambda: say(shown))
 
 
 def _swung(settings: RigSettings, heights_m: list[float], folder: Path) -> list[dict[str, Any]]:
@@ -108,23 +110,3 @@ def _facts(log: RigLog, folder: Path) -> dict[str, Any]:
         "rms_flow_m_s": float(np.sqrt(np.mean(log.flow_velocity_m_s**2))),
         "mean_quality": float(log.quality.mean()),
     }
-
-
-def _print(rows: list[dict[str, Any]]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(title="Logs written", title_justify="left")
-    for heading in ("folder", "height [m]", "rod [m]", "peak [m/s]", "encoder rms [m/s]", "flow rms [m/s]", "quality"):
-        table.add_column(heading, justify="left" if heading == "folder" else "right")
-    for row in rows:
-        table.add_row(
-            row["folder"],
-            f"{row['height_m']:g}",
-            f"{row['rod_length_m']:.3f}",
-            f"{row['peak_reference_m_s']:.3f}",
-            f"{row['rms_reference_m_s']:.3f}",
-            f"{row['rms_flow_m_s']:.3f}",
-            f"{row['mean_quality']:.0f}",
-        )
-    Console(markup=False, highlight=False).print(table)

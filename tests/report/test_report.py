@@ -14,7 +14,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from flownav.cli import report as report_command
+from flownav.cli.records import report as report_command
 from flownav.core import files
 from flownav.core.errors import InputError
 from flownav.core.record import Record
@@ -358,7 +358,7 @@ def test_the_report_appears_whole_or_not_at_all(tmp_path: Path, monkeypatch: pyt
 
 def cli() -> typer.Typer:
     app = typer.Typer()
-    app.command()(report_command.command)
+    app.command()(report_command)
     return app
 
 

@@ -1,11 +1,14 @@
-"""`flownav bench`: how fast this machine runs flownav, as ratios and times measured in one run."""
+"""`flownav bench`: how fast this machine runs flownav, measured in one run; `flownav schema`: what commands print."""
 
 from __future__ import annotations
 
+import json
 from typing import Annotated, Any
 
+import typer
+
 from flownav.cli import options
-from flownav.cli.options import option
+from flownav.cli.options import named, option
 from flownav.cli.tables import Column, answer, say, table_of
 
 WIDE = 144  # columns of the table
@@ -40,3 +43,34 @@ def command(
 
 def _asked(row: dict[str, Any]) -> str:
     return f"{'>=' if row['more_is_better'] else '<='} {row['asked']:g} {row['unit']}"
+
+
+def _complete(incomplete: str) -> list[str]:
+    from flownav.core.schemas import names
+
+    return [name for name in names() if name.startswith(incomplete)]
+
+
+def schema(
+    name: Annotated[
+        str | None,
+        named(
+            "NAME",
+            "Which schema, such as fly or file-scenario.",
+            show_default="a list of them",
+            autocompletion=_complete,
+        ),
+    ] = None,
+    as_json: options.Json = False,
+) -> None:
+    """Print the JSON schema of a command's --json object (by the command's name), or of a file; or list them."""
+    from flownav.cli.output import emit
+    from flownav.core.schemas import names, schema_of
+
+    if name is not None:
+        typer.echo(json.dumps(schema_of(name), indent=1))
+    elif as_json:
+        emit({"schemas": [{"name": each, "id": schema_of(each)["$id"]} for each in names()]})
+    else:
+        for each in names():
+            typer.echo(f"{each:<18} {schema_of(each).get('title', '')}")

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from flownav.cli import options
-from flownav.cli.options import LOG_KINDS, option, out_option
-from flownav.cli.output import emit
+from flownav.cli.options import named, option, out_option
+from flownav.cli.output import writing
+from flownav.cli.tables import answer, plain_look, say, say_files, table
 
 if TYPE_CHECKING:
     from flownav.studies.compare.job import Setting
@@ -27,23 +25,17 @@ SHORT = (
 TITLE = "rms errors where all estimators of a log have rows; end drift; GPS cuts"
 
 
-LogsOrRecords = Annotated[
-    list[Path],
-    typer.Argument(metavar="LOG", help=f"Logs, each {LOG_KINDS}; or two and more records.", show_default=False),
-]
-WithOption = Annotated[
-    list[str] | None,
-    option("FILE.toml", f"Settings of the navigator, or `{DEFAULT}`; may be repeated.", "--with", unset=DEFAULT),
-]
+LOGS = f"Logs, each {options.LOG_KINDS}; or two and more records."
+WITH = f"Settings of the navigator, or `{DEFAULT}`; may be repeated."
 WINDOWS = "Windows of LENGTH from T0 to T1 [s] in which GPS is withheld."
-OutagesOption = Annotated[str | None, option("T0:T1:LENGTH", WINDOWS, unset="whole minutes of the flight")]
+MINUTES = "whole minutes of the flight"
 
 
 def command(
-    logs: LogsOrRecords,
-    settings: WithOption = None,
+    logs: Annotated[list[Path], named("LOG", LOGS)],
+    settings: Annotated[list[str] | None, option("FILE.toml", WITH, "--with", unset=DEFAULT)] = None,
     sensor: options.Sensor = None,
-    outages: OutagesOption = None,
+    outages: Annotated[str | None, option("T0:T1:LENGTH", WINDOWS, unset=MINUTES)] = None,
     out: Annotated[Path | None, out_option("The comparison (HTML)")] = None,
     force: options.Force = False,
     as_json: options.Json = False,
@@ -55,8 +47,9 @@ def command(
     from flownav.core.measurement import Sensor
     from flownav.logs.open_log import open_flight
     from flownav.replays.session import table_windows
+    from flownav.report.comparison import write_comparison
     from flownav.studies.compare.job import compare_log, windows_of
-    from flownav.studies.compare.rows import names_of
+    from flownav.studies.compare.rows import HEADINGS, cells, names_of
 
     if len(logs) > 1 and all(path.suffix == ".fnr" for path in logs) and not (settings or sensor or outages):
         return _records(logs, None if out is None else place(out, *logs, force=force), as_json=as_json)
@@ -72,11 +65,11 @@ def command(
     with progress("replays", sum(len(chosen) * (len(cuts) + 1) for cuts in windows)) as advance:
         for name, log, cuts in zip(names_of(logs), flights, windows, strict=True):
             rows += compare_log(name, log, chosen, cuts, advance)
-    written = {} if path is None else _write(rows, path)
-    if as_json:
-        emit({"rows": rows, **written})
-    else:
-        _print(rows, written)
+    if path is not None:
+        with writing(path):
+            write_comparison(HEADINGS, [cells(row) for row in rows], rows, path)
+    written = {} if path is None else {"page": str(path)}
+    answer({"rows": rows, **written}, as_json, lambda: _show(rows, written))
 
 
 def _records(paths: list[Path], out: Path | None, *, as_json: bool) -> None:
@@ -86,18 +79,15 @@ def _records(paths: list[Path], out: Path | None, *, as_json: bool) -> None:
     from flownav.studies.compare.records import HEADINGS, cells, errors_in_time, rows_of_records
     from flownav.studies.compare.rows import names_of
 
-    named = list(zip(names_of(paths), [Record.load(path) for path in paths], strict=True))
-    rows = rows_of_records(named)
+    records = list(zip(names_of(paths), [Record.load(path) for path in paths], strict=True))
+    rows = rows_of_records(records)
     written = {}
     if out is not None:
-        errors = [errors_in_time(record) for _, record in named]
-        with _writing(out):
-            write_records(named, errors, HEADINGS, [cells(row) for row in rows], out)
+        errors = [errors_in_time(record) for _, record in records]
+        with writing(out):
+            write_records(records, errors, HEADINGS, [cells(row) for row in rows], out)
         written = {"page": str(out)}
-    if as_json:
-        emit({"records": rows, **written})
-    else:
-        _print_records(rows, written)
+    answer({"records": rows, **written}, as_json, lambda: _show_records(rows, written))
 
 
 def settings_asked(asked: list[str], sensor: Path | None) -> list[Setting]:
@@ -127,77 +117,44 @@ def settings_asked(asked: list[str], sensor: Path | None) -> list[Setting]:
     return found
 
 
-def _write(rows: list[dict[str, Any]], path: Path) -> dict[str, str]:
-    """The page; where it lies. InputError where it cannot."""
-    from flownav.report.comparison import write_comparison
-    from flownav.studies.compare.rows import HEADINGS, cells
-
-    with _writing(path):
-        write_comparison(HEADINGS, [cells(row) for row in rows], rows, path)
-    return {"page": str(path)}
-
-
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    """InputError where the page cannot be written."""
-    from flownav.core.errors import InputError
-
-    try:
-        yield
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
-
-
-def _print_records(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
+def _show_records(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
     """Records for people: their errors, then how each differs from the first."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     from flownav.studies.compare.records import MEASURES, cells, figure
 
-    console = Console(markup=False, highlight=False)
-    look: dict[str, Any] = {"box": box.SIMPLE_HEAD, "show_edge": False, "padding": (0, 1, 0, 0)}
-    errors = Table("record", *SHORT_RECORDS, title="rms errors in flight; touchdown off the pad's centre", **look)
+    errors = _table(("record", *SHORT_RECORDS), "rms errors in flight; touchdown off the pad's centre")
     for row in rows:
         errors.add_row(*cells(row)[:6])
-    apart = Table("record", *SHORT_APART, title=f"mean error less that of {rows[0]['record']}", **look)
+    apart = _table(("record", *SHORT_APART), f"mean error less that of {rows[0]['record']}")
     for row in rows[1:]:
         apart.add_section()
         apart.add_row(row["record"])
         for name in MEASURES:
             found = (row["difference"] or {}).get(name) or {}
             apart.add_row(f"  {SAID[name]}", *(figure(found.get(key)) for key in ("mean", "low", "high")))
-    for table in (errors, apart):
-        table.columns[0].overflow = "fold"
-        for column in table.columns[1:]:
-            column.justify, column.no_wrap = "right", True
-        console.print(table)
-    for name, place in written.items():
-        console.print(f"{name.capitalize()}: {place}", soft_wrap=True)
+    say(errors, apart)
+    say_files(written, written)
 
 
-def _print(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
+def _show(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
     """The same figures for people: a log's name, then its estimators."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     from flownav.studies.compare.rows import cells
 
-    console = Console(markup=False, highlight=False)
-    table = Table(*SHORT, title=TITLE, box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
-    table.columns[0].overflow = "fold"
-    for column in table.columns[1:]:
-        column.justify, column.no_wrap = "right", True
-    log = ""
+    shown, log = _table(SHORT, TITLE), ""
     for row in rows:
         name, estimator, against, *figures = cells(row)
         if name != log:
-            table.add_section()
-            table.add_row(name if against == "-" else f"{name}, by {against}")
-        table.add_row(f"  {estimator}", *figures)
+            shown.add_section()
+            shown.add_row(name if against == "-" else f"{name}, by {against}")
+        shown.add_row(f"  {estimator}", *figures)
         log = name
-    console.print(table)
-    for name, place in written.items():
-        console.print(f"{name.capitalize()}: {place}", soft_wrap=True)
+    say(shown)
+    say_files(written, written)
+
+
+def _table(heads: Sequence[str], title: str) -> Any:
+    """An empty table whose first column is folded where it is long, and whose figures stay on a line."""
+    made = table(heads, left=1, title=title, **plain_look(edge=False))
+    made.columns[0].overflow = "fold"
+    for column in made.columns[1:]:
+        column.no_wrap = True
+    return made

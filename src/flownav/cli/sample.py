@@ -8,19 +8,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flownav.cli import options
-from flownav.cli.options import SAMPLES, argument, out_option
+from flownav.cli.options import SAMPLES, argument, out_option, switch, words
 from flownav.cli.output import emit
+from flownav.cli.tables import answer
 
 if TYPE_CHECKING:
     from flownav.export.samples.writing import Written
 
 
 def command(
-    kinds: Annotated[
-        list[str] | None,
-        argument("KIND", "Which samples", *SAMPLES, default="all of them"),
-    ] = None,
-    list_only: Annotated[bool, typer.Option("--list", help="Only say what there is; write nothing.")] = False,
+    kinds: Annotated[list[str] | None, argument("KIND", "Which samples", *SAMPLES, default="all of them")] = None,
+    list_only: Annotated[bool, switch("Only say what there is; write nothing.", "--list")] = False,
     out: Annotated[Path | None, out_option("The folder to write into", "samples")] = None,
     seed: options.RigSeed = 1,
     force: options.Force = False,
@@ -29,7 +27,6 @@ def command(
     """Write sample logs: a simulated flight in the formats of PX4, ArduPilot, MAVLink and CSV, a rig, and a record."""
     from importlib.util import find_spec
 
-    from flownav.cli.options import words
     from flownav.core.errors import InputError
     from flownav.export.samples.kinds import SAMPLES as MADE
     from flownav.export.samples.kinds import sample_of
@@ -58,12 +55,9 @@ def command(
 def _list(*, as_json: bool) -> None:
     from flownav.export.samples.kinds import SAMPLES as MADE
 
-    if as_json:
-        rows = [{"kind": s.kind, "name": s.name, "what": s.what, "commands": list(s.commands)} for s in MADE]
-        emit({"samples": rows})
-        return
-    for sample in MADE:
-        typer.echo(f"{sample.kind:<10} {sample.name}\n    {sample.what}")
+    rows = [{"kind": s.kind, "name": s.name, "what": s.what, "commands": list(s.commands)} for s in MADE]
+    said = "\n".join(f"{row['kind']:<10} {row['name']}\n    {row['what']}" for row in rows)
+    answer({"samples": rows}, as_json, lambda: typer.echo(said))
 
 
 def _facts(written: list[Written]) -> list[dict[str, Any]]:

@@ -7,19 +7,32 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from flownav.cli import options
 from flownav.cli.options import out_option
-from flownav.cli.output import emit
+from flownav.cli.tables import Column, answer, say, say_files, table_of
 
 if TYPE_CHECKING:
     from flownav.studies.tuning.job import OfLog, Tuned
+
+FILE = "The settings file, written only if the proposal is accepted"
+PROPOSED = (
+    Column("setting", "key"),
+    Column("was", "default", "g"),
+    Column("tuned", "value", "g"),
+    Column("95 % interval", lambda row: f"{row['low']:g} to {row['high']:g}"),
+)
+LOGS = (
+    Column("log", "log"),
+    Column("windows", lambda log: _windows(log)),
+    Column("against", "against"),
+    Column("was", lambda log: _with_unit(log, "median_error")),
+    Column("tuned", lambda log: _with_unit(log, "median_error_tuned")),
+)
 
 
 def command(
     logs: options.Logs,
     settings: options.Settings = None,
     sensor: options.Sensor = None,
-    out: Annotated[
-        Path | None, out_option("The settings file, written only if the proposal is accepted", "out/settings.toml")
-    ] = None,
+    out: Annotated[Path | None, out_option(FILE, "out/settings.toml")] = None,
     force: options.Force = False,
     as_json: options.Json = False,
 ) -> None:
@@ -46,10 +59,7 @@ def command(
     if tuned.accepted:
         write_settings(path, tuned, stated, command_line())
     facts = _facts(tuned) | {"file": str(path) if tuned.accepted else None}
-    if as_json:
-        emit(facts)
-    else:
-        _print(tuned, facts)
+    answer(facts, as_json, lambda: _show(tuned, facts))
 
 
 def _facts(tuned: Tuned) -> dict[str, Any]:
@@ -82,29 +92,23 @@ def _log_facts(log: OfLog) -> dict[str, Any]:
     }
 
 
-def _print(tuned: Tuned, facts: dict[str, Any]) -> None:
+def _show(tuned: Tuned, facts: dict[str, Any]) -> None:
     """The same figures for people."""
-    from rich.console import Console
-    from rich.table import Table
-
-    from flownav.studies.tuning.scores import UNITS
     from flownav.studies.tuning.settings_file import gain_words
 
-    console = Console(markup=False, highlight=False)
     if tuned.proposed:
-        table = Table("setting", "was", "tuned", "95 % interval", title="Proposed")
-        for row in tuned.proposed:
-            table.add_row(row.key, f"{row.default:g}", f"{row.value:g}", f"{row.low:g} to {row.high:g}")
-        console.print(table)
-    table = Table("log", "windows", "against", "was", "tuned", title="Median error in the held-out windows")
-    for log in tuned.logs:
-        windows = f"{len(log.split.held)}, {'all held out' if log.split.whole else f'fit on {len(log.split.fit)}'}"
-        unit = UNITS.get(log.reference or "", "")
-        errors = (f"{value:.3f} {unit}" if value is not None else "-" for value in (log.start_error, log.error))
-        table.add_row(log.name, windows, log.reference or "-", *errors)
-    console.print(table)
+        say(table_of(PROPOSED, facts["settings"], title="Proposed"))
+    say(table_of(LOGS, facts["logs"], title="Median error in the held-out windows"))
     judgement = tuned.judgement
     figures = f": {gain_words(judgement.error)}" if judgement.error is not None else ""
-    console.print(f"{judgement.verdict.capitalize()}: {judgement.why}{figures}", soft_wrap=True)
-    if facts["file"] is not None:
-        console.print(f"Settings: {facts['file']}", soft_wrap=True)
+    say(f"{judgement.verdict.capitalize()}: {judgement.why}{figures}", soft=True)
+    say_files({"settings": facts["file"]}, ("settings",))
+
+
+def _windows(log: dict[str, Any]) -> str:
+    fit = "all held out" if log["held_out_whole"] else f"fit on {len(log['fit_windows'])}"
+    return f"{len(log['held_out_windows'])}, {fit}"
+
+
+def _with_unit(log: dict[str, Any], key: str) -> str:
+    return "-" if log[key] is None else f"{log[key]:.3f} {log['unit'] or ''}"

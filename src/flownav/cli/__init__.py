@@ -18,7 +18,8 @@ DONE, BAD_VERDICT, BAD_INPUT = 0, 1, 2  # Ctrl-C: 130, as shells have it
 # commands that share a module, and the function that each is there; any other is `command` of a module of its name
 ELSEWHERE = {
     "report": ("records", "report"), "view": ("records", "view"), "export": ("records", "export_to"),
-    "recover": ("records", "recover"), "schema": ("bench", "schema"),
+    "recover": ("records", "recover"), "schema": ("bench", "schema"), "tune": ("compare", "tune_settings"),
+    "sample": ("rig", "sample"),
 }  # fmt: skip
 app = typer.Typer(
     name="flownav",

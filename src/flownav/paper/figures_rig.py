@@ -19,7 +19,7 @@ from flownav.paper.laboratory import Laboratory, reading
 from flownav.paper.published import HEIGHTS_M
 from flownav.report.chart import Stack, drawn
 from flownav.report.panels import Panel
-from flownav.report.style import COLOUR, axis, layout
+from flownav.report.style import COLOUR, axis, layout, plotly
 
 PAPER, HERE = "gps", "estimate"  # whose figures: the colour of each
 HEIGHT_COLOURS = dict(zip(HEIGHTS_M, ("estimate", "flow", "gps", "autopilot"), strict=True))
@@ -49,18 +49,14 @@ def figure(
     traces: list[dict[str, Any]], x_title: str, y_title: str, height_px: int = 380, **axes: dict[str, Any]
 ) -> Any:
     """The Plotly figure; axes: what xaxis and yaxis have beside their looks."""
-    from plotly.graph_objects import Figure
-
     looks = layout(height_px) | {"hovermode": "closest"}
     looks["xaxis"] = axis(x_title) | {"zeroline": False} | axes.get("xaxis", {})
     looks["yaxis"] = axis(y_title) | {"zeroline": False} | axes.get("yaxis", {})
-    return Figure({"data": traces, "layout": {"template": {}, **looks}})
+    return plotly(traces, looks)
 
 
 def pictures(images: list[tuple[str, ArrayLike]], height_px: int = 300) -> Any:
     """Grey pictures 0 to 255 side by side, each with its title; rows run downwards."""
-    from plotly.graph_objects import Figure
-
     looks = layout(height_px) | {"hovermode": "closest", "annotations": []}
     data, gap = [], 0.06
     width = (1.0 - gap * (len(images) - 1)) / len(images)
@@ -89,7 +85,7 @@ def pictures(images: list[tuple[str, ArrayLike]], height_px: int = 300) -> Any:
         place = {"x": left + 0.5 * width, "y": 1.0, "xref": "paper", "yref": "paper"}
         middle = {"xanchor": "center", "yanchor": "bottom", "showarrow": False}
         looks["annotations"].append({"text": title, "font": {"size": 12, "color": COLOUR["ink"]}, **place, **middle})
-    return Figure({"data": data, "layout": {"template": {}, **looks}})
+    return plotly(data, looks)
 
 
 def heights_axis() -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from rich.console import Console
@@ -18,15 +17,13 @@ from flownav.paper.words import Spread
 from flownav.report import html as report
 from flownav.report import tables
 from flownav.report.panels import Panel, Section
-from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
 
 HERE = Path(__file__).parent
 
 
 def write_page(reproduction: Reproduction, path: Path) -> None:
     """Write the page, whole or not at all. OSError where it cannot be written."""
-    text = render(reproduction)
-    guard.write_page(text, path)
+    guard.write_page(render(reproduction), path)
 
 
 def figures(of: Reproduction) -> dict[str, Section]:
@@ -51,26 +48,18 @@ def figures(of: Reproduction) -> dict[str, Section]:
 
 def render(of: Reproduction) -> str:
     """The page as text."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
-    from plotly.offline import get_plotlyjs
 
     drawn = figures(of)
-    scripts = [get_plotlyjs().replace("\r", ""), (report.HERE / "page.js").read_text(encoding="utf-8")]
-    environment = Environment(
-        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    panels = [panel for section in drawn.values() for panel in section.panels if panel.figure]
-    return environment.get_template("page.html.j2").render(
+    given = report.drawn_with(list(drawn.values()))
+    style = given.pop("style") + Markup((HERE / "page.css").read_text(encoding="utf-8"))
+    del given["sections"]
+    page: str = report.template("page.html.j2", HERE).render(
         facts=words.facts(of),
         summary=words.summary(of),
         tiles=words.tiles(of),
         findings=[_worded(finding) for finding in of.findings],
-        limits={
-            "fit": f"{FIT_TOLERANCE:g}",
-            "spread": f"{SAME_SPREAD:g}",
-            "largest": f"{100 * LARGEST_TOLERANCE:g}",
-        },
+        limits={"fit": f"{FIT_TOLERANCE:g}", "spread": f"{SAME_SPREAD:g}", "largest": f"{100 * LARGEST_TOLERANCE:g}"},
         signal=words.signal(of),
         model_groups=rows.model_groups(of),
         identifiable=rows.identifiable(of.laboratory) if of.laboratory else "",
@@ -88,16 +77,10 @@ def render(of: Reproduction) -> str:
         figures=drawn,
         provenance=tables.groups(provenance()),
         command=command_line(),
-        palette=PALETTE,
-        font=Markup(FONT),
-        data={panel.key: Markup(report.figure_json(panel)) for panel in panels},
-        dark=Markup(report.inside_script(json.dumps(LIGHT_TO_DARK))),
-        style=Markup(
-            (report.HERE / "page.css").read_text(encoding="utf-8") + (HERE / "page.css").read_text(encoding="utf-8")
-        ),
-        scripts=[Markup(script) for script in scripts],
-        policy=report.content_policy(scripts),
+        style=style,
+        **given,
     )
+    return page
 
 
 def _worded(finding: Finding) -> Finding:

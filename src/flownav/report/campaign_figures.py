@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flownav.core import guard
 from flownav.report.chart import drawn
 from flownav.report.panels import Panel
-from flownav.report.style import COLOUR, FONT, axis, layout
+from flownav.report.style import COLOUR, FONT, axis, layout, plotly
 
 Array = NDArray[np.float64]
 
@@ -45,8 +45,6 @@ def common_reach_m(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns
 
 def over_the_pad(key: str, cell: dict[str, Any], touched: Touchdowns, reach_m: float) -> Panel:
     """Where a cell's flights first touched, with circles that hold 50, 95 and 99.7 % of all."""
-    from plotly.graph_objects import Figure
-
     known = np.isfinite(touched.distance_m)
     every = max(1, int(np.ceil(known.sum() / DOTS)))
     east, north = touched.east_m[known][::every], touched.north_m[known][::every]
@@ -75,13 +73,11 @@ def over_the_pad(key: str, cell: dict[str, Any], touched: Touchdowns, reach_m: f
     outside = int((np.maximum(abs(touched.north_m[known]), abs(touched.east_m[known])) > reach_m).sum())
     words += f" {outside} touched outside of this map." if outside else ""
     alt = f"Places of first contact of {cell['label']} about the pad's centre"
-    return Panel(key, cell["label"], words, alt, Figure({"data": data, "layout": {"template": {}, **look}}))
+    return Panel(key, cell["label"], words, alt, plotly(data, look))
 
 
 def tails(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> Panel:
     """The share of flights that touched farther off than a distance, on a logarithmic axis."""
-    from plotly.graph_objects import Figure
-
     data, farthest = [], 0.05
     for number, (cell, one) in enumerate(zip(cells, touched, strict=True)):
         far = np.sort(one.distance_m)
@@ -99,14 +95,12 @@ def tails(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> Pan
     look["xaxis"] |= {"type": "log"} if farthest > FAR_M else {"range": [0.0, 1.05 * farthest]}
     look["yaxis"] = axis("flights beyond (%)") | {"type": "log", "dtick": 1}
     words = "The share of all flights that first touched farther off than this, those that crashed among them."
-    figure = Figure({"data": data, "layout": {"template": {}, **look}})
+    figure = plotly(data, look)
     return Panel("tails", "Share beyond a distance", words, "Share of flights beyond a distance from the pad", figure)
 
 
 def convergence(cells: Sequence[dict[str, Any]]) -> Panel | None:
     """How the followed figure and its interval settled as the flights came in."""
-    from plotly.graph_objects import Figure
-
     data: list[dict[str, Any]] = []
     lands = any("r95_m" in cell["figures"] for cell in cells)
     for number, cell in enumerate(cells):
@@ -129,7 +123,7 @@ def convergence(cells: Sequence[dict[str, Any]]) -> Panel | None:
     look = layout(360)
     look["xaxis"] = axis("flights") | {"type": "log", "dtick": 1}
     look["yaxis"] = axis(f"{what} (m)") | {"rangemode": "tozero"}
-    figure = Figure({"data": data, "layout": {"template": {}, **look}})
+    figure = plotly(data, look)
     words = (
         "Solid: the figure after so many flights; dotted: its 95 % interval, which does not allow for looking often."
     )
@@ -210,8 +204,6 @@ def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
 
 def sensitivity(key: str, cell: dict[str, Any]) -> Panel | None:
     """Which of the drawn inputs go with a touchdown far off: rank correlations with their intervals."""
-    from plotly.graph_objects import Figure
-
     told = cell["sensitivity"][::-1]
     if not told:
         return None
@@ -229,7 +221,7 @@ def sensitivity(key: str, cell: dict[str, Any]) -> Panel | None:
     look["xaxis"] = axis("rank correlation with how far off it touched")
     look["yaxis"] = axis() | {"automargin": True, "nticks": len(told)}
     words = "The twelve strongest of Spearman's rank correlations, with 95 % intervals; grey: it may be nothing."
-    figure = Figure({"data": [bars], "layout": {"template": {}, **look}})
+    figure = plotly([bars], look)
     return Panel(key, cell["label"], words, f"Rank correlations of the inputs of {cell['label']}", figure)
 
 
@@ -244,8 +236,6 @@ def swept_numbers(cells: Sequence[dict[str, Any]]) -> list[str]:
 
 def over_a_sweep(cells: Sequence[dict[str, Any]], name: str) -> Panel:
     """A figure over a swept number, one line for what else differs."""
-    from plotly.graph_objects import Figure
-
     lands = any("r95_m" in cell["figures"] for cell in cells)
     what, words = ("landed", "share that landed (%)") if lands else ("p95_axis_m", "p95 of one axis (m)")
     lines: dict[str, list[dict[str, Any]]] = {}
@@ -266,7 +256,7 @@ def over_a_sweep(cells: Sequence[dict[str, Any]], name: str) -> Panel:
                      })  # fmt: skip
     look = layout(360)
     look["xaxis"], look["yaxis"] = axis(name), axis(words)
-    figure = Figure({"data": data, "layout": {"template": {}, **look}})
+    figure = plotly(data, look)
     return Panel(
         f"sweep-{name.replace('.', '-')}", name, "Bars: 95 % intervals.", f"{words} over {name}", figure, wide=True
     )

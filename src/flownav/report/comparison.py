@@ -33,19 +33,14 @@ def write_comparison(headings: tuple[str, ...], lines: Lines, rows: Sequence[dic
 
     headings and lines: the table as text. rows: what `flownav compare --json` prints, for the GPS cuts.
     """
-    page = render(headings, lines, rows)
-    guard.write_page(page, path)
+    guard.write_page(render(headings, lines, rows), path)
 
 
 def render(headings: tuple[str, ...], lines: Lines, rows: Sequence[dict[str, Any]]) -> str:
     """The page as text."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
-    environment = Environment(
-        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    return environment.get_template("comparison.html.j2").render(
+    page: str = template("comparison.html.j2").render(
         headings=headings,
         lines=lines,
         cuts=cuts_of(rows, [line[1] for line in lines]),
@@ -55,6 +50,7 @@ def render(headings: tuple[str, ...], lines: Lines, rows: Sequence[dict[str, Any
         style=Markup((HERE / "page.css").read_text(encoding="utf-8")),
         policy=POLICY,
     )
+    return page
 
 
 def cuts_of(rows: Sequence[dict[str, Any]], names: Sequence[str]) -> list[tuple[str, list[str], list[list[str]]]]:

@@ -114,7 +114,7 @@ def render(record: Record) -> str:
         outages=tables.outage_rows(record, found),
         sensors=tables.sensor_rows(record),
         rejected=tables.rejected_rows(record, found),
-        thinned=_thinned(record),
+        thinned=any(len(table["t_s"]) > DOT_POINTS for table in record.tables.values()),
         line_points=LINE_POINTS,
         dot_points=DOT_POINTS,
         events=tables.events(record, found),
@@ -180,8 +180,9 @@ def heights_px(charts: Mapping[str, Any]) -> dict[str, int]:
 def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:
     """What every page with figures is given: its sections, their data, colours, style, scripts and content policy."""
     from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
 
-    scripts, policy = page_scripts()
+    scripts = [get_plotlyjs().replace("\r", ""), (HERE / "page.js").read_text(encoding="utf-8")]
     return {
         "sections": shown,
         "palette": PALETTE,
@@ -190,31 +191,22 @@ def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:
         "dark": Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
         "style": Markup((HERE / "page.css").read_text(encoding="utf-8")),
         "scripts": [Markup(script) for script in scripts],
-        "policy": policy,
+        "policy": content_policy(scripts),
     }
 
 
-def template(name: str) -> Any:
+def template(name: str, folder: Path = HERE) -> Any:
     """A page's template: what is put into it is escaped, and what it lacks is an error."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
-        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(folder),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     return environment.get_template(name)
-
-
-def page_scripts() -> tuple[list[str], str]:
-    """The scripts that draw a page's figures, and the content policy that lets these and nothing else run."""
-    from plotly.offline import get_plotlyjs
-
-    scripts = [get_plotlyjs().replace("\r", ""), (HERE / "page.js").read_text(encoding="utf-8")]
-    return scripts, content_policy(scripts)
-
-
-def _thinned(record: Record) -> bool:
-    """Whether any table may be longer than what is drawn of it."""
-    return any(len(table["t_s"]) > DOT_POINTS for table in record.tables.values())
 
 
 def figure_json(panel: Panel) -> str:

@@ -132,8 +132,6 @@ STILL = 1e-6  # an axis whose values differ by less is kept from magnifying thei
 
 def figure(chart: Chart) -> Any:
     """The figure, built and checked by Plotly once."""
-    from plotly.graph_objects import Figure
-
     data: list[dict[str, Any]] = []
     named: set[str] = set()
     for row, one_axis in enumerate(chart.axes, 1):
@@ -142,7 +140,7 @@ def figure(chart: Chart) -> Any:
             named.add(one.name)
             place = {"xaxis": f"x{row}", "yaxis": f"y{row}", "legendgroup": one.name, "showlegend": first}
             data.append({"type": "scatter", "name": one.name, **place, **TRACES[one.kind](one)})
-    return Figure({"data": data, "layout": {"template": {}, **_layout(chart)}})
+    return plotly(data, _layout(chart))
 
 
 def _line(one: Series) -> dict[str, Any]:
@@ -237,3 +235,10 @@ def _note(made: dict[str, Any], t_s: float, text: str) -> None:
     place = {"x": t_s, "y": 1, "xref": "x", "yref": "paper", "xanchor": "left", "yanchor": "top", "xshift": 3}
     font = {"size": 11, "color": COLOUR["muted"]}
     made["annotations"].append(place | {"text": text, "showarrow": False, "font": font})
+
+
+def plotly(data: Sequence[Any], look: dict[str, Any]) -> Any:
+    """A Plotly figure of traces in this layout alone, without a template's."""
+    from plotly.graph_objects import Figure
+
+    return Figure({"data": list(data), "layout": {"template": {}, **look}})

@@ -17,7 +17,7 @@ from flownav.campaigns.certification.ranked import FOLDER as RANKING
 from flownav.campaigns.measures import MEASURES, NOT_LANDED, ROW_COLUMNS, measured
 from flownav.campaigns.store import RECORDS, Dataset, Store
 from flownav.core.provenance import code_sha256, command_line, hash_of, provenance
-from flownav.report.certificate import render
+from flownav.report.campaign import render_certificate
 from flownav.report.html import write_report
 
 PAGE, FACTS = "certificate.html", "certificate.json"
@@ -37,7 +37,7 @@ def write_certificate(
         told["record"], told["report"] = _recorded(certificate, flight, store.folder, name)
         on_recorded(1)
     facts |= {"assumed": assumed(certificate.plan), "made_by": _made_by(), "files": _files(certificate, store, name)}
-    page = render(facts, drawn(certificate))
+    page = render_certificate(facts, drawn(certificate))
     store.keep_text(PAGE, page)
     facts["files"]["page"] = {PAGE: hash_of(store.folder / PAGE)}
     store.keep_text(FACTS, json.dumps({"schema": SCHEMA} | facts, indent=1) + "\n")

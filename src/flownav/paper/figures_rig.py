@@ -22,6 +22,7 @@ from flownav.report.panels import Panel
 from flownav.report.style import COLOUR, axis, layout, plotly
 
 PAPER, HERE = "gps", "estimate"  # whose figures: the colour of each
+GREY = [[0, "rgb(0,0,0)"], [1, "rgb(255,255,255)"]]
 HEIGHT_COLOURS = dict(zip(HEIGHTS_M, ("estimate", "flow", "gps", "autopilot"), strict=True))
 HEIGHT_SYMBOLS = dict(zip(HEIGHTS_M, ("circle", "square", "diamond", "triangle-up"), strict=True))
 
@@ -63,28 +64,17 @@ def pictures(images: list[tuple[str, ArrayLike]], height_px: int = 300) -> Any:
     for k, (title, image) in enumerate(images, 1):
         left = (k - 1) * (width + gap)
         number = "" if k == 1 else str(k)
-        data.append(
-            {
-                "type": "heatmap",
-                "name": title,
-                "z": np.asarray(image, np.uint8),
-                "zmin": 0,
-                "zmax": 255,
-                "colorscale": [[0, "rgb(0,0,0)"], [1, "rgb(255,255,255)"]],
-                "showscale": False,
-                "xaxis": f"x{number}",
-                "yaxis": f"y{number}",
-                "hovertemplate": "%{x}, %{y}: grey %{z}",
-            }
-        )
+        look: dict[str, Any] = {"zmin": 0, "zmax": 255, "colorscale": GREY, "showscale": False}
+        place = {"xaxis": f"x{number}", "yaxis": f"y{number}", "hovertemplate": "%{x}, %{y}: grey %{z}"}
+        data.append({"type": "heatmap", "name": title, "z": np.asarray(image, np.uint8), **look, **place})
         square = {"showgrid": False, "zeroline": False, "constrain": "domain"}
         across = {"domain": [left, left + width], "anchor": f"y{number}"}
         down = {"anchor": f"x{number}", "scaleanchor": f"x{number}", "autorange": "reversed", "constraintoward": "top"}
         looks[f"xaxis{number}"] = axis("pixels") | square | across
         looks[f"yaxis{number}"] = axis() | square | down
-        place = {"x": left + 0.5 * width, "y": 1.0, "xref": "paper", "yref": "paper"}
+        over = {"x": left + 0.5 * width, "y": 1.0, "xref": "paper", "yref": "paper"}
         middle = {"xanchor": "center", "yanchor": "bottom", "showarrow": False}
-        looks["annotations"].append({"text": title, "font": {"size": 12, "color": COLOUR["ink"]}, **place, **middle})
+        looks["annotations"].append({"text": title, "font": {"size": 12, "color": COLOUR["ink"]}, **over, **middle})
     return plotly(data, looks)
 
 
@@ -230,12 +220,6 @@ def validation(laboratory: Laboratory, height_m: float = 0.6) -> Panel:
         stack.line(row, "flow", "PX4FLOW, simulated", t_s, unseen.log.flow_velocity_m_s[shown])
         stack.line(row, "estimate", "identified model", t_s, reading(run.dynamics, unseen.log)[shown])
         stack.line(row, "truth", "encoder", t_s, unseen.log.reference_velocity_m_s[shown])
+    title = "Figure 15: validation of the seven models at 60 cm"
     caption = "Encoder into the model, its output beside the sensor's, ten seconds of each run."
-    return Panel(
-        "figure-15",
-        "Figure 15: validation of the seven models at 60 cm",
-        caption,
-        caption,
-        stack.chart(window),
-        wide=True,
-    )
+    return Panel("figure-15", title, caption, caption, stack.chart(window), wide=True)

@@ -44,33 +44,16 @@ def fit_by_height(laboratory: Laboratory) -> Panel:
 
 def gain_and_delay(laboratory: Laboratory) -> Panel:
     """a/c against b/c of every model, published and reproduced."""
-    traces = []
+    traces, symbols = [], figures_rig.HEIGHT_SYMBOLS
     for height in HEIGHTS_M:
         rows = [model for model in published.table_1() if model.height_m == height]
-        symbol = figures_rig.HEIGHT_SYMBOLS[height]
-        traces.append(
-            figures_rig.dots(
-                f"paper, {height:.1f} m",
-                PAPER,
-                [1e3 * m.delay_s for m in rows],
-                [m.gain for m in rows],
-                symbol=f"{symbol}-open",
-                size=9,
-                line={"width": 1.6},
-            )
-        )
+        x, y = [1e3 * m.delay_s for m in rows], [m.gain for m in rows]
+        ring: dict[str, Any] = {"symbol": f"{symbols[height]}-open", "size": 9, "line": {"width": 1.6}}
+        traces.append(figures_rig.dots(f"paper, {height:.1f} m", PAPER, x, y, **ring))
     for height in HEIGHTS_M:
-        runs, symbol = laboratory.at(height), figures_rig.HEIGHT_SYMBOLS[height]
-        traces.append(
-            figures_rig.dots(
-                f"here, {height:.1f} m",
-                HERE,
-                [1e3 * delay_s(r) for r in runs],
-                [r.fits[2].point.gain for r in runs],
-                symbol=symbol,
-                size=8,
-            )
-        )
+        runs = laboratory.at(height)
+        x, y = [1e3 * delay_s(r) for r in runs], [r.fits[2].point.gain for r in runs]
+        traces.append(figures_rig.dots(f"here, {height:.1f} m", HERE, x, y, symbol=symbols[height], size=8))
     caption = "What a slow velocity meets: gain a/c and delay b/c, the two numbers that a swing can tell."
     figure = figures_rig.figure(traces, "delay b/c (ms)", "gain a/c", 400)
     return Panel("gain-delay", "Gain and delay of every model", caption, caption, figure)
@@ -79,35 +62,20 @@ def gain_and_delay(laboratory: Laboratory) -> Panel:
 def orders(laboratory: Laboratory) -> list[Panel]:
     """Fit against order, for the paper's swing and for a chirp."""
     panels = []
+    axes: dict[str, dict[str, Any]] = {
+        "xaxis": {"tickvals": list(range(5)), "ticktext": list(ORDER_NAMES), "range": [-0.3, 4.3]},
+        "yaxis": {"range": [50, 95]},
+    }
     for kind, words in (
         ("swing", "Seven runs a height, mean. A swing is one tone: every order fits it alike."),
         ("chirp", "One run a height, 0.3 to 4 Hz: here orders differ."),
     ):
-        tests = [test for test in laboratory.orders if test.kind == kind]
-        traces = [
-            figures_rig.line(
-                f"{t.height_m:.1f} m",
-                figures_rig.HEIGHT_COLOURS[t.height_m],
-                list(t.fits),
-                list(t.fits.values()),
-                markers=True,
-            )
-            for t in tests
-        ]
-        axes: dict[str, dict[str, Any]] = {
-            "xaxis": {"tickvals": list(range(5)), "ticktext": list(ORDER_NAMES), "range": [-0.3, 4.3]},
-            "yaxis": {"range": [50, 95]},
-        }
-        title = f"Fit against order: {kind}"
-        panels.append(
-            Panel(
-                f"orders-{kind}",
-                title,
-                words,
-                f"{title}. {words}",
-                figures_rig.figure(traces, "order of the model", "fit (%)", 340, **axes),
-            )
-        )
+        title, traces = f"Fit against order: {kind}", []
+        for t in (test for test in laboratory.orders if test.kind == kind):
+            name, colour = f"{t.height_m:.1f} m", figures_rig.HEIGHT_COLOURS[t.height_m]
+            traces.append(figures_rig.line(name, colour, list(t.fits), list(t.fits.values()), markers=True))
+        figure = figures_rig.figure(traces, "order of the model", "fit (%)", 340, **axes)
+        panels.append(Panel(f"orders-{kind}", title, words, f"{title}. {words}", figure))
     return panels
 
 
@@ -121,13 +89,9 @@ def error_by_height(ours: list[ErrorRow]) -> Panel:
         figures_rig.dots("here", HERE, [r.height_m + APART_M for r in ours], [r.std_error for r in ours]),
     ]
     caption = "Table 2. Dotted: the power law through the paper's means, which the shipped sensor file uses."
-    figure = figures_rig.figure(
-        traces,
-        "height (m)",
-        "standard deviation (m/s)",
-        xaxis=figures_rig.heights_axis(),
-        yaxis={"type": "log", "tickvals": [0.02, 0.03, 0.05, 0.1, 0.2, 0.3]},
-    )
+    up = {"type": "log", "tickvals": [0.02, 0.03, 0.05, 0.1, 0.2, 0.3]}
+    across = figures_rig.heights_axis()
+    figure = figures_rig.figure(traces, "height (m)", "standard deviation (m/s)", xaxis=across, yaxis=up)
     return Panel("error-height", "Validation error against height", caption, caption, figure)
 
 

@@ -61,20 +61,14 @@ def sections(summary: dict[str, Any], touchdowns: Sequence[Touchdowns]) -> list[
     pads = [figures.over_the_pad(f"pad-{k}", cells[k], touchdowns[k], reach_m) for k in lands]
     swept = [figures.over_a_sweep(cells, name) for name in figures.swept_numbers(cells)]
     tails = figures.tails([cells[k] for k in lands], [touchdowns[k] for k in lands]) if lands else None
+    winds = [*figures.swept_envelopes(cells), *(figures.envelope(f"wind-{k}", cells[k]) for k in lands)]
+    inputs = [figures.sensitivity(f"inputs-{k}", cell) for k, cell in enumerate(cells[:MOST_CELLS])]
     parts: list[tuple[str, str, Sequence[Panel | None]]] = [
         ("touchdowns", "Touchdowns over the pad", pads),
         ("sweep", "Over what is swept", swept),
         ("spread", "How far off, and how sure", [tails, figures.convergence(cells[:MOST_CELLS])]),
-        (
-            "wind",
-            "The wind that they landed in",
-            [*figures.swept_envelopes(cells), *(figures.envelope(f"wind-{k}", cells[k]) for k in lands)],
-        ),
-        (
-            "inputs",
-            "What matters",
-            [figures.sensitivity(f"inputs-{k}", cell) for k, cell in enumerate(cells[:MOST_CELLS])],
-        ),
+        ("wind", "The wind that they landed in", winds),
+        ("inputs", "What matters", inputs),
     ]
     drawn = [(key, title, tuple(panel for panel in panels if panel is not None)) for key, title, panels in parts]
     return [Section(key, title, panels) for key, title, panels in drawn if panels]
@@ -83,13 +77,9 @@ def sections(summary: dict[str, Any], touchdowns: Sequence[Touchdowns]) -> list[
 def facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """What was flown."""
     models = dict.fromkeys(cell["truth_model"] for cell in summary["cells"])
-    found = [
-        ("flights", f"{summary['flights']:,}"),
-        ("cells", str(len(summary["cells"]))),
-        ("seed", str(summary["seed"])),
-    ]
-    found += [("truth", " and ".join(models)), ("sampling", summary["sampling"])]
-    return [*found, *([("until", summary["until"])] if summary["until"] else [])]
+    found = {"flights": f"{summary['flights']:,}", "cells": str(len(summary["cells"])), "seed": str(summary["seed"])}
+    found |= {"truth": " and ".join(models), "sampling": summary["sampling"]}
+    return list((found | ({"until": summary["until"]} if summary["until"] else {})).items())
 
 
 def sentence(cell: dict[str, Any]) -> str:
@@ -123,15 +113,8 @@ def cell_row(cell: dict[str, Any], summary: dict[str, Any]) -> list[str]:
     landed = cell["figures"].get("landed")
     share = "-" if "r95_m" not in cell["figures"] or landed is None else _percent(landed)
     counts = cell["verdicts"]
-    figure_cells = [_with_interval(cell["figures"][name]) if name in cell["figures"] else "-" for name in names]
-    return [
-        cell["label"],
-        f"{cell['flights']:,}",
-        *figure_cells,
-        share,
-        str(counts["crashed"]),
-        str(counts["went_around"]),
-    ]
+    shown = [_with_interval(cell["figures"][name]) if name in cell["figures"] else "-" for name in names]
+    return [cell["label"], f"{cell['flights']:,}", *shown, share, str(counts["crashed"]), str(counts["went_around"])]
 
 
 def worst_row(one: dict[str, Any], summary: dict[str, Any], kept: Sequence[str]) -> dict[str, str]:

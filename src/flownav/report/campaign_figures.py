@@ -146,12 +146,9 @@ def _swept_envelope(key: str, label: str, own: list[dict[str, Any]]) -> Panel | 
     speeds = sorted({cell["values"][SPEED] for cell in own})
     if len(speeds) < 2:
         return None
-    edges = [
-        0.0,
-        *(0.5 * (slow + fast) for slow, fast in pairwise(speeds)),
-        speeds[-1] + 0.5 * (speeds[-1] - speeds[-2]),
-    ]
-    ring = {speed: (edges[k], edges[k + 1]) for k, speed in enumerate(speeds)}
+    between = (0.5 * (slow + fast) for slow, fast in pairwise(speeds))
+    edges = [0.0, *between, speeds[-1] + 0.5 * (speeds[-1] - speeds[-2])]
+    ring = dict(zip(speeds, pairwise(edges), strict=True))
     bins = []
     for cell in own:
         landed, speed = cell["figures"]["landed"], cell["values"][SPEED]
@@ -164,7 +161,7 @@ def _swept_envelope(key: str, label: str, own: list[dict[str, Any]]) -> Panel | 
 
 def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
     """The share that landed by the wind's speed and the direction that it blew from."""
-    from plotly.graph_objects import Barpolar, Figure
+    from plotly.graph_objects import Figure
 
     if not cell["envelope"]:
         return None
@@ -174,15 +171,9 @@ def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
     figure = Figure()
     for ring in rings:
         own = [one for one in cell["envelope"] if one["from_m_s"] == ring and one["landed"] is not None]
-        figure.add_trace(
-            Barpolar(
-                base=[ring] * len(own), r=[one["to_m_s"] - ring for one in own],
-                theta=[one["direction_deg"] for one in own], width=[float(steps.min())] * len(own),
-                marker={"color": [one["landed"] for one in own], "coloraxis": "coloraxis",
-                        "line": {"color": COLOUR["surface"], "width": 1}},
-                hovertext=[_wind_words(one) for one in own], hoverinfo="text", showlegend=False,
-            )
-        )  # fmt: skip
+        theta, ends = [one["direction_deg"] for one in own], [one["to_m_s"] for one in own]
+        words = [_wind_words(one) for one in own]
+        figure.add_trace(_ring(ring, ends, theta, float(steps.min()), [one["landed"] for one in own], words))
     low = min((one["landed"] for one in cell["envelope"] if one["landed"] is not None), default=0.0)
     figure.update_layout(
         layout(420)
@@ -262,6 +253,21 @@ def over_a_sweep(cells: Sequence[dict[str, Any]], name: str) -> Panel:
     )
 
 
+def _ring(
+    inner: float, outer: Sequence[float], theta: Sequence[float], width: float, share: Sequence[float],
+    words: Sequence[str],
+) -> Any:  # fmt: skip
+    """Sectors between two radii, coloured by the share that landed."""
+    from plotly.graph_objects import Barpolar
+
+    line = {"color": COLOUR["surface"], "width": 1}
+    return Barpolar(
+        base=[inner] * len(theta), r=[end - inner for end in outer], theta=theta, width=[width] * len(theta),
+        marker={"color": share, "coloraxis": "coloraxis", "line": line}, hovertext=words, hoverinfo="text",
+        showlegend=False,
+    )  # fmt: skip
+
+
 def _wind_words(one: dict[str, Any]) -> str:
     speed = f"{one['flown_m_s']:g}" if "flown_m_s" in one else f"{one['from_m_s']:.1f} to {one['to_m_s']:.1f}"
     return (
@@ -270,18 +276,14 @@ def _wind_words(one: dict[str, Any]) -> str:
     )
 
 
-SCALE = [[0.0, COLOUR["alert"]], [0.8, "#e8b23a"], [0.95, "#a9cf6a"], [1.0, COLOUR["flow"]]]
-
-
 def write_envelope(title: str, rows: Sequence[dict[str, Any]], path: Path) -> None:
     """Write the page, whole or not at all; rows as `flownav envelope --json` has them. OSError where it cannot be."""
-    page = envelope_figure(title, rows).to_html(include_plotlyjs=True, full_html=True)
-    guard.write_page(page, path)
+    guard.write_page(envelope_figure(title, rows).to_html(include_plotlyjs=True, full_html=True), path)
 
 
 def envelope_figure(title: str, rows: Sequence[dict[str, Any]]) -> Any:
     """A ring for each speed, a sector for each direction that the wind blows from; north is up."""
-    from plotly.graph_objects import Barpolar, Figure
+    from plotly.graph_objects import Figure
 
     speeds = sorted({row["speed_20ft_m_s"] for row in rows})
     directions = sorted({row["from_direction_deg"] for row in rows})
@@ -289,19 +291,9 @@ def envelope_figure(title: str, rows: Sequence[dict[str, Any]]) -> Any:
     inner = 0.0
     for speed in speeds:
         ring = [row for row in rows if row["speed_20ft_m_s"] == speed]
-        figure.add_trace(
-            Barpolar(
-                base=[inner] * len(ring),
-                r=[speed - inner] * len(ring),
-                theta=[row["from_direction_deg"] for row in ring],
-                width=[360.0 / len(directions)] * len(ring),
-                marker={"color": [row["success"]["rate"] for row in ring], "coloraxis": "coloraxis",
-                        "line": {"color": COLOUR["surface"], "width": 1}},
-                hovertext=[_words(row) for row in ring],
-                hoverinfo="text",
-                showlegend=False,
-            )
-        )  # fmt: skip
+        theta, share = [row["from_direction_deg"] for row in ring], [row["success"]["rate"] for row in ring]
+        words = [_words(row) for row in ring]
+        figure.add_trace(_ring(inner, [speed] * len(ring), theta, 360.0 / len(directions), share, words))
         inner = speed
     figure.update_layout(
         title={"text": title},

@@ -5,7 +5,8 @@ from __future__ import annotations
 import atexit
 import hashlib
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from functools import cache
 from numbers import Integral
 from pathlib import Path
@@ -158,9 +159,15 @@ def _folder() -> Path:
 
 def saved(entries: Mapping[str, Any], path: Path) -> Path:
     """Write nested dictionaries as a TOML file, whole or not at all. InputError where it cannot be written there."""
+    with writing(path), written_whole(path) as temporary:
+        temporary.write_text(f"# written by flownav\n{to_toml(entries)}", encoding="utf-8")
+    return path
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """InputError where what is done within it cannot be written at a path."""
     try:
-        with written_whole(path) as temporary:
-            temporary.write_text(f"# written by flownav\n{to_toml(entries)}", encoding="utf-8")
+        yield
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); give another path") from error
-    return path

@@ -11,18 +11,9 @@ import numpy as np
 
 from flownav.core.measurement import Sensor
 from flownav.core.record import Record
+from flownav.report import series
 from flownav.report.panels import NONE, Part, Tile, metres, number
-from flownav.report.series import (
-    flow_readings,
-    flow_velocity,
-    has,
-    mapping,
-    readings,
-    rms_m,
-    scored_outages,
-    start_end_s,
-    truth_name,
-)
+from flownav.report.series import has, mapping, readings
 
 UNIT_AFTER_NUMBER = re.compile(r"(\d) (m/s|m|s)\b")
 KINDS = {
@@ -42,7 +33,7 @@ def title(record: Record) -> str:
 def duration_s(record: Record) -> float:
     """The flight's length [s]: as the manifest says, or else as its estimate lasts."""
     stated = record.manifest.get("duration_s")
-    start, end = start_end_s(record)
+    start, end = series.start_end_s(record)
     return float(stated) if isinstance(stated, (int, float)) else end - start
 
 
@@ -70,9 +61,9 @@ def summary(record: Record) -> str:
         said.append(f"{ever} off by more than {metres(largest)} m{beside}.")
     if manifest.get("known_exactly"):
         said.append(f"What the vehicle knew exactly: {manifest['known_exactly']}.")
-    cut = scored_outages(record)
+    cut = series.scored_outages(record)
     if cut:
-        worst = max(cut, key=rms_m)
+        worst = max(cut, key=series.rms_m)
         among = f", the worst of {len(cut)} outages," if len(cut) > 1 else ""
         rms, largest = number(worst.get("horizontal_rms_m"), 2), number(worst.get("horizontal_max_m"), 2)
         said.append(
@@ -102,7 +93,7 @@ def summary(record: Record) -> str:
 
 def _reference(record: Record) -> str:
     """What errors are taken against, in words: a truth, or an estimate that serves for want of one."""
-    name = truth_name(record)
+    name = series.truth_name(record)
     return "the recorded truth" if name == "truth" else f"the recorded {name}, an estimate itself,"
 
 
@@ -112,21 +103,21 @@ def tiles(record: Record) -> list[Tile]:
     found = landing_tiles(mapping(scores.get("touchdown")))
     if scores.get("max_position_error_m") is not None:
         published = paper.get("max_position_error_m")
-        against = "what was flown on" if has(record, "flown") else f"estimate against {truth_name(record)}"
+        against = "what was flown on" if has(record, "flown") else f"estimate against {series.truth_name(record)}"
         note = f"paper {metres(published)} m" if published is not None else against
         found.append(Tile("Largest error of one axis", metres(scores["max_position_error_m"]), "m", note))
-    cut = scored_outages(record)
+    cut = series.scored_outages(record)
     if cut:
-        worst = max(cut, key=rms_m)
+        worst = max(cut, key=series.rms_m)
         when = f"rms, {worst['t0']:g} to {worst['t1']:g} s"
         name = "Drift without GPS" if len(cut) == 1 else f"Worst drift of {len(cut)} outages"
         found.append(Tile(name, number(worst.get("horizontal_rms_m"), 2), "m", when))
     truth = mapping(scores.get("truth"))
     if truth:
-        largest = f"at most {number(truth.get('horizontal_max_m'), 2)} m, against {truth_name(record)}"
+        largest = f"at most {number(truth.get('horizontal_max_m'), 2)} m, against {series.truth_name(record)}"
         found.append(Tile("Horizontal error", number(truth.get("horizontal_rms_m"), 2), "m", f"rms, {largest}"))
     if scores.get("end_drift_m") is not None:
-        laid = f"horizontal, {truth_name(record)} laid on at take-off"
+        laid = f"horizontal, {series.truth_name(record)} laid on at take-off"
         found.append(Tile("Drift at the end", metres(scores["end_drift_m"]), "m", laid))
     if scores.get("velocity_rms_m_s") is not None:
         found.append(Tile("Velocity error", number(scores["velocity_rms_m_s"], 2), "m/s", "rms, against GPS"))
@@ -140,8 +131,8 @@ def tiles(record: Record) -> list[Tile]:
 
 def flow_share(record: Record) -> float | None:
     """Share of the flight with valid flow readings, a gap not counted; None without readings."""
-    flow = flow_readings(record)
-    start, end = start_end_s(record)
+    flow = series.flow_readings(record)
+    start, end = series.start_end_s(record)
     if flow is None or len(flow.t_s) < 2 or end <= start:
         return None
     interval = np.diff(flow.t_s)
@@ -159,13 +150,15 @@ def lacking(record: Record) -> list[str]:
     if not has(record, "truth"):
         errors = "errors are shown against GPS, which has errors of its own" if gps else "no error can be shown"
         notes.append(f"No truth: {errors}.")
-    elif truth_name(record) != "truth":
-        notes.append(f"No truth: errors are shown against the {truth_name(record)}, which has errors of its own.")
+    elif series.truth_name(record) != "truth":
+        notes.append(
+            f"No truth: errors are shown against the {series.truth_name(record)}, which has errors of its own."
+        )
     if not has(record, "estimate"):
         notes.append("No estimate: nothing was fused.")
-    if flow_readings(record) is None:
+    if series.flow_readings(record) is None:
         notes.append("No valid optical flow: position and velocity rest on the other sensors.")
-    elif flow_velocity(record) is None:
+    elif series.flow_velocity(record) is None:
         notes.append("No range at the time of the flow: its readings are fused, but no velocity of theirs is drawn.")
     if not gps:
         notes.append("No GPS positions.")

@@ -172,62 +172,61 @@ class Group(NamedTuple):
     rows: tuple[tuple[str, float, tuple[tuple[str, str, str], ...]], ...]
 
 
+FAST = "fast part"  # of the receiver's error, drawn without a band
 DEGREES = 57.29577951308232
+EARTH = (("north", "n"), ("east", "e"), ("down", "d"))
+
+
+def _one(title: str, state: str, name: str, scale: float = 1.0) -> tuple[str, float, tuple[tuple[str, str, str], ...]]:
+    """A row with one state on it."""
+    return title, scale, ((state, name, "estimate"),)
+
+
 GROUPS = (
     Group(
         "gyro-bias",
         "Gyro bias",
         "What the filter takes the gyro's bias to be, and three of its standard deviations.",
-        tuple((f"{a} (°/s)", DEGREES, ((f"gyro_bias_{a}_rad_s", "bias", "estimate"),)) for a in "xyz"),
+        tuple(_one(f"{a} (°/s)", f"gyro_bias_{a}_rad_s", "bias", DEGREES) for a in "xyz"),
     ),
     Group(
         "accel-bias",
         "Accelerometer bias",
         "The same of the accelerometer.",
-        tuple((f"{a} (m/s²)", 1.0, ((f"accel_bias_{a}_m_s2", "bias", "estimate"),)) for a in "xyz"),
+        tuple(_one(f"{a} (m/s²)", f"accel_bias_{a}_m_s2", "bias") for a in "xyz"),
     ),
     Group(
         "gps-errors",
         "Error of the GPS position",
         "What the filter takes the receiver's error to be: a part that wanders for minutes and one for seconds.",
         tuple(
-            (
-                f"{title} (m)",
-                1.0,
-                ((f"gps_slow_{a}_m", "slow part", "estimate"), (f"gps_fast_{a}_m", "fast part", "gps")),
-            )
-            for title, a in (("north", "n"), ("east", "e"), ("down", "d"))
+            (f"{title} (m)", 1.0, ((f"gps_slow_{a}_m", "slow part", "estimate"), (f"gps_fast_{a}_m", FAST, "gps")))
+            for title, a in EARTH
         ),
     ),
     Group(
         "gps-velocity-errors",
         "Error of the GPS velocity",
         "What the filter takes the receiver's velocity to be off by.",
-        tuple(
-            (f"{title} (m/s)", 1.0, ((f"gps_velocity_{a}_m_s", "error", "estimate"),))
-            for title, a in (("north", "n"), ("east", "e"), ("down", "d"))
-        ),
+        tuple(_one(f"{title} (m/s)", f"gps_velocity_{a}_m_s", "error") for title, a in EARTH),
     ),
     Group(
         "other-states",
         "Other states of the filter",
         "Those that this flight's sensors let it estimate, each with three of its standard deviations.",
         (
-            ("ground, down (m)", 1.0, (("ground_d_m", "ground", "estimate"),)),
-            ("barometer (m)", 1.0, (("baro_m", "offset", "estimate"),)),
-            ("flow scale (m/m)", 1.0, (("flow_scale", "error of scale", "estimate"),)),
-            ("compass, sine (°)", DEGREES, (("compass_sin_rad", "error", "estimate"),)),
-            ("compass, cosine (°)", DEGREES, (("compass_cos_rad", "error", "estimate"),)),
-            ("attitude sensor, roll (°)", DEGREES, (("ins_roll_rad", "error", "estimate"),)),
-            ("attitude sensor, pitch (°)", DEGREES, (("ins_pitch_rad", "error", "estimate"),)),
-            ("attitude sensor, heading (°)", DEGREES, (("ins_heading_rad", "error", "estimate"),)),
-            ("age of velocity (s)", 1.0, (("velocity_lag_s", "age", "estimate"),)),
-            ("pad, north (m)", 1.0, (("pad_n_m", "pad", "estimate"),)),
-            ("pad, east (m)", 1.0, (("pad_e_m", "pad", "estimate"),)),
-            ("pad, down (m)", 1.0, (("pad_d_m", "pad", "estimate"),)),
+            _one("ground, down (m)", "ground_d_m", "ground"),
+            _one("barometer (m)", "baro_m", "offset"),
+            _one("flow scale (m/m)", "flow_scale", "error of scale"),
+            *(_one(f"compass, {title} (°)", f"compass_{a}_rad", "error", DEGREES)
+              for title, a in (("sine", "sin"), ("cosine", "cos"))),
+            *(_one(f"attitude sensor, {a} (°)", f"ins_{a}_rad", "error", DEGREES)
+              for a in ("roll", "pitch", "heading")),
+            _one("age of velocity (s)", "velocity_lag_s", "age"),
+            *(_one(f"pad, {title} (m)", f"pad_{a}_m", "pad") for title, a in EARTH),
         ),
     ),
-)
+)  # fmt: skip
 
 
 def inner_states(record: Record) -> list[Panel]:
@@ -250,7 +249,7 @@ def _panel(record: Record, group: Group) -> Panel | None:
             if state is None:
                 continue
             value, sigma = scale * state.value.T
-            if name != "fast part":
+            if name != FAST:
                 stack.band(row, "±3\N{GREEK SMALL LETTER SIGMA} stated", state.t_s, 3.0 * sigma, value)
             stack.line(row, role, name, state.t_s, value)
     chart = stack.chart(start_end_s(record), moments(record), outages(record))

@@ -9,24 +9,10 @@ import numpy as np
 
 from flownav.core.measurement import COLUMNS, Sensor
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.report import series
 from flownav.report.chart import Stack, sliding_mean, sliding_rms, thin
 from flownav.report.panels import Panel, listed
-from flownav.report.series import (
-    Array,
-    Track,
-    Window,
-    estimates,
-    euler_deg,
-    flow_readings,
-    flow_velocity,
-    gps_velocity_body,
-    has,
-    moments,
-    outages,
-    readings,
-    start_end_s,
-    track,
-)
+from flownav.report.series import Array, Track, Window, has, moments, outages, readings, track
 
 POSITION_TITLES = ("x, north (m)", "y, east (m)", "z, down (m)")
 VELOCITY_TITLES = ("u, forward (m/s)", "v, right (m/s)", "w, down (m/s)")
@@ -60,7 +46,7 @@ def position(record: Record, view: View = POSITION) -> Panel:
     """Position x, y, z: GPS readings, estimate, truth (figures 17 and 22)."""
     dots = [Source("gps", "GPS", readings(record, Sensor.GPS_POSITION))]
     lines = [Source("command", "reference", track(record, "command", REFERENCE))]
-    lines += [Source(*source) for source in estimates(record, POSITION_NED)]
+    lines += [Source(*source) for source in series.estimates(record, POSITION_NED)]
     note = DOWN if view.with_gps else ""
     note += f" {PLACED}" if has(record, "flown") and view.with_gps else ""
     return _states(record, POSITION_TITLES, dots, lines, view, note)
@@ -68,15 +54,15 @@ def position(record: Record, view: View = POSITION) -> Panel:
 
 def velocity(record: Record, view: View = VELOCITY) -> Panel:
     """Body velocity u, v, w: flow, estimate, truth (figures 18 to 25)."""
-    lines = [Source(*source) for source in estimates(record, VELOCITY_BODY)]
-    flow = flow_velocity(record)
+    lines = [Source(*source) for source in series.estimates(record, VELOCITY_BODY)]
+    flow = series.flow_velocity(record)
     name = "flow sensor" if has(record, "flow_velocity") else "flow \N{MULTIPLICATION SIGN} range"
     dots = [Source("flow", name, flow)]
     if not has(record, "truth", VELOCITY_BODY):
-        dots.insert(0, Source("gps", "GPS velocity", gps_velocity_body(record)))
+        dots.insert(0, Source("gps", "GPS velocity", series.gps_velocity_body(record)))
     note = "Body axes: forward, right, down."
     if flow is None:
-        fused = flow_readings(record) is not None
+        fused = series.flow_readings(record) is not None
         note += f" The record holds no {'range for its' if fused else 'valid'} flow readings."
     elif np.isnan(flow.value[:, 2]).all():
         note += " The flow sensor does not measure w."
@@ -97,7 +83,7 @@ def _states(
             stack.line(row, role, name, t_s, values)
     if titles is POSITION_TITLES:
         stack.reverse(3)
-    span = view.window or start_end_s(record)
+    span = view.window or series.start_end_s(record)
     figure = stack.chart(span, moments(record), outages(record))
     alt = f"{view.title} from {span[0]:.0f} to {span[1]:.0f} s: {', '.join(titles)}. "
     return Panel(view.key, view.title, note, f"{alt}Drawn: {listed(stack.names)}.", figure)
@@ -125,7 +111,7 @@ CONTROLS = {
 def attitude(record: Record) -> Panel:
     """Roll, pitch and yaw [deg] of truth, estimate and autopilot; of the attitude sensor where none of them has any."""
     key, title = "attitude", "Attitude"
-    sources, own = estimates(record, QUATERNION), readings(record, Sensor.ATTITUDE)
+    sources, own = series.estimates(record, QUATERNION), readings(record, Sensor.ATTITUDE)
     if not sources and own is not None:
         sources = [("estimate", "attitude sensor", own)]
     if not sources:
@@ -133,10 +119,10 @@ def attitude(record: Record) -> Panel:
     stack = Stack(("roll (°)", "pitch (°)", "yaw (°)"))
     for role, name, source in sources:
         kept = thin(ATTITUDE_POINTS, *source.value[:, 1:].T)
-        angles = euler_deg(Track(source.t_s[kept], source.value[kept]))
+        angles = series.euler_deg(Track(source.t_s[kept], source.value[kept]))
         for row in (1, 2, 3):
             stack.line(row, role, name, source.t_s[kept], _unbroken(angles[:, row - 1], row == 3))
-    figure = stack.chart(start_end_s(record), moments(record))
+    figure = stack.chart(series.start_end_s(record), moments(record))
     return Panel(key, title, "Z-Y-X Euler angles of body against earth; drawn in degrees.",
                  f"Roll, pitch and yaw in degrees: {listed(stack.names)}.", figure)  # fmt: skip
 
@@ -163,7 +149,7 @@ def controls(record: Record) -> Panel:
             stack.line(row, "estimate", "command", command.t_s, np.degrees(command.value[:, 0]))
     if thrust is not None:
         stack.line(len(titles), "truth", "true thrust", thrust.t_s, thrust.value[:, 0])
-    figure = stack.chart(start_end_s(record), moments(record))
+    figure = stack.chart(series.start_end_s(record), moments(record))
     return Panel(key, title, "Angles of the swash plate and the blades, as commanded.",
                  f"Controls over time: {listed(titles)}.", figure)  # fmt: skip
 
@@ -186,5 +172,5 @@ def vibration(record: Record) -> list[Panel]:
         f"in the median {np.median(shaken[0]):.2f} m/s² and {np.median(shaken[1]):.2f} °/s, "
         f"at most {np.max(shaken[0]):.2f} m/s² and {np.max(shaken[1]):.2f} °/s."
     )
-    chart = stack.chart(start_end_s(record), moments(record), outages(record))
+    chart = stack.chart(series.start_end_s(record), moments(record), outages(record))
     return [Panel("vibration", "Vibration", caption, f"Vibration of the IMU over time. {caption}", chart)]

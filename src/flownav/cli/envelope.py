@@ -30,7 +30,7 @@ def command(
     from flownav.campaigns.envelope import directions_deg, fly_envelope
     from flownav.cli.output import place, progress, require_between, writing
     from flownav.core.errors import InputError
-    from flownav.report.campaign_figures import write_envelope
+    from flownav.report.campaign import write_envelope
     from flownav.simulation.scenario import load_scenario, with_vehicle
 
     require_between("--flights", flights, 1, 1_000_000)

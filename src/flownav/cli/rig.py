@@ -59,22 +59,10 @@ def command(
 
     heights = numbers("--height", height, 0.01, 100.0)
     settings = RigSettings(
-        height_m=heights[0],
-        pivot_height_m=pivot_height,
-        start_angle_rad=start_angle,
-        duration_s=duration,
-        pad=pad,
-        light=light,
-        firmware=firmware,
-        excitation=excitation,
-        along=along,
-        refocus=refocus,
-        chain_delay_s=chain_delay,
-        gyro_late_s=gyro_late,
-        sonar_late_s=sonar_late,
-        runs=runs,
-        seed=seed,
-    )
+        height_m=heights[0], pivot_height_m=pivot_height, start_angle_rad=start_angle, duration_s=duration, pad=pad,
+        light=light, firmware=firmware, excitation=excitation, along=along, refocus=refocus, chain_delay_s=chain_delay,
+        gyro_late_s=gyro_late, sonar_late_s=sonar_late, runs=runs, seed=seed,
+    )  # fmt: skip
     rows = _swung(settings, heights, folder_place(out or Path("out/rig"), force=force))
     facts = {"seed": seed, "firmware": firmware, "pad": pad, "excitation": excitation, "runs": rows}
     shown = table_of(COLUMNS, rows, title="Logs written", title_justify="left", left=1)

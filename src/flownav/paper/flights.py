@@ -141,19 +141,11 @@ def fly_table(
     leaking = assemble(_with(scenario, "flow", flow | RIG_ERRORS)).flight
     printed = published(table)
     assert printed is not None
-    return Flights(
-        table,
-        name,
-        flights,
-        printed,
-        scores_of_flights(rows),
-        percentile_of_paper(rows, printed),
-        scores_of_flights(_flown(honest.flight, seed, flights, on_progress)),
-        scores_of_flights(_flown(leaking, seed, flights, on_progress)),
-        record,
-        float(scenario.gps.white_sigma_m),
-        lift_offs(setup.flight, unshaken, seed, flights),
-    )
+    honestly = scores_of_flights(_flown(honest.flight, seed, flights, on_progress))
+    leaked = scores_of_flights(_flown(leaking, seed, flights, on_progress))
+    lifted, white_m = lift_offs(setup.flight, unshaken, seed, flights), float(scenario.gps.white_sigma_m)
+    scores, percentile = scores_of_flights(rows), percentile_of_paper(rows, printed)
+    return Flights(table, name, flights, printed, scores, percentile, honestly, leaked, record, white_m, lifted)
 
 
 def _flown(flight: Any, seed: int, flights: int, on_progress: Callable[[int], object]) -> Array:

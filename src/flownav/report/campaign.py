@@ -274,3 +274,8 @@ def percent(share: float | None, digits: int = 2) -> str:
     if share < 1.0 and float(text) >= 100.0:
         text = f"{100.0 - 10.0**-digits:.{digits}f}"
     return f"{text} %"
+
+
+def write_envelope(title: str, rows: Sequence[dict[str, Any]], path: Path) -> None:
+    """Write the page, whole or not at all; rows as `flownav envelope --json` has them. OSError where it cannot be."""
+    guard.write_page(figures.envelope_figure(title, rows).to_html(include_plotlyjs=True, full_html=True), path)

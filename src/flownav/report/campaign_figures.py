@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core import guard
 from flownav.report.chart import drawn
 from flownav.report.panels import Panel
 from flownav.report.style import COLOUR, FONT, axis, layout, plotly
@@ -48,14 +46,14 @@ def over_the_pad(key: str, cell: dict[str, Any], touched: Touchdowns, reach_m: f
     known = np.isfinite(touched.distance_m)
     every = max(1, int(np.ceil(known.sum() / DOTS)))
     east, north = touched.east_m[known][::every], touched.north_m[known][::every]
-    circles = [(title, role, cell["figures"][name]) for name, title, role in CIRCLES]
     half, turn = 0.5 * touched.pad_m, np.linspace(0.0, 2.0 * np.pi, 181)
     pad = {"type": "rect", "x0": -half, "x1": half, "y0": -half, "y1": half, "layer": "below",
            "fillcolor": COLOUR["padfill"], "line": {"color": COLOUR["pad"], "width": 1}}  # fmt: skip
     dots = {"type": "scatter", "mode": "markers", "name": "first contact", "x": drawn(east), "y": drawn(north),
             "marker": {"color": COLOUR["truth"], "size": 3, "opacity": 0.35}, "hovertemplate": "%{y:.3f} m north, %{x:.3f} m east<extra></extra>"}  # fmt: skip # noqa: E501
     data: list[dict[str, Any]] = [dots]
-    for title, role, figure in circles:
+    for radius, title, role in CIRCLES:
+        figure = cell["figures"][radius]
         if figure["value"] is not None:
             for end, style in (("low", "dot"), ("value", "solid"), ("high", "dot")):
                 if figure[end] is not None:
@@ -120,14 +118,13 @@ def convergence(cells: Sequence[dict[str, Any]]) -> Panel | None:
     if not data:
         return None
     what = "R95 at contact" if lands else "p95 of the largest error of one axis"
-    look = layout(360)
-    look["xaxis"] = axis("flights") | {"type": "log", "dtick": 1}
+    look = layout(360) | {"xaxis": axis("flights") | {"type": "log", "dtick": 1}}
     look["yaxis"] = axis(f"{what} (m)") | {"rangemode": "tozero"}
-    figure = plotly(data, look)
     words = (
         "Solid: the figure after so many flights; dotted: its 95 % interval, which does not allow for looking often."
     )
-    return Panel("convergence", "How it settled", words, f"{what} against the number of flights", figure)
+    alt = f"{what} against the number of flights"
+    return Panel("convergence", "How it settled", words, alt, plotly(data, look))
 
 
 def swept_envelopes(cells: Sequence[dict[str, Any]]) -> list[Panel | None]:
@@ -152,10 +149,11 @@ def _swept_envelope(key: str, label: str, own: list[dict[str, Any]]) -> Panel | 
     bins = []
     for cell in own:
         landed, speed = cell["figures"]["landed"], cell["values"][SPEED]
-        place = {"from_m_s": ring[speed][0], "to_m_s": ring[speed][1], "flown_m_s": speed}
-        place["direction_deg"] = cell["values"][DIRECTION] % 360.0
-        share = {"landed": landed["value"], "low": landed["low"], "high": landed["high"]}
-        bins.append(place | share | {"flights": cell["flights"]})
+        inner, outer = ring[speed]
+        bins.append({
+            "from_m_s": inner, "to_m_s": outer, "flown_m_s": speed, "direction_deg": cell["values"][DIRECTION] % 360.0,
+            "landed": landed["value"], "low": landed["low"], "high": landed["high"], "flights": cell["flights"],
+        })  # fmt: skip
     return envelope(key, {"label": label, "envelope": bins})
 
 
@@ -219,9 +217,7 @@ def sensitivity(key: str, cell: dict[str, Any]) -> Panel | None:
 def swept_numbers(cells: Sequence[dict[str, Any]]) -> list[str]:
     """What is swept over at least three numbers."""
     names = dict.fromkeys(name for cell in cells for name in cell["values"])
-    numbers = {
-        name: {cell["values"][name] for cell in cells if isinstance(cell["values"][name], float)} for name in names
-    }
+    numbers = {name: {value for cell in cells if isinstance(value := cell["values"][name], float)} for name in names}
     return [name for name, values in numbers.items() if len(values) >= 3]
 
 
@@ -247,10 +243,8 @@ def over_a_sweep(cells: Sequence[dict[str, Any]], name: str) -> Panel:
                      })  # fmt: skip
     look = layout(360)
     look["xaxis"], look["yaxis"] = axis(name), axis(words)
-    figure = plotly(data, look)
-    return Panel(
-        f"sweep-{name.replace('.', '-')}", name, "Bars: 95 % intervals.", f"{words} over {name}", figure, wide=True
-    )
+    key = f"sweep-{name.replace('.', '-')}"
+    return Panel(key, name, "Bars: 95 % intervals.", f"{words} over {name}", plotly(data, look), wide=True)
 
 
 def _ring(
@@ -274,11 +268,6 @@ def _wind_words(one: dict[str, Any]) -> str:
         f"{speed} m/s from about {one['direction_deg']:g}°<br>"
         f"landed {100 * one['landed']:.1f} % ({100 * one['low']:.1f} to {100 * one['high']:.1f} %) of {one['flights']}"
     )
-
-
-def write_envelope(title: str, rows: Sequence[dict[str, Any]], path: Path) -> None:
-    """Write the page, whole or not at all; rows as `flownav envelope --json` has them. OSError where it cannot be."""
-    guard.write_page(envelope_figure(title, rows).to_html(include_plotlyjs=True, full_html=True), path)
 
 
 def envelope_figure(title: str, rows: Sequence[dict[str, Any]]) -> Any:

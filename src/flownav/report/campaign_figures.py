@@ -170,8 +170,9 @@ def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
     for ring in rings:
         own = [one for one in cell["envelope"] if one["from_m_s"] == ring and one["landed"] is not None]
         theta, ends = [one["direction_deg"] for one in own], [one["to_m_s"] for one in own]
-        words = [_wind_words(one) for one in own]
-        figure.add_trace(_ring(ring, ends, theta, float(steps.min()), [one["landed"] for one in own], words))
+        said, share = [_wind_words(one) for one in own], [one["landed"] for one in own]
+        figure.add_trace(_ring(ring, ends, theta, float(steps.min()), share, said))
+    quiet = {"gridcolor": COLOUR["grid"], "tickfont": {"color": COLOUR["muted"]}, "linecolor": COLOUR["rule"]}
     low = min((one["landed"] for one in cell["envelope"] if one["landed"] is not None), default=0.0)
     figure.update_layout(
         layout(420)
@@ -180,11 +181,8 @@ def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
             "coloraxis": {"colorscale": SCALE, "cmin": min(low, 0.9), "cmax": 1.0,
                           "colorbar": {"title": {"text": "landed"}, "tickformat": ".0%", "thickness": 12}},
             "polar": {"bgcolor": "rgba(0,0,0,0)",
-                      "angularaxis": {"rotation": 90, "direction": "clockwise", "ticksuffix": "°",
-                                      "gridcolor": COLOUR["grid"],
-                                      "tickfont": {"color": COLOUR["muted"]}, "linecolor": COLOUR["rule"]},
-                      "radialaxis": {"ticksuffix": " m/s", "angle": 90, "gridcolor": COLOUR["grid"],
-                                     "tickfont": {"color": COLOUR["muted"]}, "linecolor": COLOUR["rule"]}},
+                      "angularaxis": {"rotation": 90, "direction": "clockwise", "ticksuffix": "°", **quiet},
+                      "radialaxis": {"ticksuffix": " m/s", "angle": 90, **quiet}},
         }
     )  # fmt: skip
     words = "Share that landed, by the wind at 20 ft and where it blew from (north is up)."
@@ -276,13 +274,12 @@ def envelope_figure(title: str, rows: Sequence[dict[str, Any]]) -> Any:
 
     speeds = sorted({row["speed_20ft_m_s"] for row in rows})
     directions = sorted({row["from_direction_deg"] for row in rows})
-    figure = Figure()
-    inner = 0.0
+    figure, inner = Figure(), 0.0
     for speed in speeds:
         ring = [row for row in rows if row["speed_20ft_m_s"] == speed]
         theta, share = [row["from_direction_deg"] for row in ring], [row["success"]["rate"] for row in ring]
-        words = [_words(row) for row in ring]
-        figure.add_trace(_ring(inner, [speed] * len(ring), theta, 360.0 / len(directions), share, words))
+        width, said = 360.0 / len(directions), [_words(row) for row in ring]
+        figure.add_trace(_ring(inner, [speed] * len(ring), theta, width, share, said))
         inner = speed
     figure.update_layout(
         title={"text": title},

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,7 @@ from flownav.cli.tables import Column, answer, say, table_of, with_ends
 
 if TYPE_CHECKING:
     from flownav.campaigns.plan import Plan
-    from flownav.campaigns.run import Progress
+    from flownav.campaigns.run import Progress as CampaignProgress
 
 LANDED = {
     "r50_m": "R50 [m]", "r95_m": "R95 at contact [m]", "r997_m": "R99.7 [m]", "rest_r95_m": "R95 at rest [m]",
@@ -28,22 +28,7 @@ ENDS = (
 )
 
 
-class Shown:
-    """What a campaign is watched by. flown: flights that this process has flown."""
-
-    def __init__(self, bar: Any, task: Any) -> None:
-        self._bar, self._task = bar, task
-        self.flown = 0
-
-    def __call__(self, progress: Progress) -> None:
-        """Show how far the campaign is."""
-        self.flown = progress.flown
-        self._bar.update(
-            self._task, completed=progress.have, total=progress.most, cell=progress.cell, figure=figure_words(progress)
-        )
-
-
-def figure_words(progress: Progress) -> str:
+def figure_words(progress: CampaignProgress) -> str:
     """The figure that is followed, with its interval."""
     from flownav.campaigns.figures import FIGURES
 
@@ -55,8 +40,8 @@ def figure_words(progress: Progress) -> str:
 
 
 @contextmanager
-def watching(plan: Plan) -> Iterator[Shown]:
-    """A bar on standard error."""
+def watching(plan: Plan) -> Iterator[Callable[[CampaignProgress], None]]:
+    """A bar on standard error, which the value moves on."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, ProgressColumn, TextColumn, TimeRemainingColumn
     from rich.text import Text
@@ -75,17 +60,19 @@ def watching(plan: Plan) -> Iterator[Shown]:
     total = plan.flights * len(plan.cells)
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=total, cell=plan.cells[0].label, figure="")
-        yield Shown(bar, task)
+
+        def show_progress(how_far: CampaignProgress) -> None:
+            words = figure_words(how_far)
+            bar.update(task, completed=how_far.have, total=how_far.most, cell=how_far.cell, figure=words)
+
+        yield show_progress
 
 
 def show(summary: dict[str, Any], folder: Path, rate: float | None, records: list[str]) -> None:
     """The table, the worst flights, and where everything lies."""
     cells = summary["cells"]
     lands = any("r95_m" in cell["figures"] for cell in cells)
-    figures = [
-        Column(title, lambda cell, name=name: _interval(cell["figures"].get(name)))  # type: ignore[misc]
-        for name, title in (LANDED if lands else ALOFT).items()
-    ]
+    figures = [_of_figure(title, name) for name, title in (LANDED if lands else ALOFT).items()]
     wide = 72 + max(len(cell["label"]) for cell in cells) + 22 * len(figures)
     say(table_of((*COUNTS, *figures, *ENDS), cells, left=1), wide=wide)
     typer.echo("worst flights (CELL:FLIGHT):")
@@ -102,13 +89,16 @@ def show(summary: dict[str, Any], folder: Path, rate: float | None, records: lis
         typer.echo(f"record  {path}")
 
 
+def _of_figure(title: str, name: str) -> Column:
+    return Column(title, lambda cell: _interval(cell["figures"].get(name)))
+
+
 def _landed(cell: dict[str, Any]) -> str:
     landed = cell["figures"].get("landed")
-    return with_ends(*_times_100(landed), form=".1f") if landed else "-"
-
-
-def _times_100(figure: dict[str, float]) -> tuple[float, tuple[float, float]]:
-    return 100 * figure["value"], (100 * figure["low"], 100 * figure["high"])
+    if not landed:
+        return "-"
+    value, low, high = (100 * landed[end] for end in ("value", "low", "high"))
+    return with_ends(value, (low, high), form=".1f")
 
 
 def _interval(figure: dict[str, float | None] | None) -> str:

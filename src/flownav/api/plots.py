@@ -41,21 +41,13 @@ def figure_of(record: Record, what: str) -> Any:
 
 def position(record: Record) -> Any:
     """North, east and down: estimate, truth, GPS."""
-    lines = [_line(record, "gps_position", "GPS", POSITION_NED, dots=True)]
-    lines += [
-        _line(record, "truth", "truth", POSITION_NED),
-        _line(record, scored_table(record), "estimate", POSITION_NED),
-    ]
-    return _stack(f"Position, {_title(record)}", POSITION_TITLES, [line for line in lines if line is not None])
+    sources = (("gps_position", "GPS"), ("truth", "truth"), (scored_table(record), "estimate"))
+    return _stack(record, "Position", POSITION_TITLES, POSITION_NED, sources)
 
 
 def velocity(record: Record) -> Any:
     """Velocity along the body's axes: estimate and truth."""
-    lines = [
-        _line(record, "truth", "truth", VELOCITY_BODY),
-        _line(record, scored_table(record), "estimate", VELOCITY_BODY),
-    ]
-    return _stack(f"Velocity, {_title(record)}", VELOCITY_TITLES, [line for line in lines if line is not None])
+    return _stack(record, "Velocity", VELOCITY_TITLES, VELOCITY_BODY, _paths(record))
 
 
 def errors(record: Record) -> Any:
@@ -66,7 +58,7 @@ def errors(record: Record) -> Any:
     t_s = np.asarray(truth["t_s"], float)
     error = at_instants(estimate, POSITION_NED, t_s) - _matrix(truth, POSITION_NED)
     error[~_scored(record, t_s)] = np.nan
-    figure = _stack(f"Errors of position, {_title(record)}", POSITION_TITLES, [Line("estimate", t_s, error)])
+    figure = _rows(f"Errors of position, {_title(record)}", POSITION_TITLES, [Line("estimate", t_s, error)])
     stated = record.tables.get("estimate", {})
     if {f"std_{name}" for name in POSITION_NED} <= stated.keys():
         sigma = SIGMAS * at_instants(stated, tuple(f"std_{name}" for name in POSITION_NED), t_s)
@@ -85,14 +77,13 @@ def innovations(record: Record) -> Any:
     with np.errstate(invalid="ignore", divide="ignore"):
         normal = np.asarray(table["innovation"], float) / np.sqrt(np.asarray(table["innovation_variance"], float))
     known = np.isfinite(normal)
-    names = [name for name in dict.fromkeys(sensors[known].tolist())]
+    names = list(dict.fromkeys(sensors[known].tolist()))
     figure = _empty(f"Innovations over their standard deviation, {_title(record)}", names)
     for row, name in enumerate(names, 1):
         chosen = np.flatnonzero(known & (sensors == name))
         chosen = chosen[:: max(1, len(chosen) // MOST_DOTS)]
-        _trace(
-            figure, row, "estimate", np.asarray(table["t_s"], float)[chosen], normal[chosen], dots=True, legend=False
-        )
+        t_s = np.asarray(table["t_s"], float)[chosen]
+        _trace(figure, row, "estimate", t_s, normal[chosen], dots=True, legend=False)
         for edge in (-SIGMAS, SIGMAS):
             figure.add_hline(y=edge, row=row, col=1, line_width=1, line_dash="dot", line_color=COLOURS["truth"])
     return figure
@@ -169,10 +160,19 @@ def _matrix(table: Mapping[str, Column], columns: Sequence[str]) -> Array:
     return np.column_stack([np.asarray(table[name], float) for name in columns])
 
 
-def _stack(title: str, titles: Sequence[str], lines: Sequence[Line]) -> Any:
-    """Lines in a row of axes each, over one time axis. InputError where there is none."""
-    if not lines:
-        raise InputError(f"plot: the record has nothing to draw for {title.split(',')[0].lower()}")
+def _stack(
+    record: Record, what: str, titles: Sequence[str], columns: tuple[str, ...], sources: Sequence[tuple[str, str]]
+) -> Any:
+    """What these tables say of some states, GPS as dots. InputError where none says anything."""
+    lines = [_line(record, table, name, columns, dots=name == "GPS") for table, name in sources]
+    known = [line for line in lines if line is not None]
+    if not known:
+        raise InputError(f"plot: the record has nothing to draw for {what.lower()}")
+    return _rows(f"{what}, {_title(record)}", titles, known)
+
+
+def _rows(title: str, titles: Sequence[str], lines: Sequence[Line]) -> Any:
+    """Lines in a row of axes each, over one time axis."""
     figure = _empty(title, titles)
     for line in lines:
         for row in range(line.values.shape[1]):

@@ -133,16 +133,7 @@ def _missing(names: tuple[str, ...], columns: Mapping[str, Array]) -> str:
 
 
 # tables that our filter wrote, or that lie in the frame of its estimate
-OURS = (
-    "states",
-    "innovation",
-    "consistency",
-    "smoothed",
-    "flown",
-    "fed",
-    "autopilot",
-    "estimate",
-)  # tables that our filter wrote
+OURS = ("states", "innovation", "consistency", "smoothed", "flown", "fed", "autopilot", "estimate")
 KINDS = ("fly", "replay")
 WHOLE = 0.99  # of the instants that are scored: an estimate that covers less is said to
 

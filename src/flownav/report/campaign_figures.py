@@ -208,8 +208,7 @@ def sensitivity(key: str, cell: dict[str, Any]) -> Panel | None:
     look["xaxis"] = axis("rank correlation with how far off it touched")
     look["yaxis"] = axis() | {"automargin": True, "nticks": len(told)}
     words = "The twelve strongest of Spearman's rank correlations, with 95 % intervals; grey: it may be nothing."
-    figure = plotly([bars], look)
-    return Panel(key, cell["label"], words, f"Rank correlations of the inputs of {cell['label']}", figure)
+    return Panel(key, cell["label"], words, f"Rank correlations of the inputs of {cell['label']}", plotly([bars], look))
 
 
 def swept_numbers(cells: Sequence[dict[str, Any]]) -> list[str]:

@@ -84,7 +84,7 @@ def render(of: Reproduction) -> str:
 
 
 def _worded(finding: Finding) -> Finding:
-    return finding._replace(paper=words.kept_together(finding.paper), here=words.kept_together(finding.here))
+    return finding._replace(paper=rows.kept_together(finding.paper), here=rows.kept_together(finding.here))
 
 
 WIDEST = 118

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,9 +15,11 @@ from flownav.paper.findings import FIT_TOLERANCE
 from flownav.paper.laboratory import Identified, Laboratory, Run, delay_s, identified
 from flownav.paper.published import HEIGHTS_M, RELATION_FITS
 from flownav.paper.reproduction import Reproduction
-from flownav.paper.words import kept_together
 from flownav.report.panels import listed, number
 from flownav.sensors.datasheet import Dynamics
+
+NUMBER_AND_UNIT = re.compile(r"(\d) (m/s|ms|rad/s|points|cm|m|s|%)(?![A-Za-z])")
+MINUS_SIGN = re.compile(r"(?<![\w)])-(?=\d)")
 
 
 class Pair(NamedTuple):
@@ -198,6 +201,11 @@ def selected_rows(of: Reproduction) -> list[TableRow]:
 EXACT, FLOW_OLDER, GYRO_OLDER = "exact gyro scale", "flow 20 ms older", "gyro 20 ms older"
 SONARS = ("sonar at once", "sonar 150 ms late")
 ByHeight = dict[float, Identified]
+
+
+def kept_together(text: str) -> str:
+    """A number and its unit on one line, minus signs true."""
+    return NUMBER_AND_UNIT.sub("\\1\N{NO-BREAK SPACE}\\2", MINUS_SIGN.sub("\N{MINUS SIGN}", text))
 
 
 def leak_sentences(laboratory: Laboratory | None) -> str:

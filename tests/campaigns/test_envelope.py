@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from flownav.campaigns.local import directions_deg, fly_envelope, fly_many, in_wind
 from flownav.cli import app
 from flownav.core.errors import InputError
-from flownav.report.envelope import envelope_figure
+from flownav.report.campaign_figures import envelope_figure
 from flownav.scoring.errors import touchdown_rows
 from flownav.scoring.landings import succeeded
 from flownav.simulation.scenario import load_scenario, with_filter

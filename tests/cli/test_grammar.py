@@ -14,7 +14,9 @@ import typer.main
 
 import flownav
 from command import run
-from flownav.cli import app, choices, running
+from flownav import cli
+from flownav.cli import app
+from flownav.cli import options as choices
 from places import DOCS
 
 APP = typer.main.get_command(app)
@@ -170,7 +172,7 @@ def test_a_command_that_is_broken_off_is_exit_status_130(monkeypatch):
 
     monkeypatch.setattr(sys, "argv", ["flownav"])
     with pytest.raises(SystemExit) as left:
-        running.run(stops)
+        cli.run(stops)
     assert left.value.code == 130
 
 

@@ -10,7 +10,7 @@ import typer
 from pyulog import ULog
 from typer.testing import CliRunner
 
-from flownav.cli.export import command as export_command
+from flownav.cli.records import export_to as export_command
 from flownav.cli.replay import command as replay_command
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_body, to_earth
 from flownav.core.measurement import Sensor, Stream

@@ -12,10 +12,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from flownav.report.chart import Stack
+from flownav.report.chart import LINE_POINTS, Stack
 from flownav.report.html import HERE
 from flownav.report.page_data import DIGITS, SMALLEST, Columns, chart_data
-from flownav.report.samples import LINE_POINTS
 
 
 def unpacked(columns: Columns) -> list[np.ndarray]:

@@ -14,15 +14,14 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from flownav.cli import report as report_command
+from flownav.cli.records import report as report_command
 from flownav.core import files
 from flownav.core.errors import InputError
 from flownav.core.record import Record
-from flownav.report import content
 from flownav.report.figures_innovation import innovations
 from flownav.report.figures_states import position
 from flownav.report.html import render, write_report
-from flownav.report.sensor_rows import sensor_rows
+from flownav.report.tables import NONE, sensor_rows
 from report_records import flight, navigated, replay
 
 
@@ -119,7 +118,7 @@ def test_sensors_are_judged_in_words_and_the_drift_at_the_end_is_told() -> None:
     said = "optimistic: errors are larger than stated; coloured: errors last"
     assert sensor_rows(record) == [
         ("Rangefinder", "1.0 to 31.2", "1,234", "2.50", said),
-        ("IMU", "0.0 to 60.0", content.NONE, content.NONE, ""),
+        ("IMU", "0.0 to 60.0", NONE, NONE, ""),
     ]
     page = render(record)
     assert "coloured: errors last" in page
@@ -359,7 +358,7 @@ def test_the_report_appears_whole_or_not_at_all(tmp_path: Path, monkeypatch: pyt
 
 def cli() -> typer.Typer:
     app = typer.Typer()
-    app.command()(report_command.command)
+    app.command()(report_command)
     return app
 
 

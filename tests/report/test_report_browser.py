@@ -13,8 +13,8 @@ import pytest
 
 from browsing import CHROMIUM, QUIET, Visit
 from flownav.core.record import Record
+from flownav.report.comparison import write_records
 from flownav.report.html import write_report
-from flownav.report.records import write_records
 from flownav.report.series import start_end_s
 from flownav.studies.compare.records import HEADINGS, cells, errors_in_time, rows_of_records
 from report_records import flight, navigated, replay

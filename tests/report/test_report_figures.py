@@ -12,19 +12,16 @@ from hypothesis.extra.numpy import arrays
 
 from flownav.core.measurement import Sensor
 from flownav.core.record import Record
-from flownav.report.chart import Chart
+from flownav.report.chart import CROSS_POINTS, DOT_POINTS, LINE_POINTS, Chart, sliding_rms, thin, thin_dots
 from flownav.report.content import summary, tiles
-from flownav.report.figures_errors import close_ups, flown_errors, position_error
+from flownav.report.figures_errors import close_ups, error_against_gps, flown_errors, position_error
 from flownav.report.figures_filter import consistency, radius_of_uncertainty
-from flownav.report.figures_gps import error_against_gps
 from flownav.report.figures_innovation import innovations
 from flownav.report.figures_path import ground_track, path_over_pad, paths_of
-from flownav.report.figures_states import position, velocity
-from flownav.report.figures_vehicle import attitude
+from flownav.report.figures_states import attitude, position, velocity
 from flownav.report.html import render, sections
 from flownav.report.page_data import Columns, paths_data
 from flownav.report.panels import Panel
-from flownav.report.samples import CROSS_POINTS, DOT_POINTS, LINE_POINTS, sliding_rms, thin, thin_dots
 from flownav.report.series import Moment, Track, euler_deg, flow_velocity, gps_velocity_body, moments, readings
 from flownav.report.style import COLOUR, LIGHT_TO_DARK, PALETTE
 from report_records import flight, navigated, replay

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flownav.core.record import PROTECTION_LEVELS, Record
-from flownav.report.figures_protection import protection
+from flownav.report.figures_filter import protection
 from flownav.report.html import render, sections
 from report_records import flight, replay
 

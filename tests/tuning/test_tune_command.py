@@ -12,7 +12,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from flownav.cli import replay, tune
+from flownav.cli import replay
+from flownav.cli.compare import tune_settings
 from flownav.core.errors import InputError
 from flownav.logs.open_log import open_flight
 from flownav.navigation.settings import NavigatorSettingsFile
@@ -46,13 +47,13 @@ def elsewhere(tmp_path, monkeypatch):
     monkeypatch.setenv("COLUMNS", "100")
 
 
-def call(*arguments, command=tune.command):
+def call(*arguments, command=tune_settings):
     app = typer.Typer()
     app.command()(command)
     return CliRunner().invoke(app, [str(argument) for argument in arguments])
 
 
-def answer(*arguments, command=tune.command) -> dict:
+def answer(*arguments, command=tune_settings) -> dict:
     result = call(*arguments, "--json", command=command)
     assert result.exception is None, result.exception
     return json.loads(result.stdout, parse_constant=pytest.fail)  # no NaN, no Infinity

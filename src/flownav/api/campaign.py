@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flownav.api.calls import writing
 from flownav.api.record import Record
 from flownav.api.table import FRAMES
 from flownav.campaigns.engines import Engine
@@ -145,10 +146,8 @@ class Campaign:
 
         page = self.folder / REPORT if path is None else Path(path)
         kept = [f"{RECORDS}/{record.with_suffix('.html').name}" for record in self.records]
-        try:
+        with writing(page):
             write_campaign(self.summary, [self._touchdowns(cell) for cell in range(len(self.cells))], kept, page)
-        except OSError as error:
-            raise InputError(f"{page}: cannot be written ({error.strerror}); give another path") from error
         return page
 
     def _touchdowns(self, cell: int) -> Touchdowns:

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from flownav.api.parts import split
+from flownav.api.calls import call_of, require_from, split
 from flownav.api.record import Record
 from flownav.api.scenario import Scenario, scenario_of
 from flownav.api.vehicle import Vehicle
-from flownav.api.words import call_of, require_from
 from flownav.campaigns.judged import BOUND_FLIGHTS, Judged, bound_of, consistency_facts, fly_judged
 from flownav.campaigns.local import fly_recorded, known_exactly, median_flight, score_history
+from flownav.core.errors import InputError
 from flownav.core.provenance import called_as
 from flownav.parts.flying import fly_parts, fly_with, names_of
 from flownav.parts.protocols import Controller, Filter, Parts, SensorModel, VehicleModel
@@ -191,3 +191,27 @@ def _fly_pixels(
     facts["pad_frames"] = agreement(frames, setup.fitted.sheets.pad_camera)
     scores = records[0].manifest["scores"] if flights == 1 else scores_of_flights(np.array(rows)) | {"takeoff": None}
     return Flights(Record.of(records[0]), first, facts | _nothing_of_many(setup) | scores)
+
+
+def tell(setup: Setup, record: Record, url: str, speed: float, key: Path | None) -> dict[str, Any]:
+    """Tell a flight of `setup` over MAVLink, as an autopilot would; how far it came, and what was heard.
+
+    speed: 1 is real time. key: a file that signs what is told. InputError where the flight has no sensors of its own,
+    or the link cannot be opened.
+    """
+    from flownav.campaigns.faults.table import log_of
+    from flownav.live.byte_links import open_link
+    from flownav.live.loop import run_vehicle, stoppable
+    from flownav.live.simulated import SimulatedVehicle
+    from flownav.mavlink.signing import load_key
+
+    if "imu" not in record.tables or "gps_velocity" not in record.tables:
+        raise InputError("--mavlink: the flight has no IMU or no GPS velocity; give --filter landing --gps midg")
+    vehicle = SimulatedVehicle(log_of(record, setup), key=load_key(key) if key else None)
+    link = open_link(url)
+    try:
+        with stoppable() as asked:
+            reached_s = run_vehicle(vehicle, link, speed, asked)
+    finally:
+        link.close()
+    return {"flight_s": min(reached_s, vehicle.end_s), "speed": speed, "heard": dict(vehicle.counts)}

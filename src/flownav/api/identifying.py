@@ -45,7 +45,7 @@ def identify(
     paths = [Path(logs)] if isinstance(logs, str | Path) else [Path(log) for log in logs]
     require_logs(paths)
 
-    from flownav.api.words import call_of, changed
+    from flownav.api.calls import call_of, changed
     from flownav.core.provenance import called_as
 
     heights = [float(heights_m)] if isinstance(heights_m, int | float) else [float(height) for height in heights_m]

@@ -1,8 +1,9 @@
-"""The figures of `Record.plot`: a few plain Plotly figures for notebooks; the report has the whole set."""
+"""How a record shows itself: two lines on a terminal, a small table in a notebook, plain figures of `Record.plot`."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,21 +41,13 @@ def figure_of(record: Record, what: str) -> Any:
 
 def position(record: Record) -> Any:
     """North, east and down: estimate, truth, GPS."""
-    lines = [_line(record, "gps_position", "GPS", POSITION_NED, dots=True)]
-    lines += [
-        _line(record, "truth", "truth", POSITION_NED),
-        _line(record, scored_table(record), "estimate", POSITION_NED),
-    ]
-    return _stack(f"Position, {_title(record)}", POSITION_TITLES, [line for line in lines if line is not None])
+    sources = (("gps_position", "GPS"), ("truth", "truth"), (scored_table(record), "estimate"))
+    return _stack(record, "Position", POSITION_TITLES, POSITION_NED, sources)
 
 
 def velocity(record: Record) -> Any:
     """Velocity along the body's axes: estimate and truth."""
-    lines = [
-        _line(record, "truth", "truth", VELOCITY_BODY),
-        _line(record, scored_table(record), "estimate", VELOCITY_BODY),
-    ]
-    return _stack(f"Velocity, {_title(record)}", VELOCITY_TITLES, [line for line in lines if line is not None])
+    return _stack(record, "Velocity", VELOCITY_TITLES, VELOCITY_BODY, _paths(record))
 
 
 def errors(record: Record) -> Any:
@@ -65,7 +58,7 @@ def errors(record: Record) -> Any:
     t_s = np.asarray(truth["t_s"], float)
     error = at_instants(estimate, POSITION_NED, t_s) - _matrix(truth, POSITION_NED)
     error[~_scored(record, t_s)] = np.nan
-    figure = _stack(f"Errors of position, {_title(record)}", POSITION_TITLES, [Line("estimate", t_s, error)])
+    figure = _rows(f"Errors of position, {_title(record)}", POSITION_TITLES, [Line("estimate", t_s, error)])
     stated = record.tables.get("estimate", {})
     if {f"std_{name}" for name in POSITION_NED} <= stated.keys():
         sigma = SIGMAS * at_instants(stated, tuple(f"std_{name}" for name in POSITION_NED), t_s)
@@ -84,14 +77,13 @@ def innovations(record: Record) -> Any:
     with np.errstate(invalid="ignore", divide="ignore"):
         normal = np.asarray(table["innovation"], float) / np.sqrt(np.asarray(table["innovation_variance"], float))
     known = np.isfinite(normal)
-    names = [name for name in dict.fromkeys(sensors[known].tolist())]
+    names = list(dict.fromkeys(sensors[known].tolist()))
     figure = _empty(f"Innovations over their standard deviation, {_title(record)}", names)
     for row, name in enumerate(names, 1):
         chosen = np.flatnonzero(known & (sensors == name))
         chosen = chosen[:: max(1, len(chosen) // MOST_DOTS)]
-        _trace(
-            figure, row, "estimate", np.asarray(table["t_s"], float)[chosen], normal[chosen], dots=True, legend=False
-        )
+        t_s = np.asarray(table["t_s"], float)[chosen]
+        _trace(figure, row, "estimate", t_s, normal[chosen], dots=True, legend=False)
         for edge in (-SIGMAS, SIGMAS):
             figure.add_hline(y=edge, row=row, col=1, line_width=1, line_dash="dot", line_color=COLOURS["truth"])
     return figure
@@ -168,10 +160,19 @@ def _matrix(table: Mapping[str, Column], columns: Sequence[str]) -> Array:
     return np.column_stack([np.asarray(table[name], float) for name in columns])
 
 
-def _stack(title: str, titles: Sequence[str], lines: Sequence[Line]) -> Any:
-    """Lines in a row of axes each, over one time axis. InputError where there is none."""
-    if not lines:
-        raise InputError(f"plot: the record has nothing to draw for {title.split(',')[0].lower()}")
+def _stack(
+    record: Record, what: str, titles: Sequence[str], columns: tuple[str, ...], sources: Sequence[tuple[str, str]]
+) -> Any:
+    """What these tables say of some states, GPS as dots. InputError where none says anything."""
+    lines = [_line(record, table, name, columns, dots=name == "GPS") for table, name in sources]
+    known = [line for line in lines if line is not None]
+    if not known:
+        raise InputError(f"plot: the record has nothing to draw for {what.lower()}")
+    return _rows(f"{what}, {_title(record)}", titles, known)
+
+
+def _rows(title: str, titles: Sequence[str], lines: Sequence[Line]) -> Any:
+    """Lines in a row of axes each, over one time axis."""
     figure = _empty(title, titles)
     for line in lines:
         for row in range(line.values.shape[1]):
@@ -207,3 +208,75 @@ def _band(figure: Any, row: int, t_s: Array, half: Array) -> None:
         line={"width": 0}, hoverinfo="skip", name="2 sigma stated", legendgroup="band", showlegend=row == 1,
         row=row, col=1,
     )  # fmt: skip
+
+
+def lines_of(record: Record) -> list[str]:
+    """What flew and how it went; what the record holds."""
+    names, rows = list(record.tables), len(next(iter(record.tables.values()), {}).get("t_s", ()))
+    some = f" ({', '.join(names[:5])}{', ...' if len(names) > 5 else ''})" if names else ""
+    return [
+        f"<Record {what_of(record)}: {headline_of(record) or 'not scored'};",
+        f" {len(names)} tables{some}, {rows} rows in the first>",
+    ]
+
+
+def what_of(record: Record) -> str:
+    """What flew, with which filter, how long."""
+    facts = record.manifest
+    source = facts.get("scenario") or facts.get("log") or facts.get("kind") or "nothing"
+    seed = f", seed {facts['seed']} flight {facts.get('flight', 0)}" if "seed" in facts else ""
+    cut = (facts.get("parameters") or {}).get("gps_outages_s") or []
+    outages = f", GPS cut {len(cut)} time{'s' * (len(cut) != 1)}" if cut else ""
+    lasts = f", {float(facts['duration_s']):.1f} s" if facts.get("duration_s") is not None else ""
+    return f"{facts.get('kind', '?')} {source}{seed}, filter {facts.get('filter', '?')}{outages}{lasts}"
+
+
+def headline_of(record: Record) -> str:
+    """The score that matters most of this kind of record; "" where it has none."""
+    scores = record.manifest.get("scores") or {}
+    covered = record.manifest.get("covered_fraction", 1.0)
+    thin = f" (the estimate covers {100.0 * covered:.0f} %)" if covered < 0.99 else ""
+    touchdown = scores.get("touchdown")
+    if thin:
+        largest = scores.get("max_position_error_m")
+        return (f"largest error of one axis {largest:.3f} m" if largest is not None else "scored in part") + thin
+    if touchdown:
+        end = touchdown.get("rest") or touchdown.get("contact") or {}
+        away = end.get("distance_m")
+        return f"{touchdown['verdict']}" + (f", {away:.3f} m from the pad's centre" if away is not None else "")
+    if scores.get("max_position_error_m") is not None:
+        return f"largest error of one axis {scores['max_position_error_m']:.3f} m"
+    if scores.get("outages"):
+        found = [cut["horizontal_rms_m"] for cut in scores["outages"] if cut["horizontal_rms_m"] is not None]
+        if found:
+            return f"without GPS at most {max(found):.2f} m rms horizontally"
+    if scores.get("truth"):
+        return f"{scores['truth']['horizontal_rms_m']:.2f} m rms horizontally against {scores['truth']['reference']}"
+    if scores.get("velocity_rms_m_s") is not None:
+        return f"velocity {scores['velocity_rms_m_s']:.3f} m/s rms against GPS"
+    return ""
+
+
+def html_of(record: Record) -> str:
+    """A table of facts and one of the record's tables; every text is escaped."""
+    facts: list[tuple[str, Any]] = [("flight", what_of(record)), ("result", headline_of(record) or "not scored")]
+    verdict = getattr(record, "verdict", "")
+    facts += [("verdict", verdict)] if verdict else []
+    facts += [("command", _words(record.manifest["command"]))] if record.manifest.get("command") else []
+    head = "".join(
+        f"<tr><th>{escape(name)}</th><td colspan='2'>{escape(str(value))}</td></tr>" for name, value in facts
+    )
+    rows = "".join(
+        f"<tr><td>{escape(name)}</td><td>{len(table.get('t_s', ()))}</td><td>{escape(_columns(table))}</td></tr>"
+        for name, table in record.tables.items()
+    )
+    return f"<table>{head}<tr><th>table</th><th>rows</th><th>columns</th></tr>{rows}</table>"
+
+
+def _words(command: Any) -> str:
+    return " ".join(map(str, command)) if isinstance(command, list | tuple) else str(command)
+
+
+def _columns(table: dict[str, Any]) -> str:
+    names = [name for name in table if name != "t_s"]
+    return ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")

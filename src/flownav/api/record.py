@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, cast
 
+from flownav.api.calls import writing
 from flownav.api.table import Table
 from flownav.core import record as ground
-from flownav.core.errors import InputError
 
 
 class Record(ground.Record):
@@ -181,10 +181,8 @@ class Record(ground.Record):
         from flownav.report.html import write_report
 
         page = Path(f"{self.name}.html") if path is None else Path(path)
-        try:
+        with writing(page):
             write_report(self, page)
-        except OSError as error:
-            raise InputError(f"{page}: cannot be written ({error.strerror}); give another path") from error
         return page
 
     def save(self, path: str | Path, *, replacing: bool = False) -> Path:  # type: ignore[override]
@@ -198,10 +196,8 @@ class Record(ground.Record):
             '.fnr'
         """
         path = Path(path)
-        try:
+        with writing(path):
             super().save(path, replacing=replacing)
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written ({error.strerror}); give another path") from error
         return path
 
     def export(self, to: str, path: str | Path | None = None, *, frame: str | None = None) -> list[Path]:
@@ -218,18 +214,16 @@ class Record(ground.Record):
         from flownav.export.formats import destination, export
 
         target = destination(Path(f"{self.name}.fnr"), to, None if path is None else Path(path))
-        try:
+        with writing(target):
             return [Path(file) for file in export(self, to, target, frame).files]
-        except OSError as error:
-            raise InputError(f"{target}: cannot be written ({error.strerror}); give another path") from error
 
     def __repr__(self) -> str:
-        from flownav.api.shown import lines_of
+        from flownav.api.plots import lines_of
 
         return "\n".join(lines_of(self))
 
     def _repr_html_(self) -> str:
-        from flownav.api.shown import html_of
+        from flownav.api.plots import html_of
 
         return html_of(self)
 

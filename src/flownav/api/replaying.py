@@ -7,10 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from flownav.api.parts import own_filter
+from flownav.api.calls import call_of, changed, own_filter, require_path
 from flownav.api.record import Record
 from flownav.api.sensor import Sensor
-from flownav.api.words import call_of, changed, require_path
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check, load
 from flownav.core.provenance import called_as, command_words

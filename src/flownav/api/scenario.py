@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from flownav.api.changing import merged, plain_entries, saved
+from flownav.api.calls import merged, plain_entries, saved
 from flownav.api.sensor import Sensor
 from flownav.api.vehicle import Vehicle
 from flownav.core.parameter_files import check

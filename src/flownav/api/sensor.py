@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from flownav.api.changing import kept_file, merged
+from flownav.api.calls import kept_file, merged
 from flownav.core.errors import InputError
 from flownav.core.parameter_files import check, read_toml, shipped
 from flownav.lab.identification.sensor_file import write_sensor

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from flownav.api.changing import kept_file, merged, saved
+from flownav.api.calls import kept_file, merged, saved
 from flownav.core.parameter_files import read_toml
 from flownav.vehicle.kinds import AnyFile, flattened, read_kind, require_flyable, vehicle_file
 

@@ -1,38 +1,26 @@
-"""The command line: one module per command, each importing its job only when it is called."""
+"""The command line: one module per command, each importing its job only when it is called; how it runs and ends."""
 
 from __future__ import annotations
 
+import io
+import sys
+from importlib import import_module
 from typing import Annotated
 
 import typer
 
-from flownav.cli import accuracy as accuracy
-from flownav.cli import bench as bench
-from flownav.cli import campaign as campaign
-from flownav.cli import certify as certify
-from flownav.cli import compare as compare
-from flownav.cli import envelope as envelope
-from flownav.cli import export as export
-from flownav.cli import faults as faults
-from flownav.cli import flow as flow
-from flownav.cli import fly as fly
-from flownav.cli import identify as identify
-from flownav.cli import info as info
-from flownav.cli import live as live
-from flownav.cli import pad as pad
-from flownav.cli import paper as paper
-from flownav.cli import recover as recover
-from flownav.cli import replay as replay
-from flownav.cli import report as report
-from flownav.cli import rig as rig
-from flownav.cli import sample as sample
-from flownav.cli import schema as schema
-from flownav.cli import tune as tune
-from flownav.cli import validate as validate
-from flownav.cli import vehicle as vehicle
-from flownav.cli import view as view
-from flownav.cli.running import run, say_version
+import flownav
+from flownav.core.compiling.progress import announce_compilation
+from flownav.core.errors import FlownavError, InputError
+from flownav.core.guard import a_run
 
+DONE, BAD_VERDICT, BAD_INPUT = 0, 1, 2  # Ctrl-C: 130, as shells have it
+# commands that share a module, and the function that each is there; any other is `command` of a module of its name
+ELSEWHERE = {
+    "report": ("records", "report"), "view": ("records", "view"), "export": ("records", "export_to"),
+    "recover": ("records", "recover"), "schema": ("bench", "schema"), "tune": ("compare", "tune_settings"),
+    "sample": ("rig", "sample"),
+}  # fmt: skip
 app = typer.Typer(
     name="flownav",
     help="GPS/INS + optical-flow navigation for precision VTOL take-off and landing.",
@@ -41,34 +29,42 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for name, command, what in (
-    ("fly", fly.command, "Fly a take-off or landing in closed loop, scored beside the paper."),
-    ("replay", replay.command, "Fuse a recorded flight; measure the drift without GPS."),
-    ("compare", compare.command, "Many logs, many settings, beside dead reckoning and the autopilot."),
-    ("tune", tune.command, "Propose settings from logs, judged on windows held out from the fit."),
-    ("live", live.command, "Navigate a MAVLink vehicle in real time; send it the estimate."),
-    ("sample", sample.command, "Write small simulated logs, to try the other commands on."),
-    ("recover", recover.command, "Make the record of a live session that was killed."),
-    ("info", info.command, "What a log holds: sensors, rates, gaps, signs, what it lacks."),
-    ("identify", identify.command, "Identify a flow sensor from rig or flight logs; write its file."),
-    ("rig", rig.command, "Swing a flow sensor over a pad beside an encoder, from pixels."),
-    ("flow", flow.command, "Optical flow of your own frames, as the PX4FLOW computes it."),
-    ("pad", pad.command, "Find the landing pad in a frame; measure how well, by height."),
-    ("paper", paper.command, "Every table of the paper, published and reproduced side by side."),
-    ("campaign", campaign.command, "Fly a scenario many times: accuracy with intervals, rare events."),
-    ("certify", certify.command, "Pass, fail or not shown: a requirement flown, as a page to be signed."),
-    ("accuracy", accuracy.command, "The landing filter against its targets, and what its pieces are worth."),
-    ("envelope", envelope.command, "How surely a scenario lands, by the wind's speed and direction."),
-    ("faults", faults.command, "Let sensors fail on a landing: when it is noticed, what it costs."),
-    ("validate", validate.command, "Hold the simulator against recorded flights, figure beside figure."),
-    ("vehicle", vehicle.command, "Trim, power, linear models and ground effect of a helicopter."),
-    ("report", report.command, "Write a record's report as one HTML page."),
-    ("view", view.command, "Show a record in space and time with Rerun, or write its .rrd."),
-    ("export", export.command, "Write a record as MCAP, TUM, EuRoC, Parquet, CSV, ULog, KML or GPX."),
-    ("schema", schema.command, "Print the JSON schema of a command's output or of a file."),
-    ("bench", bench.command, "Measure how fast all of this is on your machine."),
+for name, what in (
+    ("fly", "Fly a take-off or landing in closed loop, scored beside the paper."),
+    ("replay", "Fuse a recorded flight; measure the drift without GPS."),
+    ("compare", "Many logs, many settings, beside dead reckoning and the autopilot."),
+    ("tune", "Propose settings from logs, judged on windows held out from the fit."),
+    ("live", "Navigate a MAVLink vehicle in real time; send it the estimate."),
+    ("sample", "Write small simulated logs, to try the other commands on."),
+    ("recover", "Make the record of a live session that was killed."),
+    ("info", "What a log holds: sensors, rates, gaps, signs, what it lacks."),
+    ("identify", "Identify a flow sensor from rig or flight logs; write its file."),
+    ("rig", "Swing a flow sensor over a pad beside an encoder, from pixels."),
+    ("flow", "Optical flow of your own frames, as the PX4FLOW computes it."),
+    ("pad", "Find the landing pad in a frame; measure how well, by height."),
+    ("paper", "Every table of the paper, published and reproduced side by side."),
+    ("campaign", "Fly a scenario many times: accuracy with intervals, rare events."),
+    ("certify", "Pass, fail or not shown: a requirement flown, as a page to be signed."),
+    ("accuracy", "The landing filter against its targets, and what its pieces are worth."),
+    ("envelope", "How surely a scenario lands, by the wind's speed and direction."),
+    ("faults", "Let sensors fail on a landing: when it is noticed, what it costs."),
+    ("validate", "Hold the simulator against recorded flights, figure beside figure."),
+    ("vehicle", "Trim, power, linear models and ground effect of a helicopter."),
+    ("report", "Write a record's report as one HTML page."),
+    ("view", "Show a record in space and time with Rerun, or write its .rrd."),
+    ("export", "Write a record as MCAP, TUM, EuRoC, Parquet, CSV, ULog, KML or GPX."),
+    ("schema", "Print the JSON schema of a command's output or of a file."),
+    ("bench", "Measure how fast all of this is on your machine."),
 ):
-    app.command(name, short_help=what)(command)
+    module, function = ELSEWHERE.get(name, (name, "command"))
+    app.command(name, short_help=what)(getattr(import_module(f"flownav.cli.{module}"), function))
+
+
+def say_version(asked: bool) -> None:
+    """The version, and nothing else is done."""
+    if asked:
+        typer.echo(f"flownav {flownav.__version__}")
+        raise typer.Exit
 
 
 @app.callback()
@@ -83,3 +79,40 @@ def about(
 def main() -> None:
     """Entry point: exit status 0 done, 1 a bad verdict, 2 a mistake of the user's (one line), 130 broken off."""
     run(app)
+
+
+def run(app: typer.Typer) -> None:
+    """Run a command and leave with its exit status."""
+    for stream in (sys.stdout, sys.stderr):  # names of files are bytes, and need not be text
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        with a_run(), announce_compilation("flownav", throughout=True):
+            status = app(prog_name="flownav", standalone_mode=False)
+    except FlownavError as error:
+        _leave(str(error), BAD_INPUT if isinstance(error, InputError) else BAD_VERDICT)
+    except typer.TyperException as error:
+        if not hasattr(error, "format_message"):
+            raise
+        _leave_usage(error)
+    except typer.Abort:
+        _leave("broken off", BAD_VERDICT)
+    except OSError as error:  # a disk that is full, a file that went away
+        _leave(f"{error.filename or 'a file'}: {error.strerror or error}", BAD_INPUT)
+    sys.exit(status if isinstance(status, int) else DONE)
+
+
+def _leave_usage(error: typer.TyperException) -> None:
+    """What was typed cannot be: one line, and where to read what can."""
+    context = getattr(error, "ctx", None)
+    command = context.command_path if context is not None else "flownav"
+    message = error.format_message().replace("\n", " ").strip()
+    if not message or type(error).__name__ == "NoArgsIsHelpError":
+        typer.echo(context.get_help() if context is not None else "", err=True)
+        sys.exit(BAD_INPUT)
+    _leave(f"{message.rstrip('.')}; `{command} --help` lists what can be given", BAD_INPUT)
+
+
+def _leave(message: str, status: int) -> None:
+    print(f"flownav: {message}", file=sys.stderr)
+    sys.exit(status)

@@ -2,64 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import REQUIREMENTS, one_of
-from flownav.cli.options import ForceOption, JsonOption, SeedOption, VehicleOption, out_option
-from flownav.cli.output import emit
+from flownav.cli import options
+from flownav.cli.options import chosen, option, out_option, words
+from flownav.cli.tables import Column, answer, figure, with_ends
 
 if TYPE_CHECKING:
     from flownav.campaigns.accuracy import Case
 
+CASES = "Which cases, repeated or with commas."
+LACKING = "Flights of each variant that lacks a piece of the navigator; 0 for none."
 STATES = ("x", "y", "z", "u", "v", "w")
 TRUTH_MODELS = ("matched", "ensemble")
 BOUND = "RMSE over the bound of the filter's own model"
 
 
 def command(
-    flights: Annotated[int, typer.Option(metavar="N", help="Flights of each case.")] = 1000,
-    cases: Annotated[
-        list[str] | None,
-        typer.Option("--cases", help="Which cases, repeated or with commas.", **one_of(*REQUIREMENTS, "all")),
-    ] = None,
-    ablations: Annotated[
-        int, typer.Option(metavar="N", help="Flights of each variant that lacks a piece of the navigator; 0 for none.")
-    ] = 100,
-    vehicle: VehicleOption = None,
-    seed: SeedOption = 1,
+    flights: Annotated[int, option("N", "Flights of each case.")] = 1000,
+    cases: Annotated[list[str] | None, chosen(CASES, *options.REQUIREMENTS, "all", flag="--cases")] = None,
+    ablations: Annotated[int, option("N", LACKING)] = 100,
+    vehicle: options.Vehicle = None,
+    seed: options.Seed = 1,
     out: Annotated[Path | None, out_option("The tables as Markdown")] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
 ) -> None:
     """Hold the navigator against its targets, matched and as an ensemble; what its pieces are worth, matched."""
-    from flownav.campaigns.accuracy import CASES, flights_of, run_case
-    from flownav.cli.lists import words
-    from flownav.cli.output import place, progress, require_between
+    from flownav.campaigns.accuracy import CASES as EVERY
+    from flownav.campaigns.accuracy import flights_of, run_case
+    from flownav.cli.output import place, progress, require_between, write_text
     from flownav.core.errors import VerdictError
 
     require_between("--flights", flights, 1, 1_000_000)
     require_between("--ablations", ablations, 0, 1_000_000)
     asked = words("--cases", cases) if cases else ["all"]
-    chosen = CASES if "all" in asked else tuple(asked)
+    named = EVERY if "all" in asked else tuple(asked)
     path = None if out is None else place(out, vehicle, force=force)
-    with progress("Flying", flights_of(chosen, flights, ablations, vehicle)) as advance:
-        made = [run_case(name, seed, flights, ablations, advance, vehicle) for name in chosen]
+    with progress("Flying", flights_of(named, flights, ablations, vehicle)) as advance:
+        made = [run_case(name, seed, flights, ablations, advance, vehicle) for name in named]
     text = markdown(made)
     if path is not None:
-        from flownav.core.guard import written_whole
-
-        with written_whole(path) as temporary:
-            temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
-    if as_json:
-        facts: dict[str, Any] = {"flights": flights, "ablation_flights": ablations, "seed": seed}
-        facts |= {"cases": [case.as_json() for case in made]} | ({"out": str(path)} if path else {})
-        emit(facts)
-    else:
-        typer.echo(text)
+        write_text(path, text)
+    facts: dict[str, Any] = {"flights": flights, "ablation_flights": ablations, "seed": seed}
+    facts |= {"cases": [case.as_json() for case in made]} | ({"out": str(path)} if path else {})
+    answer(facts, as_json, lambda: typer.echo(text))
     missed = [f"{case.name}: {target.sentence()}" for case in made for target in case.targets if not target.kept]
     if missed:
         raise VerdictError("; ".join(missed))
@@ -90,118 +81,85 @@ def _known(made: list[Case]) -> str:
 def _consistency(made: list[Case], truth_model: str) -> str:
     from flownav.scoring.consistency import GROUP_FLIGHTS
 
+    together = f"steps with the ANEES of {min(made[0].flights, GROUP_FLIGHTS)} flights in its band"
+    heading = (f"{truth_model}: {BOUND}, at the horizon", *STATES, "ANEES", together, "of all flights")
     rows = []
     for case in made:
         facts = getattr(case, truth_model)
-        ratios = (_ratio(facts["rmse_over_bound"][state]) for state in STATES)
         shares = (facts["anees"], facts["anees_inside_fraction"], facts["anees_inside_fraction_of_all_flights"])
-        rows.append((case.name, *ratios, *(f"{share:.3f}" for share in shares)))
-    heading = (
-        f"{truth_model}: {BOUND}, at the horizon",
-        *STATES,
-        "ANEES",
-        f"steps with the ANEES of {min(made[0].flights, GROUP_FLIGHTS)} flights in its band",
-        "of all flights",
-    )
+        rows.append((case.name, *_ratios(facts["rmse_over_bound"]), *(f"{share:.3f}" for share in shares)))
     return _table(heading, rows)
 
 
 def _accuracy(made: list[Case], truth_model: str) -> str:
+    what = f"{truth_model}: RMSE of what was flown on, in flight [m, m/s]"
+    largest = ("p95 of largest error of one axis [m]", "p95 of largest horizontal error [m] (95 % interval)")
     rows = []
     for case in made:
         facts = getattr(case, truth_model)
-        errors = (_length(rms) for rms in facts["rms_error"])
-        axis = _length(facts["p95_largest_axis_m"])
+        errors, axis = (_length(rms) for rms in facts["rms_error"]), _length(facts["p95_largest_axis_m"])
         rows.append((case.name, *errors, axis, _interval(facts, "p95_largest_horizontal"), str(facts["crashed"])))
-    heading = (
-        f"{truth_model}: RMSE of what was flown on, in flight [m, m/s]",
-        *STATES,
-        "p95 of largest error of one axis [m]",
-        "p95 of largest horizontal error [m] (95 % interval)",
-        "crashed",
-    )
-    return _table(heading, rows)
+    return _table((what, *STATES, *largest, "crashed"), rows)
 
 
 def _touchdowns(made: list[Case], truth_model: str) -> str:
     """Of the cases that land."""
+    ends = ("R95 at contact [m] (95 % interval)", "R95 at rest [m] (95 % interval)")
+    parts = ("estimate, p95 [m]", "guidance, p95 [m]", "pad, p95 [m]")
     rows = []
     for case in made:
         landing = getattr(case, truth_model)["touchdown"]
         if landing is not None:
             rate, limited = landing["success"], landing["limited_by"]
-            success = f"{100.0 * rate['rate']:.1f} ({100.0 * rate['low']:.1f}-{100.0 * rate['high']:.1f})"
-            parts = (_length(limited[name]) for name in ("estimate_m", "guidance_m", "pad_m"))
-            ends = (_interval(landing[end], "r95") for end in ("contact", "rest"))
+            success = with_ends(100.0 * rate["rate"], (100.0 * rate["low"], 100.0 * rate["high"]), form=".1f")
+            sizes = (_length(limited[name]) for name in ("estimate_m", "guidance_m", "pad_m"))
             aloft = {"went around": landing["verdicts"].get("went around", 0)}
             failed = {**landing["unfinished"], **aloft, **landing["broken"]}
             why = ", ".join(f"{what} {count}" for what, count in failed.items() if count) or "-"
-            rows.append((case.name, *ends, *parts, success, why))
-    heading = (
-        f"{truth_model}: touchdown",
-        "R95 at contact [m] (95 % interval)",
-        "R95 at rest [m] (95 % interval)",
-        "estimate, p95 [m]",
-        "guidance, p95 [m]",
-        "pad, p95 [m]",
-        "landed [%] (95 % interval)",
-        "not landed by",
-    )
-    return _table(heading, rows)
+            radii = (_interval(landing[end], "r95") for end in ("contact", "rest"))
+            rows.append((case.name, *radii, *sizes, success, why))
+    return _table((f"{truth_model}: touchdown", *ends, *parts, "landed [%] (95 % interval)", "not landed by"), rows)
 
 
 def _over_stated(made: list[Case]) -> str:
     """Which state's error is larger or smaller than the navigator says."""
     rows = [
-        (case.name, model, *(_ratio(getattr(case, model)["error_over_stated"][state]) for state in STATES))
+        (case.name, model, *_ratios(getattr(case, model)["error_over_stated"]))
         for case in made for model in TRUTH_MODELS
     ]  # fmt: skip
     return _table(("RMS of the error over what is stated of it, at the horizon", "truth", *STATES), rows)
 
 
 def _by_height(made: list[Case]) -> str:
-    rows = [
-        (case.name, band, *(_ratio(ratios[state]) for state in STATES))
-        for case in made for band, ratios in case.matched["rmse_over_bound_by_height"].items()
-    ]  # fmt: skip
+    bands = ((case.name, *band) for case in made for band in case.matched["rmse_over_bound_by_height"].items())
+    rows = [(name, band, *_ratios(ratios)) for name, band, ratios in bands]
     return _table((f"matched: {BOUND}", "height of the skids", *STATES), rows)
 
 
 def _ablations(case: Case) -> str:
-    def cells(row: dict[str, Any]) -> tuple[str, ...]:
-        ratios = (row["horizontal_rms_ratio"], row["vertical_rms_ratio"], row["horizontal_speed_rms_ratio"])
-        return (
-            _length(row["p95_largest_horizontal_m"]), *(f"{ratio:.2f}" for ratio in ratios), f"{row['anees']:.3g}",
-            _length(row["rest_r95_m"]), str(row["crashed"]),
-        )  # fmt: skip
-
-    rows = [(lacking, *cells(row)) for lacking, row in case.ablations.items()]
-    heading = (
-        f"{case.name} without",
-        "p95 of largest horizontal error [m]",
-        "horizontal RMSE ratio",
-        "vertical RMSE ratio",
-        "horizontal speed RMSE ratio",
-        "ANEES",
-        "touchdown R95 at rest [m]",
-        "crashed",
+    columns = (
+        Column("p95 of largest horizontal error [m]", "p95_largest_horizontal_m", ".3f"),
+        Column("horizontal RMSE ratio", "horizontal_rms_ratio", ".2f"),
+        Column("vertical RMSE ratio", "vertical_rms_ratio", ".2f"),
+        Column("horizontal speed RMSE ratio", "horizontal_speed_rms_ratio", ".2f"),
+        Column("ANEES", "anees", ".3g"),
+        Column("touchdown R95 at rest [m]", "rest_r95_m", ".3f"),
+        Column("crashed", "crashed", ""),
     )
-    return _table(heading, rows)
+    rows = [(lacking, *(column.cell(row) for column in columns)) for lacking, row in case.ablations.items()]
+    return _table((f"{case.name} without", *(column.title for column in columns)), rows)
 
 
-def _ratio(ratio: float) -> str:
-    return f"{ratio:.3f}"
+def _ratios(by_state: dict[str, float]) -> Iterator[str]:
+    return (f"{by_state[state]:.3f}" for state in STATES)
 
 
 def _length(number: float | None) -> str:
-    return "-" if number is None else f"{number:.3f}"
+    return figure(number, ".3f")
 
 
 def _interval(facts: dict[str, Any], name: str) -> str:
-    value, ends = facts[f"{name}_m"], facts[f"{name}_interval_m"]
-    if value is None:
-        return "-"
-    return f"{value:.3f} ({'-'.join('?' if end is None else f'{end:.3f}' for end in ends)})"
+    return with_ends(facts[f"{name}_m"], facts[f"{name}_interval_m"])
 
 
 def _table(heading: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:

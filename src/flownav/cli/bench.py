@@ -1,20 +1,29 @@
-"""`flownav bench`: how fast this machine runs flownav, as ratios and times measured in one run."""
+"""`flownav bench`: how fast this machine runs flownav, measured in one run; `flownav schema`: what commands print."""
 
 from __future__ import annotations
 
-from typing import Annotated
+import json
+from typing import Annotated, Any
 
 import typer
 
-from flownav.cli.options import JsonOption
-from flownav.cli.output import emit
+from flownav.cli import options
+from flownav.cli.options import named, option
+from flownav.cli.tables import Column, answer, say, table_of
 
 WIDE = 144  # columns of the table
+COLUMNS = (
+    Column("figure", "name"),
+    Column("measured", lambda row: f"{row['value']:.3g} {row['unit']}"),
+    Column("asked", lambda row: "" if row["asked"] is None else _asked(row)),
+    Column("verdict", lambda row: {True: "reached", False: "missed", None: ""}[row["reached"]]),
+    Column("note", "note"),
+)
 
 
 def command(
-    flights: Annotated[int, typer.Option(metavar="N", help="Flights in the batch that is timed.")] = 1024,
-    as_json: JsonOption = False,
+    flights: Annotated[int, option("N", "Flights in the batch that is timed.")] = 1024,
+    as_json: options.Json = False,
 ) -> None:
     """Measure flights on both filters, lanes, the filters' steps, replay, start-up, compile time and memory."""
     from flownav.cli.output import progress, require_between
@@ -26,21 +35,42 @@ def command(
         for measured in measure_all(flights):
             figures += measured
             advance(1)
-    if as_json:
-        rows = [{**figure.__dict__, "reached": figure.reached} for figure in figures]
-        emit({"figures": rows})
-        return
-    from rich.console import Console
-    from rich.table import Table
+    rows = [{**figure.__dict__, "reached": figure.reached} for figure in figures]
+    shown = table_of(COLUMNS, rows, title="flownav on this machine", title_justify="left")
+    shown.columns[1].justify = shown.columns[2].justify = "right"
+    answer({"figures": rows}, as_json, lambda: say(shown, wide=WIDE))
 
-    table = Table(title="flownav on this machine", title_justify="left")
-    for heading in ("figure", "measured", "asked", "verdict", "note"):
-        table.add_column(heading, justify="right" if heading in ("measured", "asked") else "left")
-    for figure in figures:
-        sign = ">=" if figure.more_is_better else "<="
-        verdict = {True: "reached", False: "missed", None: ""}[figure.reached]
-        asked = "" if figure.asked is None else f"{sign} {figure.asked:g} {figure.unit}"
-        table.add_row(figure.name, f"{figure.value:.3g} {figure.unit}", asked, verdict, figure.note)
-    console = Console(markup=False, highlight=False)
-    console.width = max(console.width, WIDE)
-    console.print(table)
+
+def _asked(row: dict[str, Any]) -> str:
+    return f"{'>=' if row['more_is_better'] else '<='} {row['asked']:g} {row['unit']}"
+
+
+def _complete(incomplete: str) -> list[str]:
+    from flownav.core.schemas import names
+
+    return [name for name in names() if name.startswith(incomplete)]
+
+
+def schema(
+    name: Annotated[
+        str | None,
+        named(
+            "NAME",
+            "Which schema, such as fly or file-scenario.",
+            show_default="a list of them",
+            autocompletion=_complete,
+        ),
+    ] = None,
+    as_json: options.Json = False,
+) -> None:
+    """Print the JSON schema of a command's --json object (by the command's name), or of a file; or list them."""
+    from flownav.cli.output import emit
+    from flownav.core.schemas import names, schema_of
+
+    if name is not None:
+        typer.echo(json.dumps(schema_of(name), indent=1))
+    elif as_json:
+        emit({"schemas": [{"name": each, "id": schema_of(each)["$id"]} for each in names()]})
+    else:
+        for each in names():
+            typer.echo(f"{each:<18} {schema_of(each).get('title', '')}")

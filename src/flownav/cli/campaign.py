@@ -7,20 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from flownav.cli.choices import SAMPLINGS, SCENARIOS, TRUTH_MODELS, argument, one_of, option
-from flownav.cli.options import (
-    KEPT,
-    EngineOption,
-    FilterOption,
-    JsonOption,
-    RecordsOption,
-    SeedOption,
-    VehicleOption,
-    out_option,
-)
-from flownav.cli.output import emit, require_between
+from flownav.cli import options
+from flownav.cli.options import SCENARIOS, argument, chosen, option, out_option
+from flownav.cli.output import require_between
+from flownav.cli.tables import answer
 from flownav.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -29,51 +19,44 @@ if TYPE_CHECKING:
     from flownav.campaigns.plan import Plan
 
 
-ScenariosArgument = Annotated[
-    list[str], argument("SCENARIO", "What is flown", *SCENARIOS, beside="a scenario's FILE.toml")
-]
 FLIGHTS_OF = "Flights of each cell; with --until or --rare the most."
-FlightsOption = Annotated[int | None, option("N", FLIGHTS_OF, unset="1000; with --until or --rare 100000")]
 UNTIL = 'Stop when an interval is narrow enough: "r95_m width <= 0.005".'
 SWEEP = "Fly every value of a key of the scenario, wind.speed_20ft_m_s=0:12:2 or =a,b,c; may be repeated."
-SetOption = Annotated[
-    list[str] | None, option("KEY=VALUE", "Another value in the scenario: filter.name=paper.", "--set")
-]
-SamplingOption = Annotated[
-    str, typer.Option(help="How the dispersed inputs are spread over the flights.", **one_of(*SAMPLINGS))
-]
+SET = "Another value in the scenario: filter.name=paper."
+SAMPLING = "How the dispersed inputs are spread over the flights."
 MODELS = "Each flight's vehicle, wind and sensors drawn, as the datasheets say, or both."
-OutOption = Annotated[
-    Path | None, out_option(f"The folder; {KEPT}", "out/SCENARIO_campaign; with --rare SCENARIO_rare")
-]
+FOLDER = f"The folder; {options.KEPT}"
 FLIGHT = "Fly this flight again and write its record: K, CELL:K, or --rare's rare_flight.json."
 RARE = 'How probable this is, to 1e-6: "touchdown.horizontal_m > 1", "crash".'
+Scenarios = Annotated[list[str], argument("SCENARIO", "What is flown", *SCENARIOS, beside="a scenario's FILE.toml")]
+Flights = Annotated[int | None, option("N", FLIGHTS_OF, unset="1000; with --until or --rare 100000")]
+Out = Annotated[Path | None, out_option(FOLDER, "out/SCENARIO_campaign; with --rare SCENARIO_rare")]
 
 
 def command(
-    scenarios: ScenariosArgument,
-    flights: FlightsOption = None,
+    scenarios: Scenarios,
+    flights: Flights = None,
     until: Annotated[str | None, option("RULE", UNTIL)] = None,
     sweep: Annotated[list[str] | None, option("KEY=VALUES", SWEEP)] = None,
-    set_: SetOption = None,
-    sampling: SamplingOption = "plain",
-    truth_model: Annotated[str, typer.Option(help=MODELS, **one_of(*TRUTH_MODELS))] = "ensemble",
-    filter_name: FilterOption = None,
-    vehicle: VehicleOption = None,
-    seed: SeedOption = 1,
-    engine: EngineOption = "local",
-    out: OutOption = None,
-    records: RecordsOption = 1,
+    set_: Annotated[list[str] | None, option("KEY=VALUE", SET, "--set")] = None,
+    sampling: Annotated[str, chosen(SAMPLING, *options.SAMPLINGS)] = "plain",
+    truth_model: Annotated[str, chosen(MODELS, *options.TRUTH_MODELS)] = "ensemble",
+    filter_name: options.Filter = None,
+    vehicle: options.Vehicle = None,
+    seed: options.Seed = 1,
+    engine: options.Engine = "local",
+    out: Out = None,
+    records: options.Records = 1,
     flight: Annotated[str | None, option("K", FLIGHT)] = None,
     rare: Annotated[str | None, option("EVENT", RARE)] = None,
-    as_json: JsonOption = False,
+    as_json: options.Json = False,
 ) -> None:
     """Fly a scenario many times: radii, shares and percentiles with intervals, a dataset, the worst flights."""
+    from flownav.api.calls import split
     from flownav.api.campaigning import plan_of
-    from flownav.api.parts import split
     from flownav.campaigns.run import engine_named, require_engine
     from flownav.campaigns.summary import WORST
-    from flownav.cli.campaign_rare import fly_again, fly_rare
+    from flownav.cli.campaign_said import fly_again, fly_rare
     from flownav.parts.flying import OwnPartsEngine, identities
 
     planned = _planned_flights(out) if flight is not None else None
@@ -83,9 +66,9 @@ def command(
     parts, ours, _ = split(filter_name, (), None, None)
     if parts.any and (engine != "local" or rare is not None):
         raise InputError(f"--filter {filter_name}: is flown by this process; leave out --engine and --rare")
-    chosen = _scenarios(scenarios, ours, vehicle)
+    scenarios_asked = _scenarios(scenarios, ours, vehicle)
     plan = plan_of(
-        chosen, flights=count, seed=seed, sweep=_once("--sweep", map(_swept, sweep or ())),
+        scenarios_asked, flights=count, seed=seed, sweep=_once("--sweep", map(_swept, sweep or ())),
         changes=_once("--set", map(_set, set_ or ())), sampling=sampling, truth_model=truth_model, until=until,
     )  # fmt: skip
     plan = replace(plan, parts=identities(parts))
@@ -93,10 +76,10 @@ def command(
     if rare is not None and engine != "local":
         raise InputError(f"--rare: flies on this machine's cores only; leave out --engine {engine}")
     if rare is not None:
-        return fly_rare(plan, rare, _folder(out, chosen, "rare"), as_json)
+        return fly_rare(plan, rare, _folder(out, scenarios_asked, "rare"), as_json)
     if flight is not None and flight.endswith(".json"):
         return fly_again(plan, Path(flight), as_json)
-    folder = _folder(out, chosen, "campaign")
+    folder = _folder(out, scenarios_asked, "campaign")
     if flight is not None:
         return _again(plan, flight, folder, as_json, flies)
     _fly(plan, flies or engine_named(engine), folder, records, as_json)
@@ -135,23 +118,20 @@ def _fly(plan: Plan, engine: Engine, folder: Path, records: int, as_json: bool) 
     """Fly what the folder lacks; what is said of it."""
     from flownav.api.campaigning import fly_plan
     from flownav.campaigns.store import REPORT
-    from flownav.cli.campaign_progress import watching
+    from flownav.cli.campaign_said import show, watching
 
     with watching(plan) as watch:
         flown = fly_plan(plan, engine, folder, records=records, watch=watch)
     kept = [str(path) for path in flown.records]
-    if as_json:
-        where = {"rate_per_s": flown.rate_per_s, "dataset": str(folder / "flights"), "records": kept}
-        emit(flown.summary | where | {"report": str(folder / REPORT)})
-    else:
-        from flownav.cli.campaign_table import show
-
-        show(flown.summary, folder, flown.rate_per_s, kept)
+    where = {"rate_per_s": flown.rate_per_s, "dataset": str(folder / "flights"), "records": kept}
+    facts = flown.summary | where | {"report": str(folder / REPORT)}
+    answer(facts, as_json, lambda: show(flown.summary, folder, flown.rate_per_s, kept))
 
 
 def _again(plan: Plan, flight: str, folder: Path, as_json: bool, engine: Engine | None) -> None:
     """One flight of the campaign, flown again."""
     from flownav.api.campaigning import fly_again
+    from flownav.cli.campaign_said import say_flight
 
     cell, _, number = flight.rpartition(":")
     try:
@@ -160,11 +140,7 @@ def _again(plan: Plan, flight: str, folder: Path, as_json: bool, engine: Engine 
         raise InputError(f"--flight {flight}: a number, or CELL:NUMBER, is needed") from None
     record, path = fly_again(plan, folder, place, index, engine)
     where = {"record": str(path), "report": str(path.with_suffix(".html"))}
-    facts = {"cell": plan.cells[place].label, "flight": index, **record.scores, **where}
-    if as_json:
-        emit(facts)
-    else:
-        typer.echo(f"{facts['cell']}, flight {index}\nrecord  {where['record']}\nreport  {where['report']}")
+    say_flight({"cell": plan.cells[place].label, "flight": index, **record.scores, **where}, f"flight {index}", as_json)
 
 
 def _planned_flights(folder: Path | None) -> int | None:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from flownav.cli.choices import REQUIREMENTS, argument, option
-from flownav.cli.options import KEPT, EngineOption, JsonOption, RecordsOption, VehicleOption, out_option
-from flownav.cli.output import emit
+from flownav.campaigns.run import engine_named, require_engine
+from flownav.cli import options
+from flownav.cli.options import argument, option, out_option, switch
+from flownav.cli.tables import Column, answer, figure, say, table_of
 from flownav.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,32 +16,44 @@ if TYPE_CHECKING:
     from flownav.campaigns.plan import Plan
     from flownav.campaigns.requirement import Requirement
 
-
-RequirementArgument = Annotated[
-    str, argument("REQUIREMENT", "What to show", *REQUIREMENTS, beside="a requirement's FILE.toml")
-]
-RankingOption = Annotated[
-    int, option("N", "Rows of the ranking of inputs, a power of 2, for each input; 0: none.", "--ranking")
-]
+WIDE = 150  # columns of the tables
+FILE = "a requirement's FILE.toml"
+RANKING = "Rows of the ranking of inputs, a power of 2, for each input; 0: none."
+FLIGHTS = "as many as the requirement needs"
+PLAN = (
+    Column("requirement", "requirement"),
+    Column("flights with 0 failures", lambda row: str(row["needed"]["0"])),
+    Column("with 1", lambda row: str(row["needed"]["1"])),
+    Column("with 2", lambda row: str(row["needed"]["2"])),
+    Column("failures allowed", "allowed_failures"),
+    Column("flights", "flights"),
+)
+JUDGED = (
+    Column("requirement", "sentence"),
+    Column("failed", lambda one: f"{one['failures']} of {one['flights']} ({_allowed(one)})"),
+    Column("probability shown [%]", "low", ".3f", 100.0),
+    Column("tolerance bound", lambda one: f"{figure(one['tolerance_bound'], '.3f')} {_unit(one)}".rstrip()),
+    Column("risk [%]", "risk", ".1f", 100.0),
+    Column("verdict", "verdict"),
+)
 
 
 def command(
-    requirement: RequirementArgument,
-    plan_only: Annotated[bool, typer.Option("--plan", help="Only say how many flights are needed.")] = False,
-    flights: Annotated[int | None, option("N", "How many flights.", unset="as many as the requirement needs")] = None,
-    ranking: RankingOption = 64,
-    records: RecordsOption = 3,
-    vehicle: VehicleOption = None,
-    engine: EngineOption = "local",
-    out: Annotated[Path | None, out_option(f"The folder; {KEPT}", "out/NAME_certificate")] = None,
-    as_json: JsonOption = False,
+    requirement: Annotated[str, argument("REQUIREMENT", "What to show", *options.REQUIREMENTS, beside=FILE)],
+    plan_only: Annotated[bool, switch("Only say how many flights are needed.", "--plan")] = False,
+    flights: Annotated[int | None, option("N", "How many flights.", unset=FLIGHTS)] = None,
+    ranking: Annotated[int, option("N", RANKING)] = 64,
+    records: options.Records = 3,
+    vehicle: options.Vehicle = None,
+    engine: options.Engine = "local",
+    out: Annotated[Path | None, out_option(f"The folder; {options.KEPT}", "out/NAME_certificate")] = None,
+    as_json: options.Json = False,
 ) -> None:
     """Fly what a requirement asks for: pass, fail or not shown, with its risk; exit status 1 unless it passes."""
     from flownav.campaigns.certification.cells import plan_of
     from flownav.campaigns.certification.certify import TOLD
     from flownav.campaigns.ranking import LEAST
     from flownav.campaigns.requirement import load_requirement
-    from flownav.campaigns.run import engine_named, require_engine
     from flownav.cli.output import require_between
     from flownav.core.errors import VerdictError
 
@@ -59,12 +70,7 @@ def command(
     plan = plan_of(asked, flights, vehicle)
     folder = out or Path("out") / f"{asked.name}_certificate"
     facts = _fly(asked, plan, engine_named(engine), requirement, folder, ranking, records)
-    if as_json:
-        emit(facts)
-    else:
-        from flownav.cli.certify_table import show
-
-        show(facts)
+    answer(facts, as_json, lambda: show(facts))
     if facts["verdict"] != "pass":
         worst = [one for one in facts["requirement"]["requirements"] if one["verdict"] != "pass"]
         raise VerdictError(f"{asked.name}: " + "; ".join(f"{one['verdict']}: {one['sentence']}" for one in worst))
@@ -79,7 +85,7 @@ def _fly(
     from flownav.campaigns.certification.written import write_certificate
     from flownav.campaigns.ranking import flights_of
     from flownav.campaigns.store import Store
-    from flownav.cli.campaign_progress import watching
+    from flownav.cli.campaign_said import watching
     from flownav.cli.output import progress
 
     inputs = max(len(cell.setup.ensemble().entries) for cell in plan.cells)
@@ -108,9 +114,45 @@ def _say_plan(asked: Requirement, as_json: bool) -> None:
         }
         for table in asked.requirement
     ]
-    if as_json:
-        emit({"requirement": asked.name, "flights": asked.flights(), "requirements": rows})
-        return
-    from flownav.cli.certify_table import show_plan
+    plan = {"requirement": asked.name, "flights": asked.flights(), "requirements": rows}
+    said = f"{asked.name}: {asked.flights()} flights"
+    answer(plan, as_json, lambda: say(said, table_of(PLAN, rows, left=1), wide=WIDE))
 
-    show_plan(asked.name, rows, asked.flights())
+
+RANKED = 5  # inputs that are printed
+
+
+def show(facts: dict[str, Any]) -> None:
+    """Verdict, figures, envelope in a line, ranking, files."""
+    judged = facts["requirement"]["requirements"]
+    say(f"{facts['verdict'].upper()}  {facts['requirement']['name']}", table_of(JUDGED, judged, left=1), wide=WIDE)
+    lines = [one["more"] for one in judged if one["more"]]
+    fields, cells = facts["envelope"]["bins"], facts["envelope"]["cells"]
+    if fields:
+        counts = [(sum(field["verdict"] == name for field in fields), name) for name in ("pass", "not shown", "fail")]
+        said = ", ".join(f"{count} {name}" for count, name in counts)
+        lines.append(f"envelope  {len(fields)} fields over {' and '.join(facts['envelope']['axes'])}: {said}")
+    for cell in cells if len(cells) > 1 else ():
+        lines.append(f"cell      {cell['cell']}: {cell['failures']} of {cell['flights']} failed, {cell['verdict']}")
+    if facts["ranking"] and facts["ranking_of"] == "nothing":
+        lines.append(f"rank      nothing: all {facts['ranking_flights']} flights of the ranking have the same outcome")
+    elif facts["ranking"]:
+        lines += [f"rank      {_index(row, 'input')}" for row in facts["ranking"][:RANKED]]
+        lines += [f"known     {_index(row, 'known')}" for row in facts["split"]]
+    say(*lines, f"page      {facts['out']}", wide=WIDE, soft=True)
+
+
+def _allowed(one: dict[str, Any]) -> str:
+    return "too few flights to pass" if one["failures_allowed"] < 0 else f"at most {one['failures_allowed']}"
+
+
+def _unit(one: dict[str, Any]) -> str:
+    return "" if one["tolerance_bound"] is None else str(one["unit"])
+
+
+def _index(row: dict[str, Any], name: str) -> str:
+    first, total = (
+        f"{which} {row[which]:.2f} ({row[f'{which}_interval'][0]:.2f} to {row[f'{which}_interval'][1]:.2f})"
+        for which in ("first", "total")
+    )
+    return f"{row[name]}: {first}, {total}"

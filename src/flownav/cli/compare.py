@@ -1,20 +1,19 @@
-"""`flownav compare`: many logs, many settings, and what else could have navigated."""
+"""`flownav compare` and `flownav tune`: many logs by many settings, and settings proposed from logs."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from flownav.cli.choices import option
-from flownav.cli.options import LOG_KINDS, ForceOption, JsonOption, SensorOption, out_option
-from flownav.cli.output import emit
+from flownav.cli import options
+from flownav.cli.options import named, option, out_option
+from flownav.cli.output import writing
+from flownav.cli.tables import Column, answer, plain_look, say, say_files, table, table_of
 
 if TYPE_CHECKING:
     from flownav.studies.compare.job import Setting
+    from flownav.studies.tuning.job import OfLog, Tuned
 
 DEFAULT = "default"
 SHORT_RECORDS = ("against", "horizontal\n[m]", "vertical\n[m]", "velocity\n[m/s]", "touchdown\n[m]")
@@ -27,26 +26,20 @@ SHORT = (
 TITLE = "rms errors where all estimators of a log have rows; end drift; GPS cuts"
 
 
-LogsOrRecords = Annotated[
-    list[Path],
-    typer.Argument(metavar="LOG", help=f"Logs, each {LOG_KINDS}; or two and more records.", show_default=False),
-]
-WithOption = Annotated[
-    list[str] | None,
-    option("FILE.toml", f"Settings of the navigator, or `{DEFAULT}`; may be repeated.", "--with", unset=DEFAULT),
-]
+LOGS = f"Logs, each {options.LOG_KINDS}; or two and more records."
+WITH = f"Settings of the navigator, or `{DEFAULT}`; may be repeated."
 WINDOWS = "Windows of LENGTH from T0 to T1 [s] in which GPS is withheld."
-OutagesOption = Annotated[str | None, option("T0:T1:LENGTH", WINDOWS, unset="whole minutes of the flight")]
+MINUTES = "whole minutes of the flight"
 
 
 def command(
-    logs: LogsOrRecords,
-    settings: WithOption = None,
-    sensor: SensorOption = None,
-    outages: OutagesOption = None,
+    logs: Annotated[list[Path], named("LOG", LOGS)],
+    settings: Annotated[list[str] | None, option("FILE.toml", WITH, "--with", unset=DEFAULT)] = None,
+    sensor: options.Sensor = None,
+    outages: Annotated[str | None, option("T0:T1:LENGTH", WINDOWS, unset=MINUTES)] = None,
     out: Annotated[Path | None, out_option("The comparison (HTML)")] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
 ) -> None:
     """Score every log by every setting, beside dead reckoning and its autopilot; or lay records over each other."""
     from flownav.cli.output import place, progress
@@ -55,7 +48,8 @@ def command(
     from flownav.core.measurement import Sensor
     from flownav.logs.open_log import open_flight
     from flownav.replays.session import table_windows
-    from flownav.studies.compare.job import compare_log, names_of, windows_of
+    from flownav.report.comparison import write_comparison
+    from flownav.studies.compare.job import HEADINGS, cells, compare_log, names_of, windows_of
 
     if len(logs) > 1 and all(path.suffix == ".fnr" for path in logs) and not (settings or sensor or outages):
         return _records(logs, None if out is None else place(out, *logs, force=force), as_json=as_json)
@@ -71,32 +65,29 @@ def command(
     with progress("replays", sum(len(chosen) * (len(cuts) + 1) for cuts in windows)) as advance:
         for name, log, cuts in zip(names_of(logs), flights, windows, strict=True):
             rows += compare_log(name, log, chosen, cuts, advance)
-    written = {} if path is None else _write(rows, path)
-    if as_json:
-        emit({"rows": rows, **written})
-    else:
-        _print(rows, written)
+    if path is not None:
+        with writing(path):
+            write_comparison(HEADINGS, [cells(row) for row in rows], rows, path)
+    written = {} if path is None else {"page": str(path)}
+    answer({"rows": rows, **written}, as_json, lambda: _show(rows, written))
 
 
 def _records(paths: list[Path], out: Path | None, *, as_json: bool) -> None:
     """Records beside each other, as they are: nothing is replayed."""
     from flownav.core.record import Record
-    from flownav.report.records import write_records
+    from flownav.report.comparison import write_records
     from flownav.studies.compare.job import names_of
     from flownav.studies.compare.records import HEADINGS, cells, errors_in_time, rows_of_records
 
-    named = list(zip(names_of(paths), [Record.load(path) for path in paths], strict=True))
-    rows = rows_of_records(named)
+    records = list(zip(names_of(paths), [Record.load(path) for path in paths], strict=True))
+    rows = rows_of_records(records)
     written = {}
     if out is not None:
-        errors = [errors_in_time(record) for _, record in named]
-        with _writing(out):
-            write_records(named, errors, HEADINGS, [cells(row) for row in rows], out)
+        errors = [errors_in_time(record) for _, record in records]
+        with writing(out):
+            write_records(records, errors, HEADINGS, [cells(row) for row in rows], out)
         written = {"page": str(out)}
-    if as_json:
-        emit({"records": rows, **written})
-    else:
-        _print_records(rows, written)
+    answer({"records": rows, **written}, as_json, lambda: _show_records(rows, written))
 
 
 def settings_asked(asked: list[str], sensor: Path | None) -> list[Setting]:
@@ -124,77 +115,144 @@ def settings_asked(asked: list[str], sensor: Path | None) -> list[Setting]:
     return found
 
 
-def _write(rows: list[dict[str, Any]], path: Path) -> dict[str, str]:
-    """The page; where it lies. InputError where it cannot."""
-    from flownav.report.comparison import write_comparison
-    from flownav.studies.compare.job import HEADINGS, cells
-
-    with _writing(path):
-        write_comparison(HEADINGS, [cells(row) for row in rows], rows, path)
-    return {"page": str(path)}
-
-
-@contextmanager
-def _writing(path: Path) -> Iterator[None]:
-    """InputError where the page cannot be written."""
-    from flownav.core.errors import InputError
-
-    try:
-        yield
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
-
-
-def _print_records(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
+def _show_records(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
     """Records for people: their errors, then how each differs from the first."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     from flownav.studies.compare.records import MEASURES, cells, figure
 
-    console = Console(markup=False, highlight=False)
-    look: dict[str, Any] = {"box": box.SIMPLE_HEAD, "show_edge": False, "padding": (0, 1, 0, 0)}
-    errors = Table("record", *SHORT_RECORDS, title="rms errors in flight; touchdown off the pad's centre", **look)
+    errors = _table(("record", *SHORT_RECORDS), "rms errors in flight; touchdown off the pad's centre")
     for row in rows:
         errors.add_row(*cells(row)[:6])
-    apart = Table("record", *SHORT_APART, title=f"mean error less that of {rows[0]['record']}", **look)
+    apart = _table(("record", *SHORT_APART), f"mean error less that of {rows[0]['record']}")
     for row in rows[1:]:
         apart.add_section()
         apart.add_row(row["record"])
         for name in MEASURES:
             found = (row["difference"] or {}).get(name) or {}
             apart.add_row(f"  {SAID[name]}", *(figure(found.get(key)) for key in ("mean", "low", "high")))
-    for table in (errors, apart):
-        table.columns[0].overflow = "fold"
-        for column in table.columns[1:]:
-            column.justify, column.no_wrap = "right", True
-        console.print(table)
-    for name, place in written.items():
-        console.print(f"{name.capitalize()}: {place}", soft_wrap=True)
+    say(errors, apart)
+    say_files(written, written)
 
 
-def _print(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
+def _show(rows: list[dict[str, Any]], written: dict[str, str]) -> None:
     """The same figures for people: a log's name, then its estimators."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
     from flownav.studies.compare.job import cells
 
-    console = Console(markup=False, highlight=False)
-    table = Table(*SHORT, title=TITLE, box=box.SIMPLE_HEAD, show_edge=False, padding=(0, 1, 0, 0))
-    table.columns[0].overflow = "fold"
-    for column in table.columns[1:]:
-        column.justify, column.no_wrap = "right", True
-    log = ""
+    shown, log = _table(SHORT, TITLE), ""
     for row in rows:
         name, estimator, against, *figures = cells(row)
         if name != log:
-            table.add_section()
-            table.add_row(name if against == "-" else f"{name}, by {against}")
-        table.add_row(f"  {estimator}", *figures)
+            shown.add_section()
+            shown.add_row(name if against == "-" else f"{name}, by {against}")
+        shown.add_row(f"  {estimator}", *figures)
         log = name
-    console.print(table)
-    for name, place in written.items():
-        console.print(f"{name.capitalize()}: {place}", soft_wrap=True)
+    say(shown)
+    say_files(written, written)
+
+
+def _table(heads: Sequence[str], title: str) -> Any:
+    """An empty table whose first column is folded where it is long, and whose figures stay on a line."""
+    made = table(heads, left=1, title=title, **plain_look(edge=False))
+    made.columns[0].overflow = "fold"
+    for column in made.columns[1:]:
+        column.no_wrap = True
+    return made
+
+
+FILE = "The settings file, written only if the proposal is accepted"
+PROPOSED = (
+    Column("setting", "key"),
+    Column("was", "default", "g"),
+    Column("tuned", "value", "g"),
+    Column("95 % interval", lambda row: f"{row['low']:g} to {row['high']:g}"),
+)
+OF_LOGS = (
+    Column("log", "log"),
+    Column("windows", lambda log: _windows(log)),
+    Column("against", "against"),
+    Column("was", lambda log: _with_unit(log, "median_error")),
+    Column("tuned", lambda log: _with_unit(log, "median_error_tuned")),
+)
+
+
+def tune_settings(
+    logs: options.Logs,
+    settings: options.Settings = None,
+    sensor: options.Sensor = None,
+    out: Annotated[Path | None, out_option(FILE, "out/settings.toml")] = None,
+    force: options.Force = False,
+    as_json: options.Json = False,
+) -> None:
+    """Propose settings from logs: fitted on every other window of the flights, accepted only if the rest gain by it."""
+    from flownav.cli.output import place, progress
+    from flownav.core.errors import InputError
+    from flownav.core.parameter_files import load
+    from flownav.core.provenance import command_line
+    from flownav.logs.open_log import open_flight
+    from flownav.navigation.settings import NavigatorSettingsFile
+    from flownav.studies.tuning.job import runs_expected, tune, write_settings
+
+    path = out or Path("out/settings.toml")
+    if path.suffix != ".toml":
+        raise InputError(f"--out {path}: a settings file's name ends in .toml")
+    path = place(path, *logs, settings, sensor, force=force)
+    (start,) = settings_asked([DEFAULT if settings is None else str(settings)], sensor)
+    stated = None if settings is None else load(settings, NavigatorSettingsFile)
+    flights = [open_flight(path) for path in logs]
+    with progress("replays", runs_expected(flights)) as advance:
+        tuned = tune(logs, flights, start.options, start.numbers, advance)
+    if tuned.accepted:
+        write_settings(path, tuned, stated, command_line())
+    facts = _facts(tuned) | {"file": str(path) if tuned.accepted else None}
+    answer(facts, as_json, lambda: _show_tuned(tuned, facts))
+
+
+def _facts(tuned: Tuned) -> dict[str, Any]:
+    """The JSON object, less the file."""
+    judgement = tuned.judgement
+    return {
+        "verdict": judgement.verdict,
+        "why": judgement.why,
+        "settings": [row._asdict() for row in tuned.proposed],
+        "gain_nats": None if judgement.total is None else judgement.total._asdict(),
+        "error_gain_nats": None if judgement.error is None else judgement.error._asdict(),
+        "logs": [_log_facts(log) for log in tuned.logs],
+        "runs": tuned.runs,
+    }
+
+
+def _log_facts(log: OfLog) -> dict[str, Any]:
+    from flownav.studies.tuning.scores import UNITS
+
+    return {
+        "log": log.name,
+        "held_out_whole": log.split.whole,
+        "fit_windows": [list(window) for window in log.split.fit],
+        "held_out_windows": [list(window) for window in log.split.held],
+        "against": log.reference,
+        "unit": UNITS.get(log.reference or ""),
+        "gain_nats": log.gain,
+        "median_error": log.start_error,
+        "median_error_tuned": log.error,
+    }
+
+
+def _show_tuned(tuned: Tuned, facts: dict[str, Any]) -> None:
+    """The same figures for people."""
+    from flownav.studies.tuning.job import gain_words
+
+    if tuned.proposed:
+        say(table_of(PROPOSED, facts["settings"], title="Proposed"))
+    say(table_of(OF_LOGS, facts["logs"], title="Median error in the held-out windows"))
+    judgement = tuned.judgement
+    figures = f": {gain_words(judgement.error)}" if judgement.error is not None else ""
+    say(f"{judgement.verdict.capitalize()}: {judgement.why}{figures}", soft=True)
+    say_files({"settings": facts["file"]}, ("settings",))
+
+
+def _windows(log: dict[str, Any]) -> str:
+    fit = "all held out" if log["held_out_whole"] else f"fit on {len(log['fit_windows'])}"
+    return f"{len(log['held_out_windows'])}, {fit}"
+
+
+def _with_unit(log: dict[str, Any], key: str) -> str:
+    return "-" if log[key] is None else f"{log[key]:.3f} {log['unit'] or ''}"

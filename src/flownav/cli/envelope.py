@@ -7,39 +7,30 @@ from typing import Annotated, Any
 
 import typer
 
-from flownav.cli.choices import option
-from flownav.cli.options import (
-    EnsembleOption,
-    ForceOption,
-    JsonOption,
-    ScenarioArgument,
-    SeedOption,
-    VehicleOption,
-    out_option,
-)
-from flownav.cli.output import emit
+from flownav.cli import options
+from flownav.cli.options import numbers, option, out_option
+from flownav.cli.tables import answer, say, table
 
 SPEEDS_M_S = ["2,4,6,8,10"]
 
 
 def command(
-    scenario: ScenarioArgument,
+    scenario: options.Scenario,
     speeds: Annotated[list[str], option("M/S", "Wind speeds at 20 ft [m/s], repeated or with commas.")] = SPEEDS_M_S,
     directions: Annotated[int, option("N", "How many directions the wind blows from, from north on.")] = 8,
-    vehicle: VehicleOption = None,
+    vehicle: options.Vehicle = None,
     flights: Annotated[int, option("N", "Flights of each speed and direction.")] = 32,
-    seed: SeedOption = 1,
-    ensemble: EnsembleOption = True,
+    seed: options.Seed = 1,
+    ensemble: options.Ensemble = True,
     out: Annotated[Path | None, out_option("The page (HTML)", "out/SCENARIO_envelope.html")] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
 ) -> None:
     """Fly a scenario in winds of many speeds and directions: a table and a polar map of the share that landed."""
     from flownav.campaigns.local import directions_deg, fly_envelope
-    from flownav.cli.lists import numbers
-    from flownav.cli.output import place, progress, require_between
+    from flownav.cli.output import place, progress, require_between, writing
     from flownav.core.errors import InputError
-    from flownav.report.envelope import write_envelope
+    from flownav.report.campaign import write_envelope
     from flownav.simulation.scenario import load_scenario, with_vehicle
 
     require_between("--flights", flights, 1, 1_000_000)
@@ -57,33 +48,20 @@ def command(
     model = "ensemble" if ensemble else "matched"
     named = f", {vehicle}" if vehicle else ""
     title = f"{chosen.name}{named}, {model}, {flights} flights a field, seed {seed}"
-    try:
+    with writing(page):
         write_envelope(title, rows, page)
-    except OSError as error:
-        raise InputError(f"{page}: cannot be written ({error.strerror}); give another --out") from error
-    if as_json:
-        facts: dict[str, Any] = {"scenario": chosen.name, "vehicle": vehicle, "truth_model": model}
-        facts |= {"flights": flights, "seed": seed}
-        emit(facts | {"cells": rows, "out": str(page)})
-        return
-    _show(title, rows)
-    typer.echo(f"page  {page}")
+    facts = {"scenario": chosen.name, "vehicle": vehicle, "truth_model": model, "flights": flights, "seed": seed}
+    answer(facts | {"cells": rows, "out": str(page)}, as_json, lambda: _show(title, rows, page))
 
 
-def _show(title: str, rows: list[dict[str, Any]]) -> None:
+def _show(title: str, rows: list[dict[str, Any]], page: Path) -> None:
     """Landed [%] by speed (rows) and direction (columns)."""
-    from rich.console import Console
-    from rich.table import Table
-
     directions = sorted({row["from_direction_deg"] for row in rows})
-    table = Table()
-    table.add_column("wind at 20 ft [m/s]")
-    for direction in directions:
-        table.add_column(f"from {direction:g} deg [%]", justify="right")
+    lines = []
     for speed in sorted({row["speed_20ft_m_s"] for row in rows}):
         ring = {row["from_direction_deg"]: row["success"]["rate"] for row in rows if row["speed_20ft_m_s"] == speed}
-        table.add_row(f"{speed:g}", *(f"{100.0 * ring[direction]:.0f}" for direction in directions))
-    console = Console(markup=False, highlight=False)
-    console.width = max(console.width, len(title) + 16, 26 + 19 * len(directions))
-    console.print(f"landed [%], {title}", highlight=False, markup=False)
-    console.print(table)
+        lines.append((f"{speed:g}", *(f"{100.0 * ring[direction]:.0f}" for direction in directions)))
+    heads = ("wind at 20 ft [m/s]", *(f"from {direction:g} deg [%]" for direction in directions))
+    wide = max(len(title) + 16, 26 + 19 * len(directions))
+    say(f"landed [%], {title}", table(heads, lines, left=1), wide=wide)
+    typer.echo(f"page  {page}")

@@ -7,35 +7,34 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import option
-from flownav.cli.options import FirmwareOption, JsonOption
-from flownav.cli.output import emit
+from flownav.cli import options
+from flownav.cli.options import option
+from flownav.cli.tables import answer, say, table
 
 if TYPE_CHECKING:
     from flownav.lab.optics.flow import FlowSeries
 
 
-FramesArgument = Annotated[
+FOCAL = "Focal length [px]; the PX4FLOW's is 666.67."
+RANGE = "Distance to the ground [m]; adds velocities."
+RATES = "CSV with columns rate_x_rad_s, rate_y_rad_s, rate_z_rad_s, a row a frame: compensates rotation."
+MIDDLE = "Use the middle PX x PX pixels only."
+BIN = "Average PX x PX pixels into one first."
+Frames = Annotated[
     list[Path], typer.Argument(help="A folder of pictures, pictures in order, or one video.", show_default=False)
 ]
-FocalOption = Annotated[float, option("PX", "Focal length [px]; the PX4FLOW's is 666.67.", within=(1.0, 1e6))]
-RANGE = "Distance to the ground [m]; adds velocities."
-RangeOption = Annotated[float | None, option("M", RANGE, "--range", unset=False, within=(0.01, 10_000.0))]
-RATES = "CSV with columns rate_x_rad_s, rate_y_rad_s, rate_z_rad_s, a row a frame: compensates rotation."
-WindowOption = Annotated[int | None, option("PX", "Use the middle PX x PX pixels only.", unset=False)]
-BinOption = Annotated[int, option("PX", "Average PX x PX pixels into one first.", "--bin", within=(1, 64))]
 
 
 def command(
-    frames: FramesArgument,
+    frames: Frames,
     fps: Annotated[float, option("HZ", "Frames a second.", unset=False, within=(1e-3, 1e6))],
-    focal: FocalOption = 666.67,
-    distance: RangeOption = None,
+    focal: Annotated[float, option("PX", FOCAL, within=(1.0, 1e6))] = 666.67,
+    distance: Annotated[float | None, option("M", RANGE, "--range", unset=False, within=(0.01, 10_000.0))] = None,
     rates: Annotated[Path | None, option("FILE.csv", RATES, unset=False)] = None,
-    firmware: FirmwareOption = "2014-12",
-    window: WindowOption = None,
-    bin_by: BinOption = 1,
-    as_json: JsonOption = False,
+    firmware: options.Firmware = "2014-12",
+    window: Annotated[int | None, option("PX", MIDDLE, unset=False)] = None,
+    bin_by: Annotated[int, option("PX", BIN, "--bin", within=(1, 64))] = 1,
+    as_json: options.Json = False,
 ) -> None:
     """Flow and quality from each frame to the next, with the historical firmware of your choice."""
     from flownav.core.compile import announce_compilation
@@ -51,10 +50,7 @@ def command(
             grey, fps, focal_px=focal / bin_by, rates_rad_s=turned, range_m=distance, firmware=firmware
         )
     facts = _facts(series, len(grey), grey.shape[2], grey.shape[1], fps, focal / bin_by, firmware)
-    if as_json:
-        emit(facts)
-    else:
-        _print(facts)
+    answer(facts, as_json, lambda: _show(facts))
 
 
 def _rates(path: Path) -> Any:
@@ -121,18 +117,19 @@ def _mean(values: Any, good: Any) -> list[float] | None:
     return values[good].mean(axis=0).tolist() if good.any() else None
 
 
-def _print(facts: dict[str, Any]) -> None:
-    from rich.console import Console
-    from rich.table import Table
-
+def _show(facts: dict[str, Any]) -> None:
     summary = facts["summary"]
-    console = Console(markup=False, highlight=False)
     width, height = facts["size_px"]
-    console.print(f"{facts['frames']} frames of {width}x{height} px, firmware {facts['firmware']}")
-    console.print(f"{summary['valid']} of {facts['frames'] - 1} pairs valid, quality {summary['mean_quality']:.0f}/255")
-    table = Table("mean of the valid pairs", "x", "y")
-    rows = (("flow [px]", "mean_flow_px"), ("spread [px]", "std_flow_px"), ("flow [rad/s]", "mean_flow_rad_s"))
-    for label, key in (*rows, ("velocity [m/s]", "mean_velocity_m_s")):
-        if summary[key] is not None:
-            table.add_row(label, *(f"{value:.4f}" for value in summary[key]))
-    console.print(table)
+    rows = [
+        (label, *(f"{value:.4f}" for value in summary[key]))
+        for label, key in (
+            ("flow [px]", "mean_flow_px"), ("spread [px]", "std_flow_px"), ("flow [rad/s]", "mean_flow_rad_s"),
+            ("velocity [m/s]", "mean_velocity_m_s"),
+        )
+        if summary[key] is not None
+    ]  # fmt: skip
+    say(
+        f"{facts['frames']} frames of {width}x{height} px, firmware {facts['firmware']}",
+        f"{summary['valid']} of {facts['frames'] - 1} pairs valid, quality {summary['mean_quality']:.0f}/255",
+        table(("mean of the valid pairs", "x", "y"), rows),
+    )

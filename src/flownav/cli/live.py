@@ -11,18 +11,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from flownav.cli.choices import LINKS, SENDINGS, one_of, option
-from flownav.cli.options import (
-    ForceOption,
-    GpsDelayOption,
-    JsonOption,
-    SensorOption,
-    SettingsOption,
-    SigningKeyOption,
-)
-from flownav.cli.output import emit, require_between, require_recordable
+from flownav.cli import options
+from flownav.cli.options import chosen, named, one_of, option, switch
+from flownav.cli.output import require_between, require_recordable
+from flownav.cli.tables import answer, say, say_files
 
 if TYPE_CHECKING:
     from flownav.live.loop import Latency
@@ -31,63 +23,54 @@ if TYPE_CHECKING:
     from flownav.live.session import Session
 
 
-UrlArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="URL",
-        help="udp:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:PORT or serial:DEVICE[:BAUD].",
-        show_default=False,
-        autocompletion=one_of(*LINKS)["autocompletion"],
-    ),
-]
-SendOption = Annotated[str, typer.Option(help="As which message the estimate is sent.", **one_of(*SENDINGS))]
+URL = "udp:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:PORT or serial:DEVICE[:BAUD]."
+SEND = "As which message the estimate is sent."
 RECORD = "The record; `flownav replay` reproduces it."
-RecordOption = Annotated[Path | None, option("PATH", RECORD, "--out", "--record", unset="none is written")]
 NUMBERS = (1, 255)  # of a MAVLink system, and of a component
 SYSTEM, COMPONENT = "Listen to this system only.", "Listen to this component only."
-SystemOption = Annotated[int | None, option("N", SYSTEM, unset="the first autopilot's", within=NUMBERS)]
-ComponentOption = Annotated[int | None, option("N", COMPONENT, unset="the autopilot's", within=NUMBERS)]
 LIMIT = "Send no longer than this without a horizontal aid (dead reckoning) [s]."
 SIGMA = "Send while one standard deviation of the position is below this [m]."
 PROTECTION = "Send while the horizontal protection level is below this [m]."
 UNFUSED = "Send nothing once a horizontal sensor is heard but not fused for so long [s]."
-UnfusedOption = Annotated[float, option("S", UNFUSED, within=(1.0, float("inf")))]
 ACCEPT = "Who else may send a message, 0 for any; may be repeated."
-AcceptOption = Annotated[list[str] | None, option("MESSAGE=SYSTEM.COMPONENT", ACCEPT)]
 DURATION = "End after so many seconds."
-DurationOption = Annotated[float | None, option("S", DURATION, unset="at Ctrl-C", within=(0.1, 1e6))]
-CapacityOption = Annotated[
-    float | None,
-    option("BYTES/S", "What the link carries each way.", unset="a serial port's by its baud rate", within=(500.0, 1e9)),
-]
+CARRIES = "What the link carries each way."
+BAUD = "a serial port's by its baud rate"
 SETUP = "Only read the vehicle's parameters, and say what must change for --send."
 WRITE = "With --setup: write what must change, never while armed."
 SOURCES = "With --setup: ArduPilot's source set for flownav."
-SourceSetOption = Annotated[int | None, option("1..3", SOURCES, unset="a free one", within=(1, 3))]
+Url = Annotated[str, named("URL", URL, autocompletion=one_of(*options.LINKS)["autocompletion"])]
+Record = Annotated[Path | None, option("PATH", RECORD, "--out", "--record", unset="none is written")]
+System = Annotated[int | None, option("N", SYSTEM, unset="the first autopilot's", within=NUMBERS)]
+Component = Annotated[int | None, option("N", COMPONENT, unset="the autopilot's", within=NUMBERS)]
+Accept = Annotated[list[str] | None, option("MESSAGE=SYSTEM.COMPONENT", ACCEPT)]
+Duration = Annotated[float | None, option("S", DURATION, unset="at Ctrl-C", within=(0.1, 1e6))]
+Capacity = Annotated[float | None, option("BYTES/S", CARRIES, unset=BAUD, within=(500.0, 1e9))]
+SourceSet = Annotated[int | None, option("1..3", SOURCES, unset="a free one", within=(1, 3))]
 
 
 def command(
-    url: UrlArgument,
-    sensor: SensorOption = None,
-    send: SendOption = "odometry",
-    record: RecordOption = None,
-    force: ForceOption = False,
-    signing_key: SigningKeyOption = None,
-    system: SystemOption = None,
-    component: ComponentOption = None,
-    gps_delay: GpsDelayOption = 0.22,
-    settings: SettingsOption = None,
+    url: Url,
+    sensor: options.Sensor = None,
+    send: Annotated[str, chosen(SEND, *options.SENDINGS)] = "odometry",
+    record: Record = None,
+    force: options.Force = False,
+    signing_key: options.SigningKey = None,
+    system: System = None,
+    component: Component = None,
+    gps_delay: options.GpsDelay = 0.22,
+    settings: options.Settings = None,
     send_limit: Annotated[float, option("S", LIMIT, within=(0.1, 60.0))] = 1.5,
     send_sigma: Annotated[float, option("M", SIGMA, within=(0.01, 1000.0))] = 5.0,
     send_protection: Annotated[float, option("M", PROTECTION, within=(0.01, 1000.0))] = 20.0,
-    unfused: UnfusedOption = 5.0,
-    accept: AcceptOption = None,
-    duration: DurationOption = None,
-    capacity: CapacityOption = None,
-    setup: Annotated[bool, typer.Option("--setup", help=SETUP)] = False,
-    write: Annotated[bool, typer.Option("--write", help=WRITE)] = False,
-    source_set: SourceSetOption = None,
-    as_json: JsonOption = False,
+    unfused: Annotated[float, option("S", UNFUSED, within=(1.0, float("inf")))] = 5.0,
+    accept: Accept = None,
+    duration: Duration = None,
+    capacity: Capacity = None,
+    setup: Annotated[bool, switch(SETUP, "--setup")] = False,
+    write: Annotated[bool, switch(WRITE, "--write")] = False,
+    source_set: SourceSet = None,
+    as_json: options.Json = False,
 ) -> None:
     """Navigate a vehicle that is connected by MAVLink: fuse its sensors, send the estimate, show and record it."""
     from flownav.cli.live_setup import run as run_setup
@@ -109,13 +92,13 @@ def command(
         raise InputError("--write and --source-set go with --setup only")
     if record is not None:
         require_recordable(record, sensor, signing_key, settings, force=force)
-    options = replace(
+    told = replace(
         _options(send, system, component, signing_key, gps_delay, sensor, settings),
         limits=Limits(dead_reckoning_s=send_limit, sigma_m=send_sigma, protection_m=send_protection, unfused_s=unfused),
         accept=accepted_by(accept or []),
         capacity_bytes_s=capacity or parse_url(url).capacity_bytes_s,
     )
-    _navigate(url, options, record, duration, force=force, as_json=as_json)
+    _navigate(url, told, record, duration, force=force, as_json=as_json)
 
 
 def _navigate(
@@ -185,14 +168,9 @@ def _recording(url: str, path: Path | None, options: Options, *, force: bool, sh
 
 
 def _options(
-    send: Any,
-    system: int | None,
-    component: int | None,
-    key: Path | None,
-    gps_delay_s: float,
-    sensor: Path | None,
+    send: Any, system: int | None, component: int | None, key: Path | None, gps_delay_s: float, sensor: Path | None,
     settings: Path | None,
-) -> Options:
+) -> Options:  # fmt: skip
     from flownav.core.parameter_files import load
     from flownav.live.options import Options
     from flownav.mavlink.signing import load_key
@@ -228,10 +206,7 @@ def _say_once(shown: bool) -> Callable[[str], None]:
 def _say(facts: dict[str, Any], *, as_json: bool) -> None:
     """The figures of the session; nothing where nobody is there to read them any more."""
     try:
-        if as_json:
-            emit(facts)
-        else:
-            _print(facts)
+        answer(facts, as_json, lambda: _show(facts))
         sys.stdout.flush()
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -271,26 +246,24 @@ def _facts(session: Session, latency: Latency, duration_s: float) -> dict[str, A
     }
 
 
-def _print(facts: dict[str, Any]) -> None:
+def _show(facts: dict[str, Any]) -> None:
     """The same figures for people."""
-    from rich.console import Console
-
     from flownav.live.answers import WITHHELD
     from flownav.live.screen import in_words
 
-    console = Console(markup=False, highlight=False)
     vehicle = facts["vehicle"]
     who = f"system {vehicle['system']}, component {vehicle['component']}" if vehicle else "no vehicle was heard"
-    console.print(f"{facts['duration_s']:.1f} s, {who}; {facts['sent']} estimates sent, {facts['resets']} resets")
-    for name, alarm in facts["alarms"].items():
-        console.print(f"ALARM: {name} was heard and not fused for {alarm['unfused_s']:.0f} s ({alarm['reason']})")
-    for reason, count in facts["withheld"].items():
-        console.print(f"Withheld {count}: {WITHHELD[reason]}")
-    for name, count in facts["dropped"].items():
-        console.print(f"Dropped {count}: {name}")
-    console.print(in_words(facts["traffic"]))
+    say(
+        f"{facts['duration_s']:.1f} s, {who}; {facts['sent']} estimates sent, {facts['resets']} resets",
+        *(
+            f"ALARM: {name} was heard and not fused for {alarm['unfused_s']:.0f} s ({alarm['reason']})"
+            for name, alarm in facts["alarms"].items()
+        ),
+        *(f"Withheld {count}: {WITHHELD[reason]}" for reason, count in facts["withheld"].items()),
+        *(f"Dropped {count}: {name}" for name, count in facts["dropped"].items()),
+        in_words(facts["traffic"]),
+    )
     if facts["latency_ms"]["p50"] is not None:
         figures = ", ".join(f"{name} {value:.2f} ms" for name, value in facts["latency_ms"].items())
-        console.print(f"From a flow reading's arrival to the estimate's departure: {figures}")
-    if facts.get("record"):
-        console.print(f"Record: {facts['record']}", soft_wrap=True)
+        say(f"From a flow reading's arrival to the estimate's departure: {figures}")
+    say_files(facts, ("record",))

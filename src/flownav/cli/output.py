@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -49,42 +49,43 @@ def place(path: Path, *inputs: str | Path | None, force: bool, beside: Sequence[
     work is done, where nothing must or can be put there.
     """
     from flownav.core.free_names import a_place
-    from flownav.core.guard import an_input
 
-    read = [an_input(Path(each)) for each in inputs if each is not None]
-    found = a_place(path, read, force=force, beside=beside)
+    found = a_place(path, _read(inputs), force=force, beside=beside)
     _require_place(path)
     return told(path, found)
 
 
-def several_place(path: Path, *inputs: str | Path | None, force: bool) -> Path:
-    """The same of files that are called after a path: NAME_estimate.tum, NAME_truth.tum, ..."""
-    from flownav.core.free_names import a_place_of_several
+def _read(inputs: Iterable[str | Path | None]) -> list[Path]:
+    """The files that a run reads, looked for. InputError where one is none to read."""
     from flownav.core.guard import an_input
 
-    found = a_place_of_several(path, [an_input(Path(each)) for each in inputs if each is not None], force=force)
+    return [an_input(Path(each)) for each in inputs if each is not None]
+
+
+def several_place(path: Path, *inputs: str | Path | None, force: bool) -> Path:
+    """Where files lie that are called after a path: NAME_estimate.tum, NAME_truth.tum, ... As `place`."""
+    from flownav.core.free_names import a_place_of_several
+
+    found = a_place_of_several(path, _read(inputs), force=force)
     _require_place(path)
     return told(path, found)
 
 
 def folder_place(path: Path, *inputs: str | Path | None, force: bool | None = None) -> Path:
-    """The same of a folder, which is new or empty; with force it is as it is, for its writer to look into.
+    """Where a folder lies, which is new or empty; with force it is as it is, for its writer to look into. As `place`.
 
     force: None where the command replaces no folder.
     """
     from flownav.core.free_names import a_folder_place
-    from flownav.core.guard import an_input
 
-    for each in inputs:
-        if each is not None:
-            an_input(Path(each))
+    _read(inputs)
     found = a_folder_place(path, force=bool(force))
     _require_place(path)
     return told(path, found, replaces=force is not None)
 
 
 def record_place(path: Path, *inputs: str | Path | None, force: bool, report: bool) -> Path:
-    """The same of a record and of its report beside it. InputError where the report would replace the record."""
+    """Where a record lies, and its report beside it. InputError as `place`, and where the report would replace it."""
     page = page_of(path, report=report)
     return place(path, *inputs, force=force, beside=() if page is None else (page.suffix,))
 
@@ -99,20 +100,17 @@ def told(asked: Path, found: Path, *, replaces: bool = True) -> Path:
 
 def require_recordable(path: Path, *inputs: str | Path | None, force: bool) -> None:
     """InputError where a live session's record cannot be put there; the recorder numbers it."""
-    from flownav.core.guard import a_record_place, an_input
+    from flownav.core.guard import a_record_place
 
-    a_record_place(path, [an_input(Path(each)) for each in inputs if each is not None], force=force)
+    a_record_place(path, _read(inputs), force=force)
     _require_place(path)
 
 
 def _require_place(path: Path) -> None:
     """InputError where no file can be made in the folder that a path lies in, or in the nearest that is there."""
     there = next((parent for parent in path.absolute().parents if parent.exists()), path.absolute().parent)
-    try:
-        with TemporaryFile(dir=there):
-            pass
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
+    with writing(path), TemporaryFile(dir=there):
+        pass
 
 
 def page_of(record: Path, *, report: bool) -> Path | None:
@@ -126,22 +124,27 @@ def page_of(record: Path, *, report: bool) -> Path | None:
 def save(record: Record, path: Path, *, report: bool) -> dict[str, str]:
     """Write a record and, if asked, its report beside it; where they lie. InputError where that cannot be."""
     page = page_of(path, report=report)
-    try:
+    with writing(path):
         record.save(path)
         if page is not None:
             from flownav.report.html import write_report
 
             write_report(record, page)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}); give another --out") from error
     return {"record": str(path), **({"report": str(page)} if page else {})}
 
 
-def autopilot_errors(scores: dict[str, Any]) -> str:
-    """The errors of an autopilot's own estimate (scoring/autopilot) in words, where it was compared with anything."""
-    against = {"truth": "the reference, turned and shifted onto it", "gps": "GPS, mean difference taken out"}
-    velocity = "" if scores["velocity_rms_m_s"] is None else f"; velocity {scores['velocity_rms_m_s']:.3f} m/s rms"
-    return (
-        f"against {against[scores['against']]}: horizontal {scores['horizontal_rms_m']:.2f} m rms, "
-        f"{scores['horizontal_max_m']:.2f} m max; vertical {scores['vertical_rms_m']:.2f} m rms{velocity}"
-    )
+@contextmanager
+def writing(path: Path, what: str = "") -> Iterator[None]:
+    """InputError where what is done within it cannot be written. what: is written, before "cannot"."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{path}: {what}cannot be written ({error.strerror}); give another --out") from error
+
+
+def write_text(path: Path, text: str, newline: str | None = "\n") -> None:
+    """Write a text, whole or not at all; what is no text in names of files is written as it is typed."""
+    from flownav.core.guard import written_whole
+
+    with written_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline=newline)

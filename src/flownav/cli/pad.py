@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flownav.cli.choices import CAMERAS, PATTERNS, one_of, option
-from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
-from flownav.cli.output import emit
+from flownav.cli import options
+from flownav.cli.options import chosen, numbers, option, out_option
+from flownav.cli.tables import Column, answer, figure, plain_look, say, table_of
 from flownav.core.text import finite
 
 if TYPE_CHECKING:
@@ -22,53 +22,62 @@ SPEEDS = ["0.1,0.5,1.5"]
 WIDE = 110  # columns of the table of what was measured
 
 
-FramesArgument = Annotated[
-    list[Path] | None,
-    typer.Argument(help="Your pictures: a folder, pictures, or one video. None: measure.", show_default=False),
-]
-SideOption = Annotated[float, option("M", "Side of the tag's black square, or of a plain pad [m].")]
+SIDE = "Side of the tag's black square, or of a plain pad [m]."
 FOCAL = "Focal length of your pictures [px], undistorted."
-FocalOption = Annotated[float | None, option("PX", FOCAL, unset=False, within=(1.0, 1e6))]
 IMAGE_X = "Where the pictures' right is, clockwise from body forward."
 FOCUS = "Where its lens is focused [m]."
-FocusOption = Annotated[float | None, option("M", FOCUS, unset="as built", within=(0.05, 1000.0))]
-HeightsOption = Annotated[list[str], option("M", "Heights to measure at [m], repeated or with commas.")]
-SpeedsOption = Annotated[list[str], option("M/S", "Speeds over ground [m/s], repeated or with commas.")]
-FlightsOption = Annotated[int, option("N", "Cameras, each on a flight of its own.", within=(2, 100_000))]
-CountOption = Annotated[int, option("N", "Frames a flight, height and speed.", "--frames", within=(1, 100_000))]
-TiltOption = Annotated[float, option("DEG", "Greatest tilt.", "--tilt-deg", within=(0.0, 45.0))]
+AT = "Heights to measure at [m], repeated or with commas."
+FLYING = "Speeds over ground [m/s], repeated or with commas."
+EACH = "Cameras, each on a flight of its own."
 MOUNTING = "How well it is mounted, for the datasheet."
-MountingOption = Annotated[float, option("DEG", MOUNTING, "--mounting-deg", within=(0.0, 5.0))]
+SHEET = "The datasheet (TOML), which a scenario's [sensors] name"
 PICTURES = "A folder for one frame of each flight and height."
-PrintOption = Annotated[
-    Path | None, option("PATH", "Only write the target as a PNG of true size.", "--print", unset=False)
-]
+PRINT = "Only write the target as a PNG of true size."
+YOURS = "Your pictures: a folder, pictures, or one video. None: measure."
+FOUND = (
+    Column("frame", "frame", ""),
+    Column("tan forward", lambda row: _of_fix(row, "tan_forward", ".5f")),
+    Column("tan right", lambda row: _of_fix(row, "tan_right", ".5f")),
+    Column("distance [m]", lambda row: _of_fix(row, "distance_m", ".4f")),
+    Column("heading [deg]", lambda row: _of_fix(row, "heading_rad", ".2f", 57.29577951308232)),
+    Column("what became of it", "reason"),
+)
+MEASURED = (
+    Column("height [m]", "height_m", "g"),
+    Column("speed [m/s]", "speed_m_s", "g"),
+    Column("rate [rad/s]", "image_rate_rad_s", ".2f"),
+    Column("in view", lambda row: f"{row['in_view']}/{row['frames']}"),
+    Column("found", "found"),
+    Column("wrong", "wrong"),
+    Column("angle [mrad]", "angle_sigma_rad", ".2f", 1e3),
+    Column("distance [%]", "distance_sigma", ".2f", 1e2),
+    Column("heading [mrad]", "heading_sigma_rad", ".2f", 1e3),
+)
 
 
 def command(
-    frames: FramesArgument = None,
-    side: SideOption = 0.2,
-    pattern: Annotated[str, typer.Option(help="What is printed on the pad.", **one_of(*PATTERNS))] = "tag",
+    frames: Annotated[list[Path] | None, typer.Argument(help=YOURS, show_default=False)] = None,
+    side: Annotated[float, option("M", SIDE)] = 0.2,
+    pattern: Annotated[str, chosen("What is printed on the pad.", *options.PATTERNS)] = "tag",
     code: Annotated[int, option("N", "Which tag of AprilTag 36h11, 0 to 15.")] = 0,
-    focal: FocalOption = None,
+    focal: Annotated[float | None, option("PX", FOCAL, unset=False, within=(1.0, 1e6))] = None,
     image_x: Annotated[float, option("DEG", IMAGE_X, "--image-x-deg")] = 0.0,
-    camera: Annotated[str, typer.Option(help="The camera to measure with.", **one_of(*CAMERAS))] = "wide120",
-    focus: FocusOption = None,
-    heights: HeightsOption = HEIGHTS,
-    speeds: SpeedsOption = SPEEDS,
-    flights: FlightsOption = 24,
-    count: CountOption = 2,
-    tilt: TiltOption = 15.0,
-    mounting: MountingOption = 0.4,
-    seed: SeedOption = 1,
-    out: Annotated[Path | None, out_option("The datasheet (TOML), which a scenario's [sensors] name")] = None,
-    force: ForceOption = False,
+    camera: Annotated[str, chosen("The camera to measure with.", *options.CAMERAS)] = "wide120",
+    focus: Annotated[float | None, option("M", FOCUS, unset="as built", within=(0.05, 1000.0))] = None,
+    heights: Annotated[list[str], option("M", AT)] = HEIGHTS,
+    speeds: Annotated[list[str], option("M/S", FLYING)] = SPEEDS,
+    flights: Annotated[int, option("N", EACH, within=(2, 100_000))] = 24,
+    count: Annotated[int, option("N", "Frames a flight, height and speed.", "--frames", within=(1, 100_000))] = 2,
+    tilt: Annotated[float, option("DEG", "Greatest tilt.", "--tilt-deg", within=(0.0, 45.0))] = 15.0,
+    mounting: Annotated[float, option("DEG", MOUNTING, "--mounting-deg", within=(0.0, 5.0))] = 0.4,
+    seed: options.Seed = 1,
+    out: Annotated[Path | None, out_option(SHEET)] = None,
+    force: options.Force = False,
     pictures: Annotated[Path | None, option("PATH", PICTURES, unset=False)] = None,
-    print_to: PrintOption = None,
-    as_json: JsonOption = False,
+    print_to: Annotated[Path | None, option("PATH", PRINT, "--print", unset=False)] = None,
+    as_json: options.Json = False,
 ) -> None:
     """Where the pad is from the lens: angles, distance, heading; and how well, by height."""
-    from flownav.cli.lists import numbers
     from flownav.cli.output import folder_place, place
     from flownav.lab.optics.pad import PadTarget, checked
     from flownav.lab.optics.pad_trial import Trials
@@ -77,7 +86,8 @@ def command(
     if print_to is not None:
         return _print_target(target, place(print_to, force=force), as_json)
     if frames:
-        return _show(_found(frames, target, focal, image_x), as_json, _print_found)
+        found = _found(frames, target, focal, image_x)
+        return answer(found, as_json, lambda: _show_found(found))
     datasheet = None if out is None else place(out, force=force)
     frames_in = None if pictures is None else folder_place(pictures)
     at_m = sorted(set(numbers("--heights", heights, 0.05, 50.0)))
@@ -86,7 +96,8 @@ def command(
     facts = _measured(target, camera, focus, trials, tilt, frames_in)
     if datasheet is not None:
         facts["datasheet"] = _write_datasheet(datasheet, facts, target, camera, focus, mounting)
-    _show(_plain(facts), as_json, _print_measured)
+    plain = _plain(facts)
+    answer(plain, as_json, lambda: _show_measured(plain))
 
 
 def _print_target(target: PadTarget, picture: Path, as_json: bool) -> None:
@@ -95,14 +106,7 @@ def _print_target(target: PadTarget, picture: Path, as_json: bool) -> None:
 
     print_target(target, picture)
     facts: dict[str, Any] = {"target": target._asdict(), "picture": str(picture)}
-    _show(facts, as_json, lambda _: typer.echo(f"{picture}: print it at 100 %, and measure its side"))
-
-
-def _show(facts: dict[str, Any], as_json: bool, printer: Any) -> None:
-    if as_json:
-        emit(facts)
-    else:
-        printer(facts)
+    answer(facts, as_json, lambda: typer.echo(f"{picture}: print it at 100 %, and measure its side"))
 
 
 # -- a user's own pictures ------------------------------------------------------------------------------------------
@@ -131,20 +135,12 @@ def _found(frames: list[Path], target: PadTarget, focal_px: float | None, image_
     return {"target": target._asdict(), "focal_px": focal_px, "frames": len(rows), "found": found, "per_frame": rows}
 
 
-def _print_found(facts: dict[str, Any]) -> None:
-    from rich.console import Console
-    from rich.table import Table
+def _show_found(facts: dict[str, Any]) -> None:
+    say(table_of(FOUND, facts["per_frame"]), f"found in {facts['found']} of {facts['frames']} frames")
 
-    table = Table("frame", "tan forward", "tan right", "distance [m]", "heading [deg]", "what became of it")
-    for row in facts["per_frame"]:
-        fix = [""] * 4
-        if row["reason"] == "found":
-            fix = [f"{row['tan_forward']:.5f}", f"{row['tan_right']:.5f}", f"{row['distance_m']:.4f}"]
-            fix.append(f"{row['heading_rad'] * 57.29577951308232:.2f}")
-        table.add_row(str(row["frame"]), *fix, row["reason"])
-    console = Console(markup=False, highlight=False)
-    console.print(table)
-    console.print(f"found in {facts['found']} of {facts['frames']} frames")
+
+def _of_fix(row: dict[str, Any], key: str, form: str, scale: float = 1.0) -> str:
+    return figure(row[key], form, scale) if row["reason"] == "found" else ""
 
 
 # -- rendered frames --------------------------------------------------------------------------------------------------
@@ -186,7 +182,7 @@ def _plain(facts: dict[str, Any]) -> dict[str, Any]:
 def _write_datasheet(
     out: Path, facts: dict[str, Any], target: PadTarget, camera_name: str, focus_m: float | None, mounting_deg: float
 ) -> str:
-    from flownav.core.guard import written_whole
+    from flownav.cli.output import write_text
     from flownav.core.provenance import command_line
     from flownav.lab.optics.pad_datasheet import Assumed, datasheet
     from flownav.lab.optics.pad_trial import camera_named
@@ -197,42 +193,21 @@ def _write_datasheet(
     assumed = Assumed(float(sheet.rate_hz), float(sheet.latency_s), float(sheet.jitter_s), lens_m, mounting_deg)
     trial = camera_named(camera_name, focus_m)
     text = datasheet(facts["laws"], trial, camera_name, target, assumed, command_line())
-    with written_whole(out) as temporary:
-        temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
+    write_text(out, text, newline=None)
     PadCameraSheet.read(out)
     return str(out)
 
 
-def _print_measured(facts: dict[str, Any]) -> None:
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    console = Console(markup=False, highlight=False)
-    console.width = max(console.width, WIDE)
+def _show_measured(facts: dict[str, Any]) -> None:
     target, camera, laws = facts["target"], facts["camera"], facts["laws"]
-    console.print(
+    say(
         f"{target['pattern']} of {target['side_m']:g} m, tilt to {facts['tilt_deg']:g} deg; "
-        f"{facts['flights']} cameras {camera['name']}, {laws['frames']} frames"
+        f"{facts['flights']} cameras {camera['name']}, {laws['frames']} frames",
+        table_of(MEASURED, facts["cells"], left=0, **plain_look()),
+        *_law_lines(laws),
+        *([f"datasheet: {facts['datasheet']}"] if "datasheet" in facts else []),
+        wide=WIDE,
     )
-    table = Table(box=box.SIMPLE_HEAD)
-    for name in (
-        "height [m]", "speed [m/s]", "rate [rad/s]", "in view", "found", "wrong", "angle [mrad]", "distance [%]",
-        "heading [mrad]",
-    ):  # fmt: skip
-        table.add_column(name, justify="right")
-    for row in facts["cells"]:
-        table.add_row(
-            f"{row['height_m']:g}", f"{row['speed_m_s']:g}", f"{row['image_rate_rad_s']:.2f}",
-            f"{row['in_view']}/{row['frames']}", str(row["found"]), str(row["wrong"]),
-            _figure(row["angle_sigma_rad"], 1e3), _figure(row["distance_sigma"], 1e2),
-            _figure(row["heading_sigma_rad"], 1e3),
-        )  # fmt: skip
-    console.print(table)
-    for line in _law_lines(laws):
-        console.print(line)
-    if "datasheet" in facts:
-        console.print(f"datasheet: {facts['datasheet']}")
 
 
 def _law_lines(laws: dict[str, Any]) -> list[str]:
@@ -251,7 +226,3 @@ def _law_lines(laws: dict[str, Any]) -> list[str]:
         f"hidden: {100 * a / (a + b):.1f} %, between flights Beta({a:.3f}, {b:.3f}); "
         f"false: {100 * laws['false_share']:.2f} %",
     ]
-
-
-def _figure(value: float | None, scale: float) -> str:
-    return "-" if value is None else f"{value * scale:.2f}"

@@ -5,46 +5,35 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
-from flownav.cli.choices import TABLES, one_of
-from flownav.cli.options import ForceOption, JsonOption, RigSeedOption, out_option
-from flownav.cli.output import emit
+from flownav.cli import options
+from flownav.cli.options import chosen, option, out_option
+from flownav.cli.tables import answer
 
 if TYPE_CHECKING:
     from flownav.paper.reproduction import Reproduction
 
 
 def command(
-    table: Annotated[
-        str | None, typer.Option(help="One table alone.", show_default="all of them", **one_of(*TABLES))
-    ] = None,
+    table: Annotated[str | None, chosen("One table alone.", *options.TABLES, unset="all of them")] = None,
     out: Annotated[Path | None, out_option("The page (HTML)", "out/paper.html, or out/paper-tableN.html")] = None,
-    force: ForceOption = False,
-    flights: Annotated[int, typer.Option(metavar="N", help="Flights for each of Tables 5 and 6.")] = 200,
-    seed: RigSeedOption = 1,
-    as_json: JsonOption = False,
+    force: options.Force = False,
+    flights: Annotated[int, option("N", "Flights for each of Tables 5 and 6.")] = 200,
+    seed: options.RigSeed = 1,
+    as_json: options.Json = False,
 ) -> None:
     """Reproduce the paper: Tables 1 to 3 from the synthetic rig, 5 and 6 from flights, on one HTML page."""
-    from flownav.cli.output import place, require_between
-    from flownav.core.errors import InputError, VerdictError
+    from flownav.cli.output import place, require_between, writing
+    from flownav.core.errors import VerdictError
     from flownav.paper.reproduction import TABLES as ALL_TABLES
 
     require_between("--flights", flights, 1, 1_000_000)
     page = place(out or Path("out") / ("paper.html" if table is None else f"paper-table{table}.html"), force=force)
     made = _reproduced((int(table),) if table else ALL_TABLES, seed, flights)
-    from flownav.paper.page import write_page
+    from flownav.paper.page import show, write_page
 
-    try:
+    with writing(page, "the page "):
         write_page(made, page)
-    except OSError as error:
-        raise InputError(f"{page}: the page cannot be written ({error.strerror}); give another --out") from error
-    if as_json:
-        emit(made.as_json() | {"page": str(page)})
-    else:
-        from flownav.paper.console import show
-
-        show(made, str(page))
+    answer(made.as_json() | {"page": str(page)}, as_json, lambda: show(made, str(page)))
     if made.broken:
         raise VerdictError("; ".join(f"{f.topic}: {f.here}, the paper has {f.paper}" for f in made.broken))
 

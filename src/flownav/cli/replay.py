@@ -4,64 +4,47 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
-from flownav.cli.choices import installed_filters, one_of, option
-from flownav.cli.options import (
-    FlowInstanceOption,
-    ForceOption,
-    GpsDelayOption,
-    JsonOption,
-    LogArgument,
-    ReportOption,
-    SensorOption,
-    SettingsOption,
-    TopicOption,
-    out_option,
-)
-from flownav.cli.output import emit
+from flownav.cli import options
+from flownav.cli.options import chosen, option, out_option, switch
+from flownav.cli.tables import Column, answer, figure, say, say_files, table, table_of
 
 if TYPE_CHECKING:
+    from flownav.core.record import Record
     from flownav.replays.prepare import ReplayOptions
 
-
+OUTAGE_COLUMNS = (
+    Column("GPS cut [s]", lambda cut: f"{cut['t0']:g} to {cut['t1']:g}"),
+    Column("rms [m]", "horizontal_rms_m", ".2f"),
+    Column("max [m]", "horizontal_max_m", ".2f"),
+)
 OUTAGE = "Withhold GPS from T0 to T1 [s]; repeated or with commas."
 OUTAGES = "Windows of LENGTH from T0 to T1 [s]: one replay each, with GPS withheld in it."
-SmoothOption = Annotated[
-    bool, typer.Option("--smooth", help="Also compute the best estimate after the flight (the smoother).")
-]
-InPlaceOption = Annotated[
-    str,
-    typer.Option(
-        "--filter",
-        help="The navigator's filter, an installed one's name, or your own class.",
-        **one_of("landing", beside="FILE.py:CLASS", also=installed_filters),
-    ),
-]
+SMOOTH = "Also compute the best estimate after the flight (the smoother)."
+FILTER = "The navigator's filter, an installed one's name, or your own class."
 
 
 def command(
-    log: LogArgument,
+    log: options.Log,
     gps_outage: Annotated[list[str] | None, option("T0:T1", OUTAGE)] = None,
-    no_flow: Annotated[bool, typer.Option("--no-flow", help="Withhold the optical flow.")] = False,
+    no_flow: Annotated[bool, switch("Withhold the optical flow.", "--no-flow")] = False,
     flow_scale: Annotated[str, option("X,Y", "Factors on the flow about body x and y.")] = "1,1",
-    gps_delay: GpsDelayOption = 0.22,
-    sensor: SensorOption = None,
+    gps_delay: options.GpsDelay = 0.22,
+    sensor: options.Sensor = None,
     outage_table: Annotated[str | None, option("T0:T1:LENGTH", OUTAGES)] = None,
-    flow_instance: FlowInstanceOption = None,
-    topic: TopicOption = None,
-    settings: SettingsOption = None,
-    smooth: SmoothOption = False,
-    filter_name: InPlaceOption = "landing",
+    flow_instance: options.FlowInstance = None,
+    topic: options.Topic = None,
+    settings: options.Settings = None,
+    smooth: Annotated[bool, switch(SMOOTH, "--smooth")] = False,
+    filter_name: Annotated[str, chosen(FILTER, "landing", **options.OWN_FILTERS)] = "landing",
     out: Annotated[Path | None, out_option("The record", "out/LOG.fnr")] = None,
-    force: ForceOption = False,
-    report: ReportOption = True,
-    as_json: JsonOption = False,
+    force: options.Force = False,
+    report: options.Report = True,
+    as_json: options.Json = False,
 ) -> None:
     """Fuse a recorded flight: its trajectory, its errors against its own GPS, and the drift through GPS outages."""
-    from flownav.api.parts import own_filter
+    from flownav.api.calls import own_filter
     from flownav.api.replaying import replay_log
     from flownav.cli.output import progress, record_place, save
     from flownav.core.errors import VerdictError
@@ -72,7 +55,7 @@ def command(
     from flownav.replays.session import table_windows
     from flownav.sensors.datasheet import load_sensor
 
-    options = _options(gps_delay, gps_outage or [], flow_scale, no_flow=no_flow)
+    asked_options = _options(gps_delay, gps_outage or [], flow_scale, no_flow=no_flow)
     asked = out or Path("out") / f"{log.resolve().name}.fnr"
     record_path = record_place(asked, log, settings, sensor, force=force, report=report)
     table = table_windows(*numbers("--outage-table", outage_table, ":", 3, "T0:T1:LENGTH")) if outage_table else []
@@ -81,14 +64,9 @@ def command(
     part = own_filter(filter_name)
     read = open_flight(log, flow_instance=flow_instance, topics=asked_topics(topic or []))
     with progress("GPS outages", len(table)) if table else nullcontext() as advance:
-        record = replay_log(read, options, flow, stated, smooth=smooth, table=table, part=part, progress=advance)
+        record = replay_log(read, asked_options, flow, stated, smooth=smooth, table=table, part=part, progress=advance)
     scores = record.scores | save(record, record_path, report=report)
-    if as_json:
-        emit(scores)
-    else:
-        from flownav.cli.replay_table import show
-
-        show(record, scores)
+    answer(scores, as_json, lambda: show(record, scores))
     if record.verdict:
         raise VerdictError(f"{log}: {record.verdict}")
 
@@ -117,3 +95,102 @@ def numbers(option: str, text: str, separator: str, count: int, form: str) -> tu
     if len(found) != count or not all(map(isfinite, found)):
         raise InputError(f"{option} {text}: {form} is needed, numbers")
     return found
+
+
+def show(record: Record, scores: dict[str, Any]) -> None:
+    """The same figures for people."""
+    say(f"{record.manifest['log']}: {scores['duration_s']:.1f} s")
+    if scores["outages"]:
+        say(table_of(OUTAGE_COLUMNS, scores["outages"], title="Horizontal error through GPS outages"))
+    say(*error_lines(scores))
+    say(_sensors(scores))
+    rejected = _rejected(scores)
+    if rejected.row_count:
+        say(rejected)
+    say(*(f"Note: {note}" for note in record.manifest["notes"]))
+    say(*(f"{finding['label']}: {finding['text']}" for finding in record.manifest["findings"]))
+    say_files(scores, ("record", "report"))
+
+
+def error_lines(scores: dict[str, Any]) -> list[str]:
+    """What the errors are, against each thing that there is to hold the estimate against, a sentence a line."""
+    said, truth = [], scores.get("truth")
+    if "outage_median_rms_m" in scores:
+        median, worst = figure(scores["outage_median_rms_m"]), figure(scores["outage_worst_rms_m"])
+        said.append(f"Over the table's windows: median {median} m rms, worst {worst} m rms")
+    if scores["velocity_rms_m_s"] is not None:
+        said.append(f"Horizontal velocity against GPS: {scores['velocity_rms_m_s']:.3f} m/s rms")
+    if truth:
+        turned = "" if truth["yaw_rad"] is None else f", turned by {57.29578 * truth['yaw_rad']:.1f} deg"
+        said.append(
+            f"Against {truth['reference']}{turned}: horizontal {truth['horizontal_rms_m']:.2f} m rms, "
+            f"{truth['horizontal_max_m']:.2f} m max; velocity {truth['velocity_rms_m_s']:.3f} m/s rms"
+        )
+    if scores["end_drift_m"] is not None:
+        laid = f"{scores['truth']['reference']} laid on it at take-off"
+        said.append(f"At the end of the flight, {laid}: {scores['end_drift_m']:.2f} m off")
+    if scores["protection"]:
+        said.append(_protection(scores["protection"]))
+    if "smoothed" in scores:
+        said.append(f"Smoothed over the whole flight: {_smoothed_errors(scores['smoothed'])}")
+    own = scores.get("autopilot", {})
+    if own.get("against"):
+        said.append(f"The autopilot's own estimate ({own['name']}) {autopilot_errors(own)}")
+    return said
+
+
+def autopilot_errors(scores: dict[str, Any]) -> str:
+    """The errors of an autopilot's own estimate (scoring/autopilot) in words, where it was compared with anything."""
+    against = {"truth": "the reference, turned and shifted onto it", "gps": "GPS, mean difference taken out"}
+    velocity = "" if scores["velocity_rms_m_s"] is None else f"; velocity {scores['velocity_rms_m_s']:.3f} m/s rms"
+    return (
+        f"against {against[scores['against']]}: horizontal {scores['horizontal_rms_m']:.2f} m rms, "
+        f"{scores['horizontal_max_m']:.2f} m max; vertical {scores['vertical_rms_m']:.2f} m rms{velocity}"
+    )
+
+
+def _sensors(scores: dict[str, Any]) -> Any:
+    """When each sensor spoke, and whether the filter's innovations are as large as it states, and news."""
+    from flownav.scoring.consistency import verdict
+
+    rows = []
+    for name in dict.fromkeys([*scores["coverage"], *scores["consistency"]]):
+        span, judged = scores["coverage"].get(name), scores["consistency"].get(name)
+        said = (str(judged["samples"]), figure(judged["nis_per_dof"])) if judged else ("", "")
+        words = verdict(judged["nis_per_dof"], white=judged["white"]) if judged else ""
+        rows.append((name, f"{span['t0']:.1f}, {span['t1']:.1f}" if span else "", *said, words))
+    heads = ("sensor", "from, to [s]", "innovations", "NIS", "verdict")
+    return table(heads, rows, title="Sensors and their innovations")
+
+
+def _protection(found: dict[str, Any]) -> str:
+    """Protection levels in words."""
+    level, unsaid = found["horizontal_m"], found["exceeded_unsaid_fraction"]
+    said = f"Protection level, horizontal: {level['median']:.2f} m in the median, {level['p95']:.2f} m at 95 %"
+    late = "" if unsaid is None else f"; the error is larger and nothing says so {100.0 * unsaid:.2f} % of the time"
+    return said + late
+
+
+def _rejected(scores: dict[str, Any]) -> Any:
+    """What was not fused and why, in readings and in components (a row that the reader threw away is one)."""
+    rows = []
+    for sensor, counted in scores["readings"].items():
+        offered, components = counted["offered"], scores["rejected"].get(sensor, {})
+        for reason, count in counted["rejected"].items():
+            rows.append((sensor, reason, str(count), str(offered or ""), str(components.get(reason, ""))))
+    return table(("sensor", "reason", "readings", "of", "components"), rows, title="Not fused")
+
+
+def _smoothed_errors(scores: dict[str, Any]) -> str:
+    """The smoothed path's errors in words."""
+    said = [
+        f"GPS cut {cut['t0']:g} to {cut['t1']:g} s: {figure(cut['horizontal_rms_m'])} m rms, "
+        f"{figure(cut['horizontal_max_m'])} m max"
+        for cut in scores["outages"]
+    ]
+    if scores["velocity_rms_m_s"] is not None:
+        said.append(f"velocity against GPS {scores['velocity_rms_m_s']:.3f} m/s rms")
+    if "truth" in scores:
+        truth = scores["truth"]
+        said.append(f"against {truth['reference']} {truth['horizontal_rms_m']:.2f} m rms horizontally")
+    return "; ".join(said) or "nothing to compare it with"

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flownav.cli.choices import option
-from flownav.cli.options import ForceOption, JsonOption, SeedOption, out_option
-from flownav.cli.output import emit
+from flownav.cli import options
+from flownav.cli.options import option, out_option
+from flownav.cli.tables import answer, say, table
 
 if TYPE_CHECKING:
     from flownav.studies.validation.job import Row
@@ -19,24 +19,22 @@ WIDE = 130  # columns that the table takes
 
 
 DATA = "The folder that holds the logs."
-FileOption = Annotated[
-    Path | None, option("FILE.toml", "Which logs and outages.", "--file", unset="three outdoor flights")
-]
+FILE = "Which logs and outages."
 
 
 def command(
     data: Annotated[Path, typer.Option(metavar="PATH", envvar="FLOWNAV_DATA", help=DATA)] = Path("../shared/data"),
-    flights_file: FileOption = None,
+    flights_file: Annotated[Path | None, option("FILE.toml", FILE, "--file", unset="three outdoor flights")] = None,
     flights: Annotated[int, option("N", "Simulated flights of each log.")] = 8,
-    seed: SeedOption = 1,
+    seed: options.Seed = 1,
     out: Annotated[Path | None, out_option("The page (Markdown)")] = None,
-    force: ForceOption = False,
-    as_json: JsonOption = False,
+    force: options.Force = False,
+    as_json: options.Json = False,
 ) -> None:
     """Hold the simulator against recorded flights: outage drift, innovations, noise, as flown and as simulated."""
-    from flownav.cli.output import place, progress, require_between
+    from flownav.cli.output import place, progress, require_between, write_text
     from flownav.core.errors import InputError, VerdictError
-    from flownav.core.guard import an_input, written_whole
+    from flownav.core.guard import an_input
     from flownav.studies.validation.drawn import load_flights
     from flownav.studies.validation.job import replays_of, validate
     from flownav.studies.validation.page import page
@@ -49,14 +47,9 @@ def command(
     with progress("Validating", replays_of(recorded, flights)) as advance:
         rows = validate(data, recorded, seed, flights, advance)
     if path is not None:
-        with written_whole(path) as temporary:
-            text = page(rows, seed, flights, recorded.vehicle.path_bandwidth_hz)
-            temporary.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
-    if as_json:
-        facts = {"seed": seed, "flights": flights, "rows": [row.as_json() for row in rows]}
-        emit(facts | {"out": str(path) if path else None})
-    else:
-        _show(rows)
+        write_text(path, page(rows, seed, flights, recorded.vehicle.path_bandwidth_hz))
+    facts = {"seed": seed, "flights": flights, "rows": [row.as_json() for row in rows]}
+    answer(facts | {"out": str(path) if path else None}, as_json, lambda: _show(rows))
     kind = [row for row in rows if row.decides and row.verdict == "too kind"]
     if kind:
         raise VerdictError(
@@ -66,25 +59,15 @@ def command(
 
 def _show(rows: list[Row]) -> None:
     """The rows for people."""
-    from rich.console import Console
-    from rich.table import Table
-
     from flownav.studies.validation.page import TOO_KIND, number, said, verdicts, widened
 
-    table = Table(title="Recorded flights, and the same paths with simulated sensors", title_justify="left")
-    for name in ("log", "figure"):
-        table.add_column(name, no_wrap=True)
-    for name in ("flown", "simulated", "least", "largest"):
-        table.add_column(name, justify="right")
-    table.add_column("the simulator is", no_wrap=True)
+    heads = ("log", "figure", "flown", "simulated", "least", "largest", "the simulator is")
+    shown = table(heads, title="Recorded flights, and the same paths with simulated sensors", title_justify="left")
+    for k, column in enumerate(shown.columns):
+        column.justify, column.no_wrap = ("left", True) if k in (0, 1, 6) else ("right", False)
     for row in rows:
         cells = [number(value) for value in (row.flown, row.simulated, row.low, row.high)]
-        table.add_row(row.log, row.figure, *cells, row.verdict, style="bold" if row.verdict == TOO_KIND else "")
-    console = Console(highlight=False, markup=False)
-    console.width = max(console.width, WIDE)
-    console.print(table)
-    console.print(verdicts(rows))
-    for sentence in said(rows, TOO_KIND):
-        console.print(f"Too kind: {sentence}")
-    for name, drawn, source in widened():
-        console.print(f"Widened: {name}: {drawn} ({source})")
+        shown.add_row(row.log, row.figure, *cells, row.verdict, style="bold" if row.verdict == TOO_KIND else "")
+    sentences = [f"Too kind: {sentence}" for sentence in said(rows, TOO_KIND)]
+    drawn = [f"Widened: {name}: {drawn} ({source})" for name, drawn, source in widened()]
+    say(shown, verdicts(rows), *sentences, *drawn, wide=WIDE)

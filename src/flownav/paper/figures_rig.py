@@ -1,8 +1,11 @@
-"""The paper's figures 2, 3, 8, 10 to 13 and 15 from the synthetic rig."""
+"""The paper's figures 2, 3, 8, 10 to 13 and 15 from the synthetic rig; plain figures, something against something."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flownav.core.measurement import Array
 from flownav.lab.optics.camera import FIRMWARE_FOCAL_PX, Camera, effective_focal_px, refocused
@@ -12,11 +15,73 @@ from flownav.lab.optics.pad import BLACK, WHITE, Pad, stripes, texture
 from flownav.lab.optics.projection import pose_looking_down
 from flownav.lab.optics.render import film
 from flownav.lab.rig.experiment import RigLog
-from flownav.paper import plots
 from flownav.paper.laboratory import Laboratory, reading
 from flownav.paper.published import HEIGHTS_M
-from flownav.report.chart import Stack
+from flownav.report.chart import Stack, drawn
 from flownav.report.panels import Panel
+from flownav.report.style import COLOUR, axis, layout, plotly
+
+PAPER, HERE = "gps", "estimate"  # whose figures: the colour of each
+GREY = [[0, "rgb(0,0,0)"], [1, "rgb(255,255,255)"]]
+HEIGHT_COLOURS = dict(zip(HEIGHTS_M, ("estimate", "flow", "gps", "autopilot"), strict=True))
+HEIGHT_SYMBOLS = dict(zip(HEIGHTS_M, ("circle", "square", "diamond", "triangle-up"), strict=True))
+
+
+def dots(name: str, colour: str, x: ArrayLike, y: ArrayLike, **style: Any) -> dict[str, Any]:
+    """A cloud of markers; style: parts of the marker."""
+    marker = {"color": COLOUR[colour], "size": 7, "opacity": 0.75, **style}
+    return _trace(name, x, y, {"mode": "markers", "marker": marker})
+
+
+def line(
+    name: str, colour: str, x: ArrayLike, y: ArrayLike, dash: str = "solid", width: float = 1.6, markers: bool = False
+) -> dict[str, Any]:
+    """A line, with markers at its points if asked."""
+    style = {"mode": "lines+markers" if markers else "lines", "marker": {"size": 7}}
+    return _trace(name, x, y, {**style, "line": {"color": COLOUR[colour], "width": width, "dash": dash}})
+
+
+def _trace(name: str, x: ArrayLike, y: ArrayLike, style: dict[str, Any]) -> dict[str, Any]:
+    points = {"x": drawn(np.asarray(x, float)), "y": drawn(np.asarray(y, float))}
+    return {"type": "scatter", "name": name, **points, "hovertemplate": "%{x:.3g}, %{y:.4g}", **style}
+
+
+def figure(
+    traces: list[dict[str, Any]], x_title: str, y_title: str, height_px: int = 380, **axes: dict[str, Any]
+) -> Any:
+    """The Plotly figure; axes: what xaxis and yaxis have beside their looks."""
+    looks = layout(height_px) | {"hovermode": "closest"}
+    looks["xaxis"] = axis(x_title) | {"zeroline": False} | axes.get("xaxis", {})
+    looks["yaxis"] = axis(y_title) | {"zeroline": False} | axes.get("yaxis", {})
+    return plotly(traces, looks)
+
+
+def pictures(images: list[tuple[str, ArrayLike]], height_px: int = 300) -> Any:
+    """Grey pictures 0 to 255 side by side, each with its title; rows run downwards."""
+    looks = layout(height_px) | {"hovermode": "closest", "annotations": []}
+    data, gap = [], 0.06
+    width = (1.0 - gap * (len(images) - 1)) / len(images)
+    for k, (title, image) in enumerate(images, 1):
+        left = (k - 1) * (width + gap)
+        number = "" if k == 1 else str(k)
+        look: dict[str, Any] = {"zmin": 0, "zmax": 255, "colorscale": GREY, "showscale": False}
+        place = {"xaxis": f"x{number}", "yaxis": f"y{number}", "hovertemplate": "%{x}, %{y}: grey %{z}"}
+        data.append({"type": "heatmap", "name": title, "z": np.asarray(image, np.uint8), **look, **place})
+        square = {"showgrid": False, "zeroline": False, "constrain": "domain"}
+        across = {"domain": [left, left + width], "anchor": f"y{number}"}
+        down = {"anchor": f"x{number}", "scaleanchor": f"x{number}", "autorange": "reversed", "constraintoward": "top"}
+        looks[f"xaxis{number}"] = axis("pixels") | square | across
+        looks[f"yaxis{number}"] = axis() | square | down
+        over = {"x": left + 0.5 * width, "y": 1.0, "xref": "paper", "yref": "paper"}
+        middle = {"xanchor": "center", "yanchor": "bottom", "showarrow": False}
+        looks["annotations"].append({"text": title, "font": {"size": 12, "color": COLOUR["ink"]}, **over, **middle})
+    return plotly(data, looks)
+
+
+def heights_axis() -> dict[str, Any]:
+    """An axis of the four heights."""
+    return {"tickvals": list(HEIGHTS_M), "range": [0.5, 1.6]}
+
 
 FRAME_RATE_HZ = 250.0
 SPEED_M_S = 0.35
@@ -38,15 +103,15 @@ def depth() -> list[Panel]:
     flows = np.array([_flow_of_velocity(float(height)) for height in heights])
     ideal = [SPEED_M_S / FRAME_RATE_HZ / h * effective_focal_px(_focused(float(h))) for h in heights]
     traces = [
-        plots.line("f v/(fps h)", "truth", heights, ideal, dash="5px,3px"),
-        plots.dots("block matching", "flow", heights, flows),
+        line("f v/(fps h)", "truth", heights, ideal, dash="5px,3px"),
+        dots("block matching", "flow", heights, flows),
     ]
     frames = "One frame of 64 by 64 pixels from each height: the nearer camera sees fewer, wider lines."
     curve = f"The same {SPEED_M_S} m/s moves the image less the farther the pad is; the firmware's matching, in steps "
     curve += "of half a pixel, against the motion field."
-    plot = plots.figure(traces, "height (m)", "flow (px a frame)", yaxis={"rangemode": "tozero"})
+    plot = figure(traces, "height (m)", "flow (px a frame)", yaxis={"rangemode": "tozero"})
     return [
-        Panel("figure-2-frames", "Figure 2: the pad from near and from far", frames, frames, plots.pictures(images)),
+        Panel("figure-2-frames", "Figure 2: the pad from near and from far", frames, frames, pictures(images)),
         Panel("figure-2-flow", "Figure 2: flow against depth", curve, "Flow against height. " + curve, plot),
     ]
 
@@ -89,7 +154,7 @@ def rotation() -> list[Panel]:
     flow = f"The camera rocks by ±{np.degrees(ROCK_RAD):.0f}° at {ROCK_HEIGHT_M:g} m and does not move: what is not "
     flow += f"compensated reads as velocity. The firmware of 2013 takes out {100.0 * EARLY_GYRO_SCALE:.0f} % of it."
     return [
-        Panel("figure-3-frames", "Figure 3: a roll takes the pad out of view", view, view, plots.pictures(views)),
+        Panel("figure-3-frames", "Figure 3: a roll takes the pad out of view", view, view, pictures(views)),
         Panel("figure-3-flow", "Figure 3: flow of a rotation", flow, "Reported velocity over time. " + flow, figure),
     ]
 
@@ -155,12 +220,6 @@ def validation(laboratory: Laboratory, height_m: float = 0.6) -> Panel:
         stack.line(row, "flow", "PX4FLOW, simulated", t_s, unseen.log.flow_velocity_m_s[shown])
         stack.line(row, "estimate", "identified model", t_s, reading(run.dynamics, unseen.log)[shown])
         stack.line(row, "truth", "encoder", t_s, unseen.log.reference_velocity_m_s[shown])
+    title = "Figure 15: validation of the seven models at 60 cm"
     caption = "Encoder into the model, its output beside the sensor's, ten seconds of each run."
-    return Panel(
-        "figure-15",
-        "Figure 15: validation of the seven models at 60 cm",
-        caption,
-        caption,
-        stack.chart(window),
-        wide=True,
-    )
+    return Panel("figure-15", title, caption, caption, stack.chart(window), wide=True)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from flownav.campaigns.local import fly_many, median_flight, score_history
 from flownav.core.compile import LANES
@@ -13,12 +15,61 @@ from flownav.core.parameter_files import check
 from flownav.core.record import Record
 from flownav.lab.optics.firmware import EARLY_GYRO_SCALE
 from flownav.lab.rig.instruments import SONAR_ECHO_S, SONAR_PERIOD_S
-from flownav.paper.lift_off import LiftOff, lift_offs
 from flownav.scoring.errors import STATES, percentile_of_paper, published, scores_of_flight, scores_of_flights
+from flownav.scoring.percentiles import spread
 from flownav.simulation.assemble import Setup, assemble
-from flownav.simulation.engine import fly_written
+from flownav.simulation.engine import fly_blocks, fly_written
 from flownav.simulation.flight_record import record_of
+from flownav.simulation.history import column
+from flownav.simulation.plan import Flight
 from flownav.simulation.scenario import Scenario, load_scenario, with_filter
+from flownav.simulation.sensing import EPOCH_S
+
+REACH_S = (-1.0, 3.0)  # about lift-off: where its transient is
+LIFT_OFFS = 96
+
+
+class LiftOff(NamedTuple):
+    """Largest error in w about lift-off [m/s], a row a flight: as flown, and the same flights without shake."""
+
+    shaken_m_s: Array
+    unshaken_m_s: Array
+
+    @property
+    def frozen_inflow_share(self) -> Array:
+        """What the sensor's shake has no part in: the frozen inflow of B_red."""
+        return self.unshaken_m_s / self.shaken_m_s
+
+    def as_json(self) -> dict[str, Any]:
+        """Median, 5th and 95th percentile of each."""
+        return {
+            "flights": len(self.shaken_m_s),
+            "shaken_m_s": spread(self.shaken_m_s),
+            "unshaken_m_s": spread(self.unshaken_m_s),
+            "frozen_inflow_share": spread(self.frozen_inflow_share),
+        }
+
+
+def lift_offs(shaken: Flight, unshaken: Flight, seed: int, flights: int) -> LiftOff | None:
+    """The first flights of a seed on both sensors, LIFT_OFFS of them at most; None where nothing lifts off."""
+    if not shaken.plan.starts_on_ground:
+        return None
+    count = min(flights, LIFT_OFFS)
+    both = (
+        np.concatenate([block for _, block in fly_blocks(flight, seed, 0, count, largest_w_errors)])
+        for flight in (shaken, unshaken)
+    )
+    return LiftOff(*both)
+
+
+def largest_w_errors(history: Array) -> Array:
+    """Largest absolute error in w within REACH_S of each lane's first lift-off [m/s], (lanes,)."""
+    error = np.abs(history[:, column("estimate", "vel_w_m_s")] - history[:, column("truth", "vel_w_m_s")])
+    lifted = np.argmax(history[:, column("truth", "contact_n")] <= 0.0, axis=0)
+    before, after = (round(reach_s / EPOCH_S) for reach_s in REACH_S)
+    steps = np.arange(len(error))[:, None] - lifted
+    return np.asarray(np.where((steps >= before) & (steps <= after), error, 0.0).max(axis=0))
+
 
 SCENARIOS = {5: "takeoff", 6: "landing"}
 HONEST_GPS = "midg"
@@ -89,19 +140,11 @@ def fly_table(
     leaking = assemble(_with(scenario, "flow", flow | RIG_ERRORS)).flight
     printed = published(table)
     assert printed is not None
-    return Flights(
-        table,
-        name,
-        flights,
-        printed,
-        scores_of_flights(rows),
-        percentile_of_paper(rows, printed),
-        scores_of_flights(_flown(honest.flight, seed, flights, on_progress)),
-        scores_of_flights(_flown(leaking, seed, flights, on_progress)),
-        record,
-        float(scenario.gps.white_sigma_m),
-        lift_offs(setup.flight, unshaken, seed, flights),
-    )
+    honestly = scores_of_flights(_flown(honest.flight, seed, flights, on_progress))
+    leaked = scores_of_flights(_flown(leaking, seed, flights, on_progress))
+    lifted, white_m = lift_offs(setup.flight, unshaken, seed, flights), float(scenario.gps.white_sigma_m)
+    scores, percentile = scores_of_flights(rows), percentile_of_paper(rows, printed)
+    return Flights(table, name, flights, printed, scores, percentile, honestly, leaked, record, white_m, lifted)
 
 
 def _flown(flight: Any, seed: int, flights: int, on_progress: Callable[[int], object]) -> Array:

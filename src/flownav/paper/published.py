@@ -14,12 +14,8 @@ from flownav.sensors.datasheet import IdentifiedModel
 
 HEIGHTS_M = (0.6, 0.8, 1.0, 1.5)
 MODELS = 7
-RELATION_FITS = {
-    0.6: 87.0,
-    0.8: 78.0,
-    1.0: 72.0,
-    1.5: 57.0,
-}  # section III.E, the four relations (model 2 of each height)
+# section III.E, the four relations (model 2 of each height)
+RELATION_FITS = {0.6: 87.0, 0.8: 78.0, 1.0: 72.0, 1.5: 57.0}
 SELECTED = (0.6, 2)  # "natural frequency 13.8528 rad/s": Table 1, 60 cm, model 2
 LARGEST_CLAIM_M = 0.27
 
@@ -63,31 +59,30 @@ def table_1() -> list[IdentifiedModel]:
     """The 28 identified models a/(s^2 + b s + c)."""
     return [
         IdentifiedModel(
-            height_m=float(row["height_m"]),
-            model=int(row["model"]),
-            fit_percent=float(row["fit_percent"]),
-            a_1_s2=float(row["a"]),
-            b_1_s=float(row["b"]),
-            c_1_s2=float(row["c"]),
+            height_m=float(row["height_m"]), model=int(row["model"]), fit_percent=float(row["fit_percent"]),
+            a_1_s2=float(row["a"]), b_1_s=float(row["b"]), c_1_s2=float(row["c"]),
         )
         for row in _rows("paper_table1_identified_models.csv")
-    ]
+    ]  # fmt: skip
 
 
 def table_2() -> list[ErrorRow]:
     """Validation errors of the 28 models."""
+    return _error_rows("paper_table2_validation.csv")
+
+
+def _error_rows(name: str) -> list[ErrorRow]:
     return [
-        ErrorRow(float(row["height_m"]), int(row["model"]), float(row["mean_error_m_s"]), float(row["std_error_m_s"]))
-        for row in _rows("paper_table2_validation.csv")
+        ErrorRow(
+            float(row["height_m"]), int(row.get("model", 0)), float(row["mean_error_m_s"]), float(row["std_error_m_s"])
+        )
+        for row in _rows(name)
     ]
 
 
 def table_3() -> list[ErrorRow]:
     """Errors of the selected model at each height."""
-    return [
-        ErrorRow(float(row["height_m"]), 0, float(row["mean_error_m_s"]), float(row["std_error_m_s"]))
-        for row in _rows("paper_table3_selected_model.csv")
-    ]
+    return [row._replace(model=0) for row in _error_rows("paper_table3_selected_model.csv")]
 
 
 def selected_model() -> IdentifiedModel:
@@ -97,26 +92,14 @@ def selected_model() -> IdentifiedModel:
 
 def inconsistencies() -> list[Inconsistency]:
     """All of them, in the paper's order."""
-    return [
-        Inconsistency(int(row["number"]), row["where"], row["printed"], row["reading"])
-        for row in _rows("paper_inconsistencies.csv")
-    ]
+    rows = _rows("paper_inconsistencies.csv")
+    return [Inconsistency(int(row["number"]), row["where"], row["printed"], row["reading"]) for row in rows]
 
 
 def landing_systems() -> list[LandingSystem]:
     """The four figures of the paper's comparison, its own last."""
-    return [
-        LandingSystem(
-            row["system"],
-            row["reference"],
-            float(row["figure_cm"]),
-            row["printed"],
-            row["measures"],
-            row["kind"],
-            row["elsewhere"],
-        )
-        for row in _rows("paper_landing_systems.csv")
-    ]
+    rows = ([row[name] for name in LandingSystem._fields] for row in _rows("paper_landing_systems.csv"))
+    return [LandingSystem(*row)._replace(figure_cm=float(row[2])) for row in rows]  # type: ignore[arg-type]
 
 
 def accuracy_law(height_m: float) -> float:

@@ -47,26 +47,22 @@ class Reproduction:
         if self.laboratory is not None and 1 in self.tables:
             facts["table1"] = _table_1_rows(self.laboratory)
         if 2 in self.tables:
-            facts["table2"] = [
-                _error_row(*rows) | {"model": rows[0].model, "mean_error_of_published_model": rows[2].mean_error,
-                                     "std_error_of_published_model": rows[2].std_error}
-                for rows in zip(published.table_2(), self.table_2, self.table_2_published_models, strict=True)
-            ]  # fmt: skip
+            every = zip(published.table_2(), self.table_2, self.table_2_published_models, strict=True)
+            facts["table2"] = [_error_row(*rows, model=rows[0].model) for rows in every]
         if 3 in self.tables:
-            facts["table3"] = [
-                _error_row(*rows) | {"mean_error_of_published_model": rows[2].mean_error,
-                                     "std_error_of_published_model": rows[2].std_error}
-                for rows in zip(published.table_3(), self.table_3, self.table_3_published_model, strict=True)
-            ]  # fmt: skip
+            every = zip(published.table_3(), self.table_3, self.table_3_published_model, strict=True)
+            facts["table3"] = [_error_row(*rows) for rows in every]
         facts |= {f"table{flown.table}": flown.as_json() for flown in self.flights}
         if self.laboratory is not None and self.laboratory.orders:
-            every = [(self.laboratory.fixed, _fixed_fits(self.laboratory)), *self.laboratory.others]
+            fixed = {height: self.laboratory.mean_fit(height) for height in published.HEIGHTS_M}
+            set_ups = [(self.laboratory.fixed, fixed), *self.laboratory.others]
             facts["orders"] = [
                 {"excitation": test.kind, "height_m": test.height_m, "fit_by_order": _keyed(test.fits)}
                 for test in self.laboratory.orders
             ]
             facts["configurations"] = [
-                {"name": other.name, "description": other.words, "fit_by_height": _keyed(fits)} for other, fits in every
+                {"name": other.name, "description": other.words, "fit_by_height": _keyed(fits)}
+                for other, fits in set_ups
             ]
         if self.laboratory is not None and self.laboratory.instruments:
             facts["instruments"] = [
@@ -85,10 +81,6 @@ class Reproduction:
 def _keyed(fits: Mapping[int, float] | Mapping[float, float]) -> dict[str, float]:
     """With keys that JSON takes."""
     return {f"{key:g}": fit for key, fit in fits.items()}
-
-
-def _fixed_fits(of: Laboratory) -> dict[float, float]:
-    return {height: of.mean_fit(height) for height in published.HEIGHTS_M}
 
 
 def _table_1_rows(of: Laboratory) -> list[dict[str, Any]]:
@@ -115,13 +107,17 @@ def _table_1_rows(of: Laboratory) -> list[dict[str, Any]]:
     return rows
 
 
-def _error_row(printed: ErrorRow, ours: ErrorRow, _: ErrorRow) -> dict[str, Any]:
+def _error_row(printed: ErrorRow, ours: ErrorRow, theirs: ErrorRow, **more: Any) -> dict[str, Any]:
+    """Published, reproduced, and the published model on our runs."""
     return {
         "height_m": printed.height_m,
         "mean_error_published": printed.mean_error,
         "mean_error_reproduced": ours.mean_error,
         "std_error_published": printed.std_error,
         "std_error_reproduced": ours.std_error,
+        **more,
+        "mean_error_of_published_model": theirs.mean_error,
+        "std_error_of_published_model": theirs.std_error,
     }
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,14 +11,11 @@ from flownav.paper.findings import FIT_TOLERANCE
 from flownav.paper.flights import RIG_ERRORS, Flights
 from flownav.paper.published import HEIGHTS_M, RELATION_FITS
 from flownav.paper.reproduction import Reproduction
-from flownav.paper.rows import TableRow
-from flownav.report.figure_words import Tile, number
-from flownav.report.panels import listed
+from flownav.paper.rows import TableRow, kept_together
+from flownav.report.panels import Tile, listed, number
 from flownav.scoring.errors import STATES
 
 FLIGHT_NAMES = {"takeoff": "take-off", "landing": "landing"}
-NUMBER_AND_UNIT = re.compile(r"(\d) (m/s|ms|rad/s|points|cm|m|s|%)(?![A-Za-z])")
-MINUS_SIGN = re.compile(r"(?<![\w)])-(?=\d)")
 UNITS = dict(zip(STATES, ("m", "m", "m", "m/s", "m/s", "m/s"), strict=True))
 
 
@@ -60,11 +56,6 @@ def summary(of: Reproduction) -> str:
         "not."
     )
     return kept_together(" ".join(said))
-
-
-def kept_together(text: str) -> str:
-    """A number and its unit on one line, minus signs true."""
-    return NUMBER_AND_UNIT.sub("\\1\N{NO-BREAK SPACE}\\2", MINUS_SIGN.sub("\N{MINUS SIGN}", text))
 
 
 def tiles(of: Reproduction) -> list[Tile]:

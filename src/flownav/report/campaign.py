@@ -1,18 +1,19 @@
-"""A campaign as one HTML page that needs nothing but a browser: touchdowns, tails, envelope, worst flights."""
+"""A campaign as one HTML page that needs nothing but a browser, and a certificate, which prints on A4 to be signed."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import hashlib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from flownav.core import guard
 from flownav.core.version import __version__
 from flownav.report import campaign_figures as figures
+from flownav.report import certificate_figures, tables
 from flownav.report.campaign_figures import Touchdowns
-from flownav.report.figure_words import number
-from flownav.report.html import drawn_with, template
-from flownav.report.panels import Panel, Section
+from flownav.report.html import HERE, drawn_with, template, widened
+from flownav.report.panels import NONE, Panel, Section, number
 
 MOST_CELLS = 8  # whose touchdowns are drawn
 FIGURES = {
@@ -60,20 +61,14 @@ def sections(summary: dict[str, Any], touchdowns: Sequence[Touchdowns]) -> list[
     pads = [figures.over_the_pad(f"pad-{k}", cells[k], touchdowns[k], reach_m) for k in lands]
     swept = [figures.over_a_sweep(cells, name) for name in figures.swept_numbers(cells)]
     tails = figures.tails([cells[k] for k in lands], [touchdowns[k] for k in lands]) if lands else None
+    winds = [*figures.swept_envelopes(cells), *(figures.envelope(f"wind-{k}", cells[k]) for k in lands)]
+    inputs = [figures.sensitivity(f"inputs-{k}", cell) for k, cell in enumerate(cells[:MOST_CELLS])]
     parts: list[tuple[str, str, Sequence[Panel | None]]] = [
         ("touchdowns", "Touchdowns over the pad", pads),
         ("sweep", "Over what is swept", swept),
         ("spread", "How far off, and how sure", [tails, figures.convergence(cells[:MOST_CELLS])]),
-        (
-            "wind",
-            "The wind that they landed in",
-            [*figures.swept_envelopes(cells), *(figures.envelope(f"wind-{k}", cells[k]) for k in lands)],
-        ),
-        (
-            "inputs",
-            "What matters",
-            [figures.sensitivity(f"inputs-{k}", cell) for k, cell in enumerate(cells[:MOST_CELLS])],
-        ),
+        ("wind", "The wind that they landed in", winds),
+        ("inputs", "What matters", inputs),
     ]
     drawn = [(key, title, tuple(panel for panel in panels if panel is not None)) for key, title, panels in parts]
     return [Section(key, title, panels) for key, title, panels in drawn if panels]
@@ -82,13 +77,9 @@ def sections(summary: dict[str, Any], touchdowns: Sequence[Touchdowns]) -> list[
 def facts(summary: dict[str, Any]) -> list[tuple[str, str]]:
     """What was flown."""
     models = dict.fromkeys(cell["truth_model"] for cell in summary["cells"])
-    found = [
-        ("flights", f"{summary['flights']:,}"),
-        ("cells", str(len(summary["cells"]))),
-        ("seed", str(summary["seed"])),
-    ]
-    found += [("truth", " and ".join(models)), ("sampling", summary["sampling"])]
-    return [*found, *([("until", summary["until"])] if summary["until"] else [])]
+    found = {"flights": f"{summary['flights']:,}", "cells": str(len(summary["cells"])), "seed": str(summary["seed"])}
+    found |= {"truth": " and ".join(models), "sampling": summary["sampling"]}
+    return list((found | ({"until": summary["until"]} if summary["until"] else {})).items())
 
 
 def sentence(cell: dict[str, Any]) -> str:
@@ -122,15 +113,8 @@ def cell_row(cell: dict[str, Any], summary: dict[str, Any]) -> list[str]:
     landed = cell["figures"].get("landed")
     share = "-" if "r95_m" not in cell["figures"] or landed is None else _percent(landed)
     counts = cell["verdicts"]
-    figure_cells = [_with_interval(cell["figures"][name]) if name in cell["figures"] else "-" for name in names]
-    return [
-        cell["label"],
-        f"{cell['flights']:,}",
-        *figure_cells,
-        share,
-        str(counts["crashed"]),
-        str(counts["went_around"]),
-    ]
+    shown = [_with_interval(cell["figures"][name]) if name in cell["figures"] else "-" for name in names]
+    return [cell["label"], f"{cell['flights']:,}", *shown, share, str(counts["crashed"]), str(counts["went_around"])]
 
 
 def worst_row(one: dict[str, Any], summary: dict[str, Any], kept: Sequence[str]) -> dict[str, str]:
@@ -166,3 +150,132 @@ def _with_interval(figure: dict[str, float | None]) -> str:
 
 def _percent(figure: dict[str, float]) -> str:
     return f"{100 * figure['value']:.2f} ({100 * figure['low']:.2f} to {100 * figure['high']:.2f})"
+
+
+HEADLINES = {"pass": "Pass", "fail": "Fail", "not shown": "Not shown"}
+SENTENCES = {
+    "pass": "The flights show every requirement below.",
+    "fail": "The flights show that a requirement below is not met.",
+    "not shown": "The flights show neither that every requirement below is met nor that one is not.",
+}
+MOST_NAMED = 6  # files of a folder that are hashed one by one on the page
+SIGNERS = ("Prepared by", "Checked by", "Approved by")
+
+
+def render_certificate(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> str:
+    """The page as text. facts: as certificate.json has them; shown: what the figures show of each flight."""
+    from markupsafe import Markup
+
+    sections = sections_of(facts, shown)
+    style = "".join((HERE / name).read_text(encoding="utf-8") for name in ("page.css", "certificate.css"))
+    page: str = template("certificate.html.j2").render(
+        facts=facts,
+        own=facts["requirement"],
+        headline=HEADLINES[facts["verdict"]],
+        sentence=SENTENCES[facts["verdict"]],
+        together=together(facts),
+        conditions=conditions(facts),
+        worst=[worst_of(facts, told) for told in facts["worst"]],
+        measures=[one["measure"] for one in facts["requirement"]["requirements"]],
+        axes=[certificate_figures.INPUT_WORDS.get(name, name) for name in facts["envelope"]["axes"]],
+        known=certificate_figures.KNOWN_WORDS,
+        groups=tables.groups,
+        files=[
+            ("SHA-256 of what went in", facts["files"]["in"]),
+            ("SHA-256 of what came out", by_folder(facts["files"]["out"])),
+        ],
+        signers=SIGNERS,
+        dash=NONE,
+        **drawn_with(sections) | {"style": Markup(style)},
+        number=number,
+        percent=percent,
+    )
+    return page
+
+
+def sections_of(facts: Mapping[str, Any], shown: Mapping[str, Any]) -> list[Section]:
+    """The figures in the order of the page."""
+    tails = [
+        certificate_figures.tail(one, shown["figures"][one["measure"]]) for one in facts["requirement"]["requirements"]
+    ]
+    distribution = [certificate_figures.touchdowns(facts, shown), *(panel for panel in tails if panel.figure)]
+    return [
+        Section("distribution", "What the flights did", tuple(widened(distribution))),
+        Section("envelope-map", "Under which conditions", (certificate_figures.envelope(facts),)),
+        Section("sensitivity", "What decides the outcome", tuple(certificate_figures.ranking(facts))),
+    ]
+
+
+def together(facts: Mapping[str, Any]) -> str:
+    """Whose the risk is, in words."""
+    all_of_them = facts["requirement"]["requirements"]
+    risk = percent(facts["risk"], 1)
+    if len(all_of_them) == 1:
+        return f"Consumer's risk {risk}: so likely do these flights pass when the requirement is only just not met."
+    return (
+        f"Each requirement is judged by itself at its own confidence, and all must pass. The consumer's risk is {risk},"
+        " the largest of any one: to pass together while some requirement is not met, that one must pass by luck. It "
+        "does not grow with their number. The risk of a wrong fail is of each requirement, and adds up over them."
+    )
+
+
+def conditions(facts: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Under what the statement holds: settings, ranges, lists."""
+    own = facts["requirement"]
+    rows = [("scenario", own["scenario"])]
+    rows += [(name, value) for _, group in tables.groups({"set": own["set"]}) for name, value in group]
+    given = dict(own["conditions"])
+    for name, entry in given.pop("ranges", {}).items():
+        low, high = entry.get("loc", 0.0), entry.get("loc", 0.0) + entry.get("scale", 1.0)
+        even = entry["distribution"] == "uniform"
+        said = f"{low:g} to {high:g}, evenly" if even else tables.text(entry)
+        rows.append((certificate_figures.INPUT_WORDS.get(name, name), said))
+    for name, value in given.items():
+        if value == []:
+            continue
+        many = value if isinstance(value, list) else [value]
+        words = " to ".join(map(str, many)) if name == "height_m" else ", ".join(map(str, many))
+        rows.append((name, words))
+    return rows
+
+
+def worst_of(facts: Mapping[str, Any], told: Mapping[str, Any]) -> dict[str, Any]:
+    """One of the worst flights as text."""
+    of = {one["measure"]: one for one in facts["requirement"]["requirements"]}
+    said = [
+        number(value, 3 if of[name]["unit"] else 0) if value is not None else "none"
+        for name, value in told["figures"].items()
+    ]
+    inputs = [number(told["inputs"][name], 1) for name in facts["envelope"]["axes"]]
+    return dict(told) | {"said": said, "where": inputs, "report": told.get("report")}
+
+
+def by_folder(digests: Mapping[str, str]) -> dict[str, str]:
+    """Hashes of files by name, those of a folder with many as one: SHA-256 of its lines "name SHA-256"."""
+    folders: dict[str, dict[str, str]] = {}
+    for name, digest in digests.items():
+        top, slash, _ = name.partition("/")
+        folders.setdefault(top + slash, {})[name] = digest
+    found: dict[str, str] = {}
+    for folder, inside in folders.items():
+        if len(inside) <= MOST_NAMED:
+            found |= inside
+        else:
+            lines = "".join(f"{name} {digest}\n" for name, digest in sorted(inside.items()))
+            found[f"{folder} ({len(inside)} files)"] = hashlib.sha256(lines.encode()).hexdigest()
+    return found
+
+
+def percent(share: float | None, digits: int = 2) -> str:
+    """A share in per cent, rounded towards what it does not reach: never 100 % of what is less."""
+    if share is None:
+        return NONE
+    text = f"{100.0 * share:.{digits}f}"
+    if share < 1.0 and float(text) >= 100.0:
+        text = f"{100.0 - 10.0**-digits:.{digits}f}"
+    return f"{text} %"
+
+
+def write_envelope(title: str, rows: Sequence[dict[str, Any]], path: Path) -> None:
+    """Write the page, whole or not at all; rows as `flownav envelope --json` has them. OSError where it cannot be."""
+    guard.write_page(figures.envelope_figure(title, rows).to_html(include_plotlyjs=True, full_html=True), path)

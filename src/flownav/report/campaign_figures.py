@@ -1,4 +1,4 @@
-"""The figures of a campaign's page, from what its summary says and where its flights touched."""
+"""The figures of a campaign's page and of an envelope's, from what its summary says and where its flights touched."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flownav.report.chart import drawn
 from flownav.report.panels import Panel
-from flownav.report.samples import drawn
-from flownav.report.style import COLOUR, axis, layout
+from flownav.report.style import COLOUR, FONT, axis, layout, plotly
 
 Array = NDArray[np.float64]
 
@@ -43,19 +43,17 @@ def common_reach_m(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns
 
 def over_the_pad(key: str, cell: dict[str, Any], touched: Touchdowns, reach_m: float) -> Panel:
     """Where a cell's flights first touched, with circles that hold 50, 95 and 99.7 % of all."""
-    from plotly.graph_objects import Figure
-
     known = np.isfinite(touched.distance_m)
     every = max(1, int(np.ceil(known.sum() / DOTS)))
     east, north = touched.east_m[known][::every], touched.north_m[known][::every]
-    circles = [(title, role, cell["figures"][name]) for name, title, role in CIRCLES]
     half, turn = 0.5 * touched.pad_m, np.linspace(0.0, 2.0 * np.pi, 181)
     pad = {"type": "rect", "x0": -half, "x1": half, "y0": -half, "y1": half, "layer": "below",
            "fillcolor": COLOUR["padfill"], "line": {"color": COLOUR["pad"], "width": 1}}  # fmt: skip
     dots = {"type": "scatter", "mode": "markers", "name": "first contact", "x": drawn(east), "y": drawn(north),
             "marker": {"color": COLOUR["truth"], "size": 3, "opacity": 0.35}, "hovertemplate": "%{y:.3f} m north, %{x:.3f} m east<extra></extra>"}  # fmt: skip # noqa: E501
     data: list[dict[str, Any]] = [dots]
-    for title, role, figure in circles:
+    for radius, title, role in CIRCLES:
+        figure = cell["figures"][radius]
         if figure["value"] is not None:
             for end, style in (("low", "dot"), ("value", "solid"), ("high", "dot")):
                 if figure[end] is not None:
@@ -73,13 +71,11 @@ def over_the_pad(key: str, cell: dict[str, Any], touched: Touchdowns, reach_m: f
     outside = int((np.maximum(abs(touched.north_m[known]), abs(touched.east_m[known])) > reach_m).sum())
     words += f" {outside} touched outside of this map." if outside else ""
     alt = f"Places of first contact of {cell['label']} about the pad's centre"
-    return Panel(key, cell["label"], words, alt, Figure({"data": data, "layout": {"template": {}, **look}}))
+    return Panel(key, cell["label"], words, alt, plotly(data, look))
 
 
 def tails(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> Panel:
     """The share of flights that touched farther off than a distance, on a logarithmic axis."""
-    from plotly.graph_objects import Figure
-
     data, farthest = [], 0.05
     for number, (cell, one) in enumerate(zip(cells, touched, strict=True)):
         far = np.sort(one.distance_m)
@@ -97,14 +93,12 @@ def tails(cells: Sequence[dict[str, Any]], touched: Sequence[Touchdowns]) -> Pan
     look["xaxis"] |= {"type": "log"} if farthest > FAR_M else {"range": [0.0, 1.05 * farthest]}
     look["yaxis"] = axis("flights beyond (%)") | {"type": "log", "dtick": 1}
     words = "The share of all flights that first touched farther off than this, those that crashed among them."
-    figure = Figure({"data": data, "layout": {"template": {}, **look}})
+    figure = plotly(data, look)
     return Panel("tails", "Share beyond a distance", words, "Share of flights beyond a distance from the pad", figure)
 
 
 def convergence(cells: Sequence[dict[str, Any]]) -> Panel | None:
     """How the followed figure and its interval settled as the flights came in."""
-    from plotly.graph_objects import Figure
-
     data: list[dict[str, Any]] = []
     lands = any("r95_m" in cell["figures"] for cell in cells)
     for number, cell in enumerate(cells):
@@ -124,14 +118,13 @@ def convergence(cells: Sequence[dict[str, Any]]) -> Panel | None:
     if not data:
         return None
     what = "R95 at contact" if lands else "p95 of the largest error of one axis"
-    look = layout(360)
-    look["xaxis"] = axis("flights") | {"type": "log", "dtick": 1}
+    look = layout(360) | {"xaxis": axis("flights") | {"type": "log", "dtick": 1}}
     look["yaxis"] = axis(f"{what} (m)") | {"rangemode": "tozero"}
-    figure = Figure({"data": data, "layout": {"template": {}, **look}})
     words = (
         "Solid: the figure after so many flights; dotted: its 95 % interval, which does not allow for looking often."
     )
-    return Panel("convergence", "How it settled", words, f"{what} against the number of flights", figure)
+    alt = f"{what} against the number of flights"
+    return Panel("convergence", "How it settled", words, alt, plotly(data, look))
 
 
 def swept_envelopes(cells: Sequence[dict[str, Any]]) -> list[Panel | None]:
@@ -150,25 +143,23 @@ def _swept_envelope(key: str, label: str, own: list[dict[str, Any]]) -> Panel | 
     speeds = sorted({cell["values"][SPEED] for cell in own})
     if len(speeds) < 2:
         return None
-    edges = [
-        0.0,
-        *(0.5 * (slow + fast) for slow, fast in pairwise(speeds)),
-        speeds[-1] + 0.5 * (speeds[-1] - speeds[-2]),
-    ]
-    ring = {speed: (edges[k], edges[k + 1]) for k, speed in enumerate(speeds)}
+    between = (0.5 * (slow + fast) for slow, fast in pairwise(speeds))
+    edges = [0.0, *between, speeds[-1] + 0.5 * (speeds[-1] - speeds[-2])]
+    ring = dict(zip(speeds, pairwise(edges), strict=True))
     bins = []
     for cell in own:
         landed, speed = cell["figures"]["landed"], cell["values"][SPEED]
-        place = {"from_m_s": ring[speed][0], "to_m_s": ring[speed][1], "flown_m_s": speed}
-        place["direction_deg"] = cell["values"][DIRECTION] % 360.0
-        share = {"landed": landed["value"], "low": landed["low"], "high": landed["high"]}
-        bins.append(place | share | {"flights": cell["flights"]})
+        inner, outer = ring[speed]
+        bins.append({
+            "from_m_s": inner, "to_m_s": outer, "flown_m_s": speed, "direction_deg": cell["values"][DIRECTION] % 360.0,
+            "landed": landed["value"], "low": landed["low"], "high": landed["high"], "flights": cell["flights"],
+        })  # fmt: skip
     return envelope(key, {"label": label, "envelope": bins})
 
 
 def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
     """The share that landed by the wind's speed and the direction that it blew from."""
-    from plotly.graph_objects import Barpolar, Figure
+    from plotly.graph_objects import Figure
 
     if not cell["envelope"]:
         return None
@@ -178,15 +169,10 @@ def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
     figure = Figure()
     for ring in rings:
         own = [one for one in cell["envelope"] if one["from_m_s"] == ring and one["landed"] is not None]
-        figure.add_trace(
-            Barpolar(
-                base=[ring] * len(own), r=[one["to_m_s"] - ring for one in own],
-                theta=[one["direction_deg"] for one in own], width=[float(steps.min())] * len(own),
-                marker={"color": [one["landed"] for one in own], "coloraxis": "coloraxis",
-                        "line": {"color": COLOUR["surface"], "width": 1}},
-                hovertext=[_wind_words(one) for one in own], hoverinfo="text", showlegend=False,
-            )
-        )  # fmt: skip
+        theta, ends = [one["direction_deg"] for one in own], [one["to_m_s"] for one in own]
+        said, share = [_wind_words(one) for one in own], [one["landed"] for one in own]
+        figure.add_trace(_ring(ring, ends, theta, float(steps.min()), share, said))
+    quiet = {"gridcolor": COLOUR["grid"], "tickfont": {"color": COLOUR["muted"]}, "linecolor": COLOUR["rule"]}
     low = min((one["landed"] for one in cell["envelope"] if one["landed"] is not None), default=0.0)
     figure.update_layout(
         layout(420)
@@ -195,11 +181,8 @@ def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
             "coloraxis": {"colorscale": SCALE, "cmin": min(low, 0.9), "cmax": 1.0,
                           "colorbar": {"title": {"text": "landed"}, "tickformat": ".0%", "thickness": 12}},
             "polar": {"bgcolor": "rgba(0,0,0,0)",
-                      "angularaxis": {"rotation": 90, "direction": "clockwise", "ticksuffix": "°",
-                                      "gridcolor": COLOUR["grid"],
-                                      "tickfont": {"color": COLOUR["muted"]}, "linecolor": COLOUR["rule"]},
-                      "radialaxis": {"ticksuffix": " m/s", "angle": 90, "gridcolor": COLOUR["grid"],
-                                     "tickfont": {"color": COLOUR["muted"]}, "linecolor": COLOUR["rule"]}},
+                      "angularaxis": {"rotation": 90, "direction": "clockwise", "ticksuffix": "°", **quiet},
+                      "radialaxis": {"ticksuffix": " m/s", "angle": 90, **quiet}},
         }
     )  # fmt: skip
     words = "Share that landed, by the wind at 20 ft and where it blew from (north is up)."
@@ -208,8 +191,6 @@ def envelope(key: str, cell: dict[str, Any]) -> Panel | None:
 
 def sensitivity(key: str, cell: dict[str, Any]) -> Panel | None:
     """Which of the drawn inputs go with a touchdown far off: rank correlations with their intervals."""
-    from plotly.graph_objects import Figure
-
     told = cell["sensitivity"][::-1]
     if not told:
         return None
@@ -227,23 +208,18 @@ def sensitivity(key: str, cell: dict[str, Any]) -> Panel | None:
     look["xaxis"] = axis("rank correlation with how far off it touched")
     look["yaxis"] = axis() | {"automargin": True, "nticks": len(told)}
     words = "The twelve strongest of Spearman's rank correlations, with 95 % intervals; grey: it may be nothing."
-    figure = Figure({"data": [bars], "layout": {"template": {}, **look}})
-    return Panel(key, cell["label"], words, f"Rank correlations of the inputs of {cell['label']}", figure)
+    return Panel(key, cell["label"], words, f"Rank correlations of the inputs of {cell['label']}", plotly([bars], look))
 
 
 def swept_numbers(cells: Sequence[dict[str, Any]]) -> list[str]:
     """What is swept over at least three numbers."""
     names = dict.fromkeys(name for cell in cells for name in cell["values"])
-    numbers = {
-        name: {cell["values"][name] for cell in cells if isinstance(cell["values"][name], float)} for name in names
-    }
+    numbers = {name: {value for cell in cells if isinstance(value := cell["values"][name], float)} for name in names}
     return [name for name, values in numbers.items() if len(values) >= 3]
 
 
 def over_a_sweep(cells: Sequence[dict[str, Any]], name: str) -> Panel:
     """A figure over a swept number, one line for what else differs."""
-    from plotly.graph_objects import Figure
-
     lands = any("r95_m" in cell["figures"] for cell in cells)
     what, words = ("landed", "share that landed (%)") if lands else ("p95_axis_m", "p95 of one axis (m)")
     lines: dict[str, list[dict[str, Any]]] = {}
@@ -264,10 +240,23 @@ def over_a_sweep(cells: Sequence[dict[str, Any]], name: str) -> Panel:
                      })  # fmt: skip
     look = layout(360)
     look["xaxis"], look["yaxis"] = axis(name), axis(words)
-    figure = Figure({"data": data, "layout": {"template": {}, **look}})
-    return Panel(
-        f"sweep-{name.replace('.', '-')}", name, "Bars: 95 % intervals.", f"{words} over {name}", figure, wide=True
-    )
+    key = f"sweep-{name.replace('.', '-')}"
+    return Panel(key, name, "Bars: 95 % intervals.", f"{words} over {name}", plotly(data, look), wide=True)
+
+
+def _ring(
+    inner: float, outer: Sequence[float], theta: Sequence[float], width: float, share: Sequence[float],
+    words: Sequence[str],
+) -> Any:  # fmt: skip
+    """Sectors between two radii, coloured by the share that landed."""
+    from plotly.graph_objects import Barpolar
+
+    line = {"color": COLOUR["surface"], "width": 1}
+    return Barpolar(
+        base=[inner] * len(theta), r=[end - inner for end in outer], theta=theta, width=[width] * len(theta),
+        marker={"color": share, "coloraxis": "coloraxis", "line": line}, hovertext=words, hoverinfo="text",
+        showlegend=False,
+    )  # fmt: skip
 
 
 def _wind_words(one: dict[str, Any]) -> str:
@@ -275,4 +264,37 @@ def _wind_words(one: dict[str, Any]) -> str:
     return (
         f"{speed} m/s from about {one['direction_deg']:g}°<br>"
         f"landed {100 * one['landed']:.1f} % ({100 * one['low']:.1f} to {100 * one['high']:.1f} %) of {one['flights']}"
+    )
+
+
+def envelope_figure(title: str, rows: Sequence[dict[str, Any]]) -> Any:
+    """A ring for each speed, a sector for each direction that the wind blows from; north is up."""
+    from plotly.graph_objects import Figure
+
+    speeds = sorted({row["speed_20ft_m_s"] for row in rows})
+    directions = sorted({row["from_direction_deg"] for row in rows})
+    figure, inner = Figure(), 0.0
+    for speed in speeds:
+        ring = [row for row in rows if row["speed_20ft_m_s"] == speed]
+        theta, share = [row["from_direction_deg"] for row in ring], [row["success"]["rate"] for row in ring]
+        width, said = 360.0 / len(directions), [_words(row) for row in ring]
+        figure.add_trace(_ring(inner, [speed] * len(ring), theta, width, share, said))
+        inner = speed
+    figure.update_layout(
+        title={"text": title},
+        font={"family": FONT, "color": COLOUR["ink"]},
+        coloraxis={"colorscale": SCALE, "cmin": 0.0, "cmax": 1.0,
+                   "colorbar": {"title": {"text": "landed"}, "tickformat": ".0%"}},
+        polar={"angularaxis": {"rotation": 90, "direction": "clockwise", "ticksuffix": "°"},
+               "radialaxis": {"ticksuffix": " m/s", "angle": 90}},
+    )  # fmt: skip
+    return figure
+
+
+def _words(row: dict[str, Any]) -> str:
+    rate, rest = row["success"], row["rest"]["r95_m"]
+    return (
+        f"{row['speed_20ft_m_s']:g} m/s from {row['from_direction_deg']:g}°<br>landed {100.0 * rate['rate']:.1f} % "
+        f"(95 % interval {100.0 * rate['low']:.1f}..{100.0 * rate['high']:.1f} %)<br>crashed {row['crashed']}<br>"
+        f"R95 at rest {'-' if rest is None else f'{rest:.3f} m'}"
     )

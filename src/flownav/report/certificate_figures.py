@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flownav.report.campaign_figures import DIRECTION, SPEED
+from flownav.report.chart import drawn
 from flownav.report.panels import Panel
-from flownav.report.samples import drawn
 from flownav.report.style import COLOUR, axis, layout
 
 Array = NDArray[np.float64]

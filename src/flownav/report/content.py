@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import re
-import shlex
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any
 
@@ -14,28 +11,11 @@ import numpy as np
 
 from flownav.core.measurement import Sensor
 from flownav.core.record import Record
-from flownav.report.figure_words import NONE, Tile, metres, number
-from flownav.report.landing import landing_sentences, landing_tiles
-from flownav.report.phase_rows import phases_within
-from flownav.report.series import (
-    event_rows,
-    flow_readings,
-    flow_velocity,
-    has,
-    mapping,
-    outages,
-    readings,
-    rms_m,
-    scored_outages,
-    start_end_s,
-    truth_name,
-)
-from flownav.scoring.phases import Phase, phase_at
+from flownav.report import series
+from flownav.report.panels import NONE, Part, Tile, metres, number
+from flownav.report.series import has, mapping, readings
 
-EVENTS_LISTED = 300
 UNIT_AFTER_NUMBER = re.compile(r"(\d) (m/s|m|s)\b")
-STATES = {"x": ("north", "m"), "y": ("east", "m"), "z": ("down", "m"),
-          "u": ("forward", "m/s"), "v": ("right", "m/s"), "w": ("down", "m/s")}  # fmt: skip
 KINDS = {
     "fly": "A closed-loop simulated flight of {}.",
     "replay": "A recorded flight of {}, fused again.",
@@ -53,7 +33,7 @@ def title(record: Record) -> str:
 def duration_s(record: Record) -> float:
     """The flight's length [s]: as the manifest says, or else as its estimate lasts."""
     stated = record.manifest.get("duration_s")
-    start, end = start_end_s(record)
+    start, end = series.start_end_s(record)
     return float(stated) if isinstance(stated, (int, float)) else end - start
 
 
@@ -81,9 +61,9 @@ def summary(record: Record) -> str:
         said.append(f"{ever} off by more than {metres(largest)} m{beside}.")
     if manifest.get("known_exactly"):
         said.append(f"What the vehicle knew exactly: {manifest['known_exactly']}.")
-    cut = scored_outages(record)
+    cut = series.scored_outages(record)
     if cut:
-        worst = max(cut, key=rms_m)
+        worst = max(cut, key=series.rms_m)
         among = f", the worst of {len(cut)} outages," if len(cut) > 1 else ""
         rms, largest = number(worst.get("horizontal_rms_m"), 2), number(worst.get("horizontal_max_m"), 2)
         said.append(
@@ -113,7 +93,7 @@ def summary(record: Record) -> str:
 
 def _reference(record: Record) -> str:
     """What errors are taken against, in words: a truth, or an estimate that serves for want of one."""
-    name = truth_name(record)
+    name = series.truth_name(record)
     return "the recorded truth" if name == "truth" else f"the recorded {name}, an estimate itself,"
 
 
@@ -123,21 +103,21 @@ def tiles(record: Record) -> list[Tile]:
     found = landing_tiles(mapping(scores.get("touchdown")))
     if scores.get("max_position_error_m") is not None:
         published = paper.get("max_position_error_m")
-        against = "what was flown on" if has(record, "flown") else f"estimate against {truth_name(record)}"
+        against = "what was flown on" if has(record, "flown") else f"estimate against {series.truth_name(record)}"
         note = f"paper {metres(published)} m" if published is not None else against
         found.append(Tile("Largest error of one axis", metres(scores["max_position_error_m"]), "m", note))
-    cut = scored_outages(record)
+    cut = series.scored_outages(record)
     if cut:
-        worst = max(cut, key=rms_m)
+        worst = max(cut, key=series.rms_m)
         when = f"rms, {worst['t0']:g} to {worst['t1']:g} s"
         name = "Drift without GPS" if len(cut) == 1 else f"Worst drift of {len(cut)} outages"
         found.append(Tile(name, number(worst.get("horizontal_rms_m"), 2), "m", when))
     truth = mapping(scores.get("truth"))
     if truth:
-        largest = f"at most {number(truth.get('horizontal_max_m'), 2)} m, against {truth_name(record)}"
+        largest = f"at most {number(truth.get('horizontal_max_m'), 2)} m, against {series.truth_name(record)}"
         found.append(Tile("Horizontal error", number(truth.get("horizontal_rms_m"), 2), "m", f"rms, {largest}"))
     if scores.get("end_drift_m") is not None:
-        laid = f"horizontal, {truth_name(record)} laid on at take-off"
+        laid = f"horizontal, {series.truth_name(record)} laid on at take-off"
         found.append(Tile("Drift at the end", metres(scores["end_drift_m"]), "m", laid))
     if scores.get("velocity_rms_m_s") is not None:
         found.append(Tile("Velocity error", number(scores["velocity_rms_m_s"], 2), "m/s", "rms, against GPS"))
@@ -151,8 +131,8 @@ def tiles(record: Record) -> list[Tile]:
 
 def flow_share(record: Record) -> float | None:
     """Share of the flight with valid flow readings, a gap not counted; None without readings."""
-    flow = flow_readings(record)
-    start, end = start_end_s(record)
+    flow = series.flow_readings(record)
+    start, end = series.start_end_s(record)
     if flow is None or len(flow.t_s) < 2 or end <= start:
         return None
     interval = np.diff(flow.t_s)
@@ -170,13 +150,15 @@ def lacking(record: Record) -> list[str]:
     if not has(record, "truth"):
         errors = "errors are shown against GPS, which has errors of its own" if gps else "no error can be shown"
         notes.append(f"No truth: {errors}.")
-    elif truth_name(record) != "truth":
-        notes.append(f"No truth: errors are shown against the {truth_name(record)}, which has errors of its own.")
+    elif series.truth_name(record) != "truth":
+        notes.append(
+            f"No truth: errors are shown against the {series.truth_name(record)}, which has errors of its own."
+        )
     if not has(record, "estimate"):
         notes.append("No estimate: nothing was fused.")
-    if flow_readings(record) is None:
+    if series.flow_readings(record) is None:
         notes.append("No valid optical flow: position and velocity rest on the other sensors.")
-    elif flow_velocity(record) is None:
+    elif series.flow_velocity(record) is None:
         notes.append("No range at the time of the flow: its readings are fused, but no velocity of theirs is drawn.")
     if not gps:
         notes.append("No GPS positions.")
@@ -187,105 +169,50 @@ def lacking(record: Record) -> list[str]:
     return notes
 
 
-@dataclass(frozen=True)
-class ScoreRow:
-    """A state's scores beside the paper's, as text."""
-
-    state: str
-    direction: str
-    unit: str
-    ours: tuple[str, str, str, str]  # mean, std, rms, max
-    paper: tuple[str, str]  # mean, std
-
-
-def score_rows(record: Record) -> list[ScoreRow]:
-    """One row for each scored state."""
-    states = mapping(mapping(record.manifest.get("scores")).get("states"))
-    published = mapping(mapping(record.manifest.get("paper")).get("states"))
-    rows = []
-    for key, (direction, unit) in STATES.items():
-        mine, theirs = mapping(states.get(key)), mapping(published.get(key))
-        if mine:
-            mean, std, rms, largest = (number(mine.get(f"{kind}_error")) for kind in ("mean", "std", "rms", "max"))
-            beside = (number(theirs.get("mean_error")), number(theirs.get("std_error")))
-            rows.append(ScoreRow(key, direction, unit, (mean, std, rms, largest), beside))
-    return rows
-
-
-def outage_rows(record: Record, phases: Sequence[Phase] = ()) -> list[tuple[str, str, str, str, str]]:
-    """Scored GPS outages as (window, phases, rms, max, where GPS was cut); the median and the worst last, if scored."""
-    scores, here = mapping(record.manifest.get("scores")), outages(record)
-    rows = []
-    for outage in scored_outages(record):
-        window = (float(outage["t0"]), float(outage["t1"]))
-        figures = number(outage.get("horizontal_rms_m"), 2), number(outage.get("horizontal_max_m"), 2)
-        place = "this record" if window in here else "a replay of its own"
-        rows.append((f"{window[0]:g} to {window[1]:g} s", phases_within(phases, *window), *figures, place))
-    for name, key in (("median", "outage_median_rms_m"), ("worst", "outage_worst_rms_m")):
-        if scores.get(key) is not None:
-            rows.append((name, "", number(scores[key], 2), "", ""))
-    return rows
+def landing_sentences(landing: Mapping[str, Any]) -> list[str]:
+    """Of `scores.touchdown` as one flight has it; empty where it touched nothing."""
+    contact, rest, limited = (mapping(landing.get(name)) for name in ("contact", "rest", "limited_by"))
+    said = []
+    if contact:
+        said.append(
+            f"It touched down after {number(contact.get('t_s'), 1)} s, {metres(contact.get('distance_m'))} m from the "
+            f"pad's centre, sinking at {number(contact.get('sink_rate_m_s'), 2)} m/s and drifting at "
+            f"{number(contact.get('lateral_speed_m_s'), 2)} m/s."
+        )
+    if limited.get("estimate_m") is not None:
+        said.append(
+            f"Of that its estimate was off by {metres(limited.get('estimate_m'))} m, its guidance by "
+            f"{metres(limited.get('guidance_m'))} m and the pad's place by {metres(limited.get('pad_m'))} m."
+        )
+    if rest:
+        said.append(
+            f"It came to rest {metres(rest.get('distance_m'))} m from the centre, {metres(rest.get('slide_m'))} m from "
+            "where it touched."
+        )
+    if landing.get("broken"):
+        said.append(f"It crashed: {', '.join(landing['broken'])}.")
+    return said
 
 
-@dataclass(frozen=True)
-class Event:
-    """An event as the page lists it."""
-
-    t_s: float
-    cells: tuple[str, str, str, str]  # source, kind, detail, value
-    phase: str
-
-
-@dataclass(frozen=True)
-class EventTables:
-    """Events counted by what they are, and one by one up to a limit."""
-
-    counted: list[tuple[str, str, int, str, str, str]]  # source, kind, count, first, last, phases
-    listed: list[Event]
-    total: int
+def parts_of(limited: Mapping[str, Any]) -> tuple[Part, ...]:
+    """What the touchdown's place was limited by, as bars; they add as vectors. None where it was not scored."""
+    sizes = {name: limited.get(f"{name}_m") for name in ("estimate", "guidance", "pad")}
+    known = {name: float(size) for name, size in sizes.items() if isinstance(size, (int, float)) and size == size}
+    longest = max(known.values(), default=0.0)
+    return tuple(Part(name, metres(size), size / longest if longest else 0.0) for name, size in known.items())
 
 
-def events(record: Record, phases: Sequence[Phase] = ()) -> EventTables:
-    """The events table, counted and listed."""
-    rows = event_rows(record)
-    groups: dict[tuple[str, str], list[float]] = {}
-    for t_s, source, kind, _, _ in rows:
-        groups.setdefault((source, kind), []).append(t_s)
-    where = list(phases)
-    counted = [
-        (source, kind, len(times), f"{min(times):.2f}", f"{max(times):.2f}",
-         ", ".join(dict.fromkeys(name for t_s in times if (name := phase_at(where, t_s)))))
-        for (source, kind), times in groups.items()
-    ]  # fmt: skip
-    listed = [Event(t_s, (source, kind, detail, value), phase_at(where, t_s))
-              for t_s, source, kind, detail, value in rows[:EVENTS_LISTED]]  # fmt: skip
-    return EventTables(counted, listed, len(rows))
-
-
-def groups(tree: Any) -> list[tuple[str, list[tuple[str, str]]]]:
-    """A nested mapping as (group, [(dotted key, value as text)]); its own plain values come first, as "general"."""
-    tree = mapping(tree)
-    plain = [(str(key), text(value)) for key, value in tree.items() if not isinstance(value, Mapping)]
-    nested = [(str(key), list(_flat(value))) for key, value in tree.items() if isinstance(value, Mapping)]
-    return ([("general", plain)] if plain else []) + nested
-
-
-def _flat(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, str]]:
-    for key, value in tree.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", text(value)
-
-
-def text(value: Any) -> str:
-    """A manifest value as text: strings as they are, everything else as JSON."""
-    return value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)
-
-
-def command(record: Record) -> str:
-    """The command line that made the record, "" where it does not say."""
-    stated = record.manifest.get("command")
-    if isinstance(stated, (list, tuple)):
-        return shlex.join(str(part) for part in stated)
-    return str(stated) if stated else ""
+def landing_tiles(landing: Mapping[str, Any]) -> list[Tile]:
+    """The same as headline figures."""
+    contact, rest, limited = (mapping(landing.get(name)) for name in ("contact", "rest", "limited_by"))
+    found = []
+    if contact:
+        when = f"at {number(contact.get('t_s'), 1)} s"
+        found.append(Tile("Touchdown off centre", metres(contact.get("distance_m")), "m", when, parts_of(limited)))
+        found.append(Tile("Touchdown sink rate", number(contact.get("sink_rate_m_s"), 2), "m/s", when))
+    if rest:
+        slid = f"slid {metres(rest.get('slide_m'))} m"
+        found.append(Tile("At rest off centre", metres(rest.get("distance_m")), "m", slid))
+    if landing.get("broken"):
+        found.append(Tile("Crashed", "yes", "", ", ".join(landing["broken"])))
+    return found

@@ -1,6 +1,8 @@
-"""Innovations: what each sensor read less what the filter expected, in the band that it expected it in."""
+"""Innovations in the band that they were expected in, and states beyond position and velocity in theirs."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,7 +10,7 @@ from flownav.core.measurement import COLUMNS, Sensor
 from flownav.core.record import Record
 from flownav.report.chart import Stack
 from flownav.report.panels import Panel
-from flownav.report.series import Array, mapping, moments, outages, start_end_s
+from flownav.report.series import Array, mapping, moments, outages, start_end_s, track
 
 INNOVATION_NUMBERS = ("t_s", "observation_variance", "innovation", "innovation_variance", "test_ratio", "fused")
 SMALLEST_RATIO = 0.01  # test ratios below are not drawn: the axis is logarithmic
@@ -156,3 +158,109 @@ def _reach(innovation: Array, expected: Array) -> float:
     known = expected[np.isfinite(expected)]
     shown = [np.abs(innovation[np.isfinite(innovation)]), np.quantile(known, [0.98]) if len(known) else known]
     return 1.1 * float(np.max(np.concatenate(shown), initial=1e-6))
+
+
+LEAST_CHANGE = 1e-9  # a state and a deviation that change by less were not estimated
+
+
+class Group(NamedTuple):
+    """A panel of states: its key, title and caption, and for each row a title and (state, name, role) drawn on it."""
+
+    key: str
+    title: str
+    caption: str
+    rows: tuple[tuple[str, float, tuple[tuple[str, str, str], ...]], ...]
+
+
+FAST = "fast part"  # of the receiver's error, drawn without a band
+DEGREES = 57.29577951308232
+EARTH = (("north", "n"), ("east", "e"), ("down", "d"))
+
+
+def _one(title: str, state: str, name: str, scale: float = 1.0) -> tuple[str, float, tuple[tuple[str, str, str], ...]]:
+    """A row with one state on it."""
+    return title, scale, ((state, name, "estimate"),)
+
+
+GROUPS = (
+    Group(
+        "gyro-bias",
+        "Gyro bias",
+        "What the filter takes the gyro's bias to be, and three of its standard deviations.",
+        tuple(_one(f"{a} (°/s)", f"gyro_bias_{a}_rad_s", "bias", DEGREES) for a in "xyz"),
+    ),
+    Group(
+        "accel-bias",
+        "Accelerometer bias",
+        "The same of the accelerometer.",
+        tuple(_one(f"{a} (m/s²)", f"accel_bias_{a}_m_s2", "bias") for a in "xyz"),
+    ),
+    Group(
+        "gps-errors",
+        "Error of the GPS position",
+        "What the filter takes the receiver's error to be: a part that wanders for minutes and one for seconds.",
+        tuple(
+            (f"{title} (m)", 1.0, ((f"gps_slow_{a}_m", "slow part", "estimate"), (f"gps_fast_{a}_m", FAST, "gps")))
+            for title, a in EARTH
+        ),
+    ),
+    Group(
+        "gps-velocity-errors",
+        "Error of the GPS velocity",
+        "What the filter takes the receiver's velocity to be off by.",
+        tuple(_one(f"{title} (m/s)", f"gps_velocity_{a}_m_s", "error") for title, a in EARTH),
+    ),
+    Group(
+        "other-states",
+        "Other states of the filter",
+        "Those that this flight's sensors let it estimate, each with three of its standard deviations.",
+        (
+            _one("ground, down (m)", "ground_d_m", "ground"),
+            _one("barometer (m)", "baro_m", "offset"),
+            _one("flow scale (m/m)", "flow_scale", "error of scale"),
+            *(_one(f"compass, {title} (°)", f"compass_{a}_rad", "error", DEGREES)
+              for title, a in (("sine", "sin"), ("cosine", "cos"))),
+            *(_one(f"attitude sensor, {a} (°)", f"ins_{a}_rad", "error", DEGREES)
+              for a in ("roll", "pitch", "heading")),
+            _one("age of velocity (s)", "velocity_lag_s", "age"),
+            *(_one(f"pad, {title} (m)", f"pad_{a}_m", "pad") for title, a in EARTH),
+        ),
+    ),
+)  # fmt: skip
+
+
+def inner_states(record: Record) -> list[Panel]:
+    """A panel for each group of which the filter estimated a state; none where the record holds no such states."""
+    return [panel for group in GROUPS if (panel := _panel(record, group)) is not None]
+
+
+def _panel(record: Record, group: Group) -> Panel | None:
+    rows = [
+        (title, scale, found)
+        for title, scale, drawn in group.rows
+        if (found := [one for one in drawn if _estimated(record, one[0])])
+    ]
+    if not rows:
+        return None
+    stack = Stack([title for title, _, _ in rows], row_height_px=84 if len(rows) > 3 else 110)
+    for row, (_, scale, found) in enumerate(rows, 1):
+        for column, name, role in found:
+            state = track(record, "states", (column, f"std_{column}"))
+            if state is None:
+                continue
+            value, sigma = scale * state.value.T
+            if name != FAST:
+                stack.band(row, "±3\N{GREEK SMALL LETTER SIGMA} stated", state.t_s, 3.0 * sigma, value)
+            stack.line(row, role, name, state.t_s, value)
+    chart = stack.chart(start_end_s(record), moments(record), outages(record))
+    alt = f"{group.title} over time: {', '.join(title for title, _, _ in rows)}."
+    return Panel(group.key, group.title, group.caption, alt, chart)
+
+
+def _estimated(record: Record, column: str) -> bool:
+    """Whether a state has a standard deviation above zero and either of them changes."""
+    state = track(record, "states", (column, f"std_{column}"))
+    if state is None:
+        return False
+    known = state.value[np.isfinite(state.value).all(axis=1)]
+    return bool(len(known) > 1 and known[:, 1].max() > 0.0 and np.ptp(known, axis=0).max() > LEAST_CHANGE)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from flownav.core.measurement import Sensor
 from flownav.core.record import POSITION_NED, Record
+from flownav.report.chart import LINE_POINTS, thin
 from flownav.report.panels import Panel, listed
-from flownav.report.samples import LINE_POINTS, thin
 from flownav.report.series import Array, Track, Window, at, estimates, moments, outages, readings
 
 JUMP_M = 0.5  # from one row to the next: what is flown on jumps so far as a pad is found

@@ -1,4 +1,4 @@
-"""Position, velocity and their errors in time: the paper's figures 17 to 30."""
+"""Position, velocity, attitude and controls in time: the paper's figures 17 to 25."""
 
 from __future__ import annotations
 
@@ -7,25 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flownav.core.measurement import Sensor
-from flownav.core.record import POSITION_NED, VELOCITY_BODY, Record
-from flownav.report.chart import Stack
+from flownav.core.measurement import COLUMNS, Sensor
+from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY, Record
+from flownav.report import series
+from flownav.report.chart import Stack, sliding_mean, sliding_rms, thin
 from flownav.report.panels import Panel, listed
-from flownav.report.series import (
-    Array,
-    Track,
-    Window,
-    estimates,
-    flow_readings,
-    flow_velocity,
-    gps_velocity_body,
-    has,
-    moments,
-    outages,
-    readings,
-    start_end_s,
-    track,
-)
+from flownav.report.series import Array, Track, Window, has, moments, outages, readings, track
 
 POSITION_TITLES = ("x, north (m)", "y, east (m)", "z, down (m)")
 VELOCITY_TITLES = ("u, forward (m/s)", "v, right (m/s)", "w, down (m/s)")
@@ -59,7 +46,7 @@ def position(record: Record, view: View = POSITION) -> Panel:
     """Position x, y, z: GPS readings, estimate, truth (figures 17 and 22)."""
     dots = [Source("gps", "GPS", readings(record, Sensor.GPS_POSITION))]
     lines = [Source("command", "reference", track(record, "command", REFERENCE))]
-    lines += [Source(*source) for source in estimates(record, POSITION_NED)]
+    lines += [Source(*source) for source in series.estimates(record, POSITION_NED)]
     note = DOWN if view.with_gps else ""
     note += f" {PLACED}" if has(record, "flown") and view.with_gps else ""
     return _states(record, POSITION_TITLES, dots, lines, view, note)
@@ -67,15 +54,15 @@ def position(record: Record, view: View = POSITION) -> Panel:
 
 def velocity(record: Record, view: View = VELOCITY) -> Panel:
     """Body velocity u, v, w: flow, estimate, truth (figures 18 to 25)."""
-    lines = [Source(*source) for source in estimates(record, VELOCITY_BODY)]
-    flow = flow_velocity(record)
+    lines = [Source(*source) for source in series.estimates(record, VELOCITY_BODY)]
+    flow = series.flow_velocity(record)
     name = "flow sensor" if has(record, "flow_velocity") else "flow \N{MULTIPLICATION SIGN} range"
     dots = [Source("flow", name, flow)]
     if not has(record, "truth", VELOCITY_BODY):
-        dots.insert(0, Source("gps", "GPS velocity", gps_velocity_body(record)))
+        dots.insert(0, Source("gps", "GPS velocity", series.gps_velocity_body(record)))
     note = "Body axes: forward, right, down."
     if flow is None:
-        fused = flow_readings(record) is not None
+        fused = series.flow_readings(record) is not None
         note += f" The record holds no {'range for its' if fused else 'valid'} flow readings."
     elif np.isnan(flow.value[:, 2]).all():
         note += " The flow sensor does not measure w."
@@ -96,7 +83,7 @@ def _states(
             stack.line(row, role, name, t_s, values)
     if titles is POSITION_TITLES:
         stack.reverse(3)
-    span = view.window or start_end_s(record)
+    span = view.window or series.start_end_s(record)
     figure = stack.chart(span, moments(record), outages(record))
     alt = f"{view.title} from {span[0]:.0f} to {span[1]:.0f} s: {', '.join(titles)}. "
     return Panel(view.key, view.title, note, f"{alt}Drawn: {listed(stack.names)}.", figure)
@@ -108,3 +95,82 @@ def _rows(source: Track | None, window: Window | None) -> Iterator[tuple[int, Ar
         shown = source.within(window)
         for row, values in enumerate(shown.value.T, 1):
             yield row, shown.t_s, values
+
+
+LEAST_IMU_HZ = 20.0
+SLOW_S, SHAKEN_S = 0.3, 1.0
+ATTITUDE_POINTS = 6000  # rows of an attitude that are turned into angles
+CONTROLS = {
+    "lon_rad": "longitudinal (°)",
+    "lat_rad": "lateral (°)",
+    "col_rad": "collective (°)",
+    "ped_rad": "pedal (°)",
+}
+
+
+def attitude(record: Record) -> Panel:
+    """Roll, pitch and yaw [deg] of truth, estimate and autopilot; of the attitude sensor where none of them has any."""
+    key, title = "attitude", "Attitude"
+    sources, own = series.estimates(record, QUATERNION), readings(record, Sensor.ATTITUDE)
+    if not sources and own is not None:
+        sources = [("estimate", "attitude sensor", own)]
+    if not sources:
+        return Panel(key, title, absent="The record holds no attitude.")
+    stack = Stack(("roll (°)", "pitch (°)", "yaw (°)"))
+    for role, name, source in sources:
+        kept = thin(ATTITUDE_POINTS, *source.value[:, 1:].T)
+        angles = series.euler_deg(Track(source.t_s[kept], source.value[kept]))
+        for row in (1, 2, 3):
+            stack.line(row, role, name, source.t_s[kept], _unbroken(angles[:, row - 1], row == 3))
+    figure = stack.chart(series.start_end_s(record), moments(record))
+    return Panel(key, title, "Z-Y-X Euler angles of body against earth; drawn in degrees.",
+                 f"Roll, pitch and yaw in degrees: {listed(stack.names)}.", figure)  # fmt: skip
+
+
+def _unbroken(angle_deg: np.ndarray, is_yaw: bool) -> np.ndarray:
+    """A yaw that does not leap at +-180 degrees."""
+    if not is_yaw or np.isnan(angle_deg).any():
+        return angle_deg
+    return np.unwrap(angle_deg, period=360.0)
+
+
+def controls(record: Record) -> Panel:
+    """The controls [deg] and, where known, the rotor thrust [N]."""
+    key, title = "controls", "Controls"
+    columns = [name for name in CONTROLS if track(record, "command", (name,)) is not None]
+    thrust = track(record, "truth", ("thrust_n",))
+    if not columns and thrust is None:
+        return Panel(key, title, absent="The record holds no commands.")
+    titles = [CONTROLS[name] for name in columns] + (["thrust (N)"] if thrust is not None else [])
+    stack = Stack(titles, row_height_px=118)
+    for row, name in enumerate(columns, 1):
+        command = track(record, "command", (name,))
+        if command is not None:
+            stack.line(row, "estimate", "command", command.t_s, np.degrees(command.value[:, 0]))
+    if thrust is not None:
+        stack.line(len(titles), "truth", "true thrust", thrust.t_s, thrust.value[:, 0])
+    figure = stack.chart(series.start_end_s(record), moments(record))
+    return Panel(key, title, "Angles of the swash plate and the blades, as commanded.",
+                 f"Controls over time: {listed(titles)}.", figure)  # fmt: skip
+
+
+def vibration(record: Record) -> list[Panel]:
+    """How much the vehicle shakes its IMU: what is faster than a slow mean, rms over a sliding window; none without."""
+    imu = track(record, "imu", COLUMNS[Sensor.IMU])
+    if imu is None or len(imu.t_s) < 2 or (len(imu.t_s) - 1) / max(np.ptp(imu.t_s), 1e-9) < LEAST_IMU_HZ:
+        return []
+    stack = Stack(("accelerometer (m/s²)", "gyro (°/s)"), row_height_px=120)
+    shaken = []
+    for row, columns, scale in ((1, slice(3, 6), 1.0), (2, slice(0, 3), 57.29577951308232)):
+        fast = [values - sliding_mean(imu.t_s, values, SLOW_S) for values in imu.value[:, columns].T]
+        squares = np.nan_to_num(np.sum(np.square(fast), axis=0))
+        shaken.append(scale * sliding_rms(imu.t_s, squares, SHAKEN_S))
+        stack.line(row, "imu", "vibration", imu.t_s, shaken[-1])
+    stack.from_zero()
+    caption = (
+        f"Length of what the IMU reads beyond its mean over {SLOW_S:g} s, rms over a sliding {SHAKEN_S:g} s: "
+        f"in the median {np.median(shaken[0]):.2f} m/s² and {np.median(shaken[1]):.2f} °/s, "
+        f"at most {np.max(shaken[0]):.2f} m/s² and {np.max(shaken[1]):.2f} °/s."
+    )
+    chart = stack.chart(series.start_end_s(record), moments(record), outages(record))
+    return [Panel("vibration", "Vibration", caption, f"Vibration of the IMU over time. {caption}", chart)]

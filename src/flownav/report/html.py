@@ -16,20 +16,15 @@ from flownav.report import (
     content,
     figures_errors,
     figures_filter,
-    figures_gps,
-    figures_inner,
     figures_innovation,
     figures_path,
-    figures_protection,
     figures_states,
-    figures_vehicle,
-    phase_rows,
-    sensor_rows,
+    tables,
 )
+from flownav.report.chart import DOT_POINTS, LINE_POINTS
 from flownav.report.figures_path import Paths, paths_of
 from flownav.report.page_data import Columns, paths_data, sections_data
 from flownav.report.panels import Panel, Section
-from flownav.report.samples import DOT_POINTS, LINE_POINTS
 from flownav.report.series import Window, first_pad_fix_s, has, mapping, moments, outages, start_end_s
 from flownav.report.style import FONT, LIGHT_TO_DARK, PALETTE
 from flownav.scoring.phases import Phase, phases_of
@@ -77,16 +72,16 @@ def widened(panels: list[Panel]) -> Iterator[Panel]:
 def _sections(record: Record) -> list[tuple[str, str, list[Panel]]]:
     known = has(record, "truth")
     whole = [figures_errors.position_error(record), figures_errors.velocity_error(record)] if known else []
-    against_gps = [] if known else [*figures_gps.residuals(record), figures_gps.error_against_gps(record)]
+    against_gps = [] if known else [*figures_errors.residuals(record), figures_errors.error_against_gps(record)]
     filtered = [
         *figures_filter.normalised_innovations(record),
         *figures_filter.consistency(record),
         *figures_innovation.innovations(record),
     ]
     errors = [*figures_errors.from_first_fix(record), *figures_errors.flown_errors(record), *whole, *against_gps]
-    uncertainty = [figures_filter.radius_of_uncertainty(record), *figures_protection.protection(record)]
-    inner = figures_inner.inner_states(record)
-    vehicle = [figures_vehicle.attitude(record), figures_vehicle.controls(record), *figures_vehicle.vibration(record)]
+    uncertainty = [figures_filter.radius_of_uncertainty(record), *figures_filter.protection(record)]
+    inner = figures_innovation.inner_states(record)
+    vehicle = [figures_states.attitude(record), figures_states.controls(record), *figures_states.vibration(record)]
     return [
         ("path", "Flight path", [figures_path.path_over_pad(record), figures_path.ground_track(record)]),
         ("close-ups", "Take-off, touchdown and outages", figures_errors.close_ups(record)),
@@ -113,19 +108,19 @@ def render(record: Record) -> str:
         tiles=content.tiles(record),
         lacking=content.lacking(record),
         paper=mapping(record.manifest.get("paper")),
-        scores=content.score_rows(record),
+        scores=tables.score_rows(record),
         flown=has(record, "flown"),
-        phases=phase_rows.phase_rows(record, found),
-        outages=content.outage_rows(record, found),
-        sensors=sensor_rows.sensor_rows(record),
-        rejected=sensor_rows.rejected_rows(record, found),
-        thinned=_thinned(record),
+        phases=tables.phase_rows(record, found),
+        outages=tables.outage_rows(record, found),
+        sensors=tables.sensor_rows(record),
+        rejected=tables.rejected_rows(record, found),
+        thinned=any(len(table["t_s"]) > DOT_POINTS for table in record.tables.values()),
         line_points=LINE_POINTS,
         dot_points=DOT_POINTS,
-        events=content.events(record, found),
-        parameters=content.groups(record.manifest.get("parameters")),
-        provenance=content.groups(record.manifest.get("provenance")),
-        command=content.command(record),
+        events=tables.events(record, found),
+        parameters=tables.groups(record.manifest.get("parameters")),
+        provenance=tables.groups(record.manifest.get("provenance")),
+        command=tables.command(record),
         **linked_with(shown, flight_facts(record, found), paths_of(record), start_end_s(record)),
     )
     return page
@@ -185,8 +180,9 @@ def heights_px(charts: Mapping[str, Any]) -> dict[str, int]:
 def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:
     """What every page with figures is given: its sections, their data, colours, style, scripts and content policy."""
     from markupsafe import Markup
+    from plotly.offline import get_plotlyjs
 
-    scripts, policy = page_scripts()
+    scripts = [get_plotlyjs().replace("\r", ""), (HERE / "page.js").read_text(encoding="utf-8")]
     return {
         "sections": shown,
         "palette": PALETTE,
@@ -195,31 +191,22 @@ def drawn_with(shown: Sequence[Section]) -> dict[str, Any]:
         "dark": Markup(inside_script(json.dumps(LIGHT_TO_DARK))),
         "style": Markup((HERE / "page.css").read_text(encoding="utf-8")),
         "scripts": [Markup(script) for script in scripts],
-        "policy": policy,
+        "policy": content_policy(scripts),
     }
 
 
-def template(name: str) -> Any:
+def template(name: str, folder: Path = HERE) -> Any:
     """A page's template: what is put into it is escaped, and what it lacks is an error."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     environment = Environment(
-        loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(folder),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
     return environment.get_template(name)
-
-
-def page_scripts() -> tuple[list[str], str]:
-    """The scripts that draw a page's figures, and the content policy that lets these and nothing else run."""
-    from plotly.offline import get_plotlyjs
-
-    scripts = [get_plotlyjs().replace("\r", ""), (HERE / "page.js").read_text(encoding="utf-8")]
-    return scripts, content_policy(scripts)
-
-
-def _thinned(record: Record) -> bool:
-    """Whether any table may be longer than what is drawn of it."""
-    return any(len(table["t_s"]) > DOT_POINTS for table in record.tables.values())
 
 
 def figure_json(panel: Panel) -> str:

@@ -15,10 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from flownav.report.chart import Chart, Series
+from flownav.report.chart import CROSS_POINTS, DOT_POINTS, LINE_POINTS, Chart, Series, thin, thin_dots
 from flownav.report.figures_path import Paths, drawn_rows
 from flownav.report.panels import Section
-from flownav.report.samples import CROSS_POINTS, DOT_POINTS, LINE_POINTS, thin, thin_dots
 from flownav.report.series import Array
 
 DIGITS = 6  # decimal places below the leading one of a column's largest value

@@ -41,7 +41,6 @@ from flownav.simulation import onboard, seeing
 from flownav.simulation.seeing import told
 
 if TYPE_CHECKING:
-    from flownav.simulation.scenario import Scenario
     from flownav.vehicle.kinds import AnyVehicle, RotorFacts
 
 BLADES = 2.0  # of the main rotor
@@ -92,8 +91,8 @@ class CarriedSensor(NamedTuple):
     late: bool = False
     lever: str = ""
     heard: Callable[..., Any] | None = None
-    wanted: Callable[[Scenario, Any, float], Any] = onboard.as_filed
-    readings: Callable[[Scenario], int] | None = None  # how many of `says` it gives; None: all
+    wanted: Callable[[onboard.Wishes, Any, float], Any] = onboard.as_filed
+    readings: Callable[[onboard.Wishes], int] | None = None  # how many of `says` it gives; None: all
     coefficients: Callable[[Any, Carrier], Any] = lambda sheet, _: sheet.parameters()
 
     @property

@@ -5,7 +5,7 @@ Last: datasheets as a scenario wants them, its own figures above the files', at 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,9 @@ from flownav.sensors.geometry import BeamHit, Ground, beam_distance
 from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
 from flownav.sensors.inertial_sheet import InertialSheet
 from flownav.sensors.range_sensor import RangeSensorSheet
+from flownav.sensors.settings import GpsInsSettings, PadFixSettings, RangefinderSettings
 from flownav.sensors.sheet import Lever, SensorSheet
 from flownav.vehicle.state import HelicopterState
-
-if TYPE_CHECKING:
-    from flownav.simulation.scenario import Scenario
 
 EPOCH_S = 0.02
 PHYSICS_PERIOD_S = 0.002
@@ -132,19 +130,30 @@ def clock_of(sheet: SensorSheet, phase: int, readings: int) -> Clock:
     return Clock(readings, period, phase % period)
 
 
-def as_filed(scenario: Scenario, sheet: Sheet, lens_down_m: float) -> Sheet:
+class Wishes(Protocol):
+    """What a scenario says of sensors itself, above their files; no camera for the pad where pad_fix is None."""
+
+    @property
+    def gps(self) -> GpsInsSettings: ...  # noqa: D102
+    @property
+    def rangefinder(self) -> RangefinderSettings: ...  # noqa: D102
+    @property
+    def pad_fix(self) -> PadFixSettings | None: ...  # noqa: D102
+
+
+def as_filed(scenario: Wishes, sheet: Sheet, lens_down_m: float) -> Sheet:
     """What its file says."""
     return on_clock(sheet)
 
 
-def inertial_sheet(scenario: Scenario, sheet: InertialSheet, lens_down_m: float) -> InertialSheet:
+def inertial_sheet(scenario: Wishes, sheet: InertialSheet, lens_down_m: float) -> InertialSheet:
     """The IMU at the lowest rate, not below its own, whose period is so many physics steps that an epoch has."""
     steps = [n for n in range(1, STEPS_AN_EPOCH + 1) if STEPS_AN_EPOCH % n == 0]
     fast = [n for n in steps if 1.0 / (n * PHYSICS_PERIOD_S) >= float(sheet.rate_hz) - 1e-6]
     return sheet.model_copy(update={"rate_hz": 1.0 / (max(fast or steps[:1]) * PHYSICS_PERIOD_S)})
 
 
-def receiver_sheet(scenario: Scenario, sheet: GpsReceiverSheet, lens_down_m: float) -> GpsReceiverSheet:
+def receiver_sheet(scenario: Wishes, sheet: GpsReceiverSheet, lens_down_m: float) -> GpsReceiverSheet:
     """The receiver: the paper's white noise at 50 Hz, or the sheet with what the scenario says of its errors."""
     gps = scenario.gps
     if gps.model == "white":
@@ -167,24 +176,24 @@ def receiver_sheet(scenario: Scenario, sheet: GpsReceiverSheet, lens_down_m: flo
     return on_clock(sheet.model_copy(update={"position": sheet.position.model_copy(update=shared)}))
 
 
-def receiver_readings(scenario: Scenario) -> int:
+def receiver_readings(scenario: Wishes) -> int:
     """A fix is a position and a velocity; the paper's white one has no velocity."""
     return 1 if scenario.gps.model == "white" else 2
 
 
-def camera_sheet(scenario: Scenario, sheet: FlowCameraSheet, lens_down_m: float) -> FlowCameraSheet:
+def camera_sheet(scenario: Wishes, sheet: FlowCameraSheet, lens_down_m: float) -> FlowCameraSheet:
     """The flow camera, its lens where the scenario puts it."""
     return on_clock(sheet.model_copy(update={"lens": at_height(sheet.lens, lens_down_m)}))
 
 
-def range_sheet(scenario: Scenario, sheet: RangeSensorSheet, lens_down_m: float) -> RangeSensorSheet:
+def range_sheet(scenario: Wishes, sheet: RangeSensorSheet, lens_down_m: float) -> RangeSensorSheet:
     """The rangefinder with what the scenario says of it, its lens where the scenario puts it."""
     sonar = scenario.rangefinder
     said = {name: getattr(sonar, name) for name in sonar.model_fields_set}
     return on_clock(sheet.model_copy(update=said | {"lens": at_height(sheet.lens, lens_down_m)}))
 
 
-def pad_sheet(scenario: Scenario, sheet: PadCameraSheet, lens_down_m: float) -> PadCameraSheet | None:
+def pad_sheet(scenario: Wishes, sheet: PadCameraSheet, lens_down_m: float) -> PadCameraSheet | None:
     """The pad's camera, where the scenario has one."""
     fix = scenario.pad_fix
     if fix is None:

@@ -21,7 +21,7 @@ from flownav.campaigns.run import record_again, record_path
 from flownav.campaigns.store import RECORDS, Dataset, Store
 from flownav.core.parameter_files import shipped
 from flownav.core.provenance import code_sha256, command_line, hash_of, provenance
-from flownav.report.certificate import render
+from flownav.report.campaign import render_certificate
 from flownav.report.html import write_report
 from flownav.sensors.datasheet import DEFAULT_SENSOR
 from flownav.simulation.carried import carried_sensors
@@ -49,7 +49,7 @@ def write_certificate(
         told["record"], told["report"] = _recorded(certificate, flight, store.folder, name)
         on_recorded(1)
     facts |= {"assumed": assumed(certificate.plan), "made_by": _made_by(), "files": _files(certificate, store, name)}
-    page = render(facts, drawn(certificate))
+    page = render_certificate(facts, drawn(certificate))
     store.keep_text(PAGE, page)
     facts["files"]["page"] = {PAGE: hash_of(store.folder / PAGE)}
     store.keep_text(FACTS, json.dumps({"schema": SCHEMA} | facts, indent=1) + "\n")

@@ -1,0 +1,173 @@
+"""What calls of the API share: how one is written down, parts of one's own, entries of files and their changes."""
+
+from __future__ import annotations
+
+import atexit
+import hashlib
+import inspect
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import cache
+from numbers import Integral
+from pathlib import Path
+from shutil import rmtree
+from tempfile import mkdtemp
+from typing import Any
+
+from flownav.core.errors import InputError
+from flownav.core.guard import written_whole
+from flownav.core.text import to_toml
+from flownav.parts.calling import name_of
+from flownav.parts.naming import OURS, part_of, require
+from flownav.parts.protocols import Parts
+
+LONGEST = 200  # characters of one argument
+
+
+def call_of(name: str, *arguments: Any, **options: Any) -> str:
+    """A call as Python writes it, for the record's "how to reproduce"; what is None or empty is left out.
+
+    Options that stand as the function has them unless told otherwise are left out by `changed`.
+    """
+    given = [_shown(argument) for argument in arguments]
+    said = {key: value for key, value in options.items() if value is not None and _is_said(value)}
+    given += [f"{key}={_shown(value)}" for key, value in said.items() if key.isidentifier()]
+    dotted = {key: value for key, value in said.items() if not key.isidentifier()}
+    given += [f"**{_shown(dotted)}"] if dotted else []
+    return f"flownav.{name}({', '.join(given)})"
+
+
+def changed(function: Callable[..., Any], options: Mapping[str, Any]) -> dict[str, Any]:
+    """The options that differ from the function's defaults."""
+    defaults = {name: parameter.default for name, parameter in inspect.signature(function).parameters.items()}
+    return {name: value for name, value in options.items() if not _same(value, defaults.get(name))}
+
+
+def _same(value: Any, default: Any) -> bool:
+    return type(value) is type(default) and repr(value) == repr(default)
+
+
+def _is_said(value: Any) -> bool:
+    return not (isinstance(value, tuple | list | dict) and not value)
+
+
+def _shown(value: Any) -> str:
+    text = repr(str(value)) if hasattr(value, "__fspath__") else repr(value)
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]}..."
+
+
+def require_from(name: str, value: int, low: int, high: int) -> None:
+    """InputError where an argument is no whole number, or is out of its range."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or not low <= value <= high:
+        raise InputError(f"{name} = {value!r}: must be a whole number from {low} to {high}")
+
+
+def require_path(name: str, value: Any) -> Path:
+    """The path. InputError where something else is given."""
+    if not isinstance(value, str | Path):
+        raise InputError(f"{name}: {type(value).__name__} is given; a path is needed")
+    return Path(value)
+
+
+def split(filter: Any, sensors: Sequence[Any], vehicle: Any, controller: Any) -> tuple[Parts, str | None, Any]:
+    """What is somebody else's, and the names of filter and vehicle that are the scenario's (None where they are not).
+
+    A filter by another name than ours is an entry point's or a file's. InputError where an object is no such part.
+    """
+    own_filter, own_vehicle = None, None
+    if filter is not None and not (isinstance(filter, str) and filter in OURS["filter"]):
+        own_filter, filter = _part("filter", filter), None
+    if vehicle is not None and (hasattr(vehicle, "derivative") or (isinstance(vehicle, str) and ":" in vehicle)):
+        own_vehicle, vehicle = _part("vehicle", vehicle), None
+    if isinstance(sensors, str) or not isinstance(sensors, Sequence):
+        raise InputError("sensors: a list of them is needed, such as sensors=[MyRange]")
+    own_sensors = tuple(_part("sensor", sensor) for sensor in sensors)
+    own_controller = None if controller is None else _part("controller", controller)
+    return Parts(own_filter, own_sensors, own_vehicle, own_controller), filter, vehicle
+
+
+def own_filter(filter: Any) -> Any:
+    """The filter of a replay that is not ours; None where ours is meant."""
+    if isinstance(filter, str) and filter == "paper":
+        raise InputError("--filter paper: the paper's filter flies in simulation only, where it is fed as it was")
+    return None if filter is None or (isinstance(filter, str) and filter == "landing") else _part("filter", filter)
+
+
+def _part(kind: str, part: Any) -> Any:
+    """A part by its name, or the one that is given."""
+    if isinstance(part, str):
+        return part_of(kind, part)
+    require(kind, part, name_of(part))
+    return part
+
+
+Entries = dict[str, Any]
+
+
+def merged(entries: Mapping[str, Any], changes: Mapping[str, Any], where: str) -> Entries:
+    """A copy of the entries with these changes. InputError where a dotted name leads into no table.
+
+    A mapping is merged into the table that is there; anything else replaces it. A number that replaces one with its
+    provenance ({ value, uncertainty, source }) keeps the uncertainty.
+    """
+    found = dict(entries)
+    for name, value in changes.items():
+        key, dot, rest = name.partition(".")
+        if dot:
+            value = {rest: value}
+        old = found.get(key)
+        if isinstance(value, Mapping) and "value" not in value:
+            if old is not None and not isinstance(old, Mapping):
+                raise InputError(f"{where}: {key} is no table; give a value")
+            found[key] = merged(old or {}, value, where)
+        elif isinstance(old, Mapping) and "value" in old and not isinstance(value, Mapping):
+            found[key] = {**old, "value": value, "source": "changed from Python"}
+        else:
+            found[key] = value
+    return found
+
+
+def plain_entries(entries: Any) -> Any:
+    """Entries as TOML has them: tuples as lists, without what is None."""
+    if isinstance(entries, Mapping):
+        return {key: plain_entries(value) for key, value in entries.items() if value is not None}
+    if isinstance(entries, list | tuple):
+        return [plain_entries(value) for value in entries]
+    return str(entries) if isinstance(entries, Path) else entries
+
+
+def kept_file(name: str, entries: Mapping[str, Any]) -> Path:
+    """A file with these entries for as long as this process lives, under a name that their content gives.
+
+    A scenario names its vehicle and its flow sensor by files: this is that of one which was made in Python.
+    """
+    text = to_toml(entries)
+    safe = "".join(letter if letter.isalnum() else "-" for letter in name)[:40] or "part"
+    path = _folder() / f"{safe}-{hashlib.sha256(text.encode()).hexdigest()[:12]}.toml"
+    if not path.exists():
+        path.write_text(text, encoding="utf-8")
+    return path
+
+
+@cache
+def _folder() -> Path:
+    """Removed when the process ends."""
+    folder = Path(mkdtemp(prefix="flownav-"))
+    atexit.register(rmtree, folder, ignore_errors=True)
+    return folder
+
+
+def saved(entries: Mapping[str, Any], path: Path) -> Path:
+    """Write nested dictionaries as a TOML file, whole or not at all. InputError where it cannot be written there."""
+    with writing(path), written_whole(path) as temporary:
+        temporary.write_text(f"# written by flownav\n{to_toml(entries)}", encoding="utf-8")
+    return path
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """InputError where what is done within it cannot be written at a path."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); give another path") from error

@@ -23,7 +23,7 @@ from flownav.navigation.memory import PAD_KNOWN, PROTECTION, SUSPECTED, load_aid
 from flownav.navigation.place import SEEN
 
 LONGEST_AHEAD_S = 2.0
-UNFUSED = "unfused"  # a reason that the session finds (serving.py)
+UNFUSED = "unfused"  # a reason that the session finds (horizon.Serving)
 INVALID = 2.0  # the flag of `memory.AidMemory`
 WITHHELD = {
     "no_vehicle": "no autopilot's HEARTBEAT is heard",

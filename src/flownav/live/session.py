@@ -2,7 +2,7 @@
 
 Bytes become messages of one vehicle (reception), these become measurements on the vehicle's clock (hearing), which wait
 at the horizon until all of their instant must be here, and are then fed to the navigator (filtering). Its state,
-carried on to now, is sent where nothing speaks against it (estimating).
+carried on to now, is sent where nothing speaks against it (answers).
 """
 
 from __future__ import annotations

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import struct
+
 import numpy as np
 
 from flownav.export.samples.dataflash import HEAD as HEAD
+from flownav.export.samples.dataflash import STRUCT
 from flownav.export.samples.dataflash import DataFlashWriter as DataFlashWriter
 from flownav.export.samples.dataflash import define_flight as define_flight
 from replay_logs import ORIGIN, SyntheticLog
@@ -21,6 +24,11 @@ def dataflash_of(log: SyntheticLog, writer: DataFlashWriter | None = None, boot_
     for t, name, row in sorted(rows, key=lambda entry: entry[0]):
         MESSAGES[name](writer, round((t + boot_s) * 1e6), row)
     return writer
+
+
+def blank(codes: str) -> bytes:
+    """A message's body of zeros."""
+    return bytes(struct.calcsize("<" + "".join(STRUCT[code] for code in codes)))
 
 
 def _gps(writer: DataFlashWriter, time_us: int, row: list[float]) -> None:

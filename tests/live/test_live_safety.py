@@ -16,7 +16,7 @@ from rich.console import Console
 from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.estimation.states import POSITION, STATE
-from flownav.live.answers import ODOMETRY_COMPONENT, why_withheld
+from flownav.live.answers import why_withheld
 from flownav.live.display import draw
 from flownav.live.filtering import Keeper
 from flownav.live.horizon import MOST_WAITING, Refused
@@ -410,7 +410,7 @@ def test_a_camera_of_another_system_is_heard_where_it_is_named(wires):
 
 def test_what_flownav_sent_itself_is_not_taken_when_it_comes_back(wires):
     wire = wires(send="landing-target").fly(4.0)
-    wire.fly(2.0, beside=sees_the_pad(wire, 1, ODOMETRY_COMPONENT))
+    wire.fly(2.0, beside=sees_the_pad(wire, 1, say.ODOMETRY_COMPONENT))
     assert wire.session.reason == "no_pad"
 
 

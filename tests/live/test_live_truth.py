@@ -6,7 +6,7 @@ import pytest
 
 from flownav.live.filtering import Keeper
 from flownav.live.options import Options
-from flownav.live.requests import HIL, SET_MESSAGE_INTERVAL, SILENT_S, TRIES
+from flownav.live.requests import HIL, MOST_QUESTIONS, SET_MESSAGE_INTERVAL, SILENT_S
 from flownav.live.session import Session
 from flownav.mavlink import outgoing as say
 from flownav.mavlink.framing import coder
@@ -82,7 +82,7 @@ def test_a_vehicle_is_not_asked_for_it():
     autopilot = Autopilot(ARDUPILOT, simulated=False).live(20.0)
     assert 27 in autopilot.asked
     assert 108 not in autopilot.asked
-    assert autopilot.parameters_asked == TRIES
+    assert autopilot.parameters_asked == MOST_QUESTIONS
     assert "SIM_STATE" not in autopilot.session.requests.refused
 
 

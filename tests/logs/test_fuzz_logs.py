@@ -20,7 +20,7 @@ from blackbox_logs import blackbox_log
 from blackbox_logs import quantised as box_tables
 from crazyflie_logs import deck_log
 from crazyflie_logs import quantised as deck_tables
-from dataflash_files import HEAD, DataFlashWriter, dataflash_of
+from dataflash_files import HEAD, DataFlashWriter, blank, dataflash_of
 from fed_records import queue_of_flight, record_of
 from flownav.core.errors import InputError
 from flownav.export.formats import export
@@ -211,7 +211,7 @@ LABELS = sorted(
     | {field.label for fields in FIELDS.values() for field in fields}
 )
 FORMATS = st.lists(st.tuples(st.sampled_from(sorted(CODES)), st.sampled_from(LABELS)), max_size=6).filter(
-    lambda fields: len(DataFlashWriter.blank("".join(code for code, _ in fields))) < 250
+    lambda fields: len(blank("".join(code for code, _ in fields))) < 250
 )
 
 
@@ -226,9 +226,9 @@ def test_messages_that_are_not_what_their_names_say_are_no_other_error(tmp_path,
         codes, labels = "".join(code for code, _ in fields), ",".join(label for _, label in fields)
         writer.define(name, codes, labels)
         kind = writer.types[name][0]
-        size = len(DataFlashWriter.blank(codes))
+        size = len(blank(codes))
         for i in range(3):
-            body = (noise[i:] + DataFlashWriter.blank(codes))[:size]
+            body = (noise[i:] + blank(codes))[:size]
             writer.parts.append(HEAD + bytes([kind]) + body)
     content = writer.content()
     if flies:

@@ -14,7 +14,7 @@ from flownav.estimation.states import ATTITUDE, GYRO_BIAS, PAD, POSITION, STATE,
 from flownav.live.options import Limits, Options
 from flownav.live.reception import Vehicle
 from flownav.mavlink import outgoing as say
-from flownav.mavlink.framing import INVALID_AUTOPILOT, PX4, Message, coder
+from flownav.mavlink.framing import PX4, Message, coder
 from flownav.mavlink.position_messages import LOCAL_FRD, LOCAL_NED
 from flownav.mavlink.signing import sign_outgoing
 from flownav.navigation.ahead import covariance_at, state_at
@@ -23,7 +23,7 @@ from flownav.navigation.memory import PAD_KNOWN, PROTECTION, SUSPECTED, load_aid
 from flownav.navigation.place import SEEN
 
 LONGEST_AHEAD_S = 2.0  # chosen: twice the longest horizon, within the inertial readings that are kept
-UNFUSED = "unfused"  # a reason that the session finds (serving.py)
+UNFUSED = "unfused"  # a reason that the session finds (horizon.Serving)
 INVALID = 2.0  # the flag of `memory.AidMemory`
 WITHHELD = {
     "no_vehicle": "no autopilot's HEARTBEAT is heard",
@@ -40,8 +40,6 @@ WITHHELD = {
     "no_pad": "no pad has been seen",
     "nothing_asked": "--send none",
 }
-ONBOARD_CONTROLLER, ACTIVE = 18, 4  # MAV_TYPE, MAV_STATE
-ODOMETRY_COMPONENT = 197  # MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY
 OWN_SYSTEM = 1  # until the vehicle's is known, which we then are of
 STEEPEST = 0.1  # cosine of the steepest sight of the pad that is told, 84 deg: chosen, beyond any camera's view
 
@@ -146,7 +144,7 @@ class Answers:
 
     def __init__(self, options: Options) -> None:
         self._options = options
-        self._mav: Any = coder(OWN_SYSTEM, ODOMETRY_COMPONENT)
+        self._mav: Any = coder(OWN_SYSTEM, say.ODOMETRY_COMPONENT)
 
     @property
     def mav(self) -> Any:
@@ -162,10 +160,6 @@ class Answers:
         if self._options.key is not None:
             sign_outgoing(self._mav, self._options.key, unix_s)
         return bytes(message.pack(self._mav))
-
-    def heartbeat(self) -> Message:
-        """Of a companion computer."""
-        return self._mav.heartbeat_encode(ONBOARD_CONTROLLER, INVALID_AUTOPILOT, 0, 0, ACTIVE, say.MAVLINK_VERSION)
 
     def timesync(self, now_s: float) -> Message:
         """A request, with our time."""

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import os
 import re
+import select
 import socket
+import time
 from collections import Counter, deque
 from collections.abc import Callable
 from contextlib import suppress
@@ -122,6 +124,14 @@ class Link:
 
     def forget(self) -> None:
         """The vehicle is silent: anyone may speak."""
+
+
+def waited(link: Link, seconds: float) -> None:
+    """Until something arrives, or so long."""
+    if link.fileno() < 0:
+        time.sleep(seconds)
+    else:
+        select.select([link.fileno()], [], [], seconds)
 
 
 class UdpLink(Link):

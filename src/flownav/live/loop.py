@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import gc
 import os
-import select
 import signal
 import sys
 import time
@@ -23,7 +22,7 @@ from flownav.core.measurement import COLUMNS, Measurement, Sensor
 from flownav.live.answers import estimate_of
 from flownav.live.filtering import Filtering, Keeper
 from flownav.live.horizon import Waiting
-from flownav.live.link import Link
+from flownav.live.link import Link, waited
 from flownav.live.options import Options
 from flownav.live.session import Session
 from flownav.live.simulated import SimulatedVehicle
@@ -188,7 +187,7 @@ def run_session(
 
     with Collector(spoke_s) as collector:
         while not stop():
-            _wait(link)
+            waited(link, WAIT_S)
             for piece, sender in link.read():
                 now_s = clock()
                 flow = session.due
@@ -209,14 +208,6 @@ def run_session(
             collector.turn(now_s)
 
 
-def _wait(link: Link) -> None:
-    number = link.fileno()
-    if number < 0:
-        time.sleep(WAIT_S)
-    else:
-        select.select([number], [], [], WAIT_S)
-
-
 def run_vehicle(
     vehicle: SimulatedVehicle,
     link: Link,
@@ -231,7 +222,7 @@ def run_vehicle(
     start_s, unix_s = clock(), time.time()
     t_s = 0.0
     while not stop() and not vehicle.finished:
-        _wait(link)
+        waited(link, WAIT_S)
         now_s = clock()
         t_s = speed * (now_s - start_s)
         answers = [frame for piece, _ in link.read() for frame in vehicle.hear(piece, t_s)]

@@ -2,7 +2,7 @@
 
 Bytes become messages of one vehicle (reception), these become measurements on the vehicle's clock (hearing), which wait
 at the horizon until all of their instant must be here, and are then fed to the navigator (filtering). Its state,
-carried on to now, is sent where nothing speaks against it (estimating).
+carried on to now, is sent where nothing speaks against it (answers).
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter, deque
 
 from flownav.core.measurement import Sensor
-from flownav.live.answers import ODOMETRY_COMPONENT, UNFUSED, WITHHELD, Answers, estimate_of, fault_of, why_withheld
+from flownav.live.answers import UNFUSED, WITHHELD, Answers, estimate_of, fault_of, why_withheld
 from flownav.live.filtering import BATCH, Filtering, Keeper
 from flownav.live.hearing import Hearing
 from flownav.live.horizon import Refused
@@ -21,7 +21,7 @@ from flownav.live.requests import TRUTHS, Requests, Simulator
 from flownav.mavlink.converted import Pose
 from flownav.mavlink.framing import Message
 from flownav.mavlink.messages import CONVERTERS, STATES, TrueState
-from flownav.mavlink.outgoing import Estimate
+from flownav.mavlink.outgoing import ODOMETRY_COMPONENT, Estimate, companion_heartbeat
 from flownav.navigation.feed import SLOWEST_IMU_HZ
 from flownav.navigation.reasons import HORIZONTAL
 from flownav.navigation.rows import InnovationRow
@@ -194,7 +194,7 @@ class Session:
             self._offer(t_s, now_s)
         if now_s - self._second_s >= SECOND:
             self._second_s = now_s
-            self._send(self.answers.heartbeat(), now_s)
+            self._send(companion_heartbeat(self.answers.mav), now_s)
             self._send(self.answers.timesync(now_s), now_s)
         request = self.requests.due(self.answers.mav, self.reception.vehicle, now_s)
         for question in (request, self.simulator.due(self.answers.mav, self.reception.vehicle, now_s)):

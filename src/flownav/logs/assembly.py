@@ -1,4 +1,4 @@
-"""From columns of a reader to a Stream: rows in time order, what cannot be thrown away and counted in every format."""
+"""From a reader's columns to a Stream: rows in time order; what cannot be is thrown away and counted in any format."""
 
 from __future__ import annotations
 

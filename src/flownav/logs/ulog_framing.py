@@ -50,13 +50,12 @@ class Framed:
 
     content: their definitions as a sound ULog with one row of each. rows: where all of their rows begin, by message id,
     in the file's order. dropouts_s: gaps that the logger itself states [s].
-    rejected: messages by reason. damaged: number of stretches skipped, and their bytes. start_us: header's time.
+    rejected: messages by reason. damaged: number of stretches skipped, and their bytes.
     system: who says that it wrote the log ("PX4").
     """
 
     content: bytes = b""
     rows: dict[int, Places] = field(default_factory=dict)
-    start_us: int = 0
     topics: set[str] = field(default_factory=set)
     dropouts_s: list[float] = field(default_factory=list)
     rejected: dict[str, int] = field(default_factory=dict)
@@ -126,7 +125,7 @@ class Framing:
     def __init__(self, path: Path, content: mmap | bytes, wanted: Collection[str]) -> None:
         self.content, self.wanted = content, wanted
         self.formats = Formats()
-        self.framed = Framed(start_us=struct.unpack_from("<Q", content, 8)[0])
+        self.framed = Framed()
         self.subscribed: dict[int, tuple[str, int, int]] = {}  # id: topic, least and most bytes
         self.definitions: dict[bytes, bytes] = {}  # the first of each name
         self.parameters: list[bytes] = []

@@ -14,14 +14,15 @@ import numpy as np
 
 from flownav.core.frames import Quaternion, Vector, euler_from_quaternion, rotation_from_quaternion, to_body
 from flownav.core.measurement import Array, Measurement
-from flownav.mavlink.framing import Message
+from flownav.mavlink.framing import INVALID_AUTOPILOT, Message
 from flownav.mavlink.position_messages import BODY_FRD, LOCAL_FRD, LOCAL_NED, UNKNOWN_16
 from flownav.mavlink.sensor_messages import ACCEL, DOWN, GYRO, MAG, PRESSURE, UNKNOWN_COVARIANCE, pressure_hpa
 
 NAN = float("nan")
 ESTIMATOR_VIO = 3  # MAV_ESTIMATOR_TYPE
 UPPER = np.triu_indices(6)
-HELICOPTER, GENERIC_AUTOPILOT = 4, 0  # MAV_TYPE, MAV_AUTOPILOT
+HELICOPTER, ONBOARD_CONTROLLER, GENERIC_AUTOPILOT = 4, 18, 0  # MAV_TYPE, MAV_AUTOPILOT
+ODOMETRY_COMPONENT = 197  # MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY, which flownav speaks as
 ARMED, ACTIVE, STANDBY = 128, 4, 3  # MAV_MODE_FLAG, MAV_STATE
 MAVLINK_VERSION = 3
 FIX_3D = 3
@@ -48,6 +49,11 @@ class Estimate(NamedTuple):
     velocity_covariance: Array | None = None
     reset_counter: int = 0
     quality: int = 0
+
+
+def companion_heartbeat(mav: Any) -> Message:
+    """HEARTBEAT (#0) of a companion computer."""
+    return mav.heartbeat_encode(ONBOARD_CONTROLLER, INVALID_AUTOPILOT, 0, 0, ACTIVE, MAVLINK_VERSION)
 
 
 def odometry(mav: Any, estimate: Estimate, *, frame: int = LOCAL_FRD, estimator_type: int = ESTIMATOR_VIO) -> Message:

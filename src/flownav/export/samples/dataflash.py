@@ -73,11 +73,6 @@ class DataFlashWriter:
         self._size += len(self.parts[-1])
         return at
 
-    @staticmethod
-    def blank(codes: str) -> bytes:
-        """A body of zeros."""
-        return bytes(struct.calcsize("<" + "".join(STRUCT[c] for c in codes)))
-
     def content(self) -> bytes:
         """The whole log."""
         return b"".join(self.parts)

@@ -45,7 +45,7 @@ class Report:
             "armed": self.armed,
             "send": self.send,
             "source_set": self.source_set or None,
-            "parameters": [row.as_dict() for row in self.rows],
+            "parameters": [row._asdict() for row in self.rows],
             "blocks_arming": [block._asdict() for block in self.blocks],
             "serial_port": self.port or None,
             "changes": [{**change._asdict(), "done": change.done} for change in self.changes],

@@ -5,7 +5,7 @@ The port that we speak over is found by its baud rate.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from flownav.live.setup.knowledge import SETS, Arming, Knowledge, Wanted
 from flownav.mavlink.parameters import Value
@@ -117,10 +117,6 @@ class Row(NamedTuple):
     set_to: float | None
     reboot: bool
     source: str
-
-    def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return self._asdict()
 
 
 class Block(NamedTuple):

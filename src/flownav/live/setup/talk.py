@@ -5,21 +5,18 @@ Parameters are read and written a few at a time, asked for again, with an end.
 
 from __future__ import annotations
 
-import select
 import struct
 import time
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from flownav.live.link import Link
+from flownav.live.link import Link, waited
 from flownav.live.reception import Reception, Vehicle
-from flownav.mavlink.framing import INVALID_AUTOPILOT, Message, coder
-from flownav.mavlink.outgoing import MAVLINK_VERSION
+from flownav.mavlink.framing import Message, coder
+from flownav.mavlink.outgoing import ODOMETRY_COMPONENT, companion_heartbeat
 from flownav.mavlink.parameters import Value, decoded, encoded, name_of, request_read, set_value
 from flownav.mavlink.signing import sign_outgoing
 
-COMPANION = 197  # MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY, which `live` speaks as
-ONBOARD_CONTROLLER, ACTIVE = 18, 4  # MAV_TYPE, MAV_STATE
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 FRESH_S = 3.0  # an older HEARTBEAT does not say whether the vehicle is armed: chosen, three of them
 WAIT_S = 0.02  # chosen
@@ -29,14 +26,6 @@ ANSWER_S = 0.5
 TRIES = 8  # at 30 % loss each way one in 200 is still missed
 LIMIT_S = 60.0  # chosen: reading ends although much never answers (test_live_setup)
 UNKNOWN = 1  # MAV_PARAM_ERROR_DOES_NOT_EXIST
-
-
-def waited(link: Link, seconds: float) -> None:
-    """Until something arrives, or so long."""
-    if link.fileno() < 0:
-        time.sleep(seconds)
-    else:
-        select.select([link.fileno()], [], [], seconds)
 
 
 class Talk:
@@ -55,7 +44,7 @@ class Talk:
         self._link, self._key, self.clock, self._wait = link, key, clock, wait
         self._unix_less_now_s = time.time() - clock()
         self.reception = Reception(system, component, key, time.time(), accept=())
-        self.mav: Any = coder(1, COMPANION)
+        self.mav: Any = coder(1, ODOMETRY_COMPONENT)
         self._beat_s = self._armed_s = float("-inf")
         self._armed = False
 
@@ -80,7 +69,7 @@ class Talk:
         now_s = self.clock()
         if now_s - self._beat_s >= HEARTBEAT_S:
             self._beat_s = now_s
-            self.say(self.mav.heartbeat_encode(ONBOARD_CONTROLLER, INVALID_AUTOPILOT, 0, 0, ACTIVE, MAVLINK_VERSION))
+            self.say(companion_heartbeat(self.mav))
         self._wait(self._link, seconds)
         messages: list[Message] = []
         for piece, sender in self._link.read():

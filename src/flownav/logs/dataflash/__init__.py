@@ -1,7 +1,7 @@
 """ArduPilot DataFlash logs (.bin): an own reader, whole files as columns at a time.
 
-`scan` finds the messages, `formats` what they hold, `columns` gives them as arrays; `rows` checks them, `sensors` and
-`reference` make streams and tables of them, `flight` the Log.
+`formats` finds the messages and what they hold, `columns` gives them as arrays and as checked rows, `sensors` makes
+streams of them, `flight` tables and the Log.
 """
 
 from flownav.logs.dataflash.columns import DataFlash, read_columns

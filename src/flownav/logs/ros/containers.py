@@ -38,8 +38,8 @@ class Damage(Exception):
 class _Walk:
     """What is known so far: schemas and channels by number."""
 
-    def __init__(self, path: Path, bag: Bag, wanted: Wanted) -> None:
-        self.path, self.bag, self.wanted = path, bag, wanted
+    def __init__(self, bag: Bag, wanted: Wanted) -> None:
+        self.bag, self.wanted = bag, wanted
         self.schemas: dict[int, tuple[str, str, str]] = {}
         self.channels: dict[int, Channel] = {}
         self.taken: set[int] = set()
@@ -92,7 +92,7 @@ class _Walk:
 
 def mcap_messages(path: Path, bag: Bag, wanted: Wanted) -> Iterator[Message]:
     """The wanted messages of an MCAP file; damage is said in the bag's notes. InputError where it cannot be read."""
-    walk = _Walk(path, bag, wanted)
+    walk = _Walk(bag, wanted)
     try:
         with path.open("rb") as file, mmap(file.fileno(), 0, access=ACCESS_READ) as content:
             try:

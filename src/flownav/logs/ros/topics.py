@@ -73,7 +73,6 @@ class Gathered:
     stamp_ns: array[int] = field(default_factory=lambda: array("q"))
     rows: array[float] = field(default_factory=lambda: array("d"))
     names: tuple[str, ...] = ()
-    frame: str = ""
 
     def __len__(self) -> int:
         return len(self.log_ns)

@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
+INSTALL := $(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --constraint constraints.txt
 
 .PHONY: demo test test-real-time test-random test-gpu test-slow long-log fuzz mutants league integrity rare validate weigh digests pairs report-size schemas lint bench bench-once docs pictures tutorials wheel wheel-test clean
 
@@ -98,7 +98,8 @@ $(VENV)/.python:
 	@touch $@
 
 $(VENV)/.ready: $(VENV)/.python pyproject.toml constraints.txt
-	$(INSTALL) --editable .
+	@echo "flownav: installing libraries into $(VENV), once, about half a minute"
+	$(INSTALL:--quiet=--progress-bar off) --editable .
 	@touch $@
 
 $(VENV)/.ready-%: $(VENV)/.ready

@@ -40,7 +40,7 @@ os.sched_getaffinity = lambda pid: set(range(int(os.environ.get("CORES", "2"))))
 sys.executable = os.environ.get("OTHER", sys.executable)
 p = np.array([3.0, 4.0])
 with announce_compilation("test"):
-    compile_beside(SHIFT, apply, 0, p)
+    compile_beside(SHIFT, apply, 0, p, whole=os.environ.get("WHOLE", ""))
     made = "elsewhere" if not SHIFT.is_ready and STORE.holds(SHIFT.file_name()) else "here"
     apply(SHIFT.address, p)
 print(*p, made)
@@ -78,6 +78,11 @@ def run(place: Path, **environment: str) -> tuple[str, list[str]]:
 
 def left_over(place: Path) -> list[Path]:
     return [path for path in (place / "cache").rglob("*") if path.is_file() and path.suffix not in (".kernel", ".json")]
+
+
+def test_what_both_are_together_is_said_once_in_words_for_people(place):
+    said = run(place, WHOLE="the simulator, once, about 30 s")[1]
+    assert said == ["flownav: compiling the simulator, once, about 30 s ...", "flownav: compiled 2 kernels"]
 
 
 def test_both_are_compiled_side_by_side_and_only_once(place):

@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from typing import NamedTuple
 
 import numba
 import numpy as np
 import pytest
 
-from flownav.core.compile import LANES, ONE_LANE, equation, kernel, pointer, procedure, unit
+from flownav.core.compile import LANES, ONE_LANE, equation, kernel, pointer, procedure, sparingly, unit
 from flownav.core.compiling import target
+from flownav.core.compiling.engine import FEW_STEPS, MOST_SPARED
 
 ROTATIONS = """
 import hashlib
@@ -189,3 +191,70 @@ def test_lean_and_plain_give_the_same_bits(tmp_path):
         for asked in ("", "1")
     )
     assert ours == plain
+
+
+class Told(NamedTuple):
+    """Something that is there."""
+
+    value: float
+
+
+@procedure
+def never_taken(told):
+    """What no compiler can make anything of, were it to look at it."""
+    return told.nothing_of_this_name
+
+
+@equation
+def doubled_if_told(told):
+    return never_taken(told) if told is None else 2.0 * told.value
+
+
+def test_what_is_done_for_the_lack_of_something_that_is_there_is_not_compiled():
+    @kernel
+    def run(value):
+        return doubled_if_told(Told(value))
+
+    assert run(3.0) == 6.0
+
+
+def test_a_kernel_is_spared_a_few_times_for_few_steps():
+    @kernel
+    def root(value):
+        return np.sqrt(value)
+
+    for _ in range(MOST_SPARED):
+        assert sparingly(root, 1, 2.0) == np.sqrt(2.0)
+        assert not root.is_ready(2.0)
+    assert sparingly(root, 1, 2.0) == np.sqrt(2.0)
+    assert root.is_ready(2.0)
+
+
+def test_a_kernel_is_compiled_for_many_steps():
+    @kernel
+    def half(value):
+        return 0.5 * value
+
+    assert sparingly(half, FEW_STEPS + 1, 2.0) == 1.0
+    assert half.is_ready(2.0)
+
+
+def branching(n):
+    x = 1.0 if n > 2 else 2.0
+    return x if n > 4 else -x
+
+
+def looping(n):
+    x = 0.0
+    for i in range(n):
+        x += i
+    return x
+
+
+@pytest.mark.parametrize(("function", "loops"), [(branching, False), (looping, True)])
+def test_a_loop_is_a_way_back_not_a_branch(function, loops, monkeypatch):
+    found = []
+    original = target._has_loop
+    monkeypatch.setattr(target, "_has_loop", lambda function: found.append(original(function)) or found[-1])
+    kernel(function).compile((numba.int64,))
+    assert any(found) is loops

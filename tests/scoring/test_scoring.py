@@ -32,6 +32,13 @@ def test_statistics_of_a_known_error():
     assert std == pytest.approx(np.std(error))
 
 
+def test_statistics_in_python_and_compiled_are_the_same_bytes():
+    estimate, truth = np.random.default_rng(7).normal(size=(2, 200, 6, 1))
+    counted = (np.arange(200.0) % 3.0 > 0.0)[:, None]
+    in_python = error_statistics.py_func(estimate, truth, counted)
+    assert in_python.tobytes() == error_statistics(estimate, truth, counted).tobytes()
+
+
 def test_a_flight_of_which_nothing_counts_has_null_scores():
     zeros, nothing = np.zeros((50, 6, 2)), np.full((2, len(TOUCHDOWN_COLUMNS)), np.nan)
     nothing[:, TOUCHDOWN_COLUMNS.index("expected") :] = 0.0

@@ -46,7 +46,7 @@ from flownav.core.compiling.elementary import (
     sine_of_eighth,
     sinh,
 )
-from flownav.core.compiling.engine import LANES_WIDE, equation, kernel, procedure
+from flownav.core.compiling.engine import LANES_WIDE, equation, kernel, procedure, sparingly
 from flownav.core.compiling.pointers import invoke, pointer
 from flownav.core.compiling.progress import announce_compilation
 from flownav.core.compiling.records import Layout, OnLanes, compiled, dressed
@@ -116,6 +116,7 @@ __all__ = [
     "sine_of_eighth",
     "sinh",
     "smaller",
+    "sparingly",
     "squared",
     "stepping",
     "strided",

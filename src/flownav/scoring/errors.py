@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flownav.core.compile import equation, kernel, larger, magnitude
+from flownav.core.compile import equation, kernel, larger, magnitude, sparingly
 from flownav.core.measurement import Array
 from flownav.core.parameter_files import shipped
 from flownav.core.text import finite_or_none
@@ -105,7 +105,7 @@ def score_block(estimate: Array, truth: Array, touchdown: Array, counted: Array)
     estimate and truth (epochs, 6, lanes): position NED [m] and velocity body FRD [m/s]; touchdown (lanes,
     len(TOUCHDOWN_COLUMNS)); counted (epochs, lanes) 0/1: the steps whose errors count.
     """
-    statistics = error_statistics(estimate, truth, counted)
+    statistics = sparingly(error_statistics, counted.size, estimate, truth, counted)
     largest = statistics[:, :3, 3].max(axis=1)
     return np.column_stack([statistics.reshape(len(statistics), -1), largest, touchdown])
 

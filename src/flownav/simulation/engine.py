@@ -31,6 +31,8 @@ from flownav.simulation.truth import SensorFault, Truth, packed_truth
 Array = NDArray[np.float64]
 Result = TypeVar("Result")
 
+SAID_OF_ONE = "the simulator, once, about 30 s"
+SAID_OF_MANY = "the simulator of many flights, once, about 40 s"
 AHEAD = 4  # blocks that each thread may be ahead of who takes their results
 
 
@@ -108,7 +110,7 @@ def fly_into(
     elif flight.onboard is not None:
         unit = navigator_unit(lanes, carries_lag(load_flow_settings(flight.settings)))
         if compiled:
-            compile_beside(unit, fly_block, *told, take)
+            compile_beside(unit, fly_block, *told, take, whole=SAID_OF_ONE if len(lanes) == 1 else SAID_OF_MANY)
         take = unit.address if compiled else unit.python
     fly: Any = fly_block if compiled else cast(Any, fly_block).py_func
     fly(*told, take)

@@ -25,17 +25,18 @@ PATIENCE_S = 300.0  # how long the other process may take when this one has done
 _one_at_a_time = threading.RLock()
 
 
-def compile_beside(unit: Unit, kernel: Any, *arguments: Any) -> None:
+def compile_beside(unit: Unit, kernel: Any, *arguments: Any, whole: str = "") -> None:
     """Make a unit and a kernel ready for calls with such arguments: side by side where neither is in the cache.
 
-    The arguments are only looked at for their types. Does nothing where only one is missing, where this process may
-    use but one core, or where the cache cannot be written: they are compiled when they are called.
+    The arguments are only looked at for their types; whole: what both are together, in words for people. Does nothing
+    where only one is missing, where this process may use but one core, or where the cache cannot be written: they are
+    compiled when they are called.
     """
     with _one_at_a_time:
         name = name_of(unit)
         if unit.is_ready or name is None or not _are_both_missing(unit, kernel, arguments) or not can_pay():
             return
-        with PROGRESS.expect(2), _compiling_elsewhere(unit.__name__, name) as other:
+        with PROGRESS.expect(2, whole), _compiling_elsewhere(unit.__name__, name) as other:
             kernel.prepare(*arguments)
             if other is not None:
                 with suppress(subprocess.TimeoutExpired):

@@ -6,19 +6,22 @@ from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 from numba.core.dispatcher import _FunctionCompiler  # type: ignore[attr-defined]
 from numba.core.errors import NumbaError
 from numba.core.registry import CPUDispatcher
 from numba.extending import overload, register_jitable
 
 from flownav.core.compiling import target
-from flownav.core.compiling.cache import KernelCache
+from flownav.core.compiling.cache import STORE, KernelCache
 from flownav.core.compiling.pipeline import LeanCompiler
 from flownav.core.compiling.progress import compiling
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 LANES_WIDE = 16
+MOST_SPARED = 8  # calls of a kernel that are left to Python, together about as long as compiling it
+FEW_STEPS = 5000  # a tenth of a second in Python: a flight, not a block of them
 
 EQUATIONS: dict[Callable[..., Any], bool] = {}  # every equation (True) and procedure (False): another target's compiler
 
@@ -64,6 +67,7 @@ class Kernel(CPUDispatcher):
         super().__init__(py_func, targetoptions=dict(ENTRY))
         self._compiler = _KernelCompiler(py_func, self.targetdescr, self.targetoptions, {}, LeanCompiler)
         self._cache = KernelCache(py_func, {})
+        self._spared = 0
 
     def compile(self, sig: Any) -> Any:
         """The entry for arguments of these types: known, loaded or compiled."""
@@ -81,8 +85,24 @@ class Kernel(CPUDispatcher):
         """The name of that entry's file in the cache; None where it cannot be kept."""
         return self._cache.file_name(self._kinds(arguments))
 
+    def spare(self, *arguments: Any) -> bool:
+        """Whether to do without the entry for such arguments: it is neither at hand nor has been spared often."""
+        if self._spared >= MOST_SPARED or self.is_ready(*arguments):
+            return False
+        file = self.file_name(*arguments)
+        self._spared += 1
+        return file is None or not STORE.holds(file)
+
     def _kinds(self, arguments: tuple[Any, ...]) -> tuple[Any, ...]:
         return tuple(map(self.typeof_pyval, arguments))
+
+
+def sparingly(kernel: Callable[..., Any], steps: int, *arguments: Any) -> Any:
+    """What a kernel returns; a few times from Python, the same bytes, where it would be compiled for few steps."""
+    if steps > FEW_STEPS or not isinstance(kernel, Kernel) or not kernel.spare(*arguments):
+        return kernel(*arguments)
+    with np.errstate(all="ignore"):
+        return kernel.py_func(*arguments)
 
 
 class _KernelCompiler(_FunctionCompiler):  # type: ignore[misc]

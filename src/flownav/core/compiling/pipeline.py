@@ -1,18 +1,19 @@
 """Numba's passes for what equations and kernels are made of, and no others.
 
 Numba prepares every function for closures, context managers, array expressions, literal loops and more, and computes
-the lifetimes of its variables anew after each pass (nine times a function). Equations and kernels need few of these;
-a function that holds something unusual takes Numba's own way.
+the lifetimes of its variables anew after each pass (nine times a function). Equations and kernels need few of these,
+and the lifetimes only where something is counted; a function that holds something unusual takes Numba's own way.
 """
 
 from __future__ import annotations
 
 import types as python_types
-from typing import Any
+from typing import Any, NamedTuple
 
-from numba.core import transforms
+from numba.core import transforms, types
+from numba.core.analysis import dead_branch_prune
 from numba.core.compiler import Compiler, DefaultPassBuilder
-from numba.core.compiler_machinery import PassManager
+from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.typed_passes import (
     InlineOverloads,
     IRLegalization,
@@ -32,20 +33,58 @@ from numba.core.untyped_passes import (
     TranslateByteCode,
 )
 
+from flownav.core.compiling.remembered import is_counted
+
+PRESENT = (types.BaseTuple, types.CPointer, types.Array)
+
+
+class _Present(NamedTuple):
+    """An argument that is not None, as Numba's search for dead branches looks at it: as at a literal."""
+
+    literal_type: Any
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class AbsentBranchPrune(DeadBranchPrune):
+    """Numba's pass, which by itself takes `argument is None` for decided only where the argument is None."""
+
+    _name = "absent_branch_prune"
+
+    def run_pass(self, state: Any) -> bool:
+        """Drop the branches that these types of arguments never take, before anything in them is compiled."""
+        kinds = [_Present(kind) if isinstance(kind, PRESENT) else kind for kind in state.args]
+        dead_branch_prune(state.func_ir, kinds)
+        return True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class LeanLegalization(IRLegalization):
+    """Numba's pass, which ends the life of each variable for the sake of its reference count."""
+
+    _name = "lean_legalization"
+
+    def run_pass(self, state: Any) -> bool:
+        """Leave a function as it is that has no variable with a reference count."""
+        models = state.targetctx.data_model_manager
+        if any(is_counted(models, kind) for kind in set(state.typemap.values())):
+            return bool(super().run_pass(state))
+        return False
+
+
 PASSES = (
     TranslateByteCode,
     FixupArgs,
     IRProcessing,
     RewriteSemanticConstants,
-    DeadBranchPrune,
+    AbsentBranchPrune,
     GenericRewrites,
     RewriteDynamicRaises,
     ReconstructSSA,
-    DeadBranchPrune,
+    AbsentBranchPrune,
     NopythonTypeInference,
     PreLowerStripPhis,
     InlineOverloads,
-    IRLegalization,
+    LeanLegalization,
     NativeLowering,
     NoPythonBackend,
 )

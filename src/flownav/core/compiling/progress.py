@@ -23,6 +23,7 @@ class Progress:
         self._start = 0.0
         self._done = 0
         self._expected = 0
+        self._whole = ""
         self._stop = threading.Event()
         self._ticking: threading.Thread | None = None
 
@@ -51,13 +52,13 @@ class Progress:
         self._what, self._start, self._done, self._expected = what, 0.0, 0, 0
 
     @contextmanager
-    def expect(self, parts: int) -> Iterator[None]:
-        """Say of each of so many parts which it is."""
-        before, self._expected = self._expected, self._done + parts
+    def expect(self, parts: int, whole: str = "") -> Iterator[None]:
+        """Say of each of so many parts which it is. whole: what they are together, said in place of their names."""
+        before, self._expected, self._whole = self._expected, self._done + parts, whole
         try:
             yield
         finally:
-            self._expected = before
+            self._expected, self._whole = before, ""
 
     @contextmanager
     def working(self, name: str) -> Iterator[None]:
@@ -79,7 +80,7 @@ class Progress:
             self._start = self._start or time.monotonic()
             if self._on_terminal():
                 self._tick()
-            elif len(self._working) == 1 or self._expected:
+            elif len(self._working) == 1 or (self._expected and not self._whole):
                 self._write(f"flownav: {self._line()} ...\n")
 
     def end(self, name: str, done: bool = True) -> None:
@@ -89,7 +90,9 @@ class Progress:
             self._done += done and (not self._working or self._expected > 0)
 
     def _line(self) -> str:
-        """Such as "compiling navigator (2 of 3)"."""
+        """Such as "compiling navigator (2 of 3)", or in words for people what all parts are together."""
+        if self._whole:
+            return f"compiling {self._whole}"
         names = ", ".join(name.replace("_", " ") for name in self._working[: None if self._expected else 1])
         place = f" ({min(self._done + 1, self._expected)} of {self._expected})" if self._expected else ""
         return f"compiling {names}{place}"

@@ -9,9 +9,11 @@ import operator
 from collections.abc import Hashable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from functools import cache
+from types import FunctionType
 from typing import Any, cast
 
-from numba.core import base, errors, event, ir, targetconfig, types
+from numba.core import base, errors, event, ir, postproc, targetconfig, transforms, types
+from numba.core.datamodel.models import TupleModel
 from numba.core.runtime.context import NRTContext
 
 OPERATORS = frozenset(function for function in vars(operator).values() if callable(function))
@@ -41,9 +43,9 @@ def _replaced(owner: Any, name: str, replacement: Any) -> Iterator[None]:
 
 
 def _type_of_call(self: Any, context: Any, args: Any, kws: Any) -> Any:
-    """The signature of an operator on these types, or the error that there is none; other functions as ever."""
+    """The signature of a function on these types; of an operator also the error that there is none."""
     if kws or self.typing_key not in OPERATORS:
-        return _original_type_of_call(self, context, args, kws)
+        return _type_of_equation(self, context, args, kws)
     known = self, tuple(args)
     if known not in _typed:
         try:
@@ -54,6 +56,16 @@ def _type_of_call(self: Any, context: Any, args: Any, kws: Any) -> Any:
     if isinstance(found, Exception):
         raise found
     return found
+
+
+def _type_of_equation(self: Any, context: Any, args: Any, kws: Any) -> Any:
+    """The signature of any other function; what is compiled for these types already is not looked for again."""
+    if kws or not isinstance(self.typing_key, FunctionType):
+        return _original_type_of_call(self, context, args, kws)
+    known = self, tuple(args), context
+    if known not in _typed:
+        _typed[known] = _original_type_of_call(self, context, args, kws)
+    return _typed[known]
 
 
 def _variables(self: Any, value: Any) -> list[Any]:
@@ -80,13 +92,14 @@ def _collect(value: Any, found: list[Any]) -> None:
 
 def _counted_parts(self: Any, builder: Any, kind: Any, value: Any) -> list[Any]:
     """The reference counts in a value; Numba takes every field of every tuple out of it to find that most have none."""
-    if not _is_counted(self._context.data_model_manager, kind):
+    if not is_counted(self._context.data_model_manager, kind):
         return []
     return list(_original_counted_parts(self, builder, kind, value))
 
 
 @cache
-def _is_counted(models: Any, kind: Any) -> bool:
+def is_counted(models: Any, kind: Any) -> bool:
+    """Whether a value of this type holds something with a reference count."""
     return bool(models[kind].contains_nrt_meminfo())
 
 
@@ -107,8 +120,30 @@ def _no_timer(*_: Any) -> Any:
     return nullcontext()
 
 
+def _prepared(self: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+    """The blocks in order; how long each variable lives is computed where somebody asks for it."""
+    if emit_dels or self.func_ir.is_generator:
+        _original_prepared(self, emit_dels, extend_lifetimes)
+        return
+    self.func_ir.blocks = transforms.canonicalize_cfg(self.func_ir.blocks)
+    self.func_ir.variable_lifetime = postproc.VariableLifetime(self.func_ir.blocks)
+    self.func_ir.generator_info = None
+
+
+def _returned(self: Any, builder: Any, value: Any) -> Any:
+    """A tuple as it is returned, which Numba takes apart and puts together even where that changes nothing."""
+    return value if self.get_value_type() == self.get_data_type() else _original_returned(self, builder, value)
+
+
+def _received(self: Any, builder: Any, value: Any) -> Any:
+    """A tuple that was returned, as a value."""
+    return value if self.get_value_type() == self.get_data_type() else _original_received(self, builder, value)
+
+
 _original_type_of_call = types.Function.get_call_type
 _original_counted_parts = NRTContext.get_meminfos
+_original_prepared = postproc.PostProcessor.run
+_original_returned, _original_received = TupleModel.as_return, TupleModel.from_return
 PLAIN = frozenset({str, int, float, bool, type(None), ir.Loc, ir.Scope})
 PATCHES: tuple[tuple[Any, str, Any], ...] = (
     (types.Function, "get_call_type", _type_of_call),
@@ -117,4 +152,7 @@ PATCHES: tuple[tuple[Any, str, Any], ...] = (
     (NRTContext, "get_meminfos", _counted_parts),
     (event, "install_timer", _no_timer),
     (targetconfig.TargetConfig, "values", _option_values),
+    (postproc.PostProcessor, "run", _prepared),
+    (TupleModel, "as_return", _returned),
+    (TupleModel, "from_return", _received),
 )

@@ -200,27 +200,38 @@ class LeanLibrary(JITCodeLibrary):
 
 
 def _called(library: Any) -> list[Any]:
-    """The libraries that a function needs: those it calls, and for what is not linked yet those in turn."""
+    """The libraries that a function needs: those it calls, and for what is not linked yet those in turn.
+
+    Who calls comes before what is called: the linker takes from a library only what somebody has asked for by then.
+    """
     found: dict[int, Any] = {}
-    waiting = list(library._linking_libraries)
-    while waiting:
-        called = waiting.pop(0)
-        if id(called) not in found:
-            found[id(called)] = called
-            if isinstance(called, LeanLibrary) and not called._whole:
-                waiting += called._linking_libraries
-    return list(found.values())
+    done: list[Any] = []
+
+    def visit(caller: Any) -> None:
+        for called in caller._linking_libraries:
+            if id(called) not in found:
+                found[id(called)] = called
+                if isinstance(called, LeanLibrary) and not called._whole:
+                    visit(called)
+                done.append(called)
+
+    visit(library)
+    return done[::-1]
 
 
 def _has_loop(function: ir.Function) -> bool:
-    """Whether some block of a function jumps back to itself or to one before it."""
-    order = {block.name: place for place, block in enumerate(function.blocks)}
-    return any(
-        isinstance(operand, ir.Block) and order[operand.name] <= place
-        for place, block in enumerate(function.blocks)
-        if block.terminator is not None
-        for operand in block.terminator.operands
-    )
+    """Whether some path through a function's blocks comes back to where it was."""
+    after = {block.name: _following(block) for block in function.blocks}
+    while ends := [name for name, names in after.items() if not names & after.keys()]:
+        for name in ends:
+            del after[name]
+    return bool(after)
+
+
+def _following(block: ir.Block) -> set[str]:
+    """The names of the blocks to which a block may jump."""
+    operands = block.terminator.operands if block.terminator is not None else ()
+    return {operand.name for operand in operands if isinstance(operand, ir.Block)}
 
 
 class LeanCodegen(JITCPUCodegen):

@@ -39,7 +39,7 @@ FLOW_MESSAGE, ESTIMATE_MESSAGE = (number.to_bytes(3, "little") for number in (10
 
 def vehicle(port: int, seconds: float) -> None:
     """A hover at 250 Hz of HIGHRES_IMU and OPTICAL_FLOW_RAD, 50 Hz attitude, 25 Hz range, 10 Hz GPS."""
-    from flownav.mavlink import outgoing as say
+    from flownav.logs.mavlink import outgoing as say
     from live_ends import ORIGIN, Hover, reading
 
     if PRIORITY:  # a vehicle's sensors do not wait for our processes, nor does the session wait for them

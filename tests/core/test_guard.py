@@ -17,8 +17,8 @@ from flownav.core.parameter_files import read_toml
 from flownav.core.record import Record
 from flownav.lab.optics.frame_files import read_grey
 from flownav.lab.rig.log_folder import check_rig_folder
+from flownav.logs.mavlink.signing import load_key
 from flownav.logs.open_log import open_log
-from flownav.mavlink.signing import load_key
 from replay_logs import log_of_flight
 
 

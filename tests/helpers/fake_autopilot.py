@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from flownav.live.link import Link
-from flownav.mavlink.framing import StreamFrames, coder
-from flownav.mavlink.signing import sign_outgoing
+from flownav.logs.mavlink.framing import StreamFrames, coder
+from flownav.logs.mavlink.signing import sign_outgoing
 
 ARDUPILOT, PX4 = 3, 12
 INT8, INT32, REAL32 = 2, 6, 9

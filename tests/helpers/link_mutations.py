@@ -7,8 +7,8 @@ import struct
 from random import Random
 from typing import Any
 
-from flownav.mavlink.framing import coder, dialect
-from flownav.mavlink.messages import CONVERTERS
+from flownav.logs.mavlink.framing import coder, dialect
+from flownav.logs.mavlink.messages import CONVERTERS
 from log_mutations import mutate
 from mavlink_logs import packed_payload
 

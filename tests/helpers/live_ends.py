@@ -14,9 +14,9 @@ from flownav.live.filtering import Keeper
 from flownav.live.link import UdpLink
 from flownav.live.options import Options
 from flownav.live.session import Session
-from flownav.mavlink import outgoing as say
-from flownav.mavlink.framing import coder
-from flownav.mavlink.signing import sign_outgoing
+from flownav.logs.mavlink import outgoing as say
+from flownav.logs.mavlink.framing import coder
+from flownav.logs.mavlink.signing import sign_outgoing
 
 ORIGIN = (47.0, 8.5, 400.0)
 HEIGHT_M = 2.0

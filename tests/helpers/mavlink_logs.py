@@ -11,7 +11,7 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from flownav.mavlink.framing import coder, dialect
+from flownav.logs.mavlink.framing import coder, dialect
 
 START_US = 1_795_211_000_000_000
 ARDUPILOT, PX4 = 3, 12

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from flownav.live.filtering import Keeper
 from flownav.live.options import Options
 from flownav.live.session import Session
-from flownav.mavlink.framing import StreamFrames, coder
+from flownav.logs.mavlink.framing import StreamFrames, coder
 
 TICK_S = 0.005  # as the loop wakes up
 

@@ -11,21 +11,19 @@ import os
 import numpy as np
 import pymap3d
 import pytest
-from flownav.live.lags import WINDOW_S
-from flownav.live.timing import FRESH_S
-from flownav.live.timing import WINDOW_S as LEADS_S
 
 from flownav.core.compile import ONE_LANE
 from flownav.core.frames import euler_from_quaternion, quaternion_from_euler, quaternion_product
 from flownav.core.measurement import Measurement, Sensor
 from flownav.estimation.packed import pack
 from flownav.estimation.states import ATTITUDE, GYRO_BIAS, POSITION, QUATERNION, STATES, VELOCITY
-from flownav.live import journal_place, writing
+from flownav.live import writing
 from flownav.live.answers import LONGEST_AHEAD_S, estimate_of, quality_of, why_withheld
 from flownav.live.hearing import Origin
-from flownav.live.horizon import WINDOWS, Horizon, Lags
+from flownav.live.horizon import WINDOW_S, WINDOWS, Horizon, Lags
 from flownav.live.options import Limits
-from flownav.live.reception import COARSE_S, VehicleClock
+from flownav.live.reception import COARSE_S, FRESH_S, VehicleClock
+from flownav.live.reception import WINDOW_S as LEADS_S
 from flownav.live.writing import HEAD_EVERY_S, LOCK_WAIT_S, SYNC_S, Writer, claim, is_locked, journal_of
 from flownav.navigation.loop import start_navigator
 from flownav.navigation.memory import CLOCK, MEMORY, PROTECTION
@@ -155,7 +153,7 @@ def test_one_that_only_looks_at_a_journal_is_waited_for_a_second_and_no_longer(
             raise OSError(errno.EWOULDBLOCK, "somebody looks")
         real(file, operation)
 
-    monkeypatch.setattr(journal_place, "time", clock)
+    monkeypatch.setattr(writing, "time", clock)
     monkeypatch.setattr(fcntl, "flock", flock)
     place = claim(tmp_path / "a.fnr", force=False)
     waited_s = clock.now_s - start_s

@@ -13,7 +13,7 @@ from flownav.live.filtering import Keeper
 from flownav.live.loop import warm_up
 from flownav.live.options import Options
 from flownav.live.session import Session
-from flownav.mavlink.framing import coder
+from flownav.logs.mavlink.framing import coder
 from fuzzing import FIRST_SEED, MUTANTS
 from link_mutations import mutate_piece
 from live_ends import START_S, STEP_S, UNIX_S, Hover

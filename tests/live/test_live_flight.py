@@ -29,8 +29,8 @@ from flownav.live.recorder import Recorder
 from flownav.live.screen import Screen
 from flownav.live.session import Session
 from flownav.live.simulated import BOOT_S, ORIGIN_DEG_M, SimulatedVehicle
+from flownav.logs.mavlink.framing import coder
 from flownav.logs.open_log import open_flight
-from flownav.mavlink.framing import coder
 from flownav.navigation.tables import estimate_table, innovation_table, states_table
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions

@@ -8,7 +8,7 @@ import pytest
 from flownav.core.measurement import Sensor
 from flownav.live.filtering import Keeper
 from flownav.live.options import Options
-from flownav.mavlink import outgoing as say
+from flownav.logs.mavlink import outgoing as say
 from flownav.navigation.tape import IMU_SPIKE
 from live_ends import GRAVITY, Hover, Wire, reading
 

@@ -22,8 +22,8 @@ from flownav.live.recorder import Recorder
 from flownav.live.recovery import recovered
 from flownav.live.writing import claim, is_locked
 from flownav.logs.journal import MAGIC, Block, blocks
+from flownav.logs.mavlink.messages import TrueState
 from flownav.logs.open_log import open_flight
-from flownav.mavlink.messages import TrueState
 from flownav.navigation.tables import estimate_table, innovation_table
 from flownav.replays.fed import as_fed
 from flownav.replays.prepare import ReplayOptions

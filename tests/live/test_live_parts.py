@@ -23,7 +23,7 @@ from flownav.live.loop import Latency
 from flownav.live.options import Options
 from flownav.live.reception import VehicleClock
 from flownav.live.screen import strip
-from flownav.mavlink.framing import LARGEST_FRAME, StreamFrames
+from flownav.logs.mavlink.framing import LARGEST_FRAME, StreamFrames
 from mavlink_logs import flight_log, made
 
 

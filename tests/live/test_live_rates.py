@@ -17,7 +17,7 @@ from flownav.live.byte_links import SerialLink, open_link
 from flownav.live.link import MOST_WAITING, Outgoing, message_id_of, parse_url
 from flownav.live.rates import LOOK_S, SHARE, STREAMS, Rates, bytes_of, plan
 from flownav.live.screen import Traffic, in_words, traffic_facts
-from flownav.mavlink.framing import ARDUPILOT, PX4, StreamFrames, coder
+from flownav.logs.mavlink.framing import ARDUPILOT, PX4, StreamFrames, coder
 from live_ends import Hover, Wire
 
 HUNG_S = 120.0  # whatever takes so long hangs

@@ -10,7 +10,7 @@ import pytest
 from flownav.core.measurement import Sensor
 from flownav.live.filtering import Keeper
 from flownav.live.options import Limits, Options
-from flownav.mavlink.framing import coder
+from flownav.logs.mavlink.framing import coder
 from recorded_link import Arrival, arrivals, play
 
 GPS_RAW_INT, TIMESYNC, COMMAND_LONG, GLOBAL_ORIGIN = 24, 111, 76, 49

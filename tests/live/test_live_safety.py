@@ -25,10 +25,10 @@ from flownav.live.options import Limits, Options
 from flownav.live.reception import BESIDE, Accepted, accepted_by, accepted_of
 from flownav.live.screen import Screen
 from flownav.live.session import Session
-from flownav.mavlink import outgoing as say
-from flownav.mavlink.framing import coder
-from flownav.mavlink.position_messages import LOCAL_FRD
-from flownav.mavlink.signing import SignatureCheck
+from flownav.logs.mavlink import outgoing as say
+from flownav.logs.mavlink.framing import coder
+from flownav.logs.mavlink.position_messages import LOCAL_FRD
+from flownav.logs.mavlink.signing import SignatureCheck
 from flownav.navigation.memory import PROTECTION
 from live_ends import HEIGHT_M, ORIGIN, START_S, UNIX_S, Hover, Wire, reading
 

@@ -14,7 +14,7 @@ from flownav.live.display import draw
 from flownav.live.loop import Latency
 from flownav.live.options import Options
 from flownav.live.screen import Screen
-from flownav.mavlink.framing import coder
+from flownav.logs.mavlink.framing import coder
 from live_ends import HEIGHT_M, Hover, Wire
 
 

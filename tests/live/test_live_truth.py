@@ -8,8 +8,8 @@ from flownav.live.filtering import Keeper
 from flownav.live.options import Options
 from flownav.live.requests import HIL, MOST_QUESTIONS, SET_MESSAGE_INTERVAL, SILENT_S
 from flownav.live.session import Session
-from flownav.mavlink import outgoing as say
-from flownav.mavlink.framing import coder
+from flownav.logs.mavlink import outgoing as say
+from flownav.logs.mavlink.framing import coder
 
 ARDUPILOT, PX4 = 3, 12
 

@@ -16,11 +16,11 @@ from flownav.core.errors import InputError
 from flownav.core.measurement import Sensor
 from flownav.logs.frames import attitude_rates
 from flownav.logs.log import INSTEAD
+from flownav.logs.mavlink.framing import coder
+from flownav.logs.mavlink.signing import sign_outgoing
 from flownav.logs.mavlink_log import WANTED, read_tlog
 from flownav.logs.open_log import open_flight
 from flownav.logs.plausible import check_plausible
-from flownav.mavlink.framing import coder
-from flownav.mavlink.signing import sign_outgoing
 from flownav.navigation.settings import NavigatorSettingsFile
 from flownav.replays.prepare import ReplayOptions
 from flownav.replays.session import replay

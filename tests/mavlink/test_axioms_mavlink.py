@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flownav.mavlink.clock import WRAP_MS_S, ClockState, Stamp, align, timesync_offset_s, told_unix_time
+from flownav.logs.mavlink.clock import WRAP_MS_S, ClockState, Stamp, align, timesync_offset_s, told_unix_time
 
 BOOT, OTHER, UNIX = (1, 1, "boot"), (1, 158, "boot"), (1, 1, "unix")
 UNIX_S = 1.8e9

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flownav.mavlink.clock import (
+from flownav.logs.mavlink.clock import (
     CONFIRMATIONS,
     LONGEST_WAIT_S,
     WRAP_MS_S,

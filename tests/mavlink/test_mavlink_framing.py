@@ -7,7 +7,7 @@ from collections import Counter
 
 import pytest
 
-from flownav.mavlink.framing import StreamFrames, tlog_frames
+from flownav.logs.mavlink.framing import StreamFrames, tlog_frames
 from mavlink_logs import flight_log, made
 
 LOG = flight_log(2.0)

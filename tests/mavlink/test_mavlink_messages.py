@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, to_earth
 from flownav.core.measurement import Measurement, Sensor
-from flownav.mavlink.converted import OPTIONAL, Context, Dropped, Pose
-from flownav.mavlink.framing import coder
-from flownav.mavlink.messages import (
+from flownav.logs.mavlink.converted import OPTIONAL, Context, Dropped, Pose
+from flownav.logs.mavlink.framing import coder
+from flownav.logs.mavlink.messages import (
     CONVERTERS,
     global_position_int,
     hil_state_quaternion,
@@ -22,7 +22,7 @@ from flownav.mavlink.messages import (
     measurements,
     sim_state,
 )
-from flownav.mavlink.sensor_messages import pressure_altitude_m, pressure_hpa
+from flownav.logs.mavlink.sensor_messages import pressure_altitude_m, pressure_hpa
 from mavlink_logs import arbitrary_payload, made, packed_payload
 
 ORIGIN = (47.0, 8.5, 400.0)

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion
 from flownav.core.measurement import Measurement, Sensor
-from flownav.mavlink import outgoing
-from flownav.mavlink.converted import Context
-from flownav.mavlink.framing import coder
-from flownav.mavlink.messages import measurements, sim_state
-from flownav.mavlink.outgoing import Estimate
-from flownav.mavlink.position_messages import LOCAL_NED
+from flownav.logs.mavlink import outgoing
+from flownav.logs.mavlink.converted import Context
+from flownav.logs.mavlink.framing import coder
+from flownav.logs.mavlink.messages import measurements, sim_state
+from flownav.logs.mavlink.outgoing import Estimate
+from flownav.logs.mavlink.position_messages import LOCAL_NED
 from mavlink_logs import made, through_bytes
 
 MAV = coder(1, 1)

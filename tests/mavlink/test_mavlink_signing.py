@@ -7,8 +7,8 @@ import struct
 import pytest
 
 from flownav.core.errors import InputError
-from flownav.mavlink.framing import coder
-from flownav.mavlink.signing import SignatureCheck, load_key, sign_outgoing, timestamp_at
+from flownav.logs.mavlink.framing import coder
+from flownav.logs.mavlink.signing import SignatureCheck, load_key, sign_outgoing, timestamp_at
 from mavlink_logs import made
 
 KEY, OTHER_KEY = bytes(range(32)), bytes(32)

@@ -60,7 +60,7 @@ from flownav.navigation.records import (
     SuspicionMemory,
 )
 from flownav.navigation.settings import NavigatorSettingsFile
-from flownav.navigation.spikes import BURST_S, LONE, MOST_DOUBT_M_S, doubt_of
+from flownav.navigation.spikes import BURST_S, LONE_SHARE, MOST_DOUBT_M_S, doubt_of
 from flownav.navigation.still import GYRO_FLOOR_RAD_S, RESTS, SHAKEN, offer_bias, with_imu
 from flownav.navigation.tape import empty_tape
 from flownav.navigation.told import NO_HEADING, Equipment
@@ -349,7 +349,7 @@ def test_a_burst_is_doubted_by_its_whole_length_however_many_readings_it_has():
             doubt_of(struck, step_s * k, kept, SpikeMemory(refused=float(k), reach_s=step_s))
             for k in range(1, count + 1)
         ]
-        assert added[0] == pytest.approx((LONE * 2.0 * step_s) ** 2)
+        assert added[0] == pytest.approx((LONE_SHARE * 2.0 * step_s) ** 2)
         assert sum(added) == pytest.approx((2.0 * step_s * count) ** 2, rel=1e-9)
         assert min(added) > 0.0
     huge = struck._replace(value_3=1e6)

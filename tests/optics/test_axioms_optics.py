@@ -10,16 +10,15 @@ import pytest
 from flownav.lab.optics.camera import Lens, field_angle_rad, illumination, image_radius_px, pixels_of, rays_of
 from flownav.lab.optics.plane_pose import homography, mapped, plane_pose
 from flownav.lab.optics.projection import (
-    CameraMotion,
     FlightMotion,
     ground_point,
     image_point,
-    motion_field,
     moved,
     part_time_s,
     pose_looking_down,
     row_time_s,
 )
+from optical_oracles import CameraMotion, motion_field
 
 SQUARE = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])
 WIDE = Lens(300.0, 2.0, -1.5, 0.05, 0.01)

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from flownav.scoring.drift import Motion
 
 from flownav.core.frames import quaternion_from_euler, rotation_from_quaternion, turned_about_down, within_half_turn
 from flownav.core.measurement import Sensor, Stream
@@ -15,7 +14,7 @@ from flownav.scoring.errors import ErrorSums, error_statistics, statistics_of, w
 from flownav.scoring.path import Path, References, autopilot_errors, path_scores
 from flownav.scoring.percentiles import percentile_with_interval, share_with_interval
 from flownav.scoring.recorded import at_instants
-from flownav.scoring.reference import align, difference_at, drift_of, outage_error, velocity_of
+from flownav.scoring.reference import Motion, align, difference_at, drift_of, outage_error, velocity_of
 
 T_S = np.arange(0.0, 60.0, 0.25)
 

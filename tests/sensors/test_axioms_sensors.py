@@ -6,10 +6,9 @@ import math
 
 import numpy as np
 import pytest
-from flownav.sensors.flow_camera_sheet import load_flow_camera_sheet
-from flownav.sensors.range_sensor_sheet import load_range_sensor_sheet
 
 from flownav.core.frames import angular_flow, quaternion_from_euler, rotation_from_quaternion, turned_about_down
+from flownav.sensors.camera_sheets import FlowCameraSheet
 from flownav.sensors.datasheet import load_sensor
 from flownav.sensors.flow import FlowState, misread, pattern_reach, start_flow, step_flow
 from flownav.sensors.flow_camera import (
@@ -38,7 +37,7 @@ from flownav.sensors.gps_receiver import (
     start_gps_receiver,
     step_gps_receiver,
 )
-from flownav.sensors.gps_receiver_sheet import load_gps_receiver_sheet
+from flownav.sensors.gps_receiver_sheet import GpsReceiverSheet
 from flownav.sensors.inertial import (
     ImuReading,
     InertialNormals,
@@ -47,7 +46,7 @@ from flownav.sensors.inertial import (
     start_inertial,
     step_inertial,
 )
-from flownav.sensors.inertial_sheet import load_inertial_sheet
+from flownav.sensors.inertial_sheet import InertialSheet
 from flownav.sensors.magnetometer import (
     MagnetometerNormals,
     MagnetometerParameters,
@@ -57,6 +56,7 @@ from flownav.sensors.magnetometer import (
 from flownav.sensors.processes import gauss_markov_coefficients, hold_step, lag_weights, lagged, second_order_hold
 from flownav.sensors.range_sensor import (
     RangeSensorNormals,
+    RangeSensorSheet,
     RangeSensorState,
     RangeSensorUnit,
     step_range_sensor,
@@ -131,7 +131,7 @@ def test_small_turns_and_levers_are_cross_products(seed):
 
 def test_a_rotating_force_is_a_quarter_ahead_along_x():
     """What x feels of a revolution now, y feels a quarter of a turn later: the phase is that of one rotor."""
-    p = load_inertial_sheet().parameters(152.4, 2)
+    p = InertialSheet.read().parameters(152.4, 2)
     unit, quiet = silent(InertialUnit, vibration=1.0), silent(InertialNormals)
     still = ImuReading(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for tone in ("rev", "blade"):
@@ -176,7 +176,7 @@ def test_a_receiver_s_north_is_anybody_s(seed, angle):
     """Truth and errors turned alike: the fix turns, height and what it states stay; and a place far off is no other."""
     rng = np.random.default_rng(seed)
     p = (
-        load_gps_receiver_sheet()
+        GpsReceiverSheet.read()
         .parameters()
         ._replace(position_quantum_m=0.0, velocity_quantum_m_s=0.0, lever_x_m=-0.3, lever_y_m=0.2, lever_z_m=-0.1)
     )
@@ -221,7 +221,7 @@ def test_a_magnetometer_reads_the_same_field_whichever_way_it_lies(seed):
 @pytest.mark.parametrize("scale", [0.1, 3.0, 1000.0])
 @pytest.mark.parametrize("distance_m", [0.1, 1.0, 3.0, 30.0])
 def test_a_rangefinder_in_other_units_reads_the_same_distance(scale, distance_m):
-    p = load_range_sensor_sheet().parameters()._replace(resolution_m=0.0)
+    p = RangeSensorSheet.read().parameters()._replace(resolution_m=0.0)
     lengths = ("floor_m", "ceiling_m", "sigma_m", "near_echo_m", "stuck_m")
     other = p._replace(**{name: scale * getattr(p, name) for name in lengths})
     n = silent(RangeSensorNormals, noise=0.7)
@@ -272,9 +272,9 @@ def test_at_rest_in_a_steady_motion_nothing_changes():
 def test_a_camera_that_leans_in_place_sees_as_well_as_before():
     """Quality and what is engaged go by the lens's height; the range along the boresight makes the flow alone."""
     p = (
-        load_flow_camera_sheet()
+        FlowCameraSheet.read()
         .parameters()
-        ._replace(quality_fall_height=0.5, quality_fall_flow=0.0, quality_sigma=0.0, best_quality=250.0)
+        ._replace(quality_lost_at_height=0.5, quality_lost_at_speed=0.0, quality_sigma=0.0, quality_best=250.0)
     )
     unit, quiet = silent(FlowCameraUnit, noise=1.0), silent(FlowCameraNormals)
     seeing = FlowCameraState(1.0, 0.0, 0.0, 0.0)

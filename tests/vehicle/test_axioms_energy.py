@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flownav.vehicle.multirotor_trim import settled
 
 from flownav.core.frames import rotation_from_quaternion
 from flownav.vehicle import airframe, drive, helicopter, multirotor
@@ -17,7 +16,7 @@ from flownav.vehicle.motors import battery_voltage, propeller_load, shaft_power
 from flownav.vehicle.parameters import MultirotorParameters, VehicleParameters
 from flownav.vehicle.skids import Support, with_friction, with_support
 from flownav.vehicle.state import Controls, RotorLoads
-from flownav.vehicle.trim import trim
+from flownav.vehicle.trim import settled, trim
 
 QUAD: MultirotorParameters = load_vehicle(Path("quad-450"))  # type: ignore[assignment]
 HELICOPTER: VehicleParameters = load_vehicle()  # type: ignore[assignment]
@@ -56,7 +55,7 @@ def test_spinning_rotors_turn_the_body_as_gyroscopes_and_do_no_work(seed):
 @SEEDS
 def test_a_falling_tumbling_multirotor_without_air_keeps_its_energy(seed):
     vacuum = QUAD._replace(
-        thrust_n_s2=0.0, torque_n_m_s2=1e-30, axial_n_s2_m=0.0, inplane_n_s2_m2=0.0, inplane_drag_n_s2_m=0.0,
+        thrust_n_s2=0.0, torque_n_m_s2=1e-30, axial_n_s2_m=0.0, inplane_n_s2_m2=0.0, inplane_drag_n_s2_m_rad=0.0,
         flap_back_m=0.0, fuselage_area_x_m2=0.0, fuselage_area_y_m2=0.0, fuselage_area_z_m2=0.0, motor_rate_1_s=0.0,
     )  # fmt: skip
     rng = np.random.default_rng(seed)
@@ -87,7 +86,7 @@ def test_what_air_does_to_a_body_takes_energy(seed):
     assert blades.y * v < 0.0
     assert airframe.tail_side_force(0.0, 0.0, air, HELICOPTER) * v < 0.0
     assert airframe.tail_plane_force(0.0, air, HELICOPTER) * w < 0.0
-    assert propeller_load(500.0, u * u + v * v, w, 0.0, 1e6, QUAD).drag_n_s_m > QUAD.inplane_drag_n_s2_m * 500.0
+    assert propeller_load(500.0, u * u + v * v, w, 0.0, 1e6, QUAD).drag_n_s_m > QUAD.inplane_drag_n_s2_m_rad * 500.0
 
 
 @SEEDS

@@ -26,7 +26,7 @@ SQUARE = QUAD._replace(
     skid_half_length_m=QUAD.skid_half_track_m, hub_stiffness_n_m_rad=4.0, flap_back_m=0.02, rotors_above_cg_m=0.05,
 )  # fmt: skip
 TAILLESS = HELICOPTER._replace(
-    tail_thrust_slope_n_s_m=0.0, tail_profile_torque_n_m=0.0, vertical_fin_inflow_fraction=0.0,
+    tail_thrust_slope_n_s_m=0.0, tail_profile_torque_n_m=0.0, vertical_fin_tail_inflow_fraction=0.0,
     main_speed_rad_s=HELICOPTER.main_speed_rad_s,
 )  # fmt: skip
 SEEDS = pytest.mark.parametrize("seed", range(6))
@@ -149,7 +149,9 @@ def test_a_hub_that_holds_its_blades_is_a_hub_that_stands_higher(seed):
     level = (0.0, 0.0, 1.0)
 
     def moments(**changes):
-        vehicle = SQUARE._replace(inplane_drag_n_s2_m=0.0, fuselage_area_x_m2=0.0, fuselage_area_y_m2=0.0, **changes)
+        vehicle = SQUARE._replace(
+            inplane_drag_n_s2_m_rad=0.0, fuselage_area_x_m2=0.0, fuselage_area_y_m2=0.0, **changes
+        )
         loads = multirotor.rotor_loads(speeds, -1e6, level, level, air, False, CALM, vehicle)
         wrench = multirotor.free_wrench(loads, 0.0, 0.0, level, air, vehicle)
         return loads.thrust_n / 4.0, (wrench.l, wrench.m)

@@ -203,7 +203,7 @@ def tell(setup: Setup, record: Record, url: str, speed: float, key: Path | None)
     from flownav.live.byte_links import open_link
     from flownav.live.loop import run_vehicle, stoppable
     from flownav.live.simulated import SimulatedVehicle
-    from flownav.mavlink.signing import load_key
+    from flownav.logs.mavlink.signing import load_key
 
     if "imu" not in record.tables or "gps_velocity" not in record.tables:
         raise InputError("--mavlink: the flight has no IMU or no GPS velocity; give --filter landing --gps midg")

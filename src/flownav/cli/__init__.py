@@ -9,10 +9,10 @@ from typing import Annotated
 
 import typer
 
-import flownav
 from flownav.core.compiling.progress import announce_compilation
 from flownav.core.errors import FlownavError, InputError
 from flownav.core.guard import a_run
+from flownav.core.version import __version__
 
 DONE, BAD_VERDICT, BAD_INPUT = 0, 1, 2  # Ctrl-C: 130, as shells have it
 # commands that share a module, and the function that each is there; any other is `command` of a module of its name
@@ -63,7 +63,7 @@ for name, what in (
 def say_version(asked: bool) -> None:
     """The version, and nothing else is done."""
     if asked:
-        typer.echo(f"flownav {flownav.__version__}")
+        typer.echo(f"flownav {__version__}")
         raise typer.Exit
 
 

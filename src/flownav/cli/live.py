@@ -78,7 +78,7 @@ def command(
     from flownav.live.link import parse_url
     from flownav.live.options import Limits
     from flownav.live.reception import accepted_by
-    from flownav.mavlink.signing import load_key
+    from flownav.logs.mavlink.signing import load_key
 
     require_between("--gps-delay", gps_delay, 0.0, 1.0)
     if setup and record is not None:
@@ -173,7 +173,7 @@ def _options(
 ) -> Options:  # fmt: skip
     from flownav.core.parameter_files import load
     from flownav.live.options import Options
-    from flownav.mavlink.signing import load_key
+    from flownav.logs.mavlink.signing import load_key
     from flownav.navigation.settings import NavigatorSettingsFile
     from flownav.navigation.settings_of import settings_of
     from flownav.sensors.datasheet import identified_flow, load_sensor

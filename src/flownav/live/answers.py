@@ -13,10 +13,10 @@ from flownav.core.measurement import Array
 from flownav.estimation.states import ATTITUDE, GYRO_BIAS, PAD, POSITION, STATE, VELOCITY
 from flownav.live.options import Limits, Options
 from flownav.live.reception import Vehicle
-from flownav.mavlink import outgoing as say
-from flownav.mavlink.framing import PX4, Message, coder
-from flownav.mavlink.position_messages import LOCAL_FRD, LOCAL_NED
-from flownav.mavlink.signing import sign_outgoing
+from flownav.logs.mavlink import outgoing as say
+from flownav.logs.mavlink.framing import PX4, Message, coder
+from flownav.logs.mavlink.position_messages import LOCAL_FRD, LOCAL_NED
+from flownav.logs.mavlink.signing import sign_outgoing
 from flownav.navigation.ahead import covariance_at, state_at
 from flownav.navigation.loop import Running
 from flownav.navigation.memory import PAD_KNOWN, PROTECTION, SUSPECTED, load_aid, load_imu, load_start

@@ -14,7 +14,7 @@ from flownav.estimation.states import POSITION, STATE
 from flownav.live.horizon import Waiting
 from flownav.live.options import Options
 from flownav.logs.frames import attitude_rates, mean_over
-from flownav.mavlink.messages import TrueState
+from flownav.logs.mavlink.messages import TrueState
 from flownav.navigation.feed import equipment_of
 from flownav.navigation.loop import Running, run, start_navigator
 from flownav.navigation.memory import load_start

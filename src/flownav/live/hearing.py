@@ -16,10 +16,10 @@ from flownav.live.filtering import FLOW
 from flownav.live.horizon import LATE, Horizon, Lags, Serving, Source, Sources, Waiting
 from flownav.live.options import Options
 from flownav.live.reception import Vehicle, VehicleClock, sender_of
-from flownav.mavlink.converted import Context, Dropped, Pose
-from flownav.mavlink.framing import ARDUPILOT, Message
-from flownav.mavlink.messages import instance_of, measurements
-from flownav.mavlink.position_messages import LEAST_FIX, fix_deg_m, local_position_m
+from flownav.logs.mavlink.converted import Context, Dropped, Pose
+from flownav.logs.mavlink.framing import ARDUPILOT, Message
+from flownav.logs.mavlink.messages import instance_of, measurements
+from flownav.logs.mavlink.position_messages import LEAST_FIX, fix_deg_m, local_position_m
 
 Geodetic = tuple[float, float, float]  # latitude, longitude [deg], altitude [m]
 FARTHEST_M = 50_000.0  # from the vehicle, of an origin that can be (ArduPilot's own limit for home and origin)

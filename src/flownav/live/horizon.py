@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from flownav.core.measurement import Measurement, Sensor
 from flownav.estimation.gating import Reason
-from flownav.mavlink.messages import PREFERENCE
+from flownav.logs.mavlink.messages import PREFERENCE
 from flownav.navigation.reasons import HORIZONTAL, REFUSALS
 from flownav.navigation.rows import InnovationRow
 

@@ -18,7 +18,7 @@ from contextlib import suppress
 from typing import Any, NamedTuple
 
 from flownav.core.errors import InputError
-from flownav.mavlink.framing import MAVLINK_2
+from flownav.logs.mavlink.framing import MAVLINK_2
 
 FORMS = (
     "udp:[HOST:]PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:[HOST:]PORT or serial:DEVICE[:BAUD]; "

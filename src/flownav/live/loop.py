@@ -26,9 +26,9 @@ from flownav.live.link import Link, waited
 from flownav.live.options import Options
 from flownav.live.session import Session
 from flownav.live.simulated import SimulatedVehicle
-from flownav.mavlink.framing import coder
-from flownav.mavlink.outgoing import odometry
-from flownav.mavlink.position_messages import local_position_m
+from flownav.logs.mavlink.framing import coder
+from flownav.logs.mavlink.outgoing import odometry
+from flownav.logs.mavlink.position_messages import local_position_m
 
 PRIORITY = 1  # the least of the real-time ones: before every ordinary process, behind the system's own
 NICE = -10

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from flownav.mavlink.framing import ARDUPILOT, PX4
+from flownav.logs.mavlink.framing import ARDUPILOT, PX4
 
 # of estimates: EKF3 drops one whose stamp is less than 20 ms after the last's (AP_NavEKF3.h, extNavIntervalMin_ms), so
 # that 60 a second are 30

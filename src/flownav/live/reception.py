@@ -12,9 +12,9 @@ from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 from flownav.core.errors import InputError
-from flownav.mavlink import clock as stamps
-from flownav.mavlink.framing import INVALID_AUTOPILOT, Message, StreamFrames, coder, dialect
-from flownav.mavlink.signing import SignatureCheck
+from flownav.logs.mavlink import clock as stamps
+from flownav.logs.mavlink.framing import INVALID_AUTOPILOT, Message, StreamFrames, coder, dialect
+from flownav.logs.mavlink.signing import SignatureCheck
 
 LONGEST_LOSS = 128  # half of the sequence's 256: a greater step is a sender that began anew
 NAN = float("nan")

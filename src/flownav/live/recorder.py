@@ -24,7 +24,7 @@ from flownav.live.filtering import NAN, Keeper
 from flownav.live.options import Options
 from flownav.live.recovery import WIDTHS, recovered
 from flownav.live.writing import Writer, claim
-from flownav.mavlink.messages import TrueState
+from flownav.logs.mavlink.messages import TrueState
 from flownav.navigation.tables import fed_rows
 from flownav.navigation.told import Equipment
 

@@ -15,7 +15,7 @@ from flownav.live.display import View
 from flownav.live.link import Link
 from flownav.live.loop import Latency
 from flownav.live.session import Session
-from flownav.mavlink.converted import OPTIONAL
+from flownav.logs.mavlink.converted import OPTIONAL
 from flownav.navigation.memory import PROTECTION, SUSPECTED
 
 if TYPE_CHECKING:

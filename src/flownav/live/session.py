@@ -18,10 +18,10 @@ from flownav.live.options import Options
 from flownav.live.rates import Rates
 from flownav.live.reception import Reception, Vehicle, VehicleClock
 from flownav.live.requests import TRUTHS, Requests, Simulator
-from flownav.mavlink.converted import Pose
-from flownav.mavlink.framing import Message
-from flownav.mavlink.messages import CONVERTERS, STATES, TrueState
-from flownav.mavlink.outgoing import ODOMETRY_COMPONENT, Estimate, companion_heartbeat
+from flownav.logs.mavlink.converted import Pose
+from flownav.logs.mavlink.framing import Message
+from flownav.logs.mavlink.messages import CONVERTERS, STATES, TrueState
+from flownav.logs.mavlink.outgoing import ODOMETRY_COMPONENT, Estimate, companion_heartbeat
 from flownav.navigation.feed import SLOWEST_IMU_HZ
 from flownav.navigation.reasons import HORIZONTAL
 from flownav.navigation.rows import InnovationRow

@@ -16,9 +16,9 @@ from flownav.core.frames import euler_from_quaternion, rotation_from_quaternion,
 from flownav.core.measurement import Array, Measurement, Sensor, Stream
 from flownav.core.record import POSITION_NED, QUATERNION, VELOCITY_BODY
 from flownav.logs.log import Log
-from flownav.mavlink import outgoing as say
-from flownav.mavlink.framing import Message, StreamFrames, coder
-from flownav.mavlink.signing import sign_outgoing
+from flownav.logs.mavlink import outgoing as say
+from flownav.logs.mavlink.framing import Message, StreamFrames, coder
+from flownav.logs.mavlink.signing import sign_outgoing
 
 ORIGIN_DEG_M = (29.9765, 31.2780, 40.0)
 SYSTEM, COMPONENT = 1, 1

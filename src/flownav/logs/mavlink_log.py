@@ -18,14 +18,14 @@ from flownav.core.record import RATES, Table
 from flownav.logs.assembly import Origin, content_of, local_ned, near_the_rest, sha256_of
 from flownav.logs.frames import attitude_at, in_order, state_table
 from flownav.logs.log import SIMULATOR, Log, absences_of
+from flownav.logs.mavlink.clock import Aligned, ClockState, align, stamp_of, told_unix_time
+from flownav.logs.mavlink.converted import Context, Dropped, Pose
+from flownav.logs.mavlink.framing import ARDUPILOT, INVALID_AUTOPILOT, PX4, Frame, Message, coder, dialect, tlog_frames
+from flownav.logs.mavlink.messages import CONVERTERS, STATES, LocalState, instance_of, measurements
+from flownav.logs.mavlink.position_messages import LEAST_FIX, fix_deg_m
+from flownav.logs.mavlink.sensor_messages import range_limits_m
 from flownav.logs.mavlink_streams import Gathered, Source
 from flownav.logs.plausible import of_one_clock
-from flownav.mavlink.clock import Aligned, ClockState, align, stamp_of, told_unix_time
-from flownav.mavlink.converted import Context, Dropped, Pose
-from flownav.mavlink.framing import ARDUPILOT, INVALID_AUTOPILOT, PX4, Frame, Message, coder, dialect, tlog_frames
-from flownav.mavlink.messages import CONVERTERS, STATES, LocalState, instance_of, measurements
-from flownav.mavlink.position_messages import LEAST_FIX, fix_deg_m
-from flownav.mavlink.sensor_messages import range_limits_m
 
 AUTOPILOTS = {ARDUPILOT: "ArduPilot", PX4: "PX4"}
 WANTED = {*CONVERTERS, *STATES, "SYSTEM_TIME", "PARAM_VALUE"}

@@ -11,8 +11,8 @@ import numpy as np
 
 from flownav.core.errors import InputError
 from flownav.core.measurement import COLUMNS, Array, Measurement, Sensor, Stream
-from flownav.mavlink.converted import Outcome
-from flownav.mavlink.messages import PREFERENCE
+from flownav.logs.mavlink.converted import Outcome
+from flownav.logs.mavlink.messages import PREFERENCE
 
 ENOUGH_SHARE = 0.5  # a preferred source with this share of the readings of the most frequent one is taken
 FLOW = (Sensor.FLOW_RATE, Sensor.FLOW_VELOCITY)

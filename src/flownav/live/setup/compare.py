@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flownav.live.setup.knowledge import SETS, Arming, Knowledge, Wanted
-from flownav.mavlink.parameters import Value
+from flownav.logs.mavlink.parameters import Value
 
 ARDUPILOT_PORTS = range(1, 8)
 MAVLINK_PROTOCOLS = (1, 2)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 from flownav.core.parameter_files import ParameterModel, load, shipped
-from flownav.mavlink.framing import ARDUPILOT, PX4
-from flownav.mavlink.parameters import Value
+from flownav.logs.mavlink.framing import ARDUPILOT, PX4
+from flownav.logs.mavlink.parameters import Value
 
 MAKES = {ARDUPILOT: "setup/ardupilot.toml", PX4: "setup/px4.toml"}
 SETS = (1, 2, 3)  # ArduPilot's source sets

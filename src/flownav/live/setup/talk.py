@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 
 from flownav.live.link import Link, waited
 from flownav.live.reception import Reception, Vehicle
-from flownav.mavlink.framing import Message, coder
-from flownav.mavlink.outgoing import ODOMETRY_COMPONENT, companion_heartbeat
-from flownav.mavlink.parameters import Value, decoded, encoded, name_of, request_read, set_value
-from flownav.mavlink.signing import sign_outgoing
+from flownav.logs.mavlink.framing import Message, coder
+from flownav.logs.mavlink.outgoing import ODOMETRY_COMPONENT, companion_heartbeat
+from flownav.logs.mavlink.parameters import Value, decoded, encoded, name_of, request_read, set_value
+from flownav.logs.mavlink.signing import sign_outgoing
 
 ARMED = 128  # MAV_MODE_FLAG_SAFETY_ARMED
 FRESH_S = 3.0  # an older HEARTBEAT does not say whether the vehicle is armed: chosen, three of them

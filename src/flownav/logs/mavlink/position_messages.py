@@ -7,8 +7,8 @@ from collections.abc import Iterator, Sequence
 
 from flownav.core.frames import euler_from_quaternion, rotation_from_quaternion, to_body
 from flownav.core.measurement import Measurement, Sensor
-from flownav.mavlink.converted import LARGEST_UNIT_ERROR, NAN, Context, Dropped, Outcome, quality_of, reading
-from flownav.mavlink.framing import Message
+from flownav.logs.mavlink.converted import LARGEST_UNIT_ERROR, NAN, Context, Dropped, Outcome, quality_of, reading
+from flownav.logs.mavlink.framing import Message
 
 UNKNOWN_16 = 65535
 LEAST_FIX = 3  # 3-D

@@ -24,7 +24,7 @@ from typing import Any
 
 from flownav.core.errors import InputError
 from flownav.core.guard import an_input
-from flownav.mavlink.framing import (
+from flownav.logs.mavlink.framing import (
     CHECKSUM_BYTES,
     HEADER_2,
     MAVLINK_2,

@@ -14,9 +14,9 @@ import numpy as np
 
 from flownav.core.frames import Quaternion, Vector, euler_from_quaternion, rotation_from_quaternion, to_body
 from flownav.core.measurement import Array, Measurement
-from flownav.mavlink.framing import INVALID_AUTOPILOT, Message
-from flownav.mavlink.position_messages import BODY_FRD, LOCAL_FRD, LOCAL_NED, UNKNOWN_16
-from flownav.mavlink.sensor_messages import ACCEL, DOWN, GYRO, MAG, PRESSURE, UNKNOWN_COVARIANCE, pressure_hpa
+from flownav.logs.mavlink.framing import INVALID_AUTOPILOT, Message
+from flownav.logs.mavlink.position_messages import BODY_FRD, LOCAL_FRD, LOCAL_NED, UNKNOWN_16
+from flownav.logs.mavlink.sensor_messages import ACCEL, DOWN, GYRO, MAG, PRESSURE, UNKNOWN_COVARIANCE, pressure_hpa
 
 NAN = float("nan")
 ESTIMATOR_VIO = 3  # MAV_ESTIMATOR_TYPE

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 from flownav.core.frames import GRAVITY_M_S2, quaternion_from_euler
 from flownav.core.measurement import Measurement, Sensor
-from flownav.mavlink.converted import NAN, Context, Dropped, Outcome, quality_of, reading
-from flownav.mavlink.framing import Message
+from flownav.logs.mavlink.converted import NAN, Context, Dropped, Outcome, quality_of, reading
+from flownav.logs.mavlink.framing import Message
 
 DOWN = 25  # MAV_SENSOR_ROTATION_PITCH_270
 UNKNOWN_COVARIANCE = 255

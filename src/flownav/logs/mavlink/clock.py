@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from flownav.mavlink.framing import Message
+from flownav.logs.mavlink.framing import Message
 
 UNIX_FROM_US = 10**15  # September 2001: a greater count of microseconds is UNIX time
 WRAP_MS_S = 2**32 * 1e-3

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 from flownav.core.frames import Quaternion, Vector
 from flownav.core.measurement import Sensor
-from flownav.mavlink import position_messages, sensor_messages
-from flownav.mavlink.converted import LARGEST_UNIT_ERROR, Context, Outcome, checked
-from flownav.mavlink.framing import Message
+from flownav.logs.mavlink import position_messages, sensor_messages
+from flownav.logs.mavlink.converted import LARGEST_UNIT_ERROR, Context, Outcome, checked
+from flownav.logs.mavlink.framing import Message
 
 LARGEST_DEG = 90.0
 FARTHEST_M, FASTEST_M_S, QUICKEST_RAD_S = 1e6, 1e3, 70.0  # beyond is no vehicle

@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 from typing import Any, NamedTuple
 
-from flownav.mavlink.framing import HEADER_1, HEADER_2, MAVLINK_2, PX4, Message
+from flownav.logs.mavlink.framing import HEADER_1, HEADER_2, MAVLINK_2, PX4, Message
 
 REAL32 = 9  # MAV_PARAM_TYPE
 INTEGERS = {1: "<B", 2: "<b", 3: "<H", 4: "<h", 5: "<I", 6: "<i"}  # MAV_PARAM_TYPE: its bytes
